@@ -21,6 +21,7 @@ Colors = Float64[np.ndarray, "N 3"]
 TORSO, HEAD, LEGS, ARMS = 0, 1, (2, 4), (3, 5)
 SKULL, THIGH_AND_SHIN, UPPER_ARM = 1, 3, 1  # rows of a chain: the skull; those before the foot; those before the elbow
 GRAIN = 0.003  # m, of cloth and skin (guess)
+FAR = 0.1  # m: no place on a person is farther from its nearest part (guess)
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,17 +82,21 @@ def _local(body: Body, pose: Pose, points: Points) -> tuple[Int64[np.ndarray, " 
     `points` are in the person's own frame, as large as an adult; the body is in the world.
     """
     turn = turn_about_y(pose.heading)
-    nearest = np.full(len(points), np.inf)
+    order, nearest = np.argsort(points[:, 1], kind="stable"), np.full(len(points), np.inf)
+    heights = points[order, 1]
     chains, rows = np.zeros(len(points), np.int64), np.zeros(len(points), np.int64)
     local = np.zeros((len(points), 3))
     for number, there in enumerate(body):
         starts, ends = ((places - pose.place) @ turn / pose.size for places in (there.starts, there.ends))
         chain = Chain(starts, ends, there.radii / pose.size, there.blend, there.join)
         for row in range(len(chain.starts)):
-            along, gap, place = _on(chain, row, points)
-            better = gap < nearest
-            nearest[better], chains[better], rows[better] = gap[better], number, row
-            local[better] = np.column_stack([along, place])[better]
+            height, reach = (chain.starts[row, 1], chain.ends[row, 1]), chain.radii[row].max() + FAR
+            some = order[slice(*np.searchsorted(heights, (min(height) - reach, max(height) + reach)))]
+            along, gap, place = _on(chain, row, points[some])
+            better = gap < nearest[some]
+            some = some[better]
+            nearest[some], chains[some], rows[some] = gap[better], number, row
+            local[some] = np.column_stack([along, place])[better]
     return chains, rows, local
 
 

@@ -58,8 +58,10 @@ class MeshreelCodec(Prepared):
 
     @property
     def name(self) -> str:
-        """The name in rows and plots; points with colours, a fixed m or a variant make another curve."""
+        """The name in rows and plots; colours, at a quality of their own, a fixed m or a variant make another curve."""
         colored = "" if self.color == "none" else f", {self.color}"
+        if self.color_quality is not None:
+            colored += f", geometry at {self.quality:g}"
         changed = "" if self.variant is None else f", {self.variant}"
         return f"meshreel {self.preset}{colored}{changed}" + ("" if self.basis_size is None else " m")
 

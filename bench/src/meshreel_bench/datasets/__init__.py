@@ -26,11 +26,11 @@ from meshreel.types import MeshSequence
 
 from .captured import Captured
 from .checksums import check_source, checksum, known_checksums
-from .child import CAMERAS, FRAMES, Child, Clean
 from .remesh import Place, RemeshedSequence, RemeshOptions, SideBySide
 from .rooms import PEOPLE, ROOM
 from .scenes import PROCEDURAL, SCENES, SceneData, open_scene
 from .shapes import gears, prism
+from .walker import FRAMES, Truth, Walker
 
 DEMO = "demo"  # procedural bodies: needs no benchmark data
 SHAPES: dict[str, Callable[..., MeshSequence]] = {"gears": gears, "prism": prism}  # neither do these
@@ -43,7 +43,7 @@ BODIES: dict[str, Place] = {  # of SYNTHETIC, m: on one floor, 30 cm apart
 }
 SYNTHETIC_FRAMES = 10
 RECORDINGS = ("living_room",)
-CHILD = "procedural_child"  # needs no benchmark data
+WALKER = "procedural_walker"  # needs no benchmark data
 PERFORMERS, RECORDED = "performers", "captures"  # folders of the benchmark data
 SCALES = {"basketball_player": 0.1, "textured/basketball_player": 0.1}  # to metres; the others are in metres
 REMESHED = {  # new connectivity in every frame: of a body, its first frames
@@ -51,7 +51,7 @@ REMESHED = {  # new connectivity in every frame: of a body, its first frames
     "samba60": ("samba", 60, RemeshOptions()),
     "dancer160k": ("dancer", 4, RemeshOptions(vertices=160_000, levels=2)),
 }
-NAMES = (DEMO, *SHAPES, SYNTHETIC, *SCENES, PROCEDURAL, CHILD, *RECORDINGS, *REMESHED)
+NAMES = (DEMO, *SHAPES, SYNTHETIC, *SCENES, PROCEDURAL, WALKER, *RECORDINGS, *REMESHED)
 # Endings of names: the same sequence in another order, of the wanted length.
 PLAYED: dict[str, Callable[[MeshSequence, int], MeshSequence]] = {
     "-backwards": lambda sequence, count: Chosen(sequence, range(len(sequence))[::-1][:count]),
@@ -67,6 +67,7 @@ class Dataset:
     cameras: tuple[PinholeCamera, ...] = ()  # where it was seen from; none: look from around it
     scene: SceneData | None = None  # of a simulated scene
     pictures: ColorFrames | None = None  # of colour cameras: what decoded colours are compared with
+    truth: Truth | None = None  # what simulated colour cameras without errors would see
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,9 +92,9 @@ class Store:
             return _scene(name, self.data, frames, self.cache)
         if name in RECORDINGS:
             return _recording(name, self.data, frames, self.cache)
-        if name == CHILD:
-            child = Child(_kept(name, self.cache) / f"{name}-{frames or FRAMES}", frames or FRAMES)
-            return Dataset(child, tuple(camera.view for camera in CAMERAS), pictures=Clean(child.room))
+        if name == WALKER:
+            count = frames or FRAMES
+            return Dataset(Walker(_kept(name, self.cache) / f"{name}-{count}", count), truth=Truth())
         if name == SYNTHETIC:
             count = min(frames or SYNTHETIC_FRAMES, SYNTHETIC_FRAMES)
             bodies = [(_open_files(body, self.data, count), place) for body, place in BODIES.items()]

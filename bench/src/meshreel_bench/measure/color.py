@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import numpy as np
-from jaxtyping import Float64
+from jaxtyping import Float64, Int32, Int64
 
 from meshreel.coding.group import payload_bytes_by_purpose
 from meshreel.container.reader import ReelReader
@@ -21,9 +21,11 @@ from meshreel.metrics.even_points import scatter
 from meshreel.metrics.render import Crop, Pixels
 from meshreel.types import Mesh, MeshSequence
 
+from ..datasets.walker import Truth
 from ..rows import ColorBytes
 
 EDGE = 2  # pixels from silhouettes that do not count: pictures are registered to depth within as many (living_room)
+TEXELS = 60_000  # of a frame that are compared with the truth, at most (guess)
 PARTS = ("picture_y_psnr", "picture_still_y_psnr", "picture_moving_y_psnr")  # all that is seen, what stands, what moves
 
 
@@ -44,6 +46,34 @@ def picture_psnrs(found: Iterable[Float64[np.ndarray, "3 2"]]) -> dict[str, floa
     """Return the PSNR of luma of each part that is seen, over all pixels of all pictures."""
     total = sum(found, np.zeros((3, 2))).tolist()
     return {name: psnr(square / count) for name, (square, count) in zip(PARTS, total, strict=True) if count}
+
+
+def texel_products(truth: Truth, number: int, decoded: Mesh) -> Float64[np.ndarray, " 4"]:
+    """Return the number of texels of a frame that cameras see, and the sums of their luma's products with the truth's.
+
+    These are of luma and itself, luma and truth, truth and itself. No product where the frame has no texture.
+    """
+    if decoded.texture is None or decoded.uv is None or decoded.is_empty:
+        return np.zeros(4)
+    some = scatter(decoded, np.ones(len(decoded.faces), bool), TEXELS)
+    size = np.array(decoded.texture.pixels.shape[1::-1])
+    corners = decoded.uv[some.faces].astype(np.float64) * size
+    middles = np.floor(np.einsum("nkc,nk->nc", corners, some.barycentric)) + 0.5
+    a, ab, ac = corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    area = ab[:, 0] * ac[:, 1] - ab[:, 1] * ac[:, 0]
+    v = ((middles - a)[:, 0] * ac[:, 1] - (middles - a)[:, 1] * ac[:, 0]) / area
+    w = (ab[:, 0] * (middles - a)[:, 1] - ab[:, 1] * (middles - a)[:, 0]) / area
+    inside = (v >= 0) & (w >= 0) & (v + w <= 1)
+    weights, faces = np.stack([1 - v - w, v, w], axis=1)[inside], some.faces[inside].astype(np.int32)
+    true, seen = truth.luma(number, blend(decoded.vertices, decoded.faces[faces], weights))
+    shown, true = (Painted(decoded).on(faces, weights) @ TO_YUV[0])[seen], true[seen]
+    return np.array([len(true), shown @ shown, shown @ true, true @ true])
+
+
+def texel_psnr(found: Iterable[Float64[np.ndarray, " 4"]]) -> dict[str, float]:
+    """Return the PSNR of luma of all texels that are seen; how bright all cameras are together cannot be known."""
+    count, shown, both, true = sum(found, np.zeros(4)).tolist()
+    return {"texel_y_psnr": psnr((shown - both * both / true) / count)} if count else {}
 
 
 def color_bytes(reader: ReelReader) -> ColorBytes | None:
@@ -78,10 +108,19 @@ def swimming(video: Video, originals: MeshSequence) -> dict[str, float]:
                 first, before, places = mesh, dict(now), scatter(mesh, np.ones(len(mesh.faces), bool), POINTS)
             if mesh.texture is not None:
                 now["texture_psnr"] = mesh.texture.pixels.astype(np.float32)
-            if is_colored and not mesh.is_empty and np.array_equal(mesh.faces, first.faces):
-                points = blend(mesh.vertices, mesh.faces[places.faces], places.barycentric)
-                now["swimming_psnr"] = Painted(originals[frame]).at(points, points)[0]
+            if is_colored and not mesh.is_empty:
+                corners = first.faces[places.faces]
+                there = np.isin(_as_rows(corners), _as_rows(mesh.faces))  # others are covered by patches in this frame
+                points = blend(mesh.vertices, corners[there], places.barycentric[there])
+                now["swimming_psnr"] = np.full((len(there), 3), np.nan)
+                now["swimming_psnr"][there] = Painted(originals[frame]).at(points, points)[0]
             for name in now.keys() & before.keys():
-                found[name].append(psnr(float(np.mean(np.square(now[name] - before[name])))))
+                found[name].append(psnr(float(np.nanmean(np.square(now[name] - before[name])))))
             before = now
     return {name: float(np.mean(values)) for name, values in found.items() if values}
+
+
+def _as_rows(faces: Int32[np.ndarray, "F 3"]) -> Int64[np.ndarray, " F"]:
+    """Return a number for each face that is that of an equal one."""
+    a, b, c = faces.astype(np.int64).T
+    return (a << 42) + (b << 21) + c

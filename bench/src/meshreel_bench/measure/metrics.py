@@ -24,7 +24,7 @@ from ..datasets.scenes import SceneData, true_scene
 from ..parallel_views import parallel_views_around
 from ..rows import Metrics
 from .bridges import count_bridges, count_degenerate
-from .color import picture_psnrs, picture_squares, swimming
+from .color import picture_psnrs, picture_squares, swimming, texel_products, texel_psnr
 from .seams import measure_seam, seam_row
 
 KEPT = ("d2_psnr_paper", "normal_error_deg", "ssim", "ssim_masked")  # of each frame
@@ -82,6 +82,9 @@ def _colors(frames: Measured) -> dict[str, float]:
         for picture in (pictures[k] if pictures else ())
         if picture is not None
     )
+    truth = frames.known.truth
+    if truth is not None:
+        found |= texel_psnr(texel_products(truth, *pair) for pair in zip(frames.numbers, frames.decoded, strict=True))
     return found if video is None else found | swimming(video, originals)
 
 
