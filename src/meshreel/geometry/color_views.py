@@ -22,6 +22,7 @@ from .topology import face_normals
 MOST_SIDE = 512  # pixels, of the pictures of what hides a place: a third of the time of whole ones (guess)
 MARGIN = 0.01  # of the depth, and at least as many metres: how far a place may lie behind what is seen (guess)
 FEATHER = 4.0  # pixels from a step in depth within which a colour counts less, and none at it: both sides mix (guess)
+HOLE = 2  # pixels: half of what a hole is wide, at most, that is noise (guess)
 STEP = 0.03  # of the depth between neighbours: a step (guess)
 
 
@@ -119,7 +120,8 @@ class View:
         intrinsic = camera.intrinsic.copy()
         intrinsic[:2] /= self._shrink
         self._depth = rays.look(PinholeCamera(width, height, intrinsic, camera.extrinsic)).depth
-        self._from_step = distance_transform_edt(~_steps(self._depth)) * self._shrink
+        steps = _steps(_smooth(self._depth) if clear else self._depth)
+        self._from_step = distance_transform_edt(~steps) * self._shrink
 
     def weights(
         self, points: Float64[np.ndarray, "N 3"], normals: Float64[np.ndarray, "N 3"]
@@ -147,6 +149,18 @@ class View:
         found = np.zeros((len(points), 3))
         found[chosen] = sampled(self.picture.pixels, self.picture.project(points[chosen])[0]) / self.picture.gains
         return found
+
+
+def _smooth(depth: Float32[np.ndarray, "H W"]) -> Float32[np.ndarray, "H W"]:
+    """Return a depth picture without its smallest holes and its noise, so that steps are those of the surface."""
+    from scipy.ndimage import binary_closing, distance_transform_edt, median_filter
+
+    known = np.isfinite(depth)
+    if not known.any():
+        return depth
+    nearest = distance_transform_edt(~known, return_distances=False, return_indices=True)
+    filled = median_filter(depth[tuple(nearest)], 2 * HOLE + 1)
+    return np.where(binary_closing(known, iterations=HOLE) | known, filled, np.inf).astype(np.float32)
 
 
 def _steps(depth: Float32[np.ndarray, "H W"]) -> Bool[np.ndarray, "H W"]:
