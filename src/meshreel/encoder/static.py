@@ -233,7 +233,7 @@ class _Looks:
         """Return the places of a background in a texture: as the cameras see it, where there are some."""
         if self._views is None:
             return unwrap(mesh, size or fitting_size([self._paint(frames.start)], [mesh]))
-        return projected(mesh, self._views.at(self._some(frames, 1)[0]))
+        return projected(mesh, self._views.at(self._some(frames, 1)[0], hides=mesh))
 
     def _some(self, frames: range, most: int) -> list[int]:
         return [frames.start + number for number in evenly(len(frames), most)]

@@ -10,7 +10,7 @@ from ..analysis.appearance.calibrate import CalibrationOptions, Correction, cali
 from ..analysis.survey import Survey
 from ..geometry.color_views import MARGIN, ColorFrames, ColorPicture, ColorViews
 from ..geometry.derived_sequences import CapturedSequence, DerivedSequence, only
-from ..types import MeshSequence, Placement, evenly
+from ..types import Mesh, MeshSequence, Placement, evenly
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,12 +31,17 @@ class Views:
         """Return the views of these frames, under the same numbers, to send to another process."""
         return replace(self, sequence=only(self.sequence, numbers))
 
-    def at(self, number: int, clear: bool = False) -> ColorViews:
-        """Return what the cameras saw in a frame; if `clear`, only away from steps in depth."""
+    def at(self, number: int, clear: bool = False, hides: Mesh | None = None) -> ColorViews:
+        """Return what the cameras saw in a frame; if `clear`, only away from steps in depth.
+
+        What hides a place is the surface of the frame, or another one in normalised coordinates.
+        """
         place = self.place
         pictures = [picture.placed(place) for picture in self.colors[number] if picture is not None]
-        mesh = self.sequence[number]
-        return ColorViews(pictures, mesh.at((mesh.vertices - place.origin) / place.scale), MARGIN / place.scale, clear)
+        if hides is None:
+            mesh = self.sequence[number]
+            hides = mesh.at((mesh.vertices - place.origin) / place.scale)
+        return ColorViews(pictures, hides, MARGIN / place.scale, clear)
 
 
 class Calibrated(DerivedSequence):

@@ -14,6 +14,7 @@ from meshreel.format.layout import ChunkKind, Form, Pictures
 from meshreel.format.records import unpack_all
 from meshreel.geometry.color_views import ColorPicture
 from meshreel.geometry.painted import Painted
+from meshreel.geometry.raycast import Rays
 from meshreel.geometry.topology import blend
 from meshreel.metrics.color import PEAK, POINTS, TO_YUV, psnr
 from meshreel.metrics.color_render import Colored
@@ -24,21 +25,28 @@ from meshreel.types import Mesh, MeshSequence
 from ..datasets.walker import Truth
 from ..rows import ColorBytes
 
+BEFORE = 0.03  # of the depth: what is nearer than what stands by more is something else (guess)
 EDGE = 2  # pixels from silhouettes that do not count: pictures are registered to depth within as many (living_room)
 TEXELS = 60_000  # of a frame that are compared with the truth, at most (guess)
 PARTS = ("picture_y_psnr", "picture_still_y_psnr", "picture_moving_y_psnr")  # all that is seen, what stands, what moves
 
 
 def picture_squares(picture: ColorPicture, original: Mesh, decoded: Mesh, still: int) -> Float64[np.ndarray, "3 2"]:
-    """Return sums of squared differences of luma and of pixels for each of `PARTS`; the first `still` faces stand."""
+    """Return sums of squared differences of luma and of pixels for each of `PARTS`; the first `still` faces stand.
+
+    Where the original has something before what stands, it is what moves that the decoded mesh lacks.
+    """
     from scipy.ndimage import binary_erosion
 
     camera = picture.camera
     pixels = Pixels(camera, Crop(0, camera.height, 0, camera.width))
-    shown, both = Colored(decoded).look(pixels), Colored(original).look(pixels).covered
+    shown, wanted = Colored(decoded).look(pixels), Colored(original).look(pixels)
+    near, far = (Rays(mesh).look(camera).depth for mesh in (original, decoded))
+    ahead = near < (1 - BEFORE) * far
     apart = np.square(PEAK * shown.colors.astype(np.float64) @ TO_YUV[0] - picture.pixels @ TO_YUV[0])
-    parts = (shown.covered & (shown.faces < still), shown.faces >= still)
-    stands, moves = (binary_erosion(mask & both, iterations=EDGE) for mask in parts)
+    stands = shown.covered & (shown.faces < still) & ~ahead
+    both = shown.covered & wanted.covered
+    stands, moves = (binary_erosion(mask & both, iterations=EDGE) for mask in (stands, ~stands))
     return np.array([[apart[mask].sum(), mask.sum()] for mask in (stands | moves, stands, moves)])
 
 
