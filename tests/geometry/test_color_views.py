@@ -87,3 +87,14 @@ def test_a_picture_that_is_too_bright_is_divided_by_its_gains() -> None:
     colors, seen = ColorViews([bright], WALL).at(np.array([[0.0, 0, 2]]), NORMALS[:1])
     assert seen.all()
     np.testing.assert_allclose(colors, [[39.5 / 2, 39.5 * 2, 0]])
+
+
+def test_clear_views_leave_out_what_is_beside_a_step_and_not_beside_a_hole() -> None:
+    screen = Mesh(WALL.vertices * [0.1, 0.1, 0.5], WALL.faces)
+    hole = np.linalg.norm(WALL.vertices[WALL.faces].mean(axis=1) - [0.58, 0.58, 2], axis=1) < 0.15
+    room = concatenate([WALL.with_faces(~hole), screen])
+    points = np.array([[0.225, 0, 2], [0.32, 0, 2], [0.58, 0.77, 2]])  # 1 and 6 pixels from the step, beside the hole
+    assert hole.any()
+    for clear, wanted in ((True, [False, True, True]), (False, [True, True, True])):
+        views = ColorViews([ColorPicture(AHEAD, PIXELS)], room, clear=clear)
+        assert views.at(points, NORMALS[:3])[1].tolist() == wanted

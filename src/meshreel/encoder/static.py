@@ -5,6 +5,7 @@ In: the parts of a scene. Out: the payloads of its states, in the order of time.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,6 +17,7 @@ from ..analysis.appearance.unwrap import projected, unwrap
 from ..analysis.scene.background import BackgroundOptions
 from ..analysis.survey import Survey
 from ..coding.appearance.atlas import encode_atlas
+from ..coding.appearance.pictures import MOST_CRF
 from ..coding.background import changed, decode_background, decode_change, encode_background, encode_change
 from ..coding.colored import background_canvas, encode_group_colors
 from ..container.writer import Companion
@@ -40,7 +42,8 @@ HALVINGS = 2  # of the factor between two fractions, in search for a smaller mes
 LEAST_NOISE = 1e-4  # of the unit: the noise that a background is coded for, at least (guess)
 STILL_FRAMES = 16  # in which a background is looked at for its colours, at most (guess)
 PICTURES_A_SECOND = 8  # of a background: shadows move slowly (guess)
-FINER = 2  # of the rate factor of a background's pictures than of a body's: 38 dB of living_room at quality 50
+FINER = 2  # of the rate factor of a background's pictures than of a body's (guess)
+ENLARGED = 5  # coarser for each doubling of its texels along a pixel: 38 dB of living_room at .06 Mbps, quality 50
 NEAR = 3.0  # times the noise, within which a frame shows a place of the background (guess)
 LEAST_NEAR = 0.01  # m, the same at least (guess)
 
@@ -147,7 +150,7 @@ def colored_states(
         [coded] = canvas.meshes
         frames, count = range(state.frame, end), len(mesh.vertices)
         surface = (
-            None if texture is None or state.is_patch else _Unwrapped.of(mesh, looks.layout(mesh, frames, texture.size))
+            _Unwrapped.of(mesh, *looks.layout(mesh, frames, texture.size)) if texture and not state.is_patch else None
         )
         points, normals = [mesh.vertices], [vertex_normals(mesh)]
         if surface is not None:
@@ -179,14 +182,15 @@ class _Unwrapped:
     """The texels of a background, and where they are."""
 
     layout: Layout
+    scale: float  # texels along a pixel of the cameras; 1 where there are none
     texels: Texels
     places: Float64[np.ndarray, "N 3"]
     normals: Float64[np.ndarray, "N 3"]
 
     @staticmethod
-    def of(mesh: Mesh, layout: Layout) -> _Unwrapped:
+    def of(mesh: Mesh, layout: Layout, scale: float) -> _Unwrapped:
         texels = texels_of(layout, 0)
-        return _Unwrapped(layout, texels, texels.places(mesh), face_normals(mesh)[0][texels.faces])
+        return _Unwrapped(layout, scale, texels, texels.places(mesh), face_normals(mesh)[0][texels.faces])
 
 
 def _pictured(
@@ -197,14 +201,15 @@ def _pictured(
     options: TextureOptions,
 ) -> list[Companion]:
     """Return a slow video of what a background looks like, where shadows move: what a frame hides is as usual."""
-    finer = replace(options.video, crf=max(1, options.video.crf - FINER))
+    crf = options.video.crf - FINER + round(ENLARGED * math.log2(max(1.0, surface.scale)))
+    video = replace(options.video, crf=min(max(1, crf), MOST_CRF))
 
     def picture_of(frame: int) -> UInt8[np.ndarray, "H W 3"]:
         colors, seen = looks.moment(min(frame + some.step // 2, frames[-1]), surface.places, surface.normals)
         return picture(surface.texels, np.where(seen[:, None], colors, usual[0]), usual[1] | seen)
 
     some = frames[:: max(1, round(looks.frame_rate / PICTURES_A_SECOND))]
-    return layered_pictures(surface.layout, some, picture_of, replace(options, video=finer))
+    return layered_pictures(surface.layout, some, picture_of, replace(options, video=video))
 
 
 class _Looks:
@@ -229,10 +234,10 @@ class _Looks:
         colors, seen = paint.at(points, normals)
         return np.clip(np.rint(colors), 0, 255).astype(np.uint8), seen
 
-    def layout(self, mesh: Mesh, frames: range, size: int | None) -> Layout:
-        """Return the places of a background in a texture: as the cameras see it, where there are some."""
+    def layout(self, mesh: Mesh, frames: range, size: int | None) -> tuple[Layout, float]:
+        """Return the places of a background in a texture, as cameras see it where there are some, and its scale."""
         if self._views is None:
-            return unwrap(mesh, size or fitting_size([self._paint(frames.start)], [mesh]))
+            return unwrap(mesh, size or fitting_size([self._paint(frames.start)], [mesh])), 1.0
         return projected(mesh, self._views.at(self._some(frames, 1)[0], hides=mesh))
 
     def _some(self, frames: range, most: int) -> list[int]:

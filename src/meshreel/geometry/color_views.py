@@ -22,7 +22,7 @@ from .topology import face_normals
 MOST_SIDE = 512  # pixels, of the pictures of what hides a place: a third of the time of whole ones (guess)
 MARGIN = 0.01  # of the depth, and at least as many metres: how far a place may lie behind what is seen (guess)
 FEATHER = 4.0  # pixels from a step in depth within which a colour counts less, and none at it: both sides mix (guess)
-HOLE = 2  # pixels: half of what a hole is wide, at most, that is noise (guess)
+NOISE = 5  # pixels across, of the median that a depth picture is smoothed by (guess)
 STEP = 0.03  # of the depth between neighbours: a step (guess)
 
 
@@ -152,15 +152,14 @@ class View:
 
 
 def _smooth(depth: Float32[np.ndarray, "H W"]) -> Float32[np.ndarray, "H W"]:
-    """Return a depth picture without its smallest holes and its noise, so that steps are those of the surface."""
-    from scipy.ndimage import binary_closing, distance_transform_edt, median_filter
+    """Return a depth picture without holes and noise, so that steps are those of the surface.
 
-    known = np.isfinite(depth)
-    if not known.any():
-        return depth
-    nearest = distance_transform_edt(~known, return_distances=False, return_indices=True)
-    filled = median_filter(depth[tuple(nearest)], 2 * HOLE + 1)
-    return np.where(binary_closing(known, iterations=HOLE) | known, filled, np.inf).astype(np.float32)
+    A hole has the depth of what is nearest to it in the picture: between near and far surface its middle is a step.
+    """
+    from scipy.ndimage import distance_transform_edt, median_filter
+
+    nearest = distance_transform_edt(~np.isfinite(depth), return_distances=False, return_indices=True)
+    return median_filter(depth[tuple(nearest)], NOISE)
 
 
 def _steps(depth: Float32[np.ndarray, "H W"]) -> Bool[np.ndarray, "H W"]:

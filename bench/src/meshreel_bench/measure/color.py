@@ -25,7 +25,10 @@ from meshreel.types import Mesh, MeshSequence
 from ..datasets.walker import Truth
 from ..rows import ColorBytes
 
-BEFORE = 0.03  # of the depth: what is nearer than what stands by more is something else (guess)
+BEFORE = 0.015  # of the depth: what is nearer than what stands by more is something else (guess)
+HALO = (
+    6  # pixels around what moves that do not count as standing: its depth goes so far beyond its picture (living_room)
+)
 EDGE = 2  # pixels from silhouettes that do not count: pictures are registered to depth within as many (living_room)
 TEXELS = 60_000  # of a frame that are compared with the truth, at most (guess)
 PARTS = ("picture_y_psnr", "picture_still_y_psnr", "picture_moving_y_psnr")  # all that is seen, what stands, what moves
@@ -34,9 +37,9 @@ PARTS = ("picture_y_psnr", "picture_still_y_psnr", "picture_moving_y_psnr")  # a
 def picture_squares(picture: ColorPicture, original: Mesh, decoded: Mesh, still: int) -> Float64[np.ndarray, "3 2"]:
     """Return sums of squared differences of luma and of pixels for each of `PARTS`; the first `still` faces stand.
 
-    Where the original has something before what stands, it is what moves that the decoded mesh lacks.
+    Where the original has something before what stands, the decoded mesh lacks what moves.
     """
-    from scipy.ndimage import binary_erosion
+    from scipy.ndimage import binary_dilation, binary_erosion
 
     camera = picture.camera
     pixels = Pixels(camera, Crop(0, camera.height, 0, camera.width))
@@ -44,9 +47,10 @@ def picture_squares(picture: ColorPicture, original: Mesh, decoded: Mesh, still:
     near, far = (Rays(mesh).look(camera).depth for mesh in (original, decoded))
     ahead = near < (1 - BEFORE) * far
     apart = np.square(PEAK * shown.colors.astype(np.float64) @ TO_YUV[0] - picture.pixels @ TO_YUV[0])
-    stands = shown.covered & (shown.faces < still) & ~ahead
+    still_here = shown.covered & (shown.faces < still) & ~ahead
     both = shown.covered & wanted.covered
-    stands, moves = (binary_erosion(mask & both, iterations=EDGE) for mask in (stands, ~stands))
+    stands, moves = (binary_erosion(mask & both, iterations=EDGE) for mask in (still_here, ~still_here))
+    stands &= ~binary_dilation(moves, iterations=EDGE + HALO)
     return np.array([[apart[mask].sum(), mask.sum()] for mask in (stands | moves, stands, moves)])
 
 

@@ -53,8 +53,8 @@ def unwrap(base: Mesh, size: int) -> Layout:
     return Layout(size, min(height, size), np.ascontiguousarray(places))
 
 
-def projected(mesh: Mesh, views: ColorViews) -> Layout:
-    """Return places where the cameras of some views see the faces, their pictures side by side.
+def projected(mesh: Mesh, views: ColorViews) -> tuple[Layout, float]:
+    """Return places where the cameras of some views see the faces, their pictures side by side; texels along a pixel.
 
     A face is in the picture that sees it most squarely; one that none sees whole has no place. Small pictures are
     enlarged, as corners are on whole texels, and large ones made to fit a texture.
@@ -76,4 +76,4 @@ def projected(mesh: Mesh, views: ColorViews) -> Layout:
     scale = min(ENLARGED, max(1.0, USUAL_SIDE / side), MOST_SIDE / side)
     found = np.where(best[:, None, None] < 0, 0.0, places * scale)
     sides = [max(2, -(-round(side * scale) // BLOCK) * BLOCK) for side in (left, height)]
-    return Layout(sides[0], sides[1], np.ascontiguousarray(np.rint(found).astype(np.int32)))
+    return Layout(sides[0], sides[1], np.ascontiguousarray(np.rint(found).astype(np.int32))), scale

@@ -24,6 +24,7 @@ from ...types import LUMA
 from .packets import coded_pictures
 
 PRESET = 4  # of SVT: 6 takes half as long for 5 % more bytes (basketball_player)
+MOST_CRF = 63  # of SVT
 ENCODERS = {VideoCodec.AV1: "libsvtav1", VideoCodec.H264: "libx264"}
 DECODERS = {VideoCodec.AV1: "libdav1d", VideoCodec.H264: "h264"}
 X264 = (  # no picture waits for another; one key picture; BT.709, limited range; start codes
@@ -46,7 +47,7 @@ class VideoOptions:
     preset: int = PRESET
 
     def __post_init__(self) -> None:
-        if not 1 <= self.crf <= 63 or not 0 <= self.preset <= 13:
+        if not 1 <= self.crf <= MOST_CRF or not 0 <= self.preset <= 13:
             raise InputError(f"crf {self.crf}, preset {self.preset}: give 1 to 63 and 0 to 13")
 
 
