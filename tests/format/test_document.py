@@ -207,6 +207,43 @@ def test_the_document_decodes_colors_to_the_bit(decoder: dict[str, Any]) -> None
         np.testing.assert_array_equal(told, found)
 
 
+def test_colors_take_at_most_a_tenth_more_than_the_entropy_of_their_contexts(
+    decoder: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    mesh, frames, counts = body(), 3, dict[int, list[Any]]()
+    points = subdivide_midpoint(mesh, 3).vertices
+    waves = np.sin(points @ np.array([[40.0, 5, 3], [-4, 60, 6], [2, -7, 80]]))
+    noise = np.random.default_rng(10).normal(0, 12, (frames, *points.shape))
+    shape = ColoredMesh(mesh, 3, frames, len(points))
+    colors = np.clip(128 + 90 * waves + noise, 0, 255).astype(np.uint8)
+    data = encode_colors([shape], [colors], ColorCodingOptions(1 / 16)).payload
+    kind, raw = decoder["Decoder"], [0]
+
+    def bit(self: Any, model: Any, code: Any = kind.bit) -> int:
+        found = code(self, model)
+        counts.setdefault(id(model), [model, 0, 0])[1 + found] += 1  # the model itself, so that no other gets its id
+        return found
+
+    def sign(self: Any, code: Any = kind.raw) -> int:
+        raw[0] += 1
+        return code(self)
+
+    monkeypatch.setattr(kind, "bit", bit)
+    monkeypatch.setattr(kind, "raw", sign)
+    _, offset = records.unpack(VertexColors, data)
+    coded, offset = records.unpack(CodedField, data, offset)
+    base, faces = [tuple(point) for point in mesh.vertices.tolist()], [tuple(face) for face in mesh.faces.tolist()]
+    decoder["decode_columns"](coded.symbols, coded.columns, decoder["hierarchy"](base, faces)[1])
+    count = len(base)
+    for _ in range(shape.levels):
+        level, offset = records.unpack(ColorsLevel, data, offset)
+        edges, faces, siblings = decoder["subdivide"](faces, count)
+        decoder["decode_columns"](level.values.symbols, level.values.columns, [(near, None) for near in siblings])
+        count += len(edges)
+    bits = raw[0] - sum(n * math.log2(n / (a + b)) for _, a, b in counts.values() for n in (a, b) if n)
+    assert 8 * len(data) <= 1.1 * bits  # on basketball_player's three frames .99 of it
+
+
 def test_the_document_decodes_an_atlas(decoder: dict[str, Any]) -> None:
     mesh, generator = body(), np.random.default_rng(9)
     flat = np.rint(mesh.vertices[:, :2] * 300).astype(np.int32) + 8
