@@ -52,9 +52,9 @@ class Chunk:
         return self.offset + self.size
 
     def __str__(self) -> str:
-        if self.frame_count == 0:
-            return f"chunk {self.number} (static)"
         what = f"{ChunkKind(self.kind).name.lower()}, " if self.kind in COMPANIONS else ""
+        if self.frame_count == 0:
+            return f"chunk {self.number} ({what}static)"
         track = "" if self.is_alone else f"track {self.track}, "
         return (
             f"chunk {self.number} ({what}{track}frames {self.first_frame} to {self.first_frame + self.frame_count - 1})"

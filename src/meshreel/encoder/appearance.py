@@ -112,7 +112,7 @@ class _Chain:
         try:
             encoded = encode_group_colors(canvas, colors, options.colors, None if before is None else before.colors)
         except CostlyError:  # the summary tells of it
-            self.pass_on(replace(group, is_bare=True))
+            self.pass_on(replace(group, lost_colors=True))
             return after
         companions = [Companion(ChunkKind.COLORS, encoded.payload, encoded.layers)]
         if pictured and not self._groups and group.form == Form.LAYERS and options.texture is not None:

@@ -42,7 +42,7 @@ class EncodedGroup:
     predicted: bool = False  # from the group before
     key: int | None = None  # the frame, counted in the group, whose surface the others follow
     companions: tuple[Companion, ...] = field(default=(), kw_only=True)  # its colours, an atlas, pictures
-    is_bare: bool = field(default=False, kw_only=True)  # its frames have colours that a reader would refuse
+    lost_colors: bool = field(default=False, kw_only=True)  # its frames have colours that a reader would refuse
     digests: tuple[str, ...] = field(default=(), kw_only=True)  # lines of `--debug-digests`
     stored: Stored | None = None  # where the payload is, in place of `payload`, of a group that a journal has
     work: Work = field(default_factory=dict, kw_only=True)  # that another process did until this group was done

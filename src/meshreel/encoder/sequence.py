@@ -257,7 +257,7 @@ def _added(writer: ReelWriter, each: TrackGroup, static: list[int], unit: float)
     fidelity = group.fidelity.scaled(unit)
     colors = sum(map(len, group.companions))
     facts = (group.form, group.frame_count, len(payload), fidelity, group.predicted)
-    return GroupSummary(*facts, key, track, each.share, colors, group.is_bare)
+    return GroupSummary(*facts, key, track, each.share, colors, group.lost_colors)
 
 
 def _add_companions(writer: ReelWriter, of: int, companions: Sequence[Companion], before: int | None) -> None:
@@ -311,8 +311,8 @@ def _warnings_of_scene(parts: Parts, moves: bool, dropped: int) -> Iterator[str]
 
 def _bare(groups: Sequence[GroupSummary], states: Sequence[Static] = ()) -> Iterator[str]:
     """Yield a warning of what has colours that the file has not."""
-    frames = sum(group.frame_count for group in groups if group.is_bare)
-    bare = [f"{frames} frames"] * (frames > 0) + ["the background"] * any(state.is_bare for state in states)
+    frames = sum(group.frame_count for group in groups if group.lost_colors)
+    bare = [f"{frames} frames"] * (frames > 0) + ["the background"] * any(state.lost_colors for state in states)
     if bare:
         yield f"no colours of {' and of '.join(bare)}: they would cost a reader too much"
 

@@ -56,7 +56,7 @@ class Static:
     payload: bytes
     is_patch: bool
     companions: tuple[Companion, ...] = ()  # the colours of its vertices, or of those that the patch adds
-    is_bare: bool = False  # it has colours that a reader would refuse
+    lost_colors: bool = False  # it has colours that a reader would refuse
 
     def __len__(self) -> int:
         return len(self.payload) + sum(map(len, self.companions))
@@ -162,7 +162,7 @@ def colored_states(
         except CostlyError:  # the summary tells of it
             bare = True
         if bare:
-            found.append(replace(state, is_bare=True))
+            found.append(replace(state, lost_colors=True))
             continue
         companions = [Companion(ChunkKind.COLORS, encoded.payload)]
         if surface is not None and texture is not None:

@@ -22,7 +22,7 @@ class GroupSummary:
     track: int = 0  # the body
     share: float = 1.0  # of the vertices of its frames that the track has, where there is no background
     colors: int = 0  # bytes of the colours of its vertices, beyond `size`
-    is_bare: bool = False  # its frames have colours that a reader would refuse
+    lost_colors: bool = False  # its frames have colours that a reader would refuse
 
 
 @dataclass(frozen=True, slots=True)

@@ -25,7 +25,7 @@ class ChunkKind(IntEnum):
     STATIC = 1  # a state of the background; groups refer to it
     GROUP = 2  # a group of consecutive frames of one track
     COLORS = 3  # the colours of the vertices of another chunk
-    ATLAS = 4  # where the faces of a group, and of those predicted from it, are in a texture
+    ATLAS = 4  # places of faces in a texture: of a group and those predicted from it, or of a background
     PICTURES = 5  # the textures of a group's frames, or of a background
     COMPATIBLE = 6  # the same in a coding that more devices know
 
@@ -40,7 +40,7 @@ class Form(IntEnum):
     PATCH = 5  # a background: another background without some faces, plus a Draco mesh
     VERTEX_COLORS = 6  # colours of vertices, as fields over their connectivity
     PLACES = 7  # places of corners in a texture
-    VIDEO = 8  # one picture a frame, of a video
+    VIDEO = 8  # pictures of a video: one a frame, of a background one each `interval` frames
 
 
 class AnchorRule(IntEnum):
@@ -97,7 +97,7 @@ class IndexEntry:
 
     kind: Annotated[int, Choice(U8, ChunkKind, is_open=True), "purpose"]
     form: Annotated[int, Choice(U8, Form, is_open=True), "coding; equal to the first byte of the chunk"]
-    frames: Annotated[int, U16, "number of frames; 0 if and only if STATIC, or COLORS of a STATIC"]
+    frames: Annotated[int, U16, "number of frames; 0 if and only if STATIC or a companion of one"]
     track: Annotated[int, Varint(), "number of the moving body, from 0; 0 if STATIC"]
     depends_on: Annotated[
         tuple[int, ...],
@@ -106,7 +106,7 @@ class IndexEntry:
         "for a GROUP, the STATIC chunk it is shown with and the GROUP right before it in its track; "
         "for a STATIC of form PATCH, the STATIC chunk that it changes; "
         "for COLORS, the chunk whose vertices have them and, where they are predicted, the COLORS of the group before; "
-        "for ATLAS, the GROUP whose base mesh it is of; "
+        "for ATLAS, the GROUP whose base mesh, or the STATIC whose faces, it places; "
         "for PICTURES and COMPATIBLE, the GROUP, the ATLAS, and but for the first of this, that of the group before",
     ]
     layers: Annotated[tuple[Layer, ...], List(U16, Nested(Layer)), "at least one"]

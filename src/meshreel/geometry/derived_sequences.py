@@ -1,6 +1,6 @@
 """Sequences derived from another one, frame by frame on access, and the capabilities that a sequence may have.
 
-A sequence may know which axis points up and the depth pictures behind its meshes. Every wrapper keeps both;
+A sequence may know which axis points up, and the depth and colour pictures behind its meshes. Every wrapper keeps them;
 `captured` is the one adapter for sequences that lack these attributes.
 """
 
@@ -30,7 +30,7 @@ MOST_KEPT = 1 << 27
 
 @runtime_checkable
 class CapturedSequence(MeshSequence, Protocol):
-    """A MeshSequence that knows its up axis and, where depth cameras recorded it, their pictures."""
+    """A MeshSequence that knows its up axis and, where cameras recorded it, their depth and colour pictures."""
 
     @property
     def up(self) -> Up:

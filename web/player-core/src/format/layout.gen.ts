@@ -123,9 +123,9 @@ export const Layer: Kind<Layer> = record("Layer", {
 export interface IndexEntry {
   readonly kind: number; // purpose
   readonly form: number; // coding; equal to the first byte of the chunk
-  readonly frames: number; // number of frames; 0 if and only if STATIC, or COLORS of a STATIC
+  readonly frames: number; // number of frames; 0 if and only if STATIC or a companion of one
   readonly track: number; // number of the moving body, from 0; 0 if STATIC
-  readonly dependsOn: readonly number[]; // numbers of the earlier chunks that it needs: for a GROUP, the STATIC chunk it is shown with and the GROUP right before it in its track; for a STATIC of form PATCH, the STATIC chunk that it changes; for COLORS, the chunk whose vertices have them and, where they are predicted, the COLORS of the group before; for ATLAS, the GROUP whose base mesh it is of; for PICTURES and COMPATIBLE, the GROUP, the ATLAS, and but for the first of this, that of the group before
+  readonly dependsOn: readonly number[]; // numbers of the earlier chunks that it needs: for a GROUP, the STATIC chunk it is shown with and the GROUP right before it in its track; for a STATIC of form PATCH, the STATIC chunk that it changes; for COLORS, the chunk whose vertices have them and, where they are predicted, the COLORS of the group before; for ATLAS, the GROUP whose base mesh, or the STATIC whose faces, it places; for PICTURES and COMPATIBLE, the GROUP, the ATLAS, and but for the first of this, that of the group before
   readonly layers: readonly Layer[]; // at least one
 }
 export const IndexEntry: Kind<IndexEntry> = record("IndexEntry", {
