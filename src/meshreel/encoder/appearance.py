@@ -29,6 +29,7 @@ from ..types import GREY, Mesh
 from .forms import EncodedGroup
 from .interval import Interval
 from .options import TEXTURE_SIZES, AppearanceOptions, EncoderOptions, TextureOptions
+from .progress import Stages
 from .videos import Videos
 
 USED = 0.43  # of a texture is on the surface, as unwrapped; measured on basketball_player
@@ -53,7 +54,7 @@ def as_installed(options: EncoderOptions) -> tuple[EncoderOptions, tuple[str, ..
 
 
 def colored_groups(
-    groups: Iterable[EncodedGroup], interval: Interval, options: AppearanceOptions | None
+    groups: Iterable[EncodedGroup], interval: Interval, options: AppearanceOptions | None, stages: Stages | None = None
 ) -> Iterator[EncodedGroup]:
     """Yield the groups of an interval with the colours of their frames."""
     if options is None:
@@ -70,6 +71,8 @@ def colored_groups(
         paints = [interval.paint(number, mesh) for number, mesh in zip(numbers, meshes, strict=True)]
         if any(paint is not None for paint in paints):
             state = chain.add(group, paints, options, state, has_pictures(interval, meshes, options))
+            if stages is not None:
+                stages.add("color", group.frame_count)
         else:
             chain.pass_on(group)
     yield from chain.done()

@@ -133,7 +133,7 @@ def encode_interval(
         groups = layers.encode_interval(interval, options, stages)
     else:
         groups = iter(paper.encode_interval(interval, options, stages, find))
-    for group in colored_groups(groups, interval, appearance):
+    for group in colored_groups(groups, interval, appearance, stages):
         note(interval.digests, "payload", group.form.name, group.payload, *(one.read() for one in group.companions))
         yield group if interval.digests is None else replace(group, digests=interval.digests.take())
 
