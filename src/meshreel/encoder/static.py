@@ -43,7 +43,7 @@ LEAST_NOISE = 1e-4  # of the unit: the noise that a background is coded for, at 
 STILL_FRAMES = 16  # in which a background is looked at for its colours, at most (guess)
 PICTURES_A_SECOND = 8  # of a background: shadows move slowly (guess)
 FINER = 2  # of the rate factor of a background's pictures than of a body's (guess)
-ENLARGED = 5  # coarser for each doubling of its texels along a pixel: 38 dB of living_room at .06 Mbps, quality 50
+ENLARGED = 9  # coarser for each doubling of its texels along a pixel: 38 dB of living_room at .06 Mbps, quality 50
 NEAR = 3.0  # times the noise, within which a frame shows a place of the background (guess)
 LEAST_NEAR = 0.01  # m, the same at least (guess)
 
