@@ -1,1 +1,1 @@
-"""Measurements that docs/decisions rests on: captured and procedural frames -> rows -> the tables of its pages."""
+"""Pages and pictures of docs: the tables of docs/decisions from rows that were measured, pictures from procedural data."""

@@ -1,4 +1,4 @@
-"""One group of procedural frames taken through every stage of preset `paper`, for pictures and for decisions."""
+"""One group of procedural frames taken through every stage of preset `paper`, for the pictures of docs."""
 
 from __future__ import annotations
 
