@@ -1,1 +1,1 @@
-"""Pages and pictures of docs: the tables of docs/decisions from rows that were measured, pictures from procedural data."""
+"""Tables of docs/decisions, made from rows that were measured, and pictures of docs, drawn from procedural data."""

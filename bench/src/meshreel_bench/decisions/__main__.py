@@ -1,4 +1,4 @@
-"""`python -m meshreel_bench.decisions [FOLDER]`: rewrite the tables of docs/decisions from the rows in measured.jsonl."""
+"""`python -m meshreel_bench.decisions [FOLDER]`: write the tables of docs/decisions from the rows of measured.jsonl."""
 
 from __future__ import annotations
 
