@@ -122,8 +122,7 @@ class _Cutting:
             return [FoundGroup(frames, None)]
         note(self.digests, "reference, coded", reference.base.vertices, reference.base.faces)
         note(self.digests, "fit", fit.positions)
-        residuals = np.array([residual.rms for residual in fit.residuals])
-        cut = cut_at(residuals / target_of(frames, options.target, self.noise).distance, options.groups)
+        cut = cut_at(fit.residuals / target_of(frames, options.target, self.noise).distance, options.groups)
         if cut is None:
             return [FoundGroup(frames, Fitted(reference, fit.positions))]
         if depth == 0:

@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 
 from meshreel.analysis.fit.border import SAMPLES, border_sides, sample_border
 from meshreel.analysis.fit.frame import FrameSurface
-from meshreel.geometry.closest_points import Surface
+from meshreel.geometry.closest_points import Hits, Surface
 from meshreel.geometry.strict import nearest_rotations
 from meshreel.geometry.topology import border_edges, face_normals, unique_edges, vertex_normals
 from meshreel.types import Mesh
@@ -74,6 +74,13 @@ def from_frame(mesh: Mesh, frame: FrameSurface, gate: float, least: float) -> Ro
     return Rows(hits.faces, hits.barycentric, frame.normals, values, weights)
 
 
+def normals_at(frame: FrameSurface, hits: Hits) -> np.ndarray:
+    """The vertex normals, interpolated at points of the surface; zero where they cancel."""
+    n = np.einsum("nk,nkd->nd", hits.barycentric, frame.normals[frame.mesh.faces[hits.faces]])
+    length = np.linalg.norm(n, axis=1)
+    return n / np.where(length > 0, length, 1.0)[:, None]
+
+
 def from_template(mesh: Mesh, frame: FrameSurface, gate: float, least: float) -> Rows:
     count, corner = len(mesh.vertices), np.full(len(mesh.vertices), -1)
     corner[mesh.faces.reshape(-1)[::-1]] = np.arange(mesh.faces.size)[::-1]
@@ -81,7 +88,7 @@ def from_template(mesh: Mesh, frame: FrameSurface, gate: float, least: float) ->
     faces = np.concatenate([corner // 3, np.arange(len(mesh.faces))])
     corners = np.concatenate([np.eye(3)[corner % 3], np.full((len(mesh.faces), 3), 1 / 3)])
     hits = frame.surface.closest(points)
-    normals = frame.normals_at(hits)
+    normals = normals_at(frame, hits)
     own = np.concatenate([vertex_normals(mesh), face_normals(mesh)[0]])
     weights = pair_weights(points - hits.points, normals, own, gate, least) * frame.inside_at(hits)
     scale = np.where(np.arange(len(points)) < count, 1.0, 0.5)

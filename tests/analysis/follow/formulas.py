@@ -13,7 +13,7 @@ from meshreel.analysis.fit.frame import FrameSurface
 from meshreel.analysis.follow.embedded import NORMAL_REACH
 from meshreel.analysis.follow.embedded_graph import Binding
 from meshreel.analysis.follow.embedded_pose import Pose, moved, turned
-from tests.analysis.fit.formulas import pair_weights
+from tests.analysis.fit.formulas import normals_at, pair_weights
 
 STILL = 1e-4  # squared row weight of a turn times its lever
 LARGEST_TURN = 0.5  # rad, of a node in one step
@@ -55,7 +55,7 @@ def pairs(graph: Graph, pose: Pose, frame: FrameSurface, count: int, gate: float
     points = moved(graph.points, graph.nodes, graph.binding, pose)
     normals = turned(graph.normals, graph.binding, pose)
     hits = frame.surface.closest(points)
-    ahead = pair_weights(points - hits.points, frame.normals_at(hits), normals, gate, least) * frame.inside_at(hits)
+    ahead = pair_weights(points - hits.points, normals_at(frame, hits), normals, gate, least) * frame.inside_at(hits)
     some = frame.samples(count)
     some = some[frame.inside[some]]
     theirs, planes = frame.mesh.vertices[some], frame.normals[some]
@@ -66,7 +66,7 @@ def pairs(graph: Graph, pose: Pose, frame: FrameSurface, count: int, gate: float
     away = np.maximum(along, np.linalg.norm(points[found] - theirs, axis=1) - spacing)
     return Pairs(
         np.concatenate([np.arange(len(points)), found]),
-        np.concatenate([frame.normals_at(hits), planes]),
+        np.concatenate([normals_at(frame, hits), planes]),
         np.concatenate([hits.points, theirs]),
         np.concatenate([ahead, pair_weights(away[:, None], planes, normals[found], gate, least)]),
     )

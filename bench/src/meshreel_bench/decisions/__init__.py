@@ -1,1 +1,1 @@
-"""Measurements that docs/decisions rests on: captured and procedural frames -> rows -> the tables of its pages."""
+"""Tables of docs/decisions, made from rows that were measured, and pictures of docs, drawn from procedural data."""

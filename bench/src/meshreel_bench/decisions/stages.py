@@ -1,4 +1,4 @@
-"""One group of procedural frames taken through every stage of preset `paper`, for pictures and for decisions."""
+"""One group of procedural frames taken through every stage of preset `paper`, for the pictures of docs."""
 
 from __future__ import annotations
 
@@ -58,10 +58,10 @@ class Stages:
         return payload_bytes_by_purpose(self.payload)
 
 
-def story(first: int = FIRST, count: int = COUNT) -> MeshList:
+def story() -> MeshList:
     """Frames of the procedural story, in metres."""
     people = soft_bodies(SoftBodiesOptions())
-    return MeshList(tuple(people[first + t] for t in range(count)), people.frame_rate)
+    return MeshList(tuple(people[FIRST + t] for t in range(COUNT)), people.frame_rate)
 
 
 def compute(sequence: MeshList, options: PaperOptions) -> Stages:

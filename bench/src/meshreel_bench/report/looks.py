@@ -1,4 +1,4 @@
-"""Look of each curve in plots, order of curves in tables, and the direction in which a metric is better."""
+"""Look of each curve in plots, and order of curves in tables."""
 
 from __future__ import annotations
 
@@ -47,10 +47,6 @@ KNOWN: dict[str, Look] = {
 _COLORS = ("#882255", "#6699CC", "#999933", "#332288", "#AA4499", "#661100", "#44AA99", "#66A61E")
 _MARKERS = (">", "p", "<", "H", "d")
 
-_HIGHER = ("psnr", "ssim", "iou", "covered")
-_LOWER = ("error", "rms", "hausdorff", "median", "mbps", "bytes", "called_dynamic", "encode", "decode", "seam_", "fall")
-_LOWER_UNITS = ("_deg", "_m", "_mm", "_ms", "_s", "_percent")
-
 
 def in_order(names: Iterable[str]) -> list[str]:
     """Return each name once: those that are known in their order, then the others sorted."""
@@ -66,10 +62,3 @@ def looks_of(names: Iterable[str]) -> dict[str, Look]:
         name: Look(_COLORS[place % len(_COLORS)], _MARKERS[place % len(_MARKERS)]) for place, name in enumerate(others)
     }
     return {name: KNOWN.get(name) or rest[name] for name in ordered}
-
-
-def direction(key: str) -> int:
-    """Return 1 where more of a metric is better, -1 where less is, 0 where its name does not say."""
-    if any(word in key for word in _LOWER) or key.endswith(_LOWER_UNITS):
-        return -1
-    return 1 if any(word in key for word in _HIGHER) else 0

@@ -17,7 +17,7 @@ from meshreel.io.write import replacing
 from ..experiments.study import Measure
 from ..names import BEST, title
 from ..rows import Row
-from .looks import Look, direction
+from .looks import Look
 from .values import curve_of, floors, rated, value
 
 WIDTH = 17 / 2.54  # inches
@@ -33,7 +33,7 @@ _SETTINGS: dict[Any, Any] = {
     "font.family": "DejaVu Sans",  # comes with matplotlib
     "text.parse_math": False,  # a name may have dollars
 }
-_BETTER = {1: "↑ higher is better", -1: "↓ lower is better", 0: ""}
+_BETTER = {1: "↑ higher is better", -1: "↓ lower is better"}
 
 
 def plot_curves(
@@ -89,7 +89,7 @@ def _draw(panel: Any, rows: Sequence[Row], measure: Measure, looks: Mapping[str,
     if (floor := floors(rows).get(measure.key)) is not None:
         panel.axhline(floor, color="gray", linestyle=":", lw=1.2, label="the truth itself")
     panel.set(xlabel="rate (Mbps)", ylabel=measure.label, xscale="log")
-    panel.set_title(_BETTER[direction(measure.key)], loc="right", color="dimgray", fontsize=6.5, pad=3)
+    panel.set_title(_BETTER[measure.sign], loc="right", color="dimgray", fontsize=6.5, pad=3)
     panel.grid()
     set_rates(panel, rates)
 

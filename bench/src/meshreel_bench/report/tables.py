@@ -9,9 +9,9 @@ from math import log
 import pandas as pd
 
 from ..bd_rate import bd_rate
-from ..experiments.study import Measure
+from ..experiments.study import D2, MASKED, NORMALS, SSIM, Measure
 from ..rows import Options, Row
-from .looks import direction, in_order
+from .looks import in_order
 from .values import curve, curve_of, rated, sequences, value
 from .verdicts import Verdict
 
@@ -143,24 +143,18 @@ def comparable_table(rows: Sequence[Row], wanted: float, measure: Measure | None
         for name, row in _nearest(rated(rows, sequence), wanted, measure).items():
             near = _distance(row, wanted, measure) <= 1 + 1e-9
             head = {"sequence": text(sequence), "codec": text(name) + ("" if near else f" {DAGGER}"), "Mbps": row.mbps}
-            records.append(head | {label: value(row, key) for label, key in _COMPARED.items()})
+            records.append(head | {each.label: value(row, each.key) for each in _COMPARED})
             groups.append(sequence if near else None)
     if not records:
         return []
-    signs = {label: direction(key) for label, key in _COMPARED.items() if measure is None or key != measure.key}
+    signs = {each.label: each.sign for each in _COMPARED if measure is None or each.key != measure.key}
     lines = markdown(ranked(pd.DataFrame(records), signs if measure is None else {"Mbps": -1} | signs, groups))
     limit = f"a factor of {NEAR:g} of {wanted:g} Mbps" if measure is None else f"{NEAR_DB:g} dB of {wanted:g} dB"
     note = f"{DAGGER} No point within {limit}: the nearest is shown, and is not ranked."
     return [*lines, "", note] if None in groups else lines
 
 
-_COMPARED = {
-    "D2, paper form (dB)": "d2_psnr_paper",
-    "SSIM": "ssim",
-    "masked SSIM": "ssim_masked",
-    "normal error (degrees)": "normal_error_deg",
-    "decode (ms/frame)": "decode_ms",
-}
+_COMPARED = (D2, SSIM, MASKED, NORMALS, Measure("decode_ms", "decode", " ms/frame", -1))
 
 
 def verdict_table(found: Sequence[Verdict]) -> list[str]:

@@ -1,6 +1,6 @@
 """Frames prepared for fits: search structure, vertex normals, and samples on open borders.
 
-In: a mesh. Out: FrameSurface, and values of its vertices at points of its surface.
+In: a mesh. Out: FrameSurface.
 """
 
 from __future__ import annotations
@@ -30,10 +30,6 @@ class FrameSurface:
         self.inside[border_edges(mesh).reshape(-1)] = False
         self._samples, self._sampled = dict[int, Int64[np.ndarray, " S"]](), dict[int, _core.DeformTarget]()
 
-    def normals_at(self, hits: Hits) -> Float64[np.ndarray, "N 3"]:
-        """Interpolate the vertex normals at points of the surface; unit vectors."""
-        return interpolated(self.normals, self.mesh.faces, hits)
-
     def inside_at(self, hits: Hits) -> Float64[np.ndarray, " N"]:
         """Interpolate 1 for vertices inside and 0 for those on open borders at points of the surface."""
         return np.einsum("nk,nk->n", hits.barycentric, self.inside[self.mesh.faces[hits.faces]])
@@ -60,10 +56,3 @@ class FrameSurface:
         rim = sample_border(self.mesh)
         whole = (self.surface.tree, self.mesh.vertices, self.mesh.faces, self.normals, self.inside.view(np.uint8))
         return _core.FitTarget(*whole, rim.points, rim.normals, rim.outward)
-
-
-def interpolated(values: Float64[np.ndarray, "V 3"], faces: np.ndarray, hits: Hits) -> Float64[np.ndarray, "N 3"]:
-    """Interpolate unit vectors of a mesh's vertices at points of its surface; zero where they cancel."""
-    n = np.einsum("nk,nkd->nd", hits.barycentric, values[faces[hits.faces]])
-    length = np.linalg.norm(n, axis=1)
-    return n / np.where(length > 0, length, 1.0)[:, None]

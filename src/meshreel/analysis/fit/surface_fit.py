@@ -18,10 +18,10 @@ from jaxtyping import Float64, Int32
 from ... import _core
 from ...errors import InputError
 from ...geometry import work
+from ...geometry.closest_points import Surface
 from ...geometry.strict import eigen, products
 from ...types import Mesh
 from .frame import FrameSurface
-from .residual import NOTHING, Residual, residual_of
 
 FOLLOWED = 6e-4  # RMS noise from which the second fit trusts the coherent positions more than the frames (decision 16)
 NOISY_ROUNDS = slice(1, 3)  # of the first fit: motion is smooth under noise, and tighter rounds fit it (decision 16)
@@ -110,20 +110,7 @@ class Fit:
     """Positions of a template on every frame, with their residuals."""
 
     positions: Float64[np.ndarray, "T V 3"]
-    residuals: tuple[Residual, ...]
-
-    @staticmethod
-    def at(
-        faces: Int32[np.ndarray, "F 3"],
-        positions: Float64[np.ndarray, "T V 3"],
-        surfaces: Sequence[FrameSurface | None],
-    ) -> Fit:
-        """Measure the residuals of some positions; those of empty frames (None) are infinite."""
-        meshes = (Mesh.of(fitted, faces) for fitted in positions)
-        pairs = zip(meshes, surfaces, strict=True)
-        return Fit(
-            positions, tuple(NOTHING if surface is None else residual_of(mesh, surface) for mesh, surface in pairs)
-        )
+    residuals: Float64[np.ndarray, " T"]  # symmetric RMS distance; infinite for an empty frame
 
 
 def fit_frames(
@@ -144,10 +131,21 @@ def fit_frames(
     if guides.key is not None and not 0 <= guides.key < count:
         raise InputError(f"key {guides.key} is not one of {count} frames: give 0 to {count - 1}")
     if len(faces) == 0 or count == 0:
-        return Fit(predictions.copy(), (NOTHING,) * count)
+        return Fit(predictions.copy(), np.full(count, np.inf))
     surfaces = [None if mesh.is_empty else FrameSurface(mesh) for mesh in frames]
     positions = fit_surfaces(faces, predictions, surfaces, options, guides)
-    return Fit.at(faces, positions, surfaces)
+    pairs = zip(positions, surfaces, strict=True)
+    return Fit(positions, np.array([_residual(Mesh.of(fitted, faces), surface) for fitted, surface in pairs]))
+
+
+def _residual(fitted: Mesh, frame: FrameSurface | None) -> float:
+    """Return the RMS distance of the vertices of one from the other: the larger, as one may lack what the other has."""
+    if frame is None:
+        return np.inf
+    own, theirs = fitted.vertices, frame.mesh.vertices
+    to_fit = np.linalg.norm(Surface(fitted).closest(theirs).points - theirs, axis=1)
+    to_frame = np.linalg.norm(frame.surface.closest(own).points - own, axis=1)
+    return float(np.sqrt(max(np.mean(to_fit**2), np.mean(to_frame**2))))
 
 
 def fit_surfaces(
