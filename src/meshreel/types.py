@@ -35,11 +35,20 @@ class Texture:
     """A picture in sRGB that is decoded when its pixels are asked for; InputError where its file cannot be used."""
 
     read: Callable[[], UInt8[np.ndarray, "H W 3"]]
+    size: tuple[int, int] | None = None  # rows and columns, where they are known before the picture is decoded
 
     @staticmethod
     def of(pixels: UInt8[np.ndarray, "H W 3"]) -> Texture:
         """Return the texture of a picture in memory."""
-        return Texture(partial(np.asarray, pixels))
+        return Texture(partial(np.asarray, pixels), (pixels.shape[0], pixels.shape[1]))
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns of the picture."""
+        if self.size is not None:
+            return self.size
+        rows, columns = self.pixels.shape[:2]
+        return rows, columns
 
     @property
     def pixels(self) -> UInt8[np.ndarray, "H W 3"]:

@@ -13,10 +13,11 @@ from meshreel.errors import FormatError
 from meshreel.export.animated_file import ExportOptions, export
 from meshreel.export.animated_glb import animated_glb
 from meshreel.export.animated_usd import animated_usd
-from meshreel.export.frames import joined, write_frames
+from meshreel.export.frames import write_frames
 from meshreel.export.shapes import Animation, Points, Shape
 from meshreel.format.layout import ChunkKind
 from meshreel.geometry.painted import Painted
+from meshreel.geometry.topology import concatenate
 from meshreel.io.sequence import open_sequence
 from meshreel.types import GREY, Mesh, Texture
 from tests.encoder.test_appearance import BODY, CHECKS, COLORED, textured, written
@@ -138,7 +139,7 @@ def test_parts_with_textures_of_their_own_keep_them_side_by_side() -> None:
         )
     )
     bare, weights = sphere(levels=0), np.full((1, 3), 1 / 3)
-    whole = joined([large, bare, small])
+    whole = concatenate([large, bare, small])
     assert whole.texture.pixels.shape == (64, 128, 3)
     painted, first = Painted(whole), len(BALL.faces) + len(bare.faces)
     for face in range(0, len(BALL.faces), 7):
@@ -147,4 +148,4 @@ def test_parts_with_textures_of_their_own_keep_them_side_by_side() -> None:
             wanted = Painted(mesh).on(numbers, weights)
             np.testing.assert_allclose(painted.on(numbers + np.int32(start), weights), wanted, atol=0.01)
     assert painted.on(np.array([len(BALL.faces)], np.int32), weights).tolist() == [[GREY] * 3]
-    assert joined([large, bare]).texture is large.texture and joined([Mesh.empty()]).is_empty
+    assert concatenate([large, bare]).texture is large.texture and concatenate([Mesh.empty()]).is_empty

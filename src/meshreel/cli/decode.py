@@ -12,11 +12,13 @@ from cyclopts import Parameter
 
 from ..container.reader import ReelReader
 from ..decoder.tracks import moving_of_frame
+from ..decoder.video import Video
 from ..decoder.video import open as open_video
 from ..errors import FormatError, InputError
-from ..export.frames import Part, check_part, joined, write_frames
+from ..export.frames import Part, check_part, write_frames
+from ..geometry.topology import concatenate
 from ..io.write import frame_names, left_over, make_folder
-from ..types import Mesh
+from ..types import Mesh, Texture
 from .console import Common
 
 
@@ -35,7 +37,8 @@ def command(
     Parameters
     ----------
     file
-        The .reel file. Frames of a damaged group are skipped; the others are written.
+        The .reel file. Frames of a damaged group are skipped; the others are written. Where colours alone are damaged,
+        the surface is written without them.
     output
         The directory for frame_00000.ply and so on; created if needed.
     format
@@ -50,17 +53,26 @@ def command(
         raise InputError(f"--layers must not be negative, got {layers}")
     video = open_video(file).at(layers)
     check_part(file, video.reader, only)
-    parts: dict[Part, Callable[[int], list[Mesh]]] = {
-        "all": lambda frame: [*video.parts(frame).values()],
-        "background": lambda frame: [video.background(frame)],
-        "moving": lambda frame: moving_of_frame(video.tracks, frame),
+    every: dict[Part, Callable[[Video, int], list[Mesh]]] = {
+        "all": lambda of, frame: [*of.parts(frame).values()],
+        "background": lambda of, frame: [of.background(frame)],
+        "moving": lambda of, frame: moving_of_frame(of.tracks, frame),
     }
+    parts = every[only]
     lost = _not_kept(video.reader, format)
     common.warn(lost)
+    bare, pale = video.at(layers, colors=False), list[FormatError]()
 
     def decode(frame: int) -> Mesh:
-        meshes = parts[only](frame)
-        return joined([replace(mesh, uv=None, texture=None) for mesh in meshes] if lost else meshes)
+        try:
+            mesh = concatenate(parts(video, frame))
+            if mesh.texture is None or lost:
+                return replace(mesh, uv=None, texture=None)
+            return replace(mesh, texture=Texture.of(mesh.texture.pixels))
+        except FormatError as error:
+            mesh = concatenate(parts(bare, frame))  # whose error is one of the surface
+            pale.append(error)
+            return mesh
 
     make_folder(output)
     names = frame_names(len(video), format)
@@ -70,6 +82,9 @@ def command(
         failed = write_frames(decode, paths, lambda done: progress("decode", done, len(video)))
     if failed:
         text = f"{file}: {failed[0]}; {len(failed)} of {len(video)} frames are lost, the others are written"
+        raise FormatError(f"{text}; copy the file again")
+    if pale:
+        text = f"{file}: {pale[0]}; {len(pale)} of {len(video)} frames are written without their colours"
         raise FormatError(f"{text}; copy the file again")
     row = {"output": str(output), "frames": len(video), "format": format, "frame_rate": video.frame_rate}
     common.result(row, f"{output}: {len(video)} {format} files")

@@ -69,7 +69,7 @@ class Coding:
     texture: Literal[128, 256, 512, 1024, 2048] | None = None
     """Width of a body's texture, texels; as the pictures have detail, at most 1024, if not given."""
     compatible: Annotated[bool, Parameter(negative="")] = False
-    """Store textures also as H.264, for browsers and devices that cannot play AV1; it takes twice AV1's bytes."""
+    """Store textures also as H.264, for devices that cannot play AV1; it takes 1.3 to 2 times AV1's bytes."""
 
     def goal(self) -> Goal | None:
         """Return the target, None without one. Raises InputError for a target with a quality, or out of range."""

@@ -93,5 +93,6 @@ def _target(file: Path, output: Path | None, glb: bool, usd: bool) -> Path:
         return Path(file.stem + (".glb" if glb else ".usdc"))
     known = (".glb",) if glb else EXTENSIONS if usd else (".glb", *EXTENSIONS)
     if output.suffix.lower() not in known:
-        raise InputError(f"{output}: the output must end in {' or '.join(known)}")
+        text = f"{output}: the output must end in {' or '.join(known)}"
+        raise InputError(f"{text}; a mesh file for each frame is written by meshreel decode")
     return output

@@ -19,10 +19,12 @@ from ..coding.colored import Canvas, atlas_base
 from ..container.reader import Chunk, ReelReader
 from ..errors import FormatError
 from ..format.budget import are_costly
-from ..format.layout import LAYER_PICTURES, ChunkKind, Pictures
+from ..format.layout import LAYER_PICTURES, ChunkKind, Pictures, VideoCodec
 from ..geometry.atlas import Layout
 from ..shapes import UInt8
 from ..types import Mesh, Texture
+
+CODECS = {ChunkKind.PICTURES: VideoCodec.AV1, ChunkKind.COMPATIBLE: VideoCodec.H264}
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,7 +115,8 @@ class TrackPictures:
         return pixels
 
     def _texture(self, pictures: Chunk, at: int) -> Texture:
-        return Texture(partial(self.picture, pictures.number, at))
+        width, height = self._sizes[pictures.depends_on[1]]
+        return Texture(partial(self.picture, pictures.number, at), (height, width))
 
     def _pictures_of(self, chunk: Chunk) -> Chunk | None:
         return self._reader.companion_of(chunk, ChunkKind.PICTURES) or self._reader.companion_of(
@@ -174,6 +177,8 @@ class TrackPictures:
         chunk = self._reader.chunks[link[0]]
         width, height = self._sizes[chunk.depends_on[1]]
         record = decode_pictures(data, chunk.frame_count, width * height)
+        if record.codec != CODECS[ChunkKind(chunk.kind)]:  # a decoder would find in the packets what nobody counted
+            raise FormatError(f"pictures of codec {int(record.codec)} in a chunk of kind {ChunkKind(chunk.kind).name}")
         if link[1] < len(chunk.layers) - 1 and len(record.packets) < LAYER_PICTURES:
             raise FormatError(f"{len(record.packets)} pictures in a layer that is not the last")
         return record

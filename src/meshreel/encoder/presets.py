@@ -129,7 +129,7 @@ def appearance_options(
 ) -> AppearanceOptions | None:
     """Return the options of colours at a quality; None for no colours. Raises InputError for values out of range."""
     if color not in COLORS:
-        raise InputError(f"no way of colours is called {color!r}; known: {', '.join(COLORS)}")
+        raise InputError(f"color must be one of {', '.join(COLORS)}, got {color!r}")
     if not 0 <= quality <= 100:
         raise InputError(f"color quality must be in 0 to 100, got {quality:g}")
     if (texture is not None or compatible) and color in ("vertices", "none"):

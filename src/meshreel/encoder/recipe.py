@@ -9,12 +9,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from functools import partial
-from itertools import islice
 from typing import Any
 
 from threadpoolctl import threadpool_limits
 
 from ..geometry.work import add, heard, since, so_far
+from ..types import evenly
 from . import layers, paper
 from .appearance import colored_groups, has_pictures
 from .digests import Digests, note
@@ -128,7 +128,8 @@ def encode_interval(
     if isinstance(options, LayersOptions):
         if appearance is None:  # what is not kept does not tell where the surface is, either
             options = replace(options, slide=None)
-        if has_pictures(interval, islice(interval.frames, 1), appearance):  # a frame in the `draco` form has none
+        some = (interval.frames[number] for number in evenly(len(interval.frames), 3))
+        if has_pictures(interval, some, appearance):  # a frame in the `draco` form has none
             options = replace(options, floor=False)
         groups = layers.encode_interval(interval, options, stages)
     else:

@@ -13,6 +13,7 @@ import numpy as np
 from .. import _core
 from ..shapes import Bool, Float64, Int32, Int64
 from ..types import GREY, Mesh
+from .textures import moved, side_by_side
 
 
 def unique_edges(faces: Int32[np.ndarray, "F 3"]) -> tuple[Int64[np.ndarray, "E 2"], Int64[np.ndarray, "F 3"]]:
@@ -118,7 +119,7 @@ def with_neighbours(faces: Int32[np.ndarray, "F 3"], chosen: Bool[np.ndarray, " 
 def concatenate(meshes: Sequence[Mesh]) -> Mesh:
     """Join meshes into one, vertices and faces in order; if only one has vertices, it is returned itself.
 
-    Where one has colours of its vertices, those of others are grey. A texture is kept where no mesh has another.
+    Where one has colours of its vertices, those of others are grey. Several textures are one, side by side.
     """
     meshes = [mesh for mesh in meshes if len(mesh.vertices)] or list(meshes[:1])
     if len(meshes) <= 1:
@@ -131,15 +132,19 @@ def concatenate(meshes: Sequence[Mesh]) -> Mesh:
         np.add(mesh.faces, np.int32(v), out=faces[f : f + len(mesh.faces)])
         v, f = v + len(mesh.vertices), f + len(mesh.faces)
     colors = [np.full(mesh.vertices.shape, GREY, np.uint8) if mesh.colors is None else mesh.colors for mesh in meshes]
-    textures = {mesh.texture for mesh in meshes if mesh.uv is not None and mesh.texture is not None}
-    has_one = len(textures) == 1
-    places = (np.full((len(m.faces), 3, 2), np.nan, np.float32) if m.uv is None else m.uv for m in meshes)
+    textures = [*dict.fromkeys(mesh.texture for mesh in meshes if mesh.uv is not None and mesh.texture is not None)]
+    places = (
+        np.full((len(mesh.faces), 3, 2), np.nan, np.float32)
+        if mesh.uv is None or mesh.texture is None
+        else moved(mesh.uv, mesh.texture, textures)
+        for mesh in meshes
+    )
     return Mesh(
         vertices,
         faces,
         None if all(mesh.colors is None for mesh in meshes) else np.concatenate(colors),
-        np.concatenate([*places]) if has_one else None,
-        textures.pop() if has_one else None,
+        np.concatenate([*places]) if textures else None,
+        side_by_side(textures) if textures else None,
     )
 
 

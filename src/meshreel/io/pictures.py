@@ -18,6 +18,7 @@ from .polygons import Dropped
 from .read import read_file
 from .remote import Place
 
+FORMATS = ("PNG", "JPEG", "WEBP", "AVIF", "BMP", "TIFF", "TGA", "GIF", "PPM")  # EPS would start another program
 MOST_PIXELS = 1 << 26  # of a picture: 8192 x 8192, 200 MB in memory (guess)
 _DEEP = ("I;16", "I;16B", "I;16L", "I")  # modes in which versions of Pillow return 16 bits of grey
 
@@ -49,7 +50,7 @@ def parse_picture(data: bytes, where: str) -> UInt8[np.ndarray, "H W 3"]:
     from PIL import Image, UnidentifiedImageError
 
     try:
-        with Image.open(io.BytesIO(data)) as image:
+        with Image.open(io.BytesIO(data), formats=FORMATS) as image:
             width, height = image.size
             if width * height > MOST_PIXELS:
                 raise Image.DecompressionBombError
@@ -62,7 +63,7 @@ def parse_picture(data: bytes, where: str) -> UInt8[np.ndarray, "H W 3"]:
         raise InputError(f"{where}: has more than 8192 x 8192 pixels; make it smaller") from None
     except UnidentifiedImageError:
         raise InputError(f"{where}: is no picture; give PNG or JPEG, or --color none") from None
-    except (OSError, SyntaxError, ValueError) as error:  # SyntaxError: a damaged chunk
+    except Exception as error:  # Pillow raises SyntaxError for a damaged chunk, RuntimeError for a damaged AVIF ...
         reason = getattr(error, "strerror", None) or error
         raise InputError(f"{where}: cannot be read ({reason}); write it again, or give --color none") from None
     pixels.flags.writeable = False

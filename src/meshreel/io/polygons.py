@@ -35,11 +35,15 @@ class Polygons:
 
 
 def eight_bits(values: np.ndarray) -> UInt8[np.ndarray, "..."]:
-    """Return colours in 8 bits: of larger integers all bits are a 1, of fractions 1 is; others have 8 bits already."""
+    """Return colours in 8 bits: of 16 bits without sign all are a 1, of fractions 1 is; others are 0 to 255.
+
+    Fractions beyond 2 are not such: some write 0 to 255 as text. Blended ones go a little beyond 1.
+    """
     if values.dtype.kind in "iu":
-        most = float(np.iinfo(values.dtype).max) if values.dtype.itemsize > 1 else 255.0
+        most = 65535.0 if values.dtype == np.uint16 else 255.0
     else:
-        most = 1.0 if np.nanmax(values, initial=0.0) <= 1.0 else 255.0  # some write 0 to 255 as text
+        finite = values[np.isfinite(values)]
+        most = 1.0 if finite.max(initial=0.0) <= 2.0 else 255.0
     shares = np.nan_to_num(values.astype(np.float64) / most, nan=0.0, posinf=1.0, neginf=0.0)
     return (np.clip(shares, 0.0, 1.0) * 255.0).round().astype(np.uint8)
 

@@ -12,9 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from meshreel.decoder.video import Video
 from meshreel.errors import InputError
-from meshreel.export.frames import joined
 from meshreel.types import Mesh, Texture
 
 from ..rows import Decoding
@@ -46,8 +44,6 @@ def _decode(decoder: bytes, data: bytes, numbers: Sequence[int], frames: int) ->
     for number, mesh in enumerate(shown):
         vertices.append(len(_checked(mesh, number).vertices))
         if number in numbers:  # textures are decoded when they are asked for: here
-            if isinstance(shown, Video):  # its parts have textures of their own
-                mesh = joined(list(shown.parts(number).values()))
             kept[number] = mesh if mesh.texture is None else replace(mesh, texture=Texture.of(mesh.texture.pixels))
     if len(vertices) != frames:
         raise InputError(f"decodes {len(vertices)} frames of {frames}")

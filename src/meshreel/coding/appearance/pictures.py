@@ -94,7 +94,8 @@ class VideoDecoder:
         if codec == VideoCodec.AV1:
             self._context.options = {"max_pixels": str(width * height), "max_frame_delay": "1"}
         else:
-            self._context.options = {"max_pixels": str((width + H264_BORDER) * (height + H264_BORDER))}
+            pixels = (width + H264_BORDER) * (height + H264_BORDER)
+            self._context.options = {"max_pixels": str(pixels), "err_detect": "explode", "ec": "0"}  # conceal nothing
             self._context.flags |= LOW_DELAY
         self._context.thread_count = 1
         self._size = width, height
