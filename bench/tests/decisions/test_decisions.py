@@ -14,8 +14,8 @@ from meshreel_bench.decisions.__main__ import MEASURE, main
 from meshreel_bench.decisions.rows import Case, read
 from meshreel_bench.decisions.tables import write_tables
 
-from meshreel.capture.procedural import sliding_sphere
 from meshreel.io.write import make_folder, write_mesh
+from tests.spheres import sliding_sphere
 
 PAGES = Path(__file__).parents[3] / "docs" / "decisions"
 

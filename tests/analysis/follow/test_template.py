@@ -7,10 +7,10 @@ import pytest
 
 from meshreel.analysis.follow import template
 from meshreel.analysis.follow.template import CURVATURE, FEWEST, TemplateOptions, base_mesh, shared_detail
-from meshreel.capture.procedural import sliding_sphere
 from meshreel.geometry.closest_points import Surface
 from meshreel.geometry.subdivision import heights, levels_of, refine
 from meshreel.types import Mesh
+from tests.spheres import sliding_sphere
 
 BALL = Mesh.of(sliding_sphere(1, levels=4)[0].vertices / 12**0.5, sliding_sphere(1, levels=4)[0].faces)  # diagonal 1
 ROUGH = Mesh.of(BALL.vertices * (1 + 0.03 * np.sin(14 * BALL.vertices[:, :1])), BALL.faces)
