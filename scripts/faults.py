@@ -166,9 +166,9 @@ STOPS = {  # each promise: its unit, how it is tried, the input, flags
 
 def make_inputs(folder: Path) -> None:
     """Write the meshes of a ball that slides, and the recording of one before a wall."""
-    from meshreel.capture.procedural import sliding_sphere
     from meshreel.io.write import write_mesh
     from tests.capture.depth_scenes import camera, record
+    from tests.spheres import sliding_sphere
 
     (folder / "meshes").mkdir()
     for number, mesh in enumerate(sliding_sphere(8, levels=2)):

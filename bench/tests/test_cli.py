@@ -13,8 +13,8 @@ from meshreel_bench.rows import append_row
 from msgspec.structs import replace
 
 from bench.tests.made_up import failed, row
-from meshreel.capture.procedural import sliding_sphere
 from meshreel.errors import InputError
+from tests.spheres import sliding_sphere
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "codecs.md"
 

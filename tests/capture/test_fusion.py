@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from meshreel.capture.fusion import FusionOptions, fuse_depths
-from meshreel.capture.procedural import sliding_sphere
 from meshreel.errors import InputError
 from meshreel.geometry.topology import components, face_normals, without_fragments
 from meshreel.types import Mesh
 from tests.capture.depth_scenes import RADIUS, WALL, camera, measured
+from tests.spheres import sliding_sphere
 
 AROUND = [camera(f"at{side}", side) for side in (0, 90, 180, 270)]
 FINE = FusionOptions(voxel=0.02)

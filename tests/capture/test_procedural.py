@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from meshreel.capture.implicit import field
-from meshreel.capture.procedural import SoftBodiesOptions, cast, deforming_sphere, sliding_sphere, soft_bodies
+from meshreel.capture.procedural import SoftBodiesOptions, cast, soft_bodies
 from meshreel.errors import InputError
 from meshreel.geometry.topology import components, face_normals, unique_edges
 from meshreel.types import Mesh
+from tests.spheres import deforming_sphere, sliding_sphere
 
 COARSE = SoftBodiesOptions(frames=90, spacing=0.06)
 

@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from meshreel.capture.procedural import sliding_sphere
 from meshreel.capture.recording import open_recording
 from meshreel.capture.rig import read_rig
 from meshreel.errors import InputError
 from meshreel.geometry.raycast import Rays
 from meshreel.io.depth_pictures import read_depth, write_depth
 from tests.capture.depth_scenes import camera, measured, record
+from tests.spheres import sliding_sphere
 
 STILL = [(0.0, 0.0, 0.0)] * 3
 

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from meshreel.capture.fusion import FusionOptions, fuse_depths
-from meshreel.capture.procedural import sliding_sphere
 from meshreel.capture.rig import read_rig
 from meshreel.capture.simulated_rig import TRUTH, SceneFrame, SensorOptions, corner_cameras, simulate_rig
 from meshreel.errors import InputError
@@ -17,6 +16,7 @@ from meshreel.io.depth_pictures import read_depth
 from meshreel.io.sequence import open_sequence
 from meshreel.types import Mesh
 from tests.capture.depth_scenes import RADIUS, WALL, camera, measured
+from tests.spheres import sliding_sphere
 
 EXACT = SensorOptions(noise=0.0, grazing=90.0, holes=0.0, flying=0.0)
 UNIT = sliding_sphere(1, levels=5)[0]

@@ -12,7 +12,6 @@ import pytest
 
 from meshreel.analysis.scene.pictures import write_views
 from meshreel.analysis.scene.views import place_views
-from meshreel.capture.procedural import sliding_sphere
 from meshreel.cli import main
 from meshreel.geometry.raycast import Rays
 from meshreel.io.write import write_mesh, write_picture
@@ -20,6 +19,7 @@ from tests.capture.depth_scenes import camera, record
 from tests.golden import GOLDEN
 from tests.small_options import VIEWS, quick
 from tests.small_scene import ROOM_FACES, scene
+from tests.spheres import sliding_sphere
 
 FILE = GOLDEN / "mixed.reel"
 SCENE = GOLDEN / "scene.reel"

@@ -10,7 +10,6 @@ from dataclasses import replace
 import pytest
 from distributed import LocalCluster
 
-from meshreel.capture.procedural import sliding_sphere
 from meshreel.cli import workers as module
 from meshreel.cli.workers import workers
 from meshreel.encoder.sequence import Encoder
@@ -18,6 +17,7 @@ from meshreel.errors import InputError
 from meshreel.io.sequence import SequenceOptions, open_sequence
 from meshreel.io.write import write_mesh
 from tests.small_options import quick
+from tests.spheres import sliding_sphere
 
 FRAMES = 12
 EACH_ALONE = replace(quick(key_interval=0.1), scene=None)

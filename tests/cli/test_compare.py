@@ -11,7 +11,6 @@ import pytest
 from PIL import Image
 
 import meshreel
-from meshreel.capture.procedural import sliding_sphere
 from meshreel.capture.rig import read_rig
 from meshreel.capture.simulated_rig import SceneFrame, simulate_rig
 from meshreel.container.writer import ReelWriter
@@ -21,6 +20,7 @@ from meshreel.io.write import write_mesh
 from meshreel.types import Mesh
 from tests.capture.depth_scenes import camera
 from tests.cli.conftest import FILE, failed
+from tests.spheres import sliding_sphere
 
 SMALL = ("--width", "64", "--height", "48")
 

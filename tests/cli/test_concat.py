@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import pytest
 
-from meshreel.capture.procedural import sliding_sphere
 from meshreel.container.reader import ReelReader
 from meshreel.container.sources import BytesSource, FileSource
 from meshreel.container.writer import ReelWriter
@@ -17,6 +16,7 @@ from meshreel.io.write import write_mesh
 from meshreel.types import Mesh
 from tests.cli.conftest import FILE, SCENE, failed
 from tests.metrics.shapes import moved, sphere
+from tests.spheres import sliding_sphere
 
 pytestmark = pytest.mark.usefixtures("quick_presets")
 FLAGS = ("--fps", "10", "--key-interval", "0.2", "--dynamic-only")

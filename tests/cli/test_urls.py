@@ -10,9 +10,9 @@ from collections import Counter
 import fsspec
 import pytest
 
-from meshreel.capture.procedural import sliding_sphere
 from meshreel.io.write import write_mesh
 from tests.cli.conftest import failed
+from tests.spheres import sliding_sphere
 
 pytestmark = pytest.mark.usefixtures("quick_presets")
 FLAGS = ("--key-interval", "0.2", "--dynamic-only")

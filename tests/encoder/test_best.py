@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 import meshreel
-from meshreel.capture.procedural import sliding_sphere
 from meshreel.encoder.sequence import encode
 from meshreel.format.layout import Form
 from meshreel.metrics.comparison import ComparisonOptions, compare_sequences
 from meshreel.metrics.distance import surface_errors
 from meshreel.types import Mesh, MeshList
 from tests.small_options import quick, with_method
+from tests.spheres import sliding_sphere
 
 OPTIONS = quick(group_size=2, key_interval=0.2)
 BALLS = MeshList(tuple(sliding_sphere(8, step=0.02, levels=4)), frame_rate=20.0)

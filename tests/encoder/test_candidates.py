@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from meshreel.analysis.fit.frame import FrameSurface
-from meshreel.capture.procedural import sliding_sphere
 from meshreel.encoder.candidates import Ahead, Candidate
 from meshreel.encoder.target import target_of
 from meshreel.geometry.work import since, so_far
 from meshreel.types import Mesh
 from tests.small_options import quick
+from tests.spheres import sliding_sphere
 
 OPTIONS = quick(group_size=8).method
 BALL = Mesh.of(sliding_sphere(1, levels=2)[0].vertices * [0.28, 0.2, 0.15], sliding_sphere(1, levels=2)[0].faces)

@@ -15,7 +15,6 @@ from dataclasses import replace
 import fsspec
 import pytest
 
-from meshreel.capture.procedural import sliding_sphere
 from meshreel.encoder import digests, recipe
 from meshreel.encoder import journal as module
 from meshreel.encoder.forms import EncodedGroup
@@ -29,6 +28,7 @@ from meshreel.geometry import derived_sequences
 from meshreel.types import Mesh, MeshList
 from tests.small_options import quick
 from tests.small_scene import scene
+from tests.spheres import sliding_sphere
 
 BALLS = MeshList(tuple(sliding_sphere(7, levels=1)), 10.0)
 EACH_ALONE = replace(quick(key_interval=0.1), scene=None)  # seven intervals

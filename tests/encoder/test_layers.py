@@ -11,7 +11,7 @@ import pytest
 
 from meshreel.analysis.fit.frame import FrameSurface
 from meshreel.analysis.plan import Plan
-from meshreel.capture.procedural import SoftBodiesOptions, deforming_sphere, sliding_sphere, soft_bodies
+from meshreel.capture.procedural import SoftBodiesOptions, soft_bodies
 from meshreel.coding.group import continue_group
 from meshreel.encoder import layers as layered
 from meshreel.encoder.forms import EncodedGroup
@@ -22,6 +22,7 @@ from meshreel.encoder.target import measure
 from meshreel.format.layout import Form
 from meshreel.types import Mesh
 from tests.small_options import quick
+from tests.spheres import deforming_sphere, sliding_sphere
 
 OPTIONS = quick(group_size=4).method
 BALL = Mesh.of(sliding_sphere(1, levels=2)[0].vertices / 12**0.5, sliding_sphere(1, levels=2)[0].faces)  # diagonal 1

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from meshreel.analysis.fit.frame import FrameSurface
-from meshreel.capture.procedural import sliding_sphere
 from meshreel.coding.group import decode_group
 from meshreel.coding.reference_mesh import CodedReference, code_on_lattice
 from meshreel.encoder import layers_group
@@ -18,6 +17,7 @@ from meshreel.encoder.target import Fidelity, measure, target_of
 from meshreel.format.layout import Form
 from meshreel.types import Mesh
 from tests.small_options import quick
+from tests.spheres import sliding_sphere
 
 OPTIONS = replace(quick(group_size=4).method, tails=None)
 BALL = Mesh.of(sliding_sphere(1)[0].vertices / 12**0.5, sliding_sphere(1)[0].faces)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import pytest
 
-from meshreel.capture.procedural import sliding_sphere
 from meshreel.encoder import forms
 from meshreel.encoder.draco import IntraOptions, cheapest_intra
 from meshreel.encoder.forms import EncodedGroup, cheaper
 from meshreel.encoder.target import Fidelity
 from meshreel.format.layout import Form
+from tests.spheres import sliding_sphere
 
 BALLS = list(sliding_sphere(2, levels=1))
 OPTIONS = IntraOptions(fractions=(1.0,), steps=(0.7,), levels=(0,))

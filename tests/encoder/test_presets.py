@@ -6,7 +6,6 @@ from itertools import pairwise
 
 import pytest
 
-from meshreel.analysis.plan import PlanOptions
 from meshreel.encoder.options import EncoderOptions, LayersOptions, PaperOptions
 from meshreel.encoder.presets import EFFORTS, PRESETS, displacement_step, preset_options, reference_vertices
 from meshreel.errors import InputError
@@ -60,10 +59,10 @@ def test_a_key_interval_out_of_range_is_refused(seconds):
         preset_options(key_interval=seconds)
 
 
-@pytest.mark.parametrize("wrong", [{"limit": 0.9}, {"worth": 0.0}, {"alone": -1.0}, {"keys": 0}, {"misses": 0}])
-def test_plans_that_make_no_sense_are_refused(wrong):
-    with pytest.raises(InputError, match="give >= 1"):
-        PlanOptions(**wrong)
+@pytest.mark.parametrize(("name", "value"), [("basis_size", -1), ("centers", 0)])
+def test_counts_of_the_paper_out_of_range_are_refused(name, value):
+    with pytest.raises(InputError, match=rf"{name.replace('_', ' ')}.*{value}"):
+        preset_options("paper", **{name: value})
 
 
 @pytest.mark.parametrize("wrong", [{"measured": 0}, {"measured": -1}, {"errors": (0.0,)}, {"errors": (0.8, -1.0)}])

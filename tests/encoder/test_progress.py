@@ -7,10 +7,10 @@ from fractions import Fraction
 
 import pytest
 
-from meshreel.capture.procedural import sliding_sphere
 from meshreel.encoder.progress import IntervalStages, Stages
 from meshreel.encoder.sequence import Encoder
 from tests.small_options import quick
+from tests.spheres import sliding_sphere
 
 
 @pytest.fixture

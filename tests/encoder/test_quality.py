@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import meshreel
-from meshreel.capture.procedural import SoftBodiesOptions, deforming_sphere, soft_bodies
+from meshreel.capture.procedural import SoftBodiesOptions, soft_bodies
 from meshreel.encoder.quality import TRIALS, Goal, Search, encode_to
 from meshreel.encoder.sequence import Encoder
 from meshreel.encoder.summary import GroupSummary, SceneSummary, Summary
@@ -21,6 +21,7 @@ from meshreel.format.layout import Form
 from meshreel.metrics.comparison import ComparisonOptions, compare_sequences
 from meshreel.types import MeshList
 from tests.small_options import quick, with_method
+from tests.spheres import deforming_sphere
 
 
 def searched(goal: Goal, curve: Callable[[float], float]) -> tuple[float | None, int]:

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import meshreel
-from meshreel.capture.procedural import SoftBodiesOptions, deforming_sphere, sliding_sphere, soft_bodies
+from meshreel.capture.procedural import SoftBodiesOptions, soft_bodies
 from meshreel.encoder.draco import IntraOptions
 from meshreel.encoder.sequence import encode
 from meshreel.errors import InputError
@@ -22,6 +22,7 @@ from meshreel.io.sequence import SequenceOptions, open_sequence
 from meshreel.metrics.distance import surface_errors
 from meshreel.types import Mesh, MeshList
 from tests.small_options import quick, with_method
+from tests.spheres import deforming_sphere, sliding_sphere
 
 paper = partial(quick, "paper")
 BODY = SoftBodiesOptions(frames=6, people=1, spacing=0.035)

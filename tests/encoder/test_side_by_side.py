@@ -11,7 +11,6 @@ import fsspec
 import numpy as np
 import pytest
 
-from meshreel.capture.procedural import sliding_sphere
 from meshreel.encoder import recipe
 from meshreel.encoder.forms import EncodedGroup
 from meshreel.encoder.sequence import Encoder
@@ -23,6 +22,7 @@ from meshreel.io import sequence as io
 from meshreel.io.sequence import SequenceOptions, open_sequence
 from meshreel.io.write import write_mesh
 from tests.small_options import quick
+from tests.spheres import sliding_sphere
 
 FRAMES = 70
 EACH_ALONE = replace(quick(key_interval=0.1), scene=None)

@@ -10,7 +10,6 @@ import pytest
 
 import meshreel
 from meshreel.analysis.survey import survey
-from meshreel.capture.procedural import sliding_sphere
 from meshreel.coding.intra import encode_empty, encode_intra
 from meshreel.encoder import recipe
 from meshreel.encoder.forms import EncodedGroup
@@ -29,6 +28,7 @@ from tests.encoder.test_side_by_side import Scrambled
 from tests.metrics.shapes import moved, sphere
 from tests.small_bodies import body
 from tests.small_options import quick
+from tests.spheres import sliding_sphere
 
 BALL = sphere(levels=3)
 SMALL = moved(BALL, scale=0.2)

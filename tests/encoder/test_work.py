@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from meshreel.capture.procedural import sliding_sphere
 from meshreel.encoder.presets import preset_options
 from meshreel.encoder.sequence import encode
 from meshreel.format.layout import Form
@@ -13,6 +12,7 @@ from meshreel.types import Mesh, MeshList
 from tests.scenes import ball, quick_scene, with_room
 from tests.shared_data import performer
 from tests.small_options import quick
+from tests.spheres import sliding_sphere
 
 BALL = Mesh.of(sliding_sphere(1, levels=2)[0].vertices, sliding_sphere(1, levels=2)[0].faces)
 

@@ -9,11 +9,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from meshreel.capture.procedural import sliding_sphere
 from meshreel.errors import InputError
 from meshreel.geometry import derived_sequences
 from meshreel.geometry.derived_sequences import Chosen, Recent, Unchanging, Upright, captured
 from meshreel.types import Mesh, MeshList
+from tests.spheres import sliding_sphere
 
 
 def test_chosen_frames_are_those_of_the_source():

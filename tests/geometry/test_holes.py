@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from meshreel.capture.procedural import deforming_sphere
 from meshreel.geometry.holes import close_holes
 from meshreel.geometry.topology import face_normals, unique_edges
 from meshreel.types import Mesh
+from tests.spheres import deforming_sphere
 
 BALL = deforming_sphere(1, levels=3)[0]
 

@@ -5,9 +5,7 @@ from __future__ import annotations
 import os
 
 import numpy as np
-import pytest
 
-from meshreel.errors import InputError
 from meshreel.geometry.poisson import PoissonOptions, _without_leaf_warnings, drop_small, reconstruct, thin_out
 from meshreel.geometry.topology import face_normals
 from meshreel.types import Mesh
@@ -75,9 +73,3 @@ def test_thinning_keeps_both_sides_of_a_thin_sheet() -> None:
     few, turned = thin_out(points, normals, 0.1)
     assert 150 <= len(few) <= 250
     np.testing.assert_allclose(np.abs(turned[:, 2]), 1)
-
-
-@pytest.mark.parametrize("bad", [{"depth": 2}, {"trim": -1.0}, {"reach": 0.0}, {"smallest": 1.0}])
-def test_bad_options_are_refused(bad: dict[str, float]) -> None:
-    with pytest.raises(InputError, match=next(iter(bad))):
-        PoissonOptions(**bad)  # type: ignore[arg-type]

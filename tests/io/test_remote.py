@@ -11,12 +11,12 @@ import fsspec
 import numpy as np
 import pytest
 
-from meshreel.capture.procedural import sliding_sphere
 from meshreel.errors import InputError
 from meshreel.io.file_names import find_frames
 from meshreel.io.remote import Remote, located, uploaded
 from meshreel.io.sequence import open_sequence
 from meshreel.io.write import write_mesh
+from tests.spheres import sliding_sphere
 
 
 @pytest.fixture

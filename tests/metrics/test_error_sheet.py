@@ -65,23 +65,6 @@ def test_the_same_meshes_give_the_same_bytes(tmp_path: Path):
     assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
 
 
-@pytest.mark.parametrize(
-    "options",
-    [
-        {"unit": "inch"},
-        {"views": (4,)},
-        {"views": ()},
-        {"height": 3},
-        {"limit": -1.0},
-        {"limit": np.nan},
-        {"up": "x"},
-    ],
-)
-def test_bad_sheet_options_are_refused(options: dict):
-    with pytest.raises(InputError):
-        SheetOptions(**options)
-
-
 def test_missing_frames_are_refused(tmp_path: Path):
     one, two = MeshList((BODY,)), MeshList((BODY, BODY))
     with pytest.raises(InputError, match="0 to 0"):

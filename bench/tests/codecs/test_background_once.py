@@ -11,7 +11,6 @@ from meshreel_bench.codecs.background_once import BackgroundOnceDracoCodec
 from meshreel_bench.codecs.draco import DecimatedDracoCodec
 
 from meshreel.analysis.scene.segmentation import SegmentOptions
-from meshreel.capture.procedural import sliding_sphere
 from meshreel.decoder.video import open as open_video
 from meshreel.encoder.options import SceneOptions
 from meshreel.errors import FormatError, InputError
@@ -20,6 +19,7 @@ from meshreel.geometry.closest_points import Surface, distances
 from meshreel.types import Mesh, MeshList
 from tests.small_options import VIEWS
 from tests.small_scene import balls, scene
+from tests.spheres import sliding_sphere
 
 SCENE = scene()
 

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from meshreel_bench.codecs import make_codec
 
-from meshreel.capture.procedural import sliding_sphere
 from meshreel.errors import InputError
 from meshreel.metrics.color import color_errors
 from meshreel.metrics.distance import surface_errors
 from meshreel.types import MeshList, Texture
+from tests.spheres import sliding_sphere
 
 BALL = sliding_sphere(1, levels=3)[0]
 SHADES = np.linspace(30, 220, 64)[None, :, None] * np.array([1.0, 0.8, 0.6]) * np.linspace(0.6, 1, 64)[:, None, None]

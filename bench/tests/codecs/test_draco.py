@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from meshreel_bench.codecs import make_codec
 
-from meshreel.capture.procedural import sliding_sphere
 from meshreel.errors import InputError
 from meshreel.metrics.distance import surface_errors
+from tests.spheres import sliding_sphere
 
 POINT = {"fraction": 0.5, "qp": 10}
 

@@ -9,7 +9,7 @@ from meshreel_bench.codecs import groups as stored
 from meshreel_bench.codecs.groups import GroupStore, prepare, shared_options
 from meshreel_bench.codecs.tvmc.tracking import track_sequence
 
-from meshreel.capture.procedural import SoftBodiesOptions, deforming_sphere, soft_bodies
+from meshreel.capture.procedural import SoftBodiesOptions, soft_bodies
 from meshreel.encoder import paper
 from meshreel.encoder.interval import Interval
 from meshreel.encoder.options import EncoderOptions
@@ -18,6 +18,7 @@ from meshreel.encoder.target import Fidelity
 from meshreel.types import Mesh, MeshList
 from tests.scenes import ball, quick_scene, with_room
 from tests.small_options import quick, with_method
+from tests.spheres import deforming_sphere
 
 BODY = tuple(soft_bodies(SoftBodiesOptions(frames=4, people=1, spacing=0.04)))
 PAPER = quick("paper", group_size=2)

@@ -19,11 +19,12 @@ from meshreel_bench.codecs.klt_tsdf.blocks import (
 from meshreel_bench.codecs.klt_tsdf.grid import VOLUME, prepared, sample, voxel_index
 from meshreel_bench.codecs.klt_tsdf.surface import Field, crossed, polygonize
 
-from meshreel.capture.procedural import SoftBodiesOptions, deforming_sphere, sliding_sphere, soft_bodies
+from meshreel.capture.procedural import SoftBodiesOptions, soft_bodies
 from meshreel.errors import FormatError, InputError
 from meshreel.geometry.topology import border_edges, components, part_of
 from meshreel.metrics.distance import surface_errors
 from meshreel.types import Mesh, MeshList
+from tests.spheres import deforming_sphere, sliding_sphere
 
 SMALL = KltTsdfCodec(cells=80, basis=24, step=0.05)
 

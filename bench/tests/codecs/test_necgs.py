@@ -17,10 +17,11 @@ from meshreel_bench.codecs.necgs.cubes import extract
 from meshreel_bench.codecs.necgs.grid import box_of, place_grids, truncated_distances
 from meshreel_bench.codecs.necgs.stream import decode_stream, encode_stream
 
-from meshreel.capture.procedural import SoftBodiesOptions, deforming_sphere, soft_bodies
+from meshreel.capture.procedural import SoftBodiesOptions, soft_bodies
 from meshreel.errors import FormatError, InputError
 from meshreel.metrics.distance import surface_errors
 from meshreel.types import Mesh, MeshList
+from tests.spheres import deforming_sphere
 
 TINY = NecgsCodec(resolution=16, features=4, channels=8, epochs=60, fitting=5, rate=1e-2, device="cpu")
 HASTY = replace(TINY, epochs=10, fitting=1)

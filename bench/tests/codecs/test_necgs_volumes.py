@@ -9,13 +9,14 @@ from meshreel_bench.codecs.necgs.grid import MARGIN, Placement, box_of, place_gr
 from meshreel_bench.codecs.necgs.shape import Shape, dequantize, quantize
 from meshreel_bench.codecs.necgs.stream import Coded, decode_stream, encode_stream
 
-from meshreel.capture.procedural import SoftBodiesOptions, deforming_sphere, soft_bodies
+from meshreel.capture.procedural import SoftBodiesOptions, soft_bodies
 from meshreel.errors import FormatError, InputError
 from meshreel.geometry.closest_points import Surface
 from meshreel.geometry.topology import border_edges, concatenate, face_normals, unique_edges
 from meshreel.metrics.distance import surface_errors
 from meshreel.types import Mesh
 from tests.scenes import moved, plane, sphere
+from tests.spheres import deforming_sphere
 
 SHAPE = Shape(resolution=16, features=2, channels=4, bits=8)
 

@@ -15,7 +15,7 @@ from meshreel_bench.codecs.tvmc.tracked import decode_tracked, encode_tracked
 from meshreel_bench.codecs.tvmc.tracking import Tracked, track_sequence
 from meshreel_bench.codecs.tvmc.video import TvmcVideo
 
-from meshreel.capture.procedural import SoftBodiesOptions, deforming_sphere, sliding_sphere, soft_bodies
+from meshreel.capture.procedural import SoftBodiesOptions, soft_bodies
 from meshreel.encoder.presets import reference_vertices
 from meshreel.encoder.sequence import Encoder
 from meshreel.errors import FormatError, InputError, NoReferenceError
@@ -25,6 +25,7 @@ from meshreel.metrics.distance import surface_errors
 from meshreel.types import Mesh, MeshList
 from tests.scenes import CELL, NOISE, ball, of_body, quick_scene, room, with_room
 from tests.small_options import quick
+from tests.spheres import deforming_sphere, sliding_sphere
 
 CODEC = "meshreel_bench.codecs.tvmc.codec"
 SMALL = TvmcCodec(qp=8, vertices=150, group_size=3, centers=150)

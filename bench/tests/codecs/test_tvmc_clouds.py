@@ -8,10 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from meshreel_bench.codecs.tvmc.tracked import MOST_CELLS, decode_cloud, encode_cloud, surface_order
 
-from meshreel.capture.procedural import sliding_sphere
 from meshreel.coding.reference_mesh import code_reference
 from meshreel.errors import InputError
 from meshreel.types import Mesh
+from tests.spheres import sliding_sphere
 
 
 @settings(max_examples=60, deadline=None)

@@ -7,11 +7,11 @@ import pytest
 from meshreel_bench.datasets import Store
 from meshreel_bench.datasets.remesh import RemeshedSequence, RemeshOptions, remesh
 
-from meshreel.capture.procedural import sliding_sphere
 from meshreel.errors import InputError
 from meshreel.geometry.topology import components, unique_edges
 from meshreel.metrics.distance import surface_errors
 from meshreel.types import Mesh, MeshList
+from tests.spheres import sliding_sphere
 
 BALL = sliding_sphere(1, levels=4)[0]
 SMALL = RemeshOptions(vertices=1500)

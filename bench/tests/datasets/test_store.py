@@ -12,10 +12,10 @@ from meshreel_bench.datasets import BODIES, DEMO, SYNTHETIC, Store, checksums, f
 from meshreel_bench.datasets.remesh import SideBySide
 from meshreel_bench.datasets.scenes import PROCEDURAL
 
-from meshreel.capture.procedural import sliding_sphere
 from meshreel.errors import InputError
 from meshreel.types import MeshList
 from tests.shared_data import ROOT
+from tests.spheres import sliding_sphere
 
 BALLS = sliding_sphere(3, levels=1)
 

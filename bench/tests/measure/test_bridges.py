@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from meshreel_bench.measure.bridges import count_bridges, count_degenerate
 
-from meshreel.capture.procedural import sliding_sphere
 from meshreel.geometry.topology import concatenate
 from meshreel.types import Mesh
+from tests.spheres import sliding_sphere
 
 BALL = sliding_sphere(1, levels=2)[0]
 TWO = concatenate([BALL, Mesh.of(BALL.vertices + (3.0, 0, 0), BALL.faces)])

@@ -9,13 +9,13 @@ import pytest
 from meshreel_bench.codecs.meshreel import MeshreelCodec
 from meshreel_bench.measure.color import color_bytes, picture_psnrs, picture_squares, swimming
 
-from meshreel.capture.procedural import sliding_sphere
 from meshreel.capture.rig import DepthCamera
 from meshreel.decoder.video import open as open_video
 from meshreel.format.layout import ChunkKind
 from meshreel.geometry.color_views import ColorPicture
-from meshreel.metrics.color_render import render_colors
 from meshreel.types import Mesh, MeshList
+from tests.metrics.rendered import render_colors
+from tests.spheres import sliding_sphere
 
 BALL = sliding_sphere(1, levels=4)[0]
 EYE = np.array([[1.0, 0, 0, 0], [0, -1, 0, 0], [0, 0, -1, 4], [0, 0, 0, 1]])  # looks at the ball from +z

@@ -9,8 +9,8 @@ from meshreel_bench.datasets import Store
 from meshreel_bench.measure.runner import Sweep, run_points, runs_of
 from meshreel_bench.rows import Point, read_rows
 
-from meshreel.capture.procedural import sliding_sphere
 from meshreel.errors import InputError
+from tests.spheres import sliding_sphere
 
 PLUGIN = """
 import os, time

@@ -10,8 +10,6 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float64
 
-from ..errors import InputError
-
 
 @dataclass(frozen=True, slots=True)
 class GroupOptions:
@@ -20,11 +18,6 @@ class GroupOptions:
     limit: float = 2.0  # a frame is lost if its residual is larger than this many times the target
     tolerance: float = 2.0  # or larger than the target and than this many times the group's median
     depth: int = 1  # largest number of nested cuts; frames that are lost after them are coded one by one
-
-    def __post_init__(self) -> None:
-        if self.limit < 1 or self.tolerance < 1 or self.depth < 0:
-            text = f"group limit {self.limit:g}, tolerance {self.tolerance:g}, depth {self.depth}"
-            raise InputError(f"{text}: give >= 1, >= 1, >= 0")
 
 
 def cut_at(residuals: Float64[np.ndarray, " T"], options: GroupOptions) -> int | None:

@@ -13,8 +13,6 @@ from itertools import groupby
 import numpy as np
 from jaxtyping import Float64
 
-from ..errors import InputError
-
 NOBODY = -1  # in place of a template: its frames are coded one by one
 CODED = 0.7  # squared targets that coding adds to a residual (measured on bodies at quality 50)
 USUAL = 2.0  # squared targets that a good template may leave, at most (guess)
@@ -36,16 +34,6 @@ class PlanOptions:
     settled: float = 1.0  # excess beyond which another key is tried, in prices of a template
     misses: int = 2  # keys in a row without gain after which no other is tried (guess)
     gain: float = 0.25  # that a key must bring, in prices of a template (guess)
-
-    def __post_init__(self) -> None:
-        if self.limit < 1 or not (self.worth > 0 and self.alone > 0 and self.pop > 0):
-            raise InputError(
-                f"limit {self.limit:g}, worth {self.worth:g}, alone {self.alone:g}, pop {self.pop:g}: "
-                "give >= 1, and > 0 for the others"
-            )
-        if self.keys < 1 or self.misses < 1 or min(self.settled, self.gain) < 0:
-            text = f"keys {self.keys}, misses {self.misses}, settled {self.settled:g}, gain {self.gain:g}"
-            raise InputError(f"{text}: give >= 1, >= 1, >= 0, >= 0")
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,7 +22,6 @@ from ..io.file_names import last_number
 from ..io.pictures import read_picture
 
 PICTURES = (".png", ".jpg", ".jpeg", ".webp", ".bmp")
-KEYS = ("name", "folder", "width", "height", "fx", "fy", "cx", "cy", "camera_to_world", "distortion")
 MOST_DISTORTION = 10.0  # of a coefficient: beyond, the picture would fold many times (guess)
 
 

@@ -146,9 +146,9 @@ def record_room(
     simulate_rig(folder, furnished_room(options), cameras, options.frame_rate, sensor, progress, color)
 
 
-def room_cameras(width: int = 320, count: int = 4) -> tuple[DepthCamera, ...]:
+def room_cameras(width: int = 320) -> tuple[DepthCamera, ...]:
     """Return depth cameras in the corners that look down at the middle; pictures of `width` x 0.9 `width` pixels."""
-    cameras = corner_cameras(np.array(_LOW), np.array(_HIGH), count)
+    cameras = corner_cameras(np.array(_LOW), np.array(_HIGH))
     return tuple(camera.resized(width, round(width * camera.height / camera.width)) for camera in cameras)
 
 

@@ -1,4 +1,4 @@
-"""Procedural sequences: moving people for the demo, and small shapes whose motion is known exactly.
+"""Procedural sequence: moving people for the demo.
 
 Options -> a MeshSequence. The people's connectivity changes every frame, and each frame is made when it is read.
 """
@@ -12,8 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import InputError
-from ..geometry.topology import subdivide_midpoint
-from ..types import Mesh, MeshList, MeshSequence
+from ..types import Mesh, MeshSequence
 from .figure import Pose, figure
 from .implicit import Body, Grid, polygonize
 
@@ -75,19 +74,6 @@ def soft_bodies(options: SoftBodiesOptions | None = None) -> SoftBodies:
     About 10k vertices and under 1.5 s a frame at the default spacing; the same options give the same frames.
     """
     return SoftBodies(options or SoftBodiesOptions())
-
-
-def deforming_sphere(frames: int, levels: int = 3) -> MeshList:
-    """Return a unit sphere that stretches along y by 1 + 0.3 sin: 8 x 4^levels faces, fixed connectivity."""
-    ball = _sphere(levels)
-    stretch = 1 + 0.3 * np.sin(2 * np.pi * np.arange(frames) / max(frames, 1))
-    return MeshList(tuple(Mesh.of(ball.vertices * [1.0, s, 1.0], ball.faces) for s in stretch))
-
-
-def sliding_sphere(frames: int, step: float = 0.05, levels: int = 3) -> MeshList:
-    """Return a unit sphere that moves along x by `step` (m) per frame: a rigid motion with a known answer."""
-    ball = _sphere(levels)
-    return MeshList(tuple(Mesh.of(ball.vertices + [t * step, 0.0, 0.0], ball.faces) for t in range(frames)))
 
 
 def cast(moment: float, options: SoftBodiesOptions) -> tuple[Body, ...]:
@@ -169,13 +155,3 @@ def _during(moment: float, rise: float, full: float, fade: float, end: float) ->
 def _mixed(*targets: tuple[np.ndarray, float]) -> tuple[np.ndarray, float]:
     """Return the target with the largest weight, and that weight."""
     return max(targets, key=lambda target: target[1])
-
-
-def _sphere(levels: int) -> Mesh:
-    tips = np.concatenate([np.eye(3), -np.eye(3)])
-    faces = [(0, 1, 2), (1, 3, 2), (3, 4, 2), (4, 0, 2), (1, 0, 5), (3, 1, 5), (4, 3, 5), (0, 4, 5)]
-    mesh = Mesh.of(tips, faces)
-    for _ in range(levels):
-        mesh = subdivide_midpoint(mesh)
-        mesh = Mesh.of(mesh.vertices / np.linalg.norm(mesh.vertices, axis=1, keepdims=True), mesh.faces)
-    return mesh

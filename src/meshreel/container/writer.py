@@ -121,13 +121,13 @@ class ReelWriter:
             with suppress(OSError):
                 self._spool.close()
 
-    def add_static(self, payload: bytes, layers: Sequence[int] = (), depends_on: Sequence[int] = ()) -> int:
-        """Add a state of the background and return the number of its chunk; `layers` are those of `add_group`.
+    def add_static(self, payload: bytes, depends_on: Sequence[int] = ()) -> int:
+        """Add a state of the background and return the number of its chunk.
 
         The payload has form DRACO or PATCH; for PATCH, `depends_on` is the number of the state that it changes.
         """
         form = _form(payload)
-        entry = IndexEntry(ChunkKind.STATIC, form, 0, 0, tuple(depends_on), _layers(payload, layers))
+        entry = IndexEntry(ChunkKind.STATIC, form, 0, 0, tuple(depends_on), _layers(payload, ()))
         return self._add(entry, payload)
 
     def add_group(

@@ -17,7 +17,6 @@ from ..coding import entropy
 from ..coding.layers.patches import Patches, encode_patches, encode_runs, reach
 from ..coding.mesh import encode_mesh
 from ..coding.steps import rung_of, step_of
-from ..errors import InputError
 from ..format.layout import LayersPatches
 from ..format.records import pack
 from ..geometry.closest_points import Surface
@@ -43,14 +42,6 @@ class TailOptions:
     shares: tuple[float, ...] = (0.1, 0.25, 0.5)  # of a patch's vertices that are kept
     lattice: float = 2.0  # spacing of the patches' lattice, in RMS distances of the rest
     exchange: float = 1.33  # relative fall of the squared error for a rise of the rate: 4 dB a doubling (decision 13)
-
-    def __post_init__(self) -> None:
-        if not self.thresholds or min(self.thresholds) <= 1:
-            raise InputError(f"thresholds {self.thresholds}: give one or more, above 1")
-        if not all(0 < share <= 1 for share in self.shares):
-            raise InputError(f"shares {self.shares}: give fractions of the vertices, in (0, 1]; none: no patches")
-        if not self.lattice > 0 or not self.exchange > 0:
-            raise InputError(f"lattice {self.lattice:g}, exchange {self.exchange:g}: give numbers above 0")
 
 
 @dataclass(frozen=True, slots=True)

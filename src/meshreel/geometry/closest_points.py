@@ -50,14 +50,13 @@ class Surface:
     def _oriented(self) -> tuple[Float64[np.ndarray, "F 3"], Float64[np.ndarray, " F"]]:
         return face_normals(self.mesh)  # computed on first use: most callers want points only
 
-    def closest(self, queries: Float64[np.ndarray, "N 3"], guesses: Int32[np.ndarray, " N"] | None = None) -> Hits:
+    def closest(self, queries: Float64[np.ndarray, "N 3"]) -> Hits:
         """Find the closest point of the surface to each query, with its face and barycentric weights.
 
-        Of equally close faces the one with the least number is taken. `guesses` are faces that may be near: they save
-        time and change nothing.
+        Of equally close faces the one with the least number is taken.
         """
         work.count("closest points", len(queries))
-        faces, barycentric = self.tree.closest(np.ascontiguousarray(queries), np.inf, guesses)
+        faces, barycentric = self.tree.closest(np.ascontiguousarray(queries), np.inf)
         return Hits(blend(self.mesh.vertices, self.mesh.faces[faces], barycentric), faces, barycentric)
 
     def distances(self, points: Float64[np.ndarray, "N 3"]) -> Float64[np.ndarray, " N"]:

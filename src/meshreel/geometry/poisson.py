@@ -18,7 +18,6 @@ import numpy as np
 from jaxtyping import Bool, Float64
 from scipy.spatial import cKDTree
 
-from ..errors import InputError
 from ..types import Mesh
 from .decimate import decimate
 from .topology import clean, connected_faces, large_pieces
@@ -37,17 +36,6 @@ class PoissonOptions:
     hole: float = 0.002  # untrusted patches with less than this share of all faces are kept, to avoid pinholes
     vertices: int = 15_000  # the closed surface is decimated to this many before it is trimmed
     smallest: float = 0.01  # connected components with less than this share of the largest one's faces are dropped
-
-    def __post_init__(self) -> None:
-        if self.vertices < 4:
-            raise InputError(f"vertices is {self.vertices}: give at least 4")
-        if not 3 <= self.depth <= 12:
-            raise InputError(f"depth is {self.depth}: give 3 to 12 octree levels (the paper has 9)")
-        if min(self.trim, self.hole) < 0 or not self.reach > 0 or not 0 <= self.smallest < 1:
-            raise InputError(
-                f"trim {self.trim}, hole {self.hole}, reach {self.reach}, smallest {self.smallest}: "
-                "give >= 0, >= 0, > 0 and 0 to below 1"
-            )
 
 
 def reconstruct(

@@ -9,13 +9,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float32, Int32, UInt8
+from jaxtyping import Bool, Float32, Int32
 
 from ..geometry.painted import Painted
 from ..geometry.raycast import Rays
 from ..types import Mesh
 from .color import PEAK, TO_YUV, psnr
-from .render import Crop, Pixels, crop_of
+from .render import Pixels, crop_of
 from .ssim import MARGIN, ssim_view
 from .viewpoints import Camera
 
@@ -60,12 +60,6 @@ class Colored:
         colors = painted.on(hit.faces[seen], hit.barycentric[seen])
         image.reshape(-1, 3)[seen] = np.clip(np.rint(colors), 0, 255) / 255
         return ColorView(image, hit.faces.reshape(shape))
-
-
-def render_colors(mesh: Mesh, camera: Camera) -> UInt8[np.ndarray, "H W 3"]:
-    """Render a mesh with its colours; one without is grey."""
-    view = Colored(mesh).look(Pixels(camera, Crop(0, camera.height, 0, camera.width)))
-    return np.rint(255 * view.colors).astype(np.uint8)
 
 
 def render_errors(original: Mesh, decoded: Mesh, cameras: Sequence[Camera]) -> RenderErrors:

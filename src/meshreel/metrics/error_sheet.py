@@ -19,7 +19,7 @@ from ..errors import InputError
 from ..geometry.cameras import PinholeCamera
 from ..geometry.closest_points import Surface
 from ..io.write import replacing
-from ..types import UP_AXES, Frames, Mesh, check_up
+from ..types import UP_AXES, Frames, Mesh
 from .distance import surface_errors
 from .render import Crop, View, look
 from .surface_samples import used_surface
@@ -45,17 +45,8 @@ class SheetOptions:
     up: str = "y"  # the axis that points up: y, z, -y or -z
 
     def __post_init__(self) -> None:
-        if self.unit not in ("percent", "mm"):
-            raise InputError(f"unit {self.unit!r}: give percent or mm")
-        if not all(0 <= view < 4 for view in self.views) or not self.views:
-            raise InputError(f"views {self.views}: give some of 0 to 3")
-        if not 32 <= self.height <= 4096:
-            raise InputError(f"picture height {self.height}: give 32 to 4096 pixels")
-        check_up(self.up)
         if len({(camera.width, camera.height) for camera in self.cameras}) > 1:
             raise InputError("cameras of several sizes: give a sheet cameras of one size")
-        if not self.limit >= 0:
-            raise InputError(f"limit {self.limit}: give 0 or more")
 
 
 @dataclass(frozen=True, slots=True)

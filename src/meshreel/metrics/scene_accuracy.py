@@ -49,13 +49,6 @@ class SightOptions:
     grazing: float = 65.0  # degrees between ray and normal past which depth is too coarse for surface to be expected
     slack: float = 0.005  # m that a point may lie behind what the ray meets first
 
-    def __post_init__(self) -> None:
-        if min(self.people, self.background) < 1 or not (0 < self.near < math.inf and 0 <= self.slack < math.inf):
-            text = f"{self.people} and {self.background} points, near {self.near:g}, slack {self.slack:g}"
-            raise InputError(f"sight with {text}: give one point at least and metres from 0 on, near above 0")
-        if not 0 < self.grazing <= 90:
-            raise InputError(f"grazing {self.grazing:g}: give degrees above 0, up to 90")
-
 
 @dataclass(frozen=True, slots=True)
 class Sight:

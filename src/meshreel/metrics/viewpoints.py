@@ -65,8 +65,6 @@ class ViewOptions:
     def __post_init__(self) -> None:
         if self.width < 8 or self.height < 8:
             raise InputError(f"view size {self.width} x {self.height}: give at least 8 x 8 pixels")
-        if not 1 <= self.fov <= 170:
-            raise InputError(f"field of view {self.fov}: give 1 to 170 degrees")
         check_up(self.up)
 
 

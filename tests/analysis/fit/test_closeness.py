@@ -7,8 +7,8 @@ import pytest
 
 from meshreel.analysis.fit.closeness import Closeness
 from meshreel.analysis.fit.frame import FrameSurface
-from meshreel.capture.procedural import sliding_sphere
 from meshreel.types import Mesh
+from tests.spheres import sliding_sphere
 
 BALL = Mesh.of(sliding_sphere(1)[0].vertices / 12**0.5, sliding_sphere(1)[0].faces)  # diagonal 1
 RADIUS = float(np.linalg.norm(BALL.vertices[0]))

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from meshreel.analysis.fit.slide import Slide, SlideOptions
-from meshreel.errors import InputError
+from meshreel.analysis.fit.slide import Slide
 
 SIDE = 40
 X, Y = np.meshgrid(np.arange(SIDE), np.arange(SIDE))
@@ -45,9 +44,3 @@ def test_a_template_follows_a_pattern_that_has_moved(light: float) -> None:
 def test_without_texture_or_sight_nothing_moves(paint: Pattern) -> None:
     np.testing.assert_allclose(Slide(FACES, FLAT, Pattern()).to(FLAT, paint), FLAT, atol=0.05)
     np.testing.assert_array_equal(Slide(FACES, FLAT, paint).to(FLAT, paint), FLAT)
-
-
-def test_options_out_of_range_are_refused() -> None:
-    for wrong in ({"blurs": (-1,)}, {"contrast": 0.0}, {"most": 0.0}):
-        with pytest.raises(InputError):
-            SlideOptions(**wrong)  # type: ignore[arg-type]

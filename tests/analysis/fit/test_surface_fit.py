@@ -144,25 +144,6 @@ def test_vertices_that_no_face_uses_keep_their_prediction() -> None:
     assert np.allclose(fit.positions[0][-1], 0.4)
 
 
-@pytest.mark.parametrize(
-    "wrong",
-    [
-        {"gates": (0.01,)},
-        {"smoothing": (1.0, 1.0, 1.0, 0.0)},
-        {"agreement": 1.0},
-        {"anchor": 0.0},
-        {"second_smoothing": -1.0},
-        {"second_smoothing": 0.0},
-        {"components": -1},
-        {"iterations": 0},
-        {"tolerance": 1.0},
-    ],
-)
-def test_options_that_make_no_sense_are_refused(wrong: dict[str, object]) -> None:
-    with pytest.raises(InputError, match="give"):
-        FitOptions(**wrong)  # type: ignore[arg-type]
-
-
 def test_a_key_outside_the_frames_and_missing_predictions_are_refused() -> None:
     template = ball(1)
     with pytest.raises(InputError, match="key 3"):

@@ -231,32 +231,6 @@ def test_the_same_input_gives_the_same_bits() -> None:
     assert one.residuals[1] < 0.004
 
 
-@pytest.mark.parametrize(
-    "wrong",
-    [
-        {"coarse": Stage(20, (0.1,), (1.0,)), "fine": Stage(10, (0.1,), (1.0,))},
-        {"samples": 2},
-        {"neighbours": 0},
-        {"iterations": 0},
-        {"agreement": 1.0},
-        {"damping": 0.0},
-        {"tolerance": 1.0},
-        {"torn": (0.5, 0.0)},
-        {"doubt": -1.0},
-        {"lost": -1.0},
-    ],
-)
-def test_options_that_make_no_sense_are_refused(wrong: dict[str, object]) -> None:
-    with pytest.raises(InputError, match="give"):
-        EmbeddedOptions(**wrong)  # type: ignore[arg-type]
-
-
-def test_stages_that_make_no_sense_are_refused() -> None:
-    for wrong in ((0, (0.1,), (1.0,)), (10, (), ()), (10, (0.1, 0.2), (1.0,)), (10, (-0.1,), (1.0,))):
-        with pytest.raises(InputError, match="give"):
-            Stage(*wrong)
-
-
 def test_keys_and_frames_that_cannot_be_are_refused() -> None:
     mesh = ellipsoid(2)
     with pytest.raises(InputError, match="is empty"):

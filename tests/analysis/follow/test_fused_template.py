@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-import pytest
 
 from meshreel.analysis.fit.frame import FrameSurface
 from meshreel.analysis.follow.embedded import Motion
 from meshreel.analysis.follow.embedded_graph import build_graph, farthest_first
-from meshreel.analysis.follow.fused_template import FusedOptions, fused_mesh
-from meshreel.errors import InputError
+from meshreel.analysis.follow.fused_template import fused_mesh
 from meshreel.geometry.closest_points import Surface, area_samples
 from meshreel.geometry.topology import clean
 from meshreel.types import Mesh
@@ -124,12 +120,3 @@ def test_frames_without_surface_in_common_give_the_empty_mesh() -> None:
     frames = [Mesh(sheet().vertices + (3.0 * n, 0, 0), sheet().faces) for n in range(3)]
     motion = moving(sheet(), 3, 0.0)
     assert fused_mesh(motion, carried(frames, motion), 0.001).is_empty
-
-
-@pytest.mark.parametrize(
-    "wrong",
-    [{"noise": -1.0}, {"noise": 0.0, "spacing": 0.0}, {"reach": 0.0}, {"agree": 0.0}, {"agree": 1.1}, {"smallest": 1}],
-)
-def test_options_out_of_range_are_refused(wrong: dict[str, Any]) -> None:
-    with pytest.raises(InputError, match="give"):
-        FusedOptions(**wrong)

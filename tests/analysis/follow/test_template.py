@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import pytest
 
 from meshreel.analysis.follow import template
 from meshreel.analysis.follow.template import CURVATURE, FEWEST, TemplateOptions, base_mesh, shared_detail
-from meshreel.capture.procedural import sliding_sphere
-from meshreel.errors import InputError
 from meshreel.geometry.closest_points import Surface
 from meshreel.geometry.subdivision import heights, levels_of, refine
 from meshreel.types import Mesh
+from tests.spheres import sliding_sphere
 
 BALL = Mesh.of(sliding_sphere(1, levels=4)[0].vertices / 12**0.5, sliding_sphere(1, levels=4)[0].faces)  # diagonal 1
 ROUGH = Mesh.of(BALL.vertices * (1 + 0.03 * np.sin(14 * BALL.vertices[:, :1])), BALL.faces)
@@ -45,12 +42,6 @@ def test_a_mesh_of_one_face_is_its_own_base(error: float) -> None:
     triangle = Mesh.of([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
     base = base_mesh(triangle, TemplateOptions(error=error))
     np.testing.assert_allclose(np.sort(base.vertices, axis=0), np.sort(triangle.vertices, axis=0), atol=1e-9)
-
-
-@pytest.mark.parametrize("wrong", [{"error": 0.0}, {"error": -1.0}, {"levels": 5}, {"levels": -1}, {"border": 0.0}])
-def test_options_that_cannot_be_are_refused(wrong: dict[str, Any]) -> None:
-    with pytest.raises(InputError, match="template error"):
-        TemplateOptions(**wrong)
 
 
 BASE = Mesh.of(sliding_sphere(1, levels=1)[0].vertices / 12**0.5, sliding_sphere(1, levels=1)[0].faces)

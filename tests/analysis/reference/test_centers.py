@@ -14,7 +14,6 @@ from meshreel.analysis.reference.centers import (
     largest_distances,
     reference_centers,
 )
-from meshreel.errors import InputError
 from meshreel.types import Centers
 
 OPTIONS = ReferenceCenterOptions()
@@ -102,9 +101,3 @@ def test_affinity_is_one_for_a_center_itself_half_at_its_reach_and_knows_no_unit
     assert center_spacing(distances) == 1
     assert a[0, 2] == pytest.approx(0.5)
     np.testing.assert_allclose(affinity(1000 * distances, OPTIONS), a, rtol=1e-5)
-
-
-@pytest.mark.parametrize("bad", [{"max_rounds": -1}, {"tolerance": 1.0}, {"reach": 0.0}])
-def test_bad_options_are_refused(bad: dict[str, float]) -> None:
-    with pytest.raises(InputError, match=next(iter(bad))):
-        ReferenceCenterOptions(**bad)  # type: ignore[arg-type]

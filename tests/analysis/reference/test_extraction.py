@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-import itertools
-
 import numpy as np
-import pytest
 
 from meshreel.analysis.reference.deform import DeformOptions
 from meshreel.analysis.reference.extraction import MDS, Reference, ReferenceOptions, extract_reference, predict
 from meshreel.analysis.reference.fuse import FuseOptions
-from meshreel.errors import InputError
 from meshreel.geometry.closest_points import Surface
 from meshreel.geometry.decimate import has_boundary
 from meshreel.geometry.poisson import PoissonOptions
@@ -136,18 +132,3 @@ def test_any_mesh_in_the_reference_pose_can_be_sent_back() -> None:
     few, many = (predict(reference, mesh, centers, DeformOptions()) for mesh in (reference.mesh, dense))
     assert many.shape == (2, len(dense.vertices), 3)
     assert np.abs(many[:, : few.shape[1]] - few).mean() < 1e-3
-
-
-@pytest.mark.parametrize(
-    ("kind", "bad"),
-    list(
-        itertools.chain(
-            ((ReferenceOptions, name) for name in ("vertices", "trial_vertices", "keys")),
-            ((FuseOptions, name) for name in ("subdivisions", "cover", "cell", "reach", "torn", "smallest")),
-        )
-    ),
-)
-def test_bad_options_are_refused(kind: type, bad: str) -> None:
-    value = type(getattr(kind(), bad))(-1)
-    with pytest.raises(InputError, match=bad):
-        kind(**{bad: value})

@@ -127,16 +127,6 @@ def test_no_frames_an_empty_frame_and_bad_coordinates_are_refused() -> None:
             track_centers(frames, OPTIONS)
 
 
-@pytest.mark.parametrize(
-    ("name", "value"),
-    [("centers", 0), ("samples", 10), ("neighbours", 1), ("reach", 0.0), ("agreement", float("nan")), ("spread", -1.0),
-     ("rigidity", 0.0), ("tolerance", float("inf")), ("rounds", 0), ("seed", -1)],
-)  # fmt: skip
-def test_an_option_out_of_range_is_named(name: str, value: float) -> None:
-    with pytest.raises(InputError, match=name):
-        dataclasses.replace(OPTIONS, **{name: value})
-
-
 def test_core_refuses_indices_out_of_range_and_values_that_are_not_finite() -> None:
     points, owners = np.random.default_rng(0).random((20, 3)), np.zeros(20, np.int32)
     lists = np.array([0, 1, 2], np.int32), np.array([1, 9], np.int32), np.ones(2)

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from meshreel.analysis.scene.background import BackgroundOptions, fuse_background
-from meshreel.errors import InputError
 from meshreel.geometry.closest_points import distances
 from meshreel.geometry.topology import concatenate, face_normals
 from meshreel.types import Mesh
@@ -107,28 +106,3 @@ def test_surface_that_moves_from_frame_to_frame_is_left_out():
     assert fuse_background(frames, VOXEL, BackgroundOptions(steady=9.0)).vertices[:, 2].max() > 0.6
     mesh = fuse_background(frames, VOXEL)
     assert mesh.vertices[:, 2].max() < 0.1 and height_error(mesh) < SIGMA
-
-
-@pytest.mark.parametrize(
-    "wrong",
-    [
-        {"frames": 0},
-        {"steady": 0.0},
-        {"past": -0.1},
-        {"finer": 0.0},
-        {"facing": 1.0},
-        {"seen": 1.0},
-        {"seen": -0.1},
-        {"fragment": -1.0},
-        {"fragment": np.inf},
-        {"coarse": 0.0},
-        {"lattice": 0.0},
-        {"refresh": 0.0},
-        {"refresh": float("nan")},
-        {"coarse": float("nan")},
-    ],
-    ids=str,
-)
-def test_options_that_cannot_be_are_refused(wrong):
-    with pytest.raises(InputError, match="give"):
-        BackgroundOptions(**wrong)

@@ -8,7 +8,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from meshreel.analysis.scene.bodies import BodyOptions, at_most, find_bodies, ring, same_bodies, with_ring
-from meshreel.errors import InputError
 from meshreel.geometry.closest_points import Surface
 from meshreel.geometry.topology import concatenate, part_of
 from meshreel.types import Mesh
@@ -135,12 +134,6 @@ def test_a_body_is_continued_by_that_which_shares_most_with_it():
     assert same_bodies([], [at(0)], CELL, BodyOptions()) == [-1]
     assert same_bodies([at(0)], [], CELL, BodyOptions()) == []
     assert same_bodies([NONE], [NONE], CELL, BodyOptions()) == [-1]
-
-
-@pytest.mark.parametrize("wrong", [{"cell": 0.5}, {"least": -1.0}, {"beside": -0.1}, {"lasts": 0}], ids=str)
-def test_options_that_cannot_be_are_refused(wrong):
-    with pytest.raises(InputError, match="give"):
-        BodyOptions(**wrong)
 
 
 def test_a_ring_surrounds_moving_faces_without_large_ones():

@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 
 from meshreel.analysis.scene.cut import _UNIT, CutOptions, _cut, _hollow, moving_places
 from meshreel.analysis.scene.places import Places, Tally
-from meshreel.errors import InputError
 from meshreel.geometry.voxels import Lattice, neighbours
 
 COUNT = 7
@@ -105,22 +104,3 @@ def test_few_places_seen_free_are_noise_and_small_ones_flicker():
 
 def test_a_place_seen_free_too_seldom_is_no_evidence():
     assert not moving_places(sheet(square(5, 12, 1)), CutOptions(fewest=9, share=0.15)).any()
-
-
-@pytest.mark.parametrize(
-    "wrong",
-    [
-        {"share": 0.0},
-        {"share": 1.0},
-        {"evidence": -1.0},
-        {"still": (-0.1, 0.3)},
-        {"hollow": -1.0},
-        {"fewest": -1},
-        {"reach": 0.0},
-        {"least": -0.1},
-    ],
-    ids=str,
-)
-def test_options_that_cannot_be_are_refused(wrong):
-    with pytest.raises(InputError, match="give"):
-        CutOptions(**wrong)

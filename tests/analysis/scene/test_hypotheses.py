@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from meshreel.analysis.scene.hypotheses import (
-    HypothesisOptions,
     Tracked,
     hypotheses,
     moving_in_views,
@@ -18,7 +16,6 @@ from meshreel.analysis.scene.hypotheses import (
     variation,
 )
 from meshreel.analysis.scene.views import ViewsOptions, place_views
-from meshreel.errors import InputError
 from meshreel.geometry.raycast import Rays
 from tests.analysis.scene.test_views import ROOM, box, together
 from tests.metrics.shapes import moved, sphere
@@ -97,9 +94,3 @@ def test_the_reference_view_is_the_one_that_sees_the_change():
         max(int((np.abs(m[k].depth - moments[0][k].depth) > 0.1).sum()) for m in moments) for k in range(len(views))
     ]
     assert changes[reference_view(moments)] > np.median(changes)
-
-
-@pytest.mark.parametrize("wrong", [{"variation": 0.0}, {"overlap": 1.5}, {"variation": float("nan")}])
-def test_options_that_cannot_be_are_refused(wrong):
-    with pytest.raises(InputError, match="give shares"):
-        HypothesisOptions(**wrong)

@@ -12,7 +12,6 @@ from meshreel.analysis.scene import places as module
 from meshreel.analysis.scene.cut import moving_places
 from meshreel.analysis.scene.places import Observations, Places, PlacesOptions, find_places, states
 from meshreel.analysis.scene.views import place_views
-from meshreel.errors import InputError
 from meshreel.geometry.depth import DepthPicture
 from meshreel.geometry.raycast import Rays
 from meshreel.geometry.voxels import Lattice
@@ -227,13 +226,3 @@ def test_places_behind_which_rays_hit_nothing_are_not_seen_free(views):
     """Where nothing is met, a place is not known to be free."""
     alone = each_frame([ball(FROM), ball(TO)], views)
     assert alone.free.mean() < 0.2
-
-
-@pytest.mark.parametrize(
-    "wrong",
-    [{"frames": 1}, {"rate": -1.0}, {"rate": float("inf")}, {"past": 0.0}, {"past": float("nan")}, {"views": 0}],
-    ids=str,
-)
-def test_options_that_cannot_be_are_refused(wrong):
-    with pytest.raises(InputError, match="give"):
-        PlacesOptions(**wrong)

@@ -13,9 +13,8 @@ from meshreel.analysis.scene import labelling
 from meshreel.analysis.scene.labelling import ByPlace, without_islands
 from meshreel.analysis.scene.masks import Masker
 from meshreel.analysis.scene.places import PlacesOptions
-from meshreel.analysis.scene.segmentation import SegmentOptions, segment, segment_by
+from meshreel.analysis.scene.segmentation import segment, segment_by
 from meshreel.analysis.scene.settle import Rest
-from meshreel.errors import InputError
 from meshreel.geometry.topology import components, concatenate, face_normals
 from meshreel.geometry.voxels import Lattice
 from meshreel.types import Mesh, MeshList
@@ -225,11 +224,3 @@ def test_masks_become_labels_and_unseen_faces_take_those_of_their_neighbours():
     assert masker.observed == [0, 1]
     wanted = ROLLING[1].vertices[ROLLING[1].faces].mean(axis=1)[:, 0] > 1.2
     assert (found.moving(1, ROLLING[1]) == wanted).mean() > 0.97
-
-
-@pytest.mark.parametrize(
-    "wrong", [{"threshold": 0.0}, {"threshold": 1.1}, {"island": -1.0}, {"island": np.inf}], ids=str
-)
-def test_options_that_cannot_be_are_refused(wrong):
-    with pytest.raises(InputError, match="give"):
-        SegmentOptions(**wrong)

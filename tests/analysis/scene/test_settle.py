@@ -18,7 +18,6 @@ from meshreel.encoder.options import SceneOptions
 from meshreel.encoder.parts import take_apart
 from meshreel.encoder.progress import Stages
 from meshreel.encoder.static import encode_static
-from meshreel.errors import InputError
 from meshreel.format.budget import CostlyError
 from meshreel.geometry.closest_points import Surface
 from meshreel.geometry.derived_sequences import captured
@@ -157,9 +156,3 @@ def test_surface_that_settles_without_a_background_is_a_whole_background(scene: 
 
 def distance_to(mesh: Mesh, point: np.ndarray) -> float:
     return float(np.linalg.norm(Surface(mesh).closest(point[None]).points - point))
-
-
-@pytest.mark.parametrize("wrong", [{"rest": 0.0}, {"share": 0.0}, {"least": -1.0}])
-def test_options_out_of_range_are_refused(wrong: dict[str, float]) -> None:
-    with pytest.raises(InputError, match="change of the room"):
-        SettleOptions(**wrong)

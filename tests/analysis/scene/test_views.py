@@ -95,20 +95,3 @@ def test_empty_frames_are_passed_over_and_none_but_empty_ones_refused():
     for frames in ([], [Mesh.empty()]):
         with pytest.raises(InputError, match="has a surface"):
             place_views(frames, SMALL)
-
-
-@pytest.mark.parametrize(
-    "wrong",
-    [
-        {"count": 0},
-        {"width": 4},
-        {"fov": 5.0},
-        {"fov": float("nan")},
-        {"places": 1},
-        {"reach": 0.5},
-        {"samples": 1},
-    ],
-)
-def test_options_that_cannot_be_are_refused(wrong):
-    with pytest.raises(InputError, match="give"):
-        ViewsOptions(**wrong)

@@ -7,7 +7,7 @@ import pytest
 
 from meshreel.coding.appearance.colors import ColorCodingOptions, ColoredMesh, decode_colors, encode_colors
 from meshreel.coding.colored import Canvas
-from meshreel.errors import FormatError, InputError
+from meshreel.errors import FormatError
 from meshreel.geometry.topology import subdivide_midpoint
 from tests.metrics.shapes import sphere
 
@@ -83,10 +83,3 @@ def test_damaged_colors_are_refused() -> None:
         decode_colors(follows, [SHAPE], np.zeros((7, 3)))
     with pytest.raises(FormatError):  # a mesh of other vertices
         decode_colors(data, [ColoredMesh(BALL, LEVELS, FRAMES, SHAPE.vertices + 1)])
-
-
-def test_options_out_of_range_are_refused() -> None:
-    with pytest.raises(InputError, match="color step 3"):
-        ColorCodingOptions(step=3.0)
-    with pytest.raises(InputError, match="price 2"):
-        ColorCodingOptions(price=2.0)

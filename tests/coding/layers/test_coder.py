@@ -205,21 +205,6 @@ def test_places_that_do_not_fit_are_refused() -> None:
             encode_layers(BALL, bad)
 
 
-WRONG = {
-    "step": (0.0, 2.0),
-    "curvatures": ((), (256,)),
-    "detail_ratios": ((), (1e-9,)),
-    "price": (-1.0, 1.0),
-    "tangential": (0.0, 1.1),
-}
-
-
-@pytest.mark.parametrize(("name", "value"), [(name, value) for name, values in WRONG.items() for value in values])
-def test_the_error_for_an_invalid_option_names_it(name: str, value: object) -> None:
-    with pytest.raises(InputError):
-        LayerCodingOptions(**{name: value})
-
-
 def test_the_bytes_of_a_payload_are_listed_by_purpose() -> None:
     parts = payload_bytes_by_purpose(CODED.payload)
     assert list(parts) == ["base mesh", "base motion", "level 1", "level 2", "group head"]

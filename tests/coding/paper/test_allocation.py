@@ -1,14 +1,12 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 
 from meshreel.coding import entropy, klt
 from meshreel.coding.paper import laplacian
 from meshreel.coding.paper.allocation import WORTH, DisplacementOptions, allocate, alternatives
 from meshreel.coding.paper.displacements import decode_displacements, encode_displacements
 from meshreel.coding.steps import step_of
-from meshreel.errors import InputError
 
 from .test_displacements import BASE, FIELD, moving, rms
 from .test_laplacian import icosahedron
@@ -64,25 +62,6 @@ def test_a_price_on_bits_saves_more_bytes_than_a_coarser_step_of_equal_error() -
     for step in np.geomspace(5e-4, 2e-3, 7):
         free_size, free_error = coded(float(step), 0.0)
         assert free_error > error or free_size > size
-
-
-@pytest.mark.parametrize(
-    ("values", "named"),
-    [
-        ({"step": 0.0}, "step"),
-        ({"step": float("nan")}, "step"),
-        ({"step": 2.0}, "step"),
-        ({"basis_size": -1}, "basis size"),
-        ({"price": -1.0}, "price"),
-        ({"dead_zone": 0.3}, "dead zone"),
-        ({"anchor_count": -1}, "anchors"),
-        ({"anchor_weight": 0}, "weight"),
-        ({"anchor_weight": 256}, "weight"),
-    ],
-)
-def test_options_name_the_value_that_is_wrong(values: dict[str, float], named: str) -> None:
-    with pytest.raises(InputError, match=named):
-        DisplacementOptions(**values)
 
 
 def test_the_kept_number_of_anchors_is_the_cheaper_one() -> None:

@@ -13,7 +13,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float64, Int64
 
-from ...errors import InputError
 from ...geometry import strict
 from ...geometry.color_views import ColorPicture, ColorViews, sampled
 from ...geometry.topology import face_normals, subdivide_midpoint
@@ -44,11 +43,6 @@ class CalibrationOptions:
     halvings: tuple[int, ...] = (2, 1, 0)  # of the pictures' sides, coarse to fine
     rounds: int = 6  # for each of them
     most_side: int = 1280  # pixels of the finest pictures; larger ones are halved (guess)
-
-    def __post_init__(self) -> None:
-        if min(self.frames, self.places, self.rounds, self.most_side) < 1 or min(self.halvings, default=-1) < 0:
-            text = f"calibration with halvings {self.halvings}, {self.frames} frames, {self.places} places"
-            raise InputError(f"{text}, {self.rounds} rounds, {self.most_side} pixels: give whole numbers from 1 on")
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,7 +16,6 @@ from typing import Any
 import numpy as np
 from jaxtyping import Bool, Float64, Int32
 
-from ...errors import InputError
 from ...geometry.painted import Paint
 from ...geometry.strict import inverses
 from ...geometry.subdivision import subdivide
@@ -35,11 +34,6 @@ class SlideOptions:
     blurs: tuple[int, ...] = (12, 4, 1, 1)  # of the luma over neighbours there, in each round
     contrast: float = 12.0  # luma an edge there, 0 to 255: less than this is followed less
     most: float = 0.7  # edges of the template, that a vertex moves in a round
-
-    def __post_init__(self) -> None:
-        if min(self.blurs, default=0) < 0 or self.contrast <= 0 or self.most <= 0 or not 0 <= self.levels <= 4:
-            text = f"blurs {self.blurs}, contrast {self.contrast}, most {self.most}, levels {self.levels}"
-            raise InputError(f"{text}: give >= 0, > 0, > 0 and 0 to 4")
 
 
 class Slide:

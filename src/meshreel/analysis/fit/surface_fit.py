@@ -49,26 +49,6 @@ class FitOptions:
     iterations: int = 40  # largest number of conjugate-gradient iterations per round
     tolerance: float = 1e-3  # relative residual at which they stop
 
-    def __post_init__(self) -> None:
-        if len(self.gates) != len(self.smoothing) or not self.gates or min(self.gates + self.smoothing) <= 0:
-            raise InputError(
-                f"gates {self.gates}, smoothing {self.smoothing}: give each round a positive value of both"
-            )
-        if self.strides is not None and (len(self.strides) != len(self.gates) or min(self.strides) < 1):
-            raise InputError(f"strides {self.strides}: give each round one of at least 1")
-        if not -1 <= self.agreement < 1:
-            raise InputError(f"agreement {self.agreement} is a cosine: give at least -1 and less than 1")
-        if min(self.anchor, self.pull) <= 0 or self.components < 0:
-            raise InputError(
-                f"anchor {self.anchor}, pull {self.pull}, components {self.components}: give > 0, > 0, >= 0"
-            )
-        if self.second_smoothing is not None and not self.second_smoothing > 0:
-            raise InputError(
-                f"second smoothing {self.second_smoothing:g}: give > 0, or None for the last of `smoothing`"
-            )
-        if self.iterations < 1 or not 0 <= self.tolerance < 1:
-            raise InputError(f"{self.iterations} iterations, tolerance {self.tolerance}: give at least 1, and 0 to 1")
-
     def rounds(self, noise: float) -> tuple[Rounds, Rounds]:
         """Return the rounds of both fits to frames at this RMS distance from the truth: noise makes them stiffer."""
         gates, smoothing, strides, stiffer = self.gates, self.smoothing, self.strides or (1,) * len(self.gates), 1.0

@@ -42,12 +42,6 @@ class Stage:
     gates: tuple[float, ...]  # largest distances of pairs, in diagonals
     rigidity: tuple[float, ...]  # squared row weights of an edge relative to the data of a node
 
-    def __post_init__(self) -> None:
-        if self.nodes < 1:
-            raise InputError(f"nodes is {self.nodes}; give at least 1")
-        if len(self.gates) != len(self.rigidity) or not self.gates or min(self.gates + self.rigidity) <= 0:
-            raise InputError(f"gates {self.gates}, rigidity {self.rigidity}: give each round a positive value of both")
-
 
 @dataclass(frozen=True, slots=True)
 class EmbeddedOptions:
@@ -64,22 +58,6 @@ class EmbeddedOptions:
     damping: float = 0.01  # squared row weight of a node's step relative to its data
     iterations: int = 60  # largest number of conjugate-gradient iterations per round
     tolerance: float = 1e-2  # relative residual at which they stop
-
-    def __post_init__(self) -> None:
-        if self.coarse.nodes > self.fine.nodes:
-            raise InputError(
-                f"{self.coarse.nodes} coarse nodes and {self.fine.nodes} fine ones: give fewer coarse ones"
-            )
-        if self.samples < 3 or self.neighbours < 1 or self.iterations < 1:
-            raise InputError(
-                f"samples {self.samples}, neighbours {self.neighbours}, iterations {self.iterations}: give >= 3, 1, 1"
-            )
-        if not -1 <= self.agreement < 1:
-            raise InputError(f"agreement {self.agreement} is a cosine: give at least -1 and less than 1")
-        if not (self.damping > 0 and 0 <= self.tolerance < 1):
-            raise InputError(f"damping {self.damping}, tolerance {self.tolerance}: give > 0, and 0 to 1")
-        if not (min(self.torn) > 0 and min(self.doubt, self.lost) >= 0):
-            raise InputError(f"torn {self.torn}, doubt {self.doubt}, lost {self.lost}: give > 0, >= 0, >= 0")
 
     def limits(self, noise: float) -> EmbeddedOptions:
         """Return options with the limits for frames at this RMS distance from the truth."""

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Int64
 
-from ...errors import InputError
 from ...geometry import work
 from ...geometry.poisson import PoissonOptions, drop_small, reconstruct
 from ...geometry.topology import clean, edge_lengths, vertex_normals
@@ -34,15 +33,6 @@ class FusedOptions:
     reach: float = 1.5  # cells: a frame agrees with surface up to this distance from its own
     agree: float = 0.18  # smallest share of the frames that must agree, and at least two of them
     smallest: float = 0.02  # connected bits with less than this share of the largest one's faces are dropped
-
-    def __post_init__(self) -> None:
-        if min(self.noise, self.spacing) < 0 or self.noise + self.spacing == 0 or not self.reach > 0:
-            raise InputError(
-                f"fusion noise {self.noise:g}, spacing {self.spacing:g}, reach {self.reach:g}: "
-                "give >= 0, >= 0, one of them > 0, and > 0"
-            )
-        if not 0 < self.agree <= 1 or not 0 <= self.smallest < 1:
-            raise InputError(f"agree {self.agree:g}, smallest {self.smallest:g}: give shares in (0, 1] and [0, 1)")
 
 
 def fused_mesh(

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float64, Int32
 
-from ...errors import InputError
 from ...geometry.closest_points import Surface
 from ...geometry.decimate import BOUNDARY_WEIGHT, decimate
 from ...geometry.strict import rounded
@@ -36,13 +35,6 @@ class TemplateOptions:
     error: float = rounded(0.00088 * (0.0018 / 0.0012) ** 0.55)
     levels: int = 2  # midpoint subdivisions of the base
     border: float = BOUNDARY_WEIGHT  # weight of open borders in the decimation
-
-    def __post_init__(self) -> None:
-        if self.error <= 0 or not 0 <= self.levels <= 4 or not 0 < self.border < np.inf:
-            raise InputError(
-                f"template error {self.error:g}, {self.levels} levels, border {self.border:g}: "
-                "give > 0, 0 to 4, and > 0"
-            )
 
 
 def base_mesh(key: Mesh, options: TemplateOptions, noise: float = 0.0) -> Mesh:

@@ -14,7 +14,6 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float32, Float64
 
-from ...errors import InputError
 from ...geometry.rigid import fit_rigid
 from ...geometry.strict import determinants, eigen, exp, norm, products
 from ...types import Centers
@@ -30,14 +29,6 @@ class ReferenceCenterOptions:
     tolerance: float = 2e-4  # stop when a round lowers the stress by less than this share
     reach: float = 2.0  # affinity is 1/2 at this many median distances to the nearest center (eq. 6's sigma)
     seed: int = 0  # seed of the eigenvector iteration's start
-
-    def __post_init__(self) -> None:
-        if self.max_rounds < 0:
-            raise InputError(f"max_rounds is {self.max_rounds}: give 0 or more rounds")
-        if not 0 <= self.tolerance < 1:
-            raise InputError(f"tolerance is {self.tolerance}: give a share of the stress from 0 to below 1")
-        if not self.reach > 0:
-            raise InputError(f"reach is {self.reach}: give a positive multiple of the center spacing")
 
 
 @dataclass(frozen=True, slots=True)

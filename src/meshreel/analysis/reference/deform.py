@@ -15,7 +15,6 @@ import numpy as np
 from jaxtyping import Float32, Float64, Int64
 from scipy.spatial import cKDTree
 
-from ...errors import InputError
 from ...geometry.rigid import apply, blend, fit_rigid, from_rigid
 from ...geometry.strict import exp
 from ...geometry.topology import unique_edges, vertex_normals
@@ -32,14 +31,6 @@ class DeformOptions:
     falloff: float = 1.0  # a weight falls to 1/e at this many center spacings beyond the point's nearest center
     guard_choices: int = 6  # nearest centers that a vertex may take in place of an unrelated one; 1: the paper's rule
     guard_rounds: int = 2  # passes over the mesh that replace unrelated centers
-
-    def __post_init__(self) -> None:
-        if self.neighbours < 1:
-            raise InputError(f"neighbours is {self.neighbours}: give at least 1 center (8 is usual)")
-        if not self.falloff > 0:
-            raise InputError(f"falloff is {self.falloff}: give a positive multiple of the center spacing")
-        if self.guard_choices < 1 or self.guard_rounds < 0:
-            raise InputError(f"guard_choices {self.guard_choices}, guard_rounds {self.guard_rounds}: give >= 1, >= 0")
 
 
 @dataclass(frozen=True, slots=True)

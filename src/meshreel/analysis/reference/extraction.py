@@ -14,7 +14,6 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from jaxtyping import Float64
 
-from ...errors import InputError
 from ...geometry.closest_points import Surface
 from ...types import Centers, Mesh
 from ..fit.frame import FrameSurface
@@ -42,12 +41,6 @@ class ReferenceOptions:
     centers: ReferenceCenterOptions = field(default_factory=ReferenceCenterOptions)
     deform: DeformOptions = field(default_factory=DeformOptions)
     fuse: FuseOptions = field(default_factory=FuseOptions)
-
-    def __post_init__(self) -> None:
-        if self.vertices < 4 or self.trial_vertices < 4:
-            raise InputError(f"vertices {self.vertices}, trial_vertices {self.trial_vertices}: give at least 4")
-        if self.keys < 1:
-            raise InputError(f"keys is {self.keys}: give at least 1 frame to try")
 
     def fewer_trials(self) -> ReferenceOptions:
         """Return these options with one key frame less to try, for a part of a group that was tried as a whole."""

@@ -14,7 +14,6 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from jaxtyping import Bool, Float32, Float64, Int32, Int64
 
-from ...errors import InputError
 from ...geometry.decimate import decimate
 from ...geometry.holes import close_holes
 from ...geometry.poisson import PoissonOptions, drop_small, reconstruct, thin_out
@@ -49,15 +48,6 @@ class FuseOptions:
     smallest: float = 0.01  # connected bits with less than this share of the largest one's faces are dropped
     hole: float = 0.08  # holes with a shorter perimeter, which cuts leave, are closed; share of the mesh's diagonal
     poisson: PoissonOptions = field(default_factory=PoissonOptions)
-
-    def __post_init__(self) -> None:
-        if self.subdivisions < 0 or self.cover < 0 or not 0 <= self.smallest < 1:
-            raise InputError(
-                f"subdivisions {self.subdivisions}, cover {self.cover}, smallest {self.smallest}: "
-                "give >= 0, >= 0 and 0 to below 1"
-            )
-        if not (self.cell > 0 and self.reach > 0 and self.torn > 1):
-            raise InputError(f"cell {self.cell}, reach {self.reach}, torn {self.torn}: give > 0, > 0 and > 1")
 
 
 @dataclass(frozen=True, slots=True)

@@ -45,18 +45,6 @@ class TrackOptions:
     def __post_init__(self) -> None:
         if self.centers < 1:
             raise InputError(f"centers is {self.centers}; give at least 1")
-        if self.samples < 4 * self.centers:
-            raise InputError(f"samples is {self.samples}; give at least 4 per center, {4 * self.centers}")
-        if self.neighbours < FEWEST_NEIGHBOURS:
-            raise InputError(f"neighbours is {self.neighbours}; give at least {FEWEST_NEIGHBOURS}")
-        for name in ("reach", "agreement", "spread", "rigidity", "tolerance"):
-            value = getattr(self, name)
-            if not (np.isfinite(value) and value > 0):
-                raise InputError(f"{name} is {value}; give a positive number")
-        if self.rounds < 1:
-            raise InputError(f"rounds is {self.rounds}; give at least 1")
-        if self.seed < 0:
-            raise InputError(f"seed is {self.seed}; give 0 or more")
 
 
 def track_centers(frames: Sequence[Mesh], options: TrackOptions) -> Centers:

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float64, Int64
 
-from ...errors import InputError
 from ...geometry.closest_points import Surface
 from ...geometry.topology import without_fragments
 from ...geometry.tsdf import SIDE, extract, fill_grid
@@ -38,20 +37,6 @@ class BackgroundOptions:
     coarse: float = 0.75  # RMS distance from the fused surface that decimation may cost, in RMS noise of a frame
     lattice: float = 0.67  # spacing of the lattice, in RMS noise of a frame
     refresh: float | None = None  # s between two copies of the background in the file; None: one copy
-
-    def __post_init__(self) -> None:
-        if not (self.coarse > 0 and self.lattice > 0 and (self.refresh is None or self.refresh > 0)):
-            raise InputError(
-                f"background: coarse {self.coarse:g}, lattice {self.lattice:g}, refresh {self.refresh} s: give > 0"
-            )
-        if self.frames < 1 or not 0 <= self.seen < 1 or not 0 <= self.fragment < np.inf or not self.steady > 0:
-            raise InputError(
-                f"background of {self.frames} frames, seen {self.seen:g}, fragment {self.fragment:g}, steady "
-                f"{self.steady:g}: give >= 1, 0 to below 1, >= 0, and > 0"
-            )
-        if not 0 <= self.past <= 1 or not 0.1 <= self.finer <= 1 or not 0 <= self.facing < 1:
-            text = f"background past {self.past:g}, finer {self.finer:g}, facing {self.facing:g}"
-            raise InputError(f"{text}: give 0 to 1, 0.1 to 1, and 0 to below 1")
 
     def least(self, count: int) -> int:
         """Return how many of `count` frames must have surface at a voxel."""

@@ -14,7 +14,6 @@ import numpy as np
 from jaxtyping import Bool, Float64, Int64
 from scipy.spatial import cKDTree
 
-from ...errors import InputError
 from ...geometry.closest_points import Surface
 from ...geometry.topology import (
     concatenate,
@@ -40,13 +39,6 @@ class BodyOptions:
     least: float = 0.1  # m^2: pieces that never reach this area are bits
     lasts: int = 5  # frames: bits that are present in at least this many are a body of their own
     beside: float = 0.5  # m: other bits at most this far from a body join it; those farther off are dropped
-
-    def __post_init__(self) -> None:
-        if not self.cell >= 1 or not min(self.least, self.beside) >= 0 or self.lasts < 1:
-            raise InputError(
-                f"bodies: cell {self.cell:g}, least {self.least:g} m^2, lasts {self.lasts}, beside {self.beside:g} m: "
-                "give >= 1, >= 0, >= 1, >= 0"
-            )
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,7 +17,6 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import breadth_first_order, maximum_flow
 from scipy.spatial import cKDTree
 
-from ...errors import InputError
 from ...geometry.strict import exp
 from ...geometry.topology import linked
 from .places import Places
@@ -37,15 +36,6 @@ class CutOptions:
     reach: float = 0.8  # m: moving places lie no farther than this from places that are seen free
     fewest: int = 60  # smaller connected sets of places that are seen free are noise
     least: float = 0.32  # m^2: connected moving places that cover less area over time are flicker
-
-    def __post_init__(self) -> None:
-        if not 0 < self.share < 1 or min(self.evidence, *self.still, self.hollow, self.fewest) < 0:
-            raise InputError(
-                f"share {self.share:g}, evidence {self.evidence:g}, still {self.still}, hollow {self.hollow:g}, "
-                f"fewest {self.fewest}: give a share in (0, 1), and >= 0 for the others"
-            )
-        if not (self.reach > 0 and self.least >= 0):
-            raise InputError(f"reach {self.reach:g} m, least {self.least:g} m^2: give > 0 and >= 0")
 
 
 def moving_places(places: Places, options: CutOptions = CutOptions()) -> Bool[np.ndarray, " P"]:

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Int32
 
-from ...errors import InputError
 from ...geometry.cameras import PinholeCamera
 from ...geometry.raycast import Seen
 from ...geometry.strict import inverse, products
@@ -34,11 +33,6 @@ class HypothesisOptions:
 
     variation: float = 0.1  # smallest variation over time of a moving object's mask
     overlap: float = 0.3  # smallest intersection over union of two masks of one object
-
-    def __post_init__(self) -> None:
-        if not (0 < self.variation <= 1 and 0 < self.overlap <= 1):
-            text = f"variation {self.variation:g}, overlap {self.overlap:g}"
-            raise InputError(f"{text}: give shares above 0 and at most 1")
 
 
 @dataclass(frozen=True, slots=True)

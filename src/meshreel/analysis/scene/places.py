@@ -18,7 +18,6 @@ import numpy as np
 from jaxtyping import Bool, Float32, Float64, Int32, Int64, UInt16
 from scipy.ndimage import minimum_filter
 
-from ...errors import InputError
 from ...geometry.cameras import PinholeCamera
 from ...geometry.depth import DepthPicture
 from ...geometry.raycast import Rays
@@ -40,11 +39,6 @@ class PlacesOptions:
     rate: float = 4.0  # 1/s, lowest rate of inspected frames: a body present only between two of them is not carved
     past: float = 2.0  # cells by which a view must see past the middle of a place
     views: int = 2  # smallest number of views that must see past it
-
-    def __post_init__(self) -> None:
-        if self.frames < 2 or not 0 <= self.rate < math.inf or not self.past > 0 or self.views < 1:
-            text = f"{self.frames} frames, {self.rate:g} per second, past {self.past:g}, {self.views} views"
-            raise InputError(f"{text}: give >= 2, >= 0, > 0, >= 1")
 
     def chosen(self, count: int, frame_rate: float) -> list[int]:
         """Return the numbers of the frames to inspect in a sequence of `count` frames."""

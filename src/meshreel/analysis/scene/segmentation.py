@@ -45,10 +45,6 @@ class SegmentOptions:
     island: float = 0.01  # m^2: connected faces with less area take the label of the faces around them
     cameras: tuple[PinholeCamera, ...] = ()  # views of one picture size; none: they are placed by `views`
 
-    def __post_init__(self) -> None:
-        if not 0 < self.threshold <= 1 or not 0 <= self.island < np.inf:
-            raise InputError(f"threshold {self.threshold:g}, island {self.island:g} m^2: give (0, 1] and >= 0")
-
 
 def segment(frames: MeshSequence, options: SegmentOptions = SegmentOptions(), report: Report = silent) -> ByPlace:
     """Segment a scene by geometric change over the whole sequence; `options.places` selects the inspected frames.

@@ -13,7 +13,6 @@ import numpy as np
 from jaxtyping import Bool, Int32, Int64
 from scipy.spatial import cKDTree
 
-from ...errors import InputError
 from .cut import connected
 from .places import Places, Stay
 
@@ -29,13 +28,6 @@ class SettleOptions:
     rest: float = 10.0  # s of uninterrupted rest before or after the change: people do not stand still for as long
     share: float = 0.8  # smallest share of the inspected frames in that time that have surface at the place
     least: float = 0.15  # m^2, smallest area that changes together
-
-    def __post_init__(self) -> None:
-        if not self.rest > 0 or not 0 < self.share <= 1 or not self.least >= 0:
-            raise InputError(
-                f"a change of the room: rest {self.rest:g} s, share {self.share:g}, least {self.least:g} m^2: "
-                "give > 0, (0, 1], >= 0"
-            )
 
 
 @dataclass(frozen=True, slots=True)

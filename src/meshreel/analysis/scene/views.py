@@ -43,19 +43,6 @@ class ViewsOptions:
     frames: int = 4  # frames inspected, spread evenly over those given
     samples: int = 2048  # points sampled on the surface of each inspected frame
 
-    def __post_init__(self) -> None:
-        if not 1 <= self.count <= 1000:
-            raise InputError(f"{self.count} views: give 1 to 1000")
-        if not (8 <= self.width <= 4096 and 8 <= self.height <= 4096):
-            raise InputError(f"views of {self.width} x {self.height} pixels: give 8 to 4096 a side")
-        if not 10 <= self.fov <= 150:
-            raise InputError(f"field of view {self.fov:g}: give 10 to 150 degrees")
-        if not 1 <= self.reach <= 10:
-            raise InputError(f"reach {self.reach:g}: give 1 to 10 boxes")
-        if not (2 <= self.places <= 10 and 1 <= self.frames <= 16 and 16 <= self.samples <= 8192):
-            text = f"{self.places} places, {self.frames} frames, {self.samples} samples"
-            raise InputError(f"{text}: give 2 to 10, 1 to 16 and 16 to 8192")
-
 
 def place_views(
     meshes: Sequence[Mesh] | Frames, options: ViewsOptions = ViewsOptions(), up: Up = "y"

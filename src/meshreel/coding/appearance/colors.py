@@ -14,14 +14,14 @@ from itertools import accumulate
 import numpy as np
 
 from ... import _core
-from ...errors import FormatError, InputError
+from ...errors import FormatError
 from ...format.layout import CodedField, ColorsLevel, Form, Origin, VertexColors
 from ...format.records import pack, unpack
 from ...shapes import Float64, UInt8
 from ...types import Mesh
 from ..layers.fields import Rate, encode_field
 from ..layers.graph import connectivity, hierarchy
-from ..steps import RUNGS, rung_of, step_of
+from ..steps import rung_of
 
 SIBLINGS = 24  # weight of the siblings' mean, 64ths: with 8 or 40, 1 to 3 % more bytes on basketball_player
 CHROMA = 64  # what colour differences are multiplied by, 64ths (guess)
@@ -44,10 +44,6 @@ class ColorCodingOptions:
     step: float = 0.0909  # quantiser step, in units of the whole range
     finer: float = 0.65  # step of the base, on which all others rest, in steps (guess)
     price: float = 0.12  # price of a bit, in squared steps (guess)
-
-    def __post_init__(self) -> None:
-        if not step_of(RUNGS - 1) <= self.step * self.finer <= 1 or not 0 <= self.price < 1:
-            raise InputError(f"color step {self.step}, price {self.price}: give a share of the range, and 0 to below 1")
 
 
 @dataclass(frozen=True, slots=True)

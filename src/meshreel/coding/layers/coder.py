@@ -23,7 +23,7 @@ from ...shapes import Float, Float64, Int32
 from ...types import Mesh, Placement
 from ..mesh import check_growth, check_step, decode_mesh
 from ..reference_mesh import CodedReference
-from ..steps import RUNGS, rung_of, step_of
+from ..steps import rung_of
 from .details import Shown, decode_last, decode_last_scalars, decode_level, encode_level
 from .fields import Rate
 from .graph import Connectivity, connectivity
@@ -44,20 +44,6 @@ class LayerCodingOptions:
     curvatures: tuple[int, ...] = (48, 58)  # lift of the levels' midpoints, 64ths; the last for all further levels
     price: float = 0.08  # price of a bit, in squared steps
     tangential: float = 0.4  # weight of squared errors of the base's vertices along the surface, 0 to 1
-
-    def __post_init__(self) -> None:
-        finest, coarsest = step_of(RUNGS - 1), step_of(0)
-        if not self.detail_ratios or min(self.detail_ratios) <= 0:
-            raise InputError(f"detail ratios {self.detail_ratios}: give one or more, above 0")
-        if not self.curvatures or not all(0 <= share <= 255 for share in self.curvatures):
-            raise InputError(f"curvatures {self.curvatures}: give one or more 64ths, 0 to 255")
-        for ratio in (1.0, *self.detail_ratios):
-            if not finest <= self.step * ratio <= coarsest:
-                raise InputError(f"step {self.step} x {ratio}: give a fraction in {finest:.2g} .. {coarsest:g}")
-        if not 0 <= self.price < 1:
-            raise InputError(f"price {self.price}: give squared steps per bit, in [0, 1)")
-        if not 0 < self.tangential <= 1:
-            raise InputError(f"tangential {self.tangential}: give a weight in (0, 1]")
 
     def curvature(self, level: int) -> int:
         """Return the lift of a level's midpoints, 64ths."""

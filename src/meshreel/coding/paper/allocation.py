@@ -17,7 +17,7 @@ from ...geometry.strict import log2
 from ...geometry.topology import components
 from ...shapes import Float64, Int32, Int64
 from .. import entropy, klt
-from ..steps import RUNGS, rung_of, step_of
+from ..steps import rung_of, step_of
 from . import quantize
 from .laplacian import System
 
@@ -39,19 +39,8 @@ class DisplacementOptions:
     dead_zone: float | None = None  # plain rounding, up from this fraction of a step, .5 to 1; None: shaped rounding
 
     def __post_init__(self) -> None:
-        finest, coarsest = step_of(RUNGS - 1), step_of(0)
-        if not finest <= self.step <= coarsest:
-            raise InputError(f"step {self.step}: give a fraction of the diagonal in {finest:.2g} .. {coarsest:g}")
         if self.basis_size is not None and self.basis_size < 0:
             raise InputError(f"basis size {self.basis_size}: give a number of components, 0 or more")
-        if not 0 <= self.price < 10:
-            raise InputError(f"price {self.price}: give squared steps per bit, 0 to 10")
-        if self.dead_zone is not None and not 0.5 <= self.dead_zone < 1:
-            raise InputError(f"dead zone {self.dead_zone}: give a fraction of a step in [0.5, 1), or None")
-        if (self.anchor_count or 0) < 0 or not 1 <= self.anchor_weight <= 255:
-            raise InputError(
-                f"{self.anchor_count} anchors of weight {self.anchor_weight}: give 0 or more, weighing 1 to 255"
-            )
 
 
 def alternatives(
