@@ -84,7 +84,7 @@ STUDY = Study(
         Sweep("meshreel", {"quality": (20.0, 35.0, 50.0, 65.0, 80.0)}, OURS | {"texture": 1024}, only=(PERSON,)),
         *(
             Sweep("meshreel", {"color_quality": COLORS}, options | {"preset": "best", "quality": FIFTY}, only=(PERSON,))
-            for options in ({"color": "texture", "texture": 1024}, {"color": "vertices"})
+            for options in (Options(color="texture", texture=1024), Options(color="vertices"))
         ),
         Sweep("meshreel", {"quality": (50.0, 80.0)}, OURS, only=(DEMO,)),
         Sweep("meshreel", {"quality": (35.0, 50.0)}, OURS, only=(ROOM,)),
