@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import meshreel
+from meshreel.format.layout import ChunkKind
 from meshreel.io.sequence import open_sequence
 from tests.cli.conftest import FILE, SCENE, failed
 from tests.encoder.test_appearance import BODY, textured, written
@@ -149,3 +150,18 @@ def test_textures_are_kept_or_named_in_one_line(run, tmp_path, monkeypatch, colo
     assert (
         open_sequence(tmp_path / "bare")[0].texture is None and open_sequence(tmp_path / "bare")[0].colors is not None
     )
+
+
+@pytest.mark.parametrize("kind", [ChunkKind.COLORS, ChunkKind.ATLAS, ChunkKind.PICTURES])
+def test_damaged_colors_cost_colors_and_the_exit_code(run, tmp_path, colored, kind):
+    data = bytearray(colored.read_bytes())
+    with meshreel.open(bytes(data)) as video:
+        chunk = next(chunk for chunk in video.reader.chunks if chunk.kind == kind)
+        payload = video.reader.read_chunk(chunk.number)
+    data[bytes(data).index(payload) + len(payload) // 2] ^= 255
+    (tmp_path / "bad.reel").write_bytes(data)
+    said = run("decode", tmp_path / "bad.reel", "-o", tmp_path / "out", "--format", "obj")
+    assert failed(said, "written without their colours", "copy the file again")
+    found, wanted = open_sequence(tmp_path / "out"), meshreel.open(colored)
+    assert len(found) == len(wanted)
+    assert found[0].texture is None and len(found[0].faces) == len(wanted[0].faces)

@@ -15,7 +15,7 @@ from meshreel.coding.appearance.pictures import encode_pictures
 from meshreel.decoder.video import Video
 from meshreel.errors import FormatError
 from meshreel.format import budget
-from meshreel.format.layout import ChunkKind, Pictures
+from meshreel.format.layout import ChunkKind, Pictures, VideoCodec
 from meshreel.format.records import pack, unpack_all
 from tests.golden import GOLDEN
 
@@ -90,6 +90,7 @@ class Counting:
         lambda layers: (encode_pictures((b"", *packets(layers[0]).packets[1:])),),
         lambda layers: (encode_pictures(packets(layers[0]).packets[::-1]),),
         lambda layers: (b"".join(layers) + b"\0",),
+        lambda layers: (pack(replace(packets(layers[0]), codec=VideoCodec.H264)),),
     ],
 )
 def test_damaged_pictures_of_a_group_cost_textures_only(change: Callable[[tuple[bytes, ...]], tuple[bytes, ...]]):

@@ -5,8 +5,10 @@ from __future__ import annotations
 import io
 import json
 from base64 import b64encode
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -110,7 +112,10 @@ def test_khronos_finds_nothing_wrong_with_a_texture(tmp_path: Path) -> None:
     assert validate(tmp_path / "m.glb")[0]["messages"] == []
 
 
-@pytest.mark.parametrize("kind, one", [("uchar", "255"), ("ushort", "65535"), ("float", "1.0"), ("float", "255.0")])
+@pytest.mark.parametrize(
+    "kind, one",
+    [("uchar", "255"), ("ushort", "65535"), ("int", "255"), *(("float", one) for one in ("1.0", "1.02", "255.0"))],
+)
 def test_ply_colors_of_all_kinds_are_8_bits(tmp_path: Path, kind: str, one: str) -> None:
     names = "".join(f"property {kind} {name}\n" for name in ("red", "green", "blue"))
     head = f"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n{names}"
@@ -209,6 +214,56 @@ def test_a_glb_has_its_texture(tmp_path: Path) -> None:
     np.testing.assert_array_equal(mesh.texture.pixels, PICTURE)
     np.testing.assert_allclose(mesh.vertices[mesh.faces], obj.vertices[obj.faces])
     np.testing.assert_allclose(mesh.uv, obj.visual.uv[obj.faces], atol=1e-6)
+
+
+def rewritten(data: bytes, change: Callable[[dict[str, Any]], None]) -> bytes:
+    """A GLB with another description of its scene."""
+    size = int.from_bytes(data[12:16], "little")
+    tree = json.loads(data[20 : 20 + size])
+    change(tree)
+    text = json.dumps(tree).encode()
+    text += b" " * (-len(text) % 4)
+    total = len(data) - size + len(text)
+    return (
+        data[:8]
+        + total.to_bytes(4, "little")
+        + len(text).to_bytes(4, "little")
+        + data[16:20]
+        + text
+        + data[20 + size :]
+    )
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda tree: tree["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"].update(texCoord=1),
+        lambda tree: tree["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"].update(
+            extensions={"KHR_texture_transform": {"scale": [2, 2]}}
+        ),
+        lambda tree: tree["textures"][0].pop("source"),
+    ],
+)
+def test_a_texture_that_would_lie_elsewhere_is_named_and_left_out(
+    tmp_path: Path, change: Callable[[dict[str, Any]], None]
+) -> None:
+    trimesh.load(put(tmp_path, mtl=SKIN.replace("-s 1 1 1 ", "")), process=False).export(tmp_path / "m.glb")
+    (tmp_path / "m.glb").write_bytes(rewritten((tmp_path / "m.glb").read_bytes(), change))
+    found = read_mesh(tmp_path / "m.glb")
+    assert found.mesh.texture is None and any("a texture" in words for words in found.dropped)
+
+
+def test_colors_of_a_glb_that_are_not_of_its_vertices_are_an_error(tmp_path: Path) -> None:
+    colors = np.zeros(BALL.vertices.shape, np.uint8)
+    write_mesh(Mesh(np.array(BALL.vertices), np.array(BALL.faces, np.int32), colors), tmp_path / "m.glb")
+
+    def fewer(tree: dict[str, Any]) -> None:
+        at = tree["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"]
+        tree["accessors"][at]["count"] -= 2
+
+    (tmp_path / "m.glb").write_bytes(rewritten((tmp_path / "m.glb").read_bytes(), fewer))
+    with pytest.raises(InputError, match="COLOR_0 of shape"):
+        read_mesh(tmp_path / "m.glb")
 
 
 @pytest.mark.parametrize("uri", ["data", "file"])

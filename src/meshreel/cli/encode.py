@@ -284,7 +284,7 @@ def _scene_row(summary: Summary, scene: SceneSummary, frame_rate: float) -> dict
     """Return the bytes of a scene by content; `other` is header and index."""
     sizes = {"background": scene.background}
     for track in range(scene.tracks):
-        sizes[f"track {track}"] = sum(group.size for group in summary.groups if group.track == track)
+        sizes[f"track {track}"] = sum(group.size + group.colors for group in summary.groups if group.track == track)
     sizes["other"] = summary.size - sum(sizes.values())
     return {
         "tracks": scene.tracks,

@@ -77,6 +77,8 @@ def command(
         common.warn([f"{file}: has no textures to export"])
     elif texture and target.suffix.lower() == ".glb":
         common.warn([f"{target}: glTF cannot change a picture in time: each mesh has the texture of its first frame"])
+    elif texture and video.reader.has_background and only != "moving":
+        common.warn([f"{target}: the background has its first picture in all frames: its shadows stand still"])
     size = target.stat().st_size
     row = {"output": str(target), "format": target.suffix[1:].lower(), "bytes": size}
     row |= {"frames": len(chosen), "frame_rate": video.frame_rate, "meshes": count}

@@ -223,8 +223,17 @@ class _Looks:
     def colors(
         self, frames: range, points: Float64[np.ndarray, "N 3"], normals: Float64[np.ndarray, "N 3"]
     ) -> tuple[UInt8[np.ndarray, "N 3"], Bool[np.ndarray, " N"]]:
-        """Return the usual colours of places over some frames, and which of them are known."""
-        return median_colors(points, normals, map(self._paint, self._some(frames, STILL_FRAMES)))
+        """Return the usual colours of places over some frames, and which of them are known.
+
+        What some frame shows away from steps in depth is taken from such frames: at steps, who stands there shines in.
+        """
+        some = self._some(frames, STILL_FRAMES)
+        if self._views is None:
+            return median_colors(points, normals, map(self._paint, some))
+        colors, known = median_colors(points, normals, (self._views.at(number, clear=True) for number in some))
+        rest = np.flatnonzero(~known)
+        colors[rest], known[rest] = median_colors(points[rest], normals[rest], map(self._paint, some))
+        return colors, known
 
     def moment(
         self, number: int, points: Float64[np.ndarray, "N 3"], normals: Float64[np.ndarray, "N 3"]

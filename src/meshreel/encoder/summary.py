@@ -21,7 +21,7 @@ class GroupSummary:
     key: int | None = None  # the frame of the sequence whose surface the others follow
     track: int = 0  # the body
     share: float = 1.0  # of the vertices of its frames that the track has, where there is no background
-    colors: int = 0  # bytes of the colours of its vertices, beyond `size`
+    colors: int = 0  # bytes of its colours and pictures, beyond `size`
     lost_colors: bool = False  # its frames have colours that a reader would refuse
 
 

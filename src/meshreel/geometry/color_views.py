@@ -124,9 +124,12 @@ class View:
         self._from_step = distance_transform_edt(~steps) * self._shrink
 
     def weights(
-        self, points: Float64[np.ndarray, "N 3"], normals: Float64[np.ndarray, "N 3"]
+        self, points: Float64[np.ndarray, "N 3"], normals: Float64[np.ndarray, "N 3"], at_step: float = 0.0
     ) -> Float64[np.ndarray, " N"]:
-        """Return how well the picture shows places: the cube of the cosine of the view, less near steps; 0: not."""
+        """Return how well the picture shows places: the cube of the cosine of the view, less near steps; 0: not.
+
+        `at_step` is the share of the weight that is left at a step.
+        """
         positions, depth = self.picture.project(points)
         to_eye = self.picture.camera.eye - points
         cosine = np.einsum("nd,nd->n", normals, to_eye) / np.maximum(np.linalg.norm(to_eye, axis=1), 1e-12)
@@ -141,7 +144,7 @@ class View:
         if self._clear:
             near = np.floor(near)
         weights = np.zeros(len(points))
-        weights[rows] = np.where(hidden, 0.0, cosine[rows] ** 3 * near)
+        weights[rows] = np.where(hidden, 0.0, cosine[rows] ** 3 * np.maximum(near, at_step))
         return weights
 
     def colors(self, points: Float64[np.ndarray, "N 3"], chosen: Bool[np.ndarray, " N"]) -> Float64[np.ndarray, "N 3"]:

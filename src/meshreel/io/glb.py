@@ -20,6 +20,7 @@ from .polygons import Dropped, Polygons, Unreadable
 _DROPS = {"NORMAL": "normals", "JOINTS": "skinning"}
 # Of trimesh: what begins with _ it hands on as it is; colours of 16 bits it would read by their lower byte.
 _COLORS, _HIDDEN = b'"COLOR_0"', b'"_OLOR_0"'
+_TRANSFORM, _FLOAT = "KHR_texture_transform", 5126
 _DRACO = "KHR_draco_mesh_compression"
 _DENSEST = 64  # values per byte (guess): no mesh compression comes near
 
@@ -39,10 +40,10 @@ def parse_glb(data: bytes) -> Polygons:
         placed = [(scene.graph[node][0], scene.geometry[scene.graph[node][1]]) for node in scene.graph.nodes_geometry]
         # A scale of 0 hides a node until an animation shows it.
         parts = [part for part in placed if isinstance(part[1], trimesh.Trimesh) and part[0][:3, :3].any()]
-        pictures = _pictures(tree)
-        picture = _picture(data, tree, min(pictures)) if len(pictures) == 1 else None
-        why = "several materials" if len(pictures) > 1 else "a texture (it is in another file)"
-        lost = frozenset({why} if pictures and picture is None else ())
+        pictures, unknown = _pictures(tree)
+        picture = _picture(data, tree, min(pictures)) if len(pictures) == 1 and not unknown else None
+        why = unknown or ("several materials" if len(pictures) > 1 else "a texture (it is in another file)")
+        lost = frozenset({why} if (pictures or unknown) and picture is None else ())
         return _joined(parts, _dropped(tree) | lost, picture)
     except Exception as error:  # a foreign parser may raise anything for a damaged file
         raise Unreadable(f"GLB cannot be read ({type(error).__name__}: {error})") from None
@@ -87,18 +88,26 @@ def _dropped(tree: dict[str, Any]) -> Dropped:
     return frozenset(dropped)
 
 
-def _pictures(tree: dict[str, Any]) -> set[int]:
-    """Return the numbers of the images that are base colours of triangles."""
-    found = set[int]()
+def _pictures(tree: dict[str, Any]) -> tuple[set[int], str]:
+    """Return the numbers of the images that are base colours of triangles, and what of these is not understood."""
+    found, unknown = set[int](), ""
     for primitive in (one for mesh in tree["meshes"] for one in mesh.get("primitives", [])):
-        if "material" in primitive:
-            shine = tree["materials"][primitive["material"]].get("pbrMetallicRoughness", {})
-            if "baseColorTexture" in shine:
-                texture = tree["textures"][shine["baseColorTexture"]["index"]]
-                found.add(
-                    texture.get("source", texture.get("extensions", {}).get("EXT_texture_webp", {}).get("source"))
-                )
-    return found
+        material = tree["materials"][primitive["material"]] if "material" in primitive else {}
+        shine = material.get("pbrMetallicRoughness", {})
+        if "baseColorTexture" not in shine:
+            continue
+        use, places = shine["baseColorTexture"], primitive.get("attributes", {}).get("TEXCOORD_0")
+        texture = tree["textures"][use["index"]]
+        source = texture.get("source", texture.get("extensions", {}).get("EXT_texture_webp", {}).get("source"))
+        if source is None:
+            unknown = "a texture (in a coding that is not read)"
+        elif use.get("texCoord", 0) or _TRANSFORM in use.get("extensions", {}):
+            unknown = "a texture (with places of its own)"
+        elif places is not None and tree["accessors"][places]["componentType"] != _FLOAT:
+            unknown = "a texture (with places that are no floats)"
+        else:
+            found.add(source)
+    return found, unknown
 
 
 def _picture(data: bytes, tree: dict[str, Any], image: int) -> Texture | None:
@@ -144,6 +153,9 @@ def _colors(parts: list[Any]) -> UInt8[np.ndarray, "V 3"] | None:
     found = [next((part.vertex_attributes[n] for n in names if n in part.vertex_attributes), None) for part in parts]
     if all(values is None for values in found):
         return None
+    for part, values in zip(parts, found, strict=True):
+        if values is not None and (np.ndim(values) != 2 or len(values) != len(part.vertices) or values.shape[1] < 3):
+            raise ValueError(f"COLOR_0 of shape {np.shape(values)} for {len(part.vertices)} vertices")
     colors = [
         np.full((len(part.vertices), 3), GREY, np.uint8) if values is None else from_linear(np.asarray(values)[:, :3])
         for part, values in zip(parts, found, strict=True)

@@ -87,10 +87,6 @@ def checked(polygons: Polygons) -> Loaded:
     if len(sizes) == 0:
         loose = frozenset({"vertices without faces"} if len(vertices) else ())
         return Loaded(Mesh.empty(), polygons.dropped | loose)
-    if polygons.colors is not None and polygons.colors.shape != vertices.shape:
-        raise Unreadable(
-            f"colors of shape {polygons.colors.shape} for {len(vertices)} vertices, expected three of each"
-        )
     triangles = triangulate(polygons)
     mesh = Mesh.of(vertices, corners[triangles])
     if polygons.uv is None or polygons.texture is None:

@@ -37,6 +37,13 @@ def packets(crf: int = 20, codec: VideoCodec = VideoCodec.AV1) -> list[bytes]:
     return found + encoder.finish()
 
 
+def test_h264_that_is_cut_short_is_refused_and_not_concealed() -> None:
+    first, *_ = packets(codec=VideoCodec.H264)
+    for damaged in (first[:-3], first[: len(first) // 2], first[: len(first) // 2] + bytes(len(first) // 2)):
+        with pytest.raises(FormatError, match="picture"):
+            VideoDecoder(96, 64, VideoCodec.H264).decode(damaged)
+
+
 def test_planes_are_bt_709_in_limited_range() -> None:
     colors = np.array([[0, 0, 0], [255, 255, 255], [255, 0, 0], [0, 255, 0], [0, 0, 255]], np.uint8)
     for color, wanted in zip(

@@ -63,7 +63,7 @@ def projected(mesh: Mesh, views: ColorViews) -> tuple[Layout, float]:
     best, weight = np.full(len(mesh.faces), -1), np.zeros(len(mesh.faces))
     places, left, height = np.zeros((len(mesh.faces), 3, 2)), 0, 0
     for number, view in enumerate(views.views):
-        seen, camera = view.weights(middles, normals), view.picture.camera
+        seen, camera = view.weights(middles, normals, at_step=0.1), view.picture.camera
         corners = view.picture.project(mesh.vertices)[0][mesh.faces]
         size = [camera.width, camera.height]
         with np.errstate(invalid="ignore"):
