@@ -83,9 +83,9 @@ def distortion_of(entry: Mapping[str, Any]) -> tuple[float, ...]:
     """Return the five coefficients of an entry; missing ones are 0. Raises InputError for others."""
     given = entry.get("distortion", [])
     good = isinstance(given, list) and len(given) <= 5
-    numbers = [float(k) for k in given if isinstance(k, (int, float)) and not isinstance(k, bool)] if good else []
+    numbers = [k for k in given if isinstance(k, (int, float)) and not isinstance(k, bool)] if good else []
     if not good or len(numbers) < len(given) or not all(abs(k) <= MOST_DISTORTION for k in numbers):
         raise InputError(f"distortion is {given!r:.60}; give up to five numbers, k1 k2 p1 p2 k3, as OpenCV has them")
     if any(math.isnan(k) for k in numbers):
         raise InputError("distortion has a number that is not finite; calibrate the camera again")
-    return (*numbers, *[0.0] * (5 - len(numbers)))
+    return (*map(float, numbers), *[0.0] * (5 - len(numbers)))

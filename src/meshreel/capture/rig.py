@@ -346,7 +346,7 @@ def _color_camera(folder: Path, entry: Any, beside: dict[str, Any]) -> ColorCame
 def _json(path: Path) -> dict[str, Any]:
     try:
         record = json.loads(read_file(path).decode("utf-8-sig"))  # some editors begin with a mark
-    except (OSError, UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise InputError(f"{path}: cannot be read ({error}); give JSON") from None
     if not isinstance(record, dict):
         raise InputError(f"{path}: is not a JSON object; {_SEE}")

@@ -86,8 +86,8 @@ def texture_of_materials(mesh: Place, files: tuple[str, ...], used: tuple[str, .
     known, dropped = dict[str, str | None](), set[str]()
     for name in files:
         try:
-            text = read_file(_beside(mesh, name)).decode("utf-8", "replace")
-        except OSError:
+            text = read_file(_beside(mesh, name)).decode("utf-8-sig", "replace")  # some editors begin with a mark
+        except (OSError, ValueError):  # of a name with a null
             dropped.add(f"materials ({name} cannot be read)")
             continue
         dropped |= _parse_materials(text, known)
@@ -97,9 +97,16 @@ def texture_of_materials(mesh: Place, files: tuple[str, ...], used: tuple[str, .
     if not pictures or (picture := pictures.pop()) is None:
         return None, frozenset(dropped)
     place = _beside(mesh, picture)
-    if isinstance(place, Path) and not place.exists():
+    if isinstance(place, Path) and not _exists(place):
         return None, frozenset(dropped | {f"a texture ({picture} is not there)"})
     return picture_texture(place), frozenset(dropped)
+
+
+def _exists(place: Path) -> bool:
+    try:
+        return place.exists()
+    except (OSError, ValueError):  # of a name too long, or with a null
+        return False
 
 
 def _beside(mesh: Place, name: str) -> Place:

@@ -88,7 +88,7 @@ STUDY = Study(
         ),
         Sweep("meshreel", {"quality": (50.0, 80.0)}, OURS, only=(DEMO,)),
         Sweep("meshreel", {"quality": (35.0, 50.0)}, OURS, only=(ROOM,)),
-        Sweep("meshreel", {"quality": (50.0, 80.0)}, OURS | {"texture": 1024}, only=(WALKER,)),
+        Sweep("meshreel", {"quality": (50.0,)}, OURS | {"texture": 1024}, only=(WALKER,)),
         Sweep("colored_draco", {"bits": (5, 8)}, {"qp": 10}, only=(PERSON,)),
         Sweep("colored_draco", {"quality": (25, 40, 60)}, {"color": "avif", "bits": 11}, only=(PERSON,), small=SMALL),
         Sweep("colored_draco", {"quality": (54, 42, 30)}, {"color": "av1", "bits": 11}, only=(PERSON,), small=SMALL),

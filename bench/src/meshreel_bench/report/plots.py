@@ -22,6 +22,7 @@ from .values import curve_of, floors, rated, value
 
 WIDTH = 17 / 2.54  # inches
 DPI = 130
+LONG = 24  # letters of a sequence's title that have room beside another (guess)
 _HEIGHT = 2.3  # inches, of a line of panels
 _LINE = 0.155  # inches, of the legend, from one to the next
 _LEGEND_COLUMNS = 3
@@ -63,7 +64,9 @@ def curves_figure(rows: Sequence[Row], measures: Sequence[Measure], looks: Mappi
         own = [row for row in rows if row.point.sequence == sequence]
         for panel, measure in zip(panels, measures, strict=True):
             _draw(panel, own, measure, looks, rate)
-        panels[0].set_title(f"{sequence}, {rated(own)[0].frames} frames", loc="left", fontweight="bold")
+        name = f"{sequence}, {rated(own)[0].frames} frames"
+        above = 13.0 if len(name) > LONG else None  # points: over what stands at the right
+        panels[0].set_title(name, loc="left", fontweight="bold", pad=above)
     handles = {
         name: line for panel in lines.flat for line, name in zip(*panel.get_legend_handles_labels(), strict=True)
     }
