@@ -28,7 +28,7 @@ MOST_CRF = 63  # of SVT
 ENCODERS = {VideoCodec.AV1: "libsvtav1", VideoCodec.H264: "libx264"}
 DECODERS = {VideoCodec.AV1: "libdav1d", VideoCodec.H264: "h264"}
 X264 = (  # no picture waits for another; one key picture; BT.709, limited range; start codes. Without
-    # `cpu-independent`, one encode of some 500 has other bytes than the rest (x264 164, with AVX).
+    # `cpu-independent`, one encode of some 500 has other bytes than the rest (measured).
     "threads=1:cpu-independent=1:keyint=infinite:scenecut=0:bframes=0:rc-lookahead=0:sync-lookahead=0:repeat-headers=1:annexb=1"
     ":colorprim=bt709:transfer=bt709:colormatrix=bt709:fullrange=off"
 )
