@@ -25,7 +25,7 @@ DPI = 130
 LONG = 24  # letters of a sequence's title that have room beside another (guess)
 _HEIGHT = 2.3  # inches, of a line of panels
 _LINE = 0.155  # inches, of the legend, from one to the next
-_LEGEND_COLUMNS = 3
+WIDE = 34  # letters of a curve's title of which three do not fit a line (guess)
 _SETTINGS: dict[Any, Any] = {
     **dict.fromkeys(("font.size", "axes.titlesize", "axes.labelsize", "legend.fontsize"), 7.0),
     "xtick.labelsize": 6.5,
@@ -53,9 +53,11 @@ def curves_figure(rows: Sequence[Row], measures: Sequence[Measure], looks: Mappi
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    sequences = list(dict.fromkeys(row.point.sequence for row in rated(rows)))
-    names = {curve_of(row) for row in rated(rows)}
-    legend_lines = -(-len(names) // _LEGEND_COLUMNS)
+    shown = [row for row in rated(rows) if any(value(row, measure.key) is not None for measure in measures)]
+    sequences = list(dict.fromkeys(row.point.sequence for row in shown))
+    names = {curve_of(row) for row in shown}
+    columns = 2 if max(len(title(name)) for name in names) > WIDE else 3
+    legend_lines = -(-len(names) // columns)
     size = (WIDTH, _HEIGHT * len(sequences) + 0.3 + _LINE * legend_lines)
     figure = Figure(figsize=size, layout="constrained", facecolor="white")
     FigureCanvasAgg(figure)
@@ -65,13 +67,13 @@ def curves_figure(rows: Sequence[Row], measures: Sequence[Measure], looks: Mappi
         for panel, measure in zip(panels, measures, strict=True):
             _draw(panel, own, measure, looks, rate)
         name = f"{sequence}, {rated(own)[0].frames} frames"
-        above = 13.0 if len(name) > LONG else None  # points: over what stands at the right
-        panels[0].set_title(name, loc="left", fontweight="bold", pad=above)
+        name += "\n" * (len(name) > LONG)  # over what stands at the right
+        panels[0].set_title(name, loc="left", fontweight="bold")
     handles = {
         name: line for panel in lines.flat for line, name in zip(*panel.get_legend_handles_labels(), strict=True)
     }
     legend = figure.legend(
-        list(handles.values()), list(handles), loc="outside lower center", ncols=_LEGEND_COLUMNS, frameon=False
+        list(handles.values()), list(handles), loc="outside lower center", ncols=columns, frameon=False
     )
     for label in legend.get_texts():
         if label.get_text() == title(BEST):
