@@ -160,7 +160,6 @@ def test_coordinates_around_a_million_keep_their_millimetres():
     [
         ({"qp": 1}, "qp 1"),
         ({"qp": 17}, "qp 17"),
-        ({"vertices": 3}, "vertices 3"),
         ({"group_size": 0}, "group size"),
         ({"centers": 0}, "centers"),
         ({"bits": 8}, "bits"),
