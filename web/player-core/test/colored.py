@@ -52,7 +52,7 @@ class Painter:
         ends = tuple(accumulate(layer.size for layer in chunk.layers))
         needed = [self._numbers[other] for other in chunk.depends_on]
         if chunk.kind == ChunkKind.STATIC:
-            self._numbers[chunk.number] = self._writer.add_static(payload, ends, needed)
+            self._numbers[chunk.number] = self._writer.add_static(payload, needed)
             self._add_colors(chunk, self._background(chunk, payload))
             return
         place = (chunk.first_frame, chunk.frame_count)
