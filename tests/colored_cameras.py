@@ -16,6 +16,7 @@ from meshreel.capture.procedural import grid_of_frame
 from meshreel.capture.rig import DepthCamera
 from meshreel.capture.simulated_color import ColorSensorOptions, Painter, SimulatedColor
 from meshreel.capture.solid_colors import WALKER, person_colors
+from meshreel.geometry.cameras import looking_at
 from meshreel.geometry.color_views import ColorPicture
 from meshreel.types import Mesh, MeshSequence
 from tests.metrics.shapes import sphere
@@ -86,13 +87,7 @@ def around(sensor: ColorSensorOptions, count: int = 6, width: int = 512, seed: i
     for number in range(count):
         angle = 2 * math.pi * number / count
         eye = np.array([2.6 * math.sin(angle), 1.6 if number % 2 else 0.8, 2.6 * math.cos(angle)])
-        forward = np.array([0.0, 0.9, 0.0]) - eye
-        forward /= np.linalg.norm(forward)
-        right = np.cross(forward, [0.0, 1.0, 0.0])
-        right /= np.linalg.norm(right)
-        pose = np.eye(4)
-        pose[:3, :3] = np.stack([right, np.cross(forward, right), forward], axis=1)
-        pose[:3, 3] = eye
+        pose = looking_at(eye, np.array([0.0, 0.9, 0.0]))
         focal, center = 0.8 * height / 1.75 * 2.6, ((width - 1) / 2, (height - 1) / 2)
         depth = DepthCamera(f"c{number}", width, height, (focal, focal), center, pose)
         found.append(SimulatedColor.beside(depth, sensor, random))

@@ -16,6 +16,7 @@ import numpy as np
 from jaxtyping import Bool, Float64, UInt16
 
 from ..errors import InputError
+from ..geometry.cameras import looking_at
 from ..geometry.raycast import Rays
 from ..geometry.topology import concatenate, face_normals
 from ..io.depth_pictures import write_depth
@@ -88,13 +89,7 @@ def corner_cameras(
         eye = middle.copy()
         eye[across] += math.sqrt(2) * half[across] * (math.cos(angle), math.sin(angle))
         eye[up] = low[up] + 0.9 * (high[up] - low[up])
-        forward = target - eye
-        forward /= np.linalg.norm(forward)
-        right = np.cross(forward, np.eye(3)[up])
-        right /= np.linalg.norm(right)
-        pose = np.eye(4)
-        pose[:3, :3] = np.stack([right, np.cross(forward, right), forward], axis=1)
-        pose[:3, 3] = eye
+        pose = looking_at(eye, target, up)
         name, focal, center = f"corner{number}", (417.0, 452.0), (319.5, 287.5)
         cameras.append(DepthCamera(name, 640, 576, focal, center, pose, depth_range=(0.25, 8.0)))
     return tuple(cameras)

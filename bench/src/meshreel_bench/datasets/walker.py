@@ -17,6 +17,7 @@ from meshreel.capture.rig import RIG, DepthCamera
 from meshreel.capture.simulated_color import ColorSensorOptions, shade_of
 from meshreel.capture.simulated_rig import SceneFrame, SensorOptions, simulate_rig
 from meshreel.capture.solid_colors import WALKER, person_colors
+from meshreel.geometry.cameras import looking_at
 from meshreel.geometry.closest_points import Surface
 from meshreel.geometry.color_views import ColorPicture, ColorViews
 from meshreel.geometry.topology import face_normals
@@ -88,13 +89,7 @@ def _camera(number: int, count: int) -> DepthCamera:
     """Return one of the cameras on a circle of 2.6 m; every second one stands higher."""
     angle = 2 * math.pi * number / count
     eye = np.array([2.6 * math.sin(angle), 1.6 if number % 2 else 0.8, 2.6 * math.cos(angle)])
-    forward = np.array([0.0, 0.9, 0.0]) - eye
-    forward /= np.linalg.norm(forward)
-    right = np.cross(forward, [0.0, 1.0, 0.0])
-    right /= np.linalg.norm(right)
-    pose = np.eye(4)
-    pose[:3, :3] = np.stack([right, np.cross(forward, right), forward], axis=1)
-    pose[:3, 3] = eye
+    pose = looking_at(eye, np.array([0.0, 0.9, 0.0]))
     width, height = 512, 640
     focal = 0.8 * height / 1.75 * 2.6  # the person fills four fifths of the height
     return DepthCamera(f"c{number}", width, height, (focal, focal), ((width - 1) / 2, (height - 1) / 2), pose)
