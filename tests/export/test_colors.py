@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from dataclasses import replace
 from pathlib import Path
 
@@ -140,7 +141,8 @@ def test_parts_with_textures_of_their_own_keep_them_side_by_side() -> None:
     )
     bare, weights = sphere(levels=0), np.full((1, 3), 1 / 3)
     whole = concatenate([large, bare, small])
-    assert whole.texture.pixels.shape == (64, 128, 3)
+    assert whole.texture.shape == whole.texture.pixels.shape[:2] == (64, 128)
+    assert pickle.loads(pickle.dumps(whole)).texture.shape == (64, 128)  # it is sent to other processes
     painted, first = Painted(whole), len(BALL.faces) + len(bare.faces)
     for face in range(0, len(BALL.faces), 7):
         for mesh, start in ((large, 0), (small, first)):

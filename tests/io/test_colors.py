@@ -22,6 +22,7 @@ from meshreel.io.color import from_linear, to_linear
 from meshreel.io.glb_file import cut_at_seams
 from meshreel.io.meshes import read_mesh
 from meshreel.io.pictures import pack_picture, read_picture
+from meshreel.io.polygons import eight_bits
 from meshreel.io.sequence import open_sequence
 from meshreel.io.write import write_mesh
 from meshreel.types import GREY, Mesh, Texture
@@ -123,6 +124,11 @@ def test_ply_colors_of_all_kinds_are_8_bits(tmp_path: Path, kind: str, one: str)
     text = f"{head}element face 1\nproperty list uchar int vertex_indices\nend_header\n{rows}"
     (tmp_path / "m.ply").write_text(text)
     assert read_mesh(tmp_path / "m.ply").mesh.colors.tolist() == [[255, 0, 0], [0, 255, 0], [0, 0, 255]]
+
+
+@pytest.mark.parametrize("order", "<>")
+def test_colors_of_16_bits_have_the_same_scale_in_either_byte_order(order: str) -> None:
+    assert eight_bits(np.array([[0, 300, 65535]], f"{order}u2")).tolist() == [[0, 1, 255]]
 
 
 def test_linear_light_of_gltf_and_srgb_are_inverses() -> None:

@@ -224,7 +224,7 @@ def _counted(count: int, what: str) -> str:
 def _joined(meshes: list[Mesh]) -> Mesh:
     """Return all meshes as one, read-only as each of them is."""
     mesh = concatenate(meshes)
-    for array in (mesh.vertices, mesh.faces, mesh.colors):
+    for array in (mesh.vertices, mesh.faces, mesh.colors, mesh.uv):
         if array is not None:
             array.flags.writeable = False
     return mesh

@@ -7,40 +7,37 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import partial
+from itertools import accumulate
+from typing import TypeAlias
 
 import numpy as np
 
 from ..shapes import Float32, UInt8
 from ..types import GREY, Texture
 
+Places: TypeAlias = Float32[np.ndarray, "_ 3 2"]  # of the corners of some faces, as `Mesh.uv`
 
-def side_by_side(textures: Sequence[Texture]) -> Texture:
-    """Return one texture with all of these, from left to right at its top; itself where there is one."""
+
+def side_by_side(textures: Sequence[Texture], places: Sequence[tuple[int, Places]]) -> tuple[Texture, list[Places]]:
+    """Return one texture with all of these, from left to right at its top; and places in some of them, in it.
+
+    Where there is one texture, it is returned itself, and so are the places.
+    """
     if len(textures) == 1:
-        return textures[0]
-    return Texture(partial(_picture, tuple(textures)), _size(textures))
+        return textures[0], [uv for _, uv in places]
+    shapes = tuple(texture.shape for texture in textures)
+    height, width = max(rows for rows, _ in shapes), sum(columns for _, columns in shapes)
+    lefts, found = [0, *accumulate(columns for _, columns in shapes)], list[Places]()
+    for number, uv in places:
+        rows, columns = shapes[number]
+        scale, origin = np.array([columns / width, rows / height]), np.array([lefts[number] / width, 1 - rows / height])
+        found.append((origin + scale * uv).astype(np.float32))
+    return Texture(partial(_picture, tuple(textures), (height, width)), (height, width)), found
 
 
-def moved(
-    uv: Float32[np.ndarray, "F 3 2"], texture: Texture, textures: Sequence[Texture]
-) -> Float32[np.ndarray, "F 3 2"]:
-    """Return places in one of several textures as places in all of them side by side."""
-    if len(textures) == 1:
-        return uv
-    (height, width), (rows, columns), at = _size(textures), texture.shape, textures.index(texture)
-    left = sum(one.shape[1] for one in textures[:at])
-    scale, origin = np.array([columns / width, rows / height]), np.array([left / width, 1 - rows / height])
-    return (origin + scale * uv).astype(np.float32)
-
-
-def _size(textures: Sequence[Texture]) -> tuple[int, int]:
-    return max(one.shape[0] for one in textures), sum(one.shape[1] for one in textures)
-
-
-def _picture(textures: Sequence[Texture]) -> UInt8[np.ndarray, "H W 3"]:
-    whole, left = np.full((*_size(textures), 3), GREY, np.uint8), 0
-    for texture in textures:
-        rows, columns = texture.shape
-        whole[:rows, left : left + columns] = texture.pixels
-        left += columns
+def _picture(textures: Sequence[Texture], size: tuple[int, int]) -> UInt8[np.ndarray, "H W 3"]:
+    whole, left = np.full((*size, 3), GREY, np.uint8), 0
+    for pixels in (texture.pixels for texture in textures):
+        whole[: len(pixels), left : left + pixels.shape[1]] = pixels
+        left += pixels.shape[1]
     return whole

@@ -13,7 +13,7 @@ import numpy as np
 from .. import _core
 from ..shapes import Bool, Float64, Int32, Int64
 from ..types import GREY, Mesh
-from .textures import moved, side_by_side
+from .textures import side_by_side
 
 
 def unique_edges(faces: Int32[np.ndarray, "F 3"]) -> tuple[Int64[np.ndarray, "E 2"], Int64[np.ndarray, "F 3"]]:
@@ -133,18 +133,21 @@ def concatenate(meshes: Sequence[Mesh]) -> Mesh:
         v, f = v + len(mesh.vertices), f + len(mesh.faces)
     colors = [np.full(mesh.vertices.shape, GREY, np.uint8) if mesh.colors is None else mesh.colors for mesh in meshes]
     textures = [*dict.fromkeys(mesh.texture for mesh in meshes if mesh.uv is not None and mesh.texture is not None)]
-    places = (
-        np.full((len(mesh.faces), 3, 2), np.nan, np.float32)
-        if mesh.uv is None or mesh.texture is None
-        else moved(mesh.uv, mesh.texture, textures)
-        for mesh in meshes
-    )
+    texture, places = None, list[np.ndarray]()
+    if textures:
+        pairs = [
+            (0, np.full((len(mesh.faces), 3, 2), np.nan, np.float32))
+            if mesh.uv is None or mesh.texture is None
+            else (textures.index(mesh.texture), mesh.uv)
+            for mesh in meshes
+        ]
+        texture, places = side_by_side(textures, pairs)
     return Mesh(
         vertices,
         faces,
         None if all(mesh.colors is None for mesh in meshes) else np.concatenate(colors),
-        np.concatenate([*places]) if textures else None,
-        side_by_side(textures) if textures else None,
+        np.concatenate(places) if places else None,
+        texture,
     )
 
 

@@ -40,7 +40,7 @@ def eight_bits(values: np.ndarray) -> UInt8[np.ndarray, "..."]:
     Fractions beyond 2 are not such: some write 0 to 255 as text. Blended ones go a little beyond 1.
     """
     if values.dtype.kind in "iu":
-        most = 65535.0 if values.dtype == np.uint16 else 255.0
+        most = 65535.0 if values.dtype.kind == "u" and values.dtype.itemsize == 2 else 255.0
     else:
         finite = values[np.isfinite(values)]
         most = 1.0 if finite.max(initial=0.0) <= 2.0 else 255.0
