@@ -27,7 +27,7 @@ def command(
     *,
     output: Annotated[Path, Parameter(name=["--output", "-o"])],
     voxel: float = _FUSION.voxel,
-    truncation: float = _FUSION.truncation,
+    truncation: float | None = _FUSION.truncation,
     fragment: float = _FUSION.fragment,
     frames: str = ":",
     format: Literal["ply", "obj", "glb"] = "ply",
@@ -51,7 +51,7 @@ def command(
     voxel
         Side of a voxel, m.
     truncation
-        Number of voxels before and behind a measurement that it changes.
+        Number of voxels before and behind a measurement that it changes; 4 with one camera, 3 with several.
     fragment
         Smallest area of a connected piece, m^2; smaller ones are dropped.
     frames
