@@ -8,7 +8,7 @@ from __future__ import annotations
 from functools import cache
 from importlib.metadata import entry_points
 from pathlib import Path
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from ...errors import InputError
 from .takes import Take, reading
@@ -16,6 +16,7 @@ from .takes import Take, reading
 PLUGINS = "meshreel.recordings"
 
 
+@runtime_checkable
 class Reader(Protocol):
     """A module that reads one format."""
 

@@ -18,7 +18,9 @@ from .takes import Lens, Pictures, Sensor, Stream, Take
 
 KIND = "an Azure Kinect or Femto recording (.mkv)"
 CALIBRATION = "calibration.json"
-NARROW = ((192, 640), (180, 576))  # left edge and width, upper edge and height: of 1024 x 1024 pixels of the sensor
+# Of the sensor's 1024 x 1024 pixels, in modes with pictures that are not square, and in others: left edge and width,
+# upper edge and height.
+NARROW, ALL = ((192, 640), (180, 576)), ((0, 1024), (0, 1024))
 
 
 def fits(path: Path) -> bool:
@@ -66,11 +68,12 @@ def _lens(camera: dict[str, Any], deep: bool, width: int, height: int) -> Lens:
     """Return the lens of a mode from what is known of the whole sensor, whose first pixel begins at 0."""
     cx, cy, fx, fy, k1, k2, k3, k4, k5, k6, _, _, p2, p1 = map(float, camera["Intrinsics"]["ModelParameters"][:14])
     if deep:
-        (left, wide), (top, high) = NARROW if width != height else ((0, 1024), (0, 1024))
-        left, wide, top, high = left * width / wide, 1024 * width / wide, top * height / high, 1024 * height / high
+        (left, wide), (top, high) = (
+            (begin * side / part, 1024 * side / part)
+            for (begin, part), side in zip(NARROW if width != height else ALL, (width, height), strict=True)
+        )
     else:  # 4:3, of which 16:9 leaves out as much above as below; early calibrations are of 16:9
-        wide, high = width, width * 3 / 4
-        left, top = 0.0, (high - height) / 2
+        left, top, wide, high = 0.0, (width * 0.75 - height) / 2, float(width), width * 0.75
         if camera["SensorWidth"] * 9 == camera["SensorHeight"] * 16:
             cy, fy = (cy * 2304 + 384) / 3072, fy * 2304 / 3072
     center = (cx * wide - left - 0.5, cy * high - top - 0.5)

@@ -30,6 +30,7 @@ COLOR = {
     "bgra8": [2, 1, 0, 3],
 }  # order of red, green, blue
 MODELS = ("", "plumb_bob", "rational_polynomial", "none", "Brown Conrady", "Inverse Brown Conrady")
+POSES = "tf2_msgs/msg/TFMessage"
 COMPRESSED = struct.Struct("<iff")  # before the PNG of compressedDepth: form, and the two numbers of floats
 
 
@@ -126,10 +127,11 @@ class _Bag:
 @contextmanager
 def _opened(path: Path) -> Iterator[_Bag]:
     from rosbags import rosbag1, rosbag2
-    from rosbags.typesys import Stores, get_typestore
+    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
     old = path.suffix.lower() == ".bag" and path.is_file()
     store = get_typestore(Stores.ROS1_NOETIC if old else Stores.ROS2_HUMBLE)
+    store.register(get_types_from_msg("geometry_msgs/TransformStamped[] transforms", POSES))  # ROS 1 has it elsewhere
     with (rosbag1.Reader if old else rosbag2.Reader)(path) as reader:
         yield _Bag(path, reader, store.deserialize_ros1 if old else store.deserialize_cdr)
 
@@ -179,7 +181,7 @@ def _sensor(bag: _Bag, depth: _Topic, color: _Topic | None, tree: dict[str, Any]
     (root, placed), unit = _place(tree, depth.frame), depth.unit
     option = f"{depth.sdk.rpartition('/')[0]}/option/Depth Units/value"
     for name in {option, option.replace(" ", "_")} & bag.kinds().keys():
-        unit = float(bag.first(name).data)
+        unit = round(float(bag.first(name).data), 9)  # 0.001 as 32 bits is a little more
     apart, seen = None, None
     if color is not None:
         seen, (other, beside) = _stream(bag, color), _place(tree, color.frame)
@@ -238,8 +240,7 @@ def _pixels(message: Any) -> Picture:
     if not hasattr(message, "encoding"):
         return _unpacked(message.format, data)
     channels = COLOR.get(message.encoding, [0])
-    order = ">" if message.is_bigendian else "<"
-    kind = np.dtype(DEEP.get(message.encoding, ("u1",))[0]).newbyteorder(order)
+    kind = np.dtype(DEEP.get(message.encoding, ("u1",))[0]).newbyteorder(">" if message.is_bigendian else "<")
     rows = np.frombuffer(data, np.uint8, message.height * message.step).reshape(message.height, -1)
     wide = message.width * len(channels) * kind.itemsize
     values = np.ascontiguousarray(rows[:, :wide]).view(kind).reshape(message.height, message.width, -1)
@@ -260,4 +261,4 @@ def _unpacked(form: str, data: bytes) -> Picture:
 
 def _matrix(transform: Any) -> Float64[np.ndarray, "4 4"]:
     turn, place = transform.rotation, transform.translation
-    return pose((turn.x, turn.y, turn.z, turn.w), (place.x, place.y, place.z))
+    return pose(np.array([turn.x, turn.y, turn.z, turn.w]), np.array([place.x, place.y, place.z]))

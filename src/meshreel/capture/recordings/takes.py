@@ -13,9 +13,8 @@ from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float64
-from numpy.typing import ArrayLike
 
-from ...errors import InputError, MeshreelError
+from ...errors import InputError
 
 Picture = np.ndarray | bytes  # depths H x W in the sensor's unit, integers or floats; colours H x W x 3; a PNG or JPEG
 Pictures = Iterator[tuple[float, Picture]]  # each with its time on the take's clock, s
@@ -85,8 +84,10 @@ def reading(path: Path) -> Iterator[None]:
     """Turn what packages raise for a damaged file, each errors of its own, into an InputError that names the file."""
     try:
         yield
-    except MeshreelError:
-        raise
+    except InputError as error:
+        if f"{path}" in str(error):
+            raise
+        raise InputError(f"{path}: {error}") from None
     except ModuleNotFoundError as error:
         text = f"{error.name} is missing; install it with: pip install 'meshreel[recordings]'"
         raise InputError(f"{path}: {text}") from None
@@ -104,11 +105,12 @@ def picture_size(data: bytes) -> tuple[int, int]:
         return image.size
 
 
-def pose(quaternion: ArrayLike, position: ArrayLike) -> Float64[np.ndarray, "*T 4 4"]:
+def pose(
+    quaternions: Float64[np.ndarray, "*T 4"], positions: Float64[np.ndarray, "*T 3"]
+) -> Float64[np.ndarray, "*T 4 4"]:
     """Return 4 x 4 matrices of rotations x y z w and translations. Raises ValueError for a quaternion of zeros."""
     from scipy.spatial.transform import Rotation
 
-    turns = Rotation.from_quat(np.asarray(quaternion, np.float64)).as_matrix()
-    made = np.zeros((*turns.shape[:-2], 4, 4))
-    made[..., :3, :3], made[..., :3, 3], made[..., 3, 3] = turns, position, 1.0
+    made = np.zeros((*positions.shape[:-1], 4, 4))
+    made[..., :3, :3], made[..., :3, 3], made[..., 3, 3] = Rotation.from_quat(quaternions).as_matrix(), positions, 1.0
     return made

@@ -13,7 +13,7 @@ import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from itertools import count
+from itertools import chain, count
 from pathlib import Path
 from typing import Any
 
@@ -198,7 +198,8 @@ def _parts(takes: Sequence[Take]) -> list[_Part]:
     for take in takes:
         for sensor in take.sensors:
             name = re.sub(r"[^\w-]+", "-", f"{take.path.resolve().stem}-{sensor.name}").strip("-")
-            name = next(one for one in (name, *(f"{name}-{n}" for n in count(2))) if one.lower() not in found)
+            others = (f"{name}-{number}" for number in count(2))
+            name = next(one for one in chain([name], others) if one.lower() not in found)
             found[name.lower()] = _Part(take, sensor, name)
     return list(found.values())
 
