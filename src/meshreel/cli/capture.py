@@ -13,10 +13,10 @@ from cyclopts import Parameter
 
 from ..capture.fusion import FusionOptions
 from ..capture.recording import Recording, open_recording
-from ..capture.recordings import open_take
+from ..capture.recordings import is_rig, open_take
 from ..capture.recordings.takes import Stream, Take
 from ..capture.recordings.to_rig import write_takes
-from ..capture.rig import RIG, SINGLE, read_rig
+from ..capture.rig import read_rig
 from ..errors import InputError
 from ..io.differences import first_difference
 from ..io.sequence import CAPTURED
@@ -73,8 +73,7 @@ def command(
         return _list(inputs, common)
     if output is None:
         raise InputError("--output is missing: a folder for meshes, or for the rig of recordings; or give --list")
-    is_rig = any((inputs[0] / name).is_file() for name in (RIG, SINGLE)) or not inputs[0].exists()
-    if len(inputs) > 1 or not is_rig:
+    if len(inputs) > 1 or (inputs[0].exists() and not is_rig(inputs[0])):
         if (options, frames, format) != (_FUSION, ":", "ply"):
             raise InputError(f"{inputs[0]}: is no rig: make one of it without options of fusion, then capture that")
         return _make_rig(inputs, output, common)
@@ -127,8 +126,8 @@ def _make_rig(inputs: list[Path], output: Path, common: Common) -> None:
     common.warn([*warnings, *rig.missing()])
     row = {"output": str(output), "cameras": len(rig.cameras), "color_cameras": len(rig.color_cameras)}
     row |= {"frames": len(rig.frames), "frame_rate": rig.frame_rate}
-    counted = f"{row['cameras']} depth cameras, {row['color_cameras']} colour cameras, {row['frames']} frames"
-    common.result(row, f"{output}: a rig of {counted}, {rig.frame_rate:g} a second")
+    counted = f"{row['frames']} frames, depth cameras: {row['cameras']}, colour cameras: {row['color_cameras']}"
+    common.result(row, f"{output}: a rig, {counted}, {rig.frame_rate:g} frames a second")
 
 
 def _fuse(rig: Path, output: Path, options: FusionOptions, frames: str, format: str, common: Common) -> None:

@@ -14,9 +14,8 @@ from ..analysis.scene.masks import ImageMasks, Masker, read_view_file
 from ..analysis.scene.sam3 import Sam3Masks, Sam3Options
 from ..analysis.scene.segmentation import SegmentOptions
 from ..capture.recording import open_recording
-from ..capture.recordings import is_take, open_take
+from ..capture.recordings import is_rig, is_take, open_take
 from ..capture.recordings.to_rig import write_takes
-from ..capture.rig import RIG, SINGLE
 from ..errors import InputError
 from ..geometry.derived_sequences import Upright
 from ..io.remote import Remote, located
@@ -53,12 +52,7 @@ def open_source(inputs: Sequence[str], reading: Reading) -> Source:
         remarks = write_takes(takes, rig := Path(scratch.name, "rig"))
         opened = open_source([str(rig)], reading)
         return replace(opened, remarks=(*remarks, *opened.remarks), scratch=scratch)
-    if (
-        isinstance(folder, Remote)
-        or len(inputs) > 1
-        or not any((folder / name).is_file() for name in (RIG, SINGLE))
-        or any(folder.glob("frame_*.ply"))
-    ):
+    if isinstance(folder, Remote) or len(inputs) > 1 or not is_rig(folder) or any(folder.glob("frame_*.ply")):
         options, made = reading.options(), captured(folder) if len(inputs) == 1 else {}
         rate = made.get("frames_per_second")
         if reading.fps == _READ.fps and isinstance(rate, (int, float)) and rate > 0:

@@ -130,6 +130,21 @@ def test_bags_of_all_kinds_have_the_same_camera(tmp_path, made, form):
         assert same(made(next(p for p in path.iterdir() if p.suffix in (".db3", ".mcap")))[0])
 
 
+@pytest.mark.parametrize("known", [True, False])
+def test_depth_that_was_moved_to_colour_stays_only_where_nothing_says_how_the_cameras_lie(tmp_path, known):
+    pytest.importorskip("rosbags")
+    with Bag(tmp_path / "room", "mcap") as bag:
+        if known:
+            bag.still("depth", "rgb", (0.05, 0, 0))
+        for name, frame in (("depth", "depth"), ("depth_to_rgb", "rgb")):
+            bag.image(f"/{name}/image_raw", DEPTHS[0], "16UC1", TIMES[0], frame)
+        bag.image("/rgb/image_raw", shade(0), "rgb8", TIMES[0], "rgb")
+        bag.image("/ir/image_raw", DEPTHS[0], "mono16", TIMES[0], "depth")
+    (sensor,) = open_take(tmp_path / "room").sensors
+    assert sensor.name == ("depth-image_raw" if known else "depth_to_rgb-image_raw")
+    assert sensor.color is not None and sensor.color_to_depth[0, 3] == (0.05 if known else 0)
+
+
 def test_compressed_pictures_of_a_bag_and_depth_in_metres(tmp_path, made):
     pytest.importorskip("rosbags")
     from meshreel.capture.recordings.rosbag import COMPRESSED

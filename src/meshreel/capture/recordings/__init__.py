@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Protocol, runtime_checkable
 
 from ...errors import InputError
+from ..rig import RIG, SINGLE
 from .takes import Take, reading
 
 PLUGINS = "meshreel.recordings"
@@ -39,9 +40,17 @@ def readers() -> tuple[Reader, ...]:
     return tuple(entry.load() for entry in sorted(entry_points(group=PLUGINS), key=lambda entry: entry.name))
 
 
+def is_rig(path: Path) -> bool:
+    """Return whether a folder is a rig's."""
+    return any((path / name).is_file() for name in (RIG, SINGLE))
+
+
 def is_take(path: Path) -> bool:
-    """Return whether some reader knows a file or folder."""
-    return any(reader.fits(path) for reader in readers())
+    """Return whether some reader knows a file or folder; a rig is none."""
+    try:
+        return not is_rig(path) and any(reader.fits(path) for reader in readers())
+    except OSError:  # a name that is too long, or a folder without permission
+        return False
 
 
 def open_take(path: Path) -> Take:

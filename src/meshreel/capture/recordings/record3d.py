@@ -18,7 +18,7 @@ import numpy as np
 from ...errors import InputError
 from ...io.file_names import last_number
 from ...io.read import MOST_BYTES, read_file
-from .takes import FLIP, Lens, Picture, Pictures, Sensor, Stream, Take, picture_size, pose
+from .takes import FLIP, Lens, Picture, Pictures, Sensor, Stream, Take, picture_size, pose, reading
 
 KIND = "a Record3D recording (.r3d, or the folder of its export EXR + JPG)"
 EXPORT = "EXR_RGBD"
@@ -114,6 +114,6 @@ def _exr(path: Path) -> np.ndarray:
     """Return the depths, m, of an EXR file: its red channel, or its only one."""
     import OpenEXR
 
-    with OpenEXR.File(str(path), separate_channels=True) as file:
+    with reading(path), OpenEXR.File(str(path), separate_channels=True) as file:
         channels = file.channels()
         return np.array(channels["R" if "R" in channels else min(channels)].pixels, np.float32)

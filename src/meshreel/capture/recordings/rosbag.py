@@ -36,7 +36,11 @@ COMPRESSED = struct.Struct("<iff")  # before the PNG of compressedDepth: form, a
 
 def fits(path: Path) -> bool:
     """Return whether a file has an extension of bags, or a folder what ROS 2 writes."""
-    return path.suffix.lower() in (".bag", ".mcap", ".db3") if path.is_file() else (path / "metadata.yaml").is_file()
+    if path.is_file():
+        return path.suffix.lower() in (".bag", ".mcap", ".db3")
+    return (path / "metadata.yaml").is_file() and any(
+        kind in one.name for one in path.iterdir() for kind in (".mcap", ".db3")
+    )
 
 
 def read(path: Path) -> Take:
@@ -48,8 +52,9 @@ def read(path: Path) -> Take:
         if not deep:
             raise ValueError(f"it has no depth pictures; its topics are {', '.join(bag.described()) or 'none'}")
         colors = [topic for topic in topics if not topic.deep]
-        pairs = _paired(deep, colors)
-        tree, used = bag.tree(), {topic.name for pair in pairs for topic in pair if topic is not None}
+        tree = bag.tree()
+        pairs = _paired(deep, colors, tree)
+        used = {topic.name for pair in pairs for topic in pair if topic is not None}
         sensors = tuple(_sensor(bag, depth, color, tree) for depth, color in pairs)
         others = tuple(text for text in bag.described() if text.split(" ")[0] not in used)
     return Take(path, KIND, sensors, "record the topics camera_info, too", others)
@@ -156,25 +161,32 @@ def _distinct(topics: list[_Topic]) -> list[_Topic]:
     return list({topic.base: topic for topic in reversed(topics)}.values())[::-1]
 
 
-def _paired(deep: list[_Topic], colors: list[_Topic]) -> list[tuple[_Topic, _Topic | None]]:
-    """Pair depth with the colour whose name begins alike; of several depths of one colour, one stays.
+def _paired(deep: list[_Topic], colors: list[_Topic], tree: dict[str, Any]) -> list[tuple[_Topic, _Topic | None]]:
+    """Pair depth with the colour whose name begins alike; where a bag has only one colour, all depth is beside it.
 
-    That is the one in the colour's own frame, else the first: others repeat it as seen from elsewhere.
+    Depth that was moved into the colour's frame repeats other depth: only the measured one stays where `tree` knows
+    how both cameras lie, else only the moved one.
     """
 
     def alike(depth: _Topic, color: _Topic) -> tuple[int, bool]:
         pairs = zip(depth.name.split("/")[1:], color.name.split("/")[1:], strict=False)
         shared = len(list(takewhile(lambda pair: pair[0] == pair[1], pairs)))
-        return shared + (len(deep) == 1), "image_rect" not in color.name  # a rectified picture was resampled
+        return shared, "image_rect" not in color.name  # a rectified picture was resampled
 
-    found: dict[str, tuple[_Topic, _Topic | None]] = {}
+    near: dict[_Topic | None, list[_Topic]] = {}
     for depth in deep:
-        near = max(colors, key=partial(alike, depth), default=None)
-        if near is None or alike(depth, near)[0] < 1:
-            found[depth.name] = (depth, None)
-        elif near.base not in found or depth.frame == near.frame != found[near.base][0].frame:
-            found[near.base] = (depth, near)
-    return list(found.values())
+        best = max(colors, key=partial(alike, depth), default=None)
+        lone = best is None or (len({color.base for color in colors}) > 1 and alike(depth, best)[0] == 0)
+        near.setdefault(None if lone else best, []).append(depth)
+    pairs: list[tuple[_Topic, _Topic | None]] = []
+    for color, found in near.items():
+        if color is not None:
+            own = [depth for depth in found if depth.frame != color.frame]
+            known = own and _place(tree, own[0].frame)[0] == _place(tree, color.frame)[0]
+            found = own if known or own == found else [depth for depth in found if depth.frame == color.frame]
+            found = list({depth.frame: depth for depth in reversed(found)}.values())[::-1]
+        pairs += [(depth, None if number else color) for number, depth in enumerate(found)]
+    return pairs
 
 
 def _sensor(bag: _Bag, depth: _Topic, color: _Topic | None, tree: dict[str, Any]) -> Sensor:
