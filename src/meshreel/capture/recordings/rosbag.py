@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
-from itertools import takewhile
+from itertools import product, takewhile
 from pathlib import Path
 from typing import Any
 
@@ -162,7 +162,7 @@ def _distinct(topics: list[_Topic]) -> list[_Topic]:
 
 
 def _paired(deep: list[_Topic], colors: list[_Topic], tree: dict[str, Any]) -> list[tuple[_Topic, _Topic | None]]:
-    """Pair depth with the colour whose name begins alike; where a bag has only one colour, all depth is beside it.
+    """Pair depth with the colour whose name begins alike; where no two begin alike, with any.
 
     Depth that was moved into the colour's frame repeats other depth: only the measured one stays where `tree` knows
     how both cameras lie, else only the moved one.
@@ -176,7 +176,7 @@ def _paired(deep: list[_Topic], colors: list[_Topic], tree: dict[str, Any]) -> l
     near: dict[_Topic | None, list[_Topic]] = {}
     for depth in deep:
         best = max(colors, key=partial(alike, depth), default=None)
-        lone = best is None or (len({color.base for color in colors}) > 1 and alike(depth, best)[0] == 0)
+        lone = best is None or alike(depth, best)[0] == 0 < max(alike(*pair)[0] for pair in product(deep, colors))
         near.setdefault(None if lone else best, []).append(depth)
     pairs: list[tuple[_Topic, _Topic | None]] = []
     for color, found in near.items():
