@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import io
 import re
-import shutil
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -293,13 +292,11 @@ def _appearing(folder: Path) -> Iterator[Path]:
         if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
             raise InputError(f"{folder}: is there already; choose another folder for the rig, or delete it")
         folder.parent.mkdir(parents=True, exist_ok=True)
-        place = Path(tempfile.mkdtemp(prefix=f".{folder.name}.", dir=folder.parent))
-    try:
-        yield place
+        scratch = tempfile.TemporaryDirectory(prefix=f".{folder.name}.", dir=folder.parent)
+    with scratch as place:
+        (made := Path(place, folder.name)).mkdir()
+        yield made
         with cannot_be_written(folder):
             if folder.exists():
                 folder.rmdir()
-            place.chmod(0o755)
-            place.rename(folder)
-    finally:
-        shutil.rmtree(place, ignore_errors=True)
+            made.rename(folder)
