@@ -55,7 +55,8 @@ def read(path: Path) -> Take:
         tree = bag.tree()
         pairs = _paired(deep, colors, tree)
         used = {topic.name for pair in pairs for topic in pair if topic is not None}
-        sensors = tuple(_sensor(bag, depth, color, tree) for depth, color in pairs)
+        world = _place(tree, pairs[0][0].frame)[0]
+        sensors = tuple(_sensor(bag, depth, color, tree, world) for depth, color in pairs)
         others = tuple(text for text in bag.described() if text.split(" ")[0] not in used)
     return Take(path, KIND, sensors, "record the topics camera_info, too", others)
 
@@ -189,7 +190,8 @@ def _paired(deep: list[_Topic], colors: list[_Topic], tree: dict[str, Any]) -> l
     return pairs
 
 
-def _sensor(bag: _Bag, depth: _Topic, color: _Topic | None, tree: dict[str, Any]) -> Sensor:
+def _sensor(bag: _Bag, depth: _Topic, color: _Topic | None, tree: dict[str, Any], world: str) -> Sensor:
+    """Return a depth camera and the colour beside it; its pose counts in the frame `world` only."""
     (root, placed), unit = _place(tree, depth.frame), depth.unit
     option = f"{depth.sdk.rpartition('/')[0]}/option/Depth Units/value"
     for name in {option, option.replace(" ", "_")} & bag.kinds().keys():
@@ -202,7 +204,7 @@ def _sensor(bag: _Bag, depth: _Topic, color: _Topic | None, tree: dict[str, Any]
             apart = _matrix(to_depth) @ np.linalg.inv(_matrix(to_color))
         elif root == other:
             apart = np.linalg.inv(placed) @ beside
-    poses = placed[None] if depth.frame in tree else None
+    poses = placed[None] if depth.frame in tree and root == world else None
     return Sensor(depth.base.strip("/").replace("/", "-"), _stream(bag, depth), unit, seen, apart, poses)
 
 
