@@ -326,9 +326,7 @@ def test_bags_that_are_damaged_or_have_no_depth(tmp_path, made):
     pytest.importorskip("rosbags")
     with Bag(tmp_path / "a.bag", "bag") as bag:
         bag.image("/color/image_raw", shade(0), "rgb8", TIMES[0])
-    with pytest.raises(
-        InputError, match=r"a\.bag: .*it has no depth pictures; its topics are /color/image_raw \(Image\)"
-    ):
+    with pytest.raises(InputError, match=r"a\.bag: .*no depth pictures .*; its topics are /color/image_raw \(Image\)"):
         made(tmp_path / "a.bag")
     with Bag(tmp_path / "b.bag", "bag") as bag:
         bag.info("/depth/camera_info", (0.1, 0, 0, 0), "equidistant")

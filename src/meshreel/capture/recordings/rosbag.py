@@ -50,7 +50,8 @@ def read(path: Path) -> Take:
         named = [topic for topic in topics if topic.deep and "depth" in topic.name.lower()]
         deep = _distinct(named or [topic for topic in topics if topic.deep and "infra" not in topic.name.lower()])
         if not deep:
-            raise ValueError(f"it has no depth pictures; its topics are {', '.join(bag.described()) or 'none'}")
+            forms = f"no depth pictures ({', '.join(DEEP)}, or compressedDepth as PNG)"
+            raise ValueError(f"{forms}; its topics are {', '.join(bag.described()) or 'none'}")
         colors = [topic for topic in topics if not topic.deep]
         tree = bag.tree()
         pairs = _paired(deep, colors, tree)
@@ -72,7 +73,6 @@ class _Topic:
     frame: str
     width: int
     height: int
-    stamp: float  # s
 
     @property
     def base(self) -> str:
@@ -119,8 +119,8 @@ class _Bag:
         """Return the topics with pictures."""
         kinds = self.kinds().items()
         names = [(name, count) for name, (kind, count) in kinds if kind.endswith(("/Image", "/CompressedImage"))]
-        found = [(name, count, next(self.messages(name), None)) for name, count in names]
-        return [_topic(name, count, *first) for name, count, first in found if first is not None]
+        found = [(name, count, self.first(name)) for name, count in names]
+        return [_topic(name, count, first) for name, count, first in found if first is not None]
 
     def tree(self) -> dict[str, tuple[str, Float64[np.ndarray, "4 4"]]]:
         """Return each frame's parent, and its pose in that one."""
@@ -142,19 +142,19 @@ def _opened(path: Path) -> Iterator[_Bag]:
         yield _Bag(path, reader, store.deserialize_ros1 if old else store.deserialize_cdr)
 
 
-def _topic(name: str, count: int, stamp: float, message: Any) -> _Topic:
+def _topic(name: str, count: int, message: Any) -> _Topic:
     if hasattr(message, "encoding"):
         encoding, size, readable = message.encoding, (message.width, message.height), message.encoding in COLOR
     else:  # as `16UC1; compressedDepth png`, `rgb8; jpeg compressed bgr8`, `jpeg`
-        encoding, data = message.format.split(";")[0].strip(), bytes(message.data)
-        start = COMPRESSED.size if "compressedDepth" in message.format or name.endswith("compressedDepth") else 0
-        if start and data[start : start + 4] != b"\x89PNG":
-            raise ValueError(f"{name} has the form {message.format!r}; record compressedDepth as PNG")
-        size, readable = picture_size(data[start:]), not encoding.startswith("mono")
-        encoding = "16UC1" if start and encoding not in DEEP else encoding
+        encoding = message.format.split(";")[0].strip()
+        start = COMPRESSED.size if "compressedDepth" in message.format else 0
+        try:
+            size, readable = picture_size(bytes(message.data)[start:]), not encoding.startswith("mono")
+        except OSError:  # no PNG or JPEG, as RVL is none
+            encoding, size, readable = "", (0, 0), False
     deep = True if encoding in DEEP else False if readable else None
     unit = DEEP.get(encoding, ("", 1.0))[1]
-    return _Topic(name, count, deep, unit, message.header.frame_id.lstrip("/"), *size, stamp)
+    return _Topic(name, count, deep, unit, message.header.frame_id.lstrip("/"), *size)
 
 
 def _distinct(topics: list[_Topic]) -> list[_Topic]:
@@ -229,7 +229,7 @@ def _stream(bag: _Bag, topic: _Topic) -> Stream:
 
     seconds = (bag.reader.end_time - bag.reader.start_time) / 1e9
     lens = None if lens is None else lens.resized(topic.width, topic.height)
-    return Stream(topic.width, topic.height, topic.count, seconds * (topic.count - 1) / topic.count, lens, pictures)
+    return Stream(topic.width, topic.height, topic.count, seconds, lens, pictures)
 
 
 def _lens(info: Any, straight: bool) -> Lens | None:
