@@ -34,17 +34,13 @@ STILL: tuple[Box, ...] = (
     ((1.65, 0.0, -2.1), (2.3, 2.5, -2.0)),
     ((0.8, 2.05, -2.1), (1.65, 2.5, -2.0)),
     ((-2.3, 0.0, 2.0), (2.3, 2.5, 2.1)),
-    ((-2.3, 0.0, -2.0), (-2.2, 2.5, 2.0)),
-    ((2.2, 0.0, -2.0), (2.3, 2.5, 2.0)),
+    *(((x, 0.0, -2.0), (x + 0.1, 2.5, 2.0)) for x in (-2.3, 2.2)),
     ((0.3, -0.1, -3.2), (2.2, 0.0, -2.1)),  # which leads to a corridor
     ((0.3, 0.0, -3.3), (2.2, 2.5, -3.2)),
     ((1.62, 0.0, 0.6), (2.15, 0.44, 1.7)),  # a seat with a back
     ((2.05, 0.44, 0.6), (2.2, 0.85, 1.7)),
     ((1.06, 0.68, -0.4), (1.56, 0.72, 0.35)),  # a table
-    ((1.14, 0.0, -0.38), (1.19, 0.68, -0.33)),
-    ((1.48, 0.0, -0.38), (1.53, 0.68, -0.33)),
-    ((1.14, 0.0, 0.28), (1.19, 0.68, 0.33)),
-    ((1.48, 0.0, 0.28), (1.53, 0.68, 0.33)),
+    *(((x, 0.0, z), (x + 0.05, 0.68, z + 0.05)) for x in (1.14, 1.48) for z in (-0.38, 0.28)),
     ((-2.2, 0.0, -2.0), (-1.3, 1.6, -1.6)),  # a cupboard, a shelf, a chest with things on it
     ((-2.2, 0.95, 0.2), (-1.9, 1.0, 1.4)),
     ((-1.6, 0.0, 1.5), (-0.5, 0.6, 2.0)),
@@ -57,13 +53,17 @@ BOXES: dict[str, Box] = {  # of the things, about their own origins
     "box": ((-0.15, -0.12, -0.13), (0.15, 0.12, 0.13)),
 }
 HINGE, OPEN = (0.81, 0.0, -1.97), np.radians(-80)  # of the door: it opens into the room
-ARM, HELD, ON_TABLE = (0.0, -SOLE, 0.56), (0.0, 1.04, 0.36), (1.24, 0.841, -0.08)  # m: crate and box before a person; box
-FACING_X = np.pi / 2  # heading, rad
+ARM, HELD = (0.0, -SOLE, 0.56), (0.0, 1.04, 0.36)  # m: the crate before the pusher, the box before the carrier
+ON_TABLE = (1.24, 0.841, -0.08)  # m: the box, set down
+TURNED = -np.pi / 2  # rad: heading to the left, -x
+TO_LEFT, TO_RIGHT = turn_about_y(TURNED), turn_about_y(-TURNED)
+
+Vector = Float64[np.ndarray, "3"]
 
 
 @dataclass(frozen=True, slots=True)
 class Parts:
-    """Truth of the parts of each frame, whose faces follow each other in the order of `NAMES`."""
+    """Truth of the parts of each frame, whose faces follow each other in the order of `NAMES`, people's last."""
 
     faces: Int64[np.ndarray, "T P"]  # number of a part's faces in a frame
     poses: Float64[np.ndarray, "T K 4 4"]  # of `THINGS`, to the world: the same faces move rigidly
@@ -77,8 +77,7 @@ class Parts:
         """Which parts move in a frame: people always, things whose pose is another in the frame before or after."""
         steps = (np.diff(self.poses, axis=0) != 0).any(axis=(2, 3))
         things = np.pad(steps, ((1, 0), (0, 0))) | np.pad(steps, ((0, 1), (0, 0)))
-        still, people = np.zeros((len(things), 1), bool), np.ones((len(things), len(PEOPLE)), bool)
-        return np.concatenate([still, things, people], axis=1)
+        return np.pad(np.pad(things, ((0, 0), (1, 0))), ((0, 0), (0, len(PEOPLE))), constant_values=True)
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,15 +88,15 @@ class Room3:
     spacing: float = 0.012  # m, of the grid of people's surface
 
     def parts(self, number: int) -> list[Mesh]:
-        """Return the mesh of each part of a frame in the order of `NAMES`; all are closed."""
+        """Return the mesh of each part of a frame in the order of `NAMES`; people and things are closed."""
         still = concatenate([box(corners) for corners in STILL])
-        things = [_placed(box(BOXES[name]), pose) for name, pose in zip(THINGS, _things()[number], strict=True)]
-        grid = grid_of_frame(number, self.spacing, 0)
+        poses, grid = _things()[number], grid_of_frame(number, self.spacing, 0)
+        things = [_placed(box(BOXES[name]), pose) for name, pose in zip(THINGS, poses, strict=True)]
         people = [polygonize((figure(pose, 0.7 * self.spacing),), 0.01, grid) for pose in _people(number)]
         return [*(subdivide_midpoint(mesh) for mesh in (still, *things)), *people]
 
     def record(self, folder: Path, width: int = 640) -> None:
-        """Write the rig and its truth, with `parts.npz`; two minutes for 60 frames."""
+        """Write the rig and its truth, with `parts.npz`; three minutes for 60 frames."""
         poses, counts = _things()[: self.frames], list[list[int]]()
         moving = Parts(np.zeros((0, 0), np.int64), poses).moving
 
@@ -123,65 +122,68 @@ def read_parts(rig: Path) -> Parts | None:
 
 def _things() -> Float64[np.ndarray, "T K 4 4"]:
     """Return the poses of crate, door and box in all frames."""
-    (carriers, _), (pushers, _) = _carrier(), _pusher()
-    ahead, poses = turn_about_y(FACING_X), np.tile(np.eye(4), (FRAMES, len(THINGS), 1, 1))
-    until = np.minimum(np.arange(FRAMES), LEFT)
-    poses[:, 0, :3, 3] = pushers[until] + turn_about_y(-FACING_X) @ ARM
+    carrier, pusher = _walkers()
+    poses, down = np.tile(np.eye(4), (FRAMES, len(THINGS), 1, 1)), _eased(45, 56)[:, None]
+    poses[:, 0, :3, 3] = pusher.places[np.minimum(np.arange(FRAMES), LEFT)] + TO_LEFT @ ARM
     poses[:, 1, :3, 3] = HINGE
-    poses[:, 1, :3, :3] = [turn_about_y(OPEN * _eased(number, 3, 27)) for number in range(FRAMES)]
-    down = _eased(np.arange(FRAMES), 45, 56)[:, None]
-    poses[:, 2, :3, 3] = (1 - down) * (carriers + ahead @ HELD) + down * ON_TABLE
-    poses[:, 2, :3, :3] = ahead
+    poses[:, 1, :3, :3] = [turn_about_y(OPEN * share) for share in _eased(3, 27)]
+    poses[:, 2, :3, 3] = (1 - down) * (carrier.places + TO_RIGHT @ HELD) + down * ON_TABLE
+    poses[:, 2, :3, :3] = TO_RIGHT
     return poses
 
 
 def _people(number: int) -> tuple[Pose, Pose, Pose]:
     """Return the poses of the carrier, the pusher and the sitter."""
-    (places, walked), (pushers, pushed) = _carrier(), _pusher()
-    speeds = [float(np.gradient(steps)[number]) * CYCLE * RATE for steps in (walked, pushed)]
-    strides = [STRIDE * min(speed, 1.0) for speed in speeds]
-    held = _things()[number, 2]
-    hands = tuple(held[:3, :3] @ (side * 0.17, 0.0, -0.1) + held[:3, 3] for side in (1, -1))
-    ahead = turn_about_y(-FACING_X)
-    grips = tuple(pushers[number] + ahead @ (side * 0.12, 0.84, 0.33) for side in (1, -1))
-    left = _eased(number, 27, 35)
-    turned = -FACING_X * (1 + _eased(number, 29, 42))
-    seat = np.array([1.38, SOLE, 1.15])
-    down = _eased(number, 4, 24) * (1 - _eased(number, 34, 57))
-    knees = tuple(seat + ahead @ (side * 0.12, 0.6, 0.06) for side in (1, -1))
+    carrier, pusher = _walkers()
+    held, seat = _things()[number, 2, :3, 3], np.array([1.38, SOLE, 1.15])
+    hands = _both(held, TO_RIGHT, (0.17, 0.0, -0.1))
+    grips = _both(pusher.places[number], TO_LEFT, (0.12, 0.84, 0.33))
+    knees = _both(seat, TO_LEFT, (0.12, 0.6, 0.06))
+    bow, on = 0.15 * _eased(45, 56)[number], 1 - _eased(27, 35)[number]
+    down = _eased(4, 24)[number] * (1 - _eased(34, 57)[number])
+    hips, lean = (-0.4 * down, -0.36 * down), 0.55 * np.sin(np.pi * down)
     return (
-        Pose(places[number], FACING_X, walked[number], strides[0], hands, (1.0, 1.0), lean=0.15 * _eased(number, 45, 56)),
-        Pose(pushers[number], turned, pushed[number] + 0.3, strides[1], grips, (1 - left, 1 - left), lean=0.5 * (1 - left), girth=1.1),
-        Pose(seat, -FACING_X, 0.25, 0.0, knees, (down, down), hips=(-0.4 * down, -0.36 * down), lean=0.55 * np.sin(np.pi * down), size=0.98, girth=0.92),
+        Pose(*carrier.at(number), wrists=hands, reach=(1.0, 1.0), lean=bow),
+        Pose(*pusher.at(number), wrists=grips, reach=(on, on), lean=0.5 * on, girth=1.1),
+        Pose(seat, TURNED, 0.25, 0.0, knees, (down, down), hips=hips, lean=lean, size=0.98, girth=0.92),
     )
 
 
-def _carrier() -> tuple[Float64[np.ndarray, "T 3"], Float64[np.ndarray, " T"]]:
-    """Return the places of the person with the box, and the step cycles walked: to the table."""
-    speeds = 1.1 * (1 - _eased(np.arange(FRAMES), 42, 52))
-    return _walk((-0.88, SOLE, -0.12), speeds, np.full(FRAMES, FACING_X))
+def _both(place: Vector, turn: Float64[np.ndarray, "3 3"], apart: tuple[float, float, float]) -> tuple[Vector, Vector]:
+    """Return the places of a left and a right wrist beside a place."""
+    return place + turn @ apart, place + turn @ (apart * np.array([-1.0, 1.0, 1.0]))
 
 
-def _pusher() -> tuple[Float64[np.ndarray, "T 3"], Float64[np.ndarray, " T"]]:
-    """Return the same of the person who pushes the crate, leaves it and turns away."""
-    times = np.arange(FRAMES)
-    pushing = 1.25 * _eased(times, 2, 6) * (1 - _eased(times, 23, LEFT))
-    leaving = _eased(times, 31, 38)
-    return _walk((1.0, SOLE, -0.62), pushing + leaving, -FACING_X * (1 + _eased(times, 29, 42)))
+@dataclass(frozen=True, slots=True)
+class _Walk:
+    """The way of a person: a start, and speed and heading in each frame."""
+
+    start: tuple[float, float, float]  # m
+    speeds: Float64[np.ndarray, " T"]  # m/s
+    headings: Float64[np.ndarray, " T"]  # rad
+
+    @property
+    def places(self) -> Float64[np.ndarray, "T 3"]:
+        """Place in each frame, m."""
+        ways = np.stack([np.sin(self.headings), np.zeros(FRAMES), np.cos(self.headings)], axis=1)
+        return self.start + np.pad(np.cumsum(self.speeds[:-1, None] * ways[:-1] / RATE, axis=0), ((1, 0), (0, 0)))
+
+    def at(self, number: int) -> tuple[Vector, float, float, float]:
+        """Return place, heading, step cycles walked and stride in a frame."""
+        speed, walked = float(self.speeds[number]), float(self.speeds[:number].sum()) / RATE
+        return self.places[number], float(self.headings[number]), walked / CYCLE, STRIDE * min(speed, 1.0)
 
 
-def _walk(
-    start: tuple[float, float, float], speeds: Float64[np.ndarray, " T"], headings: Float64[np.ndarray, " T"]
-) -> tuple[Float64[np.ndarray, "T 3"], Float64[np.ndarray, " T"]]:
-    steps = speeds / RATE
-    ways = np.stack([np.sin(headings), np.zeros(len(headings)), np.cos(headings)], axis=1)
-    walked = np.concatenate([[0.0], np.cumsum(steps)[:-1]])
-    return start + np.concatenate([np.zeros((1, 3)), np.cumsum(steps[:, None] * ways, axis=0)[:-1]]), walked / CYCLE
+def _walkers() -> tuple[_Walk, _Walk]:
+    """Return the ways of the carrier, to the table, and of the pusher, who leaves the crate and turns away."""
+    speeds = 1.25 * _eased(2, 6) * (1 - _eased(23, LEFT)) + _eased(31, 38)
+    pusher = _Walk((1.0, SOLE, -0.62), speeds, TURNED * (1 + _eased(29, 42)))
+    return _Walk((-0.88, SOLE, -0.12), 1.1 * (1 - _eased(42, 52)), np.full(FRAMES, -TURNED)), pusher
 
 
-def _eased(number, first: float, last: float):
-    """Return 0 up to the first frame, 1 from the last one on, and a smooth transition between."""
-    share = np.clip((number - first) / (last - first), 0, 1)
+def _eased(first: int, last: int) -> Float64[np.ndarray, " T"]:
+    """Return for each frame 0 up to the first one, 1 from the last one on, and a smooth transition between."""
+    share = np.clip((np.arange(FRAMES) - first) / (last - first), 0, 1)
     return share * share * (3 - 2 * share)
 
 
