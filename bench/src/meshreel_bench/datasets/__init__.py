@@ -29,11 +29,11 @@ from .checksums import check_source, checksum, known_checksums
 from .remesh import Place, RemeshedSequence, RemeshOptions, SideBySide
 from .rooms import PEOPLE, ROOM
 from .scenes import PROCEDURAL, ROOM3, SCENES, SceneData, open_scene
-from .shapes import arms, gears, prism
+from .shapes import gears, prism
 from .walker import FRAMES, Truth, Walker
 
 DEMO = "demo"  # procedural bodies: needs no benchmark data
-SHAPES: dict[str, Callable[..., MeshSequence]] = {"gears": gears, "prism": prism, "arms": arms}  # neither
+SHAPES: dict[str, Callable[..., MeshSequence]] = {"gears": gears, "prism": prism}  # neither do these
 SYNTHETIC = "synthetic4"
 BODIES: dict[str, Place] = {  # of SYNTHETIC, m: on one floor, 30 cm apart
     "dancer": (-1.39, 0.48, 0.0),

@@ -1,14 +1,10 @@
-"""Shapes whose truth is known, in metres, 30 frames/s: rigid gears in mesh and a prism, arms that uncross."""
+"""Shapes with sharp edges that move rigidly, in metres, 30 frames/s: two gears in mesh, a prism of 10 vertices."""
 
 from __future__ import annotations
 
 import numpy as np
 from jaxtyping import Float64, Int64
-from scipy.spatial.transform import Rotation
 
-from meshreel.capture.figure import Pose, figure
-from meshreel.capture.implicit import Body, capsule, polygonize
-from meshreel.capture.procedural import grid_of_frame
 from meshreel.geometry.topology import concatenate
 from meshreel.types import Mesh, MeshList
 
@@ -21,8 +17,6 @@ BORE, WIDTH = 0.25, 0.04  # radius of the bore over that of the pitch circle; th
 FLANK, RINGS, LAYERS = 8, 12, 6  # points of a flank, of a side face from the bore to the teeth, and of the thickness
 TURN = 0.25  # of the first gear's pitch of teeth, in a frame
 PRISM_SIDES, PRISM_TURN = 5, np.radians(4)  # a frame
-ARMS_FRAMES, ARMS_OPEN, ARMS_SPACING = 36, (3, 30), 0.014  # frames; those in which arms open; m, of the grid
-CROSSED, OPENED = ((-0.09, 1.20, 0.215), (0.10, 1.17, 0.15)), ((0.5, 1.12, 0.2), (-0.5, 1.12, 0.2))  # m: both wrists
 
 
 def gears(frames: int = FRAMES) -> MeshList:
@@ -49,34 +43,6 @@ def prism(frames: int = FRAMES) -> MeshList:
     faces = np.concatenate([*(np.column_stack(corners) for corners in sides), lid[:, ::-1], lid + n])
     tilted = vertices @ np.array([[1.0, 0.0, 0.0], [0.0, 0.6, -0.8], [0.0, 0.8, 0.6]])
     return MeshList(tuple(Mesh.of(tilted @ _about_z(PRISM_TURN * k).T, faces) for k in range(frames)))
-
-
-def arms(frames: int = ARMS_FRAMES) -> MeshList:
-    """Return a person who opens arms that touch each other and the chest at first: one surface, own faces a frame."""
-    grids = (grid_of_frame(number, ARMS_SPACING, 0) for number in range(frames))
-    return MeshList(tuple(polygonize((arms_body(number),), 0.01, grid) for number, grid in enumerate(grids)))
-
-
-def arms_body(number: int) -> Body:
-    """Return the capsules of `arms` in a frame, whose signed distance and normals are the truth of its surface."""
-    share = np.clip((number - ARMS_OPEN[0]) / (ARMS_OPEN[1] - ARMS_OPEN[0]), 0, 1)
-    share = share * share * (3 - 2 * share)
-    around = 4 * share * (1 - share) * np.array([0.0, -0.03, 0.14])  # each other
-    left, right = (1 - share) * np.array(CROSSED) + share * np.array(OPENED) + around
-    return figure(Pose(np.zeros(3), 0.0, wrists=(left, right), reach=(1.0, 1.0)), 0.7 * ARMS_SPACING)
-
-
-def carried(points: Float64[np.ndarray, "N 3"], before: Body, after: Body) -> Float64[np.ndarray, "N 3"]:
-    """Carry places on a body to where they are in another pose: with the capsule whose surface is nearest."""
-    nearest, moved = np.full(len(points), np.inf), points.copy()
-    for here, there in zip(before, after, strict=True):
-        for row, radii in enumerate(here.radii):
-            start, end = here.starts[row], here.ends[row]
-            gap = capsule(points, start, end, radii)
-            turn = Rotation.align_vectors(there.ends[row] - there.starts[row], end - start)[0]
-            nearer = gap < nearest
-            nearest[nearer], moved[nearer] = gap[nearer], there.starts[row] + turn.apply(points[nearer] - start)
-    return moved
 
 
 def _gear(teeth: int) -> tuple[Float64[np.ndarray, "V 3"], Int64[np.ndarray, "F 3"]]:

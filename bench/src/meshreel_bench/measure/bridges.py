@@ -1,4 +1,4 @@
-"""Wrong triangles: that bridge bodies which are separate in the original, or lie off or against it; slivers."""
+"""Counts of wrong triangles: those that bridge bodies which are separate in the original frame, and slivers."""
 
 from __future__ import annotations
 
@@ -8,18 +8,6 @@ from jaxtyping import Int64
 from meshreel.geometry.closest_points import Surface
 from meshreel.geometry.topology import components, drop_unreferenced, face_normals, weld
 from meshreel.types import Mesh
-
-STRAY = 0.01  # m from the original, beyond which a face has no match there
-
-
-def stray_share(original: Mesh, decoded: Mesh) -> float:
-    """Return the share of decoded faces that are flipped, against the closest original face, or unmatched."""
-    if original.is_empty or decoded.is_empty:
-        return 0.0
-    surface, middles = Surface(original), decoded.vertices[decoded.faces].mean(axis=1)
-    hits = surface.closest(middles)
-    flipped = (face_normals(decoded)[0] * surface.normals[hits.faces]).sum(axis=1) < 0
-    return float((flipped | (np.linalg.norm(hits.points - middles, axis=1) > STRAY)).mean())
 
 
 def count_degenerate(mesh: Mesh) -> int:

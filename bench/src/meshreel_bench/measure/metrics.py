@@ -25,7 +25,7 @@ from ..datasets import Dataset
 from ..datasets.scenes import SceneData
 from ..parallel_views import parallel_views_around
 from ..rows import Metrics
-from .bridges import count_bridges, count_degenerate, stray_share
+from .bridges import count_bridges, count_degenerate
 from .color import picture_psnrs, picture_squares, swimming, texel_products, texel_psnr
 from .parts import missed, part_values
 from .seams import measure_seam, seam_row
@@ -71,7 +71,6 @@ def _to_input(frames: Measured, metrics: Metrics) -> tuple[Values, PerFrame]:
     values: Values = {key: value for key, value in row.items() if key not in NO_METRICS}
     if not frames.known.cameras:  # scans of scenes are many pieces from the start
         values["bridges"] = sum(count_bridges(a, b) for a, b in zip(originals, frames.decoded, strict=True))
-        values["stray_faces"] = float(np.mean([*map(stray_share, originals, frames.decoded)]))
         values["degenerate_faces"] = sum(map(count_degenerate, frames.decoded))
     return values, per_frame
 
