@@ -1,4 +1,4 @@
-"""A person whose arms, crossed before the chest at first, open: one surface, with own faces in each frame, and the truth.
+"""A person whose arms, crossed before the chest, open: one surface, with own faces in each frame; and the truth.
 
 `arms_body` is the truth of a frame: `implicit.field` of it is the signed distance of places from the surface; its
 capsules are the same in all frames, so that `carried` tells where a place of the surface is in another one.

@@ -74,10 +74,15 @@ class Parts:
 
     @property
     def moving(self) -> Bool[np.ndarray, "T P"]:
-        """Which parts move in a frame: people always, things whose pose is another in the frame before or after."""
-        steps = (np.diff(self.poses, axis=0) != 0).any(axis=(2, 3))
-        things = np.pad(steps, ((1, 0), (0, 0))) | np.pad(steps, ((0, 1), (0, 0)))
-        return np.pad(np.pad(things, ((0, 0), (1, 0))), ((0, 0), (0, len(PEOPLE))), constant_values=True)
+        """Which parts move in a frame."""
+        return moving_parts(self.poses)
+
+
+def moving_parts(poses: Float64[np.ndarray, "T K 4 4"]) -> Bool[np.ndarray, "T P"]:
+    """Return which parts move in a frame: people always, things whose pose is another in the frame before or after."""
+    steps = (np.diff(poses, axis=0) != 0).any(axis=(2, 3))
+    things = np.pad(steps, ((1, 0), (0, 0))) | np.pad(steps, ((0, 1), (0, 0)))
+    return np.pad(np.pad(things, ((0, 0), (1, 0))), ((0, 0), (0, len(PEOPLE))), constant_values=True)
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,18 +92,22 @@ class Room3:
     frames: int = FRAMES  # the first ones
     spacing: float = 0.012  # m, of the grid of people's surface
 
+    @property
+    def poses(self) -> Float64[np.ndarray, "T K 4 4"]:
+        """Poses of the things in each frame, see `Parts`."""
+        return _things()[: self.frames]
+
     def parts(self, number: int) -> list[Mesh]:
         """Return the mesh of each part of a frame in the order of `NAMES`; people and things are closed."""
         still = concatenate([box(corners) for corners in STILL])
-        poses, grid = _things()[number], grid_of_frame(number, self.spacing, 0)
+        poses, grid = self.poses[number], grid_of_frame(number, self.spacing, 0)
         things = [_placed(box(BOXES[name]), pose) for name, pose in zip(THINGS, poses, strict=True)]
         people = [polygonize((figure(pose, 0.7 * self.spacing),), 0.01, grid) for pose in _people(number)]
         return [*(subdivide_midpoint(mesh) for mesh in (still, *things)), *people]
 
     def record(self, folder: Path, width: int = 640) -> None:
         """Write the rig and its truth, with `parts.npz`; three minutes for 60 frames."""
-        poses, counts = _things()[: self.frames], list[list[int]]()
-        moving = Parts(np.zeros((0, 0), np.int64), poses).moving
+        counts, moving = list[list[int]](), moving_parts(self.poses)
 
         def frames() -> Iterator[SceneFrame]:
             for number in range(self.frames):
@@ -109,7 +118,7 @@ class Room3:
         cameras = (camera.resized(width, round(0.9 * width)) for camera in corner_cameras(LOW, HIGH))
         simulate_rig(folder, frames(), tuple(cameras), RATE)
         with replacing(folder / TRUTH / PARTS) as file:
-            np.savez_compressed(file, allow_pickle=False, faces=np.array(counts), poses=poses)
+            np.savez_compressed(file, allow_pickle=False, faces=np.array(counts), poses=self.poses)
 
 
 def read_parts(rig: Path) -> Parts | None:

@@ -123,7 +123,7 @@ def _of_file(scene: SceneData, frames: Measured) -> Values:
     for number in frames.numbers:
         parts = (video.background(number), video.moving(number))
         rows.append(seam_row(measure_seam(scene.meshes[number], scene.labels(number), *parts)))
-    return finite(scene_means(rows)) | ({} if scene.parts is None else part_values(scene, scene.parts, video))
+    return finite(scene_means(rows)) | ({} if scene.parts is None else part_values(scene.true, scene.parts, video))
 
 
 @lru_cache(maxsize=10)  # 2 GB: what is prepared for one point serves the next
