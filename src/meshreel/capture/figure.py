@@ -30,10 +30,10 @@ class Pose:
     wrists: tuple[Vector | None, Vector | None] = (None, None)  # left, right: world targets; None: the arm swings
     reach: tuple[float, float] = (0.0, 0.0)  # how far each wrist is on its way to its target, 0 to 1
     softness: float = 0.0  # -1 to 1: deflection of belly and chest
-    hips: tuple[float, float] = (0.0, 0.0)  # m above and ahead of where they are when standing; sitting: both negative
-    lean: float = 0.0  # rad, of the trunk forward about the hips
     size: float = 1.0  # relative to an adult
     girth: float = 1.0  # relative to an average adult's radii
+    hips: tuple[float, float] = (0.0, 0.0)  # m above and ahead of where they are when standing; sitting: both negative
+    lean: float = 0.0  # rad, of the trunk forward about the hips
 
 
 def figure(pose: Pose, thinnest: float) -> Body:
