@@ -61,14 +61,15 @@ class SceneData:
         people = None if self.parts is None else self.parts.of_faces(number) > len(room3.THINGS)
         return true_scene(self.truth, number, people)
 
-    def judged(self, number: int) -> Bool[np.ndarray, " F"]:
-        """Return the faces of a frame that are to be labelled: a thing at rest may be room already, or not yet."""
+    def judged(self, number: int, source: str) -> Bool[np.ndarray, " F"]:
+        """Return the labels of a frame without those of things at rest, which may be room already, or not yet."""
         if self.parts is None:
-            return np.ones(len(self.meshes[number].faces), bool)
+            return self.labels(number, source)
         parts, counts = self.parts.of_faces(number), self.parts.moving[number]
         counts[0] = True  # the room
         path = self.folder / "labels" / f"judged-{number:05}.npy"
-        return _kept_array(path, lambda: _nearest_labels(self.truth[number].mesh, counts[parts], self.meshes[number]))
+        clean, mesh = self.truth[number].mesh, self.meshes[number]
+        return self.labels(number, source)[_kept_array(path, lambda: _nearest_labels(clean, counts[parts], mesh))]
 
     def labels(self, number: int, source: str = TRUE) -> Bool[np.ndarray, " F"]:
         """Which faces of a frame move: those nearest to clean ones that do (`TRUE`), or what the encoder finds."""

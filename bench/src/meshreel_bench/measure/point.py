@@ -160,5 +160,4 @@ def _segmentation(known: Dataset) -> dict[str, float | None]:
     if known.scene is None:
         raise InputError("a segmentation is judged on simulated scenes only, whose labels are known")
     scene, numbers = known.scene, range(len(known.sequence))
-    found, true = ((scene.labels(i, source)[scene.judged(i)] for i in numbers) for source in (FOUND, TRUE))
-    return score_labels(found, true)
+    return score_labels((scene.judged(i, FOUND) for i in numbers), (scene.judged(i, TRUE) for i in numbers))
