@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from meshreel_bench.datasets.room3 import FRAMES, NAMES, PEOPLE, THINGS, Parts, Room3, moving_parts
+from meshreel_bench.datasets.room3 import FRAMES, NAMES, PEOPLE, THINGS, Parts, Room3, moving_parts, thing_poses
 from meshreel_bench.datasets.scenes import TRUE, open_scene
 from meshreel_bench.measure.parts import missed, part_values
 
@@ -50,8 +50,9 @@ def test_each_face_has_its_part_and_things_move_rigidly(scene):
         own = [frame.mesh.vertices[frame.mesh.faces[parts.of_faces(k) == 1 + which]] for k, frame in enumerate(frames)]
         first, second = ((own[k] - parts.poses[k, which, :3, 3]) @ parts.poses[k, which, :3, :3] for k in (0, 1))
         assert np.allclose(first, second, atol=1e-5), name
-    assert parts.moving[0].tolist() == [False, False, False, True, True, True, True]
-    assert np.array_equal(frames[0].dynamic, parts.moving[0][parts.of_faces(0)])
+    moving = moving_parts(parts.poses)[0]
+    assert moving.tolist() == [False, False, False, True, True, True, True]
+    assert np.array_equal(frames[0].dynamic, moving[parts.of_faces(0)])
 
 
 def test_of_a_thing_at_rest_no_label_is_judged_and_things_are_no_people(scene):
@@ -62,7 +63,7 @@ def test_of_a_thing_at_rest_no_label_is_judged_and_things_are_no_people(scene):
 
 
 def test_crate_and_door_rest_for_a_second():
-    moving = moving_parts(Room3().poses)
+    moving = moving_parts(thing_poses())
     for name in THINGS[:2]:
         own = moving[:, NAMES.index(name)]
         assert own.sum() >= 20 and not own[FRAMES - 31 :].any()

@@ -59,6 +59,8 @@ TURNED = -np.pi / 2  # rad: heading to the left, -x
 TO_LEFT, TO_RIGHT = turn_about_y(TURNED), turn_about_y(-TURNED)
 
 Vector = Float64[np.ndarray, "3"]
+PerFrame = Float64[np.ndarray, " T"]
+_Walk = list[tuple[Vector, float, float, float]]  # what a `Pose` begins with, in each frame
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,11 +73,6 @@ class Parts:
     def of_faces(self, number: int) -> Int64[np.ndarray, " F"]:
         """Return the part, as its number in `NAMES`, of each face of a clean frame."""
         return np.repeat(np.arange(len(NAMES)), self.faces[number])
-
-    @property
-    def moving(self) -> Bool[np.ndarray, "T P"]:
-        """Which parts move in a frame."""
-        return moving_parts(self.poses)
 
 
 def moving_parts(poses: Float64[np.ndarray, "T K 4 4"]) -> Bool[np.ndarray, "T P"]:
@@ -92,33 +89,28 @@ class Room3:
     frames: int = FRAMES  # the first ones
     spacing: float = 0.012  # m, of the grid of people's surface
 
-    @property
-    def poses(self) -> Float64[np.ndarray, "T K 4 4"]:
-        """Poses of the things in each frame, see `Parts`."""
-        return _things()[: self.frames]
-
     def parts(self, number: int) -> list[Mesh]:
         """Return the mesh of each part of a frame in the order of `NAMES`; people and things are closed."""
         still = concatenate([box(corners) for corners in STILL])
-        poses, grid = self.poses[number], grid_of_frame(number, self.spacing, 0)
+        poses, grid = thing_poses()[number], grid_of_frame(number, self.spacing, 0)
         things = [_placed(box(BOXES[name]), pose) for name, pose in zip(THINGS, poses, strict=True)]
         people = [polygonize((figure(pose, 0.7 * self.spacing),), 0.01, grid) for pose in _people(number)]
         return [*(subdivide_midpoint(mesh) for mesh in (still, *things)), *people]
 
     def record(self, folder: Path, width: int = 640) -> None:
         """Write the rig and its truth, with `parts.npz`; three minutes for 60 frames."""
-        counts, moving = list[list[int]](), moving_parts(self.poses)
+        counts, poses = list[list[int]](), thing_poses()[: self.frames]
 
         def frames() -> Iterator[SceneFrame]:
             for number in range(self.frames):
                 parts = self.parts(number)
                 counts.append([len(part.faces) for part in parts])
-                yield SceneFrame(concatenate(parts), np.repeat(moving[number], counts[-1]))
+                yield SceneFrame(concatenate(parts), np.repeat(moving_parts(poses)[number], counts[-1]))
 
         cameras = (camera.resized(width, round(0.9 * width)) for camera in corner_cameras(LOW, HIGH))
         simulate_rig(folder, frames(), tuple(cameras), RATE)
         with replacing(folder / TRUTH / PARTS) as file:
-            np.savez_compressed(file, allow_pickle=False, faces=np.array(counts), poses=self.poses)
+            np.savez_compressed(file, allow_pickle=False, faces=np.array(counts), poses=poses)
 
 
 def read_parts(rig: Path) -> Parts | None:
@@ -129,31 +121,31 @@ def read_parts(rig: Path) -> Parts | None:
         return Parts(archive["faces"], archive["poses"])
 
 
-def _things() -> Float64[np.ndarray, "T K 4 4"]:
+def thing_poses() -> Float64[np.ndarray, "T K 4 4"]:
     """Return the poses of crate, door and box in all frames."""
-    carrier, pusher = _walkers()
+    carrier, pusher = _walks()
     poses, down = np.tile(np.eye(4), (FRAMES, len(THINGS), 1, 1)), _eased(45, 56)[:, None]
-    poses[:, 0, :3, 3] = pusher.places[np.minimum(np.arange(FRAMES), LEFT)] + TO_LEFT @ ARM
+    poses[:, 0, :3, 3] = [pusher[min(number, LEFT)][0] + TO_LEFT @ ARM for number in range(FRAMES)]
     poses[:, 1, :3, 3] = HINGE
     poses[:, 1, :3, :3] = [turn_about_y(OPEN * share) for share in _eased(3, 27)]
-    poses[:, 2, :3, 3] = (1 - down) * (carrier.places + TO_RIGHT @ HELD) + down * ON_TABLE
+    poses[:, 2, :3, 3] = (1 - down) * [place + TO_RIGHT @ HELD for place, *_ in carrier] + down * ON_TABLE
     poses[:, 2, :3, :3] = TO_RIGHT
     return poses
 
 
 def _people(number: int) -> tuple[Pose, Pose, Pose]:
     """Return the poses of the carrier, the pusher and the sitter."""
-    carrier, pusher = _walkers()
-    held, seat = _things()[number, 2, :3, 3], np.array([1.38, SOLE, 1.15])
+    carrier, pusher = _walks()
+    held, seat = thing_poses()[number, 2, :3, 3], np.array([1.38, SOLE, 1.15])
     hands = _both(held, TO_RIGHT, (0.17, 0.0, -0.1))
-    grips = _both(pusher.places[number], TO_LEFT, (0.12, 0.84, 0.33))
+    grips = _both(pusher[number][0], TO_LEFT, (0.12, 0.84, 0.33))
     knees = _both(seat, TO_LEFT, (0.12, 0.6, 0.06))
     bow, on = 0.15 * _eased(45, 56)[number], 1 - _eased(27, 35)[number]
     down = _eased(4, 24)[number] * (1 - _eased(34, 57)[number])
     hips, lean = (-0.4 * down, -0.36 * down), 0.55 * np.sin(np.pi * down)
     return (
-        Pose(*carrier.at(number), wrists=hands, reach=(1.0, 1.0), lean=bow),
-        Pose(*pusher.at(number), wrists=grips, reach=(on, on), lean=0.5 * on, girth=1.1),
+        Pose(*carrier[number], wrists=hands, reach=(1.0, 1.0), lean=bow),
+        Pose(*pusher[number], wrists=grips, reach=(on, on), lean=0.5 * on, girth=1.1),
         Pose(seat, TURNED, 0.25, 0.0, knees, (down, down), hips=hips, lean=lean, size=0.98, girth=0.92),
     )
 
@@ -163,34 +155,22 @@ def _both(place: Vector, turn: Float64[np.ndarray, "3 3"], apart: tuple[float, f
     return place + turn @ apart, place + turn @ (apart * np.array([-1.0, 1.0, 1.0]))
 
 
-@dataclass(frozen=True, slots=True)
-class _Walk:
-    """The way of a person: a start, and speed and heading in each frame."""
-
-    start: tuple[float, float, float]  # m
-    speeds: Float64[np.ndarray, " T"]  # m/s
-    headings: Float64[np.ndarray, " T"]  # rad
-
-    @property
-    def places(self) -> Float64[np.ndarray, "T 3"]:
-        """Place in each frame, m."""
-        ways = np.stack([np.sin(self.headings), np.zeros(FRAMES), np.cos(self.headings)], axis=1)
-        return self.start + np.pad(np.cumsum(self.speeds[:-1, None] * ways[:-1] / RATE, axis=0), ((1, 0), (0, 0)))
-
-    def at(self, number: int) -> tuple[Vector, float, float, float]:
-        """Return place, heading, step cycles walked and stride in a frame."""
-        speed, walked = float(self.speeds[number]), float(self.speeds[:number].sum()) / RATE
-        return self.places[number], float(self.headings[number]), walked / CYCLE, STRIDE * min(speed, 1.0)
-
-
-def _walkers() -> tuple[_Walk, _Walk]:
+def _walks() -> tuple[_Walk, _Walk]:
     """Return the ways of the carrier, to the table, and of the pusher, who leaves the crate and turns away."""
     speeds = 1.25 * _eased(2, 6) * (1 - _eased(23, LEFT)) + _eased(31, 38)
-    pusher = _Walk((1.0, SOLE, -0.62), speeds, TURNED * (1 + _eased(29, 42)))
-    return _Walk((-0.88, SOLE, -0.12), 1.1 * (1 - _eased(42, 52)), np.full(FRAMES, -TURNED)), pusher
+    pusher = _walked((1.0, SOLE, -0.62), speeds, TURNED * (1 + _eased(29, 42)))
+    return _walked((-0.88, SOLE, -0.12), 1.1 * (1 - _eased(42, 52)), np.full(FRAMES, -TURNED)), pusher
 
 
-def _eased(first: int, last: int) -> Float64[np.ndarray, " T"]:
+def _walked(start: tuple[float, float, float], speeds: PerFrame, headings: PerFrame) -> _Walk:
+    """Return place, heading, step cycles so far and stride in each frame; speeds in m/s."""
+    ways = np.stack([np.sin(headings), np.zeros(FRAMES), np.cos(headings)], axis=1)
+    steps = np.concatenate([[0.0], speeds[:-1] / RATE])
+    places = start + np.cumsum(steps[:, None] * np.roll(ways, 1, axis=0), axis=0)
+    return list(zip(places, headings, np.cumsum(steps) / CYCLE, STRIDE * np.minimum(speeds, 1.0), strict=True))
+
+
+def _eased(first: int, last: int) -> PerFrame:
     """Return for each frame 0 up to the first one, 1 from the last one on, and a smooth transition between."""
     share = np.clip((np.arange(FRAMES) - first) / (last - first), 0, 1)
     return share * share * (3 - 2 * share)

@@ -65,7 +65,7 @@ class SceneData:
         """Return the labels of a frame without those of things at rest, which may be room already, or not yet."""
         if self.parts is None:
             return self.labels(number, source)
-        parts, counts = self.parts.of_faces(number), self.parts.moving[number]
+        parts, counts = self.parts.of_faces(number), room3.moving_parts(self.parts.poses)[number]
         counts[0] = True  # the room
         path = self.folder / "labels" / f"judged-{number:05}.npy"
         clean, mesh = self.truth[number].mesh, self.meshes[number]

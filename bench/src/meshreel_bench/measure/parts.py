@@ -16,7 +16,7 @@ from meshreel.metrics.even_points import scatter
 from meshreel.metrics.scene_accuracy import Scene, visible
 from meshreel.types import Mesh
 
-from ..datasets.room3 import NAMES, PEOPLE, THINGS, Parts
+from ..datasets.room3 import NAMES, PEOPLE, THINGS, Parts, moving_parts
 
 FAR = 0.03  # m: surface that the decoded one is farther from is missed
 SHOWN = 0.9  # share of a thing's visible surface that is the background's where the thing is room (guess)
@@ -54,7 +54,7 @@ def _part_bytes(true: Callable[[int], Scene], parts: Parts, video: Video) -> dic
 def _room_after_s(true: Callable[[int], Scene], parts: Parts, video: Video, name: str) -> float | None:
     """Return how long after its last motion a thing is room to the end, s; None where it is not in the last frame."""
     which = NAMES.index(name)
-    rest, frame = int(np.flatnonzero(parts.moving[:, which])[-1]) + 1, len(video)
+    rest, frame = int(np.flatnonzero(moving_parts(parts.poses)[:, which])[-1]) + 1, len(video)
     while frame > rest and _is_room(true(frame - 1), parts.of_faces(frame - 1) == which, video, frame - 1):
         frame -= 1
     return None if frame == len(video) else (frame - rest) / video.frame_rate
