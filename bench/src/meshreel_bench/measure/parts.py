@@ -51,13 +51,13 @@ def _part_bytes(true: Callable[[int], Scene], parts: Parts, video: Video) -> dic
     return dict(zip(NAMES, sizes.tolist(), strict=True))
 
 
-def _room_after_s(true: Callable[[int], Scene], parts: Parts, video: Video, name: str) -> float | None:
-    """Return how long after its last motion a thing is room to the end, s; None where it is not in the last frame."""
+def _room_after_s(true: Callable[[int], Scene], parts: Parts, video: Video, name: str) -> float:
+    """Return how long after its last motion a thing is room, and stays so, s; the rest of the video where it is not."""
     which = NAMES.index(name)
     rest, frame = int(np.flatnonzero(moving_parts(parts.poses)[:, which])[-1]) + 1, len(video)
     while frame > rest and _is_room(true(frame - 1), parts.of_faces(frame - 1) == which, video, frame - 1):
         frame -= 1
-    return None if frame == len(video) else (frame - rest) / video.frame_rate
+    return (frame - rest) / video.frame_rate
 
 
 def _is_room(clean: Scene, own: Bool[np.ndarray, " F"], video: Video, frame: int) -> bool:
