@@ -34,7 +34,7 @@ ALIKE = math.cos(math.radians(40))  # least cosine between the normals of one su
 OVERLAP = 0.02  # least share of a camera's points that lie on what another one sees (guess)
 WEAK = 0.03  # of the mean curvature: directions below are tested (guess)
 TRIAL = 0.04  # m, of the motion that tests a direction (guess)
-RISE = 0.1  # share of the cost by which that must raise it: planes with noise reach .09, demo rooms .12 at least
+RISE = 0.05  # share of the cost by which that must raise it: planes reach .04 (.09 with much noise), demo rooms .08
 LEAST_COST = 1.5e-4  # below, a cost is that of rounding (guess)
 APART = 0.01  # m: a pair that ends farther apart is reported (guess)
 
