@@ -125,8 +125,8 @@ def _board_pose(pixels: UInt8[np.ndarray, "H W 3"], camera: ColorCamera, board: 
     if not good:
         return None
     turn, shift = cv2.solvePnPRefineLM(places, points, *lens, turn, shift)
-    again = cv2.projectPoints(places, turn, shift, *lens)[0]
-    if float(np.sqrt(((again - points) ** 2).sum(axis=-1).mean())) > WORST:
+    apart = cv2.projectPoints(places, turn, shift, *lens)[0].reshape(-1, 2) - points.reshape(-1, 2)
+    if float(np.sqrt((apart**2).sum(axis=1).mean())) > WORST:
         return None
     pose = np.eye(4)
     pose[:3, :3], pose[:3, 3] = cv2.Rodrigues(turn)[0], shift.reshape(3)

@@ -172,7 +172,7 @@ def _opencv(record: dict[str, Any]) -> dict[str, Pose]:
     return found
 
 
-def _json(data: bytes) -> dict[str, Pose]:
+def _json(data: bytes) -> dict[str, Any]:
     record = json.loads(data.decode("utf-8-sig"))
     if "transforms" in record:
         return _transforms(record["transforms"])
