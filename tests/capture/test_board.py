@@ -56,7 +56,7 @@ def boards(options, frames, random):
         yield pose
 
 
-def recorded(folder, options, sees, given=None):
+def recorded(folder, options, sees):
     """Colour cameras with pictures; `sees` has for each camera the frames in which the board is in its view."""
     random, poses = np.random.default_rng(0), cameras_around(len(sees))
     files = [{} for _ in sees]
@@ -66,7 +66,9 @@ def recorded(folder, options, sees, given=None):
             seen = picture(options, board, pose, random)
             write_picture(seen if frame in sees[number] else np.full_like(seen, 128), files[number][frame])
     lens = (0.0,) * 5
-    return poses, [ColorCamera(f"camera{k}", WIDTH, HEIGHT, INTRINSIC, poses[0], lens, files[k]) for k in range(len(sees))]
+    return poses, [
+        ColorCamera(f"camera{k}", WIDTH, HEIGHT, INTRINSIC, poses[0], lens, files[k]) for k in range(len(sees))
+    ]
 
 
 @pytest.mark.parametrize("options", BOARDS, ids=["charuco", "tags", "tag"])
@@ -95,7 +97,14 @@ def test_a_board_that_no_two_cameras_see_is_an_error_with_counts(tmp_path):
         poses_by_board([], BOARDS[0])
 
 
-@pytest.mark.parametrize(("change", "told"), [({"marker": 0.05}, "smaller than squares"), ({"columns": 0}, "counts from 1"), ({"dictionary": "9X9"}, "not known to OpenCV; give one of 4X4_50|not known")])
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        ({"marker": 0.05}, "smaller than squares"),
+        ({"columns": 0}, "counts from 1"),
+        ({"dictionary": "9X9"}, "not known to OpenCV; give one of 4X4_50|not known"),
+    ],
+)
 def test_an_impossible_board_is_refused(change, told):
     with pytest.raises(InputError, match=told):
         BoardOptions(**change).made()

@@ -87,7 +87,10 @@ def test_along_a_single_wall_cameras_stay_and_are_named():
     found = refine_views(views)
     [warning] = found.warnings
     assert "does not fix left, right: it is one plane" in warning
-    moved = [one.camera_to_world[:3, 3] - view.camera.camera_to_world[:3, 3] for one, view in zip(found.cameras, views, strict=True)]
+    moved = [
+        one.camera_to_world[:3, 3] - view.camera.camera_to_world[:3, 3]
+        for one, view in zip(found.cameras, views, strict=True)
+    ]
     assert np.abs(moved[0] + moved[1]).max() < 1e-3  # the mean stays
     assert np.abs(moved[0] - moved[1] - [0, 0, 0.02]).max() < 2e-3
 

@@ -37,7 +37,10 @@ def listed(numbers):
 def colmap_text(path):
     lines = ["# Image list with two lines of data per image:"]
     for number, (name, (turn, shift)) in enumerate(INSIDE.items()):
-        lines += [f"{number} {row(np.roll(turn.as_quat(), 1))} {row(shift)} 1 {name}/00001.png", "" if number else "1.5 2.5 -1"]
+        lines += [
+            f"{number} {row(np.roll(turn.as_quat(), 1))} {row(shift)} 1 {name}/00001.png",
+            "" if number else "1.5 2.5 -1",
+        ]
     path.write_text("\n".join(lines) + "\n")
 
 
@@ -50,17 +53,24 @@ def colmap_binary(path):
 
 
 def caliscope(path):
-    tables = [f"[cameras.{name}]\nignore = false\nrotation = {listed(turn.as_rotvec())}\ntranslation = {listed(shift)}" for name, (turn, shift) in INSIDE.items()]
+    tables = [
+        f"[cameras.{name}]\nignore = false\nrotation = {listed(turn.as_rotvec())}\ntranslation = {listed(shift)}"
+        for name, (turn, shift) in INSIDE.items()
+    ]
     path.write_text("\n".join([*tables, "[cameras.lost]", "ignore = true", ""]))
 
 
 def anipose(path):
-    tables = [f'[cam_{number}]\nname = "{name}"\nrotation = {turn.as_matrix().tolist()}\ntranslation = {listed(shift)}' for number, (name, (turn, shift)) in enumerate(INSIDE.items())]
+    tables = [
+        f'[cam_{number}]\nname = "{name}"\nrotation = {turn.as_matrix().tolist()}\ntranslation = {listed(shift)}'
+        for number, (name, (turn, shift)) in enumerate(INSIDE.items())
+    ]
     path.write_text("\n".join([*tables, "[metadata]", "error = 0.3", ""]))
 
 
 def opencv_matrix(name, numbers, rows):
-    return f"{name}: !!opencv-matrix\n   rows: {rows}\n   cols: {np.size(numbers) // rows}\n   dt: d\n   data: {listed(numbers)}"
+    head = f"{name}: !!opencv-matrix\n   rows: {rows}\n   cols: {np.size(numbers) // rows}"
+    return f"{head}\n   dt: d\n   data: {listed(numbers)}"
 
 
 def opencv(path):
@@ -78,12 +88,17 @@ def opencv_lists(path):
 
 def transforms():
     middle = matrix(Rotation.from_rotvec([0, 0, 1]), [5, 0, 0])
-    frames = {"world": ("rig", middle)} | {f"{n}_depth_optical_frame": ("rig", np.linalg.inv(middle) @ p) for n, p in WANTED.items()}
+    frames = {"world": ("rig", middle)} | {
+        f"{n}_depth_optical_frame": ("rig", np.linalg.inv(middle) @ p) for n, p in WANTED.items()
+    }
     found = []
     for frame, (parent, pose) in frames.items():
         above, below = ("world", "rig") if frame == "world" else (parent, frame)
         turn, shift = Rotation.from_matrix(pose[:3, :3]).as_quat(), pose[:3, 3]
-        parts = {"translation": dict(zip("xyz", shift.tolist(), strict=True)), "rotation": dict(zip("xyzw", turn.tolist(), strict=True))}
+        parts = {
+            "translation": dict(zip("xyz", shift.tolist(), strict=True)),
+            "rotation": dict(zip("xyzw", turn.tolist(), strict=True)),
+        }
         found.append({"header": {"frame_id": above}, "child_frame_id": below, "transform": parts})
     return found
 
@@ -97,7 +112,9 @@ def tf_yaml(path):
 
 
 def rig(path):
-    path.write_text(json.dumps({"cameras": [{"name": name, "camera_to_world": pose.tolist()} for name, pose in WANTED.items()]}))
+    path.write_text(
+        json.dumps({"cameras": [{"name": name, "camera_to_world": pose.tolist()} for name, pose in WANTED.items()]})
+    )
 
 
 FORMS = {
@@ -148,6 +165,7 @@ def test_a_damaged_file_raises_nothing_else(tmp_path, name, write):
         ("poses.json", '{"cameras": [{"name": "left"}]}', "'camera_to_world' is missing"),
         ("poses.json", '{"cameras": [{"name": "left", "camera_to_world": [[1]]}]}', "pose of left is not 4 x 4"),
         ("poses.json", "[]", "cannot be read"),
+        ("poses.json", '{"cameras": [{"name": "left", "camera_to_world": 1' + 400 * "0" + "}]}", "cannot be read"),
         ("poses.toml", "[cameras.a]\nsize = [1, 2]", "has no poses of cameras"),
         ("images.txt", "1 2 3\n", "cannot be read"),
     ],
@@ -161,7 +179,10 @@ def test_what_is_wrong_is_named(tmp_path, name, text, told):
 def test_a_folder_is_that_of_colmap_and_frames_that_hang_on_themselves_are_refused(tmp_path):
     colmap_binary(tmp_path / "images.bin")
     assert set(read_poses(tmp_path)) == {"left", "right"}
-    one, two = (entry | {"child_frame_id": to, "header": {"frame_id": of}} for entry, to, of in zip(transforms(), "ab", "ba", strict=False))
+    one, two = (
+        entry | {"child_frame_id": to, "header": {"frame_id": of}}
+        for entry, to, of in zip(transforms(), "ab", "ba", strict=False)
+    )
     (tmp_path / "tf.json").write_text(json.dumps({"transforms": [one, two]}))
     with pytest.raises(InputError, match="hangs on itself"):
         read_poses(tmp_path / "tf.json")

@@ -30,7 +30,10 @@ def rig(tmp_path):
         Image.fromarray(np.zeros((96, 96, 3), np.uint8)).save(folder / name / "color_00000.png")
     described = json.loads((folder / "rig.json").read_text())
     front, side = described["cameras"]
-    front["color"] = {"folder": "front/color", "camera_to_world": (np.array(front["camera_to_world"]) @ shifted(0.05)).tolist()}
+    front["color"] = {
+        "folder": "front/color",
+        "camera_to_world": (np.array(front["camera_to_world"]) @ shifted(0.05)).tolist(),
+    }
     side["color"] = "side/color"
     described |= {"remark": "kept", "color_cameras": [front | {"name": "alone", "folder": "alone"}]}
     for key in ("depth", "color"):
@@ -62,5 +65,7 @@ def test_poses_of_colour_cameras_place_the_depth_cameras_beside_them(rig):
 
 
 def test_poses_of_none_of_the_cameras_are_refused(rig):
-    with pytest.raises(InputError, match=r"x.json: has poses of a, b and of none of the depth cameras front, side; name"):
+    with pytest.raises(
+        InputError, match=r"x.json: has poses of a, b and of none of the depth cameras front, side; name"
+    ):
         posed_by(rig, {"a": shifted(0), "b": shifted(1)}, "depth", Path("x.json"))

@@ -32,7 +32,10 @@ def rig(tmp_path):
 def apart(path, folder):
     """How far the middle camera is from its place, as the others see it, m."""
     (folder / "rig.json").write_bytes(path.read_bytes())
-    places = [one.camera_to_world[:3, 3] - true.camera_to_world[:3, 3] for one, true in zip(read_rig(folder).cameras, CAMERAS, strict=True)]
+    places = [
+        one.camera_to_world[:3, 3] - true.camera_to_world[:3, 3]
+        for one, true in zip(read_rig(folder).cameras, CAMERAS, strict=True)
+    ]
     return float(np.linalg.norm(places[1] - (places[0] + places[2]) / 2))
 
 

@@ -70,7 +70,9 @@ def poses_by_board(cameras: Sequence[ColorCamera], options: BoardOptions) -> tup
     board = options.made()
     seen = [_seen(camera, board) for camera in cameras]
     pairs = {
-        (i, j): [strict.products(seen[i][n], strict.inverse(seen[j][n])) for n in sorted(seen[i].keys() & seen[j].keys())]
+        (i, j): [
+            strict.products(seen[i][n], strict.inverse(seen[j][n])) for n in sorted(seen[i].keys() & seen[j].keys())
+        ]
         for i, j in combinations(range(len(cameras)), 2)
     }
     together = sorted((pair for pair in pairs if pairs[pair]), key=lambda pair: -len(pairs[pair]))

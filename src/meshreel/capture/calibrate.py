@@ -3,7 +3,7 @@
 In: what each camera sees (`still_view`), with poses that are right to some degrees and centimetres. Out: poses with
 which the surfaces lie on each other, the distances of each pair, and what the surfaces leave open.
 
-Points of one camera meet the planes that another one sees at the pixels they project to (Chen and Medioni 1992), and one
+Points of one camera meet the planes that another one sees at the pixels they project to (Chen and Medioni 1992); one
 least-squares problem has the motions of all cameras (Gauss-Newton). Of the motions that fit equally well it takes the
 smallest: the mean pose of cameras that see each other stays, and so does what no surface fixes.
 """
@@ -26,8 +26,8 @@ from .still_view import StillView, spread, still_view
 
 POINTS = 20_000  # of a camera, about (guess)
 REACH = (0.3, 0.15, 0.08, 0.05)  # m, of the distances that count, round by round (guess)
-STEPS, LAST_STEPS = 20, 60  # of a round, at most (guess)
-DONE, LAST_DONE = 1e-3, 1e-5  # m, of a step that ends a round (guess)
+STEPS = 60  # of a round, at most (guess)
+DONE = 1e-5  # m, of a step that ends a round (guess)
 LONGEST = 0.1  # m, of a step (guess)
 MOST_AHEAD = 10.0  # steps more, where they shrink slowly (guess)
 ALIKE = math.cos(math.radians(40))  # least cosine between the normals of one surface in two cameras (guess)
@@ -103,14 +103,6 @@ class _Match:
     near: Float64[np.ndarray, " N"]  # 1 on the plane, 0 where the distances that count end
 
 
-@dataclass(frozen=True, slots=True)
-class _Problem:
-    """Least squares in the motions of all cameras: the matrix and the gradient, for six numbers of each camera."""
-
-    matrix: Float64[np.ndarray, "m m"]
-    gradient: Float64[np.ndarray, " m"]
-
-
 class _Scene:
     """What cameras see, and how well it agrees.
 
@@ -133,18 +125,18 @@ class _Scene:
     def solved(self, poses: Poses, unfixed: Directions) -> Poses:
         """Return the poses that fit best, from poses nearby, without motion in the unfixed directions."""
         for reach in REACH:
-            last, before = reach == REACH[-1], None
-            for _ in range(LAST_STEPS if last else STEPS):
-                problem = self.problem(poses, reach)
-                values, vectors = strict.eigen(problem.matrix)
+            before = None
+            for _ in range(STEPS):
+                matrix, gradient = self.problem(poses, reach)
+                values, vectors = strict.eigen(matrix)
                 held = values <= 1e-9 * max(float(values.mean()), 1.0)  # cameras together, or without an overlap
-                along = np.einsum("ab,a->b", vectors, problem.gradient) / np.where(held, np.inf, values)
+                along = np.einsum("ab,a->b", vectors, gradient) / np.where(held, np.inf, values)
                 step = -np.einsum("ab,b->a", vectors, along)
                 step -= np.einsum("ak,bk,b->a", unfixed, unfixed, step)
                 taken = _ahead(step, before)
                 taken *= min(1.0, LONGEST / max(_size(taken), 1e-12))
                 poses, before = self.moved(poses, taken), (step, taken)
-                if _size(step) < (LAST_DONE if last else DONE):
+                if _size(step) < DONE:
                     break
         return poses
 
@@ -157,8 +149,8 @@ class _Scene:
         moved[:, :3, 3] = np.einsum("nab,nb->na", turns, poses[:, :3, 3] - self.middle) + self.middle + motions[:, 3:]
         return moved
 
-    def problem(self, poses: Poses, reach: float) -> _Problem:
-        """Return the least-squares problem of small motions from these poses."""
+    def problem(self, poses: Poses, reach: float) -> tuple[Float64[np.ndarray, "m m"], Step]:
+        """Return the matrix and the gradient of the least-squares problem of small motions from these poses."""
         count = len(poses)
         matrix, gradient = np.zeros((count, 6, count, 6)), np.zeros((count, 6))
         for (i, j), ways in self.overlaps(poses, reach):
@@ -173,7 +165,7 @@ class _Scene:
                     matrix[a, :, b] -= block
                 gradient[i] += slope
                 gradient[j] -= slope
-        return _Problem(matrix.reshape(6 * count, 6 * count), gradient.reshape(-1))
+        return matrix.reshape(6 * count, 6 * count), gradient.reshape(-1)
 
     def overlaps(self, poses: Poses, reach: float) -> Iterator[tuple[tuple[int, int], tuple[_Match, _Match]]]:
         """Yield the pairs of cameras that see a surface together, with the points of each on the other's planes."""
@@ -214,7 +206,7 @@ class _Scene:
 
         Noise gives a plane normals of all directions, and edges fix what no plane fixes: a motion is tried.
         """
-        values, vectors = strict.eigen(self.problem(poses, REACH[-1]).matrix)
+        values, vectors = strict.eigen(self.problem(poses, REACH[-1])[0])
         weak = (values > 1e-9 * max(float(values.mean()), 1.0)) & (values < WEAK * values.mean())
         rest, found = max(self.cost(poses), LEAST_COST), []
         for direction in vectors.T[weak]:

@@ -1,6 +1,6 @@
 """Poses of cameras from other programs' files: COLMAP, OpenCV, caliscope, anipose, ROS and other rigs.
 
-A file -> camera names with 4 x 4 matrices from the camera (x right, y down, z forward) to the world, in the file's unit.
+A file -> camera names with 4 x 4 matrices from camera (x right, y down, z forward) to world, in the file's unit.
 Files that have the inverse, as most do, are inverted here.
 """
 
@@ -24,9 +24,11 @@ from ..io.file_names import last_number
 from ..io.read import read_file
 
 Pose = Float64[np.ndarray, "4 4"]
-FORMS = "COLMAP's images.txt or images.bin, OpenCV's .yml, caliscope's .toml, tf_static as .yaml or .json, or a rig.json"
+FORMS = (
+    "COLMAP's images.txt or images.bin, OpenCV's .yml, caliscope's .toml, tf_static as .yaml or .json, or a rig.json"
+)
 _TURNS, _SHIFTS = ("Rot", "R", "rvec"), ("T", "t", "tvec")  # OpenCV's names of matrices, before `_` and a camera's name
-_DAMAGED = (OSError, ValueError, KeyError, TypeError, IndexError, AttributeError, struct.error, RecursionError)
+_DAMAGED = (OSError, ValueError, LookupError, TypeError, AttributeError, ArithmeticError, struct.error, RecursionError)
 
 
 def read_poses(path: Path) -> dict[str, Pose]:
@@ -119,7 +121,7 @@ def _colmap_binary(data: bytes) -> dict[str, Pose]:
 
 
 def _colmap(images: Iterable[tuple[str, list[float]]]) -> dict[str, Pose]:
-    """Return the poses of cameras that stand still: the mean over the images of a folder, or of one image by its name."""
+    """Return the poses of cameras: the mean over the images of a folder, or that of an image by its own name."""
     groups = defaultdict(list)
     for name, numbers in images:
         folder, _, stem = name.replace("\\", "/").rpartition("/")
@@ -148,7 +150,7 @@ def _yaml(data: bytes) -> dict[str, Pose]:
     Loader.add_multi_constructor("", lambda loader, _, node: loader.construct_mapping(node, deep=True))
     text = re.sub(r"^%YAML:.*", "", data.decode("utf-8-sig"))  # OpenCV's first line is no YAML
     try:
-        records = [record for record in yaml.load_all(text, Loader) if isinstance(record, dict)]  # noqa: S506
+        records = [record for record in yaml.load_all(text, Loader) if isinstance(record, dict)]
     except yaml.YAMLError as error:
         raise ValueError(" ".join(str(error).split())[:80]) from None
     if any("transforms" in record for record in records):
@@ -157,7 +159,7 @@ def _yaml(data: bytes) -> dict[str, Pose]:
 
 
 def _opencv(record: dict[str, Any]) -> dict[str, Pose]:
-    """Return poses of a rotation and a translation by camera, as R_left and T_left, or of lists rvecs, Ts and cam_ids."""
+    """Return poses of matrices R_left and T_left for each camera left, or of lists rvecs, Ts and cam_ids."""
     matrices = {key: value["data"] for key, value in record.items() if isinstance(value, dict) and "data" in value}
     if "rvecs" in matrices and "Ts" in matrices:
         turns, shifts = (np.reshape(matrices[key], (-1, 3)) for key in ("rvecs", "Ts"))
@@ -166,9 +168,9 @@ def _opencv(record: dict[str, Any]) -> dict[str, Pose]:
     found = {}
     for key, shift in matrices.items():
         kind, _, name = key.partition("_")
-        turns = [matrices[f"{turn}_{name}"] for turn in _TURNS if f"{turn}_{name}" in matrices]
-        if kind in _SHIFTS and name and turns:
-            found[name] = _seen_from(turns[0], shift)
+        named = [f"{turn}_{name}" for turn in _TURNS if f"{turn}_{name}" in matrices]
+        if kind in _SHIFTS and name and named:
+            found[name] = _seen_from(matrices[named[0]], shift)
     return found
 
 

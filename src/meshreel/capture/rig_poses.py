@@ -1,6 +1,6 @@
 """Other poses for the cameras of a rig, and its description with them.
 
-Colour cameras beside a depth camera are moved with it: how they stand to each other is known better than where they are.
+A colour camera beside a depth camera goes with it: how they stand to each other is known better than where they are.
 """
 
 from __future__ import annotations

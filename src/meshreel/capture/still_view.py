@@ -58,7 +58,11 @@ def still_view(camera: DepthCamera, depths: list[Float64[np.ndarray, "H W"]]) ->
     with np.errstate(invalid="ignore", divide="ignore"):
         count = sums(weight, 0, 0)
         i, j, s = (total / count for total in (sums(weight, 1, 0), sums(weight, 0, 1), sums(inverse, 0, 0)))
-        ii, ij, jj = (sums(weight, 2, 0) / count - i * i, sums(weight, 1, 1) / count - i * j, sums(weight, 0, 2) / count - j * j)
+        ii, ij, jj = (
+            sums(weight, 2, 0) / count - i * i,
+            sums(weight, 1, 1) / count - i * j,
+            sums(weight, 0, 2) / count - j * j,
+        )
         is_, js = sums(inverse, 1, 0) / count - i * s, sums(inverse, 0, 1) / count - j * s
         ss = sums(inverse**2, 0, 0) / count - s * s
         size = ii * jj - ij * ij

@@ -1,4 +1,4 @@
-"""The command line `meshreel capture|calibrate|segment|survey|encode|concat|decode|export|info|compare|play|serve|bench|demo`.
+"""The command line `meshreel COMMAND`, with the commands of `COMMANDS`, and those that other distributions add.
 
 Errors take one line on standard error and exit code 2; `--debug` shows the traceback. The module of a command is
 imported when the command is called, so that `decode` and `info` work without the extra `encode`. This module imports

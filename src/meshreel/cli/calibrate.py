@@ -95,7 +95,9 @@ def command(
     if refine:
         found, calibration = _refined(found)
         warnings += calibration.warnings
-        write_calibration_sheet(calibration, found.up, path.with_name("calibration.png") if in_place else path.with_suffix(".png"))
+        write_calibration_sheet(
+            calibration, found.up, path.with_name("calibration.png") if in_place else path.with_suffix(".png")
+        )
     new = described(found)
     if in_place:
         with replacing(rig / BEFORE) as file:
