@@ -214,8 +214,8 @@ def test_colour_with_other_frames_than_depth_is_refused(folder, numbers, words):
     ("change", "words"),
     [
         ({"distortion": "none"}, "distortion is 'none'"),
-        ({"distortion": [0, 0, 0, 0, 0, 0]}, "give up to five numbers"),
-        ({"distortion": [99]}, "give up to five numbers"),
+        ({"distortion": [0] * 9}, "give up to eight numbers"),
+        ({"distortion": [99]}, "give up to eight numbers"),
         ({"folder": 3}, "has no folder"),
         ({"fx": -1}, "focal"),
         ({"width": "wide"}, "width is 'wide' and not a number"),

@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from meshreel.cli import main
+from meshreel.cli.flags import Reading
+from meshreel.cli.sources import open_source
 from meshreel.geometry import tsdf
 from meshreel.io.depth_pictures import read_depth, write_depth
 from meshreel.io.sequence import open_sequence
 from tests.capture.depth_scenes import RADIUS, camera, record
+from tests.capture.recordings.files import tum
+from tests.cli.conftest import failed
 
 BALLS = [(0.1 * number, 0.0, 0.0) for number in range(3)]
 
@@ -98,3 +103,33 @@ def test_surface_in_too_many_blocks_is_refused_with_the_frame(rig, tmp_path, cap
     error = capsys.readouterr().err
     assert "rig: frame 0: surface in " in error and "are depth_unit_m and depth_max_m right?" in error
     assert not list((tmp_path / "frames").glob("frame_*"))
+
+
+def test_a_recording_is_listed_and_becomes_a_rig(tmp_path, run):
+    folder, rig = tum(tmp_path / "desk"), tmp_path / "rig"
+    said = run("capture", "--list", folder)
+    assert said.code == 0 and "camera: depth 96 x 96, 4 pictures in 0.30 s (10 a second), calibrated" in said.out
+    camera = run("capture", "--list", folder, "--json").row["recordings"][0]["cameras"][0]
+    assert camera["depth"]["pictures"] == 4 and camera["color"]["calibrated"] and camera["poses"] == 4
+    row = run("capture", folder, "-o", rig, "--json").row
+    assert (row["cameras"], row["color_cameras"], row["frames"], row["frame_rate"]) == (1, 1, 4, 10)
+    assert run("capture", rig, "-o", tmp_path / "meshes", "--voxel", "0.05").code == 0
+    assert len(open_sequence(tmp_path / "meshes")) == 4
+
+
+def test_commands_that_take_scenes_take_recordings_through_a_temporary_rig(tmp_path):
+    source = open_source([str(tum(tmp_path / "desk"))], Reading(frames="1:3"))
+    assert len(source.sequence) == 2 and len(source.sequence[0].faces) > 1000 and source.warnings == ()
+    place = Path(source.scratch.name)
+    assert (place / "rig" / "rig.json").exists()
+    del source
+    assert not place.exists()
+
+
+def test_recordings_take_no_options_of_fusion_and_no_folder_that_is_there(tmp_path, run):
+    folder = tum(tmp_path / "desk")
+    assert failed(run("capture", folder), "--output is missing")
+    assert failed(run("capture", folder, "-o", tmp_path / "rig", "--voxel", "0.1"), "is no rig: make one of it")
+    assert failed(run("capture", folder, "-o", tmp_path), "is there already; choose another folder")
+    assert failed(run("capture", tmp_path, "-o", tmp_path / "rig"), "nor a recording that can be read", ".mkv")
+    assert not (tmp_path / "rig").exists()

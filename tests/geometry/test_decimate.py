@@ -78,3 +78,10 @@ def test_one_collapse_reaches_a_number_of_faces(mesh: Mesh) -> None:
 def test_too_few_faces_are_refused() -> None:
     with pytest.raises(InputError, match="faces is 3"):
         decimate_faces(ball(1), 3)
+
+
+def test_separate_triangles_may_be_fewer_than_what_a_quick_first_pass_leaves() -> None:
+    """fast-simplification refuses such a number of faces."""
+    corners = np.random.default_rng(0).random((120, 3))
+    soup = Mesh.of(corners, np.arange(120).reshape(-1, 3))
+    assert 0 < len(decimate(soup, 6).faces) <= 40

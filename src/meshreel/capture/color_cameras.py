@@ -34,7 +34,7 @@ class ColorCamera:
     height: int  # pixels
     intrinsic: Float64[np.ndarray, "3 3"]  # camera coordinates to homogeneous pixels, whose middles are whole numbers
     camera_to_world: Float64[np.ndarray, "4 4"]  # m
-    distortion: tuple[float, ...]  # k1, k2, p1, p2, k3, as OpenCV has them
+    distortion: tuple[float, ...]  # k1, k2, p1, p2, k3, and perhaps k4, k5, k6, as OpenCV has them
     files: Mapping[int, Path]  # pictures by frame number
 
     def picture(self, frame: int) -> ColorPicture | None:
@@ -80,12 +80,13 @@ def check_frames(folder: Path, cameras: Sequence[ColorCamera], frames: Sequence[
 
 
 def distortion_of(entry: Mapping[str, Any]) -> tuple[float, ...]:
-    """Return the five coefficients of an entry; missing ones are 0. Raises InputError for others."""
+    """Return the coefficients of an entry, five at least; missing ones are 0. Raises InputError for others."""
     given = entry.get("distortion", [])
-    good = isinstance(given, list) and len(given) <= 5
+    good = isinstance(given, list) and len(given) <= 8
     numbers = [k for k in given if isinstance(k, (int, float)) and not isinstance(k, bool)] if good else []
     if not good or len(numbers) < len(given) or not all(abs(k) <= MOST_DISTORTION for k in numbers):
-        raise InputError(f"distortion is {given!r:.60}; give up to five numbers, k1 k2 p1 p2 k3, as OpenCV has them")
+        text = "give up to eight numbers, k1 k2 p1 p2 k3 k4 k5 k6, as OpenCV has them"
+        raise InputError(f"distortion is {given!r:.60}; {text}")
     if any(math.isnan(k) for k in numbers):
         raise InputError("distortion has a number that is not finite; calibrate the camera again")
     return (*map(float, numbers), *[0.0] * (5 - len(numbers)))

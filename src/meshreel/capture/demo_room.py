@@ -131,7 +131,7 @@ def furnished_room(options: RoomOptions | None = None) -> Room:
         _panel((-x, 0, -z), (2 * x, 0, 0), (0, y, 0)),  # the wall at the back
         _panel((-x, 0, z), (0, 0, -2 * z), (0, y, 0)),  # and that on the left
     ]
-    return Room(options or RoomOptions(), concatenate([_joined(panels), *map(_box, FURNITURE)]))
+    return Room(options or RoomOptions(), concatenate([_joined(panels), *map(box, FURNITURE)]))
 
 
 def record_room(
@@ -171,9 +171,9 @@ def _child(seconds: float) -> Pose:
     return Pose(place, heading, wrists=(wrists[0], wrists[1]), reach=(1.0, 1.0), size=0.68, girth=1.05)
 
 
-def _box(box: Box) -> Mesh:
+def box(corners: Box) -> Mesh:
     """Return a closed box whose faces point outward."""
-    low, high = (np.array(corner) for corner in box)
+    low, high = (np.array(corner) for corner in corners)
     a, b, c = np.diag(high - low)
     lower = [_panel(low, b, a), _panel(low, c, b), _panel(low, a, c)]
     upper = [_panel(high, -a, -b), _panel(high, -b, -c), _panel(high, -c, -a)]

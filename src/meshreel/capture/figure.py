@@ -32,13 +32,15 @@ class Pose:
     softness: float = 0.0  # -1 to 1: deflection of belly and chest
     size: float = 1.0  # relative to an adult
     girth: float = 1.0  # relative to an average adult's radii
+    hips: tuple[float, float] = (0.0, 0.0)  # m above and ahead of where they are when standing; sitting: both negative
+    lean: float = 0.0  # rad, of the trunk forward about the hips
 
 
 def figure(pose: Pose, thinnest: float) -> Body:
     """Return the person's parts in world coordinates, none thinner than `thinnest` (m), so that a grid resolves it."""
     bob = -pose.stride * (0.035 + 0.02 * np.cos(4 * np.pi * pose.step))  # lowest when both feet are far apart
-    lift = np.array([0.0, bob, 0.0])
-    chains = [_torso(lift, pose), _head(lift)]
+    lift = np.array([0.0, bob + pose.hips[0], pose.hips[1]])
+    chains = [_leaned(chain, lift, pose.lean) for chain in (_torso(lift, pose), _head(lift))]
     for side, phase in ((1.0, 0.0), (-1.0, 0.5)):
         chains += [_leg(lift, side, pose.step + phase, pose.stride), *_arm(lift, side, pose)]
     turn = turn_about_y(pose.heading)
@@ -67,6 +69,17 @@ def _chain(rows: list[Row], blend: float, join: float) -> Chain:
 
 def _moved(chain: Chain, by: Vector) -> Chain:
     return Chain(chain.starts + by, chain.ends + by, chain.radii, chain.blend, chain.join)
+
+
+def _leaned(chain: Chain, lift: Vector, lean: float) -> Chain:
+    starts, ends = (_lean(points, lift, lean) for points in (chain.starts, chain.ends))
+    return Chain(starts, ends, chain.radii, chain.blend, chain.join)
+
+
+def _lean(points: np.ndarray, lift: Vector, lean: float) -> np.ndarray:
+    """Turn points of the trunk about the hips."""
+    (c, s), hips = (np.cos(lean), np.sin(lean)), np.array([0.0, 0.95, 0.0]) + lift
+    return (points - hips) @ np.array([[1.0, 0.0, 0.0], [0.0, c, s], [0.0, -s, c]]) + hips
 
 
 def _torso(lift: Vector, pose: Pose) -> Chain:
@@ -126,7 +139,7 @@ def _foot_track(phase: float) -> tuple[float, float, float]:
 
 def _arm(lift: Vector, side: float, pose: Pose) -> list[Chain]:
     which = 0 if side > 0 else 1
-    shoulder = np.array([0.185 * side, 1.40, -0.01]) + lift
+    shoulder = _lean(np.array([0.185 * side, 1.40, -0.01]) + lift, lift, pose.lean)
     swing = -side * np.cos(2 * np.pi * pose.step) * pose.stride * 0.35
     wrist = np.array([0.25 * side, 0.92 + 0.25 * abs(swing), 0.06 + swing]) + lift
     pole = np.array([0.35 * side, -0.2, -1.0])

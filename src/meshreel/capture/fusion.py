@@ -14,9 +14,11 @@ from jaxtyping import UInt16
 
 from ..errors import InputError
 from ..geometry.topology import without_fragments
-from ..geometry.tsdf import SEEN, TRUNCATION, extract, integrate
+from ..geometry.tsdf import GRAZING, SEEN, TRUNCATION, extract, integrate
 from ..types import Mesh
 from .rig import DepthCamera
+
+FINER = 2  # times the rows and columns of the pictures, interpolated, that are fused (decision 28)
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,15 +26,15 @@ class FusionOptions:
     """Resolution of the fused surface and removal of fragments."""
 
     voxel: float = 0.02  # m, side of a voxel
-    truncation: float = TRUNCATION  # voxels before and behind a depth that it constrains
-    fragment: float = 0.01  # m^2: connected components with less area are dropped
+    truncation: float | None = None  # voxels before and behind a depth that it constrains; None: by the cameras
+    fragment: float = 0.002  # m^2: connected components with less area are dropped
 
     def __post_init__(self) -> None:
         if not 1e-4 <= self.voxel <= 1:
             raise InputError(f"voxel {self.voxel:g}: give metres, 0.0001 to 1; 0.02 suits a room")
-        if not 1 <= self.truncation <= 20 or not 0 <= self.fragment < np.inf:
+        if not (self.truncation is None or 1 <= self.truncation <= 20) or not 0 <= self.fragment < np.inf:
             raise InputError(
-                f"truncation {self.truncation:g}, fragment {self.fragment:g}: give 1 to 20 voxels and an area from 0 on"
+                f"truncation {self.truncation}, fragment {self.fragment:g}: give 1 to 20 voxels and an area from 0 on"
             )
 
 
@@ -46,4 +48,10 @@ def fuse_depths(
     pictures = [camera.picture(inside) for camera, depth in depths if (inside := camera.in_range(depth)).any()]
     if not pictures:
         return Mesh.empty()
-    return without_fragments(extract(integrate(pictures, options.voxel, options.truncation), SEEN), options.fragment)
+    fine, truncation = [picture.finer(FINER) for picture in pictures], options.truncation or _truncation(len(depths))
+    return without_fragments(extract(integrate(fine, options.voxel, truncation), SEEN), options.fragment)
+
+
+def _truncation(cameras: int) -> float:
+    """Return voxels: surface seen at a grazing angle needs more, limbs that are seen from both sides bear fewer."""
+    return GRAZING if cameras == 1 else TRUNCATION

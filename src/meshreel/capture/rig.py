@@ -213,12 +213,12 @@ def _described(folder: Path) -> tuple[list[Any], tuple[DepthCamera, ...], float,
 
 
 def write_rig(
-    folder: Path, cameras: tuple[DepthCamera, ...], frame_rate: float, colors: Sequence[dict[str, Any]] = ()
+    folder: Path, cameras: tuple[DepthCamera, ...], frame_rate: float, colors: Sequence[dict[str, Any] | None] = ()
 ) -> None:
-    """Write `rig.json`; `colors` describe the colour cameras beside the first of the cameras."""
+    """Write `rig.json`; `colors` describe the colour cameras beside the first of the cameras, None where is none."""
     entries = [camera.record() | {"depth": f"{camera.name}/depth"} for camera in cameras]
     for entry, color in zip(entries, colors, strict=False):
-        entry["color"] = color
+        entry |= {} if color is None else {"color": color}
     with replacing(folder / RIG) as file:
         file.write((json.dumps({"frames_per_second": frame_rate, "cameras": entries}, indent=1) + "\n").encode())
 

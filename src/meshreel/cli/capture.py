@@ -1,9 +1,10 @@
-"""`meshreel capture`: fuse recordings of depth cameras into one mesh file per frame."""
+"""`meshreel capture`: make a rig of recordings, and fuse the depth of a rig into one mesh file per frame."""
 
 from __future__ import annotations
 
 import json
 import zlib
+from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -12,6 +13,10 @@ from cyclopts import Parameter
 
 from ..capture.fusion import FusionOptions
 from ..capture.recording import Recording, open_recording
+from ..capture.recordings import is_rig, open_take
+from ..capture.recordings.takes import Stream, Take
+from ..capture.recordings.to_rig import write_takes
+from ..capture.rig import read_rig
 from ..errors import InputError
 from ..io.differences import first_difference
 from ..io.sequence import CAPTURED
@@ -22,44 +27,111 @@ _FUSION = FusionOptions()
 
 
 def command(
-    rig: Path,
+    inputs: list[Path],
     /,
     *,
-    output: Annotated[Path, Parameter(name=["--output", "-o"])],
+    output: Annotated[Path | None, Parameter(name=["--output", "-o"])] = None,
     voxel: float = _FUSION.voxel,
-    truncation: float = _FUSION.truncation,
+    truncation: float | None = _FUSION.truncation,
     fragment: float = _FUSION.fragment,
     frames: str = ":",
     format: Literal["ply", "obj", "glb"] = "ply",
+    show: Annotated[bool, Parameter(name="--list", negative="")] = False,
     common: Common = Common(),
 ) -> None:
-    """Fuse the depth pictures of a rig of still cameras into one mesh per frame.
+    """Fuse the depth pictures of a rig of still cameras into one mesh per frame, or make a rig of recordings.
 
-    Run again after an interruption, it makes the missing frames.
+    Run again after an interruption, it makes the missing frames of a rig.
 
     Parameters
     ----------
-    rig
+    inputs
         A folder with rig.json: {"frames_per_second": 30, "cameras": [{"name": "left", "width": 640, "height": 576,
         "fx": 504, "fy": 504, "cx": 320, "cy": 288, "camera_to_world": 4 x 4 rows in metres, "depth_unit_m": 0.001,
         "depth_min_m": 0.1, "depth_max_m": 5, "depth": "left/depth"}]}, each `depth` a folder of 16-bit PNG whose names
         end in the frame's number. Cameras look along +z, x right, y down. Or a folder with camera.json (one such
         camera, with frames_per_second), depth/ and, for colours, color/. A camera's `color` is a folder of pictures
-        aligned with its depth, or an object with a folder and what differs; `color_cameras` lists others.
+        aligned with its depth, or an object with a folder and what differs; `color_cameras` lists others. Or recordings
+        of other programs, together one rig: TUM RGB-D, Stray Scanner and Record3D folders, .r3d, .bag, .mcap, .mkv.
     output
-        The directory for frame_00000.ply and so on; created if needed.
+        The directory for frame_00000.ply and so on, created if needed; of recordings, the new folder of the rig.
     voxel
         Side of a voxel, m.
     truncation
-        Number of voxels before and behind a measurement that it changes.
+        Number of voxels before and behind a measurement that it changes; 4 with one camera, 3 with several.
     fragment
         Smallest area of a connected piece, m^2; smaller ones are dropped.
     frames
         Frames to fuse, as A:B with B excluded.
     format
         Format of the mesh files.
+    show
+        Show the streams of recordings, their sizes, rates and calibration, and write nothing.
     """
     options = FusionOptions(voxel, truncation, fragment)
+    if show:
+        return _list(inputs, common)
+    if output is None:
+        raise InputError("--output is missing: a folder for meshes, or for the rig of recordings; or give --list")
+    if len(inputs) > 1 or (inputs[0].exists() and not is_rig(inputs[0])):
+        if (options, frames, format) != (_FUSION, ":", "ply"):
+            raise InputError(f"{inputs[0]}: is no rig: make one of it without options of fusion, then capture that")
+        return _make_rig(inputs, output, common)
+    return _fuse(inputs[0], output, options, frames, format, common)
+
+
+def _list(inputs: list[Path], common: Common) -> None:
+    """Print what recordings hold; no picture is read for it."""
+    takes = [open_take(path) for path in inputs]
+    lines = [line for take in takes for line in _lines(take)]
+    common.result({"recordings": [_take_row(take) for take in takes]}, *lines)
+
+
+def _take_row(take: Take) -> dict[str, Any]:
+    cameras = [
+        {"name": one.name, "depth": _row(one.depth), "color": None if one.color is None else _row(one.color)}
+        | {"poses": 0 if one.poses is None else len(one.poses)}
+        for one in take.sensors
+    ]
+    return {"path": str(take.path), "kind": take.kind, "cameras": cameras, "others": list(take.others)}
+
+
+def _row(stream: Stream) -> dict[str, Any]:
+    about = {"width": stream.width, "height": stream.height, "pictures": stream.count, "seconds": stream.seconds}
+    return about | {"pictures_per_second": stream.rate, "calibrated": stream.lens is not None}
+
+
+def _lines(take: Take) -> Iterator[str]:
+    yield f"{take.path}: {take.kind}"
+    for sensor in take.sensors:
+        for what, one in (("depth", sensor.depth), ("color", sensor.color)):
+            if one is not None:
+                known = "calibrated" if one.lens is not None else f"NOT calibrated: {take.calibrate}"
+                times = f"{one.count} pictures in {one.seconds:.2f} s ({one.rate:.4g} a second)"
+                yield f"  {sensor.name}: {what} {one.width} x {one.height}, {times}, {known}"
+    if take.others:
+        yield f"  not read: {', '.join(take.others)}"
+
+
+def _make_rig(inputs: list[Path], output: Path, common: Common) -> None:
+    """Write the rig of recordings."""
+    takes = [open_take(path) for path in inputs]
+    streams = [
+        one for take in takes for sensor in take.sensors for one in (sensor.depth, sensor.color) if one is not None
+    ]
+    total = sum(stream.count for stream in streams)
+    with common.stages(total) as progress:
+        warnings = write_takes(takes, output, lambda done: progress("read", done, total))
+    rig = read_rig(output)
+    common.warn([*warnings, *rig.missing()])
+    row = {"output": str(output), "cameras": len(rig.cameras), "color_cameras": len(rig.color_cameras)}
+    row |= {"frames": len(rig.frames), "frame_rate": rig.frame_rate}
+    counted = f"{row['frames']} frames, depth cameras: {row['cameras']}, colour cameras: {row['color_cameras']}"
+    common.result(row, f"{output}: a rig, {counted}, {rig.frame_rate:g} frames a second")
+
+
+def _fuse(rig: Path, output: Path, options: FusionOptions, frames: str, format: str, common: Common) -> None:
+    """Write the meshes of a rig."""
     recording, warnings = open_recording(rig, options, frames, keep=False)
     common.warn(warnings)
     names = frame_names(len(recording), format)

@@ -186,10 +186,10 @@ def command(
     ----------
     inputs
         A directory, a glob, mesh files (OBJ, PLY, GLB, STL, OFF) or an .npz of vertices (T x V x 3) and faces (F x 3).
-        Vertices that repeat a position are welded. Or the folder of a rig, as `capture` takes it, which is fused with
-        the defaults of `capture`; its background is better than that of the meshes that `capture` writes, because it is
-        fused from the depth itself. A sequence that mostly stands still is a scene: the file holds its background once,
-        and a track for each moving body.
+        Vertices that repeat a position are welded. Or the folder of a rig or recordings, as `capture` takes them, fused
+        with the defaults of `capture`; the background is better than that of the meshes that `capture` writes, because
+        it is fused from the depth itself. A sequence that mostly stands still is a scene: the file holds its background
+        once, and a track for each moving body.
     output
         The .reel file to write; it appears only when it is complete. Inputs and output may be URLs, as s3://bucket/scan;
         inputs also https:// (extra `remote`).

@@ -1,7 +1,8 @@
-"""Inputs of commands that take scenes: mesh files or the folder of a rig, and flags for what moves."""
+"""Inputs of commands that take scenes: mesh files, the folder of a rig or recordings, and flags for what moves."""
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -13,7 +14,8 @@ from ..analysis.scene.masks import ImageMasks, Masker, read_view_file
 from ..analysis.scene.sam3 import Sam3Masks, Sam3Options
 from ..analysis.scene.segmentation import SegmentOptions
 from ..capture.recording import open_recording
-from ..capture.rig import RIG, SINGLE
+from ..capture.recordings import is_rig, is_take, open_take
+from ..capture.recordings.to_rig import write_takes
 from ..errors import InputError
 from ..geometry.derived_sequences import Upright
 from ..io.remote import Remote, located
@@ -30,6 +32,7 @@ class Source:
 
     sequence: MeshSequence
     remarks: tuple[str, ...] = ()
+    scratch: tempfile.TemporaryDirectory[str] | None = None  # with the rig of recordings; it ends with the source
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -38,17 +41,18 @@ class Source:
 
 
 def open_source(inputs: Sequence[str], reading: Reading) -> Source:
-    """Open mesh files, or the folder of a rig, whose frames are fused on access. Raises InputError.
+    """Open mesh files, or the folder of a rig or recordings, whose frames are fused on access. Raises InputError.
 
     The truth of a simulated rig has a description of cameras, too, but is opened as the mesh files that it holds.
     """
     folder = located(inputs[0])
-    if (
-        isinstance(folder, Remote)
-        or len(inputs) > 1
-        or not any((folder / name).is_file() for name in (RIG, SINGLE))
-        or any(folder.glob("frame_*.ply"))
-    ):
+    if isinstance(folder, Path) and is_take(folder):
+        takes = [open_take(Path(name)) for name in inputs]
+        scratch = tempfile.TemporaryDirectory(prefix="meshreel-")
+        remarks = write_takes(takes, rig := Path(scratch.name, "rig"))
+        opened = open_source([str(rig)], reading)
+        return replace(opened, remarks=(*remarks, *opened.remarks), scratch=scratch)
+    if isinstance(folder, Remote) or len(inputs) > 1 or not is_rig(folder) or any(folder.glob("frame_*.ply")):
         options, made = reading.options(), captured(folder) if len(inputs) == 1 else {}
         rate = made.get("frames_per_second")
         if reading.fps == _READ.fps and isinstance(rate, (int, float)) and rate > 0:

@@ -76,6 +76,7 @@ class Candidate:
     ) -> None:
         """Follow the surface of a tracker that begins at the key; `of_key` and `of_group` also give it a template."""
         self.key, self.before, self._options, self._noise = key, before, options, ahead.noise
+        self._tolerated = options.tolerance * ahead.noise
         self._target, self._tracker = ahead.target.distance, tracker
         self._fits, self._residuals = dict[int, Float64[np.ndarray, "V 3"]](), dict[int, float]()
         self.slide: Slide | None = None
@@ -165,7 +166,7 @@ class Candidate:
 
     def _limit(self, ahead: Ahead) -> float:
         """Return the residual beyond which a frame is lost: there is none below a key that is lost itself."""
-        limit, target = self._options.plan.limit, ahead.target.distance
+        limit, target = self._options.plan_for(ahead.noise).limit, ahead.target.distance
         return 0.0 if self._usual > limit * target and self.before is None else limit * max(target, self._usual)
 
     def _tracked(self, ahead: Ahead, side: int) -> Iterator[int]:
@@ -191,7 +192,7 @@ class Candidate:
         if fused.is_empty or (reference := self._coded(ahead, fused)) is None:
             return False
         placed = reference.base.vertices
-        fitting = Fitting(reference.base.faces, len(placed), self._options.fit, self._noise)
+        fitting = Fitting(reference.base.faces, len(placed), self._options.fit, self._tolerated)
         self._rest = fitting.first(FrameSurface(fused), placed, placed)
         self._take(reference, self._rest)
         self._fit(ahead, self.key)
@@ -210,8 +211,8 @@ class Candidate:
     def _coded(self, ahead: Ahead, surface: Mesh) -> CodedReference | None:
         """Return a base mesh of a surface as decoded; None where nothing is left of it."""
         o = self._options
-        lattice = o.layers.step_above(self._noise) * (LATTICE if len(ahead) > 1 else LATTICE_ALONE)
-        reference = code_on_lattice(base_mesh(surface, o.template, self._noise), lattice, o.template.levels)
+        lattice = o.layers.step_above(self._tolerated) * (LATTICE if len(ahead) > 1 else LATTICE_ALONE)
+        reference = code_on_lattice(base_mesh(surface, o.template, self._tolerated), lattice, o.template.levels)
         note(ahead.digests, "template, coded", reference.base.vertices, reference.base.faces)
         return None if reference.mesh.is_empty else reference
 
@@ -221,7 +222,7 @@ class Candidate:
         """Let the template's vertices at the key be carried by the tracked surface."""
         faces = reference.base.faces
         self.reference, self._points, self._binding = reference, points, self._tracker.bound(Mesh(points, faces))
-        self._fitting = Fitting(faces, len(points), self._options.fit, self._noise)
+        self._fitting = Fitting(faces, len(points), self._options.fit, self._tolerated)
         self._closeness = closeness or Closeness(faces, points, self._target, self._noise)
 
     def _fit(self, ahead: Ahead, number: int) -> None:

@@ -28,7 +28,6 @@ from .target import target_of
 
 GOOD = 1.4  # targets: what leaves more is planned anew, though it stands still (guess)
 STILL = 1.1  # times its usual residual that a template may leave without a new fit (guess)
-NOISY_KEYS = 2  # keys tried at most under noise: the fused template completes them (decision 16)
 BY_RATE = 1.33  # the squared error falls with this power of the rate: 4 dB a doubling (decision 13)
 ANGLE_BY_RATE = 0.36  # the normal error falls with this power of the rate (measured on four bodies: decision 24)
 LEAST = 1e-30  # error: its logarithm is finite
@@ -95,7 +94,7 @@ class _Planner:
         """
         plan, candidates = self._planned(ahead)
         is_last, done = ahead.numbers.stop == len(self._interval.frames), dict[PlannedGroup, Coded]()
-        other = rival(plan, *_known(ahead, candidates), self._options.plan)
+        other = rival(plan, *_known(ahead, candidates), self._options.plan_for(ahead.noise))
         note(ahead.digests, "plans", plan.groups, other and other.groups)
         if other is not None:
             tried = [(self._all(ahead, one.groups, candidates, done), one) for one in (plan, other)]
@@ -107,13 +106,13 @@ class _Planner:
 
     def _planned(self, ahead: Ahead) -> tuple[Plan, list[Candidate]]:
         """Return the plan of the frames ahead and the candidates that it names; keys are tried while they may pay."""
-        o, candidates = self._options.plan, list(self._candidates)
+        o, candidates = self._options.plan_for(ahead.noise), list(self._candidates)
         if self._before is not None and self._options.predict:
             candidates.append(Candidate.of_group(ahead, self._before, self._options))
         for one in candidates:
             one.follow(ahead)
         plan, misses = best_plan(*_known(ahead, candidates), o), 0
-        for _ in range(min(o.keys, NOISY_KEYS) if ahead.noise else o.keys):
+        for _ in range(o.keys):
             tried = {number - ahead.first for number in self._tried}
             if plan.excess.sum() <= o.settled * o.worth or misses == o.misses or (key := next_key(plan, tried)) is None:
                 break

@@ -43,6 +43,11 @@ class GroupCoder:
     digests: Digests | None = field(default=None, kw_only=True)
 
     @property
+    def tolerated(self) -> float:
+        """The noise below which nothing is coded, normalised."""
+        return self.options.tolerance * self.noise
+
+    @property
     def frames(self) -> list[Mesh]:
         """The frames themselves."""
         return [surface.mesh for surface in self.surfaces]
@@ -60,7 +65,7 @@ class GroupCoder:
         has only the first of them.
         """
         try:
-            encoded = encode_layers(reference, positions, self.options.layers, previous, self.noise)
+            encoded = encode_layers(reference, positions, self.options.layers, previous, self.tolerated)
         except CostlyError:
             if len(self.surfaces) == 1:
                 return self.alone(), None
@@ -103,7 +108,7 @@ class GroupCoder:
         if self.options.tails is None:
             return _Shown(payload, layers, decoded)
         known = [surface.surface for surface in self.surfaces]
-        found = find_tails(known, decoded, len(payload), self.options.tails, noise=self.noise)
+        found = find_tails(known, decoded, len(payload), self.options.tails, noise=self.tolerated)
         if found is None:
             return _Shown(payload, layers, decoded)
         payload += pack(found.record)

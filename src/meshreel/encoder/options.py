@@ -69,6 +69,8 @@ class LayersOptions:
     fit: FitOptions = FitOptions(strides=(4, 3, 2, 1), restart=False, pull=0.3, second_smoothing=0.7)
     slide: SlideOptions | None = SlideOptions()  # of fits to frames with colours; None: shape alone tells
     plan: PlanOptions = PlanOptions()
+    noisy_plan: PlanOptions = PlanOptions(limit=4.0, alone=6.0, keys=2)  # under noise: whoever can be followed is
+    tolerance: float = 1.0  # of noise, times its RMS: nothing finer is coded
     errors: tuple[float, ...] = ()  # of a key's further templates, which are tried: times `template.error`
     layers: LayerCodingOptions = field(default_factory=LayerCodingOptions)
     tails: TailOptions | None = field(default_factory=TailOptions)  # None: no patches
@@ -76,6 +78,10 @@ class LayersOptions:
     measured: int | None = None  # frames of a group whose fidelity is measured, at most; None: all
     floor: bool = True  # Draco is tried in place of every group, not only where nothing else holds
     intra: IntraOptions = field(default_factory=IntraOptions)
+
+    def plan_for(self, noise: float) -> PlanOptions:
+        """Return the prices of a plan for frames at this RMS distance from the truth."""
+        return self.noisy_plan if noise > 0 else self.plan
 
     def __post_init__(self) -> None:
         _check_group_size(self.group_size)

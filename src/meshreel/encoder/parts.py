@@ -7,21 +7,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 
 import numpy as np
-from jaxtyping import Bool
+from jaxtyping import Bool, Float64
 
 from ..analysis.scene.background import BackgroundOptions, fuse_background
 from ..analysis.scene.background_depth import Moment, fuse_still_depth
-from ..analysis.scene.bodies import ring
+from ..analysis.scene.bodies import beyond, ring, with_ring
 from ..analysis.scene.labelling import Segmentation
 from ..analysis.scene.masks import Masker
 from ..analysis.scene.segmentation import segment, segment_by
 from ..analysis.survey import Survey, check_one_unit
 from ..errors import InputError
 from ..geometry.closest_points import Surface
+from ..geometry.depth import DepthPicture
 from ..geometry.derived_sequences import CapturedSequence, ChosenParts
 from ..geometry.topology import components, concatenate, face_normals, part_of
 from ..types import Mesh, MeshSequence, evenly
@@ -31,7 +32,9 @@ from .progress import Stages
 MOST_NOISE = 0.05  # RMS, of the diagonal of a body: beyond, nothing is left of a hand (guess)
 PROBES = 8  # frames, at most, in which moving surface is measured (guess)
 LOST = 0.5  # share of a frame's faces that may stand still where no background was found (guess)
+APART, LEAST_APART = 4.0, 0.03  # deviations, and m: what is farther from the room is not of it (guess)
 OUTLIER = 3.0  # times the segmentation's `noise`: still surface farther from the background is no noise (guess)
+AS_FAR, FEWEST = 0.25, 1000  # share of the range, and vertices at least, from which the noise of bodies is told (guess)
 NORMAL_MEDIAN = 0.6745  # of the absolute value of what is normally distributed, in standard deviations
 
 
@@ -54,6 +57,7 @@ class Parts:
     noise: float  # m, RMS distance of a frame's still surface from the background, tails and all: what bodies have
     deviation: float  # m, the same by the median, as a standard deviation: without its tails
     astray: float = 0.0  # share of the frames' surface that stands still, but is not in the background
+    _rooms: dict[int, Surface | None] = field(default_factory=dict, repr=False)
 
     @property
     def body_noise(self) -> float:
@@ -64,6 +68,23 @@ class Parts:
     def surface(self) -> Surface | None:
         """The background, prepared for queries; None where there is none."""
         return None if self.background.is_empty else Surface(self.background)
+
+    def moving(self, frame: int, mesh: Mesh) -> Mesh:
+        """Cut the surface that moves out of a frame, with what the room does not have there."""
+        by, moves = self.segmentation, self.segmentation.moving(frame, mesh)
+        if (room := self._room(sum(change.frame <= frame for change in self.changes))) is not None:
+            moves = beyond(mesh, moves, room, max(APART * self.deviation, LEAST_APART))
+        return with_ring(mesh, moves, by.cell, self.surface)
+
+    def _room(self, changes: int) -> Surface | None:
+        """Return the room after some changes, prepared for queries: all that stood there since the first frame."""
+        if not changes:
+            return self.surface
+        if changes not in self._rooms:
+            there = concatenate([self.background, *(change.came for change in self.changes[:changes])])
+            self._rooms.clear()
+            self._rooms[changes] = None if there.is_empty else Surface(there)
+        return self._rooms[changes]
 
 
 def take_apart(
@@ -140,11 +161,21 @@ class _Measured:
     astray: float  # share of all surface that stands still far from the background
 
 
+def _as_far(points: Float64[np.ndarray, "N 3"], bodies: Float64[np.ndarray, "M 3"], cameras: list[DepthPicture | None]) -> Bool[np.ndarray, " N"]:
+    """Return which points are about as far from the nearest camera as bodies are: a sensor's noise grows with range."""
+    eyes = [picture.camera.eye for picture in cameras if picture is not None]
+    if not eyes or not len(bodies):
+        return np.ones(len(points), bool)
+    own, theirs = (np.min([np.linalg.norm(some - eye, axis=1) for eye in eyes], axis=0) for some in (points, bodies))
+    near = np.abs(own / max(float(np.median(theirs)), 1e-9) - 1) <= AS_FAR
+    return near if near.sum() >= FEWEST else np.ones(len(points), bool)
+
+
 def _measured(
-    sequence: MeshSequence, segmentation: Segmentation, background: Mesh, changes: Sequence[Change]
+    sequence: CapturedSequence, segmentation: Segmentation, background: Mesh, changes: Sequence[Change]
 ) -> _Measured:
     """Measure noise and bodies in some frames; still surface that is far from the background is no noise."""
-    far = OUTLIER * segmentation.noise
+    far, depth = OUTLIER * segmentation.noise, sequence.depth
     squares, deviations, sizes, lost, whole = [], [], list[float](), 0.0, 0.0
 
     @lru_cache(maxsize=1)
@@ -155,8 +186,8 @@ def _measured(
     for number in evenly(len(sequence), PROBES):
         mesh = sequence[number]
         moves = segmentation.moving(number, mesh)
+        moving = part_of(mesh, moves)
         if moves.any():
-            moving = part_of(mesh, moves)
             label = components(moving.faces, len(moving.vertices))
             largest = moving.vertices[label == np.bincount(label).argmax()]
             sizes.append(Mesh(largest, moving.faces[:0]).diagonal)
@@ -169,7 +200,10 @@ def _measured(
         elif not still.is_empty:
             gaps = room.distances(still.vertices)
             deviations.append(float(np.median(gaps)) / NORMAL_MEDIAN)
-            squares.append(float((gaps[gaps < far] ** 2).mean()) if (gaps < far).any() else 0.0)
+            inside = gaps < far
+            if depth is not None:
+                inside &= _as_far(still.vertices, moving.vertices, depth[number])
+            squares.append(float((gaps[inside] ** 2).mean()) if inside.any() else 0.0)
             lost += float(areas[(gaps[still.faces] >= far).all(axis=1)].sum())
     astray = lost / whole if whole else 0.0
     if not squares:

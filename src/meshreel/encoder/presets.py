@@ -12,13 +12,14 @@ from ..analysis.follow.embedded import Stage
 from ..analysis.follow.template import TemplateOptions
 from ..analysis.reference.extraction import ReferenceOptions
 from ..analysis.reference.track import TrackOptions
+from ..analysis.scene.background import BackgroundOptions
 from ..coding.appearance.colors import ColorCodingOptions
 from ..coding.appearance.pictures import VideoOptions
 from ..coding.layers.coder import LayerCodingOptions
 from ..coding.paper.displacements import DisplacementOptions
 from ..errors import InputError
 from ..geometry.strict import rounded
-from .options import AppearanceOptions, EncoderOptions, LayersOptions, PaperOptions, TextureOptions
+from .options import AppearanceOptions, EncoderOptions, LayersOptions, PaperOptions, SceneOptions, TextureOptions
 from .target import Fidelity
 
 PRESETS = ("best", "paper")
@@ -70,7 +71,8 @@ def preset_options(
     appearance = appearance_options(
         float(quality if color_quality is None else color_quality), color, texture, compatible
     )
-    options = EncoderOptions(method, appearance=appearance, quality=float(quality))
+    scene = SceneOptions(background=_background(float(quality)))
+    options = EncoderOptions(method, scene, appearance, quality=float(quality))
     return options if key_interval is None else replace(options, key_interval=key_interval)
 
 
@@ -94,6 +96,7 @@ def layers_options(quality: float = 50.0, effort: str = "normal") -> LayersOptio
         template=TemplateOptions(error=rounded(0.00088 * (step / 0.0012) ** 0.55)),
         layers=LayerCodingOptions(step=step),
         displacements=DisplacementOptions(step=displacement_step(quality)),
+        tolerance=tolerance(quality),
     )
     if effort == "fast":
         return _fast(options)
@@ -101,6 +104,16 @@ def layers_options(quality: float = 50.0, effort: str = "normal") -> LayersOptio
         plan = replace(options.plan, keys=8, misses=3, settled=0.25, gain=0.05)
         return replace(options, plan=plan, errors=(0.8, 1.25))
     return options
+
+
+def tolerance(quality: float) -> float:
+    """RMS noise of a recording, times which nothing is coded: 1 at 50, halved every 40 points (decision 28)."""
+    return rounded(2 ** ((50 - quality) / 40))
+
+
+def _background(quality: float) -> BackgroundOptions:
+    usual, times = BackgroundOptions(), tolerance(quality)
+    return replace(usual, coarse=rounded(usual.coarse * times), lattice=rounded(usual.lattice * times))
 
 
 def _fast(options: LayersOptions) -> LayersOptions:

@@ -129,7 +129,7 @@ def encode_interval(
         if appearance is None:  # what is not kept does not tell where the surface is, either
             options = replace(options, slide=None)
         some = (interval.frames[number] for number in evenly(len(interval.frames), 3))
-        if has_pictures(interval, some, appearance):  # a frame in the `draco` form has none
+        if interval.noise or has_pictures(interval, some, appearance):  # a frame in the `draco` form has none
             options = replace(options, floor=False)
         groups = layers.encode_interval(interval, options, stages)
     else:

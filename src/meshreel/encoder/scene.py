@@ -75,8 +75,7 @@ def track_intervals(job: Job, parts: Parts, frames: range, tracks: Tracks) -> li
 
     Frames can where all have a surface or none has, and where they are of about one scale.
     """
-    loaded, by, found = ((k, job.sequence[k]) for k in frames), parts.segmentation, list[Interval]()
-    moving = [with_ring(mesh, by.moving(k, mesh), by.cell, parts.surface) for k, mesh in loaded]
+    moving, found = [parts.moving(k, job.sequence[k]) for k in frames], list[Interval]()
     longest = longest_interval(job.options, job.sequence.frame_rate)
     for track, meshes in tracks.of(moving):
         normalised = [parts.seen.normalise(mesh) for mesh in meshes]

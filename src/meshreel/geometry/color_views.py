@@ -28,7 +28,7 @@ STEP = 0.03  # of the depth between neighbours: a step (guess)
 
 @dataclass(frozen=True, slots=True)
 class ColorPicture:
-    """A picture in sRGB with the camera that took it; its lens bends as OpenCV's `k1 k2 p1 p2 k3` say."""
+    """A picture in sRGB with the camera that took it; its lens bends as OpenCV's `k1 k2 p1 p2 k3 k4 k5 k6` say."""
 
     camera: PinholeCamera
     pixels: UInt8[np.ndarray, "H W 3"]
@@ -43,13 +43,9 @@ class ColorPicture:
         depth = local[:, 2]
         if not any(self.distortion):
             return self.camera.project(local), depth
-        k1, k2, p1, p2, k3 = self.distortion
         with np.errstate(all="ignore"):
             x, y = local[:, 0] / np.where(depth > 0, depth, np.nan), local[:, 1] / np.where(depth > 0, depth, np.nan)
-            r2 = x * x + y * y
-            bend = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
-            bent_x = x * bend + 2 * p1 * x * y + p2 * (r2 + 2 * x * x)
-            bent_y = y * bend + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y
+            bent_x, bent_y = bent(x, y, self.distortion)
         return products(np.stack([bent_x, bent_y, np.ones(len(x))], axis=1), self.camera.intrinsic.T)[:, :2], depth
 
     def placed(self, place: Placement) -> ColorPicture:
@@ -58,6 +54,17 @@ class ColorPicture:
         extrinsic = camera.extrinsic.copy()
         extrinsic[:3, 3] = (products(extrinsic[:3, :3], origin[:, None])[:, 0] + extrinsic[:3, 3]) / place.scale
         return replace(self, camera=replace(camera, extrinsic=extrinsic))
+
+
+def bent(
+    x: Float64[np.ndarray, "*S"], y: Float64[np.ndarray, "*S"], distortion: tuple[float, ...]
+) -> tuple[Float64[np.ndarray, "*S"], Float64[np.ndarray, "*S"]]:
+    """Return where a lens shows places of the plane at depth 1; `distortion` is OpenCV's, missing numbers are 0."""
+    k1, k2, p1, p2, k3, k4, k5, k6 = (*distortion, *[0.0] * 8)[:8]
+    r2 = x * x + y * y
+    bend = (1 + r2 * (k1 + r2 * (k2 + r2 * k3))) / (1 + r2 * (k4 + r2 * (k5 + r2 * k6)))
+    bent_x = x * bend + 2 * p1 * x * y + p2 * (r2 + 2 * x * x)
+    return bent_x, y * bend + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y
 
 
 @runtime_checkable

@@ -20,6 +20,7 @@ from .topology import clean, weld
 SIDE = 8  # voxels along a side of a block (guess)
 ROOM = 20_000  # initial capacity of a grid, blocks; it grows when needed (guess)
 TRUNCATION = 3.0  # voxels before and behind a depth that it constrains (guess)
+GRAZING = 4.0  # the same where surface is seen at grazing angles, from one side (decision 28)
 SEEN = 0.5  # weight above which a voxel is known: one measurement is enough (guess)
 MOST_BLOCKS = 500_000  # bounds memory: 2 GB, and as much again while the grid grows (guess)
 

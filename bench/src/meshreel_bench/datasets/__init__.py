@@ -28,7 +28,7 @@ from .captured import Captured
 from .checksums import check_source, checksum, known_checksums
 from .remesh import Place, RemeshedSequence, RemeshOptions, SideBySide
 from .rooms import PEOPLE, ROOM
-from .scenes import PROCEDURAL, SCENES, SceneData, open_scene
+from .scenes import PROCEDURAL, ROOM3, SCENES, SceneData, open_scene
 from .shapes import gears, prism
 from .walker import FRAMES, Truth, Walker
 
@@ -51,7 +51,7 @@ REMESHED = {  # new connectivity in every frame: of a body, its first frames
     "samba60": ("samba", 60, RemeshOptions()),
     "dancer160k": ("dancer", 4, RemeshOptions(vertices=160_000, levels=2)),
 }
-NAMES = (DEMO, *SHAPES, SYNTHETIC, *SCENES, PROCEDURAL, WALKER, *RECORDINGS, *REMESHED)
+NAMES = (DEMO, *SHAPES, SYNTHETIC, *SCENES, ROOM3, PROCEDURAL, WALKER, *RECORDINGS, *REMESHED)
 # Endings of names: the same sequence in another order, of the wanted length.
 PLAYED: dict[str, Callable[[MeshSequence, int], MeshSequence]] = {
     "-backwards": lambda sequence, count: Chosen(sequence, range(len(sequence))[::-1][:count]),
@@ -88,7 +88,7 @@ class Store:
             return Dataset(soft_bodies(SoftBodiesOptions(frames=frames or SoftBodiesOptions().frames)))
         if name in SHAPES:
             return Dataset(SHAPES[name](*([frames] if frames else [])))
-        if name in (*SCENES, PROCEDURAL):
+        if name in (*SCENES, ROOM3, PROCEDURAL):
             return _scene(name, self.data, frames, self.cache)
         if name in RECORDINGS:
             return _recording(name, self.data, frames, self.cache)

@@ -24,7 +24,7 @@ from meshreel.capture import demo_room
 from meshreel.capture.fusion import FusionOptions
 from meshreel.capture.recording import open_recording
 from meshreel.capture.rig import RIG
-from meshreel.capture.simulated_rig import TRUTH, SceneFrame
+from meshreel.capture.simulated_rig import TRUTH
 from meshreel.capture.truth import Truth, read_truth
 from meshreel.geometry.closest_points import Surface, carried_labels
 from meshreel.geometry.decimate import decimate_faces
@@ -34,10 +34,12 @@ from meshreel.io.write import make_folder, replacing, write_mesh
 from meshreel.metrics.scene_accuracy import Scene, Sight
 from meshreel.types import Mesh, MeshSequence, evenly
 
+from . import room3
 from .captured import Captured
 from .rooms import SPEEDS, RoomOptions, simulate_room
 
 SCENES = tuple(SPEEDS)
+ROOM3 = "room3"  # needs no benchmark data
 TRUE = "truth"  # labels: those of the nearest clean faces
 FOUND = "found"  # labels: those that the encoder finds
 PROCEDURAL = "procedural_room"  # the room of `meshreel demo`: needs no benchmark data
@@ -52,12 +54,29 @@ class SceneData:
     folder: Path  # where everything about it is kept
     meshes: Captured
     truth: Truth
+    parts: room3.Parts | None = None  # of the truth, where it has them by name
+
+    def true(self, number: int) -> Scene:
+        """Prepare a clean frame for measurements; where parts have names, things that move are no people."""
+        people = None if self.parts is None else self.parts.of_faces(number) > len(room3.THINGS)
+        return true_scene(self.truth, number, people)
+
+    def judged(self, number: int, source: str) -> Bool[np.ndarray, " F"]:
+        """Return the labels of a frame without those of things at rest, which may be room already, or not yet."""
+        if self.parts is None:
+            return self.labels(number, source)
+        parts, counts = self.parts.of_faces(number), room3.moving_parts(self.parts.poses)[number]
+        counts[0] = True  # the room
+        path = self.folder / "labels" / f"judged-{number:05}.npy"
+        clean, mesh = self.truth[number].mesh, self.meshes[number]
+        return self.labels(number, source)[_kept_array(path, lambda: _nearest_labels(clean, counts[parts], mesh))]
 
     def labels(self, number: int, source: str = TRUE) -> Bool[np.ndarray, " F"]:
         """Which faces of a frame move: those nearest to clean ones that do (`TRUE`), or what the encoder finds."""
         if source == TRUE:
             path = self.folder / "labels" / f"{TRUE}-{number:05}.npy"
-            return _kept_array(path, lambda: _nearest_labels(self.truth[number], self.meshes[number]))
+            clean = self.truth[number]
+            return _kept_array(path, lambda: _nearest_labels(clean.mesh, clean.dynamic, self.meshes[number]))
         path = self.folder / "labels" / f"{_kept_as(source)}.npz"
         if not path.exists():
             _find_labels(self.meshes, path)
@@ -99,7 +118,7 @@ def open_scene(name: str, data: Path, cache: Path, frames: int | None = None) ->
         _simulate(name, rig, data, frames)
     fusion = FusionOptions(demo_room.VOXEL) if name == PROCEDURAL else FusionOptions()
     recording, _ = open_recording(rig, fusion, keep=False)
-    return SceneData(name, folder, Captured(recording, meshes), read_truth(rig / TRUTH))
+    return SceneData(name, folder, Captured(recording, meshes), read_truth(rig / TRUTH), room3.read_parts(rig))
 
 
 def _simulate(name: str, rig: Path, data: Path, frames: int | None) -> None:
@@ -107,6 +126,8 @@ def _simulate(name: str, rig: Path, data: Path, frames: int | None) -> None:
     if name == PROCEDURAL:
         room = demo_room.RoomOptions(PROCEDURAL_FRAMES if frames is None else frames)
         demo_room.record_room(rig, room)
+    elif name == ROOM3:
+        room3.Room3(room3.FRAMES if frames is None else frames).record(rig)
     else:
         simulate_room(rig, data, RoomOptions(name) if frames is None else RoomOptions(name, frames))
 
@@ -132,17 +153,17 @@ def _find_labels(meshes: MeshSequence, path: Path) -> None:
         np.savez_compressed(file, allow_pickle=False, **labels)
 
 
-def true_scene(truth: Truth, number: int) -> Scene:
-    """Prepare a clean frame for measurements of other meshes."""
+def true_scene(truth: Truth, number: int, people: Bool[np.ndarray, " F"] | None = None) -> Scene:
+    """Prepare a clean frame for measurements of other meshes; people are what moves where they are not given."""
     frame, sights = truth[number], [Sight(camera.view, *camera.depth_range) for camera in truth.cameras]
-    return Scene(frame.mesh, frame.dynamic, sights, complete=True)
+    return Scene(frame.mesh, frame.dynamic if people is None else people, sights, complete=True)
 
 
-def _nearest_labels(clean: SceneFrame, fused: Mesh) -> Bool[np.ndarray, " F"]:
-    """Label the faces of a fused mesh that move: each takes the label of the clean face nearest to its middle."""
-    if clean.mesh.is_empty:
+def _nearest_labels(clean: Mesh, labels: Bool[np.ndarray, " F"], fused: Mesh) -> Bool[np.ndarray, " G"]:
+    """Label the faces of a fused mesh: each takes the label of the clean face nearest to its middle."""
+    if clean.is_empty:
         return np.zeros(len(fused.faces), bool)
-    return carried_labels(Surface(clean.mesh), clean.dynamic, fused)
+    return carried_labels(Surface(clean), labels, fused)
 
 
 def _kept_mesh(path: Path, make: Callable[[], Mesh]) -> Mesh:

@@ -10,6 +10,8 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
+import numpy as np
+
 from meshreel.decoder.video import open as open_video
 from meshreel.errors import InputError
 from meshreel.format.layout import MAGIC
@@ -20,11 +22,12 @@ from meshreel.metrics.viewpoints import Box, Camera
 from meshreel.types import Mesh
 
 from ..datasets import Dataset
-from ..datasets.scenes import SceneData, true_scene
+from ..datasets.scenes import SceneData
 from ..parallel_views import parallel_views_around
 from ..rows import Metrics
 from .bridges import count_bridges, count_degenerate
 from .color import picture_psnrs, picture_squares, swimming, texel_products, texel_psnr
+from .parts import missed, part_values
 from .seams import measure_seam, seam_row
 
 KEPT = ("d2_psnr_paper", "normal_error_deg", "ssim", "ssim_masked")  # of each frame
@@ -98,7 +101,8 @@ def _regions(frames: Measured) -> Values:
         return _means("truth", clean, [scene.meshes[number] for number in frames.numbers])
     noisy = [_noisy(scene, number) for number in frames.numbers]
     values = _means("truth", clean, frames.decoded) | _means("input", noisy, frames.decoded, clean)
-    return values | _seams(scene, frames)
+    values["truth_people_missed"] = float(np.mean([missed(*pair) for pair in zip(clean, frames.decoded, strict=True)]))
+    return values | _of_file(scene, frames)
 
 
 def _means(against: str, references: Sequence[Scene], decoded: Sequence[Mesh], clean: Sequence[Scene] = ()) -> Values:
@@ -108,8 +112,8 @@ def _means(against: str, references: Sequence[Scene], decoded: Sequence[Mesh], c
     return {f"{against}_{name}": value for name, value in finite(scene_means(rows)).items()}
 
 
-def _seams(scene: SceneData, frames: Measured) -> Values:
-    """Return means of the seam between bodies and what they touch; none for codecs that code a scene as one."""
+def _of_file(scene: SceneData, frames: Measured) -> Values:
+    """Return means of the seam between bodies and what they touch, and values of parts; none of other files."""
     if not frames.data.startswith(MAGIC):
         return {}
     video = open_video(frames.data)
@@ -119,15 +123,18 @@ def _seams(scene: SceneData, frames: Measured) -> Values:
     for number in frames.numbers:
         parts = (video.background(number), video.moving(number))
         rows.append(seam_row(measure_seam(scene.meshes[number], scene.labels(number), *parts)))
-    return dict(finite(scene_means(rows)))
+    return finite(scene_means(rows)) | ({} if scene.parts is None else part_values(scene.true, scene.parts, video))
 
 
 @lru_cache(maxsize=10)  # 2 GB: what is prepared for one point serves the next
 def _true(scene: SceneData, number: int) -> Scene:
-    return true_scene(scene.truth, number)
+    return scene.true(number)
 
 
 @lru_cache(maxsize=10)
 def _noisy(scene: SceneData, number: int) -> Scene:
     clean = _true(scene, number)
-    return Scene(scene.meshes[number], scene.labels(number), clean.sights, clean.options)
+    mesh = scene.meshes[number]
+    if scene.parts is not None:
+        return clean.labelled(mesh)
+    return Scene(mesh, scene.labels(number), clean.sights, clean.options)

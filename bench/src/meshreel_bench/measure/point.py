@@ -26,7 +26,7 @@ from ..codecs import codec_version, make_codec
 from ..codecs.colored_draco import ColoredDracoCodec
 from ..codecs.scenes import BackgroundDracoCodec
 from ..datasets import Dataset, Store
-from ..datasets.scenes import FOUND, SceneFrames
+from ..datasets.scenes import FOUND, TRUE, SceneFrames
 from ..experiments.study import FLOOR
 from ..experiments.study import FOUND as SEGMENTATION
 from ..rows import Encoding, Group, Point, Row, Stream
@@ -160,4 +160,4 @@ def _segmentation(known: Dataset) -> dict[str, float | None]:
     if known.scene is None:
         raise InputError("a segmentation is judged on simulated scenes only, whose labels are known")
     scene, numbers = known.scene, range(len(known.sequence))
-    return score_labels((scene.labels(i, FOUND) for i in numbers), (scene.labels(i) for i in numbers))
+    return score_labels((scene.judged(i, FOUND) for i in numbers), (scene.judged(i, TRUE) for i in numbers))

@@ -8,7 +8,7 @@ has no counterpart, or one that faces away (folds, shards turned inside out).
 from __future__ import annotations
 
 import numpy as np
-from jaxtyping import Float64, Int32
+from jaxtyping import Bool, Float64, Int32
 
 from ...geometry.closest_points import Surface, area_samples
 from ...geometry.topology import vertex_normals
@@ -16,10 +16,28 @@ from ...types import Mesh
 from .frame import ON_BORDER, FrameSurface
 
 SAMPLES = 4000  # of each surface: as many as tracking matches
-STRAY = 0.01  # share of a noisy frame's area that may be stray surface: a guess
+STRAY = 6.0  # RMS distances of the noise: what is farther off is surface that the other one lacks: a guess
+SHARED = 0.4  # least share of the samples of each surface that noisy frames have in common (guess)
 FAR = 0.006  # diagonals: samples farther than that have no counterpart (1 cm on a body; decision 24), or than
 FAR_OFF = 4.0  # distances to reach (guess)
 WRONG = 0.03  # share of samples beyond the usual one, a sum of folds that show; good fits have up to .012 (decision 24)
+
+
+def shared_distance(
+    squares: tuple[Float64[np.ndarray, " N"], Float64[np.ndarray, " M"]],
+    beside: tuple[Bool[np.ndarray, " N"], Bool[np.ndarray, " M"]],
+    noise: float,
+) -> float:
+    """Return the RMS distance, the larger of both directions, of the surface that two noisy surfaces have in common.
+
+    `squares` are squared distances of samples of each from the other; `beside` is True where a sample lies over the
+    other surface, not past its border. What one of both lacks says nothing about the motion of the rest: infinite only
+    where little is left.
+    """
+    shared = [each[over & (each <= (STRAY * noise) ** 2)] for each, over in zip(squares, beside, strict=True)]
+    if any(len(some) < SHARED * over.sum() or not len(some) for some, over in zip(shared, beside, strict=True)):
+        return np.inf
+    return float(np.sqrt(max(some.mean() for some in shared)))
 
 
 class Closeness:
@@ -47,9 +65,8 @@ class Closeness:
         here, there = self._surface.normals[to_fit.faces], frame.surface.normals[to_frame.faces]
         back, ahead = ((to_frame.points - own) ** 2).sum(axis=1), ((to_fit.points - theirs) ** 2).sum(axis=1)
         if self._noise > 0:  # holes of noisy frames are no reason for another template
-            back = np.where(frame.inside_at(to_frame) > ON_BORDER, back, 0.0)
-            ahead = np.sort(ahead)[: len(ahead) - int(STRAY * len(ahead))]
-            return float(np.sqrt(max(back.mean(), ahead.sum() / len(theirs))))
+            both = frame.inside_at(to_frame) > ON_BORDER, ~self._surface.past_border(to_fit)
+            return shared_distance((back, ahead), both, self._noise)
         wrong = (np.einsum("nd,nd->n", normals, there) < 0) | (back > self._far**2)
         lacking = (np.einsum("nd,nd->n", frame.normals[chosen], here) < 0) | (ahead > self._far**2)
         share = float(max(wrong.mean(), lacking.mean()))

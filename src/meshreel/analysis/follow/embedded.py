@@ -24,7 +24,8 @@ from ...geometry.rigid import quaternions
 from ...geometry.strict import products, rotations_of
 from ...geometry.topology import clean, vertex_normals
 from ...types import Mesh
-from ..fit.frame import FrameSurface
+from ..fit.closeness import shared_distance
+from ..fit.frame import ON_BORDER, FrameSurface
 from .embedded_graph import Binding, DeformationGraph, build_graph, farthest_first
 from .embedded_pose import Pose, moved, rotation, turned, unmoved
 
@@ -69,7 +70,7 @@ class Tracker:
 
     def __init__(self, key_mesh: Mesh, key: int, options: EmbeddedOptions | None = None, noise: float = 0.0) -> None:
         self.options, self.key = options or EmbeddedOptions(), key
-        self.limits = self.options.limits(noise)
+        self.limits, self._noise = self.options.limits(noise), noise
         self.mesh = clean(key_mesh)
         if self.mesh.is_empty:
             raise InputError(f"the key frame {key} is empty; choose one that has a surface")
@@ -192,9 +193,13 @@ class Tracker:
         vertices = moved(self.mesh.vertices, self._graph.nodes, self._all, pose)
         self._moved.move(vertices)
         theirs = surface.mesh.vertices[surface.samples(self.options.samples)]
-        ahead, back = surface.surface.closest(vertices[self._samples]).points, self._moved.closest(theirs).points
-        pairs = ((ahead, vertices[self._samples]), (back, theirs))
-        return float(np.sqrt(max(((one - other) ** 2).sum(axis=1).mean() for one, other in pairs)))
+        own, back = vertices[self._samples], self._moved.closest(theirs)
+        ahead = surface.surface.closest(own)
+        squares = ((ahead.points - own) ** 2).sum(axis=1), ((back.points - theirs) ** 2).sum(axis=1)
+        if self._noise > 0:  # what one of both lacks says nothing of the motion of what both have
+            both = surface.inside_at(ahead) > ON_BORDER, ~self._moved.past_border(back)
+            return shared_distance(squares, both, self._noise)
+        return float(np.sqrt(max(each.mean() for each in squares)))
 
 
 @dataclass(frozen=True, slots=True)

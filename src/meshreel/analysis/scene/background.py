@@ -32,10 +32,10 @@ class BackgroundOptions:
     steady: float = 0.6  # voxels: where the standard deviation of the distances is larger, the surface was not still
     past: float = 0.5  # voxels by which a surface is continued past its border, so that borders do not recede
     finer: float = 0.75  # voxel of a fusion from depth, in voxels of the frames: averaged depth has less noise
-    facing: float = 0.3  # cosine: faces that no camera sees more frontally lie between two real surfaces
+    facing: float = 0.15  # cosine: faces that no camera sees more frontally lie between two real surfaces
     fragment: float = 0.02  # m^2: connected pieces with less area are dropped
-    coarse: float = 0.75  # RMS distance from the fused surface that decimation may cost, in RMS noise of a frame
-    lattice: float = 0.67  # spacing of the lattice, in RMS noise of a frame
+    coarse: float = 0.5  # RMS distance from the fused surface that decimation may cost, in RMS noise of a frame
+    lattice: float = 0.3  # spacing of the lattice, in RMS noise of a frame
     refresh: float | None = None  # s between two copies of the background in the file; None: one copy
 
     def least(self, count: int) -> int:

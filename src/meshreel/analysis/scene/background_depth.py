@@ -8,7 +8,7 @@ must not move; a sequence that offers depth pictures has checked that.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float32
@@ -17,11 +17,14 @@ from scipy.ndimage import binary_dilation
 from ...geometry.depth import DepthPicture
 from ...geometry.raycast import Rays, pixels_near
 from ...geometry.topology import face_normals, part_of, without_fragments
-from ...geometry.tsdf import SEEN, TRUNCATION, extract, integrate
+from ...geometry.tsdf import GRAZING, SEEN, extract, integrate
 from ...types import Mesh
 from .background import BackgroundOptions
 
 BESIDE = 3  # pixels around moving surface that are ignored: a guess
+SMOOTH, SPREAD, ROUNDS = 3, 2.0, 2  # pixels around, standard deviation in pixels, and rounds of smoothing (decision 28)
+SIMILAR = 0.01  # of the inverse depth, standard deviation of what is averaged (decision 28)
+FINER = 3  # times the rows and columns of the pictures, interpolated, that are fused (decision 28)
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +41,9 @@ def fuse_still_depth(moments: Iterable[Moment], voxel: float, options: Backgroun
     usual = usual_pictures(moments, options)
     if not usual:
         return Mesh.empty()
-    mesh = extract(integrate(usual, options.finer * voxel, TRUNCATION), SEEN)
+    usual = [_smooth(picture) for picture in usual]
+    fine = [picture.finer(FINER) for picture in usual]
+    mesh = extract(integrate(fine, options.finer * voxel, GRAZING), SEEN)
     return without_fragments(_facing(mesh, usual, options.facing), options.fragment)
 
 
@@ -74,6 +79,29 @@ def _medians(stack: np.ndarray, least: int) -> Float32[np.ndarray, "H W"]:
     count = np.isfinite(depths).sum(axis=0)
     low, high = (np.take_along_axis(depths, np.maximum(at, 0)[None], 0)[0] for at in ((count - 1) // 2, count // 2))
     return np.where(count >= least, (low + high) / 2, 0).astype(np.float32)
+
+
+def _smooth(picture: DepthPicture) -> DepthPicture:
+    """Smooth a depth picture along surfaces: sensors round depth to steps, which noise does not even out.
+
+    Inverse depths are averaged, so that planes stay planes, with those around that are about as far.
+    """
+    inverse = np.where(picture.depth > 0, 1 / np.where(picture.depth > 0, picture.depth, 1), 0).astype(np.float32)
+    height, width = inverse.shape
+    places = range(-SMOOTH, SMOOTH + 1)
+    for _ in range(ROUNDS):
+        padded, around = np.pad(inverse, SMOOTH), np.maximum(inverse, np.float32(1e-9))
+        sums, weights = np.zeros_like(inverse), np.zeros_like(inverse)
+        for down in places:
+            for right in places:
+                there = padded[SMOOTH + down : SMOOTH + down + height, SMOOTH + right : SMOOTH + right + width]
+                near = (there - inverse) / (SIMILAR * around)
+                weight = np.exp(-(near**2) / 2 - np.float32((down**2 + right**2) / (2 * SPREAD**2))) * (there > 0)
+                sums += weight * there
+                weights += weight
+        inverse = np.where(inverse > 0, sums / np.maximum(weights, np.float32(1e-9)), 0)
+    depth = np.where(inverse > 0, 1 / np.where(inverse > 0, inverse, 1), 0).astype(np.float32)
+    return replace(picture, depth=depth)
 
 
 def _facing(mesh: Mesh, pictures: list[DepthPicture], least: float) -> Mesh:

@@ -28,6 +28,8 @@ from ...geometry.voxels import Lattice, around, distinct, spread
 from ...types import Mesh
 
 MOST_RINGS = 4  # largest number of rings added around moving faces where the background has a gap: a guess
+BESIDE = 0.5  # m around moving surface where what the room lacks is taken for moving, too: a guess
+SPECK = 0.002  # m^2: smaller pieces that the room lacks are noise: a guess
 RING = 2.0  # cells, the longest edge of a face in a ring, so that large faces of a wall stay out of it: a guess
 
 
@@ -38,7 +40,9 @@ class BodyOptions:
     cell: float = 3.0  # cells of the scene: pieces of consecutive frames nearer than this are one
     least: float = 0.1  # m^2: pieces that never reach this area are bits
     lasts: int = 5  # frames: bits that are present in at least this many are a body of their own
+    large: float = 0.008  # m^2, of such a body in a frame at least, on average
     beside: float = 0.5  # m: other bits at most this far from a body join it; those farther off are dropped
+    touches: float = 2.0  # cells of the scene: the same for a bit that is there in one frame only
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,6 +92,26 @@ def with_ring(mesh: Mesh, moves: Bool[np.ndarray, " F"], cell: float, background
     return part_of(mesh, found)
 
 
+def beyond(mesh: Mesh, moves: Bool[np.ndarray, " F"], room: Surface, far: float) -> Bool[np.ndarray, " F"]:
+    """Return the moving faces, and others near them that are farther than `far` (m) from the room.
+
+    A foot that rests on the floor is there for so long, and so near to it, that it seems to stand still; the floor has
+    no such surface.
+    """
+    if not moves.any():
+        return moves
+    corners = mesh.vertices[mesh.faces[moves]].reshape(-1, 3)
+    low, high = corners.min(axis=0) - BESIDE, corners.max(axis=0) + BESIDE
+    near = ((mesh.vertices >= low) & (mesh.vertices <= high)).all(axis=1)[mesh.faces].all(axis=1) & ~moves
+    off = np.zeros(len(mesh.vertices), bool)
+    asked = np.unique(mesh.faces[near])
+    off[asked] = room.distances(mesh.vertices[asked]) > far
+    found = moves | (near & off[mesh.faces].all(axis=1))
+    pieces = connected_faces(mesh.faces[found], len(mesh.vertices))
+    found[found] = (np.bincount(pieces, face_normals(part_of(mesh, found))[1]) >= SPECK)[pieces]
+    return found | moves
+
+
 def find_bodies(moving: Sequence[Mesh], size: float, options: BodyOptions = BodyOptions()) -> Bodies:
     """Find the bodies in the moving surface of consecutive frames; `size` is the width of the scene's cells, m."""
     lattice = _lattice(moving, options.cell * size)
@@ -100,7 +124,7 @@ def find_bodies(moving: Sequence[Mesh], size: float, options: BodyOptions = Body
         for k in cluster:
             body[pieces[k].frame].append(pieces[k].mesh)
     small = [[pieces[k] for k in c] for c in clusters if max(pieces[k].area for k in c) < options.least]
-    dropped = sum(_given(bodies, bits, len(moving), options) for bits in small)
+    dropped = sum(_given(bodies, bits, len(moving), size, options) for bits in small)
     return Bodies([[concatenate(meshes) for meshes in body] for body in bodies], dropped)
 
 
@@ -170,9 +194,13 @@ def _linked(pieces: list[_Piece]) -> Int64[np.ndarray, " N"]:
     return linked(np.array(links, np.int64).reshape(-1, 2), len(pieces))
 
 
-def _given(bodies: list[list[list[Mesh]]], bits: list[_Piece], frames: int, options: BodyOptions) -> int:
-    """Make lasting bits a body, else add each to the nearest body of its frame; return the number of dropped faces."""
-    if len({bit.frame for bit in bits}) >= options.lasts:
+def _given(bodies: list[list[list[Mesh]]], bits: list[_Piece], frames: int, size: float, options: BodyOptions) -> int:
+    """Make lasting bits a body, else add each to the nearest body of its frame; return the number of dropped faces.
+
+    A bit that is there in one frame only is noise, unless it touches a body.
+    """
+    there = len({bit.frame for bit in bits})
+    if there >= options.lasts and sum(bit.area for bit in bits) >= options.large * there:
         body: list[list[Mesh]] = [[] for _ in range(frames)]
         for bit in bits:
             body[bit.frame].append(bit.mesh)
@@ -182,7 +210,7 @@ def _given(bodies: list[list[list[Mesh]]], bits: list[_Piece], frames: int, opti
     for bit in bits:
         near = [(_gap(bit.mesh, body[bit.frame]), number) for number, body in enumerate(bodies) if body[bit.frame]]
         gap, number = min(near, default=(np.inf, -1))
-        if gap <= options.beside:
+        if gap <= (options.beside if there > 1 else options.touches * size):
             bodies[number][bit.frame].append(bit.mesh)
         else:
             dropped += len(bit.mesh.faces)

@@ -1,0 +1,65 @@
+"""Recordings of other programs: RGB-D folders and files, which become the folder of a rig.
+
+Each format has a reader, a module with KIND, `fits` and `read`, found by the entry points `meshreel.recordings`.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from importlib.metadata import entry_points
+from pathlib import Path
+from typing import Protocol, runtime_checkable
+
+from ...errors import InputError
+from ..rig import RIG, SINGLE
+from .takes import Take, reading
+
+PLUGINS = "meshreel.recordings"
+
+
+@runtime_checkable
+class Reader(Protocol):
+    """A module that reads one format."""
+
+    KIND: str  # what it reads, for users
+
+    @staticmethod
+    def fits(path: Path) -> bool:
+        """Return whether a file or folder looks like this format, by its name and what is in the folder."""
+        ...
+
+    @staticmethod
+    def read(path: Path) -> Take:
+        """Return what it holds; no picture is read before its stream is asked. May raise anything for damage."""
+        ...
+
+
+@cache
+def readers() -> tuple[Reader, ...]:
+    """Return all readers, by the names of their entry points."""
+    return tuple(entry.load() for entry in sorted(entry_points(group=PLUGINS), key=lambda entry: entry.name))
+
+
+def is_rig(path: Path) -> bool:
+    """Return whether a folder is a rig's."""
+    return any((path / name).is_file() for name in (RIG, SINGLE))
+
+
+def is_take(path: Path) -> bool:
+    """Return whether some reader knows a file or folder; a rig is none."""
+    try:
+        return not is_rig(path) and any(reader.fits(path) for reader in readers())
+    except OSError:  # a name that is too long, or a folder without permission
+        return False
+
+
+def open_take(path: Path) -> Take:
+    """Return what a recording holds. Raises InputError where no reader knows it, or where it cannot be read."""
+    if not path.exists():
+        raise InputError(f"{path}: no such file or folder; check the path")
+    for reader in readers():
+        if reader.fits(path):
+            with reading(path):
+                return reader.read(path)
+    known = "; ".join(reader.KIND for reader in readers())
+    raise InputError(f"{path}: is neither the folder of a rig (rig.json) nor a recording that can be read: {known}")

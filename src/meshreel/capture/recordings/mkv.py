@@ -1,0 +1,115 @@
+"""Recordings of Azure Kinect and Orbbec Femto cameras: Matroska files with depth, colour and a calibration.
+
+Tracks are named by titles, depth is 16-bit big-endian (mm), `calibration.json` is attached:
+https://learn.microsoft.com/previous-versions/azure/kinect-dk/record-file-format. Its numbers are in shares of the
+sensor's picture, of which a mode takes a part.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float64
+
+from .takes import Lens, Pictures, Sensor, Stream, Take
+
+KIND = "an Azure Kinect or Femto recording (.mkv)"
+CALIBRATION = "calibration.json"
+# Of the sensor's 1024 x 1024 pixels, in modes with pictures that are not square, and in others: left edge and width,
+# upper edge and height.
+NARROW, ALL = ((192, 640), (180, 576)), ((0, 1024), (0, 1024))
+
+
+def fits(path: Path) -> bool:
+    """Return whether a file has the extension."""
+    return path.suffix.lower() == ".mkv" and path.is_file()
+
+
+def read(path: Path) -> Take:
+    """Return the camera of a file."""
+    import av
+
+    with av.open(path) as video:
+        tracks = {track.metadata.get("title", "").upper(): track for track in video.streams.video}
+        if "DEPTH" not in tracks:
+            raise ValueError(f"no track has the title DEPTH, only {', '.join(tracks) or 'none'}")
+        start = int(video.metadata.get("K4A_START_OFFSET_NS", 0)) / 1e9
+        attached = {one.metadata.get("filename"): one.data for one in video.streams.attachments}
+        cameras = _cameras(attached.get(CALIBRATION))
+        streams = {}
+        for title in [title for title in ("DEPTH", "COLOR") if title in tracks]:
+            track, seconds = tracks[title], (video.duration or 0) / 1e6
+            count = track.frames or round(seconds * float(track.average_rate or 0))
+            size, told = (track.width, track.height), cameras.get(title)
+            lens = None if told is None else _lens(told, title == "DEPTH", *size)
+            one = _Track(path, video.streams.video.index(track), start, size, title == "DEPTH")
+            streams[title] = Stream(*size, count, seconds * (count - 1) / max(count, 1), lens, one.pictures)
+        others = tuple(title for title in tracks if title not in streams)
+    apart = _apart(cameras["COLOR"]) if "COLOR" in cameras else None
+    sensor = Sensor("kinect", streams["DEPTH"], 0.001, streams.get("COLOR"), apart)
+    return Take(
+        path, KIND, (sensor,), f"the file has no {CALIBRATION} attached; record it with the camera's SDK", others
+    )
+
+
+def _cameras(data: bytes | None) -> dict[str, dict[str, Any]]:
+    """Return the calibration of each camera, by the title of its track."""
+    if not data:
+        return {}
+    names = {"CALIBRATION_CameraLocationD0": "DEPTH", "CALIBRATION_CameraLocationPV0": "COLOR"}
+    cameras = json.loads(data.rstrip(b"\0"))["CalibrationInformation"]["Cameras"]
+    return {names[one["Location"]]: one for one in cameras if one.get("Location") in names}
+
+
+def _lens(camera: dict[str, Any], deep: bool, width: int, height: int) -> Lens:
+    """Return the lens of a mode from what is known of the whole sensor, whose first pixel begins at 0."""
+    cx, cy, fx, fy, k1, k2, k3, k4, k5, k6, _, _, p2, p1 = map(float, camera["Intrinsics"]["ModelParameters"][:14])
+    if deep:
+        (left, wide), (top, high) = (
+            (begin * side / part, 1024 * side / part)
+            for (begin, part), side in zip(NARROW if width != height else ALL, (width, height), strict=True)
+        )
+    else:  # 4:3, of which 16:9 leaves out as much above as below; early calibrations are of 16:9
+        left, top, wide, high = 0.0, (width * 0.75 - height) / 2, float(width), width * 0.75
+        if camera["SensorWidth"] * 9 == camera["SensorHeight"] * 16:
+            cy, fy = (cy * 2304 + 384) / 3072, fy * 2304 / 3072
+    center = (cx * wide - left - 0.5, cy * high - top - 0.5)
+    reach = float(camera.get("MetricRadius") or np.inf)
+    return Lens(width, height, (fx * wide, fy * high), center, (k1, k2, p1, p2, k3, k4, k5, k6), reach)
+
+
+def _apart(color: dict[str, Any]) -> Float64[np.ndarray, "4 4"]:
+    """Return the colour camera's pose beside the depth camera; a calibration has the way back, in metres."""
+    back = np.eye(4)
+    back[:3, :3] = np.array(color["Rt"]["Rotation"], np.float64).reshape(3, 3)
+    back[:3, 3] = color["Rt"]["Translation"]
+    return np.linalg.inv(back)
+
+
+class _Track:
+    """A track of a file, which is read from its beginning each time."""
+
+    def __init__(self, path: Path, index: int, start: float, size: tuple[int, int], deep: bool) -> None:
+        self._path, self._index, self._start, self._size, self._deep = path, index, start, size, deep
+
+    def pictures(self) -> Pictures:
+        """Yield depth as it is stored, JPEG as it is stored, and other colour as it is decoded."""
+        import av
+
+        with av.open(self._path) as video:
+            track = video.streams.video[self._index]
+            for packet in video.demux(track):
+                if packet.size == 0 or packet.pts is None:
+                    continue
+                time = self._start + float(packet.pts * (packet.time_base or 0))
+                if self._deep:
+                    width, height = self._size
+                    yield time, np.frombuffer(bytes(packet), ">u2", width * height).reshape(height, width).astype("u2")
+                elif track.codec_context.name == "mjpeg":
+                    yield time, bytes(packet)
+                else:
+                    for frame in track.codec_context.decode(packet):
+                        yield time, frame.to_ndarray(format="rgb24")

@@ -1,0 +1,88 @@
+"""Folders of the app Stray Scanner: depth of a LiDAR as PNG, colour as a video, and the phone's poses.
+
+`depth/000000.png` (mm), `confidence/`, `rgb.mp4`, `camera_matrix.csv` of the colour pictures, `odometry.csv` with x
+right, y down, z forward: https://github.com/strayrobots/scanner. Depth is aligned with colour.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float64
+
+from ...io.depth_pictures import read_depth
+from ...io.file_names import last_number
+from ...io.pictures import read_picture
+from ...io.read import read_file
+from .takes import Lens, Pictures, Sensor, Stream, Take, picture_size, pose
+
+KIND = "a Stray Scanner folder (depth/, rgb.mp4, odometry.csv)"
+MATRIX, VIDEO = "camera_matrix.csv", "rgb.mp4"
+RATE = 60.0  # 1/s, of ARKit's frames, where odometry.csv has no times
+
+
+def fits(path: Path) -> bool:
+    """Return whether a folder has what the app writes."""
+    return (path / "odometry.csv").is_file() and (path / "depth").is_dir()
+
+
+def read(path: Path) -> Take:
+    """Return the camera of a folder."""
+    times, poses = _odometry(path)
+    files = sorted((path / "depth").glob("*.png"))
+    if not files:
+        raise ValueError("depth/ has no *.png")
+    stamps = [times.get(number, number / RATE) for number in (last_number(file.stem) or 0 for file in files)]
+    width, height = picture_size(read_file(files[0]))
+    color = _video(path, min(times.values(), default=0.0)) if (path / VIDEO).is_file() else None
+    lens = None if color is None or color.lens is None else color.lens.resized(width, height)
+
+    def pictures() -> Pictures:
+        for stamp, file in zip(stamps, files, strict=True):
+            depth, sure = read_depth(file), path / "confidence" / file.name
+            yield stamp, np.where(_confidence(sure) > 0, depth, 0) if sure.is_file() else depth
+
+    depth = Stream(width, height, len(files), max(stamps) - min(stamps), lens, pictures)
+    sensor = Sensor("phone", depth, 0.001, color, np.eye(4), poses)
+    return Take(path, KIND, (sensor,), f"it needs {MATRIX} and {VIDEO}, whose size the matrix is for")
+
+
+def _confidence(path: Path) -> np.ndarray:
+    """Return ARKit's confidence of each depth: 0 is low, as of pixels that mix two surfaces."""
+    return read_picture(path)[..., 0]
+
+
+def _odometry(path: Path) -> tuple[dict[int, float], Float64[np.ndarray, "T 4 4"] | None]:
+    """Return times, s, by frame, and poses; early versions of the app wrote neither titles nor times."""
+    rows = [line.replace(" ", "").split(",") for line in read_file(path / "odometry.csv").decode().splitlines() if line]
+    titled = bool(rows) and "qx" in rows[0]
+    titles = rows.pop(0) if titled else ["x", "y", "z", "qx", "qy", "qz", "qw"]
+    table = np.array([row[: len(titles)] for row in rows], dtype=np.float64).reshape(-1, len(titles))
+    columns = {title: table[:, number] for number, title in enumerate(titles)}
+    times = (
+        dict(zip(columns["frame"].astype(int).tolist(), columns["timestamp"].tolist(), strict=True)) if titled else {}
+    )
+    turns, places = (np.stack([columns[name] for name in names], axis=1) for names in (("qx", "qy", "qz", "qw"), "xyz"))
+    return times, pose(turns, places) if len(table) else None
+
+
+def _video(path: Path, start: float) -> Stream:
+    import av
+
+    with av.open(path / VIDEO) as video:
+        stream = video.streams.video[0]
+        seconds = float((stream.duration or 0) * (stream.time_base or 0))
+        width, height, count = stream.width, stream.height, stream.frames
+    lens = None
+    if (path / MATRIX).is_file():
+        text = read_file(path / MATRIX).decode()
+        matrix = np.array([line.split(",") for line in text.splitlines() if line], np.float64).reshape(3, 3)
+        lens = Lens(width, height, (matrix[0, 0], matrix[1, 1]), (matrix[0, 2], matrix[1, 2]))
+
+    def pictures() -> Pictures:
+        with av.open(path / VIDEO) as video:
+            for frame in video.decode(video=0):
+                yield start + float(frame.time or 0), frame.to_ndarray(format="rgb24")
+
+    return Stream(width, height, count, seconds * (count - 1) / max(count, 1), lens, pictures)

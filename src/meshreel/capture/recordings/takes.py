@@ -1,0 +1,116 @@
+"""Takes: what one file or folder of a recorder holds, before it is a rig.
+
+A reader -> depth cameras, the colour cameras beside them, and their pictures in order, one in memory at a time.
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float64
+
+from ...errors import InputError
+
+Picture = np.ndarray | bytes  # depths H x W in the sensor's unit, integers or floats; colours H x W x 3; a PNG or JPEG
+Pictures = Iterator[tuple[float, Picture]]  # each with its time on the take's clock, s
+FLIP = np.diag([1.0, -1.0, -1.0, 1.0])  # from x right, y down, z forward to ARKit's x right, y up, z backward
+
+
+@dataclass(frozen=True, slots=True)
+class Lens:
+    """Intrinsics of a camera in pixels, whose middles are whole numbers; it bends as OpenCV's coefficients say."""
+
+    width: int
+    height: int
+    focal: tuple[float, float]
+    center: tuple[float, float]
+    distortion: tuple[float, ...] = ()  # k1 k2 p1 p2 k3 k4 k5 k6, or fewer
+    reach: float = np.inf  # largest tangent of an angle to the optical axis for which the coefficients hold
+
+    def resized(self, width: int, height: int) -> Lens:
+        """Return the lens for pictures of another size."""
+        x, y = width / self.width, height / self.height
+        center = ((self.center[0] + 0.5) * x - 0.5, (self.center[1] + 0.5) * y - 0.5)
+        return replace(self, width=width, height=height, focal=(self.focal[0] * x, self.focal[1] * y), center=center)
+
+
+@dataclass(frozen=True, slots=True)
+class Stream:
+    """The pictures of one camera."""
+
+    width: int  # pixels
+    height: int  # pixels
+    count: int  # pictures; about as many, where the file does not say
+    seconds: float  # from the first to the last
+    lens: Lens | None  # None where the take has no calibration of it
+    pictures: Callable[[], Pictures]  # reads the take from its beginning
+
+    @property
+    def rate(self) -> float:
+        """Pictures a second; 0 where there are fewer than two."""
+        return (self.count - 1) / self.seconds if self.seconds > 0 and self.count > 1 else 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Sensor:
+    """A depth camera, and the colour camera beside it."""
+
+    name: str
+    depth: Stream
+    unit: float = 0.001  # m, what 1 means in its pictures
+    color: Stream | None = None
+    color_to_depth: Float64[np.ndarray, "4 4"] | None = None  # m; None where the take does not say
+    poses: Float64[np.ndarray, "T 4 4"] | None = None  # camera to world, m: one, or one for each moment
+
+
+@dataclass(frozen=True, slots=True)
+class Take:
+    """What a file or folder holds."""
+
+    path: Path
+    kind: str  # of recording
+    sensors: tuple[Sensor, ...]
+    calibrate: str  # what a user does where the calibration is missing
+    others: tuple[str, ...] = ()  # streams that are not read
+
+
+@contextmanager
+def reading(path: Path) -> Iterator[None]:
+    """Turn what packages raise for a damaged file, each errors of its own, into an InputError that names the file."""
+    try:
+        yield
+    except InputError as error:
+        if f"{path}" in str(error):
+            raise
+        raise InputError(f"{path}: {error}") from None
+    except ModuleNotFoundError as error:
+        text = f"{error.name} is missing; install it with: pip install 'meshreel[recordings]'"
+        raise InputError(f"{path}: {text}") from None
+    except Exception as error:
+        reason = " ".join(f"{getattr(error, 'strerror', None) or error}".split()) or type(error).__name__
+        text = "copy it again, or repair it with the recorder's tool"
+        raise InputError(f"{path}: cannot be read ({reason:.200}); {text}") from error
+
+
+def picture_size(data: bytes) -> tuple[int, int]:
+    """Return width and height of the PNG or JPEG with these first bytes. Raises OSError for others."""
+    from PIL import Image
+
+    with Image.open(io.BytesIO(data)) as image:
+        return image.size
+
+
+def pose(
+    quaternions: Float64[np.ndarray, "*T 4"], positions: Float64[np.ndarray, "*T 3"]
+) -> Float64[np.ndarray, "*T 4 4"]:
+    """Return 4 x 4 matrices of rotations x y z w and translations. Raises ValueError for a quaternion of zeros."""
+    from scipy.spatial.transform import Rotation
+
+    made = np.zeros((*positions.shape[:-1], 4, 4))
+    made[..., :3, :3], made[..., :3, 3], made[..., 3, 3] = Rotation.from_quat(quaternions).as_matrix(), positions, 1.0
+    return made

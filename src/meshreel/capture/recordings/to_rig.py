@@ -1,0 +1,302 @@
+"""Takes to the folder of a rig: depth without the bends of its lens, colours as they were recorded, in common frames.
+
+Pictures belong to one frame if they were taken within half a frame of each other. Colour is registered by calibration:
+`rig.json` says where its camera is and how its lens bends, so that no picture is resampled for it.
+"""
+
+from __future__ import annotations
+
+import io
+import re
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from itertools import chain, count
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Bool, Float64, Int64
+
+from ...errors import InputError
+from ...geometry.color_views import bent
+from ...io.pictures import pack_picture
+from ...io.unfinished import cannot_be_written
+from ..rig import DepthCamera, write_rig
+from .takes import Lens, Picture, Sensor, Stream, Take, reading
+
+MILLIMETRE = 0.001  # m, the unit of depths that are recorded as floats
+MOVES, TURNS = 0.05, 3.0  # m, degrees: a phone that tracks itself, on a tripod, strays by less (guess)
+CUT_OFF = 0.02  # of a stream's pictures: where more are missing than the file promises, it is told (guess)
+QUALITY = 95  # of JPEG, for colours that a package decoded: a third of a PNG's bytes
+Report = Callable[[int], None]  # how many pictures were read so far
+
+
+def write_takes(takes: Sequence[Take], folder: Path, report: Report = lambda _: None) -> list[str]:
+    """Write a rig's folder, which appears when it is complete; return warnings for the user.
+
+    Raises InputError where a recording cannot be read, has no calibration, or moves; and where the folder has files.
+    """
+    parts = _parts(takes)
+    with _appearing(folder) as place:
+        pictures = count(1)
+        for part in parts:
+            part.read(place / part.name, lambda: report(next(pictures)))
+        clock = Clock.of(parts[0].depth.times())
+        frames, remarks = _common(parts, clock)
+        for part in parts:
+            part.depth.rename(frames)
+            if part.color is not None:
+                part.color.rename(frames)
+        write_rig(place, tuple(part.camera() for part in parts), clock.rate, [part.beside() for part in parts])
+    unknown = sum(part.sensor.poses is None for part in parts)
+    if len(parts) > 1 and (unknown or len(takes) > 1):
+        remarks.append(
+            f"{folder}: how its {len(parts)} cameras stand to each other is not known; meshreel calibrate finds it"
+        )
+    return [remark for part in parts for remark in part.remarks] + remarks
+
+
+@dataclass(frozen=True, slots=True)
+class Clock:
+    """Frames of a recording by the times of a camera's pictures; where it dropped some, it has no numbers."""
+
+    times: Float64[np.ndarray, " T"]  # s, ascending
+    numbers: Int64[np.ndarray, " T"]
+    period: float  # s
+
+    @classmethod
+    def of(cls, times: Float64[np.ndarray, " T"]) -> Clock:
+        """Return the clock of a camera's pictures."""
+        times = np.unique(times)
+        steps = np.diff(times)
+        period = float(np.median(steps)) if len(steps) else 1 / 30
+        gaps = np.maximum(1, np.rint(steps / period)).astype(np.int64)
+        return cls(times, np.concatenate([[0], np.cumsum(gaps)]).astype(np.int64), period)
+
+    @property
+    def rate(self) -> float:
+        """Frames a second."""
+        return round(1 / self.period, 3) if self.period < 1000 else 1 / self.period
+
+    def frames(self, times: Float64[np.ndarray, " P"]) -> dict[int, int]:
+        """Return for each frame which picture of another camera was taken within half a frame of it, if any."""
+        numbers = np.rint(np.interp(times, self.times, self.numbers)).astype(np.int64)
+        away = np.abs(times - np.interp(numbers, self.numbers, self.times))
+        near = [int(k) for k in np.argsort(-away, kind="stable") if away[k] <= self.period / 2]
+        return {int(numbers[k]): k for k in near}  # the nearest comes last, and stays
+
+
+@dataclass(slots=True)
+class _Written:
+    """Pictures of a stream in the rig's folder, in the order of the recording."""
+
+    folder: Path
+    files: list[tuple[float, Path]] = field(default_factory=list)
+    by_frame: dict[int, int] = field(default_factory=dict)
+
+    def times(self) -> Float64[np.ndarray, " P"]:
+        return np.array([time for time, _ in self.files], dtype=np.float64)
+
+    def rename(self, frames: set[int]) -> None:
+        """Name pictures by their frames, and delete those of no frame."""
+        kept = {index: frame for frame, index in self.by_frame.items() if frame in frames}
+        for index, (_, path) in enumerate(self.files):
+            if index in kept:
+                path.rename(path.with_name(f"frame_{kept[index]:05}{path.suffix}"))
+            else:
+                path.unlink()
+
+
+class _Part:
+    """A sensor that becomes cameras of a rig."""
+
+    def __init__(self, take: Take, sensor: Sensor, name: str) -> None:
+        if sensor.depth.lens is None:
+            raise InputError(f"{take.path}: depth of {sensor.name} has no calibration: {take.calibrate}")
+        self.take, self.sensor, self.name, self.lens = take, sensor, name, sensor.depth.lens
+        self.pose, self.unit, self.remarks = _still(take, sensor), sensor.unit, list[str]()
+        self.depth = _Written(Path())
+        self.color: _Written | None = None
+        self.stream = sensor.color
+        if self.stream is not None and self.stream.lens is None:
+            self.remarks.append(f"{take.path}: colour of {sensor.name} has no calibration and is left out")
+            self.stream = None
+        if self.stream is not None and sensor.color_to_depth is None:
+            self.remarks.append(
+                f"{take.path}: how colour of {sensor.name} lies on its depth is not known; taken as aligned"
+            )
+        self.camera(), self.beside()  # raise InputError for numbers that no camera has
+
+    def camera(self) -> DepthCamera:
+        """Return the depth camera."""
+        return self._as_camera(self.name, self.lens, self.pose)
+
+    def beside(self) -> dict[str, Any] | None:
+        """Return the colour camera as a record of `rig.json`."""
+        if self.stream is None or self.stream.lens is None:
+            return None
+        apart = np.eye(4) if self.sensor.color_to_depth is None else self.sensor.color_to_depth
+        record = self._as_camera(f"{self.name}-color", self.stream.lens, self.pose @ apart).record()
+        return record | {"folder": f"{self.name}/color", "distortion": list(self.stream.lens.distortion)}
+
+    def _as_camera(self, name: str, lens: Lens, pose: Float64[np.ndarray, "4 4"]) -> DepthCamera:
+        try:
+            return DepthCamera(name, lens.width, lens.height, lens.focal, lens.center, pose, self.unit)
+        except InputError as error:
+            raise InputError(f"{self.take.path}: {error}") from None
+
+    def read(self, folder: Path, report: Callable[[], None]) -> None:
+        """Write all pictures to a folder."""
+        pixels = _straightened(self.lens)
+
+        def straight(picture: Picture) -> tuple[bytes, str]:
+            assert isinstance(picture, np.ndarray)
+            if picture.shape != (self.lens.height, self.lens.width):
+                text = f"{picture.shape[1]} x {picture.shape[0]} pixels where its lens has"
+                raise InputError(f"{self.take.path}: depth of {text} {self.lens.width} x {self.lens.height}")
+            if picture.dtype.kind == "f":
+                picture, self.unit = _whole(picture * (self.sensor.unit / MILLIMETRE)), MILLIMETRE
+            return pack_picture(picture if pixels is None else picture[pixels[0]] * pixels[1]), ".png"
+
+        self.depth = self._write(self.sensor.depth, folder / "depth", straight, report)
+        if self.stream is not None:
+            self.color = self._write(self.stream, folder / "color", _colored, report)
+
+    def _write(
+        self, stream: Stream, folder: Path, pack: Callable[[Picture], tuple[bytes, str]], report: Callable[[], None]
+    ) -> _Written:
+        written, what = _Written(folder), f"{self.take.path}: {folder.name} of {self.sensor.name}"
+        with cannot_be_written(folder):
+            folder.mkdir(parents=True)
+        with reading(self.take.path):
+            for number, (time, picture) in enumerate(stream.pictures()):
+                if not np.isfinite(time):
+                    raise ValueError(f"picture {number} has the time {time}")
+                data, extension = pack(picture)
+                path = folder / f"read_{number}{extension}"
+                with cannot_be_written(path):
+                    path.write_bytes(data)
+                written.files.append((time, path))
+                report()
+        if not written.files:
+            raise InputError(f"{what} has no pictures; record it again")
+        if (back := int((np.diff(written.times()) < 0).sum())) > 0:
+            self.remarks.append(f"{what}: time stamps go back {back} times; its pictures are sorted by them")
+        if stream.count - len(written.files) > max(1, CUT_OFF * stream.count):
+            self.remarks.append(
+                f"{what}: {len(written.files)} of {stream.count} pictures can be read; was the file cut off?"
+            )
+        return written
+
+
+def _parts(takes: Sequence[Take]) -> list[_Part]:
+    """Return the sensors of all takes, with names that differ, also as names of folders."""
+    found: dict[str, _Part] = {}
+    for take in takes:
+        for sensor in take.sensors:
+            name = re.sub(r"[^\w-]+", "-", f"{take.path.resolve().stem}-{sensor.name}").strip("-")
+            others = (f"{name}-{number}" for number in count(2))
+            name = next(one for one in chain([name], others) if one.lower() not in found)
+            found[name.lower()] = _Part(take, sensor, name)
+    return list(found.values())
+
+
+def _common(parts: list[_Part], clock: Clock) -> tuple[set[int], list[str]]:
+    """Give pictures their frames; return the frames that all colour cameras have, and warnings about the others."""
+    remarks, first = list[str](), parts[0].take.path
+    for part in parts:
+        times, shift = part.depth.times(), 0.0
+        if times.min() > clock.times[-1] or times.max() < clock.times[0]:
+            shift = float(clock.times[0] - times.min())
+            remarks.append(f"{part.take.path}: was at another time than {first} by its clock; both begin together now")
+        for written in (part.depth, part.color):
+            if written is not None:
+                written.by_frame = clock.frames(written.times() + shift)
+        if (lost := len(times) - len(part.depth.by_frame)) > 0:
+            text = f"{lost} of {len(times)} depth pictures are within half a frame of no frame of {first}"
+            remarks.append(f"{part.take.path}: {part.sensor.name}: {text}, and are left out")
+    frames = set[int]().union(*(part.depth.by_frame for part in parts))
+    for part in parts:
+        if part.color is not None and (bare := frames - part.color.by_frame.keys()):
+            half = f"half a frame ({500 * clock.period:.3g} ms)"
+            text = f"{len(bare)} of {len(frames)} frames have no colour within {half} and are left out"
+            remarks.append(f"{part.take.path}: {part.sensor.name}: {text}, the first is frame {min(bare)}")
+            frames -= bare
+    for part in parts:
+        if not frames & part.depth.by_frame.keys():
+            text = f"{part.sensor.name} has no frame in common with the others"
+            raise InputError(f"{part.take.path}: {text}; do the clocks of depth and colour agree?")
+    return frames, remarks
+
+
+def _still(take: Take, sensor: Sensor) -> Float64[np.ndarray, "4 4"]:
+    """Return the pose of a sensor that stands still, the identity where it is not known. Raises InputError."""
+    if sensor.poses is None:
+        return np.eye(4)
+    if not np.isfinite(sensor.poses).all():
+        raise InputError(f"{take.path}: a pose of {sensor.name} is not finite; record it again")
+    places = sensor.poses[:, :3, 3]
+    away = np.linalg.norm(places - np.median(places, axis=0), axis=1)
+    usual = sensor.poses[int(away.argmin())]
+    cosines = (np.einsum("tij,ij->t", sensor.poses[:, :3, :3], usual[:3, :3]) - 1) / 2
+    turned = float(np.degrees(np.arccos(np.clip(cosines, -1, 1))).max())
+    if away.max() > MOVES or turned > TURNS:
+        text = f"camera {sensor.name} moves: by {away.max():.2g} m and {turned:.2g} degrees in its recorded poses"
+        raise InputError(f"{take.path}: {text}; record with cameras that stand still, or cut the recording there")
+    return usual
+
+
+def _straightened(lens: Lens) -> tuple[tuple[np.ndarray, np.ndarray], Bool[np.ndarray, "H W"]] | None:
+    """Return for each pixel of a lens that does not bend which one of a picture it is, and whether there is one.
+
+    Depths are not blended: between two surfaces is none.
+    """
+    if not any(lens.distortion):
+        return None
+    rows, columns = np.mgrid[: lens.height, : lens.width].astype(np.float64)
+    x, y = (columns - lens.center[0]) / lens.focal[0], (rows - lens.center[1]) / lens.focal[1]
+    bent_x, bent_y = bent(x, y, lens.distortion)
+    column, row = bent_x * lens.focal[0] + lens.center[0], bent_y * lens.focal[1] + lens.center[1]
+    inside = (np.hypot(x, y) <= lens.reach) & (column > -0.5) & (column < lens.width - 0.5)
+    inside &= (row > -0.5) & (row < lens.height - 0.5)
+    nearest = (
+        np.rint(np.where(inside, row, 0)).astype(np.int64),
+        np.rint(np.where(inside, column, 0)).astype(np.int64),
+    )
+    return nearest, inside
+
+
+def _whole(depth: np.ndarray) -> np.ndarray:
+    """Return depths as integers of 16 bits; what is none, or too far, is 0."""
+    with np.errstate(invalid="ignore"):
+        return np.where((depth > 0) & (depth < 65535), np.rint(depth), 0).astype(np.uint16)
+
+
+def _colored(picture: Picture) -> tuple[bytes, str]:
+    """Return the bytes of a picture's file, and its extension."""
+    if isinstance(picture, bytes):
+        return picture, ".jpg" if picture[:2] == b"\xff\xd8" else ".png"
+    from PIL import Image
+
+    packed = io.BytesIO()
+    Image.fromarray(picture).save(packed, "JPEG", quality=QUALITY, subsampling=0)
+    return packed.getvalue(), ".jpg"
+
+
+@contextmanager
+def _appearing(folder: Path) -> Iterator[Path]:
+    """Yield a new folder, which takes the name `folder` at the end of the block; after a failure, nothing is left."""
+    with cannot_be_written(folder):
+        if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+            raise InputError(f"{folder}: is there already; choose another folder for the rig, or delete it")
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        scratch = tempfile.TemporaryDirectory(prefix=f".{folder.name}.", dir=folder.parent)
+    with scratch as place:
+        (made := Path(place, folder.name)).mkdir()
+        yield made
+        with cannot_be_written(folder):
+            if folder.exists():
+                folder.rmdir()
+            made.rename(folder)

@@ -1,0 +1,89 @@
+"""Folders in the form of the TUM RGB-D benchmark: lists of pictures with time stamps, depth aligned with colour.
+
+`depth.txt`, `rgb.txt` (or `associations.txt`) and, for poses, `groundtruth.txt`, as
+https://cvg.cit.tum.de/data/datasets/rgbd-dataset/file_formats describes them. Depth is in 1/5000 m.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float64
+
+from ...io.depth_pictures import read_depth
+from ...io.read import read_file
+from .takes import Lens, Picture, Pictures, Sensor, Stream, Take, picture_size, pose
+
+KIND = "a TUM RGB-D folder (depth.txt, rgb.txt)"
+UNIT = 1 / 5000  # m
+LISTS = ("associations.txt", "associated.txt", "associate.txt")
+OWN = "calibration.txt"  # fx fy cx cy, and k1 k2 p1 p2 k3: the form of the ETH3D SLAM benchmark
+# Of the colour cameras, by parts of the folders' names: the benchmark's page on file formats.
+KNOWN = {
+    "freiburg1": "517.3 516.5 318.6 255.3 0.2624 -0.9531 -0.0054 0.0026 1.1633",
+    "freiburg2": "520.9 521.0 325.1 249.7 0.2312 -0.7849 -0.0033 -0.0001 0.9172",
+    "freiburg3": "535.4 539.2 320.1 247.6",
+}
+
+
+def fits(path: Path) -> bool:
+    """Return whether a folder has a list of depth pictures."""
+    return any((path / name).is_file() for name in ("depth.txt", *LISTS))
+
+
+def read(path: Path) -> Take:
+    """Return the camera of a folder."""
+    depth, color = _lists(path)
+    numbers = next((text for name, text in KNOWN.items() if name in path.resolve().name), "")
+    numbers = read_file(path / OWN).decode() if (path / OWN).is_file() else numbers
+    seen, beside = _stream(depth, numbers, True), _stream(color, numbers, False) if color else None
+    sensor = Sensor("camera", seen, UNIT, beside, np.eye(4), _poses(path, depth))
+    return Take(path, KIND, (sensor,), f"write fx fy cx cy (k1 k2 p1 p2 k3) into {path / OWN}")
+
+
+def _lists(path: Path) -> tuple[list[tuple[float, Path]], list[tuple[float, Path]]]:
+    """Return times, s, and files of depth and of colour."""
+    if (path / "depth.txt").is_file():
+        color = _rows(path / "rgb.txt") if (path / "rgb.txt").is_file() else []
+        return [(float(t), path / name) for t, name, *_ in _rows(path / "depth.txt")], [
+            (float(t), path / name) for t, name, *_ in color
+        ]
+    rows = list(_rows(next(path / name for name in LISTS if (path / name).is_file())))
+    pairs = [(float(t), path / name) for row in rows for t, name in (row[:2], row[2:4])]
+    first = "depth" in rows[0][1] if rows else True
+    return pairs[0 if first else 1 :: 2], pairs[1 if first else 0 :: 2]
+
+
+def _rows(path: Path) -> Iterator[list[str]]:
+    lines = read_file(path).decode("utf-8-sig").splitlines()
+    yield from (line.replace(",", " ").split() for line in lines if line.strip() and not line.startswith("#"))
+
+
+def _stream(rows: list[tuple[float, Path]], numbers: str, deep: bool) -> Stream:
+    if not rows:
+        raise ValueError("its list of pictures is empty")
+    width, height = picture_size(read_file(rows[0][1]))
+    given = [float(number) for number in numbers.split()]
+    if given and len(given) < 4:
+        raise ValueError(f"{OWN} has {len(given)} numbers; give fx fy cx cy")
+    lens = Lens(width, height, (given[0], given[1]), (given[2], given[3]), tuple(given[4:9])) if given else None
+
+    def pictures() -> Pictures:
+        for time, file in rows:
+            picture: Picture = read_depth(file) if deep else read_file(file)
+            yield time, picture
+
+    times = [time for time, _ in rows]
+    return Stream(width, height, len(rows), max(times) - min(times), lens, pictures)
+
+
+def _poses(path: Path, depth: list[tuple[float, Path]]) -> Float64[np.ndarray, "T 4 4"] | None:
+    """Return the poses while depth was recorded."""
+    if not (path / "groundtruth.txt").is_file():
+        return None
+    rows = np.array([row[:8] for row in _rows(path / "groundtruth.txt")], dtype=np.float64).reshape(-1, 8)
+    times = [time for time, _ in depth]
+    rows = rows[(rows[:, 0] >= min(times)) & (rows[:, 0] <= max(times))]
+    return pose(rows[:, 4:], rows[:, 1:4]) if len(rows) else None

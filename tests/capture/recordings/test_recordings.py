@@ -1,0 +1,344 @@
+"""Recordings of every format become rigs whose depth, colour, times and poses are those that were written."""
+
+from __future__ import annotations
+
+import json
+import sys
+import types
+import zipfile
+import zlib
+
+import numpy as np
+import pytest
+
+from meshreel.capture.recordings import is_take, open_take, readers
+from meshreel.capture.recordings.takes import FLIP
+from meshreel.capture.recordings.to_rig import write_takes
+from meshreel.capture.rig import read_rig
+from meshreel.errors import InputError
+from tests.capture.recordings import files
+from tests.capture.recordings.files import COUNT, DEPTHS, SIZE, TIMES, Bag, jpeg, shade
+
+PLACE = [0.1, 1.5, 0.2]  # of the camera in recordings with poses, m
+NEAR = 3  # of 255, by which JPEG or a video changes a grey
+
+
+@pytest.fixture
+def made(tmp_path):
+    """The rig of recordings, and what was said of them."""
+
+    def make(*paths):
+        folder = tmp_path / f"rig{len(list(tmp_path.glob('rig*')))}"
+        remarks = write_takes([open_take(path) for path in paths], folder)
+        return read_rig(folder), remarks
+
+    return make
+
+
+def same(rig, rows=slice(None), unit=1.0):
+    """Depth in mm and colours of each frame are the scene's."""
+    assert rig.frames == list(range(COUNT)) and rig.frame_rate == files.RATE
+    for frame in rig.frames:
+        depth = rig.depth(0, frame) * rig.cameras[0].depth_unit * 1000 * unit
+        assert np.abs(depth - DEPTHS[frame])[rows].max() < 1e-6
+        if rig.color_cameras:
+            picture = rig.color_cameras[0].picture(frame).pixels
+            assert np.abs(picture.astype(int) - shade(frame)[0, 0]).max() <= NEAR
+    return True
+
+
+def test_a_tum_folder_has_depth_in_fifths_of_millimetres_and_its_pose(tmp_path, made):
+    rig, remarks = made(files.tum(tmp_path / "desk"))
+    assert same(rig) and remarks == [] and rig.cameras[0].name == "desk-camera"
+    assert rig.cameras[0].camera_to_world[:3, 3].tolist() == PLACE
+    assert np.allclose(rig.color_cameras[0].camera_to_world, rig.cameras[0].camera_to_world)
+
+
+def test_a_tum_folder_may_have_associations_alone_in_either_order(tmp_path, made):
+    folder = files.tum(tmp_path / "desk")
+    rows = [f"{t} rgb/{n}.jpg {t + 0.01} depth/{n}.png" for n, t in enumerate(TIMES)]
+    (folder / "associations.txt").write_text("\n".join(rows))
+    (folder / "depth.txt").unlink()
+    assert same(made(folder)[0])
+
+
+def test_the_cameras_of_the_tum_benchmark_are_known_by_the_names_of_folders(tmp_path):
+    folder = files.tum(tmp_path / "rgbd_dataset_freiburg1_xyz", numbers="")
+    lens = open_take(folder).sensors[0].depth.lens
+    assert lens.focal == (517.3, 516.5) and lens.distortion == (0.2624, -0.9531, -0.0054, 0.0026, 1.1633)
+
+
+def test_a_stray_scanner_folder_has_a_larger_video_and_loses_uncertain_depth(tmp_path, made):
+    pytest.importorskip("av")
+    rig, remarks = made(files.stray(tmp_path / "scan"))
+    assert same(rig, slice(1, None)) and remarks == [] and not rig.depth(0, 0)[0].any()
+    color = rig.color_cameras[0]
+    assert (color.width, color.intrinsic[0, 0], color.intrinsic[0, 2]) == (2 * SIZE, 2 * SIZE, SIZE - 0.5)
+    assert rig.cameras[0].focal == (SIZE, SIZE) and np.allclose(rig.cameras[0].center, SIZE / 2 - 0.5)
+    assert np.allclose(rig.cameras[0].camera_to_world, np.block([[np.eye(3), np.c_[PLACE]], [0, 0, 0, 1]]))
+
+
+def test_the_export_of_record3d_turns_from_the_axes_of_the_phone(tmp_path, made):
+    pytest.importorskip("OpenEXR")
+    rig, _ = made(files.exr(tmp_path / "scan"))
+    assert same(rig) and np.allclose(rig.cameras[0].camera_to_world[:3, :3], FLIP[:3, :3]) and rig.up == "y"
+
+
+def test_an_r3d_is_read_with_lzfse_and_without_it_says_what_to_export(tmp_path, made, monkeypatch):
+    path = tmp_path / "scan.r3d"
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("metadata", json.dumps(files.record3d_metadata()))
+        for number in range(COUNT):
+            depth = (DEPTHS[number] / 1000).astype("<f4")
+            archive.writestr(f"rgbd/{number}.jpg", jpeg(number))
+            archive.writestr(f"rgbd/{number}.depth", zlib.compress(depth.tobytes()))
+    monkeypatch.setitem(sys.modules, "liblzfse", types.SimpleNamespace(decompress=zlib.decompress))
+    assert same(made(path)[0])
+    monkeypatch.setitem(sys.modules, "liblzfse", None)
+    assert open_take(path).sensors[0].depth.count == COUNT
+    with pytest.raises(InputError, match=r"scan\.r3d: the depth .* by LZFSE.*as EXR \+ JPG, or pip install pyliblzfse"):
+        made(path)
+
+
+@pytest.mark.parametrize("form", ["bag", "sqlite3", "mcap"])
+def test_bags_of_all_kinds_have_the_same_camera(tmp_path, made, form):
+    pytest.importorskip("rosbags")
+    path = tmp_path / ("room.bag" if form == "bag" else "room")
+    with Bag(path, form) as bag:
+        bag.info("/front/depth/camera_info")
+        bag.info("/front/color/camera_info", (0.1, 0, 0, 0, 0))
+        bag.still("base", "/optical", (0.1, 1.5, 0.2))
+        bag.still("optical", "color", (0.05, 0, 0))
+        bag.write("/chatter", "std_msgs/String", bag.of("std_msgs/String", "hello"))
+        for number, time in enumerate(TIMES):
+            bag.image("/front/depth/image_raw", DEPTHS[number], "16UC1", time)
+            bag.image("/front/color/image_raw", shade(number)[..., ::-1], "bgr8", time + 0.01, "color")
+            bag.image("/front/infra/image_raw", DEPTHS[number], "16UC1", time)
+    rig, remarks = made(path)
+    assert same(rig) and remarks == [] and rig.cameras[0].name == "room-front-depth-image_raw"
+    assert np.allclose(rig.cameras[0].camera_to_world[:3, 3], PLACE)
+    assert np.allclose(rig.color_cameras[0].camera_to_world[:3, 3], [0.15, 1.5, 0.2])
+    assert rig.color_cameras[0].distortion == (0.1, 0, 0, 0, 0)
+    assert open_take(path).others == (
+        "/chatter (String)",
+        "/front/color/camera_info (CameraInfo)",
+        "/front/depth/camera_info (CameraInfo)",
+        "/front/infra/image_raw (Image)",
+        "/tf_static (TFMessage)",
+    )
+    if form != "bag":  # a file alone, without its metadata.yaml
+        assert same(made(next(p for p in path.iterdir() if p.suffix in (".db3", ".mcap")))[0])
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_depth_that_was_moved_to_colour_stays_only_where_nothing_says_how_the_cameras_lie(tmp_path, known):
+    pytest.importorskip("rosbags")
+    with Bag(tmp_path / "room", "mcap") as bag:
+        if known:
+            bag.still("depth", "rgb", (0.05, 0, 0))
+        for name, frame in (("depth", "depth"), ("depth_to_rgb", "rgb")):
+            bag.image(f"/{name}/image_raw", DEPTHS[0], "16UC1", TIMES[0], frame)
+        bag.image("/rgb/image_raw", shade(0), "rgb8", TIMES[0], "rgb")
+        bag.image("/ir/image_raw", DEPTHS[0], "mono16", TIMES[0], "depth")
+    (sensor,) = open_take(tmp_path / "room").sensors
+    assert sensor.name == ("depth-image_raw" if known else "depth_to_rgb-image_raw")
+    assert sensor.color is not None and sensor.color_to_depth[0, 3] == (0.05 if known else 0)
+
+
+def test_compressed_pictures_of_a_bag_and_depth_in_metres(tmp_path, made):
+    pytest.importorskip("rosbags")
+    from meshreel.capture.recordings.rosbag import COMPRESSED
+    from meshreel.io.pictures import pack_picture
+
+    with Bag(tmp_path / "room", "mcap") as bag:
+        for name in ("a", "b", "c"):
+            bag.info(f"/{name}/depth/camera_info")
+        bag.info("/a/rgb/camera_info")
+        for number, time in enumerate(TIMES):
+            depth = DEPTHS[number]
+            png = pack_picture(depth)
+            bag.compressed(
+                "/a/depth/image/compressedDepth", COMPRESSED.pack(0, 0, 0) + png, "16UC1; compressedDepth png", time
+            )
+            bag.compressed("/a/rgb/image/compressed", jpeg(number), "rgb8; jpeg compressed bgr8", time)
+            bag.image("/b/depth/image", (depth / 1000).astype(np.float32), "32FC1", time)
+            inverse = np.rint(40e6 / np.maximum(depth, 1000)).astype(np.uint16)
+            bag.compressed(
+                "/c/depth/image/compressedDepth",
+                COMPRESSED.pack(0, 40e3, 0.0) + pack_picture(inverse),
+                "32FC1; compressedDepth",
+                time,
+            )
+    rig, remarks = made(tmp_path / "room")
+    assert same(rig) and len(rig.cameras) == 3 and len(rig.color_cameras) == 1
+    assert np.array_equal(rig.depth(1, 2), DEPTHS[2])
+    assert np.abs(rig.depth(2, 2).astype(int) - DEPTHS[2]).max() <= 1
+    assert any("3 cameras stand to each other is not known; meshreel calibrate finds it" in one for one in remarks)
+
+
+def test_a_bag_of_realsense_says_its_unit_and_where_colour_is(tmp_path, made):
+    pytest.importorskip("rosbags")
+    deep, color = "/device_0/sensor_0/Depth_0", "/device_0/sensor_1/Color_0"
+    with Bag(tmp_path / "scan.bag", "bag") as bag:
+        bag.info(f"{deep}/info/camera_info", model="Brown Conrady")
+        bag.info(f"{color}/info/camera_info", (0.1, 0, 0, 0, 0), model="Inverse Brown Conrady")
+        bag.write("/device_0/sensor_0/option/Depth Units/value", "std_msgs/Float32", bag.of("std_msgs/Float32", 0.0005))
+        bag.write(f"{deep}/tf/0", "geometry_msgs/Transform", bag.transform((0, 0, 0)))
+        bag.write(f"{color}/tf/0", "geometry_msgs/Transform", bag.transform((0.015, 0, 0)))
+        for number, time in enumerate(TIMES):
+            bag.image(f"{deep}/image/data", DEPTHS[number] * 2, "mono16", time)
+            bag.image(f"{color}/image/data", shade(number), "rgb8", time)
+    rig, _ = made(tmp_path / "scan.bag")
+    assert same(rig) and rig.cameras[0].depth_unit == pytest.approx(0.0005)
+    assert rig.color_cameras[0].camera_to_world[0, 3] == pytest.approx(-0.015)
+
+
+CALIBRATION = {"CalibrationInformation": {"Cameras": [
+    {"Location": "CALIBRATION_CameraLocationD0", "MetricRadius": 1.74, "SensorWidth": 1024, "SensorHeight": 1024,
+     "Rt": {"Rotation": [1, 0, 0, 0, 1, 0, 0, 0, 1], "Translation": [0, 0, 0]},
+     "Intrinsics": {"ModelParameters": [0.5, 0.51, 0.49, 0.492, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]}},
+    {"Location": "CALIBRATION_CameraLocationPV0", "MetricRadius": 0, "SensorWidth": 4096, "SensorHeight": 3072,
+     "Rt": {"Rotation": [1, 0, 0, 0, 1, 0, 0, 0, 1], "Translation": [-0.032, -0.002, 0.004]},
+     "Intrinsics": {"ModelParameters": [0.5, 0.51, 0.478, 0.637, 0.58, -2.49, 1.36, 0.5, -2.3, 1.3, 0, 0, 2e-4, 1e-4]}},
+]}}  # fmt: skip
+
+
+def test_an_azure_kinect_file_has_the_lens_of_its_mode(tmp_path, made):
+    pytest.importorskip("av")
+    rig, remarks = made(files.mkv(tmp_path / "room.mkv", CALIBRATION))
+    depth, color = rig.cameras[0], rig.color_cameras[0]
+    assert remarks == [] and rig.frames == list(range(COUNT)) and (rig.depth(0, 2) == 1002).all()
+    assert np.allclose(depth.focal, (0.49 * 1024, 0.492 * 1024))
+    assert np.allclose(depth.center, (0.5 * 1024 - 192 - 0.5, 0.51 * 1024 - 180 - 0.5))
+    assert np.allclose(color.intrinsic[:2, 2], (0.5 * 1280 - 0.5, 0.51 * 960 - 120 - 0.5))
+    assert np.allclose(color.intrinsic[[0, 1], [0, 1]], (0.478 * 1280, 0.637 * 960))
+    assert color.distortion == (0.58, -2.49, 1e-4, 2e-4, 1.36, 0.5, -2.3, 1.3)
+    assert np.allclose(color.camera_to_world[:3, 3], (0.032, 0.002, -0.004))
+    assert np.abs(color.picture(3).pixels.astype(int) - 100).max() <= NEAR
+
+
+def test_bent_depth_is_straightened_without_new_depths(tmp_path, made):
+    """A wall seen through a lens that bends: each pixel that is left has a depth of the picture, in its place."""
+    folder = files.tum(tmp_path / "desk", numbers="96 96 47.5 47.5 0.2 0 0 0 0")
+    rig, _ = made(folder)
+    depth = rig.depth(0, 0)
+    assert set(np.unique(depth)) <= {0, *np.unique(DEPTHS[0].astype(np.uint16) * 5)}
+    x = (70 - 47.5) / 96
+    assert depth[48, 70] == 5 * DEPTHS[0][48, round(47.5 + 96 * x * (1 + 0.2 * (x * x + (0.5 / 96) ** 2)))]
+    assert rig.color_cameras[0].distortion == (0.2, 0, 0, 0, 0)
+
+
+def test_pictures_are_paired_within_half_a_frame_and_lost_ones_are_told(tmp_path, made):
+    late = [TIMES[0] + 0.04, TIMES[1] - 0.04, TIMES[2] + 0.06, TIMES[3]]
+    rig, remarks = made(files.tum(tmp_path / "desk", color_times=late))
+    assert rig.frames == [0, 1, 3] and len(remarks) == 1
+    assert (
+        "1 of 4 frames have no colour within half a frame (50 ms) and are left out, the first is frame 2" in remarks[0]
+    )
+
+
+def test_a_dropped_frame_leaves_a_gap_and_times_that_go_back_are_sorted(tmp_path, made):
+    gap = [TIMES[0], TIMES[1], TIMES[2], TIMES[3] + 0.1]
+    rig, _ = made(files.tum(tmp_path / "gap", gap, gap))
+    assert rig.frames == [0, 1, 2, 4] and "no camera has 1 of the frames 0 to 4" in rig.missing()[0]
+    back = [TIMES[0], TIMES[2], TIMES[1], TIMES[3]]
+    rig, remarks = made(files.tum(tmp_path / "back", back, TIMES))
+    assert "depth of camera: time stamps go back 1 times" in remarks[0]
+    assert np.array_equal(rig.depth(0, 1), DEPTHS[2] * 5)
+
+
+def test_several_recordings_are_cameras_of_one_rig(tmp_path, made):
+    first, second = (
+        files.tum(tmp_path / "a" / "desk"),
+        files.tum(tmp_path / "b" / "desk", [t + 900 for t in TIMES], [t + 900 for t in TIMES]),
+    )
+    rig, remarks = made(first, second)
+    assert [one.name for one in rig.cameras] == ["desk-camera", "desk-camera-2"] and rig.frames == list(range(COUNT))
+    assert "both begin together now" in remarks[0] and "meshreel calibrate finds it" in remarks[1]
+
+
+def test_a_camera_that_moves_by_its_own_poses_is_refused_by_name(tmp_path, made):
+    moved = [[*files.STILL[:4], 0.1 + 0.1 * n, 1.5, 0.2] for n in range(COUNT)]
+    with pytest.raises(InputError, match=r"camera camera moves: by 0\.15 m and 0 degrees in its recorded poses"):
+        made(files.tum(tmp_path / "desk", poses=moved))
+    turned = [[np.sin(n / 20), 0, 0, np.cos(n / 20), *PLACE] for n in range(COUNT)]
+    with pytest.raises(InputError, match=r"moves: by 0 m and .* degrees"):
+        made(files.tum(tmp_path / "chair", poses=turned))
+    assert not list(tmp_path.glob("rig*")) and not list(tmp_path.glob(".rig*"))
+
+
+def test_what_cannot_be_read_is_named_with_a_remedy(tmp_path, made):
+    (tmp_path / "film.avi").write_bytes(b"RIFF")
+    with pytest.raises(InputError, match=r"film\.avi: is neither the folder of a rig .* TUM RGB-D folder"):
+        made(tmp_path / "film.avi")
+    with pytest.raises(InputError, match="no such file"):
+        open_take(tmp_path / "nothing.bag")
+    with pytest.raises(InputError, match=r"depth of camera has no calibration: write fx fy cx cy .*calibration\.txt"):
+        made(files.tum(tmp_path / "desk", numbers=""))
+    assert len(readers()) == 5 and not is_take(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("change", "text"),
+    [
+        (lambda folder: (folder / "depth" / "2.png").write_bytes(jpeg(0)), "store depth as 16-bit"),
+        (lambda folder: (folder / "depth" / "2.png").write_bytes(b"\x89PNG"), "2.png: "),
+        (lambda folder: (folder / "depth" / "2.png").unlink(), "2.png: cannot be read"),
+        (lambda folder: (folder / "depth.txt").write_text("# none"), "its list of pictures is empty"),
+        (lambda folder: (folder / "depth.txt").write_text("now depth/0.png"), "could not convert string to float"),
+        (lambda folder: (folder / "depth.txt").write_text("nan depth/0.png"), "picture 0 has the time nan"),
+        (lambda folder: (folder / "calibration.txt").write_text("96 96"), "give fx fy cx cy"),
+        (lambda folder: (folder / "calibration.txt").write_text("0 96 48 48"), "focal above 0"),
+        (lambda folder: (folder / "groundtruth.txt").write_text("100 0 0 0 0 0 0 0"), "cannot be read"),
+    ],
+)
+def test_a_damaged_folder_is_an_input_error(tmp_path, made, change, text):
+    folder = files.tum(tmp_path / "desk")
+    change(folder)
+    with pytest.raises(InputError, match=text):
+        made(folder)
+    assert not list(tmp_path.glob("*rig*"))
+
+
+def test_pictures_of_another_size_are_refused(tmp_path, made):
+    folder = files.tum(tmp_path / "desk")
+    files.write_depth(DEPTHS[0][:50], folder / "depth" / "2.png")
+    with pytest.raises(InputError, match="depth of 96 x 50 pixels where its lens has 96 x 96"):
+        made(folder)
+
+
+def test_a_file_of_kinect_that_is_damaged_or_lacks_something(tmp_path, made):
+    pytest.importorskip("av")
+    with pytest.raises(InputError, match=r"has no calibration: the file has no calibration\.json attached"):
+        made(files.mkv(tmp_path / "bare.mkv", None))
+    with pytest.raises(InputError, match=r"no track has the title DEPTH, only IR, COLOR"):
+        made(files.mkv(tmp_path / "infrared.mkv", CALIBRATION, title="IR"))
+    path = files.mkv(tmp_path / "whole.mkv", CALIBRATION)
+    (tmp_path / "cut.mkv").write_bytes(path.read_bytes()[: path.stat().st_size // 3])
+    _, remarks = made(tmp_path / "cut.mkv")
+    assert any("pictures can be read; was the file cut off?" in one for one in remarks)
+    (tmp_path / "none.mkv").write_bytes(b"no video")
+    with pytest.raises(InputError, match=r"none\.mkv: cannot be read"):
+        made(tmp_path / "none.mkv")
+
+
+def test_bags_that_are_damaged_or_have_no_depth(tmp_path, made):
+    pytest.importorskip("rosbags")
+    with Bag(tmp_path / "a.bag", "bag") as bag:
+        bag.image("/color/image_raw", shade(0), "rgb8", TIMES[0])
+    with pytest.raises(InputError, match=r"a\.bag: .*no depth pictures .*; its topics are /color/image_raw \(Image\)"):
+        made(tmp_path / "a.bag")
+    with Bag(tmp_path / "b.bag", "bag") as bag:
+        bag.info("/depth/camera_info", (0.1, 0, 0, 0), "equidistant")
+        bag.image("/depth/image_raw", DEPTHS[0], "16UC1", TIMES[0])
+    with pytest.raises(InputError, match="lens model equidistant"):
+        made(tmp_path / "b.bag")
+    with Bag(tmp_path / "c.bag", "bag") as bag:
+        bag.image("/depth/image_raw", DEPTHS[0], "16UC1", TIMES[0])
+    with pytest.raises(InputError, match="has no calibration: record the topics camera_info"):
+        made(tmp_path / "c.bag")
+    data = (tmp_path / "c.bag").read_bytes()
+    for size in (0, 10, 4000, len(data) // 2):
+        (tmp_path / "d.bag").write_bytes(data[:size])
+        with pytest.raises(InputError, match=r"d\.bag: cannot be read"):
+            made(tmp_path / "d.bag")
