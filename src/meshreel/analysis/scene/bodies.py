@@ -40,7 +40,7 @@ class BodyOptions:
     cell: float = 3.0  # cells of the scene: pieces of consecutive frames nearer than this are one
     least: float = 0.1  # m^2: pieces that never reach this area are bits
     lasts: int = 5  # frames: bits that are present in at least this many are a body of their own
-    large: float = 0.008  # m^2, of such a body in a frame at least, on average
+    large: float = 0.02  # m^2, of such a body in a frame at least, on average
     beside: float = 0.5  # m: other bits at most this far from a body join it; those farther off are dropped
     touches: float = 2.0  # cells of the scene: the same for a bit that is there in one frame only
 

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from jaxtyping import Bool, Int64
 
 from ...errors import InputError
 from ...geometry.cameras import PinholeCamera
@@ -30,6 +31,7 @@ from .views import ViewsOptions, place_views
 _PROBES = 3  # frames used to place the views: a guess
 _WIDTH = 4.75  # smallest width of a cell, in median distances between two frames: decision 18
 _WIDEST = 4.0  # largest width of a cell, in edge lengths: decision 18
+_STILL = 1.5  # times the noise: surface that is farther off from one frame to another has moved (decision 28)
 _THINNED = 7  # one vertex in this many is measured when two frames are compared: a guess, for speed
 
 
@@ -66,12 +68,19 @@ def segment(frames: MeshSequence, options: SegmentOptions = SegmentOptions(), re
 
 def _by_place(frames: CapturedSequence, chosen: Sequence[int], options: SegmentOptions, report: Report) -> ByPlace:
     cell, views = edge_length(frames, chosen), _views(frames, chosen, options)
-    lattice = _lattice(frames, chosen, cell)
+    noise = _apart(frames[chosen[0]], frames[chosen[len(chosen) // 2]])
+    lattice = Lattice.near(frames[chosen[0]], max(cell, min(_WIDTH * noise, _WIDEST * cell)))
     some = Chosen(frames, chosen)
     pictures = None if some.depth is None else some.depth.__getitem__
     places = find_places(Observations(some, views, pictures, report), lattice, options.places)
     moving = moving_places(places, options.cut)
-    rest = find_rest(places, moving, chosen, frames.frame_rate, options.settle)
+
+    def holds(some: Int64[np.ndarray, " C"], numbers: list[int]) -> bool:
+        first, *others = (frames[numbers[k]] for k in evenly(len(numbers), _PROBES))
+        there = np.isin(lattice.keys(first.vertices), places.keys[some])
+        return all(_apart(first, other, there) <= _STILL * noise for other in others)
+
+    rest = find_rest(places, moving, chosen, frames.frame_rate, options.settle, holds)
     return ByPlace(cell, lattice, places.keys, moving, rest, options.island)
 
 
@@ -125,14 +134,13 @@ def _looking(
     return views
 
 
-def _lattice(frames: MeshSequence, chosen: Sequence[int], cell: float) -> Lattice:
-    """Return a lattice with cells as wide as the frames' edges (`cell`, m), wider where noise moves surface by more.
+def _apart(one: Mesh, other: Mesh, chosen: Bool[np.ndarray, " V"] | None = None) -> float:
+    """Return the median distance from (chosen) vertices of one frame to another frame, m.
 
-    Noise is estimated by the median distance from one frame to another: more than half of a scene stands still.
+    Of whole frames this is noise: more than half of a scene stands still. Infinite where there is no surface.
     """
-    first = frames[chosen[0]]
-    apart = distances(first.vertices[::_THINNED], frames[chosen[len(chosen) // 2]])
-    return Lattice.near(first, max(cell, min(_WIDTH * float(np.median(apart)), _WIDEST * cell)))
+    points = one.vertices[::_THINNED] if chosen is None else one.vertices[chosen]
+    return float(np.median(distances(points, other))) if len(points) and not other.is_empty else np.inf
 
 
 def edge_length(frames: MeshSequence, chosen: Sequence[int]) -> float:
