@@ -20,6 +20,7 @@ from ...geometry.derived_sequences import CapturedSequence, Chosen, TurnedOver, 
 from ...geometry.topology import edge_lengths, face_normals
 from ...geometry.voxels import Lattice
 from ...types import Mesh, MeshSequence, evenly
+from .color_looks import ColorLooks
 from .cut import CutOptions, moving_places
 from .labelling import ByMasks, ByPlace, looks
 from .masks import Masker
@@ -86,9 +87,12 @@ def _faces_away(mesh: Mesh) -> bool:
 def segment_by(masker: Masker, frames: MeshSequence, options: SegmentOptions = SegmentOptions()) -> ByMasks:
     """Segment a scene by the masks of `masker`, which sees every frame before its first mask where it `observes`."""
     chosen = _to_see(frames)
-    views = _looking(masker.views, frames, chosen) or _views(frames, chosen, options)
+    colors = None if masker.views else _color_looks(frames, chosen, options)
+    given = masker.views if colors is None else colors.views
+    views = _looking(given, frames, chosen) or _views(frames, chosen, options)
     if masker.observes:
-        masker.foresee([looks(frames[number], views) for number in chosen[:: max(1, len(chosen) // _PROBES)]])
+        some = chosen[:: max(1, len(chosen) // _PROBES)]
+        masker.foresee([looks(frames[number], views) for number in some], colors)
         for number in range(len(frames)):
             masker.observe(number, looks(frames[number], views), views)
     return ByMasks(masker, views, edge_length(frames, chosen), options.threshold, options.island)
@@ -97,6 +101,24 @@ def segment_by(masker: Masker, frames: MeshSequence, options: SegmentOptions = S
 def scene_views(frames: MeshSequence, options: SegmentOptions = SegmentOptions()) -> tuple[PinholeCamera, ...]:
     """Return the views of a scene: given cameras, or placed ones. Raises InputError if no frame has a surface."""
     return _views(frames, _to_see(frames), options)
+
+
+def mask_views(
+    frames: MeshSequence, options: SegmentOptions = SegmentOptions()
+) -> tuple[tuple[PinholeCamera, ...], ColorLooks | None]:
+    """Return views for masks: given cameras, or colour cameras with their pictures, or placed views."""
+    chosen = _to_see(frames)
+    colors = _color_looks(frames, chosen, options)
+    return _views(frames, chosen, options) if colors is None else colors.views, colors
+
+
+def _color_looks(frames: MeshSequence, chosen: Sequence[int], options: SegmentOptions) -> ColorLooks | None:
+    """Return the pictures of the colour cameras; None if there are none, or cameras are given."""
+    colors = captured(frames).colors
+    if options.cameras or colors is None or not chosen:
+        return None
+    looks = ColorLooks(colors, chosen[0])
+    return looks if looks.views else None
 
 
 def _to_see(frames: MeshSequence) -> list[int]:
