@@ -48,9 +48,9 @@ def motion_prompts(depths: Sequence[Float32[np.ndarray, "h w"]]) -> list[Prompt]
     things, count = label(moving, np.ones((3, 3, 3)))  # linked over time: each is shown once
     areas = np.stack([np.bincount(one.reshape(-1), minlength=count + 1) for one in things])
     prompts = []
-    for thing, frame in enumerate(areas.argmax(axis=0).tolist()):
-        pieces, number = label(things[frame] == thing, np.ones((3, 3))) if thing else (None, 0)
-        patches = [pieces == piece for piece in range(1, number + 1)]
+    for thing, frame in enumerate(areas[:, 1:].argmax(axis=0).tolist(), 1):
+        pieces, number = label(things[frame] == thing, np.ones((3, 3)))
+        patches = [np.asarray(pieces == piece) for piece in range(1, number + 1)]
         prompts += [_prompt(frame, patch, moving[frame]) for patch in patches if patch.sum() >= least]
     return prompts
 

@@ -144,7 +144,7 @@ class _Model:
     def session(self, kind: Any, pictures: Pictures) -> Any:
         """Return a session of the model for a video."""
         height, width, _ = pictures[0].shape
-        places = {name: self._device for name in ("inference_device", "inference_state_device", "video_storage_device")}
+        places = dict.fromkeys(("inference_device", "inference_state_device", "video_storage_device"), self._device)
         session = kind(video_height=height, video_width=width, dtype=self._torch.float32, **places)
         session.processed_frames = _Video(pictures, self._size, self._torch)
         return session
