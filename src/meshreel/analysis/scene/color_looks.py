@@ -1,4 +1,4 @@
-"""The pictures of colour cameras as views of a scene, for tools that make masks of them.
+"""The pictures of colour cameras as views of a scene.
 
 In: the colour pictures of a recording. Out: views of one size, and what they see of a frame.
 """
@@ -12,20 +12,20 @@ from ...geometry.cameras import PinholeCamera
 from ...geometry.color_views import ColorFrames, ColorPicture, bent, sampled
 from ...geometry.strict import inverse, products
 
-_SIDE = 640  # pixels, most along the longer side of the picture of a colour camera (guess)
+SIDE = 640  # pixels, most along the longer side of a view, for tools that make masks (guess)
 
 
 class ColorLooks:
     """The pictures of a recording's colour cameras as views of one size, without the bends of their lenses."""
 
-    def __init__(self, colors: ColorFrames, frame: int) -> None:
+    def __init__(self, colors: ColorFrames, frame: int, side: int = SIDE) -> None:
         """Take the cameras that have a picture of `frame`; the views have the shape of the first one's."""
         self._colors = colors
         taken = {number: one.camera for number, one in enumerate(colors[frame]) if one is not None}
         self._numbers = list(taken)
-        sizes = [(camera.width, camera.height) for camera in taken.values()]
-        size = np.array(sizes[0] if sizes else (1, 1))
-        width, height = np.rint(size * min(1.0, _SIDE / size.max())).astype(int).tolist()
+        width, height = next(((camera.width, camera.height) for camera in taken.values()), (1, 1))
+        share = min(1.0, side / max(width, height))
+        width, height = round(share * width), round(share * height)
         self.views = tuple(
             PinholeCamera(
                 width,

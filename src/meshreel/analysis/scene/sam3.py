@@ -27,7 +27,7 @@ from .hypotheses import Hypotheses, HypothesisOptions, hypotheses, moving_in_vie
 from .masks import Masker
 from .motion import thinned
 from .pictures import normal_picture
-from .sam3_trackers import PointTracker, Tracker, WordTracker
+from .sam3_trackers import PointTracker, WordTracker
 
 AUTOMATIC = ("person", "animal", "vehicle", "object")  # default prompts, whatever may move: a guess
 PromptBy = Literal["words", "motion"]
@@ -53,7 +53,7 @@ class Sam3Masks(Masker):
 
     def __init__(self, path: Path, prompts: Sequence[str] | None = None, options: Sam3Options = Sam3Options()) -> None:
         """Load the weights in the folder `path`. Raises InputError if they or the extra `sam3` are missing."""
-        self._tracker: Tracker
+        self._tracker: WordTracker | PointTracker
         if options.prompt_by == "words":
             self._tracker = WordTracker(path, tuple(prompts or AUTOMATIC), options.device)
         else:

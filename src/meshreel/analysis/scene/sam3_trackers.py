@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float32, Int32, UInt8
@@ -26,18 +26,6 @@ _KIND = "moving"  # of the objects that are found by their motion
 Pictures = Sequence[UInt8[np.ndarray, "H W 3"]]
 
 
-class Tracker(Protocol):
-    """Tracker of objects through a video."""
-
-    def over_time(self, pictures: Pictures, depths: Sequence[Float32[np.ndarray, "h w"]]) -> Tracked:
-        """Track objects through the pictures of one view at consecutive moments; `depths` are thinned ones."""
-        ...
-
-    def through_views(self, pictures: Pictures, first: Int32[np.ndarray, "H W"]) -> Tracked:
-        """Track objects through the pictures of all views at one moment; `first` has those of the first picture."""
-        ...
-
-
 class WordTracker:
     """SAM3's video model: finds the prompted objects in every picture of a video and tracks them through it."""
 
@@ -46,7 +34,7 @@ class WordTracker:
         self._prompts = prompts
 
     def over_time(self, pictures: Pictures, depths: Sequence[Float32[np.ndarray, "h w"]]) -> Tracked:
-        """Track objects through the pictures of one view at consecutive moments."""
+        """Track objects through the pictures of one view at consecutive moments; `depths` are for `PointTracker`."""
         del depths
         return self._follow(pictures, self._model.network.config.hotstart_delay)
 

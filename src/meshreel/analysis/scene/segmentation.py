@@ -20,7 +20,8 @@ from ...geometry.derived_sequences import CapturedSequence, Chosen, TurnedOver, 
 from ...geometry.topology import edge_lengths, face_normals
 from ...geometry.voxels import Lattice
 from ...types import Mesh, MeshSequence, evenly
-from .color_looks import ColorLooks
+from . import color_change
+from .color_looks import SIDE, ColorLooks
 from .cut import CutOptions, moving_places
 from .labelling import ByMasks, ByPlace, looks
 from .masks import Masker
@@ -73,7 +74,10 @@ def _by_place(frames: CapturedSequence, chosen: Sequence[int], options: SegmentO
     places = find_places(Observations(some, views, pictures, report), lattice, options.places)
     moving = moving_places(places, options.cut)
     rest = find_rest(places, moving, chosen, frames.frame_rate, options.settle)
-    return ByPlace(cell, lattice, places.keys, moving, rest, options.island)
+    looks = _color_looks(frames, chosen, color_change.SIDE) if moving.any() else None
+    usual = [chosen[number] for number in evenly(len(chosen), color_change.MOMENTS)]
+    colors = None if looks is None else color_change.ColorChange.of(frames, looks, usual, cell)
+    return ByPlace(cell, lattice, places.keys, moving, rest, options.island, colors)
 
 
 def _faces_away(mesh: Mesh) -> bool:
@@ -87,7 +91,7 @@ def _faces_away(mesh: Mesh) -> bool:
 def segment_by(masker: Masker, frames: MeshSequence, options: SegmentOptions = SegmentOptions()) -> ByMasks:
     """Segment a scene by the masks of `masker`, which sees every frame before its first mask where it `observes`."""
     chosen = _to_see(frames)
-    colors = None if masker.views else _color_looks(frames, chosen, options)
+    colors = None if masker.views or options.cameras else _color_looks(frames, chosen)
     given = masker.views if colors is None else colors.views
     views = _looking(given, frames, chosen) or _views(frames, chosen, options)
     if masker.observes:
@@ -108,16 +112,16 @@ def mask_views(
 ) -> tuple[tuple[PinholeCamera, ...], ColorLooks | None]:
     """Return views for masks: given cameras, or colour cameras with their pictures, or placed views."""
     chosen = _to_see(frames)
-    colors = _color_looks(frames, chosen, options)
+    colors = None if options.cameras else _color_looks(frames, chosen)
     return _views(frames, chosen, options) if colors is None else colors.views, colors
 
 
-def _color_looks(frames: MeshSequence, chosen: Sequence[int], options: SegmentOptions) -> ColorLooks | None:
-    """Return the pictures of the colour cameras; None if there are none, or cameras are given."""
+def _color_looks(frames: MeshSequence, chosen: Sequence[int], side: int = SIDE) -> ColorLooks | None:
+    """Return the pictures of the colour cameras; None if there are none."""
     colors = captured(frames).colors
-    if options.cameras or colors is None or not chosen:
+    if colors is None or not chosen:
         return None
-    looks = ColorLooks(colors, chosen[0])
+    looks = ColorLooks(colors, chosen[0], side)
     return looks if looks.views else None
 
 
