@@ -21,7 +21,7 @@ from .hypotheses import APART
 
 SIDE = 160  # pixels along the longest side of a map of motion (guess)
 _FAR = 0.9  # quantile over time of a pixel's depth that is that of the background (guess)
-_LEAST = 1e-3  # share of a map's pixels below which a moving patch is noise (guess)
+_LEAST = 5e-3  # share of a map's pixels below which a moving patch is noise, or a piece of a body (guess)
 _INSIDE, _BESIDE = 3, 2  # points on an object and beside it, as many as in the paper's release
 _WIDER = 0.15  # of the size of an object's box: how far beside it points are; as in the paper's release
 
