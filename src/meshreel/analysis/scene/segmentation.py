@@ -21,6 +21,8 @@ from ...geometry.derived_sequences import CapturedSequence, Chosen, TurnedOver, 
 from ...geometry.topology import edge_lengths, face_normals
 from ...geometry.voxels import Lattice
 from ...types import Mesh, MeshSequence, evenly
+from . import color_change
+from .color_looks import SIDE, ColorLooks
 from .cut import CutOptions, moving_places
 from .labelling import ByMasks, ByPlace, looks
 from .masks import Masker
@@ -81,7 +83,10 @@ def _by_place(frames: CapturedSequence, chosen: Sequence[int], options: SegmentO
         return all(_apart(first, other, there) <= _STILL * noise for other in others)
 
     rest = find_rest(places, moving, chosen, frames.frame_rate, options.settle, holds)
-    return ByPlace(cell, lattice, places.keys, moving, rest, options.island)
+    looks = _color_looks(frames, chosen, color_change.SIDE) if moving.any() else None
+    usual = [chosen[number] for number in evenly(len(chosen), color_change.MOMENTS)]
+    colors = None if looks is None else color_change.ColorChange.of(frames, looks, usual, cell)
+    return ByPlace(cell, lattice, places.keys, moving, rest, options.island, colors)
 
 
 def _faces_away(mesh: Mesh) -> bool:
@@ -95,9 +100,12 @@ def _faces_away(mesh: Mesh) -> bool:
 def segment_by(masker: Masker, frames: MeshSequence, options: SegmentOptions = SegmentOptions()) -> ByMasks:
     """Segment a scene by the masks of `masker`, which sees every frame before its first mask where it `observes`."""
     chosen = _to_see(frames)
-    views = _looking(masker.views, frames, chosen) or _views(frames, chosen, options)
+    colors = None if masker.views or options.cameras else _color_looks(frames, chosen)
+    given = masker.views if colors is None else colors.views
+    views = _looking(given, frames, chosen) or _views(frames, chosen, options)
     if masker.observes:
-        masker.foresee([looks(frames[number], views) for number in chosen[:: max(1, len(chosen) // _PROBES)]])
+        some = chosen[:: max(1, len(chosen) // _PROBES)]
+        masker.foresee([looks(frames[number], views) for number in some], colors)
         for number in range(len(frames)):
             masker.observe(number, looks(frames[number], views), views)
     return ByMasks(masker, views, edge_length(frames, chosen), options.threshold, options.island)
@@ -106,6 +114,24 @@ def segment_by(masker: Masker, frames: MeshSequence, options: SegmentOptions = S
 def scene_views(frames: MeshSequence, options: SegmentOptions = SegmentOptions()) -> tuple[PinholeCamera, ...]:
     """Return the views of a scene: given cameras, or placed ones. Raises InputError if no frame has a surface."""
     return _views(frames, _to_see(frames), options)
+
+
+def mask_views(
+    frames: MeshSequence, options: SegmentOptions = SegmentOptions()
+) -> tuple[tuple[PinholeCamera, ...], ColorLooks | None]:
+    """Return views for masks: given cameras, or colour cameras with their pictures, or placed views."""
+    chosen = _to_see(frames)
+    colors = None if options.cameras else _color_looks(frames, chosen)
+    return _views(frames, chosen, options) if colors is None else colors.views, colors
+
+
+def _color_looks(frames: MeshSequence, chosen: Sequence[int], side: int = SIDE) -> ColorLooks | None:
+    """Return the pictures of the colour cameras; None if there are none."""
+    colors = captured(frames).colors
+    if colors is None or not chosen:
+        return None
+    looks = ColorLooks(colors, chosen[0], side)
+    return looks if looks.views else None
 
 
 def _to_see(frames: MeshSequence) -> list[int]:
