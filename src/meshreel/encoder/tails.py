@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import zip_longest
 
 import numpy as np
 from jaxtyping import Bool, Float64, Int32, Int64
@@ -21,6 +22,7 @@ from ..format.layout import LayersPatches
 from ..format.records import pack
 from ..geometry.closest_points import Surface
 from ..geometry.decimate import decimate
+from ..geometry.depth import FreeSpace
 from ..geometry.strict import dot
 from ..geometry.topology import clean, components, concatenate, connected_faces, drop_unreferenced, face_normals
 from ..types import Mesh
@@ -59,15 +61,17 @@ def find_tails(
     options: TailOptions = TailOptions(),
     *,
     noise: float,
+    free: Sequence[FreeSpace | None] = (),
 ) -> Tails | None:
     """Find the layer of patches that lowers squared error + price x bytes most; None where none does.
 
     The `decoded` meshes of a group have the same faces; `size` is that of their layers, bytes. `noise` is the RMS
-    distance of the frames from the truth: thresholds count from there where the rest is nearer. Neither the mean nor
-    the larger of both directions' errors rises by more than the layer's bytes are worth.
+    distance of the frames from the truth: thresholds count from there where the rest is nearer. `free` is what cameras
+    saw through in each frame: surface that a frame lacks stays unless one saw through it. Neither the mean nor the
+    larger of both directions' errors rises by more than the layer's bytes are worth.
     """
     surfaces = [frame if isinstance(frame, Surface) else Surface(frame) for frame in frames]
-    shown = [_Frame(surface, mesh) for surface, mesh in zip(surfaces, decoded, strict=True)]
+    shown = [_Frame(*each) for each in zip_longest(surfaces, decoded, free)]
     faces = decoded[0].faces
     usual = float(np.mean([frame.body() for frame in shown]))  # squared
     if not EXACT**2 < usual < np.inf:
@@ -220,8 +224,8 @@ def _within(far: Float64[np.ndarray, " 3"], rung: int, frames: int) -> bool:
 class _Frame:
     """A frame and its decoded mesh, sampled at vertices and centroids, with the distances between both."""
 
-    def __init__(self, surface: Surface, decoded: Mesh) -> None:
-        original = surface.mesh
+    def __init__(self, surface: Surface, decoded: Mesh, free: FreeSpace | None = None) -> None:
+        original, self._free = surface.mesh, free
         self.original, self.decoded, self.surface = original, decoded, surface
         self.points, areas = _samples(original)
         shares = np.bincount(original.faces.reshape(-1), np.repeat(areas / 12, 3), len(original.vertices))
@@ -289,7 +293,10 @@ class _Frame:
 
     def _apart(self, mesh: Mesh) -> tuple[Float64[np.ndarray, " F"], Float64[np.ndarray, " F"]]:
         points, areas = _samples(mesh)
-        return areas, _of_faces(_squared(self.surface, points)[0], mesh.faces)
+        squared = _squared(self.surface, points)[0]
+        if self._free is not None:
+            squared[~self._free.at(points)] = 0.0
+        return areas, _of_faces(squared, mesh.faces)
 
 
 def _samples(mesh: Mesh) -> tuple[Float64[np.ndarray, "N 3"], Float64[np.ndarray, " F"]]:
