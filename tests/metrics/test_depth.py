@@ -100,7 +100,17 @@ def test_pixels_beside_a_step_or_a_hole_do_not_count():
     depth[:, 40:] = 3.0
     depth[10, 10] = 0
     clear = clear_pixels(picture(depth))
-    assert not clear[9:12, 9:12].any() and not clear[8, 10] and not clear[:, 38:42].any() and clear[5, 5] and clear[40, 37]
+    assert (
+        not clear[9:12, 9:12].any() and not clear[8, 10] and not clear[:, 38:42].any() and clear[5, 5] and clear[40, 37]
+    )
+
+
+def test_what_comes_and_goes_where_nothing_is_behind_is_a_body():
+    """A box comes nearer from frame to frame, before what is too far to be measured."""
+    distances = (0, 0, 3.0, 2.6, 2.2, 1.8, 1.4, 0)
+    walls = [np.where(scene(BODY) == BOX, ahead, WALL * (ahead > 0)) for ahead in distances]
+    found = judged(walls, walls)
+    assert [row["body_covered"] for row in found["per_frame"]] == [None, None, 1, 1, 1, 1, 1, None]
 
 
 def test_nothing_measured_or_nothing_decoded_is_no_error():

@@ -25,9 +25,11 @@ BESIDE = 2  # pixels around a step or a hole that do not count
 NEAR = (0.03, 0.015)  # m, and share of the depth, within which surface covers a measurement
 RUN = 0.01  # m^2, of a connected area that is not covered, from which on it is a lost run
 USUAL = 0.95  # quantile over time of a pixel's depth: how far it is where nobody stands (guess)
+SELDOM = 0.2  # share of all frames in which a pixel is as far as usual, below which this is a body as well (guess)
 APART = (0.06, 0.02)  # m, and share of the depth, by which a body is nearer than usual (guess)
 SPECK = 12  # pixels: smaller areas that are nearer than usual are noise (guess)
 LOOKED_AT = 60  # frames from which the usual depth is taken, at most (guess)
+HALO = 8  # pixels around a body in which still surface is not asked to stay: a foot ends softly on the floor (guess)
 LIMB = 50  # pixels of a body's lower third from which on a frame shows it (guess)
 ENDS = (0.02, 0.98)  # quantiles of heights of measured points: where a body ends (guess)
 LOWEST = 0.1  # quantile over frames of a body's lower end: the floor that it stands on (guess)
@@ -188,11 +190,14 @@ def _changes(before: Mapping[int, Judged], now: Mapping[int, Judged], refreshed:
     pairs = [(before[camera], now[camera]) for camera in sorted(before.keys() & now.keys())]
     moved = [np.zeros(0)]
     for a, b in [] if refreshed else pairs:
-        both = a.of("still") & b.of("still") & a.covered & b.covered
-        moved.append((a.shown - b.shown)[both])
+        both = (
+            a.of("still") & b.of("still") & a.covered & b.covered & ~binary_dilation(a.body | b.body, iterations=HALO)
+        )
+        moved.append(a.shown[both] - b.shown[both])
     steps, angles = np.concatenate(moved), np.zeros(0)
     if pairs:
-        angles = turned(*(Patch.join(each.patch() for each in views) for views in zip(*pairs, strict=True)))
+        patches = (Patch.join(each.patch() for each in views) for views in zip(*pairs, strict=True))
+        angles = turned(*patches, pairs[0][1].view.mesh)
     sums = {"still_changes": len(steps), "still_flicker_m": float(steps @ steps)}
     return sums | {"body_changes": len(angles), "body_flicker_deg": float(angles @ angles)}
 
@@ -233,8 +238,19 @@ def _large(pixels: Bool[np.ndarray, "H W"], least: int) -> Bool[np.ndarray, "H W
 
 
 def _usual(stack: Float64[np.ndarray, "T H W"]) -> Float64[np.ndarray, "H W"]:
-    """Return how far each pixel is where nobody stands before it, m; 0 where nothing was measured."""
+    """Return how far each pixel is where nobody stands before it, m; 0 where nothing was measured.
+
+    Infinite where all that was measured moves: behind it is what is too far, or too dark.
+    """
     ordered = np.sort(np.where(stack > 0, stack, -1.0), axis=0)
     none = (stack <= 0).sum(axis=0)
-    at = none + np.floor(USUAL * (len(stack) - 1 - none)).astype(np.int64)
-    return np.maximum(np.take_along_axis(ordered, np.minimum(at, len(stack) - 1)[None], 0)[0], 0)
+    last = len(stack) - 1
+
+    def at(share: float) -> Float64[np.ndarray, "H W"]:
+        rank = none + np.floor(share * (last - none)).astype(np.int64)
+        return np.maximum(np.take_along_axis(ordered, np.clip(rank, 0, last)[None], 0)[0], 0)
+
+    usual, near = at(USUAL), at(1 - USUAL)
+    apart = np.maximum(APART[0], APART[1] * usual)
+    seldom = (np.abs(stack - usual) <= apart).mean(axis=0) < SELDOM
+    return np.where(seldom & (usual - near > apart), np.inf, usual)

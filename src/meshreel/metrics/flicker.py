@@ -15,7 +15,9 @@ from jaxtyping import Bool, Float64, Int64
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
-from .normals import angles
+from ..geometry.closest_points import Surface
+from ..types import Mesh
+from .normals import angles, interpolate, welded_normals
 
 SIZES = (4.8, 0.6, 0.3, 0.15)  # m, of the blocks, coarse to fine; the first is a whole body (guess)
 ROUNDS = 4  # of laying on, for each size (guess)
@@ -44,10 +46,11 @@ class Patch:
         return Patch(self.points[which], self.normals[which])
 
 
-def turned(before: Patch, after: Patch) -> Float64[np.ndarray, " M"]:
-    """Return the angles between the normals of points and of their matches in the next frame, degrees.
+def turned(before: Patch, after: Patch, surface: Mesh) -> Float64[np.ndarray, " M"]:
+    """Return the angles between the normals of points and those where motion brings them in the next frame, degrees.
 
-    Points without a match within `MATCHED` are left out.
+    `surface` is all that the next frame shows, `after` the points of it that are of the body: points that none of these
+    is within `MATCHED` of are left out.
     """
     if not (len(before.points) and len(after.points)):
         return np.zeros(0)
@@ -61,9 +64,9 @@ def turned(before: Patch, after: Patch) -> Float64[np.ndarray, " M"]:
             away, at = tree.query(moved.points, distance_upper_bound=min(REACH * size, FARTHEST))
             near = np.isfinite(away)
             moved = _laid(moved, after.at(np.where(near, at, 0)), near, blocks, size)
-    away, at = tree.query(moved.points, distance_upper_bound=MATCHED)
-    near = np.isfinite(away)
-    return angles(moved.normals[near], after.normals[at[near]])
+    moved = moved.at(tree.query(moved.points)[0] <= MATCHED)
+    hits = Surface(surface).closest(moved.points)
+    return angles(moved.normals, interpolate(welded_normals(surface), surface.faces[hits.faces], hits.barycentric))
 
 
 def _laid(
