@@ -196,8 +196,8 @@ def _changes(before: Mapping[int, Judged], now: Mapping[int, Judged], refreshed:
         moved.append(a.shown[both] - b.shown[both])
     steps, angles = np.concatenate(moved), np.zeros(0)
     if pairs:
-        patches = (Patch.join(each.patch() for each in views) for views in zip(*pairs, strict=True))
-        angles = turned(*patches, pairs[0][1].view.mesh)
+        first, other = (Patch.join(each.patch() for each in views) for views in zip(*pairs, strict=True))
+        angles = turned(first, other, pairs[0][1].view.mesh)
     sums = {"still_changes": len(steps), "still_flicker_m": float(steps @ steps)}
     return sums | {"body_changes": len(angles), "body_flicker_deg": float(angles @ angles)}
 
