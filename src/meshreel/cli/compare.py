@@ -51,6 +51,7 @@ def command(
 
     With --truth, the original and decoded meshes of a scene are also compared with the clean ones: the whole scene,
     people (faces whose nearest clean face moves) and background. The numbers of the originals are the noise floor.
+    Frames of a rig are also judged by its depth pictures: what of them is covered, invented and lost, and flickers.
 
     Parameters
     ----------
@@ -160,7 +161,7 @@ def both_table(title: str, row: dict[str, Any]) -> Table:
     beside, decoded = (row[name] for name in row if name not in ("frames", "per_frame"))
     table = Table(f"{title}, {len(row['frames'])} frames", "originals (noise floor)", "decoded")
     for name in decoded:
-        if name not in ("frames", "per_frame"):
+        if name not in ("frames", "per_frame") and (beside[name], decoded[name]) != (None, None):
             table.add_row(name, _number(beside[name]), _number(decoded[name]))
     return table
 
