@@ -12,9 +12,6 @@ from typing import Any
 
 import numpy as np
 
-from meshreel.container.reader import ReelReader
-from meshreel.container.sources import BytesSource
-from meshreel.decoder.video import Video
 from meshreel.decoder.video import open as open_video
 from meshreel.errors import InputError
 from meshreel.format.layout import MAGIC, ChunkKind
@@ -23,7 +20,7 @@ from meshreel.metrics.comparison import ComparisonOptions, compare_sequences, fi
 from meshreel.metrics.depth import DepthJudge, judge
 from meshreel.metrics.scene_accuracy import Scene, people_flicker, scene_means, scene_row
 from meshreel.metrics.viewpoints import Box, Camera
-from meshreel.types import UP_AXES, Mesh
+from meshreel.types import UP_AXES, Frames, Mesh
 
 from ..datasets import Dataset
 from ..datasets.scenes import SceneData
@@ -99,11 +96,12 @@ def _colors(frames: Measured) -> dict[str, float]:
 
 def _depth(frames: Measured) -> Values:
     """Return what the depth pictures of a recording say of all its frames, and of bodies in the input beside it."""
-    source, reader = captured(frames.known.sequence), ReelReader(BytesSource(frames.data))
+    source = captured(frames.known.sequence)
     if source.depth is None:
-        raise InputError("depth pictures are those of recordings")
+        raise InputError("only recordings have depth pictures; measure others without them")
     judged = DepthJudge(source.depth, len(source), UP_AXES[source.up])
-    refreshes = {chunk.first_frame for chunk in reader.chunks if chunk.kind == ChunkKind.STATIC}
+    chunks = open_video(frames.data).reader.chunks if frames.data.startswith(MAGIC) else ()
+    refreshes = {chunk.first_frame for chunk in chunks if chunk.kind == ChunkKind.STATIC}
     values: Values = judge(judged, frames.decoded, frames.numbers, refreshes)
     flicker = judge(judged, source, frames.numbers)["body_flicker_deg"]
     return {name: value for name, value in values.items() if name != "per_frame"} | {"input_body_flicker_deg": flicker}
@@ -145,7 +143,7 @@ def _of_file(scene: SceneData, frames: Measured) -> Values:
     return values | ({} if scene.parts is None else part_values(scene.true, scene.parts, video))
 
 
-def _flicker(scene: SceneData, numbers: Sequence[int], video: Video) -> Values:
+def _flicker(scene: SceneData, numbers: Sequence[int], video: Frames) -> Values:
     """Return how much people's normals change between frames beyond the truth, degrees, and over the input's."""
     found = dict[str, list[float]](truth=[], input=[])
     for number in numbers[:-1]:
