@@ -17,7 +17,7 @@ from .drawing import Sheet
 FRAMES, ROWS = 8, ("fused", "decoded")
 
 
-def main(rig: Path, file: Path, picture: Path, first: str = "0") -> None:
+def main(rig: Path, file: Path, picture: Path, first: int = 0) -> None:
     """Draw a row of each."""
     recording, _ = open_recording(rig)
     camera = recording.rig.cameras[0].view
@@ -26,10 +26,10 @@ def main(rig: Path, file: Path, picture: Path, first: str = "0") -> None:
         for row, frames in zip(ROWS, (recording, video), strict=True):
             sheet = Sheet(FRAMES, camera.width)
             for panel in range(FRAMES):
-                frame = int(first) + panel
+                frame = first + panel
                 sheet.image(panel, f"{row}, frame {frame}", look(frames[frame], camera, crop).colors)
             sheet.write(picture.with_stem(f"{picture.stem}-{row}"))
 
 
 if __name__ == "__main__":
-    main(*map(Path, sys.argv[1:4]), *sys.argv[4:])
+    main(Path(sys.argv[1]), Path(sys.argv[2]), Path(sys.argv[3]), int(sys.argv[4]) if sys.argv[4:] else 0)
