@@ -21,7 +21,7 @@ from tests.run_page import blocks
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md")])
 RUN = [ROOT / "README.md", ROOT / "docs" / "tutorial.md"]
-INTERCHANGE, COMMANDS = (ROOT / "docs" / name for name in ("interchange.md", "cli.md"))
+INTERCHANGE, COMMANDS, CALIBRATION = (ROOT / "docs" / name for name in ("interchange.md", "cli.md", "calibration.md"))
 
 
 def test_the_python_of_the_readme_runs(tmp_path: Path) -> None:
@@ -42,7 +42,7 @@ def test_the_python_of_interchange_runs(tmp_path: Path) -> None:
     assert (tmp_path / "scan.glb").exists()
 
 
-@pytest.mark.parametrize("page", [*RUN, INTERCHANGE, COMMANDS], ids=lambda page: page.name)
+@pytest.mark.parametrize("page", [*RUN, INTERCHANGE, COMMANDS, CALIBRATION], ids=lambda page: page.name)
 def test_the_commands_of_the_docs_parse(page: Path) -> None:
     from meshreel.cli import make_app
 

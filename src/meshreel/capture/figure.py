@@ -78,6 +78,8 @@ def _leaned(chain: Chain, lift: Vector, lean: float) -> Chain:
 
 def _lean(points: np.ndarray, lift: Vector, lean: float) -> np.ndarray:
     """Turn points of the trunk about the hips."""
+    if lean == 0:  # the same bytes as ever
+        return points
     (c, s), hips = (np.cos(lean), np.sin(lean)), np.array([0.0, 0.95, 0.0]) + lift
     return (points - hips) @ np.array([[1.0, 0.0, 0.0], [0.0, c, s], [0.0, -s, c]]) + hips
 

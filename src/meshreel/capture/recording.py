@@ -160,7 +160,7 @@ def open_recording(
     rig = read_rig(folder)
     warnings = [*rig.remarks, *rig.missing()]
     for number, camera in enumerate(rig.cameras):
-        seen = _looked_at(rig, number)
+        seen = looked_at(rig, number)
         blind = sum(not depth.any() for depth in seen)
         if blind:
             warnings.append(f"camera {camera.name} measures nothing in {blind} of {len(seen)} frames looked at")
@@ -189,7 +189,7 @@ def moved_share(depths: list[Float64[np.ndarray, "H W"]]) -> float:
     return float(np.median((apart & valid).sum(axis=1) / np.maximum(valid.sum(axis=1), 1)))
 
 
-def _looked_at(rig: Rig, number: int) -> list[Float64[np.ndarray, "H W"]]:
+def looked_at(rig: Rig, number: int) -> list[Float64[np.ndarray, "H W"]]:
     """Return depths of a camera, m, from frames spread evenly over its recording; 0 is no measurement."""
     frames = sorted(rig.files[number])
     chosen = sorted({frames[int(k)] for k in np.linspace(0, len(frames) - 1, LOOKED_AT)})

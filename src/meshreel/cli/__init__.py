@@ -1,4 +1,4 @@
-"""The command line `meshreel capture|segment|survey|encode|concat|decode|export|info|compare|play|serve|bench|demo`.
+"""The command line `meshreel COMMAND`, with the commands of `COMMANDS`, and those that other distributions add.
 
 Errors take one line on standard error and exit code 2; `--debug` shows the traceback. The module of a command is
 imported when the command is called, so that `decode` and `info` work without the extra `encode`. This module imports
@@ -31,6 +31,7 @@ _STOPPED = {False: "interrupted", True: "terminated"}  # by whether it was SIGTE
 
 COMMANDS = {
     "capture": "Fuse recordings of depth cameras into one mesh per frame.",
+    "calibrate": "Find the poses of a rig's cameras, from other programs, a board, and their depth.",
     "segment": "Label which faces of a scene move, and with which body.",
     "survey": "Survey a sequence once, for encodes of its parts on many machines.",
     "encode": "Encode a sequence of meshes into one .reel file.",

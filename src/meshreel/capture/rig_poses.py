@@ -1,0 +1,74 @@
+"""Other poses for the cameras of a rig, and its description with them.
+
+A colour camera beside a depth camera goes with it: how they stand to each other is known better than where they are.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from ..errors import InputError
+from ..geometry import strict
+from ..io.read import read_file
+from .poses import Pose, pose_for
+from .rig import RIG, Rig
+
+
+def with_poses(rig: Rig, depth: Mapping[str, Pose], color: Mapping[str, Pose]) -> Rig:
+    """Return a rig with other poses, by the names of depth cameras and of colour cameras; others stay."""
+    beside, cameras, colors = _beside(_record(rig.folder)), list(rig.cameras), list(rig.color_cameras)
+    for number, camera in enumerate(cameras):
+        eye = colors[beside.index(number)] if number in beside else None
+        pose = depth.get(camera.name, camera.camera_to_world)
+        if eye is not None and eye.name in color:
+            pose = strict.products(color[eye.name], strict.products(strict.inverse(eye.camera_to_world), pose))
+        cameras[number] = replace(camera, camera_to_world=pose)
+        if eye is not None:
+            motion = strict.products(pose, strict.inverse(camera.camera_to_world))
+            moved = replace(eye, camera_to_world=strict.products(motion, eye.camera_to_world))
+            colors[beside.index(number)] = moved
+    for number, eye in list(enumerate(colors))[len(beside) :]:
+        colors[number] = replace(eye, camera_to_world=color.get(eye.name, eye.camera_to_world))
+    return replace(rig, cameras=tuple(cameras), color_cameras=tuple(colors))
+
+
+def posed_by(rig: Rig, poses: Mapping[str, Pose], kind: str, where: Path) -> tuple[Rig, list[str]]:
+    """Return a rig with the poses of a file, which are those of its depth or its colour cameras (`kind`).
+
+    Also return a warning that names cameras without one. Raises InputError where it has none of any camera.
+    """
+    names = [camera.name for camera in (rig.cameras if kind == "depth" else rig.color_cameras)]
+    found = {name: pose for name in names if (pose := pose_for(name, poses, kind)) is not None}
+    if not found:
+        text = f"has poses of {', '.join(list(poses)[:8])} and of none of the {kind} cameras {', '.join(names)}"
+        raise InputError(f"{where}: {text}; name them alike in {RIG}")
+    lost = [name for name in names if name not in found]
+    warnings = [f"{where}: has no pose of {', '.join(lost)}, which stay where they were"] if lost else []
+    return with_poses(rig, *((found, {}) if kind == "depth" else ({}, found))), warnings
+
+
+def described(rig: Rig) -> bytes:
+    """Return the rig's description, `rig.json`, with its poses; all else is as in the file."""
+    record = _record(rig.folder)
+    beside, alone = _beside(record), record.get("color_cameras", [])
+    for entry, camera in zip(record["cameras"], rig.cameras, strict=True):
+        entry["camera_to_world"] = camera.camera_to_world.tolist()
+    for entry, eye in zip([*(record["cameras"][k]["color"] for k in beside), *alone], rig.color_cameras, strict=True):
+        if isinstance(entry, dict) and "camera_to_world" in entry:
+            entry["camera_to_world"] = eye.camera_to_world.tolist()
+    return (json.dumps(record, indent=1) + "\n").encode()
+
+
+def _record(folder: Path) -> dict[str, Any]:
+    """Return the rig's description, which was read before without an error."""
+    record: dict[str, Any] = json.loads(read_file(folder / RIG).decode("utf-8-sig"))
+    return record
+
+
+def _beside(record: dict[str, Any]) -> list[int]:
+    """Return the numbers of the depth cameras that have a colour camera, in the order of the rig's colour cameras."""
+    return [number for number, entry in enumerate(record["cameras"]) if "color" in entry]

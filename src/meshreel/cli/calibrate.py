@@ -1,0 +1,137 @@
+"""`meshreel calibrate`: the poses of a rig's cameras, from other programs, a board, and what the cameras see."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+from cyclopts import Parameter
+from rich.table import Table
+
+from ..capture.board import BoardOptions, poses_by_board
+from ..capture.calibrate import Calibration, refine
+from ..capture.calibration_sheet import write_calibration_sheet
+from ..capture.poses import read_poses
+from ..capture.recording import open_recording
+from ..capture.rig import RIG, Rig
+from ..capture.rig_poses import described, posed_by, with_poses
+from ..errors import InputError
+from ..io.write import check_apart, replacing
+from .console import Common
+
+_BOARD = BoardOptions()
+BEFORE = "rig.before.json"  # what --in-place replaced
+
+
+def command(
+    rig: Path,
+    /,
+    *,
+    output: Annotated[Path | None, Parameter(name=["--output", "-o"])] = None,
+    in_place: Annotated[bool, Parameter(negative="")] = False,
+    poses: Path | None = None,
+    poses_of: Literal["depth", "color"] = "depth",
+    scale: float = 1.0,
+    board: Literal["charuco", "apriltag"] | None = None,
+    columns: int = _BOARD.columns,
+    rows: int = _BOARD.rows,
+    square: float = _BOARD.square,
+    marker: float = _BOARD.marker,
+    dictionary: str = _BOARD.dictionary,
+    refine: bool = True,
+    common: Common = Common(),
+) -> None:
+    """Find the poses of a rig's cameras: coarse from a file or a board, fine from the depth of what stands still.
+
+    Without --poses and --board it begins with the poses in rig.json, right to some degrees and centimetres. Beside its
+    output it draws a picture.
+
+    Parameters
+    ----------
+    rig
+        A folder with rig.json and recorded depth, as `capture` takes it; a still room with furniture is best.
+    output
+        The .json file to write: rig.json with new poses. The picture beside it is a .png of that name.
+    in_place
+        Replace the rig's rig.json; the one before is kept as rig.before.json.
+    poses
+        File to begin with: COLMAP's images.txt or images.bin, OpenCV's .yml, caliscope's .toml, ROS tf_static as .yaml
+        or .json, or a rig.json. Cameras are found by their names.
+    poses_of
+        Which cameras the file has: the depth cameras, or the colour cameras beside them.
+    scale
+        Factor from the unit of that file to metres; COLMAP's unit is unknown.
+    board
+        Kind of a board that was moved through the colour pictures (extra `calibrate`).
+    columns
+        Squares (of a ChArUco board) or tags in a row of the board.
+    rows
+        Rows of the board.
+    square
+        Side of a square, or from one tag to the next, m.
+    marker
+        Side of a marker or tag, m.
+    dictionary
+        OpenCV's name of the markers; 5X5_100, and APRILTAG_36h11 for tags, where none is given.
+    refine
+        Refine the poses on depth.
+    """
+    path = _output(rig, output, in_place)
+    if not (math.isfinite(scale) and scale > 0):
+        raise InputError(f"--scale {scale:g}: give a factor above 0")
+    recording, warnings = open_recording(rig, keep=False)
+    found, calibration = recording.rig, None
+    if poses is not None:
+        unit = np.array([[1, 1, 1, scale]] * 3 + [[1, 1, 1, 1]])
+        given = {name: pose * unit for name, pose in read_poses(poses).items()}
+        found, told = posed_by(found, given, poses_of, poses)
+        warnings += told
+    if board is not None:
+        options = BoardOptions(board, columns, rows, square, marker, dictionary)
+        seen, told = poses_by_board(found.color_cameras, options)
+        found, warnings = with_poses(found, {}, seen), warnings + told
+    if refine:
+        found, calibration = _refined(found)
+        warnings += calibration.warnings
+        write_calibration_sheet(
+            calibration, found.up, path.with_name("calibration.png") if in_place else path.with_suffix(".png")
+        )
+    new = described(found)
+    if in_place:
+        with replacing(rig / BEFORE) as file:
+            file.write((rig / RIG).read_bytes())
+    with replacing(path) as file:
+        file.write(new)
+    common.warn(warnings)
+    _tell(path, calibration, warnings, common)
+
+
+def _output(rig: Path, output: Path | None, in_place: bool) -> Path:
+    """Return the file to write. Raises InputError unless exactly one is named that may be written."""
+    if (output is None) != in_place:
+        raise InputError("give either --output FILE.json, or --in-place to replace the rig's own rig.json")
+    path = rig / RIG if output is None else output
+    if path.suffix != ".json":
+        raise InputError(f"{path}: the output must end in .json")
+    if not in_place:
+        check_apart(path, [rig / RIG])
+    return path
+
+
+def _refined(rig: Rig) -> tuple[Rig, Calibration]:
+    calibration = refine(rig)
+    return with_poses(rig, {camera.name: camera.camera_to_world for camera in calibration.cameras}, {}), calibration
+
+
+def _tell(path: Path, calibration: Calibration | None, warnings: list[str], common: Common) -> None:
+    """Print the distance of each pair of cameras, mm."""
+    table, pairs = Table("cameras", "overlap", "before, mm", "after, mm"), []
+    for pair in calibration.pairs if calibration else ():
+        before, after = (None if math.isnan(d) else 1000 * d for d in (pair.before, pair.after))
+        pairs.append({"cameras": pair.cameras, "overlap": pair.overlap, "before_mm": before, "after_mm": after})
+        shown = "-" if before is None else f"{before:.1f}"
+        table.add_row(" - ".join(pair.cameras), f"{100 * pair.overlap:.0f} %", shown, f"{1000 * pair.after:.1f}")
+    row = {"output": str(path), "pairs": pairs, "warnings": warnings}
+    common.result(row, *([table] if pairs else []), f"{path}: poses of {'refined' if calibration else 'given'} cameras")
