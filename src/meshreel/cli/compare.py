@@ -20,7 +20,7 @@ from ..errors import FormatError, InputError
 from ..format.layout import MAGIC, ChunkKind
 from ..geometry.cameras import PinholeCamera
 from ..geometry.topology import weld
-from ..io.sequence import FileSequence, SequenceOptions, open_sequence
+from ..io.sequence import SequenceOptions, open_sequence
 from ..metrics.comparison import ComparisonOptions, compare_sequences
 from ..metrics.depth import DepthJudge, judge
 from ..metrics.error_sheet import SheetOptions, write_sheet
@@ -69,42 +69,58 @@ def command(
     if sheet is not None and not sheet.parent.is_dir():
         raise InputError(f"{sheet}: there is no folder {sheet.parent}; make it or choose another")
     source = open_source([originals], reading)
-    sequence = source.sequence
-    other = open_decoded(decoded, reading)
+    sequence, other = source.sequence, open_decoded(decoded, reading)
     if len(sequence) != len(other):
         raise InputError(f"{originals} has {len(sequence)} frames and {decoded} {len(other)}; choose with --frames A:B")
     shown = SheetOptions(sheet_frames, cameras=_sheet_cameras(looking, sequence), up=looking.up)
     truth = None if knowing.truth is None else open_truth(knowing.truth, reading, len(sequence))
     try:
         with common.stages(len(sequence)) as progress:
-            row = compare_sequences(sequence, counted(other, progress), _options(looking, other)).to_row()
+            row = _measured(sequence, other, _options(looking, other), progress)
             if truth is not None:
-                numbers = range(0, len(sequence), knowing.truth_every)
-                row["truth"] = against_truth(sequence, other, truth, numbers, progress)
-            if isinstance(sequence, Recording):
-                row["depth"] = by_depth(sequence, other, progress)
+                row["truth"] = against_truth(
+                    sequence, other, truth, range(0, len(sequence), knowing.truth_every), progress
+                )
         if sheet is not None:
             write_sheet(sequence, other, sheet, shown)
     except FormatError as error:  # names the chunk, but not the file
         raise FormatError(f"{decoded}: {error}; copy the file again, or compare frames before it") from None
-    if isinstance(other, Video):
-        described = describe_file(Path(decoded))
-        row = {name: described[name] for name in ("bytes", "mbps", "bytes_by_content", "mbps_by_content")} | row
     warnings = [*source.warnings, *(f"{decoded}: {w}" for w in getattr(other, "warnings", ()))]
-    common.warn(warnings)
+    _tell({"warnings": warnings} | _rate(decoded, other) | row, sheet, common)
+
+
+def _tell(row: dict[str, Any], sheet: Path | None, common: Common) -> None:
+    """Print warnings and tables, or JSON."""
+    common.warn(row["warnings"])
     texts: list[object] = [both_table(title, row[name]) for name, title in BESIDE.items() if name in row]
     texts += [f"picture: {sheet}"] if sheet is not None else []
-    common.result({"warnings": warnings} | row, metric_table(row), *_cameras(row), *texts)
+    common.result(row, metric_table(row), *_cameras(row), *texts)
 
 
-def open_decoded(decoded: str, reading: Reading) -> Video | FileSequence:
+def _measured(
+    sequence: MeshSequence, other: MeshSequence, options: ComparisonOptions, progress: StageBars
+) -> dict[str, Any]:
+    """Compare the meshes of all frames, and judge those of a rig by its depth pictures."""
+    row = compare_sequences(sequence, counted(other, progress), options).to_row()
+    return row | {"depth": by_depth(sequence, other, progress)} if isinstance(sequence, Recording) else row
+
+
+def _rate(decoded: str, other: MeshSequence) -> dict[str, Any]:
+    """Return the size of a .reel file and its rate; nothing of meshes."""
+    if not isinstance(other, Video):
+        return {}
+    described = describe_file(Path(decoded))
+    return {name: described[name] for name in ("bytes", "mbps", "bytes_by_content", "mbps_by_content")}
+
+
+def open_decoded(decoded: str, reading: Reading) -> MeshSequence:
     """Open a .reel file, or decoded meshes."""
     if is_reel(decoded):
         return open_video(decoded)
     return open_sequence(decoded, SequenceOptions(reading.fps, weld=weld))
 
 
-def _options(looking: Looking, decoded: Video | FileSequence) -> ComparisonOptions:
+def _options(looking: Looking, decoded: MeshSequence) -> ComparisonOptions:
     """Return the options that were asked for; key frames are those that a file names where none are given."""
     options = looking.options()
     if isinstance(decoded, Video) and not options.keys:
@@ -144,7 +160,7 @@ def against_truth(
     return compare_with_truth(sequence, other, clean, numbers, lambda done: progress("truth", done, len(numbers)))
 
 
-def by_depth(sequence: Recording, decoded: Video | FileSequence, progress: StageBars) -> dict[str, Any]:
+def by_depth(sequence: Recording, decoded: MeshSequence, progress: StageBars) -> dict[str, Any]:
     """Judge decoded frames by the depth pictures of a recording, and beside them its own frames."""
     judged = DepthJudge(sequence.depth, len(sequence), UP_AXES[sequence.up])
     chunks = decoded.reader.chunks if isinstance(decoded, Video) else ()
