@@ -22,7 +22,7 @@ from ..analysis.scene.segmentation import segment, segment_by
 from ..analysis.survey import Survey, check_one_unit
 from ..errors import InputError
 from ..geometry.closest_points import Surface
-from ..geometry.depth import DepthPicture
+from ..geometry.depth import DepthPicture, FreeSpace
 from ..geometry.derived_sequences import CapturedSequence, ChosenParts
 from ..geometry.topology import components, concatenate, face_normals, part_of
 from ..types import Mesh, MeshSequence, evenly
@@ -30,8 +30,9 @@ from .options import SceneOptions
 from .progress import Stages
 
 MOST_NOISE = 0.05  # RMS, of the diagonal of a body: beyond, nothing is left of a hand (guess)
-PROBES = 8  # frames, at most, in which moving surface is measured (guess)
+PROBES = 12  # frames, at most, in which moving surface is measured (guess)
 LOST = 0.5  # share of a frame's faces that may stand still where no background was found (guess)
+SEEN_THROUGH = 2  # of the probed frames, in which a place must be free that something stands at for a while (guess)
 APART, LEAST_APART = 4.0, 0.03  # deviations, and m: what is farther from the room is not of it (guess)
 OUTLIER = 3.0  # times the segmentation's `noise`: still surface farther from the background is no noise (guess)
 AS_FAR, FEWEST = 0.25, 1000  # share of the range, and vertices at least, from which the noise of bodies is told (guess)
@@ -57,6 +58,7 @@ class Parts:
     noise: float  # m, RMS distance of a frame's still surface from the background, tails and all: what bodies have
     deviation: float  # m, the same by the median, as a standard deviation: without its tails
     astray: float = 0.0  # share of the frames' surface that stands still, but is not in the background
+    free: tuple[FreeSpace, ...] = ()  # of some frames; none where no depth is known
     _rooms: dict[int, Surface | None] = field(default_factory=dict, repr=False)
 
     @property
@@ -73,8 +75,19 @@ class Parts:
         """Cut the surface that moves out of a frame, with what the room does not have there."""
         by, moves = self.segmentation, self.segmentation.moving(frame, mesh)
         if (room := self._room(sum(change.frame <= frame for change in self.changes))) is not None:
-            moves = beyond(mesh, moves, room, max(APART * self.deviation, LEAST_APART))
+            more = beyond(mesh, moves, room, max(APART * self.deviation, LEAST_APART))
+            moves |= more & self._is_left(mesh, more & ~moves)
         return with_ring(mesh, moves, by.cell, self.surface)
+
+    def _is_left(self, mesh: Mesh, chosen: Bool[np.ndarray, " F"]) -> Bool[np.ndarray, " F"]:
+        """Return which of some faces were seen through in other frames: room that is measured now and then was not."""
+        if not self.free:
+            return chosen
+        middles = mesh.vertices[mesh.faces[chosen]].mean(axis=1)
+        seen = sum(free.at(middles).astype(np.int64) for free in self.free)
+        found = chosen.copy()
+        found[chosen] = seen >= min(SEEN_THROUGH, len(self.free))
+        return found
 
     def _room(self, changes: int) -> Surface | None:
         """Return the room after some changes, prepared for queries: all that stood there since the first frame."""
@@ -109,7 +122,9 @@ def take_apart(
     found = _measured(sequence, segmentation, background, changes)
     unit = float(np.median(found.sizes)) if found.sizes else 0.0
     seen = replace(seen, scale=unit or seen.diagonal)
-    return Parts(seen, segmentation, background, changes, found.noise, found.deviation, found.astray)
+    depth, some = sequence.depth, evenly(len(sequence), PROBES)
+    free = () if depth is None else tuple(FreeSpace.of(depth[number]) for number in some)
+    return Parts(seen, segmentation, background, changes, found.noise, found.deviation, found.astray, free)
 
 
 def _check_nothing_lost(sequence: MeshSequence, segmentation: Segmentation, options: BackgroundOptions) -> None:

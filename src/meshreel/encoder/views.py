@@ -59,7 +59,7 @@ class Sight:
 
     def at(self, number: int) -> FreeSpace:
         """Return what the cameras saw through in a frame."""
-        return FreeSpace(tuple(picture for picture in self.depth[number] if picture is not None), self.place)
+        return FreeSpace.of(self.depth[number], self.place)
 
 
 class Calibrated(DerivedSequence):

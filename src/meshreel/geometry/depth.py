@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol, runtime_checkable
 
@@ -54,19 +55,25 @@ class DepthPicture:
 class FreeSpace:
     """What the depth cameras saw through at one moment, asked in any coordinates."""
 
-    pictures: tuple[DepthPicture, ...]
+    pictures: tuple[DepthPicture, ...]  # each depth the least of nine pixels, 0 where one of them has none
     place: Placement = Placement(1.0, (0.0, 0.0, 0.0))  # of the coordinates, in the world
+
+    @staticmethod
+    def of(pictures: Sequence[DepthPicture | None], place: Placement | None = None) -> FreeSpace:
+        """Return what cameras saw through, in coordinates at a place in the world, or in those of the world."""
+        some = (replace(one, depth=minimum_filter(one.depth, 3)) for one in pictures if one is not None)
+        return FreeSpace(tuple(some)) if place is None else FreeSpace(tuple(some), place)
 
     def at(self, points: Float64[np.ndarray, "N 3"]) -> Bool[np.ndarray, " N"]:
         """Return the points that some camera saw past: in all nine pixels around, it measured something farther off."""
         world, found = np.asarray(self.place.origin) + self.place.scale * points, np.zeros(len(points), bool)
         for picture in self.pictures:
-            camera, least = picture.camera, minimum_filter(picture.depth, 3) * picture.unit
+            camera = picture.camera
             local = products(world, camera.extrinsic[:3, :3].T) + camera.extrinsic[:3, 3]
             with np.errstate(invalid="ignore"):
                 columns, rows = np.floor(camera.project(local)).T
             inside = np.flatnonzero((columns >= 0) & (columns < camera.width) & (rows >= 0) & (rows < camera.height))
-            depth = least[rows[inside].astype(np.int64), columns[inside].astype(np.int64)]
+            depth = picture.depth[rows[inside].astype(np.int64), columns[inside].astype(np.int64)] * picture.unit
             ahead = local[inside, 2]
             found[inside[depth > ahead + np.maximum(THROUGH[0], THROUGH[1] * ahead)]] = True
         return found
