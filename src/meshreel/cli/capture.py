@@ -19,6 +19,7 @@ from ..capture.recordings.to_rig import write_takes
 from ..capture.rig import read_rig
 from ..errors import InputError
 from ..io.differences import first_difference
+from ..io.read import read_json
 from ..io.sequence import CAPTURED
 from ..io.write import frame_names, make_folder, replacing, write_mesh
 from .console import Common
@@ -181,10 +182,7 @@ def _started(output: Path, made: dict[str, Any], names: list[str]) -> set[str]:
     make_folder(output)
     there = {name for name in names if (output / name).exists()}
     if path.exists():
-        try:
-            before = json.loads(path.read_text())
-        except (OSError, ValueError) as error:
-            raise InputError(f"{path}: cannot be read ({error}); delete the folder, or choose another") from None
+        before = read_json(path, "delete the folder, or choose another")
         if before != (now := json.loads(json.dumps(made))):
             text = f"{output}: holds frames of another rig or of other options"
             raise InputError(f"{text} ({first_difference(before, now)}); choose another folder")

@@ -16,6 +16,7 @@ from jaxtyping import Float64
 
 from ..errors import InputError
 from ..geometry.cameras import PinholeCamera, unpack_cameras
+from ..io.read import read_input
 from ..types import UP_AXES, Mesh, check_up
 
 MARGIN = 1.05  # times the box, so that nothing touches the border (guess)
@@ -117,11 +118,7 @@ def views_around(box: Box, options: ViewOptions = ViewOptions()) -> list[Pinhole
 
 def read_cameras(path: Path) -> list[PinholeCamera]:
     """Read the cameras of an Open3D PinholeCameraParameters or PinholeCameraTrajectory JSON file."""
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise InputError(f"{path}: cannot read cameras ({error}); give Open3D pinhole camera JSON") from error
-    return unpack_cameras(data, str(path))
+    return unpack_cameras(read_input(path, "give Open3D pinhole camera JSON"), str(path))
 
 
 def extent(box: Box, up: str) -> tuple[float, float]:

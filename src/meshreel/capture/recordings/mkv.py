@@ -8,6 +8,7 @@ sensor's picture, of which a mode takes a part.
 from __future__ import annotations
 
 import json
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -45,8 +46,8 @@ def read(path: Path) -> Take:
             count = track.frames or round(seconds * float(track.average_rate or 0))
             size, told = (track.width, track.height), cameras.get(title)
             lens = None if told is None else _lens(told, title == "DEPTH", *size)
-            one = _Track(path, video.streams.video.index(track), start, size, title == "DEPTH")
-            streams[title] = Stream(*size, count, seconds * (count - 1) / max(count, 1), lens, one.pictures)
+            pictures = partial(_pictures, path, video.streams.video.index(track), start, title == "DEPTH")
+            streams[title] = Stream(*size, count, seconds * (count - 1) / max(count, 1), lens, pictures)
         others = tuple(title for title in tracks if title not in streams)
     apart = _apart(cameras["COLOR"]) if "COLOR" in cameras else None
     sensor = Sensor("kinect", streams["DEPTH"], 0.001, streams.get("COLOR"), apart)
@@ -89,27 +90,21 @@ def _apart(color: dict[str, Any]) -> Float64[np.ndarray, "4 4"]:
     return np.linalg.inv(back)
 
 
-class _Track:
-    """A track of a file, which is read from its beginning each time."""
+def _pictures(path: Path, index: int, start: float, deep: bool) -> Pictures:
+    """Yield depth as it is stored, JPEG as it is stored, and other colour as it is decoded."""
+    import av
 
-    def __init__(self, path: Path, index: int, start: float, size: tuple[int, int], deep: bool) -> None:
-        self._path, self._index, self._start, self._size, self._deep = path, index, start, size, deep
-
-    def pictures(self) -> Pictures:
-        """Yield depth as it is stored, JPEG as it is stored, and other colour as it is decoded."""
-        import av
-
-        with av.open(self._path) as video:
-            track = video.streams.video[self._index]
-            for packet in video.demux(track):
-                if packet.size == 0 or packet.pts is None:
-                    continue
-                time = self._start + float(packet.pts * (packet.time_base or 0))
-                if self._deep:
-                    width, height = self._size
-                    yield time, np.frombuffer(bytes(packet), ">u2", width * height).reshape(height, width).astype("u2")
-                elif track.codec_context.name == "mjpeg":
-                    yield time, bytes(packet)
-                else:
-                    for frame in track.codec_context.decode(packet):
-                        yield time, frame.to_ndarray(format="rgb24")
+    with av.open(path) as video:
+        track = video.streams.video[index]
+        shape = track.height, track.width
+        for packet in video.demux(track):
+            if packet.size == 0 or packet.pts is None:
+                continue
+            time = start + float(packet.pts * (packet.time_base or 0))
+            if deep:
+                yield time, np.frombuffer(bytes(packet), ">u2", shape[0] * shape[1]).reshape(shape).astype("u2")
+            elif track.codec_context.name == "mjpeg":
+                yield time, bytes(packet)
+            else:
+                for frame in track.codec_context.decode(packet):
+                    yield time, frame.to_ndarray(format="rgb24")
