@@ -114,7 +114,8 @@ def simulate_rig(
     for place in (*places, folder / TRUTH):
         make_folder(place)
     labels, count = {}, 0
-    eyes = _color_cameras(cameras, sensor, color)
+    drawn = np.random.default_rng([sensor.seed, 1 << 29])
+    eyes = [] if color is None else [SimulatedColor.beside(camera, color, drawn) for camera in cameras]
     for camera in cameras[: len(eyes)]:
         make_folder(folder / camera.name / "color")
     for number, frame in enumerate(frames):
@@ -140,14 +141,6 @@ def simulate_rig(
     described = [eye.record(f"{camera.name}/color", random) for camera, eye in zip(cameras, eyes, strict=False)]
     write_rig(folder, wrong, frame_rate, described)
     return count
-
-
-def _color_cameras(
-    cameras: tuple[DepthCamera, ...], sensor: SensorOptions, color: ColorSensorOptions | None
-) -> list[SimulatedColor]:
-    """Return a colour camera beside each depth camera; none without `color`."""
-    random = np.random.default_rng([sensor.seed, 1 << 29])
-    return [] if color is None else [SimulatedColor.beside(camera, color, random) for camera in cameras]
 
 
 class _Rays:

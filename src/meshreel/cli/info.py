@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from itertools import pairwise
 from pathlib import Path
@@ -157,11 +158,10 @@ def _contents(
 
 
 def _sum(rows: Iterable[dict[str, int]]) -> dict[str, int]:
-    total: dict[str, int] = {}
+    total = Counter[str]()
     for row in rows:
-        for name, size in row.items():
-            total[name] = total.get(name, 0) + size
-    return total
+        total.update(row)
+    return dict(total)
 
 
 def _renamed(track: dict[str, Any], several: bool) -> dict[str, int]:

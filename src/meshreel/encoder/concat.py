@@ -20,8 +20,7 @@ from ..container.writer import Companion, ReelWriter
 from ..errors import FormatError, InputError
 from ..format.checks import COMPANIONS
 from ..format.layout import ChunkKind, Header
-from ..io.differences import first_difference
-from ..io.read import read_input
+from ..io.read import first_difference, read_input
 from ..io.remote import Place, uploaded
 from ..io.write import check_apart
 from .metadata import joined_metadata, of_all_parts, place_of

@@ -192,14 +192,10 @@ class Unchanging(DerivedSequence):
     def __getitem__(self, index: int) -> Mesh:
         mesh = self._recent.get(index)
         if mesh is None:
-            mesh = self._read(index)
+            work.count("frames read")
+            mesh = super().__getitem__(index)
+            self._check(index, digest([mesh]))
             self._recent.keep(index, mesh)
-        return mesh
-
-    def _read(self, index: int) -> Mesh:
-        work.count("frames read")
-        mesh = super().__getitem__(index)
-        self._check(index, digest([mesh]))
         return mesh
 
     def only(self, numbers: Sequence[int]) -> Unchanging:

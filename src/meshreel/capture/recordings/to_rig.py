@@ -157,7 +157,9 @@ class _Part:
                 text = f"{picture.shape[1]} x {picture.shape[0]} pixels where its lens has"
                 raise InputError(f"{self.take.path}: depth of {text} {self.lens.width} x {self.lens.height}")
             if picture.dtype.kind == "f":
-                picture, self.unit = _whole(picture * (self.sensor.unit / MILLIMETRE)), MILLIMETRE
+                depth, self.unit = picture * (self.sensor.unit / MILLIMETRE), MILLIMETRE
+                with np.errstate(invalid="ignore"):  # what is none, or too far, is 0
+                    picture = np.where((depth > 0) & (depth < 65535), np.rint(depth), 0).astype(np.uint16)
             return pack_picture(picture if pixels is None else picture[pixels[0]] * pixels[1]), ".png"
 
         self.depth = self._write(self.sensor.depth, folder / "depth", straight, report)
@@ -266,12 +268,6 @@ def _straightened(lens: Lens) -> tuple[tuple[np.ndarray, np.ndarray], Bool[np.nd
         np.rint(np.where(inside, column, 0)).astype(np.int64),
     )
     return nearest, inside
-
-
-def _whole(depth: np.ndarray) -> np.ndarray:
-    """Return depths as integers of 16 bits; what is none, or too far, is 0."""
-    with np.errstate(invalid="ignore"):
-        return np.where((depth > 0) & (depth < 65535), np.rint(depth), 0).astype(np.uint16)
 
 
 def _colored(picture: Picture) -> tuple[bytes, str]:
