@@ -35,17 +35,14 @@ class CapturedSequence(MeshSequence, Protocol):
     @property
     def up(self) -> Up:
         """The axis that points up."""
-        ...
 
     @property
     def depth(self) -> DepthFrames | None:
         """The depth pictures from which the meshes were made; None where they are not known."""
-        ...
 
     @property
     def colors(self) -> ColorFrames | None:
         """The pictures of colour cameras; None where there are none."""
-        ...
 
 
 def captured(sequence: MeshSequence) -> CapturedSequence:

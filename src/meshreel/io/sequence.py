@@ -87,9 +87,8 @@ class Files:
 class _Seen:
     """Counts for warnings, from the frames read so far; a frame that is read twice counts once."""
 
-    merged: dict[int, tuple[int, int, int]] = field(
-        default_factory=dict
-    )  # by frame: merged vertices, all vertices, lost faces
+    # By frame: merged vertices, all vertices, lost faces.
+    merged: dict[int, tuple[int, int, int]] = field(default_factory=dict)
     dropped: dict[str, int] = field(default_factory=dict)  # kind of dropped data: first frame that has it
     smallest: tuple[float, int] | None = None  # diagonal, frame
     largest: tuple[float, int] | None = None

@@ -90,12 +90,10 @@ class Picture(Protocol):
     @property
     def covered(self) -> Bool[np.ndarray, "H W"]:
         """Where a mesh is seen."""
-        ...
 
     @property
     def colors(self) -> Float32[np.ndarray, "H W 3"]:
         """Colors, 0 to 1."""
-        ...
 
 
 class Pixels:

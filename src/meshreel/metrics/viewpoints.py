@@ -29,29 +29,23 @@ class Camera(Protocol):
     @property
     def width(self) -> int:
         """Width of the picture, pixels."""
-        ...
 
     @property
     def height(self) -> int:
         """Height of the picture, pixels."""
-        ...
 
     @property
     def extrinsic(self) -> Float64[np.ndarray, "4 4"]:
         """World to camera."""
-        ...
 
     def rays(self, pixels: Float64[np.ndarray, "N 2"]) -> tuple[np.ndarray, np.ndarray]:
         """Return origins and unit directions (N x 3 each, camera frame) through image positions (column, row)."""
-        ...
 
     def project(self, points: Float64[np.ndarray, "N 3"]) -> Float64[np.ndarray, "N 2"]:
         """Return image positions of points in the camera frame; not finite for points that are not in front of it."""
-        ...
 
     def record(self) -> dict[str, Any]:
         """Return the camera for JSON."""
-        ...
 
 
 @dataclass(frozen=True, slots=True)
