@@ -66,11 +66,9 @@ class DepthCamera:
         if not (math.isfinite(self.depth_unit) and self.depth_unit > 0 and 0 <= near < far < math.inf):
             text = f"depth unit {self.depth_unit:g}, range {near:g} to {far:g}"
             raise InputError(f"camera {self.name}: {text}: give metres, unit above 0 and 0 <= nearest < farthest")
-        broken = _broken(self.camera_to_world)
-        if broken:
-            raise InputError(
-                f"camera {self.name}: camera_to_world {broken}; calibrate it again, or leave the camera out"
-            )
+        if broken := _broken(self.camera_to_world):
+            text = f"camera {self.name}: camera_to_world {broken}"
+            raise InputError(f"{text}; calibrate it again, or leave the camera out")
 
     @property
     def intrinsic(self) -> Float64[np.ndarray, "3 3"]:

@@ -23,7 +23,7 @@ from ..io.depth_pictures import write_depth
 from ..io.write import make_folder, replacing, write_mesh, write_picture
 from ..types import Mesh
 from .rig import RIG, DepthCamera, write_rig
-from .simulated_color import ColorSensorOptions, Painter, SimulatedColor
+from .simulated_color import ColorSensorOptions, Painter, SimulatedColor, turned
 
 TRUTH = "truth"  # folder of the clean meshes
 LABELS = "dynamic.npz"  # file in that folder: for each frame, a bit per face of its mesh
@@ -210,10 +210,7 @@ def _noise(shape: tuple[int, ...], correlation: float, random: np.random.Generat
 
 def _mistaken(camera: DepthCamera, sensor: SensorOptions, random: np.random.Generator) -> DepthCamera:
     """Return the camera with the errors of its calibration."""
-    from scipy.spatial.transform import Rotation
-
     apart, degrees = sensor.pose_error
-    pose = camera.camera_to_world.copy()
-    pose[:3, :3] = Rotation.from_rotvec(degrees * random.standard_normal(3), degrees=True).as_matrix() @ pose[:3, :3]
+    pose = turned(camera.camera_to_world, degrees, random)
     pose[:3, 3] += apart * random.standard_normal(3)
     return replace(camera, camera_to_world=pose)

@@ -61,7 +61,9 @@ class GlbWriter:
         node = {"name": shape.name, "mesh": mesh}
         if shape.shown[0][0] > 0:
             node["scale"] = [0, 0, 0]  # as in the first frame, for viewers that do not animate
-        self._child(self._part(shape.part), node)
+        if shape.part not in self._parts:
+            self._parts[shape.part] = self._child(0, {"name": shape.part})
+        self._child(self._parts[shape.part], node)
         self._animate(shape, len(self._nodes) - 1)
 
     def finish(self, file: BinaryIO) -> None:
@@ -122,11 +124,6 @@ class GlbWriter:
     def _channel(self, node: int, path: str, accessors: tuple[int, int], interpolation: str) -> None:
         self._samplers.append({"input": accessors[0], "output": accessors[1], "interpolation": interpolation})
         self._channels.append({"sampler": len(self._samplers) - 1, "target": {"node": node, "path": path}})
-
-    def _part(self, name: str) -> int:
-        if name not in self._parts:
-            self._parts[name] = self._child(0, {"name": name})
-        return self._parts[name]
 
     def _child(self, parent: int, node: dict[str, Any]) -> int:
         self._nodes.append(node)

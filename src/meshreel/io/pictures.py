@@ -29,11 +29,6 @@ MOST_PIXELS = 1 << 26  # of a picture: 8192 x 8192, 200 MB in memory (guess)
 DEEP = ("I;16", "I;16B", "I;16L", "I")  # modes in which versions of Pillow return 16 bits of grey
 
 
-def picture_texture(place: Place) -> Texture:
-    """Return the texture of a picture in a file, which is read when its pixels are asked for."""
-    return Texture(partial(read_picture, place))
-
-
 def read_picture(place: Place) -> UInt8[np.ndarray, "H W 3"]:
     """Read a picture as sRGB, without transparency. Raises InputError where it cannot be read, or is too large."""
     return _read(place, place.stat().st_mtime_ns if isinstance(place, Path) and place.exists() else 0)
@@ -112,7 +107,7 @@ def texture_of_materials(mesh: Place, files: tuple[str, ...], used: tuple[str, .
     place = _beside(mesh, picture)
     if isinstance(place, Path) and not _exists(place):
         return None, frozenset(dropped | {f"a texture ({picture} is not there)"})
-    return picture_texture(place), frozenset(dropped)
+    return Texture(partial(read_picture, place)), frozenset(dropped)  # read when its pixels are asked for
 
 
 def _exists(place: Path) -> bool:

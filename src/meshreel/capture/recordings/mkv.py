@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float64
 
+from ..poses import pose_of
 from .takes import Lens, Pictures, Sensor, Stream, Take
 
 KIND = "an Azure Kinect or Femto recording (.mkv)"
@@ -49,7 +49,10 @@ def read(path: Path) -> Take:
             pictures = partial(_pictures, path, video.streams.video.index(track), start, title == "DEPTH")
             streams[title] = Stream(*size, count, seconds * (count - 1) / max(count, 1), lens, pictures)
         others = tuple(title for title in tracks if title not in streams)
-    apart = _apart(cameras["COLOR"]) if "COLOR" in cameras else None
+    apart = None
+    if "COLOR" in cameras:  # which has the way back, in metres
+        back = cameras["COLOR"]["Rt"]
+        apart = np.linalg.inv(pose_of(np.reshape(back["Rotation"], (3, 3)), back["Translation"]))
     sensor = Sensor("kinect", streams["DEPTH"], 0.001, streams.get("COLOR"), apart)
     return Take(
         path, KIND, (sensor,), f"the file has no {CALIBRATION} attached; record it with the camera's SDK", others
@@ -80,14 +83,6 @@ def _lens(camera: dict[str, Any], deep: bool, width: int, height: int) -> Lens:
     center = (cx * wide - left - 0.5, cy * high - top - 0.5)
     reach = float(camera.get("MetricRadius") or np.inf)
     return Lens(width, height, (fx * wide, fy * high), center, (k1, k2, p1, p2, k3, k4, k5, k6), reach)
-
-
-def _apart(color: dict[str, Any]) -> Float64[np.ndarray, "4 4"]:
-    """Return the colour camera's pose beside the depth camera; a calibration has the way back, in metres."""
-    back = np.eye(4)
-    back[:3, :3] = np.array(color["Rt"]["Rotation"], np.float64).reshape(3, 3)
-    back[:3, 3] = color["Rt"]["Translation"]
-    return np.linalg.inv(back)
 
 
 def _pictures(path: Path, index: int, start: float, deep: bool) -> Pictures:
