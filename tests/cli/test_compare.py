@@ -164,6 +164,13 @@ def test_with_the_truth_both_are_compared_with_it(run, rig):
     assert "against the truth, 2 frames" in told.out and "people_coverage_rms_m" in told.out
 
 
+def test_frames_of_a_rig_are_judged_by_its_depth_pictures(run, rig):
+    found = run("compare", rig, rig / "larger", "--no-ssim", "--json").row["depth"]
+    assert len(found["decoded"]["per_frame"]) == found["originals"]["frames_judged"] == 3
+    assert found["originals"]["all_covered"] > 0.95 and found["decoded"]["all_invented"] < 0.05
+    assert "by the depth pictures, 3 frames" in run("compare", rig, rig / "larger", "--no-ssim").out
+
+
 def test_a_sheet_of_a_rig_is_what_its_cameras_see_of_the_chosen_frames(run, rig, tmp_path):
     """Two cameras of 64 x 64 pixels, two of three frames; an axis may begin with a hyphen."""
     said = run("compare", rig, rig / "truth", "--no-ssim", "--sheet", tmp_path / "a.png", "--sheet-frames", "0", "2")

@@ -119,6 +119,20 @@ def test_a_rig_is_an_input(run, rig, tmp_path):
     assert said.code == 0 and "camera left lacks 1 of 3 frames" in said.err
 
 
+def test_the_pictures_of_a_rig_s_colour_cameras_are_those_for_masks(run, rig, tmp_path):
+    record = json.loads((rig / "rig.json").read_text())
+    left = next(entry for entry in record["cameras"] if entry["name"] == "left")
+    left["color"] = "left/color"
+    (rig / "rig.json").write_text(json.dumps(record))
+    (rig / "left" / "color").mkdir()
+    for number in range(3):
+        pixels = np.full((left["height"], left["width"], 3), 40 * number, np.uint8)
+        Image.fromarray(pixels).save(rig / "left" / "color" / f"color_{number:05}.png")
+    said = run("segment", rig, "-o", tmp_path / "out", "--views-only", "--json")
+    assert said.code == 0 and said.row["views"] == 1
+    assert (np.asarray(Image.open(tmp_path / "out" / "view00" / "frame_00002.png")) == 80).all()
+
+
 def test_masks_that_are_missing_or_of_another_size_are_reported_before_anything_is_written(
     run, scan, painted, tmp_path
 ):
@@ -148,6 +162,8 @@ def test_masks_that_are_missing_or_of_another_size_are_reported_before_anything_
         (["--masks", "masks", "--views", "c.json"], ["--views c.json", "cameras of their own"]),
         (["--prompts", "person"], ["--prompts", "give --sam3"]),
         (["--device", "cuda"], ["--device", "give --sam3"]),
+        (["--prompt-by", "motion"], ["--prompt-by", "give --sam3"]),
+        (["--sam3", "w", "--prompt-by", "motion", "--prompts", "person"], ["--prompt-by motion needs none"]),
         (["--sam3", "weights"], ["weights: holds no weights of SAM3", "config.json"]),
         (["--views", "none.json"], ["none.json", "cannot be read"]),
         (["--views", "bad.json"], ["bad.json", "pinhole camera JSON"]),

@@ -154,3 +154,17 @@ def test_a_clean_frame_without_faces_cannot_label_others():
     nothing = Scene(Mesh.empty(), np.zeros(0, bool), [sight()], complete=True)
     with pytest.raises(InputError, match="frame 3 of the truth has no faces"):
         compare_with_truth([], [], lambda _: nothing, [3])
+
+
+def test_a_ball_that_moves_as_the_truth_does_not_flicker_and_one_that_is_noisy_does():
+    """The ball moves by 4 cm; its noise is new in each frame."""
+    balls = [moved(sphere(BALL), (0.04 * k, 0, 0)) for k in range(3)]
+    meshes = [parts(ball=ball)[0] for ball in balls]
+    noised = [parts(ball=noisy(ball, 0.002, seed=k))[0] for k, ball in enumerate(balls)]
+    found = compare_with_truth(meshes, noised, lambda k: truth(ball=balls[k]), range(3))
+    assert found["per_frame"][0]["decoded"]["people_flicker_deg"] is None
+    assert found["noise_floor"]["people_flicker_deg"] < 0.01 and found["decoded"]["people_flicker_deg"] > 1
+    assert (
+        compare_with_truth(meshes, meshes, lambda k: truth(ball=balls[k]), (0, 2))["decoded"]["people_flicker_deg"]
+        is None
+    )

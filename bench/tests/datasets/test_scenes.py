@@ -7,18 +7,22 @@ import json
 import numpy as np
 import pytest
 from meshreel_bench.codecs import make_codec
-from meshreel_bench.datasets import Store
+from meshreel_bench.datasets import Dataset, Store
 from meshreel_bench.datasets import scenes as module
+from meshreel_bench.datasets.captured import Captured
 from meshreel_bench.datasets.scenes import SceneFrames, open_scene, true_scene
+from meshreel_bench.measure.metrics import Measured, _flicker, measure_frames
 from meshreel_bench.measure.point import measure_point
 from meshreel_bench.report.values import value
 from meshreel_bench.rows import Point
 
+from meshreel.capture.procedural import soft_bodies
+from meshreel.capture.recording import open_recording
 from meshreel.capture.simulated_rig import SceneFrame, SensorOptions, simulate_rig
 from meshreel.errors import InputError
 from meshreel.geometry.closest_points import Surface
 from meshreel.metrics.scene_accuracy import compare_with_truth
-from meshreel.types import Mesh
+from meshreel.types import Mesh, MeshList
 from tests.capture.depth_scenes import camera
 from tests.metrics.shapes import moved, plane, sphere
 
@@ -121,6 +125,21 @@ def test_the_truth_is_measured_beside_the_input_where_pictures_are_from_the_came
     row = measure_point(Point("room2", "draco", {"qp": 8}, 4, metrics="distances"), Store(cache, cache))
     assert row.measured_frames == [0, 2] and row.metrics["d2_psnr_paper"] > 40
     assert row.metrics["truth_people_median_m"] > 0 and "bridges" not in row.metrics
+
+
+def test_the_input_flickers_as_the_input_and_the_truth_not_at_all(scene):
+    assert _flicker(scene, [0, 1, 2], scene.meshes)["people_flicker_of_input"] == 1
+    assert _flicker(scene, [0, 1, 2], MeshList(tuple(frame.mesh for frame in FRAMES)))["people_flicker_of_input"] < 0.1
+
+
+def test_a_recording_is_judged_by_its_depth_pictures_in_all_frames(scene):
+    recording, _ = open_recording(scene.folder / "rig")
+    known = Dataset(Captured(recording, scene.folder / "meshes"))
+    row, _ = measure_frames(Measured(known, range(4), [frame.mesh for frame in FRAMES]), "depth")
+    assert row["all_covered"] > 0.95 and row["all_invented"] < 0.01 and row["frames_judged"] == 4
+    assert row["body_flicker_deg"] < row["input_body_flicker_deg"] and "per_frame" not in row
+    with pytest.raises(InputError, match="only recordings have depth pictures"):
+        measure_frames(Measured(Dataset(soft_bodies()), [0], [soft_bodies()[0]]), "depth")
 
 
 def test_labels_that_the_encoder_finds_are_judged_by_the_true_ones(cache, monkeypatch):

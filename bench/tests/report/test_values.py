@@ -63,6 +63,15 @@ def test_bytes_of_a_group_are_spread_over_its_frames():
     assert value(ROW, "second_half_over_first") is None
 
 
+def test_groups_with_surface_have_a_mean_length_and_the_largest_step_at_their_borders_counts():
+    groups = [Group(0, 6, "layers", 9), Group(6, 4, "draco", 9), Group(0, 10, "empty", 1)]
+    frames = {"d2_psnr_paper": [60.0, 70.0, 60.0, 60.0, 60.0, 60.0, 62.0, 61.0, None, 61.0]}
+    made = msgspec.structs.replace(ROW, stream=Stream(100, 10, 30, groups, ColorBytes(background=20)), per_frame=frames)
+    assert (value(made, "group_frames"), value(made, "draco_groups"), value(made, "border_step_db")) == (5, 1, 2)
+    assert value(made, "background_mbps") == pytest.approx(made.mbps / 2)
+    assert value(ROW, "border_step_db") is None and value(floor("ball"), "group_frames") is None
+
+
 def test_the_fall_at_the_ends_is_that_of_the_worse_end():
     made = msgspec.structs.replace(ROW, per_frame={"d2_psnr_paper": [58.0, 60.0, 59.0]})
     assert value(made, "fall_at_ends_db") == 2.0

@@ -17,19 +17,22 @@ from ..container.sources import FileSource
 from ..decoder.video import Video
 from ..decoder.video import open as open_video
 from ..errors import FormatError, InputError
-from ..format.layout import MAGIC
+from ..format.layout import MAGIC, ChunkKind
 from ..geometry.cameras import PinholeCamera
 from ..geometry.topology import weld
-from ..io.sequence import FileSequence, SequenceOptions, open_sequence
-from ..metrics.comparison import compare_sequences
+from ..io.sequence import SequenceOptions, open_sequence
+from ..metrics.comparison import ComparisonOptions, compare_sequences
+from ..metrics.depth import DepthJudge, judge
 from ..metrics.error_sheet import SheetOptions, write_sheet
 from ..metrics.scene_accuracy import Scene, Sight, compare_with_truth
 from ..metrics.viewpoints import read_cameras
-from ..types import Frames, Mesh, MeshSequence
+from ..types import UP_AXES, Frames, MeshSequence
 from .console import Common, StageBars
 from .flags import Knowing, Looking, Reading
 from .info import describe_file
 from .sources import open_source
+
+BESIDE = {"truth": "against the truth", "depth": "by the depth pictures"}  # parts of a row with numbers of both
 
 
 def command(
@@ -48,6 +51,7 @@ def command(
 
     With --truth, the original and decoded meshes of a scene are also compared with the clean ones: the whole scene,
     people (faces whose nearest clean face moves) and background. The numbers of the originals are the noise floor.
+    Frames of a rig are also judged by its depth pictures: what of them is covered, invented and lost, and flickers.
 
     Parameters
     ----------
@@ -62,41 +66,66 @@ def command(
     sheet_frames
         Frames in the sheet; by default the first, the middle and the last.
     """
-    options = looking.options()
     if sheet is not None and not sheet.parent.is_dir():
         raise InputError(f"{sheet}: there is no folder {sheet.parent}; make it or choose another")
     source = open_source([originals], reading)
-    sequence = source.sequence
-    reel = is_reel(decoded)
-    meshes = SequenceOptions(reading.fps, weld=weld)
-    other: Video | FileSequence = open_video(decoded) if reel else open_sequence(decoded, meshes)
+    sequence, other = source.sequence, open_decoded(decoded, reading)
     if len(sequence) != len(other):
         raise InputError(f"{originals} has {len(sequence)} frames and {decoded} {len(other)}; choose with --frames A:B")
-    if isinstance(other, Video) and not options.keys:
-        options = replace(options, keys=recorded_keys(other.reader.metadata, len(other)))
     shown = SheetOptions(sheet_frames, cameras=_sheet_cameras(looking, sequence), up=looking.up)
     truth = None if knowing.truth is None else open_truth(knowing.truth, reading, len(sequence))
     try:
         with common.stages(len(sequence)) as progress:
-            row = compare_sequences(sequence, counted(other, progress), options).to_row()
+            row = _measured(sequence, other, _options(looking, other), progress)
             if truth is not None:
-                row |= {
-                    "truth": against_truth(
-                        sequence, other, truth, range(0, len(sequence), knowing.truth_every), progress
-                    )
-                }
+                row["truth"] = against_truth(
+                    sequence, other, truth, range(0, len(sequence), knowing.truth_every), progress
+                )
         if sheet is not None:
             write_sheet(sequence, other, sheet, shown)
     except FormatError as error:  # names the chunk, but not the file
         raise FormatError(f"{decoded}: {error}; copy the file again, or compare frames before it") from None
-    if reel:
-        described = describe_file(Path(decoded))
-        row = {name: described[name] for name in ("bytes", "mbps", "bytes_by_content", "mbps_by_content")} | row
     warnings = [*source.warnings, *(f"{decoded}: {w}" for w in getattr(other, "warnings", ()))]
-    common.warn(warnings)
-    texts: list[object] = [] if truth is None else [truth_table(row["truth"])]
+    _tell({"warnings": warnings} | _rate(decoded, other) | row, sheet, common)
+
+
+def _tell(row: dict[str, Any], sheet: Path | None, common: Common) -> None:
+    """Print warnings and tables, or JSON."""
+    common.warn(row["warnings"])
+    texts: list[object] = [both_table(title, row[name]) for name, title in BESIDE.items() if name in row]
     texts += [f"picture: {sheet}"] if sheet is not None else []
-    common.result({"warnings": warnings} | row, metric_table(row), *_cameras(row), *texts)
+    common.result(row, metric_table(row), *_cameras(row), *texts)
+
+
+def _measured(
+    sequence: MeshSequence, other: MeshSequence, options: ComparisonOptions, progress: StageBars
+) -> dict[str, Any]:
+    """Compare the meshes of all frames, and judge those of a rig by its depth pictures."""
+    row = compare_sequences(sequence, counted(other, progress), options).to_row()
+    return row | {"depth": by_depth(sequence, other, progress)} if isinstance(sequence, Recording) else row
+
+
+def _rate(decoded: str, other: MeshSequence) -> dict[str, Any]:
+    """Return the size of a .reel file and its rate; nothing of meshes."""
+    if not isinstance(other, Video):
+        return {}
+    described = describe_file(Path(decoded))
+    return {name: described[name] for name in ("bytes", "mbps", "bytes_by_content", "mbps_by_content")}
+
+
+def open_decoded(decoded: str, reading: Reading) -> MeshSequence:
+    """Open a .reel file, or decoded meshes."""
+    if is_reel(decoded):
+        return open_video(decoded)
+    return open_sequence(decoded, SequenceOptions(reading.fps, weld=weld))
+
+
+def _options(looking: Looking, decoded: MeshSequence) -> ComparisonOptions:
+    """Return the options that were asked for; key frames are those that a file names where none are given."""
+    options = looking.options()
+    if isinstance(decoded, Video) and not options.keys:
+        return replace(options, keys=recorded_keys(decoded.reader.metadata, len(decoded)))
+    return options
 
 
 def _sheet_cameras(looking: Looking, sequence: MeshSequence) -> tuple[PinholeCamera, ...]:
@@ -131,11 +160,25 @@ def against_truth(
     return compare_with_truth(sequence, other, clean, numbers, lambda done: progress("truth", done, len(numbers)))
 
 
-def truth_table(row: dict[str, Any]) -> Table:
-    """Return a table of means against the truth, for originals and decoded meshes, one metric per line."""
-    table = Table(f"against the truth, {len(row['frames'])} frames", "originals (noise floor)", "decoded")
-    for name in row["decoded"]:
-        table.add_row(name, *(_number(row[which][name]) for which in ("noise_floor", "decoded")))
+def by_depth(sequence: Recording, decoded: MeshSequence, progress: StageBars) -> dict[str, Any]:
+    """Judge decoded frames by the depth pictures of a recording, and beside them its own frames."""
+    judged = DepthJudge(sequence.depth, len(sequence), UP_AXES[sequence.up])
+    chunks = decoded.reader.chunks if isinstance(decoded, Video) else ()
+    refreshes = {chunk.first_frame for chunk in chunks if chunk.kind == ChunkKind.STATIC}
+    found = dict[str, Any]()
+    for name, frames, changed in (("originals", sequence, set[int]()), ("decoded", decoded, refreshes)):
+        numbers = counted(range(len(sequence)), progress, f"depth of {name}")
+        found[name] = judge(judged, frames, numbers, changed)
+    return {"frames": list(range(len(sequence)))} | found
+
+
+def both_table(title: str, row: dict[str, Any]) -> Table:
+    """Return a table of numbers of originals and of decoded meshes, a line each."""
+    beside, decoded = (row[name] for name in row if name not in ("frames", "per_frame"))
+    table = Table(f"{title}, {len(row['frames'])} frames", "originals (noise floor)", "decoded")
+    for name in decoded:
+        if name not in ("frames", "per_frame") and (beside[name], decoded[name]) != (None, None):
+            table.add_row(name, _number(beside[name]), _number(decoded[name]))
     return table
 
 
@@ -169,11 +212,11 @@ def metric_table(row: dict[str, Any]) -> Table:
     return table
 
 
-def counted(sequence: MeshSequence, progress: StageBars) -> Iterator[Mesh]:
-    """Yield the frames of a sequence and report each after its use."""
-    for i, mesh in enumerate(sequence):
-        yield mesh
-        progress("compare", i + 1, len(sequence))
+def counted(items: MeshSequence | range, progress: StageBars, stage: str = "compare") -> Iterator[Any]:
+    """Yield frames or their numbers and report each after its use."""
+    for i, item in enumerate(items):
+        yield item
+        progress(stage, i + 1, len(items))
 
 
 def _cameras(row: dict[str, Any]) -> list[str]:

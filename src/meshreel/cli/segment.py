@@ -14,7 +14,7 @@ from ..analysis.scene.labelling import Segmentation
 from ..analysis.scene.masks import CAMERAS, Masker
 from ..analysis.scene.pictures import write_views
 from ..analysis.scene.preview import FrameViews, label_colors, look_at_labels, sheet
-from ..analysis.scene.segmentation import scene_views, segment, segment_by
+from ..analysis.scene.segmentation import mask_views, scene_views, segment, segment_by
 from ..encoder.labels import FrameLabels, label_frames
 from ..encoder.options import EncoderOptions, SceneOptions
 from ..encoder.presets import preset_options
@@ -55,8 +55,8 @@ def command(
         the triangles of the frame after reading and welding. The views are in cameras.json; sheet.png shows some frames
         from some views, with a color for each body, and colored/ holds the same frames as PLY with colors.
     views_only
-        Write only pictures of the views (normals as colors), view00/frame_00000.png and so on, and cameras.json. Masks
-        of these pictures, under the same names, are a folder for --masks.
+        Write only pictures of the views, view00/frame_00000.png and so on, and cameras.json: those of a rig's colour
+        cameras, or normals as colors. Masks of these pictures, under the same names, are a folder for --masks.
     previews
         Number of frames in the sheet and in colored/, evenly spread; 0 for neither.
     """
@@ -70,9 +70,9 @@ def command(
     masker = masking.masker(len(source.sequence))
     left = _left_over(output, len(source.sequence), views_only, previews)
     if views_only:
-        views = scene_views(sequence, scene.segment)
+        views, colors = mask_views(sequence, scene.segment)
         with common.stages(len(sequence)) as progress:
-            write_views(output, sequence, views, lambda done: progress("look", done, len(sequence)))
+            write_views(output, sequence, views, lambda done: progress("look", done, len(sequence)), colors)
         row = {"frames": len(sequence), "views": len(views)}
         text = f"{output}: pictures of {row['frames']} frames from {row['views']} views, and {CAMERAS}"
     else:

@@ -11,7 +11,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from ..analysis.scene.masks import ImageMasks, Masker, read_view_file
-from ..analysis.scene.sam3 import Sam3Masks, Sam3Options
+from ..analysis.scene.sam3 import PromptBy, Sam3Masks, Sam3Options
 from ..analysis.scene.segmentation import SegmentOptions
 from ..capture.recording import open_recording
 from ..capture.recordings import is_rig, is_take, open_take
@@ -82,10 +82,13 @@ class Masking:
     prompts: Annotated[tuple[str, ...], Parameter(consume_multiple=True, negative="")] = ()
     """Words for objects that SAM3 looks for, as --prompts person --prompts dog; only moving ones count. Common words
     if not given."""
+    prompt_by: PromptBy = "words"
+    """How objects are shown to SAM3: by words, or by points on what is seen to move in one view (motion)."""
     device: str = "cpu"
     """Device of SAM3 in torch's notation: cpu, cuda, cuda:1."""
     views: Path | None = None
-    """File of Open3D pinhole cameras of one size that look at the scene; by default they are placed."""
+    """File of Open3D pinhole cameras of one size that look at the scene. By default, masks are made of the pictures of
+    a rig's colour cameras; without any, views are placed, and masks made of their normals."""
     up: Annotated[Up | None, Parameter(allow_leading_hyphen=True)] = None
     """Axis that points up, for players and for the pictures of placed views. By default the axis recorded with the
     cameras, or y."""
@@ -95,8 +98,10 @@ class Masking:
             raise InputError(f"--masks {self.masks} and --sam3 {self.sam3}: give one of both")
         if self.masks is not None and self.views is not None:
             raise InputError(f"--views {self.views}: the masks in {self.masks} have cameras of their own; leave it out")
-        if self.sam3 is None and (self.prompts or self.device != "cpu"):
-            raise InputError("--prompts and --device are for SAM3; give --sam3, too")
+        if self.sam3 is None and (self.prompts or self.device != "cpu" or self.prompt_by != "words"):
+            raise InputError("--prompts, --prompt-by and --device are for SAM3; give --sam3, too")
+        if self.prompts and self.prompt_by == "motion":
+            raise InputError("--prompts are words and --prompt-by motion needs none; leave out one of both")
 
     @property
     def wanted(self) -> bool:
@@ -118,5 +123,5 @@ class Masking:
         if self.masks is not None:
             return ImageMasks(self.masks, frames)
         if self.sam3 is not None:
-            return Sam3Masks(self.sam3, self.prompts or None, Sam3Options(device=self.device))
+            return Sam3Masks(self.sam3, self.prompts or None, Sam3Options(None, self.prompt_by, self.device))
         return None

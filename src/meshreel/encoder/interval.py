@@ -12,12 +12,13 @@ import numpy as np
 from ..analysis.pieces import piece_of_faces
 from ..analysis.survey import Survey
 from ..errors import InputError
+from ..geometry.depth import FreeSpace
 from ..geometry.derived_sequences import DerivedSequence
 from ..geometry.painted import Paint, Painted
 from ..geometry.topology import clean, part_of
 from ..types import Frames, Mesh
 from .digests import Digests
-from .views import Views
+from .views import Sight, Views
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,6 +33,7 @@ class Interval:
     # Digest of the frames; empty where they are frames of the sequence, or pieces of them: it has their digests.
     surface: str = ""
     views: Views | None = field(default=None, kw_only=True)  # of colour cameras
+    sight: Sight | None = field(default=None, kw_only=True)  # of depth cameras
     weight: Fraction = field(default=Fraction(1), kw_only=True)  # of each frame in progress: bodies share a frame
     larger: float = field(default=1.0, kw_only=True)  # times, the whole frames than the body: targets are of the former
 
@@ -51,6 +53,10 @@ class Interval:
         if mesh.is_empty or not (mesh.is_colored or self.views is not None):
             return None
         return Painted(mesh) if self.views is None else self.views.at(self.first_frame + number)
+
+    def free(self, number: int) -> FreeSpace | None:
+        """Return what was seen through in a frame, counted from the first; None where nobody knows."""
+        return None if self.sight is None else self.sight.at(self.first_frame + number)
 
     @property
     def observed(self) -> Any:

@@ -69,7 +69,8 @@ class _Planner:
         """Return the next frames."""
         numbers = range(self._at, min(self._at + self._options.group_size, len(self._interval.frames)))
         known, digests, noise = self._surfaces, self._interval.digests, self._interval.noise
-        self._surfaces = {at: known.get(at) or FrameSurface(self._interval.frames[at]) for at in numbers}
+        frames, free = self._interval.frames, self._interval.free
+        self._surfaces = {at: known.get(at) or FrameSurface(frames[at], free(at)) for at in numbers}
         meshes = [surface.mesh for surface in self._surfaces.values()]
         note(digests, "frames", *(array for mesh in meshes for array in (mesh.vertices, mesh.faces)))
         target = target_of(meshes, self._options.target, noise)

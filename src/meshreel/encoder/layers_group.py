@@ -107,8 +107,8 @@ class GroupCoder:
         decoded = [Mesh(positions, faces) for positions in encoded.positions]
         if self.options.tails is None:
             return _Shown(payload, layers, decoded)
-        known = [surface.surface for surface in self.surfaces]
-        found = find_tails(known, decoded, len(payload), self.options.tails, noise=self.tolerated)
+        known, free = [surface.surface for surface in self.surfaces], [surface.free for surface in self.surfaces]
+        found = find_tails(known, decoded, len(payload), self.options.tails, noise=self.tolerated, free=free)
         if found is None:
             return _Shown(payload, layers, decoded)
         payload += pack(found.record)

@@ -145,8 +145,13 @@ def _background(
     return fuse_background(ChosenParts(sequence, numbers, clear), cell, options)
 
 
-def _change(sequence: MeshSequence, segmentation: Segmentation, frame: int, options: BackgroundOptions) -> Change:
+def _change(sequence: CapturedSequence, segmentation: Segmentation, frame: int, options: BackgroundOptions) -> Change:
     numbers = [frame + number for number in evenly(len(sequence) - frame, options.frames)]
+    if options.depth and (depth := sequence.depth) is not None:
+        meshes = ((number, sequence[number]) for number in numbers)
+        moments = (Moment(depth[k], mesh, ~segmentation.moving(k, mesh)) for k, mesh in meshes)
+        room = fuse_still_depth(moments, segmentation.cell, options)
+        return Change(frame, part_of(room, segmentation.came(frame, room)))
     later = ChosenParts(sequence, numbers, lambda _, mesh: segmentation.came(frame, mesh))
     return Change(frame, fuse_background(later, segmentation.cell, options))
 

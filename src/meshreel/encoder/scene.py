@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import pairwise
 
-from ..analysis.scene.bodies import BodyOptions, at_most, find_bodies, same_bodies, with_ring
+from ..analysis.scene.bodies import BodyOptions, at_most, find_bodies, same_bodies
 from ..analysis.scene.labelling import Segmentation
 from ..analysis.survey import Survey
 from ..format.checks import MOST_TRACKS
@@ -29,7 +29,7 @@ from .parts import Parts
 from .recipe import encode_intervals, longest_interval
 from .static import refreshes
 from .tracks import TrackGroup
-from .views import Views
+from .views import Sight, Views
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,7 +82,7 @@ def track_intervals(job: Job, parts: Parts, frames: range, tracks: Tracks) -> li
         for cut in _cut(normalised, frames, parts.seen, longest):
             some = normalised[cut.start : cut.stop]
             one = Interval(some, parts.body_noise, frames.start + cut.start, track, digest(some))
-            found.append(replace(one, views=Views.of(job.sequence, parts.seen)))
+            found.append(replace(one, views=Views.of(job.sequence, parts.seen), sight=Sight.of(job.sequence, parts.seen)))
     return found
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import zip_longest
 
 import numpy as np
 from jaxtyping import Bool, Float64, Int32, Int64
@@ -21,6 +22,7 @@ from ..format.layout import LayersPatches
 from ..format.records import pack
 from ..geometry.closest_points import Surface
 from ..geometry.decimate import decimate
+from ..geometry.depth import FreeSpace
 from ..geometry.strict import dot
 from ..geometry.topology import clean, components, concatenate, connected_faces, drop_unreferenced, face_normals
 from ..types import Mesh
@@ -31,6 +33,9 @@ DRACO_HEAD = 36  # bytes of a Draco mesh that all patches share
 EXACT = 1e-7  # RMS distance of the rest, of the diagonal, below which no byte is worth spending (guess)
 
 
+NOISY_REST = 1.0  # RMS noise that the rest of a noisy body may be off (guess)
+FAR = 0.006  # diagonals: surface farther than that has no counterpart (1 cm on a body, as for keys: decision 24)
+HOLE = 0.002  # squared diagonals of such surface, half a foot, that are patched at any price (guess)
 TINY = 1e-300  # of areas: a mesh may have none
 
 
@@ -59,37 +64,44 @@ def find_tails(
     options: TailOptions = TailOptions(),
     *,
     noise: float,
+    free: Sequence[FreeSpace | None] = (),
 ) -> Tails | None:
     """Find the layer of patches that lowers squared error + price x bytes most; None where none does.
 
     The `decoded` meshes of a group have the same faces; `size` is that of their layers, bytes. `noise` is the RMS
-    distance of the frames from the truth: thresholds count from there where the rest is nearer. Neither the mean nor
-    the larger of both directions' errors rises by more than the layer's bytes are worth.
+    distance of the frames from the truth: thresholds count from there where the rest is nearer. `free` is what cameras
+    saw through in each frame: surface that a frame lacks stays unless one saw through it. Neither the mean nor the
+    larger of both directions' errors rises by more than the layer's bytes are worth; but holes are patched at any price.
     """
     surfaces = [frame if isinstance(frame, Surface) else Surface(frame) for frame in frames]
-    shown = [_Frame(surface, mesh) for surface, mesh in zip(surfaces, decoded, strict=True)]
+    shown = [_Frame(*each) for each in zip_longest(surfaces, decoded, free)]
     faces = decoded[0].faces
     usual = float(np.mean([frame.body() for frame in shown]))  # squared
     if not EXACT**2 < usual < np.inf:
         return None
+    if noise > 0:  # a foot that the template lacks may be more than a tail
+        usual = min(usual, (NOISY_REST * noise) ** 2)
     price = options.exchange * len(frames) * usual / size
     usual = max(usual, noise**2)
     rung = _rung([surface.mesh for surface in surfaces], options.lattice * usual**0.5)
     search = _Search(shown, faces, usual, price, options, rung)
-    best, least = None, search.cost(None)
+    ghosts = search.ghosts()
+    best, least = None, np.inf if ghosts.any() else search.cost(None)
     better = list[_Coded]()  # each than those before it
-    for dropped in search.masks():
+    for dropped in search.masks(ghosts):
         tried = search.coded(dropped, (Mesh.empty(),) * len(frames))
         if (cost := search.cost(tried)) < least:
             best, least = tried, cost
             better.append(tried)
     dropped = best.parts.dropped if best else search.nothing
+    if torn := any(search.holes(dropped)):
+        better, least = [], np.inf
     for patches in search.patches(best):
         tried = search.coded(dropped, patches)
         if (cost := search.cost(tried)) < least:
             least = cost
             better.append(tried)
-    chosen = next((tried for tried in reversed(better) if search.holds(tried)), None)
+    chosen = next((tried for tried in reversed(better) if torn or ghosts.any() or search.holds(tried)), None)
     return (
         None
         if chosen is None
@@ -138,12 +150,24 @@ class _Search:
         pairs = zip(self.frames, tried.parts.dropped, tried.parts.meshes, strict=True)
         return np.array([frame.errors_with(gone, patch, self.usual) for frame, gone, patch in pairs])
 
-    def masks(self) -> Iterator[Bool[np.ndarray, "T F"]]:
-        """Yield a mask of the faces worth dropping for each threshold, except empty masks."""
+    def masks(self, ghosts: Bool[np.ndarray, "T F"]) -> Iterator[Bool[np.ndarray, "T F"]]:
+        """Yield a mask of the faces worth dropping for each threshold, and those of ghosts, except empty masks."""
         for threshold in self.options.thresholds:
-            chosen = self._paying(np.stack([frame.apart > threshold**2 * self.usual for frame in self.frames]))
+            chosen = ghosts | self._paying(np.stack([frame.apart > threshold**2 * self.usual for frame in self.frames]))
             if chosen.any():
                 yield chosen
+
+    def ghosts(self) -> Bool[np.ndarray, "T F"]:
+        """Return the faces of surface, more than a bit, that stands where a camera saw through."""
+        far = np.stack([frame.apart > self._far if frame.knows_free else frame.apart < 0 for frame in self.frames])
+        labels = _regions(self.faces, far)
+        areas = np.stack([frame.areas for frame in self.frames])
+        chosen = np.zeros_like(far)
+        for label in range(labels.max() + 1):
+            region = labels == label
+            if (areas * region).sum(axis=1).max() >= HOLE:
+                chosen |= region
+        return chosen
 
     def _paying(self, far: Bool[np.ndarray, "T F"]) -> Bool[np.ndarray, "T F"]:
         """Return the regions of faces, connected in space and time, that are worth their bytes."""
@@ -172,16 +196,32 @@ class _Search:
             if not all(mesh.is_empty for mesh in meshes):
                 yield meshes
 
+    def holes(self, dropped: Bool[np.ndarray, "T F"]) -> Iterator[bool]:
+        """Yield for each frame whether it has surface, more than a bit, where nothing is decoded."""
+        for frame, gone in zip(self.frames, dropped, strict=True):
+            left = frame.left(gone)
+            yield any(self._is_hole(frame, left, faces) for faces in frame.lost(left, self._far))
+
+    @property
+    def _far(self) -> float:
+        """Squared distance beyond which surface of a frame has no counterpart."""
+        return max(FAR**2, self.options.thresholds[0] ** 2 * self.usual)
+
+    def _is_hole(self, frame: _Frame, squared: Float64[np.ndarray, " N"], faces: Int64[np.ndarray, " S"]) -> bool:
+        corners = frame.original.faces[faces]
+        far = (squared[corners] > self._far).all(axis=1)
+        return bool(frame.surface.areas[faces[far]].sum() >= HOLE)
+
     def _patch(self, frame: _Frame, squared: Float64[np.ndarray, " N"], threshold: float) -> Mesh:
         """Yield the patches of a frame where its samples are farther than a limit from the decoded mesh."""
         chosen = []
         for faces in frame.lost(squared, threshold**2 * self.usual):
-            samples = frame.samples_of(faces)
-            if dot(frame.weights[samples], squared[samples]) < 2 * self.price * LEAST_BYTES:
+            samples, hole = frame.samples_of(faces), self._is_hole(frame, squared, faces)
+            if not hole and dot(frame.weights[samples], squared[samples]) < 2 * self.price * LEAST_BYTES:
                 continue
             tried = [(self._worth(frame, squared, samples, small), small) for small in self._reduced(frame, faces)]
             worth, small = max(tried, key=lambda pair: pair[0], default=(0.0, None))
-            if small is not None and worth > 0:
+            if small is not None and (hole or worth > 0):
                 chosen.append(small)
         return drop_unreferenced(concatenate(chosen))
 
@@ -220,9 +260,9 @@ def _within(far: Float64[np.ndarray, " 3"], rung: int, frames: int) -> bool:
 class _Frame:
     """A frame and its decoded mesh, sampled at vertices and centroids, with the distances between both."""
 
-    def __init__(self, surface: Surface, decoded: Mesh) -> None:
-        original = surface.mesh
-        self.original, self.decoded, self.surface = original, decoded, surface
+    def __init__(self, surface: Surface, decoded: Mesh, free: FreeSpace | None = None) -> None:
+        original, self._free = surface.mesh, free
+        self.original, self.decoded, self.surface, self.knows_free = original, decoded, surface, free is not None
         self.points, areas = _samples(original)
         shares = np.bincount(original.faces.reshape(-1), np.repeat(areas / 12, 3), len(original.vertices))
         weights = np.concatenate([shares, 0.75 * areas])
@@ -289,7 +329,10 @@ class _Frame:
 
     def _apart(self, mesh: Mesh) -> tuple[Float64[np.ndarray, " F"], Float64[np.ndarray, " F"]]:
         points, areas = _samples(mesh)
-        return areas, _of_faces(_squared(self.surface, points)[0], mesh.faces)
+        squared = _squared(self.surface, points)[0]
+        if self._free is not None:
+            squared[~self._free.at(points)] = 0.0
+        return areas, _of_faces(squared, mesh.faces)
 
 
 def _samples(mesh: Mesh) -> tuple[Float64[np.ndarray, "N 3"], Float64[np.ndarray, " F"]]:

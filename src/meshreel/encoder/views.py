@@ -1,4 +1,4 @@
-"""Colour cameras as the encoder looks through them: at one frame, in normalised coordinates."""
+"""Cameras as the encoder looks through them: at one frame, in normalised coordinates."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from functools import cached_property
 from ..analysis.appearance.calibrate import CalibrationOptions, Correction, calibrate
 from ..analysis.survey import Survey
 from ..geometry.color_views import MARGIN, ColorFrames, ColorPicture, ColorViews
+from ..geometry.depth import DepthFrames, FreeSpace
 from ..geometry.derived_sequences import CapturedSequence, DerivedSequence, only
 from ..types import Mesh, MeshSequence, Placement, evenly
 
@@ -42,6 +43,23 @@ class Views:
             mesh = self.sequence[number]
             hides = mesh.at((mesh.vertices - place.origin) / place.scale)
         return ColorViews(pictures, hides, MARGIN / place.scale, clear)
+
+
+@dataclass(frozen=True, slots=True)
+class Sight:
+    """The depth pictures of a sequence, which tell where there is no surface."""
+
+    depth: DepthFrames
+    place: Placement  # of the coordinates in which they are asked
+
+    @staticmethod
+    def of(sequence: CapturedSequence, seen: Survey) -> Sight | None:
+        """Return the sight of a sequence, None where no depth cameras are known."""
+        return None if sequence.depth is None else Sight(sequence.depth, Placement(seen.unit, tuple(seen.center)))
+
+    def at(self, number: int) -> FreeSpace:
+        """Return what the cameras saw through in a frame."""
+        return FreeSpace(tuple(picture for picture in self.depth[number] if picture is not None), self.place)
 
 
 class Calibrated(DerivedSequence):

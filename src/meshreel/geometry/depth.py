@@ -6,10 +6,14 @@ from dataclasses import dataclass, replace
 from typing import Protocol, runtime_checkable
 
 import numpy as np
-from jaxtyping import Float32, Float64, Int64, UInt16
+from jaxtyping import Bool, Float32, Float64, Int64, UInt16
+from scipy.ndimage import minimum_filter
 
+from ..types import Placement
 from .cameras import PinholeCamera
+from .strict import products
 
+THROUGH = (0.03, 0.015)  # m, and share of the depth, by which a camera must see past a place to know it is free (guess)
 STEP = 0.03  # of the depth between neighbours: what is farther apart is two surfaces (guess)
 
 
@@ -44,6 +48,28 @@ class DepthPicture:
         intrinsic = np.diag([factor, factor, 1.0]) @ self.camera.intrinsic
         height, width = depth.shape
         return replace(self, camera=PinholeCamera(width, height, intrinsic, self.camera.extrinsic), depth=depth)
+
+
+@dataclass(frozen=True, slots=True)
+class FreeSpace:
+    """What the depth cameras saw through at one moment, asked in any coordinates."""
+
+    pictures: tuple[DepthPicture, ...]
+    place: Placement = Placement(1.0, (0.0, 0.0, 0.0))  # of the coordinates, in the world
+
+    def at(self, points: Float64[np.ndarray, "N 3"]) -> Bool[np.ndarray, " N"]:
+        """Return the points that some camera saw past: in all nine pixels around, it measured something farther off."""
+        world, found = np.asarray(self.place.origin) + self.place.scale * points, np.zeros(len(points), bool)
+        for picture in self.pictures:
+            camera, least = picture.camera, minimum_filter(picture.depth, 3) * picture.unit
+            local = products(world, camera.extrinsic[:3, :3].T) + camera.extrinsic[:3, 3]
+            with np.errstate(invalid="ignore"):
+                columns, rows = np.floor(camera.project(local)).T
+            inside = np.flatnonzero((columns >= 0) & (columns < camera.width) & (rows >= 0) & (rows < camera.height))
+            depth = least[rows[inside].astype(np.int64), columns[inside].astype(np.int64)]
+            ahead = local[inside, 2]
+            found[inside[depth > ahead + np.maximum(THROUGH[0], THROUGH[1] * ahead)]] = True
+        return found
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,4 @@
-"""A decoded scene judged by the depth pictures that it was made from: what it covers, invents and loses.
+"""A decoded scene judged by the depth pictures that it was made from: what it covers, invents and loses, and flickers.
 
 Depth pictures of still cameras and decoded meshes -> a row of numbers. No truth is needed, so recordings are judged as
 simulated rigs are. What a camera measures at a pixel is still where it is as far as usual, and of a body where it is
@@ -7,28 +7,32 @@ nearer. Pixels beside a step in depth or a hole do not count: a sensor mixes bot
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from jaxtyping import Bool, Float32, Float64
+from jaxtyping import Bool, Float64
 from scipy.ndimage import binary_dilation, label, maximum_filter, minimum_filter
 
 from ..geometry.cameras import PinholeCamera
-from ..geometry.depth import DepthFrames, DepthPicture
-from ..geometry.raycast import Rays
+from ..geometry.depth import STEP, DepthFrames, DepthPicture
 from ..types import Frames, Mesh, evenly
+from .comparison import Row
+from .flicker import Patch, turned
+from .render import Crop, Pixels, View, Visible
 
 BESIDE = 2  # pixels around a step or a hole that do not count
-STEP = 0.03  # of the depth between neighbours: a step (guess)
 NEAR = (0.03, 0.015)  # m, and share of the depth, within which surface covers a measurement
 RUN = 0.01  # m^2, of a connected area that is not covered, from which on it is a lost run
 USUAL = 0.95  # quantile over time of a pixel's depth: how far it is where nobody stands (guess)
+SELDOM = 0.2  # share of all frames in which a pixel is as far as usual, below which this is a body as well (guess)
 APART = (0.06, 0.02)  # m, and share of the depth, by which a body is nearer than usual (guess)
 SPECK = 12  # pixels: smaller areas that are nearer than usual are noise (guess)
 LOOKED_AT = 60  # frames from which the usual depth is taken, at most (guess)
+HALO = 8  # pixels around a body in which still surface is not asked to stay: a foot ends softly on the floor (guess)
 LIMB = 50  # pixels of a body's lower third from which on a frame shows it (guess)
+ENDS = (0.02, 0.98)  # quantiles of heights of measured points: where a body ends (guess)
+LOWEST = 0.1  # quantile over frames of a body's lower end: the floor that it stands on (guess)
 PARTS = ("all", "still", "body")
 
 
@@ -38,13 +42,20 @@ class Judged:
 
     camera: PinholeCamera
     depth: Float64[np.ndarray, "H W"]  # m, measured
-    shown: Float32[np.ndarray, "H W"]  # m, decoded; infinite: nothing
+    view: View  # of the decoded surface
     clear: Bool[np.ndarray, "H W"]  # those that count
     body: Bool[np.ndarray, "H W"]  # measured nearer than usual
 
     def of(self, part: str) -> Bool[np.ndarray, "H W"]:
         """Return the pixels of one of `PARTS` that count."""
         return self.clear & {"all": np.True_, "still": ~self.body, "body": self.body}[part]
+
+    @property
+    def shown(self) -> Float64[np.ndarray, "H W"]:
+        """Decoded depth, m; infinite where nothing was decoded."""
+        depth = np.full(self.depth.shape, np.inf)
+        depth[self.view.covered] = self.view.points @ self.camera.extrinsic[2, :3] + self.camera.extrinsic[2, 3]
+        return depth
 
     @property
     def near(self) -> Float64[np.ndarray, "H W"]:
@@ -68,13 +79,10 @@ class Judged:
         areas = np.bincount(runs.reshape(-1), (self.depth**2 / focal).reshape(-1), count + 1)[1:]
         return np.sort(areas[areas >= RUN])[::-1]
 
-    def points(self, pixels: Bool[np.ndarray, "H W"]) -> Float64[np.ndarray, "N 3"]:
-        """Return the measured places of some pixels in world coordinates, m."""
-        rows, columns = np.nonzero(pixels)
-        homogeneous = np.stack([columns + 0.5, rows + 0.5, np.ones(len(rows))])
-        local = np.linalg.inv(self.camera.intrinsic) @ homogeneous * self.depth[pixels]
-        turn, shift = self.camera.extrinsic[:3, :3], self.camera.extrinsic[:3, 3:]
-        return (turn.T @ (local - shift)).T
+    def patch(self) -> Patch:
+        """Return the decoded surface that covers measurements of a body."""
+        kept = (self.of("body") & self.covered)[self.view.covered]
+        return Patch(self.view.points[kept], self.view.normals[kept])
 
 
 class DepthJudge:
@@ -83,37 +91,75 @@ class DepthJudge:
     def __init__(self, frames: DepthFrames, count: int, up: Sequence[float]) -> None:
         """Prepare the pictures of `count` frames, of which some are read; `up` is the direction that points up."""
         self._frames, self._up = frames, np.asarray(up, np.float64)
-        stacks: dict[int, list[np.ndarray]] = {}
-        for number in evenly(count, LOOKED_AT):
-            for camera, picture in enumerate(frames[number]):
-                if picture is not None:
-                    stacks.setdefault(camera, []).append(picture.depth * picture.unit)
-        self._usual = {camera: _usual(np.stack(stack)) for camera, stack in stacks.items()}
-        self._floor = np.inf
+        looked_at = [frames[number] for number in evenly(count, LOOKED_AT)]
+        self._usual = dict[int, np.ndarray]()
+        for camera, pictures in enumerate(zip(*looked_at, strict=True)):
+            there = [picture.depth * picture.unit for picture in pictures if picture is not None]
+            if there:
+                self._usual[camera] = _usual(np.stack(there))
+        heights = [self._heights(pictures) for pictures in looked_at]
+        lows = [np.quantile(each, ENDS[0]) for each in heights if len(each) >= LIMB]
+        self._floor = float(np.quantile(lows, LOWEST)) if lows else 0.0
 
-    def of(self, number: int, decoded: Mesh) -> Iterator[Judged]:
-        """Yield what each camera measured in a frame beside the decoded mesh."""
-        rays = Rays(decoded)
-        for camera, picture in enumerate(self._frames[number]):
+    def of(self, number: int, decoded: Mesh) -> dict[int, Judged]:
+        """Return by camera what it measured in a frame, beside the decoded mesh; cameras without it are left out."""
+        visible, found = Visible(decoded), dict[int, Judged]()
+        for place, picture in enumerate(self._frames[number]):
+            if picture is not None:
+                camera = picture.camera
+                view = visible.look(Pixels(camera, Crop(0, camera.height, 0, camera.width)))
+                depth, clear = picture.depth * picture.unit, clear_pixels(picture)
+                found[place] = Judged(camera, depth, view, clear, self._body(place, depth))
+        return found
+
+    def limb(self, judged: Iterable[Judged]) -> tuple[int, int]:
+        """Return how many pixels of a frame show the lower third of the body, and how many of these are covered."""
+        views = [(each, each.of("body")) for each in judged]
+        heights = [_points(each.camera, each.depth, body) @ self._up for each, body in views]
+        known = np.concatenate([*heights, np.zeros(0)])
+        if not len(known):
+            return 0, 0
+        third = self._floor + (np.quantile(known, ENDS[1]) - self._floor) / 3
+        covered = np.concatenate([each.covered[body] for each, body in views])
+        return int((known < third).sum()), int(covered[known < third].sum())
+
+    def _body(self, camera: int, depth: Float64[np.ndarray, "H W"]) -> Bool[np.ndarray, "H W"]:
+        nearer = depth < self._usual.get(camera, 0.0) - np.maximum(APART[0], APART[1] * depth)
+        return _large((depth > 0) & nearer, SPECK)
+
+    def _heights(self, pictures: Sequence[DepthPicture | None]) -> Float64[np.ndarray, " N"]:
+        """Return the heights of a body's measured points in a frame, m."""
+        found = [np.zeros(0)]
+        for number, picture in enumerate(pictures):
             if picture is not None:
                 depth = picture.depth * picture.unit
-                nearer = depth < self._usual[camera] - np.maximum(APART[0], APART[1] * depth)
-                shown, body = rays.look(picture.camera).depth, _large((depth > 0) & nearer, SPECK)
-                yield Judged(picture.camera, depth, shown, clear_pixels(picture), body)
+                body = self._body(number, depth) & clear_pixels(picture)
+                found.append(_points(picture.camera, depth, body) @ self._up)
+        return np.concatenate(found)
 
 
-def _large(pixels: Bool[np.ndarray, "H W"], least: int) -> Bool[np.ndarray, "H W"]:
-    """Return the connected areas of at least so many pixels."""
-    areas = label(pixels)[0]
-    return pixels & (np.bincount(areas.reshape(-1)) >= least)[areas]
+def judge(judged: DepthJudge, decoded: Frames, numbers: Iterable[int], refreshes: Collection[int] = ()) -> Row:
+    """Judge some decoded frames; return numbers over all of them, and under `per_frame` those of each.
 
-
-def _usual(stack: Float64[np.ndarray, "T H W"]) -> Float64[np.ndarray, "H W"]:
-    """Return how far each pixel is where nobody stands before it, m; 0 where nothing was measured."""
-    ordered = np.sort(np.where(stack > 0, stack, -1.0), axis=0)
-    none = (stack <= 0).sum(axis=0)
-    at = none + np.floor(USUAL * (len(stack) - 1 - none)).astype(np.int64)
-    return np.maximum(np.take_along_axis(ordered, np.minimum(at, len(stack) - 1)[None], 0)[0], 0)
+    By part: the shares of pixels `covered` and `invented`, the number of `lost_runs` a frame and the area of the
+    largest. `limbs_shown` counts the frames that show the lower third of a body, `limbs_lost` those of them whose
+    decoded mesh has not half of it. From a frame to the next: `still_flicker_m` is the RMS change of decoded depth
+    where both measured what stands still, `body_flicker_deg` that of normals on bodies, motion taken out. `refreshes`
+    are the frames in which another background begins: its change does not count. Shares of nothing are None.
+    """
+    rows, before = list[Row](), dict[int, Judged]()
+    for number in numbers:
+        now = judged.of(number, decoded[number])
+        follows = bool(rows) and rows[-1]["frame"] == number - 1
+        row = _counts(list(now.values())) | _changes(before if follows else {}, now, number in refreshes)
+        limb, kept = judged.limb(now.values())
+        row |= {"limbs_shown": limb >= LIMB, "limbs_lost": limb >= LIMB and 2 * kept < limb}
+        rows.append({"frame": number} | row)
+        before = now
+    sums = {name: sum(row[name] for row in rows) for name in (rows[0] if rows else ())}
+    sums |= {name: max(row[name] for row in rows) for name in sums if name.endswith("largest_lost_m2")}
+    found = _rates(sums, len(rows)) if rows else {}
+    return {"frames_judged": len(rows)} | found | {"per_frame": [{"frame": r["frame"]} | _rates(r, 1) for r in rows]}
 
 
 def clear_pixels(picture: DepthPicture) -> Bool[np.ndarray, "H W"]:
@@ -123,25 +169,88 @@ def clear_pixels(picture: DepthPicture) -> Bool[np.ndarray, "H W"]:
     return ~binary_dilation((least <= 0) | (most - least > STEP * depth), iterations=BESIDE - 1)
 
 
-def judge(judged: DepthJudge, decoded: Frames, numbers: Iterable[int]) -> dict[str, Any]:
-    """Judge some decoded frames; return shares over all their pixels by part, and a row for each frame.
-
-    `still_flicker_m` is the RMS change of decoded depth between a frame and the next one where both measured what
-    stands still. `limbs_lost` counts frames which show the lower third of a body, and whose decoded mesh has not half
-    of it.
-    """
-    rows, before = list[dict[str, Any]](), dict[int, Judged]()
-    for number in numbers:
-        now = dict(enumerate(judged.of(number, decoded[number])))
-        rows.append({"frame": number, **_row(list(now.values()), judged.low(now.values())), **_flicker(before, now)})
-        before = now
-    sums = {name: sum(row[name] for row in rows) for name in rows[0] if name != "frame" and "largest" not in name}
-    found: dict[str, Any] = {"frames_judged": len(rows)}
+def _counts(views: Sequence[Judged]) -> Row:
+    """Return the pixels of a frame by part, and what was lost of it."""
+    row: Row = {}
     for part in PARTS:
-        pixels = max(sums[f"{part}_pixels"], 1)
-        found[f"{part}_covered"] = sums[f"{part}_covered_pixels"] / pixels
-        found[f"{part}_invented"] = sums[f"{part}_invented_pixels"] / pixels
-        found[f"{part}_lost_runs"] = sums[f"{part}_lost_runs"] / max(len(rows), 1)
-    found["limbs_shown"], found["limbs_lost"] = sums["limb_shown"], sums["limb_lost"]
-    found["still_flicker_m"] = float(np.sqrt(sums["changed_m2"] / max(sums["compared_pixels"], 1)))
-    return found | {"per_frame": rows}
+        own = [(each.of(part), each.covered, each.invented) for each in views]
+        runs = np.concatenate([*(each.lost_runs(part) for each in views), np.zeros(0)])
+        row |= {
+            f"{part}_pixels": sum(int(pixels.sum()) for pixels, *_ in own),
+            f"{part}_covered": sum(int((pixels & covered).sum()) for pixels, covered, _ in own),
+            f"{part}_invented": sum(int((pixels & invented).sum()) for pixels, _, invented in own),
+            f"{part}_lost_runs": len(runs),
+            f"{part}_largest_lost_m2": float(runs.max(initial=0.0)),
+        }
+    return row
+
+
+def _changes(before: Mapping[int, Judged], now: Mapping[int, Judged], refreshed: bool) -> Row:
+    """Return sums of squared changes from one frame to the next, and what they are of."""
+    pairs = [(before[camera], now[camera]) for camera in sorted(before.keys() & now.keys())]
+    moved = [np.zeros(0)]
+    for a, b in [] if refreshed else pairs:
+        both = (
+            a.of("still") & b.of("still") & a.covered & b.covered & ~binary_dilation(a.body | b.body, iterations=HALO)
+        )
+        moved.append(a.shown[both] - b.shown[both])
+    steps, angles = np.concatenate(moved), np.zeros(0)
+    if pairs:
+        first, other = (Patch.join(each.patch() for each in views) for views in zip(*pairs, strict=True))
+        angles = turned(first, other, pairs[0][1].view.mesh)
+    sums = {"still_changes": len(steps), "still_flicker_m": float(steps @ steps)}
+    return sums | {"body_changes": len(angles), "body_flicker_deg": float(angles @ angles)}
+
+
+def _rates(sums: Row, frames: int) -> Row:
+    """Return shares and means of what was summed over some frames."""
+    row: Row = {}
+    for part in PARTS:
+        for name in (f"{part}_covered", f"{part}_invented"):
+            row[name] = _share(sums[name], sums[f"{part}_pixels"])
+        row[f"{part}_lost_runs"] = sums[f"{part}_lost_runs"] / frames
+        row[f"{part}_largest_lost_m2"] = sums[f"{part}_largest_lost_m2"]
+    row |= {name: int(sums[name]) for name in ("limbs_shown", "limbs_lost")}
+    for name, count in (("still_flicker_m", "still_changes"), ("body_flicker_deg", "body_changes")):
+        square = _share(sums[name], sums[count])
+        row[name] = None if square is None else float(np.sqrt(square))
+    return row
+
+
+def _share(part: float, whole: float) -> float | None:
+    return part / whole if whole else None
+
+
+def _points(
+    camera: PinholeCamera, depth: Float64[np.ndarray, "H W"], pixels: Bool[np.ndarray, "H W"]
+) -> Float64[np.ndarray, "N 3"]:
+    """Return the measured places of some pixels in world coordinates, m."""
+    rows, columns = np.nonzero(pixels)
+    homogeneous = np.stack([columns + 0.5, rows + 0.5, np.ones(len(rows))])
+    local = np.linalg.inv(camera.intrinsic) @ homogeneous * depth[pixels]
+    return (camera.extrinsic[:3, :3].T @ (local - camera.extrinsic[:3, 3:])).T
+
+
+def _large(pixels: Bool[np.ndarray, "H W"], least: int) -> Bool[np.ndarray, "H W"]:
+    """Return the connected areas of at least so many pixels."""
+    areas = label(pixels)[0]
+    return pixels & (np.bincount(areas.reshape(-1)) >= least)[areas]
+
+
+def _usual(stack: Float64[np.ndarray, "T H W"]) -> Float64[np.ndarray, "H W"]:
+    """Return how far each pixel is where nobody stands before it, m; 0 where nothing was measured.
+
+    Infinite where all that was measured moves: behind it is what is too far, or too dark.
+    """
+    ordered = np.sort(np.where(stack > 0, stack, -1.0), axis=0)
+    none = (stack <= 0).sum(axis=0)
+    last = len(stack) - 1
+
+    def at(share: float) -> Float64[np.ndarray, "H W"]:
+        rank = none + np.floor(share * (last - none)).astype(np.int64)
+        return np.maximum(np.take_along_axis(ordered, np.clip(rank, 0, last)[None], 0)[0], 0)
+
+    usual, near = at(USUAL), at(1 - USUAL)
+    apart = np.maximum(APART[0], APART[1] * usual)
+    seldom = (np.abs(stack - usual) <= apart).mean(axis=0) < SELDOM
+    return np.where(seldom & (usual - near > apart), np.inf, usual)

@@ -11,6 +11,7 @@ simulated rigs. The noisy input may take the place of the truth.
 - The peak of both PSNRs is the diagonal of the whole reference scene, for its parts too. Forward is the paper's way
   and serves for the noisy input; against a truth it measures only the size of holes, so backward counts there.
 - SSIM of normal renders from these cameras, over pixels where either mesh shows the part (masked SSIM).
+- Flicker of people: how much more the normals in these renders change between successive frames than the truth's.
 """
 
 from __future__ import annotations
@@ -181,20 +182,43 @@ def compare_with_truth(
     """Measure the decoded meshes and the originals (noise floor) against the truth, in the frames `numbers`.
 
     Returns a JSON-ready row of means, and of each frame under `per_frame`; numbers that are not finite, or of a missing
-    part, are None. `progress` gets the number of finished frames. Raises InputError for a clean frame without faces,
-    since then it cannot label other meshes.
+    part, are None. `people_flicker_deg` compares a frame with the one before it, if that is among `numbers`. `progress`
+    gets the number of finished frames. Raises InputError for a clean frame without faces, since then it cannot label
+    other meshes.
     """
     frames: list[Row] = []
+    before = dict[str, Scene]()
     for done, number in enumerate(numbers, 1):
         clean = truth(number)
         if clean.mesh.is_empty:
             raise InputError(f"frame {number} of the truth has no faces; simulate the rig again")
-        floor = scene_row(clean, clean.labelled(originals[number]))
-        frames.append({"noise_floor": floor, "decoded": scene_row(clean, clean.labelled(decoded[number]))})
+        scenes = {"noise_floor": clean.labelled(originals[number]), "decoded": clean.labelled(decoded[number])}
+        follows = done > 1 and numbers[done - 2] == number - 1
+        row = {name: scene_row(clean, scene) for name, scene in scenes.items()}
+        for name, scene in scenes.items():
+            flicker = people_flicker((before["truth"], clean), (before[name], scene)) if follows else None
+            row[name]["people_flicker_deg"] = flicker
+        frames.append(row)
+        before = {"truth": clean} | scenes
         progress(done)
     means = {name: finite(scene_means([frame[name] for frame in frames])) for name in ("noise_floor", "decoded")}
     rows = [{name: finite(row) for name, row in frame.items()} for frame in frames]
     return {"frames": list(numbers)} | means | {"per_frame": rows}
+
+
+def people_flicker(truth: tuple[Scene, Scene], shown: tuple[Scene, Scene]) -> float | None:
+    """Return the RMS change of people's rendered normals from a frame to the next beyond that of the truth, degrees.
+
+    That is the root of the difference of squares, 0 where the truth changes more, over pixels that show people in both
+    frames of both; None where there are none.
+    """
+    beyond = list[Float64[np.ndarray, " N"]]()
+    for pictures in zip(*(scene.pictures for scene in (*truth, *shown)), strict=True):
+        people = np.logical_and.reduce([picture.dynamic for picture in pictures])
+        normals = [2 * picture.colors[people].astype(np.float64) - 1 for picture in pictures]
+        beyond.append(angles(*normals[2:]) ** 2 - angles(*normals[:2]) ** 2)
+    squares = np.concatenate([*beyond, np.zeros(0)])
+    return math.sqrt(max(float(squares.mean()), 0.0)) if len(squares) else None
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import sys
+from dataclasses import replace
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -17,6 +19,7 @@ from meshreel.analysis.scene.segmentation import SegmentOptions, segment_by
 from meshreel.analysis.scene.views import ViewsOptions, place_views
 from meshreel.analysis.scene.votes import Votes
 from meshreel.errors import InputError
+from meshreel.geometry.color_views import ColorPicture
 from meshreel.geometry.raycast import Rays
 from meshreel.types import MeshList
 from tests.analysis.scene.test_views import box, together
@@ -64,6 +67,16 @@ def test_objects_have_numbers_and_the_same_pictures_give_the_same(weights: Path)
         assert np.array_equal(objects > 0, first.masks(frame, SEEN[frame], VIEWS)) and objects.max() <= 4
 
 
+def test_what_moves_is_shown_by_points_and_followed_over_time_and_through_views(weights: Path):
+    found = []
+    for _ in range(2):
+        masker = sam3.Sam3Masks(weights, None, replace(EASILY, prompt_by="motion"))
+        for frame, seen in enumerate(SEEN):
+            masker.observe(frame, seen, VIEWS)
+        found.append(masker.objects(2, SEEN[2], VIEWS))
+    assert np.array_equal(*found) and found[0].shape == (3, 60, 80) and found[0].any()
+
+
 def test_masks_are_made_with_the_default_prompts(weights: Path):
     found = observed(weights, prompts=None).masks(0, SEEN[0], VIEWS)
     assert found.shape == (3, 60, 80)
@@ -103,19 +116,19 @@ class Followed:
     def __init__(self, *_: object) -> None:
         self.asked: list[str] = []
 
-    def over_time(self, _pictures: list[np.ndarray]) -> Tracked:
+    def over_time(self, _pictures: list[np.ndarray], _depths: list[np.ndarray]) -> Tracked:
         self.asked.append("time")
         ball = np.stack([seen[EASILY.reference].faces >= len(WALLS.faces) for seen in SEEN])
         return Tracked(ball.astype(np.int32), {1: "ball"})
 
-    def through_views(self, _pictures: list[np.ndarray]) -> Tracked:
+    def through_views(self, _pictures: list[np.ndarray], _first: np.ndarray) -> Tracked:
         self.asked.append("views")
         return Tracked(np.ones((len(VIEWS), 60, 80), np.int32), {1: "ball"})
 
 
 def test_masks_asked_for_a_second_time_come_from_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     tracker = Followed()
-    monkeypatch.setattr(sam3, "_Tracker", lambda *_: tracker)
+    monkeypatch.setattr(sam3, "WordTracker", lambda *_: tracker)
     masker = sam3.Sam3Masks(tmp_path, None, EASILY)
     found = []
     for _ in range(2):
@@ -129,9 +142,29 @@ def test_masks_asked_for_a_second_time_come_from_memory(tmp_path: Path, monkeypa
 class Pictures(Followed):
     """One that keeps the pictures that it is given over time."""
 
-    def over_time(self, pictures: list[np.ndarray]) -> Tracked:
+    def over_time(self, pictures: list[np.ndarray], _depths: list[np.ndarray]) -> Tracked:
         self.pictures = pictures
         return Tracked(np.zeros((len(pictures), 60, 80), np.int32), {})
+
+
+class Filmed(MeshList):
+    """The frames with the pictures of a colour camera, of one colour in each; it lacks the last one."""
+
+    up, depth = "y", None
+    colors: ClassVar = [[ColorPicture(VIEWS[0], np.full((60, 80, 3), 50 * k, np.uint8))] for k in range(3)] + [[None]]
+
+
+def test_the_pictures_of_a_colour_camera_are_used_where_there_are_any(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    tracker, frames = Pictures(), Filmed(tuple(FRAMES))
+    monkeypatch.setattr(sam3, "WordTracker", lambda *_: tracker)
+    found = segment_by(sam3.Sam3Masks(tmp_path), frames)
+    assert not found.moving(0, FRAMES[0]).any() and found.views == (VIEWS[0],)
+    assert [set(picture.reshape(-1).tolist()) for picture in tracker.pictures[:3]] == [{0}, {50}, {100}]
+    assert np.array_equal(tracker.pictures[3], normal_picture(Rays(FRAMES[3]).look(VIEWS[0]), VIEWS[0]))
+    segment_by(masker := sam3.Sam3Masks(tmp_path), frames, SegmentOptions(cameras=VIEWS)).moving(0, FRAMES[0])
+    assert masker.reference and np.array_equal(
+        tracker.pictures[1], normal_picture(SEEN[1][masker.reference], VIEWS[masker.reference])
+    )
 
 
 def best_last() -> tuple:
@@ -142,7 +175,7 @@ def best_last() -> tuple:
 
 def test_the_view_in_which_most_changes_is_followed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     tracker, views = Pictures(), best_last()
-    monkeypatch.setattr(sam3, "_Tracker", lambda *_: tracker)
+    monkeypatch.setattr(sam3, "WordTracker", lambda *_: tracker)
     found = segment_by(sam3.Sam3Masks(tmp_path), MeshList(tuple(FRAMES)), SegmentOptions(cameras=views))
     assert not found.moving(0, FRAMES[0]).any()
     wanted = [normal_picture(Rays(mesh).look(views[-1]), views[-1]) for mesh in FRAMES]

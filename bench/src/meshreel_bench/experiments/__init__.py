@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from meshreel.errors import InputError
 
-from . import ablations, color, figure6, layers, scenes, speed, targets
+from . import ablations, color, figure6, layers, recordings, scenes, speed, targets
 from .study import Study
 
 # In the order of the report.
@@ -17,6 +17,7 @@ EXPERIMENTS: dict[str, Study] = {
     "ablation_basis": ablations.BASIS,
     "ablation_stages": ablations.STAGES,
     "scenes": scenes.STUDY,
+    "recordings": recordings.STUDY,
     "layers": layers.STUDY,
     "targets": targets.STUDY,
     "speed": speed.STUDY,

@@ -94,6 +94,7 @@ PROMISES: tuple[Promise, ...] = (
         Gains(body, BEST, ANCHORS, JUDGED, -60.0, ends_past=Bound(SYMMETRIC.key, 70.0, "dB"))
         for body in ("dancer", "basketball_player")
     ),
+    Always("bodies: step of PSNR at a border of groups", Which("", BEST), at_most("border_step_db", 1.5, "dB")),
     Always("encode, dancer", Which("dancer", BEST), at_most("encode_s", 4.0, "CPU s/frame")),
     Flat(Which("collision", BEST)),
     Always("decode, dancer", Which("dancer", BEST), at_most("decode_ms", 1.5, "ms")),

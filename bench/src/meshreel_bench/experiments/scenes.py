@@ -94,6 +94,14 @@ PROMISES: tuple[Promise, ...] = (
             at_most("door_room_s", 1.0, "s"),
         ),
     ),
+    *(
+        Reaches(
+            f"{room}: flicker of people over the input's",
+            Which(room, BEST, DEFAULT.options, "regions"),
+            (at_most("people_flicker_of_input", 0.5),),
+        )
+        for room in (ROOM, ROOM3)
+    ),
     Always(f"{ROOM}: encode", SYSTEM, at_most("encode_s", 6.0, "CPU s/frame")),
     Always(f"{ROOM}: decode", SYSTEM, at_most("decode_ms", 5.0, "ms")),
     Always(f"{ROOM}: first frame", SYSTEM, at_most("first_frame_ms", 200.0, "ms")),

@@ -15,14 +15,15 @@ from jaxtyping import Int64
 
 from meshreel.decoder.video import open as open_video
 from meshreel.errors import InputError
-from meshreel.format.layout import MAGIC
+from meshreel.format.layout import MAGIC, ChunkKind
 from meshreel.geometry.closest_points import Surface
-from meshreel.geometry.derived_sequences import Chosen
+from meshreel.geometry.derived_sequences import Chosen, captured
 from meshreel.geometry.topology import components, drop_unreferenced, face_normals, weld
 from meshreel.metrics.comparison import ComparisonOptions, compare_sequences, finite
-from meshreel.metrics.scene_accuracy import Scene, scene_means, scene_row
+from meshreel.metrics.depth import DepthJudge, judge
+from meshreel.metrics.scene_accuracy import Scene, people_flicker, scene_means, scene_row
 from meshreel.metrics.viewpoints import Box, Camera
-from meshreel.types import Mesh
+from meshreel.types import UP_AXES, Frames, Mesh
 
 from ..datasets import Dataset
 from ..datasets.scenes import SceneData
@@ -54,6 +55,8 @@ def measure_frames(frames: Measured, metrics: Metrics) -> tuple[Values, PerFrame
     values, per_frame = _to_input(frames, metrics)
     if metrics == "colors":
         return values | finite(_colors(frames)), per_frame
+    if metrics == "depth":
+        return values | _depth(frames), per_frame
     if frames.known.scene is not None:
         values |= _means("truth", [(_true(frames.known.scene, number)) for number in frames.numbers], frames.decoded)
     return values, per_frame
@@ -64,7 +67,7 @@ def _to_input(frames: Measured, metrics: Metrics) -> tuple[Values, PerFrame]:
     cameras: Sequence[Camera] | None = frames.known.cameras or None
     if cameras is None and metrics in ("parallel views", "colors"):
         cameras = parallel_views_around(Box.of(originals))
-    options = ComparisonOptions(cameras, ssim=metrics != "distances")
+    options = ComparisonOptions(cameras, ssim=metrics not in ("distances", "depth"))
     row: dict[str, Any] = compare_sequences(originals, frames.decoded, options).to_row()
     if row.pop("frames_empty") == row["frames_compared"]:
         raise InputError("no frame has a face with an area; give a sequence with surface")
@@ -92,6 +95,19 @@ def _colors(frames: Measured) -> dict[str, float]:
     return found if video is None else found | swimming(video, originals)
 
 
+def _depth(frames: Measured) -> Values:
+    """Return what the depth pictures of a recording say of all its frames, and of bodies in the input beside it."""
+    source = captured(frames.known.sequence)
+    if source.depth is None:
+        raise InputError("only recordings have depth pictures; measure others without them")
+    judged = DepthJudge(source.depth, len(source), UP_AXES[source.up])
+    chunks = open_video(frames.data).reader.chunks if frames.data.startswith(MAGIC) else ()
+    refreshes = {chunk.first_frame for chunk in chunks if chunk.kind == ChunkKind.STATIC}
+    values: Values = judge(judged, frames.decoded, frames.numbers, refreshes)
+    flicker = judge(judged, source, frames.numbers)["body_flicker_deg"]
+    return {name: value for name, value in values.items() if name != "per_frame"} | {"input_body_flicker_deg": flicker}
+
+
 def _regions(frames: Measured) -> Values:
     """Return means of people, background and all of it, and values of parts."""
     scene = frames.known.scene
@@ -103,10 +119,10 @@ def _regions(frames: Measured) -> Values:
     noisy = [_noisy(scene, number) for number in frames.numbers]
     values = _means("truth", clean, frames.decoded) | _means("input", noisy, frames.decoded, clean)
     values["truth_people_missed"] = float(np.mean([missed(*pair) for pair in zip(clean, frames.decoded, strict=True)]))
-    if scene.parts is None or not frames.data.startswith(MAGIC):
+    if not frames.data.startswith(MAGIC) or len(video := open_video(frames.data)) != len(scene.meshes):
         return values
-    video = open_video(frames.data)
-    return values | (part_values(scene.true, scene.parts, video) if len(video) == len(scene.meshes) else {})
+    values |= _flicker(scene, frames.numbers, video)
+    return values | ({} if scene.parts is None else part_values(scene.true, scene.parts, video))
 
 
 def _means(against: str, references: Sequence[Scene], decoded: Sequence[Mesh], clean: Sequence[Scene] = ()) -> Values:
@@ -114,6 +130,19 @@ def _means(against: str, references: Sequence[Scene], decoded: Sequence[Mesh], c
     pairs = zip(references, clean or references, decoded, strict=True)
     rows = [scene_row(reference, true.labelled(mesh)) for reference, true, mesh in pairs]
     return {f"{against}_{name}": value for name, value in finite(scene_means(rows)).items()}
+
+
+def _flicker(scene: SceneData, numbers: Sequence[int], video: Frames) -> Values:
+    """Return how much people's normals change between frames beyond the truth, degrees, and over the input's."""
+    found = dict[str, list[float]](truth=[], input=[])
+    for number in numbers[:-1]:
+        clean = (_true(scene, number), scene.true(number + 1))
+        for name, meshes in (("truth", video), ("input", scene.meshes)):
+            shown = (clean[0].labelled(meshes[number]), clean[1].labelled(meshes[number + 1]))
+            found[name].append(people_flicker(clean, shown) or 0.0)
+    own, noisy = (float(np.mean(values or [0.0])) for values in found.values())
+    names = ("truth_people_flicker_deg", "input_people_flicker_deg", "people_flicker_of_input")
+    return dict(zip(names, (own, noisy, own / noisy if noisy else None), strict=True))
 
 
 @lru_cache(maxsize=10)  # 2 GB: what is prepared for one point serves the next

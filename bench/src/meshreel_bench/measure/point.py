@@ -54,7 +54,7 @@ def measure_point(point: Point, store: Store) -> Row:
     count = len(known.sequence)
     some = evenly(count, SOME) if known.cameras else list(range(count))
     whole = not known.cameras or point.sampled or point.metrics == "regions"
-    numbers = some if whole else some[::2]
+    numbers = list(range(count)) if point.metrics == "depth" else some if whole else some[::2]
     row = empty_row(point, store, frames=count, frame_rate=known.sequence.frame_rate, measured_frames=numbers)
     if point.codec == SEGMENTATION:
         return msgspec.structs.replace(row, metrics=_segmentation(known))

@@ -78,6 +78,21 @@ def _fall_at_ends(row: Row) -> float | None:
     return found[len(found) // 2] - min(found[0], found[-1]) if found else None
 
 
+def _border_step(row: Row) -> float | None:
+    """Return the largest step of D2 from the last frame of a group to the first of the next, dB."""
+    found, groups = row.per_frame.get("d2_psnr_paper", []), row.stream.groups if row.stream else []
+    borders = {group.first_frame for group in groups if group.first_frame} if len(found) == row.frames else set[int]()
+    pairs = [(found[border - 1], found[border]) for border in borders]
+    return max((abs(a - b) for a, b in pairs if a is not None and b is not None), default=None)
+
+
+def _of_groups(row: Row) -> tuple[float, int] | None:
+    """Return the mean length of groups with surface, frames, and how many are of Draco."""
+    groups = [group for group in row.stream.groups if group.form != "empty"] if row.stream else []
+    drawn = [group.form for group in groups].count("draco")
+    return (float(np.mean([group.frames for group in groups])), drawn) if groups else None
+
+
 def _at_rest(seconds: float | None, reference_s: float | None) -> float | None:
     """Return a time as it would be on the machine at rest, by the fixed loop's time beside it."""
     return None if seconds is None or reference_s is None else seconds * REST_S / reference_s
@@ -133,6 +148,13 @@ def _color_mbps(row: Row, share: Callable[[ColorBytes], int]) -> float | None:
     return row.mbps * share(row.stream.colors) / row.stream.bytes
 
 
+def _of_background(row: Row) -> float:
+    """Return the rate of what stands still, with its colours, Mbps."""
+    assert row.stream is not None
+    colors = row.stream.colors.background if row.stream.colors else 0
+    return row.mbps * (row.stream.background_bytes + colors) / row.stream.bytes
+
+
 DERIVED: dict[str, Callable[[Row], float | None]] = {
     "mbps": lambda row: row.mbps if row.stream else None,
     "mbps_background_10s": _mbps_background_10s,
@@ -140,6 +162,10 @@ DERIVED: dict[str, Callable[[Row], float | None]] = {
     "background_color_mbps": lambda row: _color_mbps(row, lambda known: known.background),
     "color_share": lambda row: found / row.mbps if (found := _color_mbps(row, lambda known: known.all)) else None,
     "background_bytes": lambda row: row.stream.background_bytes if row.stream else None,
+    "background_mbps": lambda row: _of_background(row) if row.stream else None,
+    "border_step_db": _border_step,
+    "group_frames": lambda row: found[0] if (found := _of_groups(row)) else None,
+    "draco_groups": lambda row: found[1] if (found := _of_groups(row)) else None,
     "encode_s": lambda row: row.encoding.s if row.encoding else None,
     "encode_s_at_rest": lambda row: _at_rest(row.encoding.s, row.encoding.reference_s) if row.encoding else None,
     "encode_mb": lambda row: row.encoding.peak_rss_mb if row.encoding else None,

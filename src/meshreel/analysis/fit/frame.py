@@ -12,6 +12,7 @@ from jaxtyping import Float64, Int64
 
 from ... import _core
 from ...geometry.closest_points import Hits, Surface, area_samples
+from ...geometry.depth import FreeSpace
 from ...geometry.topology import border_edges, vertex_normals
 from ...types import Mesh
 from .border import sample_border
@@ -22,8 +23,9 @@ ON_BORDER = 1e-6  # points of a surface with an interpolated `inside` up to this
 class FrameSurface:
     """A frame prepared for matching: search structure, vertex normals, and which vertices are on no open border."""
 
-    def __init__(self, mesh: Mesh) -> None:
-        self.mesh = mesh
+    def __init__(self, mesh: Mesh, free: FreeSpace | None = None) -> None:
+        """`free` is what cameras saw through in the frame, where that is known."""
+        self.mesh, self.free = mesh, free
         self.surface = Surface(mesh)
         self.normals = vertex_normals(mesh)
         self.inside = np.ones(len(mesh.vertices), bool)

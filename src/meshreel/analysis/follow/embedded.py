@@ -9,7 +9,7 @@ It replaces the paper's volume tracking (section 3.1) in preset `best` (docs/dec
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -28,6 +28,7 @@ from ..fit.closeness import shared_distance
 from ..fit.frame import ON_BORDER, FrameSurface
 from .embedded_graph import Binding, DeformationGraph, build_graph, farthest_first
 from .embedded_pose import Pose, moved, rotation, turned, unmoved
+from .rigid import RigidBody, RigidMotion
 
 NORMAL_REACH = 0.01  # diagonals, weight of a difference of unit normals in a search: a guess
 LOST = 3.0  # RMS distances of the noise that a residual may have in addition: legs come and go (decision 16)
@@ -86,6 +87,7 @@ class Tracker:
         self._all = self._graph.bind(self.mesh.vertices, self._graph.cells, o.neighbours)
         self._poses = {key: Pose.at(self._graph.nodes)}
         self._residuals = {key: 0.0}
+        self._body, self._rigid = RigidBody(self.mesh, noise), {key: RigidMotion.none()}
 
     def step(self, frame: int, mesh: Mesh | FrameSurface) -> float:
         """Register a frame, starting from the nearest registered frame between it and the key; return its residual.
@@ -102,7 +104,17 @@ class Tracker:
         if surface is not None:
             pose, residual = self._follow(frame, surface)
         self._poses[frame], self._residuals[frame] = pose, residual
+        if surface is not None and self._known(frame) in self._rigid:
+            start = RigidMotion.between(self._graph.nodes, pose.positions)
+            motion = self._body.brought(surface, start)
+            if self._body.holds(surface, motion, residual):
+                self._rigid[frame] = motion
         return residual
+
+    def rigid(self, frames: Iterable[int]) -> list[RigidMotion] | None:
+        """Return the rigid motions from the key to registered frames; None where the body has moved otherwise."""
+        found = [self._rigid.get(frame) for frame in frames]
+        return None if None in found else [motion for motion in found if motion is not None]
 
     def residual(self, frame: int) -> float | None:
         """Return the RMS distance of the moved key mesh and a frame, the larger of both directions; None if unknown."""
@@ -118,8 +130,12 @@ class Tracker:
 
     def motion(self, frames: Sequence[int]) -> Motion:
         """Return the motion through some registered frames, in the given order."""
-        rotations = np.stack([self._poses[frame].rotations for frame in frames])
-        positions = np.stack([self._poses[frame].positions for frame in frames])
+        poses = [self._poses[frame] for frame in frames]
+        if (rigid := self.rigid(frames)) is not None:
+            count = len(self._graph.nodes)
+            poses = [Pose(np.tile(one.turn, (count, 1, 1)), one.of(self._graph.nodes)) for one in rigid]
+        rotations = np.stack([pose.rotations for pose in poses])
+        positions = np.stack([pose.positions for pose in poses])
         residuals = np.array([self._residuals[frame] for frame in frames])
         return Motion(self.mesh, self._graph, rotations, positions, residuals, self.options.neighbours)
 

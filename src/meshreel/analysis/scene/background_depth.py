@@ -22,8 +22,11 @@ from ...types import Mesh
 from .background import BackgroundOptions
 
 BESIDE = 3  # pixels around moving surface that are ignored: a guess
-SMOOTH, SPREAD, ROUNDS = 3, 2.0, 2  # pixels around, standard deviation in pixels, and rounds of smoothing (decision 28)
-SIMILAR = 0.01  # of the inverse depth, standard deviation of what is averaged (decision 28)
+HIDDEN = np.float32(-1)  # in place of a depth: what stands still is not seen there
+OPEN = 0.3  # least share of the moments in which a pixel is not hidden that must have a depth there (guess)
+SMOOTH, SPREAD, ROUNDS = 2, 1.5, 2  # pixels around, standard deviation in pixels, and rounds of smoothing (decision 28)
+SIMILAR = 4.0  # times the noise, standard deviation of the inverse depths that are averaged (decision 28)
+SECOND_MEDIAN = 0.6745 * 6**0.5  # of the absolute second difference of normally distributed values, in deviations
 FINER = 3  # times the rows and columns of the pictures, interpolated, that are fused (decision 28)
 
 
@@ -59,24 +62,28 @@ def usual_pictures(moments: Iterable[Moment], options: BackgroundOptions = Backg
                 stacks.setdefault(number, []).append(_still(picture, rays, moment))
     found = list[DepthPicture]()
     for number, stack in sorted(stacks.items()):
-        depth = _medians(np.stack(stack), options.least(len(stack)))
+        depth = _medians(np.stack(stack), options)
         if depth.any():
             found.append(DepthPicture(cameras[number].camera, depth, cameras[number].unit, cameras[number].far))
     return found
 
 
 def _still(picture: DepthPicture, rays: Rays, moment: Moment) -> np.ndarray:
-    """Return the depths of a picture with 0 for pixels that see moving faces or lie within `BESIDE` pixels of those."""
+    """Return the depths of a picture, `HIDDEN` for pixels that see moving faces or are within `BESIDE` pixels of some."""
     moves = pixels_near(picture.camera, Mesh(moment.mesh.vertices, moment.mesh.faces[~moment.still]))
     faces = rays.faces_in(picture.camera, moves)  # of the whole mesh: what stands still may hide what moves
     moves[moves] = (faces >= 0) & ~np.append(moment.still, True)[faces]
-    return np.where(binary_dilation(moves, iterations=BESIDE), 0, picture.depth).astype(picture.depth.dtype)
+    return np.where(binary_dilation(moves, iterations=BESIDE), HIDDEN, picture.depth.astype(np.float32))
 
 
-def _medians(stack: np.ndarray, least: int) -> Float32[np.ndarray, "H W"]:
-    """Return for each pixel the median of its depths other than 0; 0 if there are fewer than `least`."""
-    depths = np.sort(np.where(stack > 0, stack, np.inf).astype(np.float32), axis=0)
+def _medians(stack: Float32[np.ndarray, "T H W"], options: BackgroundOptions) -> Float32[np.ndarray, "H W"]:
+    """Return for each pixel the median of its depths above 0; 0 where too few are.
+
+    A door that opens soon is measured a few times, and what is behind it perhaps never.
+    """
+    depths = np.sort(np.where(stack > 0, stack, np.inf), axis=0)
     count = np.isfinite(depths).sum(axis=0)
+    least = np.maximum(options.least(len(stack)), OPEN * (stack >= 0).sum(axis=0))
     low, high = (np.take_along_axis(depths, np.maximum(at, 0)[None], 0)[0] for at in ((count - 1) // 2, count // 2))
     return np.where(count >= least, (low + high) / 2, 0).astype(np.float32)
 
@@ -87,7 +94,7 @@ def _smooth(picture: DepthPicture) -> DepthPicture:
     Inverse depths are averaged, so that planes stay planes, with those around that are about as far.
     """
     inverse = np.where(picture.depth > 0, 1 / np.where(picture.depth > 0, picture.depth, 1), 0).astype(np.float32)
-    height, width = inverse.shape
+    (height, width), similar = inverse.shape, np.float32(max(SIMILAR * _noise(inverse), 1e-6))
     places = range(-SMOOTH, SMOOTH + 1)
     for _ in range(ROUNDS):
         padded, around = np.pad(inverse, SMOOTH), np.maximum(inverse, np.float32(1e-9))
@@ -95,13 +102,19 @@ def _smooth(picture: DepthPicture) -> DepthPicture:
         for down in places:
             for right in places:
                 there = padded[SMOOTH + down : SMOOTH + down + height, SMOOTH + right : SMOOTH + right + width]
-                near = (there - inverse) / (SIMILAR * around)
+                near = (there - inverse) / (similar * around)
                 weight = np.exp(-(near**2) / 2 - np.float32((down**2 + right**2) / (2 * SPREAD**2))) * (there > 0)
                 sums += weight * there
                 weights += weight
         inverse = np.where(inverse > 0, sums / np.maximum(weights, np.float32(1e-9)), 0)
-    depth = np.where(inverse > 0, 1 / np.where(inverse > 0, inverse, 1), 0).astype(np.float32)
-    return replace(picture, depth=depth)
+    return replace(picture, depth=np.where(inverse > 0, 1 / np.where(inverse > 0, inverse, 1), 0).astype(np.float32))
+
+
+def _noise(inverse: Float32[np.ndarray, "H W"]) -> float:
+    """Return the usual noise of a picture's inverse depths, as a share: by second differences, which planes have not."""
+    differences = np.abs(inverse[:, :-2] - 2 * inverse[:, 1:-1] + inverse[:, 2:])
+    known = (inverse[:, :-2] > 0) & (inverse[:, 1:-1] > 0) & (inverse[:, 2:] > 0)
+    return float(np.median((differences[known] / inverse[:, 1:-1][known]))) / SECOND_MEDIAN if known.any() else 0.0
 
 
 def _facing(mesh: Mesh, pictures: list[DepthPicture], least: float) -> Mesh:

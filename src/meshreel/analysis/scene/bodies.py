@@ -28,7 +28,7 @@ from ...geometry.voxels import Lattice, around, distinct, spread
 from ...types import Mesh
 
 MOST_RINGS = 4  # largest number of rings added around moving faces where the background has a gap: a guess
-BESIDE = 0.5  # m around moving surface where what the room lacks is taken for moving, too: a guess
+BESIDE = 0.9  # m around moving surface where what the room lacks is taken for moving, too: a guess
 SPECK = 0.002  # m^2: smaller pieces that the room lacks are noise: a guess
 RING = 2.0  # cells, the longest edge of a face in a ring, so that large faces of a wall stay out of it: a guess
 
@@ -40,8 +40,8 @@ class BodyOptions:
     cell: float = 3.0  # cells of the scene: pieces of consecutive frames nearer than this are one
     least: float = 0.1  # m^2: pieces that never reach this area are bits
     lasts: int = 5  # frames: bits that are present in at least this many are a body of their own
-    large: float = 0.008  # m^2, of such a body in a frame at least, on average
-    beside: float = 0.5  # m: other bits at most this far from a body join it; those farther off are dropped
+    large: float = 0.02  # m^2, of such a body in a frame at least, on average
+    beside: float = 0.9  # m: other bits at most this far from a body join it, as feet below legs that no camera sees
     touches: float = 2.0  # cells of the scene: the same for a bit that is there in one frame only
 
 

@@ -16,7 +16,7 @@ from ...geometry.cameras import PinholeCamera
 from ...geometry.raycast import Seen
 from ...geometry.strict import inverse, products
 
-_APART = (0.06, 0.02)  # m, and share of the depth: a pixel whose depth varies by more sees a change; guesses
+APART = (0.06, 0.02)  # m, and share of the depth: a pixel whose depth varies by more sees a change; guesses
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,7 +119,7 @@ def reference_view(moments: Sequence[Sequence[Seen]]) -> int:
         depths = np.stack([one.depth for one in seen])
         nearest, farthest = depths.min(axis=0), depths.max(axis=0)
         with np.errstate(invalid="ignore"):  # nothing is seen at any moment
-            changes.append(int((farthest - nearest > np.maximum(_APART[0], _APART[1] * nearest)).sum()))
+            changes.append(int((farthest - nearest > np.maximum(APART[0], APART[1] * nearest)).sum()))
     return int(np.argmax(changes))
 
 

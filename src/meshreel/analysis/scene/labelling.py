@@ -19,6 +19,7 @@ from ...geometry.raycast import Rays, Seen
 from ...geometry.topology import connected_faces, face_normals, unique_edges
 from ...geometry.voxels import Lattice, spread
 from ...types import Mesh
+from .color_change import ColorChange
 from .masks import Masker
 from .settle import Rest
 from .votes import Votes
@@ -82,7 +83,10 @@ class _LabelCache:
 
 @dataclass(frozen=True)
 class ByPlace:
-    """Segmentation by place: surface at a moving place moves, and so does surface far from every known place."""
+    """Segmentation by place: surface at a moving place moves, and so does surface far from every known place.
+
+    With `colors`, so does surface beside it that is a little nearer than the room and of another hue.
+    """
 
     cell: float  # m
     lattice: Lattice
@@ -90,6 +94,7 @@ class ByPlace:
     chosen: Bool[np.ndarray, " P"]
     rest: Rest  # the frames in which surface at a moving place belongs to the room nevertheless
     island: float  # m^2
+    colors: ColorChange | None = field(default=None, repr=False, compare=False)
     _cache: _LabelCache = field(default_factory=lambda: _LabelCache(_REMEMBERED), init=False, repr=False, compare=False)
 
     @property
@@ -108,11 +113,16 @@ class ByPlace:
 
     def _moving(self, frame: int, mesh: Mesh) -> Bool[np.ndarray, " F"]:
         chosen = self.chosen & (frame >= self.rest.until) & (frame < self.rest.since)
-        return without_islands(mesh, self.faces_at(mesh, chosen, elsewhere=True), self.island)
+        moving = self.faces_at(mesh, chosen, elsewhere=True)
+        if self.colors is not None and moving.any():
+            unlike = self.colors.faces(frame, mesh) & ~self.faces_at(mesh, self.chosen & ~chosen)
+            moving = _reached(mesh, moving, unlike)
+        return without_islands(mesh, moving, self.island)
 
     def still_at_first(self, frame: int, mesh: Mesh) -> Bool[np.ndarray, " F"]:
         """Return True for each face of frame `frame` that belongs to the room as it is in the first frame."""
-        return self.faces_at(mesh, ~self.chosen | (self.rest.until > frame))
+        still = self.faces_at(mesh, ~self.chosen | (self.rest.until > frame))
+        return still if self.colors is None else still & ~self.moving(frame, mesh)
 
     def came(self, change: int, mesh: Mesh) -> Bool[np.ndarray, " F"]:
         """Return True for each face at a place that rests from `change` on."""
@@ -222,6 +232,15 @@ def without_islands(mesh: Mesh, chosen: Bool[np.ndarray, " F"], least: float) ->
     beside[label[touched[mesh.faces[rests]].any(axis=1)]] = True
     moving[rests] = (area < least) & beside[label]
     return moving
+
+
+def _reached(mesh: Mesh, moving: Bool[np.ndarray, " F"], more: Bool[np.ndarray, " F"]) -> Bool[np.ndarray, " F"]:
+    """Return the moving faces and those of `more` that are connected with one."""
+    either = moving | more
+    label = connected_faces(mesh.faces[either], len(mesh.vertices))
+    reached = np.bincount(label, moving[either], len(mesh.vertices)) > 0
+    either[either] = reached[label]
+    return either
 
 
 def _areas(mesh: Mesh, chosen: Bool[np.ndarray, " F"]) -> tuple[Float64[np.ndarray, " C"], Int64[np.ndarray, " C"]]:

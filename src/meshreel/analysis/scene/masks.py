@@ -17,6 +17,7 @@ from ...geometry.cameras import PinholeCamera, unpack_cameras
 from ...geometry.raycast import Seen
 from ...io.mask_pictures import find_masks, read_mask
 from ...io.read import read_file
+from .color_looks import ColorLooks
 
 CAMERAS = "cameras.json"  # file name: Open3D's pinhole camera JSON, beside the folders of the views
 
@@ -28,9 +29,12 @@ class Masker(Protocol):
     views: tuple[PinholeCamera, ...] | None = None  # cameras of the masks; None: those that the scene is segmented with
     observes: bool = False  # whether `foresee` and `observe` must be called before the first masks
 
-    def foresee(self, moments: Sequence[Sequence[Seen]]) -> None:
-        """Learn what all views see at a few moments, to choose a reference view; called once, before `observe`."""
-        del moments
+    def foresee(self, moments: Sequence[Sequence[Seen]], colors: ColorLooks | None = None) -> None:
+        """Learn what all views see at a few moments, to choose a reference view; called once, before `observe`.
+
+        `colors` are the pictures of the views if these are colour cameras.
+        """
+        del moments, colors
 
     def observe(self, frame: int, seen: Sequence[Seen], views: Sequence[PinholeCamera]) -> None:
         """Learn what the views see of a frame; called for every frame in order, before the first masks."""

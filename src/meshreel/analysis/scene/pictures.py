@@ -1,7 +1,7 @@
 """Render the views as pictures for people and for tools that make masks (paper, section 3.2).
 
-In: what a view sees. Out: normals as colors, the paper's coloring; and folders of such pictures in the layout of the
-mask folders that `ImageMasks` reads.
+In: what a view sees, and the pictures of colour cameras where there are any. Out: those, without the bends of lenses,
+or normals as colors; and folders of such pictures in the layout of the mask folders that `ImageMasks` reads.
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ from jaxtyping import Float64, UInt8
 
 from ...geometry.cameras import PinholeCamera, pack_cameras
 from ...geometry.raycast import Rays, Seen
-from ...geometry.strict import inverse
 from ...io.write import frame_names, make_folder, replacing, write_picture
 from ...types import Frames
+from .color_looks import ColorLooks, ahead_of
 from .masks import CAMERAS, one_size
 
 
@@ -26,10 +26,7 @@ def normal_picture(seen: Seen, view: PinholeCamera) -> UInt8[np.ndarray, "H W 3"
     Normals are computed from the depths of neighbouring pixels, so they face the camera whatever the orientation of the
     faces.
     """
-    rows, columns = np.mgrid[: view.height, : view.width]
-    ahead = np.einsum(
-        "hwd,ed->hwe", np.stack([columns + 0.5, rows + 0.5, np.ones(rows.shape)], axis=-1), inverse(view.intrinsic)
-    )
+    ahead = ahead_of(view)
     hit = np.isfinite(seen.depth)
     points = np.where(hit, seen.depth, np.nan)[..., None] * ahead
     normals = np.nan_to_num(np.cross(_step(points, 1), _step(points, 0)))
@@ -41,12 +38,16 @@ def normal_picture(seen: Seen, view: PinholeCamera) -> UInt8[np.ndarray, "H W 3"
 
 
 def write_views(
-    folder: Path, frames: Frames, views: Sequence[PinholeCamera], report: Callable[[int], None] = lambda _done: None
+    folder: Path,
+    frames: Frames,
+    views: Sequence[PinholeCamera],
+    report: Callable[[int], None] = lambda _done: None,
+    colors: ColorLooks | None = None,
 ) -> None:
     """Write pictures of each frame from each view: view00/frame_00000.png ..., and `cameras.json` last.
 
-    A tool that makes masks from them keeps names and sizes, and puts the same `cameras.json` beside its masks.
-    `report` is called with the number of finished frames.
+    They are those in `colors`, whose views these are, or normals. A tool that makes masks from them keeps names and
+    sizes, and puts the same `cameras.json` beside its masks. `report` is called with the number of finished frames.
     """
     views = one_size(views, "views")
     places = [folder / f"view{number:02}" for number in range(len(views))]
@@ -54,8 +55,10 @@ def write_views(
         make_folder(place)
     for number, name in enumerate(frame_names(len(frames), "png")):
         rays = Rays(frames[number])
-        for view, place in zip(views, places, strict=True):
-            write_picture(normal_picture(rays.look(view), view), place / name)
+        for view, place in enumerate(places):
+            taken = None if colors is None else colors.at(number, view)
+            picture = normal_picture(rays.look(views[view]), views[view]) if taken is None else taken
+            write_picture(picture, place / name)
         report(number + 1)
     with replacing(folder / CAMERAS) as file:
         file.write(pack_cameras(views))

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from jaxtyping import Bool, Int64
 
 from ...errors import InputError
 from ...geometry.cameras import PinholeCamera
@@ -20,6 +21,8 @@ from ...geometry.derived_sequences import CapturedSequence, Chosen, TurnedOver, 
 from ...geometry.topology import edge_lengths, face_normals
 from ...geometry.voxels import Lattice
 from ...types import Mesh, MeshSequence, evenly
+from . import color_change
+from .color_looks import SIDE, ColorLooks
 from .cut import CutOptions, moving_places
 from .labelling import ByMasks, ByPlace, looks
 from .masks import Masker
@@ -30,6 +33,7 @@ from .views import ViewsOptions, place_views
 _PROBES = 3  # frames used to place the views: a guess
 _WIDTH = 4.75  # smallest width of a cell, in median distances between two frames: decision 18
 _WIDEST = 4.0  # largest width of a cell, in edge lengths: decision 18
+_STILL = 1.5  # times the noise: surface that is farther off from one frame to another has moved (decision 28)
 _THINNED = 7  # one vertex in this many is measured when two frames are compared: a guess, for speed
 
 
@@ -66,13 +70,23 @@ def segment(frames: MeshSequence, options: SegmentOptions = SegmentOptions(), re
 
 def _by_place(frames: CapturedSequence, chosen: Sequence[int], options: SegmentOptions, report: Report) -> ByPlace:
     cell, views = edge_length(frames, chosen), _views(frames, chosen, options)
-    lattice = _lattice(frames, chosen, cell)
+    noise = _apart(frames[chosen[0]], frames[chosen[len(chosen) // 2]])
+    lattice = Lattice.near(frames[chosen[0]], max(cell, min(_WIDTH * noise, _WIDEST * cell)))
     some = Chosen(frames, chosen)
     pictures = None if some.depth is None else some.depth.__getitem__
     places = find_places(Observations(some, views, pictures, report), lattice, options.places)
     moving = moving_places(places, options.cut)
-    rest = find_rest(places, moving, chosen, frames.frame_rate, options.settle)
-    return ByPlace(cell, lattice, places.keys, moving, rest, options.island)
+
+    def holds(some: Int64[np.ndarray, " C"], numbers: list[int]) -> bool:
+        first, *others = (frames[numbers[k]] for k in evenly(len(numbers), _PROBES))
+        there = np.isin(lattice.keys(first.vertices), places.keys[some])
+        return all(_apart(first, other, there) <= _STILL * noise for other in others)
+
+    rest = find_rest(places, moving, chosen, frames.frame_rate, options.settle, holds)
+    looks = _color_looks(frames, chosen, color_change.SIDE) if moving.any() else None
+    usual = [chosen[number] for number in evenly(len(chosen), color_change.MOMENTS)]
+    colors = None if looks is None else color_change.ColorChange.of(frames, looks, usual, cell)
+    return ByPlace(cell, lattice, places.keys, moving, rest, options.island, colors)
 
 
 def _faces_away(mesh: Mesh) -> bool:
@@ -86,9 +100,12 @@ def _faces_away(mesh: Mesh) -> bool:
 def segment_by(masker: Masker, frames: MeshSequence, options: SegmentOptions = SegmentOptions()) -> ByMasks:
     """Segment a scene by the masks of `masker`, which sees every frame before its first mask where it `observes`."""
     chosen = _to_see(frames)
-    views = _looking(masker.views, frames, chosen) or _views(frames, chosen, options)
+    colors = None if masker.views or options.cameras else _color_looks(frames, chosen)
+    given = masker.views if colors is None else colors.views
+    views = _looking(given, frames, chosen) or _views(frames, chosen, options)
     if masker.observes:
-        masker.foresee([looks(frames[number], views) for number in chosen[:: max(1, len(chosen) // _PROBES)]])
+        some = chosen[:: max(1, len(chosen) // _PROBES)]
+        masker.foresee([looks(frames[number], views) for number in some], colors)
         for number in range(len(frames)):
             masker.observe(number, looks(frames[number], views), views)
     return ByMasks(masker, views, edge_length(frames, chosen), options.threshold, options.island)
@@ -97,6 +114,24 @@ def segment_by(masker: Masker, frames: MeshSequence, options: SegmentOptions = S
 def scene_views(frames: MeshSequence, options: SegmentOptions = SegmentOptions()) -> tuple[PinholeCamera, ...]:
     """Return the views of a scene: given cameras, or placed ones. Raises InputError if no frame has a surface."""
     return _views(frames, _to_see(frames), options)
+
+
+def mask_views(
+    frames: MeshSequence, options: SegmentOptions = SegmentOptions()
+) -> tuple[tuple[PinholeCamera, ...], ColorLooks | None]:
+    """Return views for masks: given cameras, or colour cameras with their pictures, or placed views."""
+    chosen = _to_see(frames)
+    colors = None if options.cameras else _color_looks(frames, chosen)
+    return _views(frames, chosen, options) if colors is None else colors.views, colors
+
+
+def _color_looks(frames: MeshSequence, chosen: Sequence[int], side: int = SIDE) -> ColorLooks | None:
+    """Return the pictures of the colour cameras; None if there are none."""
+    colors = captured(frames).colors
+    if colors is None or not chosen:
+        return None
+    looks = ColorLooks(colors, chosen[0], side)
+    return looks if looks.views else None
 
 
 def _to_see(frames: MeshSequence) -> list[int]:
@@ -125,14 +160,13 @@ def _looking(
     return views
 
 
-def _lattice(frames: MeshSequence, chosen: Sequence[int], cell: float) -> Lattice:
-    """Return a lattice with cells as wide as the frames' edges (`cell`, m), wider where noise moves surface by more.
+def _apart(one: Mesh, other: Mesh, chosen: Bool[np.ndarray, " V"] | None = None) -> float:
+    """Return the median distance from (chosen) vertices of one frame to another frame, m.
 
-    Noise is estimated by the median distance from one frame to another: more than half of a scene stands still.
+    Of whole frames this is noise: more than half of a scene stands still. Infinite where there is no surface.
     """
-    first = frames[chosen[0]]
-    apart = distances(first.vertices[::_THINNED], frames[chosen[len(chosen) // 2]])
-    return Lattice.near(first, max(cell, min(_WIDTH * float(np.median(apart)), _WIDEST * cell)))
+    points = one.vertices[::_THINNED] if chosen is None else one.vertices[chosen]
+    return float(np.median(distances(points, other))) if len(points) and not other.is_empty else np.inf
 
 
 def edge_length(frames: MeshSequence, chosen: Sequence[int]) -> float:

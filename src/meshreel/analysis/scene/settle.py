@@ -6,7 +6,7 @@ surface at a moving place belongs to the room.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,11 +21,15 @@ _FEWEST = 3  # smallest number of inspected frames with surface in a time of res
 _ALIKE = 1  # largest difference, in inspected frames, between neighbours that change together: a guess
 
 
+Holds = Callable[[Int64[np.ndarray, " C"], list[int]], bool]
+
+
 @dataclass(frozen=True, slots=True)
 class SettleOptions:
     """Conditions for a change of the room (decision 18)."""
 
     rest: float = 10.0  # s of uninterrupted rest before or after the change: people do not stand still for as long
+    still: float = 0.8  # s of the same where surface does not move by more than noise, as a crate's (decision 28)
     share: float = 0.8  # smallest share of the inspected frames in that time that have surface at the place
     least: float = 0.15  # m^2, smallest area that changes together
 
@@ -54,8 +58,12 @@ def find_rest(
     numbers: Sequence[int],
     frame_rate: float,
     options: SettleOptions = SettleOptions(),
+    holds: Holds = lambda _places, _numbers: False,
 ) -> Rest:
-    """Find when moving places rest; `numbers` are the numbers of the inspected frames."""
+    """Find when moving places rest; `numbers` are the numbers of the inspected frames.
+
+    `holds` tells whether the surface at some places is where it was in all of some frames: nobody stands so still.
+    """
     rest = Rest.none(len(places.keys))
     frames = np.asarray(numbers, np.int32)
     late = _settled(places.tally.after, frames, frame_rate, options)
@@ -64,7 +72,8 @@ def find_rest(
     for at, order, out, sign in ((late, frames, rest.since, 1), (early, frames[::-1], rest.until, -1)):
         for group in _together(places, moving & (at >= 0), at, least):
             last = int(at[group].max())  # when the last of these places has come to rest
-            out[group] = order[last] if sign > 0 else order[last] + 1
+            if abs(int(order[-1] - order[last])) >= options.rest * frame_rate or holds(group, order[last:].tolist()):
+                out[group] = order[last] if sign > 0 else order[last] + 1
     return _with_unknown(places, moving, rest)
 
 
@@ -85,7 +94,7 @@ def _settled(
 ) -> Int64[np.ndarray, " P"]:
     """Return the index of the first inspected frame of each place's rest; -1 if its stay is too short or too patchy."""
     share = stay.count / (len(frames) - stay.first)
-    long = frames[-1] - frames[stay.first] >= options.rest * frame_rate
+    long = frames[-1] - frames[stay.first] >= min(options.rest, options.still) * frame_rate
     full = (share >= options.share) & (stay.count >= _FEWEST)
     return np.where((stay.first >= 0) & long & full, stay.first, -1).astype(np.int64)
 

@@ -1,0 +1,128 @@
+"""Rigid motion of a whole body, as of a door, a crate or a chair: one pose for each frame.
+
+In: the key frame's surface, another frame, a motion to start from. Out: the rigid motion that brings both together, by
+point-to-plane steps in both directions, and how far they are apart where it is worst.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float64
+
+from ...geometry.closest_points import Surface, area_samples
+from ...geometry.rigid import fit_rigid
+from ...geometry.strict import inverse, products, rotations_of
+from ...types import Mesh
+from ..fit.closeness import STRAY, shared_distance
+from ..fit.frame import ON_BORDER, FrameSurface
+from .embedded_graph import farthest_first
+
+ROUNDS = 12  # of point-to-plane steps, at most (guess)
+SETTLED = 1e-5  # a step that moves no point by more, in diagonals, is the last (guess)
+GATE = (0.03, 4.0)  # diagonals in the first round, halved in each; RMS noise at least: pairs farther apart are none (guess)
+ALONG = 0.1  # weight of the distance of frame surface past the body's border: it tells how far the body slid (guess)
+WHOLE, WORST = 1.6, 3.25  # RMS noise that the whole body, and its worst part, may be off (doors of room3: decision 28)
+BENDS = 1.75  # times the residual of a motion that bends (people: 2.5 and more; decision 28)
+EXACT = 1e-4  # diagonals, in place of the noise of clean frames (guess)
+SAMPLES = 1500  # of each surface (guess)
+BLOCKS = 24  # parts of a surface that are judged one by one: an arm that moves is not lost in a mean (guess)
+
+
+@dataclass(frozen=True, slots=True)
+class RigidMotion:
+    """The motion x -> turn x + shift."""
+
+    turn: Float64[np.ndarray, "3 3"]
+    shift: Float64[np.ndarray, "3"]
+
+    @staticmethod
+    def none() -> RigidMotion:
+        """Return the motion that leaves all points where they are."""
+        return RigidMotion(np.eye(3), np.zeros(3))
+
+    @staticmethod
+    def between(source: Float64[np.ndarray, "N 3"], target: Float64[np.ndarray, "N 3"]) -> RigidMotion:
+        """Return the rigid motion that is nearest to that of some points (Kabsch)."""
+        turns, shifts = fit_rigid(source[None], target[None], np.ones((1, len(source))))
+        return RigidMotion(turns[0], shifts[0])
+
+    def of(self, points: Float64[np.ndarray, "N 3"]) -> Float64[np.ndarray, "N 3"]:
+        """Return where points go."""
+        return products(points, self.turn.T) + self.shift
+
+    def after(self, angles: Float64[np.ndarray, "3"], step: Float64[np.ndarray, "3"]) -> RigidMotion:
+        """Return this motion followed by a small turn (half its angles make a quaternion) and a step."""
+        turn = rotations_of(np.concatenate([[1.0], angles / 2])[None])[0]
+        return RigidMotion(products(turn, self.turn), products(turn, self.shift[:, None])[:, 0] + step)
+
+
+class RigidBody:
+    """A key frame's surface, prepared to be brought to other frames as it is."""
+
+    def __init__(self, mesh: Mesh, noise: float) -> None:
+        """`noise` is the RMS distance of the frames from the truth."""
+        self._surface, self._noise, self._faces = Surface(mesh), noise, mesh.faces
+        self._vertices, self._chosen = mesh.vertices, area_samples(mesh, SAMPLES)
+        centers = mesh.vertices[farthest_first(mesh, self._chosen, BLOCKS)]
+        away = ((mesh.vertices[self._chosen][:, None] - centers) ** 2).sum(axis=2)
+        self._block = away.argmin(axis=1)
+
+    def brought(self, frame: FrameSurface, motion: RigidMotion) -> RigidMotion:
+        """Return the motion that brings the body onto a frame, from one that is near it."""
+        gate, least = GATE[0], GATE[1] * self._noise
+        for _ in range(ROUNDS):
+            rows, gaps = self._pairs(frame, motion, max(gate, least))
+            if len(rows) < 6:
+                break
+            normal = products(rows.T, rows) + 1e-9 * np.eye(6)
+            step = products(inverse(normal), products(rows.T, gaps[:, None]))[:, 0]
+            motion, gate = motion.after(step[:3], step[3:]), gate / 2
+            if np.abs(step).max() < SETTLED:
+                break
+        return motion
+
+    def holds(self, frame: FrameSurface, motion: RigidMotion, free: float) -> bool:
+        """Return whether a motion explains a frame about as well as one that bends, which left the residual `free`."""
+        whole, worst = self.residual(frame, motion)
+        noise = max(self._noise, EXACT)
+        return whole <= min(WHOLE * noise, BENDS * max(free, EXACT)) and worst <= WORST * noise
+
+    def residual(self, frame: FrameSurface, motion: RigidMotion) -> tuple[float, float]:
+        """Return the RMS distance from a frame, and that of the part of the body that is farthest from it."""
+        own, theirs = self._moved(motion), frame.mesh.vertices[frame.samples(SAMPLES)]
+        ahead, back = frame.surface.closest(own), self._surface.closest(theirs)
+        squares = ((ahead.points - own) ** 2).sum(axis=1), ((back.points - theirs) ** 2).sum(axis=1)
+        over = frame.inside_at(ahead) > ON_BORDER, ~self._surface.past_border(back)
+        noise = max(self._noise, EXACT)
+        usable = over[0] & (squares[0] <= (STRAY * noise) ** 2)
+        count = np.bincount(self._block[usable], minlength=BLOCKS)
+        sums = np.bincount(self._block[usable], squares[0][usable], minlength=BLOCKS)
+        parts = np.sqrt(sums[count >= 8] / count[count >= 8])
+        return shared_distance(squares, over, noise), float(parts.max(initial=0.0))
+
+    def _moved(self, motion: RigidMotion) -> Float64[np.ndarray, "S 3"]:
+        vertices = motion.of(self._vertices)
+        self._surface.move(vertices)
+        return vertices[self._chosen]
+
+    def _pairs(
+        self, frame: FrameSurface, motion: RigidMotion, gate: float
+    ) -> tuple[Float64[np.ndarray, "R 6"], Float64[np.ndarray, " R"]]:
+        """Return the rows of a small turn and step for pairs in both directions, and the gaps that they shall close."""
+        own, theirs = self._moved(motion), frame.mesh.vertices[frame.samples(SAMPLES)]
+        ahead, back = frame.surface.closest(own), self._surface.closest(theirs)
+        inside, past = frame.inside_at(ahead) > ON_BORDER, self._surface.past_border(back)
+        facing = frame.surface.normals[ahead.faces], self._surface.normals[back.faces]
+        found = list[tuple[np.ndarray, np.ndarray, np.ndarray]]()  # places on the body, directions, gaps along them
+        for places, aims, ways, good in (
+            (own, ahead.points, facing[0], inside),
+            (back.points, theirs, facing[1], ~past),
+            *((back.points, theirs, ALONG * np.broadcast_to(axis, theirs.shape), past) for axis in np.eye(3)),
+        ):
+            gaps = aims - places
+            near = good & ((gaps**2).sum(axis=1) <= gate**2)
+            found.append((places[near], ways[near], (gaps * ways).sum(axis=1)[near]))
+        places, ways, gaps = (np.concatenate(each) for each in zip(*found, strict=True))
+        return np.concatenate([np.cross(places, ways), ways], axis=1), gaps

@@ -1,0 +1,82 @@
+"""Faces in front of the room by less than the noise of places shows, found by their colour: feet on a floor.
+
+In: the pictures of colour cameras and the meshes of some frames. Out: faces that are nearer than the room usually is
+there and have another hue. Shadows change the brightness and hardly the hue, and are no nearer.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float32
+from scipy.ndimage import binary_opening, uniform_filter
+
+from ...geometry.raycast import Rays
+from ...types import Frames, Mesh
+from .color_looks import ColorLooks
+
+SIDE = 320  # pixels, most along the longer side of a view (guess)
+MOMENTS = 24  # frames that tell what is usual (guess)
+_FAR = 0.75  # quantile over them of the depth that is that of the room (guess)
+_ROOM = 3.0  # of `nearer`: within this distance of that depth a pixel shows the room (guess)
+_HUE = 0.015  # least change of a colour's share of the sum of channels (measured on a real room: .01 to .03 do)
+_NOISE = 4.0  # least change in standard deviations of a pixel (guess)
+_DARK = 30  # added to the sum of channels: the hue of dark pixels is noise (guess)
+
+
+@dataclass(frozen=True, slots=True)
+class ColorChange:
+    """What colour cameras usually see, to compare frames with it."""
+
+    looks: ColorLooks
+    nearer: float  # m, by which a pixel must be nearer than usual
+    depth: Float32[np.ndarray, "X H W"]  # m; NaN: nothing is seen
+    hue: Float32[np.ndarray, "X H W 2"]
+    limit: Float32[np.ndarray, "X H W"]  # by which a hue must differ
+
+    @staticmethod
+    def of(frames: Frames, looks: ColorLooks, numbers: Sequence[int], nearer: float) -> ColorChange:
+        """Find what is usual in some frames."""
+        depths, hues = [], []
+        for number in numbers:
+            rays = Rays(frames[number])
+            depths.append([rays.look(view).depth for view in looks.views])
+            hues.append([_hue(looks, number, view) for view in range(len(looks.views))])
+        depth = np.array(depths, np.float32)
+        far = _quantile(np.where(np.isfinite(depth), depth, np.nan), _FAR)
+        room = np.where((np.abs(depth - far) < _ROOM * nearer)[..., None], np.array(hues, np.float32), np.nan)
+        hue = _quantile(room, 0.5)
+        noise = 1.4826 * _quantile(np.abs(room - hue).max(axis=-1), 0.5)
+        return ColorChange(looks, nearer, far, hue, np.maximum(_HUE, _NOISE * noise))
+
+    def faces(self, frame: int, mesh: Mesh) -> Bool[np.ndarray, " F"]:
+        """Return the faces of a frame of which most pixels see another hue nearer than usual."""
+        rays, found, seen = Rays(mesh), np.zeros(len(mesh.faces)), np.zeros(len(mesh.faces))
+        for number, view in enumerate(self.looks.views):
+            sight = rays.look(view)
+            change = np.nan_to_num(np.abs(_hue(self.looks, frame, number) - self.hue[number]).max(axis=-1))
+            before = np.nan_to_num(self.depth[number] - sight.depth, neginf=0.0)
+            unlike = (uniform_filter(change, 3) > self.limit[number]) & (uniform_filter(before, 3) > self.nearer)
+            unlike = binary_opening(unlike, np.ones((2, 2)))
+            hit = sight.faces >= 0
+            found += np.bincount(sight.faces[hit & unlike], minlength=len(found))
+            seen += np.bincount(sight.faces[hit], minlength=len(found))
+        return (found > 0) & (2 * found >= seen)
+
+
+def _hue(looks: ColorLooks, frame: int, view: int) -> Float32[np.ndarray, "H W 2"]:
+    """Return the shares of red and green in the colours that a view sees; NaN where its camera lacks the frame."""
+    picture = looks.at(frame, view)
+    if picture is None:
+        return np.full((looks.views[view].height, looks.views[view].width, 2), np.nan, np.float32)
+    values = picture.astype(np.float32)
+    return values[..., :2] / (values.sum(axis=-1, keepdims=True) + _DARK)
+
+
+def _quantile(stack: Float32[np.ndarray, "T ..."], share: float) -> Float32[np.ndarray, "..."]:
+    """Return a quantile over the first axis of what is no NaN; NumPy's own takes a minute for four cameras."""
+    ordered, known = np.sort(stack, axis=0), (~np.isnan(stack)).sum(axis=0)  # NaN last
+    at = np.rint(share * np.maximum(known - 1, 0)).astype(np.int64)
+    return np.take_along_axis(ordered, at[None], axis=0)[0]
