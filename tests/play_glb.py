@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
-from meshreel.io.color import from_linear
+from meshreel.io.glb_file import from_linear
 from meshreel.types import Mesh, Texture
 
 _TYPES = {5126: "<f4", 5125: "<u4", 5123: "<u2"}

@@ -10,7 +10,7 @@ import numpy as np
 from PIL import Image
 from pxr import Ar, Usd, UsdGeom, UsdShade, UsdValidation
 
-from meshreel.io.color import from_linear
+from meshreel.io.glb_file import from_linear
 from meshreel.types import Mesh, Texture
 
 _ROUNDED = 1.001e-6  # s: a time of whole microseconds may be that of the frame rate, rounded

@@ -204,7 +204,6 @@ class MeshSequence(Frames, Protocol):
     @property
     def frame_rate(self) -> float:
         """Frames per second, 1/s."""
-        ...
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,7 +14,11 @@ from meshreel.io.write import write_picture
 from tests.capture.wrong_poses import errors
 
 cv2 = pytest.importorskip("cv2")
-BOARDS = [BoardOptions(), BoardOptions("apriltag", 4, 3, 0.08, 0.06), BoardOptions("apriltag", 1, 1, 0.3, 0.25)]
+BOARDS = [
+    BoardOptions("charuco"),
+    BoardOptions("apriltag", 4, 3, 0.08, 0.06),
+    BoardOptions("apriltag", 1, 1, 0.3, 0.25),
+]
 WIDTH, HEIGHT, FOCAL = 960, 720, 900.0
 INTRINSIC = np.array([[FOCAL, 0, WIDTH / 2 - 0.5], [0, FOCAL, HEIGHT / 2 - 0.5], [0, 0, 1]])
 PIXELS = 4000  # of the printed board, a metre

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from meshreel.geometry.holes import close_holes
-from meshreel.geometry.topology import face_normals, unique_edges
+from meshreel.geometry.topology import close_holes, face_normals, unique_edges
 from meshreel.types import Mesh
 from tests.spheres import deforming_sphere
 

@@ -18,8 +18,7 @@ from PIL import Image
 from meshreel.errors import InputError
 from meshreel.geometry.painted import Painted
 from meshreel.geometry.topology import clean, concatenate, part_of, weld
-from meshreel.io.color import from_linear, to_linear
-from meshreel.io.glb_file import cut_at_seams
+from meshreel.io.glb_file import cut_at_seams, from_linear, to_linear
 from meshreel.io.meshes import read_mesh
 from meshreel.io.pictures import pack_picture, read_picture
 from meshreel.io.polygons import eight_bits

@@ -30,7 +30,6 @@ def test_area_errors_agree_with_brute_force_over_random_surface_points():
     distances = brute_force_distances(_random_points(a, 20_000), b)
     assert errors.forward.rms == pytest.approx(np.sqrt((distances**2).mean()), rel=0.02)
     assert errors.forward.hausdorff95 == pytest.approx(np.quantile(distances, 0.95), rel=0.03)
-    assert errors.forward.maximum >= distances.max() * 0.98
 
 
 def test_a_shifted_plane_has_the_psnr_of_its_shift():
@@ -109,7 +108,7 @@ def test_meshes_of_any_size_are_measured_as_those_of_a_metre(power):
     assert there.d2_psnr_paper == pytest.approx(here.d2_psnr_paper, abs=1e-4)
     assert there.d2_psnr == pytest.approx(here.d2_psnr, abs=1e-4)
     assert there.angle == pytest.approx(here.angle, abs=1e-3)
-    for name in ("rms", "hausdorff95", "maximum"):
+    for name in ("rms", "hausdorff95"):
         assert getattr(there.backward, name) == pytest.approx(getattr(here.backward, name) * scale, rel=1e-4)
     assert surface_errors(moved(a, scale=scale), moved(a, scale=scale)).d1_psnr == math.inf
     assert surface_errors(a, moved(b, scale=scale)).d2_psnr < 20  # no query is lost where sizes are far apart

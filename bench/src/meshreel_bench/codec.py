@@ -17,20 +17,16 @@ class Codec(Protocol):
     @property
     def name(self) -> str:
         """Name in rows and plots."""
-        ...
 
     @property
     def options(self) -> dict[str, Any]:
         """The operating point, ready for JSON."""
-        ...
 
     def encode(self, sequence: MeshSequence, progress: Progress | None = None) -> bytes:
         """Return all that a decoder needs; its length is the rate."""
-        ...
 
     def decode(self, data: bytes) -> Sequence[Mesh]:
         """Return the frames, from the bytes alone; may decode lazily, frame by frame."""
-        ...
 
 
 @runtime_checkable
@@ -40,12 +36,9 @@ class TwoStepCodec(Codec, Protocol):
     @property
     def analysis_key(self) -> str:
         """Equal for operating points that share an analysis, of one codec or of several."""
-        ...
 
     def analyse(self, sequence: MeshSequence, progress: Progress | None = None) -> Any:
         """Return the analysis that several operating points share."""
-        ...
 
     def code(self, analysis: Any, progress: Progress | None = None) -> bytes:
         """Return the bytes; the analysis stays as it was."""
-        ...

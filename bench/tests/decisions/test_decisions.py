@@ -11,8 +11,7 @@ from pkgutil import iter_modules
 import pytest
 from meshreel_bench import decisions
 from meshreel_bench.decisions.__main__ import main
-from meshreel_bench.decisions.rows import read
-from meshreel_bench.decisions.tables import COLUMNS, PIVOTS, write_tables
+from meshreel_bench.decisions.tables import COLUMNS, PIVOTS, read, write_tables
 
 PAGES = Path(__file__).parents[3] / "docs" / "decisions"
 TOLD = {"float64", "lattice"}  # decisions whose rows a page tells in a sentence

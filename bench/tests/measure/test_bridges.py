@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from meshreel_bench.measure.bridges import count_bridges, count_degenerate
+from meshreel_bench.measure.metrics import count_bridges, count_degenerate
 
 from meshreel.geometry.topology import concatenate
 from meshreel.types import Mesh

@@ -8,16 +8,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import combinations
-from typing import Any, Literal
+from itertools import permutations
+from typing import Annotated, Any, Literal
 
 import numpy as np
-from jaxtyping import Float64, UInt8
+from cyclopts import Parameter
+from jaxtyping import UInt8
 
 from ..errors import InputError
 from ..geometry import strict
 from .color_cameras import ColorCamera
-from .poses import Pose, mean_pose
+from .poses import Pose, mean_pose, pose_of
 
 LEAST_CORNERS = 6  # of a board in a picture: four and one to check them, and one more (guess)
 WORST = 2.0  # pixels between corners and where the board's pose puts them, root mean square (guess)
@@ -28,12 +29,18 @@ LOOKED_AT = 200  # frames, at most (guess)
 class BoardOptions:
     """A printed board: ChArUco (a chessboard with markers on its white squares), or a grid of AprilTags."""
 
-    kind: Literal["charuco", "apriltag"] = "charuco"
-    columns: int = 7  # squares or tags
+    kind: Annotated[Literal["charuco", "apriltag"] | None, Parameter(name="--board")] = None
+    """Kind of a board that was moved through the colour pictures (extra `calibrate`)."""
+    columns: int = 7
+    """Squares (of a ChArUco board) or tags in a row of the board."""
     rows: int = 5
-    square: float = 0.04  # m, side of a square, or from one tag to the next
-    marker: float = 0.03  # m, side of a marker or tag, its black border included
-    dictionary: str = ""  # OpenCV's name of the markers, as 5X5_100; empty: 5X5_100, or APRILTAG_36h11
+    """Rows of the board."""
+    square: float = 0.04
+    """Side of a square, or from one tag to the next, m."""
+    marker: float = 0.03
+    """Side of a marker or tag, its black border included, m."""
+    dictionary: str = ""
+    """OpenCV's name of the markers; 5X5_100, and APRILTAG_36h11 for tags, where none is given."""
 
     def __post_init__(self) -> None:
         if not (1 <= self.columns <= 100 and 1 <= self.rows <= 100 and 0 < self.marker < self.square < 10):
@@ -43,14 +50,14 @@ class BoardOptions:
     def made(self) -> Any:
         """Return OpenCV's board. Raises InputError where OpenCV is missing, or has no such markers."""
         aruco = opencv().aruco
-        name = f"DICT_{self.dictionary or ('5X5_100' if self.kind == 'charuco' else 'APRILTAG_36h11')}"
+        name = f"DICT_{self.dictionary or ('APRILTAG_36h11' if self.kind == 'apriltag' else '5X5_100')}"
         if not hasattr(aruco, name):
             known = ", ".join(one[5:] for one in dir(aruco) if one.startswith("DICT_"))
             raise InputError(f"dictionary {name[5:]!r:.40} is not known to OpenCV; give one of {known}")
         markers, size = aruco.getPredefinedDictionary(getattr(aruco, name)), (self.columns, self.rows)
-        if self.kind == "charuco":
-            return aruco.CharucoBoard(size, self.square, self.marker, markers)
-        return aruco.GridBoard(size, self.marker, self.square - self.marker, markers)
+        if self.kind == "apriltag":
+            return aruco.GridBoard(size, self.marker, self.square - self.marker, markers)
+        return aruco.CharucoBoard(size, self.square, self.marker, markers)
 
 
 def opencv() -> Any:
@@ -69,25 +76,20 @@ def poses_by_board(cameras: Sequence[ColorCamera], options: BoardOptions) -> tup
     """
     board = options.made()
     seen = [_seen(camera, board) for camera in cameras]
-    pairs = {
-        (i, j): [
-            strict.products(seen[i][n], strict.inverse(seen[j][n])) for n in sorted(seen[i].keys() & seen[j].keys())
-        ]
-        for i, j in combinations(range(len(cameras)), 2)
+    across = {  # poses of j in i
+        (i, j): [strict.products(pose, strict.inverse(seen[j][n])) for n, pose in seen[i].items() if n in seen[j]]
+        for i, j in permutations(range(len(cameras)), 2)
     }
-    together = sorted((pair for pair in pairs if pairs[pair]), key=lambda pair: -len(pairs[pair]))
+    together = sorted((pair for pair in across if across[pair]), key=lambda pair: -len(across[pair]))
     if not together:
         counts = ", ".join(f"{camera.name} in {len(found)} frames" for camera, found in zip(cameras, seen, strict=True))
         text = f"no two cameras see the board in one frame ({counts or 'there are no colour cameras'})"
         raise InputError(f"{text}; check its numbers and dictionary, or move it where several see it")
     first = min(min(pair) for pair in together)
     placed = {first: cameras[first].camera_to_world}
-    while steps := [pair for pair in together if (pair[0] in placed) != (pair[1] in placed)]:
+    while steps := [(i, j) for i, j in together if i in placed and j not in placed]:
         i, j = steps[0]  # of those, the pair with the most frames
-        across = mean_pose(pairs[i, j])  # from j to i
-        placed[j if i in placed else i] = (
-            strict.products(placed[i], across) if i in placed else strict.products(placed[j], strict.inverse(across))
-        )
+        placed[j] = strict.products(placed[i], mean_pose(across[i, j]))
     lost = [camera.name for number, camera in enumerate(cameras) if number not in placed]
     text = f"{', '.join(lost)} did not see the board together with {cameras[first].name}, also not through others"
     return {cameras[n].name: pose for n, pose in placed.items()}, [f"{text}; poses stay as given"] if lost else []
@@ -97,11 +99,10 @@ def _seen(camera: ColorCamera, board: Any) -> dict[int, Pose]:
     """Return the board's pose in the camera, by frame."""
     frames = sorted(camera.files)
     chosen = sorted({frames[int(k)] for k in np.linspace(0, len(frames) - 1, LOOKED_AT)})
-    found = {}
+    found = dict[int, Pose]()
     for frame in chosen:
         picture = camera.picture(frame)
-        pose = None if picture is None else _board_pose(picture.pixels, camera, board)
-        if pose is not None:
+        if picture is not None and (pose := _board_pose(picture.pixels, camera, board)) is not None:
             found[frame] = pose
     return found
 
@@ -120,7 +121,10 @@ def _board_pose(pixels: UInt8[np.ndarray, "H W 3"], camera: ColorCamera, board: 
         return None
     places, points = board.matchImagePoints(corners, ids)
     least = 4 if len(ids) == 1 and board.getIds().size == 1 else LEAST_CORNERS
-    if places is None or len(places) < least or _on_a_line(places.reshape(-1, 3)):
+    if places is None or len(places) < least:
+        return None
+    places = places.reshape(-1, 3)
+    if np.linalg.matrix_rank(places - places[:1], tol=1e-6) < 2:  # on a line, about which the board is free to turn
         return None
     lens = camera.intrinsic, np.array(camera.distortion)
     good, turn, shift = cv2.solvePnP(places, points, *lens, flags=cv2.SOLVEPNP_IPPE)
@@ -130,11 +134,4 @@ def _board_pose(pixels: UInt8[np.ndarray, "H W 3"], camera: ColorCamera, board: 
     apart = cv2.projectPoints(places, turn, shift, *lens)[0].reshape(-1, 2) - points.reshape(-1, 2)
     if float(np.sqrt((apart**2).sum(axis=1).mean())) > WORST:
         return None
-    pose = np.eye(4)
-    pose[:3, :3], pose[:3, 3] = cv2.Rodrigues(turn)[0], shift.reshape(3)
-    return pose
-
-
-def _on_a_line(places: Float64[np.ndarray, "N 3"] | Any) -> bool:
-    """Return whether corners leave the board free to turn."""
-    return bool(np.linalg.matrix_rank(places[:, :2] - places[:1, :2], tol=1e-6) < 2)
+    return pose_of(turn.reshape(3), shift.reshape(3))

@@ -6,11 +6,10 @@ pictures that are aligned with its depth, or an object that says what is differe
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from jaxtyping import Float64
@@ -21,7 +20,7 @@ from ..geometry.color_views import ColorPicture
 from ..io.file_names import last_number
 from ..io.pictures import read_picture
 
-PICTURES = (".png", ".jpg", ".jpeg", ".webp", ".bmp")
+PICTURES = {"depth": (".png",), "color": (".png", ".jpg", ".jpeg", ".webp", ".bmp")}
 MOST_DISTORTION = 10.0  # of a coefficient: beyond, the picture would fold many times (guess)
 
 
@@ -36,6 +35,7 @@ class ColorCamera:
     camera_to_world: Float64[np.ndarray, "4 4"]  # m
     distortion: tuple[float, ...]  # k1, k2, p1, p2, k3, and perhaps k4, k5, k6, as OpenCV has them
     files: Mapping[int, Path]  # pictures by frame number
+    beside: int | None = None  # number of the depth camera that it stands beside; None: it stands alone
 
     def picture(self, frame: int) -> ColorPicture | None:
         """Read the picture of a frame, None where there is none. Raises InputError where it has another size."""
@@ -50,23 +50,23 @@ class ColorCamera:
         return ColorPicture(camera, pixels, self.distortion)
 
 
-def pictures_in(folder: Path, name: str) -> dict[int, Path]:
-    """Return the pictures in a folder by the last number in their names. Raises InputError where there is none."""
+def pictures_in(folder: Path, name: str, kind: Literal["depth", "color"]) -> dict[int, Path]:
+    """Return a camera's pictures by the last number in their names. Raises InputError where there is none."""
     try:
-        paths = sorted(p for p in folder.iterdir() if p.suffix.lower() in PICTURES and not p.name.startswith("."))
+        paths = sorted(p for p in folder.iterdir() if p.suffix.lower() in PICTURES[kind] and not p.name.startswith("."))
     except OSError as error:
-        text = f"{folder}: color of camera {name} cannot be read ({error.strerror})"
-        raise InputError(f"{text}; name its folder, or leave `color` out") from None
+        text = f"{folder}: {kind} of camera {name} cannot be read ({error.strerror})"
+        raise InputError(f"{text}; name its folder as `{kind}`, or leave it out") from None
     found: dict[int, Path] = {}
     for path in paths:
         number = last_number(path.stem)
         if number is None:
-            raise InputError(f"{path}: has no frame number in its name; name it as color_00012.png")
+            raise InputError(f"{path}: has no frame number in its name; name it as {kind}_00012.png")
         if number in found:
             raise InputError(f"{path}: is frame {number}, as {found[number].name} is; keep one of them")
         found[number] = path
     if not found:
-        raise InputError(f"{folder}: camera {name} has no color pictures; record some, or leave `color` out")
+        raise InputError(f"{folder}: camera {name} has no {kind} pictures (*{PICTURES[kind][0]}); record some")
     return found
 
 
@@ -83,10 +83,7 @@ def distortion_of(entry: Mapping[str, Any]) -> tuple[float, ...]:
     """Return the coefficients of an entry, five at least; missing ones are 0. Raises InputError for others."""
     given = entry.get("distortion", [])
     good = isinstance(given, list) and len(given) <= 8
-    numbers = [k for k in given if isinstance(k, (int, float)) and not isinstance(k, bool)] if good else []
-    if not good or len(numbers) < len(given) or not all(abs(k) <= MOST_DISTORTION for k in numbers):
+    if not good or not all(type(k) in (int, float) and abs(k) <= MOST_DISTORTION for k in given):  # no NaN is
         text = "give up to eight numbers, k1 k2 p1 p2 k3 k4 k5 k6, as OpenCV has them"
         raise InputError(f"distortion is {given!r:.60}; {text}")
-    if any(math.isnan(k) for k in numbers):
-        raise InputError("distortion has a number that is not finite; calibrate the camera again")
-    return (*map(float, numbers), *[0.0] * (5 - len(numbers)))
+    return (*map(float, given), *[0.0] * (5 - len(given)))

@@ -16,12 +16,11 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float64, Int64
 
-from ..errors import InputError
 from ..geometry.topology import concatenate, weld
 from ..types import Mesh
 from .figure import Pose, figure
 from .implicit import polygonize
-from .procedural import grid_of_frame
+from .procedural import check_frames, grid_of_frame
 from .rig import DepthCamera
 from .simulated_color import ColorSensorOptions
 from .simulated_rig import SceneFrame, SensorOptions, corner_cameras, simulate_rig
@@ -34,10 +33,8 @@ NOISE = 0.3  # of the sensor, see `SensorOptions.noise` (guess)
 VOXEL = 0.03  # m, for the fusion of such pictures (guess)
 SIZE = (3.0, 1.7, 2.6)  # m, of the room; its origin is the middle of the floor (guess)
 _FACE = 0.1  # m, about the side length of the room's faces (guess)
-_LOW, _HIGH = (
-    (-1.4, 0.0, -1.2),
-    (1.7, 2.3, 1.6),
-)  # m, box of the cameras: inside the walls, outside the open sides (guess)
+# m, box of the cameras: inside the walls, outside the open sides (guess).
+_LOW, _HIGH = (-1.4, 0.0, -1.2), (1.7, 2.3, 1.6)
 _CIRCLE, _SPEED = 0.8, 0.8  # m and m/s, of the walk around the middle (guess)
 _CYCLE, _STRIDE = 0.9, 0.42  # m walked in a step cycle, m of a step (guess)
 _SOLE = 0.01  # m by which feet would sink into the floor (guess)
@@ -68,12 +65,7 @@ class RoomOptions:
     seed: int = 0  # of the grids
 
     def __post_init__(self) -> None:
-        if self.frames < 1:
-            raise InputError(f"frames {self.frames} is below 1; ask for at least one")
-        if not 0.008 <= self.spacing <= 0.1:
-            raise InputError(f"spacing {self.spacing} m is outside 0.008 to 0.1; 0.03 suits a room")
-        if not (math.isfinite(self.frame_rate) and self.frame_rate > 0):
-            raise InputError(f"frame rate {self.frame_rate} is not a positive number; give one, as 30")
+        check_frames(self.frames, self.frame_rate, self.spacing)
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,7 +5,7 @@ The person stands at its own origin and faces +z, with y up and x to its left. S
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float64
@@ -40,7 +40,10 @@ def figure(pose: Pose, thinnest: float) -> Body:
     """Return the person's parts in world coordinates, none thinner than `thinnest` (m), so that a grid resolves it."""
     bob = -pose.stride * (0.035 + 0.02 * np.cos(4 * np.pi * pose.step))  # lowest when both feet are far apart
     lift = np.array([0.0, bob + pose.hips[0], pose.hips[1]])
-    chains = [_leaned(chain, lift, pose.lean) for chain in (_torso(lift, pose), _head(lift))]
+    chains = [
+        replace(one, starts=_lean(one.starts, lift, pose.lean), ends=_lean(one.ends, lift, pose.lean))
+        for one in (_torso(lift, pose), _head(lift))
+    ]
     for side, phase in ((1.0, 0.0), (-1.0, 0.5)):
         chains += [_leg(lift, side, pose.step + phase, pose.stride), *_arm(lift, side, pose)]
     turn = turn_about_y(pose.heading)
@@ -69,11 +72,6 @@ def _chain(rows: list[Row], blend: float, join: float) -> Chain:
 
 def _moved(chain: Chain, by: Vector) -> Chain:
     return Chain(chain.starts + by, chain.ends + by, chain.radii, chain.blend, chain.join)
-
-
-def _leaned(chain: Chain, lift: Vector, lean: float) -> Chain:
-    starts, ends = (_lean(points, lift, lean) for points in (chain.starts, chain.ends))
-    return Chain(starts, ends, chain.radii, chain.blend, chain.join)
 
 
 def _lean(points: np.ndarray, lift: Vector, lean: float) -> np.ndarray:

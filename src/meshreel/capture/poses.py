@@ -83,20 +83,34 @@ def mean_pose(poses: Iterable[Pose]) -> Pose:
     return mean
 
 
-def pose_of(turn: Any, shift: Any) -> Pose:
-    """Return the matrix of a rotation (3 x 3, a rotation vector, or a quaternion w, x, y, z) and a translation."""
+def pose_of(turns: Any, shifts: Any) -> Float64[np.ndarray, "*T 4 4"]:
+    """Return the matrices of rotations (3 x 3, quaternions x y z w, or rotation vectors) and translations.
+
+    Raises ValueError for numbers that are no rotation.
+    """
     from scipy.spatial.transform import Rotation
 
-    numbers = np.array(turn, dtype=np.float64)
-    if numbers.size == 9:
-        matrix = numbers.reshape(3, 3)
-    elif numbers.size == 4:
-        matrix = Rotation.from_quat(np.roll(numbers.reshape(4), -1)).as_matrix()
-    else:
-        matrix = Rotation.from_rotvec(numbers.reshape(3)).as_matrix()
+    numbers, places = np.asarray(turns, np.float64), np.asarray(shifts, np.float64)
+    if numbers.shape[-2:] != (3, 3):
+        read = Rotation.from_quat if numbers.shape[-1] == 4 else Rotation.from_rotvec
+        numbers = read(numbers).as_matrix()
+    poses = np.zeros((*places.shape[:-1], 4, 4))
+    poses[..., :3, :3], poses[..., :3, 3], poses[..., 3, 3] = numbers, places, 1.0
+    return poses
+
+
+def pose_in_root(above: Mapping[str, tuple[str, Pose]], frame: str) -> tuple[str, Pose]:
+    """Return the root of a frame, and the frame's pose in it; `above` has each frame's parent, and its pose there.
+
+    Raises ValueError for frames that hang on each other.
+    """
     pose = np.eye(4)
-    pose[:3, :3], pose[:3, 3] = matrix, np.array(shift, dtype=np.float64).reshape(3)
-    return pose
+    for _ in range(len(above) + 1):
+        if frame not in above:
+            return frame, pose
+        frame, step = above[frame]
+        pose = strict.products(step, pose)
+    raise ValueError(f"frame {frame} hangs on itself")
 
 
 def _seen_from(turn: Any, shift: Any) -> Pose:
@@ -125,7 +139,7 @@ def _colmap(images: Iterable[tuple[str, list[float]]]) -> dict[str, Pose]:
     groups = defaultdict(list)
     for name, numbers in images:
         folder, _, stem = name.replace("\\", "/").rpartition("/")
-        groups[folder or Path(stem).stem].append(_seen_from(numbers[:4], numbers[4:]))
+        groups[folder or Path(stem).stem].append(_seen_from(np.roll(numbers[:4], -1), numbers[4:]))
     return {name: mean_pose(poses) for name, poses in groups.items()}
 
 
@@ -170,7 +184,8 @@ def _opencv(record: dict[str, Any]) -> dict[str, Pose]:
         kind, _, name = key.partition("_")
         named = [f"{turn}_{name}" for turn in _TURNS if f"{turn}_{name}" in matrices]
         if kind in _SHIFTS and name and named:
-            found[name] = _seen_from(matrices[named[0]], shift)
+            turn = matrices[named[0]]
+            found[name] = _seen_from(turn if len(turn) == 3 else np.reshape(turn, (3, 3)), shift)
     return found
 
 
@@ -186,19 +201,10 @@ def _transforms(records: list[dict[str, Any]]) -> dict[str, Pose]:
     above = {}
     for record in records:
         shift, turn = record["transform"]["translation"], record["transform"]["rotation"]
-        pose = pose_of([turn[axis] for axis in "wxyz"], [shift[axis] for axis in "xyz"])
+        pose = pose_of([turn[axis] for axis in "xyzw"], [shift[axis] for axis in "xyz"])
         above[record["child_frame_id"].strip("/")] = (record["header"]["frame_id"].strip("/"), pose)
-
-    def placed(frame: str, depth: int = 0) -> Pose:
-        if depth > len(above):
-            raise ValueError(f"frame {frame} hangs on itself")
-        if frame not in above:
-            return np.eye(4)
-        parent, pose = above[frame]
-        return strict.products(placed(parent, depth + 1), pose)
-
     optical = [frame for frame in above if frame.endswith("optical_frame")]
-    return {frame: placed(frame) for frame in optical or above}
+    return {frame: pose_in_root(above, frame)[1] for frame in optical or above}
 
 
 _READERS: dict[str, Callable[[bytes], Mapping[str, Any]]] = {

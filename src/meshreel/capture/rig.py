@@ -22,8 +22,7 @@ from ..errors import InputError
 from ..geometry.cameras import PinholeCamera
 from ..geometry.depth import DepthPicture
 from ..io.depth_pictures import read_depth
-from ..io.file_names import last_number
-from ..io.read import read_file
+from ..io.read import read_json
 from ..io.write import replacing
 from ..types import UP_AXES, UPS, Up
 from .color_cameras import ColorCamera, check_frames, distortion_of, pictures_in
@@ -67,11 +66,9 @@ class DepthCamera:
         if not (math.isfinite(self.depth_unit) and self.depth_unit > 0 and 0 <= near < far < math.inf):
             text = f"depth unit {self.depth_unit:g}, range {near:g} to {far:g}"
             raise InputError(f"camera {self.name}: {text}: give metres, unit above 0 and 0 <= nearest < farthest")
-        broken = _broken(self.camera_to_world)
-        if broken:
-            raise InputError(
-                f"camera {self.name}: camera_to_world {broken}; calibrate it again, or leave the camera out"
-            )
+        if broken := _broken(self.camera_to_world):
+            text = f"camera {self.name}: camera_to_world {broken}"
+            raise InputError(f"{text}; calibrate it again, or leave the camera out")
 
     @property
     def intrinsic(self) -> Float64[np.ndarray, "3 3"]:
@@ -168,9 +165,9 @@ def read_rig(folder: Path) -> Rig:
     """Read the rig in a folder. Raises InputError where its description or a camera's pictures are missing or wrong."""
     entries, cameras, rate, alone = _described(folder)
     folders = [folder / str(e.get("depth", f"{c.name}/depth")) for e, c in zip(entries, cameras, strict=True)]
-    files = tuple(_pictures(place, camera) for place, camera in zip(folders, cameras, strict=True))
-    beside = zip(entries, cameras, strict=True)
-    colors = [_color_camera(folder, e["color"], c.record() | {"name": c.name}) for e, c in beside if "color" in e]
+    files = tuple(pictures_in(place, camera.name, "depth") for place, camera in zip(folders, cameras, strict=True))
+    beside = [number for number, entry in enumerate(entries) if "color" in entry]
+    colors = [_color_camera(folder, entries[k]["color"], cameras[k].record(), k) for k in beside]
     colors += [_color_camera(folder, entry, {"name": f"color{number}"}) for number, entry in enumerate(alone)]
     rig = Rig(folder, cameras, files, rate, tuple(_unknown(folder, entries)), tuple(colors))
     check_frames(folder, colors, rig.frames)
@@ -187,13 +184,13 @@ def _described(folder: Path) -> tuple[list[Any], tuple[DepthCamera, ...], float,
     """Read a description: its entry per camera, the cameras, their frame rate, 1/s, and entries of further cameras."""
     path, single = folder / RIG, folder / SINGLE
     if path.exists():
-        record = _json(path)
+        record = read_json(path, "give JSON")
         entries = record.get("cameras")
         if not isinstance(entries, list) or not entries:
             raise InputError(f"{path}: has no list `cameras`; describe one camera at least")
     elif single.exists():
         path = single
-        record = _json(path)
+        record = read_json(path, "give JSON")
         color = {"color": "color"} if (folder / "color").is_dir() else {}
         entries = [{"name": folder.resolve().name, "depth": "depth"} | color | record]
     else:
@@ -304,27 +301,7 @@ def _broken(pose: Float64[np.ndarray, "4 4"]) -> str:
     return ""
 
 
-def _pictures(folder: Path, camera: DepthCamera) -> dict[int, Path]:
-    """Return the depth pictures in a folder by the last number in their names."""
-    try:
-        paths = sorted(p for p in folder.iterdir() if p.suffix.lower() == ".png" and not p.name.startswith("."))
-    except OSError as error:
-        text = f"{folder}: depth of camera {camera.name} cannot be read ({error.strerror})"
-        raise InputError(f"{text}; name its folder as `depth` in {RIG}") from None
-    found: dict[int, Path] = {}
-    for path in paths:
-        number = last_number(path.stem)
-        if number is None:
-            raise InputError(f"{path}: has no frame number in its name; name it as depth_00012.png")
-        if number in found:
-            raise InputError(f"{path}: is frame {number}, as {found[number].name} is; keep one of them")
-        found[number] = path
-    if not found:
-        raise InputError(f"{folder}: camera {camera.name} has no depth pictures (*.png); record some, or leave it out")
-    return found
-
-
-def _color_camera(folder: Path, entry: Any, beside: dict[str, Any]) -> ColorCamera:
+def _color_camera(folder: Path, entry: Any, beside: dict[str, Any], number: int | None = None) -> ColorCamera:
     """Return the colour camera of an entry, a folder or an object; what it does not say is as `beside` has it."""
     path, given = folder / RIG, {"folder": entry} if isinstance(entry, str) else entry
     if not isinstance(given, dict):
@@ -337,17 +314,7 @@ def _color_camera(folder: Path, entry: Any, beside: dict[str, Any]) -> ColorCame
             raise InputError(f"color camera {camera.name} has no folder; name that of its pictures")
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
-    files, pose = pictures_in(folder / place, camera.name), camera.camera_to_world
-    found = ColorCamera(camera.name, camera.width, camera.height, camera.intrinsic, pose, distortion, files)
+    files, pose = pictures_in(folder / place, camera.name, "color"), camera.camera_to_world
+    found = ColorCamera(camera.name, camera.width, camera.height, camera.intrinsic, pose, distortion, files, number)
     found.picture(min(files))  # an error of its size is told before anything else is done
     return found
-
-
-def _json(path: Path) -> dict[str, Any]:
-    try:
-        record = json.loads(read_file(path).decode("utf-8-sig"))  # some editors begin with a mark
-    except (OSError, ValueError, RecursionError) as error:
-        raise InputError(f"{path}: cannot be read ({error}); give JSON") from None
-    if not isinstance(record, dict):
-        raise InputError(f"{path}: is not a JSON object; {_SEE}")
-    return record

@@ -9,30 +9,29 @@ import json
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from ..errors import InputError
 from ..geometry import strict
-from ..io.read import read_file
+from ..io.read import read_json
 from .poses import Pose, pose_for
 from .rig import RIG, Rig
 
 
 def with_poses(rig: Rig, depth: Mapping[str, Pose], color: Mapping[str, Pose]) -> Rig:
     """Return a rig with other poses, by the names of depth cameras and of colour cameras; others stay."""
-    beside, cameras, colors = _beside(_record(rig.folder)), list(rig.cameras), list(rig.color_cameras)
-    for number, camera in enumerate(cameras):
-        eye = colors[beside.index(number)] if number in beside else None
+    eyes, cameras, motions = {eye.beside: eye for eye in rig.color_cameras}, [], []
+    for number, camera in enumerate(rig.cameras):
         pose = depth.get(camera.name, camera.camera_to_world)
-        if eye is not None and eye.name in color:
+        if (eye := eyes.get(number)) is not None and eye.name in color:
             pose = strict.products(color[eye.name], strict.products(strict.inverse(eye.camera_to_world), pose))
-        cameras[number] = replace(camera, camera_to_world=pose)
-        if eye is not None:
-            motion = strict.products(pose, strict.inverse(camera.camera_to_world))
-            moved = replace(eye, camera_to_world=strict.products(motion, eye.camera_to_world))
-            colors[beside.index(number)] = moved
-    for number, eye in list(enumerate(colors))[len(beside) :]:
-        colors[number] = replace(eye, camera_to_world=color.get(eye.name, eye.camera_to_world))
+        cameras.append(replace(camera, camera_to_world=pose))
+        motions.append(strict.products(pose, strict.inverse(camera.camera_to_world)))
+    colors = []
+    for eye in rig.color_cameras:
+        pose = color.get(eye.name, eye.camera_to_world)
+        if eye.beside is not None:
+            pose = strict.products(motions[eye.beside], eye.camera_to_world)
+        colors.append(replace(eye, camera_to_world=pose))
     return replace(rig, cameras=tuple(cameras), color_cameras=tuple(colors))
 
 
@@ -53,22 +52,13 @@ def posed_by(rig: Rig, poses: Mapping[str, Pose], kind: str, where: Path) -> tup
 
 def described(rig: Rig) -> bytes:
     """Return the rig's description, `rig.json`, with its poses; all else is as in the file."""
-    record = _record(rig.folder)
-    beside, alone = _beside(record), record.get("color_cameras", [])
-    for entry, camera in zip(record["cameras"], rig.cameras, strict=True):
+    record = read_json(rig.folder / RIG, "give JSON")
+    entries = record["cameras"]
+    for entry, camera in zip(entries, rig.cameras, strict=True):
         entry["camera_to_world"] = camera.camera_to_world.tolist()
-    for entry, eye in zip([*(record["cameras"][k]["color"] for k in beside), *alone], rig.color_cameras, strict=True):
+    alone = iter(record.get("color_cameras", []))
+    for eye in rig.color_cameras:
+        entry = next(alone) if eye.beside is None else entries[eye.beside]["color"]
         if isinstance(entry, dict) and "camera_to_world" in entry:
             entry["camera_to_world"] = eye.camera_to_world.tolist()
     return (json.dumps(record, indent=1) + "\n").encode()
-
-
-def _record(folder: Path) -> dict[str, Any]:
-    """Return the rig's description, which was read before without an error."""
-    record: dict[str, Any] = json.loads(read_file(folder / RIG).decode("utf-8-sig"))
-    return record
-
-
-def _beside(record: dict[str, Any]) -> list[int]:
-    """Return the numbers of the depth cameras that have a colour camera, in the order of the rig's colour cameras."""
-    return [number for number, entry in enumerate(record["cameras"]) if "color" in entry]

@@ -61,11 +61,7 @@ class SimulatedColor:
 
     def record(self, folder: str, random: np.random.Generator) -> dict[str, Any]:
         """Return the object of `rig.json` that describes it, with the error of its pose."""
-        from scipy.spatial.transform import Rotation
-
-        pose = self.camera.camera_to_world.copy()
-        error = Rotation.from_rotvec(self.sensor.pose_error * random.standard_normal(3), degrees=True)
-        pose[:3, :3] = error.as_matrix() @ pose[:3, :3]
+        pose = turned(self.camera.camera_to_world, self.sensor.pose_error, random)
         known = replace(self.camera, camera_to_world=pose).record()
         names = ("width", "height", "fx", "fy", "cx", "cy", "camera_to_world")
         return {"folder": folder} | {name: known[name] for name in names}
@@ -88,6 +84,15 @@ class SimulatedColor:
         image = np.stack([gaussian_filter(image[..., k], self.sensor.blur) for k in range(3)], axis=2)
         image += self.sensor.noise * random.standard_normal(image.shape)
         return np.clip(np.rint(image), 0, 255).astype(np.uint8)
+
+
+def turned(pose: Float64[np.ndarray, "4 4"], degrees: float, random: np.random.Generator) -> Float64[np.ndarray, "4 4"]:
+    """Return a pose that is wrong by a turn with this standard deviation."""
+    from scipy.spatial.transform import Rotation
+
+    wrong = pose.copy()
+    wrong[:3, :3] = Rotation.from_rotvec(degrees * random.standard_normal(3), degrees=True).as_matrix() @ pose[:3, :3]
+    return wrong
 
 
 def shade_of(mesh: Mesh, faces: Int64[np.ndarray, " N"], frame: int) -> Float64[np.ndarray, " N"]:

@@ -23,7 +23,7 @@ from ..io.depth_pictures import write_depth
 from ..io.write import make_folder, replacing, write_mesh, write_picture
 from ..types import Mesh
 from .rig import RIG, DepthCamera, write_rig
-from .simulated_color import ColorSensorOptions, Painter, SimulatedColor
+from .simulated_color import ColorSensorOptions, Painter, SimulatedColor, turned
 
 TRUTH = "truth"  # folder of the clean meshes
 LABELS = "dynamic.npz"  # file in that folder: for each frame, a bit per face of its mesh
@@ -114,7 +114,8 @@ def simulate_rig(
     for place in (*places, folder / TRUTH):
         make_folder(place)
     labels, count = {}, 0
-    eyes = _color_cameras(cameras, sensor, color)
+    drawn = np.random.default_rng([sensor.seed, 1 << 29])
+    eyes = [] if color is None else [SimulatedColor.beside(camera, color, drawn) for camera in cameras]
     for camera in cameras[: len(eyes)]:
         make_folder(folder / camera.name / "color")
     for number, frame in enumerate(frames):
@@ -140,14 +141,6 @@ def simulate_rig(
     described = [eye.record(f"{camera.name}/color", random) for camera, eye in zip(cameras, eyes, strict=False)]
     write_rig(folder, wrong, frame_rate, described)
     return count
-
-
-def _color_cameras(
-    cameras: tuple[DepthCamera, ...], sensor: SensorOptions, color: ColorSensorOptions | None
-) -> list[SimulatedColor]:
-    """Return a colour camera beside each depth camera; none without `color`."""
-    random = np.random.default_rng([sensor.seed, 1 << 29])
-    return [] if color is None else [SimulatedColor.beside(camera, color, random) for camera in cameras]
 
 
 class _Rays:
@@ -217,10 +210,7 @@ def _noise(shape: tuple[int, ...], correlation: float, random: np.random.Generat
 
 def _mistaken(camera: DepthCamera, sensor: SensorOptions, random: np.random.Generator) -> DepthCamera:
     """Return the camera with the errors of its calibration."""
-    from scipy.spatial.transform import Rotation
-
     apart, degrees = sensor.pose_error
-    pose = camera.camera_to_world.copy()
-    pose[:3, :3] = Rotation.from_rotvec(degrees * random.standard_normal(3), degrees=True).as_matrix() @ pose[:3, :3]
+    pose = turned(camera.camera_to_world, degrees, random)
     pose[:3, 3] += apart * random.standard_normal(3)
     return replace(camera, camera_to_world=pose)

@@ -11,17 +11,17 @@ from cyclopts import Parameter
 from rich.table import Table
 
 from ..capture.board import BoardOptions, poses_by_board
-from ..capture.calibrate import Calibration, refine
+from ..capture.calibrate import Calibration
+from ..capture.calibrate import refine as refined
 from ..capture.calibration_sheet import write_calibration_sheet
 from ..capture.poses import read_poses
 from ..capture.recording import open_recording
-from ..capture.rig import RIG, Rig
+from ..capture.rig import RIG
 from ..capture.rig_poses import described, posed_by, with_poses
 from ..errors import InputError
 from ..io.write import check_apart, replacing
 from .console import Common
 
-_BOARD = BoardOptions()
 BEFORE = "rig.before.json"  # what --in-place replaced
 
 
@@ -34,12 +34,7 @@ def command(
     poses: Path | None = None,
     poses_of: Literal["depth", "color"] = "depth",
     scale: float = 1.0,
-    board: Literal["charuco", "apriltag"] | None = None,
-    columns: int = _BOARD.columns,
-    rows: int = _BOARD.rows,
-    square: float = _BOARD.square,
-    marker: float = _BOARD.marker,
-    dictionary: str = _BOARD.dictionary,
+    board: Annotated[BoardOptions, Parameter(name="*")] = BoardOptions(),
     refine: bool = True,
     common: Common = Common(),
 ) -> None:
@@ -63,18 +58,6 @@ def command(
         Which cameras the file has: the depth cameras, or the colour cameras beside them.
     scale
         Factor from the unit of that file to metres; COLMAP's unit is unknown.
-    board
-        Kind of a board that was moved through the colour pictures (extra `calibrate`).
-    columns
-        Squares (of a ChArUco board) or tags in a row of the board.
-    rows
-        Rows of the board.
-    square
-        Side of a square, or from one tag to the next, m.
-    marker
-        Side of a marker or tag, m.
-    dictionary
-        OpenCV's name of the markers; 5X5_100, and APRILTAG_36h11 for tags, where none is given.
     refine
         Refine the poses on depth.
     """
@@ -88,12 +71,12 @@ def command(
         given = {name: pose * unit for name, pose in read_poses(poses).items()}
         found, told = posed_by(found, given, poses_of, poses)
         warnings += told
-    if board is not None:
-        options = BoardOptions(board, columns, rows, square, marker, dictionary)
-        seen, told = poses_by_board(found.color_cameras, options)
+    if board.kind is not None:
+        seen, told = poses_by_board(found.color_cameras, board)
         found, warnings = with_poses(found, {}, seen), warnings + told
     if refine:
-        found, calibration = _refined(found)
+        calibration = refined(found)
+        found = with_poses(found, {one.name: one.camera_to_world for one in calibration.cameras}, {})
         warnings += calibration.warnings
         write_calibration_sheet(
             calibration, found.up, path.with_name("calibration.png") if in_place else path.with_suffix(".png")
@@ -118,11 +101,6 @@ def _output(rig: Path, output: Path | None, in_place: bool) -> Path:
     if not in_place:
         check_apart(path, [rig / RIG])
     return path
-
-
-def _refined(rig: Rig) -> tuple[Rig, Calibration]:
-    calibration = refine(rig)
-    return with_poses(rig, {camera.name: camera.camera_to_world for camera in calibration.cameras}, {}), calibration
 
 
 def _tell(path: Path, calibration: Calibration | None, warnings: list[str], common: Common) -> None:

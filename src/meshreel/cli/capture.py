@@ -18,7 +18,7 @@ from ..capture.recordings.takes import Stream, Take
 from ..capture.recordings.to_rig import write_takes
 from ..capture.rig import read_rig
 from ..errors import InputError
-from ..io.differences import first_difference
+from ..io.read import first_difference, read_json
 from ..io.sequence import CAPTURED
 from ..io.write import frame_names, make_folder, replacing, write_mesh
 from .console import Common
@@ -69,8 +69,10 @@ def command(
         Show the streams of recordings, their sizes, rates and calibration, and write nothing.
     """
     options = FusionOptions(voxel, truncation, fragment)
-    if show:
-        return _list(inputs, common)
+    if show:  # for which no picture is read
+        takes = [open_take(path) for path in inputs]
+        lines = [line for take in takes for line in _lines(take)]
+        return common.result({"recordings": [_take_row(take) for take in takes]}, *lines)
     if output is None:
         raise InputError("--output is missing: a folder for meshes, or for the rig of recordings; or give --list")
     if len(inputs) > 1 or (inputs[0].exists() and not is_rig(inputs[0])):
@@ -78,13 +80,6 @@ def command(
             raise InputError(f"{inputs[0]}: is no rig: make one of it without options of fusion, then capture that")
         return _make_rig(inputs, output, common)
     return _fuse(inputs[0], output, options, frames, format, common)
-
-
-def _list(inputs: list[Path], common: Common) -> None:
-    """Print what recordings hold; no picture is read for it."""
-    takes = [open_take(path) for path in inputs]
-    lines = [line for take in takes for line in _lines(take)]
-    common.result({"recordings": [_take_row(take) for take in takes]}, *lines)
 
 
 def _take_row(take: Take) -> dict[str, Any]:
@@ -181,10 +176,7 @@ def _started(output: Path, made: dict[str, Any], names: list[str]) -> set[str]:
     make_folder(output)
     there = {name for name in names if (output / name).exists()}
     if path.exists():
-        try:
-            before = json.loads(path.read_text())
-        except (OSError, ValueError) as error:
-            raise InputError(f"{path}: cannot be read ({error}); delete the folder, or choose another") from None
+        before = read_json(path, "delete the folder, or choose another")
         if before != (now := json.loads(json.dumps(made))):
             text = f"{output}: holds frames of another rig or of other options"
             raise InputError(f"{text} ({first_difference(before, now)}); choose another folder")

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -61,7 +61,7 @@ def describe_file(file: Path) -> dict[str, Any]:
             raise FormatError(f"{file}: {error}") from error
         there = source.size
         groups = [_describe_group(reader, chunk, there) for chunk in reader.groups]
-        shown = _shown(reader)
+        shown = reader.static_ranges(range(reader.frame_count))
         static = [chunk for chunk in reader.chunks if chunk.kind == ChunkKind.STATIC]
         states = [_describe_state(reader, chunk, there, shown.get(chunk.number, [])) for chunk in static]
     tracks = [_describe_track(reader, number, groups) for number in range(len(reader.tracks))]
@@ -109,16 +109,6 @@ def _companions(reader: ReelReader, chunk: Chunk) -> Iterator[tuple[str, Chunk]]
             yield name if chunk.frame_count else f"background's {name}", other
 
 
-def _shown(reader: ReelReader) -> dict[int, list[tuple[int, int]]]:
-    """Return the ranges of frames (end excluded) that show each state of the background, by chunk number."""
-    ranges: dict[int, list[tuple[int, int]]] = {}
-    starts = sorted({group.first_frame for group in reader.groups})  # the background changes only with a group
-    for start, end in pairwise([*starts, reader.frame_count]):
-        if (chunk := reader.static_of_frame(start)) is not None:
-            ranges.setdefault(chunk.number, []).append((start, end))
-    return ranges
-
-
 def _describe_state(reader: ReelReader, chunk: Chunk, there: int, shown: Iterable[tuple[int, int]]) -> dict[str, Any]:
     """Describe a state of the background: the state that it changes, if any, and the frames that show it."""
     row: dict[str, Any] = {"chunk": chunk.number, "form": chunk.form_name, "bytes": _size_of(reader, chunk)}
@@ -157,11 +147,10 @@ def _contents(
 
 
 def _sum(rows: Iterable[dict[str, int]]) -> dict[str, int]:
-    total: dict[str, int] = {}
+    total = Counter[str]()
     for row in rows:
-        for name, size in row.items():
-            total[name] = total.get(name, 0) + size
-    return total
+        total.update(row)
+    return dict(total)
 
 
 def _renamed(track: dict[str, Any], several: bool) -> dict[str, int]:

@@ -14,7 +14,7 @@ from ..analysis.scene.labelling import Segmentation
 from ..analysis.scene.masks import CAMERAS, Masker
 from ..analysis.scene.pictures import write_views
 from ..analysis.scene.preview import FrameViews, label_colors, look_at_labels, sheet
-from ..analysis.scene.segmentation import SegmentOptions, mask_views, scene_views, segment, segment_by
+from ..analysis.scene.segmentation import mask_views, scene_views, segment, segment_by
 from ..encoder.labels import FrameLabels, label_frames
 from ..encoder.options import EncoderOptions, SceneOptions
 from ..encoder.presets import preset_options
@@ -70,7 +70,10 @@ def command(
     masker = masking.masker(len(source.sequence))
     left = _left_over(output, len(source.sequence), views_only, previews)
     if views_only:
-        row = _write_views(sequence, output, scene.segment, common)
+        views, colors = mask_views(sequence, scene.segment)
+        with common.stages(len(sequence)) as progress:
+            write_views(output, sequence, views, lambda done: progress("look", done, len(sequence)), colors)
+        row = {"frames": len(sequence), "views": len(views)}
         text = f"{output}: pictures of {row['frames']} frames from {row['views']} views, and {CAMERAS}"
     else:
         row = _write_labels(_Labelling(sequence, masker, scene), output, previews, common)
@@ -91,13 +94,6 @@ def _left_over(output: Path, count: int, views_only: bool, previews: int) -> tup
         return tuple(line for place in places for line in left_over(place, frame_names(count, "png")))
     colored = [frame_names(count, "ply")[number] for number in evenly(count, previews)]
     return (*left_over(output / LABELS, frame_names(count, "npz")), *left_over(output / COLORED, colored))
-
-
-def _write_views(frames: MeshSequence, output: Path, options: SegmentOptions, common: Common) -> dict[str, Any]:
-    views, colors = mask_views(frames, options)
-    with common.stages(len(frames)) as progress:
-        write_views(output, frames, views, lambda done: progress("look", done, len(frames)), colors)
-    return {"frames": len(frames), "views": len(views)}
 
 
 @dataclass(frozen=True, slots=True)

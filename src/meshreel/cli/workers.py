@@ -17,7 +17,7 @@ from typing import Any
 from .. import __version__
 from ..encoder.worker import Told, die_with_parent, end_with_parent, tell_to
 from ..errors import InputError
-from ..io.differences import first_difference
+from ..io.read import first_difference
 
 _BLOCKS = hasattr(signal, "pthread_sigmask")
 CONNECTS = 10.0  # s, in which a scheduler answers (guess)

@@ -6,12 +6,9 @@ which few files have, is imported where it is met.
 
 from __future__ import annotations
 
-import numpy as np
-
 from ..errors import FormatError
 from ..format.layout import DracoGroup, Form
 from ..format.records import unpack_all
-from ..shapes import Float
 from ..types import Mesh, Placement
 from .intra import decode_empty, decode_intra
 from .layers.coder import (
@@ -60,22 +57,6 @@ def skip_group(data: bytes, frame_count: int, layers: int | None, previous: Laye
     records = read_layers(data, layers)
     _check_count(records.head.frames, frame_count)
     return state_after(records, previous)
-
-
-def write_vertices(
-    data: bytes, layers: int | None, previous: LayersState | None, place: Placement, out: Float[np.ndarray, "T V 3"]
-) -> LayersState | None:
-    """Decode the vertices of a group of form `layers` into an array; return the state that predicts the next one.
-
-    Return None where patches add vertices: these frames are decoded one by one. Raises InputError if the frames do not
-    fit the array, and FormatError as `continue_group` does.
-    """
-    records = read_layers(data, layers)
-    decoded = place_layers(records, previous, place, out=out)
-    patches = patches_of(data, records, layers, len(decoded.faces))
-    if patches is not None and not all(mesh.is_empty for mesh in patches.meshes):
-        return None
-    return decoded.state
 
 
 def _form_of(data: bytes) -> int | None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import zlib
 from bisect import bisect_right
 from dataclasses import dataclass
-from itertools import accumulate
+from itertools import accumulate, pairwise
 
 from ..errors import FormatError
 from ..format.budget import check_frames, check_head
@@ -151,6 +151,17 @@ class ReelReader:
         """Return the STATIC chunk that a frame is shown with: the newest one that a group of the frame depends on."""
         named = [n for chunk in self.chunks_of_frame(frame) for n in chunk.depends_on if self._is_static(n)]
         return self.chunks[max(named)] if named else None
+
+    def static_ranges(self, frames: range) -> dict[int, list[tuple[int, int]]]:
+        """Return by its number the ranges (end excluded) of some consecutive frames that show each STATIC chunk."""
+        ranges = dict[int, list[tuple[int, int]]]()
+        starts = sorted({frames.start, *(group.first_frame for group in self.groups if group.first_frame in frames)})
+        for start, end in pairwise([*starts, frames.stop]):  # it changes only with a group
+            if (chunk := self.static_of_frame(start)) is not None:
+                own = ranges.setdefault(chunk.number, [])
+                first = own.pop()[0] if own and own[-1][1] == start else start
+                own.append((first, end))
+        return ranges
 
     def shown_from(self, static: Chunk) -> int:
         """Return the first frame that is shown with a STATIC chunk, from which its pictures are counted."""

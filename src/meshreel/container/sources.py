@@ -17,11 +17,9 @@ class Source(Protocol):
     @property
     def size(self) -> int:
         """Size of the source in bytes."""
-        ...
 
     def get_bytes(self, offset: int, length: int) -> bytes:
         """Up to `length` bytes from `offset`; fewer only where the source ends."""
-        ...
 
 
 @runtime_checkable

@@ -13,13 +13,13 @@ import numpy as np
 
 from ..coding.background import decode_background, decode_change
 from ..coding.colored import Canvas, background_canvas, canvas_of, decode_group_colors, paint_background
-from ..coding.group import continue_group, skip_group, write_vertices
+from ..coding.group import continue_group, skip_group
 from ..coding.layers.coder import MOST_NUMBERS, LayersState
 from ..container.reader import Chunk, ReelReader
-from ..errors import FormatError, InputError
+from ..errors import FormatError
 from ..format.budget import Chain, together
 from ..format.layout import ChunkKind, Form
-from ..shapes import Float, UInt8
+from ..shapes import UInt8
 from ..types import Frames, Mesh, Placement
 from .cache import MOST_KEPT, NO_GROUP, CachedGroup, CachedStates, Refusals, memory_of, read_only
 from .pictures import Decoders, TrackPictures
@@ -65,35 +65,6 @@ class Track(Frames):
         chunk = self.reader.chunk_of_frame(index, self.number)
         group = self._decoded(chunk)
         return group.frames[index - chunk.first_frame], group.nbytes
-
-    def write_vertices(self, first: int, out: Float[np.ndarray, "T V 3"]) -> None:
-        """Write the vertices of frames `first`, `first` + 1 ... in metres, as many as `out` has; float64 or float32.
-
-        Whole groups of form `layers` are decoded into the array, which is faster than to decode and copy them. Raises
-        InputError where a frame has another number of vertices, and otherwise as indexing does.
-        """
-        done = 0
-        while done < len(out):
-            chunk = self.reader.chunk_of_frame(first + done, self.number)
-            rows = out[done : chunk.first_frame + chunk.frame_count - first]
-            whole = chunk.form == Form.LAYERS and len(rows) == chunk.frame_count and self._group.number != chunk.number
-            if not (whole and self._write_group(chunk, rows)):
-                for frame, row in enumerate(rows, first + done):
-                    copy_vertices(self[frame], frame, row)
-            done += len(rows)
-
-    def _write_group(self, chunk: Chunk, out: Float[np.ndarray, "T V 3"]) -> bool:
-        """Decode the vertices of a group into an array; False where patches add vertices."""
-        state, states = self._state_before(chunk)
-        payload = self._read(chunk)
-        with self._refusals.of(chunk):
-            try:
-                after = write_vertices(payload, self.layers, state, self._place, out)
-            except InputError as error:
-                raise InputError(f"{chunk}: {error}") from error
-        if after is not None and not self._colored:  # else the state lacks what the next colours are predicted from
-            self._states = states.add(chunk.number, after, state, self._most)
-        return after is not None
 
     def _decoded(self, chunk: Chunk) -> CachedGroup:
         """Return a group, from the cache if it was the last one decoded."""
@@ -234,13 +205,6 @@ class Background:
             mesh = paint_background(mesh, payload, self.reader.read_chunk(of.number))
         with self._refusals.of(chunk):
             return self._pictures.textured(chunk, [mesh], background_canvas(payload))[0]
-
-
-def copy_vertices(mesh: Mesh, frame: int, out: Float[np.ndarray, "V 3"]) -> None:
-    """Copy the vertices of a frame into an array. Raises InputError if it has another shape."""
-    if mesh.vertices.shape != out.shape:
-        raise InputError(f"frame {frame} has {len(mesh.vertices)} vertices: the array has room for {len(out)}")
-    out[:] = mesh.vertices
 
 
 def placement(reader: ReelReader) -> Placement:

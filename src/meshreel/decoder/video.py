@@ -20,7 +20,7 @@ from ..geometry.topology import concatenate
 from ..shapes import Float
 from ..types import Mesh, Up
 from .pictures import Decoders
-from .tracks import Background, Track, copy_vertices, moving_of_frame
+from .tracks import Background, Track, moving_of_frame
 
 if TYPE_CHECKING:
     from ..container.http import HttpSource
@@ -168,24 +168,21 @@ class Video(Sequence[Mesh]):
     def vertices(self, first: int, last: int, out: np.ndarray | None = None) -> Float[np.ndarray, "T V 3"]:
         """Return the vertices of frames `first` to `last` - 1 in metres, which all must have the same number of them.
 
-        They are written to `out` if it is given, a contiguous array of float64 or float32, for which the coordinates
-        are rounded; otherwise to a new array of float64. Of a video that is one moving body, whole groups are decoded
-        straight into the array. Raises InputError if they do not fit it, and otherwise as indexing does.
+        They are written to `out` if it is given, an array of float64 or float32, for which the coordinates are rounded;
+        otherwise to a new array of float64. Raises InputError if they do not fit it, and otherwise as indexing does.
         """
         if not 0 <= first < last <= len(self):
             raise IndexError(f"frames {first} to {last} of a video of {len(self)} frames")
         if out is None:
             out = np.empty((last - first, len(self[first].vertices), 3))
-        elif out.ndim != 3 or len(out) != last - first or out.dtype.char not in "df" or not out.flags.carray:
-            raise InputError(
-                f"an array of {out.dtype} {out.shape} for {last - first} frames: give a contiguous one of float64 or "
-                f"float32, frames x vertices x 3"
-            )
-        if len(self.tracks) == 1 and not self.reader.has_background:
-            self.tracks[0].write_vertices(first, out)
-            return out
+        elif out.ndim != 3 or len(out) != last - first or out.dtype.char not in "df":
+            text = f"an array of {out.dtype} {out.shape} for {last - first} frames"
+            raise InputError(f"{text}: give one of float64 or float32, frames x vertices x 3")
         for row, frame in zip(out, range(first, last), strict=True):
-            copy_vertices(self[frame], frame, row)
+            vertices = self[frame].vertices
+            if vertices.shape != row.shape:
+                raise InputError(f"frame {frame} has {len(vertices)} vertices: the array has room for {len(row)}")
+            row[:] = vertices
         return out
 
     def __repr__(self) -> str:

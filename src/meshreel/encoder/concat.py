@@ -20,8 +20,7 @@ from ..container.writer import Companion, ReelWriter
 from ..errors import FormatError, InputError
 from ..format.checks import COMPANIONS
 from ..format.layout import ChunkKind, Header
-from ..io.differences import first_difference
-from ..io.read import read_file
+from ..io.read import first_difference, read_input
 from ..io.remote import Place, uploaded
 from ..io.write import check_apart
 from .metadata import joined_metadata, of_all_parts, place_of
@@ -131,10 +130,7 @@ def _add(writer: ReelWriter, path: Place) -> None:
 def _source(path: Place) -> StreamSource:
     if isinstance(path, Path):
         return FileSource(path)
-    try:
-        return StreamSource(BytesIO(read_file(path)), str(path))
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error}); check the URL and your rights") from error
+    return StreamSource(BytesIO(read_input(path, "check the URL and your rights")), str(path))
 
 
 def _opened(source: StreamSource, path: Place) -> ReelReader:

@@ -61,7 +61,7 @@ def machine_line() -> str:
     pools.sort(key=str)  # they are found in any order
     found: dict[str, Any] = {"stage": "machine", "python": platform.python_version(), "system": platform.platform()}
     found |= {
-        "processor": _processor(),
+        "processor": processor(),
         "cores": os.cpu_count(),
         "meshreel": __version__,
         "libraries": versions(),
@@ -80,7 +80,7 @@ def versions() -> dict[str, str | None]:
     return found
 
 
-def _processor() -> str:
+def processor() -> str:
     """Return the processor's name, which the standard library does not know on Linux."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()

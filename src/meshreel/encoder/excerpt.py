@@ -18,7 +18,7 @@ from ..analysis.survey import Survey
 from ..errors import InputError
 from ..format.checks import LARGEST
 from ..geometry.derived_sequences import Unchanging
-from ..io.read import read_file
+from ..io.read import read_input
 from ..io.remote import Place
 from ..io.write import replacing
 
@@ -85,15 +85,10 @@ def write_survey(seen: Survey, sequence: Unchanging, path: Path) -> None:
 
 def read_survey(path: Place) -> Surveyed:
     """Read the file of a survey. Raises InputError for any other file."""
+    data = read_input(path)
     try:
-        record = json.loads(read_file(path))
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror or error}); check the path") from None
-    except (ValueError, RecursionError):
-        record = None
-    try:
-        return _surveyed(str(path), record)
-    except (KeyError, TypeError, ValueError, OverflowError) as error:
+        return _surveyed(str(path), json.loads(data))
+    except (KeyError, TypeError, ValueError, OverflowError, RecursionError) as error:
         text = f"{path}: is no survey that this version of meshreel wrote ({type(error).__name__}: {error})"
         raise InputError(f"{text}; write it again with meshreel survey") from None
 

@@ -23,7 +23,7 @@ from ..container.writer import Companion, Stored
 from ..errors import InputError
 from ..format.layout import ChunkKind, Form
 from ..geometry.derived_sequences import Unchanging
-from ..io.differences import first_difference
+from ..io.read import first_difference
 from ..io.remote import Place, located, uploaded
 from ..io.unfinished import cannot_be_written, claim, discard, part_of, sync, sync_folder, unfinished
 from ..io.write import check_apart

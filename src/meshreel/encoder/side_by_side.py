@@ -39,8 +39,10 @@ def as_done(
             for future in done:  # first what can be kept
                 if future.exception() is None:
                     yield running.pop(future), future.result()
-            if failed:
-                _raise_first(running, min(failed))
+            if failed:  # all calls before one that failed have been submitted
+                for future in sorted(running, key=running.__getitem__):
+                    if running[future] <= min(failed):
+                        future.result()
     finally:
         for future in running:
             future.cancel()
@@ -52,10 +54,3 @@ def workers_of(executor: Executor) -> int:
     if count is None and (client := getattr(executor, "_client", None)) is not None:
         count = sum(client.nthreads().values())  # of a Dask cluster, which may grow
     return count or UNKNOWN
-
-
-def _raise_first(running: dict[Future[Any], int], failed: int) -> None:
-    """Raise what the first failing call raised: all before the one that failed have been submitted."""
-    for future in sorted(running, key=running.__getitem__):
-        if running[future] <= failed:
-            future.result()

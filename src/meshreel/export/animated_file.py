@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
-from itertools import accumulate, pairwise
+from itertools import accumulate
 from pathlib import Path
 
 import numpy as np
@@ -114,15 +114,8 @@ def _animation(reader: ReelReader, frames: range, up: Up) -> Animation:
 
 def _states(source: _Source) -> Iterator[Shape]:
     """Yield a shape for each state of the background, with the ranges of exported frames that show it."""
-    reader, frames = source.reader, source.frames
-    ranges: dict[int, list[tuple[int, int]]] = {}
-    starts = sorted({frames.start, *(group.first_frame for group in reader.groups if group.first_frame in frames)})
-    for start, end in pairwise([*starts, frames.stop]):
-        if (chunk := reader.static_of_frame(start)) is not None:
-            own = ranges.setdefault(chunk.number, [])
-            first = own.pop()[0] if own and own[-1][1] == start else start
-            own.append((first, end))
-    for number, own in enumerate(ranges.values()):
+    frames = source.frames
+    for number, own in enumerate(source.reader.static_ranges(frames).values()):
         mesh = source.background.of_frame(own[0][0])
         if mesh is not None and not mesh.is_empty:
             shown = tuple((first - frames.start, end - frames.start) for first, end in own)

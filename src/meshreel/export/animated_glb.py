@@ -20,7 +20,7 @@ import numpy as np
 from ..errors import InputError
 from ..io.glb_file import COLORS, PLACES, Faces, GlbFile, cut_at_seams, light
 from ..io.write import replacing
-from .shapes import Animation, Points, Shape, changes, unit_normals
+from .shapes import Animation, Shape, changes, unit_normals
 
 _MATERIAL = {
     "name": "surface",
@@ -47,7 +47,9 @@ class GlbWriter:
     def __init__(self, path: Path, animation: Animation, spool: IO[bytes]) -> None:
         self._file = GlbFile(spool, str(path), "export fewer frames or layers, or to USD")
         self._animation, self._times = animation, _times(path, animation)
-        self._nodes: list[dict[str, Any]] = [_root(animation)]
+        root = animation.root
+        moved = {} if np.array_equal(root, np.eye(4)) else {"matrix": root.T.reshape(-1).tolist()}
+        self._nodes: list[dict[str, Any]] = [{"name": "scene", **moved}]
         self._parts: dict[str, int] = {}  # their nodes
         self._materials: dict[bool, int] = {}  # of faces without a place in a picture, by whether they have colours
         self._channels: list[dict[str, Any]] = []
@@ -59,7 +61,9 @@ class GlbWriter:
         node = {"name": shape.name, "mesh": mesh}
         if shape.shown[0][0] > 0:
             node["scale"] = [0, 0, 0]  # as in the first frame, for viewers that do not animate
-        self._child(self._part(shape.part), node)
+        if shape.part not in self._parts:
+            self._parts[shape.part] = self._child(0, {"name": shape.part})
+        self._child(self._parts[shape.part], node)
         self._animate(shape, len(self._nodes) - 1)
 
     def finish(self, file: BinaryIO) -> None:
@@ -83,17 +87,15 @@ class GlbWriter:
         file.open_vertices()
         frames, base = list[dict[str, int]](), dict[str, np.ndarray]()
         for frame in chain([first], points):
-            known = {name: values[origins] for name, values in self._attributes(shape, frame).items()}
+            known = {"POSITION": self._animation.local(shape, frame.vertices), "NORMAL": unit_normals(frame)}
+            known |= {} if frame.colors is None or shape.pictured.all() else {COLORS: light(frame.colors)}
+            known = {name: values[origins] for name, values in known.items()}
             shown = {name: values - base[name] if base else values for name, values in known.items()}
             frames.append({name: file.put(row, "VEC3", shape, name == "POSITION") for name, row in shown.items()})
             base = base or known
         frames[0] |= places
         material = None if shape.pictured.all() else self._material(first.colors is not None)
         return file.put_faces(Faces(corners, shape.pictured, picture, material), frames, shape)
-
-    def _attributes(self, shape: Shape, frame: Points) -> dict[str, np.ndarray]:
-        known = {"POSITION": self._animation.local(shape, frame.vertices), "NORMAL": unit_normals(frame)}
-        return known if frame.colors is None or shape.pictured.all() else known | {COLORS: light(frame.colors)}
 
     def _material(self, colored: bool) -> int:
         """Return the material of faces without a place in a picture."""
@@ -123,11 +125,6 @@ class GlbWriter:
         self._samplers.append({"input": accessors[0], "output": accessors[1], "interpolation": interpolation})
         self._channels.append({"sampler": len(self._samplers) - 1, "target": {"node": node, "path": path}})
 
-    def _part(self, name: str) -> int:
-        if name not in self._parts:
-            self._parts[name] = self._child(0, {"name": name})
-        return self._parts[name]
-
     def _child(self, parent: int, node: dict[str, Any]) -> int:
         self._nodes.append(node)
         self._nodes[parent].setdefault("children", []).append(len(self._nodes) - 1)
@@ -142,9 +139,3 @@ def _times(path: Path, animation: Animation) -> np.ndarray:
         text = f"{path}: frame {stuck[0]} of those exported and the next begin at {animation.times[stuck[0]]:.9g} s"
         raise InputError(f"{text} for the float32 times of a GLB file; export fewer frames, or to USD")
     return times
-
-
-def _root(animation: Animation) -> dict[str, Any]:
-    matrix = animation.root
-    moved = {} if np.array_equal(matrix, np.eye(4)) else {"matrix": matrix.T.reshape(-1).tolist()}
-    return {"name": "scene", **moved}

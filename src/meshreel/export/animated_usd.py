@@ -83,9 +83,8 @@ class UsdWriter:
         UsdGeom.SetStageMetersPerUnit(stage, 1)
         scene = UsdGeom.Xform.Define(stage, "/scene")
         if not np.array_equal(animation.root, np.eye(4)):
-            scene.AddTransformOp().Set(
-                Gf.Matrix4d(animation.root.T.tolist())
-            )  # USD multiplies row vectors from the left
+            # USD multiplies row vectors from the left.
+            scene.AddTransformOp().Set(Gf.Matrix4d(animation.root.T.tolist()))
         Usd.ModelAPI(scene).SetKind(Kind.Tokens.component)
         stage.SetDefaultPrim(scene.GetPrim())
 
@@ -122,9 +121,8 @@ class UsdWriter:
         shown = list(changes(shape, len(self._codes)))
         if shown == [(0, True)]:
             return
-        visibility = mesh.CreateVisibilityAttr(
-            states[shown[0][1]]
-        )  # as in the first frame, for viewers that do not animate
+        # As in the first frame, for viewers that do not animate.
+        visibility = mesh.CreateVisibilityAttr(states[shown[0][1]])
         for frame, is_shown in shown:
             visibility.Set(states[is_shown], self._codes[frame])
 

@@ -94,7 +94,6 @@ class AnimationWriter(Protocol):
 
     def add(self, shape: Shape) -> None:
         """Write a shape, computing its frames one by one. Raises InputError if the file cannot hold it."""
-        ...
 
 
 def changes(shape: Shape, count: int) -> Iterator[tuple[int, bool]]:

@@ -23,12 +23,10 @@ class Kind(Protocol):
     @property
     def label(self) -> str:
         """Name of the kind in FORMAT.md."""
-        ...
 
     @property
     def least(self) -> int:
         """The fewest bytes that a value can take; at least 1 for an item of a List."""
-        ...
 
     def pack(self, value: Any) -> bytes: ...
 

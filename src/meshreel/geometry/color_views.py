@@ -73,7 +73,6 @@ class ColorFrames(Protocol):
 
     def __getitem__(self, index: int, /) -> list[ColorPicture | None]:
         """Return a frame's pictures, one for each camera; None for a camera that lacks the frame."""
-        ...
 
 
 class ColorViews:

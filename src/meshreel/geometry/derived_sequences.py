@@ -35,17 +35,14 @@ class CapturedSequence(MeshSequence, Protocol):
     @property
     def up(self) -> Up:
         """The axis that points up."""
-        ...
 
     @property
     def depth(self) -> DepthFrames | None:
         """The depth pictures from which the meshes were made; None where they are not known."""
-        ...
 
     @property
     def colors(self) -> ColorFrames | None:
         """The pictures of colour cameras; None where there are none."""
-        ...
 
 
 def captured(sequence: MeshSequence) -> CapturedSequence:
@@ -192,14 +189,10 @@ class Unchanging(DerivedSequence):
     def __getitem__(self, index: int) -> Mesh:
         mesh = self._recent.get(index)
         if mesh is None:
-            mesh = self._read(index)
+            work.count("frames read")
+            mesh = super().__getitem__(index)
+            self._check(index, digest([mesh]))
             self._recent.keep(index, mesh)
-        return mesh
-
-    def _read(self, index: int) -> Mesh:
-        work.count("frames read")
-        mesh = super().__getitem__(index)
-        self._check(index, digest([mesh]))
         return mesh
 
     def only(self, numbers: Sequence[int]) -> Unchanging:

@@ -23,11 +23,9 @@ class Paint(Protocol):
         self, points: Float64[np.ndarray, "N 3"], normals: Float64[np.ndarray, "N 3"]
     ) -> tuple[Float64[np.ndarray, "N 3"], Bool[np.ndarray, " N"]]:
         """Return the colours of places with these normals, 0 to 255, and which of them it knows."""
-        ...
 
     def pixels_on(self, mesh: Mesh) -> float:
         """Return how many pixels of the pictures that it has show a mesh; infinite where it has none."""
-        ...
 
 
 class Painted:

@@ -12,8 +12,7 @@ import numpy as np
 from jaxtyping import Float32, UInt8
 
 from ..types import GREY, Texture
-from .color import from_linear
-from .glb_file import PASSED_OVER
+from .glb_file import PASSED_OVER, from_linear
 from .pictures import parse_picture
 from .polygons import Dropped, Polygons, Unreadable
 

@@ -14,10 +14,9 @@ from io import BytesIO
 from typing import IO, Any, BinaryIO
 
 import numpy as np
-from jaxtyping import Bool, Float32, Int32, Int64, UInt8
+from jaxtyping import Bool, Float32, Int32, Int64, UInt8, UInt16
 
 from ..errors import InputError
-from .color import to_linear
 from .pictures import pack_picture
 
 MOST_BYTES = (1 << 32) - 1  # of a GLB file, whose header has 32 bits for its length (glTF 2.0, "GLB File Format")
@@ -167,6 +166,21 @@ def cut_at_seams(
     codes, corners = np.unique(faces * np.int64(len(places)) + numbers, return_inverse=True)
     origins, place = np.divmod(codes, max(len(places), 1))
     return origins, corners.reshape(-1, 3).astype(np.int32), places[place]
+
+
+def to_linear(colors: UInt8[np.ndarray, "V 3"]) -> UInt16[np.ndarray, "V 3"]:
+    """Return sRGB as linear light, all of which is 65535 (IEC 61966-2-1)."""
+    s = np.arange(256) / 255
+    light = np.where(s <= 0.04045, s / 12.92, ((s + 0.055) / 1.055) ** 2.4)
+    return np.rint(65535 * light).astype(np.uint16)[colors]
+
+
+def from_linear(light: np.ndarray) -> UInt8[np.ndarray, "V 3"]:
+    """Return linear light, integers whose largest number is all of it or shares of 1, as sRGB."""
+    most = np.iinfo(light.dtype).max if light.dtype.kind in "iu" else 1.0
+    shares = np.clip(np.nan_to_num(light.astype(np.float64) / most), 0.0, 1.0)
+    s = np.where(shares <= 0.0031308, 12.92 * shares, 1.055 * shares ** (1 / 2.4) - 0.055)
+    return np.rint(255 * s).astype(np.uint8)
 
 
 def light(colors: UInt8[np.ndarray, "V 3"]) -> Float32[np.ndarray, "V 3"]:

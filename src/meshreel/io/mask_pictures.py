@@ -6,7 +6,6 @@ mask tools do); a folder -> its files by view and by frame.
 
 from __future__ import annotations
 
-import io
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -15,7 +14,8 @@ from jaxtyping import UInt8
 
 from ..errors import InputError
 from .file_names import last_number
-from .read import read_file
+from .pictures import opened
+from .read import read_input
 
 _MODES = ("L", "P", "1")  # of Pillow: gray, palette, black and white
 _LIKE = "name folders view00, view01 ... and files frame_00000.png ..."
@@ -23,28 +23,19 @@ _LIKE = "name folders view00, view01 ... and files frame_00000.png ..."
 
 def read_mask(path: Path) -> UInt8[np.ndarray, "H W"]:
     """Read object numbers from an 8-bit gray or palette PNG. Raises InputError for other or unreadable files."""
-    from PIL import Image, UnidentifiedImageError
-
-    try:
-        with Image.open(io.BytesIO(read_file(path))) as image:
-            if image.mode not in _MODES:
-                raise InputError(f"{path}: a mask of mode {image.mode}; store object numbers as 8-bit gray PNG")
-            return np.array(image).astype(np.uint8)
-    except UnidentifiedImageError:
-        raise InputError(f"{path}: is no picture; store object numbers as 8-bit gray PNG") from None
-    except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:  # SyntaxError: a damaged chunk
-        reason = getattr(error, "strerror", None) or error
-        raise InputError(f"{path}: cannot be read ({reason}); make the mask again") from None
+    wanted, remedy = "store object numbers as 8-bit gray PNG", "make the mask again"
+    with opened(read_input(path, remedy), str(path), wanted, remedy) as image:
+        if image.mode not in _MODES:
+            raise InputError(f"{path}: a mask of mode {image.mode}; {wanted}")
+        return np.array(image).astype(np.uint8)
 
 
 def is_mask(path: Path) -> bool:
     """Return True if the header of a file is that of a mask, False for color pictures and other files."""
-    from PIL import Image
-
     try:
-        with Image.open(io.BytesIO(read_file(path))) as image:
+        with opened(read_input(path), "", "", "") as image:
             return image.mode in _MODES
-    except (OSError, SyntaxError, ValueError, Image.DecompressionBombError):
+    except InputError:
         return False
 
 

@@ -19,7 +19,7 @@ from .off import parse_off
 from .pictures import texture_of_materials
 from .ply import parse_ply
 from .polygons import Dropped, Polygons, Unreadable, triangulate
-from .read import read_file
+from .read import read_input
 from .remote import Place
 from .stl import parse_stl
 
@@ -51,12 +51,7 @@ def read_mesh(path: Place, where: str | None = None) -> Loaded:
     parse = _PARSERS.get(path.suffix.lower())
     if parse is None:
         raise InputError(f"{where}: {path.suffix or 'no'} extension is not one of {', '.join(EXTENSIONS)}; convert it")
-    try:
-        data = read_file(path)
-    except OSError as error:
-        raise InputError(
-            f"{where}: cannot be read ({error.strerror or error}); check the path and its rights"
-        ) from None
+    data = read_input(path, where=where)
     if not data:
         raise InputError(f"{where}: the file has 0 bytes; write it again, or leave it out with --frames")
     try:

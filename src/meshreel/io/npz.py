@@ -10,7 +10,8 @@ import threading
 import tokenize
 import zipfile
 import zlib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from functools import lru_cache, partial
 from pathlib import Path
 from typing import IO, Any
@@ -28,6 +29,17 @@ _DAMAGED = (  # errors of NumPy and zipfile for damaged files; RuntimeError for 
     *(OSError, ValueError, EOFError, SyntaxError, tokenize.TokenError, RecursionError),
     *(zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError),
 )
+
+
+@contextmanager
+def _reading(where: str) -> Iterator[None]:
+    """Turn errors of a damaged file into an InputError."""
+    try:
+        yield
+    except Unreadable as error:
+        raise InputError(f"{where}: {error}; mend the .npz, or leave the frame out with --frames") from None
+    except _DAMAGED as error:
+        raise InputError(f"{where}: cannot be read as .npz ({error}); write it again with numpy.savez") from None
 
 
 class _Stream:
@@ -64,21 +76,18 @@ class Archive:
     def __init__(self, path: Path) -> None:
         self.path, self.paths = path, (path,)
         self._last: tuple[int, np.ndarray] | None = None  # the picture that was read last, and its frame
-        try:
-            with zipfile.ZipFile(path) as archive:
-                names = {name.removesuffix(".npy") for name in archive.namelist()}
-                if not {"vertices", "faces"} <= names:
-                    found = ", ".join(sorted(names)) or "nothing"
-                    raise InputError(f"{path}: has {found}; save it as 'vertices' and 'faces'")
-                self._vertices = _Stream(path, archive, "vertices", 2)
-                self._colors = _Stream(path, archive, "colors", 2) if "colors" in names else None
-                self._texture = _Stream(path, archive, "texture", 3) if "texture" in names else None
-                for name in {"faces", "uv"} & names:
-                    _head(archive, name)  # refuses an array larger than the file before it is allocated
-                arrays = np.load(path, allow_pickle=False)
-                faces, uv = arrays["faces"], arrays["uv"] if "uv" in names else None
-        except _DAMAGED as error:
-            raise InputError(f"{path}: cannot be read as .npz ({error}); write it again with numpy.savez") from None
+        with _reading(str(path)), zipfile.ZipFile(path) as archive:
+            names = {name.removesuffix(".npy") for name in archive.namelist()}
+            if not {"vertices", "faces"} <= names:
+                found = ", ".join(sorted(names)) or "nothing"
+                raise InputError(f"{path}: has {found}; save it as 'vertices' and 'faces'")
+            self._vertices = _Stream(path, archive, "vertices", 2)
+            self._colors = _Stream(path, archive, "colors", 2) if "colors" in names else None
+            self._texture = _Stream(path, archive, "texture", 3) if "texture" in names else None
+            for name in {"faces", "uv"} & names:
+                _head(archive, name)  # refuses an array larger than the file before it is allocated
+            arrays = np.load(path, allow_pickle=False)
+            faces, uv = arrays["faces"], arrays["uv"] if "uv" in names else None
         if self._vertices.rows is None or self._vertices.shape[1:] != (3,) or self._vertices.dtype.kind not in "fiu":
             raise InputError(f"{path}: {self._vertices}; it must be numbers T x V x 3")
         if faces.ndim != 2 or (faces.shape[1] < 3 and len(faces)) or faces.dtype.kind not in "iu":
@@ -111,12 +120,8 @@ class Archive:
 
     def load(self, index: int, where: str) -> Loaded:
         """Read and check one frame."""
-        try:
+        with _reading(where):
             return checked(self._polygons(index))
-        except Unreadable as error:
-            raise InputError(f"{where}: {error}; mend the .npz, or leave the frame out with --frames") from None
-        except _DAMAGED as error:
-            raise InputError(f"{where}: cannot be read ({error}); write it again with numpy.savez") from None
 
     def _check_colors(self) -> None:
         """Raise InputError where colours or pictures are not those of the vertices and frames."""
@@ -143,12 +148,9 @@ class Archive:
         assert self._texture is not None
         index = 0 if self._texture.rows is None else index
         if self._last is None or self._last[0] != index:
-            try:
+            with _reading(self.name(index)):
                 self._last = index, self._texture.row(index)
-            except (Unreadable, *_DAMAGED) as error:
-                raise InputError(
-                    f"{self.name(index)}: cannot be read ({error}); write it again with numpy.savez"
-                ) from None
+        assert self._last is not None
         return self._last[1]
 
 

@@ -6,8 +6,11 @@ In: a file, or the materials that an OBJ names. Out: an array H x W x 3, read wh
 from __future__ import annotations
 
 import io
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import lru_cache, partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from jaxtyping import UInt8, UInt16
@@ -15,17 +18,15 @@ from jaxtyping import UInt8, UInt16
 from ..errors import InputError
 from ..types import Texture
 from .polygons import Dropped
-from .read import read_file
+from .read import read_file, read_input
 from .remote import Place
+
+if TYPE_CHECKING:
+    from PIL import Image
 
 FORMATS = ("PNG", "JPEG", "WEBP", "AVIF", "BMP", "TIFF", "TGA", "GIF", "PPM")  # EPS would start another program
 MOST_PIXELS = 1 << 26  # of a picture: 8192 x 8192, 200 MB in memory (guess)
-_DEEP = ("I;16", "I;16B", "I;16L", "I")  # modes in which versions of Pillow return 16 bits of grey
-
-
-def picture_texture(place: Place) -> Texture:
-    """Return the texture of a picture in a file, which is read when its pixels are asked for."""
-    return Texture(partial(read_picture, place))
+DEEP = ("I;16", "I;16B", "I;16L", "I")  # modes in which versions of Pillow return 16 bits of grey
 
 
 def read_picture(place: Place) -> UInt8[np.ndarray, "H W 3"]:
@@ -36,39 +37,45 @@ def read_picture(place: Place) -> UInt8[np.ndarray, "H W 3"]:
 @lru_cache(maxsize=4)  # as many as a frame and its neighbours have (guess)
 def _read(place: Place, changed: int) -> UInt8[np.ndarray, "H W 3"]:
     del changed
-    try:
-        data = read_file(place)
-    except OSError as error:
-        raise InputError(
-            f"{place}: cannot be read ({error.strerror or error}); check it, or give --color none"
-        ) from None
-    return parse_picture(data, str(place))
+    return parse_picture(read_input(place, "check it, or give --color none"), str(place))
 
 
 def parse_picture(data: bytes, where: str) -> UInt8[np.ndarray, "H W 3"]:
     """Return the picture in the bytes of a file; errors as `read_picture`, which begin with `where`."""
+    with opened(data, where, "give PNG or JPEG, or --color none", "write it again, or give --color none") as image:
+        if image.mode in DEEP:
+            pixels = np.repeat((np.asarray(image).astype(np.float64)[..., None] / 257).round(), 3, axis=2)
+            pixels = np.clip(pixels, 0, 255).astype(np.uint8)
+        else:
+            pixels = np.array(image.convert("RGB"))
+    pixels.flags.writeable = False
+    return pixels
+
+
+@contextmanager
+def opened(data: bytes, where: str, wanted: str, remedy: str) -> Iterator[Image.Image]:
+    """Open the picture in the bytes of a file.
+
+    Raises InputError, also for damage that the block meets; it begins with `where`, and says what is `wanted` where
+    that is no picture, and the `remedy` for damage.
+    """
     from PIL import Image, UnidentifiedImageError
 
     try:
         Image.init()
         with Image.open(io.BytesIO(data), formats=[name for name in FORMATS if name in Image.OPEN]) as image:
-            width, height = image.size
-            if width * height > MOST_PIXELS:
+            if image.width * image.height > MOST_PIXELS:
                 raise Image.DecompressionBombError
-            if image.mode in _DEEP:
-                pixels = np.repeat((np.asarray(image).astype(np.float64)[..., None] / 257).round(), 3, axis=2)
-                pixels = np.clip(pixels, 0, 255).astype(np.uint8)
-            else:
-                pixels = np.array(image.convert("RGB"))
+            yield image
+    except InputError:
+        raise
     except Image.DecompressionBombError:
         raise InputError(f"{where}: has more than 8192 x 8192 pixels; make it smaller") from None
     except UnidentifiedImageError:
-        raise InputError(f"{where}: is no picture; give PNG or JPEG, or --color none") from None
+        raise InputError(f"{where}: is no picture; {wanted}") from None
     except Exception as error:  # Pillow raises SyntaxError for a damaged chunk, RuntimeError for a damaged AVIF ...
         reason = getattr(error, "strerror", None) or error
-        raise InputError(f"{where}: cannot be read ({reason}); write it again, or give --color none") from None
-    pixels.flags.writeable = False
-    return pixels
+        raise InputError(f"{where}: cannot be read ({reason}); {remedy}") from None
 
 
 def pack_picture(pixels: UInt8[np.ndarray, "H W *C"] | UInt16[np.ndarray, "H W"]) -> bytes:
@@ -100,7 +107,7 @@ def texture_of_materials(mesh: Place, files: tuple[str, ...], used: tuple[str, .
     place = _beside(mesh, picture)
     if isinstance(place, Path) and not _exists(place):
         return None, frozenset(dropped | {f"a texture ({picture} is not there)"})
-    return picture_texture(place), frozenset(dropped)
+    return Texture(partial(read_picture, place)), frozenset(dropped)  # read when its pixels are asked for
 
 
 def _exists(place: Path) -> bool:

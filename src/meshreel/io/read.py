@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import errno
+import json
 import os
 import stat
+from typing import Any
 
+from ..errors import InputError
 from .remote import Place, Remote
 
 MOST_BYTES = 1 << 30  # of a file: as binary PLY, 20 million vertices and 60 million faces (guess)
@@ -30,3 +33,34 @@ def read_file(path: Place) -> bytes:
         return data
     finally:
         os.close(number)
+
+
+def read_input(path: Place, remedy: str = "check the path and its rights", where: str = "") -> bytes:
+    """Return the bytes of a file. Raises InputError, which begins with its name, or `where`, and says what to do."""
+    try:
+        return read_file(path)
+    except OSError as error:
+        raise InputError(f"{where or path}: cannot be read ({error.strerror or error}); {remedy}") from None
+
+
+def read_json(path: Place, remedy: str) -> dict[str, Any]:
+    """Return the object in a file of JSON. Raises InputError, which says what to do."""
+    try:
+        record = json.loads(read_input(path, remedy).decode("utf-8-sig"))  # some editors begin with a mark
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"{path}: cannot be read ({error}); {remedy}") from None
+    if not isinstance(record, dict):
+        raise InputError(f"{path}: is not a JSON object; {remedy}")
+    return record
+
+
+def first_difference(before: Any, now: Any, name: str = "") -> str:
+    """Return the first entry in which two records differ, and the beginning of both values."""
+    if isinstance(before, dict) and isinstance(now, dict):
+        key = next(key for key in {**now, **before} if key not in now or key not in before or before[key] != now[key])
+        return first_difference(before.get(key), now.get(key), f"{name}.{key}" if name else key)
+    if isinstance(before, list) and isinstance(now, list) and len(before) == len(now):
+        number = next(number for number, pair in enumerate(zip(before, now, strict=True)) if pair[0] != pair[1])
+        return first_difference(before[number], now[number], f"{name}[{number}]")
+    values = [json.dumps(value) for value in (before, now)]
+    return f"{name} {values[0]:.60}, now {values[1]:.60}"

@@ -87,9 +87,8 @@ class Files:
 class _Seen:
     """Counts for warnings, from the frames read so far; a frame that is read twice counts once."""
 
-    merged: dict[int, tuple[int, int, int]] = field(
-        default_factory=dict
-    )  # by frame: merged vertices, all vertices, lost faces
+    # By frame: merged vertices, all vertices, lost faces.
+    merged: dict[int, tuple[int, int, int]] = field(default_factory=dict)
     dropped: dict[str, int] = field(default_factory=dict)  # kind of dropped data: first frame that has it
     smallest: tuple[float, int] | None = None  # diagonal, frame
     largest: tuple[float, int] | None = None
@@ -160,19 +159,14 @@ class FileSequence(MeshSequence):
             whole, mesh = mesh, self._options.weld(mesh)
             merged = len(whole.vertices) - len(mesh.vertices)
             self._seen.merged[number] = (merged, len(whole.vertices), len(whole.faces) - len(mesh.faces))
-        self._note(number, mesh, loaded)
+        sized = (mesh.diagonal, number) if mesh.diagonal > 0 else None
+        self._seen.add(_Seen({}, dict.fromkeys(loaded.dropped, number), sized, sized))
         return mesh
 
     def name(self, index: int) -> str:
         """Return the name of a frame in error messages: its number in the source and its file."""
         number = self._chosen[operator.index(index)]
         return f"frame {number} ({self._frames.name(number)})"
-
-    def _note(self, number: int, mesh: Mesh, loaded: Loaded) -> None:
-        seen = self._seen
-        size = mesh.diagonal
-        sized = (size, number) if size > 0 else None
-        seen.add(_Seen({}, dict.fromkeys(loaded.dropped, number), sized, sized))
 
 
 def open_sequence(source: str | Path | Sequence[str | Path], options: SequenceOptions | None = None) -> FileSequence:

@@ -147,7 +147,6 @@ if sys.platform == "win32":
         return True
 
 else:
-    import errno
     import fcntl
 
     def _lock(number: int) -> bool:

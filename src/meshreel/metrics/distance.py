@@ -31,15 +31,13 @@ class OneWayErrors:
     plane_mse: float  # m^2, the same along the normal of the matched point (D2)
     rms: float  # m, over the area
     hausdorff95: float  # m, distance that 95 % of the area does not exceed
-    maximum: float  # m, over all samples
     angle: float  # degrees, mean over the area, between interpolated vertex normals
     vertex_angle: float  # degrees, mean over the vertices, where quantisation rotates normals most
 
     def times(self, unit: float) -> OneWayErrors:
         """Return the errors of the same meshes scaled by `unit`."""
         squares = {"point_mse": self.point_mse * unit**2, "plane_mse": self.plane_mse * unit**2}
-        lengths = {"rms": self.rms * unit, "hausdorff95": self.hausdorff95 * unit, "maximum": self.maximum * unit}
-        return replace(self, **squares, **lengths)
+        return replace(self, **squares, rms=self.rms * unit, hausdorff95=self.hausdorff95 * unit)
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,8 +142,8 @@ def _scaled(mesh: Mesh, factor: float) -> Mesh:
     return Mesh.of(mesh.vertices * factor, mesh.faces)
 
 
-_PERFECT = OneWayErrors(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-_WORST = OneWayErrors(math.inf, math.inf, math.inf, math.inf, math.inf, WORST_ANGLE, WORST_ANGLE)
+_PERFECT = OneWayErrors(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+_WORST = OneWayErrors(math.inf, math.inf, math.inf, math.inf, WORST_ANGLE, WORST_ANGLE)
 
 
 def _one_way(source: Samples, found: Matches) -> OneWayErrors:
@@ -159,7 +157,6 @@ def _one_way(source: Samples, found: Matches) -> OneWayErrors:
         plane_mse=float(along[:vertices].mean()),
         rms=float(np.sqrt(dot(source.weights, squared))),
         hausdorff95=quantile(found.distances, source.weights, 0.95),
-        maximum=float(found.distances.max()),
         angle=dot(source.weights, turned),
         vertex_angle=float(turned[:vertices].mean()),
     )

@@ -40,11 +40,7 @@ def scatter(mesh: Mesh, chosen: Bool[np.ndarray, " F"], count: int) -> Scatter:
     steps = np.arange(count)
     at = np.searchsorted(ends, (steps + 0.5) * (area / count), side="right")
     faces = which[np.minimum(at, len(which) - 1)]
-    weights = _in_triangle((0.5 + _R2 * (steps[:, None] + 1)) % 1)
+    square = (0.5 + _R2 * (steps[:, None] + 1)) % 1
+    folded = np.where(square.sum(axis=1, keepdims=True) > 1, 1 - square, square)  # its far half onto the near one
+    weights = np.column_stack([1 - folded.sum(axis=1), folded])
     return Scatter(blend(mesh.vertices, mesh.faces[faces], weights), faces, weights, area)
-
-
-def _in_triangle(square: Float64[np.ndarray, "N 2"]) -> Float64[np.ndarray, "N 3"]:
-    """Return barycentric weights of points in the unit square, whose far half is folded onto the near one."""
-    folded = np.where(square.sum(axis=1, keepdims=True) > 1, 1 - square, square)
-    return np.column_stack([1 - folded.sum(axis=1), folded])

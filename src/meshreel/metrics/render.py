@@ -90,12 +90,10 @@ class Picture(Protocol):
     @property
     def covered(self) -> Bool[np.ndarray, "H W"]:
         """Where a mesh is seen."""
-        ...
 
     @property
     def colors(self) -> Float32[np.ndarray, "H W 3"]:
         """Colors, 0 to 1."""
-        ...
 
 
 class Pixels:
@@ -125,8 +123,10 @@ class Visible:
         if mesh.is_empty or 0 in crop.shape:
             covered, nothing = np.zeros(crop.shape, dtype=bool), np.zeros((0, 3))
             return View(crop, covered, mesh, nothing.astype(np.int32), nothing, nothing)
-        hit, faces, weights = _cast(_to_camera(mesh.vertices, pixels.camera), mesh.faces, *pixels.rays)
-        corners = mesh.faces[faces]
+        local = Mesh(_to_camera(mesh.vertices, pixels.camera), mesh.faces)  # about the eye
+        answer = Rays(local, origin=np.zeros(3)).cast(*pixels.rays)
+        hit = answer.faces >= 0
+        corners, weights = mesh.faces[answer.faces[hit]], answer.barycentric[hit]
         normals = interpolate(self._normals, corners, weights)
         return View(crop, hit.reshape(crop.shape), mesh, corners, weights, normals)
 
@@ -136,16 +136,3 @@ def _to_camera(vertices: Float64[np.ndarray, "V 3"], camera: Camera) -> Float64[
     rotation = camera.extrinsic[:3, :3]
     eye = -np.linalg.solve(rotation, camera.extrinsic[:3, 3])
     return (vertices - eye) @ rotation.T
-
-
-def _cast(
-    vertices: Float64[np.ndarray, "V 3"],
-    faces: Int32[np.ndarray, "F 3"],
-    origins: Float64[np.ndarray, "N 3"],
-    directions: Float64[np.ndarray, "N 3"],
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return which rays hit and, for those, the face and the barycentric weights."""
-    rays = Rays(Mesh(vertices, faces), origin=np.zeros(3))  # the eye is the origin already
-    answer = rays.cast(origins, directions)
-    hit = answer.faces >= 0
-    return hit, answer.faces[hit], answer.barycentric[hit]

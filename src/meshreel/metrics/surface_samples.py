@@ -51,7 +51,9 @@ def sample(mesh: Mesh, center: Float64[np.ndarray, " 3"]) -> Samples:
     """Sample a mesh, a result of `used_surface`, moved so that `center` is the origin."""
     mesh = Mesh.of(mesh.vertices - center, mesh.faces)
     normals = welded_normals(mesh)
-    levels = _levels(len(mesh.faces))
+    levels = 0
+    while len(mesh.faces) * 4**levels < _ENOUGH_FACES and levels < _MOST_LEVELS:
+        levels += 1
     fine = subdivide_midpoint(mesh, levels)  # the same surface; old vertices stay first
     fine_normals = subdivide_midpoint(Mesh.of(normals, mesh.faces), levels).vertices
     areas = face_normals(fine)[1]
@@ -83,10 +85,3 @@ def used_surface(mesh: Mesh) -> Mesh:
 
 def _centroids(values: Float64[np.ndarray, "V 3"], faces: Int32[np.ndarray, "F 3"]) -> Float64[np.ndarray, "F 3"]:
     return (values[faces[:, 0]] + values[faces[:, 1]] + values[faces[:, 2]]) / 3
-
-
-def _levels(faces: int) -> int:
-    levels = 0
-    while faces * 4**levels < _ENOUGH_FACES and levels < _MOST_LEVELS:
-        levels += 1
-    return levels

@@ -16,6 +16,7 @@ from jaxtyping import Float64
 
 from ..errors import InputError
 from ..geometry.cameras import PinholeCamera, unpack_cameras
+from ..io.read import read_input
 from ..types import UP_AXES, Mesh, check_up
 
 MARGIN = 1.05  # times the box, so that nothing touches the border (guess)
@@ -28,29 +29,23 @@ class Camera(Protocol):
     @property
     def width(self) -> int:
         """Width of the picture, pixels."""
-        ...
 
     @property
     def height(self) -> int:
         """Height of the picture, pixels."""
-        ...
 
     @property
     def extrinsic(self) -> Float64[np.ndarray, "4 4"]:
         """World to camera."""
-        ...
 
     def rays(self, pixels: Float64[np.ndarray, "N 2"]) -> tuple[np.ndarray, np.ndarray]:
         """Return origins and unit directions (N x 3 each, camera frame) through image positions (column, row)."""
-        ...
 
     def project(self, points: Float64[np.ndarray, "N 3"]) -> Float64[np.ndarray, "N 2"]:
         """Return image positions of points in the camera frame; not finite for points that are not in front of it."""
-        ...
 
     def record(self) -> dict[str, Any]:
         """Return the camera for JSON."""
-        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,11 +112,7 @@ def views_around(box: Box, options: ViewOptions = ViewOptions()) -> list[Pinhole
 
 def read_cameras(path: Path) -> list[PinholeCamera]:
     """Read the cameras of an Open3D PinholeCameraParameters or PinholeCameraTrajectory JSON file."""
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise InputError(f"{path}: cannot read cameras ({error}); give Open3D pinhole camera JSON") from error
-    return unpack_cameras(data, str(path))
+    return unpack_cameras(read_input(path, "give Open3D pinhole camera JSON"), str(path))
 
 
 def extent(box: Box, up: str) -> tuple[float, float]:

@@ -31,11 +31,6 @@ EXPOSED = ("Accept-Ranges", "Content-Length", "Content-Range", "ETag")
 _ORIGIN = re.compile(r"\*|https?://[^\s/?#@]+")
 
 
-def built_player() -> Path:
-    """Return the folder of the player in the package."""
-    return Path(__file__).parents[1] / "player"
-
-
 def make_app(
     library: Library, player: Path | None = None, cors: Sequence[str] = (), hosts: Sequence[str] = ("*",)
 ) -> Starlette:
@@ -44,7 +39,7 @@ def make_app(
     "*" allows all of them. `/` plays the file of a library with `only` one, otherwise it is a gallery; `/watch/NAME`
     plays a file and `/files/NAME` sends it. Raises InputError for a malformed origin.
     """
-    built, posters = Player(player or built_player()), Posters()
+    built, posters = Player(player or Path(__file__).parents[1] / "player"), Posters()
     style = Asset.of(Path(__file__).with_name("gallery.css").read_bytes(), "text/css")
     pages = _Pages(library, built, posters)
     routes = [

@@ -98,7 +98,9 @@ class Player:
             files = sorted(path for path in self._folder.glob("*") if path.is_file())
             seen = [(path.name, version_of(path.stat())) for path in files]
             if seen != self._seen:
-                self._files = {path.name: Asset.of(path.read_bytes(), _type(path)) for path in files}
+                self._files = {
+                    path.name: Asset.of(path.read_bytes(), TYPES.get(path.suffix.lower(), BYTES)) for path in files
+                }
                 sums = "".join(f"{name} {asset.digest}\n" for name, asset in self._files.items())
                 self._edition = blake2b(sums.encode(), digest_size=SUM).hexdigest() if files else ""
                 self._seen = seen
@@ -113,7 +115,3 @@ class Player:
             raise HTTPException(404, "there is no such file")
         lasting = LASTING if name != path else FRESH
         return files[name].answer(request.headers, PAGE if files[name].media == "text/html" else lasting)
-
-
-def _type(path: Path) -> str:
-    return TYPES.get(path.suffix.lower(), BYTES)

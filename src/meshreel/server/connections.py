@@ -15,6 +15,7 @@ import sys
 import threading
 import time
 from dataclasses import dataclass
+from functools import partial
 from types import FrameType
 from typing import Any
 
@@ -101,13 +102,10 @@ class Server(uvicorn.Server):
         await super().startup(sockets=[])  # listens to none: uvicorn has no limit for the handshake of TLS
         loop, encryption = asyncio.get_running_loop(), self.config.ssl
         patience = self._limits.request if encryption else None
+        made = {"config": self.config, "server_state": self.server_state, "app_state": self.lifespan.state}
         for one in sockets:
             options = {"sock": one, "ssl": encryption, "ssl_handshake_timeout": patience, "backlog": BACKLOG}
-            self.servers.append(await loop.create_server(self._connection, **options))
-
-    def _connection(self) -> Connection:
-        made = {"config": self.config, "server_state": self.server_state, "app_state": self.lifespan.state}
-        return Connection(self._limits, **made)
+            self.servers.append(await loop.create_server(partial(Connection, self._limits, **made), **options))
 
     async def on_tick(self, counter: int) -> bool:
         for connection in list(self.server_state.connections):

@@ -60,7 +60,8 @@ def gallery_page(title: str, entries: Sequence[Entry]) -> str:
 def _tile(entry: Entry) -> str:
     name = escape(entry.name.removesuffix(".reel"))
     address = quote(entry.name)
-    facts = f"{entry.mbps:.3g} Mbps, {entry.duration:.1f} s, {entry.frames} frames, {_size(entry.size)}"
+    size = f"{entry.size / 1e6:.3g} MB" if entry.size >= 1e6 else f"{entry.size / 1e3:.3g} kB"
+    facts = f"{entry.mbps:.3g} Mbps, {entry.duration:.1f} s, {entry.frames} frames, {size}"
     lines = f'<div class="facts">{facts}</div>' if entry.frames else ""
     lines += f'<div class="error">{escape(entry.error)}</div>' if entry.error else ""
     poster = (
@@ -68,7 +69,3 @@ def _tile(entry: Entry) -> str:
     )
     inside = f'{poster}<div class="facts-box"><div class="name">{name}</div>{lines}</div>'
     return f'<li><a href="/watch/{address}">{inside}</a></li>\n' if entry.frames else f"<li>{inside}</li>\n"
-
-
-def _size(count: int) -> str:
-    return f"{count / 1e6:.3g} MB" if count >= 1e6 else f"{count / 1e3:.3g} kB"

@@ -7,7 +7,7 @@ import math
 import socket
 import ssl
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from typing import Annotated
@@ -123,15 +123,10 @@ def _encryption(address: str) -> ssl.SSLContext:
 def _own_addresses() -> list[str]:
     """Return the IPv4 addresses of this machine that its host name and its routes reveal."""
     found: dict[str, None] = {}
-    try:
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-            probe.connect(("192.0.2.1", 9))  # sends nothing; the socket then knows the local address
-            found[probe.getsockname()[0]] = None
-    except OSError:
-        pass
-    try:
+    with suppress(OSError), socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.connect(("192.0.2.1", 9))  # sends nothing; the socket then knows the local address
+        found[probe.getsockname()[0]] = None
+    with suppress(OSError):
         for *_, place in socket.getaddrinfo(socket.gethostname(), None, family=socket.AF_INET):
             found[str(place[0])] = None
-    except OSError:
-        pass
     return [address for address in found if not address.startswith("127.")]

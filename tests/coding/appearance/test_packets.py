@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from meshreel.coding.appearance.packets import MOST_CODED, coded_pictures
-from meshreel.coding.appearance.pictures import VideoEncoder, VideoOptions, to_i420
+from meshreel.coding.appearance.pictures import MOST_CODED, VideoEncoder, VideoOptions, coded_pictures, to_i420
 from meshreel.errors import FormatError
 from meshreel.format.layout import VideoCodec
 

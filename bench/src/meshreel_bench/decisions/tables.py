@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from .rows import Row, read
-
 MARKED = re.compile(r"(<!-- table: (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
+Row = dict[str, Any]  # that docs/decisions rests on: a line of JSON each
 Cell = str | Callable[[Row], str]  # a format string, or a function of the row
 Columns = dict[str, Cell]  # cells by head; heads of numbers begin with ">"
 Table = tuple[list[str], list[list[str]]]  # heads and lines
@@ -24,6 +24,11 @@ def write_tables(pages: Path) -> Iterator[Path]:
         if new != old:
             page.write_text(new, encoding="utf-8")
             yield page
+
+
+def read(file: Path) -> list[Row]:
+    """Return all rows of a file."""
+    return [json.loads(line) for line in file.read_text(encoding="utf-8").splitlines()]
 
 
 def table(name: str, rows: Sequence[Row]) -> str:

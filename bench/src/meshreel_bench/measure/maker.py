@@ -5,11 +5,11 @@ from __future__ import annotations
 import os
 import platform
 import subprocess
-from contextlib import suppress
 from functools import cache
 from pathlib import Path
 
 from meshreel import __version__
+from meshreel.encoder.digests import processor
 
 from ..rows import Maker
 
@@ -19,7 +19,7 @@ _DIGITS = 12  # of a commit
 @cache
 def maker() -> Maker:
     """Return what makes rows here."""
-    machine = (platform.platform(), platform.python_version(), _cpu(), os.cpu_count())
+    machine = (platform.platform(), platform.python_version(), processor(), os.cpu_count())
     return Maker(__version__, _commit(), *machine)
 
 
@@ -38,12 +38,3 @@ def _commit() -> str:
 def _git(folder: Path, *words: str) -> str:
     answer = subprocess.run(["git", *words], cwd=folder, capture_output=True, text=True, check=True, timeout=10)
     return answer.stdout.strip()
-
-
-def _cpu() -> str | None:
-    """Return the processor's model, where the system has its name."""
-    with suppress(OSError):
-        for line in Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines():  # Linux
-            if line.startswith("model name"):
-                return line.partition(":")[2].strip()
-    return platform.processor() or None

@@ -1,6 +1,6 @@
 """Metrics of decoded frames: against the input, and where a scene is simulated, against the truth.
 
-Names that begin with `truth_` or `input_` are of whole scenes, people and background; `seam_` is where these meet.
+Names that begin with `truth_` or `input_` are of whole scenes, people and background.
 """
 
 from __future__ import annotations
@@ -11,11 +11,14 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
+from jaxtyping import Int64
 
 from meshreel.decoder.video import open as open_video
 from meshreel.errors import InputError
 from meshreel.format.layout import MAGIC, ChunkKind
+from meshreel.geometry.closest_points import Surface
 from meshreel.geometry.derived_sequences import Chosen, captured
+from meshreel.geometry.topology import components, drop_unreferenced, face_normals, weld
 from meshreel.metrics.comparison import ComparisonOptions, compare_sequences, finite
 from meshreel.metrics.depth import DepthJudge, judge
 from meshreel.metrics.scene_accuracy import Scene, people_flicker, scene_means, scene_row
@@ -26,10 +29,8 @@ from ..datasets import Dataset
 from ..datasets.scenes import SceneData
 from ..parallel_views import parallel_views_around
 from ..rows import Metrics
-from .bridges import count_bridges, count_degenerate
 from .color import picture_psnrs, picture_squares, swimming, texel_products, texel_psnr
 from .parts import missed, part_values
-from .seams import measure_seam, seam_row
 
 KEPT = ("d2_psnr_paper", "normal_error_deg", "ssim", "ssim_masked")  # of each frame
 NO_METRICS = ("frames_compared", "frames_missing", "key_frames", "per_frame", "cameras")  # of a comparison's record
@@ -108,7 +109,7 @@ def _depth(frames: Measured) -> Values:
 
 
 def _regions(frames: Measured) -> Values:
-    """Return means of people, background and all of it, and of the seam between them."""
+    """Return means of people, background and all of it, and values of parts."""
     scene = frames.known.scene
     if scene is None:
         raise InputError("regions are those of simulated scenes, whose truth is known")
@@ -118,7 +119,10 @@ def _regions(frames: Measured) -> Values:
     noisy = [_noisy(scene, number) for number in frames.numbers]
     values = _means("truth", clean, frames.decoded) | _means("input", noisy, frames.decoded, clean)
     values["truth_people_missed"] = float(np.mean([missed(*pair) for pair in zip(clean, frames.decoded, strict=True)]))
-    return values | _of_file(scene, frames)
+    if not frames.data.startswith(MAGIC) or len(video := open_video(frames.data)) != len(scene.meshes):
+        return values
+    values |= _flicker(scene, frames.numbers, video)
+    return values | ({} if scene.parts is None else part_values(scene.true, scene.parts, video))
 
 
 def _means(against: str, references: Sequence[Scene], decoded: Sequence[Mesh], clean: Sequence[Scene] = ()) -> Values:
@@ -126,21 +130,6 @@ def _means(against: str, references: Sequence[Scene], decoded: Sequence[Mesh], c
     pairs = zip(references, clean or references, decoded, strict=True)
     rows = [scene_row(reference, true.labelled(mesh)) for reference, true, mesh in pairs]
     return {f"{against}_{name}": value for name, value in finite(scene_means(rows)).items()}
-
-
-def _of_file(scene: SceneData, frames: Measured) -> Values:
-    """Return means of the seam between bodies and what they touch, and values of parts; none of other files."""
-    if not frames.data.startswith(MAGIC):
-        return {}
-    video = open_video(frames.data)
-    if len(video) != len(scene.meshes):
-        return {}
-    rows = []
-    for number in frames.numbers:
-        parts = (video.background(number), video.moving(number))
-        rows.append(seam_row(measure_seam(scene.meshes[number], scene.labels(number), *parts)))
-    values = finite(scene_means(rows)) | _flicker(scene, frames.numbers, video)
-    return values | ({} if scene.parts is None else part_values(scene.true, scene.parts, video))
 
 
 def _flicker(scene: SceneData, numbers: Sequence[int], video: Frames) -> Values:
@@ -168,3 +157,28 @@ def _noisy(scene: SceneData, number: int) -> Scene:
     if scene.parts is not None:
         return clean.labelled(mesh)
     return Scene(mesh, scene.labels(number), clean.sights, clean.options)
+
+
+def count_degenerate(mesh: Mesh) -> int:
+    """Faces with less than a thousandth of the median area."""
+    areas = face_normals(mesh)[1]
+    return int((areas < 1e-3 * np.median(areas)).sum()) if len(areas) else 0
+
+
+def count_bridges(original: Mesh, decoded: Mesh) -> int:
+    """Faces of `decoded` that join vertices nearest to different connected components of `original`."""
+    whole = drop_unreferenced(weld(original))
+    if whole.is_empty or decoded.is_empty:
+        return 0
+    bodies = components(whole.faces, len(whole.vertices))
+    if bodies.max() == 0:
+        return 0
+    corners = _nearest_body(whole, bodies, decoded)[decoded.faces]
+    return int((corners != corners[:, :1]).any(axis=1).sum())
+
+
+def _nearest_body(whole: Mesh, bodies: Int64[np.ndarray, " W"], decoded: Mesh) -> Int64[np.ndarray, " V"]:
+    """For each decoded vertex, the component of the original whose surface is nearest."""
+    middle = whole.vertices.mean(axis=0)  # closest points are found in float32
+    surface = Surface(Mesh.of(whole.vertices - middle, whole.faces))
+    return bodies[whole.faces[surface.closest(decoded.vertices - middle).faces, 0]]

@@ -15,11 +15,11 @@ import numpy as np
 from jaxtyping import Bool, Float32, Float64, Int32, Int64
 
 from ...geometry.decimate import decimate
-from ...geometry.holes import close_holes
 from ...geometry.poisson import PoissonOptions, drop_small, reconstruct, thin_out
 from ...geometry.rigid import apply, rotate
 from ...geometry.topology import (
     clean,
+    close_holes,
     large_pieces,
     longest_edges,
     subdivide_midpoint,

@@ -26,12 +26,10 @@ class Reader(Protocol):
     @staticmethod
     def fits(path: Path) -> bool:
         """Return whether a file or folder looks like this format, by its name and what is in the folder."""
-        ...
 
     @staticmethod
     def read(path: Path) -> Take:
         """Return what it holds; no picture is read before its stream is asked. May raise anything for damage."""
-        ...
 
 
 @cache

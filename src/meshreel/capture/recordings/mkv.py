@@ -8,12 +8,13 @@ sensor's picture, of which a mode takes a part.
 from __future__ import annotations
 
 import json
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float64
 
+from ..poses import pose_of
 from .takes import Lens, Pictures, Sensor, Stream, Take
 
 KIND = "an Azure Kinect or Femto recording (.mkv)"
@@ -45,10 +46,13 @@ def read(path: Path) -> Take:
             count = track.frames or round(seconds * float(track.average_rate or 0))
             size, told = (track.width, track.height), cameras.get(title)
             lens = None if told is None else _lens(told, title == "DEPTH", *size)
-            one = _Track(path, video.streams.video.index(track), start, size, title == "DEPTH")
-            streams[title] = Stream(*size, count, seconds * (count - 1) / max(count, 1), lens, one.pictures)
+            pictures = partial(_pictures, path, video.streams.video.index(track), start, title == "DEPTH")
+            streams[title] = Stream(*size, count, seconds * (count - 1) / max(count, 1), lens, pictures)
         others = tuple(title for title in tracks if title not in streams)
-    apart = _apart(cameras["COLOR"]) if "COLOR" in cameras else None
+    apart = None
+    if "COLOR" in cameras:  # which has the way back, in metres
+        back = cameras["COLOR"]["Rt"]
+        apart = np.linalg.inv(pose_of(np.reshape(back["Rotation"], (3, 3)), back["Translation"]))
     sensor = Sensor("kinect", streams["DEPTH"], 0.001, streams.get("COLOR"), apart)
     return Take(
         path, KIND, (sensor,), f"the file has no {CALIBRATION} attached; record it with the camera's SDK", others
@@ -81,35 +85,21 @@ def _lens(camera: dict[str, Any], deep: bool, width: int, height: int) -> Lens:
     return Lens(width, height, (fx * wide, fy * high), center, (k1, k2, p1, p2, k3, k4, k5, k6), reach)
 
 
-def _apart(color: dict[str, Any]) -> Float64[np.ndarray, "4 4"]:
-    """Return the colour camera's pose beside the depth camera; a calibration has the way back, in metres."""
-    back = np.eye(4)
-    back[:3, :3] = np.array(color["Rt"]["Rotation"], np.float64).reshape(3, 3)
-    back[:3, 3] = color["Rt"]["Translation"]
-    return np.linalg.inv(back)
+def _pictures(path: Path, index: int, start: float, deep: bool) -> Pictures:
+    """Yield depth as it is stored, JPEG as it is stored, and other colour as it is decoded."""
+    import av
 
-
-class _Track:
-    """A track of a file, which is read from its beginning each time."""
-
-    def __init__(self, path: Path, index: int, start: float, size: tuple[int, int], deep: bool) -> None:
-        self._path, self._index, self._start, self._size, self._deep = path, index, start, size, deep
-
-    def pictures(self) -> Pictures:
-        """Yield depth as it is stored, JPEG as it is stored, and other colour as it is decoded."""
-        import av
-
-        with av.open(self._path) as video:
-            track = video.streams.video[self._index]
-            for packet in video.demux(track):
-                if packet.size == 0 or packet.pts is None:
-                    continue
-                time = self._start + float(packet.pts * (packet.time_base or 0))
-                if self._deep:
-                    width, height = self._size
-                    yield time, np.frombuffer(bytes(packet), ">u2", width * height).reshape(height, width).astype("u2")
-                elif track.codec_context.name == "mjpeg":
-                    yield time, bytes(packet)
-                else:
-                    for frame in track.codec_context.decode(packet):
-                        yield time, frame.to_ndarray(format="rgb24")
+    with av.open(path) as video:
+        track = video.streams.video[index]
+        shape = track.height, track.width
+        for packet in video.demux(track):
+            if packet.size == 0 or packet.pts is None:
+                continue
+            time = start + float(packet.pts * (packet.time_base or 0))
+            if deep:
+                yield time, np.frombuffer(bytes(packet), ">u2", shape[0] * shape[1]).reshape(shape).astype("u2")
+            elif track.codec_context.name == "mjpeg":
+                yield time, bytes(packet)
+            else:
+                for frame in track.codec_context.decode(packet):
+                    yield time, frame.to_ndarray(format="rgb24")

@@ -16,19 +16,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float64
 
 from ...io.depth_pictures import parse_depth
-from .takes import Lens, Picture, Pictures, Sensor, Stream, Take, picture_size, pose
+from ..poses import Pose, pose_in_root, pose_of
+from .takes import Lens, Picture, Pictures, Sensor, Stream, Take, picture_size
 
 KIND = "a ROS 1 or RealSense .bag, a ROS 2 bag, an .mcap"
 DEEP = {"16UC1": ("<u2", 0.001), "mono16": ("<u2", 0.001), "32FC1": ("<f4", 1.0)}  # type, and its unit in ROS, m
-COLOR = {
-    "rgb8": [0, 1, 2],
-    "bgr8": [2, 1, 0],
-    "rgba8": [0, 1, 2, 3],
-    "bgra8": [2, 1, 0, 3],
-}  # order of red, green, blue
+# Order of red, green, blue.
+COLOR = {"rgb8": [0, 1, 2], "bgr8": [2, 1, 0], "rgba8": [0, 1, 2, 3], "bgra8": [2, 1, 0, 3]}
 MODELS = ("", "plumb_bob", "rational_polynomial", "none", "Brown Conrady", "Inverse Brown Conrady")
 POSES = "tf2_msgs/msg/TFMessage"
 COMPRESSED = struct.Struct("<iff")  # before the PNG of compressedDepth: form, and the two numbers of floats
@@ -48,7 +44,8 @@ def read(path: Path) -> Take:
     with _opened(path) as bag:
         topics = [topic for topic in bag.topics() if topic.deep is not None]
         named = [topic for topic in topics if topic.deep and "depth" in topic.name.lower()]
-        deep = _distinct(named or [topic for topic in topics if topic.deep and "infra" not in topic.name.lower()])
+        others = [topic for topic in topics if topic.deep and "infra" not in topic.name.lower()]
+        deep = _distinct(named or others, "base")
         if not deep:
             forms = f"no depth pictures ({', '.join(DEEP)}, or compressedDepth as PNG)"
             raise ValueError(f"{forms}; its topics are {', '.join(bag.described()) or 'none'}")
@@ -56,10 +53,10 @@ def read(path: Path) -> Take:
         tree = bag.tree()
         pairs = _paired(deep, colors, tree)
         used = {topic.name for pair in pairs for topic in pair if topic is not None}
-        world = _place(tree, pairs[0][0].frame)[0]
+        world = pose_in_root(tree, pairs[0][0].frame)[0]
         sensors = tuple(_sensor(bag, depth, color, tree, world) for depth, color in pairs)
-        others = tuple(text for text in bag.described() if text.split(" ")[0] not in used)
-    return Take(path, KIND, sensors, "record the topics camera_info, too", others)
+        unread = tuple(text for text in bag.described() if text.split(" ")[0] not in used)
+    return Take(path, KIND, sensors, "record the topics camera_info, too", unread)
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,25 +101,20 @@ class _Bag:
         """Return the first message of a topic, None without one."""
         return next((message for _, message in self.messages(name)), None)
 
-    def kinds(self) -> dict[str, tuple[str, int]]:
-        """Return type and number of messages of each topic."""
-        found: dict[str, tuple[str, int]] = {}
-        for one in self.reader.connections:
-            found[one.topic] = (one.msgtype, one.msgcount + found.get(one.topic, ("", 0))[1])
-        return dict(sorted(found.items()))
-
     def described(self) -> list[str]:
         """Return a text for each topic."""
-        return [f"{name} ({kind.split('/')[-1]})" for name, (kind, _) in self.kinds().items()]
+        return [f"{name} ({(kind.msgtype or '').split('/')[-1]})" for name, kind in sorted(self.reader.topics.items())]
 
     def topics(self) -> list[_Topic]:
         """Return the topics with pictures."""
-        kinds = self.kinds().items()
-        names = [(name, count) for name, (kind, count) in kinds if kind.endswith(("/Image", "/CompressedImage"))]
-        found = [(name, count, self.first(name)) for name, count in names]
-        return [_topic(name, count, first) for name, count, first in found if first is not None]
+        found = []
+        for name, kind in sorted(self.reader.topics.items()):
+            if (kind.msgtype or "").endswith(("/Image", "/CompressedImage")):
+                first = self.first(name)
+                found += [] if first is None else [_topic(name, kind.msgcount, first)]
+        return found
 
-    def tree(self) -> dict[str, tuple[str, Float64[np.ndarray, "4 4"]]]:
+    def tree(self) -> dict[str, tuple[str, Pose]]:
         """Return each frame's parent, and its pose in that one."""
         stills = [one for _, message in self.messages("/tf_static") for one in message.transforms]
         return {
@@ -157,9 +149,9 @@ def _topic(name: str, count: int, message: Any) -> _Topic:
     return _Topic(name, count, deep, unit, message.header.frame_id.lstrip("/"), *size)
 
 
-def _distinct(topics: list[_Topic]) -> list[_Topic]:
-    """Return topics without those that repeat one in another compression."""
-    return list({topic.base: topic for topic in reversed(topics)}.values())[::-1]
+def _distinct(topics: list[_Topic], name: str) -> list[_Topic]:
+    """Return topics without those that repeat one in another compression (base), or of one camera (frame)."""
+    return list({getattr(topic, name): topic for topic in reversed(topics)}.values())[::-1]
 
 
 def _paired(deep: list[_Topic], colors: list[_Topic], tree: dict[str, Any]) -> list[tuple[_Topic, _Topic | None]]:
@@ -183,22 +175,22 @@ def _paired(deep: list[_Topic], colors: list[_Topic], tree: dict[str, Any]) -> l
     for color, found in near.items():
         if color is not None:
             own = [depth for depth in found if depth.frame != color.frame]
-            known = own and _place(tree, own[0].frame)[0] == _place(tree, color.frame)[0]
+            known = own and pose_in_root(tree, own[0].frame)[0] == pose_in_root(tree, color.frame)[0]
             found = own if known or own == found else [depth for depth in found if depth.frame == color.frame]
-            found = list({depth.frame: depth for depth in reversed(found)}.values())[::-1]
+            found = _distinct(found, "frame")
         pairs += [(depth, None if number else color) for number, depth in enumerate(found)]
     return pairs
 
 
 def _sensor(bag: _Bag, depth: _Topic, color: _Topic | None, tree: dict[str, Any], world: str) -> Sensor:
     """Return a depth camera and the colour beside it; its pose counts in the frame `world` only."""
-    (root, placed), unit = _place(tree, depth.frame), depth.unit
+    (root, placed), unit = pose_in_root(tree, depth.frame), depth.unit
     option = f"{depth.sdk.rpartition('/')[0]}/option/Depth Units/value"
-    for name in {option, option.replace(" ", "_")} & bag.kinds().keys():
+    for name in {option, option.replace(" ", "_")} & bag.reader.topics.keys():
         unit = round(float(bag.first(name).data), 9)  # 0.001 as 32 bits is a little more
     apart, seen = None, None
     if color is not None:
-        seen, (other, beside) = _stream(bag, color), _place(tree, color.frame)
+        seen, (other, beside) = _stream(bag, color), pose_in_root(tree, color.frame)
         to_depth, to_color = bag.first(f"{depth.sdk}/tf/0"), bag.first(f"{color.sdk}/tf/0")
         if to_depth is not None and to_color is not None:  # from their common reference
             apart = _matrix(to_depth) @ np.linalg.inv(_matrix(to_color))
@@ -206,16 +198,6 @@ def _sensor(bag: _Bag, depth: _Topic, color: _Topic | None, tree: dict[str, Any]
             apart = np.linalg.inv(placed) @ beside
     poses = placed[None] if depth.frame in tree and root == world else None
     return Sensor(depth.base.strip("/").replace("/", "-"), _stream(bag, depth), unit, seen, apart, poses)
-
-
-def _place(tree: dict[str, Any], frame: str) -> tuple[str, Float64[np.ndarray, "4 4"]]:
-    """Return the root of a frame, and the frame's pose in it."""
-    placed, seen = np.eye(4), set[str]()
-    while frame in tree and frame not in seen:
-        seen.add(frame)
-        frame, step = tree[frame]
-        placed = step @ placed
-    return frame, placed
 
 
 def _stream(bag: _Bag, topic: _Topic) -> Stream:
@@ -273,6 +255,6 @@ def _unpacked(form: str, data: bytes) -> Picture:
     return parse_depth(data, form) if form.split(";")[0].strip() in DEEP else data
 
 
-def _matrix(transform: Any) -> Float64[np.ndarray, "4 4"]:
+def _matrix(transform: Any) -> Pose:
     turn, place = transform.rotation, transform.translation
-    return pose(np.array([turn.x, turn.y, turn.z, turn.w]), np.array([place.x, place.y, place.z]))
+    return pose_of([turn.x, turn.y, turn.z, turn.w], [place.x, place.y, place.z])

@@ -15,7 +15,8 @@ from ...io.depth_pictures import read_depth
 from ...io.file_names import last_number
 from ...io.pictures import read_picture
 from ...io.read import read_file
-from .takes import Lens, Pictures, Sensor, Stream, Take, picture_size, pose
+from ..poses import pose_of
+from .takes import Lens, Pictures, Sensor, Stream, Take, picture_size
 
 KIND = "a Stray Scanner folder (depth/, rgb.mp4, odometry.csv)"
 MATRIX, VIDEO = "camera_matrix.csv", "rgb.mp4"
@@ -41,16 +42,13 @@ def read(path: Path) -> Take:
     def pictures() -> Pictures:
         for stamp, file in zip(stamps, files, strict=True):
             depth, sure = read_depth(file), path / "confidence" / file.name
-            yield stamp, np.where(_confidence(sure) > 0, depth, 0) if sure.is_file() else depth
+            if sure.is_file():  # ARKit's confidence: 0 is low, as of pixels that mix two surfaces
+                depth = np.where(read_picture(sure)[..., 0] > 0, depth, 0)
+            yield stamp, depth
 
     depth = Stream(width, height, len(files), max(stamps) - min(stamps), lens, pictures)
     sensor = Sensor("phone", depth, 0.001, color, np.eye(4), poses)
     return Take(path, KIND, (sensor,), f"it needs {MATRIX} and {VIDEO}, whose size the matrix is for")
-
-
-def _confidence(path: Path) -> np.ndarray:
-    """Return ARKit's confidence of each depth: 0 is low, as of pixels that mix two surfaces."""
-    return read_picture(path)[..., 0]
 
 
 def _odometry(path: Path) -> tuple[dict[int, float], Float64[np.ndarray, "T 4 4"] | None]:
@@ -64,7 +62,7 @@ def _odometry(path: Path) -> tuple[dict[int, float], Float64[np.ndarray, "T 4 4"
         dict(zip(columns["frame"].astype(int).tolist(), columns["timestamp"].tolist(), strict=True)) if titled else {}
     )
     turns, places = (np.stack([columns[name] for name in names], axis=1) for names in (("qx", "qy", "qz", "qw"), "xyz"))
-    return times, pose(turns, places) if len(table) else None
+    return times, pose_of(turns, places) if len(table) else None
 
 
 def _video(path: Path, start: float) -> Stream:

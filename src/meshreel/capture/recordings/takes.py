@@ -103,14 +103,3 @@ def picture_size(data: bytes) -> tuple[int, int]:
 
     with Image.open(io.BytesIO(data)) as image:
         return image.size
-
-
-def pose(
-    quaternions: Float64[np.ndarray, "*T 4"], positions: Float64[np.ndarray, "*T 3"]
-) -> Float64[np.ndarray, "*T 4 4"]:
-    """Return 4 x 4 matrices of rotations x y z w and translations. Raises ValueError for a quaternion of zeros."""
-    from scipy.spatial.transform import Rotation
-
-    made = np.zeros((*positions.shape[:-1], 4, 4))
-    made[..., :3, :3], made[..., :3, 3], made[..., 3, 3] = Rotation.from_quat(quaternions).as_matrix(), positions, 1.0
-    return made

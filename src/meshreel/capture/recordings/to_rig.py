@@ -23,6 +23,7 @@ from ...errors import InputError
 from ...geometry.color_views import bent
 from ...io.pictures import pack_picture
 from ...io.unfinished import cannot_be_written
+from ...io.write import make_folder
 from ..rig import DepthCamera, write_rig
 from .takes import Lens, Picture, Sensor, Stream, Take, reading
 
@@ -52,9 +53,8 @@ def write_takes(takes: Sequence[Take], folder: Path, report: Report = lambda _: 
         write_rig(place, tuple(part.camera() for part in parts), clock.rate, [part.beside() for part in parts])
     unknown = sum(part.sensor.poses is None for part in parts)
     if len(parts) > 1 and (unknown or len(takes) > 1):
-        remarks.append(
-            f"{folder}: how its {len(parts)} cameras stand to each other is not known; meshreel calibrate finds it"
-        )
+        text = f"how its {len(parts)} cameras stand to each other is not known; meshreel calibrate finds it"
+        remarks.append(f"{folder}: {text}")
     return [remark for part in parts for remark in part.remarks] + remarks
 
 
@@ -92,7 +92,6 @@ class Clock:
 class _Written:
     """Pictures of a stream in the rig's folder, in the order of the recording."""
 
-    folder: Path
     files: list[tuple[float, Path]] = field(default_factory=list)
     by_frame: dict[int, int] = field(default_factory=dict)
 
@@ -117,16 +116,15 @@ class _Part:
             raise InputError(f"{take.path}: depth of {sensor.name} has no calibration: {take.calibrate}")
         self.take, self.sensor, self.name, self.lens = take, sensor, name, sensor.depth.lens
         self.pose, self.unit, self.remarks = _still(take, sensor), sensor.unit, list[str]()
-        self.depth = _Written(Path())
+        self.depth = _Written()
         self.color: _Written | None = None
         self.stream = sensor.color
         if self.stream is not None and self.stream.lens is None:
             self.remarks.append(f"{take.path}: colour of {sensor.name} has no calibration and is left out")
             self.stream = None
         if self.stream is not None and sensor.color_to_depth is None:
-            self.remarks.append(
-                f"{take.path}: how colour of {sensor.name} lies on its depth is not known; taken as aligned"
-            )
+            text = f"how colour of {sensor.name} lies on its depth is not known; taken as aligned"
+            self.remarks.append(f"{take.path}: {text}")
         self.camera(), self.beside()  # raise InputError for numbers that no camera has
 
     def camera(self) -> DepthCamera:
@@ -142,10 +140,8 @@ class _Part:
         return record | {"folder": f"{self.name}/color", "distortion": list(self.stream.lens.distortion)}
 
     def _as_camera(self, name: str, lens: Lens, pose: Float64[np.ndarray, "4 4"]) -> DepthCamera:
-        try:
+        with reading(self.take.path):
             return DepthCamera(name, lens.width, lens.height, lens.focal, lens.center, pose, self.unit)
-        except InputError as error:
-            raise InputError(f"{self.take.path}: {error}") from None
 
     def read(self, folder: Path, report: Callable[[], None]) -> None:
         """Write all pictures to a folder."""
@@ -157,7 +153,9 @@ class _Part:
                 text = f"{picture.shape[1]} x {picture.shape[0]} pixels where its lens has"
                 raise InputError(f"{self.take.path}: depth of {text} {self.lens.width} x {self.lens.height}")
             if picture.dtype.kind == "f":
-                picture, self.unit = _whole(picture * (self.sensor.unit / MILLIMETRE)), MILLIMETRE
+                depth, self.unit = picture * (self.sensor.unit / MILLIMETRE), MILLIMETRE
+                with np.errstate(invalid="ignore"):  # what is none, or too far, is 0
+                    picture = np.where((depth > 0) & (depth < 65535), np.rint(depth), 0).astype(np.uint16)
             return pack_picture(picture if pixels is None else picture[pixels[0]] * pixels[1]), ".png"
 
         self.depth = self._write(self.sensor.depth, folder / "depth", straight, report)
@@ -167,9 +165,8 @@ class _Part:
     def _write(
         self, stream: Stream, folder: Path, pack: Callable[[Picture], tuple[bytes, str]], report: Callable[[], None]
     ) -> _Written:
-        written, what = _Written(folder), f"{self.take.path}: {folder.name} of {self.sensor.name}"
-        with cannot_be_written(folder):
-            folder.mkdir(parents=True)
+        written, what = _Written(), f"{self.take.path}: {folder.name} of {self.sensor.name}"
+        make_folder(folder)
         with reading(self.take.path):
             for number, (time, picture) in enumerate(stream.pictures()):
                 if not np.isfinite(time):
@@ -185,9 +182,8 @@ class _Part:
         if (back := int((np.diff(written.times()) < 0).sum())) > 0:
             self.remarks.append(f"{what}: time stamps go back {back} times; its pictures are sorted by them")
         if stream.count - len(written.files) > max(1, CUT_OFF * stream.count):
-            self.remarks.append(
-                f"{what}: {len(written.files)} of {stream.count} pictures can be read; was the file cut off?"
-            )
+            text = f"{len(written.files)} of {stream.count} pictures can be read; was the file cut off?"
+            self.remarks.append(f"{what}: {text}")
         return written
 
 
@@ -266,12 +262,6 @@ def _straightened(lens: Lens) -> tuple[tuple[np.ndarray, np.ndarray], Bool[np.nd
         np.rint(np.where(inside, column, 0)).astype(np.int64),
     )
     return nearest, inside
-
-
-def _whole(depth: np.ndarray) -> np.ndarray:
-    """Return depths as integers of 16 bits; what is none, or too far, is 0."""
-    with np.errstate(invalid="ignore"):
-        return np.where((depth > 0) & (depth < 65535), np.rint(depth), 0).astype(np.uint16)
 
 
 def _colored(picture: Picture) -> tuple[bytes, str]:

@@ -14,7 +14,8 @@ from jaxtyping import Float64
 
 from ...io.depth_pictures import read_depth
 from ...io.read import read_file
-from .takes import Lens, Picture, Pictures, Sensor, Stream, Take, picture_size, pose
+from ..poses import pose_of
+from .takes import Lens, Picture, Pictures, Sensor, Stream, Take, picture_size
 
 KIND = "a TUM RGB-D folder (depth.txt, rgb.txt)"
 UNIT = 1 / 5000  # m
@@ -86,4 +87,4 @@ def _poses(path: Path, depth: list[tuple[float, Path]]) -> Float64[np.ndarray, "
     rows = np.array([row[:8] for row in _rows(path / "groundtruth.txt")], dtype=np.float64).reshape(-1, 8)
     times = [time for time, _ in depth]
     rows = rows[(rows[:, 0] >= min(times)) & (rows[:, 0] <= max(times))]
-    return pose(rows[:, 4:], rows[:, 1:4]) if len(rows) else None
+    return pose_of(rows[:, 4:], rows[:, 1:4]) if len(rows) else None

@@ -1,7 +1,8 @@
 """Encode pictures that change little from frame to frame: as AV1 by SVT, or H.264 by x264 (PyAV, extra `color`).
 
 In -> out: pictures in sRGB <-> packets, one for each picture, in their order. Both sides know I420 planes of limited
-range (ITU-R BT.709), which decoders agree on to the bit; their colours are a matter of who shows them.
+range (ITU-R BT.709), which decoders agree on to the bit; their colours are a matter of who shows them. What a packet
+asks of its decoder is seen without decoding it: a few bytes can ask for thousands of pictures.
 """
 
 from __future__ import annotations
@@ -17,11 +18,11 @@ import numpy as np
 
 from ...errors import FormatError, InputError
 from ...format.budget import check_pictures
+from ...format.kinds import Varint
 from ...format.layout import LAYER_PICTURES, Form, Pictures, VideoCodec
 from ...format.records import pack, unpack_all
 from ...shapes import UInt8
 from ...types import LUMA
-from .packets import coded_pictures
 
 PRESET = 4  # of SVT: 6 takes half as long for 5 % more bytes (basketball_player)
 MOST_CRF = 63  # of SVT
@@ -37,6 +38,10 @@ COMMENT = 6  # type of a NAL unit: supplemental enhancement information
 H264_BORDER = 128  # pixels that FFmpeg's decoder counts beside a picture, at most
 LOW_DELAY = 0x80000  # FFmpeg's flag AV_CODEC_FLAG_LOW_DELAY: a picture is shown when its packet is decoded
 BAND = 64  # rows that become sRGB together: their floats take some MiB
+MOST_CODED = 8  # pictures in a packet: AV1 keeps as many for later ones
+SEQUENCE, FRAME = 1, 6  # types of an OBU (AV1, 6.2.2), and those with the header of a picture
+HEADERS = (3, FRAME, 7)
+SLICES = (1, 2, 5)  # types of a NAL unit (H.264, table 7-1) with a first slice
 BLUE, RED = 1.8556, 1.5748  # what a full colour difference is of blue and of red
 
 
@@ -137,6 +142,41 @@ def decode_pictures(data: bytes, frames: int, texels: int) -> Pictures:
     return record
 
 
+def coded_pictures(packet: bytes, codec: VideoCodec) -> int:
+    """Return how many pictures a packet decodes, to show one.
+
+    Raises FormatError where it shows none or several, decodes more than 8, or is AV1 of another profile than Main.
+    """
+    coded, shown = _of_av1(packet) if codec == VideoCodec.AV1 else _of_h264(packet)
+    if shown != 1 or coded > MOST_CODED:
+        raise FormatError(f"a packet of {len(packet)} bytes that decodes {coded} pictures and shows {shown}")
+    return coded
+
+
+def _of_av1(packet: bytes) -> tuple[int, int]:
+    at = coded = shown = 0
+    while at < len(packet):
+        head = packet[at]
+        size, begin = Varint().unpack(packet, at + 1 + (head >> 2 & 1))
+        at, kind = begin + size, head >> 3 & 15
+        if at > len(packet) or not head & 2:
+            raise FormatError(f"a damaged picture: an OBU of {size} bytes that ends behind its packet, or has no size")
+        first = packet[begin] if size else 0
+        if kind == SEQUENCE and first & 0xE8:  # a profile but Main, or the short headers of a still picture
+            raise FormatError(f"a video whose sequence header begins with {first}: not AV1's Main profile")
+        if kind in HEADERS:
+            again = first >> 7  # show_existing_frame
+            coded += not again
+            shown += again or first >> 4 & 1
+    return coded, shown
+
+
+def _of_h264(packet: bytes) -> tuple[int, int]:
+    heads = re.findall(rb"\x00\x00\x01(.)[\x80-\xff]", packet, re.DOTALL)  # of slices that begin with block 0
+    count = sum(head[0] & 31 in SLICES for head in heads)
+    return count, count
+
+
 def to_i420(pixels: UInt8[np.ndarray, "H W 3"]) -> UInt8[np.ndarray, "R W"]:
     """Return the planes of a picture with even sides, one below the other: R is 3 H / 2."""
     red, green, blue = (pixels[..., k].astype(np.float64) for k in range(3))
@@ -162,7 +202,8 @@ def from_i420(planes: UInt8[np.ndarray, "R W"]) -> UInt8[np.ndarray, "H W 3"]:
 
 def _shown(luma: np.ndarray, blue: np.ndarray, red: np.ndarray) -> np.ndarray:
     y = (luma.astype(np.float64) - 16) * (255 / 219)
-    b, r = (_doubled((plane.astype(np.float64) - 128) * (255 / 224)) for plane in (blue, red))
+    differences = ((plane.astype(np.float64) - 128) * (255 / 224) for plane in (blue, red))
+    b, r = (plane.repeat(2, axis=0).repeat(2, axis=1) for plane in differences)
     shown = [y + RED * r, y - (LUMA[2] * BLUE * b + LUMA[0] * RED * r) / LUMA[1], y + BLUE * b]
     return np.clip(np.rint(np.stack(shown, axis=2)), 0, 255).astype(np.uint8)
 
@@ -175,10 +216,6 @@ def _without_comments(packet: bytes) -> bytes:
 
 def _halved(plane: np.ndarray) -> np.ndarray:
     return (plane[::2, ::2] + plane[1::2, ::2] + plane[::2, 1::2] + plane[1::2, 1::2]) / 4
-
-
-def _doubled(plane: np.ndarray) -> np.ndarray:
-    return plane.repeat(2, axis=0).repeat(2, axis=1)
 
 
 def _context(codec: str, mode: Literal["r", "w"]) -> Any:

@@ -19,7 +19,7 @@ from ...format.budget import Size, check_cost, layers_cost
 from ...format.layout import Form, LayersGroup, LayersLevel, LayersPatches, Origin, Presence
 from ...format.records import pack, unpack, unpack_all
 from ...geometry.subdivision import heights, refine, subdivide, write_frames
-from ...shapes import Float, Float64, Int32
+from ...shapes import Float64, Int32
 from ...types import Mesh, Placement
 from ..mesh import check_growth, check_step, decode_mesh
 from ..reference_mesh import CodedReference
@@ -162,30 +162,25 @@ class DecodedLayers:
     """Decoded group, with spare memory behind its positions."""
 
     faces: Int32[np.ndarray, "F 3"]
-    positions: Float[np.ndarray, "T V 3"]
+    positions: Float64[np.ndarray, "T V 3"]
     state: LayersState
     spare: Int32[np.ndarray, "N 3"]  # memory for faces, behind the positions
 
 
 def place_layers(
-    records: LayersRecords,
-    previous: LayersState | None,
-    place: Placement | None = None,
-    spare: bool = False,
-    out: Float[np.ndarray, "T V 3"] | None = None,
+    records: LayersRecords, previous: LayersState | None, place: Placement | None = None, spare: bool = False
 ) -> DecodedLayers:
     """Decode records; with `place`, the positions are placed by it, but never the state.
 
     With `spare`, the block of memory also has room for the faces of each frame: the next group gets one block again
-    without the page faults that would take as long as decoding. With `out`, of float64 or float32, the positions are
-    written there. Raises InputError if it has another shape.
+    without the page faults that would take as long as decoding.
     """
     head = records.head
     base, previous = _start(records, previous)
     known = decode_trajectories(records.layers[0], base, head.frames)
     last = np.ascontiguousarray(known[:, :, -1])
     faces, finest = base.faces, len(records.layers) - 1
-    room = None if finest else _Room.of(head.frames, len(known), 0, out)
+    room = None if finest else _Room.of(head.frames, len(known), 0)
     scalars: list[Float64[np.ndarray, " _"]] = []
     finer: list[Connectivity] = []
     for number, record in enumerate(records.layers[1:], 1):
@@ -194,7 +189,7 @@ def place_layers(
         if number < finest:
             known, offsets = decode_level(record, near, known, before)
         else:
-            room = _Room.of(head.frames, near.level.count, len(near.level.faces) * spare, out)
+            room = _Room.of(head.frames, near.level.count, len(near.level.faces) * spare)
             offsets = decode_last(record, near, known, before, Shown(room.positions, place))
         faces = near.level.faces
         finer.append(near)
@@ -229,16 +224,12 @@ def state_after(records: LayersRecords, previous: LayersState | None) -> LayersS
 class _Room:
     """One block of memory for the positions of a group and for faces."""
 
-    positions: Float[np.ndarray, "T V 3"]
+    positions: Float64[np.ndarray, "T V 3"]
     faces: Int32[np.ndarray, "N 3"]
 
     @staticmethod
-    def of(frames: int, vertices: int, faces: int, out: Float[np.ndarray, "_ _ 3"] | None) -> _Room:
-        """Allocate memory for `vertices` vertices, unless `out` is theirs, and `faces` faces in each frame."""
-        if out is not None:
-            if out.shape != (frames, vertices, 3):
-                raise InputError(f"{frames} frames of {vertices} vertices: give an array for them, not {out.shape}")
-            return _Room(out, np.empty((frames * faces, 3), np.int32))
+    def of(frames: int, vertices: int, faces: int) -> _Room:
+        """Allocate memory for `vertices` vertices and `faces` faces in each frame."""
         size = 3 * frames * vertices
         block = _core.empty(size + (3 * frames * faces + 1) // 2)
         rows = block[size:].view(np.int32)[: 3 * frames * faces]

@@ -13,7 +13,7 @@ import numpy as np
 from ... import _core
 from ...format.layout import LayersLevel, Origin
 from ...geometry.subdivision import Level
-from ...shapes import Float, Float64
+from ...shapes import Float64
 from ...types import Placement
 from .fields import EncodedField, Rate, encode_field
 from .graph import Connectivity, siblings
@@ -34,7 +34,7 @@ class EncodedLevel:
 class Shown:
     """Destination of the vertices of the last decoded level."""
 
-    positions: Float[np.ndarray, "T W 3"]  # written by the decoder; float64 or float32
+    positions: Float64[np.ndarray, "T W 3"]  # written by the decoder
     place: Placement | None  # applied to the vertices
 
 

@@ -159,8 +159,10 @@ def _taken_in(record: LayersPatches, frames: int) -> tuple[Mesh, ...]:
     if mesh.is_empty:
         return (Mesh.empty(),) * frames
     check_growth(mesh, 0)
-    cells = _cells(mesh, step, record.width, frames)
-    of_vertices = (cells[:, 0] + record.width // 2) // max(record.width, 1)
+    if not 0 < record.width * frames <= MOST_CELLS or np.abs(mesh.vertices).max() > 2 * MOST_CELLS * step:
+        raise FormatError(f"patches: {frames} frames, {record.width} cells wide")
+    cells = np.rint(mesh.vertices / step).astype(np.int64)
+    of_vertices = (cells[:, 0] + record.width // 2) // record.width
     of_faces = of_vertices[mesh.faces]
     if of_faces.min() < 0 or of_faces.max() >= frames or (of_faces != of_faces[:, :1]).any():
         raise FormatError(f"patches: a face that is in none of {frames} frames, or in two")
@@ -184,12 +186,6 @@ def _parted(
     ends = np.searchsorted(of_faces[order], np.arange(frames + 1)).tolist()
     spans = zip(pairwise(starts), pairwise(ends), strict=True)
     return tuple(Mesh.of(points[a:b].copy(), faces[c:d] - a) for (a, b), (c, d) in spans)
-
-
-def _cells(mesh: Mesh, step: float, width: int, frames: int) -> Int64[np.ndarray, "V 3"]:
-    if not 0 < width * frames <= MOST_CELLS or np.abs(mesh.vertices).max() > 2 * MOST_CELLS * step:
-        raise FormatError(f"patches: {frames} frames, {width} cells wide")
-    return np.rint(mesh.vertices / step).astype(np.int64)
 
 
 def _joined(points: Float64[np.ndarray, "V 3"], faces: Int32[np.ndarray, "F 3"], patch: Mesh) -> Mesh:
