@@ -19,7 +19,9 @@ from meshreel.encoder.sequence import encode
 from meshreel.encoder.tails import TailOptions, find_tails
 from meshreel.encoder.target import Fidelity, measure
 from meshreel.format.records import pack
-from meshreel.types import Mesh, MeshList
+from meshreel.geometry.cameras import PinholeCamera
+from meshreel.geometry.depth import DepthPicture, FreeSpace
+from meshreel.types import Mesh, MeshList, Placement
 from tests.coding.paper.test_laplacian import icosahedron
 from tests.small_options import with_method
 
@@ -108,8 +110,8 @@ def test_patches_on_an_almost_exact_template_are_close_to_the_frame(noise: float
 
 
 def test_a_mask_that_pays_is_kept_where_a_patch_beside_it_does_not(monkeypatch: pytest.MonkeyPatch) -> None:
-    template = both(BALL, knob())
-    frames = [both(BALL, knob(at=-0.4)), template, BALL]
+    template = both(BALL, knob(0.012))
+    frames = [both(BALL, knob(0.012, at=-0.4)), template, BALL]
     places = noisy(template, 3)
     monkeypatch.setattr(tails._Search, "holds", lambda _, tried: all(mesh.is_empty for mesh in tried.parts.meshes))
     found = find_tails(frames, meshes(places, template.faces), SIZE, noise=0.0)
@@ -180,3 +182,21 @@ def test_a_file_has_the_layer_where_it_pays_and_plays_without_it(sequence: MeshL
 def test_tails_can_be_switched_off(sequence: MeshList, tmp_path) -> None:
     encode(sequence, tmp_path / "without.reel", options=options(tails=None))
     assert "patches" not in payload_bytes_by_purpose(meshreel.open(tmp_path / "without.reel").reader.read_chunk(0))
+
+
+def test_surface_that_a_frame_lacks_stays_unless_a_camera_saw_through_it():
+    more = both(BALL, knob())
+    camera = PinholeCamera(64, 64, np.array([[60.0, 0, 32], [0, 60.0, 32], [0, 0, 1]]), np.eye(4))
+    away = DepthPicture(camera, np.full((64, 64), 9.0, np.float32), 1.0, 10.0)  # nothing up to nine metres
+    place = Placement(1.0, (0.0, 0.0, 3.0))
+    frames, shown = [Mesh(BALL.vertices + NOISE[0], BALL.faces)] * 2, [more] * 2
+    seen, blind = FreeSpace.of([away], place), FreeSpace.of([], place)
+    dropped = find_tails(frames, shown, SIZE, noise=1e-3, free=[seen] * 2)
+    assert dropped is not None and all(len(mesh.faces) < len(more.faces) for mesh in dropped.frames)
+    assert find_tails(frames, shown, SIZE, noise=1e-3, free=[blind] * 2) is None
+
+
+def test_holes_of_noisy_bodies_are_patched_at_any_price():
+    frame = both(Mesh(BALL.vertices + NOISE[0], BALL.faces), knob())
+    found = find_tails([frame] * 2, [BALL] * 2, 10, noise=1e-3)  # a byte costs more than the knob
+    assert found is not None and all(len(mesh.faces) > len(BALL.faces) for mesh in found.frames)

@@ -133,7 +133,7 @@ class Candidate:
 
     def fit(self, ahead: Ahead, numbers: range) -> Float64[np.ndarray, "T V 3"]:
         """Return the final fits to successive frames that it follows: near what one shape explains."""
-        if (rigid := self._tracker.rigid(numbers)) is not None:
+        if len(numbers) > 1 and (rigid := self._tracker.rigid(numbers)) is not None:
             return np.stack([motion.of(self._points) for motion in rigid])
         first = np.stack([self._fits[number] for number in numbers])
         if not self._options.fit.components or len(numbers) == 1:

@@ -181,7 +181,9 @@ class _Measured:
     astray: float  # share of all surface that stands still far from the background
 
 
-def _as_far(points: Float64[np.ndarray, "N 3"], bodies: Float64[np.ndarray, "M 3"], cameras: list[DepthPicture | None]) -> Bool[np.ndarray, " N"]:
+def _as_far(
+    points: Float64[np.ndarray, "N 3"], bodies: Float64[np.ndarray, "M 3"], cameras: list[DepthPicture | None]
+) -> Bool[np.ndarray, " N"]:
     """Return which points are about as far from the nearest camera as bodies are: a sensor's noise grows with range."""
     eyes = [picture.camera.eye for picture in cameras if picture is not None]
     if not eyes or not len(bodies):

@@ -82,7 +82,9 @@ def track_intervals(job: Job, parts: Parts, frames: range, tracks: Tracks) -> li
         for cut in _cut(normalised, frames, parts.seen, longest):
             some = normalised[cut.start : cut.stop]
             one = Interval(some, parts.body_noise, frames.start + cut.start, track, digest(some))
-            found.append(replace(one, views=Views.of(job.sequence, parts.seen), sight=Sight.of(job.sequence, parts.seen)))
+            found.append(
+                replace(one, views=Views.of(job.sequence, parts.seen), sight=Sight.of(job.sequence, parts.seen))
+            )
     return found
 
 

@@ -71,7 +71,8 @@ def find_tails(
     The `decoded` meshes of a group have the same faces; `size` is that of their layers, bytes. `noise` is the RMS
     distance of the frames from the truth: thresholds count from there where the rest is nearer. `free` is what cameras
     saw through in each frame: surface that a frame lacks stays unless one saw through it. Neither the mean nor the
-    larger of both directions' errors rises by more than the layer's bytes are worth; but holes are patched at any price.
+    larger of both directions' errors rises by more than the layer's bytes are worth; but holes are patched at any
+    price.
     """
     surfaces = [frame if isinstance(frame, Surface) else Surface(frame) for frame in frames]
     shown = [_Frame(*each) for each in zip_longest(surfaces, decoded, free)]

@@ -93,8 +93,8 @@ def _between(count: int, factor: int) -> _Between:
     places = (np.arange(count * factor) + 0.5) / factor - 0.5
     before = np.floor(places).astype(np.int64)
     share = places - before
-    inside = (np.clip(before + k, 0, count - 1) for k in (0, 1))
-    return _Between(*inside, share, np.clip(before + (share >= 0.5), 0, count - 1))
+    first, second, nearest = (np.clip(before + k, 0, count - 1) for k in (0, 1, share >= 0.5))
+    return _Between(first, second, share, nearest)
 
 
 @runtime_checkable

@@ -73,3 +73,9 @@ def test_what_a_coarse_target_allows_is_not_wrong():
 def gaps(mesh: Mesh, other: Mesh) -> np.ndarray:
     surface = FrameSurface(other).surface
     return np.linalg.norm(surface.closest(mesh.vertices).points - mesh.vertices, axis=1)
+
+
+def test_noisy_surfaces_are_compared_where_both_have_something():
+    noise, far = 0.003, Mesh.of(0.25 * BALL.vertices + [0.6, 0, 0], BALL.faces)
+    assert closeness(BALL, joined(BALL, far), noise) < noise and closeness(joined(BALL, far), BALL, noise) < noise
+    assert closeness(BALL, Mesh.of(BALL.vertices + [3.0, 0, 0], BALL.faces), noise) == np.inf

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.ndimage import binary_erosion
 
 from meshreel.analysis.scene.background import BackgroundOptions
 from meshreel.analysis.scene.background_depth import Moment, fuse_still_depth, usual_pictures
 from meshreel.capture.fusion import FusionOptions, fuse_depths
 from meshreel.geometry.closest_points import distances
 from meshreel.geometry.derived_sequences import captured
+from meshreel.geometry.raycast import Rays
 from meshreel.types import Mesh, MeshList
 from tests.capture.depth_scenes import RADIUS, WALL, camera, measured
 
@@ -86,3 +88,24 @@ def test_of_nothing_there_is_nothing(pictures):
 
 def test_plain_meshes_have_no_depth():
     assert captured(MeshList((Mesh.empty(),))).depth is None
+
+
+def test_a_door_that_opens_soon_is_no_room_where_nothing_is_behind_it():
+    depth = np.full((AHEAD.height, AHEAD.width), 2000.0)
+    opened = np.where(np.arange(AHEAD.width) < 20, 0, depth)
+    moments_ = [Moment([AHEAD.picture(one.astype(np.uint16))], Mesh.empty(), np.zeros(0, bool))
+                for one in [depth] * 2 + [opened] * 8]  # fmt: skip
+    usual = usual_pictures(moments_)[0].depth
+    assert (usual[:, :20] == 0).all() and (usual[:, 20:] == 2000).all()
+
+
+def test_a_floor_seen_at_a_grazing_angle_has_no_cracks():
+    rows = (np.arange(AHEAD.height) + 0.5 - AHEAD.center[1] - 0.5) / AHEAD.focal[1]
+    with np.errstate(divide="ignore"):
+        below = np.where(rows > 0, 1.2 / np.where(rows > 0, rows, 1), 0)
+    depth = np.where((below > 1) & (below < 4), below * 1000, 0)[:, None] * np.ones(AHEAD.width)
+    picture = AHEAD.picture(depth.astype(np.uint16))
+    mesh = fuse_still_depth([Moment([picture], Mesh.empty(), np.zeros(0, bool))], VOXEL)
+    seen = Rays(mesh).look(AHEAD.view).depth
+    inside = binary_erosion(depth > 0, iterations=2)
+    assert np.mean(np.isfinite(seen[inside])) > 0.99

@@ -15,7 +15,7 @@ from tests.metrics.shapes import moved, plane, sphere
 
 CELL = 0.05
 BALL = sphere(0.3, 3)  # 1.1 m^2
-BIT = sphere(0.03, 1)  # 0.01 m^2
+BIT = sphere(0.05, 1)  # 0.03 m^2
 NONE = Mesh.empty()
 
 

@@ -83,10 +83,15 @@ def test_a_box_moves_only_while_it_is_carried(scene: MeshList, found: ByPlace) -
 
 
 def test_without_enough_rest_it_moves_always(scene: MeshList) -> None:
-    options = replace(OPTIONS, settle=SettleOptions(rest=20.0))
+    options = replace(OPTIONS, settle=SettleOptions(rest=20.0, still=20.0))
     found = segment(scene, options)
     assert found.rest.changes == []
     assert found.moving(0, scene[0])[ROOM:].mean() > 0.9
+
+
+def test_what_stands_still_as_a_thing_does_needs_no_long_rest(scene: MeshList) -> None:
+    found = segment(scene, replace(OPTIONS, settle=SettleOptions(rest=20.0, still=1.0)))
+    assert len(found.rest.changes) == 2
 
 
 def test_changes_are_two_of_the_frames(found: ByPlace) -> None:

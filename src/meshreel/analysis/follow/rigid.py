@@ -14,14 +14,17 @@ from jaxtyping import Float64
 from ...geometry.closest_points import Surface, area_samples
 from ...geometry.rigid import fit_rigid
 from ...geometry.strict import inverse, products, rotations_of
+from ...geometry.topology import vertex_normals
 from ...types import Mesh
 from ..fit.closeness import STRAY, shared_distance
 from ..fit.frame import ON_BORDER, FrameSurface
 from .embedded_graph import farthest_first
 
-ROUNDS = 12  # of point-to-plane steps, at most (guess)
+ROUNDS = 20  # of point-to-plane steps, at most (guess)
 SETTLED = 1e-5  # a step that moves no point by more, in diagonals, is the last (guess)
-GATE = (0.03, 4.0)  # diagonals in the first round, halved in each; RMS noise at least: pairs farther apart are none (guess)
+GATE, SHRINKS = 0.03, 0.75  # diagonals: pairs farther apart are none in the first round, and of that in each (guess)
+NEAREST = 4.0  # RMS noise that pairs may be apart at least (guess)
+ALIKE = 0.5  # least cosine between the normals of a pair (guess)
 ALONG = 0.1  # weight of the distance of frame surface past the body's border: it tells how far the body slid (guess)
 WHOLE, WORST = 1.6, 3.25  # RMS noise that the whole body, and its worst part, may be off (doors of room3: decision 28)
 BENDS = 1.75  # times the residual of a motion that bends (people: 2.5 and more; decision 28)
@@ -65,20 +68,21 @@ class RigidBody:
         """`noise` is the RMS distance of the frames from the truth."""
         self._surface, self._noise, self._faces = Surface(mesh), noise, mesh.faces
         self._vertices, self._chosen = mesh.vertices, area_samples(mesh, SAMPLES)
+        self._normals = vertex_normals(mesh)[self._chosen]
         centers = mesh.vertices[farthest_first(mesh, self._chosen, BLOCKS)]
         away = ((mesh.vertices[self._chosen][:, None] - centers) ** 2).sum(axis=2)
         self._block = away.argmin(axis=1)
 
     def brought(self, frame: FrameSurface, motion: RigidMotion) -> RigidMotion:
         """Return the motion that brings the body onto a frame, from one that is near it."""
-        gate, least = GATE[0], GATE[1] * self._noise
+        gate, least = GATE, NEAREST * self._noise
         for _ in range(ROUNDS):
             rows, gaps = self._pairs(frame, motion, max(gate, least))
             if len(rows) < 6:
                 break
             normal = products(rows.T, rows) + 1e-9 * np.eye(6)
             step = products(inverse(normal), products(rows.T, gaps[:, None]))[:, 0]
-            motion, gate = motion.after(step[:3], step[3:]), gate / 2
+            motion, gate = motion.after(step[:3], step[3:]), SHRINKS * gate
             if np.abs(step).max() < SETTLED:
                 break
         return motion
@@ -115,10 +119,13 @@ class RigidBody:
         ahead, back = frame.surface.closest(own), self._surface.closest(theirs)
         inside, past = frame.inside_at(ahead) > ON_BORDER, self._surface.past_border(back)
         facing = frame.surface.normals[ahead.faces], self._surface.normals[back.faces]
+        own_ways, their_ways = products(self._normals, motion.turn.T), frame.normals[frame.samples(SAMPLES)]
+        inside &= (facing[0] * own_ways).sum(axis=1) > ALIKE
+        over = ~past & ((facing[1] * their_ways).sum(axis=1) > ALIKE)
         found = list[tuple[np.ndarray, np.ndarray, np.ndarray]]()  # places on the body, directions, gaps along them
         for places, aims, ways, good in (
             (own, ahead.points, facing[0], inside),
-            (back.points, theirs, facing[1], ~past),
+            (back.points, theirs, facing[1], over),
             *((back.points, theirs, ALONG * np.broadcast_to(axis, theirs.shape), past) for axis in np.eye(3)),
         ):
             gaps = aims - places

@@ -69,7 +69,7 @@ def usual_pictures(moments: Iterable[Moment], options: BackgroundOptions = Backg
 
 
 def _still(picture: DepthPicture, rays: Rays, moment: Moment) -> np.ndarray:
-    """Return the depths of a picture, `HIDDEN` for pixels that see moving faces or are within `BESIDE` pixels of some."""
+    """Return the depths of a picture, `HIDDEN` for pixels that see moving faces or lie within `BESIDE` of some."""
     moves = pixels_near(picture.camera, Mesh(moment.mesh.vertices, moment.mesh.faces[~moment.still]))
     faces = rays.faces_in(picture.camera, moves)  # of the whole mesh: what stands still may hide what moves
     moves[moves] = (faces >= 0) & ~np.append(moment.still, True)[faces]
@@ -111,10 +111,10 @@ def _smooth(picture: DepthPicture) -> DepthPicture:
 
 
 def _noise(inverse: Float32[np.ndarray, "H W"]) -> float:
-    """Return the usual noise of a picture's inverse depths, as a share: by second differences, which planes have not."""
+    """Return the usual noise of inverse depths, as a share of them: by second differences, which planes have not."""
     differences = np.abs(inverse[:, :-2] - 2 * inverse[:, 1:-1] + inverse[:, 2:])
     known = (inverse[:, :-2] > 0) & (inverse[:, 1:-1] > 0) & (inverse[:, 2:] > 0)
-    return float(np.median((differences[known] / inverse[:, 1:-1][known]))) / SECOND_MEDIAN if known.any() else 0.0
+    return float(np.median(differences[known] / inverse[:, 1:-1][known])) / SECOND_MEDIAN if known.any() else 0.0
 
 
 def _facing(mesh: Mesh, pictures: list[DepthPicture], least: float) -> Mesh:

@@ -1,0 +1,51 @@
+"""Rigid bodies: a box that turns is found again under noise, an arm that bends is not taken for one."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from meshreel.analysis.fit.frame import FrameSurface
+from meshreel.analysis.follow.rigid import RigidBody, RigidMotion
+from meshreel.capture.demo_room import box
+from meshreel.geometry.strict import rotations_of
+from meshreel.geometry.topology import subdivide_midpoint
+from meshreel.types import Mesh
+
+NOISE = 0.003
+BOX = subdivide_midpoint(box(((-0.4, -0.25, -0.05), (0.4, 0.25, 0.05))), 4)
+
+
+def turn(degrees: float) -> np.ndarray:
+    half = np.radians(degrees) / 2
+    return rotations_of(np.array([[np.cos(half), 0.0, np.sin(half), 0.0]]))[0]
+
+
+def seen(mesh: Mesh, seed: int) -> FrameSurface:
+    """The mesh as noise leaves it."""
+    return FrameSurface(
+        Mesh(mesh.vertices + np.random.default_rng(seed).normal(0, NOISE, mesh.vertices.shape), mesh.faces)
+    )
+
+
+@pytest.mark.parametrize("degrees, shift", [(0.0, 0.0), (4.0, 0.02), (6.0, 0.03)])
+def test_a_box_that_moves_is_found_where_it_is(degrees, shift):
+    true = RigidMotion(turn(degrees), np.array([shift, 0.0, shift]))
+    frame = seen(Mesh(true.of(BOX.vertices), BOX.faces), 1)
+    body = RigidBody(seen(BOX, 0).mesh, NOISE)
+    found = body.brought(frame, RigidMotion.none())
+    assert np.abs(found.of(BOX.vertices) - true.of(BOX.vertices)).max() < NOISE
+    assert body.holds(frame, found, NOISE)
+
+
+def test_a_plate_that_bends_is_no_rigid_body():
+    bent = BOX.vertices + [0.0, 0.0, 0.1] * np.maximum(BOX.vertices[:, :1], 0) ** 2 / 0.16
+    frame, body = seen(Mesh(bent, BOX.faces), 1), RigidBody(seen(BOX, 0).mesh, NOISE)
+    motion = body.brought(frame, RigidMotion.none())
+    assert not body.holds(frame, motion, NOISE)
+
+
+def test_a_body_far_from_a_frame_does_not_hold():
+    away = Mesh(BOX.vertices + [5.0, 0, 0], BOX.faces)
+    body = RigidBody(BOX, NOISE)
+    assert not body.holds(FrameSurface(away), body.brought(FrameSurface(away), RigidMotion.none()), NOISE)
