@@ -108,7 +108,7 @@ class GroupCoder:
         if self.options.tails is None:
             return _Shown(payload, layers, decoded)
         known, free = [surface.surface for surface in self.surfaces], [surface.free for surface in self.surfaces]
-        found = find_tails(known, decoded, len(payload), self.options.tails, noise=self.tolerated, free=free)
+        found = find_tails(known, decoded, len(payload), self.options.tails, noise=self.noise, free=free)
         if found is None:
             return _Shown(payload, layers, decoded)
         payload += pack(found.record)
