@@ -35,6 +35,7 @@ LOST = 0.5  # share of a frame's faces that may stand still where no background 
 SEEN_THROUGH = 2  # of the probed frames, in which a place must be free that something stands at for a while (guess)
 APART, LEAST_APART = 4.0, 0.03  # deviations, and m: what is farther from the room is not of it (guess)
 OUTLIER = 3.0  # times the segmentation's `noise`: still surface farther from the background is no noise (guess)
+TAIL = 4.0  # standard deviations, by the median, beyond which a distance is no noise (guess)
 AS_FAR, FEWEST = 0.25, 1000  # share of the range, and vertices at least, from which the noise of bodies is told (guess)
 NORMAL_MEDIAN = 0.6745  # of the absolute value of what is normally distributed, in standard deviations
 
@@ -55,7 +56,7 @@ class Parts:
     segmentation: Segmentation
     background: Mesh  # m, as in the first frame; empty where nothing stands still
     changes: list[Change]
-    noise: float  # m, RMS distance of a frame's still surface from the background, tails and all: what bodies have
+    noise: float  # m, RMS distance of still surface, as far off as bodies, from the background: what bodies have
     deviation: float  # m, the same by the median, as a standard deviation: without its tails
     astray: float = 0.0  # share of the frames' surface that stands still, but is not in the background
     free: tuple[FreeSpace, ...] = ()  # of some frames; none where no depth is known
@@ -193,6 +194,12 @@ def _as_far(
     return near if near.sum() >= FEWEST else np.ones(len(points), bool)
 
 
+def _mean_square(gaps: Float64[np.ndarray, " N"]) -> float:
+    """Return the mean square of distances that are noise: those far beyond the usual one are of surface that differs."""
+    usual = gaps[gaps <= TAIL / NORMAL_MEDIAN * float(np.median(gaps))] if len(gaps) else gaps
+    return float((usual**2).mean()) if len(usual) else 0.0
+
+
 def _measured(
     sequence: CapturedSequence, segmentation: Segmentation, background: Mesh, changes: Sequence[Change]
 ) -> _Measured:
@@ -225,7 +232,7 @@ def _measured(
             inside = gaps < far
             if depth is not None:
                 inside &= _as_far(still.vertices, moving.vertices, depth[number])
-            squares.append(float((gaps[inside] ** 2).mean()) if inside.any() else 0.0)
+            squares.append(_mean_square(gaps[inside]))
             lost += float(areas[(gaps[still.faces] >= far).all(axis=1)].sum())
     astray = lost / whole if whole else 0.0
     if not squares:

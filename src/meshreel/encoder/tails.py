@@ -35,6 +35,7 @@ EXACT = 1e-7  # RMS distance of the rest, of the diagonal, below which no byte i
 
 NOISY_REST = 1.0  # RMS noise that the rest of a noisy body may be off (guess)
 FAR = 0.006  # diagonals: surface farther than that has no counterpart (1 cm on a body, as for keys: decision 24)
+SHARD = 2e-5  # squared diagonals: half a square centimetre of a body, that faces the wrong way, shows (guess)
 HOLE = 0.002  # squared diagonals of such surface, half a foot, that are patched at any price (guess)
 TINY = 1e-300  # of areas: a mesh may have none
 
@@ -85,7 +86,7 @@ def find_tails(
     price = options.exchange * len(frames) * usual / size
     usual = max(usual, noise**2)
     rung = _rung([surface.mesh for surface in surfaces], options.lattice * usual**0.5)
-    search = _Search(shown, faces, usual, price, options, rung)
+    search = _Search(shown, faces, usual, price, options, rung, noise)
     ghosts = search.ghosts()
     best, least = None, np.inf if ghosts.any() else search.cost(None)
     better = list[_Coded]()  # each than those before it
@@ -125,6 +126,7 @@ class _Search:
     price: float  # of a byte, squared distances summed over the frames
     options: TailOptions
     rung: int  # of the patches' lattice
+    noise: float  # RMS distance of the frames from the truth
 
     @property
     def nothing(self) -> Bool[np.ndarray, "T F"]:
@@ -159,16 +161,20 @@ class _Search:
                 yield chosen
 
     def ghosts(self) -> Bool[np.ndarray, "T F"]:
-        """Return the faces of surface, more than a bit, that stands where a camera saw through."""
-        far = np.stack([frame.apart > self._far if frame.knows_free else frame.apart < 0 for frame in self.frames])
+        """Return the faces of surface, more than a bit, that stands where a camera saw through.
+
+        Of a clean body they are shards, which face away from the frame's surface or have no counterpart there.
+        """
+        if self.noise == 0:
+            far = np.stack([frame.wrong() for frame in self.frames])
+        else:
+            far = np.stack([(frame.apart > self._far) & frame.knows_free for frame in self.frames])
         labels = _regions(self.faces, far)
-        areas = np.stack([frame.areas for frame in self.frames])
-        chosen = np.zeros_like(far)
-        for label in range(labels.max() + 1):
-            region = labels == label
-            if (areas * region).sum(axis=1).max() >= HOLE:
-                chosen |= region
-        return chosen
+        largest = np.zeros(labels.max() + 1)
+        for row, frame in zip(labels, self.frames, strict=True):
+            there = np.bincount(row[row >= 0], frame.areas[row >= 0], len(largest))
+            largest = np.maximum(largest, there)
+        return far & np.append(largest >= (HOLE if self.noise else SHARD), False)[labels]
 
     def _paying(self, far: Bool[np.ndarray, "T F"]) -> Bool[np.ndarray, "T F"]:
         """Return the regions of faces, connected in space and time, that are worth their bytes."""
@@ -274,6 +280,13 @@ class _Frame:
             dot(self.weights, self.squared),
             dot(self.areas, self.apart) / max(float(self.areas.sum()), TINY),
         )
+
+    def wrong(self) -> Bool[np.ndarray, " F"]:
+        """Return the decoded faces that face away from the frame's surface, or are farther from it than `FAR`."""
+        middles = self.decoded.vertices[self.decoded.faces].mean(axis=1)
+        squared, hits = _squared(self.surface, middles)
+        facing = np.einsum("nd,nd->n", face_normals(self.decoded)[0], self.surface.normals[hits])
+        return (facing < 0) | (squared > FAR**2)
 
     def body(self) -> float:
         """Return the mean squared distance from the frame to the decoded mesh except its farthest 2 %."""
