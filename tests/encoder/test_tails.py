@@ -173,7 +173,7 @@ def test_a_file_has_the_layer_where_it_pays_and_plays_without_it(sequence: MeshL
     assert payload_bytes_by_purpose(patched.reader.read_chunk(0))["patches"] > 0
     levels = len(patched.reader.chunks[0].layers) - 2
     plain = patched.at(levels)
-    assert {len(mesh.faces) for mesh in plain} == {len(patched[1].faces)}
+    assert len({len(mesh.faces) for mesh in plain}) == 1
     assert len(patched[0].faces) > len(plain[0].faces)
     assert len(patched.at(levels + 1)[0].faces) == len(patched[0].faces)
     assert measure(list(sequence), list(patched)).distance < 0.5 * measure(list(sequence), list(plain)).distance

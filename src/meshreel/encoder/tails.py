@@ -35,7 +35,7 @@ EXACT = 1e-7  # RMS distance of the rest, of the diagonal, below which no byte i
 
 NOISY_REST = 1.0  # RMS noise that the rest of a noisy body may be off (guess)
 FAR = 0.006  # diagonals: surface farther than that has no counterpart (1 cm on a body, as for keys: decision 24)
-SHARD = 2e-5  # squared diagonals: half a square centimetre of a body, that faces the wrong way, shows (guess)
+SHARD = 5e-5  # squared diagonals: a square centimetre or two of a body that face the wrong way show (guess)
 HOLE = 0.002  # squared diagonals of such surface, half a foot, that are patched at any price (guess)
 TINY = 1e-300  # of areas: a mesh may have none
 
@@ -103,7 +103,8 @@ def find_tails(
         if (cost := search.cost(tried)) < least:
             least = cost
             better.append(tried)
-    chosen = next((tried for tried in reversed(better) if torn or ghosts.any() or search.holds(tried)), None)
+    least_of_all = better[0] if ghosts.any() and better else None
+    chosen = next((tried for tried in reversed(better) if torn or search.holds(tried)), least_of_all)
     return (
         None
         if chosen is None
