@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import overload
 
 import numpy as np
 import pytest
 
+import meshreel
 from meshreel.analysis.fit.frame import FrameSurface
 from meshreel.analysis.plan import Plan
 from meshreel.capture.procedural import SoftBodiesOptions, soft_bodies
@@ -21,6 +23,7 @@ from meshreel.encoder.layers_group import GroupCoder
 from meshreel.encoder.target import measure
 from meshreel.format.layout import Form
 from meshreel.types import Mesh
+from tests.crossed_arms import FRAMES, arms, stray_share
 from tests.small_options import quick
 from tests.spheres import deforming_sphere, sliding_sphere
 
@@ -228,3 +231,10 @@ def test_a_body_with_new_connectivity_in_every_frame_is_followed():
     frames = [Mesh.of((mesh.vertices - (low + high) / 2) / scale, mesh.faces) for mesh in meshes]
     groups = coded(frames, quick(quality=20).method)
     assert max(group.fidelity.worst for group in groups) < 4e-3
+
+
+@pytest.mark.slow
+def test_arms_that_uncross_leave_no_shards(tmp_path: Path) -> None:
+    frames = [arms(number) for number in range(FRAMES)]
+    meshreel.encode(frames, tmp_path / "arms.reel")
+    assert max(map(stray_share, frames, meshreel.open(tmp_path / "arms.reel"))) <= 0.001

@@ -195,7 +195,7 @@ def _as_far(
 
 
 def _mean_square(gaps: Float64[np.ndarray, " N"]) -> float:
-    """Return the mean square of distances that are noise: those far beyond the usual one are of surface that differs."""
+    """Return the mean square of distances that are noise: far beyond the usual one, surface is another."""
     usual = gaps[gaps <= TAIL / NORMAL_MEDIAN * float(np.median(gaps))] if len(gaps) else gaps
     return float((usual**2).mean()) if len(usual) else 0.0
 

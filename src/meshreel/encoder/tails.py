@@ -35,7 +35,7 @@ EXACT = 1e-7  # RMS distance of the rest, of the diagonal, below which no byte i
 
 NOISY_REST = 1.0  # RMS noise that the rest of a noisy body may be off (guess)
 FAR = 0.006  # diagonals: surface farther than that has no counterpart (1 cm on a body, as for keys: decision 24)
-SHARD = 5e-5  # squared diagonals: a square centimetre or two of a body that face the wrong way show (guess)
+SHARD = 2e-5  # squared diagonals: half a square centimetre of a body that faces the wrong way shows (guess)
 HOLE = 0.002  # squared diagonals of such surface, half a foot, that are patched at any price (guess)
 TINY = 1e-300  # of areas: a mesh may have none
 
