@@ -107,8 +107,8 @@ def layers_options(quality: float = 50.0, effort: str = "normal") -> LayersOptio
 
 
 def tolerance(quality: float) -> float:
-    """RMS noise of a recording, times which nothing is coded: 1 at 50, halved every 40 points (decision 28)."""
-    return rounded(2 ** ((50 - quality) / 40))
+    """RMS noise of a recording, times which nothing is coded: 1 at 50, halved every 32 points (decision 28)."""
+    return rounded(2 ** ((50 - quality) / 32))
 
 
 def _background(quality: float) -> BackgroundOptions:
