@@ -69,7 +69,7 @@ class _Planner:
         """Return the next frames."""
         numbers = range(self._at, min(self._at + self._options.group_size, len(self._interval.frames)))
         known, digests, noise = self._surfaces, self._interval.digests, self._interval.noise
-        frames, free = self._interval.frames, self._interval.free
+        frames, free = self._interval.frames, self._interval.free if self._options.tails else lambda _: None
         self._surfaces = {at: known.get(at) or FrameSurface(frames[at], free(at)) for at in numbers}
         meshes = [surface.mesh for surface in self._surfaces.values()]
         note(digests, "frames", *(array for mesh in meshes for array in (mesh.vertices, mesh.faces)))

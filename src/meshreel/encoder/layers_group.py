@@ -43,11 +43,6 @@ class GroupCoder:
     digests: Digests | None = field(default=None, kw_only=True)
 
     @property
-    def tolerated(self) -> float:
-        """The noise below which nothing is coded, normalised."""
-        return self.options.tolerance * self.noise
-
-    @property
     def frames(self) -> list[Mesh]:
         """The frames themselves."""
         return [surface.mesh for surface in self.surfaces]
@@ -65,7 +60,8 @@ class GroupCoder:
         has only the first of them.
         """
         try:
-            encoded = encode_layers(reference, positions, self.options.layers, previous, self.tolerated)
+            noise = self.options.tolerance * self.noise
+            encoded = encode_layers(reference, positions, self.options.layers, previous, noise)
         except CostlyError:
             if len(self.surfaces) == 1:
                 return self.alone(), None

@@ -6,7 +6,7 @@ In: the frames of a scene, options. Out: Parts, which the encoding of every inte
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 
@@ -95,9 +95,8 @@ class Parts:
         if not changes:
             return self.surface
         if changes not in self._rooms:
-            there = concatenate([self.background, *(change.came for change in self.changes[:changes])])
             self._rooms.clear()
-            self._rooms[changes] = None if there.is_empty else Surface(there)
+            self._rooms[changes] = _room_after(self.background, self.changes[:changes])
         return self._rooms[changes]
 
 
@@ -149,10 +148,8 @@ def _background(
         stages.reach("background", number / len(sequence))
         return segmentation.still_at_first(number, mesh)
 
-    if options.depth and (depth := sequence.depth) is not None:
-        meshes = ((number, sequence[number]) for number in numbers)
-        moments = (Moment(depth[k], mesh, stands(k, mesh)) for k, mesh in meshes)
-        return fuse_still_depth(moments, cell, options)
+    if options.depth and sequence.depth is not None:
+        return _fused(sequence, numbers, stands, cell, options)
 
     def clear(number: int, mesh: Mesh) -> Bool[np.ndarray, " F"]:
         still = stands(number, mesh)
@@ -161,15 +158,33 @@ def _background(
     return fuse_background(ChosenParts(sequence, numbers, clear), cell, options)
 
 
+def _fused(
+    sequence: CapturedSequence,
+    numbers: Sequence[int],
+    still: Callable[[int, Mesh], Bool[np.ndarray, " F"]],
+    cell: float,
+    options: BackgroundOptions,
+) -> Mesh:
+    """Fuse the still faces of some frames from their depth pictures, which are known."""
+    depth = sequence.depth
+    assert depth is not None
+    meshes = ((number, sequence[number]) for number in numbers)
+    return fuse_still_depth((Moment(depth[k], mesh, still(k, mesh)) for k, mesh in meshes), cell, options)
+
+
 def _change(sequence: CapturedSequence, segmentation: Segmentation, frame: int, options: BackgroundOptions) -> Change:
     numbers = [frame + number for number in evenly(len(sequence) - frame, options.frames)]
-    if options.depth and (depth := sequence.depth) is not None:
-        meshes = ((number, sequence[number]) for number in numbers)
-        moments = (Moment(depth[k], mesh, ~segmentation.moving(k, mesh)) for k, mesh in meshes)
-        room = fuse_still_depth(moments, segmentation.cell, options)
+    if options.depth and sequence.depth is not None:
+        room = _fused(sequence, numbers, lambda k, mesh: ~segmentation.moving(k, mesh), segmentation.cell, options)
         return Change(frame, part_of(room, segmentation.came(frame, room)))
     later = ChosenParts(sequence, numbers, lambda _, mesh: segmentation.came(frame, mesh))
     return Change(frame, fuse_background(later, segmentation.cell, options))
+
+
+def _room_after(background: Mesh, changes: Sequence[Change]) -> Surface | None:
+    """Return all that stood in the room up to some changes, prepared for queries; None where that is nothing."""
+    there = concatenate([background, *(change.came for change in changes)])
+    return None if there.is_empty else Surface(there)
 
 
 @dataclass(frozen=True, slots=True)
@@ -209,8 +224,7 @@ def _measured(
 
     @lru_cache(maxsize=1)
     def room_after(count: int) -> Surface | None:
-        there = concatenate([background, *(change.came for change in changes[:count])])
-        return None if there.is_empty else Surface(there)
+        return _room_after(background, changes[:count])
 
     for number in evenly(len(sequence), PROBES):
         mesh = sequence[number]

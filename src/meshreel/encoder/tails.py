@@ -276,7 +276,9 @@ class _Frame:
         weights = np.concatenate([shares, 0.75 * areas])
         self.weights = weights / weights.sum()
         self.squared, self.hit = _squared(Surface(decoded), self.points)
-        self.areas, self.apart = self._apart(decoded)  # of each decoded face: its area, its mean squared distance
+        points, self.areas = _samples(decoded)
+        self._nearest = _squared(self.surface, points)  # of the decoded mesh's samples
+        self.apart = self._of_free(points, self._nearest[0], decoded)  # of each decoded face, squared
         self.errors = (
             dot(self.weights, self.squared),
             dot(self.areas, self.apart) / max(float(self.areas.sum()), TINY),
@@ -284,8 +286,8 @@ class _Frame:
 
     def wrong(self) -> Bool[np.ndarray, " F"]:
         """Return the decoded faces that face away from the frame's surface, or are farther from it than `FAR`."""
-        middles = self.decoded.vertices[self.decoded.faces].mean(axis=1)
-        squared, hits = _squared(self.surface, middles)
+        middles = slice(len(self.decoded.vertices), None)  # of its samples
+        squared, hits = (each[middles] for each in self._nearest)
         facing = np.einsum("nd,nd->n", face_normals(self.decoded)[0], self.surface.normals[hits])
         return (facing < 0) | (squared > FAR**2)
 
@@ -344,10 +346,15 @@ class _Frame:
 
     def _apart(self, mesh: Mesh) -> tuple[Float64[np.ndarray, " F"], Float64[np.ndarray, " F"]]:
         points, areas = _samples(mesh)
-        squared = _squared(self.surface, points)[0]
+        return areas, self._of_free(points, _squared(self.surface, points)[0], mesh)
+
+    def _of_free(
+        self, points: Float64[np.ndarray, "N 3"], squared: Float64[np.ndarray, " N"], mesh: Mesh
+    ) -> Float64[np.ndarray, " F"]:
+        """Return mean squared distances of faces from those of samples, which count where a camera saw through them."""
         if self._free is not None:
-            squared[~self._free.at(points)] = 0.0
-        return areas, _of_faces(squared, mesh.faces)
+            squared = np.where(self._free.at(points), squared, 0.0)
+        return _of_faces(squared, mesh.faces)
 
 
 def _samples(mesh: Mesh) -> tuple[Float64[np.ndarray, "N 3"], Float64[np.ndarray, " F"]]:

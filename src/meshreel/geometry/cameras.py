@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float64
+from jaxtyping import Float64, Int64
 
 from ..errors import InputError
 from .strict import inverse, products
@@ -69,6 +69,19 @@ class PinholeCamera:
         """Project points of the camera frame to image positions; points that are not in front give NaN."""
         depth = np.where(points[:, 2:] > 0, points[:, 2:], np.nan)
         return products(points, self.intrinsic.T)[:, :2] / depth
+
+    def seen(
+        self, points: Float64[np.ndarray, "P 3"]
+    ) -> tuple[Int64[np.ndarray, " N"], Int64[np.ndarray, " N"], Float64[np.ndarray, " N"]]:
+        """Project points of the world; return the pixels, counted row by row, of those inside the picture, the numbers
+        of these points, and their depths.
+        """
+        local = products(points, self.extrinsic[:3, :3].T) + self.extrinsic[:3, 3]
+        with np.errstate(invalid="ignore"):
+            columns, rows = np.floor(self.project(local)).T
+        inside = np.flatnonzero((columns >= 0) & (columns < self.width) & (rows >= 0) & (rows < self.height))
+        pixels = rows[inside].astype(np.int64) * self.width + columns[inside].astype(np.int64)
+        return pixels, inside, local[inside, 2]
 
     def record(self) -> dict[str, Any]:
         """Return the camera as a record of Open3D's JSON, in which matrices are stored column by column."""

@@ -12,7 +12,6 @@ from scipy.ndimage import minimum_filter
 
 from ..types import Placement
 from .cameras import PinholeCamera
-from .strict import products
 
 THROUGH = (0.03, 0.015)  # m, and share of the depth, by which a camera must see past a place to know it is free (guess)
 STEP = 0.03  # of the depth between neighbours: what is farther apart is two surfaces (guess)
@@ -68,13 +67,8 @@ class FreeSpace:
         """Return the points that some camera saw past: in all nine pixels around, it measured something farther off."""
         world, found = np.asarray(self.place.origin) + self.place.scale * points, np.zeros(len(points), bool)
         for picture in self.pictures:
-            camera = picture.camera
-            local = products(world, camera.extrinsic[:3, :3].T) + camera.extrinsic[:3, 3]
-            with np.errstate(invalid="ignore"):
-                columns, rows = np.floor(camera.project(local)).T
-            inside = np.flatnonzero((columns >= 0) & (columns < camera.width) & (rows >= 0) & (rows < camera.height))
-            depth = picture.depth[rows[inside].astype(np.int64), columns[inside].astype(np.int64)] * picture.unit
-            ahead = local[inside, 2]
+            pixels, inside, ahead = picture.camera.seen(world)
+            depth = picture.depth.reshape(-1)[pixels] * picture.unit
             found[inside[depth > ahead + np.maximum(THROUGH[0], THROUGH[1] * ahead)]] = True
         return found
 

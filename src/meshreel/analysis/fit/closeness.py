@@ -25,17 +25,17 @@ WRONG = 0.03  # share of samples beyond the usual one, a sum of folds that show;
 
 def shared_distance(
     squares: tuple[Float64[np.ndarray, " N"], Float64[np.ndarray, " M"]],
-    beside: tuple[Bool[np.ndarray, " N"], Bool[np.ndarray, " M"]],
+    over: tuple[Bool[np.ndarray, " N"], Bool[np.ndarray, " M"]],
     noise: float,
 ) -> float:
     """Return the RMS distance, the larger of both directions, of the surface that two noisy surfaces have in common.
 
-    `squares` are squared distances of samples of each from the other; `beside` is True where a sample lies over the
+    `squares` are squared distances of samples of each from the other; `over` is True where a sample lies over the
     other surface, not past its border. What one of both lacks says nothing about the motion of the rest: infinite only
     where little is left.
     """
-    shared = [each[over & (each <= (STRAY * noise) ** 2)] for each, over in zip(squares, beside, strict=True)]
-    if any(len(some) < SHARED * over.sum() or not len(some) for some, over in zip(shared, beside, strict=True)):
+    shared = [each[there & (each <= (STRAY * noise) ** 2)] for each, there in zip(squares, over, strict=True)]
+    if any(len(some) < SHARED * there.sum() or not len(some) for some, there in zip(shared, over, strict=True)):
         return np.inf
     return float(np.sqrt(max(some.mean() for some in shared)))
 

@@ -87,8 +87,8 @@ class Tracker:
         self._all = self._graph.bind(self.mesh.vertices, self._graph.cells, o.neighbours)
         self._poses = {key: Pose.at(self._graph.nodes)}
         self._residuals = {key: 0.0}
-        self._body = RigidBody(self.mesh, noise)
-        self._rigid = {key: RigidMotion.none()} if noise > 0 else {}  # what bends costs clean bodies nothing
+        self._body = RigidBody(self.mesh, noise) if noise > 0 else None  # what bends costs clean bodies nothing
+        self._rigid = {} if self._body is None else {key: RigidMotion.none()}
 
     def step(self, frame: int, mesh: Mesh | FrameSurface) -> float:
         """Register a frame, starting from the nearest registered frame between it and the key; return its residual.
@@ -105,7 +105,7 @@ class Tracker:
         if surface is not None:
             pose, residual = self._follow(frame, surface)
         self._poses[frame], self._residuals[frame] = pose, residual
-        if surface is not None and self._rigid and self._known(frame) in self._rigid:
+        if surface is not None and self._body is not None and self._known(frame) in self._rigid:
             start = RigidMotion.between(self._graph.nodes, pose.positions)
             motion = self._body.brought(surface, start)
             if self._body.holds(surface, motion, residual):

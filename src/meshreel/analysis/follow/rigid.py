@@ -66,7 +66,7 @@ class RigidBody:
 
     def __init__(self, mesh: Mesh, noise: float) -> None:
         """`noise` is the RMS distance of the frames from the truth."""
-        self._surface, self._noise, self._faces = Surface(mesh), noise, mesh.faces
+        self._surface, self._noise = Surface(mesh), noise
         self._vertices, self._chosen = mesh.vertices, area_samples(mesh, SAMPLES)
         self._normals = vertex_normals(mesh)[self._chosen]
         centers = mesh.vertices[farthest_first(mesh, self._chosen, BLOCKS)]

@@ -21,7 +21,6 @@ from scipy.ndimage import minimum_filter
 from ...geometry.cameras import PinholeCamera
 from ...geometry.depth import DepthPicture
 from ...geometry.raycast import Rays
-from ...geometry.strict import products
 from ...geometry.topology import face_normals
 from ...geometry.voxels import Lattice, distinct, neighbours, spread
 from ...types import Frames, Mesh, evenly
@@ -205,7 +204,7 @@ def _states(
     seen = np.zeros((len(frames), len(places.keys)), np.uint8)
     middles, size = places.middles, places.lattice.size
     for number, view in enumerate(views):
-        pixels, inside, depth = _projected(view, middles)
+        pixels, inside, depth = view.seen(middles)
         limit = (depth + options.past * size) / (size / _FINENESS)
         for row, one in zip(seen, frames, strict=True):
             row[inside[one.depths[number].reshape(-1)[pixels] > limit]] += 1
@@ -224,7 +223,7 @@ def _sensed(
     camera measured more than that in all nine pixels around the place.
     """
     middles = places.middles
-    at = {number: _projected(eye.camera, middles) for number, eye in places.eyes.items()}
+    at = {number: eye.camera.seen(middles) for number, eye in places.eyes.items()}
     for one in frames:
         expected, past, clear = np.zeros((3, len(middles)), bool)
         for number, eye in places.eyes.items():
@@ -313,15 +312,3 @@ def _near(
     near = there.copy()
     near[beside[there].reshape(-1)] = True
     return near
-
-
-def _projected(
-    view: PinholeCamera, points: Float64[np.ndarray, "P 3"]
-) -> tuple[Int64[np.ndarray, " N"], Int64[np.ndarray, " N"], Float64[np.ndarray, " N"]]:
-    """Project points into a view; return the pixels of those inside the picture, their numbers, and their depths, m."""
-    local = products(points, view.extrinsic[:3, :3].T) + view.extrinsic[:3, 3]
-    with np.errstate(invalid="ignore"):
-        columns, rows = np.floor(view.project(local)).T
-    inside = np.flatnonzero((columns >= 0) & (columns < view.width) & (rows >= 0) & (rows < view.height))
-    pixels = rows[inside].astype(np.int64) * view.width + columns[inside].astype(np.int64)
-    return pixels, inside, local[inside, 2]
