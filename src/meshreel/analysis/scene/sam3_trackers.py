@@ -225,7 +225,8 @@ def _libraries() -> tuple[Any, Any]:
     except ImportError as error:
         raise InputError(f"SAM3 needs the extra sam3 ({error}): pip install 'meshreel[sam3]'") from None
     transformers.utils.logging.disable_progress_bar()
-    modeling_sam3_video.cv_utils_kernel = CleanUp
+    modeling: Any = modeling_sam3_video  # its own type for this name is the kernel that is not installed
+    modeling.cv_utils_kernel = CleanUp
     return torch, transformers
 
 
