@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float64
-from scipy.ndimage import binary_dilation, label, maximum_filter, minimum_filter
+from scipy.ndimage import binary_dilation, distance_transform_edt, label, maximum_filter, minimum_filter
 
 from ..geometry.cameras import PinholeCamera
 from ..geometry.depth import STEP, DepthFrames, DepthPicture
@@ -29,7 +29,9 @@ SELDOM = 0.2  # share of all frames in which a pixel is as far as usual, below w
 APART = (0.06, 0.02)  # m, and share of the depth, by which a body is nearer than usual (guess)
 SPECK = 12  # pixels: smaller areas that are nearer than usual are noise (guess)
 LOOKED_AT = 60  # frames from which the usual depth is taken, at most (guess)
-HALO = 8  # pixels around a body in which still surface is not asked to stay: a foot ends softly on the floor (guess)
+FOOT = (
+    0.3  # m around a body in which nothing is asked to stand still: a foot is as long, and not `APART` from the floor
+)
 LIMB = 50  # pixels of a body's lower third from which on a frame shows it (guess)
 ENDS = (0.02, 0.98)  # quantiles of heights of measured points: where a body ends (guess)
 LOWEST = 0.1  # quantile over frames of a body's lower end: the floor that it stands on (guess)
@@ -49,6 +51,12 @@ class Judged:
     def of(self, part: str) -> Bool[np.ndarray, "H W"]:
         """Return the pixels of one of `PARTS` that count."""
         return self.clear & {"all": np.True_, "still": ~self.body, "body": self.body}[part]
+
+    @property
+    def off_body(self) -> Bool[np.ndarray, "H W"]:
+        """Pixels in which covered surface stands still for sure: farther than a foot's length from a body."""
+        away = distance_transform_edt(~self.body) if self.body.any() else np.inf
+        return self.of("still") & self.covered & (away * self.depth > FOOT * self.camera.intrinsic[0, 0])
 
     @property
     def shown(self) -> Float64[np.ndarray, "H W"]:
@@ -190,9 +198,7 @@ def _changes(before: Mapping[int, Judged], now: Mapping[int, Judged], refreshed:
     pairs = [(before[camera], now[camera]) for camera in sorted(before.keys() & now.keys())]
     moved = [np.zeros(0)]
     for a, b in [] if refreshed else pairs:
-        both = (
-            a.of("still") & b.of("still") & a.covered & b.covered & ~binary_dilation(a.body | b.body, iterations=HALO)
-        )
+        both = a.off_body & b.off_body
         moved.append(a.shown[both] - b.shown[both])
     steps, angles = np.concatenate(moved), np.zeros(0)
     if pairs:
