@@ -60,7 +60,8 @@ class DepthCamera:
         if not all(FOCAL[0] * n <= f <= FOCAL[1] * n for f, n in zip(self.focal, sides, strict=True)) or not all(
             -AWAY * n <= c <= (1 + AWAY) * n for c, n in zip(self.center, sides, strict=True)
         ):
-            text = f"focal {self.focal}, center {self.center} for pictures of {self.width} x {self.height}"
+            (fx, fy), (cx, cy) = self.focal, self.center
+            text = f"focal ({fx:g}, {fy:g}), center ({cx:g}, {cy:g}) for pictures of {self.width} x {self.height}"
             raise InputError(f"camera {self.name}: {text}: give pixels, focal above 0; calibrate the camera again")
         near, far = self.depth_range
         if not (math.isfinite(self.depth_unit) and self.depth_unit > 0 and 0 <= near < far < math.inf):

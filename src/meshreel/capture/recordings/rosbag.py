@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from ...errors import InputError
 from ...io.depth_pictures import parse_depth
 from ..poses import Pose, pose_in_root, pose_of
 from .takes import Lens, Picture, Pictures, Sensor, Stream, Take, picture_size
@@ -48,7 +49,8 @@ def read(path: Path) -> Take:
         deep = _distinct(named or others, "base")
         if not deep:
             forms = f"no depth pictures ({', '.join(DEEP)}, or compressedDepth as PNG)"
-            raise ValueError(f"{forms}; its topics are {', '.join(bag.described()) or 'none'}")
+            text = f"{forms}; its topics are {', '.join(bag.described()) or 'none'}"
+            raise InputError(f"{path}: {text}; record a topic of depth")
         colors = [topic for topic in topics if not topic.deep]
         tree = bag.tree()
         pairs = _paired(deep, colors, tree)
@@ -141,8 +143,8 @@ def _topic(name: str, count: int, message: Any) -> _Topic:
         encoding = message.format.split(";")[0].strip()
         start = COMPRESSED.size if "compressedDepth" in message.format else 0
         try:
-            size, readable = picture_size(bytes(message.data)[start:]), not encoding.startswith("mono")
-        except OSError:  # no PNG or JPEG, as RVL is none
+            size, readable = picture_size(bytes(message.data)[start:], name), not encoding.startswith("mono")
+        except InputError:  # no PNG or JPEG, as RVL is none
             encoding, size, readable = "", (0, 0), False
     deep = True if encoding in DEEP else False if readable else None
     unit = DEEP.get(encoding, ("", 1.0))[1]
