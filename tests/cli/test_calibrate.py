@@ -78,10 +78,22 @@ def test_poses_of_a_file_are_taken_with_their_scale(rig, tmp_path, capsys):
         (["-o", "new.yml"], "must end in .json"),
         (["-o", "RIG/rig.json"], "is the input"),
         (["-o", "new.json", "--scale", "0"], "--scale 0: give a factor above 0"),
+        (["-o", "nowhere/new.json"], "nowhere/new.json: there is no folder nowhere"),
+        (["-o", "new.json", "--scale", "2"], "--scale and --poses-of are for the poses of a file; give --poses"),
+        (["-o", "new.json", "--columns", "5"], "are of a board; give --board, too"),
+        (["-o", "new.json", "--no-refine"], "--no-refine leaves nothing to do without --poses or --board"),
+        (["-o", "new.json", "--board", "charuco"], "rig: has no colour cameras, in whose pictures --board is found"),
+        (
+            ["-o", "new.json", "--poses", "RIG/rig.json", "--poses-of", "color"],
+            "rig: has no color cameras, whose poses",
+        ),
+        (["-o", "new.json", "--poses", "mirror.json"], "mirror.json: camera left: camera_to_world is no rotation"),
     ],
 )
 def test_an_output_that_would_lose_poses_is_refused(rig, capsys, monkeypatch, tmp_path, arguments, told):
     monkeypatch.chdir(tmp_path)
+    mirrored = {"name": "left", "camera_to_world": np.diag([1, 1, -1, 1]).tolist()}
+    (tmp_path / "mirror.json").write_text(json.dumps({"cameras": [mirrored]}))
     assert main(["calibrate", str(rig), *(one.replace("RIG", str(rig)) for one in arguments)]) == 2
     error = capsys.readouterr().err
     assert told in error and error.count("\n") == 1

@@ -93,6 +93,13 @@ def test_pictures_of_another_size_are_refused(tmp_path, made):
         made(folder)
 
 
+def test_what_a_killed_run_left_is_deleted_by_the_next(tmp_path, made):
+    (tmp_path / ".rig0.making" / "desk-camera").mkdir(parents=True)
+    (tmp_path / ".rig0.part").write_bytes(b"")
+    made(files.tum(tmp_path / "desk"))
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["desk", "rig0"]
+
+
 def test_time_stamps_in_another_unit_repeated_or_far_off(tmp_path, made):
     nanoseconds = [1e9 * time for time in TIMES]
     with pytest.raises(
@@ -156,6 +163,14 @@ def test_bags_that_are_damaged_or_have_no_depth(tmp_path, made):
         bag.image("/depth/image_raw", DEPTHS[0], "16UC1", TIMES[0])
     with pytest.raises(InputError, match="lens model equidistant"):
         made(tmp_path / "b.bag")
+    with Bag(tmp_path / "e.bag", "bag") as bag:
+        bag.info("/depth/camera_info")
+        bag.image("/depth/image_raw", DEPTHS[0], "16UC1", TIMES[0])
+        values = (bag.header(TIMES[1], "optical"), 96, 96, "16UC1", 0, 10, np.zeros(960, np.uint8))
+        bag.write("/depth/image_raw", "sensor_msgs/Image", bag.of("sensor_msgs/Image", *values), TIMES[1])
+    text = r"e\.bag: cannot be read, depth of .* from picture 1 on \(96 x 96 pixels of 16UC1 in 960 bytes, 10 a row"
+    with pytest.raises(InputError, match=text):
+        made(tmp_path / "e.bag")
     with Bag(tmp_path / "c.bag", "bag") as bag:
         bag.image("/depth/image_raw", DEPTHS[0], "16UC1", TIMES[0])
     with pytest.raises(InputError, match="has no calibration: record the topics camera_info"):

@@ -39,7 +39,7 @@ def read(path: Path) -> Take:
         archive = zipfile.ZipFile(path)  # open as long as its pictures may be asked for
         names, load = archive.namelist(), partial(_unpacked, archive)
         about = json.loads(load("metadata"))
-        decode = partial(_lzfse, load, float(about["w"]) / float(about["h"]))
+        decode = partial(_lzfse, load, float(about["w"]) / max(1.0, float(about["h"])))
     deep, color = _by_number(names, (".exr", ".depth")), _by_number(names, (".jpg",))
     if not deep:
         raise ValueError("it has no depth pictures")

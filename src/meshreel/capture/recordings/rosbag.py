@@ -239,8 +239,11 @@ def _pixels(message: Any) -> Picture:
         return _unpacked(message.format, data)
     channels = COLOR.get(message.encoding, [0])
     kind = np.dtype(DEEP.get(message.encoding, ("u1",))[0]).newbyteorder(">" if message.is_bigendian else "<")
-    rows = np.frombuffer(data, np.uint8, message.height * message.step).reshape(message.height, -1)
     wide = message.width * len(channels) * kind.itemsize
+    if message.step < wide or len(data) < message.height * message.step:
+        size = f"{message.width} x {message.height} pixels of {message.encoding}"
+        raise ValueError(f"{size} in {len(data)} bytes, {message.step} a row, are too few")
+    rows = np.frombuffer(data, np.uint8, message.height * message.step).reshape(message.height, -1)
     values = np.ascontiguousarray(rows[:, :wide]).view(kind).reshape(message.height, message.width, -1)
     return values[..., channels[:3]] if len(channels) > 1 else values[..., 0].astype(kind.newbyteorder("="))
 

@@ -92,8 +92,11 @@ class Take:
 
 
 @contextmanager
-def reading(path: Path) -> Iterator[None]:
-    """Turn what packages raise for a damaged file, each errors of its own, into an InputError that names the file."""
+def reading(path: Path, where: Callable[[], str] = str) -> Iterator[None]:
+    """Turn what packages raise for a damaged file, each errors of its own, into an InputError that names the file.
+
+    `where` says in which place of the file, after a comma.
+    """
     try:
         yield
     except InputError as error:
@@ -104,10 +107,10 @@ def reading(path: Path) -> Iterator[None]:
         text = f"{error.name} is missing; install it with: pip install 'meshreel[recordings]'"
         raise InputError(f"{path}: {text}") from None
     except Exception as error:
-        missing = " is missing" if isinstance(error, KeyError) else ""
+        missing = " is missing" if isinstance(error, KeyError) and " " not in f"{error}" else ""
         reason = " ".join(f"{getattr(error, 'strerror', None) or error}{missing}".split()) or type(error).__name__
         text = "copy it again, or repair it with the recorder's tool"
-        raise InputError(f"{path}: cannot be read ({reason:.200}); {text}") from error
+        raise InputError(f"{path}: cannot be read{where()} ({reason:.200}); {text}") from error
 
 
 def picture_size(data: bytes, where: str) -> tuple[int, int]:

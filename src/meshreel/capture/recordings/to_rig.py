@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import io
 import re
-import tempfile
+import shutil
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -22,7 +22,7 @@ from jaxtyping import Bool, Float64, Int64
 from ...errors import InputError
 from ...geometry.color_views import bent
 from ...io.pictures import pack_picture
-from ...io.unfinished import cannot_be_written
+from ...io.unfinished import cannot_be_written, claim, discard, part_of
 from ...io.write import make_folder
 from ..color_cameras import distortion_of
 from ..rig import DepthCamera, write_rig
@@ -179,7 +179,9 @@ class _Part:
     ) -> _Written:
         written, what = _Written(), f"{self.take.path}: {folder.name} of {self.sensor.name}"
         make_folder(folder)
-        with reading(self.take.path):
+        with reading(
+            self.take.path, lambda: f", {folder.name} of {self.sensor.name} from picture {len(written.files)} on"
+        ):
             for number, (time, picture) in enumerate(stream.pictures()):
                 if not np.isfinite(time):
                     raise ValueError(f"picture {number} has the time {time}")
@@ -295,16 +297,28 @@ def _colored(picture: Picture, lens: Lens) -> tuple[bytes, str]:
 
 @contextmanager
 def _appearing(folder: Path) -> Iterator[Path]:
-    """Yield a new folder, which takes the name `folder` at the end of the block; after a failure, nothing is left."""
+    """Yield a new folder, which takes the name `folder` at the end of the block; after a failure, nothing is left.
+
+    What a killed run left is deleted by the next one to the same folder.
+    """
+    if not folder.name:
+        raise InputError(f"{folder}: is the folder that you are in; name a new one for the rig")
     with cannot_be_written(folder):
         if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
             raise InputError(f"{folder}: is there already; choose another folder for the rig, or delete it")
         folder.parent.mkdir(parents=True, exist_ok=True)
-        scratch = tempfile.TemporaryDirectory(prefix=f".{folder.name}.", dir=folder.parent)
-    with scratch as place:
-        (made := Path(place, folder.name)).mkdir()
+        lock = claim(name := part_of(folder), folder)
+    made = name.with_suffix(".making")
+    try:
+        with cannot_be_written(folder):
+            if made.exists():
+                shutil.rmtree(made)
+            made.mkdir()
         yield made
         with cannot_be_written(folder):
             if folder.exists():
                 folder.rmdir()
             made.rename(folder)
+    finally:
+        shutil.rmtree(made, ignore_errors=True)
+        discard(lock, name)
