@@ -39,6 +39,12 @@ def apart(path, folder):
     return float(np.linalg.norm(places[1] - (places[0] + places[2]) / 2))
 
 
+def test_a_recording_of_one_camera_has_no_poses_to_calibrate(tmp_path, capsys):
+    (tmp_path / "camera.json").write_text("{}")
+    assert main(["calibrate", str(tmp_path), "-o", str(tmp_path / "new.json")]) == 2
+    assert "has one camera, in camera.json" in capsys.readouterr().err
+
+
 def test_new_poses_and_a_picture_are_written_beside_the_old_ones(rig, tmp_path, capsys):
     before, out = (rig / "rig.json").read_bytes(), tmp_path / "new.json"
     assert main(["calibrate", str(rig), "-o", str(out), "--json"]) == 0

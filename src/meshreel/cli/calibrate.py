@@ -16,7 +16,7 @@ from ..capture.calibrate import refine as refined
 from ..capture.calibration_sheet import write_calibration_sheet
 from ..capture.poses import read_poses
 from ..capture.recording import open_recording
-from ..capture.rig import RIG
+from ..capture.rig import RIG, SINGLE
 from ..capture.rig_poses import described, posed_by, with_poses
 from ..errors import InputError
 from ..io.write import check_apart, replacing
@@ -104,6 +104,8 @@ def _output(rig: Path, output: Path | None, in_place: bool) -> Path:
     """Return the file to write. Raises InputError unless exactly one is named that may be written."""
     if (output is None) != in_place:
         raise InputError("give either --output FILE.json, or --in-place to replace the rig's own rig.json")
+    if (rig / SINGLE).is_file() and not (rig / RIG).is_file():
+        raise InputError(f"{rig}: has one camera, in {SINGLE}; poses are calibrated of cameras in a {RIG}")
     path = rig / RIG if output is None else output
     if path.suffix != ".json":
         raise InputError(f"{path}: the output must end in .json")
