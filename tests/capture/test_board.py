@@ -106,6 +106,8 @@ def test_a_board_that_no_two_cameras_see_is_an_error_with_counts(tmp_path):
     [
         ({"marker": 0.05}, "smaller than squares"),
         ({"columns": 0}, "counts from 1"),
+        ({"columns": 1, "rows": 1}, "a board of 1 x 1 with 5X5_100 is none to OpenCV"),
+        ({"columns": 60, "rows": 60, "dictionary": "4X4_50"}, "and a dictionary with enough markers"),
         ({"dictionary": "9X9"}, "not known to OpenCV; give one of 4X4_50|not known"),
     ],
 )

@@ -102,7 +102,7 @@ def mirrored(rig):
         (lambda r: r["cameras"][0].update(width=96.5), "pictures of 96.5 x 96"),
         (lambda r: r["cameras"][0].update(height=True), "height is True"),
         (lambda r: r["cameras"][0].update(width=10**400), "pictures of inf x 96"),
-        (lambda r: r["cameras"][0].update(fx=0.6), r"camera front: focal \(0.6, 96.0\).* 96 x 96: give pixels"),
+        (lambda r: r["cameras"][0].update(fx=0.6), r"camera front: focal \(0.6, 96\).* 96 x 96: give pixels"),
         (lambda r: r["cameras"][0].update(fx=1e300), "camera front: focal"),
         (lambda r: r["cameras"][0].update(cx=1e300), "camera front: focal .* center"),
         (lambda r: r["cameras"][0].update(name=None), "name is None; give text"),

@@ -39,6 +39,12 @@ def apart(path, folder):
     return float(np.linalg.norm(places[1] - (places[0] + places[2]) / 2))
 
 
+def test_a_recording_of_one_camera_has_no_poses_to_calibrate(tmp_path, capsys):
+    (tmp_path / "camera.json").write_text("{}")
+    assert main(["calibrate", str(tmp_path), "-o", str(tmp_path / "new.json")]) == 2
+    assert "has one camera, in camera.json" in capsys.readouterr().err
+
+
 def test_new_poses_and_a_picture_are_written_beside_the_old_ones(rig, tmp_path, capsys):
     before, out = (rig / "rig.json").read_bytes(), tmp_path / "new.json"
     assert main(["calibrate", str(rig), "-o", str(out), "--json"]) == 0
@@ -78,10 +84,22 @@ def test_poses_of_a_file_are_taken_with_their_scale(rig, tmp_path, capsys):
         (["-o", "new.yml"], "must end in .json"),
         (["-o", "RIG/rig.json"], "is the input"),
         (["-o", "new.json", "--scale", "0"], "--scale 0: give a factor above 0"),
+        (["-o", "nowhere/new.json"], "nowhere/new.json: there is no folder nowhere"),
+        (["-o", "new.json", "--scale", "2"], "--scale and --poses-of are for the poses of a file; give --poses"),
+        (["-o", "new.json", "--columns", "5"], "are of a board; give --board, too"),
+        (["-o", "new.json", "--no-refine"], "--no-refine leaves nothing to do without --poses or --board"),
+        (["-o", "new.json", "--board", "charuco"], "rig: has no colour cameras, in whose pictures --board is found"),
+        (
+            ["-o", "new.json", "--poses", "RIG/rig.json", "--poses-of", "color"],
+            "rig: has no color cameras, whose poses",
+        ),
+        (["-o", "new.json", "--poses", "mirror.json"], "mirror.json: camera left: camera_to_world is no rotation"),
     ],
 )
 def test_an_output_that_would_lose_poses_is_refused(rig, capsys, monkeypatch, tmp_path, arguments, told):
     monkeypatch.chdir(tmp_path)
+    mirrored = {"name": "left", "camera_to_world": np.diag([1, 1, -1, 1]).tolist()}
+    (tmp_path / "mirror.json").write_text(json.dumps({"cameras": [mirrored]}))
     assert main(["calibrate", str(rig), *(one.replace("RIG", str(rig)) for one in arguments)]) == 2
     error = capsys.readouterr().err
     assert told in error and error.count("\n") == 1

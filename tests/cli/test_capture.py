@@ -75,7 +75,7 @@ def test_what_is_missing_is_reported_once_and_errors_take_one_line(rig, tmp_path
     assert capsys.readouterr().err.count("camera side lacks 1 of 3 frames") == 1
     assert main(["capture", str(tmp_path / "nothing"), "-o", str(tmp_path / "other")]) == 2
     error = capsys.readouterr().err
-    assert "neither rig.json nor camera.json" in error and error.count("\n") == 1
+    assert "nothing: no such file or folder; check the path" in error and error.count("\n") == 1
     assert main(["capture", str(rig), "-o", str(tmp_path / "other"), "--voxel", "9"]) == 2
     assert "voxel 9" in capsys.readouterr().err and not (tmp_path / "other").exists()
 
@@ -113,6 +113,9 @@ def test_a_recording_is_listed_and_becomes_a_rig(tmp_path, run):
     assert camera["depth"]["pictures"] == 4 and camera["color"]["calibrated"] and camera["poses"] == 4
     row = run("capture", folder, "-o", rig, "--json").row
     assert (row["cameras"], row["color_cameras"], row["frames"], row["frame_rate"]) == (1, 1, 4, 10)
+    said = run("capture", "--list", rig).out
+    assert "rig: a rig, 4 frames, 10 a second" in said and "desk-camera-color: color 96 x 96, 4 pictures" in said
+    assert run("capture", "--list", rig, "--json").row["recordings"][0]["cameras"][0]["pictures"] == 4
     assert run("capture", rig, "-o", tmp_path / "meshes", "--voxel", "0.05").code == 0
     assert len(open_sequence(tmp_path / "meshes")) == 4
 
@@ -131,5 +134,9 @@ def test_recordings_take_no_options_of_fusion_and_no_folder_that_is_there(tmp_pa
     assert failed(run("capture", folder), "--output is missing")
     assert failed(run("capture", folder, "-o", tmp_path / "rig", "--voxel", "0.1"), "is no rig: make one of it")
     assert failed(run("capture", folder, "-o", tmp_path), "is there already; choose another folder")
+    (tmp_path / "other").mkdir()
+    (tmp_path / "other" / "rig.json").write_text("{}")
+    for inputs in ([folder, tmp_path / "other"], [tmp_path / "other", folder]):
+        assert failed(run("encode", *inputs, "-o", tmp_path / "x.reel"), "other: is a rig, which no other")
     assert failed(run("capture", tmp_path, "-o", tmp_path / "rig"), "nor a recording that can be read", ".mkv")
     assert not (tmp_path / "rig").exists()

@@ -164,11 +164,17 @@ def test_with_the_truth_both_are_compared_with_it(run, rig):
     assert "against the truth, 2 frames" in told.out and "people_coverage_rms_m" in told.out
 
 
-def test_frames_of_a_rig_are_judged_by_its_depth_pictures(run, rig):
+def test_frames_of_a_rig_are_judged_by_its_depth_pictures(run, rig, tmp_path):
     found = run("compare", rig, rig / "larger", "--no-ssim", "--json").row["depth"]
     assert len(found["decoded"]["per_frame"]) == found["originals"]["frames_judged"] == 3
     assert found["originals"]["all_covered"] > 0.95 and found["decoded"]["all_invented"] < 0.05
-    assert "by the depth pictures, 3 frames" in run("compare", rig, rig / "larger", "--no-ssim").out
+    said = run("compare", rig, rig / "larger", "--no-ssim")
+    assert "by the depth pictures, 3 frames" in said.out and "another recording" not in said.err
+    (tmp_path / "far").mkdir()
+    for number, mesh in enumerate(open_sequence(rig / "larger")):
+        write_mesh(mesh.at(mesh.vertices + 9.0), tmp_path / "far" / f"{number}.ply")
+    told = run("compare", rig, tmp_path / "far", "--no-ssim").err
+    assert "far: covers 0 % of what the depth cameras of" in told and "is it of another recording" in told
 
 
 def test_a_sheet_of_a_rig_is_what_its_cameras_see_of_the_chosen_frames(run, rig, tmp_path):

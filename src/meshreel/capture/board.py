@@ -55,9 +55,19 @@ class BoardOptions:
             known = ", ".join(one[5:] for one in dir(aruco) if one.startswith("DICT_"))
             raise InputError(f"dictionary {name[5:]!r:.40} is not known to OpenCV; give one of {known}")
         markers, size = aruco.getPredefinedDictionary(getattr(aruco, name)), (self.columns, self.rows)
-        if self.kind == "apriltag":
-            return aruco.GridBoard(size, self.marker, self.square - self.marker, markers)
-        return aruco.CharucoBoard(size, self.square, self.marker, markers)
+        try:
+            if self.kind == "apriltag":
+                board = aruco.GridBoard(size, self.marker, self.square - self.marker, markers)
+            else:
+                board = aruco.CharucoBoard(size, self.square, self.marker, markers)
+            if int(np.max(board.getIds())) >= len(markers.bytesList):
+                raise ValueError("too few markers")
+            return board
+        except Exception as error:  # OpenCV's, or Python's where it returns nothing
+            text = f"a board of {self.columns} x {self.rows} with {name[5:]} is none to OpenCV"
+            raise InputError(
+                f"{text}; give its numbers of columns and rows, and a dictionary with enough markers"
+            ) from error
 
 
 def opencv() -> Any:

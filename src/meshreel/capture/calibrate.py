@@ -11,8 +11,9 @@ smallest: the mean pose of cameras that see each other stays, and so does what n
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import combinations, permutations
 
 import numpy as np
@@ -40,6 +41,7 @@ APART = 0.01  # m: a pair that ends farther apart is reported (guess)
 
 Poses = Float64[np.ndarray, "n 4 4"]  # camera to world, m
 Step = Float64[np.ndarray, " m"]  # a motion of each camera, see `_Scene`
+Report = Callable[[str, int, int], None]  # a stage, how many of its rounds are done, and how many it has
 Directions = Float64[np.ndarray, "m k"]  # k such motions
 
 
@@ -63,7 +65,7 @@ class Calibration:
     warnings: tuple[str, ...]
 
 
-def refine(rig: Rig) -> Calibration:
+def refine(rig: Rig, report: Report = lambda *_: None) -> Calibration:
     """Refine the poses of a rig's depth cameras. Raises InputError where it has one, or one sees nothing still."""
     if len(rig.cameras) < 2:
         raise InputError(f"{rig.folder}: has one camera; poses are calibrated between two at least")
@@ -72,15 +74,15 @@ def refine(rig: Rig) -> Calibration:
         if not view.known.any():
             text = f"camera {view.camera.name} sees no surface that stands still"
             raise InputError(f"{rig.folder}: {text}; record more of the room, or leave the camera out")
-    return refine_views(views)
+    return refine_views(views, report)
 
 
-def refine_views(views: Sequence[StillView]) -> Calibration:
+def refine_views(views: Sequence[StillView], report: Report = lambda *_: None) -> Calibration:
     """Refine the poses of cameras on what they see."""
     start, scene = np.array([view.camera.camera_to_world for view in views]), _Scene(views)
-    poses = scene.solved(start, np.zeros((6 * len(views), 0)))
+    poses = scene.solved(start, np.zeros((6 * len(views), 0)), partial(report, "refine"))
     if (unfixed := scene.unfixed(poses)).size:
-        poses = scene.solved(start, unfixed)
+        poses = scene.solved(start, unfixed, partial(report, "refine held"))
     cameras = tuple(replace(view.camera, camera_to_world=pose) for view, pose in zip(views, poses, strict=True))
     first, last = scene.distances(start), scene.distances(poses)
     names = [view.camera.name for view in views]
@@ -122,9 +124,10 @@ class _Scene:
         self.middle = np.median(places, axis=0)
         self.size = float(np.sqrt(((places - self.middle) ** 2).sum(axis=1).mean()))  # m
 
-    def solved(self, poses: Poses, unfixed: Directions) -> Poses:
+    def solved(self, poses: Poses, unfixed: Directions, report: Callable[[int, int], None]) -> Poses:
         """Return the poses that fit best, from poses nearby, without motion in the unfixed directions."""
-        for reach in REACH:
+        for number, reach in enumerate(REACH):
+            report(number, len(REACH))
             before = None
             for _ in range(STEPS):
                 matrix, gradient = self.problem(poses, reach)
@@ -138,6 +141,7 @@ class _Scene:
                 poses, before = self.moved(poses, taken), (step, taken)
                 if _size(step) < DONE:
                     break
+        report(len(REACH), len(REACH))
         return poses
 
     def moved(self, poses: Poses, step: Step) -> Poses:

@@ -84,6 +84,6 @@ def distortion_of(entry: Mapping[str, Any]) -> tuple[float, ...]:
     given = entry.get("distortion", [])
     good = isinstance(given, list) and len(given) <= 8
     if not good or not all(type(k) in (int, float) and abs(k) <= MOST_DISTORTION for k in given):  # no NaN is
-        text = "give up to eight numbers, k1 k2 p1 p2 k3 k4 k5 k6, as OpenCV has them"
+        text = f"give up to eight numbers of at most {MOST_DISTORTION:g}, k1 k2 p1 p2 k3 k4 k5 k6, as OpenCV has them"
         raise InputError(f"distortion is {given!r:.60}; {text}")
     return (*map(float, given), *[0.0] * (5 - len(given)))

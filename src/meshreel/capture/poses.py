@@ -21,14 +21,14 @@ from jaxtyping import Float64
 from ..errors import InputError
 from ..geometry import strict
 from ..io.file_names import last_number
-from ..io.read import read_file
+from ..io.read import read_input
 
 Pose = Float64[np.ndarray, "4 4"]
 FORMS = (
     "COLMAP's images.txt or images.bin, OpenCV's .yml, caliscope's .toml, tf_static as .yaml or .json, or a rig.json"
 )
 _TURNS, _SHIFTS = ("Rot", "R", "rvec"), ("T", "t", "tvec")  # OpenCV's names of matrices, before `_` and a camera's name
-_DAMAGED = (OSError, ValueError, LookupError, TypeError, AttributeError, ArithmeticError, struct.error, RecursionError)
+_DAMAGED = (ValueError, LookupError, TypeError, AttributeError, ArithmeticError, struct.error, RecursionError)
 
 
 def read_poses(path: Path) -> dict[str, Pose]:
@@ -41,8 +41,9 @@ def read_poses(path: Path) -> dict[str, Pose]:
     read = _READERS.get(path.suffix.lower())
     if read is None:
         raise InputError(f"{path}: {path.suffix or 'no'} extension is of no file of poses; give {FORMS}")
+    data = read_input(path)
     try:
-        poses = {str(name): np.array(pose, dtype=np.float64) for name, pose in read(read_file(path)).items()}
+        poses = {str(name): np.array(pose, dtype=np.float64) for name, pose in read(data).items()}
         if not poses:
             raise ValueError("has no poses of cameras")
         for name, pose in poses.items():
@@ -159,7 +160,12 @@ def _yaml(data: bytes) -> dict[str, Pose]:
         raise InputError("YAML needs the extra `calibrate`: pip install 'meshreel[calibrate]'") from None
 
     class Loader(yaml.SafeLoader):
-        """YAML with OpenCV's matrices as mappings."""
+        """YAML with OpenCV's matrices as mappings, and without aliases, of which a few bytes make gigabytes."""
+
+        def compose_node(self, parent: Any, index: Any) -> Any:
+            if self.check_event(yaml.AliasEvent):
+                raise yaml.YAMLError("it has an alias, *, which no such file needs")
+            return super().compose_node(parent, index)
 
     Loader.add_multi_constructor("", lambda loader, _, node: loader.construct_mapping(node, deep=True))
     text = re.sub(r"^%YAML:.*", "", data.decode("utf-8-sig"))  # OpenCV's first line is no YAML

@@ -60,7 +60,8 @@ class DepthCamera:
         if not all(FOCAL[0] * n <= f <= FOCAL[1] * n for f, n in zip(self.focal, sides, strict=True)) or not all(
             -AWAY * n <= c <= (1 + AWAY) * n for c, n in zip(self.center, sides, strict=True)
         ):
-            text = f"focal {self.focal}, center {self.center} for pictures of {self.width} x {self.height}"
+            (fx, fy), (cx, cy) = self.focal, self.center
+            text = f"focal ({fx:g}, {fy:g}), center ({cx:g}, {cy:g}) for pictures of {self.width} x {self.height}"
             raise InputError(f"camera {self.name}: {text}: give pixels, focal above 0; calibrate the camera again")
         near, far = self.depth_range
         if not (math.isfinite(self.depth_unit) and self.depth_unit > 0 and 0 <= near < far < math.inf):
@@ -194,8 +195,10 @@ def _described(folder: Path) -> tuple[list[Any], tuple[DepthCamera, ...], float,
         color = {"color": "color"} if (folder / "color").is_dir() else {}
         entries = [{"name": folder.resolve().name, "depth": "depth"} | color | record]
     else:
+        if not folder.exists():
+            raise InputError(f"{folder}: no such file or folder; check the path")
         text = f"{folder}: {'' if folder.is_dir() else 'is no folder and '}has neither {RIG} nor {SINGLE}"
-        raise InputError(f"{text}; describe its cameras in one of them")
+        raise InputError(f"{text}; describe its cameras in one, or make a rig of a recording with meshreel capture")
     rate = record.get("frames_per_second")
     if isinstance(rate, bool) or not isinstance(rate, (int, float)) or not RATES[0] <= rate <= RATES[1]:
         raise InputError(f"{path}: frames_per_second is {rate!r:.40}; give a number from {RATES[0]:g} to {RATES[1]:g}")

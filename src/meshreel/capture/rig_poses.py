@@ -41,13 +41,19 @@ def posed_by(rig: Rig, poses: Mapping[str, Pose], kind: str, where: Path) -> tup
     Also return a warning that names cameras without one. Raises InputError where it has none of any camera.
     """
     names = [camera.name for camera in (rig.cameras if kind == "depth" else rig.color_cameras)]
-    found = {name: pose for name in names if (pose := pose_for(name, poses, kind)) is not None}
+    if not names:
+        raise InputError(f"{rig.folder}: has no {kind} cameras, whose poses {where} is said to have; check --poses-of")
+    try:
+        found = {name: pose for name in names if (pose := pose_for(name, poses, kind)) is not None}
+        posed = with_poses(rig, *((found, {}) if kind == "depth" else ({}, found)))
+    except InputError as error:  # of a pose that is no camera's, or of one name for several
+        raise InputError(f"{where}: {error}") from None
     if not found:
         text = f"has poses of {', '.join(list(poses)[:8])} and of none of the {kind} cameras {', '.join(names)}"
         raise InputError(f"{where}: {text}; name them alike in {RIG}")
     lost = [name for name in names if name not in found]
     warnings = [f"{where}: has no pose of {', '.join(lost)}, which stay where they were"] if lost else []
-    return with_poses(rig, *((found, {}) if kind == "depth" else ({}, found))), warnings
+    return posed, warnings
 
 
 def described(rig: Rig) -> bytes:

@@ -30,7 +30,7 @@ PIPE_CLOSED = 141  # 128 + SIGPIPE
 _STOPPED = {False: "interrupted", True: "terminated"}  # by whether it was SIGTERM
 
 COMMANDS = {
-    "capture": "Fuse recordings of depth cameras into one mesh per frame.",
+    "capture": "Fuse the depth of a rig into one mesh per frame, or make a rig of recordings of other programs.",
     "calibrate": "Find the poses of a rig's cameras, from other programs, a board, and their depth.",
     "segment": "Label which faces of a scene move, and with which body.",
     "survey": "Survey a sequence once, for encodes of its parts on many machines.",

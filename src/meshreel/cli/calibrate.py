@@ -16,7 +16,7 @@ from ..capture.calibrate import refine as refined
 from ..capture.calibration_sheet import write_calibration_sheet
 from ..capture.poses import read_poses
 from ..capture.recording import open_recording
-from ..capture.rig import RIG
+from ..capture.rig import RIG, SINGLE
 from ..capture.rig_poses import described, posed_by, with_poses
 from ..errors import InputError
 from ..io.write import check_apart, replacing
@@ -64,6 +64,12 @@ def command(
     path = _output(rig, output, in_place)
     if not (math.isfinite(scale) and scale > 0):
         raise InputError(f"--scale {scale:g}: give a factor above 0")
+    if poses is None and (scale, poses_of) != (1.0, "depth"):
+        raise InputError("--scale and --poses-of are for the poses of a file; give --poses, too")
+    if board.kind is None and board != BoardOptions():
+        raise InputError("--columns, --rows, --square, --marker and --dictionary are of a board; give --board, too")
+    if not refine and poses is None and board.kind is None:
+        raise InputError("--no-refine leaves nothing to do without --poses or --board; give one, or leave it out")
     recording, warnings = open_recording(rig, keep=False)
     found, calibration = recording.rig, None
     if poses is not None:
@@ -72,10 +78,13 @@ def command(
         found, told = posed_by(found, given, poses_of, poses)
         warnings += told
     if board.kind is not None:
+        if not found.color_cameras:
+            raise InputError(f"{rig}: has no colour cameras, in whose pictures --board is found; give --poses instead")
         seen, told = poses_by_board(found.color_cameras, board)
         found, warnings = with_poses(found, {}, seen), warnings + told
     if refine:
-        calibration = refined(found)
+        with common.stages(0, "rounds") as progress:
+            calibration = refined(found, progress)
         found = with_poses(found, {one.name: one.camera_to_world for one in calibration.cameras}, {})
         warnings += calibration.warnings
         write_calibration_sheet(
@@ -95,11 +104,16 @@ def _output(rig: Path, output: Path | None, in_place: bool) -> Path:
     """Return the file to write. Raises InputError unless exactly one is named that may be written."""
     if (output is None) != in_place:
         raise InputError("give either --output FILE.json, or --in-place to replace the rig's own rig.json")
+    if (rig / SINGLE).is_file() and not (rig / RIG).is_file():
+        raise InputError(f"{rig}: has one camera, in {SINGLE}; poses are calibrated of cameras in a {RIG}")
     path = rig / RIG if output is None else output
     if path.suffix != ".json":
         raise InputError(f"{path}: the output must end in .json")
     if not in_place:
         check_apart(path, [rig / RIG])
+        if path.is_dir() or not path.parent.is_dir():  # told before anything is computed
+            text = "is a folder" if path.is_dir() else f"there is no folder {path.parent}"
+            raise InputError(f"{path}: {text}; name a file in a folder that is there")
     return path
 
 

@@ -4,24 +4,25 @@ from __future__ import annotations
 
 import json
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from cyclopts import Parameter
 
+from ..capture.color_cameras import ColorCamera
 from ..capture.fusion import FusionOptions
 from ..capture.recording import Recording, open_recording
 from ..capture.recordings import is_rig, open_take
 from ..capture.recordings.takes import Stream, Take
-from ..capture.recordings.to_rig import write_takes
-from ..capture.rig import read_rig
+from ..capture.rig import DepthCamera, Rig, read_rig
 from ..errors import InputError
 from ..io.read import first_difference, read_json
 from ..io.sequence import CAPTURED
 from ..io.write import frame_names, make_folder, replacing, write_mesh
 from .console import Common
+from .sources import make_rig
 
 _FUSION = FusionOptions()
 
@@ -66,13 +67,14 @@ def command(
     format
         Format of the mesh files.
     show
-        Show the streams of recordings, their sizes, rates and calibration, and write nothing.
+        Show the streams of recordings or rigs, their sizes, rates and calibration, and write nothing.
     """
     options = FusionOptions(voxel, truncation, fragment)
     if show:  # for which no picture is read
-        takes = [open_take(path) for path in inputs]
-        lines = [line for take in takes for line in _lines(take)]
-        return common.result({"recordings": [_take_row(take) for take in takes]}, *lines)
+        found = [read_rig(path) if is_rig(path) else open_take(path) for path in inputs]
+        lines = [line for one in found for line in (_rig_lines(one) if isinstance(one, Rig) else _lines(one))]
+        rows = [_rig_row(one) if isinstance(one, Rig) else _take_row(one) for one in found]
+        return common.result({"recordings": rows}, *lines)
     if output is None:
         raise InputError("--output is missing: a folder for meshes, or for the rig of recordings; or give --list")
     if len(inputs) > 1 or (inputs[0].exists() and not is_rig(inputs[0])):
@@ -108,15 +110,28 @@ def _lines(take: Take) -> Iterator[str]:
         yield f"  not read: {', '.join(take.others)}"
 
 
+def _rig_row(rig: Rig) -> dict[str, Any]:
+    streams: list[tuple[str, DepthCamera | ColorCamera, Mapping[int, Path]]] = []
+    streams += [("depth", camera, files) for camera, files in zip(rig.cameras, rig.files, strict=True)]
+    streams += [("color", camera, camera.files) for camera in rig.color_cameras]
+    cameras = [
+        {"name": one.name, "kind": kind, "width": one.width, "height": one.height, "pictures": len(files)}
+        for kind, one, files in streams
+    ]
+    about = {"path": str(rig.folder), "kind": "a rig", "frames": len(rig.frames), "frame_rate": rig.frame_rate}
+    return about | {"cameras": cameras}
+
+
+def _rig_lines(rig: Rig) -> Iterator[str]:
+    row = _rig_row(rig)
+    yield f"{rig.folder}: a rig, {row['frames']} frames, {rig.frame_rate:g} a second"
+    for one in row["cameras"]:
+        yield f"  {one['name']}: {one['kind']} {one['width']} x {one['height']}, {one['pictures']} pictures, calibrated"
+
+
 def _make_rig(inputs: list[Path], output: Path, common: Common) -> None:
     """Write the rig of recordings."""
-    takes = [open_take(path) for path in inputs]
-    streams = [
-        one for take in takes for sensor in take.sensors for one in (sensor.depth, sensor.color) if one is not None
-    ]
-    total = sum(stream.count for stream in streams)
-    with common.stages(total) as progress:
-        warnings = write_takes(takes, output, lambda done: progress("read", done, total))
+    warnings = make_rig([open_take(path) for path in inputs], output, common)
     rig = read_rig(output)
     common.warn([*warnings, *rig.missing()])
     row = {"output": str(output), "cameras": len(rig.cameras), "color_cameras": len(rig.color_cameras)}

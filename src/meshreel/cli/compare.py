@@ -32,6 +32,7 @@ from .flags import Knowing, Looking, Reading
 from .info import describe_file
 from .sources import open_source
 
+ALIKE = 0.2  # share of what depth measured: a decoded scene that covers less is of another recording (guess)
 BESIDE = {"truth": "against the truth", "depth": "by the depth pictures"}  # parts of a row with numbers of both
 
 
@@ -68,7 +69,7 @@ def command(
     """
     if sheet is not None and not sheet.parent.is_dir():
         raise InputError(f"{sheet}: there is no folder {sheet.parent}; make it or choose another")
-    source = open_source([originals], reading)
+    source = open_source([originals], reading, common)
     sequence, other = source.sequence, open_decoded(decoded, reading)
     if len(sequence) != len(other):
         raise InputError(f"{originals} has {len(sequence)} frames and {decoded} {len(other)}; choose with --frames A:B")
@@ -86,7 +87,16 @@ def command(
     except FormatError as error:  # names the chunk, but not the file
         raise FormatError(f"{decoded}: {error}; copy the file again, or compare frames before it") from None
     warnings = [*source.warnings, *(f"{decoded}: {w}" for w in getattr(other, "warnings", ()))]
+    warnings += _other(row, originals, decoded)
     _tell({"warnings": warnings} | _rate(decoded, other) | row, sheet, common)
+
+
+def _other(row: dict[str, Any], originals: str, decoded: str) -> Iterator[str]:
+    """Yield a warning where the decoded surface is hardly anywhere that the depth pictures of a rig have surface."""
+    own, share = (row["depth"][name]["all_covered"] for name in ("originals", "decoded")) if "depth" in row else (0, 0)
+    if (share or 0.0) < ALIKE <= (own or 0.0):
+        text = f"{decoded}: covers {100 * (share or 0.0):.0f} % of what the depth cameras of {originals} measured"
+        yield f"{text}; is it of another recording, or of other frames (--frames)?"
 
 
 def _tell(row: dict[str, Any], sheet: Path | None, common: Common) -> None:

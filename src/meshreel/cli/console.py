@@ -66,7 +66,7 @@ class Common:
             sys.stdout.flush()  # a server prints its addresses and keeps running
 
     @contextmanager
-    def stages(self, total: int) -> Iterator[StageBars]:
+    def stages(self, total: int, counted: str = "frames") -> Iterator[StageBars]:
         """Show progress bars, one per stage, on standard error, or lines where that is no terminal; none if quiet."""
         console = Console(stderr=True)
         columns = (
@@ -74,14 +74,14 @@ class Common:
             TextColumn("{task.description:<10}"),
             BarColumn(),
             MofNCompleteColumn(),
-            TextColumn("frames"),
+            TextColumn(counted),
             TimeElapsedColumn(),
             TextColumn("left"),
             _LeftColumn(),
         )
         shown = console.is_terminal and not self.quiet
         bars = Progress(*columns, console=console, disable=not shown)
-        with bars, nullcontext() if shown or self.quiet else _lines(bars):
+        with bars, nullcontext() if shown or self.quiet else _lines(bars, counted):
             yield StageBars(bars, total)
 
 
@@ -128,14 +128,14 @@ class _LeftColumn(ProgressColumn):
 
 
 @contextmanager
-def _lines(bars: Progress) -> Iterator[None]:
+def _lines(bars: Progress, counted: str) -> Iterator[None]:
     """Print a line of progress on standard error every `EVERY` seconds, until the block ends."""
     ended = threading.Event()
 
     def run() -> None:
         with suppress(OSError, ValueError):  # standard error is closed
             while not ended.wait(EVERY):
-                if text := line_of(bars.tasks):
+                if text := line_of(bars.tasks, counted):
                     print(text, file=sys.stderr, flush=True)
 
     thread = threading.Thread(target=run, name="lines of progress", daemon=True)
@@ -147,7 +147,7 @@ def _lines(bars: Progress) -> Iterator[None]:
         thread.join()
 
 
-def line_of(tasks: Iterable[Task]) -> str:
+def line_of(tasks: Iterable[Task], counted: str = "frames") -> str:
     """Return a line that tells how far the unfinished stages are, empty where there is none."""
     open_ones = [task for task in tasks if not task.finished]
     if not open_ones:
@@ -156,7 +156,7 @@ def line_of(tasks: Iterable[Task]) -> str:
     lefts = [seconds for task in open_ones if (seconds := left(task)) is not None]
     so_far = _clock(max(task.elapsed or 0.0 for task in open_ones))
     rest = f", about {_clock(max(lefts))} left" if lefts else ""
-    return f"meshreel: {counts} of {open_ones[0].total:.0f} frames; {so_far} so far{rest}"
+    return f"meshreel: {counts} of {open_ones[0].total:.0f} {counted}; {so_far} so far{rest}"
 
 
 def _clock(seconds: float | None) -> str:

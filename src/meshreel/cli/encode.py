@@ -212,7 +212,7 @@ def command(
     if debug_digests is not None and (resume or coding.goal() is not None):
         raise InputError("--debug-digests describes one whole encode: leave out --resume and targets")
     part.check(coding, masking)
-    source = open_source(inputs, reading if part.survey is None else replace(reading, frames=":"))
+    source = open_source(inputs, reading if part.survey is None else replace(reading, frames=":"), common)
     scene = parting.scene(preset_options().scene or SceneOptions(), masking)
 
     def options_at(quality: float) -> EncoderOptions:

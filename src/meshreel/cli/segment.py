@@ -64,7 +64,7 @@ def command(
         raise InputError(f"--previews {previews}: give 0 to {MOST_PREVIEWS}")
     if views_only and (masking.masks or masking.sam3):
         raise InputError("--views-only needs no masks; leave out --masks and --sam3")
-    source = open_source(inputs, reading)
+    source = open_source(inputs, reading, common)
     scene, sequence = preset_options().scene or SceneOptions(), masking.upright(source)
     scene = replace(scene, segment=masking.options(scene.segment))
     masker = masking.masker(len(source.sequence))

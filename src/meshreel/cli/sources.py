@@ -15,12 +15,14 @@ from ..analysis.scene.sam3 import PromptBy, Sam3Masks, Sam3Options
 from ..analysis.scene.segmentation import SegmentOptions
 from ..capture.recording import open_recording
 from ..capture.recordings import is_rig, is_take, open_take
+from ..capture.recordings.takes import Take
 from ..capture.recordings.to_rig import write_takes
 from ..errors import InputError
 from ..geometry.derived_sequences import Upright
 from ..io.remote import Remote, located
 from ..io.sequence import captured, open_sequence
 from ..types import MeshSequence, Up
+from .console import Common
 from .flags import Reading
 
 _READ = Reading()
@@ -40,18 +42,21 @@ class Source:
         return (*self.remarks, *getattr(self.sequence, "warnings", ()))
 
 
-def open_source(inputs: Sequence[str], reading: Reading) -> Source:
+def open_source(inputs: Sequence[str], reading: Reading, common: Common = Common(quiet=True)) -> Source:
     """Open mesh files, or the folder of a rig or recordings, whose frames are fused on access. Raises InputError.
 
-    The truth of a simulated rig has a description of cameras, too, but is opened as the mesh files that it holds.
+    `common` shows how far the reading of recordings is. The truth of a simulated rig has a description of cameras, too,
+    but is opened as the mesh files that it holds.
     """
     folder = located(inputs[0])
     if isinstance(folder, Path) and is_take(folder):
         takes = [open_take(Path(name)) for name in inputs]
         scratch = tempfile.TemporaryDirectory(prefix="meshreel-")
-        remarks = write_takes(takes, rig := Path(scratch.name, "rig"))
+        remarks = make_rig(takes, rig := Path(scratch.name, "rig"), common)
         opened = open_source([str(rig)], reading)
         return replace(opened, remarks=(*remarks, *opened.remarks), scratch=scratch)
+    if len(inputs) > 1 and (rigs := [name for name in inputs if is_rig(Path(name))]):
+        raise InputError(f"{rigs[0]}: is a rig, which no other input joins; give it alone")
     if isinstance(folder, Remote) or len(inputs) > 1 or not is_rig(folder) or any(folder.glob("frame_*.ply")):
         options, made = reading.options(), captured(folder) if len(inputs) == 1 else {}
         rate = made.get("frames_per_second")
@@ -67,6 +72,14 @@ def open_source(inputs: Sequence[str], reading: Reading) -> Source:
         text = f"--fps {reading.fps:g}: {folder} is a rig of {recording.frame_rate:g} frames a second"
         raise InputError(f"{text}; leave it out, or mend the rig's description")
     return Source(recording, tuple(remarks))
+
+
+def make_rig(takes: Sequence[Take], folder: Path, common: Common) -> list[str]:
+    """Write the rig of recordings and show how far it is; return warnings for the user."""
+    streams = [one for take in takes for sensor in take.sensors for one in (sensor.depth, sensor.color) if one]
+    total = sum(stream.count for stream in streams)
+    with common.stages(total, "pictures") as progress:
+        return write_takes(takes, folder, lambda done: progress("read", done, total))
 
 
 @Parameter(name="*")

@@ -49,7 +49,7 @@ def command(
         raise InputError(f"{output}: the output must end in .json")
     if reading.frames != ":":
         raise InputError(f"--frames {reading.frames}: a survey is of all frames; give --frames to encode --survey")
-    source = open_source(inputs, reading)
+    source = open_source(inputs, reading, common)
     sequence = Masking(up=up).upright(source)
     with uploaded(place) as path, common.stages(len(sequence)) as progress, workers(jobs, cluster) as executor:
         check_apart(path, sequence.files)

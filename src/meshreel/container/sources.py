@@ -90,7 +90,7 @@ class FileSource(StreamSource):
         try:
             file = open(self.path, "rb", opener=_open_at_once)  # noqa: SIM115 (open until `close`)
         except OSError as error:
-            raise InputError(f"{self.path}: cannot be opened: {error.strerror}") from error
+            raise InputError(f"{self.path}: cannot be opened: {error.strerror}; give a .reel file") from error
         super().__init__(file, str(self.path))
 
     def __enter__(self) -> FileSource:

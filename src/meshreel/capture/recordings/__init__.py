@@ -55,9 +55,16 @@ def open_take(path: Path) -> Take:
     """Return what a recording holds. Raises InputError where no reader knows it, or where it cannot be read."""
     if not path.exists():
         raise InputError(f"{path}: no such file or folder; check the path")
-    for reader in readers():
-        if reader.fits(path):
-            with reading(path):
-                return reader.read(path)
+    if is_rig(path):
+        raise InputError(f"{path}: is a rig, which no other recording joins; give it alone")
+    found = [reader for reader in readers() if reader.fits(path)]
+    if len(found) > 1:
+        kinds = " and ".join(reader.KIND for reader in found)
+        raise InputError(f"{path}: is {kinds} at once; move the files of one into a folder of their own")
+    if found:
+        with reading(path):
+            return found[0].read(path)
     known = "; ".join(reader.KIND for reader in readers())
-    raise InputError(f"{path}: is neither the folder of a rig (rig.json) nor a recording that can be read: {known}")
+    raise InputError(
+        f"{path}: is neither the folder of a rig (rig.json, camera.json) nor a recording that can be read: {known}"
+    )

@@ -39,13 +39,16 @@ def read(path: Path) -> Take:
         archive = zipfile.ZipFile(path)  # open as long as its pictures may be asked for
         names, load = archive.namelist(), partial(_unpacked, archive)
         about = json.loads(load("metadata"))
-        decode = partial(_lzfse, load, float(about["w"]) / float(about["h"]))
+        decode = partial(_lzfse, load, float(about["w"]) / max(1.0, float(about["h"])))
     deep, color = _by_number(names, (".exr", ".depth")), _by_number(names, (".jpg",))
     if not deep:
         raise ValueError("it has no depth pictures")
     rate, stamps = float(about.get("fps", 30)), about.get("frameTimestamps") or []
-    times = {n: float(stamps[n]) if n < len(stamps) else n / rate for n in {*deep, *color}}
     size, lens = (int(about["w"]), int(about["h"])), None
+    if not (rate > 0 and min(size) > 0):
+        raise ValueError(f"its metadata have {rate:g} fps and pictures of {size[0]} x {size[1]}")
+    stamped = max(*deep, *color) < len(stamps)  # those of some would be on another clock
+    times = {n: float(stamps[n]) if stamped else n / rate for n in {*deep, *color}}
     if "K" in about:
         k = np.array(about["K"], np.float64).reshape(3, 3).T
         lens = Lens(*size, (k[0, 0], k[1, 1]), (k[0, 2], k[1, 2]))
@@ -61,7 +64,7 @@ def read(path: Path) -> Take:
 
     given = np.array(about.get("poses") or np.zeros((0, 7)), np.float64).reshape(-1, 7)
     poses = pose_of(given[:, :4], given[:, 4:]) @ FLIP if len(given) else None
-    beside = stream(color, picture_size(load(next(iter(color.values())))), load) if color else None
+    beside = stream(color, _size(load, next(iter(color.values()))), load) if color else None
     sensor = Sensor("phone", stream(deep, (int(width), int(height)), decode), 1.0, beside, np.eye(4), poses)
     return Take(path, KIND, (sensor,), "its metadata have no K; export the recording again")
 
@@ -69,6 +72,10 @@ def read(path: Path) -> Take:
 def _folder(path: Path) -> Path | None:
     places = (path, path / EXPORT)
     return next((p for p in places if (p / "metadata.json").is_file() and (p / "depth").is_dir()), None)
+
+
+def _size(load: Callable[[str], bytes], name: str) -> tuple[int, int]:
+    return picture_size(load(name), name)
 
 
 def _stored(folder: Path, name: str) -> bytes:

@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from ...errors import InputError
 from ...io.depth_pictures import parse_depth
 from ..poses import Pose, pose_in_root, pose_of
 from .takes import Lens, Picture, Pictures, Sensor, Stream, Take, picture_size
@@ -48,7 +49,8 @@ def read(path: Path) -> Take:
         deep = _distinct(named or others, "base")
         if not deep:
             forms = f"no depth pictures ({', '.join(DEEP)}, or compressedDepth as PNG)"
-            raise ValueError(f"{forms}; its topics are {', '.join(bag.described()) or 'none'}")
+            text = f"{forms}; its topics are {', '.join(bag.described()) or 'none'}"
+            raise InputError(f"{path}: {text}; record a topic of depth")
         colors = [topic for topic in topics if not topic.deep]
         tree = bag.tree()
         pairs = _paired(deep, colors, tree)
@@ -141,8 +143,8 @@ def _topic(name: str, count: int, message: Any) -> _Topic:
         encoding = message.format.split(";")[0].strip()
         start = COMPRESSED.size if "compressedDepth" in message.format else 0
         try:
-            size, readable = picture_size(bytes(message.data)[start:]), not encoding.startswith("mono")
-        except OSError:  # no PNG or JPEG, as RVL is none
+            size, readable = picture_size(bytes(message.data)[start:], name), not encoding.startswith("mono")
+        except InputError:  # no PNG or JPEG, as RVL is none
             encoding, size, readable = "", (0, 0), False
     deep = True if encoding in DEEP else False if readable else None
     unit = DEEP.get(encoding, ("", 1.0))[1]
@@ -237,8 +239,11 @@ def _pixels(message: Any) -> Picture:
         return _unpacked(message.format, data)
     channels = COLOR.get(message.encoding, [0])
     kind = np.dtype(DEEP.get(message.encoding, ("u1",))[0]).newbyteorder(">" if message.is_bigendian else "<")
-    rows = np.frombuffer(data, np.uint8, message.height * message.step).reshape(message.height, -1)
     wide = message.width * len(channels) * kind.itemsize
+    if message.step < wide or len(data) < message.height * message.step:
+        size = f"{message.width} x {message.height} pixels of {message.encoding}"
+        raise ValueError(f"{size} in {len(data)} bytes, {message.step} a row, are too few")
+    rows = np.frombuffer(data, np.uint8, message.height * message.step).reshape(message.height, -1)
     values = np.ascontiguousarray(rows[:, :wide]).view(kind).reshape(message.height, message.width, -1)
     return values[..., channels[:3]] if len(channels) > 1 else values[..., 0].astype(kind.newbyteorder("="))
 

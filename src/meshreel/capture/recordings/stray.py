@@ -11,12 +11,13 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float64
 
+from ...errors import InputError
 from ...io.depth_pictures import read_depth
 from ...io.file_names import last_number
 from ...io.pictures import read_picture
-from ...io.read import read_file
+from ...io.read import read_file, read_input
 from ..poses import pose_of
-from .takes import Lens, Pictures, Sensor, Stream, Take, picture_size
+from .takes import Lens, Pictures, Sensor, Stream, Take, picture_size, reading
 
 KIND = "a Stray Scanner folder (depth/, rgb.mp4, odometry.csv)"
 MATRIX, VIDEO = "camera_matrix.csv", "rgb.mp4"
@@ -30,23 +31,31 @@ def fits(path: Path) -> bool:
 
 def read(path: Path) -> Take:
     """Return the camera of a folder."""
-    times, poses = _odometry(path)
+    with reading(path / "odometry.csv"):
+        times, poses = _odometry(path)
     files = sorted((path / "depth").glob("*.png"))
     if not files:
         raise ValueError("depth/ has no *.png")
-    stamps = [times.get(number, number / RATE) for number in (last_number(file.stem) or 0 for file in files)]
-    width, height = picture_size(read_file(files[0]))
+    numbers = {file: last_number(file.stem) or 0 for file in files}
+    stamps = {file: times.get(n, n / RATE) for file, n in numbers.items() if n in times or not times}
+    if not stamps:
+        raise ValueError("odometry.csv has no row of a picture in depth/")
+    width, height = picture_size(read_input(files[0]), str(files[0]))
     color = _video(path, min(times.values(), default=0.0)) if (path / VIDEO).is_file() else None
     lens = None if color is None or color.lens is None else color.lens.resized(width, height)
 
     def pictures() -> Pictures:
-        for stamp, file in zip(stamps, files, strict=True):
+        for file, stamp in stamps.items():
             depth, sure = read_depth(file), path / "confidence" / file.name
             if sure.is_file():  # ARKit's confidence: 0 is low, as of pixels that mix two surfaces
-                depth = np.where(read_picture(sure)[..., 0] > 0, depth, 0)
+                trusted = read_picture(sure)[..., 0] > 0
+                if trusted.shape != depth.shape:
+                    text = f"{trusted.shape[1]} x {trusted.shape[0]} pixels where depth has"
+                    raise InputError(f"{sure}: {text} {depth.shape[1]} x {depth.shape[0]}; copy it again, or delete it")
+                depth = np.where(trusted, depth, 0)
             yield stamp, depth
 
-    depth = Stream(width, height, len(files), max(stamps) - min(stamps), lens, pictures)
+    depth = Stream(width, height, len(files), max(stamps.values()) - min(stamps.values()), lens, pictures)
     sensor = Sensor("phone", depth, 0.001, color, np.eye(4), poses)
     return Take(path, KIND, (sensor,), f"it needs {MATRIX} and {VIDEO}, whose size the matrix is for")
 
@@ -57,6 +66,8 @@ def _odometry(path: Path) -> tuple[dict[int, float], Float64[np.ndarray, "T 4 4"
     titled = bool(rows) and "qx" in rows[0]
     titles = rows.pop(0) if titled else ["x", "y", "z", "qx", "qy", "qz", "qw"]
     table = np.array([row[: len(titles)] for row in rows], dtype=np.float64).reshape(-1, len(titles))
+    if not np.isfinite(table).all():
+        raise ValueError("it has a number that is not finite")
     columns = {title: table[:, number] for number, title in enumerate(titles)}
     times = (
         dict(zip(columns["frame"].astype(int).tolist(), columns["timestamp"].tolist(), strict=True)) if titled else {}
@@ -68,14 +79,15 @@ def _odometry(path: Path) -> tuple[dict[int, float], Float64[np.ndarray, "T 4 4"
 def _video(path: Path, start: float) -> Stream:
     import av
 
-    with av.open(path / VIDEO) as video:
+    with reading(path / VIDEO), av.open(path / VIDEO) as video:
         stream = video.streams.video[0]
         seconds = float((stream.duration or 0) * (stream.time_base or 0))
         width, height, count = stream.width, stream.height, stream.frames
     lens = None
     if (path / MATRIX).is_file():
-        text = read_file(path / MATRIX).decode()
-        matrix = np.array([line.split(",") for line in text.splitlines() if line], np.float64).reshape(3, 3)
+        with reading(path / MATRIX):
+            text = read_file(path / MATRIX).decode()
+            matrix = np.array([line.split(",") for line in text.splitlines() if line], np.float64).reshape(3, 3)
         lens = Lens(width, height, (matrix[0, 0], matrix[1, 1]), (matrix[0, 2], matrix[1, 2]))
 
     def pictures() -> Pictures:

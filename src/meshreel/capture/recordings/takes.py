@@ -5,7 +5,6 @@ A reader -> depth cameras, the colour cameras beside them, and their pictures in
 
 from __future__ import annotations
 
-import io
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -15,6 +14,7 @@ import numpy as np
 from jaxtyping import Float64
 
 from ...errors import InputError
+from ...io.pictures import opened
 
 Picture = np.ndarray | bytes  # depths H x W in the sensor's unit, integers or floats; colours H x W x 3; a PNG or JPEG
 Pictures = Iterator[tuple[float, Picture]]  # each with its time on the take's clock, s
@@ -31,6 +31,18 @@ class Lens:
     center: tuple[float, float]
     distortion: tuple[float, ...] = ()  # k1 k2 p1 p2 k3 k4 k5 k6, or fewer
     reach: float = np.inf  # largest tangent of an angle to the optical axis for which the coefficients hold
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite(self.distortion).all() and self.reach > 0):
+            numbers = ", ".join(f"{number:g}" for number in self.distortion)
+            raise ValueError(
+                f"its lens bends by ({numbers}) up to a tangent of {self.reach:g}: not finite, or not above 0"
+            )
+
+    def check(self, width: int, height: int) -> None:
+        """Raise InputError for a picture of another size."""
+        if (width, height) != (self.width, self.height):
+            raise InputError(f"{width} x {height} pixels where its lens has {self.width} x {self.height}")
 
     def resized(self, width: int, height: int) -> Lens:
         """Return the lens for pictures of another size."""
@@ -80,8 +92,11 @@ class Take:
 
 
 @contextmanager
-def reading(path: Path) -> Iterator[None]:
-    """Turn what packages raise for a damaged file, each errors of its own, into an InputError that names the file."""
+def reading(path: Path, where: Callable[[], str] = str) -> Iterator[None]:
+    """Turn what packages raise for a damaged file, each errors of its own, into an InputError that names the file.
+
+    `where` says in which place of the file, after a comma.
+    """
     try:
         yield
     except InputError as error:
@@ -92,14 +107,13 @@ def reading(path: Path) -> Iterator[None]:
         text = f"{error.name} is missing; install it with: pip install 'meshreel[recordings]'"
         raise InputError(f"{path}: {text}") from None
     except Exception as error:
-        reason = " ".join(f"{getattr(error, 'strerror', None) or error}".split()) or type(error).__name__
+        missing = " is missing" if isinstance(error, KeyError) and " " not in f"{error}" else ""
+        reason = " ".join(f"{getattr(error, 'strerror', None) or error}{missing}".split()) or type(error).__name__
         text = "copy it again, or repair it with the recorder's tool"
-        raise InputError(f"{path}: cannot be read ({reason:.200}); {text}") from error
+        raise InputError(f"{path}: cannot be read{where()} ({reason:.200}); {text}") from error
 
 
-def picture_size(data: bytes) -> tuple[int, int]:
-    """Return width and height of the PNG or JPEG with these first bytes. Raises OSError for others."""
-    from PIL import Image
-
-    with Image.open(io.BytesIO(data)) as image:
+def picture_size(data: bytes, where: str) -> tuple[int, int]:
+    """Return width and height of a PNG or JPEG, of which only the head is read. Raises InputError for others."""
+    with opened(data, where, f"its {len(data)} bytes are no PNG or JPEG; copy it again", "copy it again") as image:
         return image.size

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import io
 import re
-import tempfile
+import shutil
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -22,14 +22,18 @@ from jaxtyping import Bool, Float64, Int64
 from ...errors import InputError
 from ...geometry.color_views import bent
 from ...io.pictures import pack_picture
-from ...io.unfinished import cannot_be_written
+from ...io.unfinished import cannot_be_written, claim, discard, part_of
 from ...io.write import make_folder
+from ..color_cameras import distortion_of
 from ..rig import DepthCamera, write_rig
-from .takes import Lens, Picture, Sensor, Stream, Take, reading
+from .takes import Lens, Picture, Sensor, Stream, Take, picture_size, reading
 
 MILLIMETRE = 0.001  # m, the unit of depths that are recorded as floats
 MOVES, TURNS = 0.05, 3.0  # m, degrees: a phone that tracks itself, on a tripod, strays by less (guess)
 CUT_OFF = 0.02  # of a stream's pictures: where more are missing than the file promises, it is told (guess)
+APART = (1e-4, 3600.0)  # s, between pictures: outside, time stamps are in another unit (guess)
+LONGEST_GAP = 1e9  # frames: one whose time stamp is damaged may be as far away as 64 bits reach (guess)
+LONGEST_NAME = 100  # characters of a camera's name, and of its folder (guess)
 QUALITY = 95  # of JPEG, for colours that a package decoded: a third of a PNG's bytes
 Report = Callable[[int], None]  # how many pictures were read so far
 
@@ -45,6 +49,9 @@ def write_takes(takes: Sequence[Take], folder: Path, report: Report = lambda _: 
         for part in parts:
             part.read(place / part.name, lambda: report(next(pictures)))
         clock = Clock.of(parts[0].depth.times())
+        if not APART[0] <= clock.period <= APART[1]:
+            text = f"its depth pictures are {clock.period:.3g} s apart by their time stamps"
+            raise InputError(f"{parts[0].take.path}: {text}; give time stamps in seconds")
         frames, remarks = _common(parts, clock)
         for part in parts:
             part.depth.rename(frames)
@@ -72,7 +79,7 @@ class Clock:
         times = np.unique(times)
         steps = np.diff(times)
         period = float(np.median(steps)) if len(steps) else 1 / 30
-        gaps = np.maximum(1, np.rint(steps / period)).astype(np.int64)
+        gaps = np.clip(np.rint(steps / period), 1, LONGEST_GAP).astype(np.int64)
         return cls(times, np.concatenate([[0], np.cumsum(gaps)]).astype(np.int64), period)
 
     @property
@@ -137,7 +144,10 @@ class _Part:
             return None
         apart = np.eye(4) if self.sensor.color_to_depth is None else self.sensor.color_to_depth
         record = self._as_camera(f"{self.name}-color", self.stream.lens, self.pose @ apart).record()
-        return record | {"folder": f"{self.name}/color", "distortion": list(self.stream.lens.distortion)}
+        record |= {"folder": f"{self.name}/color", "distortion": list(self.stream.lens.distortion)}
+        with reading(self.take.path):
+            distortion_of(record)  # raises InputError for what no rig may have
+        return record
 
     def _as_camera(self, name: str, lens: Lens, pose: Float64[np.ndarray, "4 4"]) -> DepthCamera:
         with reading(self.take.path):
@@ -147,11 +157,9 @@ class _Part:
         """Write all pictures to a folder."""
         pixels = _straightened(self.lens)
 
-        def straight(picture: Picture) -> tuple[bytes, str]:
+        def straight(picture: Picture, lens: Lens) -> tuple[bytes, str]:
             assert isinstance(picture, np.ndarray)
-            if picture.shape != (self.lens.height, self.lens.width):
-                text = f"{picture.shape[1]} x {picture.shape[0]} pixels where its lens has"
-                raise InputError(f"{self.take.path}: depth of {text} {self.lens.width} x {self.lens.height}")
+            lens.check(picture.shape[1], picture.shape[0])
             if picture.dtype.kind == "f":
                 depth, self.unit = picture * (self.sensor.unit / MILLIMETRE), MILLIMETRE
                 with np.errstate(invalid="ignore"):  # what is none, or too far, is 0
@@ -163,15 +171,24 @@ class _Part:
             self.color = self._write(self.stream, folder / "color", _colored, report)
 
     def _write(
-        self, stream: Stream, folder: Path, pack: Callable[[Picture], tuple[bytes, str]], report: Callable[[], None]
+        self,
+        stream: Stream,
+        folder: Path,
+        pack: Callable[[Picture, Lens], tuple[bytes, str]],
+        report: Callable[[], None],
     ) -> _Written:
         written, what = _Written(), f"{self.take.path}: {folder.name} of {self.sensor.name}"
         make_folder(folder)
-        with reading(self.take.path):
+        with reading(
+            self.take.path, lambda: f", {folder.name} of {self.sensor.name} from picture {len(written.files)} on"
+        ):
             for number, (time, picture) in enumerate(stream.pictures()):
                 if not np.isfinite(time):
                     raise ValueError(f"picture {number} has the time {time}")
-                data, extension = pack(picture)
+                try:
+                    data, extension = pack(picture, stream.lens or self.lens)
+                except InputError as error:
+                    raise InputError(f"{what}: picture {number} ({time:.3f} s): {error}") from None
                 path = folder / f"read_{number}{extension}"
                 with cannot_be_written(path):
                     path.write_bytes(data)
@@ -192,7 +209,7 @@ def _parts(takes: Sequence[Take]) -> list[_Part]:
     found: dict[str, _Part] = {}
     for take in takes:
         for sensor in take.sensors:
-            name = re.sub(r"[^\w-]+", "-", f"{take.path.resolve().stem}-{sensor.name}").strip("-")
+            name = re.sub(r"[^\w-]+", "-", f"{take.path.resolve().stem}-{sensor.name}").strip("-")[:LONGEST_NAME]
             others = (f"{name}-{number}" for number in count(2))
             name = next(one for one in chain([name], others) if one.lower() not in found)
             found[name.lower()] = _Part(take, sensor, name)
@@ -211,8 +228,9 @@ def _common(parts: list[_Part], clock: Clock) -> tuple[set[int], list[str]]:
             if written is not None:
                 written.by_frame = clock.frames(written.times() + shift)
         if (lost := len(times) - len(part.depth.by_frame)) > 0:
-            text = f"{lost} of {len(times)} depth pictures are within half a frame of no frame of {first}"
-            remarks.append(f"{part.take.path}: {part.sensor.name}: {text}, and are left out")
+            text = f"{lost} of {len(times)} depth pictures are left out: another one is at their time or nearer"
+            text += "" if part is parts[0] else f", or no frame of {first} is within half a frame"
+            remarks.append(f"{part.take.path}: {part.sensor.name}: {text}")
     frames = set[int]().union(*(part.depth.by_frame for part in parts))
     for part in parts:
         if part.color is not None and (bare := frames - part.color.by_frame.keys()):
@@ -264,12 +282,14 @@ def _straightened(lens: Lens) -> tuple[tuple[np.ndarray, np.ndarray], Bool[np.nd
     return nearest, inside
 
 
-def _colored(picture: Picture) -> tuple[bytes, str]:
-    """Return the bytes of a picture's file, and its extension."""
+def _colored(picture: Picture, lens: Lens) -> tuple[bytes, str]:
+    """Return the bytes of a picture's file, and its extension. Raises InputError where it does not fit the lens."""
     if isinstance(picture, bytes):
+        lens.check(*picture_size(picture, "colour"))
         return picture, ".jpg" if picture[:2] == b"\xff\xd8" else ".png"
     from PIL import Image
 
+    lens.check(picture.shape[1], picture.shape[0])
     packed = io.BytesIO()
     Image.fromarray(picture).save(packed, "JPEG", quality=QUALITY, subsampling=0)
     return packed.getvalue(), ".jpg"
@@ -277,16 +297,28 @@ def _colored(picture: Picture) -> tuple[bytes, str]:
 
 @contextmanager
 def _appearing(folder: Path) -> Iterator[Path]:
-    """Yield a new folder, which takes the name `folder` at the end of the block; after a failure, nothing is left."""
+    """Yield a new folder, which takes the name `folder` at the end of the block; after a failure, nothing is left.
+
+    What a killed run left is deleted by the next one to the same folder.
+    """
+    if not folder.name:
+        raise InputError(f"{folder}: is the folder that you are in; name a new one for the rig")
     with cannot_be_written(folder):
         if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
             raise InputError(f"{folder}: is there already; choose another folder for the rig, or delete it")
         folder.parent.mkdir(parents=True, exist_ok=True)
-        scratch = tempfile.TemporaryDirectory(prefix=f".{folder.name}.", dir=folder.parent)
-    with scratch as place:
-        (made := Path(place, folder.name)).mkdir()
+        lock = claim(name := part_of(folder), folder)
+    made = name.with_suffix(".making")
+    try:
+        with cannot_be_written(folder):
+            if made.exists():
+                shutil.rmtree(made)
+            made.mkdir()
         yield made
         with cannot_be_written(folder):
             if folder.exists():
                 folder.rmdir()
             made.rename(folder)
+    finally:
+        shutil.rmtree(made, ignore_errors=True)
+        discard(lock, name)

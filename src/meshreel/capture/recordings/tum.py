@@ -6,20 +6,24 @@ https://cvg.cit.tum.de/data/datasets/rgbd-dataset/file_formats describes them. D
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float64
 
+from ...errors import InputError
 from ...io.depth_pictures import read_depth
-from ...io.read import read_file
+from ...io.read import read_input
 from ..poses import pose_of
-from .takes import Lens, Picture, Pictures, Sensor, Stream, Take, picture_size
+from .takes import Lens, Picture, Pictures, Sensor, Stream, Take, picture_size, reading
 
 KIND = "a TUM RGB-D folder (depth.txt, rgb.txt)"
 UNIT = 1 / 5000  # m
 LISTS = ("associations.txt", "associated.txt", "associate.txt")
+ROW = (float, str)  # of a list: a time, s, and a file's name
 OWN = "calibration.txt"  # fx fy cx cy, and k1 k2 p1 p2 k3: the form of the ETH3D SLAM benchmark
 # Of the colour cameras, by parts of the folders' names: the benchmark's page on file formats.
 KNOWN = {
@@ -37,8 +41,7 @@ def fits(path: Path) -> bool:
 def read(path: Path) -> Take:
     """Return the camera of a folder."""
     depth, color = _lists(path)
-    numbers = next((text for name, text in KNOWN.items() if name in path.resolve().name), "")
-    numbers = read_file(path / OWN).decode() if (path / OWN).is_file() else numbers
+    numbers = _numbers(path)
     seen, beside = _stream(depth, numbers, True), _stream(color, numbers, False) if color else None
     sensor = Sensor("camera", seen, UNIT, beside, np.eye(4), _poses(path, depth))
     return Take(path, KIND, (sensor,), f"write fx fy cx cy (k1 k2 p1 p2 k3) into {path / OWN}")
@@ -47,33 +50,59 @@ def read(path: Path) -> Take:
 def _lists(path: Path) -> tuple[list[tuple[float, Path]], list[tuple[float, Path]]]:
     """Return times, s, and files of depth and of colour."""
     if (path / "depth.txt").is_file():
-        color = _rows(path / "rgb.txt") if (path / "rgb.txt").is_file() else []
-        return [(float(t), path / name) for t, name, *_ in _rows(path / "depth.txt")], [
-            (float(t), path / name) for t, name, *_ in color
-        ]
-    rows = list(_rows(next(path / name for name in LISTS if (path / name).is_file())))
-    pairs = [(float(t), path / name) for row in rows for t, name in (row[:2], row[2:4])]
+        color = _rows(path / "rgb.txt", ROW) if (path / "rgb.txt").is_file() else []
+        return [(t, path / name) for t, name in _rows(path / "depth.txt", ROW)], [(t, path / name) for t, name in color]
+    rows = list(_rows(next(path / name for name in LISTS if (path / name).is_file()), ROW * 2))
+    pairs = [(t, path / name) for row in rows for t, name in (row[:2], row[2:])]
     first = "depth" in rows[0][1] if rows else True
     return pairs[0 if first else 1 :: 2], pairs[1 if first else 0 :: 2]
 
 
-def _rows(path: Path) -> Iterator[list[str]]:
-    lines = read_file(path).decode("utf-8-sig").splitlines()
-    yield from (line.replace(",", " ").split() for line in lines if line.strip() and not line.startswith("#"))
+def _numbers(path: Path) -> list[float]:
+    """Return fx fy cx cy, and what its lens has beside them, of a folder; none where they are not known."""
+    own = path / OWN
+    if not own.is_file():
+        known = next((text for name, text in KNOWN.items() if name in path.resolve().name), "")
+        return [float(number) for number in known.split()]
+    text = " ".join(" ".join(words) for words in _lines(own).values())
+    try:
+        given = [float(number) for number in text.split()]
+    except ValueError:
+        given = [math.nan]
+    if given and (len(given) < 4 or not all(map(math.isfinite, given))):
+        raise InputError(f"{own}: has {text!r:.60}; give the numbers fx fy cx cy, and k1 k2 p1 p2 k3 where it bends")
+    return given
 
 
-def _stream(rows: list[tuple[float, Path]], numbers: str, deep: bool) -> Stream:
+def _lines(path: Path) -> dict[int, list[str]]:
+    """Return the words of each line that has some and is no comment, by its number; any bytes may be a file's name."""
+    lines = read_input(path).decode("utf-8-sig", "surrogateescape").splitlines()
+    words = {number: line.replace(",", " ").split() for number, line in enumerate(lines, 1)}
+    return {number: each for number, each in words.items() if each and not each[0].startswith("#")}
+
+
+def _rows(path: Path, columns: tuple[type, ...]) -> Iterator[list[Any]]:
+    """Yield the first columns of each line. Raises InputError, which names a line that has others."""
+    for number, words in _lines(path).items():
+        try:
+            row = [column(word) for column, word in zip(columns, words[: len(columns)], strict=True)]
+        except ValueError:
+            row = [math.nan]
+        if not all(math.isfinite(value) for value in row if isinstance(value, float)):
+            wanted = " ".join("NAME" if column is str else "NUMBER" for column in columns)
+            raise InputError(f"{path}: line {number} is {' '.join(words)!r:.60}; give {wanted}")
+        yield row
+
+
+def _stream(rows: list[tuple[float, Path]], given: list[float], deep: bool) -> Stream:
     if not rows:
         raise ValueError("its list of pictures is empty")
-    width, height = picture_size(read_file(rows[0][1]))
-    given = [float(number) for number in numbers.split()]
-    if given and len(given) < 4:
-        raise ValueError(f"{OWN} has {len(given)} numbers; give fx fy cx cy")
+    width, height = picture_size(read_input(rows[0][1]), str(rows[0][1]))
     lens = Lens(width, height, (given[0], given[1]), (given[2], given[3]), tuple(given[4:9])) if given else None
 
     def pictures() -> Pictures:
         for time, file in rows:
-            picture: Picture = read_depth(file) if deep else read_file(file)
+            picture: Picture = read_depth(file) if deep else read_input(file)
             yield time, picture
 
     times = [time for time, _ in rows]
@@ -84,7 +113,8 @@ def _poses(path: Path, depth: list[tuple[float, Path]]) -> Float64[np.ndarray, "
     """Return the poses while depth was recorded."""
     if not (path / "groundtruth.txt").is_file():
         return None
-    rows = np.array([row[:8] for row in _rows(path / "groundtruth.txt")], dtype=np.float64).reshape(-1, 8)
+    rows = np.array(list(_rows(path / "groundtruth.txt", (float,) * 8)), dtype=np.float64).reshape(-1, 8)
     times = [time for time, _ in depth]
     rows = rows[(rows[:, 0] >= min(times)) & (rows[:, 0] <= max(times))]
-    return pose_of(rows[:, 4:], rows[:, 1:4]) if len(rows) else None
+    with reading(path / "groundtruth.txt"):
+        return pose_of(rows[:, 4:], rows[:, 1:4]) if len(rows) else None
