@@ -196,6 +196,18 @@ def test_surface_that_a_frame_lacks_stays_unless_a_camera_saw_through_it():
     assert find_tails(frames, shown, SIZE, noise=1e-3, free=[blind] * 2) is None
 
 
+@pytest.mark.parametrize(("measured", "stays"), [(0, False), (2, True)])
+def test_surface_that_cameras_face_and_hardly_ever_measure_goes(measured: int, stays: bool) -> None:
+    more, bare = both(BALL, knob()), Mesh(BALL.vertices + NOISE[0], BALL.faces)
+    camera = PinholeCamera(64, 64, np.array([[60.0, 0, 32], [0, 60.0, 32], [0, 0, 1]]), np.eye(4))
+    dark = DepthPicture(camera, np.zeros((64, 64), np.float32), 1.0, 10.0)
+    free = [FreeSpace.of([dark], Placement(1.0, (0.0, 0.0, 3.0)))] * 4
+    frames = [both(bare, knob())] * measured + [bare] * (4 - measured)
+    found = find_tails(frames, [more] * 4, SIZE, noise=1e-3, free=free)
+    faces = len(more.faces) if found is None else len(found.frames[-1].faces)
+    assert (faces == len(more.faces)) == stays
+
+
 def test_holes_of_noisy_bodies_are_patched_at_any_price():
     frame = both(Mesh(BALL.vertices + NOISE[0], BALL.faces), knob())
     found = find_tails([frame] * 2, [BALL] * 2, 10, noise=1e-3)  # a byte costs more than the knob

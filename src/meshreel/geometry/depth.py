@@ -13,6 +13,7 @@ from scipy.ndimage import minimum_filter
 from ..types import Placement
 from .cameras import PinholeCamera
 
+FACING = 0.3  # cosine between a surface and the way to a camera from which on the camera measures it (guess)
 THROUGH = (0.03, 0.015)  # m, and share of the depth, by which a camera must see past a place to know it is free (guess)
 STEP = 0.03  # of the depth between neighbours: what is farther apart is two surfaces (guess)
 
@@ -70,6 +71,18 @@ class FreeSpace:
             pixels, inside, ahead = picture.camera.seen(world)
             depth = picture.depth.reshape(-1)[pixels] * picture.unit
             found[inside[depth > ahead + np.maximum(THROUGH[0], THROUGH[1] * ahead)]] = True
+        return found
+
+    def faced(self, points: Float64[np.ndarray, "N 3"], normals: Float64[np.ndarray, "N 3"]) -> Bool[np.ndarray, " N"]:
+        """Return the points with these normals that face some camera which measured nothing before them."""
+        world, found = np.asarray(self.place.origin) + self.place.scale * points, np.zeros(len(points), bool)
+        for picture in self.pictures:
+            way = picture.camera.eye - world
+            facing = np.einsum("nd,nd->n", way, normals) > FACING * np.linalg.norm(way, axis=1)
+            pixels, inside, ahead = picture.camera.seen(world)
+            depth = picture.depth.reshape(-1)[pixels] * picture.unit
+            hidden = (depth > 0) & (depth < ahead - np.maximum(THROUGH[0], THROUGH[1] * ahead))
+            found[inside[~hidden]] |= facing[inside[~hidden]]
         return found
 
 
