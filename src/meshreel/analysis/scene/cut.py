@@ -22,6 +22,9 @@ from ...geometry.topology import linked
 from .places import Places
 
 _UNIT = 20  # integer capacity of a link of weight 1: a guess
+_EDGE = 5  # cells by which the cut may miss an edge: a guess
+_LEVEL = 0.5  # cells that a place of a plane may be off it: a guess
+_ALIKE = 0.95  # least cosine between the normals of places of a plane: a guess
 _AROUND = 64  # nearest places seen free whose mean share describes a neighbourhood: a guess
 
 
@@ -32,6 +35,7 @@ class CutOptions:
     share: float = 0.03  # smallest share of frames in which a place must be seen free to be evidence of motion
     evidence: float = 30.0  # cost of calling a place still that is always seen free
     still: tuple[float, float] = (0.2, 0.3)  # cost of calling a place moving: constant, and times the shares around it
+    often: float = 0.5  # share of frames in which a place must have surface to cost as much: less tells less of rest
     hollow: float = 6.0  # rate at which a link weakens as the normals at its ends turn towards each other
     reach: float = 0.8  # m: moving places lie no farther than this from places that are seen free
     fewest: int = 60  # smaller connected sets of places that are seen free are noise
@@ -51,12 +55,32 @@ def moving_places(places: Places, options: CutOptions = CutOptions()) -> Bool[np
     near = np.flatnonzero(gaps <= options.reach)
     moves = np.where(share >= options.share / 2, options.evidence * share, 0.0)[near]
     always, around = options.still
-    rests = always + around * _around(middles[near], middles[seeds], share[seeds])
+    known = np.minimum(places.tally.occupied[near] / (options.often * max(places.tally.frames, 1)), 1.0)
+    rests = known * (always + around * _around(middles[near], middles[seeds], share[seeds]))
     first, second = _links(places, near)
     turn = _hollow(middles[near], places.normals[near], first, second)
     links = exp(-options.hollow * turn)
     moving[near] = _cut(moves, rests, np.stack([first, second]), links)
+    moving &= ~_continued(places, moving, options.often)
     return _large(places, moving, round(options.least / places.lattice.size**2))
+
+
+def _continued(places: Places, moving: Bool[np.ndarray, " P"], often: float) -> Bool[np.ndarray, " P"]:
+    """Return the moving places that continue a still plane and were never seen free, as a wall beside a door's hinge.
+
+    They have surface in a share of `often` of the frames at least. Normals of places are means of all surface there, so the cut may leave an edge between both by a few cells.
+    """
+    tally, found = places.tally, np.zeros(len(moving), bool)
+    never = moving & (tally.free == 0) & (tally.occupied >= often * tally.frames)
+    middles, normals, size = places.middles, places.normals, places.lattice.size
+    for _ in range(_EDGE):
+        own = np.flatnonzero(never & ~found)
+        beside = places.beside[own]
+        apart = middles[beside] - middles[own][:, None]
+        level = np.abs((apart * normals[beside]).sum(axis=2)) <= _LEVEL * size
+        alike = (normals[beside] * normals[own][:, None]).sum(axis=2) >= _ALIKE
+        found[own] = (level & alike & (~moving | found)[beside]).any(axis=1)
+    return found
 
 
 def connected(
