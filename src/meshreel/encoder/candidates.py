@@ -15,7 +15,7 @@ from jaxtyping import Float64
 from ..analysis.fit.closeness import Closeness
 from ..analysis.fit.frame import FrameSurface
 from ..analysis.fit.slide import Slide
-from ..analysis.fit.surface_fit import Fitting
+from ..analysis.fit.surface_fit import Fitting, strongest_components
 from ..analysis.follow.embedded import Tracker
 from ..analysis.follow.fused_template import fused_mesh
 from ..analysis.follow.template import base_mesh, shared_detail
@@ -139,8 +139,12 @@ class Candidate:
         if not self._options.fit.components or len(numbers) == 1:
             return first
         first = self._slid(ahead, numbers, first)
-        detail = shared_detail(self.reference.mesh.faces, len(self.reference.mesh.vertices), self.reference.levels)
-        triples = zip(numbers, detail(first), first, strict=True)
+        count = len(self.reference.mesh.vertices)
+        usual = first.copy()
+        if self._noise > 0:  # what the base does beyond its strongest motions is noise
+            usual[:, :count] = strongest_components(first[:, :count], len(first) // 2, self._options.fit.components)
+        detail = shared_detail(self.reference.mesh.faces, count, self.reference.levels)
+        triples = zip(numbers, detail(usual), first, strict=True)
         return np.stack([self._fitting.second(ahead.at(number), *both) for number, *both in triples])
 
     def _slid(

@@ -23,7 +23,9 @@ from .places import Places
 
 _UNIT = 20  # integer capacity of a link of weight 1: a guess
 _EDGE = 5  # cells by which the cut may miss an edge: a guess
-_LEVEL = 0.5  # cells that a place of a plane may be off it: a guess
+_MOSTLY = 0.5  # share of the frames in which what continues a plane has surface: a guess
+_OFF = 0.5  # cells that a place of a plane may be off it: a guess
+_FULL = 0.8  # share of the frames until it vanished in which a place had surface: a guess
 _ALIKE = 0.95  # least cosine between the normals of places of a plane: a guess
 _AROUND = 64  # nearest places seen free whose mean share describes a neighbourhood: a guess
 
@@ -35,7 +37,6 @@ class CutOptions:
     share: float = 0.03  # smallest share of frames in which a place must be seen free to be evidence of motion
     evidence: float = 30.0  # cost of calling a place still that is always seen free
     still: tuple[float, float] = (0.2, 0.3)  # cost of calling a place moving: constant, and times the shares around it
-    often: float = 0.5  # share of frames in which a place must have surface to cost as much: less tells less of rest
     hollow: float = 6.0  # rate at which a link weakens as the normals at its ends turn towards each other
     reach: float = 0.8  # m: moving places lie no farther than this from places that are seen free
     fewest: int = 60  # smaller connected sets of places that are seen free are noise
@@ -55,32 +56,55 @@ def moving_places(places: Places, options: CutOptions = CutOptions()) -> Bool[np
     near = np.flatnonzero(gaps <= options.reach)
     moves = np.where(share >= options.share / 2, options.evidence * share, 0.0)[near]
     always, around = options.still
-    known = np.minimum(places.tally.occupied[near] / (options.often * max(places.tally.frames, 1)), 1.0)
-    rests = known * (always + around * _around(middles[near], middles[seeds], share[seeds]))
+    rests = always + around * _around(middles[near], middles[seeds], share[seeds])
     first, second = _links(places, near)
     turn = _hollow(middles[near], places.normals[near], first, second)
     links = exp(-options.hollow * turn)
     moving[near] = _cut(moves, rests, np.stack([first, second]), links)
-    moving &= ~_continued(places, moving, options.often)
+    moving &= ~_continued(places, moving)
+    moving |= _left_together(places, moving)
     return _large(places, moving, round(options.least / places.lattice.size**2))
 
 
-def _continued(places: Places, moving: Bool[np.ndarray, " P"], often: float) -> Bool[np.ndarray, " P"]:
-    """Return the moving places that continue a still plane and were never seen free, as a wall beside a door's hinge.
+def _continued(places: Places, moving: Bool[np.ndarray, " P"]) -> Bool[np.ndarray, " P"]:
+    """Return the moving places, mostly there and never seen free, that continue a still plane: walls beside hinges.
 
-    They have surface in a share of `often` of the frames at least. Normals of places are means of all surface there, so the cut may leave an edge between both by a few cells.
+    Normals of places are means of all surface there, so the cut may miss an edge by a few cells.
     """
     tally, found = places.tally, np.zeros(len(moving), bool)
-    never = moving & (tally.free == 0) & (tally.occupied >= often * tally.frames)
-    middles, normals, size = places.middles, places.normals, places.lattice.size
+    never = moving & (tally.free == 0) & (tally.occupied >= _MOSTLY * tally.frames)
     for _ in range(_EDGE):
         own = np.flatnonzero(never & ~found)
         beside = places.beside[own]
-        apart = middles[beside] - middles[own][:, None]
-        level = np.abs((apart * normals[beside]).sum(axis=2)) <= _LEVEL * size
-        alike = (normals[beside] * normals[own][:, None]).sum(axis=2) >= _ALIKE
-        found[own] = (level & alike & (~moving | found)[beside]).any(axis=1)
+        found[own] = (_level(places, own[:, None], beside) & (~moving | found)[beside]).any(axis=1)
     return found
+
+
+def _left_together(places: Places, moving: Bool[np.ndarray, " P"]) -> Bool[np.ndarray, " P"]:
+    """Return the places never seen free whose surface vanished together with moving surface in one plane.
+
+    An open door may hide where a part of it was.
+    """
+    tally = places.tally
+    last, count = tally.early.first, tally.early.count
+    gone = (last >= 0) & (last < tally.frames - 1) & (count >= _FULL * (last + 1))
+    left, hidden = gone & moving & (tally.free > 0), gone & ~moving & (tally.free == 0)
+    own = np.flatnonzero(left | hidden)
+
+    def alike(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        return (last[own[a]] == last[own[b]]) & _level(places, own[a], own[b])
+
+    label = connected(places, own, alike)
+    found = np.zeros(len(moving), bool)
+    found[own] = hidden[own] & (np.bincount(label, left[own], len(own)) > 0)[label]
+    return found
+
+
+def _level(places: Places, one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Return whether pairs of places are of one plane."""
+    apart = (places.middles[other] - places.middles[one]) * places.normals[other]
+    alike = (places.normals[other] * places.normals[one]).sum(axis=-1) >= _ALIKE
+    return alike & (np.abs(apart.sum(axis=-1)) <= _OFF * places.lattice.size)
 
 
 def connected(
