@@ -27,7 +27,6 @@ NEAREST = 4.0  # RMS noise that pairs may be apart at least (guess)
 ALIKE = 0.5  # least cosine between the normals of a pair (guess)
 ALONG = 0.1  # weight of the distance of frame surface past the body's border: it tells how far the body slid (guess)
 WHOLE, WORST = 1.6, 3.25  # RMS noise that the whole body, and its worst part, may be off (doors of room3: decision 28)
-BENT = 1.15  # RMS noise that a motion that bends may leave: if more, the body is so much noisier (decision 28)
 BENDS = 1.75  # times the residual of a motion that bends (people: 2.5 and more; decision 28)
 EXACT = 1e-4  # diagonals, in place of the noise of clean frames (guess)
 SAMPLES = 1500  # of each surface (guess)
@@ -91,7 +90,7 @@ class RigidBody:
     def holds(self, frame: FrameSurface, motion: RigidMotion, free: float) -> bool:
         """Return whether a motion explains a frame about as well as one that bends, which left the residual `free`."""
         whole, worst = self.residual(frame, motion)
-        noise = max(self._noise, EXACT, free / BENT)
+        noise = max(self._noise, EXACT, free)  # a body may be noisier than the rest
         return whole <= min(WHOLE * noise, BENDS * max(free, EXACT)) and worst <= WORST * noise
 
     def residual(self, frame: FrameSurface, motion: RigidMotion) -> tuple[float, float]:
