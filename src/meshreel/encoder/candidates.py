@@ -6,6 +6,7 @@ group. What is known of a candidate stays with it, so that no frame is tracked o
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
@@ -29,6 +30,7 @@ from .target import Fidelity
 
 LATTICE = 0.33  # spacing of the base's lattice, in steps: the motion codes what it rounds away (decision 14)
 LATTICE_ALONE = 0.8  # the same for a single frame, whose base need not move (decision 14)
+MOTIONS = 18.0  # 1/s: so many motions of a noisy body tell from noise (decision 28)
 LATER, EARLIER = 1, -1  # sides of a key
 
 
@@ -42,6 +44,7 @@ class Ahead:
     target: Fidelity  # that the frames should reach, normalised
     digests: Digests | None = None
     paint: Callable[[int, Mesh], Paint | None] = lambda *_: None  # as `Interval.paint`
+    frame_rate: float = 30.0  # 1/s
 
     def __len__(self) -> int:
         return len(self.surfaces)
@@ -142,7 +145,8 @@ class Candidate:
         count = len(self.reference.mesh.vertices)
         usual = first.copy()
         if self._noise > 0:  # what the base does beyond its strongest motions is noise
-            usual[:, :count] = strongest_components(first[:, :count], len(first) // 2, self._options.fit.components)
+            most = math.ceil(MOTIONS * len(first) / ahead.frame_rate)
+            usual[:, :count] = strongest_components(first[:, :count], len(first) // 2, most)
         detail = shared_detail(self.reference.mesh.faces, count, self.reference.levels)
         triples = zip(numbers, detail(usual), first, strict=True)
         return np.stack([self._fitting.second(ahead.at(number), *both) for number, *both in triples])

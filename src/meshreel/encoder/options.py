@@ -66,9 +66,7 @@ class LayersOptions:
     embedded: EmbeddedOptions = field(default_factory=EmbeddedOptions)
     template: TemplateOptions = field(default_factory=TemplateOptions)
     fused: FusedOptions = field(default_factory=FusedOptions)
-    fit: FitOptions = FitOptions(
-        strides=(4, 3, 2, 1), components=10, restart=False, pull=0.3, second_smoothing=0.7
-    )  # components: of noisy bodies (decision 28)
+    fit: FitOptions = FitOptions(strides=(4, 3, 2, 1), restart=False, pull=0.3, second_smoothing=0.7)
     slide: SlideOptions | None = SlideOptions()  # of fits to frames with colours; None: shape alone tells
     plan: PlanOptions = PlanOptions()
     noisy_plan: PlanOptions = PlanOptions(limit=4.0, alone=6.0, keys=2)  # under noise: whoever can be followed is
