@@ -6,6 +6,7 @@ group. What is known of a candidate stays with it, so that no frame is tracked o
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
@@ -15,7 +16,7 @@ from jaxtyping import Float64
 from ..analysis.fit.closeness import Closeness
 from ..analysis.fit.frame import FrameSurface
 from ..analysis.fit.slide import Slide
-from ..analysis.fit.surface_fit import Fitting
+from ..analysis.fit.surface_fit import Fitting, strongest_components
 from ..analysis.follow.embedded import Tracker
 from ..analysis.follow.fused_template import fused_mesh
 from ..analysis.follow.template import base_mesh, shared_detail
@@ -29,6 +30,7 @@ from .target import Fidelity
 
 LATTICE = 0.33  # spacing of the base's lattice, in steps: the motion codes what it rounds away (decision 14)
 LATTICE_ALONE = 0.8  # the same for a single frame, whose base need not move (decision 14)
+MOTIONS = 18.0  # 1/s: so many motions of a noisy body tell from noise (decision 28)
 LATER, EARLIER = 1, -1  # sides of a key
 
 
@@ -42,6 +44,7 @@ class Ahead:
     target: Fidelity  # that the frames should reach, normalised
     digests: Digests | None = None
     paint: Callable[[int, Mesh], Paint | None] = lambda *_: None  # as `Interval.paint`
+    frame_rate: float = 30.0  # 1/s
 
     def __len__(self) -> int:
         return len(self.surfaces)
@@ -139,8 +142,13 @@ class Candidate:
         if not self._options.fit.components or len(numbers) == 1:
             return first
         first = self._slid(ahead, numbers, first)
-        detail = shared_detail(self.reference.mesh.faces, len(self.reference.mesh.vertices), self.reference.levels)
-        triples = zip(numbers, detail(first), first, strict=True)
+        count = len(self.reference.mesh.vertices)
+        usual = first.copy()
+        if self._noise > 0:  # what the base does beyond its strongest motions is noise
+            most = math.ceil(MOTIONS * len(first) / ahead.frame_rate)
+            usual[:, :count] = strongest_components(first[:, :count], len(first) // 2, most)
+        detail = shared_detail(self.reference.mesh.faces, count, self.reference.levels)
+        triples = zip(numbers, detail(usual), first, strict=True)
         return np.stack([self._fitting.second(ahead.at(number), *both) for number, *both in triples])
 
     def _slid(

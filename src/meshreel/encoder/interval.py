@@ -27,6 +27,7 @@ class Interval:
 
     frames: Frames  # normalised
     noise: float = 0.0  # RMS distance of the frames from the truth, normalised; 0: a clean capture
+    frame_rate: float = field(default=30.0, kw_only=True)  # 1/s
     first_frame: int = 0  # its number in the sequence
     track: int = 0
     digests: Digests | None = field(default=None, kw_only=True)  # of what its stages compute; None: nobody asks

@@ -83,7 +83,12 @@ def track_intervals(job: Job, parts: Parts, frames: range, tracks: Tracks) -> li
             some = normalised[cut.start : cut.stop]
             one = Interval(some, parts.body_noise, frames.start + cut.start, track, digest(some))
             found.append(
-                replace(one, views=Views.of(job.sequence, parts.seen), sight=Sight.of(job.sequence, parts.seen))
+                replace(
+                    one,
+                    views=Views.of(job.sequence, parts.seen),
+                    sight=Sight.of(job.sequence, parts.seen),
+                    frame_rate=job.sequence.frame_rate,
+                )
             )
     return found
 

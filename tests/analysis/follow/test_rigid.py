@@ -38,6 +38,14 @@ def test_a_box_that_moves_is_found_where_it_is(degrees, shift):
     assert body.holds(frame, found, NOISE)
 
 
+def test_a_body_noisier_than_told_is_rigid_where_bending_leaves_hardly_less():
+    frame, body = seen(BOX, 1), RigidBody(seen(BOX, 0).mesh, NOISE / 2)
+    motion = body.brought(frame, RigidMotion.none())
+    left, _ = body.residual(frame, motion)
+    assert body.holds(frame, motion, left / 1.2)
+    assert not body.holds(frame, motion, left / 2.5)
+
+
 def test_a_plate_that_bends_is_no_rigid_body():
     bent = BOX.vertices + [0.0, 0.0, 0.1] * np.maximum(BOX.vertices[:, :1], 0) ** 2 / 0.16
     frame, body = seen(Mesh(bent, BOX.faces), 1), RigidBody(seen(BOX, 0).mesh, NOISE)

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from meshreel.analysis.scene.cut import _UNIT, CutOptions, _cut, _hollow, moving_places
+from meshreel.analysis.scene.cut import _UNIT, CutOptions, _continued, _cut, _hollow, _left_together, moving_places
 from meshreel.analysis.scene.places import Places, Tally
 from meshreel.geometry.voxels import Lattice, neighbours
 
@@ -104,3 +104,24 @@ def test_few_places_seen_free_are_noise_and_small_ones_flicker():
 
 def test_a_place_seen_free_too_seldom_is_no_evidence():
     assert not moving_places(sheet(square(5, 12, 1)), CutOptions(fewest=9, share=0.15)).any()
+
+
+def test_a_still_plane_goes_on_where_it_was_never_seen_free():
+    free, wide = square(5, 12), square(5, 14) > 0
+    found = _continued(sheet(free), wide.reshape(-1)).reshape(20, 20)
+    assert np.array_equal(found, wide & (free == 0))
+    bent = np.where(wide.reshape(-1, 1), [0.0, 1, 0], [0.0, 0, 1])
+    assert not _continued(sheet(free, bent), wide.reshape(-1)).any()  # another plane ends there
+
+
+@pytest.mark.parametrize("together", [True, False])
+def test_what_vanishes_with_a_plane_that_left_has_left_though_it_is_hidden(together):
+    left, hidden = square(5, 12) > 0, np.zeros((20, 20), bool)
+    hidden[5:12, 12:16] = True
+    places = sheet(np.zeros((20, 20), int))
+    places.tally.__init__(400)
+    for frame in range(10):
+        there = ~(left & (frame >= 3)) & ~(hidden & (frame >= (3 if together else 6)))
+        places.tally.add(there.reshape(-1), (left & (frame >= 3)).reshape(-1))
+    found = _left_together(places, left.reshape(-1)).reshape(20, 20)
+    assert np.array_equal(found, hidden if together else np.zeros_like(hidden))

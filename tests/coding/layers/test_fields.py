@@ -80,6 +80,14 @@ def test_a_price_on_bits_saves_more_than_it_spoils() -> None:
     assert priced.symbol_bits < 0.95 * plain.symbol_bits
 
 
+def test_columns_as_weak_as_noise_are_left_out() -> None:
+    clean = np.outer(np.linspace(-1, 1, COUNT), np.ones(8)) * 0.05
+    noisy = clean + np.random.default_rng(0).normal(0, 1e-3, clean.shape)
+    every, strong = (encode_field(noisy, GRAPH, Rate(72, 0.08, least)) for least in (0.0, 1.25e-3))
+    assert every.record.columns > 4 and strong.record.columns == 1
+    assert ((strong.decoded - clean) ** 2).mean() < 0.5 * ((every.decoded - clean) ** 2).mean()
+
+
 def test_errors_move_to_where_they_do_not_show() -> None:
     wanted, errors, bits = trajectories(), [], []
     for tangential in (1.0, 0.3):

@@ -90,7 +90,7 @@ class RigidBody:
     def holds(self, frame: FrameSurface, motion: RigidMotion, free: float) -> bool:
         """Return whether a motion explains a frame about as well as one that bends, which left the residual `free`."""
         whole, worst = self.residual(frame, motion)
-        noise = max(self._noise, EXACT)
+        noise = max(self._noise, EXACT, free)  # a body may be noisier than the rest
         return whole <= min(WHOLE * noise, BENDS * max(free, EXACT)) and worst <= WORST * noise
 
     def residual(self, frame: FrameSurface, motion: RigidMotion) -> tuple[float, float]:

@@ -22,6 +22,11 @@ from ...geometry.topology import linked
 from .places import Places
 
 _UNIT = 20  # integer capacity of a link of weight 1: a guess
+_EDGE = 5  # cells by which the cut may miss an edge: a guess
+_MOSTLY = 0.5  # share of the frames in which what continues a plane has surface: a guess
+_OFF = 0.5  # cells that a place of a plane may be off it: a guess
+_FULL = 0.8  # share of the frames until it vanished in which a place had surface: a guess
+_ALIKE = 0.95  # least cosine between the normals of places of a plane: a guess
 _AROUND = 64  # nearest places seen free whose mean share describes a neighbourhood: a guess
 
 
@@ -56,7 +61,50 @@ def moving_places(places: Places, options: CutOptions = CutOptions()) -> Bool[np
     turn = _hollow(middles[near], places.normals[near], first, second)
     links = exp(-options.hollow * turn)
     moving[near] = _cut(moves, rests, np.stack([first, second]), links)
+    moving &= ~_continued(places, moving)
+    moving |= _left_together(places, moving)
     return _large(places, moving, round(options.least / places.lattice.size**2))
+
+
+def _continued(places: Places, moving: Bool[np.ndarray, " P"]) -> Bool[np.ndarray, " P"]:
+    """Return the moving places, mostly there and never seen free, that continue a still plane: walls beside hinges.
+
+    Normals of places are means of all surface there, so the cut may miss an edge by a few cells.
+    """
+    tally, found = places.tally, np.zeros(len(moving), bool)
+    never = moving & (tally.free == 0) & (tally.occupied >= _MOSTLY * tally.frames)
+    for _ in range(_EDGE):
+        own = np.flatnonzero(never & ~found)
+        beside = places.beside[own]
+        found[own] = (_level(places, own[:, None], beside) & (~moving | found)[beside]).any(axis=1)
+    return found
+
+
+def _left_together(places: Places, moving: Bool[np.ndarray, " P"]) -> Bool[np.ndarray, " P"]:
+    """Return the places never seen free whose surface vanished together with moving surface in one plane.
+
+    An open door may hide where a part of it was.
+    """
+    tally = places.tally
+    last, count = tally.early.first, tally.early.count
+    gone = (last >= 0) & (last < tally.frames - 1) & (count >= _FULL * (last + 1))
+    left, hidden = gone & moving & (tally.free > 0), gone & ~moving & (tally.free == 0)
+    own = np.flatnonzero(left | hidden)
+
+    def alike(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        return (last[own[a]] == last[own[b]]) & _level(places, own[a], own[b])
+
+    label = connected(places, own, alike)
+    found = np.zeros(len(moving), bool)
+    found[own] = hidden[own] & (np.bincount(label, left[own], len(own)) > 0)[label]
+    return found
+
+
+def _level(places: Places, one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Return whether pairs of places are of one plane."""
+    apart = (places.middles[other] - places.middles[one]) * places.normals[other]
+    alike = (places.normals[other] * places.normals[one]).sum(axis=-1) >= _ALIKE
+    return alike & (np.abs(apart.sum(axis=-1)) <= _OFF * places.lattice.size)
 
 
 def connected(

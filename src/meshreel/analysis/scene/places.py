@@ -116,6 +116,11 @@ class Tally:
         return Stay(np.where(seen, self._after.first, -1).astype(np.int32), self._after.count)
 
     @property
+    def early(self) -> Stay:
+        """Stays until each place was first seen free, or until the end; `first` is the last frame with surface."""
+        return self._before
+
+    @property
     def before(self) -> Stay:
         """Stays until each place was first seen free; frames are numbered backwards from the last one."""
         known = (self.free > 0) & (self._before.first >= 0)

@@ -31,6 +31,7 @@ from .patches import Patches, decode_patches
 from .trajectories import decode_last_places, decode_trajectories, encode_trajectories
 
 NOISY_STEP = 0.8  # RMS distances of the noise that a step is wide in addition (decision 16)
+NOISY_DETAIL = 1.25  # RMS distances of the noise that a column of detail must have: noise has one (decision 28)
 MOST_FRAMES = 255  # of a group: a byte in the head
 MOST_NUMBERS = 1 << 29  # of decoded places: 4 GiB
 
@@ -56,7 +57,7 @@ class LayerCodingOptions:
     def rate(self, level: int, noise: float) -> Rate:
         """Return step and price of a level; 0 is the base."""
         ratio = 1.0 if level == 0 else self.detail_ratios[min(level, len(self.detail_ratios)) - 1]
-        return Rate(rung_of(self.step_above(noise) * ratio), self.price)
+        return Rate(rung_of(self.step_above(noise) * ratio), self.price, NOISY_DETAIL * noise if level else 0.0)
 
 
 @dataclass(frozen=True, slots=True)
