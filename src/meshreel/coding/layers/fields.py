@@ -35,7 +35,7 @@ class Rate:
 
     rung: int  # of the ladder of quantiser steps
     price: float  # of a bit, in squared steps
-    least: float = 0.0  # RMS weight that a column must have, in the field's unit: what is weaker is noise
+    least: float = 0.0  # RMS weight that a column must have, in the field's unit, but the strongest: the rest is noise
 
     @property
     def step(self) -> float:
@@ -75,7 +75,9 @@ def encode_field(
     side = np.append(bits, mean).astype(np.int32) if has_mean else np.zeros(0, np.int32)
     centered = trajectories - (np.ldexp(mean, -bits) if has_mean else 0.0)
     basis = klt.fit_about(np.zeros(width), centered)
-    kept = np.flatnonzero(basis.energies > max(LEAST_RMS * rate.step, rate.least) ** 2)
+    least = np.full(len(basis.energies), max(LEAST_RMS * rate.step, rate.least))
+    least[:1] = LEAST_RMS * rate.step  # what stands still on a body is no noise, however small
+    kept = np.flatnonzero(basis.energies > least**2)
     coded = _Columns(centered, basis.only(kept), graph, rate, surface)
     while not (pays := coded.pays()).all():
         kept = kept[pays]
