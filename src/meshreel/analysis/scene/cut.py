@@ -27,6 +27,7 @@ _MOSTLY = 0.5  # share of the frames in which what continues a plane has surface
 _OFF = 0.5  # cells that a place of a plane may be off it: a guess
 _FULL = 0.8  # share of the frames until it vanished in which a place had surface: a guess
 _ALIKE = 0.95  # least cosine between the normals of places of a plane: a guess
+_FLAT = 0.99  # the same of a plane that goes on: on a ball at rest, neighbours have .97
 _AROUND = 64  # nearest places seen free whose mean share describes a neighbourhood: a guess
 
 
@@ -76,7 +77,7 @@ def _continued(places: Places, moving: Bool[np.ndarray, " P"]) -> Bool[np.ndarra
     for _ in range(_EDGE):
         own = np.flatnonzero(never & ~found)
         beside = places.beside[own]
-        found[own] = (_level(places, own[:, None], beside) & (~moving | found)[beside]).any(axis=1)
+        found[own] = (_level(places, own[:, None], beside, _FLAT) & (~moving | found)[beside]).any(axis=1)
     return found
 
 
@@ -100,10 +101,10 @@ def _left_together(places: Places, moving: Bool[np.ndarray, " P"]) -> Bool[np.nd
     return found
 
 
-def _level(places: Places, one: np.ndarray, other: np.ndarray) -> np.ndarray:
+def _level(places: Places, one: np.ndarray, other: np.ndarray, cosine: float = _ALIKE) -> np.ndarray:
     """Return whether pairs of places are of one plane."""
     apart = (places.middles[other] - places.middles[one]) * places.normals[other]
-    alike = (places.normals[other] * places.normals[one]).sum(axis=-1) >= _ALIKE
+    alike = (places.normals[other] * places.normals[one]).sum(axis=-1) >= cosine
     return alike & (np.abs(apart.sum(axis=-1)) <= _OFF * places.lattice.size)
 
 

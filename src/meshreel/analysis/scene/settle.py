@@ -71,7 +71,8 @@ def find_rest(
     least = round(options.least / places.lattice.size**2)
     for at, order, out, sign in ((late, frames, rest.since, 1), (early, frames[::-1], rest.until, -1)):
         for group in _together(places, moving & (at >= 0), at, least):
-            last = int(at[group].max())  # when the last of these places has come to rest
+            # When the last of these places has come to rest; what slows down is in its last place before it stands.
+            last = min(int(at[group].max()) + 1, len(order) - 1)
             if abs(int(order[-1] - order[last])) >= options.rest * frame_rate or holds(group, order[last:].tolist()):
                 out[group] = order[last] if sign > 0 else order[last] + 1
     return _with_unknown(places, moving, rest)
