@@ -47,7 +47,7 @@ def colored_record(video: Video, frame: int) -> dict[str, dict[str, object]]:
 
 
 def splats_records(video: Video) -> list[list[dict[str, object]] | None]:
-    """Of each frame every 75th splat as it is bound, about the file's origin; None where it has none."""
+    """Of each frame every 50th splat as it is bound, about the file's origin; None where it has none."""
     found, origin = list[list[dict[str, object]] | None](), np.array(video.reader.header.origin)
     for frame in range(len(video)):
         bound = video.splats(frame)
@@ -55,7 +55,7 @@ def splats_records(video: Video) -> list[list[dict[str, object]] | None]:
             found.append(None)
             continue
         shown = replace(bound, means=bound.means - origin)
-        rows = range(0, len(bound.opacities), 75)
+        rows = range(0, len(bound.opacities), 50)
         found.append([{name: getattr(shown, name)[row].tolist() for name in Bound.__slots__} for row in rows])
     return found
 
