@@ -19,15 +19,16 @@ from ...geometry.cameras import PinholeCamera
 from ...geometry.splats import Carrier, Splats, locate, pose
 from .splat_raster import LEAST, Drawing, Flat, camera_matrices, project
 
-COVER = 0.55  # standard deviation of a splat in the beginning, in the root of its share of the surface (guess)
+COVER = 0.45  # standard deviation of a splat in the beginning, in the root of its share of the surface (guess)
 RATES = {  # of Adam, in the units of `Splats`; logarithms of scales, and logits of opacities (guess)
     "weights": 5e-3,
-    "offsets": 1e-4,
-    "turns": 3e-2,
-    "scales": 2e-2,
-    "opacities": 5e-2,
-    "colors": 1e-2,
+    "offsets": 3e-4,
+    "turns": 5e-2,
+    "scales": 3e-2,
+    "opacities": 1e-1,
+    "colors": 2e-2,
 }
+LARGER, LONGER = 1.0, 0.7  # of logarithms: scales from those in the beginning, and from their mean (guess)
 LAST = 0.1  # share of the rates at the end
 FIRST_OPACITY = 0.9
 
@@ -101,11 +102,12 @@ class _Fit:
         self._torch, carrier = torch, frames[0].carrier
         self._faces, weights, area = _spread(carrier, options.count)
         count = len(self._faces)
+        self._first = float(np.log(COVER * np.sqrt(area / count)))  # logarithm of scales in the beginning
         first = {
             "weights": weights,
             "offsets": np.zeros(count),
             "turns": np.zeros(count),
-            "scales": np.full((count, 2), np.log(COVER * np.sqrt(area / count))),
+            "scales": np.full((count, 2), self._first),
             "opacities": np.full(count, np.log(FIRST_OPACITY / (1 - FIRST_OPACITY))),
             "colors": np.full((count, 3), 0.5),
         }
@@ -131,6 +133,10 @@ class _Fit:
         with torch.no_grad():
             weights = self._own["weights"].clamp_(min=0)
             weights /= weights.sum(dim=1, keepdim=True).clamp_(min=1)
+            scales, offsets = self._own["scales"], self._own["offsets"]
+            middle = scales.mean(dim=1, keepdim=True).clamp_(self._first - LARGER, self._first + LARGER)
+            scales[:] = middle + (scales - middle).clamp_(-LONGER, LONGER)
+            offsets.clamp_(-float(np.exp(self._first)), float(np.exp(self._first)))
         self.added += drawing.shares()
         self._errors += drawing.shares(error.detach().abs().mean(dim=2).numpy().astype(np.float64))
 
