@@ -13,13 +13,13 @@ from ..analysis.appearance.splat_raster import draw
 from ..analysis.appearance.splat_views import GOLDEN, rendered, ring, taken
 from ..capture.recording import Recording
 from ..decoder.video import Video
+from ..encoder.progress import Progress
 from ..errors import FormatError, InputError
 from ..export.splats import write_splats
 from ..geometry.splats import Bound
 from ..metrics.color import PEAK, psnr
 from ..metrics.ssim import BORDER, ssim_map
 from ..types import MeshSequence, evenly
-from .console import StageBars
 
 FRAMES, VIEWS, SIZE = 8, 4, 256  # frames that are compared, cameras around each, and pixels of the longer side
 ASIDE = 0.11  # turns, from a camera that the encoder has fitted to
@@ -31,7 +31,7 @@ def check_splats(video: Video, name: str) -> None:
         raise InputError(f"{name}: has no splats; encode with --splats 8000")
 
 
-def write_all(video: Video, paths: Sequence[Path], progress: StageBars) -> list[FormatError]:
+def write_all(video: Video, paths: Sequence[Path], progress: Progress) -> list[FormatError]:
     """Write the splats of each frame; return the errors of damaged frames, whose files are removed."""
     failed = list[FormatError]()
     for number, path in enumerate(paths):
@@ -44,7 +44,7 @@ def write_all(video: Video, paths: Sequence[Path], progress: StageBars) -> list[
     return failed
 
 
-def compare_splats(sequence: MeshSequence, video: Video, progress: StageBars) -> dict[str, Any]:
+def compare_splats(sequence: MeshSequence, video: Video, progress: Progress) -> dict[str, Any]:
     """Return PSNR, dB, and SSIM of pictures of splats in some frames, cut to the bodies.
 
     Of a rig they are compared with its pictures; of coloured meshes with renders from cameras that were not fitted to.

@@ -13,6 +13,8 @@ PSNR, SSIM = Measure("splats_psnr", "PSNR of held-out views", " dB"), Measure("s
 MEASURES = (
     PSNR,
     SSIM,
+    Measure("splats_own_psnr", "PSNR with new splats in each frame", " dB"),
+    Measure("splats_own_ssim", "SSIM with these"),
     Measure("splats_mbps", "splats", " Mbps", -1),
     Measure("splats_per_frame_mbps", "new splats each frame", " Mbps", -1),
     Measure("splats_spz_mbps", "as SPZ each frame", " Mbps", -1),

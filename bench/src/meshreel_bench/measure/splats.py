@@ -62,10 +62,17 @@ def splat_values(
     chains = [[(k, replace(c, vertices=c.vertices / unit)) for k, c in chain] for chain in chains]
     of_frame = {number: chain for chain in chains for number, _ in chain}
     wanted = [k for k in evenly(count, JUDGED) if k in of_frame]
-    found, last = _Found({"whole": [], "exact": [], "fitted": [], "between": []}, [], [], [], []), None
+    found, alone_each = (_Found({"whole": [], "exact": [], "fitted": [], "between": []}, [], [], [], []) for _ in "ab")
+    last: Bound | None = None
+    of_unit = lambda k: _scaled(painted(k), unit)  # noqa: E731
     for chain in {id(of_frame[k]): of_frame[k] for k in wanted}.values():
-        last = _judge(chain, [k for k in wanted if k in dict(chain)], lambda k: _scaled(painted(k), unit), found)
-    return _values(found, len(chains), count, known.sequence.frame_rate) | _anchors(last, known.sequence.frame_rate)
+        last = _judge(chain, [k for k in wanted if k in dict(chain)], of_unit, found)
+        for k in (k for k in wanted if k in dict(chain) and len(chain) > 1):
+            _judge([(k, dict(chain)[k])], [k], of_unit, alone_each)
+    rate = known.sequence.frame_rate
+    own = _values(alone_each, count, count, rate) if alone_each.scores else {}
+    own = {f"splats_own_{name}": own[f"splats_{name}"] for name in ("psnr", "ssim") if own}
+    return _values(found, len(chains), count, rate) | own | _anchors(last, rate)
 
 
 def _judge(chain: Chain, wanted: Sequence[int], painted: Callable[[int], Mesh], found: _Found) -> Bound:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float32, Float64, Int64
+from jaxtyping import Float32, Float64, Int32
 
 from ...errors import InputError
 from ...geometry.atlas import finer_places
@@ -143,7 +143,7 @@ class _Fit:
     def move(self, random: np.random.Generator) -> None:
         """Move splats that add nothing to pictures to where those are that err most, which become smaller."""
         torch, count = self._torch, len(self._faces)
-        dead = np.flatnonzero(self.added < DEAD * np.median(self.added))
+        dead = np.flatnonzero(self.added < DEAD * self.added.mean())
         if len(dead):
             chance = np.where(self.added > 0, self._errors, 0)
             chance[dead] = 0
@@ -167,7 +167,7 @@ class _Fit:
         scales[is_swapped] = scales[is_swapped][:, ::-1]
         turns = np.mod(turns + np.where(is_swapped, np.pi / 2, 0), np.pi)
         opacities, colors = 1 / (1 + np.exp(-own["opacities"])), np.clip(own["colors"], 0, 1)
-        splats = Splats(self._faces.astype(np.int32), own["weights"], own["offsets"], turns, scales, opacities, colors)
+        splats = Splats(self._faces.copy(), own["weights"], own["offsets"], turns, scales, opacities, colors)
         kept = (opacities >= LEAST) & (self.added > 0)
         return splats.take(kept), self.added[kept]
 
@@ -204,7 +204,7 @@ class _Fit:
             self._own["colors"][:] = _tensor(self._torch, sums / total[:, None])
 
 
-DEAD = 0.02  # of the median of what splats add to pictures: it is as good as unseen (guess)
+DEAD = 0.05  # of the mean of what splats add to pictures: less is as good as unseen (guess)
 
 
 def _composite_function(torch: Any) -> Any:
@@ -221,14 +221,14 @@ def _composite_function(torch: Any) -> Any:
 
         @staticmethod
         def backward(context: Any, *given: Any) -> Any:
-            centers, conics, opacities, colors = context.drawing.gradients(given[0].numpy())
+            centers, conics, opacities, colors = context.drawing.gradients(given[0].numpy().astype(np.float64))
             found = [_tensor(torch, values) for values in (centers, conics, opacities, colors)]
             return found[0], found[1], None, None, found[2], found[3], None, None
 
     return Composite
 
 
-def _spread(carrier: Carrier, count: int) -> tuple[Int64[np.ndarray, " N"], Float64[np.ndarray, "N 2"], float]:
+def _spread(carrier: Carrier, count: int) -> tuple[Int32[np.ndarray, " N"], Float64[np.ndarray, "N 2"], float]:
     """Return faces of the base mesh and places on them, evenly over the surface, and its area."""
     a, b, c = np.moveaxis(carrier.vertices[carrier.faces], 1, 0)
     areas = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
@@ -238,7 +238,7 @@ def _spread(carrier: Carrier, count: int) -> tuple[Int64[np.ndarray, " N"], Floa
     random = np.random.default_rng(count)  # places inside the finest faces
     inside = random.dirichlet(np.ones(3), count)
     weights = np.einsum("nk,nkd->nd", inside, cut[finer % len(cut)])
-    return finer // len(cut), weights, float(ends[-1])
+    return (finer // len(cut)).astype(np.int32), weights, float(ends[-1])
 
 
 def _tensor(torch: Any, values: np.ndarray) -> Any:

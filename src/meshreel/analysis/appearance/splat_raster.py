@@ -114,7 +114,7 @@ class Drawing:
     def gradients(self, of_picture: Float64[np.ndarray, "H W 3"]) -> tuple[np.ndarray, ...]:
         """Return the gradients of centers, conics, opacities and colours from that of the picture."""
         n, index, flat = len(self._opacities), self._index, self._flat
-        given = of_picture.reshape(-1, 3).astype(np.float64)
+        given = of_picture.reshape(-1, 3)
         here = given[self._pixels]
         gains = (here * self._colors[index]).sum(axis=1)
         added = np.concatenate([[0.0], np.cumsum(self.weights * gains)])
