@@ -87,13 +87,18 @@ def _table_3(rows: Sequence[Row]) -> Iterator[str]:
     yield "|---|---|---|---|---|---|---|"
     yield from (f"| dancer (paper) | {name} | {mesh} | {db}, {ssim} | 719.8 | | |" for name, mesh, db, ssim in PAPER_3)
     for row in rows:
-        once = "splats_own_psnr" in row.metrics
-        of = {name: value(row, f"splats_{name}") for name in ("psnr", "ssim", "mbps", "own_psnr", "own_ssim")}
-        own = (of["own_psnr"], of["own_ssim"]) if once else (of["psnr"], of["ssim"])
-        chain = f"{of['psnr']:.2f}, {of['ssim']:.3f} | {of['mbps']:.3g}" if once else "|"
-        mbps = value(row, "splats_per_frame_mbps")
-        cells = (row.point.sequence, f"{curve_of(row)}{_setting(row)}", f"{row.mbps:.3g}")
-        yield f"| {' | '.join(cells)} | {own[0]:.2f}, {own[1]:.3f} | {mbps:.3g} | {chain} |"
+        cells: list[str | None] = [row.point.sequence, f"{curve_of(row)}{_setting(row)}", f"{row.mbps:.3g}"]
+        known = {
+            name: None if (found := value(row, f"splats_{name}")) is None else f"{found:.4g}"
+            for name in ("psnr", "ssim", "mbps", "per_frame_mbps", "own_psnr", "own_ssim")
+        }
+        here = f"{known['psnr']}, {known['ssim']}"
+        if value(row, "splats_between_psnr") is None:  # no two frames share a base mesh
+            cells += [here, known["mbps"], "", ""]
+        else:
+            own = "" if known["own_psnr"] is None else f"{known['own_psnr']}, {known['own_ssim']}"
+            cells += [own, known["per_frame_mbps"], here, known["mbps"]]
+        yield f"| {' | '.join(map(str, cells))} |"
 
 
 def _heads(columns: Sequence[str]) -> Iterator[str]:
