@@ -16,10 +16,10 @@ from pathlib import Path
 
 import numpy as np
 
-from meshreel.capture.procedural import deforming_sphere
 from meshreel.coding.appearance.atlas import encode_atlas
 from meshreel.coding.appearance.colors import ColorCodingOptions
 from meshreel.coding.appearance.pictures import VideoOptions
+from meshreel.coding.appearance.splats import encode_splats
 from meshreel.coding.background import decode_background, decode_change, encode_background, encode_change
 from meshreel.coding.colored import atlas_base, background_canvas, canvas_of, encode_group_colors
 from meshreel.coding.group import continue_group
@@ -39,7 +39,9 @@ from meshreel.format.records import pack
 from meshreel.geometry.atlas import Layout
 from meshreel.geometry.topology import concatenate
 from meshreel.types import Mesh
-from tests.golden import colored_record, frame_record, planes
+from tests.golden import colored_record, frame_record, planes, splats_records
+from tests.spheres import deforming_sphere
+from tests.splats import some_splats
 
 FRAMES = 4
 COLORS = ColorCodingOptions(step=1 / 24)
@@ -79,6 +81,12 @@ def main(folder: Path) -> None:
         )
     with golden(folder, "colored/scene", header()) as writer:
         add_colored_scene(writer)
+    (folder / "splats").mkdir(exist_ok=True)
+    with golden(folder, "splats/splats", header()) as writer:
+        for number, group in enumerate((*patched_groups(), moving, still)):
+            add(writer, group)
+            if number in (0, 2):
+                add_splats(writer, group[1])
 
 
 @contextmanager
@@ -184,6 +192,14 @@ def add_pictures(writer: ReelWriter, base: Mesh, groups: Sequence[int], counts: 
         for companion in own:
             before = (last[companion.kind],) if companion.kind in last else ()
             last[companion.kind] = writer.add_companion(companion, (group, atlas, *before))
+
+
+def add_splats(writer: ReelWriter, payload: bytes) -> None:
+    """Splats of all sizes on the faces of the last group's base mesh, which the groups predicted from it have, too."""
+    number = writer.last_of(0)
+    splats = some_splats(300, len(atlas_base(payload).faces), seed=number)
+    data, layers = encode_splats(splats, splats.opacities)
+    writer.add_companion(Companion(ChunkKind.SPLATS, data, layers), (number,))
 
 
 def add_colored_scene(writer: ReelWriter) -> None:
@@ -299,6 +315,8 @@ def draco_group() -> Group:
 
 def record(video: Video) -> dict[str, object]:
     """What a reader must find in a file."""
+    if video.reader.has_splats:
+        return {"frames": splats_records(video), "frames_of_first_layers": splats_records(video.at(0))}
     if video.reader.is_colored:
         shown = sorted({*range(min(len(video), 12)), *range(0, len(video), 49), *range(len(video) - 4, len(video))})
         return {"parts": {str(frame): colored_record(video, frame) for frame in shown}, "planes": planes(video.reader)}

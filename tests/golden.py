@@ -6,6 +6,7 @@ Of pictures the I420 planes are recorded, never sRGB, which is a matter of the r
 from __future__ import annotations
 
 import hashlib
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ from meshreel.container.reader import ReelReader
 from meshreel.decoder.video import Video
 from meshreel.format.layout import Atlas, ChunkKind
 from meshreel.format.records import unpack_all
+from meshreel.geometry.splats import Bound
 from meshreel.types import Mesh
 
 GOLDEN = Path(__file__).resolve().parents[1] / "conformance" / "v1"
@@ -41,6 +43,20 @@ def colored_record(video: Video, frame: int) -> dict[str, dict[str, object]]:
         if mesh.uv is not None:
             places = np.nan_to_num(mesh.uv, nan=-1.0).astype("<f4")
             found[name]["uv_sha256"] = hashlib.sha256(places.tobytes()).hexdigest()
+    return found
+
+
+def splats_records(video: Video) -> list[list[dict[str, object]] | None]:
+    """Of each frame every 50th splat as it is bound, about the file's origin; None where it has none."""
+    found, origin = list[list[dict[str, object]] | None](), np.array(video.reader.header.origin)
+    for frame in range(len(video)):
+        bound = video.splats(frame)
+        if bound is None:
+            found.append(None)
+            continue
+        shown = replace(bound, means=bound.means - origin)
+        rows = range(0, len(bound.opacities), 50)
+        found.append([{name: getattr(shown, name)[row].tolist() for name in Bound.__slots__} for row in rows])
     return found
 
 

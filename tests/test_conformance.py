@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import json
 
+import numpy as np
 import pytest
 
 import meshreel
 from meshreel.format.checks import COMPANIONS
 from meshreel.format.layout import ChunkKind
-from tests.golden import GOLDEN, colored_record, frame_record, planes
+from tests.golden import GOLDEN, colored_record, frame_record, planes, splats_records
 
 FILES = sorted(GOLDEN.glob("*.reel"))
 COLORED = sorted(GOLDEN.glob("colored/*.reel"))
@@ -35,7 +36,7 @@ def test_a_golden_file_decodes_bit_for_bit(path):
 def test_there_is_a_golden_file_for_each_companion_of_a_group_and_of_a_background():
     chunks = [chunk for path in COLORED for chunk in meshreel.open(path).reader.chunks]
     assert {(chunk.kind, chunk.frame_count > 0) for chunk in chunks if chunk.kind in COMPANIONS} == {
-        (kind, is_group) for kind in COMPANIONS for is_group in (True, False)
+        (kind, is_group) for kind in COMPANIONS if kind != ChunkKind.SPLATS for is_group in (True, False)
     }
     assert max(path.stat().st_size for path in GOLDEN.rglob("*")) < 40_000
 
@@ -47,3 +48,17 @@ def test_a_golden_file_has_the_same_colours_and_planes(path):
     for frame, parts in wanted["parts"].items():
         assert colored_record(video, int(frame)) == parts
     assert planes(video.reader) == wanted["planes"]
+
+
+def test_a_golden_file_has_the_same_splats_in_the_same_places():
+    path = GOLDEN / "splats" / "splats.reel"
+    wanted, video = json.loads(path.with_suffix(".json").read_text()), meshreel.open(path)
+    assert [frames is None for frames in wanted["frames"]] == [False] * 9 + [True] * 3
+    for name, shown in (("frames", video), ("frames_of_first_layers", video.at(0))):
+        for found, frame in zip(splats_records(shown), wanted[name], strict=True):
+            assert (found is None) == (frame is None)
+            for some, splat in zip(found or [], frame or [], strict=True):
+                for part in splat:
+                    np.testing.assert_allclose(some[part], splat[part], atol=1e-9)
+    hidden = [splat["opacities"] for frame in wanted["frames"] if frame for splat in frame]
+    assert 0 in hidden and max(hidden) > 0.5  # some frames lack faces

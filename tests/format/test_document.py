@@ -13,6 +13,7 @@ import pytest
 from meshreel.coding import entropy
 from meshreel.coding.appearance.atlas import decode_atlas, encode_atlas
 from meshreel.coding.appearance.colors import ColorCodingOptions, ColoredMesh, decode_colors, encode_colors
+from meshreel.coding.appearance.splats import decode_splats, encode_splats
 from meshreel.coding.background import decode_background, decode_change, encode_background, encode_change
 from meshreel.coding.layers.coder import LayerCodingOptions, LayersState, encode_layers
 from meshreel.coding.layers.patches import encode_patches
@@ -28,6 +29,8 @@ from meshreel.format.layout import (
     CodedField,
     ColorsLevel,
     DisplacementHead,
+    Gaussians,
+    GaussiansLayer,
     LayersGroup,
     LayersLevel,
     Origin,
@@ -36,9 +39,11 @@ from meshreel.format.layout import (
 )
 from meshreel.format.records import pack
 from meshreel.geometry.atlas import Layout
+from meshreel.geometry.splats import Carrier, bind
 from meshreel.geometry.topology import subdivide_midpoint
 from meshreel.types import Mesh
 from tests.coding.decoded_layers import decode_layers
+from tests.splats import some_splats
 
 DOCUMENT = Path(__file__).resolve().parents[2] / "FORMAT.md"
 
@@ -264,3 +269,27 @@ def test_the_document_decodes_an_atlas(decoder: dict[str, Any]) -> None:
         proper = [f for f, face in enumerate(mesh.faces.tolist()) if len(set(face)) == 3]
         np.testing.assert_array_equal(np.array(told)[proper], places[proper])
         np.testing.assert_array_equal(decode_atlas(pack(record), mesh).places[proper], places[proper])
+
+
+def test_the_document_decodes_splats_and_binds_them(decoder: dict[str, Any]) -> None:
+    base = body()
+    wanted = some_splats(300, len(base.faces))
+    data, _ = encode_splats(wanted, np.ones(300))
+    head, offset = records.unpack(Gaussians, data)
+    layers = list[GaussiansLayer]()
+    while offset < len(data):
+        layer, offset = records.unpack(GaussiansLayer, data, offset)
+        layers.append(layer)
+    for count in range(1, len(layers) + 1):
+        told = decoder["decode_splats"](head, layers[:count], len(base.faces))
+        known = decode_splats(data[: len(pack(head)) + sum(len(pack(one)) for one in layers[:count])], len(base.faces))
+        fine = subdivide_midpoint(base, 2)
+        bound = bind(known, Carrier(fine.vertices, fine.faces, 2))
+        for number, splat in enumerate(told):
+            face, weights, along = decoder["locate_splat"](splat, 2)
+            corners = fine.vertices[fine.faces[face]].tolist()
+            found = decoder["bind_splat"](splat, corners, weights, along)
+            for value, name in zip(found, ("means", "axes", "scales"), strict=True):
+                np.testing.assert_allclose(value, getattr(bound, name)[number], atol=1e-12)
+            np.testing.assert_allclose(splat["color"], bound.colors[number])
+            assert bound.opacities[number] == (splat["opacity"] if np.any(found[1][2]) else 0)

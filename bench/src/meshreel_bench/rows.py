@@ -13,7 +13,7 @@ from meshreel.errors import InputError
 
 Option = str | int | float | bool | None
 Options = dict[str, Option]
-Metrics = Literal["distances", "views", "parallel views", "regions", "colors", "depth"]
+Metrics = Literal["distances", "views", "parallel views", "regions", "colors", "depth", "splats"]
 
 
 class Point(msgspec.Struct, frozen=True):
@@ -25,8 +25,8 @@ class Point(msgspec.Struct, frozen=True):
     frames: int | None = None  # the first frames of the sequence; None: all
     sampled: bool = False  # the codec is given some frames of a scene only: it is slow, or codes every frame alone
     # distances alone; also pictures, from where the cameras stood or from four sides (perspective, or parallel); people
-    # and background of a simulated scene against truth and input; colours of parallel views and cameras' pictures; or
-    # all frames of a recording by its depth pictures
+    # and background of a simulated scene against truth and input; colours of parallel views and cameras' pictures;
+    # all frames of a recording by its depth pictures; or splats on the decoded mesh, by pictures of these
     metrics: Metrics = "views"
 
     @property

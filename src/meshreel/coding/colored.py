@@ -17,6 +17,7 @@ from ..format.budget import check_colors
 from ..format.layout import DracoGroup, Form, LaplacianGroup, StaticPatch
 from ..format.records import unpack_all
 from ..geometry.atlas import Layout
+from ..geometry.splats import Carrier
 from ..geometry.subdivision import levels_of
 from ..geometry.topology import concatenate
 from ..shapes import Bool, Float32, Float64, Int32, UInt8
@@ -48,6 +49,24 @@ class Canvas:
             kept = whole[~gone] if gone.any() else whole
             found.append(np.concatenate([kept, np.full((added, 3, 2), np.nan, np.float32)]) if added else kept)
         return found
+
+    def carriers(self, frames: Sequence[Mesh], unit: float = 1.0) -> list[Carrier]:
+        """Return what carries splats in each frame: the template, where it is and what of it the frame lacks.
+
+        `unit` is that of normalised coordinates in the frames.
+        """
+        template, lacking = self.meshes[0], self.dropped
+        faces = finest_faces(template.base, template.levels)
+        return [
+            Carrier(
+                np.ascontiguousarray(mesh.vertices[: template.vertices]),
+                faces,
+                template.levels,
+                None if lacking is None else lacking[number],
+                unit,
+            )
+            for number, mesh in enumerate(frames)
+        ]
 
     def by_frame(self, colors: Sequence[UInt8[np.ndarray, "_ _ 3"]]) -> list[UInt8[np.ndarray, "_ 3"]]:
         """Return the colours of the vertices of each frame from those of the meshes."""
@@ -161,9 +180,12 @@ def background_canvas(data: bytes) -> Canvas:
 
 
 def atlas_base(data: bytes) -> Mesh:
-    """Return the mesh that an atlas is of, from the first layer of its group, or from a background."""
+    """Return the mesh that an atlas or splats are of, from the first layer of their group, or from a background."""
     if data[:1] == bytes([Form.LAYERS]):
         return base_of(read_layers(data, 0), None)
+    if data[:1] == bytes([Form.LAPLACIAN]):
+        record = unpack_all(LaplacianGroup, data)
+        return decode_mesh(record.reference, record.step)
     return background_canvas(data).meshes[0].base
 
 

@@ -109,7 +109,12 @@ class ReelReader:
     @property
     def is_colored(self) -> bool:
         """Whether the file has colours."""
-        return bool(self._companions)
+        return any(chunk.kind != ChunkKind.SPLATS for chunk in self._companions.values())
+
+    @property
+    def has_splats(self) -> bool:
+        """Whether the file has splats."""
+        return any(chunk.kind == ChunkKind.SPLATS for chunk in self._companions.values())
 
     @property
     def has_textures(self) -> bool:

@@ -19,10 +19,12 @@ from ..container.reader import Chunk, ReelReader
 from ..errors import FormatError
 from ..format.budget import Chain, together
 from ..format.layout import ChunkKind, Form
+from ..geometry.splats import Bound
 from ..shapes import UInt8
 from ..types import Frames, Mesh, Placement
 from .cache import MOST_KEPT, NO_GROUP, CachedGroup, CachedStates, Refusals, memory_of, read_only
 from .pictures import Decoders, TrackPictures
+from .splats import TrackSplats
 
 MOST_TOGETHER = 8 * MOST_NUMBERS  # bytes: the groups of one frame take no more memory than the largest legal group
 
@@ -50,6 +52,7 @@ class Track(Frames):
         self._group = NO_GROUP
         self._states = CachedStates({})
         self._pictures = TrackPictures(reader, decoders or Decoders())
+        self._splats = TrackSplats(reader, layers)
         self._refusals = Refusals()  # of frames
         self._lost = Refusals()  # of states, which may be whole where frames of the same group are damaged
 
@@ -65,6 +68,14 @@ class Track(Frames):
         chunk = self.reader.chunk_of_frame(index, self.number)
         group = self._decoded(chunk)
         return group.frames[index - chunk.first_frame], group.nbytes
+
+    def splats(self, index: int) -> Bound | None:
+        """Return the splats of frame `index` in metres; None where its groups have none. Raises as indexing does."""
+        chunk = self.reader.chunk_of_frame(index, self.number)
+        if (of := self._splats.of(chunk)) is None:
+            return None
+        frames, (before, _) = self._decoded(chunk).frames, self._state_before(chunk)
+        return self._splats.bound(of, chunk, self._read(chunk), frames, before, index - chunk.first_frame)
 
     def _decoded(self, chunk: Chunk) -> CachedGroup:
         """Return a group, from the cache if it was the last one decoded."""

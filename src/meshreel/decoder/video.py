@@ -16,6 +16,7 @@ import numpy as np
 from ..container.reader import ReelReader
 from ..container.sources import BytesSource, FileSource, Source, Stream, StreamSource
 from ..errors import FormatError, InputError
+from ..geometry.splats import Bound
 from ..geometry.topology import concatenate
 from ..shapes import Float
 from ..types import Mesh, Up
@@ -164,6 +165,15 @@ class Video(Sequence[Mesh]):
     def moving(self, index: int) -> Mesh:
         """Return frame `index` without its background, which is not read."""
         return _joined(moving_of_frame(self.tracks, self._frame(index)))
+
+    def splats(self, index: int) -> Bound | None:
+        """Return the splats of all moving bodies of frame `index` in metres; None where none has any.
+
+        They are to be drawn in place of the surface of these bodies. Raises as indexing does.
+        """
+        frame = self._frame(index)
+        found = [some for some in (track.splats(frame) for track in self.tracks) if some is not None]
+        return Bound.join(found) if found else None
 
     def vertices(self, first: int, last: int, out: np.ndarray | None = None) -> Float[np.ndarray, "T V 3"]:
         """Return the vertices of frames `first` to `last` - 1 in metres, which all must have the same number of them.

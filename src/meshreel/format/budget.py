@@ -40,6 +40,7 @@ class Limits:
     pictures: int = 768 << 20  # what the pictures of a chunk, or of a layer, may cost, and per_byte more (guess)
     texel: int = 2  # of a picture that is decoded
     videos: int = 176 << 20  # memory that the decoders of all videos may take, and per_byte more: of 2048 x 2048
+    splat: int = 1024  # of a splat, bound in a frame
     held: int = 44  # of a texel of a video, whose decoder keeps up to 16 pictures (H.264; measured: 42)
 
 
@@ -139,6 +140,11 @@ def check_colors(meshes: Sequence[tuple[int, int]], size: int) -> None:
     cost += LIMITS.painting * max((vertices for vertices, _ in meshes), default=0)
     if cost > LIMITS.colors + LIMITS.per_byte * size:
         raise CostlyError(f"colours: {size} bytes that cost {cost} to decode")
+
+
+def splats_cost(count: int) -> int:
+    """Return the cost of so many splats."""
+    return LIMITS.splat * count
 
 
 def check_pictures(texels: int, size: int) -> None:

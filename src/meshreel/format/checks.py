@@ -18,6 +18,7 @@ COMPANIONS = {
     ChunkKind.ATLAS: Form.PLACES,
     ChunkKind.PICTURES: Form.VIDEO,
     ChunkKind.COMPATIBLE: Form.VIDEO,
+    ChunkKind.SPLATS: Form.GAUSSIANS,
 }
 GROUP_FORMS = (Form.LAPLACIAN, Form.LAYERS, Form.DRACO, Form.EMPTY)
 MOST_CHANGES = 255  # patches on one background: random access decodes all of them (guess)
@@ -52,6 +53,7 @@ class IndexChecks:
         # Of each STATIC and GROUP: its frames, its track, and the group that it is predicted from.
         self._whole: dict[int, tuple[int, int, int | None]] = {}
         self._bases: set[int] = set()  # chunks that may have an atlas: those that begin with a base mesh
+        self._bearers: set[int] = set()  # groups that may have splats: those that begin with a mesh of all frames
         # By coded chunk and kind, the number of the chunk that has its colours, its atlas or its pictures.
         self.companions: dict[tuple[int, int], int] = {}
         self._atlases: dict[int, int] = {}  # of each group with pictures, the number of its atlas
@@ -80,6 +82,8 @@ class IndexChecks:
             self._whole[number] = (entry.frames, entry.track, before)
             if entry.form == Form.LAYERS and before is None:
                 self._bases.add(number)
+            if number in self._bases or entry.form == Form.LAPLACIAN:
+                self._bearers.add(number)
         elif entry.kind in COMPANIONS:
             self._add_companion(entry)
         self._count += 1
@@ -137,6 +141,8 @@ class IndexChecks:
             return ((),) if known is None else ((), (known,))
         if kind == ChunkKind.ATLAS:
             return ((),) if of in self._bases else ()
+        if kind == ChunkKind.SPLATS:
+            return ((),) if of in self._bearers else ()
         own = self.companions.get((of, ChunkKind.ATLAS))
         if own is not None:
             return ((own,),)

@@ -28,6 +28,7 @@ class ChunkKind(IntEnum):
     ATLAS = 4  # places of faces in a texture: of a group and those predicted from it, or of a background
     PICTURES = 5  # the textures of a group's frames, or of a background
     COMPATIBLE = 6  # the same in a coding that more devices know
+    SPLATS = 7  # Gaussians on the faces of a group and of those predicted from it
 
 
 class Form(IntEnum):
@@ -41,6 +42,7 @@ class Form(IntEnum):
     VERTEX_COLORS = 6  # colours of vertices, as fields over their connectivity
     PLACES = 7  # places of corners in a texture
     VIDEO = 8  # pictures of a video: one a frame, of a background one each `interval` frames
+    GAUSSIANS = 9  # splats, the most important first
 
 
 class AnchorRule(IntEnum):
@@ -107,6 +109,7 @@ class IndexEntry:
         "for a STATIC of form PATCH, the STATIC chunk that it changes; "
         "for COLORS, the chunk whose vertices have them and, where they are predicted, the COLORS of the group before; "
         "for ATLAS, the GROUP whose base mesh, or the STATIC whose faces, it places; "
+        "for SPLATS, the GROUP whose base mesh they are on; "
         "for PICTURES and COMPATIBLE, the GROUP, the ATLAS, and but for the first of this, that of the group before",
     ]
     layers: Annotated[tuple[Layer, ...], List(U16, Nested(Layer)), "at least one"]
@@ -292,6 +295,34 @@ class Pictures:
 
 
 @dataclass(frozen=True, slots=True)
+class Gaussians:
+    """First bytes of a chunk of form GAUSSIANS; a GaussiansLayer follows for each of its layers."""
+
+    form: Annotated[Form, Choice(U8, Form), "GAUSSIANS"]
+    place_bits: Annotated[int, U8, "b, 1 to 14: weights of a face's corners are integers times 2^-b"]
+    turn_bits: Annotated[int, U8, "b, 1 to 14: angles are integers times pi 2^-b"]
+    opacity_bits: Annotated[int, U8, "b, 1 to 14: opacities are integers times 2^-b"]
+    color_bits: Annotated[int, U8, "b, 1 to 14: lumas and colour differences are integers times 2^-b"]
+    offset_level: Annotated[int, U8, "k: offsets along the normal are integers times 2^(-k/8)"]
+    scale_level: Annotated[int, U8, "k, which levels of scales are counted from"]
+    count: Annotated[int, Varint(), "N, splats of all layers"]
+
+
+@dataclass(frozen=True, slots=True)
+class GaussiansLayer:
+    """Splats of a layer, in the order of their faces."""
+
+    count: Annotated[int, Varint(), "n, above 0"]
+    faces: Annotated[bytes, Blob(Varint()), "n integers: how many faces of the base mesh lie between it and the last"]
+    places: Annotated[bytes, Blob(Varint()), "2 n integers: weights of the second corners, then of the third ones"]
+    offsets: Annotated[bytes, Blob(Varint()), "n integers: offsets along the normal"]
+    turns: Annotated[bytes, Blob(Varint()), "n integers: angles of the longer axes"]
+    scales: Annotated[bytes, Blob(Varint()), "2 n integers: levels of longer scales, then how many the shorter add"]
+    opacities: Annotated[bytes, Blob(Varint()), "n integers: opacities"]
+    colors: Annotated[bytes, Blob(Varint()), "3 n integers: lumas, then both differences, each less the splat before"]
+
+
+@dataclass(frozen=True, slots=True)
 class EmptyGroup:
     """The payload of a group of form EMPTY."""
 
@@ -314,4 +345,6 @@ PAYLOADS = (
     ColorsLevel,
     Atlas,
     Pictures,
+    Gaussians,
+    GaussiansLayer,
 )

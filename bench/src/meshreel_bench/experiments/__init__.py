@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from meshreel.errors import InputError
 
-from . import ablations, color, figure6, layers, recordings, scenes, speed, targets
+from . import ablations, color, figure6, layers, recordings, scenes, speed, splats, targets
 from .study import Study
 
 # In the order of the report.
@@ -12,6 +12,7 @@ EXPERIMENTS: dict[str, Study] = {
     "figure6": figure6.STUDY,
     "table1": figure6.TABLE_1,
     "table2": figure6.TABLE_2,
+    "table3": splats.TABLE_3,
     "ablation_centers": ablations.CENTERS,
     "ablation_gof": ablations.GOF,
     "ablation_basis": ablations.BASIS,

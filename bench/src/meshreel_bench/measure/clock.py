@@ -43,7 +43,7 @@ class StageTimer:
         self.stages: dict[str, float] = {}
         self.references = [reference_s() for _ in range(SAMPLES)]
         self._work, self._apart = so_far(), 0.0
-        self._import, builtins.__import__ = builtins.__import__, self._late  # type: ignore[assignment]
+        self._import, builtins.__import__ = builtins.__import__, self._late
         self._start = self._last = time.process_time()
         if ON_TIME:
             signal.signal(signal.SIGALRM, self._sample)  # on this thread, so that nothing runs beside the loop
@@ -64,10 +64,10 @@ class StageTimer:
         self.seconds, self.work = time.process_time() - self._apart - self._start, since(self._work)
         self.references += [reference_s() for _ in range(SAMPLES)]
 
-    def _late(self, name: str, *rest: Any) -> Any:
+    def _late(self, name: str, *rest: Any, **named: Any) -> Any:
         """Import a module; what is imported where it is first needed is not charged."""
         is_late = name in LATE and name not in sys.modules
-        start, module = time.process_time(), self._import(name, *rest)
+        start, module = time.process_time(), self._import(name, *rest, **named)
         self._apart += is_late * (time.process_time() - start)
         return module
 

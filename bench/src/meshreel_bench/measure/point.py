@@ -27,6 +27,7 @@ from ..codecs.colored_draco import ColoredDracoCodec
 from ..codecs.scenes import BackgroundDracoCodec
 from ..datasets import Dataset, Store
 from ..datasets.scenes import FOUND, TRUE, SceneFrames
+from ..datasets.solid import coloured
 from ..experiments.study import FLOOR
 from ..experiments.study import FOUND as SEGMENTATION
 from ..rows import Encoding, Group, Point, Row, Stream
@@ -36,8 +37,9 @@ from .decode import decoded_apart
 from .maker import maker
 from .metrics import Measured, measure_frames
 from .segmentation import score_labels
+from .splats import splat_values
 
-TRUTH_NAME = "the truth itself"
+TRUTH_NAME, UNCOMPRESSED = "the truth itself", "uncompressed"
 SOME = 10  # frames of a scene that a sampled point has; of all other points every second of these is measured
 KEYS = "key_frames"  # of a file's metadata: numbers of the frames that others are predicted from
 
@@ -59,6 +61,8 @@ def measure_point(point: Point, store: Store) -> Row:
     if point.codec == SEGMENTATION:
         return msgspec.structs.replace(row, metrics=_segmentation(known))
     if point.codec == FLOOR:
+        if point.metrics == "splats":
+            return _uncompressed(row, known, point, store)
         if known.scene is None:
             raise InputError("the truth itself is known of simulated scenes only")
         clean = [known.scene.truth[number].mesh for number in numbers]
@@ -70,7 +74,11 @@ def measure_point(point: Point, store: Store) -> Row:
     data, encoding = _encoded(codec, source, (point.sequence, point.frames, point.sampled))
     wanted = list(range(len(some))) if point.sampled else numbers
     decoding, meshes = decoded_apart(decoder, data, wanted, len(source))
-    metrics, per_frame = measure_frames(Measured(known, numbers, meshes, data), point.metrics)
+    if point.metrics == "splats":
+        painted = coloured(point.sequence, store, point.frames)
+        metrics, per_frame = dict[str, float | None](splat_values(known, painted, meshes, numbers, data)), {}
+    else:
+        metrics, per_frame = measure_frames(Measured(known, numbers, meshes, data), point.metrics)
     return msgspec.structs.replace(
         row,
         name=codec.name,
@@ -81,6 +89,15 @@ def measure_point(point: Point, store: Store) -> Row:
         metrics=metrics,
         per_frame=per_frame,
     )
+
+
+def _uncompressed(row: Row, known: Dataset, point: Point, store: Store) -> Row:
+    """Return the row of splats on the meshes as they are: float32 places and int32 corners."""
+    meshes = list(known.sequence)
+    size = sum(12 * (len(mesh.vertices) + len(mesh.faces)) for mesh in meshes)
+    painted = coloured(point.sequence, store, point.frames)
+    metrics = dict[str, float | None](splat_values(known, painted, meshes, range(len(meshes)), b""))
+    return msgspec.structs.replace(row, name=UNCOMPRESSED, stream=Stream(size, len(meshes)), metrics=metrics)
 
 
 def empty_row(point: Point, store: Store, **known: Any) -> Row:

@@ -30,6 +30,7 @@ export const LIMITS = {
   pictures: 805306368,
   texel: 2,
   videos: 184549376,
+  splat: 1024,
   held: 44,
 } as const;
 
@@ -40,6 +41,7 @@ export const ChunkKind = {
   ATLAS: 4,
   PICTURES: 5,
   COMPATIBLE: 6,
+  SPLATS: 7,
 } as const;
 
 export const Form = {
@@ -51,6 +53,7 @@ export const Form = {
   VERTEX_COLORS: 6,
   PLACES: 7,
   VIDEO: 8,
+  GAUSSIANS: 9,
 } as const;
 
 export const AnchorRule = {
@@ -125,7 +128,7 @@ export interface IndexEntry {
   readonly form: number; // coding; equal to the first byte of the chunk
   readonly frames: number; // number of frames; 0 if and only if STATIC or a companion of one
   readonly track: number; // number of the moving body, from 0; 0 if STATIC
-  readonly dependsOn: readonly number[]; // numbers of the earlier chunks that it needs: for a GROUP, the STATIC chunk it is shown with and the GROUP right before it in its track; for a STATIC of form PATCH, the STATIC chunk that it changes; for COLORS, the chunk whose vertices have them and, where they are predicted, the COLORS of the group before; for ATLAS, the GROUP whose base mesh, or the STATIC whose faces, it places; for PICTURES and COMPATIBLE, the GROUP, the ATLAS, and but for the first of this, that of the group before
+  readonly dependsOn: readonly number[]; // numbers of the earlier chunks that it needs: for a GROUP, the STATIC chunk it is shown with and the GROUP right before it in its track; for a STATIC of form PATCH, the STATIC chunk that it changes; for COLORS, the chunk whose vertices have them and, where they are predicted, the COLORS of the group before; for ATLAS, the GROUP whose base mesh, or the STATIC whose faces, it places; for SPLATS, the GROUP whose base mesh they are on; for PICTURES and COMPATIBLE, the GROUP, the ATLAS, and but for the first of this, that of the group before
   readonly layers: readonly Layer[]; // at least one
 }
 export const IndexEntry: Kind<IndexEntry> = record("IndexEntry", {
@@ -365,4 +368,48 @@ export const Pictures: Kind<Pictures> = record("Pictures", {
   codec: choice(u8, VideoCodec),
   interval: varint,
   packets: list(u16, blob(varint)),
+});
+
+/** First bytes of a chunk of form GAUSSIANS; a GaussiansLayer follows for each of its layers. */
+export interface Gaussians {
+  readonly form: number; // GAUSSIANS
+  readonly placeBits: number; // b, 1 to 14: weights of a face's corners are integers times 2^-b
+  readonly turnBits: number; // b, 1 to 14: angles are integers times pi 2^-b
+  readonly opacityBits: number; // b, 1 to 14: opacities are integers times 2^-b
+  readonly colorBits: number; // b, 1 to 14: lumas and colour differences are integers times 2^-b
+  readonly offsetLevel: number; // k: offsets along the normal are integers times 2^(-k/8)
+  readonly scaleLevel: number; // k, which levels of scales are counted from
+  readonly count: number; // N, splats of all layers
+}
+export const Gaussians: Kind<Gaussians> = record("Gaussians", {
+  form: choice(u8, Form),
+  placeBits: u8,
+  turnBits: u8,
+  opacityBits: u8,
+  colorBits: u8,
+  offsetLevel: u8,
+  scaleLevel: u8,
+  count: varint,
+});
+
+/** Splats of a layer, in the order of their faces. */
+export interface GaussiansLayer {
+  readonly count: number; // n, above 0
+  readonly faces: Uint8Array; // n integers: how many faces of the base mesh lie between it and the last
+  readonly places: Uint8Array; // 2 n integers: weights of the second corners, then of the third ones
+  readonly offsets: Uint8Array; // n integers: offsets along the normal
+  readonly turns: Uint8Array; // n integers: angles of the longer axes
+  readonly scales: Uint8Array; // 2 n integers: levels of longer scales, then how many the shorter add
+  readonly opacities: Uint8Array; // n integers: opacities
+  readonly colors: Uint8Array; // 3 n integers: lumas, then both differences, each less the splat before
+}
+export const GaussiansLayer: Kind<GaussiansLayer> = record("GaussiansLayer", {
+  count: varint,
+  faces: blob(varint),
+  places: blob(varint),
+  offsets: blob(varint),
+  turns: blob(varint),
+  scales: blob(varint),
+  opacities: blob(varint),
+  colors: blob(varint),
 });

@@ -1,0 +1,73 @@
+"""Bodies in the colours of a solid that they are cut from: the same place of a body has the same colour in all frames.
+
+In: a sequence by name. Out: its frames in colour. Bodies whose connectivity stays are coloured by their first frame; of
+others a template is tracked, at a quality above all that are compared, and carries the colours.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float64, UInt8
+
+from meshreel.encoder.presets import preset_options
+from meshreel.encoder.sequence import Encoder
+from meshreel.errors import InputError
+from meshreel.geometry.closest_points import Surface
+from meshreel.geometry.topology import blend, subdivide_midpoint
+from meshreel.types import Mesh, MeshSequence
+
+from ..carriers import chains_of
+from . import REMESHED, Store
+
+STRIPE, GRAIN = 0.1, 0.02  # m, periods of the colours
+FINER = 2  # midpoint subdivisions before vertices get colours, which then have some millimetres of detail
+TRACKED = 80.0  # quality of a template that carries colours
+
+
+def solid_colors(points: Float64[np.ndarray, "N 3"]) -> UInt8[np.ndarray, "N 3"]:
+    """Return the colours of places in a solid: stripes of two colours, with a grain."""
+    stripes = np.sin(2 * np.pi / STRIPE * points[:, 1:2]) > 0
+    grain = np.sin(2 * np.pi / GRAIN * points + [0.0, 1.0, 2.0]).prod(axis=1, keepdims=True)
+    side = np.where(points[:, :1] > 0, [[205, 160, 120]], [[190, 200, 215]])
+    return np.clip(np.where(stripes, side, [[60, 70, 110]]) * (1 + 0.4 * grain), 0, 255).astype(np.uint8)
+
+
+def coloured(name: str, store: Store, frames: int | None) -> Callable[[int], Mesh]:
+    """Return a function of a frame's number: the frame in colour, its own where it has a texture."""
+    if name in REMESHED:
+        source = store.open(REMESHED[name][0], frames or REMESHED[name][1]).sequence
+        rest = subdivide_midpoint(source[0], FINER)
+        colors = solid_colors(rest.vertices)
+        return lambda number: Mesh(subdivide_midpoint(source[number], FINER).vertices, rest.faces, colors)
+    sequence = store.open(name, frames).sequence
+    return (lambda number: sequence[number]) if sequence[0].is_colored else _carried(sequence)
+
+
+def _carried(sequence: MeshSequence) -> Callable[[int], Mesh]:
+    """Return the frames in the colours that a tracked template carries."""
+    template = cache(lambda: _tracked(sequence))
+
+    def painted(number: int) -> Mesh:
+        mesh, carrier, rest = subdivide_midpoint(sequence[number], 1), template()[number], template()[0]
+        hits = Surface(carrier).closest(mesh.vertices)
+        return replace(mesh, colors=solid_colors(blend(rest.vertices, rest.faces[hits.faces], hits.barycentric)))
+
+    return painted
+
+
+def _tracked(sequence: MeshSequence) -> list[Mesh]:
+    """Return a template in all frames: that of the first chain of groups, which must be the only one."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, "template.reel")
+        options = preset_options(quality=TRACKED, color="none", group_size=min(len(sequence), 64))
+        Encoder(sequence).encode(path, replace(options, scene=None))
+        chains = chains_of(path.read_bytes())
+    if len(chains) > 1:
+        raise InputError(f"a template cannot be tracked: {len(chains)} chains; give fewer frames")
+    return [Mesh(carrier.vertices, carrier.faces) for _, carrier in chains[0]]

@@ -1,0 +1,147 @@
+"""Table 3: splats on decoded meshes, judged by renders from cameras and in frames that they were not fitted to.
+
+In: a sequence, the bytes of its mesh and what they decode to. Out: PSNR and SSIM of held-out pictures, which are cut to
+the body, and the rate of the splats: a set for each chain of groups that share a base mesh, or for each frame.
+"""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import tempfile
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from meshreel.analysis.appearance.splat_fit import FitSplatsOptions, SplatFrame, SplatView, fit_splats
+from meshreel.analysis.appearance.splat_views import GOLDEN, rendered, ring
+from meshreel.cli.splats import ASIDE, errors
+from meshreel.coding.appearance.splats import decode_splats, encode_splats
+from meshreel.errors import InputError
+from meshreel.export.splats import write_splats
+from meshreel.format.layout import MAGIC
+from meshreel.geometry.splats import Bound, bind
+from meshreel.types import Mesh, evenly
+
+from ..carriers import Chain, alone, chains_of
+from ..datasets import Dataset
+
+COUNT, SIZE = 8000, 256  # splats, and pixels of the longer side of the body
+FITTED, VIEWS, VIEWS_ALONE = 12, 6, 16  # frames of a chain, cameras of each, and of a frame with splats of its own
+STEPS, STEPS_ALONE = 450, 200
+JUDGED = 2  # frames of those that were fitted to, and as many between these
+HELD = 4  # cameras of each
+PATH = "splat-transform"  # of npm: PlayCanvas' converter, which writes SPZ and SOG
+FLOATS = 14  # numbers of a splat with harmonics of degree 0: place 3, scale 3, rotation 4, opacity, colour 3
+
+
+@dataclass(slots=True)
+class _Found:
+    """What pictures of splats are apart from those of the originals, and what sets of splats take."""
+
+    squares: dict[str, list[float]]
+    scores: list[float]
+    sizes: list[int]
+    seconds: list[float]
+    counts: list[int]
+
+
+def splat_values(
+    known: Dataset, painted: Callable[[int], Mesh], decoded: Sequence[Mesh], numbers: Sequence[int], data: bytes
+) -> dict[str, float]:
+    """Return what splats on the decoded frames reach; `painted` has the frames in colour."""
+    count, unit = len(known.sequence), known.sequence[0].diagonal  # splats are in units of it, as in a file
+    chains = (
+        chains_of(data)
+        if data.startswith(MAGIC)
+        else [[(k, alone(mesh))] for k, mesh in zip(numbers, decoded, strict=True)]
+    )
+    chains = [[(k, replace(c, vertices=c.vertices / unit)) for k, c in chain] for chain in chains]
+    of_frame = {number: chain for chain in chains for number, _ in chain}
+    wanted = [k for k in evenly(count, JUDGED) if k in of_frame]
+    found, alone_each = (_Found({"whole": [], "exact": [], "fitted": [], "between": []}, [], [], [], []) for _ in "ab")
+    last: Bound | None = None
+    of_unit = lambda k: _scaled(painted(k), unit)  # noqa: E731
+    for chain in {id(of_frame[k]): of_frame[k] for k in wanted}.values():
+        last = _judge(chain, [k for k in wanted if k in dict(chain)], of_unit, found)
+        for k in (k for k in wanted if k in dict(chain) and len(chain) > 1):
+            _judge([(k, dict(chain)[k])], [k], of_unit, alone_each)
+    rate = known.sequence.frame_rate
+    own = _values(alone_each, count, count, rate) if alone_each.scores else {}
+    own = {f"splats_own_{name}": own[f"splats_{name}"] for name in ("psnr", "ssim") if own}
+    return _values(found, len(chains), count, rate) | own | _anchors(last, rate)
+
+
+def _judge(chain: Chain, wanted: Sequence[int], painted: Callable[[int], Mesh], found: _Found) -> Bound:
+    """Fit a chain's splats to every second frame, and judge them in some of these and in those behind them."""
+    some = chain[::2] if len(chain) > 1 else chain
+    chosen = [some[k] for k in evenly(len(some), FITTED)]
+    views, steps = (VIEWS, STEPS) if len(chosen) > 1 else (VIEWS_ALONE, STEPS_ALONE)
+    frames = [SplatFrame(carrier, _rendered(painted(k), views, GOLDEN * k)) for k, carrier in chosen]
+    start = time.process_time()
+    splats, importance = fit_splats(frames, FitSplatsOptions(COUNT, steps))
+    found.seconds.append(time.process_time() - start)
+    payload, _ = encode_splats(splats, importance)
+    coded, carriers, last = decode_splats(payload, 1 + int(splats.faces.max())), dict(chain), None
+    found.sizes.append(len(payload))
+    found.counts.append(len(splats))
+    known = np.array([k for k, _ in chosen])
+    fitted = {int(known[np.abs(known - k).argmin()]) for k in wanted}
+    between = {k + 1 for k in fitted} & carriers.keys()
+    for number in sorted(fitted | between):
+        for view in _rendered(painted(number), HELD, GOLDEN * number + ASIDE):
+            last = bind(coded, carriers[number])
+            square, score = errors(last, view)
+            found.squares["fitted" if number in fitted else "between"].append(square)
+            found.squares["whole"].append(square)
+            found.scores.append(score)
+            found.squares["exact"].append(errors(bind(splats, carriers[number]), view)[0])
+    assert last is not None
+    return last
+
+
+def _scaled(mesh: Mesh, unit: float) -> Mesh:
+    return mesh.at(mesh.vertices / unit)
+
+
+def _rendered(mesh: Mesh, views: int, turn: float) -> tuple[SplatView, ...]:
+    return rendered(mesh, ring(mesh, views, SIZE, turn))
+
+
+def _values(found: _Found, sets: int, frames: int, rate: float) -> dict[str, float]:
+    db = {name: -10 * float(np.log10(np.mean(values))) for name, values in found.squares.items() if values}
+    size = float(np.mean(found.sizes))
+    return {
+        "splats_psnr": db["whole"],
+        "splats_ssim": float(np.mean(found.scores)),
+        "splats_lost_db": db["exact"] - db["whole"],
+        "splats_fitted_psnr": db["fitted"],
+        **({"splats_between_psnr": db["between"]} if "between" in db else {}),
+        "splats_set_bytes": size,
+        "splats_sets": sets,
+        "splats_count": float(np.mean(found.counts)),
+        "splats_mbps": 8 * size * sets * rate / frames / 1e6,
+        "splats_per_frame_mbps": 8 * size * rate / 1e6,
+        "splats_fit_s": float(np.mean(found.seconds)),
+    }
+
+
+def _anchors(bound: Bound | None, rate: float) -> dict[str, float]:
+    """Return the rates of the same splats, a frame each: raw, and as SPZ and SOG where their converter is installed."""
+    assert bound is not None
+    found = {"splats_raw_mbps": 8 * 4 * FLOATS * len(bound.means) * rate / 1e6}
+    if shutil.which(PATH) is None:
+        return found
+    with tempfile.TemporaryDirectory() as folder:
+        source = Path(folder, "frame.ply")
+        write_splats(bound, source)
+        for ending in ("spz", "sog"):
+            path = Path(folder, f"frame.{ending}")
+            done = subprocess.run([PATH, "-q", "-w", "-g", "cpu", source, path], capture_output=True, check=False)
+            if done.returncode or not path.exists():
+                raise InputError(f"{PATH} cannot write {ending}: {done.stderr.decode()[-200:]}")
+            found[f"splats_{ending}_mbps"] = 8 * path.stat().st_size * rate / 1e6
+    return found

@@ -1,0 +1,253 @@
+"""Fit splats to pictures of a moving mesh: all frames share the splats, and the mesh moves them.
+
+In: the mesh in some frames, and in each cameras with their pictures on white -> splats, and how important each is. Adam
+on one picture after another; splats that nobody sees move to where errors are. Needs the extra `splats` (torch).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float32, Float64, Int32
+
+from ...errors import InputError
+from ...geometry.atlas import finer_places
+from ...geometry.cameras import PinholeCamera
+from ...geometry.splats import Carrier, Splats, locate, pose
+from .splat_raster import LEAST, Drawing, Flat, camera_matrices, project
+
+COVER = 0.45  # standard deviation of a splat in the beginning, in the root of its share of the surface (guess)
+RATES = {  # of Adam, in the units of `Splats`; logarithms of scales, and logits of opacities (guess)
+    "weights": 5e-3,
+    "offsets": 3e-4,
+    "turns": 5e-2,
+    "scales": 3e-2,
+    "opacities": 1e-1,
+    "colors": 2e-2,
+}
+LARGER, LONGER = 1.0, 0.7  # of logarithms: scales from those in the beginning, and from their mean (guess)
+LAST = 0.1  # share of the rates at the end
+FIRST_OPACITY = 0.9
+
+
+@dataclass(frozen=True, slots=True)
+class SplatView:
+    """A camera, and its picture of the surface alone, on white."""
+
+    camera: PinholeCamera
+    pixels: Float32[np.ndarray, "H W 3"]  # sRGB, 0 to 1
+
+
+@dataclass(frozen=True, slots=True)
+class SplatFrame:
+    """The mesh of a frame, and what cameras see of it."""
+
+    carrier: Carrier
+    views: tuple[SplatView, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class FitSplatsOptions:
+    """Options of the fit of splats."""
+
+    count: int = 8000
+    steps: int = 900  # pictures that are looked at, one after the other
+    moves: int = 5  # times that unseen splats move to where errors are
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.count <= 1 << 20 or self.steps < 1 or self.moves < 0:
+            raise InputError(f"{self.count} splats, {self.steps} steps: give 1 to {1 << 20} and at least 1")
+
+
+def fit_splats(
+    frames: Sequence[SplatFrame],
+    options: FitSplatsOptions = FitSplatsOptions(),
+    progress: Callable[[int], None] | None = None,
+) -> tuple[Splats, Float64[np.ndarray, " N"]]:
+    """Return splats that look like the pictures of all frames, and what each adds to these.
+
+    Raises InputError where no camera sees the surface, and without torch.
+    """
+    pictures = [(frame.carrier, view) for frame in frames for view in frame.views]
+    if not any((view.pixels < 1).any() for _, view in pictures):
+        raise InputError(f"no splats: none of {len(pictures)} pictures shows the surface; check the cameras")
+    torch = _torch()
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)  # sums have an order
+    try:
+        fit = _Fit(torch, frames, options)
+        random = np.random.default_rng(options.seed)
+        every = max(options.steps * 6 // 10 // (options.moves + 1), 1)
+        queue = list[int]()
+        for step in range(options.steps):
+            queue = queue or random.permutation(len(pictures)).tolist()
+            fit.step(*pictures[queue.pop()], step / options.steps)
+            if (step + 1) % every == 0 and (step + 1) // every <= options.moves:
+                fit.move(random)
+            if progress is not None:
+                progress(step + 1)
+        return fit.result()
+    finally:
+        torch.set_num_threads(threads)
+
+
+class _Fit:
+    """Splats that are being fitted, as tensors of torch."""
+
+    def __init__(self, torch: Any, frames: Sequence[SplatFrame], options: FitSplatsOptions) -> None:
+        self._torch, carrier = torch, frames[0].carrier
+        self._faces, weights, area = _spread(carrier, options.count)
+        count = len(self._faces)
+        self._first = float(np.log(COVER * np.sqrt(area / count)))  # logarithm of scales in the beginning
+        first = {
+            "weights": weights,
+            "offsets": np.zeros(count),
+            "turns": np.zeros(count),
+            "scales": np.full((count, 2), self._first),
+            "opacities": np.full(count, np.log(FIRST_OPACITY / (1 - FIRST_OPACITY))),
+            "colors": np.full((count, 3), 0.5),
+        }
+        self._own = {name: torch.tensor(first[name], dtype=torch.float32, requires_grad=True) for name in RATES}
+        self._adam = torch.optim.Adam(
+            [{"params": [self._own[name]], "lr": rate} for name, rate in RATES.items()], eps=1e-15
+        )
+        self._composite = _composite_function(torch)
+        self.added, self._errors = np.zeros(count), np.zeros(count)
+        self._paint(frames)
+
+    def step(self, carrier: Carrier, view: SplatView, done: float) -> None:
+        """Improve the splats by one picture; `done` is the share of the steps."""
+        torch = self._torch
+        drawing, picture = self._drawn(carrier, view.camera)
+        wanted = torch.from_numpy(view.pixels)
+        error = torch.where(wanted.isnan(), 0.0, picture - wanted)  # NaN: unknown
+        self._adam.zero_grad()
+        (error.abs().mean() + (error * error).mean()).backward()
+        for group, rate in zip(self._adam.param_groups, RATES.values(), strict=True):
+            group["lr"] = rate * LAST**done
+        self._adam.step()
+        with torch.no_grad():
+            weights = self._own["weights"].clamp_(min=0)
+            weights /= weights.sum(dim=1, keepdim=True).clamp_(min=1)
+            scales, offsets = self._own["scales"], self._own["offsets"]
+            middle = scales.mean(dim=1, keepdim=True).clamp_(self._first - LARGER, self._first + LARGER)
+            scales[:] = middle + (scales - middle).clamp_(-LONGER, LONGER)
+            offsets.clamp_(-float(np.exp(self._first)), float(np.exp(self._first)))
+        self.added += drawing.shares()
+        self._errors += drawing.shares(error.detach().abs().mean(dim=2).numpy().astype(np.float64))
+
+    def move(self, random: np.random.Generator) -> None:
+        """Move splats that add nothing to pictures to where those are that err most, which become smaller."""
+        torch, count = self._torch, len(self._faces)
+        dead = np.flatnonzero(self.added < DEAD * self.added.mean())
+        if len(dead):
+            chance = np.where(self.added > 0, self._errors, 0)
+            chance[dead] = 0
+            parents = random.choice(count, len(dead), p=chance / chance.sum())
+            self._faces[dead] = self._faces[parents]
+            with torch.no_grad():
+                for values in self._own.values():
+                    values[dead] = values[parents]
+                    for moments in self._adam.state[values].values():
+                        if moments.dim():
+                            moments[dead] = 0
+                halves = np.unique(np.concatenate([dead, parents]))
+                self._own["scales"][halves] -= np.log(1.3)
+        self.added[:], self._errors[:] = 0, 0
+
+    def result(self) -> tuple[Splats, Float64[np.ndarray, " N"]]:
+        """Return the splats, and what each added to the pictures since the last move."""
+        own = {name: values.detach().numpy().astype(np.float64) for name, values in self._own.items()}
+        scales, turns = np.exp(own["scales"]), own["turns"]
+        is_swapped = scales[:, 0] < scales[:, 1]
+        scales[is_swapped] = scales[is_swapped][:, ::-1]
+        turns = np.mod(turns + np.where(is_swapped, np.pi / 2, 0), np.pi)
+        opacities, colors = 1 / (1 + np.exp(-own["opacities"])), np.clip(own["colors"], 0, 1)
+        splats = Splats(self._faces.copy(), own["weights"], own["offsets"], turns, scales, opacities, colors)
+        kept = (opacities >= LEAST) & (self.added > 0)
+        return splats.take(kept), self.added[kept]
+
+    def _drawn(self, carrier: Carrier, camera: PinholeCamera) -> tuple[Drawing, Any]:
+        torch, own = self._torch, self._own
+        weights = own["weights"]
+        finer, now, along = locate(self._faces, weights.detach().numpy().astype(np.float64), carrier.levels)
+        moved = (weights - weights.detach())[:, :, None] * _tensor(torch, along)
+        corners = _tensor(torch, carrier.vertices[carrier.faces[finer]])
+        lengths = own["offsets"], own["turns"], own["scales"].exp(), 1.0
+        means, axes, scales = pose(
+            torch, corners, _tensor(torch, now) + moved.sum(dim=1), _tensor(torch, along), lengths
+        )
+        matrices = [_tensor(torch, matrix) for matrix in camera_matrices(camera)]
+        flat = project(torch, means, axes, scales, (matrices[0], matrices[1]))
+        opacities = torch.sigmoid(own["opacities"])
+        if carrier.lacking is not None:
+            opacities = opacities * torch.from_numpy(~carrier.lacking[finer])
+        size, drawn = (camera.height, camera.width), list[Drawing]()
+        picture = self._composite.apply(*flat.tensors, opacities, own["colors"], size, drawn)
+        return drawn[0], picture
+
+    def _paint(self, frames: Sequence[SplatFrame]) -> None:
+        """Give each splat the mean of what pictures of some frames show where it is."""
+        sums, total = np.zeros((len(self._faces), 3)), np.full(len(self._faces), 1e-9)
+        for frame in frames[:: max(len(frames) // 2, 1)]:
+            for view in frame.views:
+                drawing, _ = self._drawn(frame.carrier, view.camera)
+                known = np.isfinite(view.pixels[..., 0])
+                shown = np.where(known[..., None], view.pixels, 0).astype(np.float64)
+                sums += np.stack([drawing.shares(shown[..., k]) for k in range(3)], axis=1)
+                total += drawing.shares(known.astype(np.float64))
+        with self._torch.no_grad():
+            self._own["colors"][:] = _tensor(self._torch, sums / total[:, None])
+
+
+DEAD = 0.05  # of the mean of what splats add to pictures: less is as good as unseen (guess)
+
+
+def _composite_function(torch: Any) -> Any:
+    """Return `Drawing` as a function that torch differentiates."""
+
+    class Composite(torch.autograd.Function):
+        @staticmethod
+        def forward(context: Any, *values: Any) -> Any:
+            *tensors, size, drawn = values
+            arrays = [value.detach().numpy().astype(np.float64) for value in tensors]
+            context.drawing = Drawing(Flat(*arrays[:4]), arrays[4], arrays[5], size)
+            drawn.append(context.drawing)
+            return _tensor(torch, context.drawing.picture)
+
+        @staticmethod
+        def backward(context: Any, *given: Any) -> Any:
+            centers, conics, opacities, colors = context.drawing.gradients(given[0].numpy().astype(np.float64))
+            found = [_tensor(torch, values) for values in (centers, conics, opacities, colors)]
+            return found[0], found[1], None, None, found[2], found[3], None, None
+
+    return Composite
+
+
+def _spread(carrier: Carrier, count: int) -> tuple[Int32[np.ndarray, " N"], Float64[np.ndarray, "N 2"], float]:
+    """Return faces of the base mesh and places on them, evenly over the surface, and its area."""
+    a, b, c = np.moveaxis(carrier.vertices[carrier.faces], 1, 0)
+    areas = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
+    ends = np.cumsum(areas)
+    finer = np.searchsorted(ends, (np.arange(count) + 0.5) / count * ends[-1])
+    cut = finer_places(np.array([[[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]]), carrier.levels)
+    random = np.random.default_rng(count)  # places inside the finest faces
+    inside = random.dirichlet(np.ones(3), count)
+    weights = np.einsum("nk,nkd->nd", inside, cut[finer % len(cut)])
+    return (finer // len(cut)).astype(np.int32), weights, float(ends[-1])
+
+
+def _tensor(torch: Any, values: np.ndarray) -> Any:
+    return torch.from_numpy(np.ascontiguousarray(values, dtype=np.float32))
+
+
+def _torch() -> Any:
+    try:
+        import torch
+    except ImportError:
+        raise InputError("splats are fitted by torch: pip install 'meshreel[splats]'") from None
+    return torch

@@ -1,0 +1,168 @@
+"""Draw Gaussians: projected, sorted by depth, and composited from front to back at each pixel; with gradients.
+
+In -> out: Gaussians in space and a camera -> a picture. The work is on pairs of a pixel and a Gaussian that reaches it,
+sorted by pixel, so that no tile is padded. Sizes and limits are those of 3DGS (Kerbl et al. 2023) and of gsplat.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float32, Float64, Int64
+
+from ...geometry.cameras import PinholeCamera
+
+BLUR = 0.3  # pixels squared, added to the variances of what is drawn: no Gaussian falls between pixels
+LEAST = 1 / 255  # opacity that is drawn
+MOST = 0.999  # opacity, so that what is behind has a gradient
+SPENT = 1e-4  # share of the light, below which what is behind is not drawn
+NEAR = 1e-6  # lengths before the camera, within which nothing is drawn
+WHITE = 1.0  # the background, as of `metrics.color_render`
+
+
+@dataclass(frozen=True, slots=True)
+class Flat:
+    """Gaussians in a picture: places, inverse covariances (xx, xy, yy) and depths; arrays of NumPy or torch."""
+
+    centers: Any  # N 2, pixels
+    conics: Any  # N 3, 1 / pixels squared
+    spreads: Any  # N 2, variances along x and y, pixels squared
+    depths: Any  # N
+
+    @property
+    def tensors(self) -> tuple[Any, Any, Any, Any]:
+        """All four."""
+        return self.centers, self.conics, self.spreads, self.depths
+
+
+def project(xp: Any, means: Any, axes: Any, scales: Any, camera: tuple[Any, Any]) -> Flat:
+    """Project Gaussians, by the local affine approximation (EWA); `camera` is (3 x 4 world to camera, 3 x 3 pixels)."""
+    pose, pixels = camera
+    x, y, depths = (means @ pose[:, :3].T + pose[:, 3]).T
+    z = xp.where(depths > NEAR, depths, xp.ones_like(depths))
+    rows = (axes * scales[:, :, None]) @ pose[:, :3].T
+    right = (rows[:, :, 0] - (x / z)[:, None] * rows[:, :, 2]) / z[:, None]
+    down = (rows[:, :, 1] - (y / z)[:, None] * rows[:, :, 2]) / z[:, None]
+    across = pixels[0, 0] * right + pixels[0, 1] * down
+    below = pixels[1, 0] * right + pixels[1, 1] * down
+    xx, xy, yy = (across * across).sum(axis=1) + BLUR, (across * below).sum(axis=1), (below * below).sum(axis=1) + BLUR
+    area = xx * yy - xy * xy
+    centers = xp.stack([pixels[k, 0] * x / z + pixels[k, 1] * y / z + pixels[k, 2] for k in range(2)], axis=1)
+    conics = xp.stack([yy / area, -xy / area, xx / area], axis=1)
+    return Flat(centers, conics, xp.stack([xx, yy], axis=1), depths)
+
+
+def camera_matrices(camera: PinholeCamera) -> tuple[Float64[np.ndarray, "3 4"], Float64[np.ndarray, "3 3"]]:
+    """Return what `project` takes."""
+    return camera.extrinsic[:3], camera.intrinsic
+
+
+class Drawing:
+    """A picture of Gaussians, with what its gradients need."""
+
+    def __init__(
+        self,
+        flat: Flat,
+        opacities: Float64[np.ndarray, " N"],
+        colors: Float64[np.ndarray, "N 3"],
+        size: tuple[int, int],
+    ) -> None:
+        """Draw Gaussians on white; `size` is height and width."""
+        self._flat, self._opacities, self._colors, self.size = flat, opacities, colors, size
+        index, x, y = _pairs(flat, opacities, size)
+        self._dx, self._dy = (
+            (at + 0.5 - center[index]).astype(np.float32)
+            for at, center in ((x, flat.centers[:, 0]), (y, flat.centers[:, 1]))
+        )
+        a, b, c = (flat.conics[:, k].astype(np.float32)[index] for k in range(3))
+        power = -0.5 * (a * self._dx**2 + c * self._dy**2) - b * self._dx * self._dy
+        alphas = opacities.astype(np.float32)[index] * np.exp(power)
+        kept = np.flatnonzero(alphas >= LEAST)
+        pixels = (y * size[1] + x)[kept]
+        kept = kept[_stable_order(pixels)]
+        self._index, self._pixels, alphas = index[kept], (y * size[1] + x)[kept], alphas[kept]
+        self._dx, self._dy = self._dx[kept], self._dy[kept]
+        self._is_free = alphas < MOST  # of the upper limit
+        self._alphas = np.minimum(alphas, np.float32(MOST))
+        self._composite()
+
+    def _composite(self) -> None:
+        """Compute how much light each pair has left, what it adds, and the picture."""
+        count = self.size[0] * self.size[1]
+        logs = np.log1p(-self._alphas.astype(np.float64))
+        self._starts = np.searchsorted(self._pixels, np.arange(count + 1))
+        sums = np.concatenate([[0.0], np.cumsum(logs)])
+        left = np.exp(sums[:-1] - sums[self._starts[self._pixels]])
+        seen = np.flatnonzero(left > SPENT)
+        self._left, self._index, self._pixels = left[seen], self._index[seen], self._pixels[seen]
+        self._alphas, self._is_free = self._alphas[seen].astype(np.float64), self._is_free[seen]
+        self._dx, self._dy = self._dx[seen], self._dy[seen]
+        self._starts = np.searchsorted(self._pixels, np.arange(count + 1))
+        self.weights = self._alphas * self._left
+        self._rest = 1 - np.bincount(self._pixels, self.weights, count)
+        own = self._colors[self._index]
+        channels = [np.bincount(self._pixels, self.weights * own[:, k], count) + WHITE * self._rest for k in range(3)]
+        self.picture: Float64[np.ndarray, "H W 3"] = np.stack(channels, axis=1).reshape(*self.size, 3)
+
+    def shares(self, values: Float64[np.ndarray, "H W"] | None = None) -> Float64[np.ndarray, " N"]:
+        """Return the sum, over all pixels, of what each Gaussian adds to a pixel, times a value of the pixel."""
+        weights = self.weights if values is None else self.weights * values.reshape(-1)[self._pixels]
+        return np.bincount(self._index, weights, len(self._opacities))
+
+    def gradients(self, of_picture: Float64[np.ndarray, "H W 3"]) -> tuple[np.ndarray, ...]:
+        """Return the gradients of centers, conics, opacities and colours from that of the picture."""
+        n, index, flat = len(self._opacities), self._index, self._flat
+        given = of_picture.reshape(-1, 3)
+        here = given[self._pixels]
+        gains = (here * self._colors[index]).sum(axis=1)
+        added = np.concatenate([[0.0], np.cumsum(self.weights * gains)])
+        behind = (
+            added[self._starts[self._pixels + 1]] - added[1:] + (WHITE * self._rest * given.sum(axis=1))[self._pixels]
+        )
+        alphas = (self._left * gains - behind / (1 - self._alphas)) * self._is_free
+        powers = alphas * self._alphas
+        a, b, c = (flat.conics[index, k] for k in range(3))
+        dx, dy = self._dx, self._dy
+        columns = (a * dx + b * dy, b * dx + c * dy, -0.5 * dx * dx, -dx * dy, -0.5 * dy * dy)
+        sums = [np.bincount(index, powers * column, n) for column in columns]
+        opacities = np.bincount(index, powers, n) / np.maximum(self._opacities, LEAST)
+        colors = [np.bincount(index, self.weights * here[:, k], n) for k in range(3)]
+        return np.stack(sums[:2], axis=1), np.stack(sums[2:], axis=1), opacities, np.stack(colors, axis=1)
+
+
+def _pairs(
+    flat: Flat, opacities: Float64[np.ndarray, " N"], size: tuple[int, int]
+) -> tuple[Int64[np.ndarray, " P"], Int64[np.ndarray, " P"], Int64[np.ndarray, " P"]]:
+    """Return the Gaussian, column and row of each pixel of the boxes that Gaussians reach, from the nearest on."""
+    reach = np.sqrt(2 * np.log(np.maximum(opacities / LEAST, 1))[:, None] * flat.spreads)
+    limits = np.array([size[1], size[0]])
+    low = np.clip(np.ceil(flat.centers - reach - 0.5), 0, limits).astype(np.int64)
+    high = np.clip(np.floor(flat.centers + reach - 0.5) + 1, 0, limits).astype(np.int64)
+    sides = np.maximum(high - low, 0)
+    counts = np.where((flat.depths > NEAR) & (opacities >= LEAST), sides[:, 0] * sides[:, 1], 0)
+    order = np.argsort(flat.depths, kind="stable")
+    order = order[counts[order] > 0]
+    index = np.repeat(order, counts[order])
+    ends = np.cumsum(counts[order])
+    within = np.arange(len(index)) - np.repeat(ends - counts[order], counts[order])
+    rows = within // sides[index, 0]
+    return index, low[index, 0] + within - rows * sides[index, 0], low[index, 1] + rows
+
+
+def _stable_order(pixels: Int64[np.ndarray, " P"]) -> Int64[np.ndarray, " P"]:
+    """Return a stable order by pixel: by radix, which NumPy has for 16 bits."""
+    order = np.argsort((pixels & 0xFFFF).astype(np.uint16), kind="stable")
+    if pixels.max(initial=0) > 0xFFFF:
+        order = order[np.argsort((pixels >> 16).astype(np.uint16)[order], kind="stable")]
+    return order
+
+
+def draw(
+    bound: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray], camera: PinholeCamera
+) -> Float32[np.ndarray, "H W 3"]:
+    """Return the picture of Gaussians on white: their means, axes, scales, opacities and colours, sRGB, 0 to 1."""
+    means, axes, scales, opacities, colors = bound
+    flat = project(np, means, axes, scales, camera_matrices(camera))
+    return Drawing(flat, opacities, colors, (camera.height, camera.width)).picture.astype(np.float32)

@@ -1,0 +1,206 @@
+"""Encode splats: flat Gaussians on the faces of a base mesh, which move with it through all groups of a chain.
+
+In -> out: splats <-> bytes, each layer a byte range, the most important splats first. In a layer, splats are in the
+order of their faces, so that neighbours are alike.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import accumulate, pairwise
+
+import numpy as np
+
+from ...errors import FormatError, InputError
+from ...format.budget import check_cost, splats_cost
+from ...format.layout import Form, Gaussians, GaussiansLayer
+from ...format.records import pack, unpack
+from ...geometry.splats import Splats, locate
+from ...shapes import Float64, Int64
+from ..entropy import decode_integers, encode_integers
+from ..steps import RUNGS, rung_of, step_of
+
+ROUND = 1.1  # ratio of scales up to which a splat counts as round, whose angle is 0 (guess): nobody sees it
+MOST_BITS = 14  # of a number of a splat
+
+
+@dataclass(frozen=True, slots=True)
+class SplatCodingOptions:
+    """Options of the coding of splats."""
+
+    place_bits: int = 7  # of the weights of a face's corners
+    turn_bits: int = 6
+    opacity_bits: int = 6
+    color_bits: int = 7
+    offset_step: float = 1e-4  # normalised: .2 mm on a person
+    layers: tuple[float, ...] = (0.125, 0.5, 1.0)  # share of the splats that the first k layers have
+
+    def __post_init__(self) -> None:
+        bits = (self.place_bits, self.turn_bits, self.opacity_bits, self.color_bits)
+        if not all(1 <= some <= MOST_BITS for some in bits) or not 0 < self.offset_step < 1:
+            raise InputError(f"bits {bits}, offset step {self.offset_step:g}: give 1 to {MOST_BITS}, and 0 to 1")
+        if not self.layers or self.layers[-1] != 1 or min(np.diff((0.0, *self.layers))) <= 0:
+            raise InputError(f"layers {self.layers}: give shares that rise from above 0 to 1")
+
+
+def encode_splats(
+    splats: Splats, importance: Float64[np.ndarray, " N"], options: SplatCodingOptions = SplatCodingOptions()
+) -> tuple[bytes, tuple[int, ...]]:
+    """Encode splats; return the payload and where its layers end. Raises InputError for values that have no code."""
+    _check_input(splats, importance)
+    o, rungs = options, _rungs(splats.scales)
+    middle = int(np.median(rungs[:, 0]))
+    bits = (o.place_bits, o.turn_bits, o.opacity_bits, o.color_bits)
+    head = Gaussians(Form.GAUSSIANS, *bits, rung_of(o.offset_step), middle, len(splats))
+    parts = [pack(head)]
+    for number, chosen in enumerate(_layers(splats, importance, options.layers)):
+        record = pack(_encode_layer(splats.take(chosen), head))
+        parts = [parts[0] + record] if number == 0 else [*parts, record]
+    return b"".join(parts), tuple(accumulate(map(len, parts)))
+
+
+def decode_splats(data: bytes, faces: int) -> Splats:
+    """Decode the splats of a payload, or of its first layers, on a base mesh of so many faces.
+
+    The fewer they are, the larger they become. Raises FormatError where the bytes are damaged, and CostlyError where
+    they have more splats than they may.
+    """
+    head, offset = unpack(Gaussians, data)
+    bits = (head.place_bits, head.turn_bits, head.opacity_bits, head.color_bits)
+    if head.form != Form.GAUSSIANS or not all(1 <= some <= MOST_BITS for some in bits) or head.offset_level >= RUNGS:
+        raise FormatError(f"splats of form {head.form}, bits {bits} and offset level {head.offset_level}")
+    found, total = list[Splats](), 0
+    while offset < len(data) or not found:
+        record, offset = unpack(GaussiansLayer, data, offset)
+        total += record.count
+        check_cost(splats_cost(total), len(data), "splats")
+        found.append(_decode_layer(record, head, faces))
+    if total > head.count:
+        raise FormatError(f"{total} splats of {head.count}")
+    splats = Splats(*(np.concatenate([getattr(some, name) for some in found]) for name in Splats.__slots__))
+    return replace(splats, scales=splats.scales * math.sqrt(math.sqrt(head.count / total)))
+
+
+def _encode_layer(splats: Splats, head: Gaussians) -> GaussiansLayer:
+    """Encode the splats of a layer; they are in the order of their faces."""
+    size, rungs = 1 << head.place_bits, _rungs(splats.scales)
+    places = _on_lattice(splats.weights, size)
+    turns = np.rint(splats.turns / np.pi * (1 << head.turn_bits)).astype(np.int64) % (1 << head.turn_bits)
+    turns[splats.scales[:, 0] < ROUND * splats.scales[:, 1]] = 0
+    opacities = np.rint(splats.opacities * (1 << head.opacity_bits))
+    red, green, blue = splats.colors.T
+    differences = red - blue, green - (red + blue) / 2
+    colors = np.rint(
+        np.stack([(red + blue) / 4 + green / 2, *(some / 2 for some in differences)]) * 2.0**head.color_bits
+    )
+    return GaussiansLayer(
+        len(splats),
+        _packed(np.diff(splats.faces, prepend=0)),
+        _packed(places.T),
+        _packed(np.rint(splats.offsets / step_of(head.offset_level))),
+        _packed(turns),
+        _packed([rungs[:, 0] - head.scale_level, rungs[:, 1] - rungs[:, 0]]),
+        _packed(opacities),
+        _packed(np.diff(colors, axis=1, prepend=0)),
+    )
+
+
+def _decode_layer(record: GaussiansLayer, head: Gaussians, count: int) -> Splats:
+    n, size = record.count, 1 << head.place_bits
+    if n == 0:
+        raise FormatError("splats: a layer without any")
+    faces = np.cumsum(_unpacked(record.faces, n)[0])
+    places = _unpacked(record.places, n, 2)
+    offsets, turns = _unpacked(record.offsets, n)[0], _unpacked(record.turns, n)[0]
+    longer, shorter = _unpacked(record.scales, n, 2)
+    opacities = _unpacked(record.opacities, n)[0]
+    luma, orange, green = np.cumsum(_unpacked(record.colors, n, 3), axis=1) / 2.0**head.color_bits
+    rungs = np.stack([longer + head.scale_level, longer + head.scale_level + shorter], axis=1)
+    limits = (
+        (faces, count - 1, "face"),
+        (places, size, "weight"),
+        (places.sum(axis=0), size, "sum of weights"),
+        (turns, (1 << head.turn_bits) - 1, "angle"),
+        (shorter, RUNGS - 1, "ratio of scales"),
+        (rungs, RUNGS - 1, "scale"),
+        (opacities, 1 << head.opacity_bits, "opacity"),
+    )
+    for values, most, what in limits:
+        if values.min() < 0 or values.max() > most:
+            raise FormatError(f"splats: {what} {values.min()} to {values.max()}, beyond 0 to {most}")
+    blend = luma - green, luma + green
+    colors = np.stack([blend[0] + orange, blend[1], blend[0] - orange], axis=1)
+    return Splats(
+        faces.astype(np.int32),
+        places.T / size,
+        offsets * step_of(head.offset_level),
+        turns * (np.pi / (1 << head.turn_bits)),
+        _STEPS[rungs],
+        opacities / (1 << head.opacity_bits),
+        np.clip(colors, 0, 1),
+    )
+
+
+_STEPS = np.array([step_of(rung) for rung in range(RUNGS)])
+
+
+def _packed(values: object) -> bytes:
+    return encode_integers(np.asarray(values).reshape(-1).astype(np.int32))
+
+
+def _unpacked(data: bytes, count: int, rows: int = 1) -> Int64[np.ndarray, "R N"]:
+    return decode_integers(data, rows * count).reshape(rows, count).astype(np.int64)
+
+
+def _rungs(scales: Float64[np.ndarray, "N 2"]) -> Int64[np.ndarray, "N 2"]:
+    """Return the levels of scales, which must not be 0; that of the shorter is not less."""
+    rungs = np.clip(np.rint(-8 * np.log2(scales)), 0, RUNGS - 1).astype(np.int64)
+    return np.maximum.accumulate(rungs, axis=1)
+
+
+def _on_lattice(weights: Float64[np.ndarray, "N 2"], size: int) -> Int64[np.ndarray, "N 2"]:
+    """Return weights as integers that are 0 to `size`, and whose sum is."""
+    places = np.clip(np.rint(weights * size), 0, size).astype(np.int64)
+    places[:, 1] = np.minimum(places[:, 1], size - places[:, 0])
+    return places
+
+
+def _layers(
+    splats: Splats, importance: Float64[np.ndarray, " N"], shares: Sequence[float]
+) -> list[Int64[np.ndarray, " _"]]:
+    """Return the splats of each layer, in the order of their places.
+
+    Layers are spread evenly over the surface: of splats that are neighbours in that order, the most important is first.
+    """
+    order = _by_place(splats)
+    n, rank = len(order), np.empty(len(order))
+    run = max(round(shares[-1] / shares[0]), 1)  # neighbours of which one is in the first layer
+    for start in range(0, n, run):
+        some = importance[order[start : start + run]]
+        rank[start : start + len(some)][np.argsort(-some, kind="stable")] = np.arange(len(some))
+    by_rank = np.argsort(rank, kind="stable")
+    bounds = [0, *(max(round(share * n), 1) for share in shares)]
+    parts = (np.sort(by_rank[a:b]) for a, b in pairwise(bounds) if b > a)
+    return [order[part] for part in parts]
+
+
+def _by_place(splats: Splats) -> Int64[np.ndarray, " N"]:
+    """Return the order of splats by face, and in a face by the face that they have after four subdivisions."""
+    return np.argsort(locate(splats.faces, splats.weights, 4)[0], kind="stable")
+
+
+def _check_input(splats: Splats, importance: Float64[np.ndarray, " N"]) -> None:
+    if len(splats) == 0:
+        raise InputError("no splats: give at least one")
+    for name in (*Splats.__slots__, "importance"):
+        values = importance if name == "importance" else getattr(splats, name)
+        wrong = ~np.isfinite(values).reshape(len(splats), -1).all(axis=1)
+        if wrong.any():
+            raise InputError(f"splat {int(wrong.argmax())}: {name} {values[wrong.argmax()]}; give finite numbers")
+    outside = (splats.scales <= 0).any(axis=1) | (splats.opacities < 0) | (splats.opacities > 1)
+    if outside.any():
+        k = int(outside.argmax())
+        text = f"splat {k}: scales {splats.scales[k]}, opacity {splats.opacities[k]:g}"
+        raise InputError(f"{text}; give scales above 0 and opacities of 0 to 1")

@@ -1,0 +1,120 @@
+"""Splats on a mesh: flat Gaussians at places of a base mesh's faces, and where they are when the mesh has moved.
+
+In: splats, and the mesh of a frame after any number of subdivisions. Out: Gaussians in space. A place inside a face of
+the base mesh is found on each finer mesh, so that every layer of a group has the splats.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..shapes import Bool, Float64, Int32, Int64
+
+THIN = 0.1  # third scale, along the normal, of the shorter one (guess): surfaces are thin
+
+
+@dataclass(frozen=True, slots=True)
+class Splats:
+    """Gaussians on the faces of a base mesh; lengths are normalised."""
+
+    faces: Int32[np.ndarray, " N"]  # of the base mesh
+    weights: Float64[np.ndarray, "N 2"]  # of the second and third corner of the face; the first has the rest of 1
+    offsets: Float64[np.ndarray, " N"]  # from the face, along its normal
+    turns: Float64[np.ndarray, " N"]  # rad, of the longer axis from the face's first edge, about its normal
+    scales: Float64[np.ndarray, "N 2"]  # standard deviations along the longer axis and the shorter
+    opacities: Float64[np.ndarray, " N"]  # 0 to 1
+    colors: Float64[np.ndarray, "N 3"]  # red, green, blue, sRGB, 0 to 1
+
+    def __len__(self) -> int:
+        return len(self.faces)
+
+    def take(self, chosen: Int64[np.ndarray, " M"] | Bool[np.ndarray, " N"]) -> Splats:
+        """Return some of the splats."""
+        return Splats(*(getattr(self, name)[chosen] for name in self.__slots__))
+
+
+@dataclass(frozen=True, slots=True)
+class Bound:
+    """Gaussians in space, in a frame."""
+
+    means: Float64[np.ndarray, "N 3"]
+    axes: Float64[np.ndarray, "N 3 3"]  # rows: along the longer scale, the shorter, and the normal; right-handed
+    scales: Float64[np.ndarray, "N 3"]  # standard deviations along these
+    opacities: Float64[np.ndarray, " N"]  # 0 to 1; 0 where the frame lacks the face
+    colors: Float64[np.ndarray, "N 3"]  # sRGB, 0 to 1
+
+    @staticmethod
+    def join(parts: Sequence[Bound]) -> Bound:
+        """Return all Gaussians of at least one part, one behind the other."""
+        return Bound(*(np.concatenate([getattr(part, name) for part in parts]) for name in Bound.__slots__))
+
+
+@dataclass(frozen=True, slots=True)
+class Carrier:
+    """The mesh of a frame that carries splats: the base mesh after some subdivisions."""
+
+    vertices: Float64[np.ndarray, "V 3"]
+    faces: Int32[np.ndarray, "F 3"]
+    levels: int  # midpoint subdivisions of the base mesh
+    lacking: Bool[np.ndarray, " F"] | None = None  # faces that the frame lacks
+    unit: float = 1.0  # what lengths of splats count, in the unit of the vertices
+
+
+def bind(splats: Splats, carrier: Carrier) -> Bound:
+    """Return the splats in a frame; one on a face that the frame lacks, or without area, is transparent."""
+    finer, weights, along = locate(splats.faces, splats.weights, carrier.levels)
+    corners, own = carrier.vertices[carrier.faces[finer]], (splats.offsets, splats.turns, splats.scales, carrier.unit)
+    means, axes, scales = pose(np, corners, weights, along, own)
+    is_there = axes.any(axis=2).all(axis=1)
+    if carrier.lacking is not None:
+        is_there &= ~carrier.lacking[finer]
+    return Bound(means, axes, scales, np.where(is_there, splats.opacities, 0.0), splats.colors)
+
+
+def pose(xp: Any, corners: Any, weights: Any, along: Any, own: tuple[Any, Any, Any, float]) -> tuple[Any, Any, Any]:
+    """Return means, axes and scales of splats, from the corners of their faces; `xp` is NumPy, or torch.
+
+    `own` are their offsets, turns and scales, and the unit of these. Axes on a face without area are 0.
+    """
+    offsets, turns, scales, unit = own
+    first = _unit(xp, (along[:, 0, :, None] * corners).sum(axis=1))
+    normals = _unit(xp, _cross(xp, corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
+    second = _cross(xp, normals, first)
+    means = (weights[:, :, None] * corners).sum(axis=1) + unit * offsets[:, None] * normals
+    cosines, sines = xp.cos(turns)[:, None], xp.sin(turns)[:, None]
+    axes = xp.stack([cosines * first + sines * second, cosines * second - sines * first, normals], axis=1)
+    return means, axes, unit * xp.stack([scales[:, 0], scales[:, 1], THIN * scales[:, 1]], axis=1)
+
+
+def locate(
+    faces: Int32[np.ndarray, " N"], weights: Float64[np.ndarray, "N 2"], levels: int
+) -> tuple[Int64[np.ndarray, " N"], Float64[np.ndarray, "N 3"], Float64[np.ndarray, "N 2 3"]]:
+    """Return places on a base mesh as places on the mesh after so many subdivisions.
+
+    These are the faces, the weights of their corners, and how these weights change with the second and the third one.
+    """
+    finer, along = faces.astype(np.int64), np.tile(np.array([[-1.0, 1.0, 0.0], [-1.0, 0.0, 1.0]]), (len(faces), 1, 1))
+    own = np.column_stack([1 - weights.sum(axis=1), weights])
+    for _ in range(levels):
+        largest = own.argmax(axis=1)
+        is_inner = own.max(axis=1, initial=0) < 0.5
+        own, along = 2 * own, 2 * along
+        own[np.arange(len(own)), largest] -= 1  # faces (a, ab, ca), (ab, b, bc), (ca, bc, c)
+        own[is_inner, largest[is_inner]] += 1
+        own[is_inner] = 1 - own[is_inner][:, [2, 0, 1]]  # (ab, bc, ca)
+        along[is_inner] = -along[is_inner][:, :, [2, 0, 1]]
+        finer = 4 * finer + np.where(is_inner, 3, largest)
+    return finer, own, along
+
+
+def _cross(xp: Any, a: Any, b: Any) -> Any:
+    return xp.stack([a[:, i] * b[:, j] - a[:, j] * b[:, i] for i, j in ((1, 2), (2, 0), (0, 1))], axis=1)
+
+
+def _unit(xp: Any, vectors: Any) -> Any:
+    squares = (vectors * vectors).sum(axis=1)
+    return vectors / xp.sqrt(xp.where(squares > 0, squares, xp.ones_like(squares)))[:, None]
