@@ -1,0 +1,58 @@
+// Splats as the GPU takes them; what types.ts says of PackedSplats.
+
+import type { DecodedGroup } from "./decoded.ts";
+import { locate } from "./splats.ts";
+import type { Located, Splats } from "./splats.ts";
+import { stepOf } from "./steps.ts";
+import { SPLATS_WIDTH, SPLAT_WEIGHT, SPLAT_WORDS } from "../types.ts";
+import type { PackedSplats } from "../types.ts";
+
+const [LARGEST, FAR] = [1 / 20, 3]; // share of scales that reach leaves out, and how many of the largest other it is (guess)
+const FULL_TURN = 1 << 16;
+
+/** Splats of a group whose base mesh was subdivided `levels` times; `scale`: metres of a normalised length. */
+export function packSplats(splats: Splats, group: DecodedGroup, levels: number, scale: number): PackedSplats {
+  const count = splats.faces.length;
+  const lacking: number[] = []; // words
+  const own = new Uint32Array(SPLAT_WORDS * count);
+  const floats = new Float32Array(own.buffer);
+  for (let k = 0; k < count; k++) {
+    const { face, weights, along } = locate(splats, k, levels);
+    const [first, isBack] = firstEdge(along);
+    const [a, b, c] = [0, 1, 2].map((corner) => (first + corner) % 3);
+    const turn = Math.round((splats.turns[k] / (2 * Math.PI)) * FULL_TURN + (isBack ? FULL_TURN / 2 : 0)) % FULL_TURN;
+    const at = SPLAT_WORDS * k;
+    [a, b, c].forEach((corner, n) => (own[at + n] = group.faces[3 * face + corner]));
+    own[at + 3] = Math.round(SPLAT_WEIGHT * weights[b]) | (Math.round(SPLAT_WEIGHT * weights[c]) << 16);
+    floats[at + 4] = scale * splats.offsets[k];
+    own[at + 5] = turn | (splats.levels[2 * k] << 16) | (splats.levels[2 * k + 1] << 24);
+    own[at + 6] = [0, 1, 2].reduce((sum, d) => sum | (byteOf(splats.colors[3 * k + d]) << (8 * d)), byteOf(splats.opacities[k]) << 24);
+    const bits = lackingBits(group, face);
+    own[at + 7] = bits === null ? 0 : own.length + lacking.length;
+    if (bits !== null) lacking.push(...bits);
+  }
+  const words = new Uint32Array(4 * SPLATS_WIDTH * Math.ceil((own.length + lacking.length) / (4 * SPLATS_WIDTH)));
+  words.set(own);
+  words.set(lacking, own.length);
+  const unit = scale * splats.growth;
+  const longer = splats.levels.filter((_, k) => k % 2 === 0).sort();
+  return { count, words, unit, reach: FAR * unit * stepOf(longer[Math.floor(LARGEST * count)]) };
+}
+
+/** The corner that an edge of the face begins at which has the direction of the base face's first edge, and whether it goes the other way. */
+function firstEdge(along: Located["along"]): [number, boolean] {
+  const first = (along.indexOf(0) + 1) % 3;
+  return [first, along[first] > 0];
+}
+
+/** A bit for each frame that lacks a face; null where none does. */
+function lackingBits({ frameCount, faces, dropped }: DecodedGroup, face: number): number[] | null {
+  if (dropped === null) return null;
+  const bits = new Array<number>(Math.ceil(frameCount / 32)).fill(0);
+  for (let t = 0; t < frameCount; t++) if (dropped[(t * faces.length) / 3 + face]) bits[t >> 5] |= 1 << (t & 31);
+  return bits.some((word) => word !== 0) ? bits : null;
+}
+
+function byteOf(value: number): number {
+  return Math.round(255 * value);
+}
