@@ -33,6 +33,7 @@ export interface PartUniforms {
   readonly next: IUniform<number>;
   readonly behind: IUniform<number>;
   readonly blend: IUniform<number>;
+  readonly reach: IUniform<number>;
 }
 
 export function makeUniforms(): PartUniforms {
@@ -49,6 +50,7 @@ export function makeUniforms(): PartUniforms {
     next: { value: 0 },
     behind: { value: 0 },
     blend: { value: 0 },
+    reach: { value: 0 },
   };
 }
 
@@ -57,14 +59,15 @@ export interface Paint {
   readonly color: Vector;
 }
 
-/** What is drawn beside the surface; both need the feed `corner`. */
+/** What is drawn beside the surface; the first two need the feed `corner`. */
 export interface Extras {
   readonly edges: boolean;
   readonly places: boolean; // of corners, in a texture
+  readonly beneath: boolean; // splats are drawn in its place: all but patches gives its depth alone
 }
 
 /** A material whose values are `uniforms`: changes of them take effect at once. */
-export function surfaceMaterial(feed: Feed, { edges, places }: Extras, look: Look, uniforms: PartUniforms, paint: Paint): RawShaderMaterial {
+export function surfaceMaterial(feed: Feed, { edges, places, beneath }: Extras, look: Look, uniforms: PartUniforms, paint: Paint): RawShaderMaterial {
   return new RawShaderMaterial({
     name: `meshreel ${feed}`,
     glslVersion: GLSL3,
@@ -76,6 +79,7 @@ export function surfaceMaterial(feed: Feed, { edges, places }: Extras, look: Loo
       TRACKS_MODE: MODES.indexOf("tracks"),
       ...(edges ? { EDGES: 1 } : {}),
       ...(places ? { PLACES: 1, PLACE_SCALE } : {}),
+      ...(beneath ? { BENEATH: 1 } : {}),
     },
     uniforms: {
       ...look,
@@ -85,20 +89,22 @@ export function surfaceMaterial(feed: Feed, { edges, places }: Extras, look: Loo
       edgeColor: { value: EDGE_COLOR },
     },
     side: DoubleSide,
+    ...(beneath ? { transparent: true, premultipliedAlpha: true } : {}), // so that it comes behind all that is opaque
   });
 }
 
-/** The materials of a part, by what is drawn: with edges or without, textured or not. */
+/** The materials of a part, by what is drawn: with edges or without, textured or not, beneath splats or not. */
 export class Materials {
   readonly #all: readonly RawShaderMaterial[];
 
   /** `feed`: of what has neither. */
   constructor(feed: Feed, look: Look, uniforms: PartUniforms, paint: Paint) {
-    this.#all = [0, 1, 2, 3].map((k) => surfaceMaterial(k === 0 ? feed : "corner", { edges: (k & 1) !== 0, places: (k & 2) !== 0 }, look, uniforms, paint));
+    const extras = Array.from({ length: 8 }, (_, k): Extras => ({ edges: (k & 1) !== 0, places: (k & 2) !== 0, beneath: (k & 4) !== 0 }));
+    this.#all = extras.map((some) => surfaceMaterial(some.edges || some.places ? "corner" : feed, some, look, uniforms, paint));
   }
 
-  of({ edges, places }: Extras): RawShaderMaterial {
-    return this.#all[(edges ? 1 : 0) + (places ? 2 : 0)];
+  of({ edges, places, beneath }: Extras): RawShaderMaterial {
+    return this.#all[(edges ? 1 : 0) + (places ? 2 : 0) + (beneath ? 4 : 0)];
   }
 
   dispose(): void {

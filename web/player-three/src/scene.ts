@@ -9,6 +9,7 @@ import { MODES } from "./modes.ts";
 import type { Mode } from "./modes.ts";
 import { Part } from "./part.ts";
 import { triangleCount } from "./ranges.ts";
+import { Sorter } from "./sorter.ts";
 import { Upload } from "./upload.ts";
 import { Warmer } from "./warmer.ts";
 
@@ -24,10 +25,14 @@ export class ReelScene extends Group {
   readonly #background = new Part("attribute", this.#look, { clay: BACKGROUND_CLAY, color: BACKGROUND_COLOR });
   readonly #warmer = new Warmer(this.#look);
   #renderer: WebGLRenderer | null = null;
+  readonly #sorter: Sorter;
+  #mode: Mode = "shaded";
   #triangles = 0;
 
-  constructor() {
+  /** `sorter` orders splats; without one that has a worker the page does, which takes it some milliseconds a picture. It is not disposed of. */
+  constructor(sorter = new Sorter(null)) {
     super();
+    this.#sorter = sorter;
     this.#background.renderOrder = 1; // most of it is hidden behind what moves
     this.add(this.#background);
   }
@@ -36,7 +41,7 @@ export class ReelScene extends Group {
   get gpuBytes(): number {
     let bytes = 0;
     for (const upload of this.#uploads.values()) bytes += upload.bytes;
-    for (const part of this.#parts()) bytes += part.imageBytes;
+    for (const part of this.#parts()) bytes += part.ownBytes;
     return bytes;
   }
 
@@ -45,15 +50,24 @@ export class ReelScene extends Group {
     return this.#triangles;
   }
 
+  /** Splats of the last picture given to `show`, of each track. */
+  get splats(): readonly number[] {
+    return this.#tracks.map(({ splatCount }) => splatCount);
+  }
+
   /** How surfaces look. To be seen from the next `show` on. */
   get mode(): Mode {
-    return MODES[this.#look.mode.value];
+    return this.#mode;
   }
 
   set mode(mode: Mode) {
     if (mode === this.mode) return;
-    this.#look.mode.value = MODES.indexOf(mode);
-    for (const part of this.#parts()) part.edges = this.#edges;
+    this.#mode = mode;
+    this.#look.mode.value = MODES.indexOf(mode === "splats" ? "color" : mode);
+    for (const part of this.#parts()) {
+      part.edges = this.#edges;
+      part.withSplats = mode === "splats";
+    }
     if (!this.#edges) for (const upload of this.#uploads.values()) upload.dropEdges();
   }
 
@@ -71,7 +85,7 @@ export class ReelScene extends Group {
     this.#listen(renderer);
     checkSize(packed, renderer);
     const upload = this.#uploadOf(packed);
-    this.#warmer.warm(upload, this.#edges, renderer);
+    this.#warmer.warm(upload, this.#mode, renderer);
     return upload;
   }
 
@@ -129,8 +143,9 @@ export class ReelScene extends Group {
 
   #addTrack(): void {
     const track = this.#tracks.length;
-    const part = new Part("texture", this.#look, { clay: trackClay(track), color: trackColor(track) });
+    const part = new Part("texture", this.#look, { clay: trackClay(track), color: trackColor(track) }, this.#sorter);
     part.edges = this.#edges;
+    part.withSplats = this.#mode === "splats";
     this.#tracks.push(part);
     this.add(part);
   }
@@ -144,7 +159,7 @@ export class ReelScene extends Group {
 
   #refill = (): void => {
     if (this.#renderer === null) return;
-    for (const upload of this.#uploads.values()) this.#warmer.warm(upload, this.#edges, this.#renderer);
+    for (const upload of this.#uploads.values()) this.#warmer.warm(upload, this.#mode, this.#renderer);
   };
 }
 

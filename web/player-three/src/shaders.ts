@@ -3,14 +3,14 @@
 /** Where a vertex comes from: an attribute; the texture at gl_VertexID; the texture at an attribute, corner by corner. */
 export type Feed = "attribute" | "texture" | "corner";
 
-const PRECISION = /* glsl */ `
+export const PRECISION = /* glsl */ `
 precision highp float;
 precision highp int;
 precision highp sampler2D;
 precision highp usampler2D;
 `;
 
-const POSITION = /* glsl */ `
+export const POSITION = /* glsl */ `
 uniform vec3 boxMinimum;
 uniform vec3 boxSize;
 
@@ -19,7 +19,7 @@ vec3 positionOf(uvec4 texel) {
 }
 `;
 
-const NORMAL = /* glsl */ `
+export const NORMAL = /* glsl */ `
 vec3 normalOf(uvec4 texel) {
   vec2 code = vec2(float(texel.w & 255u), float(texel.w >> 8u)) / 127.5 - 1.0;
   vec3 n = vec3(code, 1.0 - abs(code.x) - abs(code.y));
@@ -46,7 +46,7 @@ vec3 readColor(int vertex) { return rgba.rgb; }
 
 // here and next: the texels of vertex 0 in the two frames between which `blend` lies; behind: added to the number of a vertex that
 // does not move.
-const FROM_TEXTURE = /* glsl */ `
+export const FROM_TEXTURE = /* glsl */ `
 uniform usampler2D vertices;
 uniform sampler2D colors;
 uniform int movingCount;
@@ -114,6 +114,10 @@ out vec2 texturePlace;
 #ifdef EDGES
 out vec3 barycentric;
 #endif
+#ifdef BENEATH
+uniform float reach; // m: how far behind itself a surface hides splats
+flat out int isBeneath;
+#endif
 
 void main() {
   int vertex = vertexNumber();
@@ -122,6 +126,11 @@ void main() {
   vec4 seen = modelViewMatrix * vec4(scenePosition, 1.0);
   toEye = -(seen.xyz * mat3(modelViewMatrix));
   gl_Position = projectionMatrix * seen;
+#ifdef BENEATH
+  isBeneath = vertex < movingCount ? 1 : 0;
+  vec4 pushed = projectionMatrix * vec4(seen.xy, seen.z - reach * length(modelViewMatrix[0]), 1.0);
+  if (isBeneath == 1 && gl_Position.w > 0.0) gl_Position.z = pushed.z / pushed.w * gl_Position.w;
+#endif
 #ifdef PLACES
   texturePlace = place / float(PLACE_SCALE);
 #endif
@@ -156,6 +165,9 @@ in vec2 texturePlace;
 #endif
 #ifdef EDGES
 in vec3 barycentric;
+#endif
+#ifdef BENEATH
+flat in int isBeneath;
 #endif
 out vec4 fragment;
 
@@ -197,6 +209,9 @@ void main() {
   result = mix(result, edgeColor, edge());
 #endif
   fragment = vec4(result, 1.0);
+#ifdef BENEATH
+  if (isBeneath == 1) fragment = vec4(0.0); // only its depth: premultiplied
+#endif
 }
 `;
 
