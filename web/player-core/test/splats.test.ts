@@ -7,7 +7,8 @@ import { beforeAll, expect, test } from "vitest";
 import { ChunkDecoder } from "../src/decode/chunk_decoder.ts";
 import { Video } from "../src/decode/decoder.ts";
 import type { Tools } from "../src/decode/group.ts";
-import type { Bound } from "../src/decode/splats.ts";
+import { checkShowable } from "../src/decode/pack_splats.ts";
+import type { Bound, Splats } from "../src/decode/splats.ts";
 import { decodeSplats } from "../src/decode/splats.ts";
 import { FormatError } from "../src/errors.ts";
 import { LIMITS } from "../src/format/layout.gen.ts";
@@ -107,6 +108,17 @@ test("what is changed in their bytes is refused in words, or decoded; what is cu
     else expect(() => decodeSplats(tools.core, data.subarray(0, end), faces)).toThrow(FormatError);
   }
   expect(() => decodeSplats(tools.core, data, Math.max(...whole.faces))).toThrow(/^splat \d+: /);
+});
+
+test("more splats than can be shown are refused, and their group is shown without", () => {
+  const many = { faces: { length: (1 << 22) + 1 } } as unknown as Splats;
+  expect(() => checkShowable(many)).toThrow("4194305 splats: over 4194304");
+  const job = jobOf(HEAD, HEAD.chunks[0], FILE);
+  job.companions[0].payload[job.companions[0].payload.length - 1] ^= 1;
+  const damage: string[] = [];
+  const shown = new ChunkDecoder(tools).decode(job, ({ message }) => damage.push(message)) as PackedGroup;
+  expect(damage).toEqual([expect.stringContaining("layer 2 is damaged")]);
+  expect([shown.splats, shown.faces.length > 0]).toEqual([null, true]);
 });
 
 test("a count that their bytes have no right to is refused before memory is taken", () => {

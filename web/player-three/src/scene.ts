@@ -2,6 +2,7 @@
 
 import { Group } from "three";
 import type { WebGLRenderer } from "three";
+import { SPLATS_WIDTH } from "@meshreel/player-core/types";
 import type { Packed, Shown, TextureImage } from "@meshreel/player-core/types";
 import { BACKGROUND_CLAY, BACKGROUND_COLOR, trackClay, trackColor } from "./colors.ts";
 import { makeLook } from "./materials.ts";
@@ -167,6 +168,8 @@ function checkSize(packed: Packed, renderer: WebGLRenderer): void {
   if (packed.kind === "static") return;
   const { textureWidth, textureHeight, texels, colors } = packed;
   const most = renderer.capabilities.maxTextureSize;
+  const splatRows = (packed.splats?.words.length ?? 0) / 4 / SPLATS_WIDTH;
+  if (splatRows > most) throw new RangeError(`group of chunk ${packed.chunk}: ${packed.splats!.count} splats, ${splatRows} rows of a texture, the GPU's largest is ${most}; choose fewer layers`);
   const size = `a texture of ${textureWidth} x ${textureHeight}`;
   if (Math.max(textureWidth, textureHeight) > most) throw new RangeError(`group of chunk ${packed.chunk}: ${size}, the GPU's largest is ${most}; choose fewer layers`);
   if (texels.length !== 4 * textureWidth * textureHeight) throw new RangeError(`group of chunk ${packed.chunk}: ${texels.length / 4} texels for ${size}`);

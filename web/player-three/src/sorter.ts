@@ -1,4 +1,4 @@
-// Orders splats without keeping the page waiting: in a worker, one job at a time for each who asks.
+// Orders splats without keeping the page waiting: in a worker, one job at a time for each who asks; on the page where there is no worker.
 
 import type { Box, PackedSplats } from "@meshreel/player-core/types";
 import type { Vector } from "./colors.ts";
@@ -10,6 +10,7 @@ export interface OrderWorker {
   postMessage(message: OrderJob, transfer: Transferable[]): void;
   terminate(): void;
   onmessage: ((event: { data: Ordered }) => void) | null;
+  onerror: ((event: never) => void) | null;
 }
 
 /** What is to be ordered; `texels` are copied. */
@@ -32,7 +33,7 @@ export class Sorter {
   lastMs = 0;
   /** Called when an order has come: a picture is to be drawn. */
   onorder: (() => void) | null = null;
-  readonly #open: (() => OrderWorker) | null;
+  #open: (() => OrderWorker) | null;
   #worker: OrderWorker | null = null;
   readonly #askers = new Map<number, Asker>();
   #keys = 0;
@@ -42,7 +43,7 @@ export class Sorter {
     this.#open = open;
   }
 
-  /** A key for `ask`; `answer` gets what is asked with it. */
+  /** A key for `ask`; `answer` gets what is asked with it, or nothing where that is to be asked again. */
   join(answer: (order: Uint32Array) => void): number {
     this.#askers.set(++this.#keys, { answer, splats: null, texels: new Uint16Array(0), isWaiting: false });
     return this.#keys;
@@ -56,19 +57,20 @@ export class Sorter {
   ask(key: number, { splats, texels, box, forward }: Question): boolean {
     const asker = this.#askers.get(key);
     if (asker === undefined || asker.isWaiting) return false;
-    if (this.#open === null) {
-      asker.answer(orderSplats(splats, { texels, box, forward }));
-      this.onorder?.();
+    const worker = (this.#worker ??= this.#start());
+    if (worker === null) {
+      const start = performance.now();
+      const order = orderSplats(splats, { texels, box, forward });
+      this.#hear({ key, order, texels: asker.texels, ms: performance.now() - start });
       return true;
     }
-    if (this.#worker === null) (this.#worker = this.#open()).onmessage = ({ data }) => this.#hear(data);
     const copy = asker.texels.length === texels.length ? asker.texels : new Uint16Array(texels.length);
     copy.set(texels);
     const { count, words } = splats;
     const job = { key, splats: splats === asker.splats ? null : { count, words }, texels: copy, box, forward };
     asker.isWaiting = true;
     asker.splats = splats;
-    this.#worker.postMessage(job, [copy.buffer]);
+    worker.postMessage(job, [copy.buffer]);
     return true;
   }
 
@@ -76,6 +78,30 @@ export class Sorter {
     this.#worker?.terminate();
     this.#worker = null;
     this.#askers.clear();
+  }
+
+  #start(): OrderWorker | null {
+    try {
+      const worker = this.#open?.() ?? null;
+      if (worker !== null) {
+        worker.onmessage = ({ data }) => this.#hear(data);
+        worker.onerror = () => this.#giveUp();
+      }
+      return worker;
+    } catch {
+      this.#open = null;
+      return null;
+    }
+  }
+
+  #giveUp(): void {
+    this.#worker?.terminate();
+    this.#worker = this.#open = null;
+    for (const asker of this.#askers.values()) {
+      asker.isWaiting = false;
+      asker.answer(new Uint32Array(0)); // it asks again
+    }
+    this.onorder?.();
   }
 
   #hear({ key, order, texels, ms }: Ordered): void {

@@ -111,6 +111,7 @@ export class SplatMesh extends Mesh<InstancedBufferGeometry, RawShaderMaterial> 
 
   /** An order that came late, of other splats, is none. */
   #take(order: Uint32Array): void {
+    if (order.length === 0) this.#asked = null;
     if (this.#order?.count !== order.length) return;
     this.#order.array.set(order);
     this.#order.needsUpdate = true;

@@ -14,7 +14,7 @@ import { led } from "../format/budget.ts";
 import type { Led } from "../format/budget.ts";
 import { checkPayload } from "../format/payload.ts";
 import { packGroup, packStatic } from "./pack.ts";
-import { packSplats } from "./pack_splats.ts";
+import { checkShowable, packSplats } from "./pack_splats.ts";
 import type { FineAtlas } from "./pack.ts";
 import type { Damage, DecodeJob } from "../protocol.ts";
 import { describe } from "../format/reader.ts";
@@ -88,7 +88,7 @@ export class ChunkDecoder {
     const [colors, state] = colored ?? [null, made.state];
     const template = made.canvas[0];
     const layout = companion(job, "atlas", damage, (data) => decodeAtlas(core, data, template.base)) ?? previous?.layout ?? null;
-    const own = companion(job, "splats", damage, (data) => decodeSplats(core, data, faceCount(template.base)));
+    const own = companion(job, "splats", damage, (data) => checkShowable(decodeSplats(core, data, faceCount(template.base))));
     const carried = own ?? inherited(previous, template);
     if (state !== null) this.states.set(file, chunk, { ...state, layout, splats: carried });
     if (job.stateOnly) return null;

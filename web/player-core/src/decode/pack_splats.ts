@@ -1,5 +1,6 @@
 // Splats as the GPU takes them; what types.ts says of PackedSplats.
 
+import { FormatError } from "../errors.ts";
 import type { DecodedGroup } from "./decoded.ts";
 import { locate } from "./splats.ts";
 import type { Located, Splats } from "./splats.ts";
@@ -9,6 +10,13 @@ import type { PackedSplats } from "../types.ts";
 
 const [LARGEST, FAR] = [1 / 20, 3]; // share of scales that reach leaves out, and how many of the largest other it is (guess)
 const FULL_TURN = 1 << 16;
+const MOST = 1 << 22; // splats: their texture has no more rows than nearly every GPU allows, and none draws more in time
+
+/** FormatError where there are more splats than can be shown. */
+export function checkShowable(splats: Splats): Splats {
+  if (splats.faces.length > MOST) throw new FormatError(`${splats.faces.length} splats: over ${MOST}, more than can be shown`);
+  return splats;
+}
 
 /** Splats of a group whose base mesh was subdivided `levels` times; `scale`: metres of a normalised length. */
 export function packSplats(splats: Splats, group: DecodedGroup, levels: number, scale: number): PackedSplats {
