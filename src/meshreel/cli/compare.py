@@ -31,6 +31,7 @@ from .console import Common, StageBars
 from .flags import Knowing, Looking, Reading
 from .info import describe_file
 from .sources import open_source
+from .splats import check_splats, compare_splats
 
 BESIDE = {"truth": "against the truth", "depth": "by the depth pictures"}  # parts of a row with numbers of both
 
@@ -44,6 +45,7 @@ def command(
     looking: Looking = Looking(),
     sheet: Path | None = None,
     sheet_frames: Annotated[tuple[int, ...], Parameter(consume_multiple=True, negative="")] = (),
+    splats: Annotated[bool, Parameter(negative="")] = False,
     knowing: Knowing = Knowing(),
     common: Common = Common(),
 ) -> None:
@@ -65,6 +67,9 @@ def command(
         front.
     sheet_frames
         Frames in the sheet; by default the first, the middle and the last.
+    splats
+        Compare pictures of the splats of a .reel file, too: with renders of coloured originals from cameras that were
+        not fitted to, or with the pictures of a rig. PSNR and SSIM are of pictures that are cut to the bodies.
     """
     if sheet is not None and not sheet.parent.is_dir():
         raise InputError(f"{sheet}: there is no folder {sheet.parent}; make it or choose another")
@@ -73,10 +78,16 @@ def command(
     if len(sequence) != len(other):
         raise InputError(f"{originals} has {len(sequence)} frames and {decoded} {len(other)}; choose with --frames A:B")
     shown = SheetOptions(sheet_frames, cameras=_sheet_cameras(looking, sequence), up=looking.up)
+    if splats:
+        if not isinstance(other, Video):
+            raise InputError(f"{decoded}: --splats needs a .reel file")
+        check_splats(other, decoded)
     truth = None if knowing.truth is None else open_truth(knowing.truth, reading, len(sequence))
     try:
         with common.stages(len(sequence)) as progress:
             row = _measured(sequence, other, _options(looking, other), progress)
+            if splats and isinstance(other, Video):
+                row |= compare_splats(sequence, other, progress)
             if truth is not None:
                 row["truth"] = against_truth(
                     sequence, other, truth, range(0, len(sequence), knowing.truth_every), progress

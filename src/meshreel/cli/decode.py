@@ -20,6 +20,7 @@ from ..geometry.topology import concatenate
 from ..io.write import frame_names, left_over, make_folder
 from ..types import Mesh, Texture
 from .console import Common
+from .splats import check_splats, write_all
 
 
 def command(
@@ -30,6 +31,7 @@ def command(
     format: Literal["ply", "obj", "glb", "npz"] = "ply",
     layers: int | None = None,
     only: Part = "all",
+    splats: Annotated[bool, Parameter(negative="")] = False,
     common: Common = Common(),
 ) -> None:
     """Decode a .reel file into a directory of meshes.
@@ -48,11 +50,16 @@ def command(
         give coarser, valid meshes from fewer bytes.
     only
         Of a scene, only the background or only the moving bodies; by default whole frames.
+    splats
+        Write the splats of each frame in place of meshes: PLY files for viewers of 3D Gaussian splatting.
     """
     if layers is not None and layers < 0:
         raise InputError(f"--layers must not be negative, got {layers}")
     video = open_video(file).at(layers)
     check_part(file, video.reader, only)
+    if splats:
+        _write_splats(file, video, output, format, common)
+        return
     every: dict[Part, Callable[[Video, int], list[Mesh]]] = {
         "all": lambda of, frame: [*of.parts(frame).values()],
         "background": lambda of, frame: [of.background(frame)],
@@ -88,6 +95,23 @@ def command(
         raise FormatError(f"{text}; copy the file again")
     row = {"output": str(output), "frames": len(video), "format": format, "frame_rate": video.frame_rate}
     common.result(row, f"{output}: {len(video)} {format} files")
+
+
+def _write_splats(file: Path, video: Video, output: Path, format: str, common: Common) -> None:
+    """Write the splats of all frames. Raises InputError where there are none, or for another format than PLY."""
+    if format != "ply":
+        raise InputError(f"--format {format}: splats are written as PLY; leave --format out")
+    check_splats(video, str(file))
+    make_folder(output)
+    names = frame_names(len(video), "ply")
+    common.warn(left_over(output, names, "frame_*.ply"))
+    with common.stages(len(video)) as progress:
+        failed = write_all(video, [output / name for name in names], progress)
+    if failed:
+        text = f"{file}: {failed[0]}; {len(failed)} of {len(video)} frames are lost, the others are written"
+        raise FormatError(f"{text}; copy the file again")
+    row = {"output": str(output), "frames": len(video), "format": "ply", "frame_rate": video.frame_rate}
+    common.result(row, f"{output}: splats of {len(video)} frames, ply files")
 
 
 def _not_kept(reader: ReelReader, format: str) -> tuple[str, ...]:

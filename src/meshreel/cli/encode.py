@@ -70,6 +70,9 @@ class Coding:
     """Width of a body's texture, texels; as the pictures have detail, at most 1024, if not given."""
     compatible: Annotated[bool, Parameter(negative="")] = False
     """Store textures also as H.264, for devices that cannot play AV1; it takes 1.3 to 2 times AV1's bytes."""
+    splats: int | None = None
+    """Number of Gaussian splats on each moving body, as 8000: they move with it, and take some 7 bytes each in every
+    key interval. Fitted to colour cameras or coloured meshes (extra `splats`: torch)."""
 
     def goal(self) -> Goal | None:
         """Return the target, None without one. Raises InputError for a target with a quality, or out of range."""
@@ -95,6 +98,7 @@ class Coding:
             color_quality=self.color_quality,
             texture=self.texture,
             compatible=self.compatible,
+            splats=self.splats,
         )
 
 

@@ -21,6 +21,7 @@ COMPANION_NAMES = {
     ChunkKind.ATLAS: "atlas",
     ChunkKind.PICTURES: "pictures",
     ChunkKind.COMPATIBLE: "pictures in H.264",
+    ChunkKind.SPLATS: "splats",
 }
 
 

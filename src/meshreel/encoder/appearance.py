@@ -8,7 +8,7 @@ other: they have one atlas, in which the surface hardly changes, and their pictu
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from importlib.util import find_spec
 
 import numpy as np
@@ -30,6 +30,7 @@ from .forms import EncodedGroup
 from .interval import Interval
 from .options import TEXTURE_SIZES, AppearanceOptions, EncoderOptions, TextureOptions
 from .progress import Stages
+from .splats import ChainSplats
 from .videos import Videos
 
 USED = 0.43  # of a texture is on the surface, as unwrapped; measured on basketball_player
@@ -42,6 +43,8 @@ def as_installed(options: EncoderOptions) -> tuple[EncoderOptions, tuple[str, ..
     Raises InputError where they are asked for.
     """
     appearance = options.appearance
+    if appearance is not None and appearance.splats is not None and find_spec("torch") is None:
+        raise InputError("splats are fitted by torch: pip install 'meshreel[splats]'")
     if appearance is None or appearance.texture is None:
         return options, ()
     missing = [name for name in ("av", "xatlas") if find_spec(name) is None]
@@ -60,17 +63,18 @@ def colored_groups(
     if options is None:
         yield from groups
         return
-    at, state, chain = 0, None, _Chain()
+    at, state, chain = 0, None, _Chain(interval, options)
     for group in groups:
         numbers = range(at, at + group.frame_count)
         at = numbers.stop
         if not group.predicted:
             yield from chain.done()
-            state, chain = None, _Chain()
+            state, chain = None, _Chain(interval, options)
         meshes = [interval.frames[number] for number in numbers]
         paints = [interval.paint(number, mesh) for number, mesh in zip(numbers, meshes, strict=True)]
         if any(paint is not None for paint in paints):
-            state = chain.add(group, paints, options, state, has_pictures(interval, meshes, options))
+            pictured = has_pictures(interval, meshes, options)
+            state = chain.add(group, _Frames(numbers, paints), options, state, pictured)
             if stages is not None:
                 stages.add("color", group.frame_count)
         else:
@@ -87,11 +91,20 @@ def has_pictures(interval: Interval, meshes: Iterable[Mesh], options: Appearance
     return any(mesh.texture is not None for mesh in meshes)
 
 
-class _Chain:
-    """Groups of one chain, and the video of their pictures."""
+@dataclass(frozen=True, slots=True)
+class _Frames:
+    """Frames of a group: their numbers in the interval, and what knows their colours."""
 
-    def __init__(self) -> None:
+    numbers: range
+    paints: list[Paint | None]
+
+
+class _Chain:
+    """Groups of one chain, their splats, and the video of their pictures."""
+
+    def __init__(self, interval: Interval, options: AppearanceOptions) -> None:
         self._groups = list[EncodedGroup]()
+        self._splats = None if options.splats is None else ChainSplats(options.splats, interval)
         self._pictured = list[bool]()  # whether each of the groups has pictures
         self._video: _Video | None = None
 
@@ -103,14 +116,17 @@ class _Chain:
     def add(
         self,
         group: EncodedGroup,
-        paints: Sequence[Paint | None],
+        frames: _Frames,
         options: AppearanceOptions,
         before: LayersState | None,
         pictured: bool,
     ) -> LayersState | None:
         """Add a group with the colours of its frames; return the state that those of the next are predicted from."""
+        paints = frames.paints
         meshes, after = continue_group(group.payload, len(paints), None, before)
         canvas = canvas_of(group.payload, [len(mesh.vertices) for mesh in meshes], None, before)
+        if self._splats is not None:
+            self._splats.add(group.form, canvas, meshes, frames.numbers)
         colors = [_vertex_colors(paint, mesh) for paint, mesh in zip(paints, meshes, strict=True)]
         try:
             encoded = encode_group_colors(canvas, colors, options.colors, None if before is None else before.colors)
@@ -129,7 +145,11 @@ class _Chain:
         return None if after is None else replace(after, colors=encoded.state)
 
     def done(self) -> list[EncodedGroup]:
-        """Return the groups with their pictures."""
+        """Return the groups with their splats and pictures."""
+        if self._splats is not None and self._groups:
+            first = self._groups[0]
+            companions = (*first.companions, *self._splats.companions())
+            self._groups[0] = replace(first, companions=companions)
         if self._video is None:
             return self._groups
         counts = [group.frame_count for group, own in zip(self._groups, self._pictured, strict=True) if own]

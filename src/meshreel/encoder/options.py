@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from ..analysis.appearance.calibrate import CalibrationOptions
+from ..analysis.appearance.splat_fit import FitSplatsOptions
 from ..analysis.fit.slide import SlideOptions
 from ..analysis.fit.surface_fit import FitOptions
 from ..analysis.follow.embedded import EmbeddedOptions
@@ -22,6 +23,7 @@ from ..analysis.scene.bodies import BodyOptions
 from ..analysis.scene.segmentation import SegmentOptions
 from ..coding.appearance.colors import ColorCodingOptions
 from ..coding.appearance.pictures import VideoOptions
+from ..coding.appearance.splats import SplatCodingOptions
 from ..coding.layers.coder import LayerCodingOptions
 from ..coding.paper.displacements import DisplacementOptions
 from ..errors import InputError
@@ -116,12 +118,29 @@ class TextureOptions:
 
 
 @dataclass(frozen=True, slots=True)
+class SplatOptions:
+    """Options of splats, which need the extra `splats`."""
+
+    fit: FitSplatsOptions = FitSplatsOptions()
+    coding: SplatCodingOptions = SplatCodingOptions()
+    frames: int = 16  # of a chain, whose pictures are looked at, at most
+    views: int = 6  # of each, where there are no colour cameras
+    size: int = 256  # pixels, of the longer side of the body in a picture
+
+    def __post_init__(self) -> None:
+        if self.frames < 1 or self.views < 1 or not 16 <= self.size <= 4096:
+            text = f"splats of {self.frames} frames, {self.views} views, {self.size} pixels"
+            raise InputError(f"{text}: give at least 1, 1 and 16 to 4096")
+
+
+@dataclass(frozen=True, slots=True)
 class AppearanceOptions:
     """Options of what surfaces look like; a sequence without colours has none."""
 
     colors: ColorCodingOptions = ColorCodingOptions()  # of the vertices, which every coloured group has
     texture: TextureOptions | None = TextureOptions()  # None: no textures
     calibration: CalibrationOptions | None = CalibrationOptions()  # of colour cameras; None: they are as they are said
+    splats: SplatOptions | None = None  # None: no splats
 
 
 @dataclass(frozen=True, slots=True)

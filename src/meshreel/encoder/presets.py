@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from ..analysis.appearance.splat_fit import FitSplatsOptions
 from ..analysis.follow.embedded import Stage
 from ..analysis.follow.template import TemplateOptions
 from ..analysis.reference.extraction import ReferenceOptions
@@ -19,7 +20,15 @@ from ..coding.layers.coder import LayerCodingOptions
 from ..coding.paper.displacements import DisplacementOptions
 from ..errors import InputError
 from ..geometry.strict import rounded
-from .options import AppearanceOptions, EncoderOptions, LayersOptions, PaperOptions, SceneOptions, TextureOptions
+from .options import (
+    AppearanceOptions,
+    EncoderOptions,
+    LayersOptions,
+    PaperOptions,
+    SceneOptions,
+    SplatOptions,
+    TextureOptions,
+)
 from .target import Fidelity
 
 PRESETS = ("best", "paper")
@@ -39,13 +48,15 @@ def preset_options(
     color_quality: float | None = None,
     texture: int | None = None,
     compatible: bool = False,
+    splats: int | None = None,
 ) -> EncoderOptions:
     """Return the encoder's options for a preset at a quality; `basis_size` fixes the components of a group.
 
     `effort` is how long the preset `best` searches: see `EFFORTS`. `color` is one of `COLORS`: textures where the
     frames have pictures, textures always, colours of vertices only, or none; `color_quality` is that of colours, by
-    default `quality`; `texture` is the width of textures, texels; `compatible` adds them as H.264. Raises InputError
-    for an unknown preset or values out of range.
+    default `quality`; `texture` is the width of textures, texels; `compatible` adds them as H.264; `splats` is
+    how many splats a chain of groups has, none if not given. Raises InputError for an unknown preset or values out of
+    range.
     """
     if preset not in PRESETS:
         raise InputError(f"no preset is called {preset!r}; known: {', '.join(PRESETS)}")
@@ -69,7 +80,7 @@ def preset_options(
     if group_size is not None:
         method = replace(method, group_size=group_size)
     appearance = appearance_options(
-        float(quality if color_quality is None else color_quality), color, texture, compatible
+        float(quality if color_quality is None else color_quality), color, texture, compatible, splats
     )
     scene = SceneOptions(background=_background(float(quality)))
     options = EncoderOptions(method, scene, appearance, quality=float(quality))
@@ -138,7 +149,11 @@ def motion_step(quality: float) -> float:
 
 
 def appearance_options(
-    quality: float = 50.0, color: str = "auto", texture: int | None = None, compatible: bool = False
+    quality: float = 50.0,
+    color: str = "auto",
+    texture: int | None = None,
+    compatible: bool = False,
+    splats: int | None = None,
 ) -> AppearanceOptions | None:
     """Return the options of colours at a quality; None for no colours. Raises InputError for values out of range."""
     if color not in COLORS:
@@ -149,11 +164,14 @@ def appearance_options(
         given = f"texture {texture}" if texture is not None else "compatible"
         raise InputError(f"{given} and color {color!r}: there are no textures; leave one of both out")
     if color == "none":
+        if splats is not None:
+            raise InputError(f"{splats} splats and color 'none': splats are fitted to colours; leave one of both out")
         return None
+    drawn = None if splats is None else SplatOptions(FitSplatsOptions(splats))
     vertices, video = ColorCodingOptions(step=color_step(quality)), VideoOptions(crf=rate_factor(quality))
     if color == "vertices":
-        return AppearanceOptions(vertices, None)
-    return AppearanceOptions(vertices, TextureOptions(texture, video, color == "texture", compatible))
+        return AppearanceOptions(vertices, None, splats=drawn)
+    return AppearanceOptions(vertices, TextureOptions(texture, video, color == "texture", compatible), splats=drawn)
 
 
 def rate_factor(quality: float) -> int:

@@ -129,7 +129,8 @@ def encode_interval(
         if appearance is None:  # what is not kept does not tell where the surface is, either
             options = replace(options, slide=None)
         some = (interval.frames[number] for number in evenly(len(interval.frames), 3))
-        if interval.noise or has_pictures(interval, some, appearance):  # a frame in the `draco` form has none
+        splats = appearance is not None and appearance.splats is not None
+        if interval.noise or splats or has_pictures(interval, some, appearance):  # a frame in the `draco` form has none
             options = replace(options, floor=False)
         groups = layers.encode_interval(interval, options, stages)
     else:

@@ -49,7 +49,7 @@ from .parts import Parts, take_apart
 from .presets import preset_options
 from .progress import Progress, Stages
 from .scene import Tracks, encode_bodies, scene_intervals
-from .static import Static, colored_states
+from .static import Static, colored_states, is_colored
 from .summary import GroupSummary, SceneSummary, Summary
 from .surveying import surveyed
 from .tracks import TrackGroup, encode_tracked, intervals_of, tracked_bodies
@@ -151,6 +151,9 @@ class Encoder:
             raise InputError("masks for a sequence that is not taken apart (scene=None): give one of both")
         before, excerpt = so_far(), self._excerpt
         options, lacking = as_installed(options)
+        drawn = options.appearance is not None and options.appearance.splats is not None
+        if drawn and self.sequence.colors is None and not is_colored(self.sequence):
+            raise InputError("splats need colours, and no frame has any: give colour cameras or coloured meshes")
         if excerpt is not None:
             excerpt.surveyed.check(self.sequence)
             if self._is_scene(options):

@@ -37,12 +37,17 @@ class Views:
 
         What hides a place is the surface of the frame, or another one in normalised coordinates.
         """
-        place = self.place
-        pictures = [picture.placed(place) for picture in self.colors[number] if picture is not None]
-        if hides is None:
-            mesh = self.sequence[number]
-            hides = mesh.at((mesh.vertices - place.origin) / place.scale)
-        return ColorViews(pictures, hides, MARGIN / place.scale, clear)
+        hides = self.surface(number) if hides is None else hides
+        return ColorViews(self.pictures(number), hides, MARGIN / self.place.scale, clear)
+
+    def pictures(self, number: int) -> list[ColorPicture]:
+        """Return the pictures of a frame, for places in normalised coordinates."""
+        return [picture.placed(self.place) for picture in self.colors[number] if picture is not None]
+
+    def surface(self, number: int) -> Mesh:
+        """Return all surface of a frame, in normalised coordinates."""
+        mesh, place = self.sequence[number], self.place
+        return mesh.at((mesh.vertices - place.origin) / place.scale)
 
 
 @dataclass(frozen=True, slots=True)

@@ -121,7 +121,8 @@ class _Fit:
         """Improve the splats by one picture; `done` is the share of the steps."""
         torch = self._torch
         drawing, picture = self._drawn(carrier, view.camera)
-        error = picture - torch.from_numpy(view.pixels)
+        wanted = torch.from_numpy(view.pixels)
+        error = torch.where(wanted.isnan(), 0.0, picture - wanted)  # NaN: unknown
         self._adam.zero_grad()
         (error.abs().mean() + (error * error).mean()).backward()
         for group, rate in zip(self._adam.param_groups, RATES.values(), strict=True):
@@ -189,8 +190,10 @@ class _Fit:
         for frame in frames[:: max(len(frames) // 2, 1)]:
             for view in frame.views:
                 drawing, _ = self._drawn(frame.carrier, view.camera)
-                sums += np.stack([drawing.shares(view.pixels[..., k].astype(np.float64)) for k in range(3)], axis=1)
-                total += drawing.shares()
+                known = np.isfinite(view.pixels[..., 0])
+                shown = np.where(known[..., None], view.pixels, 0).astype(np.float64)
+                sums += np.stack([drawing.shares(shown[..., k]) for k in range(3)], axis=1)
+                total += drawing.shares(known.astype(np.float64))
         with self._torch.no_grad():
             self._own["colors"][:] = _tensor(self._torch, sums / total[:, None])
 

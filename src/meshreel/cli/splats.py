@@ -1,0 +1,82 @@
+"""Splats for the commands: a PLY of each frame, and how far pictures of splats are from pictures of the originals."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..analysis.appearance.splat_fit import SplatView
+from ..analysis.appearance.splat_raster import draw
+from ..analysis.appearance.splat_views import GOLDEN, rendered, ring, taken
+from ..capture.recording import Recording
+from ..decoder.video import Video
+from ..errors import FormatError, InputError
+from ..export.splats import write_splats
+from ..geometry.splats import Bound
+from ..metrics.color import PEAK, psnr
+from ..metrics.ssim import BORDER, ssim_map
+from ..types import MeshSequence, evenly
+from .console import StageBars
+
+FRAMES, VIEWS, SIZE = 8, 4, 256  # frames that are compared, cameras around each, and pixels of the longer side
+ASIDE = 0.11  # turns, from a camera that the encoder has fitted to
+
+
+def check_splats(video: Video, name: str) -> None:
+    """Raise InputError where a video has no splats."""
+    if not video.reader.has_splats:
+        raise InputError(f"{name}: has no splats; encode with --splats 8000")
+
+
+def write_all(video: Video, paths: Sequence[Path], progress: StageBars) -> list[FormatError]:
+    """Write the splats of each frame; return the errors of damaged frames, whose files are removed."""
+    failed = list[FormatError]()
+    for number, path in enumerate(paths):
+        try:
+            write_splats(video.splats(number), path)
+        except FormatError as error:
+            failed.append(error)
+            path.unlink(missing_ok=True)
+        progress("decode", number + 1, len(paths))
+    return failed
+
+
+def compare_splats(sequence: MeshSequence, video: Video, progress: StageBars) -> dict[str, Any]:
+    """Return PSNR, dB, and SSIM of pictures of splats in some frames, cut to the bodies.
+
+    Of a rig they are compared with its pictures; of coloured meshes with renders from cameras that were not fitted to.
+    Raises InputError where there is neither.
+    """
+    numbers, squares, scores = evenly(len(sequence), FRAMES), list[float](), list[float]()
+    for done, number in enumerate(numbers, 1):
+        if (bound := video.splats(number)) is not None:
+            for square, score in (errors(bound, view) for view in held_out(sequence, video, number)):
+                squares.append(square)
+                scores.append(score)
+        progress("splats", done, len(numbers))
+    if not squares:
+        raise InputError("--splats: no frame of the originals has colours and splats; compare with coloured originals")
+    row = {"splats_psnr": psnr(PEAK**2 * float(np.mean(squares))), "splats_ssim": float(np.mean(scores))}
+    return row | {"splats_views": len(squares)}
+
+
+def held_out(sequence: MeshSequence, video: Video, number: int) -> tuple[SplatView, ...]:
+    """Return pictures of a frame: a rig's, or renders from where no encoder looked."""
+    if isinstance(sequence, Recording) and sequence.colors is not None:
+        pictures = [picture for picture in sequence.colors[number] if picture is not None]
+        return taken(pictures, video.moving(number), sequence[number], SIZE)
+    mesh = sequence[number]
+    return rendered(mesh, ring(mesh, VIEWS, SIZE, GOLDEN * number + ASIDE)) if mesh.is_colored else ()
+
+
+def errors(bound: Bound, view: SplatView) -> tuple[float, float]:
+    """Return the mean squared error, of values 0 to 1, and SSIM of a picture of splats; unknown pixels are left out."""
+    found = np.clip(draw((bound.means, bound.axes, bound.scales, bound.opacities, bound.colors), view.camera), 0, 1)
+    known = np.isfinite(view.pixels)
+    wanted = np.where(known, view.pixels, found).astype(np.float64)
+    inside = slice(BORDER, -BORDER)
+    square = float(np.square(found - wanted)[known].mean()) if known.any() else 0.0
+    return square, float(ssim_map(found.astype(np.float64), wanted)[inside, inside].mean())
