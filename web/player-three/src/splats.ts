@@ -33,7 +33,8 @@ export class SplatMesh extends Mesh<InstancedBufferGeometry, RawShaderMaterial> 
   #order: InstancedBufferAttribute | null = null;
   readonly #view = new Matrix4();
   readonly #viewport = new Vector4();
-  readonly #middle = new Vector3();
+  readonly #middle = new Vector3(); // of the box
+  readonly #scratch = new Vector3();
 
   constructor(uniforms: PartUniforms, sorter: Sorter) {
     super(new InstancedBufferGeometry());
@@ -95,7 +96,7 @@ export class SplatMesh extends Mesh<InstancedBufferGeometry, RawShaderMaterial> 
     const { elements } = this.#view.multiplyMatrices(camera.matrixWorldInverse, this.matrixWorld);
     const length = Math.hypot(elements[2], elements[6], elements[10]);
     this.#sort([-elements[2] / length, -elements[6] / length, -elements[10] / length]);
-    const depth = -this.#middle.clone().applyMatrix4(this.#view).z; // tracks one behind the other, from the next picture on
+    const depth = -this.#scratch.copy(this.#middle).applyMatrix4(this.#view).z; // tracks one behind the other, from the next picture on
     this.renderOrder = AFTER_SURFACES + 1 / (1 + Math.max(0, depth));
   };
 
