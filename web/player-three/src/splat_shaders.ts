@@ -4,7 +4,7 @@
 import { SPLATS_WIDTH, SPLAT_WEIGHT } from "@meshreel/player-core/types";
 import { FROM_TEXTURE, POSITION, NORMAL, PRECISION } from "./shaders.ts";
 
-/** A quad around each splat, at the depth of its middle: as wide as it is drawn, along the axes of its ellipse. */
+/** A triangle around each splat, at the depth of its middle: around the ellipse within which it is drawn, along the axes of that. */
 export const SPLAT_VERTEX = `${PRECISION}${POSITION}${NORMAL}${FROM_TEXTURE}
 const float BLUR = 0.3; // pixels squared, added to variances: no splat falls between pixels
 const float THIN = 0.1; // third scale of the shorter one
@@ -62,7 +62,7 @@ void main() {
   float middle = 0.5 * (xx + yy), spread = length(vec2(0.5 * (xx - yy), xy));
   vec2 variances = vec2(middle + spread, max(middle - spread, BLUR));
   vec2 longer = abs(xy) > 1e-6 * middle ? normalize(vec2(xy, variances.x - xx)) : (xx >= yy ? vec2(1.0, 0.0) : vec2(0.0, 1.0));
-  deviations = (vec2(gl_VertexID & 1, gl_VertexID >> 1) * 2.0 - 1.0) * sqrt(2.0 * log(LEAST * ownColor.a));
+  deviations = sqrt(2.0 * log(LEAST * ownColor.a)) * (gl_VertexID == 0 ? vec2(0.0, 2.0) : vec2(sqrt(3.0) * float(2 * gl_VertexID - 3), -1.0));
   vec2 pixels = deviations.x * sqrt(variances.x) * longer + deviations.y * sqrt(variances.y) * vec2(-longer.y, longer.x);
   gl_Position = projectionMatrix * seen;
   gl_Position.xy += gl_Position.w * pixels / (0.5 * viewport);

@@ -1,4 +1,4 @@
-// The splats of a track: one quad each, whose places the GPU works out from the group's vertices; only their order is uploaded.
+// The splats of a track: one triangle each, whose places the GPU works out from the group's vertices; only their order is uploaded.
 
 import { DynamicDrawUsage, GLSL3, InstancedBufferAttribute, InstancedBufferGeometry, Matrix4, Mesh, RawShaderMaterial, Sphere, Vector2, Vector3, Vector4 } from "three";
 import type { Camera, DataTexture, IUniform, WebGLRenderer } from "three";
@@ -12,7 +12,7 @@ import type { Upload } from "./upload.ts";
 
 const TURNED = 1e-3; // how far a unit vector goes until splats are ordered anew
 const AFTER_SURFACES = 2; // as renderOrder; surfaces beneath splats are drawn at 1
-const CORNERS = [0, 1, 2, 2, 1, 3];
+const CORNERS = 3; // of what is drawn for a splat
 
 interface SplatUniforms {
   readonly splats: IUniform<DataTexture | null>;
@@ -43,7 +43,7 @@ export class SplatMesh extends Mesh<InstancedBufferGeometry, RawShaderMaterial> 
       transparent: true, premultipliedAlpha: true, depthWrite: false,
     });
     Object.assign(this.material.uniforms, uniforms, this.#own); // the part's own: changes of them take effect at once
-    this.geometry.setIndex(CORNERS);
+    this.geometry.setDrawRange(0, CORNERS);
     this.#sorter = sorter;
     this.#key = sorter.join((order) => this.#take(order));
     this.visible = false;

@@ -77,7 +77,7 @@ const splatApi = {
       sortMs.push(sorter.lastMs);
     }
     const rate = (1000 * pictures) / (performance.now() - start);
-    const vertices = 4 * scene.splats.reduce((sum, count) => sum + count, 0);
+    const vertices = 3 * scene.splats.reduce((sum, count) => sum + count, 0);
     splatApi.release(packed);
     return { rate, sortMs, bytes: bytes / pictures, vertices };
   },
