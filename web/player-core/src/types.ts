@@ -53,7 +53,7 @@ export interface PackedGroup extends PackedVertices {
   /** Corners of the additional faces of single frames: frame t has extra[extraStarts[t]] up to extra[extraStarts[t + 1]]. */
   readonly extra: Uint32Array;
   readonly extraStarts: Uint32Array; // T + 1 numbers
-  readonly splats: PackedSplats | null; // shown in place of the surface that every frame has or lacks, if at all
+  readonly splats: PackedSplats | null; // shown in place of all surface but what single frames have alone
   readonly layers: number; // layers beyond the first that it was decoded from
   readonly bytes: number; // that it was decoded from
   readonly decodeMs: number;
@@ -69,7 +69,6 @@ export interface PackedSplats {
   readonly count: number;
   readonly words: Uint32Array; // padded to SPLATS_WIDTH texels of four words
   readonly unit: number; // m: the scale of level 0; that of level k is 2^(-k/8) of it
-  readonly reach: number; // m: three of their longer scales, but of the largest ones
 }
 
 export const SPLAT_WORDS = 8;

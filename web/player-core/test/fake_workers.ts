@@ -151,7 +151,7 @@ function colorsOf({ companions }: DecodeJob): Uint8Array | null {
 /** One splat, where they are sound. */
 function splatsOf({ companions }: DecodeJob): PackedSplats | null {
   const isThere = companions.some((companion) => companion.kind === "splats" && !isDamaged(companion));
-  return isThere ? { count: 1, words: new Uint32Array(8), unit: 1, reach: 1 } : null;
+  return isThere ? { count: 1, words: new Uint32Array(8), unit: 1 } : null;
 }
 
 /** Of a texture of 64 x 32 texels, where pictures will be shown. */

@@ -33,7 +33,6 @@ export interface PartUniforms {
   readonly next: IUniform<number>;
   readonly behind: IUniform<number>;
   readonly blend: IUniform<number>;
-  readonly reach: IUniform<number>;
 }
 
 export function makeUniforms(): PartUniforms {
@@ -50,7 +49,6 @@ export function makeUniforms(): PartUniforms {
     next: { value: 0 },
     behind: { value: 0 },
     blend: { value: 0 },
-    reach: { value: 0 },
   };
 }
 
@@ -63,11 +61,11 @@ export interface Paint {
 export interface Extras {
   readonly edges: boolean;
   readonly places: boolean; // of corners, in a texture
-  readonly beneath: boolean; // splats are drawn in its place: all but patches gives its depth alone
+  readonly patches: boolean; // alone: splats are drawn in place of the rest
 }
 
 /** A material whose values are `uniforms`: changes of them take effect at once. */
-export function surfaceMaterial(feed: Feed, { edges, places, beneath }: Extras, look: Look, uniforms: PartUniforms, paint: Paint): RawShaderMaterial {
+export function surfaceMaterial(feed: Feed, { edges, places, patches }: Extras, look: Look, uniforms: PartUniforms, paint: Paint): RawShaderMaterial {
   return new RawShaderMaterial({
     name: `meshreel ${feed}`,
     glslVersion: GLSL3,
@@ -79,7 +77,7 @@ export function surfaceMaterial(feed: Feed, { edges, places, beneath }: Extras, 
       TRACKS_MODE: MODES.indexOf("tracks"),
       ...(edges ? { EDGES: 1 } : {}),
       ...(places ? { PLACES: 1, PLACE_SCALE } : {}),
-      ...(beneath ? { BENEATH: 1 } : {}),
+      ...(patches ? { PATCHES: 1 } : {}),
     },
     uniforms: {
       ...look,
@@ -89,22 +87,21 @@ export function surfaceMaterial(feed: Feed, { edges, places, beneath }: Extras, 
       edgeColor: { value: EDGE_COLOR },
     },
     side: DoubleSide,
-    ...(beneath ? { transparent: true, premultipliedAlpha: true } : {}), // so that it comes behind all that is opaque
   });
 }
 
-/** The materials of a part, by what is drawn: with edges or without, textured or not, beneath splats or not. */
+/** The materials of a part, by what is drawn: with edges or without, textured or not, all or patches alone. */
 export class Materials {
   readonly #all: readonly RawShaderMaterial[];
 
   /** `feed`: of what has neither. */
   constructor(feed: Feed, look: Look, uniforms: PartUniforms, paint: Paint) {
-    const extras = Array.from({ length: 8 }, (_, k): Extras => ({ edges: (k & 1) !== 0, places: (k & 2) !== 0, beneath: (k & 4) !== 0 }));
+    const extras = Array.from({ length: 8 }, (_, k): Extras => ({ edges: (k & 1) !== 0, places: (k & 2) !== 0, patches: (k & 4) !== 0 }));
     this.#all = extras.map((some) => surfaceMaterial(some.edges || some.places ? "corner" : feed, some, look, uniforms, paint));
   }
 
-  of({ edges, places, beneath }: Extras): RawShaderMaterial {
-    return this.#all[(edges ? 1 : 0) + (places ? 2 : 0) + (beneath ? 4 : 0)];
+  of({ edges, places, patches }: Extras): RawShaderMaterial {
+    return this.#all[(edges ? 1 : 0) + (places ? 2 : 0) + (patches ? 4 : 0)];
   }
 
   dispose(): void {

@@ -30,11 +30,10 @@ export class Part extends Group {
   constructor(feed: Feed, look: Look, paint: Paint, sorter: Sorter | null = null) {
     super();
     this.#materials = new Materials(feed, look, this.#uniforms, paint);
-    const plain = this.#materials.of({ edges: false, places: false, beneath: false });
+    const plain = this.#materials.of({ edges: false, places: false, patches: false });
     this.#faces = new Mesh<BufferGeometry, RawShaderMaterial>(NOTHING, plain);
     this.#extra = new Mesh<BufferGeometry, RawShaderMaterial>(NOTHING, plain);
     this.#faces.onBeforeRender = this.#extra.onBeforeRender = (renderer) => this.#image.drawnBy(renderer);
-    this.#faces.renderOrder = this.#extra.renderOrder = 1; // before all splats
     this.add(this.#faces, this.#extra);
     this.#splats = sorter && new SplatMesh(this.#uniforms, sorter);
     if (this.#splats !== null) this.add(this.#splats);
@@ -102,9 +101,10 @@ export class Part extends Group {
   #take(upload: Upload): void {
     this.#upload = upload;
     this.visible = true;
-    const beneath = this.#isSplatted(upload);
-    this.#faces.material = this.#extra.material = this.#materials.of({ edges: this.#edges, places: upload.isTextured, beneath });
-    if (!beneath) this.#splats?.hide();
+    const patches = this.#isSplatted(upload);
+    this.#faces.material = this.#extra.material = this.#materials.of({ edges: this.#edges, places: upload.isTextured, patches });
+    this.#faces.visible = !patches;
+    if (!patches) this.#splats?.hide();
     this.#faces.geometry = upload.faces(this.#edges);
     this.#extra.geometry = upload.extra(this.#edges) ?? NOTHING;
     this.#extra.visible = false;
@@ -124,7 +124,6 @@ export function setUpload(uniforms: PartUniforms, upload: Upload): void {
   uniforms.colors.value = upload.colors;
   uniforms.hasColors.value = upload.packed.colors !== null;
   uniforms.movingCount.value = upload.packed.vertexCount;
-  uniforms.reach.value = (upload.packed.kind === "group" && upload.packed.splats?.reach) || 0;
 }
 
 /** Sets the frame, and the range of the extra faces of single frames; returns true where this frame has any. */

@@ -46,7 +46,7 @@ export class ReelScene extends Group {
     return bytes;
   }
 
-  /** Triangles of the last picture given to `show`. */
+  /** Triangles of the last picture given to `show`; a splat is one. */
   get triangles(): number {
     return this.#triangles;
   }
@@ -133,7 +133,7 @@ export class ReelScene extends Group {
       return;
     }
     part.show(this.#uploadOf(packed), frame, blend, image);
-    this.#triangles += triangleCount(packed, frame);
+    this.#triangles += part.splatCount > 0 ? part.splatCount : triangleCount(packed, frame);
   }
 
   #uploadOf(packed: Packed): Upload {

@@ -114,10 +114,6 @@ out vec2 texturePlace;
 #ifdef EDGES
 out vec3 barycentric;
 #endif
-#ifdef BENEATH
-uniform float reach; // m: how far behind itself a surface hides splats
-flat out int isBeneath;
-#endif
 
 void main() {
   int vertex = vertexNumber();
@@ -126,10 +122,8 @@ void main() {
   vec4 seen = modelViewMatrix * vec4(scenePosition, 1.0);
   toEye = -(seen.xyz * mat3(modelViewMatrix));
   gl_Position = projectionMatrix * seen;
-#ifdef BENEATH
-  isBeneath = vertex < movingCount ? 1 : 0;
-  vec4 pushed = projectionMatrix * vec4(seen.xy, seen.z - reach * length(modelViewMatrix[0]), 1.0);
-  if (isBeneath == 1 && gl_Position.w > 0.0) gl_Position.z = pushed.z / pushed.w * gl_Position.w;
+#ifdef PATCHES
+  if (vertex < movingCount) gl_Position = vec4(0.0, 0.0, 2.0, 1.0); // nowhere
 #endif
 #ifdef PLACES
   texturePlace = place / float(PLACE_SCALE);
@@ -165,9 +159,6 @@ in vec2 texturePlace;
 #endif
 #ifdef EDGES
 in vec3 barycentric;
-#endif
-#ifdef BENEATH
-flat in int isBeneath;
 #endif
 out vec4 fragment;
 
@@ -209,9 +200,6 @@ void main() {
   result = mix(result, edgeColor, edge());
 #endif
   fragment = vec4(result, 1.0);
-#ifdef BENEATH
-  if (isBeneath == 1) fragment = vec4(0.0); // only its depth: premultiplied
-#endif
 }
 `;
 

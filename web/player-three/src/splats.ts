@@ -1,6 +1,6 @@
 // The splats of a track: one triangle each, whose places the GPU works out from the group's vertices; only their order is uploaded.
 
-import { DynamicDrawUsage, GLSL3, InstancedBufferAttribute, InstancedBufferGeometry, Matrix4, Mesh, RawShaderMaterial, Sphere, Vector2, Vector3, Vector4 } from "three";
+import { DynamicDrawUsage, GLSL3, InstancedBufferAttribute, InstancedBufferGeometry, Matrix4, Mesh, RawShaderMaterial, Vector2, Vector3, Vector4 } from "three";
 import type { Camera, DataTexture, IUniform, WebGLRenderer } from "three";
 import type { PackedGroup, PackedSplats } from "@meshreel/player-core/types";
 import type { Vector } from "./colors.ts";
@@ -11,7 +11,6 @@ import { SPLAT_FRAGMENT, SPLAT_VERTEX } from "./splat_shaders.ts";
 import type { Upload } from "./upload.ts";
 
 const TURNED = 1e-3; // how far a unit vector goes until splats are ordered anew
-const AFTER_SURFACES = 2; // as renderOrder; surfaces beneath splats are drawn at 1
 const CORNERS = 3; // of what is drawn for a splat
 
 interface SplatUniforms {
@@ -46,7 +45,7 @@ export class SplatMesh extends Mesh<InstancedBufferGeometry, RawShaderMaterial> 
     this.geometry.setDrawRange(0, CORNERS);
     this.#sorter = sorter;
     this.#key = sorter.join((order) => this.#take(order));
-    this.visible = false;
+    this.frustumCulled = this.visible = false;
   }
 
   /** Splats that are drawn. */
@@ -65,13 +64,12 @@ export class SplatMesh extends Mesh<InstancedBufferGeometry, RawShaderMaterial> 
     this.#frame = localFrame(shown, frame);
     if (shown === this.#shown) return;
     this.#shown = shown;
-    const { count, unit, reach } = shown.splats;
+    const { count, unit } = shown.splats;
     if (this.#order?.count !== count) this.#renew(count);
     this.#own.splats.value = upload.splats;
     this.#own.splatUnit.value = unit;
     const { minimum, size } = shown.box;
-    this.#middle.set(...size).multiplyScalar(0.5).add(new Vector3(...minimum));
-    this.geometry.boundingSphere = new Sphere(this.#middle.clone(), Math.hypot(...size) / 2 + reach);
+    this.#middle.set(...size).multiplyScalar(0.5).add(this.#scratch.set(...minimum));
     this.visible = true;
   }
 
@@ -97,7 +95,7 @@ export class SplatMesh extends Mesh<InstancedBufferGeometry, RawShaderMaterial> 
     const length = Math.hypot(elements[2], elements[6], elements[10]);
     this.#sort([-elements[2] / length, -elements[6] / length, -elements[10] / length]);
     const depth = -this.#scratch.copy(this.#middle).applyMatrix4(this.#view).z; // tracks one behind the other, from the next picture on
-    this.renderOrder = AFTER_SURFACES + 1 / (1 + Math.max(0, depth));
+    this.renderOrder = 1 / (1 + Math.max(0, depth));
   };
 
   #sort(forward: Vector): void {

@@ -25,7 +25,7 @@ export class Warmer {
 
   constructor(look: Look) {
     this.#materials = { group: new Materials("texture", look, this.#uniforms, PAINT), static: new Materials("attribute", look, this.#uniforms, PAINT) };
-    this.#mesh = new Mesh(NOTHING, this.#materials.group.of({ edges: false, places: false, beneath: false }));
+    this.#mesh = new Mesh(NOTHING, this.#materials.group.of({ edges: false, places: false, patches: false }));
     this.#mesh.frustumCulled = false;
     this.#scene.add(this.#mesh);
   }
@@ -33,12 +33,12 @@ export class Warmer {
   /** Puts textures and buffers of an upload on the GPU, and compiles what draws them. */
   warm(upload: Upload, mode: Mode, renderer: WebGLRenderer): void {
     const edges = mode === "wireframe";
-    const beneath = mode === "splats" && upload.splats !== null;
-    this.#mesh.material = this.#materials[upload.packed.kind].of({ edges, places: upload.isTextured, beneath });
+    const patches = mode === "splats" && upload.splats !== null;
+    this.#mesh.material = this.#materials[upload.packed.kind].of({ edges, places: upload.isTextured, patches });
     const geometries = [upload.faces(edges), upload.extra(edges)].filter((geometry) => geometry !== null);
     this.#uniforms.vertices.value = upload.texture; // which the geometries may have made, as the other one
     this.#uniforms.colors.value = upload.colors;
-    if (beneath) {
+    if (patches) {
       renderer.initTexture(upload.splats!);
       renderer.compile(this.#splats, this.#camera);
     }

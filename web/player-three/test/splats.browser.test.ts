@@ -1,4 +1,4 @@
-// Splats in Chromium are those that are composited without a GPU; the mesh beneath hides what is behind it, and what has no splats stays.
+// Splats in Chromium are those that are composited without a GPU, and what has no splats stays.
 
 import { readFileSync } from "node:fs";
 import { join } from "node:path";
@@ -24,7 +24,6 @@ import type {} from "./pages/splats.ts";
 
 const [WIDTH, HEIGHT] = [320, 240]; // of a Picture
 const [RED, GREEN] = [0xff0000ff, 0xff00ff00]; // opaque; red is the lowest byte
-const FAR = 100; // m: of a reach, that surfaces hide nothing
 
 /** Round splats on each face of a sphere, as large as it is; `colorOf`: from the middle of a face in frame 0. */
 function withSplats(packed: PackedGroup, colorOf: (middle: Vector) => number, copies = 1): PackedGroup {
@@ -39,7 +38,7 @@ function withSplats(packed: PackedGroup, colorOf: (middle: Vector) => number, co
     words.set([...corners, third | (third << 16), 0, 0, colorOf(middle), 0], SPLAT_WORDS * splat);
   }
   const unit = 0.9 * RADIUS * Math.sqrt((4 * Math.PI) / (faces.length / 3)); // of the sphere's own faces
-  return { ...packed, splats: { count, words, unit, reach: 3 * unit } };
+  return { ...packed, splats: { count, words, unit } };
 }
 
 describeInBrowser("splats in Chromium", () => {
@@ -66,7 +65,7 @@ describeInBrowser("splats in Chromium", () => {
     const [from, width, height] = [[0.7, 0.4, 1.1] as const, 120, 90];
     for (const frame of [0, 1, 2, 4, 5, 8]) {
       const group = groups.find(({ firstFrame, frameCount }) => frame < firstFrame + frameCount)!;
-      const alone = { ...group, extra: new Uint32Array(0), extraStarts: new Uint32Array(group.frameCount + 1), splats: { ...group.splats!, reach: FAR } };
+      const alone = { ...group, extra: new Uint32Array(0), extraStarts: new Uint32Array(group.frameCount + 1) };
       const drawn = Buffer.from(await draw([alone], "splats", frame, [from, width, height]), "base64");
       const bound = video.splats(frame)!.map((splat) => ({ ...splat, means: splat.means.map((value, k) => value - origin[k]) as never }));
       const wanted = composite(bound, from, width, height);
@@ -77,7 +76,7 @@ describeInBrowser("splats in Chromium", () => {
     }
   });
 
-  test("cover what their mesh covers, and the mesh hides those behind it", async () => {
+  test("cover what their mesh covers, and the nearer ones those behind them", async () => {
     const group = withSplats(makeGroup({ squareFrame: -1 }).packed, ([, , z]) => (z > 0 ? GREEN : RED));
     const mesh = new Picture(await draw([group], "tracks", 1));
     const splats = new Picture(await draw([group], "splats", 1));

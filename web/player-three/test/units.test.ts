@@ -118,7 +118,7 @@ describe("the order of splats", () => {
     const worker: OrderWorker = { postMessage: (job) => void asked.push(job), terminate: () => undefined, onmessage: null, onerror: null };
     const sorter = new Sorter(() => worker);
     const answers: number[] = [];
-    const question = { splats: { ...splats, unit: 1, reach: 1 }, texels, box, forward };
+    const question = { splats: { ...splats, unit: 1 }, texels, box, forward };
     const key = sorter.join((order) => void answers.push(order.length));
     expect([sorter.ask(key, question), sorter.ask(key, question), asked.length]).toEqual([true, false, 1]);
     worker.onmessage!({ data: { key, order: new Uint32Array(COUNT), texels: asked[0].texels, ms: 3 } });

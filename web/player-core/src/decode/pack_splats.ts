@@ -4,11 +4,9 @@ import { FormatError } from "../errors.ts";
 import type { DecodedGroup } from "./decoded.ts";
 import { locate } from "./splats.ts";
 import type { Located, Splats } from "./splats.ts";
-import { stepOf } from "./steps.ts";
 import { SPLATS_WIDTH, SPLAT_WEIGHT, SPLAT_WORDS } from "../types.ts";
 import type { PackedSplats } from "../types.ts";
 
-const [LARGEST, FAR] = [1 / 20, 3]; // share of scales that reach leaves out, and how many of the largest other it is (guess)
 const FULL_TURN = 1 << 16;
 const MOST = 1 << 22; // splats: their texture has no more rows than nearly every GPU allows, and none draws more in time
 
@@ -42,9 +40,7 @@ export function packSplats(splats: Splats, group: DecodedGroup, levels: number, 
   const words = new Uint32Array(4 * SPLATS_WIDTH * Math.ceil((own.length + lacking.length) / (4 * SPLATS_WIDTH)));
   words.set(own);
   words.set(lacking, own.length);
-  const unit = scale * splats.growth;
-  const longer = splats.levels.filter((_, k) => k % 2 === 0).sort();
-  return { count, words, unit, reach: FAR * unit * stepOf(longer[Math.floor(LARGEST * count)]) };
+  return { count, words, unit: scale * splats.growth };
 }
 
 /** The corner that an edge of the face begins at which has the direction of the base face's first edge, and whether it goes the other way. */
