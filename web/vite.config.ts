@@ -1,5 +1,5 @@
 // Builds the player into src/meshreel/player/, or into the folder MESHREEL_PLAYER: meshreel-player.js, which defines the element, the page
-// that `meshreel play` opens, the decoding worker, Draco, and the licences of what is in them. core.wasm is put there before by
+// that `meshreel play` opens, the decoding worker, Draco, the worker that orders splats, and the licences of what is in them. core.wasm is put there before by
 // scripts/build_wasm.py. Two builds give the same bytes.
 
 import { copyFileSync, mkdirSync, readdirSync, readFileSync, rmSync, writeFileSync } from "node:fs";
@@ -16,6 +16,7 @@ const KEPT = new Set(["core.wasm"]);
 export const ENTRIES: Readonly<Record<string, string>> = {
   "meshreel-player": "player-element/src/index.ts",
   worker: "player-core/src/worker_entry.ts",
+  order: "player-three/src/order_worker.ts",
   page: "player-element/src/page.ts",
 };
 

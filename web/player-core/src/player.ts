@@ -41,7 +41,7 @@ export class Player extends PlaybackTarget implements Playback {
   #textures = true;
   #level = NaN; // layers beyond the first, as last reported by `layerschange`
   interpolate = true;
-
+  splats = true;
   #paused = true;
   #ended = false;
   #seeking = false;
@@ -187,11 +187,11 @@ export class Player extends PlaybackTarget implements Playback {
   }
 
   update(now: number, far?: ReadonlySet<number>): Shown | null {
-    const session = this.#session;
-    const clock = this.#clock;
+    const [session, clock] = [this.#session, this.#clock];
     if (session === null || clock === null) return null;
     const { picture, timeline } = session;
     if (far) session.textures.far = far;
+    if (this.splats !== session.decoding.wanted.splats) this.#wake();
     clock.advance(now);
     const frame = timeline.frameAt(clock.time);
     const isShown = picture.show(frame, this.interpolate ? timeline.blendAt(clock.time, frame) : 0);
@@ -265,7 +265,7 @@ export class Player extends PlaybackTarget implements Playback {
     this.#wakesIn = Infinity;
     const [session, clock] = [this.#session, this.#clock];
     if (session === null || clock === null || this.#error !== null) return;
-    session.pump({ time: clock.time, speed: this.#rate, loop: this.#loop, layers: this.#layers, isWaiting: this.#hasStalled && !clock.isRunning });
+    session.pump({ time: clock.time, speed: this.#rate, loop: this.#loop, layers: this.#layers, splats: this.splats, isWaiting: this.#hasStalled && !clock.isRunning });
     this.#tellProgress(session);
     const level = this.#layers === "auto" ? session.level : this.#layers;
     if (level !== this.#level) {

@@ -31,6 +31,7 @@ export interface Aim {
   readonly speed: number; // content seconds a second
   readonly loop: boolean;
   readonly layers: Layers;
+  readonly splats: boolean; // whether they are wanted
   readonly isWaiting: boolean; // it should play and cannot
 }
 
@@ -68,7 +69,7 @@ export class Session {
   readonly #events: SessionEvents;
   readonly #adaptive: Adaptive;
   readonly #movingTracks: number; // that have something to decode
-  readonly #rates = new Map<string, number>(); // bits/s by layers beyond the first, with textures and without
+  readonly #rates = new Map<string, number>(); // bits/s by layers beyond the first and what is wanted with them
   #plan: Plan = { steps: [], keep: new Set(), chainCount: 0, coming: [] };
   #size: number | null = null; // of the file, as the source had it last
   #speed = 1;
@@ -87,7 +88,7 @@ export class Session {
     this.decoding = new Decoding(head, this.#links, this.fetcher, share, events);
     this.textures = new Textures(head, this.fetcher, this.decoding, { warn: events.warn, changed: events.textured }, { on: textures, decodable });
     this.picture = new Picture(head, this.decoding, this.textures);
-    this.#adaptive = new Adaptive(head, this.timeline, this.#bandwidth, this.textures.rendition);
+    this.#adaptive = new Adaptive(head, this.timeline, this.#bandwidth, this.decoding.wanted);
   }
 
   /** Layers beyond the first that "auto" chooses now. */
@@ -112,6 +113,7 @@ export class Session {
       exact: aim.layers !== "auto",
     };
     this.textures.loop = aim.loop;
+    if (aim.splats !== this.decoding.wanted.splats) this.decoding.want({ splats: aim.splats });
     const made = plan(this.head, this.#links, this.timeline, outlook, this.decoding);
     const keep = new Set(made.keep);
     this.picture.addTo(keep);
@@ -172,13 +174,13 @@ export class Session {
 
   /** Bits a second of content of the whole stream, with `layers` layers beyond the first. */
   rateAt(layers: number): number {
-    const textures = this.textures.rendition;
-    const key = `${layers} ${textures}`;
+    const { wanted } = this.decoding;
+    const key = `${layers} ${wanted.textures} ${wanted.splats}`;
     let rate = this.#rates.get(key);
     if (rate === undefined) {
       const shown = this.head.chunks.filter(({ kind }) => kind === "static" || kind === "group");
       const layersOf = (chunk: Chunk): number => (chunk.kind === "static" ? chunk.layers.length : layers + 1);
-      const size = shown.reduce((sum, chunk) => sum + sizeWithCompanions(this.head, chunk, layersOf(chunk), textures), 0);
+      const size = shown.reduce((sum, chunk) => sum + sizeWithCompanions(this.head, chunk, layersOf(chunk), wanted), 0);
       rate = (8 * size) / this.timeline.duration;
       this.#rates.set(key, rate);
     }
@@ -224,7 +226,7 @@ export class Session {
   }
 
   #adapt(aim: Aim): void {
-    this.#adaptive.textures = this.textures.rendition;
+    this.#adaptive.wanted = this.decoding.wanted;
     const before = this.#adaptive.level;
     const level = this.#adaptive.decide({
       now: performance.now(),

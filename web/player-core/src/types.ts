@@ -53,10 +53,27 @@ export interface PackedGroup extends PackedVertices {
   /** Corners of the additional faces of single frames: frame t has extra[extraStarts[t]] up to extra[extraStarts[t + 1]]. */
   readonly extra: Uint32Array;
   readonly extraStarts: Uint32Array; // T + 1 numbers
+  readonly splats: PackedSplats | null; // shown in place of all surface but what single frames have alone
   readonly layers: number; // layers beyond the first that it was decoded from
   readonly bytes: number; // that it was decoded from
   readonly decodeMs: number;
 }
+
+/**
+ * Splats of a group. Eight words each: the vertices of the corners of its face; the weights of the second and the third one, in SPLAT_WEIGHTths,
+ * a half each; its offset along the normal, m, as float32; its turn from the direction of the face's first edge, in 65536ths of a full one, a
+ * half, and the levels of its scales, a byte each; red, green, blue (sRGB) and its opacity, a byte each; and where from on, among these words,
+ * the bits of the frames lie that lack it: 0 where none does.
+ */
+export interface PackedSplats {
+  readonly count: number;
+  readonly words: Uint32Array; // padded to SPLATS_WIDTH texels of four words
+  readonly unit: number; // m: the scale of level 0; that of level k is 2^(-k/8) of it
+}
+
+export const SPLAT_WORDS = 8;
+export const SPLAT_WEIGHT = 1 << 14;
+export const SPLATS_WIDTH = 2048; // texels
 
 /** A decoded state of the background. Texels: one a vertex, without padding. */
 export interface PackedStatic extends PackedVertices {
@@ -111,7 +128,7 @@ export interface TextureStats {
 }
 
 /** What a chunk may add to another one, which is shown without it where it is damaged. */
-export type CompanionKind = "colors" | "atlas" | Rendition;
+export type CompanionKind = "colors" | "atlas" | "splats" | Rendition;
 
 /** Which video textures are decoded from: AV1, or the same pictures in H.264. */
 export type Rendition = "pictures" | "compatible";
@@ -128,6 +145,7 @@ export interface Info {
   readonly size: number; // bytes
   readonly hasColors: boolean; // whether some of it has colours of its own
   readonly hasTextures: boolean; // whether some of these are in textures
+  readonly hasSplats: boolean; // whether some of it has splats
   readonly metadata: Readonly<Record<string, unknown>>;
 }
 
@@ -188,6 +206,7 @@ export interface Playback extends EventTarget {
   interpolate: boolean; // blend between frames of a group
   layers: Layers;
   textures: boolean; // whether textures are fetched and shown
+  splats: boolean; // whether splats are fetched
   play(): Promise<void>;
   pause(): void;
   /** Pauses and moves by a number of frames; a negative one goes back. */

@@ -13,7 +13,7 @@ const GOOD: Conditions = { now: 0, time: 0, speed: 1, bandwidth: 1e9, fetched: 1
 const bits = (bytes: number): number => 8 * bytes;
 
 function make(bandwidth: number): Adaptive {
-  return new Adaptive(HEAD, TIMELINE, bandwidth, null);
+  return new Adaptive(HEAD, TIMELINE, bandwidth, { textures: null, splats: false });
 }
 
 test("rates are those of the file's own bytes", () => {

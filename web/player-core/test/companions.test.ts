@@ -131,10 +131,55 @@ test("chunks of kinds that the player does not know are neither fetched nor miss
   expect(name(Head.parse(file).chunks[0])).toBe("chunk 0 (of another kind)");
 });
 
+describe("splats", () => {
+  const laplacian = { form: Form.LAPLACIAN };
+  const splats = (of: number): FakeChunk => ({ ...colors([of], OF_COLORS), kind: "splats", form: Form.GAUSSIANS });
+  const chained = (): FakeChunk[] => [group(10, FULL), splats(0), group(10, FULL, { dependsOn: [0] }), group(10, [300], laplacian), splats(3)];
+  const withSplats = (): number[] => rig.workers.begun.filter(({ job }) => job.companions.length > 0).map(({ job }) => job.chunk);
+
+  test("come with the group that begins a chain, and with as many layers", async () => {
+    rig.begin(makeReel(chained(), RATE), FAST, { count: 1 });
+    rig.player.layers = 1;
+    await play(2);
+    expect(rig.viewer.warnings).toEqual([]);
+    expect(rig.viewer.frames).toEqual(frames(0, 30));
+    expect(rig.workers.begun.map(({ job }) => [job.chunk, ...job.companions.map(({ payload }) => payload.length)])).toEqual([[0, 150], [2], [3, 350]]);
+    expect(rig.player.info).toMatchObject({ hasSplats: true, hasColors: false });
+  });
+
+  test("that are not wanted are neither fetched nor counted; wanted again, their chain is decoded again", async () => {
+    rig.begin(makeReel(chained(), RATE), FAST, { count: 1 });
+    rig.player.splats = false;
+    await play(2);
+    expect(withSplats()).toEqual([]);
+    expect(rig.viewer.shown?.groups[0]?.splats).toBeNull();
+    const rate = rig.player.stats.mbps;
+    rig.player.splats = true;
+    rig.player.currentTime = 0.5;
+    await pass(1);
+    expect(withSplats()).toContain(0);
+    expect(rig.workers.chunks.filter((chunk) => chunk === 2)).toHaveLength(2);
+    expect(rig.player.stats.mbps).toBeGreaterThan(rate);
+    rig.player.currentTime = 0;
+    await pass(1);
+    expect(rig.viewer.shown?.groups[0]?.splats?.count).toBe(1);
+  });
+
+  test("that are damaged leave the surface", async () => {
+    rig.begin(damaged(makeReel(chained(), RATE), 1), FAST);
+    await play(2);
+    expect(rig.viewer.warnings).toEqual(["chunk 1 (splats, track 0, frames 0 to 9): a layer is damaged; it is skipped"]);
+    expect(rig.viewer.frames).toEqual(frames(0, 30));
+    expect(rig.player.stats.skippedGroups).toBe(0);
+  });
+});
+
 describe("the index", () => {
   const two = [group(10, FULL), group(10, FULL, { dependsOn: [0] })];
   const atlas: FakeChunk = { kind: "atlas", form: Form.PLACES, frames: 10, track: 0, dependsOn: [0], layers: [9] };
   const pictures: FakeChunk = { ...atlas, kind: "pictures", form: Form.VIDEO };
+  const splats: FakeChunk = { ...atlas, kind: "splats", form: Form.GAUSSIANS };
+  const draco = group(10, FULL, { form: Form.DRACO });
   const refused: [string, FakeChunk[], RegExp][] = [
     ["colours of nothing", [...two, colors([], [9])], /of undefined, which is no chunk before/],
     ["colours of a chunk behind them", [colors([1], [9]), ...two], /of 1, which is no chunk before/],
@@ -148,6 +193,11 @@ describe("the index", () => {
     ["an atlas of a predicted group", [...two, { ...atlas, dependsOn: [1] }], /of 1, that depends on $/],
     ["pictures predicted from those of the other rendition", [two[0], atlas, { ...pictures, kind: "compatible", dependsOn: [0, 1] }, two[1], { ...pictures, dependsOn: [3, 1, 2] }], /of 3, that depends on 1,2$/],
     ["pictures without an atlas", [...two, { ...pictures, dependsOn: [1] }], /of 1, that depends on $/],
+    ["splats of a predicted group", [...two, { ...splats, dependsOn: [1] }], /of 1, that depends on $/],
+    ["splats of a form without a mesh for all frames", [draco, splats], /of 0, that depends on $/],
+    ["splats of another form", [two[0], { ...splats, form: Form.PLACES }], /form 7 .* not those of chunk 0/],
+    ["splats that need others", [two[0], colors([0], [9]), { ...splats, dependsOn: [0, 1] }], /of 0, that depends on 1$/],
+    ["splats of a background", [background(9), { ...splats, frames: 0 }, ...two], /of 0, that depends on $/],
     ["a group of the form of colours", [group(10, FULL, { form: Form.VERTEX_COLORS })], /of kind 2 and form 6/],
     ["a background of the form of colours", [{ ...background(10), form: Form.VERTEX_COLORS }, ...two], /of kind 1 and form 6/],
     ["a chunk of a future kind without bytes", [{ ...atlas, kind: "future", layers: [0] }, ...two], /without bytes/],

@@ -4,7 +4,7 @@ import { crc32 } from "../src/format/crc.ts";
 import { Form } from "../src/format/layout.gen.ts";
 import type { WorkerLike, WorkerSetup } from "../src/time/pool.ts";
 import type { DecodeJob, FromWorker, ToWorker } from "../src/protocol.ts";
-import type { Packed } from "../src/types.ts";
+import type { Packed, PackedSplats } from "../src/types.ts";
 
 export interface Done {
   readonly job: DecodeJob;
@@ -140,12 +140,18 @@ function packedOf(job: DecodeJob, bytesPerFrame: number): Packed {
   const texels = new Uint16Array((frameCount * bytesPerFrame) / 2);
   const layers = job.ranges.length - 1;
   const extra = { extra: new Uint32Array(0), extraStarts: new Uint32Array(frameCount + 1), textureWidth: 1, textureHeight: 1 };
-  return { kind: "group", track, firstFrame, frameCount, layers, texels, ...extra, ...shared };
+  return { kind: "group", track, firstFrame, frameCount, layers, texels, splats: splatsOf(job), ...extra, ...shared };
 }
 
 /** One texel, where the colours are sound. */
 function colorsOf({ companions }: DecodeJob): Uint8Array | null {
   return companions.some((companion) => companion.kind === "colors" && !isDamaged(companion)) ? new Uint8Array(4) : null;
+}
+
+/** One splat, where they are sound. */
+function splatsOf({ companions }: DecodeJob): PackedSplats | null {
+  const isThere = companions.some((companion) => companion.kind === "splats" && !isDamaged(companion));
+  return isThere ? { count: 1, words: new Uint32Array(8), unit: 1 } : null;
 }
 
 /** Of a texture of 64 x 32 texels, where pictures will be shown. */

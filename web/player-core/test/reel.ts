@@ -4,7 +4,7 @@ import { crc32 } from "../src/format/crc.ts";
 import { ChunkKind, Form } from "../src/format/layout.gen.ts";
 import { noise } from "./server.ts";
 
-const KINDS = { static: ChunkKind.STATIC, group: ChunkKind.GROUP, colors: ChunkKind.COLORS, atlas: ChunkKind.ATLAS, pictures: ChunkKind.PICTURES, compatible: ChunkKind.COMPATIBLE, future: 200 };
+const KINDS = { static: ChunkKind.STATIC, group: ChunkKind.GROUP, colors: ChunkKind.COLORS, atlas: ChunkKind.ATLAS, pictures: ChunkKind.PICTURES, compatible: ChunkKind.COMPATIBLE, splats: ChunkKind.SPLATS, future: 200 };
 
 export interface FakeChunk {
   readonly kind: keyof typeof KINDS;

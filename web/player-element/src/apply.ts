@@ -9,6 +9,7 @@ export function applyToPlayback(name: string, settings: Reflected, playback: Pla
   if (name === "layers") playback.layers = settings.layers;
   if (name === "speed" || name === "playbackrate") playback.playbackRate = settings.playbackRate;
   if (name === "textures") playback.textures = settings.textures;
+  if (name === "mode") playback.splats = settings.splats;
   if (name === "interpolate") playback.interpolate = settings.interpolate;
 }
 

@@ -1,7 +1,7 @@
 // Attributes and properties: what a page writes, and what the player takes from it. Nothing here knows the DOM.
 
 import { PLAYBACK_RATES } from "@meshreel/player-core/types";
-import type { Layers } from "@meshreel/player-core/types";
+import type { Info, Layers } from "@meshreel/player-core/types";
 import { MODES } from "@meshreel/player-three/modes";
 import type { Mode } from "@meshreel/player-three/modes";
 import type { Up } from "./upright.ts";
@@ -71,10 +71,23 @@ export function parseLayers(text: string | null): Layers {
   return readLayers(text ?? "") ?? "auto";
 }
 
-/** How surfaces look: the recording's own colours where the text is none; shaded in place of colours that it has not. */
-export function parseMode(text: string | null, hasColors: boolean): Mode {
-  const mode = readMode(text ?? "") ?? "color";
-  return mode === "color" && !hasColors ? "shaded" : mode;
+/** What a recording may look like. */
+export type Looks = Pick<Info, "hasColors" | "hasSplats">;
+
+/** How surfaces look where the text is none: by splats, or in colours, or shaded, whichever of these comes first that the recording has. */
+export function parseMode(text: string | null, has: Looks | null): Mode {
+  const mode = readMode(text ?? "") ?? "splats";
+  return [mode, "color" as const].find((some) => modesOf(has).includes(some)) ?? "shaded";
+}
+
+/** Modes that a recording can be shown in. */
+export function modesOf(has: Looks | null): readonly Mode[] {
+  return MODES.filter((mode) => (mode !== "splats" || has?.hasSplats) && (mode !== "color" || has?.hasColors));
+}
+
+/** Whether splats are wanted where there are some. */
+export function wantsSplats(text: string | null): boolean {
+  return (readMode(text ?? "") ?? "splats") === "splats";
 }
 
 /** The axis that points up, in place of the one in the file; null where none is given. */

@@ -1,6 +1,7 @@
 // The real engine: recordings come from the network or from files, workers decode them, three.js draws them.
 
 import { BlobSource, HttpSource, Player, WorkerPool, type WorkerLike } from "@meshreel/player-core";
+import type { OrderWorker } from "@meshreel/player-three";
 import { GraphicsError } from "./stage.ts";
 import type { Engine, Settings, Stage } from "./stage.ts";
 import { ThreeStage } from "./stage_three.ts";
@@ -10,6 +11,7 @@ export interface Files {
   readonly worker: URL;
   readonly core: URL;
   readonly draco: URL;
+  readonly order: URL; // the worker that orders splats
 }
 
 const POOL_KEPT = 1000; // ms that workers are kept after the last player is closed: a change of `src` needs them again
@@ -28,9 +30,9 @@ export class RealEngine implements Engine {
     this.#files = files;
   }
 
-  open(source: string | Blob, { layers, interpolate, textures, loop, playbackRate }: Settings): Player {
+  open(source: string | Blob, { layers, interpolate, textures, splats, loop, playbackRate }: Settings): Player {
     const { worker, core, draco } = this.#files;
-    const create = (): WorkerLike => openWorker(worker);
+    const create = (): WorkerLike => openWorker(worker) as WorkerLike;
     const shared = (this.#shared ??= { workers: new WorkerPool({ create, core: core.href, draco: draco.href }), users: 0 });
     shared.users++;
     const player = new PooledPlayer({
@@ -40,14 +42,14 @@ export class RealEngine implements Engine {
     player.leave = () => this.#leave(shared);
     // Workers that could not be started are not tried again by their pool: whoever tries again gets new ones.
     player.addEventListener("error", () => this.#forget(shared));
-    Object.assign(player, { layers, interpolate, textures, loop, playbackRate });
+    Object.assign(player, { layers, interpolate, textures, splats, loop, playbackRate });
     player.load().catch(() => undefined); // reported by the error event
     return player;
   }
 
   stage(canvas: HTMLCanvasElement): Stage {
     try {
-      return new ThreeStage(canvas);
+      return new ThreeStage(canvas, () => openWorker(this.#files.order) as OrderWorker);
     } catch (error) {
       throw new GraphicsError(error instanceof Error ? error.message : String(error), { cause: error });
     }
@@ -82,11 +84,11 @@ class PooledPlayer extends Player {
  * A worker of a module. Browsers start workers only from the page's own origin: of any other, a worker made here imports the module,
  * which that origin must allow by CORS.
  */
-export function openWorker(module: URL): WorkerLike {
-  if (module.origin === location.origin) return new Worker(module, { type: "module" }) as WorkerLike;
+export function openWorker(module: URL): Worker {
+  if (module.origin === location.origin) return new Worker(module, { type: "module" });
   const address = URL.createObjectURL(new Blob([`import ${JSON.stringify(module.href)};`], { type: "text/javascript" }));
   const worker = new Worker(address, { type: "module" });
   // The address is needed until the worker has read it, and a worker does not report when; it answers its first message after that.
   worker.addEventListener("message", () => URL.revokeObjectURL(address), { once: true });
-  return worker as WorkerLike;
+  return worker;
 }

@@ -9,6 +9,8 @@ export { MeshreelPlayer };
 const beside = (name: string): URL => new URL(name, import.meta.url);
 
 if (globalThis.customElements && !customElements.get("meshreel-player")) {
-  MeshreelPlayer.engine = new RealEngine({ worker: beside("worker.js"), core: beside("core.wasm"), draco: beside("draco.wasm") });
+  MeshreelPlayer.engine = new RealEngine({
+    worker: beside("worker.js"), core: beside("core.wasm"), draco: beside("draco.wasm"), order: beside("order.js"),
+  });
   customElements.define("meshreel-player", MeshreelPlayer);
 }

@@ -124,12 +124,17 @@ export class Reflected extends Element {
     this.setAttribute("textures", value ? "on" : "off");
   }
 
-  /** How surfaces look; `color` where none is set, and `shaded` in its place while the recording has no colours. */
+  /** How surfaces look: where none is set, or one that the recording has not, `splats`, `color` or `shaded`, the first of these that it has. */
   get mode(): Mode {
-    return parse.parseMode(this.getAttribute("mode"), this.info?.hasColors ?? false);
+    return parse.parseMode(this.getAttribute("mode"), this.info);
   }
   set mode(value: Mode) {
     this.setAttribute("mode", value);
+  }
+
+  /** Whether splats are fetched, where the recording has some: `mode` says so. */
+  get splats(): boolean {
+    return parse.wantsSplats(this.getAttribute("mode"));
   }
 
   /** The recording's axis that points up; null for the one that the file names. */

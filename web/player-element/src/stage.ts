@@ -9,19 +9,21 @@ import type { Up } from "./upright.ts";
 export interface PictureStats {
   readonly triangles: number; // of the last picture
   readonly gpuBytes: number; // of buffers and textures
+  readonly splats: number; // of the last picture
+  readonly sortMs: number; // in a worker, of the last time that splats were ordered
   readonly headsetRate: number; // Hz of the headset that shows it; 0 on a page, and where the headset does not report it
 }
 
 /**
  * Draws packed groups into a canvas and moves a camera. Events:
- * `change` (a picture is wanted: the camera moved, a texture came), `camerachange`, `lost` and `restored` (the GPU's context),
+ * `change` (a picture is wanted: the camera moved, a texture came, splats are in order), `camerachange`, `lost` and `restored` (the GPU's context),
  * `vrstart` and `vrend`.
  */
 export interface Stage extends EventTarget {
   readonly canvas: HTMLCanvasElement;
   readonly stats: PictureStats;
   readonly presenting: boolean; // to a headset
-  readonly far: ReadonlySet<number>; // tracks that were drawn so small that textures make no difference
+  readonly far: ReadonlySet<number>; // tracks whose textures make no difference: they were drawn so small, or as splats
   mode: Mode;
   background: string; // a CSS colour
   camera: string; // as the attribute has it; "" fits the view
@@ -49,6 +51,7 @@ export interface Settings {
   readonly layers: Layers;
   readonly interpolate: boolean;
   readonly textures: boolean;
+  readonly splats: boolean;
   readonly loop: boolean;
   readonly playbackRate: number;
 }

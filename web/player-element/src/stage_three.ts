@@ -1,8 +1,8 @@
 // A stage that draws with three.js: the recording, a camera that orbits it, and a headset.
 
 import type { Box, Info, Packed, Shown } from "@meshreel/player-core/types";
-import { ReelScene, updateFar } from "@meshreel/player-three";
-import type { Mode } from "@meshreel/player-three";
+import { ReelScene, Sorter, updateFar } from "@meshreel/player-three";
+import type { Mode, OrderWorker } from "@meshreel/player-three";
 import { VrSession } from "@meshreel/xr";
 import type { VrActions } from "@meshreel/xr";
 import { Color, Group, PerspectiveCamera, Scene, Spherical, Vector3, WebGLRenderer } from "three";
@@ -30,7 +30,8 @@ export class ThreeStage extends EventTarget implements Stage {
   readonly #eye = new PerspectiveCamera(FOV, 1, 0.01, 1000);
   readonly #orbit: OrbitControls;
   readonly #stop = new AbortController();
-  #reel = new ReelScene();
+  readonly #sorter: Sorter;
+  #reel: ReelScene;
   #box: Box | null = null; // of the recording, as it stands
   #info: Info | null = null; // of the recording
   #up: Up | null = null;
@@ -42,9 +43,13 @@ export class ThreeStage extends EventTarget implements Stage {
   readonly #place = new Vector3(); // of the eye, in the recording's space
   readonly far = new Set<number>();
 
-  constructor(canvas: HTMLCanvasElement) {
+  /** `openOrder`: makes a worker that orders splats. */
+  constructor(canvas: HTMLCanvasElement, openOrder: () => OrderWorker) {
     super();
     this.canvas = canvas;
+    this.#sorter = new Sorter(openOrder);
+    this.#sorter.onorder = () => this.dispatchEvent(new Event("change"));
+    this.#reel = new ReelScene(this.#sorter);
     this.#renderer = new WebGLRenderer({ canvas, antialias: true, powerPreference: "high-performance" });
     this.#scene.add(this.#content);
     this.#content.add(this.#reel);
@@ -58,7 +63,9 @@ export class ThreeStage extends EventTarget implements Stage {
   }
 
   get stats(): PictureStats {
-    return { triangles: this.#reel.visible ? this.#reel.triangles : 0, gpuBytes: this.#reel.gpuBytes, headsetRate: this.#session?.rate ?? 0 };
+    const { visible, triangles, gpuBytes, splats } = this.#reel;
+    const count = visible ? splats.reduce((sum, some) => sum + some, 0) : 0;
+    return { triangles: visible ? triangles : 0, gpuBytes, splats: count, sortMs: this.#sorter.lastMs, headsetRate: this.#session?.rate ?? 0 };
   }
 
   get presenting(): boolean {
@@ -107,7 +114,7 @@ export class ThreeStage extends EventTarget implements Stage {
     this.exitVr(); // a session's place is that of one recording
     this.#reel.removeFromParent();
     this.#reel.dispose();
-    this.#reel = new ReelScene();
+    this.#reel = new ReelScene(this.#sorter);
     this.#reel.mode = this.#mode;
     this.#content.add(this.#reel);
     this.#stand(info);
@@ -125,6 +132,7 @@ export class ThreeStage extends EventTarget implements Stage {
     if (shown) this.#reel.show(shown);
     if (this.presenting) this.far.clear(); // it comes near
     else if (shown) updateFar(this.far, shown, this.#reel.worldToLocal(this.#place.copy(this.#eye.position)), this.canvas.height / (2 * TANGENT));
+    this.#reel.splats.forEach((count, track) => void (count > 0 && this.far.add(track)));
     this.#reel.visible = shown !== null;
     const moves = !this.presenting && this.#orbit.update();
     this.#renderer.render(this.#scene, this.#eye);
@@ -184,6 +192,7 @@ export class ThreeStage extends EventTarget implements Stage {
     this.#stop.abort();
     this.#orbit.dispose();
     this.#reel.dispose();
+    this.#sorter.dispose();
     this.#renderer.dispose();
     this.#renderer.forceContextLoss();
   }

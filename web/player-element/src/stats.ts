@@ -20,7 +20,7 @@ export function statisticsLines(stats: Statistics, info: Info | null, frame: num
     ["Decode", `${stats.decodeMs.toFixed(1)} ms a group, load ${(stats.decodeLoad * 100).toFixed(0)} %`],
     ["Buffer", `${stats.bufferedSeconds.toFixed(1)} s, ${formatCount(stats.stalls)} ${stats.stalls === 1 ? "stall" : "stalls"}`],
     ["Layers", layersText(stats, info?.mostLayers ?? 0)],
-    ["Colours", info?.hasColors ? colorsText(stats) : "none"],
+    ["Colours", colorsOf(stats, info)],
     ["Triangles", formatCount(stats.triangles)],
     ["Display", stats.fps > 0 ? `${formatCount(stats.fps)} fps, ${stats.frameMs.toFixed(1)} ms each` : "still"],
     ["GPU memory", formatAmount(stats.gpuBytes, "B")],
@@ -32,6 +32,11 @@ export function statisticsLines(stats: Statistics, info: Info | null, frame: num
 function layersText({ layers, wholeLayers }: Statistics, most: number): string {
   if (most === 0) return "one only";
   return layers >= wholeLayers ? `${most} of ${most}` : `${layers} of ${wholeLayers}`;
+}
+
+function colorsOf(stats: Statistics, info: Info | null): string {
+  if (stats.splats > 0) return `${formatCount(stats.splats)} splats, ordered in ${stats.sortMs.toFixed(1)} ms`;
+  return info?.hasColors ? colorsText(stats) : "none";
 }
 
 const WITHOUT: Readonly<Record<Exclude<TextureState, "shown">, string>> = {

@@ -8,7 +8,7 @@ import type { Engine, Settings, Stage } from "../src/stage.ts";
 
 export const INFO: Info = {
   frameCount: 48, frameRate: 24, duration: 2, origin: [0, 0, 0], box: { minimum: [-1, 0, -1], size: [2, 2, 2] }, trackCount: 1,
-  mostLayers: 3, size: 123_456, hasColors: false, hasTextures: false, metadata: {},
+  mostLayers: 3, size: 123_456, hasColors: false, hasTextures: false, hasSplats: false, metadata: {},
 };
 
 /** Keeps time like a real one; a head comes after 10 ms, a seek takes 20 ms. An address with "404" in it fails. */
@@ -21,6 +21,7 @@ export class FakePlayback extends EventTarget implements Playback {
   playbackRate: number;
   interpolate: boolean;
   textures: boolean;
+  splats: boolean;
   layers: Layers;
   stalled = false; // set by tests
   updates = 0;
@@ -38,6 +39,7 @@ export class FakePlayback extends EventTarget implements Playback {
     this.playbackRate = settings.playbackRate;
     this.interpolate = settings.interpolate;
     this.textures = settings.textures;
+    this.splats = settings.splats;
     this.layers = settings.layers;
     const bad = typeof source === "string" && source.includes("404");
     this.#later(10, () => (bad ? this.fail(`${String(source)}: not found (404), check the address`, "missing") : this.#head()));
@@ -143,7 +145,7 @@ export class FakePlayback extends EventTarget implements Playback {
 /** Draws a turning square and the number of the frame. */
 export class FakeStage extends EventTarget implements Stage {
   readonly canvas: HTMLCanvasElement;
-  readonly stats = { triangles: 41_234, gpuBytes: 12_345_678, headsetRate: 0 };
+  readonly stats = { triangles: 41_234, gpuBytes: 12_345_678, splats: 0, sortMs: 0, headsetRate: 0 };
   presenting = false;
   readonly far = new Set<number>();
   mode: Mode = "shaded";

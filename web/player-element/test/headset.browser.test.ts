@@ -1,10 +1,12 @@
 // The built player with a real recording in a simulated Quest 3: from the button to both eyes, and back to the page.
 
+import { readFileSync } from "node:fs";
 import { createRequire } from "node:module";
 import { dirname, join } from "node:path";
 import type { Page } from "playwright-core";
 import { afterAll, beforeAll, expect, test } from "vitest";
 import { describeInBrowser } from "../../test/browser.ts";
+import { ROOT } from "../../test/python.ts";
 import { Site } from "./product.ts";
 
 const IWER = join(dirname(createRequire(import.meta.url).resolve("iwer/package.json")), "build/iwer.js");
@@ -97,6 +99,20 @@ describeInBrowser("the built player in a headset", () => {
     expect(await page.evaluate(() => document.querySelector("meshreel-player")!.camera)).toBe(camera);
     const drawn = await page.evaluate(() => document.querySelector("meshreel-player")!.statistics!.drawn);
     await page.waitForFunction((before) => document.querySelector("meshreel-player")!.statistics!.drawn > before, drawn); // by the page's own frames
+    expect(errors).toEqual([]);
+    await page.close();
+  }, 60_000);
+
+  test("both eyes see splats, where nothing else is drawn", async () => {
+    site.write("splats.reel", readFileSync(join(ROOT, "conformance/v1/splats/splats.reel")));
+    const { page, errors } = await site.visit("player/index.html?src=/splats.reel&t=0.28&background=white", [{ path: IWER }, installHeadset]); // without patches
+    await page.waitForFunction(() => (document.querySelector("meshreel-player")!.statistics?.splats ?? 0) > 0);
+    await page.locator("button.vr").click();
+    await page.waitForFunction(() => document.querySelector("meshreel-player")!.presenting);
+    await page.evaluate(() => headset.frames(3));
+    const [left, right] = await page.evaluate(() => headset.eyes());
+    expect(left).toBeGreaterThan(0.002);
+    expect(Math.abs(left - right)).toBeLessThan(0.2 * left);
     expect(errors).toEqual([]);
     await page.close();
   }, 60_000);

@@ -329,7 +329,7 @@ describeInBrowser("the built player", () => {
     await buildPlayer(join(site.folder, "again"));
     const files = readdirSync(join(site.folder, "player")).sort();
     expect(readdirSync(join(site.folder, "again")).sort()).toEqual(files);
-    expect(files).toEqual(["LICENSES.txt", "core.wasm", "draco.wasm", "index.html", "meshreel-player.js", "page.css", "page.js", "worker.js"]);
+    expect(files).toEqual(["LICENSES.txt", "core.wasm", "draco.wasm", "index.html", "meshreel-player.js", "order.js", "page.css", "page.js", "worker.js"]);
     for (const name of files) {
       const bytes = readFileSync(join(site.folder, "player", name));
       expect(bytes.equals(readFileSync(join(site.folder, "again", name))), name).toBe(true);

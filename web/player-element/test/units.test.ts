@@ -40,11 +40,15 @@ describe("attributes", () => {
   test("layers are a whole number from 0, else auto", () => {
     expect(["0", " 3 ", "auto", "-1", "1.5", "", null].map(parse.parseLayers)).toEqual([0, 3, "auto", "auto", "auto", "auto", "auto"]);
   });
-  test("a mode that is not known is the recording's colours, or where it has none shaded", () => {
-    const texts = ["normal", "WIREFRAME", "tracks", "color", "colour", "x", null];
-    const read = (hasColors: boolean): Mode[] => texts.map((text) => parse.parseMode(text, hasColors));
-    expect(read(true)).toEqual(["normal", "wireframe", "tracks", "color", "color", "color", "color"]);
-    expect(read(false)).toEqual(["normal", "wireframe", "tracks", "shaded", "shaded", "shaded", "shaded"]);
+  test("a mode that is not known, or that the recording has not, is its splats, its colours, or shaded", () => {
+    const texts = ["normal", "WIREFRAME", "splats", "color", "colour", "x", null];
+    const read = (hasColors: boolean, hasSplats: boolean): Mode[] => texts.map((text) => parse.parseMode(text, { hasColors, hasSplats }));
+    expect(read(true, true)).toEqual(["normal", "wireframe", "splats", "color", "color", "splats", "splats"]);
+    expect(read(false, true)).toEqual(["normal", "wireframe", "splats", "shaded", "shaded", "splats", "splats"]);
+    expect(read(true, false)).toEqual(["normal", "wireframe", "color", "color", "color", "color", "color"]);
+    expect(read(false, false)).toEqual(["normal", "wireframe", "shaded", "shaded", "shaded", "shaded", "shaded"]);
+    expect(parse.parseMode("tracks", null)).toBe("tracks");
+    expect(texts.map(parse.wantsSplats)).toEqual([false, false, true, false, false, true, true]);
   });
   test("an axis that points up is one of four, or nobody's word", () => {
     expect(["y", "Z", " -y ", "-z", "x", "", null].map(parse.parseUp)).toEqual(["y", "z", "-y", "-z", null, null, null]);
@@ -162,11 +166,16 @@ describe("menus", () => {
     expect(layersValue(3, "auto")).toBe("auto");
     expect(layersChoices(0, 9).map(({ value }) => value)).toEqual(["auto", "0"]);
   });
-  test.each([true, false])("the next mode of the last is the first; colours are offered where there are some", (hasColors) => {
-    const all = modeChoices(hasColors).map(({ value }) => value);
-    expect(all).toEqual(hasColors ? [...MODES] : MODES.slice(1));
+  test.each([
+    [{ hasColors: true, hasSplats: true }, [...MODES]],
+    [{ hasColors: true, hasSplats: false }, MODES.slice(1)],
+    [{ hasColors: false, hasSplats: true }, MODES.filter((mode) => mode !== "color")],
+    [{ hasColors: false, hasSplats: false }, MODES.slice(2)],
+  ])("the next mode of the last is the first; colours and splats are offered where there are some", (has, wanted) => {
+    const all = modeChoices(has).map(({ value }) => value);
+    expect(all).toEqual(wanted);
     let mode = all[0] as Mode;
-    for (const expected of [...all.slice(1), all[0]]) expect((mode = nextMode(mode, hasColors))).toBe(expected);
+    for (const expected of [...all.slice(1), all[0]]) expect((mode = nextMode(mode, has))).toBe(expected);
   });
 });
 
@@ -188,7 +197,7 @@ describe("messages", () => {
 describe("drawing only what changed", () => {
   const shown = { frame: 3, blend: 0.5, frames: [3], groups: [null], background: null, images: [null], backgroundImage: null };
   test("a paused playback that has shown something needs no pictures", () => {
-    const playback = new FakePlayback("x", { layers: "auto", interpolate: true, textures: true, loop: false, playbackRate: 1 });
+    const playback = new FakePlayback("x", { layers: "auto", interpolate: true, textures: true, splats: true, loop: false, playbackRate: 1 });
     expect(goesOn(playback, null)).toBe(true);
     expect(goesOn(playback, shown)).toBe(false);
     playback.seeking = true;
@@ -214,8 +223,8 @@ describe("small parts", () => {
     expect([ranges(2, 2).length, ranges(0, NaN).length]).toEqual([0, 0]);
   });
   test("the statistics name what the overlay must show", () => {
-    const playback = new FakePlayback("x", { layers: "auto", interpolate: true, textures: true, loop: false, playbackRate: 1 });
-    const lines = statisticsLines({ ...playback.stats, triangles: 41_234, gpuBytes: 12_345_678, headsetRate: 0, fps: 60, frameMs: 0.42, drawn: 1 }, INFO, 4);
+    const playback = new FakePlayback("x", { layers: "auto", interpolate: true, textures: true, splats: true, loop: false, playbackRate: 1 });
+    const lines = statisticsLines({ ...playback.stats, triangles: 41_234, gpuBytes: 12_345_678, splats: 0, sortMs: 0, headsetRate: 0, fps: 60, frameMs: 0.42, drawn: 1 }, INFO, 4);
     expect(Object.fromEntries(lines)).toMatchObject({
       Frame: "5 of 48, 24 fps", Rate: "2.41 Mbit/s", Bandwidth: "48.2 Mbit/s", Triangles: "41,234", "GPU memory": "12.3 MB", Layers: "3 of 3",
       "Skipped groups": "0", Colours: "none", Display: "60 fps, 0.4 ms each",
@@ -228,8 +237,8 @@ describe("the layers in the overlay", () => {
   test.each([
     [3, 3, 3, "3 of 3"], [1, 3, 3, "1 of 3"], [0, 0, 3, "3 of 3"], [2, 2, 3, "3 of 3"], [1, 2, 3, "1 of 2"], [0, 0, 0, "one only"],
   ])("%i layers of the %i there are, of %i in the file: %s", (layers, wholeLayers, mostLayers, text) => {
-    const playback = new FakePlayback("x", { layers: "auto", interpolate: true, textures: true, loop: false, playbackRate: 1 });
-    const numbers = { ...playback.stats, layers, wholeLayers, triangles: 0, gpuBytes: 0, headsetRate: 0, fps: 0, frameMs: 0, drawn: 0 };
+    const playback = new FakePlayback("x", { layers: "auto", interpolate: true, textures: true, splats: true, loop: false, playbackRate: 1 });
+    const numbers = { ...playback.stats, layers, wholeLayers, triangles: 0, gpuBytes: 0, splats: 0, sortMs: 0, headsetRate: 0, fps: 0, frameMs: 0, drawn: 0 };
     expect(Object.fromEntries(statisticsLines(numbers, { ...INFO, mostLayers }, 0)).Layers).toBe(text);
     playback.dispose();
   });

@@ -2,6 +2,8 @@
 
 export { ReelScene } from "./scene.ts";
 export { updateFar } from "./far.ts";
+export { Sorter } from "./sorter.ts";
+export type { OrderWorker } from "./sorter.ts";
 export { MODES } from "./modes.ts";
 export type { Mode } from "./modes.ts";
 export { Bench, formatReport } from "./bench.ts";

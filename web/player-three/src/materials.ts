@@ -57,14 +57,15 @@ export interface Paint {
   readonly color: Vector;
 }
 
-/** What is drawn beside the surface; both need the feed `corner`. */
+/** What is drawn beside the surface; the first two need the feed `corner`. */
 export interface Extras {
   readonly edges: boolean;
   readonly places: boolean; // of corners, in a texture
+  readonly patches: boolean; // alone: splats are drawn in place of the rest
 }
 
 /** A material whose values are `uniforms`: changes of them take effect at once. */
-export function surfaceMaterial(feed: Feed, { edges, places }: Extras, look: Look, uniforms: PartUniforms, paint: Paint): RawShaderMaterial {
+export function surfaceMaterial(feed: Feed, { edges, places, patches }: Extras, look: Look, uniforms: PartUniforms, paint: Paint): RawShaderMaterial {
   return new RawShaderMaterial({
     name: `meshreel ${feed}`,
     glslVersion: GLSL3,
@@ -76,6 +77,7 @@ export function surfaceMaterial(feed: Feed, { edges, places }: Extras, look: Loo
       TRACKS_MODE: MODES.indexOf("tracks"),
       ...(edges ? { EDGES: 1 } : {}),
       ...(places ? { PLACES: 1, PLACE_SCALE } : {}),
+      ...(patches ? { PATCHES: 1 } : {}),
     },
     uniforms: {
       ...look,
@@ -88,17 +90,18 @@ export function surfaceMaterial(feed: Feed, { edges, places }: Extras, look: Loo
   });
 }
 
-/** The materials of a part, by what is drawn: with edges or without, textured or not. */
+/** The materials of a part, by what is drawn: with edges or without, textured or not, all or patches alone. */
 export class Materials {
   readonly #all: readonly RawShaderMaterial[];
 
   /** `feed`: of what has neither. */
   constructor(feed: Feed, look: Look, uniforms: PartUniforms, paint: Paint) {
-    this.#all = [0, 1, 2, 3].map((k) => surfaceMaterial(k === 0 ? feed : "corner", { edges: (k & 1) !== 0, places: (k & 2) !== 0 }, look, uniforms, paint));
+    const extras = Array.from({ length: 8 }, (_, k): Extras => ({ edges: (k & 1) !== 0, places: (k & 2) !== 0, patches: (k & 4) !== 0 }));
+    this.#all = extras.map((some) => surfaceMaterial(some.edges || some.places ? "corner" : feed, some, look, uniforms, paint));
   }
 
-  of({ edges, places }: Extras): RawShaderMaterial {
-    return this.#all[(edges ? 1 : 0) + (places ? 2 : 0)];
+  of({ edges, places, patches }: Extras): RawShaderMaterial {
+    return this.#all[(edges ? 1 : 0) + (places ? 2 : 0) + (patches ? 4 : 0)];
   }
 
   dispose(): void {

@@ -1,4 +1,4 @@
-// A part of the scene: a track, or the background. Its two meshes stay; what they show is swapped.
+// A part of the scene: a track, or the background. Its meshes stay; what they show is swapped.
 
 import { BufferGeometry, Group, Mesh } from "three";
 import type { RawShaderMaterial } from "three";
@@ -7,6 +7,8 @@ import { ImageTexture } from "./image.ts";
 import { Materials, makeUniforms } from "./materials.ts";
 import type { Look, Paint, PartUniforms } from "./materials.ts";
 import { localFrame } from "./ranges.ts";
+import type { Sorter } from "./sorter.ts";
+import { SplatMesh } from "./splats.ts";
 import type { Feed } from "./shaders.ts";
 import type { Upload } from "./upload.ts";
 
@@ -19,17 +21,22 @@ export class Part extends Group {
   readonly #image = new ImageTexture();
   readonly #faces: Mesh<BufferGeometry, RawShaderMaterial>;
   readonly #extra: Mesh<BufferGeometry, RawShaderMaterial>;
+  readonly #splats: SplatMesh | null;
   #edges = false;
+  #withSplats = false;
   #upload: Upload | null = null;
 
-  constructor(feed: Feed, look: Look, paint: Paint) {
+  /** `sorter`: of what may have splats. */
+  constructor(feed: Feed, look: Look, paint: Paint, sorter: Sorter | null = null) {
     super();
     this.#materials = new Materials(feed, look, this.#uniforms, paint);
-    const plain = this.#materials.of({ edges: false, places: false });
+    const plain = this.#materials.of({ edges: false, places: false, patches: false });
     this.#faces = new Mesh<BufferGeometry, RawShaderMaterial>(NOTHING, plain);
     this.#extra = new Mesh<BufferGeometry, RawShaderMaterial>(NOTHING, plain);
     this.#faces.onBeforeRender = this.#extra.onBeforeRender = (renderer) => this.#image.drawnBy(renderer);
     this.add(this.#faces, this.#extra);
+    this.#splats = sorter && new SplatMesh(this.#uniforms, sorter);
+    if (this.#splats !== null) this.add(this.#splats);
     this.visible = false;
   }
 
@@ -44,6 +51,18 @@ export class Part extends Group {
     this.#edges = edges;
   }
 
+  /** Whether splats are drawn where there are some, from the next `show` on. */
+  set withSplats(withSplats: boolean) {
+    if (withSplats === this.#withSplats) return;
+    this.hide();
+    this.#withSplats = withSplats;
+  }
+
+  /** Splats that are drawn. */
+  get splatCount(): number {
+    return this.visible ? (this.#splats?.splatCount ?? 0) : 0;
+  }
+
   /** Shows nothing, and keeps no reference to what it showed. */
   hide(): void {
     if (this.#upload === null) return;
@@ -52,11 +71,12 @@ export class Part extends Group {
     this.#faces.geometry = this.#extra.geometry = NOTHING;
     this.#uniforms.vertices.value = this.#uniforms.colors.value = this.#uniforms.image.value = null;
     this.#image.show(null);
+    this.#splats?.hide();
   }
 
-  /** Bytes of its texture on the GPU. */
-  get imageBytes(): number {
-    return this.#image.bytes;
+  /** Bytes of its texture on the GPU, and of the order of its splats. */
+  get ownBytes(): number {
+    return this.#image.bytes + (this.#splats?.bytes ?? 0);
   }
 
   /** Shows a frame of the recording and what is `blend` of the way to the next one, with the frame's texture where it has one. */
@@ -67,6 +87,7 @@ export class Part extends Group {
     if (upload.packed.kind === "static") return;
     const extra = this.#extra.geometry === NOTHING ? null : this.#extra.geometry;
     this.#extra.visible = setFrame(this.#uniforms, extra, upload.packed, frame, blend);
+    if (this.#isSplatted(upload)) this.#splats?.show(upload, Math.round(frame + blend));
   }
 
   override dispose(): void {
@@ -74,16 +95,24 @@ export class Part extends Group {
     this.hide();
     this.#materials.dispose();
     this.#image.dispose();
+    this.#splats?.dispose();
   }
 
   #take(upload: Upload): void {
     this.#upload = upload;
     this.visible = true;
-    this.#faces.material = this.#extra.material = this.#materials.of({ edges: this.#edges, places: upload.isTextured });
+    const patches = this.#isSplatted(upload);
+    this.#faces.material = this.#extra.material = this.#materials.of({ edges: this.#edges, places: upload.isTextured, patches });
+    this.#faces.visible = !patches;
+    if (!patches) this.#splats?.hide();
     this.#faces.geometry = upload.faces(this.#edges);
     this.#extra.geometry = upload.extra(this.#edges) ?? NOTHING;
     this.#extra.visible = false;
     setUpload(this.#uniforms, upload);
+  }
+
+  #isSplatted({ splats }: Upload): boolean {
+    return this.#withSplats && this.#splats !== null && splats !== null;
   }
 }
 

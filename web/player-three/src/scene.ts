@@ -2,6 +2,7 @@
 
 import { Group } from "three";
 import type { WebGLRenderer } from "three";
+import { SPLATS_WIDTH } from "@meshreel/player-core/types";
 import type { Packed, Shown, TextureImage } from "@meshreel/player-core/types";
 import { BACKGROUND_CLAY, BACKGROUND_COLOR, trackClay, trackColor } from "./colors.ts";
 import { makeLook } from "./materials.ts";
@@ -9,6 +10,7 @@ import { MODES } from "./modes.ts";
 import type { Mode } from "./modes.ts";
 import { Part } from "./part.ts";
 import { triangleCount } from "./ranges.ts";
+import { Sorter } from "./sorter.ts";
 import { Upload } from "./upload.ts";
 import { Warmer } from "./warmer.ts";
 
@@ -24,10 +26,14 @@ export class ReelScene extends Group {
   readonly #background = new Part("attribute", this.#look, { clay: BACKGROUND_CLAY, color: BACKGROUND_COLOR });
   readonly #warmer = new Warmer(this.#look);
   #renderer: WebGLRenderer | null = null;
+  readonly #sorter: Sorter;
+  #mode: Mode = "shaded";
   #triangles = 0;
 
-  constructor() {
+  /** `sorter` orders splats; without one that has a worker the page does, which takes it some milliseconds a picture. It is not disposed of. */
+  constructor(sorter = new Sorter(null)) {
     super();
+    this.#sorter = sorter;
     this.#background.renderOrder = 1; // most of it is hidden behind what moves
     this.add(this.#background);
   }
@@ -36,24 +42,33 @@ export class ReelScene extends Group {
   get gpuBytes(): number {
     let bytes = 0;
     for (const upload of this.#uploads.values()) bytes += upload.bytes;
-    for (const part of this.#parts()) bytes += part.imageBytes;
+    for (const part of this.#parts()) bytes += part.ownBytes;
     return bytes;
   }
 
-  /** Triangles of the last picture given to `show`. */
+  /** Triangles of the last picture given to `show`; a splat is one. */
   get triangles(): number {
     return this.#triangles;
   }
 
+  /** Splats of the last picture given to `show`, of each track. */
+  get splats(): readonly number[] {
+    return this.#tracks.map(({ splatCount }) => splatCount);
+  }
+
   /** How surfaces look. To be seen from the next `show` on. */
   get mode(): Mode {
-    return MODES[this.#look.mode.value];
+    return this.#mode;
   }
 
   set mode(mode: Mode) {
     if (mode === this.mode) return;
-    this.#look.mode.value = MODES.indexOf(mode);
-    for (const part of this.#parts()) part.edges = this.#edges;
+    this.#mode = mode;
+    this.#look.mode.value = MODES.indexOf(mode === "splats" ? "color" : mode);
+    for (const part of this.#parts()) {
+      part.edges = this.#edges;
+      part.withSplats = mode === "splats";
+    }
     if (!this.#edges) for (const upload of this.#uploads.values()) upload.dropEdges();
   }
 
@@ -71,7 +86,7 @@ export class ReelScene extends Group {
     this.#listen(renderer);
     checkSize(packed, renderer);
     const upload = this.#uploadOf(packed);
-    this.#warmer.warm(upload, this.#edges, renderer);
+    this.#warmer.warm(upload, this.#mode, renderer);
     return upload;
   }
 
@@ -118,7 +133,7 @@ export class ReelScene extends Group {
       return;
     }
     part.show(this.#uploadOf(packed), frame, blend, image);
-    this.#triangles += triangleCount(packed, frame);
+    this.#triangles += part.splatCount > 0 ? part.splatCount : triangleCount(packed, frame);
   }
 
   #uploadOf(packed: Packed): Upload {
@@ -129,8 +144,9 @@ export class ReelScene extends Group {
 
   #addTrack(): void {
     const track = this.#tracks.length;
-    const part = new Part("texture", this.#look, { clay: trackClay(track), color: trackColor(track) });
+    const part = new Part("texture", this.#look, { clay: trackClay(track), color: trackColor(track) }, this.#sorter);
     part.edges = this.#edges;
+    part.withSplats = this.#mode === "splats";
     this.#tracks.push(part);
     this.add(part);
   }
@@ -144,7 +160,7 @@ export class ReelScene extends Group {
 
   #refill = (): void => {
     if (this.#renderer === null) return;
-    for (const upload of this.#uploads.values()) this.#warmer.warm(upload, this.#edges, this.#renderer);
+    for (const upload of this.#uploads.values()) this.#warmer.warm(upload, this.#mode, this.#renderer);
   };
 }
 
@@ -152,6 +168,8 @@ function checkSize(packed: Packed, renderer: WebGLRenderer): void {
   if (packed.kind === "static") return;
   const { textureWidth, textureHeight, texels, colors } = packed;
   const most = renderer.capabilities.maxTextureSize;
+  const splatRows = (packed.splats?.words.length ?? 0) / 4 / SPLATS_WIDTH;
+  if (splatRows > most) throw new RangeError(`group of chunk ${packed.chunk}: ${packed.splats!.count} splats, ${splatRows} rows of a texture, the GPU's largest is ${most}; choose fewer layers`);
   const size = `a texture of ${textureWidth} x ${textureHeight}`;
   if (Math.max(textureWidth, textureHeight) > most) throw new RangeError(`group of chunk ${packed.chunk}: ${size}, the GPU's largest is ${most}; choose fewer layers`);
   if (texels.length !== 4 * textureWidth * textureHeight) throw new RangeError(`group of chunk ${packed.chunk}: ${texels.length / 4} texels for ${size}`);

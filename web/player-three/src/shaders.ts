@@ -3,14 +3,14 @@
 /** Where a vertex comes from: an attribute; the texture at gl_VertexID; the texture at an attribute, corner by corner. */
 export type Feed = "attribute" | "texture" | "corner";
 
-const PRECISION = /* glsl */ `
+export const PRECISION = /* glsl */ `
 precision highp float;
 precision highp int;
 precision highp sampler2D;
 precision highp usampler2D;
 `;
 
-const POSITION = /* glsl */ `
+export const POSITION = /* glsl */ `
 uniform vec3 boxMinimum;
 uniform vec3 boxSize;
 
@@ -19,7 +19,7 @@ vec3 positionOf(uvec4 texel) {
 }
 `;
 
-const NORMAL = /* glsl */ `
+export const NORMAL = /* glsl */ `
 vec3 normalOf(uvec4 texel) {
   vec2 code = vec2(float(texel.w & 255u), float(texel.w >> 8u)) / 127.5 - 1.0;
   vec3 n = vec3(code, 1.0 - abs(code.x) - abs(code.y));
@@ -46,7 +46,7 @@ vec3 readColor(int vertex) { return rgba.rgb; }
 
 // here and next: the texels of vertex 0 in the two frames between which `blend` lies; behind: added to the number of a vertex that
 // does not move.
-const FROM_TEXTURE = /* glsl */ `
+export const FROM_TEXTURE = /* glsl */ `
 uniform usampler2D vertices;
 uniform sampler2D colors;
 uniform int movingCount;
@@ -122,6 +122,9 @@ void main() {
   vec4 seen = modelViewMatrix * vec4(scenePosition, 1.0);
   toEye = -(seen.xyz * mat3(modelViewMatrix));
   gl_Position = projectionMatrix * seen;
+#ifdef PATCHES
+  if (vertex < movingCount) gl_Position = vec4(0.0, 0.0, 2.0, 1.0); // nowhere
+#endif
 #ifdef PLACES
   texturePlace = place / float(PLACE_SCALE);
 #endif

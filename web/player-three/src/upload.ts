@@ -1,11 +1,13 @@
 // What the GPU holds of one packed value. Everything lies over the value's own arrays: nothing is copied, and a lost context can
 // be filled again from them.
 
-import { BufferAttribute, BufferGeometry, DataTexture, IntType, RGBAFormat, RGBAIntegerFormat, Sphere, UnsignedByteType, UnsignedShortType, Vector3 } from "three";
+import { BufferAttribute, BufferGeometry, DataTexture, IntType, RGBAFormat, RGBAIntegerFormat, Sphere, UnsignedByteType, UnsignedIntType, UnsignedShortType, Vector3 } from "three";
+import { SPLATS_WIDTH } from "@meshreel/player-core/types";
 import type { Box, Packed, PackedStatic } from "@meshreel/player-core/types";
 
 const TEXEL_BYTES = 8;
 const COLOR_BYTES = 4; // of a texel
+const SPLATS_BYTES = 16; // as well
 
 /** Triangles of three corners each: with an index, and where edges or textures are wanted without one, each corner an attribute. */
 interface Triangles {
@@ -21,6 +23,8 @@ export class Upload {
   texture: DataTexture | null = null;
   /** Their colours, texel for texel; null where there are none. */
   colors: DataTexture | null = null;
+  /** Splats, and which frames lack them; null where there are none. */
+  readonly splats: DataTexture | null = null;
   readonly #sphere: Sphere;
   readonly #faces: Triangles;
   readonly #extra: Triangles | null = null;
@@ -37,6 +41,7 @@ export class Upload {
       if (packed.colors !== null) this.#faces.indexed.setAttribute("rgba", new BufferAttribute(packed.colors, 4, true));
     } else {
       this.#setTextures(packed, packed.textureWidth, packed.textureHeight);
+      if (packed.splats !== null) this.splats = splatsTexture(packed.splats.words);
       if (packed.extra.length > 0) this.#extra = this.#triangles(packed.extra, packed.places?.extra ?? null);
     }
   }
@@ -46,7 +51,7 @@ export class Upload {
     const { packed } = this;
     const corners = packed.faces.byteLength + (packed.kind === "group" ? packed.extra.byteLength : 0);
     const attributes = packed.kind === "static" ? packed.texels.byteLength + (packed.colors?.byteLength ?? 0) : 0;
-    const textures = texelsOf(this.texture) * TEXEL_BYTES + texelsOf(this.colors) * COLOR_BYTES;
+    const textures = texelsOf(this.texture) * TEXEL_BYTES + texelsOf(this.colors) * COLOR_BYTES + texelsOf(this.splats) * SPLATS_BYTES;
     const places = (packed.places?.faces.byteLength ?? 0) + (packed.places?.extra.byteLength ?? 0);
     if (this.isTextured) return attributes + textures + corners + places;
     return attributes + textures + corners * (this.#hasCorners ? 2 : 1);
@@ -81,6 +86,7 @@ export class Upload {
     this.#dropCorners();
     for (const triangles of this.#parts()) triangles.indexed.dispose();
     this.#dropTextures();
+    this.splats?.dispose();
   }
 
   #dropCorners(): void {
@@ -158,6 +164,13 @@ function vertexTexture(texels: Uint16Array, width: number, height: number): Data
 /** Bytes as they are: the screen's colours (sRGB), like all others here. */
 function colorTexture(colors: Uint8Array, width: number, height: number): DataTexture {
   const texture = new DataTexture(colors, width, height, RGBAFormat, UnsignedByteType);
+  texture.needsUpdate = true;
+  return texture;
+}
+
+function splatsTexture(words: Uint32Array): DataTexture {
+  const texture = new DataTexture(words, SPLATS_WIDTH, words.length / 4 / SPLATS_WIDTH, RGBAIntegerFormat, UnsignedIntType);
+  texture.internalFormat = "RGBA32UI";
   texture.needsUpdate = true;
   return texture;
 }

@@ -90,7 +90,7 @@ export function makeGroup(options: GroupOptions = {}): MadeGroup {
   colors?.set(all.flatMap(({ positions }, k) => positions.flatMap(() => [...shown[k], 255])));
   const packed: PackedGroup = {
     kind: "group", chunk: 1, track, firstFrame, frameCount, vertexCount, textureWidth, textureHeight, texels, colors, box, places: null,
-    faces: Uint32Array.from(frames[0].faces), extra, extraStarts, layers: 0, bytes: 1000, decodeMs: 1,
+    faces: Uint32Array.from(frames[0].faces), extra, extraStarts, splats: null, layers: 0, bytes: 1000, decodeMs: 1,
   };
   const positions = frames.map((frame, t) => [...frame.positions, ...(lone?.positions ?? []).map((p) => (t === squareFrame ? p : null))]);
   return { packed, positions };

@@ -1,8 +1,14 @@
-import { expect, test } from "vitest";
+import { describe, expect, test } from "vitest";
+import { SPLAT_WEIGHT, SPLAT_WORDS } from "@meshreel/player-core/types";
 import { trackColor } from "../src/colors.ts";
+import type { Vector } from "../src/colors.ts";
 import type { Shown } from "@meshreel/player-core/types";
 import { updateFar } from "../src/far.ts";
+import { orderSplats } from "../src/order.ts";
+import type { OrderJob } from "../src/order.ts";
 import { localFrame, triangleCount, vertexRoom } from "../src/ranges.ts";
+import { Sorter } from "../src/sorter.ts";
+import type { OrderWorker } from "../src/sorter.ts";
 import { Upload } from "../src/upload.ts";
 import { makeFloor, makeGroup } from "./analytic.ts";
 
@@ -72,4 +78,53 @@ test("the colours of 21 tracks are all different", () => {
   for (const [i, one] of colors.entries()) {
     for (const other of colors.slice(i + 1)) expect(Math.max(...one.map((value, k) => Math.abs(value - other[k])))).toBeGreaterThan(0.05);
   }
+});
+
+describe("the order of splats", () => {
+  const [COUNT, RANGE] = [500, 65535];
+  const box = { minimum: [1, 2, 3], size: [1, 2, 4] } as const;
+  const forward: Vector = [0.6, 0, 0.8];
+  /** Each on a triangle of its own in the plane x = 0.5, 0.1 m before it or behind. */
+  const made = (): { splats: { count: number; words: Uint32Array }; texels: Uint16Array; depths: number[] } => {
+    const words = new Uint32Array(SPLAT_WORDS * COUNT);
+    const [floats, texels] = [new Float32Array(words.buffer), new Uint16Array(12 * COUNT)];
+    const depths = Array.from({ length: COUNT }, (_, k) => {
+      const [y, z] = [(k * 7919) % 60_000, (k * 104_729) % 60_000];
+      texels.set([32768, y, z, 0, 32768, y + 900, z, 0, 32768, y, z + 900, 0], 12 * k); // looks along +x
+      words.set([3 * k, 3 * k + 1, 3 * k + 2, SPLAT_WEIGHT / 2 + ((SPLAT_WEIGHT / 4) << 16)], SPLAT_WORDS * k);
+      floats[SPLAT_WORDS * k + 4] = k % 2 === 0 ? 0.1 : -0.1;
+      return forward[0] * (0.5 + (k % 2 === 0 ? 0.1 : -0.1)) + (forward[2] * 4 * (z + 225)) / RANGE;
+    });
+    return { splats: { count: COUNT, words }, texels, depths };
+  };
+
+  test("is from the farthest to the nearest, with their offsets, and has each of them once", () => {
+    const { splats, texels, depths } = made();
+    const order = [...orderSplats(splats, { texels, box, forward })];
+    expect([...order].sort((a, b) => a - b)).toEqual(Array.from({ length: COUNT }, (_, k) => k));
+    order.slice(1).forEach((k, at) => expect(depths[k]).toBeLessThan(depths[order[at]] + 2 * (5 / RANGE)));
+  });
+
+  test("of splats at one depth is that of the file", () => {
+    const { splats, texels } = made();
+    const flat = { ...box, size: [0, 0, 0] as const };
+    new Float32Array(splats.words.buffer).forEach((_, k, all) => void (k % SPLAT_WORDS === 4 && (all[k] = 0)));
+    expect([...orderSplats(splats, { texels, box: flat, forward })]).toEqual(Array.from({ length: COUNT }, (_, k) => k));
+  });
+
+  test("comes from the page where a worker dies, though it had been asked", () => {
+    const { splats, texels } = made();
+    const asked: OrderJob[] = [];
+    const worker: OrderWorker = { postMessage: (job) => void asked.push(job), terminate: () => undefined, onmessage: null, onerror: null };
+    const sorter = new Sorter(() => worker);
+    const answers: number[] = [];
+    const question = { splats: { ...splats, unit: 1 }, texels, box, forward };
+    const key = sorter.join((order) => void answers.push(order.length));
+    expect([sorter.ask(key, question), sorter.ask(key, question), asked.length]).toEqual([true, false, 1]);
+    worker.onmessage!({ data: { key, order: new Uint32Array(COUNT), texels: asked[0].texels, ms: 3 } });
+    expect([sorter.ask(key, question), asked[1].splats, asked[1].texels === asked[0].texels]).toEqual([true, null, true]);
+    worker.onerror!(undefined as never);
+    expect(sorter.ask(key, question)).toBe(true);
+    expect([answers, asked.length]).toEqual([[COUNT, 0, COUNT], 2]);
+  });
 });

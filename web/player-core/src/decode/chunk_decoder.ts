@@ -1,20 +1,24 @@
 // The inside of a decoding worker: jobs in, packed groups out. Keeps what groups that follow are predicted from.
 
 import { decodeAtlas, finerPlaces } from "./atlas.ts";
+import { arraysOf } from "../bytes.ts";
 import type { Layout } from "./atlas.ts";
 import { paintStatic } from "./colors.ts";
 import type { Tools } from "./group.ts";
 import { colorGroup, continueGroup, decodeStatic } from "./group.ts";
 import type { LayersState } from "./layers.ts";
+import { faceCount } from "../mesh.ts";
 import type { Placement } from "../mesh.ts";
 import { FormatError } from "../errors.ts";
 import { led } from "../format/budget.ts";
 import type { Led } from "../format/budget.ts";
 import { checkPayload } from "../format/payload.ts";
 import { packGroup, packStatic } from "./pack.ts";
+import { checkShowable, packSplats } from "./pack_splats.ts";
 import type { FineAtlas } from "./pack.ts";
 import type { Damage, DecodeJob } from "../protocol.ts";
 import { describe } from "../format/reader.ts";
+import { decodeSplats, inherited } from "./splats.ts";
 import type { ColoredMesh } from "../wasm/colors.ts";
 import type { CompanionKind, Packed } from "../types.ts";
 
@@ -84,10 +88,13 @@ export class ChunkDecoder {
     const [colors, state] = colored ?? [null, made.state];
     const template = made.canvas[0];
     const layout = companion(job, "atlas", damage, (data) => decodeAtlas(core, data, template.base)) ?? previous?.layout ?? null;
-    if (state !== null) this.states.set(file, chunk, { ...state, layout });
+    const own = companion(job, "splats", damage, (data) => checkShowable(decodeSplats(core, data, faceCount(template.base))));
+    const carried = own ?? inherited(previous, template);
+    if (state !== null) this.states.set(file, chunk, { ...state, layout, splats: carried });
     if (job.stateOnly) return null;
     const shape = packGroup(core, made.group, colors, job.textured ? fineAtlas(layout, template) : null);
-    return { kind: "group", chunk, track, firstFrame, ...shape, layers: Math.max(0, job.ranges.length - 1), bytes: bytesOf(job), decodeMs: 0 };
+    const splats = carried && packSplats(carried, made.group, template.levels, job.scale);
+    return { kind: "group", chunk, track, firstFrame, ...shape, splats, layers: Math.max(0, job.ranges.length - 1), bytes: bytesOf(job), decodeMs: 0 };
   }
 
   private background(job: DecodeJob, place: Placement, damage: (damage: Damage) => void): Packed | null {
@@ -138,8 +145,5 @@ function bytesOf({ payload, companions }: DecodeJob): number {
 
 /** The buffers of a packed value, to be handed over with it. */
 export function buffersOf(packed: Packed): ArrayBufferLike[] {
-  const { texels, colors, faces, places } = packed;
-  const ofPlaces = places === null ? [] : [places.faces, places.extra];
-  const arrays = [texels, faces, ...ofPlaces, ...(colors === null ? [] : [colors]), ...(packed.kind === "group" ? [packed.extra, packed.extraStarts] : [])];
-  return [...new Set(arrays.map((array) => array.buffer))];
+  return [...new Set(arraysOf(packed).map((array) => array.buffer))];
 }

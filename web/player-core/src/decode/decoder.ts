@@ -8,22 +8,26 @@ import type { GroupColors } from "./decoded.ts";
 import { led } from "../format/budget.ts";
 import type { Led } from "../format/budget.ts";
 import { FormatError } from "../errors.ts";
-import { EMPTY, concatenate } from "../mesh.ts";
+import { EMPTY, concatenate, faceCount } from "../mesh.ts";
 import type { Mesh, Placement } from "../mesh.ts";
+import type { CompanionKind } from "../types.ts";
 import { Form } from "../format/layout.gen.ts";
 import { checkPayload } from "../format/payload.ts";
 import { Head, describe } from "../format/reader.ts";
 import type { Chunk } from "../format/reader.ts";
+import { bind, decodeSplats, inherited } from "./splats.ts";
+import type { Bound, Splats } from "./splats.ts";
 
-/** A group with its colours, where it has some. */
-interface Colored extends Continued {
+/** A group with its colours and the splats of its chain, where it has some. */
+interface Dressed extends Continued {
   readonly colors: GroupColors | null;
+  readonly splats: Splats | null;
 }
 
 export class Video {
   readonly head: Head;
   private readonly place: Placement;
-  private readonly groups = new Map<number, Colored | FormatError>();
+  private readonly groups = new Map<number, Dressed | FormatError>();
   private readonly states = new Map<number, Led | FormatError>();
 
   constructor(
@@ -47,18 +51,38 @@ export class Video {
     return concatenate([state === null ? EMPTY : this.state(state).mesh, ...moving]);
   }
 
-  private decoded(chunk: Chunk): Colored {
+  /** The splats of frame `index` in metres, of all tracks; null where none has some. FormatError where a chunk is damaged. */
+  splats(index: number): Bound[] | null {
+    const tracks = this.head.tracks.map((_, track) => {
+      const chunk = this.head.chunkOfFrame(index, track);
+      const { group, splats, canvas } = this.decoded(chunk);
+      if (splats === null || canvas.length === 0) return null;
+      const { frameCount, vertexCount, positions, faces, dropped } = group;
+      const part = <T extends Float64Array | Uint8Array>(all: T): T => {
+        const size = all.length / frameCount;
+        return all.subarray((index - chunk.firstFrame) * size, (index - chunk.firstFrame + 1) * size) as T;
+      };
+      const vertices = part(positions.subarray(0, 3 * frameCount * vertexCount));
+      const carrier = { vertices, faces, levels: canvas[0].levels, dropped: dropped && part(dropped), unit: this.place.scale };
+      return Array.from(splats.faces, (_, k) => bind(splats, k, carrier));
+    });
+    return tracks.every((track) => track === null) ? null : tracks.flatMap((track) => track ?? []);
+  }
+
+  private decoded(chunk: Chunk): Dressed {
     return once(this.groups, chunk, () => {
       const before = this.head.groupBefore(chunk);
-      const previous = before === null ? null : this.decoded(before).state;
+      const known = before && this.decoded(before);
+      const previous = known && known.state;
       const count = this.layers === null ? chunk.layers.length : this.layers + 1;
       const { layers, place } = this;
       const made = continueGroup(this.tools, this.payload(chunk, count), { frameCount: chunk.frameCount, layers, previous, place });
-      const of = this.colorsOf(chunk);
-      if (of === null) return { ...made, colors: null };
+      const splats = this.splatsOf(chunk, made) ?? inherited(known && known.state && { faces: known.state.faces, splats: known.splats }, made.canvas[0]);
+      const of = this.companionOf(chunk, "colors");
+      if (of === null) return { ...made, colors: null, splats };
       const data = this.payload(of, chunk.form === Form.LAYERS && layers !== null ? layers + 1 : of.layers.length);
       const [colors, state] = colorGroup(this.tools.core, made, data, { layers, previous });
-      return { ...made, state, colors };
+      return { ...made, state, colors, splats };
     });
   }
 
@@ -68,14 +92,20 @@ export class Video {
       const before = changed && this.state(changed);
       const payload = this.payload(chunk, chunk.layers.length);
       const made = decodeStatic(this.tools, payload, before && before.mesh, this.place);
-      const of = this.colorsOf(chunk);
+      const of = this.companionOf(chunk, "colors");
       const mesh = of === null ? made.mesh : paintStatic(this.tools.core, made, this.payload(of, of.layers.length));
       return led(before, mesh, payload.length);
     });
   }
 
-  private colorsOf(chunk: Chunk): Chunk | null {
-    return this.head.companionsOf(chunk).find(({ kind }) => kind === "colors") ?? null;
+  private companionOf(chunk: Chunk, wanted: CompanionKind): Chunk | null {
+    return this.head.companionsOf(chunk).find(({ kind }) => kind === wanted) ?? null;
+  }
+
+  private splatsOf(chunk: Chunk, { canvas }: Continued): Splats | null {
+    const of = this.companionOf(chunk, "splats");
+    if (of === null) return null;
+    return decodeSplats(this.tools.core, this.payload(of, this.layers === null ? of.layers.length : this.layers + 1), faceCount(canvas[0].base));
   }
 
   private payload(chunk: Chunk, count: number): Uint8Array {

@@ -13,6 +13,7 @@ import { connectivity, decodeLastLevel, decodeLevel, decodeMotion, framesOfRows 
 import type { Connectivity } from "../wasm/layers.ts";
 import type { Core } from "../wasm/memory.ts";
 import type { Layout } from "./atlas.ts";
+import type { Splats } from "./splats.ts";
 import { checkGrowth, checkStep, decodeMesh } from "./mesh.ts";
 
 const MOST_NUMBERS = 2 ** 29; // of decoded places: 4 GiB, as in Python
@@ -25,6 +26,7 @@ export interface LayersState {
   readonly finer: readonly Connectivity[];
   readonly colors: Float64Array | null; // values of the colours of all decoded vertices (colors.ts)
   readonly layout: Layout | null; // of the textures of its chain (atlas.ts)
+  readonly splats: Splats | null; // of its chain
 }
 
 /** The records of a payload, or those of its first levels. */
@@ -79,7 +81,7 @@ export function placeLayers(core: Core, draco: DecoderModule, records: LayersRec
     finer.push(near);
   });
   positions ??= framesOfRows(core, rows, vertices, place);
-  return { base, faces, positions, state: { faces: base.faces, base: last, scalars, finer, colors: null, layout: null } };
+  return { base, faces, positions, state: { faces: base.faces, base: last, scalars, finer, colors: null, layout: null, splats: null } };
 }
 
 function baseOf(core: Core, draco: DecoderModule, head: LayersGroup, previous: LayersState | null): Mesh {

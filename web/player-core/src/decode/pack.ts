@@ -22,7 +22,7 @@ export interface FineAtlas {
 }
 
 /** A group as it is in itself, wherever it comes from. */
-export type GroupShape = Omit<PackedGroup, "kind" | "chunk" | "track" | "firstFrame" | "layers" | "bytes" | "decodeMs">;
+export type GroupShape = Omit<PackedGroup, "kind" | "chunk" | "track" | "firstFrame" | "splats" | "layers" | "bytes" | "decodeMs">;
 
 /** `atlas`: of the shared faces, where they have textures. */
 export function packGroup(core: Core, group: DecodedGroup, colors: GroupColors | null, atlas: FineAtlas | null): GroupShape {

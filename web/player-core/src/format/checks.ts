@@ -14,6 +14,7 @@ const COMPANIONS: ReadonlyMap<number, number> = new Map([
   [ChunkKind.ATLAS, Form.PLACES],
   [ChunkKind.PICTURES, Form.VIDEO],
   [ChunkKind.COMPATIBLE, Form.VIDEO],
+  [ChunkKind.SPLATS, Form.GAUSSIANS],
 ]);
 const FORMS: readonly number[] = [Form.LAPLACIAN, Form.LAYERS, Form.DRACO, Form.EMPTY, Form.PATCH];
 
@@ -48,6 +49,7 @@ interface Whole {
   readonly entry: IndexEntry;
   readonly before: number | undefined; // the group that it is predicted from
   readonly isBase: boolean; // whether it begins with a base mesh, and may have an atlas
+  readonly isBearer: boolean; // whether it begins with a mesh of all its frames, and may have splats
 }
 
 class IndexChecks {
@@ -95,9 +97,10 @@ class IndexChecks {
   }
 
   private wholeOf(entry: IndexEntry): Whole {
-    if (entry.kind === ChunkKind.STATIC) return { entry, before: undefined, isBase: entry.form === Form.DRACO };
+    if (entry.kind === ChunkKind.STATIC) return { entry, before: undefined, isBase: entry.form === Form.DRACO, isBearer: false };
     const before = entry.dependsOn.find((other) => !this.changes.has(other));
-    return { entry, before, isBase: entry.form === Form.LAYERS && before === undefined };
+    const isBase = entry.form === Form.LAYERS && before === undefined;
+    return { entry, before, isBase, isBearer: isBase || entry.form === Form.LAPLACIAN };
   }
 
   /** What belongs to a chunk before it, which it names first; what else it needs follows from its kind. */
@@ -114,10 +117,11 @@ class IndexChecks {
   }
 
   /** What a companion may depend on, beside the chunk that it is of. */
-  private needed(kind: number, of: number, { before, isBase }: Whole): readonly (readonly number[])[] {
+  private needed(kind: number, of: number, { before, isBase, isBearer }: Whole): readonly (readonly number[])[] {
     const last = before === undefined ? undefined : this.companion(before, kind);
     if (kind === ChunkKind.COLORS) return last === undefined ? [[]] : [[], [last]];
     if (kind === ChunkKind.ATLAS) return isBase ? [[]] : [];
+    if (kind === ChunkKind.SPLATS) return isBearer ? [[]] : [];
     const own = this.companion(of, ChunkKind.ATLAS);
     if (own !== undefined) return [[own]];
     return last === undefined ? [] : [[this.atlases.get(before!)!, last]];

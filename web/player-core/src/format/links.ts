@@ -1,7 +1,7 @@
 // Which chunk needs which: the chains that groups and states of the background are predicted in.
 
 import { Form } from "./layout.gen.ts";
-import { isCompanion } from "./reader.ts";
+import { isCompanion, isVideo } from "./reader.ts";
 import type { Chunk, CompanionChunk, Head } from "./reader.ts";
 import type { Rendition } from "../types.ts";
 
@@ -62,17 +62,27 @@ export function sizeOfLayers(chunk: Chunk, layers: number): number {
 /** How many layers of a companion are wanted with the first `layers` of its chunk: textures are what goes first, where the first layer alone is. */
 export function companionLayers(chunk: Chunk, companion: Chunk, layers: number): number {
   const isScaled = chunk.form === Form.LAYERS && layers < chunk.layers.length;
-  if (isScaled && layers === 1 && companion.kind !== "colors") return 0;
+  if (isScaled && layers === 1 && (companion.kind === "atlas" || isVideo(companion))) return 0;
   return isScaled ? Math.min(layers, companion.layers.length) : companion.layers.length;
 }
 
-/** What is wanted with a chunk where its textures are of one rendition, or are not wanted. */
-export function companionsWith(head: Head, chunk: Chunk, textures: Rendition | null): readonly CompanionChunk[] {
-  return head.companionsOf(chunk).filter(({ kind }) => kind === "colors" || (textures !== null && (kind === "atlas" || kind === textures)));
+/** What a viewer wants of companions, beside colours. */
+export interface Wanted {
+  readonly textures: Rendition | null; // of this rendition
+  readonly splats: boolean;
+}
+
+/** What is wanted with a chunk. */
+export function companionsWith(head: Head, chunk: Chunk, { textures, splats }: Wanted): readonly CompanionChunk[] {
+  const isWanted = ({ kind }: CompanionChunk): boolean => {
+    if (kind === "colors") return true;
+    return kind === "splats" ? splats : textures !== null && (kind === "atlas" || kind === textures);
+  };
+  return head.companionsOf(chunk).filter(isWanted);
 }
 
 /** Bytes of the first layers of a chunk, and of what is wanted of its companions with these. */
-export function sizeWithCompanions(head: Head, chunk: Chunk, layers: number, textures: Rendition | null): number {
+export function sizeWithCompanions(head: Head, chunk: Chunk, layers: number, wanted: Wanted): number {
   const own = sizeOfLayers(chunk, layers);
-  return companionsWith(head, chunk, textures).reduce((sum, companion) => sum + sizeOfLayers(companion, companionLayers(chunk, companion, layers)), own);
+  return companionsWith(head, chunk, wanted).reduce((sum, companion) => sum + sizeOfLayers(companion, companionLayers(chunk, companion, layers)), own);
 }

@@ -138,7 +138,7 @@ export class Head {
     return chunk.kind === "static" && chunk.dependsOn.length > 0 ? this.chunks[chunk.dependsOn[0]] : null;
   }
 
-  /** The chunks that add to one: its colours, and its atlas and pictures. */
+  /** The chunks that add to one: its colours, its atlas and pictures, its splats. */
   companionsOf(chunk: Chunk): readonly CompanionChunk[] {
     return this.companions.get(chunk.number) ?? [];
   }
@@ -176,7 +176,7 @@ export function isCompanion(chunk: Chunk): chunk is CompanionChunk {
 }
 
 function isCompanionKind(kind: Chunk["kind"]): kind is CompanionKind {
-  return ["colors", "atlas", ...RENDITIONS].includes(kind);
+  return ["colors", "atlas", "splats", ...RENDITIONS].includes(kind);
 }
 
 /** Whether a chunk has textures. */
@@ -232,6 +232,8 @@ function kindOf(kind: number): Chunk["kind"] {
       return "pictures";
     case ChunkKind.COMPATIBLE:
       return "compatible";
+    case ChunkKind.SPLATS:
+      return "splats";
     default:
       return "unknown";
   }
@@ -268,6 +270,7 @@ function infoOf(header: Header, chunks: readonly Chunk[], trackCount: number, fr
     size: last.offset + last.size,
     hasColors: chunks.some((chunk) => chunk.kind === "colors" || isVideo(chunk)),
     hasTextures: chunks.some(isVideo),
+    hasSplats: chunks.some((chunk) => chunk.kind === "splats"),
     metadata: metadataOf(header.metadata),
   };
 }

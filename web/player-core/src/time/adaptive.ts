@@ -2,8 +2,8 @@
 
 import type { Timeline } from "./clock.ts";
 import { mostLayers, sizeWithCompanions } from "../format/links.ts";
+import type { Wanted } from "../format/links.ts";
 import type { Head } from "../format/reader.ts";
-import type { Rendition } from "../types.ts";
 import { groupsBetween } from "./scheduler.ts";
 
 /** How playback goes. Seconds are of display time. */
@@ -32,7 +32,7 @@ export class Adaptive {
   readonly #timeline: Timeline;
   #rates: readonly number[] = [];
   #ratesAt = NaN; // s
-  #textures: Rendition | null; // whose bytes count
+  #wanted: Wanted; // whose bytes count
   readonly #loads: number[] = []; // of each level at normal speed, as measured last
   #changed = -Infinity; // ms
   #ceiling = Infinity; // level that decoding did not keep up with, less one
@@ -40,16 +40,16 @@ export class Adaptive {
   #penalty: number = PENALTY_MS[0];
 
   /** Starts with what the bandwidth measured so far allows; at best where there is none. */
-  constructor(head: Head, timeline: Timeline, bandwidth: number, textures: Rendition | null) {
+  constructor(head: Head, timeline: Timeline, bandwidth: number, wanted: Wanted) {
     this.#head = head;
     this.#timeline = timeline;
-    this.#textures = textures;
+    this.#wanted = wanted;
     this.level = affordable(this.rates(0), bandwidth, 0.6);
   }
 
-  set textures(rendition: Rendition | null) {
-    if (rendition !== this.#textures) this.#ratesAt = NaN;
-    this.#textures = rendition;
+  set wanted(wanted: Wanted) {
+    if (wanted.textures !== this.#wanted.textures || wanted.splats !== this.#wanted.splats) this.#ratesAt = NaN;
+    this.#wanted = wanted;
   }
 
   /** The level for the groups that are fetched next. */
@@ -77,7 +77,7 @@ export class Adaptive {
     const frames = groups.reduce((sum, group) => sum + group.frameCount, 0);
     const perByte = (8 * this.#head.tracks.length * frameCount) / (frames * duration);
     const most = groups.reduce((found, group) => Math.max(found, mostLayers(group)), 0);
-    return Array.from({ length: most + 1 }, (_, level) => perByte * groups.reduce((sum, group) => sum + sizeWithCompanions(this.#head, group, level + 1, this.#textures), 0));
+    return Array.from({ length: most + 1 }, (_, level) => perByte * groups.reduce((sum, group) => sum + sizeWithCompanions(this.#head, group, level + 1, this.#wanted), 0));
   }
 
   #forNetwork(rates: readonly number[], { bandwidth, speed, fetched, isWaiting }: Conditions): number {

@@ -1,17 +1,18 @@
 // Groups and states of the background that are decoded, and the jobs that decode them.
 
+import { bytesOf } from "../bytes.ts";
 import { FormatError } from "../errors.ts";
 import type { Fetcher } from "../net/fetcher.ts";
 import { together } from "../format/budget.ts";
 import { Form } from "../format/layout.gen.ts";
 import { companionLayers, companionsWith, mostLayers } from "../format/links.ts";
-import type { Links } from "../format/links.ts";
+import type { Links, Wanted } from "../format/links.ts";
 import type { Outcome, Share } from "./pool.ts";
 import { describe, isCompanion, isVideo } from "../format/reader.ts";
 import type { Chunk, CompanionChunk, Head } from "../format/reader.ts";
 import type { Holdings, Plan, Step } from "./scheduler.ts";
 import type { Companion, DecodeJob } from "../protocol.ts";
-import type { Packed, Rendition } from "../types.ts";
+import type { Packed } from "../types.ts";
 
 export interface DecodingEvents {
   ready(packed: Packed): void;
@@ -20,9 +21,13 @@ export interface DecodingEvents {
   changed(): void; // a job is done: there may be more to show, and more to do
 }
 
-interface State {
+interface With {
+  readonly textured: boolean; // what textures of its chain need
+  readonly splatted: boolean; // the splats of its chain
+}
+
+interface State extends With {
   readonly layers: number;
-  readonly textured: boolean; // with what textures of its chain need
   readonly worker: number;
 }
 
@@ -32,13 +37,14 @@ const [FEWEST_TIMINGS, TIMINGS] = [2, 12]; // jobs that the load is measured ove
 export class Decoding implements Holdings {
   /** Counts what changes in what can be shown. */
   version = 0;
+  wanted: Wanted = { textures: null, splats: true }; // of companions
   lastMs = 0; // of decoding the last group
   readonly #head: Head;
   readonly #links: Links;
   readonly #fetcher: Fetcher;
   readonly #share: Share;
   readonly #events: DecodingEvents;
-  readonly #decoded = new Map<number, { packed: Packed; layers: number; bytes: number; textured: boolean }>(); // by chunk, as all below
+  readonly #decoded = new Map<number, With & { packed: Packed; layers: number; bytes: number }>(); // by chunk, as all below
   readonly #states = new Map<number, State>();
   readonly #running = new Map<number, Step>();
   readonly #submitted = new Map<number, Step>();
@@ -46,7 +52,6 @@ export class Decoding implements Holdings {
   #lost: readonly Chunk[] = []; // that the file ends before or within
   readonly #tries = new Map<number, number>();
   #keep: ReadonlySet<number> = new Set();
-  #textures: Rendition | null = null;
   #bytesPerFrame = 0; // of the last groups
   #stale = new Set<number>(); // chunks whose jobs had begun when timings were forgotten
   readonly #timings: { readonly ms: number; readonly frames: number }[] = []; // of the last groups
@@ -70,8 +75,7 @@ export class Decoding implements Holdings {
 
   decodedAt(chunk: Chunk): number {
     const found = this.#decoded.get(chunk.number);
-    if (found === undefined || (this.picturesOf(chunk, found.layers) !== null && !found.textured)) return -1;
-    return found.layers;
+    return found === undefined || this.#lacks(chunk, found.layers, found) ? -1 : found.layers;
   }
 
   stateAt(chunk: Chunk): number {
@@ -79,7 +83,7 @@ export class Decoding implements Holdings {
     const running = this.#running.get(number);
     if (running) return running.layers;
     const state = this.#states.get(number);
-    if (state && !state.textured && this.picturesOf(chunk, state.layers) !== null) return -1;
+    if (state && this.#lacks(chunk, state.layers, state)) return -1;
     return state && this.#share.isAt(this.#links.rootOf(chunk), state.worker) ? state.layers : -1;
   }
 
@@ -89,7 +93,7 @@ export class Decoding implements Holdings {
 
   /** What a chunk is decoded with, but for what can never be. */
   companionsOf(chunk: Chunk): readonly CompanionChunk[] {
-    return companionsWith(this.#head, chunk, this.#textures).filter((companion) => !this.isFailed(companion));
+    return companionsWith(this.#head, chunk, this.wanted).filter((companion) => !this.isFailed(companion));
   }
 
   /** The pictures that a chunk is shown with where it has so many layers beyond the first; null where it is shown without. */
@@ -98,10 +102,10 @@ export class Decoding implements Holdings {
     return found !== undefined && companionLayers(chunk, found, layers + 1) > 0 ? found : null;
   }
 
-  /** Which textures are shown, if any; those that are wanted again are decoded with the next plan. */
-  set textures(rendition: Rendition | null) {
-    if (rendition !== this.#textures) this.version++;
-    this.#textures = rendition;
+  /** Changes what is wanted of companions: with the next plan what was left out is decoded. */
+  want(change: Partial<Wanted>): void {
+    this.wanted = { ...this.wanted, ...change };
+    this.version++;
   }
 
   /** Gives up the pictures of a chunk and those that need them. */
@@ -193,10 +197,10 @@ export class Decoding implements Holdings {
 
   /** Gives up a chunk and those that need it; returns how many these are. */
   #giveUp(chunk: Chunk): number {
-    const numbers = this.#links.withDependents(chunk.number).filter((number) => !this.#failed.has(number));
-    for (const number of numbers) this.#failed.add(number);
+    const before = this.#failed.size;
+    for (const number of this.#links.withDependents(chunk.number)) this.#failed.add(number);
     this.version++;
-    return numbers.length;
+    return this.#failed.size - before;
   }
 
   #fail(chunk: Chunk, message: string): void {
@@ -204,6 +208,16 @@ export class Decoding implements Holdings {
     const more = others > 0 ? `, and ${others} that ${others === 1 ? "needs" : "need"} it` : "";
     const text = message.startsWith(`chunk ${chunk.number} `) ? message : `${describe(chunk)}: ${message}`;
     this.#events.warn(new FormatError(`${text}; it is skipped${more}`));
+  }
+
+  /** Whether the chain of a chunk has splats that are wanted and can be decoded. */
+  #hasSplats(chunk: Chunk): boolean {
+    return this.companionsOf(this.#head.chunks[this.#links.rootOf(chunk)]).some(({ kind }) => kind === "splats");
+  }
+
+  /** Whether a chunk was decoded without what it is wanted with now. */
+  #lacks(chunk: Chunk, layers: number, { textured, splatted }: With): boolean {
+    return (!textured && this.picturesOf(chunk, layers) !== null) || (!splatted && this.#hasSplats(chunk));
   }
 
   #hasState({ chunk, layers }: Step): boolean {
@@ -228,16 +242,16 @@ export class Decoding implements Holdings {
       scale: this.#head.header.scale,
       stateOnly: !step.show,
     };
-    let textured = false;
+    let made: With = { textured: false, splatted: false };
     this.#share.submit({
       lane: this.#links.rootOf(chunk),
       start: () => {
         this.#submitted.delete(chunk.number);
         this.#running.set(chunk.number, step);
-        textured = this.picturesOf(chunk, layers) !== null;
-        return { ...job, payload: this.#fetcher.payload(chunk, layers + 1), companions: this.#companionJobs(step), textured };
+        made = { textured: this.picturesOf(chunk, layers) !== null, splatted: this.#hasSplats(chunk) };
+        return { ...job, payload: this.#fetcher.payload(chunk, layers + 1), companions: this.#companionJobs(step), textured: made.textured };
       },
-      settle: (outcome) => this.#settle(step, outcome, textured),
+      settle: (outcome) => this.#settle(step, outcome, made),
     });
   }
 
@@ -249,20 +263,20 @@ export class Decoding implements Holdings {
     });
   }
 
-  #settle(step: Step, outcome: Outcome, textured: boolean): void {
+  #settle(step: Step, outcome: Outcome, made: With): void {
     const { chunk, layers } = step;
     this.#running.delete(chunk.number);
     for (const { chunk: number, message } of outcome.damage) {
       if (!this.#failed.has(number)) this.#fail(this.#head.chunks[number], message); // or it was predicted from one that is damaged
     }
     if (outcome.kind === "decoded") {
-      this.#states.set(chunk.number, { layers, textured, worker: outcome.worker });
+      this.#states.set(chunk.number, { ...made, layers, worker: outcome.worker });
       this.#tries.delete(chunk.number);
       this.#time(chunk, outcome.ms);
       const { packed } = outcome;
       const crowd = packed === null ? null : this.#crowdOf(chunk, bytesOf(packed));
       if (crowd !== null) this.#fail(chunk, crowd);
-      else if (packed !== null && this.#keep.has(chunk.number)) this.#add(chunk, packed, layers, textured);
+      else if (packed !== null && this.#keep.has(chunk.number)) this.#add(chunk, packed, layers, made);
     } else {
       this.#share.clear(); // what follows in the chain would fail, too: it is planned again
       this.#submitted.clear();
@@ -288,10 +302,10 @@ export class Decoding implements Holdings {
     return `with those of other tracks it takes ${bytes} bytes, over ${together(size)}`;
   }
 
-  #add(chunk: Chunk, packed: Packed, layers: number, textured: boolean): void {
+  #add(chunk: Chunk, packed: Packed, layers: number, made: With): void {
     const old = this.packedOf(chunk);
     const bytes = bytesOf(packed);
-    this.#decoded.set(chunk.number, { packed, layers, bytes, textured });
+    this.#decoded.set(chunk.number, { ...made, packed, layers, bytes });
     if (packed.kind === "group") {
       const perFrame = bytes / packed.frameCount;
       this.#bytesPerFrame = this.#bytesPerFrame === 0 ? perFrame : (this.#bytesPerFrame + perFrame) / 2;
@@ -332,10 +346,4 @@ export class Decoding implements Holdings {
 
 function rangesOf(chunk: Chunk, layers: number): { size: number; crc: number }[] {
   return chunk.layers.slice(0, layers).map(({ size, crc }) => ({ size, crc }));
-}
-
-function bytesOf(packed: Packed): number {
-  const { texels, colors, faces, places } = packed;
-  const ofPlaces = places === null ? 0 : places.faces.byteLength + places.extra.byteLength;
-  return texels.byteLength + (colors?.byteLength ?? 0) + ofPlaces + faces.byteLength + (packed.kind === "group" ? packed.extra.byteLength + packed.extraStarts.byteLength : 0);
 }

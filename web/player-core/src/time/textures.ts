@@ -66,7 +66,7 @@ export class Textures implements LaneHost {
     this.#choices = inFile.filter((kind) => decodable?.includes(kind));
     const better = inFile.slice(0, this.#choices.length > 0 ? inFile.indexOf(this.#choices[0]) : undefined).map((kind) => CODECS[kind]);
     if (better.length > 0) this.#reason = decodable === null ? NO_WEBCODECS : `this browser decodes no ${better.join(" and no ")}`;
-    decoding.textures = this.rendition;
+    decoding.want({ textures: this.rendition });
     if (better.length > 0 && this.#choices.length === 0) this.#warn();
   }
 
@@ -274,7 +274,7 @@ export class Textures implements LaneHost {
   }
 
   #switch(): void {
-    this.#decoding.textures = this.rendition;
+    this.#decoding.want({ textures: this.rendition });
     if (this.rendition === null) for (const lane of this.#lanes.values()) lane.want([], () => true);
     this.changed();
   }

@@ -30,7 +30,7 @@ const ACTS: Readonly<Record<Action, Act>> = {
   vr: (player, surface) => void toggleVr(player, surface),
   stats: (player) => void (player.stats = !player.stats),
   mode: (player, surface) => {
-    player.mode = nextMode(player.mode, player.info?.hasColors ?? false);
+    player.mode = nextMode(player.mode, player.info);
     surface.tell(modeName(player.mode));
   },
   loop: (player, surface) => {

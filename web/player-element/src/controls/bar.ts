@@ -139,7 +139,7 @@ export class Bar {
       new Menu("layers", "Layers",
         () => ({ choices: layersChoices(most(), player.layers), value: layersValue(most(), player.layers), enabled: most() > 0 }),
         (value) => void (player.layers = parseLayers(value))),
-      new Menu("mode", "Shading", () => ({ choices: modeChoices(player.info?.hasColors ?? false), value: player.mode }),
+      new Menu("mode", "Shading", () => ({ choices: modeChoices(player.info), value: player.mode }),
         (value) => void (player.mode = value as Mode)),
     ];
     this.#parts.push(...menus);

@@ -1,14 +1,15 @@
 // What the menus offer.
 
 import type { Layers } from "@meshreel/player-core/types";
-import { MODES, type Mode } from "@meshreel/player-three/modes";
+import type { Mode } from "@meshreel/player-three/modes";
+import { type Looks, modesOf } from "../attributes.ts";
 import { formatSpeed } from "../format.ts";
 import type { Choice } from "./dom.ts";
 
 const SPEEDS = [0.1, 0.25, 0.5, 0.75, 1, 1.25, 1.5, 2, 4];
 const MOST_LEVELS = 6;
 const MODE_NAMES: Readonly<Record<Mode, string>> = {
-  color: "Colours", shaded: "Shaded", normal: "Normals", wireframe: "Wireframe", tracks: "Parts in colour",
+  splats: "Splats", color: "Colours", shaded: "Shaded", normal: "Normals", wireframe: "Wireframe", tracks: "Parts in colour",
 };
 
 /** Usual speeds, and the one that is set if it is none of them. */
@@ -37,19 +38,15 @@ function levelName(level: number, most: number): string {
   return level === 0 ? "Lowest" : `Level ${level} of ${most}`;
 }
 
-export function modeChoices(hasColors: boolean): readonly Choice[] {
-  return modesOf(hasColors).map((mode) => ({ value: mode, text: MODE_NAMES[mode] }));
+export function modeChoices(has: Looks | null): readonly Choice[] {
+  return modesOf(has).map((mode) => ({ value: mode, text: MODE_NAMES[mode] }));
 }
 
 export function modeName(mode: Mode): string {
   return MODE_NAMES[mode];
 }
 
-export function nextMode(mode: Mode, hasColors: boolean): Mode {
-  const modes = modesOf(hasColors);
+export function nextMode(mode: Mode, has: Looks | null): Mode {
+  const modes = modesOf(has);
   return modes[(modes.indexOf(mode) + 1) % modes.length]!;
-}
-
-function modesOf(hasColors: boolean): readonly Mode[] {
-  return MODES.filter((mode) => hasColors || mode !== "color");
 }
