@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import io
 from dataclasses import replace
+from itertools import accumulate
 
 import numpy as np
 import pytest
 
 from meshreel.analysis.appearance.splat_fit import FitSplatsOptions
 from meshreel.cli.splats import compare_splats
-from meshreel.container.reader import ReelReader
+from meshreel.coding.intra import encode_intra
+from meshreel.container.reader import Chunk, ReelReader
 from meshreel.container.sources import BytesSource
+from meshreel.container.writer import Companion, ReelWriter
 from meshreel.decoder.video import Video
 from meshreel.decoder.video import open as open_video
 from meshreel.encoder.appearance import as_installed
@@ -103,6 +106,23 @@ def test_without_torch_nothing_is_encoded_and_the_extra_is_named(monkeypatch: py
     monkeypatch.setattr("meshreel.encoder.appearance.find_spec", lambda _: None)
     with pytest.raises(InputError, match=r"meshreel\[splats\]"):
         as_installed(options())
+
+
+def test_frames_with_meshes_of_their_own_have_no_splats(video: Video) -> None:
+    reader, out = video.reader, io.BytesIO()
+    group = reader.groups[0]
+    of = reader.companion_of(group, ChunkKind.SPLATS)
+    assert of is not None
+    with ReelWriter(out, reader.header) as writer:
+        writer.add_group(0, group.frame_count, reader.read_chunk(group.number), ends(group))
+        writer.add_companion(Companion(ChunkKind.SPLATS, reader.read_chunk(of.number), ends(of)), [0])
+        writer.add_group(group.frame_count, 1, encode_intra([ball(1)[0]], 0.01, 0), depends_on=[0])
+    some = open_video(out.getvalue())
+    assert some.splats(0) is not None and some.splats(group.frame_count) is None
+
+
+def ends(chunk: Chunk) -> list[int]:
+    return list(accumulate(layer.size for layer in chunk.layers))
 
 
 def test_damaged_splats_cost_no_frame(video: Video) -> None:

@@ -21,30 +21,35 @@ class TrackSplats:
     def __init__(self, reader: ReelReader, layers: int | None) -> None:
         self._reader, self._layers = reader, layers
         self._refusals = Refusals()
-        self._splats: tuple[int, Splats] | None = None  # of the chunk that was asked for last
+        self._splats: tuple[int, int, Splats] | None = None  # of the chunk asked for last, and faces of its mesh
         self._carriers: tuple[int, list[Carrier]] | None = None  # of the frames of the group that was asked for last
 
     def of(self, chunk: Chunk) -> Chunk | None:
-        """Return the chunk of the splats that a group has: those of the first group of its chain; None: none."""
-        first = chunk
-        while (before := self._reader.group_before(first)) is not None:
-            first = before
-        return self._reader.companion_of(first, ChunkKind.SPLATS)
+        """Return the chunk of the splats that a group has: its own, or those of the group before it; None: none."""
+        at: Chunk | None = chunk if chunk.form in (Form.LAYERS, Form.LAPLACIAN) else None
+        while at is not None:
+            if (found := self._reader.companion_of(at, ChunkKind.SPLATS)) is not None:
+                return found
+            at = self._reader.group_before(at)
+        return None
 
     def bound(
         self, of: Chunk, chunk: Chunk, payload: bytes, frames: list[Mesh], before: LayersState | None, index: int
-    ) -> Bound:
-        """Return the splats of a frame of a group, whose frames are in metres. FormatError on damaged bytes."""
+    ) -> Bound | None:
+        """Return the splats of a frame of a group, whose frames are in metres; None where they are of another mesh.
+
+        Raises FormatError on damaged bytes.
+        """
         if self._carriers is None or self._carriers[0] != chunk.number:
             layers = None if chunk.form != Form.LAYERS else self._layers
             canvas = canvas_of(payload, [len(mesh.vertices) for mesh in frames], layers, before)
             self._carriers = chunk.number, canvas.carriers(frames, self._reader.header.scale)
         if self._splats is None or self._splats[0] != of.number:
             whole = None if self._layers is None else self._layers + 1
-            group = self._reader.chunks[of.depends_on[0]]
-            base = atlas_base(self._reader.read_chunk(group.number, 1))
+            count = len(atlas_base(self._reader.read_chunk(of.depends_on[0], 1)).faces)
             data = self._reader.read_chunk(of.number, whole)
             self._refusals.check(of)
             with self._refusals.of(of):
-                self._splats = of.number, decode_splats(data, len(base.faces))
-        return bind(self._splats[1], self._carriers[1][index])
+                self._splats = of.number, count, decode_splats(data, count)
+        carrier, (_, count, splats) = self._carriers[1][index], self._splats
+        return bind(splats, carrier) if len(carrier.faces) == count * 4**carrier.levels else None
