@@ -17,7 +17,7 @@ from jaxtyping import Float64
 
 from ..errors import InputError
 from ..geometry.color_views import ColorPicture, ColorViews, spread_colors
-from ..geometry.depth import DepthPicture
+from ..geometry.depth import DepthPicture, apart
 from ..geometry.topology import vertex_normals
 from ..io.sequence import SequenceOptions
 from ..types import Mesh, MeshSequence, Up
@@ -26,7 +26,6 @@ from .fusion import FusionOptions, fuse_depths
 from .rig import Rig, read_rig
 
 LOOKED_AT = 12  # frames examined for movement, spread over the recording (guess)
-APART = (0.06, 0.02)  # m, and share of the depth: measurements farther apart are of different surfaces (guess)
 MOVED = 0.5  # share of pixels that differ from their usual depth, in the median frame, of a camera that moves (guess)
 LEAST = 0.3  # share of pixels with a measurement below which a frame is ignored: it may show no background (guess)
 
@@ -184,9 +183,9 @@ def moved_share(depths: list[Float64[np.ndarray, "H W"]]) -> float:
     stack = np.where(np.stack(seen) > 0, np.stack(seen), np.nan)
     known = np.isfinite(stack).sum(axis=0) >= 3
     usual = np.nanmedian(stack[:, known], axis=0)
-    apart = np.abs(stack[:, known] - usual) > np.maximum(APART[0], APART[1] * usual)
+    other = np.abs(stack[:, known] - usual) > apart(usual)
     valid = np.isfinite(stack[:, known])
-    return float(np.median((apart & valid).sum(axis=1) / np.maximum(valid.sum(axis=1), 1)))
+    return float(np.median((other & valid).sum(axis=1) / np.maximum(valid.sum(axis=1), 1)))
 
 
 def looked_at(rig: Rig, number: int) -> list[Float64[np.ndarray, "H W"]]:
