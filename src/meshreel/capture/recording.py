@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import pickle
 import tempfile
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -122,30 +123,23 @@ class Kept:
     def __init__(self) -> None:
         self._file: Any = None  # io.FileIO
         self._places: dict[int, tuple[int, int]] = {}  # offset in the file, and size, bytes
-        self._full = False
 
     def get(self, number: int) -> Mesh | None:
         """Return a kept mesh, or None."""
-        if self._file is None or number not in self._places:
+        if number not in self._places:
             return None
         offset, size = self._places[number]
         self._file.seek(offset)
-        data = self._file.read(size)
-        return pickle.loads(data) if len(data) == size else None
+        return pickle.loads(self._file.read(size))
 
     def put(self, number: int, mesh: Mesh) -> None:
-        """Keep a mesh, unless the disk has no room; then none is kept from now on."""
-        if self._full:
-            return
-        try:
+        """Keep a mesh, unless the disk has no room: it is fused again, then."""
+        with suppress(OSError):
             if self._file is None:  # without a buffer: one that could not be written would fail again when it is read
                 self._file = tempfile.TemporaryFile(prefix="meshreel-", buffering=0)  # noqa: SIM115
             offset, data = self._file.seek(0, 2), pickle.dumps(mesh)
-            self._full = self._file.write(data) != len(data)
-        except OSError:  # frames that are read again are then fused again
-            self._full = True
-        if not self._full:
-            self._places[number] = (offset, len(data))
+            if self._file.write(data) == len(data):
+                self._places[number] = (offset, len(data))
 
 
 def open_recording(
