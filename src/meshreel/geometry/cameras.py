@@ -21,11 +21,13 @@ _RIGID = 1e-3  # largest error of an entry of R R^T: some tools write few digits
 _LARGEST = 1e9  # largest number of a matrix: keeps everything computed from it finite (guess)
 
 
-def looking_at(eye: Float64[np.ndarray, "3"], target: Float64[np.ndarray, "3"]) -> Float64[np.ndarray, "4 4"]:
-    """Return the matrix from camera to world of a camera at a place that looks at another; y points up."""
+def looking_at(
+    eye: Float64[np.ndarray, "3"], target: Float64[np.ndarray, "3"], up: int = 1
+) -> Float64[np.ndarray, "4 4"]:
+    """Return the matrix from camera to world of a camera at a place that looks at another; axis `up` points up."""
     forward = target - eye
     forward /= np.linalg.norm(forward)
-    right = np.cross(forward, (0.0, 1.0, 0.0))
+    right = np.cross(forward, np.eye(3)[up])
     right /= np.linalg.norm(right)
     pose = np.eye(4)
     pose[:3, :3] = np.stack([right, np.cross(forward, right), forward], axis=1)
