@@ -168,7 +168,6 @@ def test_a_damaged_file_raises_nothing_else(tmp_path, name, write):
         ("poses.json", '{"cameras": [{"name": "left", "camera_to_world": 1' + 400 * "0" + "}]}", "cannot be read"),
         ("poses.toml", "[cameras.a]\nsize = [1, 2]", "has no poses of cameras"),
         ("images.txt", "1 2 3\n", "cannot be read"),
-        ("poses.yml", "a: &a [1, 2]\nR_left: {data: *a}\n", r"it has an alias, \*, which no such file needs"),
     ],
 )
 def test_what_is_wrong_is_named(tmp_path, name, text, told):

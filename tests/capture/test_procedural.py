@@ -57,7 +57,7 @@ def test_a_third_person_and_a_frame_rate_can_be_chosen() -> None:
     assert components(sequence[0].faces, len(sequence[0].vertices)).max() == 2
 
 
-@pytest.mark.parametrize("options", [{"frames": 0}, {"people": 4}, {"spacing": 1.0}, {"story": 0.0}, {"begin": -1.0}])
+@pytest.mark.parametrize("options", [{"frames": 0}, {"people": 4}, {"spacing": 1.0}, {"begin": -1.0}])
 def test_impossible_options_are_refused(options: dict) -> None:
     with pytest.raises(InputError, match=rf"{next(iter(options))} .* (ask|choose|suits|give)"):
         SoftBodiesOptions(**options)

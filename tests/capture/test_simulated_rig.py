@@ -40,15 +40,12 @@ def test_without_errors_depth_is_that_of_the_surface(tmp_path):
     assert np.percentile(apart, 97) <= 2  # mm; at the ball's rim a ray grazes it or not
 
 
-@pytest.mark.parametrize("correlation", [0.0, 3.0])
-def test_noise_has_the_chosen_size_and_grows_with_depth(tmp_path, correlation):
+def test_noise_has_the_chosen_size_and_grows_with_depth(tmp_path):
     still = SceneFrame.of([PLATE], [])
     exact = seen(tmp_path / "exact", EXACT, frames=[still])[0].astype(float)
-    noisy = seen(tmp_path / "noisy", replace(EXACT, noise=1.0, correlation=correlation), frames=[still] * 8)
+    noisy = seen(tmp_path / "noisy", replace(EXACT, noise=1.0), frames=[still] * 8)
     errors = noisy.astype(float) - exact
     assert abs(errors.std() - 21) < 2 and abs(errors.mean()) < 3  # mm; the wall is 3.2 m away
-    alike = np.mean([np.corrcoef(e[:, 1:].ravel(), e[:, :-1].ravel())[0, 1] for e in errors])
-    assert (alike > 0.8) if correlation else (abs(alike) < 0.05)
 
 
 def test_holes_flying_pixels_and_grazing_angles_are_simulated(tmp_path):
@@ -94,25 +91,21 @@ def test_the_truth_has_clean_meshes_and_labels_that_fused_faces_take(tmp_path):
     assert len(carried_labels(Surface(SCENE.mesh), SCENE.dynamic, Mesh.empty())) == 0
 
 
-@pytest.mark.parametrize("up", [1, 2])
-def test_cameras_in_the_corners_look_down_at_the_middle(up):
+def test_cameras_in_the_corners_look_down_at_the_middle():
     low, high = np.array([-3.0, -1.0, -2.0]), np.array([3.0, 2.0, 2.0])
-    cameras = corner_cameras(low, high, 4, up)
+    cameras = corner_cameras(low, high)
     assert len({one.name for one in cameras}) == 4
     for one in cameras:
         eye, forward, down = one.camera_to_world[:3, 3], one.camera_to_world[:3, 2], one.camera_to_world[:3, 1]
-        across = [axis for axis in range(3) if axis != up]
-        assert np.allclose(np.abs(eye - (low + high) / 2)[across], ((high - low) / 2)[across])
-        assert forward[up] < 0 and down[up] < -0.5  # it looks down, and its y axis points down
+        assert np.allclose(np.abs(eye - (low + high) / 2)[::2], ((high - low) / 2)[::2])
+        assert forward[1] < 0 and down[1] < -0.5  # it looks down, and its y axis points down
         ahead = (one.extrinsic @ [*((low + high) / 2), 1])[:3]
         assert ahead[2] > 0 and np.abs(ahead[:2] / ahead[2]).max() < 0.3
-    with pytest.raises(InputError, match="0 cameras"):
-        corner_cameras(low, high, 0)
 
 
 @pytest.mark.parametrize(
-    "wrong", [{"noise": -1.0}, {"grazing": 0.0}, {"holes": 1.5}, {"jump": 0.0}, {"pose_error": (0.0, float("nan"))}]
+    "wrong", [{"noise": -1.0}, {"grazing": 0.0}, {"holes": 1.5}, {"pose_error": (0.0, float("nan"))}]
 )
 def test_impossible_sensors_are_refused(wrong):
-    with pytest.raises(InputError, match="sensor with"):
+    with pytest.raises(InputError, match="give numbers from 0 on"):
         SensorOptions(**wrong)

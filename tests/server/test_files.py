@@ -1,9 +1,8 @@
-"""Sent files: all kinds of ranges, streaming, and files that a client cannot reach."""
+"""Sent files: all kinds of headers Range, streaming, and files that a client cannot reach."""
 
 from __future__ import annotations
 
 import asyncio
-import email
 import json
 import mimetypes
 import os
@@ -28,45 +27,20 @@ from tests.golden import GOLDEN
 WALK = "/files/walk.reel"
 
 
-def parts_of(answer):
-    """Content-Range and bytes of each part."""
-    assert answer.status_code == 206 and len(answer.content) == int(answer.headers["content-length"])
-    head = f"Content-Type: {answer.headers['content-type']}\n\n".encode()
-    parts = email.message_from_bytes(head + answer.content).get_payload()
-    return [(part["content-range"], part.get_payload(decode=True)) for part in parts]
-
-
-def test_several_ranges_come_as_parts(client, folder):
-    data = (folder / "walk.reel").read_bytes()
-    parts = parts_of(client.get(WALK, headers={"Range": "bytes=0-3, 10-19, -5"}))
-    assert [part for _, part in parts] == [data[:4], data[10:20], data[-5:]]
-    assert parts[1][0] == f"bytes 10-19/{len(data)}"
-
-
-@pytest.mark.parametrize("asked", ["0-9,5-20", "0-0,0-20", ",".join(["0-20"] * 100)])
-def test_ranges_that_overlap_are_sent_once(client, folder, asked):
-    answer = client.get(WALK, headers={"Range": f"bytes={asked}"})
-    assert answer.status_code == 206 and answer.content == (folder / "walk.reel").read_bytes()[:21]
-
-
 SIZE = (GOLDEN / "layers.reel").stat().st_size
 HUGE = "9" * 5000
 RANGES = {
-    "bytes=0-0": [(0, 1)],
-    "BYTES=0-3": [(0, 4)],
-    "bytes=0-3\t, , 5-9": [(0, 4), (5, 10)],
-    "bytes=10-19,0-3": [(10, 20), (0, 4)],
-    "bytes=000-0003": [(0, 4)],
-    "bytes=0-3,99999999-": [(0, 4)],
-    f"bytes=-{HUGE}": [(0, SIZE)],
-    f"bytes=0-{HUGE}": [(0, SIZE)],
-    f"bytes={SIZE - 1}-": [(SIZE - 1, SIZE)],
+    "bytes=0-0": (0, 1),
+    "BYTES=0-3": (0, 4),
+    "bytes=0-3, 5-9": 200,
+    "bytes=000-0003": (0, 4),
+    f"bytes=-{HUGE}": (0, SIZE),
+    f"bytes=0-{HUGE}": (0, SIZE),
+    f"bytes={SIZE - 1}-": (SIZE - 1, SIZE),
     f"bytes={SIZE}-": 416,
     "bytes=-0": 416,
     f"bytes={HUGE}-": 416,
-    f"bytes=-0,{SIZE}-{SIZE}": 416,
     "bytes=5-2": 200,
-    "bytes=0-3,5-2": 200,
     f"bytes={HUGE}-1": 200,
     "bytes=a-b": 200,
     "bytes=0x0-3": 200,
@@ -83,7 +57,6 @@ RANGES = {
     "bytes =0-3": 200,
     "": 200,
     "items=0-3": 200,
-    "bytes=" + ",".join(f"{2 * k}-{2 * k}" for k in range(101)): 200,
     "bytes=" + "0-0," * 5000: 200,
 }
 
@@ -97,12 +70,10 @@ def test_ranges_are_those_of_rfc_9110_and_what_is_none_is_ignored(client, folder
         assert answer.headers["content-range"] == f"bytes */{len(data)}"
     elif wanted == 200:
         assert answer.status_code == 200 and answer.content == data and "content-range" not in answer.headers
-    elif len(wanted) == 1:
-        ((start, stop),) = wanted
+    else:
+        start, stop = wanted
         assert answer.status_code == 206 and answer.content == data[start:stop]
         assert answer.headers["content-range"] == f"bytes {start}-{stop - 1}/{len(data)}"
-    else:
-        assert parts_of(answer) == [(f"bytes {a}-{b - 1}/{len(data)}", data[a:b]) for a, b in wanted]
 
 
 def test_two_headers_range_are_none(client, folder):

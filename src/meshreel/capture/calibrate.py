@@ -21,9 +21,10 @@ from jaxtyping import Float64
 
 from ..errors import InputError
 from ..geometry import strict
+from ..geometry.depth import depth_noise
 from .recording import looked_at
 from .rig import DepthCamera, Rig
-from .still_view import StillView, spread, still_view
+from .still_view import StillView, still_view
 
 POINTS = 20_000  # of a camera, about (guess)
 REACH = (0.3, 0.15, 0.08, 0.05)  # m, of the distances that count, round by round (guess)
@@ -201,7 +202,7 @@ class _Scene:
             _placed(poses[other], points[inside][met]),
             strict.products(normals[met], poses[other][:3, :3].T),
             distances[met],
-            1 / (spread(depths[0]) ** 2 + spread(depths[1]) ** 2),
+            1 / (depth_noise(depths[0]) ** 2 + depth_noise(depths[1]) ** 2),
             1 - (distances[met] / reach) ** 2,
         )
 

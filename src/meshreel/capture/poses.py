@@ -160,12 +160,7 @@ def _yaml(data: bytes) -> dict[str, Pose]:
         raise InputError("YAML needs the extra `calibrate`: pip install 'meshreel[calibrate]'") from None
 
     class Loader(yaml.SafeLoader):
-        """YAML with OpenCV's matrices as mappings, and without aliases, of which a few bytes make gigabytes."""
-
-        def compose_node(self, parent: Any, index: Any) -> Any:
-            if self.check_event(yaml.AliasEvent):
-                raise yaml.YAMLError("it has an alias, *, which no such file needs")
-            return super().compose_node(parent, index)
+        """YAML with OpenCV's matrices as mappings."""
 
     Loader.add_multi_constructor("", lambda loader, _, node: loader.construct_mapping(node, deep=True))
     text = re.sub(r"^%YAML:.*", "", data.decode("utf-8-sig"))  # OpenCV's first line is no YAML

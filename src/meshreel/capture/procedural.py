@@ -19,6 +19,7 @@ from .implicit import Body, Grid, polygonize
 _TOUCH = 0.02  # m over which two people's surfaces blend where they meet (guess)
 _FAR, _NEAR = 1.9, 0.66  # m between the two people, at most and at least (guess)
 _CYCLE = 0.9  # m walked in a step cycle (guess)
+_STORY = 3.0  # s to walk up, shake hands, part and wave; then the story repeats (guess)
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,7 +30,6 @@ class SoftBodiesOptions:
     frame_rate: float = 30.0  # 1/s
     spacing: float = 0.022  # m between grid points: 0.022 gives about 10k vertices for two people
     people: int = 2  # 1 to 3
-    story: float = 3.0  # s to walk up, shake hands, part and wave; then the story repeats
     begin: float = 0.0  # s into the story; 0.95 with 30 frames: apart, in touch, apart
     seed: int = 0  # of the grids
 
@@ -39,8 +39,6 @@ class SoftBodiesOptions:
             raise InputError(f"people {self.people} is not 1, 2 or 3; choose one of these")
         if not 0 <= self.begin < math.inf:
             raise InputError(f"begin {self.begin} is not a time from 0 on; give seconds, as 0.95")
-        if not 0 < self.story < math.inf:
-            raise InputError(f"story {self.story} is not a positive number; give one, as 3")
 
 
 def check_frames(frames: int, frame_rate: float, spacing: float) -> None:
@@ -69,7 +67,7 @@ class SoftBodies(MeshSequence):
     def __getitem__(self, index: int) -> Mesh:
         number = range(len(self))[operator.index(index)]
         seconds = self.options.begin + number / self.options.frame_rate
-        moment = seconds / self.options.story % 1.0
+        moment = seconds / _STORY % 1.0
         grid = grid_of_frame(number, self.options.spacing, self.options.seed)
         return polygonize(cast(moment, self.options), _TOUCH, grid)
 

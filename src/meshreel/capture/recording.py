@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import pickle
 import tempfile
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -17,7 +18,7 @@ from jaxtyping import Float64
 
 from ..errors import InputError
 from ..geometry.color_views import ColorPicture, ColorViews, spread_colors
-from ..geometry.depth import DepthPicture
+from ..geometry.depth import DepthPicture, apart
 from ..geometry.topology import vertex_normals
 from ..io.sequence import SequenceOptions
 from ..types import Mesh, MeshSequence, Up
@@ -26,7 +27,6 @@ from .fusion import FusionOptions, fuse_depths
 from .rig import Rig, read_rig
 
 LOOKED_AT = 12  # frames examined for movement, spread over the recording (guess)
-APART = (0.06, 0.02)  # m, and share of the depth: measurements farther apart are of different surfaces (guess)
 MOVED = 0.5  # share of pixels that differ from their usual depth, in the median frame, of a camera that moves (guess)
 LEAST = 0.3  # share of pixels with a measurement below which a frame is ignored: it may show no background (guess)
 
@@ -123,30 +123,23 @@ class Kept:
     def __init__(self) -> None:
         self._file: Any = None  # io.FileIO
         self._places: dict[int, tuple[int, int]] = {}  # offset in the file, and size, bytes
-        self._full = False
 
     def get(self, number: int) -> Mesh | None:
         """Return a kept mesh, or None."""
-        if self._file is None or number not in self._places:
+        if number not in self._places:
             return None
         offset, size = self._places[number]
         self._file.seek(offset)
-        data = self._file.read(size)
-        return pickle.loads(data) if len(data) == size else None
+        return pickle.loads(self._file.read(size))
 
     def put(self, number: int, mesh: Mesh) -> None:
-        """Keep a mesh, unless the disk has no room; then none is kept from now on."""
-        if self._full:
-            return
-        try:
+        """Keep a mesh, unless the disk has no room: it is fused again, then."""
+        with suppress(OSError):
             if self._file is None:  # without a buffer: one that could not be written would fail again when it is read
                 self._file = tempfile.TemporaryFile(prefix="meshreel-", buffering=0)  # noqa: SIM115
             offset, data = self._file.seek(0, 2), pickle.dumps(mesh)
-            self._full = self._file.write(data) != len(data)
-        except OSError:  # frames that are read again are then fused again
-            self._full = True
-        if not self._full:
-            self._places[number] = (offset, len(data))
+            if self._file.write(data) == len(data):
+                self._places[number] = (offset, len(data))
 
 
 def open_recording(
@@ -184,9 +177,9 @@ def moved_share(depths: list[Float64[np.ndarray, "H W"]]) -> float:
     stack = np.where(np.stack(seen) > 0, np.stack(seen), np.nan)
     known = np.isfinite(stack).sum(axis=0) >= 3
     usual = np.nanmedian(stack[:, known], axis=0)
-    apart = np.abs(stack[:, known] - usual) > np.maximum(APART[0], APART[1] * usual)
+    other = np.abs(stack[:, known] - usual) > apart(usual)
     valid = np.isfinite(stack[:, known])
-    return float(np.median((apart & valid).sum(axis=1) / np.maximum(valid.sum(axis=1), 1)))
+    return float(np.median((other & valid).sum(axis=1) / np.maximum(valid.sum(axis=1), 1)))
 
 
 def looked_at(rig: Rig, number: int) -> list[Float64[np.ndarray, "H W"]]:

@@ -17,6 +17,7 @@ from jaxtyping import Bool, Float64, UInt16
 
 from ..errors import InputError
 from ..geometry.cameras import looking_at
+from ..geometry.depth import depth_noise
 from ..geometry.raycast import Rays
 from ..geometry.topology import concatenate, face_normals
 from ..io.depth_pictures import write_depth
@@ -28,29 +29,24 @@ from .simulated_color import ColorSensorOptions, Painter, SimulatedColor, turned
 TRUTH = "truth"  # folder of the clean meshes
 LABELS = "dynamic.npz"  # file in that folder: for each frame, a bit per face of its mesh
 DEEPEST = 65_535  # units, largest value of a 16-bit depth picture
+JUMP = 0.05  # m between neighbouring pixels: where they are farther apart, flying pixels come up (guess)
 
 
 @dataclass(frozen=True, slots=True)
 class SensorOptions:
     """Errors of a depth camera."""
 
-    noise: float = 0.4  # times a standard deviation of 15, 20 and 25 mm at 2, 3 and 4 m
-    correlation: float = 0.0  # pixels over which the noise is correlated (standard deviation of a Gaussian); 0: none
+    noise: float = 0.4  # times `depth_noise`, standard deviation
     grazing: float = 80.0  # degrees between ray and normal above which nothing is measured
     holes: float = 0.002  # share of the pixels that measure nothing
     flying: float = 0.3  # share of the pixels beside a jump that measure a depth between both sides
-    jump: float = 0.05  # m between neighbours above which there is a jump
     pose_error: tuple[float, float] = (0.0, 0.0)  # m, degrees: standard deviations of the errors in the rig's file
     seed: int = 0
 
     def __post_init__(self) -> None:
-        lengths = (self.noise, self.correlation, *self.pose_error)
-        if not all(math.isfinite(value) and value >= 0 for value in lengths) or not self.jump > 0:
-            text = f"noise {self.noise:g}, correlation {self.correlation:g}, pose error {self.pose_error}"
-            raise InputError(f"sensor with {text}, jump {self.jump:g}: give numbers from 0 on, jump above 0")
-        if not 0 < self.grazing <= 90 or not (0 <= self.holes <= 1 and 0 <= self.flying <= 1):
-            text = f"grazing {self.grazing:g}, holes {self.holes:g}, flying {self.flying:g}"
-            raise InputError(f"sensor with {text}: give degrees up to 90 and shares from 0 to 1")
+        good = all(math.isfinite(value) and value >= 0 for value in (self.noise, *self.pose_error))
+        if not (good and 0 < self.grazing <= 90 and 0 <= self.holes <= 1 and 0 <= self.flying <= 1):
+            raise InputError(f"{self}: give numbers from 0 on, degrees up to 90 and shares up to 1")
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,28 +66,22 @@ class SceneFrame:
 
 
 def corner_cameras(
-    low: Float64[np.ndarray, " 3"], high: Float64[np.ndarray, " 3"], count: int = 4, up: int = 1
+    low: Float64[np.ndarray, " 3"], high: Float64[np.ndarray, " 3"], count: int = 4
 ) -> tuple[DepthCamera, ...]:
     """Return cameras of the paper's size (640 x 576, 75 x 65 degrees) high up around a box, looking down at its middle.
 
     `low` and `high` are the box's corners, m; the cameras stand on an ellipse through its vertical edges, the first at
-    45 degrees. `up` is the number of the axis that points up.
+    45 degrees; y is up.
     """
-    if count < 1:
-        raise InputError(f"{count} cameras: give one at least")
-    across = [(up + 1) % 3, (up + 2) % 3]
     middle, half = (low + high) / 2, (high - low) / 2
-    target = middle.copy()
-    target[up] = low[up] + 0.4 * (high[up] - low[up])
+    target = np.array([middle[0], low[1] + 0.4 * (high[1] - low[1]), middle[2]])
     cameras = []
     for number in range(count):
         angle = math.pi / 4 + 2 * math.pi * number / count
-        eye = middle.copy()
-        eye[across] += math.sqrt(2) * half[across] * (math.cos(angle), math.sin(angle))
-        eye[up] = low[up] + 0.9 * (high[up] - low[up])
-        pose = looking_at(eye, target, up)
+        across = math.sqrt(2) * half * (math.sin(angle), 0.0, math.cos(angle))
+        eye = np.array([middle[0], low[1] + 0.9 * (high[1] - low[1]), middle[2]]) + across
         name, focal, center = f"corner{number}", (417.0, 452.0), (319.5, 287.5)
-        cameras.append(DepthCamera(name, 640, 576, focal, center, pose, depth_range=(0.25, 8.0)))
+        cameras.append(DepthCamera(name, 640, 576, focal, center, looking_at(eye, target), depth_range=(0.25, 8.0)))
     return tuple(cameras)
 
 
@@ -176,7 +166,7 @@ def _measured(
     depth = _flown(depth, sensor, random)
     seen = np.isfinite(depth) & (random.random(depth.shape) >= sensor.holes)
     depth = np.where(seen, depth, 0.0)
-    depth += sensor.noise * (0.005 + 0.005 * depth) * _noise(depth.shape, sensor.correlation, random)
+    depth += sensor.noise * depth_noise(depth) * random.standard_normal(depth.shape)
     units = np.rint(depth / camera.depth_unit)
     return camera.in_range(np.where(seen & (units > 0) & (units <= DEEPEST), units, 0).astype(np.uint16))
 
@@ -189,23 +179,12 @@ def _flown(
     for axis in (0, 1):
         beside = np.roll(depth, 1, axis=axis)
         with np.errstate(invalid="ignore"):  # two misses side by side
-            jumps = np.isfinite(depth) & np.isfinite(beside) & (np.abs(depth - beside) > sensor.jump)
+            jumps = np.isfinite(depth) & np.isfinite(beside) & (np.abs(depth - beside) > JUMP)
         np.moveaxis(jumps, axis, 0)[0] = False  # the first row has no neighbour
         mixed = jumps & (random.random(depth.shape) < sensor.flying)
         share = random.random(depth.shape)
         found[mixed] = share[mixed] * depth[mixed] + (1 - share[mixed]) * beside[mixed]
     return found
-
-
-def _noise(shape: tuple[int, ...], correlation: float, random: np.random.Generator) -> Float64[np.ndarray, "H W"]:
-    """Draw normal noise of unit deviation, correlated over `correlation` pixels."""
-    from scipy.ndimage import gaussian_filter
-
-    white = random.standard_normal(shape)
-    if correlation == 0:
-        return white
-    smooth = gaussian_filter(white, correlation, mode="wrap")
-    return smooth / smooth.std()
 
 
 def _mistaken(camera: DepthCamera, sensor: SensorOptions, random: np.random.Generator) -> DepthCamera:

@@ -11,13 +11,13 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float64
 
-from .recording import APART
+from ..geometry.depth import apart, depth_noise
 from .rig import DepthCamera
 
 CHANGES = 0.25  # share of the frames in which a still pixel may measure something else (guess)
 WINDOW = 100  # a side of the window that a plane is fitted to, in the picture's width (guess)
 FULL = 0.6  # share of the window's pixels that must have a depth (guess)
-FINE = 0.5  # of `spread`: what is below is flat and still (guess)
+FINE = 0.5  # of `depth_noise`: what is below is flat and still (guess)
 FLAT = 2.5  # times the usual distance of depths from their plane, above which a window is no plane (guess)
 
 
@@ -33,11 +33,6 @@ class StillView:
     def known(self) -> Bool[np.ndarray, "H W"]:
         """The pixels that have a plane."""
         return np.isfinite(self.points[..., 2])
-
-
-def spread(depth: Float64[np.ndarray, "..."]) -> Float64[np.ndarray, "..."]:
-    """Return how a depth camera's noise grows with depth, m: 10 mm at 1 m, 20 mm at 3 m (paper, section 4.1)."""
-    return 0.005 + 0.005 * depth
 
 
 def still_view(camera: DepthCamera, depths: list[Float64[np.ndarray, "H W"]]) -> StillView:
@@ -69,7 +64,7 @@ def still_view(camera: DepthCamera, depths: list[Float64[np.ndarray, "H W"]]) ->
         right, down = (jj * is_ - ij * js) / size, (ii * js - ij * is_) / size  # change per pixel
         middle = s - right * i - down * j
         depth = 1 / middle
-        off = np.sqrt(np.maximum(ss - right * is_ - down * js, 0)) * depth**2 / spread(depth)
+        off = np.sqrt(np.maximum(ss - right * is_ - down * js, 0)) * depth**2 / depth_noise(depth)
         change = np.sqrt(sums(np.where(valid, change, 0.0), 0, 0) / count)
     good = valid & (count >= FULL * len(steps) ** 2) & (size > 1e-6 * half**4) & (middle > 0)
     flat = good.copy()
@@ -103,9 +98,9 @@ def _usual(
     low, high = (np.take_along_axis(ordered, k[None], axis=0)[0] for k in middle)
     usual = (low + high) / 2
     with np.errstate(invalid="ignore"):
-        near = np.abs(ordered - usual) <= np.maximum(APART[0], APART[1] * usual)
+        near = np.abs(ordered - usual) <= apart(usual)
         # The mean of those: the median is too near where something passed in front of the surface.
         usual = np.where(near, ordered, 0).sum(axis=0) / near.sum(axis=0)
-        change = np.where(near, (ordered - usual) ** 2, 0).sum(axis=0) / near.sum(axis=0) / spread(usual) ** 2
+        change = np.where(near, (ordered - usual) ** 2, 0).sum(axis=0) / near.sum(axis=0) / depth_noise(usual) ** 2
     still = (2 * count >= len(stack)) & (near.sum(axis=0) >= (1 - CHANGES) * count) & (count > 0)
     return np.where(still, usual, np.nan), change

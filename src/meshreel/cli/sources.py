@@ -20,7 +20,7 @@ from ..capture.recordings.to_rig import write_takes
 from ..errors import InputError
 from ..geometry.derived_sequences import Upright
 from ..io.remote import Remote, located
-from ..io.sequence import captured, open_sequence
+from ..io.sequence import capture_record, open_sequence
 from ..types import MeshSequence, Up
 from .console import Common
 from .flags import Reading
@@ -58,7 +58,7 @@ def open_source(inputs: Sequence[str], reading: Reading, common: Common = Common
     if len(inputs) > 1 and (rigs := [name for name in inputs if is_rig(Path(name))]):
         raise InputError(f"{rigs[0]}: is a rig, which no other input joins; give it alone")
     if isinstance(folder, Remote) or len(inputs) > 1 or not is_rig(folder) or any(folder.glob("frame_*.ply")):
-        options, made = reading.options(), captured(folder) if len(inputs) == 1 else {}
+        options, made = reading.options(), capture_record(folder) if len(inputs) == 1 else {}
         rate = made.get("frames_per_second")
         if reading.fps == _READ.fps and isinstance(rate, (int, float)) and rate > 0:
             options = replace(options, frame_rate=float(rate))

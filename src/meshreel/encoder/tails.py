@@ -32,8 +32,6 @@ from .shown_frame import FAR, ShownFrame, squared_distances
 LEAST_BYTES = 4  # bytes of a region or a patch at least (guess)
 DRACO_HEAD = 36  # bytes of a Draco mesh that all patches share
 EXACT = 1e-7  # RMS distance of the rest, of the diagonal, below which no byte is worth spending (guess)
-
-
 NOISY_REST = 1.0  # RMS noise that the rest of a noisy body may be off (guess)
 
 
@@ -92,8 +90,8 @@ def find_tails(
         if (cost := search.cost(tried)) < least:
             best, least = tried, cost
             better.append(tried)
-    dropped = best.parts.dropped if best else search.nothing
-    if torn := any(search.holes(dropped)):
+    dropped = best.parts.dropped if best else np.zeros((len(frames), len(faces)), bool)
+    if torn := search.is_torn(dropped):
         better, least = [], np.inf
     for patches in search.patches(best):
         tried = search.coded(dropped, patches)
@@ -102,11 +100,9 @@ def find_tails(
             better.append(tried)
     least_of_all = better[0] if gone.any() and better else None
     chosen = next((tried for tried in reversed(better) if torn or search.holds(tried)), least_of_all)
-    return (
-        None
-        if chosen is None
-        else Tails(chosen.record, chosen.parts.apply(np.stack([mesh.vertices for mesh in decoded]), faces))
-    )
+    if chosen is None:
+        return None
+    return Tails(chosen.record, chosen.parts.apply(np.stack([mesh.vertices for mesh in decoded]), faces))
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,11 +121,6 @@ class _Search:
     options: TailOptions
     rung: int  # of the patches' lattice
     noise: float  # RMS distance of the frames from the truth
-
-    @property
-    def nothing(self) -> Bool[np.ndarray, "T F"]:
-        """Return a mask that drops no face."""
-        return np.zeros((len(self.frames), len(self.faces)), bool)
 
     def coded(self, dropped: Bool[np.ndarray, "T F"], meshes: Sequence[Mesh]) -> _Coded:
         """Return a mask and patches as a decoder sees them."""
@@ -185,11 +176,10 @@ class _Search:
             if not all(mesh.is_empty for mesh in meshes):
                 yield meshes
 
-    def holes(self, dropped: Bool[np.ndarray, "T F"]) -> Iterator[bool]:
-        """Yield for each frame whether it has surface, more than a bit, where nothing is decoded."""
-        for frame, gone in zip(self.frames, dropped, strict=True):
-            left = frame.left(gone)
-            yield any(self._is_hole(frame, left, faces) for faces in frame.lost(left, self.far))
+    def is_torn(self, dropped: Bool[np.ndarray, "T F"]) -> bool:
+        """Return whether a frame has surface, more than a bit, where nothing is decoded."""
+        pairs = ((frame, frame.left(gone)) for frame, gone in zip(self.frames, dropped, strict=True))
+        return any(self._is_hole(frame, left, faces) for frame, left in pairs for faces in frame.lost(left, self.far))
 
     @property
     def far(self) -> float:
@@ -202,7 +192,7 @@ class _Search:
         return bool(frame.surface.areas[faces[far]].sum() >= HOLE)
 
     def _patch(self, frame: ShownFrame, squared: Float64[np.ndarray, " N"], threshold: float) -> Mesh:
-        """Yield the patches of a frame where its samples are farther than a limit from the decoded mesh."""
+        """Return the patches of a frame where its samples are farther than a limit from the decoded mesh."""
         chosen = []
         for faces in frame.lost(squared, threshold**2 * self.usual):
             samples, hole = frame.samples_of(faces), self._is_hole(frame, squared, faces)

@@ -15,7 +15,18 @@ from .cameras import PinholeCamera
 
 FACING = 0.3  # cosine between a surface and the way to a camera from which on the camera measures it (guess)
 THROUGH = (0.03, 0.015)  # m, and share of the depth, by which a camera must see past a place to know it is free (guess)
+APART = (0.06, 0.02)  # m, and share of the depth: measurements farther apart are of different surfaces (guess)
 STEP = 0.03  # of the depth between neighbours: what is farther apart is two surfaces (guess)
+
+
+def apart(depth: Float64[np.ndarray, "..."]) -> Float64[np.ndarray, "..."]:
+    """Return by how much two measurements at a depth must differ to be of different surfaces, m."""
+    return np.maximum(APART[0], APART[1] * depth)
+
+
+def depth_noise(depth: Float64[np.ndarray, "..."]) -> Float64[np.ndarray, "..."]:
+    """Return the usual noise of a depth camera, m, which grows: 15 mm at 2 m, 20 mm at 3 m (paper, section 4.1)."""
+    return 0.005 + 0.005 * depth
 
 
 @dataclass(frozen=True, slots=True)

@@ -65,11 +65,10 @@ def distinct(keys: Int64[np.ndarray, " N"]) -> Int64[np.ndarray, " P"]:
     return ordered[np.concatenate([[True], ordered[1:] != ordered[:-1]])] if len(ordered) else ordered
 
 
-def around(keys: Int64[np.ndarray, " P"], reach: int = 1) -> Int64[np.ndarray, " Q"]:
-    """Return the given cells and all cells within `reach` cells of one of them along every axis."""
-    steps = range(-reach, reach + 1)
+def around(keys: Int64[np.ndarray, " P"]) -> Int64[np.ndarray, " Q"]:
+    """Return the given cells and all cells beside one of them, also at an edge or a corner."""
     for axis in np.eye(3, dtype=np.int64):
-        keys = distinct(np.concatenate([moved(keys, axis * step) for step in steps]))
+        keys = distinct(np.concatenate([moved(keys, axis * step) for step in (-1, 0, 1)]))
     return keys
 
 

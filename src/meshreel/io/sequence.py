@@ -187,11 +187,11 @@ def open_sequence(source: str | Path | Sequence[str | Path], options: SequenceOp
     paths, remarks = find_frames(source)
     if not paths:
         raise InputError("the list of files has 0 frames; give at least one")
-    up = "y" if place is None else known_up(captured(place).get("up"))
+    up = "y" if place is None else known_up(capture_record(place).get("up"))
     return FileSequence(Files(paths), options, remarks, up)
 
 
-def captured(folder: Place) -> dict[str, Any]:
+def capture_record(folder: Place) -> dict[str, Any]:
     """Return the record that `meshreel capture` wrote beside its meshes; empty for other folders and files."""
     try:
         record = json.loads(read_file(folder / CAPTURED))

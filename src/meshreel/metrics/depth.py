@@ -15,7 +15,7 @@ from jaxtyping import Bool, Float64
 from scipy.ndimage import binary_dilation, distance_transform_edt, label, maximum_filter, minimum_filter
 
 from ..geometry.cameras import PinholeCamera
-from ..geometry.depth import STEP, DepthFrames, DepthPicture
+from ..geometry.depth import STEP, DepthFrames, DepthPicture, apart
 from ..types import Frames, Mesh, evenly
 from .comparison import Row
 from .flicker import Patch, turned
@@ -26,12 +26,9 @@ NEAR = (0.03, 0.015)  # m, and share of the depth, within which surface covers a
 RUN = 0.01  # m^2, of a connected area that is not covered, from which on it is a lost run
 USUAL = 0.95  # quantile over time of a pixel's depth: how far it is where nobody stands (guess)
 SELDOM = 0.2  # share of all frames in which a pixel is as far as usual, below which this is a body as well (guess)
-APART = (0.06, 0.02)  # m, and share of the depth, by which a body is nearer than usual (guess)
 SPECK = 12  # pixels: smaller areas that are nearer than usual are noise (guess)
 LOOKED_AT = 60  # frames from which the usual depth is taken, at most (guess)
-FOOT = (
-    0.3  # m around a body in which nothing is asked to stand still: a foot is as long, and not `APART` from the floor
-)
+FOOT = 0.3  # m around a body in which nothing is asked to stand still: a foot, which is not `apart` from the floor
 LIMB = 50  # pixels of a body's lower third from which on a frame shows it (guess)
 ENDS = (0.02, 0.98)  # quantiles of heights of measured points: where a body ends (guess)
 LOWEST = 0.1  # quantile over frames of a body's lower end: the floor that it stands on (guess)
@@ -132,7 +129,7 @@ class DepthJudge:
         return int((known < third).sum()), int(covered[known < third].sum())
 
     def _body(self, camera: int, depth: Float64[np.ndarray, "H W"]) -> Bool[np.ndarray, "H W"]:
-        nearer = depth < self._usual.get(camera, 0.0) - np.maximum(APART[0], APART[1] * depth)
+        nearer = depth < self._usual.get(camera, 0.0) - apart(depth)
         return _large((depth > 0) & nearer, SPECK)
 
     def _heights(self, pictures: Sequence[DepthPicture | None]) -> Float64[np.ndarray, " N"]:
@@ -257,6 +254,6 @@ def _usual(stack: Float64[np.ndarray, "T H W"]) -> Float64[np.ndarray, "H W"]:
         return np.maximum(np.take_along_axis(ordered, np.clip(rank, 0, last)[None], 0)[0], 0)
 
     usual, near = at(USUAL), at(1 - USUAL)
-    apart = np.maximum(APART[0], APART[1] * usual)
-    seldom = (np.abs(stack - usual) <= apart).mean(axis=0) < SELDOM
-    return np.where(seldom & (usual - near > apart), np.inf, usual)
+    far = apart(usual)
+    seldom = (np.abs(stack - usual) <= far).mean(axis=0) < SELDOM
+    return np.where(seldom & (usual - near > far), np.inf, usual)

@@ -34,14 +34,12 @@ _LEAST_LIMIT = 1e-3  # % or mm; below it the color bar would show rounding (gues
 
 @dataclass(frozen=True, slots=True)
 class SheetOptions:
-    """Frames, views and scale of a sheet."""
+    """Frames, cameras and size of a sheet."""
 
     frames: tuple[int, ...] = ()  # empty: first, middle and last
-    views: tuple[int, ...] = (0,)  # 0 front, 1 right, 2 back, 3 left; unused if there are cameras
-    cameras: tuple[PinholeCamera, ...] = ()  # of one size; empty: `views` around all that is shown
+    cameras: tuple[PinholeCamera, ...] = ()  # of one size; empty: one before all that is shown
     height: int = 480  # pixels of one picture
     unit: str = "percent"  # of the heat map: percent (of the diagonal) or mm
-    limit: float = 0.0  # end of the color bar, in that unit; 0: the 99 % quantile of the visible errors
     up: str = "y"  # the axis that points up: y, z, -y or -z
 
     def __post_init__(self) -> None:
@@ -60,7 +58,7 @@ class SheetRow:
 
 
 def write_sheet(originals: Frames, decoded: Frames, path: Path, options: SheetOptions | None = None) -> None:
-    """Write the PNG, with a line for each chosen frame and view."""
+    """Write the PNG, with a line for each chosen frame and camera."""
     options = options or SheetOptions()
     rows = list(_rows(originals, decoded, options))
     figure = _draw(rows, options)
@@ -106,8 +104,7 @@ def _cameras(meshes: list[Mesh], options: SheetOptions) -> list[PinholeCamera]:
     vertical = int(np.abs(UP_AXES[options.up]).argmax())
     aspect = float(np.delete(box.size, vertical).max()) / max(float(box.size[vertical]), 1e-9)
     width = int(options.height * min(max(aspect, 0.5), 3.0))
-    cameras = views_around(box, ViewOptions(width, options.height, fov=30.0, up=options.up))
-    return [cameras[view] for view in options.views]
+    return views_around(box, ViewOptions(width, options.height, fov=30.0, up=options.up))[:1]
 
 
 def _draw(rows: list[SheetRow], options: SheetOptions) -> Any:
@@ -117,7 +114,7 @@ def _draw(rows: list[SheetRow], options: SheetOptions) -> Any:
     height, width = rows[0].original.crop.shape
     size = np.array([_LEFT + 3 * (width + _GAP) + _RIGHT, _TOP + len(rows) * (height + _GAP)])
     errors = np.concatenate([row.errors[np.isfinite(row.errors)] for row in rows])
-    limit = options.limit or (max(float(np.quantile(errors, 0.99)), _LEAST_LIMIT) if len(errors) else 1.0)
+    limit = max(float(np.quantile(errors, 0.99)), _LEAST_LIMIT) if len(errors) else 1.0
     figure = Figure(figsize=tuple(size / _DPI), dpi=_DPI)
     FigureCanvasAgg(figure)
 

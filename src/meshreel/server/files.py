@@ -1,4 +1,4 @@
-"""Answers from .reel files: whole or by ranges (RFC 9110), never mixed from two versions. In: a file. Out: a response.
+"""Answers from .reel files: whole or a range (RFC 9110), never mixed from two versions. In: a file. Out: a response.
 
 An open file is what is sent, whatever its name leads to by now. Where it changes meanwhile, the connection is closed.
 """
@@ -10,12 +10,10 @@ import os
 import re
 import sys
 import time
-from collections.abc import Iterator
 from dataclasses import dataclass
 from email.utils import formatdate
 from hashlib import blake2b
 from pathlib import Path
-from secrets import token_hex
 from typing import BinaryIO
 
 from starlette.concurrency import run_in_threadpool
@@ -33,8 +31,7 @@ from .library import Version, version_of
 
 LOG = logging.getLogger(__name__)
 PIECE = 65_536  # bytes that are read and sent at once (guess)
-MOST_RANGES = 100  # in a request (guess): whoever asks for more gets the whole file
-_RANGE = re.compile(r"(\d*)-(\d*)", re.ASCII)
+_RANGE = re.compile(r"bytes=(\d*)-(\d*)", re.ASCII | re.IGNORECASE)
 _MOST_DIGITS = 18  # of a number of bytes that may exist
 
 
@@ -106,37 +103,27 @@ def answer(opened: OpenFile, asked: Headers, is_head: bool) -> Response:
         return NotModifiedResponse(headers)
     is_current = asked.get("if-range") in (None, opened.tag, headers.get("last-modified"))
     stated = asked.getlist("range") if is_current and not is_head else []
-    ranges = parse_ranges(stated[0], size) if len(stated) == 1 else None
-    if ranges == []:
+    wanted = parse_range(stated[0], size) if len(stated) == 1 else None
+    if wanted is not None and not wanted:
         opened.file.close()
         return Response(status_code=416, headers={**headers, "Content-Range": f"bytes */{size}"})
-    return _FileResponse(opened, dict(headers), ranges, is_head)
+    return _FileResponse(opened, dict(headers), wanted, is_head)
 
 
-def parse_ranges(text: str, size: int) -> list[range] | None:
-    """Return the ranges of a header Range in a file of `size` bytes, joined where they touch.
+def parse_range(text: str, size: int) -> range | None:
+    """Return the range of a header Range in a file of `size` bytes; it is empty where it begins behind the file.
 
-    None where the header is to be ignored: of another unit, malformed, or of too many ranges. Without a range that
-    begins within the file, the list is empty.
+    None where the header is to be ignored: of another unit, malformed, or of several ranges, which no player asks for.
     """
-    unit, _, listed = text.partition("=")
-    items = [item for item in (item.strip(" \t") for item in listed.split(",")) if item]
-    if unit.lower() != "bytes" or not 0 < len(items) <= MOST_RANGES or (size == 0 and items[0][0] == "-"):
+    parts = _RANGE.fullmatch(text)
+    if parts is None or not any(parts.groups()):
         return None
-    found: list[range] = []
-    for item in items:
-        parts = _RANGE.fullmatch(item)
-        if parts is None or item == "-":
-            return None
-        first, last = (_number(digits) for digits in parts.groups())
-        if not parts[1]:
-            first, last = max(size - last, 0), size
-        elif not parts[2]:
-            last = size
-        elif last < first:
-            return None
-        _join(found, range(first, min(last + 1, size)))
-    return found
+    first, last = (_number(digits) for digits in parts.groups())
+    if not parts[1]:
+        return range(max(size - last, 0), size) if size else None
+    if parts[2] and last < first:
+        return None
+    return range(first, min(last + 1, size) if parts[2] else size)
 
 
 def _number(digits: str) -> int:
@@ -144,31 +131,17 @@ def _number(digits: str) -> int:
     return int(digits or "0") if len(digits) <= _MOST_DIGITS else sys.maxsize
 
 
-def _join(found: list[range], one: range) -> None:
-    """Add a range to a list, in place of those that it overlaps or touches."""
-    if not one:
-        return
-    for other in [other for other in found if other.start <= one.stop and one.start <= other.stop]:
-        found.remove(other)
-        one = range(min(one.start, other.start), max(one.stop, other.stop))
-    found.append(one)
-
-
 class _FileResponse(StreamingResponse):
     """A file in pieces. Where it changes, the response stays incomplete, upon which uvicorn closes the connection."""
 
-    def __init__(self, opened: OpenFile, headers: dict[str, str], ranges: list[range] | None, is_head: bool) -> None:
+    def __init__(self, opened: OpenFile, headers: dict[str, str], asked: range | None, is_head: bool) -> None:
         size = opened.found.st_size
-        parts: list[bytes | range] = [range(size)] if ranges is None else [*ranges]
-        if ranges is not None and len(ranges) == 1:
-            headers["Content-Range"] = _content_range(ranges[0], size)
-        elif ranges is not None:
-            boundary = token_hex(13)  # 104 random bits, which no file has
-            headers["Content-Type"] = f"multipart/byteranges; boundary={boundary}"
-            parts = _multipart(ranges, size, boundary)
-        headers["Content-Length"] = str(sum(map(len, parts)))
-        self._opened, self._parts = opened, [] if is_head else parts
-        super().__init__((), 200 if ranges is None else 206, headers, BYTES)
+        sent = range(size) if asked is None else asked
+        if asked is not None:
+            headers["Content-Range"] = f"bytes {asked.start}-{asked.stop - 1}/{size}"
+        headers["Content-Length"] = str(len(sent))
+        self._opened, self._sent = opened, range(0) if is_head else sent
+        super().__init__((), 200 if asked is None else 206, headers, BYTES)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         try:
@@ -178,26 +151,10 @@ class _FileResponse(StreamingResponse):
 
     async def stream_response(self, send: Send) -> None:
         await send({"type": "http.response.start", "status": self.status_code, "headers": self.raw_headers})
-        for piece in (piece for part in self._parts for piece in _pieces(part)):
-            data = piece if isinstance(piece, bytes) else await run_in_threadpool(self._opened.read, piece)
+        for at in range(0, len(self._sent), PIECE):
+            data = await run_in_threadpool(self._opened.read, self._sent[at : at + PIECE])
             if data is None:
                 LOG.warning("%r has changed while it was sent: closed the connection", self._opened.file.name)
                 return
             await send({"type": "http.response.body", "body": data, "more_body": True})
         await send({"type": "http.response.body", "body": b"", "more_body": False})
-
-
-def _pieces(part: bytes | range) -> Iterator[bytes | range]:
-    return iter([part]) if isinstance(part, bytes) else (part[at : at + PIECE] for at in range(0, len(part), PIECE))
-
-
-def _multipart(ranges: list[range], size: int, boundary: str) -> list[bytes | range]:
-    parts: list[bytes | range] = []
-    for one in ranges:
-        head = f"--{boundary}\r\nContent-Type: {BYTES}\r\nContent-Range: {_content_range(one, size)}\r\n\r\n"
-        parts += [(("\r\n" if parts else "") + head).encode(), one]
-    return [*parts, f"\r\n--{boundary}--\r\n".encode()]
-
-
-def _content_range(one: range, size: int) -> str:
-    return f"bytes {one.start}-{one.stop - 1}/{size}"

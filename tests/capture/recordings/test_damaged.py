@@ -94,8 +94,7 @@ def test_pictures_of_another_size_are_refused(tmp_path, made):
 
 
 def test_what_a_killed_run_left_is_deleted_by_the_next(tmp_path, made):
-    (tmp_path / ".rig0.making" / "desk-camera").mkdir(parents=True)
-    (tmp_path / ".rig0.part").write_bytes(b"")
+    (tmp_path / ".rig0.part" / "desk-camera").mkdir(parents=True)
     made(files.tum(tmp_path / "desk"))
     assert sorted(path.name for path in tmp_path.iterdir()) == ["desk", "rig0"]
 

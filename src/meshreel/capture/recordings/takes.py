@@ -34,10 +34,7 @@ class Lens:
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.distortion).all() and self.reach > 0):
-            numbers = ", ".join(f"{number:g}" for number in self.distortion)
-            raise ValueError(
-                f"its lens bends by ({numbers}) up to a tangent of {self.reach:g}: not finite, or not above 0"
-            )
+            raise ValueError(f"its lens bends by {self.distortion} up to a tangent of {self.reach:g}: not finite, or 0")
 
     def check(self, width: int, height: int) -> None:
         """Raise InputError for a picture of another size."""

@@ -22,7 +22,7 @@ from jaxtyping import Bool, Float64, Int64
 from ...errors import InputError
 from ...geometry.color_views import bent
 from ...io.pictures import pack_picture
-from ...io.unfinished import cannot_be_written, claim, discard, part_of
+from ...io.unfinished import cannot_be_written, part_of
 from ...io.write import make_folder
 from ..color_cameras import distortion_of
 from ..rig import DepthCamera, write_rig
@@ -297,23 +297,16 @@ def _colored(picture: Picture, lens: Lens) -> tuple[bytes, str]:
 
 @contextmanager
 def _appearing(folder: Path) -> Iterator[Path]:
-    """Yield a new folder, which takes the name `folder` at the end of the block; after a failure, nothing is left.
-
-    What a killed run left is deleted by the next one to the same folder.
-    """
+    """Yield a new folder, which takes the name `folder` at the end of the block; after a failure, nothing is left."""
     if not folder.name:
         raise InputError(f"{folder}: is the folder that you are in; name a new one for the rig")
     with cannot_be_written(folder):
         if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
             raise InputError(f"{folder}: is there already; choose another folder for the rig, or delete it")
-        folder.parent.mkdir(parents=True, exist_ok=True)
-        lock = claim(name := part_of(folder), folder)
-    made = name.with_suffix(".making")
+        made = part_of(folder)
+        shutil.rmtree(made, ignore_errors=True)  # of a run that was killed
+        made.mkdir(parents=True)
     try:
-        with cannot_be_written(folder):
-            if made.exists():
-                shutil.rmtree(made)
-            made.mkdir()
         yield made
         with cannot_be_written(folder):
             if folder.exists():
@@ -321,4 +314,3 @@ def _appearing(folder: Path) -> Iterator[Path]:
             made.rename(folder)
     finally:
         shutil.rmtree(made, ignore_errors=True)
-        discard(lock, name)
