@@ -121,8 +121,8 @@ def test_frames_with_meshes_of_their_own_have_no_splats(video: Video) -> None:
     assert some.splats(0) is not None and some.splats(group.frame_count) is None
 
 
-def ends(chunk: Chunk) -> list[int]:
-    return list(accumulate(layer.size for layer in chunk.layers))
+def ends(chunk: Chunk) -> tuple[int, ...]:
+    return tuple(accumulate(layer.size for layer in chunk.layers))
 
 
 def test_damaged_splats_cost_no_frame(video: Video) -> None:
