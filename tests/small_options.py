@@ -28,9 +28,16 @@ def quick(
     color_quality: float | None = None,
     texture: int | None = None,
     compatible: bool = False,
+    splats: int | None = None,
 ) -> EncoderOptions:
     """The preset's options made small; takes what `preset_options` takes."""
-    colors = {"color": color, "color_quality": color_quality, "texture": texture, "compatible": compatible}
+    colors = {
+        "color": color,
+        "color_quality": color_quality,
+        "texture": texture,
+        "compatible": compatible,
+        "splats": splats,
+    }
     options = preset_options(preset, quality, basis_size, group_size, centers, key_interval, effort, **colors)  # type: ignore[arg-type]
     method = options.method
     method = _quick_layers(method) if isinstance(method, LayersOptions) else _quick_paper(method)

@@ -17,6 +17,7 @@ from ..container.sources import FileSource
 from ..decoder.video import Video
 from ..decoder.video import open as open_video
 from ..errors import FormatError, InputError
+from ..export.splats import check_splats
 from ..format.layout import MAGIC, ChunkKind
 from ..geometry.cameras import PinholeCamera
 from ..geometry.topology import weld
@@ -31,7 +32,7 @@ from .console import Common, StageBars
 from .flags import Knowing, Looking, Reading
 from .info import describe_file
 from .sources import open_source
-from .splats import check_splats, compare_splats
+from .splats import compare_splats
 
 ALIKE = 0.2  # share of what depth measured: a decoded scene that covers less is of another recording (guess)
 BESIDE = {"truth": "against the truth", "depth": "by the depth pictures"}  # parts of a row with numbers of both

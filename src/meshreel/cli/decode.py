@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
@@ -16,11 +16,11 @@ from ..decoder.video import Video
 from ..decoder.video import open as open_video
 from ..errors import FormatError, InputError
 from ..export.frames import Part, check_part, write_frames
+from ..export.splats import check_splats, write_splats
 from ..geometry.topology import concatenate
 from ..io.write import frame_names, left_over, make_folder
 from ..types import Mesh, Texture
 from .console import Common
-from .splats import check_splats, write_all
 
 
 def command(
@@ -106,7 +106,7 @@ def _write_splats(file: Path, video: Video, output: Path, format: str, common: C
     names = frame_names(len(video), "ply")
     common.warn(left_over(output, names, "frame_*.ply"))
     with common.stages(len(video)) as progress:
-        failed = write_all(video, [output / name for name in names], progress)
+        failed = _write_all(video, [output / name for name in names], progress)
     if failed:
         text = f"{file}: {failed[0]}; {len(failed)} of {len(video)} frames are lost, the others are written"
         raise FormatError(f"{text}; copy the file again")
@@ -123,3 +123,16 @@ def _not_kept(reader: ReelReader, format: str) -> tuple[str, ...]:
     if find_spec("av") and find_spec("PIL"):
         return ()
     return ("no textures, colours of vertices are kept: textures need the extra color: pip install 'meshreel[color]'",)
+
+
+def _write_all(video: Video, paths: Sequence[Path], progress: Callable[[str, int, int], object]) -> list[FormatError]:
+    """Write the splats of each frame; return the errors of damaged frames, whose files are removed."""
+    failed = list[FormatError]()
+    for number, path in enumerate(paths):
+        try:
+            write_splats(video.splats(number), path)
+        except FormatError as error:
+            failed.append(error)
+            path.unlink(missing_ok=True)
+        progress("decode", number + 1, len(paths))
+    return failed

@@ -1,9 +1,7 @@
-"""Splats for the commands: a PLY of each frame, and how far pictures of splats are from pictures of the originals."""
+"""How far pictures of splats are from pictures of the originals, for `meshreel compare`."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,8 +12,7 @@ from ..analysis.appearance.splat_views import GOLDEN, rendered, ring, taken
 from ..capture.recording import Recording
 from ..decoder.video import Video
 from ..encoder.progress import Progress
-from ..errors import FormatError, InputError
-from ..export.splats import write_splats
+from ..errors import InputError
 from ..geometry.splats import Bound
 from ..metrics.color import PEAK, psnr
 from ..metrics.ssim import BORDER, ssim_map
@@ -23,25 +20,6 @@ from ..types import MeshSequence, evenly
 
 FRAMES, VIEWS, SIZE = 8, 4, 256  # frames that are compared, cameras around each, and pixels of the longer side
 ASIDE = 0.11  # turns, from a camera that the encoder has fitted to
-
-
-def check_splats(video: Video, name: str) -> None:
-    """Raise InputError where a video has no splats."""
-    if not video.reader.has_splats:
-        raise InputError(f"{name}: has no splats; encode with --splats 8000")
-
-
-def write_all(video: Video, paths: Sequence[Path], progress: Progress) -> list[FormatError]:
-    """Write the splats of each frame; return the errors of damaged frames, whose files are removed."""
-    failed = list[FormatError]()
-    for number, path in enumerate(paths):
-        try:
-            write_splats(video.splats(number), path)
-        except FormatError as error:
-            failed.append(error)
-            path.unlink(missing_ok=True)
-        progress("decode", number + 1, len(paths))
-    return failed
 
 
 def compare_splats(sequence: MeshSequence, video: Video, progress: Progress) -> dict[str, Any]:

@@ -10,6 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
+from ..decoder.video import Video
+from ..errors import InputError
 from ..geometry.rigid import quaternions
 from ..geometry.splats import Bound
 from ..io.write import replacing
@@ -17,6 +19,12 @@ from ..io.write import replacing
 HARMONIC = 0.28209479177387814  # of degree 0: 1 / (2 sqrt(pi))
 MOST_OPACITY = 1 - 2**-10  # whose logit is finite
 NAMES = "x y z nx ny nz f_dc_0 f_dc_1 f_dc_2 opacity scale_0 scale_1 scale_2 rot_0 rot_1 rot_2 rot_3"
+
+
+def check_splats(video: Video, name: str) -> None:
+    """Raise InputError where a video has no splats."""
+    if not video.reader.has_splats:
+        raise InputError(f"{name}: has no splats; encode with --splats 8000")
 
 
 def write_splats(bound: Bound | None, path: Path) -> None:
