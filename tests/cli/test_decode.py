@@ -127,14 +127,14 @@ def test_a_missing_file_and_a_folder_that_cannot_be_are_reported(run, tmp_path):
 @pytest.fixture(scope="module")
 def colored(tmp_path_factory):
     """A file whose frames have textures."""
+    for name in ("av", "xatlas"):
+        pytest.importorskip(name)
     path = tmp_path_factory.mktemp("textures") / "a.reel"
     written([textured(mesh) for mesh in BODY[:2]], path)
     return path
 
 
 def test_textures_are_kept_or_named_in_one_line(run, tmp_path, monkeypatch, colored):
-    for name in ("av", "xatlas"):
-        pytest.importorskip(name)
     said = run("decode", colored, "-o", tmp_path / "ply")
     assert said.code == 0 and said.err.count("\n") == 1 and "PLY has no textures" in said.err
     assert open_sequence(tmp_path / "ply")[0].colors is not None

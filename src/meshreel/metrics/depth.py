@@ -52,8 +52,10 @@ class Judged:
     @property
     def off_body(self) -> Bool[np.ndarray, "H W"]:
         """Pixels in which covered surface stands still for sure: farther than a foot's length from a body."""
-        away = distance_transform_edt(~self.body) if self.body.any() else np.inf
-        return self.of("still") & self.covered & (away * self.depth > FOOT * self.camera.intrinsic[0, 0])
+        still = self.of("still") & self.covered
+        if not self.body.any():
+            return still
+        return still & (distance_transform_edt(~self.body) * self.depth > FOOT * self.camera.intrinsic[0, 0])
 
     @property
     def shown(self) -> Float64[np.ndarray, "H W"]:
