@@ -74,8 +74,8 @@ class _Planner:
         meshes = [surface.mesh for surface in self._surfaces.values()]
         note(digests, "frames", *(array for mesh in meshes for array in (mesh.vertices, mesh.faces)))
         target = target_of(meshes, self._options.target, noise)
-        known_to = digests, self._interval.paint, self._interval.frame_rate
-        return Ahead(self._at, list(self._surfaces.values()), noise, target, *known_to)
+        surfaces, paint, rate = list(self._surfaces.values()), self._interval.paint, self._interval.frame_rate
+        return Ahead(self._at, surfaces, noise, target, digests, paint, rate)
 
     def _standing(self, ahead: Ahead) -> list[Coded]:
         """Code the template where it was, if its residual there is hardly larger than usual: a fit would only slide."""

@@ -142,10 +142,10 @@ class _Search:
         pairs = zip(self.frames, tried.parts.dropped, tried.parts.meshes, strict=True)
         return np.array([frame.errors_with(gone, patch, self.usual) for frame, gone, patch in pairs])
 
-    def masks(self, ghosts: Bool[np.ndarray, "T F"]) -> Iterator[Bool[np.ndarray, "T F"]]:
-        """Yield a mask of the faces worth dropping for each threshold, and those of ghosts, except empty masks."""
+    def masks(self, gone: Bool[np.ndarray, "T F"]) -> Iterator[Bool[np.ndarray, "T F"]]:
+        """Yield a mask of the faces worth dropping for each threshold, with those gone anyway; no empty one."""
         for threshold in self.options.thresholds:
-            chosen = ghosts | self._paying(np.stack([frame.apart > threshold**2 * self.usual for frame in self.frames]))
+            chosen = gone | self._paying(np.stack([frame.apart > threshold**2 * self.usual for frame in self.frames]))
             if chosen.any():
                 yield chosen
 

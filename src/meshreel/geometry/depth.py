@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Bool, Float32, Float64, Int64, UInt16
@@ -77,24 +77,32 @@ class FreeSpace:
 
     def at(self, points: Float64[np.ndarray, "N 3"]) -> Bool[np.ndarray, " N"]:
         """Return the points that some camera saw past: in all nine pixels around, it measured something farther off."""
-        world, found = np.asarray(self.place.origin) + self.place.scale * points, np.zeros(len(points), bool)
-        for picture in self.pictures:
-            pixels, inside, ahead = picture.camera.seen(world)
-            depth = picture.depth.reshape(-1)[pixels] * picture.unit
-            found[inside[depth > ahead + np.maximum(THROUGH[0], THROUGH[1] * ahead)]] = True
+        found = np.zeros(len(points), bool)
+        for _, inside, depth, ahead, past in self._measured(self._world(points)):
+            found[inside[depth > ahead + past]] = True
         return found
 
     def faced(self, points: Float64[np.ndarray, "N 3"], normals: Float64[np.ndarray, "N 3"]) -> Bool[np.ndarray, " N"]:
         """Return the points with these normals that face some camera which measured nothing before them."""
-        world, found = np.asarray(self.place.origin) + self.place.scale * points, np.zeros(len(points), bool)
+        world, found = self._world(points), np.zeros(len(points), bool)
+        for camera, inside, depth, ahead, past in self._measured(world):
+            way = camera.eye - world[inside]
+            facing = np.einsum("nd,nd->n", way, normals[inside]) > FACING * np.linalg.norm(way, axis=1)
+            hidden = (depth > 0) & (depth < ahead - past)
+            found[inside[facing & ~hidden]] = True
+        return found
+
+    def _world(self, points: Float64[np.ndarray, "N 3"]) -> Float64[np.ndarray, "N 3"]:
+        return np.asarray(self.place.origin) + self.place.scale * points
+
+    def _measured(self, world: Float64[np.ndarray, "N 3"]) -> Iterator[tuple[PinholeCamera, Any, Any, Any, Any]]:
+        """Yield each camera, the numbers of the places in its picture, what it measured there, how far they are, and by
+        how much more or less it must have measured to tell, m.
+        """
         for picture in self.pictures:
-            way = picture.camera.eye - world
-            facing = np.einsum("nd,nd->n", way, normals) > FACING * np.linalg.norm(way, axis=1)
             pixels, inside, ahead = picture.camera.seen(world)
             depth = picture.depth.reshape(-1)[pixels] * picture.unit
-            hidden = (depth > 0) & (depth < ahead - np.maximum(THROUGH[0], THROUGH[1] * ahead))
-            found[inside[~hidden]] |= facing[inside[~hidden]]
-        return found
+            yield picture.camera, inside, depth, ahead, np.maximum(THROUGH[0], THROUGH[1] * ahead)
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from jaxtyping import Bool, Float64
@@ -35,7 +36,7 @@ LOWEST = 0.1  # quantile over frames of a body's lower end: the floor that it st
 PARTS = ("all", "still", "body")
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)  # no slots: what is derived is computed once
 class Judged:
     """One camera's picture of one frame beside what was decoded; masks of its pixels."""
 
@@ -49,7 +50,7 @@ class Judged:
         """Return the pixels of one of `PARTS` that count."""
         return self.clear & {"all": np.True_, "still": ~self.body, "body": self.body}[part]
 
-    @property
+    @cached_property
     def off_body(self) -> Bool[np.ndarray, "H W"]:
         """Pixels in which covered surface stands still for sure: farther than a foot's length from a body."""
         still = self.of("still") & self.covered
@@ -57,19 +58,19 @@ class Judged:
             return still
         return still & (distance_transform_edt(~self.body) * self.depth > FOOT * self.camera.intrinsic[0, 0])
 
-    @property
+    @cached_property
     def shown(self) -> Float64[np.ndarray, "H W"]:
         """Decoded depth, m; infinite where nothing was decoded."""
         depth = np.full(self.depth.shape, np.inf)
         depth[self.view.covered] = self.view.points @ self.camera.extrinsic[2, :3] + self.camera.extrinsic[2, 3]
         return depth
 
-    @property
+    @cached_property
     def near(self) -> Float64[np.ndarray, "H W"]:
         """Distance within which decoded surface covers a measurement, m."""
         return np.maximum(NEAR[0], NEAR[1] * self.depth)
 
-    @property
+    @cached_property
     def covered(self) -> Bool[np.ndarray, "H W"]:
         """Pixels whose measurement is on decoded surface."""
         return np.abs(self.shown - self.depth) <= self.near

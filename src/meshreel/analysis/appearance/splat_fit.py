@@ -31,6 +31,7 @@ RATES = {  # of Adam, in the units of `Splats`; logarithms of scales, and logits
 LARGER, LONGER = 1.0, 0.7  # of logarithms: scales from those in the beginning, and from their mean (guess)
 LAST = 0.1  # share of the rates at the end
 FIRST_OPACITY = 0.9
+DEAD = 0.05  # of the mean of what splats add to pictures: less is as good as unseen (guess)
 
 
 @dataclass(frozen=True, slots=True)
@@ -202,9 +203,6 @@ class _Fit:
                 total += drawing.shares(known.astype(np.float64))
         with self._torch.no_grad():
             self._own["colors"][:] = _tensor(self._torch, sums / total[:, None])
-
-
-DEAD = 0.05  # of the mean of what splats add to pictures: less is as good as unseen (guess)
 
 
 def _composite_function(torch: Any) -> Any:
