@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import gzip
 import io
+import struct
 from dataclasses import replace
 from itertools import accumulate
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from meshreel.analysis.appearance.splat_fit import FitSplatsOptions
+from meshreel.cli.decode import command as decode
 from meshreel.cli.splats import compare_splats
 from meshreel.coding.intra import encode_intra
 from meshreel.container.reader import Chunk, ReelReader
@@ -25,6 +29,7 @@ from meshreel.errors import FormatError, InputError
 from meshreel.export.splats import write_splats
 from meshreel.format.layout import ChunkKind
 from meshreel.types import Mesh, MeshList
+from tests.golden import GOLDEN
 from tests.spheres import deforming_sphere
 
 FRAMES = 6
@@ -157,6 +162,44 @@ def test_a_viewer_of_splats_reads_what_is_written(video: Video, tmp_path) -> Non
     np.testing.assert_allclose(0.5 + 0.28209479 * column["f_dc_2"], bound.colors[1:, 2], atol=1e-5)
     write_splats(None, tmp_path / "empty.ply")
     assert b"element vertex 0\n" in (tmp_path / "empty.ply").read_bytes()
+
+
+def test_spz_has_the_same_splats_within_its_steps(video: Video, tmp_path) -> None:
+    bound = video.splats(1)
+    assert bound is not None
+    write_splats(bound, tmp_path / "frame.spz")
+    data = gzip.decompress((tmp_path / "frame.spz").read_bytes())
+    magic, version, count, degree, fraction, _, _ = struct.unpack("<4sIIBBBB", data[:16])
+    assert (magic, version, count, degree) == (b"NGSP", 3, len(bound.means), 0) and len(data) == 16 + 20 * count
+    values = np.frombuffer(data, np.uint8, offset=16)
+    places, rest = np.split(values, [9 * count])
+    parts = np.pad(places.reshape(-1, 3), ((0, 0), (1, 0))).copy().view("<i4").reshape(-1, 3)
+    np.testing.assert_allclose(parts / 2.0 ** (8 + fraction), bound.means, atol=2.0**-fraction)
+    opacities, colors, scales, turns = np.split(rest.astype(np.float64), np.cumsum([count, 3 * count, 3 * count]))
+    np.testing.assert_allclose(opacities / 255, bound.opacities, atol=0.003)
+    harmonics = (colors.reshape(-1, 3) / 255 - 0.5) / 0.15
+    np.testing.assert_allclose(0.5 + 0.28209479 * harmonics, bound.colors, atol=0.005)
+    np.testing.assert_allclose(scales.reshape(-1, 3) / 16 - 10, np.log(bound.scales), atol=0.032)
+    axes = Rotation.from_quat([_quaternion(int(bits)) for bits in turns.astype(np.uint8).view("<u4")])
+    assert np.einsum("nck,nkc->nk", axes.as_matrix(), bound.axes).min() > 0.9999
+
+
+def _quaternion(bits: int) -> list[float]:
+    """Return x y z w of the largest part's number and three others, the last of which are the lowest bits."""
+    largest, found = bits >> 30, [0.0] * 4
+    for part in (part for part in (3, 2, 1, 0) if part != largest):
+        found[part] = (bits & 511) / 511 / 2**0.5 * (-1 if bits & 512 else 1)
+        bits >>= 10
+    found[largest] = max(1 - sum(own * own for own in found), 0) ** 0.5
+    return found
+
+
+def test_an_spz_file_of_meshes_is_refused(tmp_path) -> None:
+    file = GOLDEN / "splats" / "splats.reel"
+    with pytest.raises(InputError, match="add --splats"):
+        decode(file, output=tmp_path / "out", format="spz")
+    decode(file, output=tmp_path / "out", format="spz", splats=True)
+    assert {path.suffix for path in (tmp_path / "out").iterdir()} == {".spz"}
 
 
 def _npy(body: bytes, columns: int) -> bytes:

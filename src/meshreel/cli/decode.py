@@ -28,7 +28,7 @@ def command(
     /,
     *,
     output: Annotated[Path, Parameter(name=["--output", "-o"])],
-    format: Literal["ply", "obj", "glb", "npz"] = "ply",
+    format: Literal["ply", "obj", "glb", "npz", "spz"] = "ply",
     layers: int | None = None,
     only: Part = "all",
     splats: Annotated[bool, Parameter(negative="")] = False,
@@ -45,13 +45,14 @@ def command(
         The directory for frame_00000.ply and so on; created if needed.
     format
         Format of the mesh files. All keep colours of vertices; OBJ (with .mtl and .png), GLB and npz keep textures.
+        Of splats, ply or spz.
     layers
         Largest number of layers (subdivisions, or KLT components) to decode of each group beyond its first: fewer
         give coarser, valid meshes from fewer bytes.
     only
         Of a scene, only the background or only the moving bodies; by default whole frames.
     splats
-        Write the splats of each frame in place of meshes: PLY files for viewers of 3D Gaussian splatting.
+        Write the splats of each frame in place of meshes: PLY or SPZ files for viewers of 3D Gaussian splatting.
     """
     if layers is not None and layers < 0:
         raise InputError(f"--layers must not be negative, got {layers}")
@@ -60,6 +61,8 @@ def command(
     if splats:
         _write_splats(file, video, output, format, common)
         return
+    if format == "spz":
+        raise InputError("--format spz: has splats and no meshes; add --splats, or give ply, obj, glb or npz")
     every: dict[Part, Callable[[Video, int], list[Mesh]]] = {
         "all": lambda of, frame: [*of.parts(frame).values()],
         "background": lambda of, frame: [of.background(frame)],
@@ -98,20 +101,20 @@ def command(
 
 
 def _write_splats(file: Path, video: Video, output: Path, format: str, common: Common) -> None:
-    """Write the splats of all frames. Raises InputError where there are none, or for another format than PLY."""
-    if format != "ply":
-        raise InputError(f"--format {format}: splats are written as PLY; leave --format out")
+    """Write the splats of all frames. Raises InputError where there are none, or for a format of meshes."""
+    if format not in ("ply", "spz"):
+        raise InputError(f"--format {format}: splats are written as PLY or SPZ; give --format ply or spz")
     check_splats(video, str(file))
     make_folder(output)
-    names = frame_names(len(video), "ply")
-    common.warn(left_over(output, names, "frame_*.ply"))
+    names = frame_names(len(video), format)
+    common.warn(left_over(output, names, f"frame_*.{format}"))
     with common.stages(len(video)) as progress:
         failed = _write_all(video, [output / name for name in names], progress)
     if failed:
         text = f"{file}: {failed[0]}; {len(failed)} of {len(video)} frames are lost, the others are written"
         raise FormatError(f"{text}; copy the file again")
-    row = {"output": str(output), "frames": len(video), "format": "ply", "frame_rate": video.frame_rate}
-    common.result(row, f"{output}: splats of {len(video)} frames, ply files")
+    row = {"output": str(output), "frames": len(video), "format": format, "frame_rate": video.frame_rate}
+    common.result(row, f"{output}: splats of {len(video)} frames, {format} files")
 
 
 def _not_kept(reader: ReelReader, format: str) -> tuple[str, ...]:

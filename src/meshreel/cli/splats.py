@@ -13,6 +13,7 @@ from ..capture.recording import Recording
 from ..decoder.video import Video
 from ..encoder.progress import Progress
 from ..errors import InputError
+from ..geometry.derived_sequences import captured
 from ..geometry.splats import Bound
 from ..metrics.color import PEAK, psnr
 from ..metrics.ssim import BORDER, ssim_map
@@ -46,8 +47,8 @@ def held_out(sequence: MeshSequence, video: Video, number: int) -> tuple[SplatVi
     if isinstance(sequence, Recording) and sequence.colors is not None:
         pictures = [picture for picture in sequence.colors[number] if picture is not None]
         return taken(pictures, video.moving(number), sequence[number], SIZE)
-    mesh = sequence[number]
-    return rendered(mesh, ring(mesh, VIEWS, SIZE, GOLDEN * number + ASIDE)) if mesh.is_colored else ()
+    mesh, up = sequence[number], captured(sequence).up
+    return rendered(mesh, ring(mesh, VIEWS, SIZE, GOLDEN * number + ASIDE, up)) if mesh.is_colored else ()
 
 
 def errors(bound: Bound, view: SplatView) -> tuple[float, float]:

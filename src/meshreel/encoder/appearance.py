@@ -34,6 +34,7 @@ from .splats import ChainSplats
 from .videos import Videos
 
 USED = 0.43  # of a texture is on the surface, as unwrapped; measured on basketball_player
+COARSER = 2.0  # steps of vertex colours beside pictures: for players without video, at half of their bytes (guess)
 MOST_FITTING = 1024  # texels, unless a larger texture is asked for: 2 mm on a person
 
 
@@ -128,14 +129,17 @@ class _Chain:
         if self._splats is not None:
             self._splats.add(group.form, canvas, meshes, frames.numbers)
         colors = [_vertex_colors(paint, mesh) for paint, mesh in zip(paints, meshes, strict=True)]
+        texture = options.texture if pictured and not self._groups and group.form == Form.LAYERS else None
+        is_pictured = texture is not None or self._video is not None
+        coding = replace(options.colors, step=COARSER * options.colors.step) if is_pictured else options.colors
         try:
-            encoded = encode_group_colors(canvas, colors, options.colors, None if before is None else before.colors)
+            encoded = encode_group_colors(canvas, colors, coding, None if before is None else before.colors)
         except CostlyError:  # the summary tells of it
             self.pass_on(replace(group, lost_colors=True))
             return after
         companions = [Companion(ChunkKind.COLORS, encoded.payload, encoded.layers)]
-        if pictured and not self._groups and group.form == Form.LAYERS and options.texture is not None:
-            self._video = _Video(canvas, options.texture, paints, meshes)
+        if texture is not None:
+            self._video = _Video(canvas, texture, paints, meshes)
             companions.append(Companion(ChunkKind.ATLAS, self._video.atlas))
         if self._video is not None:
             for paint, mesh in zip(paints, meshes, strict=True):

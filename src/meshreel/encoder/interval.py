@@ -16,7 +16,7 @@ from ..geometry.depth import FreeSpace
 from ..geometry.derived_sequences import DerivedSequence
 from ..geometry.painted import Paint, Painted
 from ..geometry.topology import clean, part_of
-from ..types import Frames, Mesh
+from ..types import Frames, Mesh, Up
 from .digests import Digests
 from .views import Sight, Views
 
@@ -33,6 +33,7 @@ class Interval:
     digests: Digests | None = field(default=None, kw_only=True)  # of what its stages compute; None: nobody asks
     # Digest of the frames; empty where they are frames of the sequence, or pieces of them: it has their digests.
     surface: str = ""
+    up: Up = field(default="y", kw_only=True)  # the axis that points up
     views: Views | None = field(default=None, kw_only=True)  # of colour cameras
     sight: Sight | None = field(default=None, kw_only=True)  # of depth cameras
     weight: Fraction = field(default=Fraction(1), kw_only=True)  # of each frame in progress: bodies share a frame

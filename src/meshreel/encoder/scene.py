@@ -85,6 +85,7 @@ def track_intervals(job: Job, parts: Parts, frames: range, tracks: Tracks) -> li
             found.append(
                 replace(
                     one,
+                    up=job.sequence.up,
                     views=Views.of(job.sequence, parts.seen),
                     sight=Sight.of(job.sequence, parts.seen),
                     frame_rate=job.sequence.frame_rate,

@@ -64,4 +64,4 @@ class ChainSplats:
         if views is not None:
             at = interval.first_frame + number
             return taken(views.pictures(at), mesh, views.surface(at), o.size)
-        return rendered(mesh, ring(mesh, o.views, o.size, GOLDEN * number)) if mesh.is_colored else ()
+        return rendered(mesh, ring(mesh, o.views, o.size, GOLDEN * number, interval.up)) if mesh.is_colored else ()

@@ -83,13 +83,14 @@ def intervals_of(job: Job, seen: Survey, planned: TrackedBodies) -> Iterator[Int
     for frames, bodies in planned.intervals:
         for body in bodies:
             if not body.bodies:
-                yield Interval(NormalisedFrames(job.sequence, seen, frames), first_frame=frames.start, views=views)
+                some = NormalisedFrames(job.sequence, seen, frames)
+                yield Interval(some, first_frame=frames.start, up=job.sequence.up, views=views)
                 continue
             some = BodyFrames(job.sequence, seen, frames, body.number, body.bodies)
             larger = min(seen.diagonals[frames.start : frames.stop]) / min(body.diagonals)
             weight = Fraction(1, len(bodies))
             one = Interval(some, first_frame=frames.start, track=body.track, weight=weight, larger=larger)
-            yield replace(one, views=views)
+            yield replace(one, up=job.sequence.up, views=views)
 
 
 def encode_tracked(job: Job, seen: Survey) -> Iterator[list[TrackGroup]]:

@@ -1,11 +1,15 @@
-"""Export of the splats of a frame to PLY as viewers of 3D Gaussian splatting read it (Kerbl et al. 2023).
+"""Export of the splats of a frame to files that viewers of 3D Gaussian splatting read: PLY (Kerbl et al. 2023) and SPZ.
 
-In: Gaussians in metres. Out: a file with their places, logarithms of scales, quaternions, logits of opacities, and
-colours as harmonics of degree 0. Those that the frame does not show are left out.
+In: Gaussians in metres. Out: a file with their places, logarithms of scales, quaternions, opacities (in PLY their
+logits), and colours as harmonics of degree 0. Those that the frame does not show are left out. SPZ is Niantic's format
+in version 3: 20 bytes a splat, packed by gzip.
 """
 
 from __future__ import annotations
 
+import gzip
+import math
+import struct
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +19,7 @@ from ..errors import InputError
 from ..geometry.rigid import quaternions
 from ..geometry.splats import Bound
 from ..io.write import replacing
+from ..shapes import Float64, UInt8
 
 HARMONIC = 0.28209479177387814  # of degree 0: 1 / (2 sqrt(pi))
 MOST_OPACITY = 1 - 2**-10  # whose logit is finite
@@ -28,15 +33,53 @@ def check_splats(video: Video, name: str) -> None:
 
 
 def write_splats(bound: Bound | None, path: Path) -> None:
-    """Write Gaussians, which may be none, to a PLY file, which appears when it is complete."""
+    """Write Gaussians, which may be none, to a .ply or .spz file, which appears when it is complete."""
     rows = np.zeros((0, len(NAMES.split()))) if bound is None else _rows(bound)
+    data = _spz(rows) if path.suffix == ".spz" else _ply(rows)
+    with replacing(path) as file:
+        file.write(data)
+
+
+def _ply(rows: Float64[np.ndarray, "N 17"]) -> bytes:
     properties = "".join(f"property float {name}\n" for name in NAMES.split())
     head = f"ply\nformat binary_little_endian 1.0\nelement vertex {len(rows)}\n{properties}end_header\n"
-    with replacing(path) as file:
-        file.write(head.encode() + rows.astype("<f4").tobytes())
+    return head.encode() + rows.astype("<f4").tobytes()
 
 
-def _rows(bound: Bound) -> np.ndarray:
+def _spz(rows: Float64[np.ndarray, "N 17"]) -> bytes:
+    """Return an SPZ file: a head, then each attribute of all splats; numbers are those of its specification."""
+    places, colors, logits, scales, turns = rows[:, :3], rows[:, 6:9], rows[:, 9], rows[:, 10:13], rows[:, 13:]
+    most = float(np.abs(places).max(initial=1.0))
+    fraction = min(max(22 - math.floor(math.log2(most)), 0), 16)  # bits of a place behind the point
+    fixed = np.clip(np.round(places * 2**fraction), 1 - 2**23, 2**23 - 1).astype("<i4")
+    parts = (
+        np.ascontiguousarray(fixed).view(np.uint8).reshape(-1, 4)[:, :3],
+        _bytes(255 / (1 + np.exp(-logits))),
+        _bytes(255 * (0.15 * colors + 0.5)),
+        _bytes(16 * (scales + 10)),
+        _smallest_three(turns[:, [1, 2, 3, 0]]).view(np.uint8),
+    )
+    head = struct.pack("<4sIIBBBB", b"NGSP", 3, len(rows), 0, fraction, 0, 0)
+    return gzip.compress(head + b"".join(part.tobytes() for part in parts), mtime=0)
+
+
+def _smallest_three(turns: Float64[np.ndarray, "N 4"]) -> np.ndarray:
+    """Return quaternions x y z w in 32 bits each: which part is largest, then sign and size of the three others."""
+    rows, largest = np.arange(len(turns)), np.abs(turns).argmax(axis=1)
+    turns = turns * np.where(turns[rows, largest] < 0, -1.0, 1.0)[:, None]
+    found = largest.astype("<u4")
+    for part in range(4):
+        own = turns[:, part]
+        size = np.round(511 * np.minimum(np.abs(own) * math.sqrt(2), 1)).astype("<u4")
+        found = np.where(largest == part, found, found << 10 | (own < 0).astype("<u4") << 9 | size)
+    return found.astype("<u4")
+
+
+def _bytes(values: Float64[np.ndarray, "..."]) -> UInt8[np.ndarray, "..."]:
+    return np.clip(np.round(values), 0, 255).astype(np.uint8)
+
+
+def _rows(bound: Bound) -> Float64[np.ndarray, "N 17"]:
     shown = bound.opacities > 0
     opacities = np.minimum(bound.opacities[shown], MOST_OPACITY)
     columns = (

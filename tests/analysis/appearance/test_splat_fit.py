@@ -14,7 +14,7 @@ from meshreel.errors import InputError
 from meshreel.geometry.color_views import ColorPicture
 from meshreel.geometry.splats import Bound, Carrier, bind
 from meshreel.geometry.topology import subdivide_midpoint
-from meshreel.types import Mesh
+from meshreel.types import UP_AXES, UPS, Mesh
 from tests.metrics.shapes import sphere
 from tests.splats import some_splats
 
@@ -150,3 +150,13 @@ def test_what_hides_a_body_is_unknown_in_its_picture() -> None:
     nearer = PAINTED.at(eye + 0.5 * (PAINTED.vertices - eye))  # hides all of it
     [hidden] = taken([picture], PAINTED, nearer, 48)
     assert np.isnan(hidden.pixels[middle]).all()
+
+
+@pytest.mark.parametrize("up", UPS)
+def test_cameras_around_a_body_look_at_it_from_above_the_horizon(up):
+    above = np.array(UP_AXES[up])
+    eyes = np.array([camera.eye for camera in ring(PAINTED, 6, 48, 0.3, up)])
+    heights = (eyes - PAINTED.middle) @ above
+    assert len(eyes) == 6 and (heights > 0).all()
+    across = np.linalg.norm(eyes - PAINTED.middle - heights[:, None] * above, axis=1)
+    assert (across > 2 * heights).all()

@@ -6,6 +6,7 @@ others a template is tracked, at a quality above all that are compared, and carr
 
 from __future__ import annotations
 
+import math
 import tempfile
 from collections.abc import Callable
 from dataclasses import replace
@@ -19,8 +20,10 @@ from meshreel.encoder.presets import preset_options
 from meshreel.encoder.sequence import Encoder
 from meshreel.errors import InputError
 from meshreel.geometry.closest_points import Surface
+from meshreel.geometry.derived_sequences import DerivedSequence
+from meshreel.geometry.painted import Painted
 from meshreel.geometry.topology import blend, subdivide_midpoint
-from meshreel.types import Mesh, MeshSequence
+from meshreel.types import Mesh, MeshSequence, Texture
 
 from ..carriers import chains_of
 from . import REMESHED, Store
@@ -28,6 +31,37 @@ from . import REMESHED, Store
 STRIPE, GRAIN = 0.1, 0.02  # m, periods of the colours
 FINER = 2  # midpoint subdivisions before vertices get colours, which then have some millimetres of detail
 TRACKED = 80.0  # quality of a template that carries colours
+CELL = 6  # pixels of the square that a face has in a texture: about 3 mm each on bodies of 10,000 vertices
+
+
+class InColours(DerivedSequence):
+    """The frames of a sequence, each with a texture of its own: a square for each face."""
+
+    def __init__(self, source: MeshSequence, painted: Callable[[int], Mesh]) -> None:
+        """Take the frames, and what returns a mesh of the same surface in colour."""
+        super().__init__(source)
+        self._painted = painted
+
+    def __getitem__(self, index: int) -> Mesh:
+        number = range(len(self))[index]
+        mesh = self._source[number]
+        return mesh if mesh.is_colored or mesh.is_empty else textured(mesh, Painted(self._painted(number)))
+
+
+def textured(mesh: Mesh, paint: Painted) -> Mesh:
+    """Return a mesh with a texture that has a square of `CELL` pixels for each face, whose half shows the face."""
+    across = math.ceil(math.sqrt(len(mesh.faces)))
+    row, column = np.divmod(np.arange(len(mesh.faces)), across)
+    corners = np.array([[0.5, 0.5], [CELL - 0.5, 0.5], [0.5, CELL - 0.5]])
+    uv = (corners + CELL * np.column_stack([column, across - 1 - row])[:, None]) / (CELL * across)
+    y, x = np.mgrid[:CELL, :CELL].reshape(2, -1) / (CELL - 1)  # from the square's lower left
+    a, b, c = np.moveaxis(mesh.vertices[mesh.faces], 1, 0)[..., None, :]
+    places = a + x[:, None] * (b - a) + y[:, None] * (c - a)
+    colors = paint.at(places.reshape(-1, 3), np.zeros((places.size // 3, 3)))[0].reshape(-1, CELL, CELL, 3)
+    squares = np.zeros((across * across, CELL, CELL, 3), np.uint8)
+    squares[: len(colors)] = np.round(colors[:, ::-1])
+    pixels = squares.reshape(across, across, CELL, CELL, 3).swapaxes(1, 2).reshape(across * CELL, across * CELL, 3)
+    return replace(mesh, uv=uv.astype(np.float32), texture=Texture.of(pixels))
 
 
 def solid_colors(points: Float64[np.ndarray, "N 3"]) -> UInt8[np.ndarray, "N 3"]:

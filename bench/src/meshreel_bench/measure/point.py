@@ -7,8 +7,8 @@ theirs. In a codec's place `captured` is the truth itself, `segmentation` the en
 from __future__ import annotations
 
 import pickle
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import Any
 
@@ -19,7 +19,7 @@ from meshreel.container.sources import BytesSource
 from meshreel.errors import InputError
 from meshreel.format.layout import MAGIC, ChunkKind
 from meshreel.geometry.derived_sequences import Chosen
-from meshreel.types import MeshSequence, evenly
+from meshreel.types import Mesh, MeshSequence, evenly
 
 from ..codec import Codec, TwoStepCodec
 from ..codecs import codec_version, make_codec
@@ -27,7 +27,7 @@ from ..codecs.colored_draco import ColoredDracoCodec
 from ..codecs.scenes import BackgroundDracoCodec
 from ..datasets import Dataset, Store
 from ..datasets.scenes import FOUND, TRUE, SceneFrames
-from ..datasets.solid import coloured
+from ..datasets.solid import InColours, coloured
 from ..experiments.study import FLOOR
 from ..experiments.study import FOUND as SEGMENTATION
 from ..rows import Encoding, Group, Point, Row, Stream
@@ -53,6 +53,9 @@ def measure_points(points: Sequence[Point], store: Store) -> Iterator[Row]:
 def measure_point(point: Point, store: Store) -> Row:
     """Return the row of a point. Raises InputError where it cannot be measured, and whatever its codec raises."""
     known = _opened(point.sequence, point.frames, store)
+    painted = coloured(point.sequence, store, point.frames) if point.metrics == "splats" else None
+    if painted is not None:  # colours tell where the surface slides
+        known = replace(known, sequence=InColours(known.sequence, painted))
     count = len(known.sequence)
     some = evenly(count, SOME) if known.cameras else list(range(count))
     whole = not known.cameras or point.sampled or point.metrics == "regions"
@@ -61,8 +64,8 @@ def measure_point(point: Point, store: Store) -> Row:
     if point.codec == SEGMENTATION:
         return msgspec.structs.replace(row, metrics=_segmentation(known))
     if point.codec == FLOOR:
-        if point.metrics == "splats":
-            return _uncompressed(row, known, point, store)
+        if painted is not None:
+            return _uncompressed(row, known, painted)
         if known.scene is None:
             raise InputError("the truth itself is known of simulated scenes only")
         clean = [known.scene.truth[number].mesh for number in numbers]
@@ -74,8 +77,7 @@ def measure_point(point: Point, store: Store) -> Row:
     data, encoding = _encoded(codec, source, (point.sequence, point.frames, point.sampled))
     wanted = list(range(len(some))) if point.sampled else numbers
     decoding, meshes = decoded_apart(decoder, data, wanted, len(source))
-    if point.metrics == "splats":
-        painted = coloured(point.sequence, store, point.frames)
+    if painted is not None:
         metrics, per_frame = dict[str, float | None](splat_values(known, painted, meshes, numbers, data)), {}
     else:
         metrics, per_frame = measure_frames(Measured(known, numbers, meshes, data), point.metrics)
@@ -91,11 +93,10 @@ def measure_point(point: Point, store: Store) -> Row:
     )
 
 
-def _uncompressed(row: Row, known: Dataset, point: Point, store: Store) -> Row:
+def _uncompressed(row: Row, known: Dataset, painted: Callable[[int], Mesh]) -> Row:
     """Return the row of splats on the meshes as they are: float32 places and int32 corners."""
     meshes = list(known.sequence)
     size = sum(12 * (len(mesh.vertices) + len(mesh.faces)) for mesh in meshes)
-    painted = coloured(point.sequence, store, point.frames)
     metrics = dict[str, float | None](splat_values(known, painted, meshes, range(len(meshes)), b""))
     return msgspec.structs.replace(row, name=UNCOMPRESSED, stream=Stream(size, len(meshes)), metrics=metrics)
 

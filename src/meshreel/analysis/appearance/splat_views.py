@@ -18,7 +18,7 @@ from ...geometry.cameras import PinholeCamera, looking_at
 from ...geometry.color_views import ColorPicture, sampled
 from ...geometry.painted import Painted
 from ...geometry.raycast import Hit, Rays, pixels_near
-from ...types import Mesh
+from ...types import UP_AXES, Mesh, Up
 from .splat_fit import SplatView
 
 GOLDEN = (math.sqrt(5) - 1) / 2  # of a turn, from a frame's cameras to the next one's: no two frames have the same
@@ -30,14 +30,16 @@ HIDDEN = 0.01  # of the distance: what is nearer by that hides the mesh (guess)
 Colors = Callable[[Hit, Float64[np.ndarray, "N 3"]], Float64[np.ndarray, "N 3"]]  # of hits, and where they are
 
 
-def ring(mesh: Mesh, count: int, size: int, turn: float, up: int = 1) -> list[PinholeCamera]:
+def ring(mesh: Mesh, count: int, size: int, turn: float, up: Up = "y") -> list[PinholeCamera]:
     """Return cameras around a mesh, which fills pictures of `size` pixels; `turn` is that of the first, in turns."""
     extent, found = mesh.diagonal, list[PinholeCamera]()
-    along, aside = np.eye(3)[(up + 1) % 3], np.eye(3)[(up + 2) % 3]
+    above = np.array(UP_AXES[up])
+    axis = int(np.abs(above).argmax())
+    along, aside = np.eye(3)[(axis + 1) % 3], np.eye(3)[(axis + 2) % 3]
     for number in range(count):
         angle, tilt = 2 * math.pi * (number / count + turn), TILTS[number % len(TILTS)]
-        way = math.cos(tilt) * (math.cos(angle) * along + math.sin(angle) * aside) + math.sin(tilt) * np.eye(3)[up]
-        pose = np.linalg.inv(looking_at(mesh.middle + AWAY * extent * way, mesh.middle, up))
+        way = math.cos(tilt) * (math.cos(angle) * along + math.sin(angle) * aside) + math.sin(tilt) * above
+        pose = np.linalg.inv(looking_at(mesh.middle + AWAY * extent * way, mesh.middle, axis))
         camera = PinholeCamera(size, size, np.diag([size, size, 1.0]), pose)
         found += [cut] if (cut := cut_to(camera, mesh, size)) else []
     return found
