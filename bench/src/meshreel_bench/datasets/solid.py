@@ -40,12 +40,15 @@ class InColours(DerivedSequence):
     def __init__(self, source: MeshSequence, painted: Callable[[int], Mesh]) -> None:
         """Take the frames, and what returns a mesh of the same surface in colour."""
         super().__init__(source)
-        self._painted = painted
+        self._painted, self._known = painted, dict[int, Mesh]()  # some 2 MB each: painting takes a second
 
     def __getitem__(self, index: int) -> Mesh:
         number = range(len(self))[index]
-        mesh = self._source[number]
-        return mesh if mesh.is_colored or mesh.is_empty else textured(mesh, Painted(self._painted(number)))
+        if number not in self._known:
+            mesh = self._source[number]
+            is_bare = not (mesh.is_colored or mesh.is_empty)
+            self._known[number] = textured(mesh, Painted(self._painted(number))) if is_bare else mesh
+        return self._known[number]
 
 
 def textured(mesh: Mesh, paint: Painted) -> Mesh:
