@@ -51,6 +51,7 @@ class MeshreelCodec(Prepared):
     color: str = "none"  # studies of geometry compare with codecs that have no colours
     color_quality: float | None = None
     texture: int | None = None
+    key_interval: float | None = None  # s
     variant: str | None = None
 
     def __post_init__(self) -> None:
@@ -58,10 +59,12 @@ class MeshreelCodec(Prepared):
 
     @property
     def name(self) -> str:
-        """The name in rows and plots; colours, at a quality of their own, a fixed m or a variant make another curve."""
+        """The name in rows and plots; colours, their own quality, keys, a fixed m or a variant make another curve."""
         colored = "" if self.color == "none" else f", {self.color}"
         if self.color_quality is not None:
             colored += f", geometry at {self.quality:g}"
+        if self.key_interval is not None:
+            colored += f", keys each {self.key_interval:g} s"
         changed = "" if self.variant is None else f", {self.variant}"
         return f"meshreel {self.preset}{colored}{changed}" + ("" if self.basis_size is None else " m")
 

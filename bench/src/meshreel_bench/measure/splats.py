@@ -30,9 +30,9 @@ from ..carriers import Chain, alone, chains_of
 from ..datasets import Dataset
 
 COUNT, SIZE = 8000, 256  # splats, and pixels of the longer side of the body
-FITTED, VIEWS, VIEWS_ALONE = 12, 6, 16  # frames of a chain, cameras of each, and of a frame with splats of its own
-STEPS, STEPS_ALONE = 450, 200
-JUDGED = 2  # frames of those that were fitted to, and as many between these
+FITTED, VIEWS, VIEWS_ALONE = 16, 6, 16  # frames of a chain, cameras of each, and of a frame with splats of its own
+STEPS, STEPS_ALONE = 900, 200
+JUDGED = 4  # frames of those that were fitted to, and as many between these
 HELD = 4  # cameras of each
 PATH = "splat-transform"  # of npm: PlayCanvas' converter, which writes SPZ and SOG
 FLOATS = 14  # numbers of a splat with harmonics of degree 0: place 3, scale 3, rotation 4, opacity, colour 3
