@@ -69,7 +69,7 @@ TABLE_3 = Study(
     floors=BODIES,
     notes=(
         "8,000 splats; pictures of 256 pixels, cut to the body. A mesh that is no .reel file has new splats each",
-        "frame, as the paper has; those of a .reel file belong to a chain of groups, which a key begins, and are fitted",
+        "frame, as in the paper; those of a .reel file belong to a chain of groups, which a key begins, and are fitted",
         "to every second frame. The mesh of `best` has colours of vertices at quality 10, which its Mbps include: they",
         "hold the tracked surface in place. *Lost by coding* is by how much splats before quantisation are better.",
     ),
