@@ -60,5 +60,5 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    """List the promised names and no others: modules below may change without notice."""
-    return sorted(__all__)
+    """List the promised names and what every module has; modules below may change without notice."""
+    return sorted({*__all__, *(name for name in globals() if name.startswith("__"))})

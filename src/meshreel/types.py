@@ -6,7 +6,7 @@ Coordinates are float64 in memory, so that geo-referenced captures (around 1e6) 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, Literal, Protocol, get_args, runtime_checkable
 
@@ -34,7 +34,7 @@ GREY = 128  # red, green and blue of a surface without colours beside one with c
 class Texture:
     """A picture in sRGB that is decoded when its pixels are asked for; InputError where its file cannot be used."""
 
-    read: Callable[[], UInt8[np.ndarray, "H W 3"]]
+    read: Callable[[], UInt8[np.ndarray, "H W 3"]] = field(repr=False)
     size: tuple[int, int] | None = None  # rows and columns, where they are known before the picture is decoded
 
     @staticmethod
@@ -56,11 +56,11 @@ class Texture:
         return self.read()
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Mesh:
     """A triangle mesh, which may have no faces and no vertices (an empty frame), and may have colours.
 
-    The arrays of decoded meshes are read-only; those of `copy()` are not.
+    The arrays of the parts of a decoded frame are read-only; those of whole frames and of `copy()` are not.
     """
 
     vertices: Float64[np.ndarray, "V 3"]  # m, right-handed
@@ -140,6 +140,14 @@ class Mesh:
         uv = None if self.uv is None else self.uv.copy()
         return Mesh(self.vertices.copy(), self.faces.copy(), colors, uv, self.texture)
 
+    def __repr__(self) -> str:
+        facts = [f"{len(self.vertices)} vertices", f"{len(self.faces)} faces"]
+        if len(self.vertices):
+            low, high = self.box
+            facts += [" x ".join(f"{size:.3g}" for size in high - low) + " m"]
+        facts += [name for name, given in (("colours", self.colors), ("texture", self.texture)) if given is not None]
+        return f"<meshreel.Mesh: {', '.join(facts)}>"
+
     def to_trimesh(self) -> trimesh.Trimesh:
         """Return a copy as a `trimesh.Trimesh`, with the same vertices in the same order and their colours."""
         import trimesh
@@ -205,8 +213,11 @@ class MeshSequence(Frames, Protocol):
     def frame_rate(self) -> float:
         """Frames per second, 1/s."""
 
+    def __repr__(self) -> str:
+        return f"<meshreel.{type(self).__name__}: {len(self)} frames, {self.frame_rate:g} frames/s>"
 
-@dataclass(frozen=True, slots=True)
+
+@dataclass(frozen=True, slots=True, repr=False)
 class MeshList(MeshSequence):
     """A MeshSequence of meshes that are in memory."""
 

@@ -14,6 +14,7 @@ import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from difflib import get_close_matches
 from types import FrameType
 from typing import TYPE_CHECKING, NoReturn
 
@@ -127,7 +128,7 @@ def _noted(text: str, error: BaseException) -> str:
 def _text_of(error: Exception) -> str:
     from concurrent.futures.process import BrokenProcessPool
 
-    from cyclopts import CycloptsError, MissingArgumentError
+    from cyclopts import CycloptsError, MissingArgumentError, UnknownCommandError
 
     if isinstance(error, ImportError) and isinstance(error.__cause__, ModuleNotFoundError):
         error = error.__cause__  # raised by the import of the command's module
@@ -137,6 +138,8 @@ def _text_of(error: Exception) -> str:
         return f"{error.name} is missing; install it with: pip install 'meshreel[{extra}]'"
     if isinstance(error, MissingArgumentError) and error.argument is not None:
         return _missing(error, " ".join(["meshreel", *(error.command_chain or ())]))
+    if isinstance(error, UnknownCommandError) and error.unused_tokens:
+        return _unknown(error.unused_tokens[0])
     if isinstance(error, CycloptsError):
         return f"{text} (see meshreel --help)"
     if isinstance(error, BrokenProcessPool):
@@ -148,6 +151,14 @@ def _text_of(error: Exception) -> str:
     if isinstance(error, (MeshreelError, OSError)):
         return text
     return f"{type(error).__name__}: {text}; this is a fault of meshreel: please report it with the output of --debug"
+
+
+def _unknown(name: str) -> str:
+    """Name a command that does not exist, and those that it begins, or is like."""
+    names = [*COMMANDS, "bench"]
+    near = [known for known in names if known.startswith(name)] or get_close_matches(name, names)
+    meant = f" Did you mean {' or '.join(near)}?" if near else ""
+    return f'Unknown command "{name}".{meant} Commands: {", ".join(names)} (see meshreel --help)'
 
 
 def _missing(error: MissingArgumentError, command: str) -> str:

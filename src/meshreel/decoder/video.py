@@ -13,9 +13,10 @@ from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
-from ..container.reader import ReelReader
+from ..container.reader import Chunk, ReelReader
 from ..container.sources import BytesSource, FileSource, Source, Stream, StreamSource
 from ..errors import FormatError, InputError
+from ..format.layout import Form
 from ..geometry.splats import Bound
 from ..geometry.topology import concatenate
 from ..shapes import Float
@@ -60,8 +61,8 @@ class Video(Sequence[Mesh]):
 
     A frame is its background, if it has one, and its moving bodies, one in each track; `parts` returns them separately.
     Random access decodes one group of each track, and the groups that it is predicted from. A file stays open until
-    `close`, or until the end of a `with` block. The arrays of the meshes are read-only, and those of a group may be
-    parts of one array: `mesh.copy()` gives arrays that can be changed, and kept without the rest of the group.
+    `close`, or until the end of a `with` block. The arrays of a frame are the caller's own, who may change them; those
+    of `parts` and `background` are read-only, because the video keeps them: `mesh.copy()` gives arrays of one's own.
     """
 
     def __init__(
@@ -176,24 +177,36 @@ class Video(Sequence[Mesh]):
         return Bound.join(found) if found else None
 
     def vertices(self, first: int, last: int, out: np.ndarray | None = None) -> Float[np.ndarray, "T V 3"]:
-        """Return the vertices of frames `first` to `last` - 1 in metres, which all must have the same number of them.
+        """Return the vertices of frames `first` to `last` - 1 in metres, which all must have the same ones.
 
         They are written to `out` if it is given, an array of float64 or float32, for which the coordinates are rounded;
-        otherwise to a new array of float64. Raises InputError if they do not fit it, and otherwise as indexing does.
+        otherwise to a new array of float64. Raises InputError, which names the frame, where their number or what they
+        are changes, or does not fit the array; and otherwise as indexing does.
         """
         if not 0 <= first < last <= len(self):
             raise IndexError(f"frames {first} to {last} of a video of {len(self)} frames")
-        if out is None:
-            out = np.empty((last - first, len(self[first].vertices), 3))
-        elif out.ndim != 3 or len(out) != last - first or out.dtype.char not in "df":
+        if out is not None and (out.ndim != 3 or len(out) != last - first or out.dtype.char not in "df"):
             text = f"an array of {out.dtype} {out.shape} for {last - first} frames"
             raise InputError(f"{text}: give one of float64 or float32, frames x vertices x 3")
+        shown, before = [*self.parts(first).values()], self.reader.chunks_of_frame(first)
+        if out is None:
+            out = np.empty((last - first, sum(len(mesh.vertices) for mesh in shown), 3))
         for row, frame in zip(out, range(first, last), strict=True):
-            vertices = self[frame].vertices
-            if vertices.shape != row.shape:
-                raise InputError(f"frame {frame} has {len(vertices)} vertices: the array has room for {len(row)}")
-            row[:] = vertices
+            parts, chunks = [*self.parts(frame).values()], self.reader.chunks_of_frame(frame)
+            if (count := sum(len(mesh.vertices) for mesh in parts)) != len(row) or row.shape[1:] != (3,):
+                raise InputError(f"frame {frame} has {count} vertices: the array has room for {len(row)}")
+            if not (self._follow(chunks, before) or all(map(_are_alike, parts, shown))):
+                raise InputError(f"frame {frame} has other vertices than frame {first}: ask for the frames before it")
+            np.concatenate([mesh.vertices for mesh in parts], out=row, casting="same_kind")
+            before = chunks
         return out
+
+    def _follow(self, chunks: tuple[Chunk, ...], before: tuple[Chunk, ...]) -> bool:
+        """Return whether groups go on with the vertices of those before, one after the other."""
+        return all(
+            chunk.form != Form.DRACO and (chunk == one or self.reader.group_before(chunk) == one)
+            for chunk, one in zip(chunks, before, strict=True)
+        )
 
     def __repr__(self) -> str:
         return f"<meshreel.Video: {', '.join(self._facts().values())}>"
@@ -228,10 +241,11 @@ def _counted(count: int, what: str) -> str:
     return f"{count} {what}" if count == 1 else f"{count} {what}s"
 
 
+def _are_alike(one: Mesh, other: Mesh) -> bool:
+    return np.array_equal(one.faces, other.faces) and len(one.vertices) == len(other.vertices)
+
+
 def _joined(meshes: list[Mesh]) -> Mesh:
-    """Return all meshes as one, read-only as each of them is."""
+    """Return all meshes as one, in arrays that belong to nobody else."""
     mesh = concatenate(meshes)
-    for array in (mesh.vertices, mesh.faces, mesh.colors, mesh.uv):
-        if array is not None:
-            array.flags.writeable = False
-    return mesh
+    return mesh.copy() if any(mesh is part for part in meshes) else mesh
