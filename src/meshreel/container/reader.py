@@ -65,7 +65,7 @@ class ReelReader:
     """Checked head of a file, and access to its chunks; does not close the source."""
 
     def __init__(self, source: Source) -> None:
-        self._source = source
+        self._source, self._bytes_read = source, 0
         self.header, index, self.head_size = _read_head(source)
         check_index(index)
         self.chunks = _chunks(index, self.head_size)
@@ -85,6 +85,27 @@ class ReelReader:
             for number in group.depends_on:
                 self._shown_from.setdefault(number, group.first_frame)
         self._times = list(accumulate(self.header.intervals, initial=self.header.first_time))
+
+    @property
+    def source(self) -> Source:
+        """Where the bytes come from."""
+        return self._source
+
+    @property
+    def bytes_read(self) -> int:
+        """Bytes that came over the network, the head's among them; of a file here, those of chunks that were read."""
+        found: int = getattr(self._source, "bytes_read", self._bytes_read)
+        return found
+
+    @property
+    def box(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Lower and upper corner of the box that holds all frames, m."""
+        head = self.header
+        low, high = (
+            tuple(o + head.scale * x for o, x in zip(head.origin, corner, strict=True))
+            for corner in (head.minimum, head.maximum)
+        )
+        return low, high
 
     @property
     def frame_rate(self) -> float:
@@ -195,6 +216,7 @@ class ReelReader:
         if offset + size > self._source.size:
             raise FormatError(f"{chunk}: truncated, the file ends at byte {self._source.size} of {self.size}")
         payload = self._source.get_bytes(offset, size)
+        self._bytes_read += size
         if len(payload) != size:
             raise FormatError(f"{chunk}: truncated, {len(payload)} of {size} bytes")
         _check_payload(chunk, payload, wanted)
