@@ -16,7 +16,7 @@ from meshreel.container.sources import BytesSource
 from meshreel.container.writer import Companion, ReelWriter
 from meshreel.encoder import appearance
 from meshreel.encoder.appearance import as_installed
-from meshreel.encoder.concat import concat
+from meshreel.encoder.edit import concat
 from meshreel.encoder.excerpt import Excerpt, read_survey
 from meshreel.encoder.presets import appearance_options, preset_options
 from meshreel.encoder.sequence import Encoder

@@ -36,7 +36,11 @@ COMMANDS = {
     "segment": "Label which faces of a scene move, and with which body.",
     "survey": "Survey a sequence once, for encodes of its parts on many machines.",
     "encode": "Encode a sequence of meshes into one .reel file.",
+    "cut": "Write some frames of a .reel file, without encoding them again.",
     "concat": "Join .reel files that are parts of one sequence, without encoding them again.",
+    "retime": "Write a .reel file that plays at another frame rate or speed.",
+    "transform": "Write a .reel file in another place, size or orientation.",
+    "tag": "Write a .reel file with other metadata, as a title.",
     "decode": "Decode a .reel file into a directory of meshes.",
     "export": "Write a .reel file as one animated file, GLB or USD, that other programs play.",
     "info": "Show the rate by content, tracks over time, groups and forms, and what the encoder recorded.",
@@ -45,6 +49,7 @@ COMMANDS = {
     "serve": "Serve a folder of .reel files: a gallery, and a page that plays each.",
     "demo": "Make a short capture of moving people, encode it, and measure the result.",
 }
+EDITS = ("cut", "concat", "retime", "transform", "tag")  # which share a module
 BENCH = "Measure codecs against each other (a distribution of its own: pip install meshreel-bench)."
 
 
@@ -67,7 +72,8 @@ def make_app() -> App:
     help = "Compression of time-varying meshes."
     app = App(name="meshreel", help=help, version=__version__, suppress_keyboard_interrupt=False)
     for name, text in COMMANDS.items():
-        app.command(f"meshreel.cli.{name}:command", name=name, help=text)
+        where = f"meshreel.cli.edits:{name}" if name in EDITS else f"meshreel.cli.{name}:command"
+        app.command(where, name=name, help=text)
     added = {entry.name: entry.value for entry in entry_points(group=PLUGINS) if entry.name not in COMMANDS}
     for name, where in added.items():
         app.command(where, name=name, help=BENCH)

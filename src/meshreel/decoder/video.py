@@ -145,8 +145,7 @@ class Video(Sequence[Mesh]):
     @property
     def box(self) -> tuple[Float64[np.ndarray, "3"], Float64[np.ndarray, "3"]]:
         """Lower and upper corner of the box that holds all frames, m, as the encoder stored it."""
-        low, high = self.reader.box
-        return np.array(low), np.array(high)
+        return self.reader.box
 
     @property
     def bytes_read(self) -> int:
