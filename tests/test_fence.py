@@ -86,6 +86,7 @@ def test_the_promised_names_are_these():
         "SequenceOptions",
         "Video",
         "as_sequence",
+        "edit",
         "encode",
         "open",
         "open_sequence",

@@ -47,7 +47,10 @@ COMMANDS = {
     "compare": "Compare original meshes with decoded ones by every metric, and print the rate of a .reel file.",
     "play": "Play a .reel file in a browser, on this machine or on a headset.",
     "serve": "Serve a folder of .reel files: a gallery, and a page that plays each.",
+    "player": "Copy the player's files for a web server.",
     "demo": "Make a short capture of moving people, encode it, and measure the result.",
+    "doctor": "Tell what is installed, and what this machine can do with it.",
+    "completion": "Print the script by which a shell completes commands and flags.",
 }
 EDITS = ("cut", "concat", "retime", "transform", "tag")  # which share a module
 BENCH = "Measure codecs against each other (a distribution of its own: pip install meshreel-bench)."
@@ -63,17 +66,23 @@ class Terminated(BaseException):
 PLUGINS = "meshreel.commands"  # entry points by which other distributions add commands: meshreel-bench adds `bench`
 
 
-def make_app() -> App:
+def place_of(name: str) -> str:
+    """Return module and function of a command."""
+    return f"meshreel.cli.edits:{name}" if name in EDITS else f"meshreel.cli.{name}:command"
+
+
+def make_app(names: Sequence[str] = tuple(COMMANDS)) -> App:
     """Return the parser of the command line, with the commands that other distributions add."""
     from importlib.metadata import entry_points
 
     from cyclopts import App
 
+    from .examples import epilogue
+
     help = "Compression of time-varying meshes."
     app = App(name="meshreel", help=help, version=__version__, suppress_keyboard_interrupt=False)
-    for name, text in COMMANDS.items():
-        where = f"meshreel.cli.edits:{name}" if name in EDITS else f"meshreel.cli.{name}:command"
-        app.command(where, name=name, help=text)
+    for name in names:
+        app.command(place_of(name), name=name, help=COMMANDS[name], help_epilogue=epilogue(name))
     added = {entry.name: entry.value for entry in entry_points(group=PLUGINS) if entry.name not in COMMANDS}
     for name, where in added.items():
         app.command(where, name=name, help=BENCH)
