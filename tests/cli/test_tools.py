@@ -59,7 +59,7 @@ def test_the_doctor_tells_what_is_there_and_what_is_missing(run, monkeypatch):
     assert row["meshreel"] == meshreel.__version__ and row["player"]
     assert row["extras"]["(none)"]["numpy"] and {"encode", "color", "play"} <= row["extras"].keys()
     assert "meshreel" not in {name for packages in row["extras"].values() for name in packages}
-    monkeypatch.setitem(sys.modules, "av.codec", None)
+    monkeypatch.setitem(sys.modules, "av", None)
     monkeypatch.setenv("PATH", "")
     bare = run("doctor")
     assert bare.code == 0 and "codecs: none" in bare.out and f"meshreel {meshreel.__version__}" in bare.out

@@ -53,7 +53,7 @@ COMMANDS = {
     "completion": "Print the script by which a shell completes commands and flags.",
 }
 EDITS = ("cut", "concat", "retime", "transform", "tag")  # which share a module
-BENCH = "Measure codecs against each other (a distribution of its own: pip install meshreel-bench)."
+BENCH = "Measure codecs against each other."
 
 
 PLAY_NEEDS = ("starlette", "uvicorn", "trustme")  # packages of the extra `play`; all others are of `encode`
@@ -86,8 +86,6 @@ def make_app(names: Sequence[str] = tuple(COMMANDS)) -> App:
     added = {entry.name: entry.value for entry in entry_points(group=PLUGINS) if entry.name not in COMMANDS}
     for name, where in added.items():
         app.command(where, name=name, help=BENCH)
-    if "bench" not in added:
-        app.command("meshreel.cli.no_bench:command", name="bench", help=BENCH)
     return app
 
 
@@ -170,6 +168,8 @@ def _text_of(error: Exception) -> str:
 
 def _unknown(name: str) -> str:
     """Name a command that does not exist, and those that it begins, or is like."""
+    if name == "bench":
+        return "the bench is a distribution of its own; install it with: pip install meshreel-bench"
     names = [*COMMANDS, "bench"]
     near = [known for known in names if known.startswith(name)] or get_close_matches(name, names)
     meant = f" Did you mean {' or '.join(near)}?" if near else ""

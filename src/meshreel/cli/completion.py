@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from importlib import import_module
 from typing import Literal
 
@@ -19,16 +20,13 @@ def command(shell: Literal["bash", "zsh", "fish"], /, *, common: Common = Common
     shell
         The shell: append the script to ~/.bashrc, or write it where zsh or fish look for completions.
     """
-    script = make_app([name for name in COMMANDS if _is_usable(name)]).generate_completion(shell=shell)
+    usable = list[str]()
+    for name in COMMANDS:
+        with suppress(ImportError):
+            import_module(place_of(name).partition(":")[0])
+            usable.append(name)
+    script = make_app(usable).generate_completion(shell=shell)
     if common.json or common.quiet:
         common.result({"shell": shell, "script": script})
     else:
         print(script)
-
-
-def _is_usable(name: str) -> bool:
-    try:
-        import_module(place_of(name).partition(":")[0])
-    except ImportError:
-        return False
-    return True

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import os
 import platform
 import re
 import shutil
-import webbrowser
-from contextlib import suppress
 from importlib.metadata import PackageNotFoundError, requires, version
 from importlib.resources import files
-from typing import Any, Literal
+from typing import Any
 
 from rich.table import Table
 
@@ -19,32 +16,29 @@ from .console import Common
 
 _NEEDS = re.compile(r"([A-Za-z0-9._-]+)[^;]*(?:;.*extra == [\"']([a-z0-9]+)[\"'])?")
 _BROWSERS = ("chromium", "chromium-browser", "google-chrome", "firefox")
-_CODECS: dict[str, tuple[str, Literal["r", "w"]]] = {
-    "AV1 decoded": ("libdav1d", "r"),
-    "AV1 encoded": ("libsvtav1", "w"),
-    "H.264 encoded": ("libx264", "w"),
-}
+_CODECS = {"AV1 decoded": "libdav1d", "AV1 encoded": "libsvtav1", "H.264 encoded": "libx264"}
 
 
 def command(*, common: Common = Common()) -> None:
-    """Tell what is installed, extra by extra, which video codecs there are, and whether there are a GPU and a browser."""
+    """Tell what is installed, extra by extra, which video codecs there are, and whether a GPU and browser are found."""
     row: dict[str, Any] = {"meshreel": __version__, "python": platform.python_version(), "system": platform.platform()}
-    row |= {"cores": os.cpu_count(), "extras": _extras(), "codecs": _codecs(), "gpu": _gpu(), "browser": _browser()}
+    row |= {"extras": _extras(), "codecs": _codecs(), "gpu": _gpu()}
+    row["browser"] = next(filter(None, map(shutil.which, _BROWSERS)), None)
     row["player"] = (files("meshreel") / "player" / "meshreel-player.js").is_file()
     table = Table("extra", "installed", "missing")
     for extra, packages in row["extras"].items():
         there = ", ".join(f"{name} {found}" for name, found in packages.items() if found)
         table.add_row(extra, there, ", ".join(name for name, found in packages.items() if not found) or "nothing")
     codecs = ", ".join(f"{name}: {'yes' if there else 'no'}" for name, there in row["codecs"].items())
-    lines = [
-        f"meshreel {row['meshreel']}, Python {row['python']}, {row['system']}, {row['cores']} cores",
+    common.result(
+        row,
+        f"meshreel {row['meshreel']}, Python {row['python']}, {row['system']}",
         table,
         f"codecs: {codecs or 'none (extra color)'}",
         f"GPU: {row['gpu'] or 'none found; only --splats and --sam3 use one'}",
         f"browser: {row['browser'] or 'none found; meshreel serve prints an address for another machine'}",
         f"player: {'built' if row['player'] else 'missing; run scripts/build-web, or install a wheel'}",
-    ]
-    common.result(row, *lines)
+    )
 
 
 def _extras() -> dict[str, dict[str, str | None]]:
@@ -52,43 +46,27 @@ def _extras() -> dict[str, dict[str, str | None]]:
     found: dict[str, dict[str, str | None]] = {}
     for line in requires("meshreel") or ():
         if (need := _NEEDS.match(line)) and need[1] != "meshreel":
-            found.setdefault(need[2] or "(none)", {})[need[1]] = _version(need[1])
+            packages = found.setdefault(need[2] or "(none)", {})
+            try:
+                packages[need[1]] = version(need[1])
+            except PackageNotFoundError:
+                packages[need[1]] = None
     return found
-
-
-def _version(name: str) -> str | None:
-    try:
-        return version(name)
-    except PackageNotFoundError:
-        return None
 
 
 def _codecs() -> dict[str, bool]:
     """Return which codecs of textures PyAV has; nothing without it."""
     try:
-        from av.codec import Codec
+        from av import codecs_available
     except ImportError:
         return {}
-    found = dict.fromkeys(_CODECS, False)
-    for name, (codec, mode) in _CODECS.items():
-        with suppress(ValueError):  # av's error of an unknown codec
-            Codec(codec, mode)
-            found[name] = True
-    return found
+    return {name: codec in codecs_available for name, codec in _CODECS.items()}
 
 
 def _gpu() -> str | None:
-    """Return the GPU that torch finds, or that NVIDIA's driver is there without it; None: neither."""
-    with suppress(ImportError):
+    """Return the GPU that torch finds; None without one, or without torch."""
+    try:
         import torch
-
-        return str(torch.cuda.get_device_name()) if torch.cuda.is_available() else None
-    return "NVIDIA's driver is there, torch is not" if shutil.which("nvidia-smi") else None
-
-
-def _browser() -> str | None:
-    if (found := next(filter(None, map(shutil.which, _BROWSERS)), None)) is not None:
-        return found
-    with suppress(webbrowser.Error):
-        return str(getattr(webbrowser.get(), "name", type(webbrowser.get()).__name__))
-    return None
+    except ImportError:
+        return None
+    return str(torch.cuda.get_device_name()) if torch.cuda.is_available() else None

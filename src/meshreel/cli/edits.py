@@ -15,13 +15,14 @@ from ..io.remote import Place, located
 from ..types import Up
 from .console import Common
 
+File = Annotated[str, Parameter(help="The .reel file; it may be a URL (extra `remote`).")]
 Output = Annotated[
     str, Parameter(name=["--output", "-o"], help="The .reel file to write, when it is complete; or a URL.")
 ]
 
 
 def cut(
-    file: str,
+    file: File,
     /,
     *,
     output: Output,
@@ -33,8 +34,6 @@ def cut(
 
     Parameters
     ----------
-    file
-        The .reel file; it may be a URL (extra `remote`).
     frames
         Frames to keep, as A:B with B excluded. Those that they are coded with stay in the file, hidden.
     keys
@@ -62,14 +61,12 @@ def concat(inputs: list[str], /, *, output: Output, common: Common = Common()) -
 
 
 def retime(
-    file: str, /, *, output: Output, fps: float | None = None, speed: float | None = None, common: Common = Common()
+    file: File, /, *, output: Output, fps: float | None = None, speed: float | None = None, common: Common = Common()
 ) -> None:
     """Write a .reel file that plays at another frame rate or speed; nothing is encoded again.
 
     Parameters
     ----------
-    file
-        The .reel file; it may be a URL (extra `remote`).
     fps
         Frames per second, evenly.
     speed
@@ -79,7 +76,7 @@ def retime(
 
 
 def transform(
-    file: str,
+    file: File,
     /,
     *,
     output: Output,
@@ -93,8 +90,6 @@ def transform(
 
     Parameters
     ----------
-    file
-        The .reel file; it may be a URL (extra `remote`).
     scale
         Factor about the world's origin, as 0.001 for a file that was made from millimetres.
     rotate
@@ -116,7 +111,7 @@ def transform(
 
 
 def tag(
-    file: str,
+    file: File,
     values: Annotated[list[str], Parameter(negative="")],
     /,
     *,
@@ -127,8 +122,6 @@ def tag(
 
     Parameters
     ----------
-    file
-        The .reel file; it may be a URL (extra `remote`).
     values
         NAME=VALUE, as title="A walk" or take=3 (numbers, true, false and JSON are taken as such); NAME= takes it away.
     """

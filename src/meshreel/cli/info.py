@@ -108,7 +108,7 @@ def describe_file(file: Path) -> dict[str, Any]:
         "first_surface": surface,
         "layers": max(group["layers"] for group in groups),
         "color": _color(reader),
-        "frames_hidden": sum(group.frame_count for group in reader.tracks[0]) - reader.frame_count,
+        "frames_hidden": reader.coded_count - reader.frame_count,
         "bytes": reader.size,
         "bytes_missing": reader.size - there,
         "mbps": megabits(reader.size, reader),

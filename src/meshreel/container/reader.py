@@ -74,7 +74,8 @@ class ReelReader:
         check_index(self.index)
         self.metadata = parse_metadata(self.header.metadata)
         groups = (entry for entry in self.index.chunks if entry.kind == ChunkKind.GROUP)
-        self.edit = parse_edit(self.metadata, flags, sum(entry.frames for entry in groups if entry.track == 0))
+        self.coded_count = sum(entry.frames for entry in groups if entry.track == 0)  # frames, the hidden ones too
+        self.edit = parse_edit(self.metadata, flags, self.coded_count)
         self.chunks = _chunks(self.index, self.head_size, -self.edit.first)
         self.groups = tuple(chunk for chunk in self.chunks if chunk.kind == ChunkKind.GROUP)
         self.tracks = _by_track(self.groups)  # the groups of each

@@ -100,11 +100,6 @@ class ReelWriter:
         self._checks = IndexChecks()
 
     @property
-    def chunk_count(self) -> int:
-        """Number of chunks added, which is the number of the next."""
-        return len(self._entries)
-
-    @property
     def frame_count(self) -> int:
         """Number of frames added to the first track."""
         return self.frames_of(0)

@@ -12,7 +12,6 @@ from collections.abc import Iterable, Sequence
 from html import escape
 from importlib.resources import files
 
-_TYPES = {".js": "text/javascript", ".wasm": "application/wasm"}
 _NAMES = ("meshreel-player.js", "worker.js", "order.js", "core.wasm", "draco.wasm")
 
 # The element, its files from memory (`meshreelFiles`, which the player looks at), and the recording given to it.
@@ -30,15 +29,11 @@ meshreel-player {{ width: 100%; height: 100%; aspect-ratio: auto }}
 (async (packed, recording) => {{
   const bytes = (text) => new Blob([Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0))]);
   const opened = (text) => new Response(bytes(text).stream().pipeThrough(new DecompressionStream("gzip"))).blob();
-  const unpacked = async ([type, text]) => new Blob([await opened(text)], {{ type }});
-  const data = (blob) => new Promise((done) => {{
-    const reader = new FileReader();
-    reader.onload = () => done(reader.result);
-    reader.readAsDataURL(blob);
-  }});
-  const address = async ([name, file]) => {{
-    const blob = await unpacked(file); // a worker of a page on disk may not fetch from the page's memory
-    return [name, name.endsWith(".wasm") ? await data(blob) : URL.createObjectURL(blob)];
+  const letters = (buffer) => Array.from(new Uint8Array(buffer), (byte) => String.fromCharCode(byte)).join("");
+  const address = async ([name, text]) => {{
+    const file = await (await opened(text)).arrayBuffer();
+    if (name.endsWith(".js")) return [name, URL.createObjectURL(new Blob([file], {{ type: "text/javascript" }}))];
+    return [name, `data:application/wasm;base64,${{btoa(letters(file))}}`]; // workers of a page on disk fetch no blobs
   }};
   globalThis.meshreelFiles = Object.fromEntries(await Promise.all(Object.entries(packed).map(address)));
   await import(meshreelFiles["meshreel-player.js"]);
@@ -51,7 +46,8 @@ meshreel-player {{ width: 100%; height: 100%; aspect-ratio: auto }}
 
 def player_page(data: bytes, name: str) -> str:
     """Return the page that plays a file, whose name it shows. Raises FileNotFoundError where no player is built."""
-    packed = {file: (_TYPES[file[file.rindex(".") :]], _text(gzip.compress(_built(file), mtime=0))) for file in _NAMES}
+    built = files("meshreel") / "player"
+    packed = {file: _text(gzip.compress((built / file).read_bytes(), mtime=0)) for file in _NAMES}
     shown = json.dumps(name).replace("<", "\\u003c")  # no name ends the script
     return _PAGE.format(title=escape(name), name=shown, packed=json.dumps(packed), recording=_text(data))
 
@@ -67,10 +63,6 @@ def table(facts: Iterable[tuple[str, str]], note: str) -> str:
     """Return the facts of a file that is too large for a notebook, and how to play it."""
     rows = "".join(f"<tr><th>{escape(name)}</th><td>{escape(value)}</td></tr>" for name, value in facts)
     return f"<table>{rows}</table><p>{escape(note)}</p>"
-
-
-def _built(name: str) -> bytes:
-    return files("meshreel").joinpath("player", name).read_bytes()
 
 
 def _text(data: bytes) -> str:

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from ..container.reader import ReelReader
+from ..container.reader import Chunk, ReelReader
 from ..container.sources import FileSource, StreamSource
 from ..container.writer import pack_head
 from ..errors import FormatError, InputError
@@ -29,11 +29,12 @@ from ..io.remote import Place, located, uploaded
 from ..io.sequence import SequenceOptions
 from ..io.write import check_apart, replacing
 from ..types import Up, check_up
-from .metadata import HISTORY, PART, joined_metadata, of_all_parts, place_of, upright
+from .metadata import HISTORY, PART, joined_metadata, of_all_parts, place_of
 from .spans import kept_chunks, span_of
 
 Name = str | Place
 Numbers = Sequence[Any] | np.ndarray
+Part = tuple[dict[str, Any], int]  # the metadata of a file, and its number of frames
 _MOST = 0xFFFF  # bytes of metadata (FORMAT.md)
 _OWN = ("key_frames", PART, HISTORY, ITEM, "up")  # metadata that `tag` leaves alone: others are computed from them
 
@@ -68,9 +69,7 @@ def cut(source: Name, output: Name, frames: str, at_keys: bool = False) -> Edite
         whole = span_of(reader, shown)
         shown = range(max(whole.start, 0), min(whole.stop, reader.frame_count)) if at_keys else shown
         numbers = kept_chunks(reader, whole)
-        if unknown := [n for n in numbers if reader.chunks[n].kind not in list(ChunkKind)]:
-            text = f"{path}: {reader.chunks[unknown[0]]} is of a kind that this version cannot cut; update meshreel"
-            raise InputError(text)
+        _check_known(path, (reader.chunks[number] for number in numbers))
         edit = Edit(shown.start - whole.start, shown.stop - whole.start, reader.edit.rotation)
         header = replace(reader.header, intervals=reader.header.intervals[shown.start : shown.stop - 1])
         metadata = {name: value for name, value in reader.metadata.items() if name not in (ITEM, PART)}
@@ -90,19 +89,17 @@ def concat(sources: Sequence[Name], output: Name) -> Edited:
     """
     if not sources:
         raise InputError("no files to join; give at least one")
-    pieces, parts, heads, hidden = list[_Piece](), list[tuple[dict[str, Any], int]](), list[ReelReader](), [0, 0]
+    pieces, parts, heads, hidden = list[_Piece](), list[Part](), list[ReelReader](), [0, 0]
     for source in sources:
         with _opened(located(source)) as (path, reader):
             first = heads[0] if heads else reader
-            _check_alike(path, reader, first, located(sources[0]))
-            coded = sum(group.frame_count for group in reader.tracks[0])
-            ends = (reader.edit.first, coded - reader.edit.end)
+            parts.append((reader.metadata, reader.frame_count))
+            _check_alike(path, reader, first, located(sources[0]), parts)
+            ends = (reader.edit.first, reader.coded_count - reader.edit.end)
             if (ends[0] and heads) or (ends[1] and len(heads) < len(sources) - 1):
                 text = f"{path}: hides {ends[0]} frames at its begin and {ends[1]} at its end, and would show them"
                 raise InputError(f"{text}; cut it with --keys")
             hidden = [hidden[0] or ends[0], ends[1]]
-            parts.append((reader.metadata, reader.frame_count))
-            _check_metadata(path, parts)
             known = {n: sum(len(piece.numbers) for piece in pieces) + n for n in range(len(reader.chunks))}
             pieces.append(_piece(path, reader, range(len(reader.chunks)), known))
             heads.append(reader)
@@ -162,11 +159,10 @@ def transform(
         before = np.array(reader.edit.rotation).reshape(3, 3) if reader.edit.rotation else np.eye(3)
         both = turn @ before
         rotated = tuple(both.ravel().tolist()) if np.abs(both - np.eye(3)).max() > 1e-12 else ()
-        coded = sum(group.frame_count for group in reader.tracks[0])
         metadata = {name: value for name, value in reader.metadata.items() if name != ITEM}
-        metadata |= replace(reader.edit, rotation=rotated).item(coded)
+        metadata |= replace(reader.edit, rotation=rotated).item(reader.coded_count)
         if up is not None:
-            metadata = {name: value for name, value in metadata.items() if name != "up"} | upright(up)
+            metadata = metadata | {"up": up}
         told = f"transform by {scale:g}, {np.round(turn, 6).tolist()}, {list(map(float, translation))}"
         return _relabelled(path, reader, output, header, metadata | _history(metadata, told))
 
@@ -180,8 +176,8 @@ def tag(source: Name, output: Name, values: dict[str, Any]) -> Edited:
         return _relabelled(path, reader, output, reader.header, metadata)
 
 
-def _check_alike(path: Place, reader: ReelReader, other: ReelReader, first: Place) -> None:
-    """Raise InputError where a file is not of the sequence that the first is of."""
+def _check_alike(path: Place, reader: ReelReader, other: ReelReader, first: Place, parts: Sequence[Part]) -> None:
+    """Raise InputError where a file, the last of the parts, is not of the sequence of the first, or not the next."""
     if len(reader.tracks) != len(other.tracks):
         text = f"{path}: {len(reader.tracks)} tracks, and {first} has {len(other.tracks)}"
         raise InputError(f"{text}; encode both with --survey FILE, which meshreel survey writes")
@@ -192,32 +188,26 @@ def _check_alike(path: Place, reader: ReelReader, other: ReelReader, first: Plac
             raise InputError(f"{text}; encode both with --survey FILE, which meshreel survey writes")
     if reader.edit.rotation != other.edit.rotation:
         raise InputError(f"{path}: is rotated otherwise than {first}; transform both in the same way")
-    if unknown := [chunk for chunk in reader.chunks if chunk.kind not in list(ChunkKind)]:
-        raise InputError(f"{path}: {unknown[0]} is of a kind that this version cannot join; update meshreel")
+    _check_known(path, reader.chunks)
     try:
         ours, theirs = of_all_parts(other.metadata), of_all_parts(reader.metadata)
-    except (KeyError, TypeError) as error:
-        raise _foreign(path, error) from None
+        joined_metadata(parts[-1:])
+        begin, own = place_of(parts[0][0]), place_of(parts[-1][0])
+    except (KeyError, TypeError, ValueError) as error:
+        text = f"{path}: its metadata are not those of meshreel encode ({error!r}); encode it again"
+        raise InputError(text) from None
     if ours != theirs:
         text = f"{path}: differs from {first}: {first_difference(ours, theirs)}"
         raise InputError(f"{text}; encode both with the same options")
-
-
-def _check_metadata(path: Place, parts: Sequence[tuple[dict[str, Any], int]]) -> None:
-    """Raise InputError where the last part does not begin where those before it end, or has foreign metadata."""
-    try:
-        joined_metadata(parts[-1:])
-        first, ours = place_of(parts[0][0]), place_of(parts[-1][0])
-    except (KeyError, TypeError, ValueError) as error:
-        raise _foreign(path, error) from None
-    end = 0 if first is None else first[0] + sum(frames for _, frames in parts[:-1])
-    if first is not None and ours is not None and ours[0] != end:
-        text = f"{path}: begins at frame {ours[0]} of the sequence, and the next in turn is {end}"
+    end = sum(frames for _, frames in parts[:-1])
+    if begin is not None and own is not None and own[0] != begin[0] + end:
+        text = f"{path}: begins at frame {own[0]} of the sequence, and the next in turn is {begin[0] + end}"
         raise InputError(f"{text}; give each part once, in the order of the frames")
 
 
-def _foreign(path: Place, error: Exception) -> InputError:
-    return InputError(f"{path}: its metadata are not those of meshreel encode ({error!r}); encode it again")
+def _check_known(path: Place, chunks: Iterable[Chunk]) -> None:
+    if unknown := [chunk for chunk in chunks if chunk.kind not in list(ChunkKind)]:
+        raise InputError(f"{path}: {unknown[0]} is of a kind that this version cannot copy; update meshreel")
 
 
 def _timed(readers: Sequence[ReelReader]) -> Header:

@@ -51,9 +51,8 @@ def _stands_alone(reader: ReelReader, group: Chunk) -> Chunk:
 
 
 def _states(reader: ReelReader, frames: range) -> list[Chunk]:
-    groups = [group for group in reader.groups if group.first_frame < frames.stop]
-    groups = [group for group in groups if group.first_frame + group.frame_count > frames.start]
-    named = {number for group in groups for number in group.depends_on}
+    some = [g for g in reader.groups if g.first_frame < frames.stop and g.first_frame + g.frame_count > frames.start]
+    named = {number for group in some for number in group.depends_on}
     return [reader.chunks[number] for number in named if reader.chunks[number].kind == ChunkKind.STATIC]
 
 
