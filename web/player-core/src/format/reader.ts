@@ -90,7 +90,7 @@ export class Head {
     const metadata = metadataOf(header.metadata);
     const frames = index.chunks.reduce((sum, entry) => sum + (entry.kind === ChunkKind.GROUP && entry.track === 0 ? entry.frames : 0), 0);
     const edit = editOf(metadata, unpack(Preamble, data)[0].flags, frames);
-    return new Head(header, chunksOf(index, size, -edit.first), metadata, edit);
+    return new Head(header, chunksOf(index, size, 0 - edit.first), metadata, edit);
   }
 
   /** Bytes of the whole file. */
