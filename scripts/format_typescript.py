@@ -8,7 +8,7 @@ from enum import IntEnum
 
 from meshreel.format.budget import LIMITS
 from meshreel.format.kinds import Array, Blob, Bytes, Choice, Kind, List, Number, Rest, Text, Varint
-from meshreel.format.layout import MAGIC, VERSION
+from meshreel.format.layout import EDITED, MAGIC, VERSION
 from meshreel.format.records import Nested, record_fields
 
 HEAD = """\
@@ -28,7 +28,11 @@ def typescript(records: Sequence[type]) -> str:
     for record in records:
         _declare(record, enumerations, done)
     magic = ", ".join(str(byte) for byte in MAGIC)
-    parts = [HEAD, f"export const MAGIC = [{magic}] as const;\nexport const VERSION = {VERSION};\n"]
+    parts = [
+        HEAD,
+        f"export const MAGIC = [{magic}] as const;\n",
+        f"export const VERSION = {VERSION};\nexport const EDITED = {EDITED};\n",
+    ]
     parts.append(_constants("LIMITS", {_camel(name): value for name, value in asdict(LIMITS).items()}))
     parts += [
         _constants(values.__name__, {value.name: value.value for value in values}) for values in enumerations.values()

@@ -86,6 +86,7 @@ def test_the_promised_names_are_these():
         "SequenceOptions",
         "Video",
         "as_sequence",
+        "edit",
         "encode",
         "open",
         "open_sequence",
@@ -95,8 +96,10 @@ def test_the_promised_names_are_these():
     assert all(getattr(meshreel, name) is not None for name in meshreel.__all__)
 
 
-def test_dir_lists_the_promised_names_and_only_these():
-    assert dir(meshreel) == sorted(meshreel.__all__)
+def test_dir_lists_the_promised_names_and_what_every_module_has():
+    assert [name for name in dir(meshreel) if not name.startswith("_")] == sorted(meshreel.__all__)
+    assert {"__version__", "__doc__", "__file__"} <= set(dir(meshreel))
+    assert not [name for name in dir(meshreel) if name.startswith("_") and not name.startswith("__")]
 
 
 def test_a_name_that_is_not_promised_is_an_attribute_error():

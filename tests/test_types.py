@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -109,6 +111,80 @@ def test_copies_and_meshes_of_other_libraries_may_be_written_to():
         other.vertices[0] = 5
     assert mesh.vertices[0].tolist() == [0, 0, 0]
     assert np.asarray(mesh.to_open3d().triangles).tolist() == [[0, 1, 2]]
+
+
+COLORED = replace(TRIANGLE, colors=np.array([[255, 0, 0], [0, 255, 0], [10, 20, 30]], np.uint8))
+
+
+def to_trimesh(mesh: Mesh) -> object:
+    return mesh.to_trimesh()
+
+
+def to_scene(mesh: Mesh) -> object:
+    """A scene of trimesh in which the mesh has a place of its own."""
+    trimesh = pytest.importorskip("trimesh")
+    scene = trimesh.Scene()
+    placed = mesh.at(mesh.vertices - 1).to_trimesh()
+    scene.add_geometry(placed, transform=trimesh.transformations.translation_matrix([1, 1, 1]))
+    return scene
+
+
+def to_open3d(mesh: Mesh) -> object:
+    pytest.importorskip("open3d", reason="needs the extra encode")
+    return mesh.to_open3d()
+
+
+def to_open4d(mesh: Mesh) -> object:
+    """What a frame of Open4D has: `geometry` with `positions`, `triangles` and colours as fractions of 1."""
+    colors = None if mesh.colors is None else (mesh.colors / 255).astype(np.float32)
+    geometry = SimpleNamespace(positions=mesh.vertices.astype(np.float32), triangles=mesh.faces.astype(np.uint32))
+    geometry.colors = colors
+    return SimpleNamespace(frame_index=0, timestamp=0.0, geometry=geometry)
+
+
+@pytest.mark.parametrize("mesh", [TRIANGLE, COLORED])
+@pytest.mark.parametrize("convert", [to_trimesh, to_scene, to_open3d, to_open4d])
+def test_meshes_of_other_libraries_come_back_as_they_went(convert, mesh: Mesh):
+    (back,) = as_sequence([convert(mesh)])
+    assert back.vertices.tolist() == mesh.vertices.tolist() and back.faces.tolist() == mesh.faces.tolist()
+    assert back.vertices.dtype == np.float64 and back.faces.dtype == np.int32
+    assert (back.colors is None) == (mesh.colors is None)
+    if mesh.colors is not None:
+        assert np.array_equal(back.colors, mesh.colors) and back.colors.dtype == np.uint8
+
+
+@pytest.mark.parametrize("mesh", [TRIANGLE, COLORED])
+def test_pyvista_gets_vertices_faces_and_colors(mesh: Mesh):
+    pytest.importorskip("pyvista", reason="pyvista is not installed")
+    found = mesh.to_pyvista()
+    assert np.asarray(found.points).tolist() == mesh.vertices.tolist()
+    assert found.regular_faces.tolist() == mesh.faces.tolist()
+    assert ("RGB" in found.point_data) == (mesh.colors is not None)
+    found.points[0] = 9
+    assert mesh.vertices[0].tolist() == [0, 0, 0]
+    assert mesh.colors is None or np.array_equal(found.point_data["RGB"], mesh.colors)
+
+
+def test_pyvista_missing_is_named(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setitem(sys.modules, "pyvista", None)
+    with pytest.raises(ImportError, match="pip install pyvista"):
+        TRIANGLE.to_pyvista()
+
+
+def test_a_sequence_that_knows_its_frame_rate_keeps_it():
+    class Frames(list):
+        fps = 24.0
+
+    assert as_sequence(Frames([to_open4d(TRIANGLE)])).frame_rate == 24
+    assert as_sequence(Frames([TRIANGLE]), 10.0).frame_rate == 10
+    assert as_sequence([TRIANGLE]).frame_rate == 30
+
+
+def test_colors_that_are_not_those_of_the_vertices_are_refused():
+    wrong = to_open4d(TRIANGLE)
+    wrong.geometry.colors = np.zeros((2, 3))
+    with pytest.raises(InputError, match=r"frame 0: colours of shape \(2, 3\); give 3 x 3"):
+        as_sequence([wrong])
 
 
 def test_open3d_missing_names_the_extra(monkeypatch: pytest.MonkeyPatch):

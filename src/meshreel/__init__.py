@@ -13,6 +13,7 @@ from .errors import FormatError, InputError, MeshreelError
 
 if TYPE_CHECKING:
     from .decoder.video import Video, open
+    from .encoder import edit
     from .encoder.options import EncoderOptions
     from .encoder.presets import preset_options
     from .encoder.sequence import encode
@@ -32,6 +33,7 @@ __all__ = [
     "SequenceOptions",
     "Video",
     "as_sequence",
+    "edit",
     "encode",
     "open",
     "open_sequence",
@@ -44,6 +46,7 @@ _LATER = {
     **dict.fromkeys(("Mesh", "MeshList", "MeshSequence", "as_sequence"), ".types"),
     "EncoderOptions": ".encoder.options",
     "SequenceOptions": ".io.sequence",
+    "edit": ".encoder.edit",
     "encode": ".encoder.sequence",
     "open_sequence": ".io.sequence",
     "preset_options": ".encoder.presets",
@@ -54,11 +57,12 @@ def __getattr__(name: str) -> Any:
     if name not in _LATER:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     try:
-        return getattr(import_module(_LATER[name], __name__), name)
+        module = import_module(_LATER[name], __name__)
+        return module if _LATER[name].endswith(f".{name}") else getattr(module, name)
     except ModuleNotFoundError as error:
         raise ImportError(f"meshreel.{name} needs the extra `encode`: pip install 'meshreel[encode]'") from error
 
 
 def __dir__() -> list[str]:
-    """List the promised names and no others: modules below may change without notice."""
-    return sorted(__all__)
+    """List the promised names and what every module has; modules below may change without notice."""
+    return sorted({*__all__, *(name for name in globals() if name.startswith("__"))})

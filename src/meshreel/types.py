@@ -6,7 +6,7 @@ Coordinates are float64 in memory, so that geo-referenced captures (around 1e6) 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, Literal, Protocol, get_args, runtime_checkable
 
@@ -34,7 +34,7 @@ GREY = 128  # red, green and blue of a surface without colours beside one with c
 class Texture:
     """A picture in sRGB that is decoded when its pixels are asked for; InputError where its file cannot be used."""
 
-    read: Callable[[], UInt8[np.ndarray, "H W 3"]]
+    read: Callable[[], UInt8[np.ndarray, "H W 3"]] = field(repr=False)
     size: tuple[int, int] | None = None  # rows and columns, where they are known before the picture is decoded
 
     @staticmethod
@@ -56,11 +56,11 @@ class Texture:
         return self.read()
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Mesh:
     """A triangle mesh, which may have no faces and no vertices (an empty frame), and may have colours.
 
-    The arrays of decoded meshes are read-only; those of `copy()` are not.
+    The arrays of the parts of a decoded frame are read-only; those of whole frames and of `copy()` are not.
     """
 
     vertices: Float64[np.ndarray, "V 3"]  # m, right-handed
@@ -140,12 +140,38 @@ class Mesh:
         uv = None if self.uv is None else self.uv.copy()
         return Mesh(self.vertices.copy(), self.faces.copy(), colors, uv, self.texture)
 
+    def __repr__(self) -> str:
+        facts = [f"{len(self.vertices)} vertices", f"{len(self.faces)} faces"]
+        if len(self.vertices):
+            low, high = self.box
+            facts += [" x ".join(f"{size:.3g}" for size in high - low) + " m"]
+        facts += [name for name, given in (("colours", self.colors), ("texture", self.texture)) if given is not None]
+        return f"<meshreel.Mesh: {', '.join(facts)}>"
+
     def to_trimesh(self) -> trimesh.Trimesh:
         """Return a copy as a `trimesh.Trimesh`, with the same vertices in the same order and their colours."""
         import trimesh
 
         mesh = self.copy()
         return trimesh.Trimesh(mesh.vertices, mesh.faces, vertex_colors=mesh.colors, process=False)
+
+    def _repr_png_(self) -> bytes | None:
+        """Return a picture for notebooks, None for a mesh without faces."""
+        from .geometry.picture import picture
+
+        return None if self.is_empty else picture(self)
+
+    def to_pyvista(self) -> Any:
+        """Return a copy as a `pyvista.PolyData`, its colours as the point data `RGB`. Raises ImportError without it."""
+        try:
+            import pyvista
+        except ImportError as error:
+            raise ImportError("Mesh.to_pyvista needs the package pyvista: pip install pyvista") from error
+        mesh = self.copy()
+        found = pyvista.PolyData.from_regular_faces(mesh.vertices, mesh.faces)
+        if mesh.colors is not None:
+            found.point_data["RGB"] = mesh.colors
+        return found
 
     def to_open3d(self) -> Any:
         """Return a copy as an `open3d.geometry.TriangleMesh`. Raises ImportError without the extra `encode`."""
@@ -205,8 +231,11 @@ class MeshSequence(Frames, Protocol):
     def frame_rate(self) -> float:
         """Frames per second, 1/s."""
 
+    def __repr__(self) -> str:
+        return f"<meshreel.{type(self).__name__}: {len(self)} frames, {self.frame_rate:g} frames/s>"
 
-@dataclass(frozen=True, slots=True)
+
+@dataclass(frozen=True, slots=True, repr=False)
 class MeshList(MeshSequence):
     """A MeshSequence of meshes that are in memory."""
 
@@ -221,25 +250,31 @@ class MeshList(MeshSequence):
         return self.meshes[index]
 
 
-def as_sequence(value: object, frame_rate: float = 30.0) -> MeshSequence:
+def as_sequence(value: object, frame_rate: float | None = None) -> MeshSequence:
     """Return `value` if it is a MeshSequence, otherwise a MeshList of its items at `frame_rate` (1/s).
 
-    An item is a Mesh, an object with `vertices` and `faces` (trimesh) or `triangles` (Open3D), or a pair of arrays
-    (vertices, faces). Raises InputError for any other value; the message names the frame.
+    An item is a Mesh, a mesh or scene of trimesh, a mesh of Open3D, a frame of Open4D, or a pair of arrays (vertices,
+    faces). Colours of vertices are kept. Without a frame rate it is the `fps` of `value`, as Open4D's sequences have
+    it, or 30. Raises InputError for any other value; the message names the frame.
     """
     if isinstance(value, MeshSequence):
         return value
     if isinstance(value, str | bytes) or not isinstance(value, Iterable):
         remedy = "give a list of meshes, or meshreel.open_sequence(path)"
         raise InputError(f"{type(value).__name__} {str(value)[:60]!r} is no sequence of meshes; {remedy}")
-    return MeshList(tuple(_as_mesh(item, f"frame {number}") for number, item in enumerate(value)), frame_rate)
+    rate = float(getattr(value, "fps", None) or 30.0) if frame_rate is None else frame_rate
+    return MeshList(tuple(_as_mesh(item, f"frame {number}") for number, item in enumerate(value)), rate)
 
 
 def _as_mesh(item: object, where: str) -> Mesh:
     if isinstance(item, Mesh):
         return item
+    if hasattr(item, "to_mesh"):  # a scene of trimesh: all its meshes, in their places
+        item = item.to_mesh()
+    item = getattr(item, "geometry", item)  # of a frame of Open4D
     faces = getattr(item, "faces", getattr(item, "triangles", None))
-    pair = item if isinstance(item, tuple | list) else (getattr(item, "vertices", None), faces)
+    vertices = getattr(item, "vertices", getattr(item, "positions", None))
+    pair = item if isinstance(item, tuple | list) else (vertices, faces)
     if len(pair) != 2 or pair[0] is None or pair[1] is None:
         remedy = "give a Mesh, a trimesh or Open3D mesh, or a pair (vertices, faces)"
         raise InputError(f"{where}: {type(item).__name__} {str(item)[:60]!r} is no mesh; {remedy}")
@@ -249,7 +284,21 @@ def _as_mesh(item: object, where: str) -> Mesh:
     if corners.size and not 0 <= corners.min() <= corners.max() < len(vertices):
         wrong = corners.min() if corners.min() < 0 else corners.max()
         raise InputError(f"{where}: a face refers to vertex {wrong}, but there are {len(vertices)} (from 0)")
-    return Mesh.of(vertices, corners)
+    return replace(Mesh.of(vertices, corners), colors=_colors_of(item, len(vertices), where))
+
+
+def _colors_of(item: object, count: int, where: str) -> UInt8[np.ndarray, "V 3"] | None:
+    """Return colours of vertices: those of trimesh are bytes, those of Open3D and Open4D fractions of 1."""
+    visual = getattr(item, "visual", None)
+    given = getattr(item, "vertex_colors", getattr(item, "colors", ()))
+    found = np.asarray(given if visual is None else visual.vertex_colors if visual.kind == "vertex" else ())
+    if found.size == 0 or found.dtype == object:
+        return None
+    if found.ndim != 2 or found.shape[0] != count or found.shape[1] not in (3, 4):
+        raise InputError(f"{where}: colours of shape {found.shape}; give {count} x 3, one of each vertex")
+    if found.dtype.kind == "f":
+        found = (255 * np.clip(found, 0, 1)).round()
+    return np.ascontiguousarray(found[:, :3], np.uint8)
 
 
 def _rows_of_three(values: object, what: str) -> np.ndarray:

@@ -98,7 +98,7 @@ def test_files_that_no_survey_unites_are_refused(run, slide, surveyed, tmp_path)
     assert failed(run("concat", first, other, *out), "b.reel: origin", "meshreel survey")
     finer = part(run, slide, surveyed, "d.reel", "--frames", "2:4", "--quality", "60")
     assert failed(run("concat", first, finer, *out), "d.reel: differs from", "quality 50.0, now 60.0", "same options")
-    assert failed(run("concat", SCENE, *out), "scene.reel: is a scene")
+    assert failed(run("concat", SCENE, *out), "scene.reel: its metadata are not those of meshreel encode")
     quicker = part(run, slide, surveyed, "f.reel", "--frames", "2:4", "--effort", "fast")
     assert failed(run("concat", first, quicker, *out), "f.reel: differs from", "options", "same options")
     damaged = part(run, slide, surveyed, "g.reel", "--frames", "2:4").read_bytes()[:-1] + b"?"

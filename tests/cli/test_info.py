@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 
 import meshreel
@@ -155,3 +156,33 @@ def test_what_was_recorded_cannot_steer_a_terminal(run, tmp_path):
         writer.add_group(0, 1, encode_empty())
     said = run("info", tmp_path / "a.reel")
     assert said.code == 0 and "recorded at encode: tool a\\x1b[31m\\nb\n" in said.out
+
+
+def test_box_duration_mesh_layers_and_colour_are_shown_first(run):
+    lines = run("info", SCENE).out.splitlines()
+    assert "14 frames at 25/s, 0.56 s" in lines[0]
+    first = meshreel.open(SCENE)[0]
+    low, high = meshreel.open(SCENE).box
+    box = " x ".join(f"{size:.3g}" for size in high - low)
+    assert f"box {box} m, y is up; frame 0: {len(first.vertices)} vertices, {len(first.faces)} faces" in lines[1]
+    assert "3 layers; colour: none" in lines[1]
+    assert "colour: vertices, textures (AV1)" in run("info", GOLDEN / "colored" / "scene.reel").out
+    nothing = run("info", GOLDEN / "empty.reel")
+    assert nothing.code == 0 and "no surface found" in nothing.out
+
+
+def test_a_long_file_fits_on_a_screen_unless_all_groups_are_asked_for(run, tmp_path):
+    payload = meshreel.open(FILE).reader.read_chunk(2)
+    header = replace(HEADER, metadata=json.dumps({"key_frames": [*range(500)]}))
+    with ReelWriter(tmp_path / "a.reel", header) as writer:
+        for first in range(0, 60, 3):
+            for track in range(20):
+                writer.add_group(first, 3, payload if first % 2 or not track else encode_empty(), track=track)
+    short, long = run("info", tmp_path / "a.reel"), run("info", tmp_path / "a.reel", "--groups")
+    assert len(short.out.splitlines()) < 60 < 400 < len(long.out.splitlines())
+    assert "392 more: --groups shows all" in short.out and "12 more: --groups shows all" in short.out
+    assert "more: --groups" not in long.out and "track 19: " in long.out and "track 19: " not in short.out
+    assert "499" in long.out and "499" not in short.out
+    assert sum(run("info", tmp_path / "a.reel", "--json").row["bytes_by_content"].values()) == (
+        (tmp_path / "a.reel").stat().st_size
+    )

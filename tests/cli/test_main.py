@@ -37,6 +37,14 @@ def test_an_unknown_command_is_reported(run):
     assert failed(run("encod"), "encod")
 
 
+@pytest.mark.parametrize(
+    ("typed", "meant"), [("enc", "encode"), ("encdoe", "encode"), ("ex", "export"), ("s", "segment or survey or serve")]
+)
+def test_a_beginning_or_a_slip_suggests_the_command(run, typed, meant):
+    assert failed(run(typed), f"Did you mean {meant}?")
+    assert failed(run("xyz"), 'Unknown command "xyz". Commands: capture')
+
+
 def test_ctrl_c_exits_with_130_and_prints_one_line(run, monkeypatch):
     def interrupted(_):
         raise KeyboardInterrupt

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import io
+import sys
 import threading
 from collections.abc import Callable, Iterator
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
@@ -9,12 +11,29 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 import pytest
 
 import meshreel
+from meshreel.coding.intra import encode_intra
 from meshreel.container.http import HttpSource
 from meshreel.container.reader import FIRST_REQUEST
+from meshreel.container.writer import ReelWriter
 from meshreel.errors import FormatError, InputError
+from meshreel.format.layout import Header
 from tests.golden import GOLDEN, frame_record
+from tests.metrics.shapes import sphere
 
 DATA = (GOLDEN / "scene.reel").read_bytes()
+HEADER = Header(30.0, (0.0, 0.0, 0.0), 1.0, (-0.5,) * 3, (0.5,) * 3, "{}")
+
+
+def groups_file(count: int) -> bytes:
+    """A file of `count` groups of one frame, each of some kB."""
+    file = io.BytesIO()
+    with ReelWriter(file, HEADER) as writer:
+        for number in range(count):
+            writer.add_group(number, 1, encode_intra([sphere(0.4 + 0.01 * number)], 1e-4, 0))
+    return file.getvalue()
+
+
+LARGE = groups_file(8)
 LONG = bytes(range(256)) * (FIRST_REQUEST // 64)  # four first requests
 
 
@@ -94,6 +113,37 @@ def test_a_server_without_ranges_is_asked_once(serve):
     source = HttpSource(server.url)
     assert source.get_bytes(FIRST_REQUEST, 1000) == LONG[FIRST_REQUEST : FIRST_REQUEST + 1000]
     assert len(server.asked) == 1
+
+
+@pytest.mark.parametrize("ranges", [True, False])
+def test_the_bytes_that_came_are_told_those_of_a_seek_among_them(serve, ranges):
+    data = LARGE
+    with meshreel.open(serve(data, ranges).url) as video:
+        head = video.bytes_read
+        assert head == (min(FIRST_REQUEST, len(data)) if ranges else len(data))
+        last = frame_record(video[-1])
+        group = video.reader.groups[-1]
+        beyond = group.size if ranges and group.end > FIRST_REQUEST else 0
+        assert video.bytes_read == head + beyond
+    assert last == frame_record(meshreel.open(data)[-1])
+
+
+def test_a_store_is_read_by_ranges_and_its_errors_name_the_url():
+    system = pytest.importorskip("fsspec").filesystem("memory")
+    system.pipe("/reels/a.reel", LARGE)
+    with meshreel.open("memory://reels/a.reel") as video:
+        assert frame_record(video[-1]) == frame_record(meshreel.open(LARGE)[-1])
+        assert 0 < video.bytes_read < len(LARGE) and video.path == "memory://reels/a.reel"
+    with pytest.raises(InputError, match=r"memory://reels/b.reel: cannot be read \(FileNotFoundError"):
+        meshreel.open("memory://reels/b.reel")
+    with pytest.raises(InputError, match=r"nowhere://b.reel: cannot be read \(ValueError: Protocol not known"):
+        meshreel.open("nowhere://b.reel")
+
+
+def test_a_store_without_fsspec_names_the_extra(monkeypatch):
+    monkeypatch.setitem(sys.modules, "fsspec.core", None)
+    with pytest.raises(InputError, match=r"pip install 'meshreel\[remote\]'"):
+        meshreel.open("s3://bucket/a.reel")
 
 
 def test_a_server_that_stops_answering_by_range_is_an_input_error(serve):

@@ -113,19 +113,24 @@ def test_a_file_of_one_sequence_has_one_track_and_no_background():
     video = meshreel.open(GOLDEN / "mixed.reel")
     assert len(video.tracks) == 1 and not video.reader.has_background and video.reader.has_moving
     assert list(video.parts(3)) == ["track 0"]
-    assert video[3] is video.parts(3)["track 0"] is video.moving(3) is video.tracks[0][3]
+    assert video.parts(3)["track 0"] is video.tracks[0][3]
+    assert frame_record(video[3]) == frame_record(video.moving(3)) == frame_record(video.tracks[0][3])
     assert video.background(3).is_empty
     nothing = meshreel.open(GOLDEN / "empty.reel")
     assert not nothing.reader.has_background and not nothing.reader.has_moving
 
 
-def test_nothing_that_a_scene_gives_can_be_written_to():
+def test_parts_of_a_scene_cannot_be_written_to_and_its_frames_belong_to_the_caller():
     video = meshreel.open(SCENE)
     for frame in range(COUNT):
-        for mesh in (video[frame], video.moving(frame), *video.parts(frame).values()):
+        for mesh in (video.background(frame), *video.parts(frame).values()):
             for array in (mesh.vertices, mesh.faces):
                 with pytest.raises(ValueError, match="read-only"):
                     array += 1
+        for mesh in (video[frame], video.moving(frame)):
+            mesh.vertices[:] += 1.0
+            mesh.faces[:] = 0
+        assert frame_record(video[frame]) == WHOLE[frame]
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -364,7 +369,7 @@ def scene_of(*states: tuple[bytes, tuple[int, ...]]) -> bytes:
 def test_a_room_without_anybody_is_its_background_in_metres():
     video = meshreel.open(scene_of((encode_background(icosahedron(1), 0.001), ())))
     wanted = Placement(HEADER.scale, HEADER.origin).of(icosahedron(1))
-    assert video[0] is video[2] is video.background(1)
+    assert video.background(0) is video.background(1) and frame_record(video[0]) == frame_record(video[2])
     gaps = np.abs(video[0].vertices[:, None] - wanted.vertices[None]).max(axis=2).min(axis=1)
     assert gaps.max() <= 0.001 * HEADER.scale
     assert video.moving(0).is_empty and not video.reader.has_moving and video.reader.has_background

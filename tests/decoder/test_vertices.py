@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import io
+
 import numpy as np
 import pytest
 
 import meshreel
+from meshreel.coding.intra import encode_intra
+from meshreel.container.writer import ReelWriter
 from meshreel.errors import InputError
-from tests.decoder.test_chains import COUNT, DATA, EMPTY
+from meshreel.types import Mesh
+from tests.decoder.test_chains import COUNT, DATA, EMPTY, HEADER
 from tests.golden import GOLDEN
 
 MOVING = COUNT - EMPTY
@@ -61,6 +66,18 @@ def test_an_array_for_other_meshes_is_refused():
 def test_a_frame_of_another_size_is_named():
     with pytest.raises(InputError, match=f"frame {MOVING} has 0 vertices"):
         meshreel.open(DATA).vertices(0, COUNT)
+
+
+def test_vertices_that_are_no_longer_the_same_are_refused_though_as_many():
+    corners, file = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0.5, 0.5, 0.5]], io.BytesIO()
+    pyramid = [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]]
+    frames = [Mesh.of(corners, pyramid), Mesh.of(corners, pyramid[:3])]
+    with ReelWriter(file, HEADER) as writer:
+        writer.add_group(0, 2, encode_intra(frames, 0.001, 0))
+    video = meshreel.open(file.getvalue())
+    assert len(video[0].vertices) == len(video[1].vertices)
+    with pytest.raises(InputError, match="frame 1 has other vertices than frame 0"):
+        video.vertices(0, 2)
 
 
 @pytest.mark.parametrize(("first", "last"), [(-1, 1), (0, COUNT + 1), (2, 2)])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 from contextlib import suppress
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -19,6 +20,7 @@ from meshreel.decoder.tracks import Track
 from meshreel.errors import FormatError, InputError
 from meshreel.format.layout import AnchorRule, DisplacementHead, Form, LaplacianGroup
 from meshreel.format.records import pack
+from meshreel.types import Mesh, MeshList, Texture
 from tests.golden import GOLDEN, frame_record
 
 MIXED = (GOLDEN / "mixed.reel").read_bytes()  # empty 0-1, laplacian 2-5, draco 6-8, empty 9
@@ -89,11 +91,31 @@ def test_a_video_is_a_sequence_of_meshes():
 def test_what_a_video_keeps_cannot_be_changed_from_outside():
     for name in ("mixed", "layers", "layers_patched"):
         video = meshreel.open(GOLDEN / f"{name}.reel")
-        for number, mesh in enumerate(video):
+        for number, mesh in enumerate(video.tracks[0]):
             for array in (mesh.vertices, mesh.faces):
                 with pytest.raises(ValueError, match="read-only"):
                     array += 1
-            assert video[number] is mesh  # it is given again
+            assert video.tracks[0][number] is mesh  # it is given again
+            own, before = video[number], frame_record(mesh)
+            own.vertices[:] += 1.0
+            own.faces[:] = 0
+            assert frame_record(video[number]) == before
+
+
+def test_open3d_takes_the_arrays_of_a_frame():
+    utility = pytest.importorskip("open3d").utility
+    mesh = meshreel.open(MIXED)[1]
+    assert len(utility.Vector3dVector(mesh.vertices)) == len(mesh.vertices)
+    assert len(utility.Vector3iVector(mesh.faces)) == len(mesh.faces)
+
+
+def test_a_mesh_and_a_sequence_say_what_they_are():
+    mesh = Mesh.of([[0, 0, 0], [2, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+    assert repr(mesh) == "<meshreel.Mesh: 3 vertices, 1 faces, 2 x 1 x 0 m>"
+    assert repr(Mesh.empty()) == "<meshreel.Mesh: 0 vertices, 0 faces>"
+    painted = replace(mesh, colors=np.zeros((3, 3), np.uint8), texture=Texture.of(np.zeros((4, 8, 3), np.uint8)))
+    assert repr(painted).endswith("2 x 1 x 0 m, colours, texture>") and len(repr(painted.texture)) < 60
+    assert repr(MeshList((mesh,) * 600, 25.0)) == "<meshreel.MeshList: 600 frames, 25 frames/s>"
 
 
 def test_slices_and_negative_indices_are_those_of_a_list():

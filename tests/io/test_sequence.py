@@ -262,3 +262,36 @@ def test_the_up_axis_is_the_one_that_capture_recorded(tmp_path, record, up):
         (tmp_path / CAPTURED).write_text(record)
     assert open_sequence(tmp_path).up == up
     assert open_sequence([tmp_path / "frame_00000.ply"]).up == "y"
+
+
+def warnings_of(folder, *meshes, names=None, **options):
+    """Warnings of a folder of meshes, all of which are read."""
+    for number, mesh in enumerate(meshes):
+        write_mesh(mesh, folder / f"frame_{names[number] if names else number:03}.ply")
+    sequence = open_sequence(folder, SequenceOptions(**options))
+    for _ in sequence:
+        pass
+    return sequence.warnings
+
+
+def test_a_person_900_m_tall_and_one_of_a_millimetre_are_pointed_out_and_the_scale_mends_it(tmp_path):
+    tall = Mesh.of([[0, 0, 0], [0, 900, 0], [300, 0, 0]], [[0, 1, 2]])
+    (warning,) = warnings_of(tmp_path, tall, tall)
+    assert "is 949 m from corner to corner" in warning
+    assert "--scale 0.001 if it is in millimetres" in warning
+    assert warnings_of(tmp_path, tall, tall, scale=0.001) == ()
+    (small,) = warnings_of(tmp_path, tall, tall, scale=1e-6)
+    assert "is 0.000949 m from corner to corner" in small
+
+
+def test_gaps_in_the_numbers_and_empty_frames_are_pointed_out(tmp_path):
+    mesh = Mesh.of([[0, 0, 0], [0, 1, 0], [1, 0, 0]], [[0, 1, 2]])
+    gaps, empty = warnings_of(tmp_path, mesh, mesh, Mesh.empty(), mesh, Mesh.empty(), names=[3, 4, 5, 8, 11])
+    assert "4 frames are missing between the file names, the first between 5 and 8" in gaps
+    assert empty == "2 frames are empty (the first: frame 2): nothing is shown there"
+
+
+def test_every_third_number_is_no_gap_and_one_empty_frame_is_named(tmp_path):
+    mesh = Mesh.of([[0, 0, 0], [0, 1, 0], [1, 0, 0]], [[0, 1, 2]])
+    (empty,) = warnings_of(tmp_path, mesh, Mesh.empty(), mesh, mesh, names=[0, 3, 6, 9])
+    assert empty == "1 frame is empty (the first: frame 1): nothing is shown there"

@@ -14,6 +14,7 @@ import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from difflib import get_close_matches
 from types import FrameType
 from typing import TYPE_CHECKING, NoReturn
 
@@ -35,16 +36,24 @@ COMMANDS = {
     "segment": "Label which faces of a scene move, and with which body.",
     "survey": "Survey a sequence once, for encodes of its parts on many machines.",
     "encode": "Encode a sequence of meshes into one .reel file.",
+    "cut": "Write some frames of a .reel file, without encoding them again.",
     "concat": "Join .reel files that are parts of one sequence, without encoding them again.",
+    "retime": "Write a .reel file that plays at another frame rate or speed.",
+    "transform": "Write a .reel file in another place, size or orientation.",
+    "tag": "Write a .reel file with other metadata, as a title.",
     "decode": "Decode a .reel file into a directory of meshes.",
     "export": "Write a .reel file as one animated file, GLB or USD, that other programs play.",
     "info": "Show the rate by content, tracks over time, groups and forms, and what the encoder recorded.",
     "compare": "Compare original meshes with decoded ones by every metric, and print the rate of a .reel file.",
     "play": "Play a .reel file in a browser, on this machine or on a headset.",
     "serve": "Serve a folder of .reel files: a gallery, and a page that plays each.",
+    "player": "Copy the player's files for a web server.",
     "demo": "Make a short capture of moving people, encode it, and measure the result.",
+    "doctor": "Tell what is installed, and what this machine can do with it.",
+    "completion": "Print the script by which a shell completes commands and flags.",
 }
-BENCH = "Measure codecs against each other (a distribution of its own: pip install meshreel-bench)."
+EDITS = ("cut", "concat", "retime", "transform", "tag")  # which share a module
+BENCH = "Measure codecs against each other."
 
 
 PLAY_NEEDS = ("starlette", "uvicorn", "trustme")  # packages of the extra `play`; all others are of `encode`
@@ -57,21 +66,26 @@ class Terminated(BaseException):
 PLUGINS = "meshreel.commands"  # entry points by which other distributions add commands: meshreel-bench adds `bench`
 
 
-def make_app() -> App:
+def place_of(name: str) -> str:
+    """Return module and function of a command."""
+    return f"meshreel.cli.edits:{name}" if name in EDITS else f"meshreel.cli.{name}:command"
+
+
+def make_app(names: Sequence[str] = tuple(COMMANDS)) -> App:
     """Return the parser of the command line, with the commands that other distributions add."""
     from importlib.metadata import entry_points
 
     from cyclopts import App
 
+    from .examples import epilogue
+
     help = "Compression of time-varying meshes."
     app = App(name="meshreel", help=help, version=__version__, suppress_keyboard_interrupt=False)
-    for name, text in COMMANDS.items():
-        app.command(f"meshreel.cli.{name}:command", name=name, help=text)
+    for name in names:
+        app.command(place_of(name), name=name, help=COMMANDS[name], help_epilogue=epilogue(name))
     added = {entry.name: entry.value for entry in entry_points(group=PLUGINS) if entry.name not in COMMANDS}
     for name, where in added.items():
         app.command(where, name=name, help=BENCH)
-    if "bench" not in added:
-        app.command("meshreel.cli.no_bench:command", name="bench", help=BENCH)
     return app
 
 
@@ -127,7 +141,7 @@ def _noted(text: str, error: BaseException) -> str:
 def _text_of(error: Exception) -> str:
     from concurrent.futures.process import BrokenProcessPool
 
-    from cyclopts import CycloptsError, MissingArgumentError
+    from cyclopts import CycloptsError, MissingArgumentError, UnknownCommandError
 
     if isinstance(error, ImportError) and isinstance(error.__cause__, ModuleNotFoundError):
         error = error.__cause__  # raised by the import of the command's module
@@ -137,6 +151,8 @@ def _text_of(error: Exception) -> str:
         return f"{error.name} is missing; install it with: pip install 'meshreel[{extra}]'"
     if isinstance(error, MissingArgumentError) and error.argument is not None:
         return _missing(error, " ".join(["meshreel", *(error.command_chain or ())]))
+    if isinstance(error, UnknownCommandError) and error.unused_tokens:
+        return _unknown(error.unused_tokens[0])
     if isinstance(error, CycloptsError):
         return f"{text} (see meshreel --help)"
     if isinstance(error, BrokenProcessPool):
@@ -148,6 +164,16 @@ def _text_of(error: Exception) -> str:
     if isinstance(error, (MeshreelError, OSError)):
         return text
     return f"{type(error).__name__}: {text}; this is a fault of meshreel: please report it with the output of --debug"
+
+
+def _unknown(name: str) -> str:
+    """Name a command that does not exist, and those that it begins, or is like."""
+    if name == "bench":
+        return "the bench is a distribution of its own; install it with: pip install meshreel-bench"
+    names = [*COMMANDS, "bench"]
+    near = [known for known in names if known.startswith(name)] or get_close_matches(name, names)
+    meant = f" Did you mean {' or '.join(near)}?" if near else ""
+    return f'Unknown command "{name}".{meant} Commands: {", ".join(names)} (see meshreel --help)'
 
 
 def _missing(error: MissingArgumentError, command: str) -> str:

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
+from cyclopts import Parameter
 from rich.table import Table
 
 from ..coding.group import payload_bytes_by_purpose
 from ..container.reader import Chunk, ReelReader
 from ..container.sources import FileSource
+from ..decoder.video import Video
 from ..errors import FormatError
 from ..format.layout import ChunkKind, Form
 from .console import Common
@@ -25,24 +28,50 @@ COMPANION_NAMES = {
 }
 
 
-def command(file: Path, /, *, common: Common = Common()) -> None:
-    """Show the rate by content, the tracks over time, the groups and their forms, and what the encoder recorded.
+MOST = 8  # rows of a table without --groups: all of them fit on a screen (guess)
+MOST_CONTENTS = 24  # rows of contents; where there are more, tracks are added up
+_LONGEST = 80  # characters of a value that the encoder recorded
+
+
+def command(
+    file: Path, /, *, groups: Annotated[bool, Parameter(negative="")] = False, common: Common = Common()
+) -> None:
+    """Show what is in a file: duration, box, vertices, rate by content, tracks, and what the encoder recorded.
 
     Parameters
     ----------
     file
         The .reel file.
+    groups
+        Show all groups, tracks and states of the background, however long the file is.
     """
     row = describe_file(file)
     size = f"{row['bytes']} bytes"
     if missing := row["bytes_missing"]:
         size = f"{row['bytes'] - missing} of {size} ({missing} are missing: the file is truncated)"
-    head = f"{file}: {row['frames']} frames at {row['frame_rate']:g}/s, {size}, {row['mbps']:.4g} Mbps"
-    recorded = _printable(", ".join(f"{name} {value}" for name, value in row["metadata"].items()))
-    tables = [rate_table(row), *([_tracks(row), _states(row)] if row["background"] or len(row["tracks"]) > 1 else [])]
-    common.result(row, head, f"recorded at encode: {recorded or 'nothing'}", *tables, _groups(row))
+    length = f"{row['frames']} frames at {row['frame_rate']:g}/s, {row['duration_s']:.4g} s"
+    head = f"{file}: {length}, {size}, {row['mbps']:.4g} Mbps"
+    metadata = {name: str(value) for name, value in row["metadata"].items()}
+    short = {name: text if len(text) <= _LONGEST else f"{text[:_LONGEST]} ..." for name, text in metadata.items()}
+    recorded = _printable(", ".join(f"{name} {text}" for name, text in (metadata if groups else short).items()))
+    is_long, more = len(row["bytes_by_content"]) > MOST_CONTENTS and not groups, None if groups else MOST
+    tables = [rate_table(row | _added_up(row) if is_long else row)]
+    if row["background"] or len(row["tracks"]) > 1:
+        tables += [_tracks(row, more), _states(row, more)]
+    told = f"recorded at encode: {recorded or 'nothing'}"
+    common.result(row, head, _looks(row), told, *tables, _groups(row, more))
     common.warn(f"background: {state['error']}" for state in row["background"] if "error" in state)
     common.warn(f"group {i}: {group['error']}" for i, group in enumerate(row["groups"]) if "error" in group)
+
+
+def _looks(row: dict[str, Any]) -> str:
+    """Describe what is seen in a line: box, mesh, layers, colour."""
+    low, high = row["box_m"]
+    box = " x ".join(f"{end - begin:.3g}" for begin, end in zip(low, high, strict=True))
+    mesh, hidden = row["first_surface"], row["frames_hidden"]
+    what = f"frame {mesh['frame']}: {mesh['vertices']} vertices, {mesh['faces']} faces" if mesh else "no surface found"
+    parts = [f"box {box} m, {row['up']} is up", what, f"{row['layers']} layers", f"colour: {row['color']}"]
+    return "; ".join([*parts, *([f"{hidden} frames more are hidden"] if hidden else [])])
 
 
 def _printable(text: str) -> str:
@@ -64,6 +93,7 @@ def describe_file(file: Path) -> dict[str, Any]:
         groups = [_describe_group(reader, chunk, there) for chunk in reader.groups]
         shown = reader.static_ranges(range(reader.frame_count))
         static = [chunk for chunk in reader.chunks if chunk.kind == ChunkKind.STATIC]
+        surface = _first_surface(reader)
         states = [_describe_state(reader, chunk, there, shown.get(chunk.number, [])) for chunk in static]
     tracks = [_describe_track(reader, number, groups) for number in range(len(reader.tracks))]
     several = len(tracks) > 1
@@ -72,6 +102,13 @@ def describe_file(file: Path) -> dict[str, Any]:
     return {
         "frames": reader.frame_count,
         "frame_rate": reader.frame_rate,
+        "duration_s": reader.duration,
+        "box_m": [corner.tolist() for corner in reader.box],
+        "up": reader.up,
+        "first_surface": surface,
+        "layers": max(group["layers"] for group in groups),
+        "color": _color(reader),
+        "frames_hidden": reader.coded_count - reader.frame_count,
         "bytes": reader.size,
         "bytes_missing": reader.size - there,
         "mbps": megabits(reader.size, reader),
@@ -84,6 +121,26 @@ def describe_file(file: Path) -> dict[str, Any]:
     }
 
 
+def _first_surface(reader: ReelReader) -> dict[str, int] | None:
+    """Return number, vertices and faces of the first frame with a surface that is whole, among the first few."""
+    video = Video(reader).at(colors=False)
+    for frame in range(min(reader.frame_count, MOST)):
+        with suppress(FormatError):
+            if not (mesh := video[frame]).is_empty:
+                return {"frame": frame, "vertices": len(mesh.vertices), "faces": len(mesh.faces)}
+    return None
+
+
+def _color(reader: ReelReader) -> str:
+    kinds = {
+        ChunkKind.COLORS: "vertices",
+        ChunkKind.PICTURES: "textures (AV1)",
+        ChunkKind.COMPATIBLE: "textures (H.264)",
+        ChunkKind.SPLATS: "splats",
+    }
+    return ", ".join(name for kind, name in kinds.items() if any(c.kind == kind for c in reader.chunks)) or "none"
+
+
 def megabits(size: int, reader: ReelReader) -> float:
     """Return the rate of `size` bytes spread over all frames, Mbit/s."""
     return size * 8 * reader.frame_rate / reader.frame_count / 1e6
@@ -92,10 +149,17 @@ def megabits(size: int, reader: ReelReader) -> float:
 def _describe_group(reader: ReelReader, chunk: Chunk, there: int) -> dict[str, Any]:
     """Describe a group of a file of which the first `there` bytes exist."""
     row: dict[str, Any] = {"chunk": chunk.number, "track": chunk.track}
-    row |= {"first_frame": chunk.first_frame, "frames": chunk.frame_count}
+    first, end = _shown(reader, chunk)
+    row |= {"first_frame": first, "frames": end - first}
     row |= {"form": chunk.form_name, "bytes": _size_of(reader, chunk), "layers": len(chunk.layers) - 1}
     row["predicted"] = reader.group_before(chunk) is not None
     return row | _contents(reader, chunk, there, payload_bytes_by_purpose)
+
+
+def _shown(reader: ReelReader, chunk: Chunk) -> tuple[int, int]:
+    """Return the first frame of a group that is shown, and where those end."""
+    first = min(max(chunk.first_frame, 0), reader.frame_count)
+    return first, max(min(chunk.first_frame + chunk.frame_count, reader.frame_count), first)
 
 
 def _size_of(reader: ReelReader, chunk: Chunk) -> int:
@@ -121,7 +185,8 @@ def _describe_state(reader: ReelReader, chunk: Chunk, there: int, shown: Iterabl
 def _describe_track(reader: ReelReader, number: int, groups: list[dict[str, Any]]) -> dict[str, Any]:
     """Describe a track: the frames in which its body appears, and the bytes of its contents."""
     own = [group for group in groups if group["track"] == number]
-    there = [(g.first_frame, g.first_frame + g.frame_count) for g in reader.tracks[number] if g.form != Form.EMPTY]
+    there = [_shown(reader, group) for group in reader.tracks[number] if group.form != Form.EMPTY]
+    there = [span for span in there if span[0] < span[1]]
     size = sum(group["bytes"] for group in own)
     row: dict[str, Any] = {"track": number, "ranges": _merged(there), "groups": len(own), "bytes": size}
     return row | {
@@ -172,6 +237,16 @@ def _merged(ranges: Iterable[tuple[int, int]]) -> list[list[int]]:
     return merged
 
 
+def _added_up(row: dict[str, Any]) -> dict[str, Any]:
+    """Return bytes and rates by content of all tracks together."""
+    found: dict[str, dict[str, Any]] = {name: {} for name in ("bytes_by_content", "mbps_by_content")}
+    for of, sums in found.items():
+        for name, size in row[of].items():
+            what = name.partition(": ")[2] or name
+            sums[what] = sums.get(what, 0) + size
+    return found
+
+
 def rate_table(row: dict[str, Any]) -> Table:
     """Return a table of bytes and rate by content."""
     table = Table("content", "bytes", "Mbps", "share")
@@ -180,33 +255,43 @@ def rate_table(row: dict[str, Any]) -> Table:
     return table
 
 
-def _tracks(row: dict[str, Any]) -> Table:
+def _tracks(row: dict[str, Any], most: int | None) -> Table:
     table = Table("track", "appears in frames", "groups", "bytes", "Mbps")
-    for track in row["tracks"]:
+    for track in row["tracks"][:most]:
         size = (str(track["groups"]), str(track["bytes"]), f"{track['mbps']:.4f}")
-        table.add_row(str(track["track"]), _listed(track["ranges"]), *size)
-    return table
+        table.add_row(str(track["track"]), _listed(track["ranges"], most), *size)
+    return _ended(table, len(row["tracks"]), most)
 
 
-def _states(row: dict[str, Any]) -> Table:
+def _states(row: dict[str, Any], most: int | None) -> Table:
     table = Table("background", "form", "changes", "shown in frames", "bytes")
-    for state in row["background"]:
+    for state in row["background"][:most]:
         changes = "" if state["changes"] is None else f"chunk {state['changes']}"
-        table.add_row(f"chunk {state['chunk']}", state["form"], changes, _listed(state["ranges"]), str(state["bytes"]))
-    return table
+        shown = _listed(state["ranges"], most)
+        table.add_row(f"chunk {state['chunk']}", state["form"], changes, shown, str(state["bytes"]))
+    return _ended(table, len(row["background"]), most)
 
 
-def _groups(row: dict[str, Any]) -> Table:
+def _groups(row: dict[str, Any], most: int | None) -> Table:
     several = len(row["tracks"]) > 1
     table = Table("group", *(["track"] if several else []), "frames", "form", "layers", "bytes", "by content")
-    for number, group in enumerate(row["groups"]):
+    for number, group in enumerate(row["groups"][:most]):
         sizes = ", ".join(f"{name} {size}" for name, size in group["bytes_by_content"].items())
-        frames = _listed([[group["first_frame"], group["first_frame"] + group["frames"] - 1]])
+        last = group["first_frame"] + group["frames"] - 1
+        frames = _listed([[group["first_frame"], last]]) if group["frames"] else "hidden"
         form = group["form"] + (", predicted" if group["predicted"] else "")
         cells = [str(number), *([str(group["track"])] if several else []), frames, form]
         table.add_row(*cells, str(group["layers"]), str(group["bytes"]), sizes)
+    return _ended(table, len(row["groups"]), most)
+
+
+def _ended(table: Table, count: int, most: int | None) -> Table:
+    """Return a table that says how many rows it lacks."""
+    if most is not None and count > most:
+        table.caption = f"{count - most} more: --groups shows all"
     return table
 
 
-def _listed(ranges: list[list[int]]) -> str:
-    return ", ".join(f"{first}-{last}" for first, last in ranges) or "none"
+def _listed(ranges: list[list[int]], most: int | None = None) -> str:
+    listed = ", ".join(f"{first}-{last}" for first, last in ranges[:most]) or "none"
+    return listed if most is None or len(ranges) <= most else f"{listed}, ..."

@@ -1,4 +1,4 @@
-"""HTTP source: the bytes of a file on a web server, by range requests. In: a URL. Out: bytes."""
+"""Sources behind URLs: a web server, by range requests, or a store that fsspec knows. In: a URL. Out: bytes."""
 
 from __future__ import annotations
 
@@ -15,16 +15,15 @@ _TIMEOUT = 30.0  # s without an answer (guess)
 _RANGE = re.compile(r"bytes (\d{1,18})-\d{1,18}/(\d{1,18})", re.ASCII)
 
 
-class HttpSource:
-    """A file behind an http(s) URL: one request for each range, each over a connection of its own.
+class _UrlSource:
+    """A file behind a URL: one request for each range.
 
-    The first request fetches the first FIRST_REQUEST bytes, where the index of most files ends, and the size. A server
-    without ranges sends the whole file, which is then kept in memory. Raises InputError if the URL cannot be read.
+    The first request fetches the first FIRST_REQUEST bytes, where the index of most files ends, and the size.
     """
 
     def __init__(self, url: str) -> None:
-        self._url = url
-        self._begin, self._size = self._request(0, FIRST_REQUEST)  # the bytes known from the beginning
+        self._url, self.bytes_read = url, 0
+        self._begin, self._size = self._counted(0, FIRST_REQUEST)  # the bytes known from the beginning
 
     @property
     def size(self) -> int:
@@ -34,13 +33,48 @@ class HttpSource:
         end = min(offset + length, self._size)
         if end <= len(self._begin):
             return self._begin[offset:end]
-        return self._request(offset, end - offset)[0]
+        return self._counted(offset, end - offset)[0]
 
     def close(self) -> None:
         """Do nothing: no connection stays open."""
 
+    def _counted(self, offset: int, length: int) -> tuple[bytes, int]:
+        found = self._request(offset, length)
+        self.bytes_read += len(found[0])
+        return found
+
     def _request(self, offset: int, length: int) -> tuple[bytes, int]:
         """Return the bytes of a range, or all bytes if the server has no ranges, and the size of the file."""
+        raise NotImplementedError
+
+
+class StoreSource(_UrlSource):
+    """A file behind a URL of fsspec, as s3:// and gs:// (extra `remote`). Raises InputError if it cannot be read."""
+
+    def _request(self, offset: int, length: int) -> tuple[bytes, int]:
+        try:
+            from fsspec.core import url_to_fs
+
+            system, path = url_to_fs(self._url)
+            size = int(system.size(path)) if offset == 0 else self._size
+            data: bytes = system.cat_file(path, start=offset, end=min(offset + length, size))
+        except ImportError as error:
+            text = "a URL needs the extra `remote`, pip install 'meshreel[remote]', and some protocols a package more"
+            raise InputError(f"{self._url}: {error}; {text}") from error
+        except Exception as error:  # each file system has errors of its own
+            reason = " ".join(f"{type(error).__name__}: {error}".split())
+            raise InputError(f"{self._url}: cannot be read ({reason}); check the URL and your rights") from error
+        return data, size
+
+
+class HttpSource(_UrlSource):
+    """A file behind an http(s) URL, each request over a connection of its own.
+
+    A server without ranges sends the whole file, which is then kept in memory. Raises InputError if the URL cannot be
+    read.
+    """
+
+    def _request(self, offset: int, length: int) -> tuple[bytes, int]:
         try:
             request = Request(self._url, headers={"Range": f"bytes={offset}-{offset + length - 1}"})
             with urlopen(request, timeout=_TIMEOUT) as answer:

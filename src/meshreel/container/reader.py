@@ -10,11 +10,15 @@ from bisect import bisect_right
 from dataclasses import dataclass
 from itertools import accumulate, pairwise
 
+import numpy as np
+
 from ..errors import FormatError
 from ..format.budget import check_frames, check_head
 from ..format.checks import COMPANIONS, check_header, check_index, parse_metadata
-from ..format.layout import MAGIC, VERSION, Checksum, ChunkKind, Form, Header, Index, Layer, Preamble
+from ..format.edit import parse_edit
+from ..format.layout import EDITED, MAGIC, VERSION, Checksum, ChunkKind, Form, Header, Index, Layer, Preamble
 from ..format.records import least_size, unpack, unpack_all
+from ..shapes import Float64
 from ..types import Up, known_up
 from .sources import Source
 
@@ -65,15 +69,18 @@ class ReelReader:
     """Checked head of a file, and access to its chunks; does not close the source."""
 
     def __init__(self, source: Source) -> None:
-        self._source = source
-        self.header, index, self.head_size = _read_head(source)
-        check_index(index)
-        self.chunks = _chunks(index, self.head_size)
+        self._source, self._bytes_read = source, 0
+        self.header, self.index, self.head_size, flags = _read_head(source)
+        check_index(self.index)
+        self.metadata = parse_metadata(self.header.metadata)
+        groups = (entry for entry in self.index.chunks if entry.kind == ChunkKind.GROUP)
+        self.coded_count = sum(entry.frames for entry in groups if entry.track == 0)  # frames, the hidden ones too
+        self.edit = parse_edit(self.metadata, flags, self.coded_count)
+        self.chunks = _chunks(self.index, self.head_size, -self.edit.first)
         self.groups = tuple(chunk for chunk in self.chunks if chunk.kind == ChunkKind.GROUP)
         self.tracks = _by_track(self.groups)  # the groups of each
-        self.frame_count = self.tracks[0][-1].first_frame + self.tracks[0][-1].frame_count
+        self.frame_count = self.edit.end - self.edit.first
         check_header(self.header, self.frame_count)
-        self.metadata = parse_metadata(self.header.metadata)
         self.size = self.chunks[-1].end  # bytes of the whole file, even if it is truncated
         check_frames(sum(group.frame_count for group in self.groups), self.size)
         if source.size > self.size:
@@ -85,6 +92,25 @@ class ReelReader:
             for number in group.depends_on:
                 self._shown_from.setdefault(number, group.first_frame)
         self._times = list(accumulate(self.header.intervals, initial=self.header.first_time))
+
+    @property
+    def source(self) -> Source:
+        """Where the bytes come from."""
+        return self._source
+
+    @property
+    def bytes_read(self) -> int:
+        """Bytes that came over the network, the head's among them; of a file here, those of chunks that were read."""
+        found: int = getattr(self._source, "bytes_read", self._bytes_read)
+        return found
+
+    @property
+    def box(self) -> tuple[Float64[np.ndarray, "3"], Float64[np.ndarray, "3"]]:
+        """Lower and upper corner of the box that holds all frames, m."""
+        head, turn = self.header, np.array(self.edit.rotation or np.eye(3)).reshape(3, 3)
+        sides = head.scale * turn[:, :, None] * np.array([head.minimum, head.maximum], np.float64).T
+        low, high = sides.min(axis=2).sum(axis=1), sides.max(axis=2).sum(axis=1)
+        return head.origin + low, head.origin + high
 
     @property
     def frame_rate(self) -> float:
@@ -195,22 +221,23 @@ class ReelReader:
         if offset + size > self._source.size:
             raise FormatError(f"{chunk}: truncated, the file ends at byte {self._source.size} of {self.size}")
         payload = self._source.get_bytes(offset, size)
+        self._bytes_read += size
         if len(payload) != size:
             raise FormatError(f"{chunk}: truncated, {len(payload)} of {size} bytes")
         _check_payload(chunk, payload, wanted)
         return payload
 
 
-def _read_head(source: Source) -> tuple[Header, Index, int]:
-    """Return header, index and size of the head; a short head takes one request, within the size of the source."""
+def _read_head(source: Source) -> tuple[Header, Index, int, int]:
+    """Return header, index, size and flags; a short head takes one request, within the size of the source."""
     data = source.get_bytes(0, min(FIRST_REQUEST, source.size))
     if data[: len(MAGIC)] != MAGIC:
         raise FormatError("not a .reel file: the signature is missing")
     preamble, start = unpack(Preamble, data)
     if preamble.version != VERSION:
         raise FormatError(f"format version {preamble.version}: this reader knows version {VERSION}, update meshreel")
-    if preamble.flags != 0:
-        raise FormatError(f"flags {preamble.flags}: version {VERSION} has none")
+    if preamble.flags & ~EDITED:
+        raise FormatError(f"flags {preamble.flags}: this reader knows {EDITED} alone, update meshreel")
     size = preamble.head_size
     end = size - least_size(Checksum)
     if not start <= end or size > source.size:
@@ -220,12 +247,15 @@ def _read_head(source: Source) -> tuple[Header, Index, int]:
     if len(data) != size or unpack_all(Checksum, data[end:]).crc != zlib.crc32(data[:end]):
         raise FormatError("the head is damaged: its checksum does not match")
     header, start = unpack(Header, data[:end], start)
-    return header, unpack_all(Index, data[start:end]), size
+    return header, unpack_all(Index, data[start:end]), size, preamble.flags
 
 
-def _chunks(index: Index, offset: int) -> tuple[Chunk, ...]:
+def _chunks(index: Index, offset: int, first_frame: int) -> tuple[Chunk, ...]:
+    """Return the chunks behind each other from an offset on, and the frames of each track from the first on."""
     chunks: list[Chunk] = []
-    frames = [0] * (1 + max((entry.track for entry in index.chunks if entry.kind == ChunkKind.GROUP), default=0))
+    frames = [first_frame] * (
+        1 + max((entry.track for entry in index.chunks if entry.kind == ChunkKind.GROUP), default=0)
+    )
     for number, entry in enumerate(index.chunks):
         is_group = entry.kind == ChunkKind.GROUP
         of = chunks[entry.depends_on[0]] if entry.kind in COMPANIONS else None

@@ -91,7 +91,16 @@ class FileSource(StreamSource):
             file = open(self.path, "rb", opener=_open_at_once)  # noqa: SIM115 (open until `close`)
         except OSError as error:
             raise InputError(f"{self.path}: cannot be opened: {error.strerror}; give a .reel file") from error
+        self._disk = file
         super().__init__(file, str(self.path))
+
+    def get_bytes(self, offset: int, length: int) -> bytes:
+        if not hasattr(os, "pread"):
+            return super().get_bytes(offset, length)
+        try:  # a forked process has a file of its own, but the same position in it
+            return os.pread(self._disk.fileno(), length, offset)
+        except OSError as error:
+            raise InputError(f"{self.path}: cannot be read at byte {offset}: {error.strerror}") from error
 
     def __enter__(self) -> FileSource:
         return self

@@ -20,7 +20,20 @@ from typing import IO, Any, Protocol, runtime_checkable
 from ..errors import FormatError, InputError
 from ..format.budget import check_frames, check_head
 from ..format.checks import IndexChecks, check_header, parse_metadata
-from ..format.layout import MAGIC, VERSION, Checksum, ChunkKind, Form, Header, Index, IndexEntry, Layer, Preamble
+from ..format.edit import ITEM
+from ..format.layout import (
+    EDITED,
+    MAGIC,
+    VERSION,
+    Checksum,
+    ChunkKind,
+    Form,
+    Header,
+    Index,
+    IndexEntry,
+    Layer,
+    Preamble,
+)
 from ..format.records import least_size, pack
 from ..io.unfinished import FULL, sync_folder, unfinished
 from .sources import Stream
@@ -85,11 +98,6 @@ class ReelWriter:
         self._entries: list[IndexEntry] = []
         self._chunks: list[Stored] = []
         self._checks = IndexChecks()
-
-    @property
-    def chunk_count(self) -> int:
-        """Number of chunks added, which is the number of the next."""
-        return len(self._entries)
 
     @property
     def frame_count(self) -> int:
@@ -227,7 +235,8 @@ def pack_head(header: Header, index: Index) -> bytes:
     body = pack(header) + pack(index)
     size = least_size(Preamble) + len(body) + least_size(Checksum)
     check_head(size)
-    data = pack(Preamble(MAGIC, VERSION, 0, size)) + body
+    flags = EDITED if ITEM in parse_metadata(header.metadata) else 0
+    data = pack(Preamble(MAGIC, VERSION, flags, size)) + body
     return data + pack(Checksum(zlib.crc32(data)))
 
 

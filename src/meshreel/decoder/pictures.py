@@ -10,6 +10,7 @@ from __future__ import annotations
 import threading
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -65,6 +66,21 @@ class Decoders:
             raise FormatError(message)
 
 
+@dataclass(frozen=True, slots=True)
+class _Shown:
+    """A picture, decoded when it is asked for; pickled as what it shows."""
+
+    pictures: TrackPictures
+    number: int
+    at: int
+
+    def __call__(self) -> UInt8[np.ndarray, "H W 3"]:
+        return self.pictures.picture(self.number, self.at)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return partial, (np.asarray, self())
+
+
 class TrackPictures:
     """Textures of the frames of one track."""
 
@@ -116,7 +132,7 @@ class TrackPictures:
 
     def _texture(self, pictures: Chunk, at: int) -> Texture:
         width, height = self._sizes[pictures.depends_on[1]]
-        return Texture(partial(self.picture, pictures.number, at), (height, width))
+        return Texture(_Shown(self, pictures.number, at), (height, width))
 
     def _pictures_of(self, chunk: Chunk) -> Chunk | None:
         return self._reader.companion_of(chunk, ChunkKind.PICTURES) or self._reader.companion_of(

@@ -87,7 +87,9 @@ class Track(Frames):
         with self._refusals.of(chunk):
             meshes, after = continue_group(payload, chunk.frame_count, self.layers, state, self._place)
         meshes, after = self._painted(chunk, payload, meshes, state, after)
-        shown = {id(mesh): read_only(mesh) for mesh in meshes}  # the frames of an empty group are one mesh
+        shown = {
+            id(mesh): read_only(turned(mesh, self.reader)) for mesh in meshes
+        }  # the frames of an empty group are one mesh
         meshes = [shown[id(mesh)] for mesh in meshes]
         self._states = states.add(chunk.number, after, state, self._most)
         self._group = group = CachedGroup(chunk.number, meshes, memory_of(meshes))
@@ -164,8 +166,8 @@ class Background:
         self._colored = colored
         self._pictures = TrackPictures(reader, decoders or Decoders())
         self._place = placement(reader)
-        # Number of a chunk, its mesh, and what led to it; replaced as a whole, as other threads do.
-        self._last = (-1, Mesh.empty(), Chain())
+        # Number of a chunk, its mesh, what led to it, and what is shown; replaced as a whole, as other threads do.
+        self._last = (-1, Mesh.empty(), Chain(), Mesh.empty())
         self._refusals = Refusals()
 
     def of_frame(self, frame: int) -> Mesh | None:
@@ -183,7 +185,7 @@ class Background:
 
     def _state(self, chunk: Chunk) -> Mesh:
         """Decode a state, starting from the last one decoded if the state is that one or was changed from it."""
-        known, mesh, led = self._last
+        known, mesh, led, shown = self._last
         chain = [chunk]
         self._refusals.check(chunk)
         while chain[-1].number != known and chain[-1].depends_on:
@@ -195,9 +197,9 @@ class Background:
         for link in reversed(chain):
             mesh, led = self._decode(link, mesh, led)
         if chain:
-            mesh = read_only(mesh)
-            self._last = (chunk.number, mesh, led)
-        return mesh
+            shown = read_only(turned(mesh, self.reader))
+            self._last = (chunk.number, mesh, led, shown)
+        return shown
 
     def _decode(self, chunk: Chunk, before: Mesh, led: Chain) -> tuple[Mesh, Chain]:
         payload = self.reader.read_chunk(chunk.number)
@@ -221,6 +223,15 @@ class Background:
 def placement(reader: ReelReader) -> Placement:
     """Return the map from the normalised coordinates of a file to metres."""
     return Placement(reader.header.scale, reader.header.origin)
+
+
+def turned(mesh: Mesh, reader: ReelReader) -> Mesh:
+    """Return a mesh of a file, in metres, as the file's edit turns it."""
+    if not reader.edit.rotation:
+        return mesh
+    turn, origin = np.array(reader.edit.rotation).reshape(3, 3), np.array(reader.header.origin)
+    x, y, z = (mesh.vertices - origin).T
+    return mesh.at(origin + np.stack([a * x + b * y + c * z for a, b, c in turn], axis=1))  # not BLAS, whose bits vary
 
 
 def moving_of_frame(tracks: Sequence[Track], frame: int) -> list[Mesh]:

@@ -7,31 +7,35 @@ compiled core, and PyAV when a picture is asked for.
 from __future__ import annotations
 
 import operator
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
-from ..container.reader import ReelReader
+from ..container.reader import Chunk, ReelReader
 from ..container.sources import BytesSource, FileSource, Source, Stream, StreamSource
 from ..errors import FormatError, InputError
+from ..format.layout import Form
 from ..geometry.splats import Bound
 from ..geometry.topology import concatenate
-from ..shapes import Float
+from ..shapes import Float, Float64
 from ..types import Mesh, Up
 from .pictures import Decoders
 from .tracks import Background, Track, moving_of_frame
 
 if TYPE_CHECKING:
-    from ..container.http import HttpSource
+    from ..container.http import HttpSource, StoreSource
 
 BACKGROUND = "background"  # its name among the parts of a frame
+INLINE = 8_000_000  # bytes of a file that a notebook's output may hold (guess): saved notebooks hold 4/3 of it
 
 
 def open(source: str | Path | bytes | Stream | Source) -> Video:
-    """Open the video in a .reel file: a path, an http(s) URL, bytes, a binary file object, or a source of byte ranges.
+    """Open the video in a .reel file: a path, a URL, bytes, a binary file object, or a source of byte ranges.
 
+    A URL is http(s)://, or one of a store that fsspec knows, as s3:// (extra `remote`); what is decoded is fetched.
     Raises InputError if it cannot be read, and FormatError if the header or the index are damaged or of a version that
     this reader does not know.
     """
@@ -41,18 +45,23 @@ def open(source: str | Path | bytes | Stream | Source) -> Video:
         return Video(ReelReader(source if isinstance(source, Source) else StreamSource(source)))
     ranges = _source_at(source)
     try:
-        return Video(ReelReader(ranges), close=ranges.close)
+        return Video(ReelReader(ranges), close=ranges.close, path=source)
     except FormatError as error:
         ranges.close()
         raise FormatError(f"{source}: {error}") from error
 
 
-def _source_at(place: str | Path) -> StreamSource | HttpSource:
-    if str(place).startswith(("http://", "https://")):
-        from ..container.http import HttpSource
+def _source_at(place: str | Path) -> FileSource | HttpSource | StoreSource:
+    if isinstance(place, str) and "://" in place:
+        from ..container.http import HttpSource, StoreSource
 
-        return HttpSource(str(place))
+        return HttpSource(place) if place.startswith(("http://", "https://")) else StoreSource(place)
     return FileSource(place)
+
+
+def _reopened(source: str | Path | Source, layers: int | None, colored: bool) -> Video:
+    """Return a pickled video, opened again by the process that unpickles it."""
+    return open(source).at(layers, colored)
 
 
 class Video(Sequence[Mesh]):
@@ -60,8 +69,8 @@ class Video(Sequence[Mesh]):
 
     A frame is its background, if it has one, and its moving bodies, one in each track; `parts` returns them separately.
     Random access decodes one group of each track, and the groups that it is predicted from. A file stays open until
-    `close`, or until the end of a `with` block. The arrays of the meshes are read-only, and those of a group may be
-    parts of one array: `mesh.copy()` gives arrays that can be changed, and kept without the rest of the group.
+    `close`, or until the end of a `with` block. The arrays of a frame are the caller's own, who may change them; those
+    of `parts` and `background` are read-only, because the video keeps them: `mesh.copy()` gives arrays of one's own.
     """
 
     def __init__(
@@ -70,8 +79,10 @@ class Video(Sequence[Mesh]):
         layers: int | None = None,
         close: Callable[[], None] | None = None,
         colored: bool = True,
+        path: str | Path | None = None,
     ) -> None:
         self.reader = reader
+        self.path = path  # that it was opened by, or its URL; None for bytes and objects
         self.layers = layers
         self._colored = colored
         decoders, numbers = Decoders(), range(len(reader.tracks))
@@ -89,7 +100,16 @@ class Video(Sequence[Mesh]):
         layers = None if layers is None else operator.index(layers)
         if layers is not None and layers < 0:
             raise InputError(f"layers must not be negative, got {layers}: give a number of layers, or None for all")
-        return Video(self.reader, layers, self._close, colors)
+        return Video(self.reader, layers, self._close, colors, self.path)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle the path or the URL, by which another process opens the file again, or else the bytes."""
+        source: str | Path | Source = self.reader.source
+        if self.path is not None:
+            source = Path(self.path).absolute() if isinstance(source, FileSource) else self.path
+        elif isinstance(source, StreamSource):
+            raise InputError("a video of a file object cannot be pickled; open it by its path, its URL or its bytes")
+        return _reopened, (source, self.layers, self._colored)
 
     def close(self) -> None:
         """Close the file. Afterwards only frames of the groups that were decoded last can be read."""
@@ -121,6 +141,16 @@ class Video(Sequence[Mesh]):
     def metadata(self) -> dict[str, Any]:
         """Values that the encoder recorded, such as preset and quality; decoding does not need them."""
         return self.reader.metadata
+
+    @property
+    def box(self) -> tuple[Float64[np.ndarray, "3"], Float64[np.ndarray, "3"]]:
+        """Lower and upper corner of the box that holds all frames, m, as the encoder stored it."""
+        return self.reader.box
+
+    @property
+    def bytes_read(self) -> int:
+        """Bytes read so far: from a URL all that came; from a file here those of the chunks that were decoded."""
+        return self.reader.bytes_read
 
     @property
     def up(self) -> Up:
@@ -176,34 +206,86 @@ class Video(Sequence[Mesh]):
         return Bound.join(found) if found else None
 
     def vertices(self, first: int, last: int, out: np.ndarray | None = None) -> Float[np.ndarray, "T V 3"]:
-        """Return the vertices of frames `first` to `last` - 1 in metres, which all must have the same number of them.
+        """Return the vertices of frames `first` to `last` - 1 in metres, which all must have the same ones.
 
         They are written to `out` if it is given, an array of float64 or float32, for which the coordinates are rounded;
-        otherwise to a new array of float64. Raises InputError if they do not fit it, and otherwise as indexing does.
+        otherwise to a new array of float64. Raises InputError, which names the frame, where their number or what they
+        are changes, or does not fit the array; and otherwise as indexing does.
         """
         if not 0 <= first < last <= len(self):
             raise IndexError(f"frames {first} to {last} of a video of {len(self)} frames")
-        if out is None:
-            out = np.empty((last - first, len(self[first].vertices), 3))
-        elif out.ndim != 3 or len(out) != last - first or out.dtype.char not in "df":
+        if out is not None and (out.ndim != 3 or len(out) != last - first or out.dtype.char not in "df"):
             text = f"an array of {out.dtype} {out.shape} for {last - first} frames"
             raise InputError(f"{text}: give one of float64 or float32, frames x vertices x 3")
+        shown, before = [*self.parts(first).values()], self.reader.chunks_of_frame(first)
+        if out is None:
+            out = np.empty((last - first, sum(len(mesh.vertices) for mesh in shown), 3))
         for row, frame in zip(out, range(first, last), strict=True):
-            vertices = self[frame].vertices
-            if vertices.shape != row.shape:
-                raise InputError(f"frame {frame} has {len(vertices)} vertices: the array has room for {len(row)}")
-            row[:] = vertices
+            parts, chunks = [*self.parts(frame).values()], self.reader.chunks_of_frame(frame)
+            if (count := sum(len(mesh.vertices) for mesh in parts)) != len(row) or row.shape[1:] != (3,):
+                raise InputError(f"frame {frame} has {count} vertices: the array has room for {len(row)}")
+            if not (self._follow(chunks, before) or all(map(_are_alike, parts, shown))):
+                raise InputError(f"frame {frame} has other vertices than frame {first}: ask for the frames before it")
+            np.concatenate([mesh.vertices for mesh in parts], out=row, casting="same_kind")
+            before = chunks
         return out
+
+    def _follow(self, chunks: tuple[Chunk, ...], before: tuple[Chunk, ...]) -> bool:
+        """Return whether groups go on with the vertices of those before, one after the other."""
+        return all(
+            chunk.form != Form.DRACO and (chunk == one or self.reader.group_before(chunk) == one)
+            for chunk, one in zip(chunks, before, strict=True)
+        )
 
     def __repr__(self) -> str:
         return f"<meshreel.Video: {', '.join(self._facts().values())}>"
 
     def _repr_html_(self) -> str:
-        """Return a table for notebooks."""
-        from html import escape
+        """Return for a notebook the player with the file in it, or a table where the file has more than `INLINE` bytes.
 
-        rows = (f"<tr><th>{escape(name)}</th><td>{escape(value)}</td></tr>" for name, value in self._facts().items())
-        return f"<table>{''.join(rows)}</table>"
+        The output needs no network; browsers of 2023 and later play it.
+        """
+        from .page import table
+
+        if self.reader.size > INLINE:
+            play = f"play it with video.show(), or in a terminal: meshreel play {self.path or 'FILE'}"
+            note = f"{self.name} is larger than {INLINE / 1e6:g} MB: {play}"
+            return table(self._facts().items(), note)
+        return self._frame_of_page()
+
+    def show(self) -> None:
+        """Play the video: in a notebook below the cell; elsewhere in the browser, as a page in a temporary folder.
+
+        The page has the whole file in it and needs no server; `meshreel play` streams a large one.
+        """
+        shell = sys.modules.get("IPython") and sys.modules["IPython"].get_ipython()
+        if shell is not None and hasattr(shell, "kernel"):
+            from IPython.display import HTML, display
+
+            display(HTML(self._frame_of_page()))
+            return
+        import tempfile
+        import webbrowser
+
+        page = Path(tempfile.mkdtemp(prefix="meshreel-"), f"{Path(self.name).stem}.html")
+        page.write_text(self._page(), encoding="utf-8")
+        if not webbrowser.open(page.as_uri()):
+            raise InputError(f"no browser was found: open {page}")
+
+    @property
+    def name(self) -> str:
+        """Name of the file, without folders; "recording" for bytes and objects."""
+        return "recording" if self.path is None else str(self.path).rstrip("/").rpartition("/")[2]
+
+    def _frame_of_page(self) -> str:
+        from .page import in_frame
+
+        return in_frame(self._page(), [self.name, *self._facts().values()])
+
+    def _page(self) -> str:
+        from .page import player_page
+
+        return player_page(self.reader.source.get_bytes(0, self.reader.source.size), self.name)
 
     def _facts(self) -> dict[str, str]:
         facts = {
@@ -228,10 +310,11 @@ def _counted(count: int, what: str) -> str:
     return f"{count} {what}" if count == 1 else f"{count} {what}s"
 
 
+def _are_alike(one: Mesh, other: Mesh) -> bool:
+    return np.array_equal(one.faces, other.faces) and len(one.vertices) == len(other.vertices)
+
+
 def _joined(meshes: list[Mesh]) -> Mesh:
-    """Return all meshes as one, read-only as each of them is."""
+    """Return all meshes as one, in arrays that belong to nobody else."""
     mesh = concatenate(meshes)
-    for array in (mesh.vertices, mesh.faces, mesh.colors, mesh.uv):
-        if array is not None:
-            array.flags.writeable = False
-    return mesh
+    return mesh.copy() if any(mesh is part for part in meshes) else mesh

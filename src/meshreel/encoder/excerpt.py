@@ -1,7 +1,7 @@
 """Excerpts: frames of a surveyed sequence that are encoded as a part of its file, and the file of its survey.
 
 In: a survey, or a file that has one. Out: an Excerpt. Parts that are encoded from one survey join without being encoded
-again (`encoder.concat`), whatever machine encoded them.
+again (`encoder.edit`), whatever machine encoded them.
 """
 
 from __future__ import annotations

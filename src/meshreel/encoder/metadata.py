@@ -12,10 +12,12 @@ from collections.abc import Sequence
 from dataclasses import asdict, astuple, dataclass
 from typing import Any
 
+from ..format.edit import ITEM
 from ..types import Up
 from .options import EncoderOptions
 from .summary import GroupSummary
 
+HISTORY = "history"  # of a file that was edited: what was done, in words
 PART = "part"  # of a file that is a part: its place, its exact totals, and a digest of its options
 _KEYS, _MEANS = "key_frames", ("rms_m", "worst_rms_m", "d2_psnr_paper", "normal_error_deg")
 
@@ -99,7 +101,7 @@ def joined_metadata(parts: Sequence[tuple[dict[str, Any], int]]) -> dict[str, An
         keys += [first + key for key in metadata[_KEYS]]
         first += frames
     means = Totals.added([Totals.from_metadata(metadata, frames) for metadata, frames in parts]).means
-    shared = {name: value for name, value in parts[0][0].items() if name != PART}
+    shared = {name: value for name, value in parts[0][0].items() if name not in (PART, ITEM)}
     return shared | {_KEYS: keys} | means
 
 
@@ -108,7 +110,7 @@ def of_all_parts(metadata: dict[str, Any]) -> dict[str, Any]:
 
     Raises KeyError or TypeError for metadata that no encoder wrote.
     """
-    found = {name: value for name, value in metadata.items() if name not in (PART, _KEYS, *_MEANS)}
+    found = {name: value for name, value in metadata.items() if name not in (PART, ITEM, HISTORY, _KEYS, *_MEANS)}
     return found | ({"options": metadata[PART]["options"], "frames": metadata[PART]["of"]} if PART in metadata else {})
 
 

@@ -106,7 +106,7 @@ def _animation(reader: ReelReader, frames: range, up: Up) -> Animation:
         times = np.array(list(accumulate(chosen, initial=0)), np.float64) / 1e6
     else:
         times = np.arange(len(frames)) / header.frame_rate
-    corners = np.asarray(header.origin) + header.scale * np.array([header.minimum, header.maximum], np.float64)
+    corners = np.array(reader.box)
     is_far = np.abs(corners).max() > _FAR * np.linalg.norm(corners[1] - corners[0])
     x, y, z = corners.mean(axis=0).tolist() if is_far else (0.0, 0.0, 0.0)
     return Animation(times, header.frame_rate, (x, y, z), up)

@@ -16,6 +16,7 @@ from .records import Nested
 
 MAGIC = b"REEL\r\n\x1a\n"  # the line ends reveal a transfer in text mode
 VERSION = 1
+EDITED = 1  # bit of Preamble.flags: the item `edit` of the metadata counts
 LAYER_PICTURES = 64  # of a background, in each layer but the last: 8 s of the 8 a second that an encoder makes (guess)
 
 
@@ -58,7 +59,7 @@ class Preamble:
 
     magic: Annotated[bytes, Bytes(8), "`52 45 45 4c 0d 0a 1a 0a`"]
     version: Annotated[int, U8, "version of the format, 1; a reader refuses any other"]
-    flags: Annotated[int, U8, "reserved, 0"]
+    flags: Annotated[int, U8, "1: the metadata has an `edit`, which counts; other bits are 0"]
     head_size: Annotated[int, U32, "size of the head, bytes: offset of the first chunk"]
 
 

@@ -145,4 +145,16 @@ def _ordered(source: Place, root: _P, paths: list[_P]) -> tuple[tuple[_P, ...], 
                 f"{source}: {names[before]!r} and {names[after]!r} both have frame number {key[before]}; "
                 "give a glob that fits only one of them"
             )
-    return tuple(order), ()
+    return tuple(order), _gaps(source, [key[path] for path in order])
+
+
+def _gaps(source: Place, numbers: Sequence[int]) -> tuple[str, ...]:
+    """Return a warning of frame numbers that are left out, where most of them are one step apart."""
+    steps = [after - before for before, after in pairwise(numbers)]
+    usual = Counter(steps).most_common(1)[0][0]
+    wide = [(before, step) for before, step in zip(numbers, steps, strict=False) if step > usual]
+    if not wide:
+        return ()
+    lost, (first, step) = sum(step // usual - 1 for _, step in wide), wide[0]
+    text = f"{lost} frames are missing between the file names, the first between {first} and {first + step}"
+    return (f"{source}: {text}; the others follow one another without a pause",)

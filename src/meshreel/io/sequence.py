@@ -26,6 +26,7 @@ from .remote import Place, Remote, located
 
 CAPTURED = "capture.json"  # in a folder that `meshreel capture` wrote: how the frames were made
 _FRAMES = re.compile(r"(-?\d{1,18})?:(-?\d{1,18})?")
+_SIZES = 0.02, 100.0  # m, diagonals of what is recorded; of others the unit is doubtful (guess)
 _SUSPICIOUS_RATIO = 20.0  # of two frames' diagonals; a person who crouches or enters changes it less (guess)
 
 
@@ -89,6 +90,7 @@ class _Seen:
 
     # By frame: merged vertices, all vertices, lost faces.
     merged: dict[int, tuple[int, int, int]] = field(default_factory=dict)
+    empty: set[int] = field(default_factory=set)  # frames without a surface
     dropped: dict[str, int] = field(default_factory=dict)  # kind of dropped data: first frame that has it
     smallest: tuple[float, int] | None = None  # diagonal, frame
     largest: tuple[float, int] | None = None
@@ -96,6 +98,7 @@ class _Seen:
     def add(self, other: _Seen) -> None:
         """Add the counts of other frames, or of the same."""
         self.merged |= other.merged
+        self.empty |= other.empty
         for what, first in other.dropped.items():
             self.dropped[what] = min(first, self.dropped.get(what, first))
         if other.smallest is not None and other.largest is not None:
@@ -160,7 +163,8 @@ class FileSequence(MeshSequence):
             merged = len(whole.vertices) - len(mesh.vertices)
             self._seen.merged[number] = (merged, len(whole.vertices), len(whole.faces) - len(mesh.faces))
         sized = (mesh.diagonal, number) if mesh.diagonal > 0 else None
-        self._seen.add(_Seen({}, dict.fromkeys(loaded.dropped, number), sized, sized))
+        empty = {number} if mesh.is_empty else set[int]()
+        self._seen.add(_Seen({}, empty, dict.fromkeys(loaded.dropped, number), sized, sized))
         return mesh
 
     def name(self, index: int) -> str:
@@ -212,6 +216,12 @@ def _warnings(seen: _Seen, remarks: tuple[str, ...]) -> Iterator[str]:
     if merged:
         lost = f", and {faces} faces that collapsed with them" if faces else ""
         yield f"welded {merged} of {positions} vertices that repeat a position{lost}, in {len(seen.merged)} frames"
+    if seen.empty:
+        number = "1 frame is" if len(seen.empty) == 1 else f"{len(seen.empty)} frames are"
+        yield f"{number} empty (the first: frame {min(seen.empty)}): nothing is shown there"
+    if seen.smallest and seen.largest and (seen.largest[0] < _SIZES[0] or seen.smallest[0] > _SIZES[1]):
+        size, units = seen.largest[0], "--scale 0.001 if it is in millimetres, 0.01 in centimetres"
+        yield f"frame {seen.largest[1]} is {size:.3g} m from corner to corner: meshreel counts in metres; give {units}"
     if seen.smallest and seen.largest and seen.largest[0] > _SUSPICIOUS_RATIO * seen.smallest[0]:
         yield (
             f"frame {seen.largest[1]} is {seen.largest[0] / seen.smallest[0]:.3g} times as large as frame "

@@ -140,6 +140,7 @@ export interface Info {
   readonly duration: number; // s, the last frame's own time included
   readonly origin: readonly [number, number, number]; // m, where the scene's own space has its zero
   readonly box: Box; // around all frames
+  readonly rotation?: readonly number[] | null | undefined; // that frames are shown with, about the origin: nine numbers, row by row
   readonly trackCount: number;
   readonly mostLayers: number; // layers beyond the first that the richest group has
   readonly size: number; // bytes

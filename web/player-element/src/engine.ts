@@ -81,10 +81,11 @@ class PooledPlayer extends Player {
 }
 
 /**
- * A worker of a module. Browsers start workers only from the page's own origin: of any other, a worker made here imports the module,
+ * A worker of a module. Browsers start workers only from the page's own origin, or from what it has in memory: of any other, a worker made here imports the module,
  * which that origin must allow by CORS.
  */
 export function openWorker(module: URL): Worker {
+  if (module.protocol === "blob:") return new Worker(module); // as a classic script, which it is too: a page on disk may load no module
   if (module.origin === location.origin) return new Worker(module, { type: "module" });
   const address = URL.createObjectURL(new Blob([`import ${JSON.stringify(module.href)};`], { type: "text/javascript" }));
   const worker = new Worker(address, { type: "module" });

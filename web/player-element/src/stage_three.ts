@@ -5,7 +5,7 @@ import { ReelScene, Sorter, updateFar } from "@meshreel/player-three";
 import type { Mode, OrderWorker } from "@meshreel/player-three";
 import { VrSession } from "@meshreel/xr";
 import type { VrActions } from "@meshreel/xr";
-import { Color, Group, PerspectiveCamera, Scene, Spherical, Vector3, WebGLRenderer } from "three";
+import { Color, Group, Matrix4, PerspectiveCamera, Scene, Spherical, Vector3, WebGLRenderer } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import { readCamera } from "./attributes.ts";
 import type { PictureStats, Stage } from "./stage.ts";
@@ -216,8 +216,10 @@ export class ThreeStage extends EventTarget implements Stage {
   /** A recording on its floor, all of it in view. */
   #stand(info: Info): void {
     this.#info = info;
-    this.#reel.rotation.x = turnOf(info.metadata, this.#up);
-    this.#box = stoodUp(info.box, this.#reel.rotation.x);
+    const turn = turnOf(info.metadata, this.#up);
+    const [a, b, c, d, e, f, g, h, i] = info.rotation ?? [1, 0, 0, 0, 1, 0, 0, 0, 1];
+    this.#reel.quaternion.setFromRotationMatrix(new Matrix4().makeRotationX(turn).multiply(new Matrix4().set(a, b, c, 0, d, e, f, 0, g, h, i, 0, 0, 0, 0, 1)));
+    this.#box = stoodUp(info.box, turn);
     this.fit();
   }
 

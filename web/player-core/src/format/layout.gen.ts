@@ -6,7 +6,9 @@ import {
 import type { Kind } from "./records.ts";
 
 export const MAGIC = [82, 69, 69, 76, 13, 10, 26, 10] as const;
+
 export const VERSION = 1;
+export const EDITED = 1;
 
 export const LIMITS = {
   free: 201326592,
@@ -80,7 +82,7 @@ export const VideoCodec = {
 export interface Preamble {
   readonly magic: Uint8Array; // `52 45 45 4c 0d 0a 1a 0a`
   readonly version: number; // version of the format, 1; a reader refuses any other
-  readonly flags: number; // reserved, 0
+  readonly flags: number; // 1: the metadata has an `edit`, which counts; other bits are 0
   readonly headSize: number; // size of the head, bytes: offset of the first chunk
 }
 export const Preamble: Kind<Preamble> = record("Preamble", {

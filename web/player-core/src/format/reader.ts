@@ -4,8 +4,10 @@
 import { checkHeader, checkIndex } from "./checks.ts";
 import { crc32 } from "./crc.ts";
 import { checkFrames } from "./budget.ts";
+import { editOf } from "./edit.ts";
+import type { Edit } from "./edit.ts";
 import { FormatError } from "../errors.ts";
-import { Checksum, ChunkKind, Form, Header, Index, LIMITS, MAGIC, Preamble, VERSION } from "./layout.gen.ts";
+import { Checksum, ChunkKind, EDITED, Form, Header, Index, LIMITS, MAGIC, Preamble, VERSION } from "./layout.gen.ts";
 import type { Layer } from "./layout.gen.ts";
 import { unpack, unpackAll } from "./records.ts";
 import type { Box, CompanionKind, Info, Rendition } from "../types.ts";
@@ -45,19 +47,19 @@ export class Head {
   private constructor(
     readonly header: Header,
     readonly chunks: readonly Chunk[],
+    metadata: Record<string, unknown>,
+    edit: Edit,
   ) {
     this.tracks = byTrack(chunks);
     for (const chunk of chunks) if (isCompanion(chunk)) this.companions.set(chunk.dependsOn[0], [...this.companionsOf(chunks[chunk.dependsOn[0]]), chunk]);
     this.pieces = chunks.flatMap((chunk) => (isVideo(chunk) && chunk.frameCount === 0 ? layersOf(chunk) : [chunk]));
     for (const { kind, dependsOn, firstFrame } of chunks) if (kind === "group") for (const other of dependsOn) if (!this.shown.has(other)) this.shown.set(other, firstFrame);
-    const groups = this.tracks[0];
-    const last = groups[groups.length - 1];
-    const frameCount = last.firstFrame + last.frameCount;
+    const frameCount = edit.end - edit.first;
     checkHeader(header, frameCount);
     const end = chunks[chunks.length - 1];
-    checkFrames(frameCount * this.tracks.length, end.offset + end.size);
+    checkFrames(codedFrames(chunks) * this.tracks.length, end.offset + end.size);
     this.times = timesOf(header.intervals);
-    this.info = infoOf(header, chunks, this.tracks.length, frameCount, this.timestampOf(frameCount - 1));
+    this.info = infoOf(header, chunks, metadata, edit.rotation, this.tracks.length, frameCount, this.timestampOf(frameCount - 1));
   }
 
   /** Bytes of the head, from the first 14 bytes of a file. FormatError where it is none, or of an unknown version. */
@@ -69,7 +71,7 @@ export class Head {
     if (preamble.version !== VERSION) {
       throw new FormatError(`format version ${preamble.version}: this player knows version ${VERSION}, update it`, "newer");
     }
-    if (preamble.flags !== 0) throw new FormatError(`flags ${preamble.flags}: version ${VERSION} has none`);
+    if (preamble.flags & ~EDITED) throw new FormatError(`flags ${preamble.flags}: this player knows ${EDITED} alone, update it`, "newer");
     if (preamble.headSize < PREAMBLE_SIZE + Checksum.least) throw new FormatError(`a head of ${preamble.headSize} bytes: damaged`);
     if (preamble.headSize > LIMITS.head) throw new FormatError(`a head of ${preamble.headSize} bytes, over ${LIMITS.head}`);
     return preamble.headSize;
@@ -85,7 +87,10 @@ export class Head {
     const [header, start] = unpack(Header, data.subarray(0, end), PREAMBLE_SIZE);
     const index = unpackAll(Index, data.subarray(start, end));
     checkIndex(index);
-    return new Head(header, chunksOf(index, size));
+    const metadata = metadataOf(header.metadata);
+    const frames = index.chunks.reduce((sum, entry) => sum + (entry.kind === ChunkKind.GROUP && entry.track === 0 ? entry.frames : 0), 0);
+    const edit = editOf(metadata, unpack(Preamble, data)[0].flags, frames);
+    return new Head(header, chunksOf(index, size, 0 - edit.first), metadata, edit);
   }
 
   /** Bytes of the whole file. */
@@ -199,7 +204,8 @@ export function describe(chunk: Pick<Chunk, "number" | "kind" | "track" | "first
   return `chunk ${number} (${what}track ${track}, frames ${firstFrame} to ${firstFrame + frameCount - 1})`;
 }
 
-function chunksOf(index: Index, start: number): Chunk[] {
+/** The chunks of a file, which lie behind each other from `start`; the first group of each track begins with frame `first`, below 0 where some are hidden. */
+function chunksOf(index: Index, start: number, first: number): Chunk[] {
   const frames: number[] = [];
   const chunks: Chunk[] = [];
   let offset = start;
@@ -209,7 +215,7 @@ function chunksOf(index: Index, start: number): Chunk[] {
     const { form, track, dependsOn, layers } = entry;
     let firstFrame = isCompanionKind(kind) ? chunks[dependsOn[0]].firstFrame : 0;
     if (kind === "group") {
-      firstFrame = frames[track] ?? 0;
+      firstFrame = frames[track] ?? first;
       frames[track] = firstFrame + entry.frames;
     }
     chunks.push({ number, kind, form, track, firstFrame, frameCount: entry.frames, dependsOn, offset, size, layers });
@@ -256,7 +262,13 @@ function timesOf(intervals: readonly number[]): Float64Array {
   return times;
 }
 
-function infoOf(header: Header, chunks: readonly Chunk[], trackCount: number, frameCount: number, lastTime: number): Info {
+function codedFrames(chunks: readonly Chunk[]): number {
+  return chunks.reduce((sum, { kind, track, frameCount }) => sum + (kind === "group" && track === 0 ? frameCount : 0), 0);
+}
+
+function infoOf(
+  header: Header, chunks: readonly Chunk[], metadata: Record<string, unknown>, rotation: Info["rotation"], trackCount: number, frameCount: number, lastTime: number,
+): Info {
   const last = chunks[chunks.length - 1];
   const scaled = chunks.filter(({ kind, form }) => kind === "group" && (form === Form.LAYERS || form === Form.LAPLACIAN));
   return {
@@ -264,21 +276,26 @@ function infoOf(header: Header, chunks: readonly Chunk[], trackCount: number, fr
     frameRate: header.frameRate,
     duration: lastTime + 1 / header.frameRate,
     origin: header.origin as unknown as Info["origin"],
-    box: boxOf(header),
+    box: boxOf(header, rotation ?? [1, 0, 0, 0, 1, 0, 0, 0, 1]),
+    rotation,
     trackCount,
     mostLayers: scaled.reduce((most, chunk) => Math.max(most, chunk.layers.length - 1), 0),
     size: last.offset + last.size,
     hasColors: chunks.some((chunk) => chunk.kind === "colors" || isVideo(chunk)),
     hasTextures: chunks.some(isVideo),
     hasSplats: chunks.some((chunk) => chunk.kind === "splats"),
-    metadata: metadataOf(header.metadata),
+    metadata,
   };
 }
 
-function boxOf(header: Header): Box {
-  const [x, y, z] = header.minimum.map((low) => low * header.scale);
-  const [width, height, depth] = header.minimum.map((low, k) => (header.maximum[k] - low) * header.scale);
-  return { minimum: [x, y, z], size: [width, height, depth] };
+/** The box around the box of a header, turned and in metres from the origin. */
+function boxOf({ minimum, maximum, scale }: Header, rotation: readonly number[]): Box {
+  const ends = [0, 1, 2].map((row) => {
+    const sides = [0, 1, 2].map((k) => [minimum[k], maximum[k]].map((end) => end * scale * rotation[3 * row + k]));
+    return [sides.reduce((sum, side) => sum + Math.min(...side), 0), sides.reduce((sum, side) => sum + Math.max(...side), 0)];
+  });
+  const [[x, right], [y, top], [z, front]] = ends;
+  return { minimum: [x, y, z], size: [right - x, top - y, front - z] };
 }
 
 /** The JSON object of a header. FormatError for other text, for numbers beyond doubles, and for half a surrogate, as in Python. */

@@ -157,6 +157,7 @@ export class Picture {
 
   /** Whether a group that is shown has the next frame, too. */
   #goesOn({ frame, frames, groups }: Mutable): boolean {
+    if (frame + 1 >= this.#head.frameCount) return false; // what follows is hidden
     for (let track = 0; track < groups.length; track++) {
       const group = groups[track];
       if (group !== null && frames[track] === frame && frame + 1 < group.firstFrame + group.frameCount) return true;

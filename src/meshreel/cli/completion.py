@@ -1,0 +1,32 @@
+"""`meshreel completion`: the script by which a shell completes commands and flags."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from importlib import import_module
+from typing import Literal
+
+from . import COMMANDS, make_app, place_of
+from .console import Common
+
+
+def command(shell: Literal["bash", "zsh", "fish"], /, *, common: Common = Common()) -> None:
+    """Print the script by which a shell completes commands and flags.
+
+    Commands whose packages are not installed have no flags in it.
+
+    Parameters
+    ----------
+    shell
+        The shell: append the script to ~/.bashrc, or write it where zsh or fish look for completions.
+    """
+    usable = list[str]()
+    for name in COMMANDS:
+        with suppress(ImportError):
+            import_module(place_of(name).partition(":")[0])
+            usable.append(name)
+    script = make_app(usable).generate_completion(shell=shell)
+    if common.json or common.quiet:
+        common.result({"shell": shell, "script": script})
+    else:
+        print(script)

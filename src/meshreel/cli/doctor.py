@@ -1,0 +1,72 @@
+"""`meshreel doctor`: what is installed, and what this machine can do with it."""
+
+from __future__ import annotations
+
+import platform
+import re
+import shutil
+from importlib.metadata import PackageNotFoundError, requires, version
+from importlib.resources import files
+from typing import Any
+
+from rich.table import Table
+
+from .. import __version__
+from .console import Common
+
+_NEEDS = re.compile(r"([A-Za-z0-9._-]+)[^;]*(?:;.*extra == [\"']([a-z0-9]+)[\"'])?")
+_BROWSERS = ("chromium", "chromium-browser", "google-chrome", "firefox")
+_CODECS = {"AV1 decoded": "libdav1d", "AV1 encoded": "libsvtav1", "H.264 encoded": "libx264"}
+
+
+def command(*, common: Common = Common()) -> None:
+    """Tell what is installed, extra by extra, which video codecs there are, and whether a GPU and browser are found."""
+    row: dict[str, Any] = {"meshreel": __version__, "python": platform.python_version(), "system": platform.platform()}
+    row |= {"extras": _extras(), "codecs": _codecs(), "gpu": _gpu()}
+    row["browser"] = next(filter(None, map(shutil.which, _BROWSERS)), None)
+    row["player"] = (files("meshreel") / "player" / "meshreel-player.js").is_file()
+    table = Table("extra", "installed", "missing")
+    for extra, packages in row["extras"].items():
+        there = ", ".join(f"{name} {found}" for name, found in packages.items() if found)
+        table.add_row(extra, there, ", ".join(name for name, found in packages.items() if not found) or "nothing")
+    codecs = ", ".join(f"{name}: {'yes' if there else 'no'}" for name, there in row["codecs"].items())
+    common.result(
+        row,
+        f"meshreel {row['meshreel']}, Python {row['python']}, {row['system']}",
+        table,
+        f"codecs: {codecs or 'none (extra color)'}",
+        f"GPU: {row['gpu'] or 'none found; only --splats and --sam3 use one'}",
+        f"browser: {row['browser'] or 'none found; meshreel serve prints an address for another machine'}",
+        f"player: {'built' if row['player'] else 'missing; run scripts/build-web, or install a wheel'}",
+    )
+
+
+def _extras() -> dict[str, dict[str, str | None]]:
+    """Return the packages of each extra, and of none, with their versions; None for those that are missing."""
+    found: dict[str, dict[str, str | None]] = {}
+    for line in requires("meshreel") or ():
+        if (need := _NEEDS.match(line)) and need[1] != "meshreel":
+            packages = found.setdefault(need[2] or "(none)", {})
+            try:
+                packages[need[1]] = version(need[1])
+            except PackageNotFoundError:
+                packages[need[1]] = None
+    return found
+
+
+def _codecs() -> dict[str, bool]:
+    """Return which codecs of textures PyAV has; nothing without it."""
+    try:
+        from av import codecs_available
+    except ImportError:
+        return {}
+    return {name: codec in codecs_available for name, codec in _CODECS.items()}
+
+
+def _gpu() -> str | None:
+    """Return the GPU that torch finds; None without one, or without torch."""
+    try:
+        import torch
+    except ImportError:
+        return None
+    return str(torch.cuda.get_device_name()) if torch.cuda.is_available() else None

@@ -1,0 +1,152 @@
+"""`meshreel cut`, `concat`, `retime`, `transform` and `tag`: edits of .reel files that encode nothing again."""
+
+from __future__ import annotations
+
+import json
+from typing import Annotated, Any
+
+import numpy as np
+from cyclopts import Parameter
+
+from ..encoder import edit
+from ..encoder.edit import Edited
+from ..errors import InputError
+from ..io.remote import Place, located
+from ..types import Up
+from .console import Common
+
+File = Annotated[str, Parameter(help="The .reel file; it may be a URL (extra `remote`).")]
+Output = Annotated[
+    str, Parameter(name=["--output", "-o"], help="The .reel file to write, when it is complete; or a URL.")
+]
+
+
+def cut(
+    file: File,
+    /,
+    *,
+    output: Output,
+    frames: str,
+    keys: Annotated[bool, Parameter(negative="")] = False,
+    common: Common = Common(),
+) -> None:
+    """Write some frames of a .reel file; nothing is encoded again.
+
+    Parameters
+    ----------
+    frames
+        Frames to keep, as A:B with B excluded. Those that they are coded with stay in the file, hidden.
+    keys
+        Cut where frames decode alone, before A and behind B, so that nothing is hidden.
+    """
+    _tell(_checked(output), edit.cut(file, _checked(output), frames, keys), common)
+
+
+def concat(inputs: list[str], /, *, output: Output, common: Common = Common()) -> None:
+    """Join .reel files one after the other; nothing is encoded again.
+
+    Parameters
+    ----------
+    inputs
+        The files in the order of their frames, encoded with one --survey and the same options, or cut from one file.
+        They may be URLs (extra `remote`).
+    """
+    place = _checked(output)
+    joined = edit.concat(inputs, place)
+    if joined.missing:
+        whole = joined.frames + joined.missing
+        common.warn((f"{place}: {joined.missing} of the sequence's {whole} frames are in none of the files",))
+    row = {"output": str(place), "frames": joined.frames, "bytes": joined.size, "files": len(inputs)}
+    common.result(row, f"{place}: {joined.frames} frames of {len(inputs)} files, {joined.size} bytes")
+
+
+def retime(
+    file: File, /, *, output: Output, fps: float | None = None, speed: float | None = None, common: Common = Common()
+) -> None:
+    """Write a .reel file that plays at another frame rate or speed; nothing is encoded again.
+
+    Parameters
+    ----------
+    fps
+        Frames per second, evenly.
+    speed
+        How many times as fast it plays, as 0.5 for half the speed.
+    """
+    _tell(_checked(output), edit.retime(file, _checked(output), fps, speed), common)
+
+
+def transform(
+    file: File,
+    /,
+    *,
+    output: Output,
+    scale: float = 1.0,
+    rotate: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    translate: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    up: Annotated[Up | None, Parameter(allow_leading_hyphen=True)] = None,
+    common: Common = Common(),
+) -> None:
+    """Write a .reel file in another place, size or orientation; nothing is encoded again.
+
+    Parameters
+    ----------
+    scale
+        Factor about the world's origin, as 0.001 for a file that was made from millimetres.
+    rotate
+        Degrees about x, then y, then z of the world. Players and readers before this version refuse the file.
+    translate
+        Metres along x, y and z, after that.
+    up
+        Axis that points up, for players and exports; it moves nothing.
+    """
+    turn = np.eye(3)
+    for axis, angle in enumerate(np.radians(rotate)):
+        one, other = (axis + 1) % 3, (axis + 2) % 3
+        step = np.eye(3)
+        step[one, one] = step[other, other] = np.cos(angle)
+        step[one, other], step[other, one] = -np.sin(angle), np.sin(angle)
+        turn = step @ turn
+    done = edit.transform(file, _checked(output), scale, turn if any(rotate) else None, translate, up)
+    _tell(_checked(output), done, common)
+
+
+def tag(
+    file: File,
+    values: Annotated[list[str], Parameter(negative="")],
+    /,
+    *,
+    output: Output,
+    common: Common = Common(),
+) -> None:
+    """Write a .reel file with other metadata, which `meshreel info` shows.
+
+    Parameters
+    ----------
+    values
+        NAME=VALUE, as title="A walk" or take=3 (numbers, true, false and JSON are taken as such); NAME= takes it away.
+    """
+    tags: dict[str, Any] = {}
+    for value in values:
+        name, sign, text = value.partition("=")
+        if not sign:
+            raise InputError(f"{value!r}: give NAME=VALUE, as title=Walk")
+        try:
+            tags[name] = json.loads(text) if text else None
+        except ValueError:
+            tags[name] = text
+    _tell(_checked(output), edit.tag(file, _checked(output), tags), common)
+
+
+def _checked(output: str) -> Place:
+    place = located(output)
+    if place.suffix != ".reel":
+        raise InputError(f"{output}: the output must end in .reel")
+    return place
+
+
+def _tell(place: Place, done: Edited, common: Common) -> None:
+    if done.hidden:
+        text = f"{done.hidden} hidden frames that the others are coded with are in it, too (--keys cuts without any)"
+        common.warn([f"{place}: {text}"])
+    row = {"output": str(place), "frames": done.frames, "hidden": done.hidden, "bytes": done.size}
+    common.result(row, f"{place}: {done.frames} frames, {done.size} bytes")

@@ -1,0 +1,40 @@
+"""`meshreel player`: where the built player lies, or a copy of it for a web server."""
+
+from __future__ import annotations
+
+from importlib.resources import as_file, files
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from ..errors import InputError
+from ..io.write import make_folder, replacing
+from .console import Common
+
+EMBED = """\
+<script type="module" src="{folder}/meshreel-player.js"></script>
+<meshreel-player src="walk.reel" controls loop style="width: 640px; aspect-ratio: 16 / 9"></meshreel-player>"""
+
+
+def command(*, copy_to: Annotated[Path | None, Parameter()] = None, common: Common = Common()) -> None:
+    """Copy the player's files for a web server, or print the folder where they are.
+
+    Parameters
+    ----------
+    copy_to
+        The folder to copy them to, made if needed; files of the same names are replaced. The files stay together.
+    """
+    with as_file(files("meshreel") / "player") as folder:
+        found = sorted(path for path in folder.iterdir() if path.is_file())
+        if not any(path.name == "meshreel-player.js" for path in found):
+            raise InputError(f"{folder}: the player is not built; run scripts/build-web, or install a wheel")
+        if copy_to is None:
+            common.result({"folder": str(folder), "files": [path.name for path in found]}, str(folder))
+            return
+        make_folder(copy_to)
+        for path in found:
+            with replacing(copy_to / path.name) as file:
+                file.write(path.read_bytes())
+    text = f"{copy_to}: {len(found)} files; in a page beside that folder:\n{EMBED.format(folder=copy_to.name)}"
+    common.result({"folder": str(copy_to), "files": [path.name for path in found]}, text)

@@ -1,0 +1,56 @@
+"""Edits of a file: which of its coded frames are shown, and how they are turned.
+
+In: metadata, whose item `edit` counts where the preamble has the flag EDITED. Out: an Edit. Older readers refuse a file
+with the flag, rather than show hidden frames or another position.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..errors import FormatError
+from .layout import EDITED
+
+ITEM = "edit"  # of the metadata
+_CLOSE = 1e-6  # to a rotation: far above the rounding of products of rotations, far below what is seen
+
+
+@dataclass(frozen=True, slots=True)
+class Edit:
+    """Frames shown, as coded frames `first` to `end` - 1, and a rotation about the header's origin."""
+
+    first: int
+    end: int
+    rotation: tuple[float, ...] = ()  # nine numbers, row by row; none: not turned
+
+    def item(self, frames: int) -> dict[str, Any]:
+        """Return the metadata of a file of `frames` coded frames: the item `edit`, or nothing where all is as coded."""
+        found: dict[str, Any] = {} if (self.first, self.end) == (0, frames) else {"frames": [self.first, self.end]}
+        found |= {"rotation": list(self.rotation)} if self.rotation else {}
+        return {ITEM: found} if found else {}
+
+
+def parse_edit(metadata: dict[str, Any], flags: int, frames: int) -> Edit:
+    """Return the edit of a file of `frames` coded frames. Raises FormatError for one that cannot be followed."""
+    item = metadata.get(ITEM) if flags & EDITED else {}
+    if not isinstance(item, dict) or item.keys() - {"frames", "rotation"}:
+        raise FormatError(f"Header.metadata: edit {item!r:.80} is none that this reader knows, update meshreel")
+    shown, rotation = item.get("frames", [0, frames]), item.get("rotation", [])
+    if not isinstance(shown, list) or [type(number) for number in shown] != [int, int]:
+        raise FormatError(f"Header.metadata: edit.frames {shown!r:.80} are no two numbers of frames")
+    if not 0 <= shown[0] < shown[1] <= frames:
+        raise FormatError(f"Header.metadata: edit.frames {shown} of {frames} frames")
+    if not isinstance(rotation, list) or not (rotation == [] or is_rotation(rotation)):
+        raise FormatError(f"Header.metadata: edit.rotation {rotation!r:.80} is no rotation of nine numbers")
+    return Edit(shown[0], shown[1], tuple(map(float, rotation)))
+
+
+def is_rotation(numbers: list[Any]) -> bool:
+    """Return whether nine numbers, row by row, are a rotation matrix."""
+    if len(numbers) != 9 or not all(type(number) in (int, float) and abs(number) <= 2 for number in numbers):
+        return False
+    matrix = np.array(numbers, np.float64).reshape(3, 3)
+    return bool(np.abs(matrix @ matrix.T - np.eye(3)).max() <= _CLOSE and np.linalg.det(matrix) > 0)

@@ -1,0 +1,49 @@
+"""Edits from the command line: `cut`, `retime`, `transform` and `tag` (`concat` has tests of its own)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+import meshreel
+from tests.cli.conftest import SCENE, failed
+from tests.golden import frame_record
+
+
+def test_a_cut_tells_of_hidden_frames_and_info_shows_those_that_are_shown(run, tmp_path):
+    said = run("cut", SCENE, "-o", tmp_path / "a.reel", "--frames", "4:9", "--json")
+    assert said.row["frames"] == 5 and said.row["hidden"] == 9 and "9 hidden frames" in said.err
+    shown = run("info", tmp_path / "a.reel", "--json").row
+    assert shown["frames"] == 5 and shown["metadata"]["history"] == ["cut 4:9"]
+    assert all(0 <= first <= last < 5 for track in shown["tracks"] for first, last in track["ranges"])
+    whole = run("cut", SCENE, "-o", tmp_path / "b.reel", "--frames", "4:9", "--keys", "--json")
+    assert whole.row["hidden"] == 0 and whole.err == ""
+
+
+def test_decode_and_export_of_a_cut_have_its_frames(run, tmp_path):
+    assert run("cut", SCENE, "-o", tmp_path / "a.reel", "--frames", "4:9").code == 0
+    assert run("decode", tmp_path / "a.reel", "-o", tmp_path / "out").out.count("5 ply files") == 1
+    assert run("export", tmp_path / "a.reel", "-o", tmp_path / "a.glb", "--json").row["frames"] == 5
+
+
+def test_rotations_are_about_x_then_y_then_z(run, tmp_path):
+    assert run("transform", SCENE, "-o", tmp_path / "a.reel", "--rotate", "90", "0", "90", "--scale", "2").code == 0
+    before, after = meshreel.open(SCENE)[2].vertices, meshreel.open(tmp_path / "a.reel")[2].vertices
+    x, y, z = 2 * before.T
+    np.testing.assert_allclose(after, np.column_stack([z, x, y]), atol=1e-6)  # y to z, -z to y; then x to y, -y to x
+
+
+def test_a_title_and_a_speed(run, tmp_path):
+    assert run("tag", SCENE, "title=A walk", "take=3", "-o", tmp_path / "a.reel").code == 0
+    assert run("retime", tmp_path / "a.reel", "--speed", "2", "-o", tmp_path / "b.reel").code == 0
+    video = meshreel.open(tmp_path / "b.reel")
+    assert video.metadata["title"] == "A walk" and video.metadata["take"] == 3 and video.frame_rate == 50
+    assert frame_record(video[3]) == frame_record(meshreel.open(SCENE)[3])
+    assert "title A walk" in run("info", tmp_path / "b.reel").out
+
+
+def test_wrong_words_are_said(run, tmp_path):
+    out = ("-o", tmp_path / "a.reel")
+    assert failed(run("tag", SCENE, "title", *out), "'title': give NAME=VALUE")
+    assert failed(run("cut", SCENE, "--frames", "1:2", "-o", tmp_path / "a.mesh"), "must end in .reel")
+    assert failed(run("retime", SCENE, *out), "a frame rate or a speed")
+    assert failed(run("cut", SCENE, "--frames", "99:", *out), "leave 0")

@@ -1,0 +1,144 @@
+"""What a notebook shows of a video and of a mesh, and videos in other processes."""
+
+from __future__ import annotations
+
+import io
+import multiprocessing
+import pickle
+import re
+import struct
+import zlib
+from base64 import b64decode
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
+from html import unescape
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import meshreel
+from meshreel.container.sources import BytesSource
+from meshreel.decoder import video as module
+from meshreel.decoder.page import player_page
+from meshreel.errors import FormatError, InputError
+from meshreel.geometry.picture import HEIGHT, WIDTH, picture
+from meshreel.types import Mesh
+from tests.container.test_http import LARGE
+from tests.golden import GOLDEN, frame_record
+from tests.metrics.shapes import sphere
+
+SCENE = GOLDEN / "scene.reel"
+TEXTURED = sorted((GOLDEN / "colored").glob("*.reel"))
+
+
+def test_a_notebook_shows_the_player_with_the_file_in_a_frame():
+    shown = meshreel.open(SCENE)._repr_html_()
+    assert "scene.reel, 14 frames" in shown
+    (frame,) = re.findall(r'srcdoc="([^"]*)"', shown)
+    page = unescape(frame)
+    assert page == player_page(SCENE.read_bytes(), "scene.reel") == meshreel.open(SCENE)._page()
+    (recording,) = re.findall(r', "([A-Za-z0-9+/=]+)"\);\n</script>', page)
+    assert b64decode(recording) == SCENE.read_bytes()
+    assert not re.search(r'(src|href)="', page)  # it fetches nothing
+
+
+def test_no_name_of_a_file_ends_the_script_or_a_tag():
+    page = player_page(b"", "</script><b>'\"")
+    assert page.count("</script>") == 1 and "<b>" not in page
+
+
+def test_a_large_file_is_a_table_that_says_how_to_play_it(monkeypatch):
+    monkeypatch.setattr(module, "INLINE", 1000)
+    shown = meshreel.open(SCENE)._repr_html_()
+    assert "<table>" in shown and "14 frames" in shown and "meshreel play" in shown and "srcdoc" not in shown
+
+
+def test_show_opens_a_page_that_is_whole(monkeypatch, tmp_path):
+    opened: list[str] = []
+    monkeypatch.setattr("webbrowser.open", lambda *named: opened.extend(named) or True)
+    monkeypatch.setattr("tempfile.mkdtemp", lambda **_: str(tmp_path))
+    meshreel.open(SCENE).show()
+    assert opened == [(tmp_path / "scene.html").as_uri()]
+    assert (tmp_path / "scene.html").read_text() == meshreel.open(SCENE)._page()
+    monkeypatch.setattr("webbrowser.open", lambda _: False)
+    with pytest.raises(InputError, match=r"no browser was found: open .*recording.html"):
+        meshreel.open(SCENE.read_bytes()).show()
+
+
+def pixels_of(data: bytes) -> np.ndarray:
+    """The pixels of a PNG as `picture` writes it."""
+    assert data[:8] == b"\x89PNG\r\n\x1a\n"
+    size = struct.unpack(">I", data[33:37])[0]
+    rows = np.frombuffer(zlib.decompress(data[41 : 41 + size]), np.uint8).reshape(HEIGHT, 1 + 4 * WIDTH)
+    return rows[:, 1:].reshape(HEIGHT, WIDTH, 4)
+
+
+def test_the_picture_of_a_ball_is_a_disk_without_holes_brightest_in_its_middle():
+    seen = pixels_of(picture(sphere(0.5, 4)))
+    rows, columns = np.mgrid[:HEIGHT, :WIDTH]
+    far = np.hypot(rows + 0.5 - HEIGHT / 2, columns + 0.5 - WIDTH / 2) / (0.47 * HEIGHT)
+    assert (seen[far < 0.98, 3] == 255).all() and (seen[far > 1.03, 3] == 0).all()
+    assert seen[far < 0.2, 0].mean() > 1.5 * seen[(far > 0.9) & (far < 0.97), 0].mean()
+
+
+def test_the_picture_of_a_mesh_has_its_colors_and_an_empty_one_has_none():
+    ball = sphere(0.5, 3)
+    red = replace(ball, colors=np.tile(np.array([255, 0, 0], np.uint8), (len(ball.vertices), 1)))
+    seen = pixels_of(red._repr_png_() or b"")
+    assert seen[..., 0].max() > 200 and seen[..., 1:3].max() == 0
+    assert Mesh.empty()._repr_png_() is None
+
+
+def last_frame(video: meshreel.Video) -> object:
+    return frame_record(video[-1])
+
+
+@pytest.mark.parametrize("way", [str, Path, Path.read_bytes, lambda path: BytesSource(path.read_bytes())])
+def test_a_video_goes_to_another_process(way):
+    video = meshreel.open(way(SCENE)).at(layers=1)
+    again = pickle.loads(pickle.dumps(video))
+    assert again.layers == 1 and repr(again) == repr(video) and last_frame(again) == last_frame(video)
+    with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:
+        assert pool.submit(last_frame, video).result() == last_frame(video)
+
+
+def test_a_video_of_a_file_object_says_how_it_can_be_pickled():
+    with pytest.raises(InputError, match="open it by its path"):
+        pickle.dumps(meshreel.open(io.BytesIO(SCENE.read_bytes())))
+
+
+def read_often(video: meshreel.Video, results: object) -> None:
+    """Put what goes wrong while chunks are read over and over; their checksums tell."""
+    try:
+        for number in range(3000):
+            video.reader.read_chunk(number % len(video.reader.chunks))
+        results.put("")
+    except FormatError as error:
+        results.put(str(error))
+
+
+def test_forked_processes_that_share_an_open_file_do_not_disturb_each_other(tmp_path):
+    if "fork" not in multiprocessing.get_all_start_methods():
+        pytest.skip("this system does not fork")
+    (tmp_path / "a.reel").write_bytes(LARGE)
+    video = meshreel.open(tmp_path / "a.reel")
+    context = multiprocessing.get_context("fork")
+    queue = context.SimpleQueue()
+    workers = [context.Process(target=read_often, args=(video, queue)) for _ in range(4)]
+    for worker in workers:
+        worker.start()
+    assert [queue.get() for _ in workers] == [""] * 4
+    for worker in workers:
+        worker.join()
+
+
+def test_a_mesh_with_a_texture_is_pickled_as_it_is_shown():
+    pytest.importorskip("av", reason="textures need the extra color")
+    found = [meshreel.open(path)[0] for path in TEXTURED]
+    found = [mesh for mesh in found if mesh.texture is not None]
+    assert found
+    for mesh in found:
+        again = pickle.loads(pickle.dumps(mesh))
+        assert np.array_equal(again.vertices, mesh.vertices) and again.texture.shape == mesh.texture.shape
+        assert np.array_equal(again.texture.pixels, mesh.texture.pixels)
