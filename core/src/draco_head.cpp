@@ -1,8 +1,7 @@
 #include <algorithm>
 #include <cstring>
 
-#include "draco_faces.h"
-#include "draco_reader.h"
+#include "draco_head.h"
 #include "guarded.h"
 #include "meshreel/draco.h"
 
@@ -38,7 +37,7 @@ int check_kind(DracoReader& in) {
     return (low | high) != 0 ? MR_DRACO_METADATA : MR_OK;
 }
 
-int read_connectivity(DracoReader& in, DracoClaims& claims, uint64_t most) {
+int read_connectivity(DracoReader& in, DracoClaims& claims, uint64_t most, DracoFaces* faces) {
     const auto traversal = static_cast<DracoTraversal>(in.byte());
     claims.points = in.varint(), claims.faces = in.varint();
     const uint8_t attributes = in.byte();  // with seams of their own
@@ -48,7 +47,7 @@ int read_connectivity(DracoReader& in, DracoClaims& claims, uint64_t most) {
     if (attributes != 0) return MR_DRACO_ATTRIBUTES;
     if (claims.faces > most || claims.points > most || claims.splits > most - claims.points) return MR_DRACO_CLAIMS;
     if (claims.symbols > claims.faces) return MR_DRACO_FACES;
-    return read_draco_faces(in, traversal, claims) ? MR_OK : MR_DRACO_FACES;
+    return read_draco_faces(in, traversal, claims, faces) ? MR_OK : MR_DRACO_FACES;
 }
 
 int check_attributes(DracoReader& in) {
@@ -60,33 +59,58 @@ int check_attributes(DracoReader& in) {
     return in.byte() == kQuantised ? MR_OK : MR_DRACO_ATTRIBUTES;
 }
 
+uint32_t number_of(const uint8_t* bytes) {
+    uint32_t value = 0;
+    for (int k = 3; k >= 0; --k) value = value << 8 | bytes[k];
+    return value;
+}
+
 bool is_finite(const uint8_t* number) {  // a 32-bit float
     return (number[3] & 0x7f) != 0x7f || (number[2] & 0x80) == 0;
 }
 
-int check_positions(DracoReader& in, const DracoClaims& claims) {
+float float_of(const uint8_t* bytes) {
+    const uint32_t bits = number_of(bytes);
+    float value;
+    std::memcpy(&value, &bits, sizeof value);
+    return value;
+}
+
+int read_positions(DracoReader& in, const DracoClaims& claims, DracoPositions* positions) {
     constexpr uint8_t parallelogram = 1, wrapped = 1, compressed = 1;
     if (in.byte() != parallelogram || in.byte() != wrapped || in.byte() != compressed) return MR_DRACO_PREDICTION;
-    in.symbols(claims.points, 3, DracoReader::kAnyValue, nullptr);
-    in.take(8);                            // bounds of the wrapping
+    if (positions) positions->corrections = in.numbers(claims.points, 3);
+    else in.symbols(claims.points, 3, DracoReader::kAnyValue, nullptr);
+    const uint8_t* bounds = in.take(8);    // of the wrapping
     const uint8_t* numbers = in.take(16);  // the lattice's corner and its width
     const uint8_t bits = in.byte();
     if (!in.at_end()) return MR_BAD_DRACO;
     for (int k = 0; k < 4; ++k)
         if (!is_finite(numbers + 4 * k)) return MR_DRACO_LATTICE;
-    return bits >= 1 && bits <= kMostBits ? MR_OK : MR_DRACO_LATTICE;
+    if (bits < 1 || bits > kMostBits) return MR_DRACO_LATTICE;
+    if (!positions) return MR_OK;
+    positions->least = static_cast<int32_t>(number_of(bounds)),
+    positions->most = static_cast<int32_t>(number_of(bounds + 4));
+    for (int k = 0; k < 3; ++k) positions->corner[k] = float_of(numbers + 4 * k);
+    positions->width = float_of(numbers + 12), positions->bits = bits;
+    return MR_OK;
 }
 
-int check_mesh(const mr_bytes& mesh, DracoClaims& claims, uint64_t most) {
+int read_mesh(const mr_bytes& mesh, DracoClaims& claims, uint64_t most, DracoParts* parts) {
     DracoReader in(mesh.data, mesh.size);
     int status = check_kind(in);
-    if (status == MR_OK) status = read_connectivity(in, claims, most);
+    if (status == MR_OK) status = read_connectivity(in, claims, most, parts ? &parts->faces : nullptr);
     if (status == MR_OK) status = check_attributes(in);
-    if (status == MR_OK) status = check_positions(in, claims);
+    if (status == MR_OK) status = read_positions(in, claims, parts ? &parts->positions : nullptr);
     return status;
 }
 
 }  // namespace
+
+int read_draco(const mr_bytes& mesh, DracoParts& parts) {
+    return read_mesh(mesh, parts.claims, most_of(mesh.size), &parts);
+}
+
 }  // namespace meshreel
 
 int mr_check_draco(const mr_bytes* meshes, size_t count) {
@@ -97,7 +121,8 @@ int mr_check_draco(const mr_bytes* meshes, size_t count) {
     for (size_t k = 0; k < count; ++k) {
         if (meshes[k].size == 0) continue;  // the empty mesh
         DracoClaims claims{};
-        const int status = guarded(MR_NO_MEMORY, MR_BAD_DRACO, [&] { return check_mesh(meshes[k], claims, most); });
+        const int status =
+            guarded(MR_NO_MEMORY, MR_BAD_DRACO, [&] { return read_mesh(meshes[k], claims, most, nullptr); });
         if (status != MR_OK) return status;
         faces += claims.faces, points += claims.points + claims.splits, steps += claims.steps;
         if (faces > most || points > most) return MR_DRACO_CLAIMS;
