@@ -79,7 +79,9 @@ def library() -> ctypes.CDLL:
     build = ROOT / "build/decoder"
     configure("core/decoder", build)
     run("cmake", "--build", build, "--config", "Release")
-    [path] = [p for pattern in ("**/libmeshreel.so", "**/libmeshreel.dylib", "**/meshreel.dll") for p in build.glob(pattern)]
+    [path] = [
+        p for pattern in ("**/libmeshreel.so", "**/libmeshreel.dylib", "**/meshreel.dll") for p in build.glob(pattern)
+    ]
     loaded = ctypes.CDLL(str(path))
     loaded.meshreel_last_error.restype = loaded.meshreel_metadata.restype = c_char_p
     loaded.meshreel_abi_version.restype = c_uint32
