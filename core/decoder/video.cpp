@@ -136,17 +136,22 @@ void Video::keep(uint32_t chunk, const std::shared_ptr<State>& state, Cached& ca
 }
 
 // Returns why there are no colours, where they are damaged: the surface is shown without them.
-std::string Video::paint(uint32_t chunk, const Context& context, int64_t layers, Continued& made) {
+template <class Paint>
+std::string Video::paint_with(uint32_t chunk, int64_t layers, Paint paint) {
     const uint32_t of = head.companion_of(chunk, kColorsOf);
     if (of == kNoChunk) return "";
     try {
         refused_.check(of);
         const std::vector<uint8_t> data = read(of, layers);
-        refused_.of(head, of, [&] { paint_group(view(data), context, made); });
+        refused_.of(head, of, [&] { paint(view(data)); });
     } catch (const FormatError& error) {
         return error.what();
     }
     return "";
+}
+
+std::string Video::paint(uint32_t chunk, const Context& context, int64_t layers, Continued& made) {
+    return paint_with(chunk, layers, [&](const mr_bytes& data) { paint_group(data, context, made); });
 }
 
 uint32_t Video::pictures_of(uint32_t chunk) const {
@@ -227,14 +232,9 @@ Mesh Video::decode_state(uint32_t chunk) {
     });
     std::string& lacks = background_.lacking;
     if (!is_change) lacks.clear();
-    const uint32_t of = head.companion_of(chunk, kColorsOf);
-    if (of != kNoChunk) try {
-            refused_.check(of);
-            const std::vector<uint8_t> data = read(of, kAllLayers);
-            refused_.of(head, of, [&] { paint_background(view(data), made); });
-        } catch (const FormatError& error) {
-            lacks = error.what();
-        }
+    const std::string unpainted =
+        paint_with(chunk, kAllLayers, [&](const mr_bytes& data) { paint_background(data, made); });
+    if (lacks.empty()) lacks = unpainted;
     const std::string more = put_on_texture(chunk, 0, made.mesh.faces, made.mesh.places);
     if (lacks.empty()) lacks = more;
     return std::move(made.mesh);

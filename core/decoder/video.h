@@ -66,6 +66,8 @@ private:
     std::shared_ptr<State> state_before(uint32_t chunk, Cached& cached);
     void keep(uint32_t chunk, const std::shared_ptr<State>& state, Cached& cached) const;
     Context context_of(uint32_t chunk, const State* previous) const;
+    template <class Paint>
+    std::string paint_with(uint32_t chunk, int64_t layers, Paint paint);
     std::string paint(uint32_t chunk, const Context& context, int64_t layers, Continued& made);
     std::string put_on_texture(uint32_t chunk, unsigned levels, const Faces& faces, std::vector<float>& places);
     const Mesh& state_of(uint32_t chunk);

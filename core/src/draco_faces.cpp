@@ -172,19 +172,19 @@ bool read_handles(DracoReader& in, uint64_t symbols, std::vector<DracoHandle>& h
     return in.good();
 }
 
-}  // namespace
-
-bool read_draco_faces(DracoReader& in, DracoTraversal traversal, DracoClaims& claims, DracoFaces* faces) {
+// Calls `begin` with the handles and the symbols, of which it tells `keep` one after the other.
+template <class Begin, class Keep>
+bool follow(DracoReader& in, DracoTraversal traversal, DracoClaims& claims, Begin begin, Keep keep) {
     std::vector<DracoHandle> handles;
     if (!read_handles(in, claims.symbols, handles)) return false;
     Symbols symbols(in, traversal, claims);
     if (!in.good()) return false;
-    if (faces) faces->handles = handles, faces->start_chance = symbols.start_chance, faces->starts = symbols.starts;
+    begin(handles, symbols);
     Boundary boundary(claims.points + claims.splits);
     std::unordered_map<uint64_t, uint32_t> waiting;          // edges, by the symbol of the split
     for (uint64_t number = claims.symbols; number-- > 0;) {  // the encoder's numbers: it went the other way
         const uint8_t symbol = symbols.next(boundary.valence());
-        if (faces) faces->symbols.push_back(symbol);
+        keep(symbol);
         const auto found = waiting.find(number);
         if (!boundary.add(symbol, found == waiting.end() ? Boundary::kNone : found->second)) return false;
         for (; !handles.empty() && handles.back().source == number; handles.pop_back()) {
@@ -195,6 +195,19 @@ bool read_draco_faces(DracoReader& in, DracoTraversal traversal, DracoClaims& cl
     claims.steps = boundary.renamed();
     return boundary.points() == claims.points && boundary.joined() == claims.splits &&
            claims.faces - claims.symbols <= boundary.open();
+}
+
+}  // namespace
+
+bool read_draco_faces(DracoReader& in, DracoTraversal traversal, DracoClaims& claims) {
+    return follow(in, traversal, claims, [](const auto&, const Symbols&) {}, [](uint8_t) {});
+}
+
+bool read_draco_faces(DracoReader& in, DracoTraversal traversal, DracoClaims& claims, DracoFaces& faces) {
+    const auto begin = [&](const std::vector<DracoHandle>& handles, const Symbols& symbols) {
+        faces.handles = handles, faces.start_chance = symbols.start_chance, faces.starts = symbols.starts;
+    };
+    return follow(in, traversal, claims, begin, [&](uint8_t symbol) { faces.symbols.push_back(symbol); });
 }
 
 }  // namespace meshreel

@@ -38,7 +38,9 @@ struct DracoFaces {
     DracoReader starts;        // whether each does, coded
 };
 
-// True where the faces that follow are those that are claimed. Sets the claims' steps, and `faces` unless it is null.
-bool read_draco_faces(DracoReader& in, DracoTraversal traversal, DracoClaims& claims, DracoFaces* faces);
+// True where the faces that follow are those that are claimed. Sets the claims' steps; the second also what they are
+// made from.
+bool read_draco_faces(DracoReader& in, DracoTraversal traversal, DracoClaims& claims);
+bool read_draco_faces(DracoReader& in, DracoTraversal traversal, DracoClaims& claims, DracoFaces& faces);
 
 }  // namespace meshreel

@@ -37,7 +37,8 @@ int check_kind(DracoReader& in) {
     return (low | high) != 0 ? MR_DRACO_METADATA : MR_OK;
 }
 
-int read_connectivity(DracoReader& in, DracoClaims& claims, uint64_t most, DracoFaces* faces) {
+template <class ReadFaces>
+int read_connectivity(DracoReader& in, DracoClaims& claims, uint64_t most, ReadFaces read_faces) {
     const auto traversal = static_cast<DracoTraversal>(in.byte());
     claims.points = in.varint(), claims.faces = in.varint();
     const uint8_t attributes = in.byte();  // with seams of their own
@@ -47,7 +48,7 @@ int read_connectivity(DracoReader& in, DracoClaims& claims, uint64_t most, Draco
     if (attributes != 0) return MR_DRACO_ATTRIBUTES;
     if (claims.faces > most || claims.points > most || claims.splits > most - claims.points) return MR_DRACO_CLAIMS;
     if (claims.symbols > claims.faces) return MR_DRACO_FACES;
-    return read_draco_faces(in, traversal, claims, faces) ? MR_OK : MR_DRACO_FACES;
+    return read_faces(in, traversal, claims) ? MR_OK : MR_DRACO_FACES;
 }
 
 int check_attributes(DracoReader& in) {
@@ -59,14 +60,53 @@ int check_attributes(DracoReader& in) {
     return in.byte() == kQuantised ? MR_OK : MR_DRACO_ATTRIBUTES;
 }
 
+bool is_finite(const uint8_t* number) {  // a 32-bit float
+    return (number[3] & 0x7f) != 0x7f || (number[2] & 0x80) == 0;
+}
+
+// Where the parts of the positions are.
+struct Places {
+    DracoReader symbols;
+    const uint8_t *bounds, *numbers;
+    uint8_t bits;
+};
+
+int check_positions(DracoReader& in, const DracoClaims& claims, Places& places) {
+    constexpr uint8_t parallelogram = 1, wrapped = 1, compressed = 1;
+    if (in.byte() != parallelogram || in.byte() != wrapped || in.byte() != compressed) return MR_DRACO_PREDICTION;
+    places.symbols = in;
+    in.symbols(claims.points, 3, DracoReader::kAnyValue, nullptr);
+    places.bounds = in.take(8);            // of the wrapping
+    const uint8_t* numbers = in.take(16);  // the lattice's corner and its width
+    const uint8_t bits = in.byte();
+    if (!in.at_end()) return MR_BAD_DRACO;
+    for (int k = 0; k < 4; ++k)
+        if (!is_finite(numbers + 4 * k)) return MR_DRACO_LATTICE;
+    places.numbers = numbers, places.bits = bits;
+    return bits >= 1 && bits <= kMostBits ? MR_OK : MR_DRACO_LATTICE;
+}
+
+template <class ReadFaces>
+int read_mesh(const mr_bytes& mesh, DracoClaims& claims, uint64_t most, Places& places, ReadFaces read_faces) {
+    DracoReader in(mesh.data, mesh.size);
+    int status = check_kind(in);
+    if (status == MR_OK) status = read_connectivity(in, claims, most, read_faces);
+    if (status == MR_OK) status = check_attributes(in);
+    if (status == MR_OK) status = check_positions(in, claims, places);
+    return status;
+}
+
+int check_mesh(const mr_bytes& mesh, DracoClaims& claims, uint64_t most) {
+    Places places{};
+    return read_mesh(mesh, claims, most, places, [](DracoReader& in, DracoTraversal traversal, DracoClaims& known) {
+        return read_draco_faces(in, traversal, known);
+    });
+}
+
 uint32_t number_of(const uint8_t* bytes) {
     uint32_t value = 0;
     for (int k = 3; k >= 0; --k) value = value << 8 | bytes[k];
     return value;
-}
-
-bool is_finite(const uint8_t* number) {  // a 32-bit float
-    return (number[3] & 0x7f) != 0x7f || (number[2] & 0x80) == 0;
 }
 
 float float_of(const uint8_t* bytes) {
@@ -76,39 +116,22 @@ float float_of(const uint8_t* bytes) {
     return value;
 }
 
-int read_positions(DracoReader& in, const DracoClaims& claims, DracoPositions* positions) {
-    constexpr uint8_t parallelogram = 1, wrapped = 1, compressed = 1;
-    if (in.byte() != parallelogram || in.byte() != wrapped || in.byte() != compressed) return MR_DRACO_PREDICTION;
-    if (positions) positions->corrections = in.numbers(claims.points, 3);
-    else in.symbols(claims.points, 3, DracoReader::kAnyValue, nullptr);
-    const uint8_t* bounds = in.take(8);    // of the wrapping
-    const uint8_t* numbers = in.take(16);  // the lattice's corner and its width
-    const uint8_t bits = in.byte();
-    if (!in.at_end()) return MR_BAD_DRACO;
-    for (int k = 0; k < 4; ++k)
-        if (!is_finite(numbers + 4 * k)) return MR_DRACO_LATTICE;
-    if (bits < 1 || bits > kMostBits) return MR_DRACO_LATTICE;
-    if (!positions) return MR_OK;
-    positions->least = static_cast<int32_t>(number_of(bounds)),
-    positions->most = static_cast<int32_t>(number_of(bounds + 4));
-    for (int k = 0; k < 3; ++k) positions->corner[k] = float_of(numbers + 4 * k);
-    positions->width = float_of(numbers + 12), positions->bits = bits;
-    return MR_OK;
-}
-
-int read_mesh(const mr_bytes& mesh, DracoClaims& claims, uint64_t most, DracoParts* parts) {
-    DracoReader in(mesh.data, mesh.size);
-    int status = check_kind(in);
-    if (status == MR_OK) status = read_connectivity(in, claims, most, parts ? &parts->faces : nullptr);
-    if (status == MR_OK) status = check_attributes(in);
-    if (status == MR_OK) status = read_positions(in, claims, parts ? &parts->positions : nullptr);
-    return status;
-}
-
 }  // namespace
 
 int read_draco(const mr_bytes& mesh, DracoParts& parts) {
-    return read_mesh(mesh, parts.claims, most_of(mesh.size), &parts);
+    Places places{};
+    const auto read_faces = [&](DracoReader& in, DracoTraversal traversal, DracoClaims& claims) {
+        return read_draco_faces(in, traversal, claims, parts.faces);
+    };
+    const int status = read_mesh(mesh, parts.claims, most_of(mesh.size), places, read_faces);
+    if (status != MR_OK) return status;
+    DracoPositions& found = parts.positions;
+    found.corrections = places.symbols.numbers(parts.claims.points, 3);
+    found.least = static_cast<int32_t>(number_of(places.bounds));
+    found.most = static_cast<int32_t>(number_of(places.bounds + 4));
+    for (int k = 0; k < 3; ++k) found.corner[k] = float_of(places.numbers + 4 * k);
+    found.width = float_of(places.numbers + 12), found.bits = places.bits;
+    return places.symbols.good() ? MR_OK : MR_BAD_DRACO;
 }
 
 }  // namespace meshreel
@@ -121,8 +144,7 @@ int mr_check_draco(const mr_bytes* meshes, size_t count) {
     for (size_t k = 0; k < count; ++k) {
         if (meshes[k].size == 0) continue;  // the empty mesh
         DracoClaims claims{};
-        const int status =
-            guarded(MR_NO_MEMORY, MR_BAD_DRACO, [&] { return read_mesh(meshes[k], claims, most, nullptr); });
+        const int status = guarded(MR_NO_MEMORY, MR_BAD_DRACO, [&] { return check_mesh(meshes[k], claims, most); });
         if (status != MR_OK) return status;
         faces += claims.faces, points += claims.points + claims.splits, steps += claims.steps;
         if (faces > most || points > most) return MR_DRACO_CLAIMS;

@@ -29,7 +29,8 @@ double sum_of(const meshreel_mesh& mesh) {
     double sum = 0;
     for (uint64_t k = 0; k < 3 * mesh.vertex_count; ++k) sum += mesh.positions[k];
     for (uint64_t k = 0; k < 3 * mesh.vertex_count && mesh.colors; ++k) sum += mesh.colors[k];
-    for (uint64_t k = 0; k < 6 * mesh.face_count && mesh.uv; ++k) sum += mesh.uv[k] == mesh.uv[k] ? mesh.uv[k] : 0;  // NaN: a face without a place
+    for (uint64_t k = 0; k < 6 * mesh.face_count && mesh.uv; ++k)
+        sum += mesh.uv[k] == mesh.uv[k] ? mesh.uv[k] : 0;  // NaN: a face without a place
     return sum;
 }
 

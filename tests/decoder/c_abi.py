@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import fcntl
 import shutil
 import subprocess
 import sysconfig
@@ -77,8 +78,11 @@ def configure(source: str, build: Path, *options: str) -> None:
 def library() -> ctypes.CDLL:
     """Build the library in build/decoder, where an older build is brought up to date, and load it."""
     build = ROOT / "build/decoder"
-    configure("core/decoder", build)
-    run("cmake", "--build", build, "--config", "Release")
+    build.parent.mkdir(exist_ok=True)
+    with build.with_suffix(".lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)  # other workers of the tests wait
+        configure("core/decoder", build)
+        run("cmake", "--build", build, "--config", "Release")
     [path] = [
         p for pattern in ("**/libmeshreel.so", "**/libmeshreel.dylib", "**/meshreel.dll") for p in build.glob(pattern)
     ]

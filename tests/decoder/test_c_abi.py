@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import io
 import json
+import re
 import shutil
 import subprocess
 from collections.abc import Callable
@@ -293,6 +294,18 @@ def test_colours_that_are_damaged_are_left_out_and_told_of():
         found = video.decode(0, 0)
         assert "checksum" in video.message and found["colors"] is None
         check_same(known.at(colors=False).parts(0)["track 0"], found | {"uv": None})
+
+
+def test_the_bindings_in_the_docs_have_the_calls_of_the_header():
+    header = (ROOT / "core/include/meshreel/decoder.h").read_text()
+    docs = (ROOT / "docs/engines.md").read_text()
+
+    def calls(text: str, before: str) -> dict[str, int]:
+        found = re.findall(before + r"[^;]*?(meshreel_\w+)\(([^)]*)\);", text)
+        return {name: 0 if arguments in ("", "void") else arguments.count(",") + 1 for name, arguments in found}
+
+    assert calls(header, "MESHREEL_API ") == calls(docs, "static extern ")
+    assert len(calls(header, "MESHREEL_API ")) == 12
 
 
 def test_the_header_is_c_and_the_installed_package_is_found(tmp_path: Path):
