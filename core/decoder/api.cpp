@@ -16,6 +16,7 @@ struct meshreel_video {
     std::string error;
     Mesh mesh;        // of the last call
     Picture picture;  // of the last call
+    Bound splats;     // of the last call
     struct Known {
         Faces faces;
         uint64_t identity;
@@ -211,6 +212,19 @@ int32_t meshreel_picture(meshreel_video* video, uint64_t frame, int32_t part, in
         const Picture& found = video->picture;
         if (found.packet.empty()) return MESHREEL_OK;
         *packet = {found.packet.data(), found.packet.size(), found.stream, found.number, found.width, found.height};
+        return MESHREEL_OK;
+    });
+}
+
+int32_t meshreel_decode_splats(meshreel_video* video, uint64_t frame, int32_t track, meshreel_splats* splats) {
+    if (splats) *splats = {};
+    return call(video, splats, [&](Video& opened) -> int32_t {
+        const char* fault = fault_of(opened.head, frame, track);
+        if (fault || track < 0) return refuse(*video, fault ? fault : "splats belong to a track");
+        video->splats = opened.splats(frame, static_cast<size_t>(track));
+        const Bound& found = video->splats;
+        *splats = {found.opacities.size(), found.means.data(),     found.axes.data(),
+                   found.scales.data(),    found.opacities.data(), found.colors.data()};
         return MESHREEL_OK;
     });
 }

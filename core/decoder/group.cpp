@@ -136,6 +136,7 @@ Continued continue_group(const mr_bytes& data, const Context& context) {
 
 Mesh base_mesh(const mr_bytes& data) {
     if (data.data[0] == kLayers) return layers_base(data);
+    if (data.data[0] == kLaplacian) return laplacian_base(data);
     const std::vector<IntraMesh> meshes = decode_intra(data);
     require(meshes.size() == 1, "background: not one mesh");
     return meshes[0].base;

@@ -32,6 +32,7 @@ struct ColoredMesh {
 // Frames: vertices and faces that all of them share, and a mesh that is added to each.
 struct Group {
     size_t frames = 0, vertices = 0;
+    unsigned levels = 0;            // subdivisions that the shared mesh has of its base
     std::vector<double> positions;  // frames x vertices x 3, m
     Faces faces = no_faces();
     std::vector<uint8_t> dropped;  // frames x faces, 1 where a frame lacks one; or empty
@@ -82,10 +83,10 @@ void paint_group(const mr_bytes& data, const Context& context, Continued& made);
 // The same of a background; the colours of a change are those of its end.
 void paint_background(const mr_bytes& data, Background& made);
 
-// The mesh that an atlas is of: from the first layer of a group of form LAYERS that needs no other, or from a
-// background.
+// The mesh that an atlas or splats are of: from the first layer of a group that needs no other, or from a background.
 Mesh base_mesh(const mr_bytes& data);
 Mesh layers_base(const mr_bytes& data);
+Mesh laplacian_base(const mr_bytes& data);
 
 // Where the corners of a base mesh's faces are in a texture.
 struct Atlas {

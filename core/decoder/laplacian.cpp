@@ -144,6 +144,22 @@ std::vector<double> decode_deltas(const DisplacementHead& head, size_t columns, 
     return deltas;
 }
 
+struct LaplacianGroup {
+    unsigned levels;
+    Mesh reference;
+    mr_bytes displacements;
+};
+
+LaplacianGroup read_group(const mr_bytes& data) {
+    Records in(data);
+    require(in.u8() == kLaplacian, "a group of another form than LAPLACIAN");
+    const unsigned levels = in.u8();
+    const double step = in.f64();
+    const mr_bytes coded = in.blob(in.u32());
+    check_step(step);
+    return {levels, decode_draco(coded, step), in.rest()};
+}
+
 // vertices x frames x 3 numbers, from at most so many components.
 std::vector<double> decode_displacements(const mr_bytes& data, const Mesh& base, int64_t most) {
     const DisplacementHead head = read_head(data);
@@ -173,14 +189,11 @@ std::vector<double> decode_displacements(const mr_bytes& data, const Mesh& base,
 
 }  // namespace
 
+Mesh laplacian_base(const mr_bytes& data) { return read_group(data).reference; }
+
 Continued decode_laplacian(const mr_bytes& data, const Context& context) {
-    Records in(data);
-    require(in.u8() == kLaplacian, "a group of another form than LAPLACIAN");
-    const unsigned levels = in.u8();
-    const double step = in.f64();
-    const mr_bytes coded = in.blob(in.u32()), displacements = in.rest();
-    check_step(step);
-    const Mesh reference = decode_draco(coded, step);
+    const LaplacianGroup record = read_group(data);
+    const auto& [levels, reference, displacements] = record;
     const DisplacementHead head = read_head(displacements);
     require(head.frames == context.frames, "a group of other frames than the index says");
     check_growth(reference, levels, head.frames);
@@ -190,7 +203,7 @@ Continued decode_laplacian(const mr_bytes& data, const Context& context) {
     Continued made;
     Group& group = made.group;
     const size_t frames = group.frames = head.frames, vertices = group.vertices = base.vertex_count();
-    group.faces = base.faces;
+    group.faces = base.faces, group.levels = levels;
     group.positions.resize(field.size());
     for (size_t v = 0; v < vertices; ++v)
         for (size_t t = 0; t < frames; ++t)

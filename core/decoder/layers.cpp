@@ -168,7 +168,7 @@ Continued decode_layers(const mr_bytes& data, const Context& context) {
     made.canvas.push_back({base, levels, records.frames, refinement.vertices});
     if (!context.is_shown) return made;
     Group& group = made.group;
-    group.frames = records.frames, group.vertices = refinement.vertices;
+    group.frames = records.frames, group.vertices = refinement.vertices, group.levels = levels;
     group.positions = std::move(refinement.positions), group.faces = refinement.faces;
     if (records.rest.size == 0 || (context.layers != kAllLayers && context.layers <= records.levels)) return made;
     decode_patches(records.rest, group);

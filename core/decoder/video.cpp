@@ -25,6 +25,7 @@ void Video::set_layers(int64_t layers) {
     if (layers == layers_) return;
     layers_ = layers;
     tracks_ = std::vector<Cached>(head.tracks.size());
+    splats_ = {};
     refused_ = lost_ = Refusals();  // other layers of a chunk may be whole
 }
 

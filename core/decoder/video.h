@@ -9,6 +9,7 @@
 #include "format_error.h"
 #include "group.h"
 #include "source.h"
+#include "splats.h"
 
 namespace meshreel {
 
@@ -46,6 +47,7 @@ public:
     Mesh track(uint64_t frame, size_t track);
     Mesh background(uint64_t frame);
     Mesh whole(uint64_t frame);
+    Bound splats(uint64_t frame, size_t track);
     // The coded picture of a group or a background in a frame, in the coding of a kind of chunks.
     Picture picture(uint64_t frame, uint32_t chunk, Kind kind);
 
@@ -74,6 +76,7 @@ private:
     Mesh decode_state(uint32_t chunk);
     const Atlas& atlas(uint32_t chunk);
     uint32_t pictures_of(uint32_t chunk) const;
+    uint32_t splats_of(uint32_t chunk) const;
     std::vector<uint8_t> read(uint32_t chunk, int64_t layers) const;
 
     Source source_;
@@ -94,6 +97,11 @@ private:
     } background_;
     uint32_t atlas_chunk_ = kNoChunk;
     Atlas atlas_{};
+    struct {
+        uint32_t chunk = kNoChunk;
+        size_t faces = 0;  // of the base mesh
+        std::vector<Splat> all;
+    } splats_;  // those that were decoded last
 };
 
 }  // namespace meshreel

@@ -51,6 +51,9 @@ void decode_frame(meshreel_video* video, uint64_t frame, int32_t part, Tally& ta
     if (status == MESHREEL_OK) CHECK(are_in_range(mesh) && sum_of(mesh) > -1e300);
     ++(status == MESHREEL_OK ? tally.decoded : tally.refused);
     meshreel_packet packet;
+    meshreel_splats splats;
+    if (meshreel_decode_splats(video, frame, part, &splats) == MESHREEL_OK && splats.count > 0)
+        CHECK(splats.opacities[splats.count - 1] <= 1 && splats.colors[3 * splats.count - 1] <= 1);
     if (part != MESHREEL_WHOLE) meshreel_picture(video, frame, part, MESHREEL_AV1, &packet);
 }
 

@@ -60,6 +60,15 @@ class Packet(ctypes.Structure):
     ]
 
 
+class CSplats(ctypes.Structure):
+    """`meshreel_splats`."""
+
+    _fields_ = [
+        ("count", c_uint64),
+        *((name, POINTER(c_double)) for name in ("means", "axes", "scales", "opacities", "colors")),
+    ]
+
+
 def run(*command: str | Path) -> str:
     """Return what a command prints; its errors are the test's."""
     done = subprocess.run(command, capture_output=True, text=True, check=False)
@@ -102,6 +111,7 @@ def library() -> ctypes.CDLL:
         "set_layers": [handle, c_int32],
         "decode": [handle, c_uint64, c_int32, POINTER(Shown)],
         "picture": [handle, c_uint64, c_int32, c_int32, POINTER(Packet)],
+        "decode_splats": [handle, c_uint64, c_int32, POINTER(CSplats)],
         "round": [POINTER(Shown), POINTER(c_double), POINTER(c_float)],
     }.items():
         getattr(loaded, f"meshreel_{name}").argtypes = arguments
@@ -184,6 +194,13 @@ class CVideo:
         packet = Packet()
         self._check(self._c.meshreel_picture(self._handle, frame, part, codec, byref(packet)))
         return (ctypes.string_at(packet.data, packet.size), packet) if packet.data else None
+
+    def splats(self, frame: int, track: int) -> dict[str, np.ndarray] | None:
+        found = CSplats()
+        self._check(self._c.meshreel_decode_splats(self._handle, frame, track, byref(found)))
+        shapes = {"means": (3,), "axes": (3, 3), "scales": (3,), "opacities": (), "colors": (3,)}
+        arrays = {name: (getattr(found, name), (found.count, *shape)) for name, shape in shapes.items()}
+        return {name: _array(*array, np.float64) for name, array in arrays.items()} if found.count else None
 
     def _check(self, status: int) -> None:
         if status != OK:

@@ -146,6 +146,21 @@ def test_the_axis_that_points_up_is_told(text: str, up: int):
         assert video.info.up == up
 
 
+def test_splats_are_those_of_python():
+    path = GOLDEN / "splats/splats.reel"
+    for layers in (None, 0):
+        known, counts = meshreel.open(path).at(layers), list[int]()
+        with CVideo(path.read_bytes()) as video:
+            video.set_layers(-1 if layers is None else layers)
+            for frame in range(len(known)):
+                wanted, found = known.splats(frame), video.splats(frame, 0)
+                assert (wanted is None) == (found is None)
+                counts.append(0 if found is None else len(found["opacities"]))
+                for name, array in (found or {}).items():
+                    np.testing.assert_allclose(array, getattr(wanted, name), rtol=0, atol=1e-9)
+        assert max(counts) > 0 == min(counts)
+
+
 def test_packets_are_those_of_the_file_in_their_order():
     known = meshreel.open(GOLDEN / "colored/textures.reel").reader
     with CVideo((GOLDEN / "colored/textures.reel").read_bytes()) as video:
@@ -305,7 +320,7 @@ def test_the_bindings_in_the_docs_have_the_calls_of_the_header():
         return {name: 0 if arguments in ("", "void") else arguments.count(",") + 1 for name, arguments in found}
 
     assert calls(header, "MESHREEL_API ") == calls(docs, "static extern ")
-    assert len(calls(header, "MESHREEL_API ")) == 12
+    assert len(calls(header, "MESHREEL_API ")) == 13
 
 
 def test_the_header_is_c_and_the_installed_package_is_found(tmp_path: Path):

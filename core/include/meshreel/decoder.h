@@ -5,7 +5,7 @@
 // by its bytes (FORMAT.md, "What a file may cost"): a file that asks for more is refused as damaged.
 //
 // Not here: the decoding of textures, which engines have in hardware. Places of corners (UV) and the coded packets, AV1
-// and H.264, are handed out as they are. Splats are not decoded.
+// and H.264, are handed out as they are.
 #pragma once
 
 #include <stddef.h>
@@ -118,6 +118,22 @@ typedef struct meshreel_packet {
 // `data` is null where there is none.
 MESHREEL_API int32_t meshreel_picture(meshreel_video* video, uint64_t frame, int32_t part, int32_t codec,
                                       meshreel_packet* packet);
+
+// Flat Gaussians in space, of each its numbers side by side. They are drawn in place of the surface of their track,
+// from front to back, each exp(-(u^2 / s0^2 + v^2 / s1^2 + w^2 / s2^2) / 2) of the distances from its mean along its
+// axes.
+typedef struct meshreel_splats {
+    uint64_t count;
+    const double* means;      // three, m
+    const double* axes;       // nine: three unit vectors
+    const double* scales;     // three, along these, m
+    const double* opacities;  // one, 0 to 1; 0 where the frame lacks its face
+    const double* colors;     // three, sRGB, 0 to 1
+} meshreel_splats;
+
+// The splats of a track in a frame, none where it has none; valid as a mesh is.
+MESHREEL_API int32_t meshreel_decode_splats(meshreel_video* video, uint64_t frame, int32_t track,
+                                            meshreel_splats* splats);
 
 #ifdef __cplusplus
 }
