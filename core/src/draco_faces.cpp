@@ -7,23 +7,17 @@
 namespace meshreel {
 namespace {
 
-enum Symbol : uint8_t { C, S, L, R, E, kSymbols };  // edgebreaker: J. Rossignac (1999); in the order of their numbers
+using namespace clers;
 
 constexpr int kContexts = 6;  // of valences 2 to 7
-
-// A split that closes a handle: an edge beside the face of one symbol waits for the face of another.
-struct Handle {
-    uint64_t source, split;
-    bool is_right;
-};
 
 // Symbols in the order of decoding.
 class Symbols {
 public:
     Symbols(DracoReader& in, DracoTraversal traversal, const DracoClaims& claims) : traversal_(traversal) {
         if (traversal == DracoTraversal::Standard) bits_ = in.block();
-        in.byte();  // whether each component starts within its surface: a chance, and coded bits
-        in.block();
+        start_chance = in.byte();
+        starts = in.block();
         if (traversal == DracoTraversal::Standard) return;
         uint64_t left = claims.symbols;
         for (std::vector<uint8_t>& context : contexts_) {
@@ -49,6 +43,9 @@ public:
         context.pop_back();
         return symbol;
     }
+
+    uint8_t start_chance;  // as DracoFaces has them
+    DracoReader starts;
 
 private:
     DracoTraversal traversal_;
@@ -160,7 +157,7 @@ private:
     uint64_t renamed_ = 0;
 };
 
-bool read_handles(DracoReader& in, uint64_t symbols, std::vector<Handle>& handles) {
+bool read_handles(DracoReader& in, uint64_t symbols, std::vector<DracoHandle>& handles) {
     const uint64_t count = in.varint();
     uint64_t source = 0;
     for (uint64_t k = 0; k < count && in.good(); ++k) {
@@ -171,21 +168,23 @@ bool read_handles(DracoReader& in, uint64_t symbols, std::vector<Handle>& handle
     }
     if (count == 0) return true;
     DracoReader bits(in.take((count + 7) / 8), (count + 7) / 8);
-    for (Handle& handle : handles) handle.is_right = in.good() && bits.bits(1) == 1;
+    for (DracoHandle& handle : handles) handle.is_right = in.good() && bits.bits(1) == 1;
     return in.good();
 }
 
-}  // namespace
-
-bool read_draco_faces(DracoReader& in, DracoTraversal traversal, DracoClaims& claims) {
-    std::vector<Handle> handles;
+// Calls `begin` with the handles and the symbols, of which it tells `keep` one after the other.
+template <class Begin, class Keep>
+bool follow(DracoReader& in, DracoTraversal traversal, DracoClaims& claims, Begin begin, Keep keep) {
+    std::vector<DracoHandle> handles;
     if (!read_handles(in, claims.symbols, handles)) return false;
     Symbols symbols(in, traversal, claims);
     if (!in.good()) return false;
+    begin(handles, symbols);
     Boundary boundary(claims.points + claims.splits);
     std::unordered_map<uint64_t, uint32_t> waiting;          // edges, by the symbol of the split
     for (uint64_t number = claims.symbols; number-- > 0;) {  // the encoder's numbers: it went the other way
         const uint8_t symbol = symbols.next(boundary.valence());
+        keep(symbol);
         const auto found = waiting.find(number);
         if (!boundary.add(symbol, found == waiting.end() ? Boundary::kNone : found->second)) return false;
         for (; !handles.empty() && handles.back().source == number; handles.pop_back()) {
@@ -196,6 +195,19 @@ bool read_draco_faces(DracoReader& in, DracoTraversal traversal, DracoClaims& cl
     claims.steps = boundary.renamed();
     return boundary.points() == claims.points && boundary.joined() == claims.splits &&
            claims.faces - claims.symbols <= boundary.open();
+}
+
+}  // namespace
+
+bool read_draco_faces(DracoReader& in, DracoTraversal traversal, DracoClaims& claims) {
+    return follow(in, traversal, claims, [](const auto&, const Symbols&) {}, [](uint8_t) {});
+}
+
+bool read_draco_faces(DracoReader& in, DracoTraversal traversal, DracoClaims& claims, DracoFaces& faces) {
+    const auto begin = [&](const std::vector<DracoHandle>& handles, const Symbols& symbols) {
+        faces.handles = handles, faces.start_chance = symbols.start_chance, faces.starts = symbols.starts;
+    };
+    return follow(in, traversal, claims, begin, [&](uint8_t symbol) { faces.symbols.push_back(symbol); });
 }
 
 }  // namespace meshreel

@@ -18,7 +18,29 @@ struct DracoClaims {
 
 enum class DracoTraversal : uint8_t { Standard = 0, ByValence = 2 };
 
-// True where the faces that follow are those that are claimed. Sets the claims' steps.
+// Edgebreaker's symbols (J. Rossignac 1999), in the order of their numbers.
+namespace clers {
+enum Symbol : uint8_t { C, S, L, R, E, kSymbols };
+}
+
+// A split that closes a handle: an edge beside the face of one symbol waits for the face of another. Symbols are
+// numbered as they were coded, the last one decoded first.
+struct DracoHandle {
+    uint64_t source, split;
+    bool is_right;
+};
+
+// What the faces are made from.
+struct DracoFaces {
+    std::vector<uint8_t> symbols;  // in the order of decoding
+    std::vector<DracoHandle> handles;
+    uint8_t start_chance = 0;  // that a component does not start within its surface, 256ths
+    DracoReader starts;        // whether each does, coded
+};
+
+// True where the faces that follow are those that are claimed. Sets the claims' steps; the second also what they are
+// made from.
 bool read_draco_faces(DracoReader& in, DracoTraversal traversal, DracoClaims& claims);
+bool read_draco_faces(DracoReader& in, DracoTraversal traversal, DracoClaims& claims, DracoFaces& faces);
 
 }  // namespace meshreel

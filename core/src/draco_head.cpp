@@ -1,8 +1,7 @@
 #include <algorithm>
 #include <cstring>
 
-#include "draco_faces.h"
-#include "draco_reader.h"
+#include "draco_head.h"
 #include "guarded.h"
 #include "meshreel/draco.h"
 
@@ -38,7 +37,8 @@ int check_kind(DracoReader& in) {
     return (low | high) != 0 ? MR_DRACO_METADATA : MR_OK;
 }
 
-int read_connectivity(DracoReader& in, DracoClaims& claims, uint64_t most) {
+template <class ReadFaces>
+int read_connectivity(DracoReader& in, DracoClaims& claims, uint64_t most, ReadFaces read_faces) {
     const auto traversal = static_cast<DracoTraversal>(in.byte());
     claims.points = in.varint(), claims.faces = in.varint();
     const uint8_t attributes = in.byte();  // with seams of their own
@@ -48,7 +48,7 @@ int read_connectivity(DracoReader& in, DracoClaims& claims, uint64_t most) {
     if (attributes != 0) return MR_DRACO_ATTRIBUTES;
     if (claims.faces > most || claims.points > most || claims.splits > most - claims.points) return MR_DRACO_CLAIMS;
     if (claims.symbols > claims.faces) return MR_DRACO_FACES;
-    return read_draco_faces(in, traversal, claims) ? MR_OK : MR_DRACO_FACES;
+    return read_faces(in, traversal, claims) ? MR_OK : MR_DRACO_FACES;
 }
 
 int check_attributes(DracoReader& in) {
@@ -64,29 +64,76 @@ bool is_finite(const uint8_t* number) {  // a 32-bit float
     return (number[3] & 0x7f) != 0x7f || (number[2] & 0x80) == 0;
 }
 
-int check_positions(DracoReader& in, const DracoClaims& claims) {
+// Where the parts of the positions are.
+struct Places {
+    DracoReader symbols;
+    const uint8_t *bounds, *numbers;
+    uint8_t bits;
+};
+
+int check_positions(DracoReader& in, const DracoClaims& claims, Places& places) {
     constexpr uint8_t parallelogram = 1, wrapped = 1, compressed = 1;
     if (in.byte() != parallelogram || in.byte() != wrapped || in.byte() != compressed) return MR_DRACO_PREDICTION;
+    places.symbols = in;
     in.symbols(claims.points, 3, DracoReader::kAnyValue, nullptr);
-    in.take(8);                            // bounds of the wrapping
+    places.bounds = in.take(8);            // of the wrapping
     const uint8_t* numbers = in.take(16);  // the lattice's corner and its width
     const uint8_t bits = in.byte();
     if (!in.at_end()) return MR_BAD_DRACO;
     for (int k = 0; k < 4; ++k)
         if (!is_finite(numbers + 4 * k)) return MR_DRACO_LATTICE;
+    places.numbers = numbers, places.bits = bits;
     return bits >= 1 && bits <= kMostBits ? MR_OK : MR_DRACO_LATTICE;
 }
 
-int check_mesh(const mr_bytes& mesh, DracoClaims& claims, uint64_t most) {
+template <class ReadFaces>
+int read_mesh(const mr_bytes& mesh, DracoClaims& claims, uint64_t most, Places& places, ReadFaces read_faces) {
     DracoReader in(mesh.data, mesh.size);
     int status = check_kind(in);
-    if (status == MR_OK) status = read_connectivity(in, claims, most);
+    if (status == MR_OK) status = read_connectivity(in, claims, most, read_faces);
     if (status == MR_OK) status = check_attributes(in);
-    if (status == MR_OK) status = check_positions(in, claims);
+    if (status == MR_OK) status = check_positions(in, claims, places);
     return status;
 }
 
+int check_mesh(const mr_bytes& mesh, DracoClaims& claims, uint64_t most) {
+    Places places{};
+    return read_mesh(mesh, claims, most, places, [](DracoReader& in, DracoTraversal traversal, DracoClaims& known) {
+        return read_draco_faces(in, traversal, known);
+    });
+}
+
+uint32_t number_of(const uint8_t* bytes) {
+    uint32_t value = 0;
+    for (int k = 3; k >= 0; --k) value = value << 8 | bytes[k];
+    return value;
+}
+
+float float_of(const uint8_t* bytes) {
+    const uint32_t bits = number_of(bytes);
+    float value;
+    std::memcpy(&value, &bits, sizeof value);
+    return value;
+}
+
 }  // namespace
+
+int read_draco(const mr_bytes& mesh, DracoParts& parts) {
+    Places places{};
+    const auto read_faces = [&](DracoReader& in, DracoTraversal traversal, DracoClaims& claims) {
+        return read_draco_faces(in, traversal, claims, parts.faces);
+    };
+    const int status = read_mesh(mesh, parts.claims, most_of(mesh.size), places, read_faces);
+    if (status != MR_OK) return status;
+    DracoPositions& found = parts.positions;
+    found.corrections = places.symbols.numbers(parts.claims.points, 3);
+    found.least = static_cast<int32_t>(number_of(places.bounds));
+    found.most = static_cast<int32_t>(number_of(places.bounds + 4));
+    for (int k = 0; k < 3; ++k) found.corner[k] = float_of(places.numbers + 4 * k);
+    found.width = float_of(places.numbers + 12), found.bits = places.bits;
+    return places.symbols.good() ? MR_OK : MR_BAD_DRACO;
+}
+
 }  // namespace meshreel
 
 int mr_check_draco(const mr_bytes* meshes, size_t count) {

@@ -9,19 +9,23 @@ constexpr uint8_t kTagged = 0, kRaw = 1;
 constexpr uint8_t kMostBits = 18;                 // of untagged symbols
 constexpr uint64_t kMostValues = 1 << kMostBits;  // of theirs
 constexpr uint64_t kFewValues = 64;               // of tables whose symbols are decoded: tags, and small symbols
+constexpr uint64_t kMostTags = 33;                // numbers of bits of 32-bit numbers
 constexpr int kTagPrecision = 12;
 
-// rANS (J. Duda), which is read from the last byte to the first. Values are below kFewValues.
+int precision_of(int bits) { return std::clamp(3 * bits / 2, 12, 20); }
+
+// rANS (J. Duda), which is read from the last byte to the first.
+template <class Value>
 class Rans {
 public:
     // `chances` of the values: their sum is 2^precision, or nothing can be decoded.
     Rans(int precision, const std::vector<uint32_t>& chances, const uint8_t* data, uint64_t size)
-        : data_(data), precision_(precision), low_(4u << precision), value_(size_t{1} << precision) {
+        : data_(data), precision_(precision), low_(4u << precision), chance_(chances), value_(size_t{1} << precision) {
         uint32_t sum = 0;
         for (size_t value = 0; value < chances.size(); ++value) {
             if (chances[value] > value_.size() - sum) return;
-            chance_[value] = chances[value], below_[value] = sum;
-            std::fill_n(value_.begin() + sum, chances[value], static_cast<uint8_t>(value));
+            below_.push_back(sum);
+            std::fill_n(value_.begin() + sum, chances[value], static_cast<Value>(value));
             sum += chances[value];
         }
         const uint64_t bytes = size > 0 ? uint64_t{data[size - 1]} / 64 + 1 : 1;
@@ -34,10 +38,10 @@ public:
 
     bool good() const { return good_; }
 
-    uint8_t next() {
+    Value next() {
         while (state_ < low_ && left_ > 0) state_ = state_ << 8 | data_[--left_];
         const uint32_t place = state_ & ((1u << precision_) - 1);
-        const uint8_t value = value_[place];
+        const Value value = value_[place];
         state_ = (state_ >> precision_) * chance_[value] + place - below_[value];
         return value;
     }
@@ -46,14 +50,15 @@ private:
     const uint8_t* data_;
     uint64_t left_ = 0;
     int precision_;
-    uint32_t low_, state_ = 0, chance_[kFewValues] = {}, below_[kFewValues] = {};
-    std::vector<uint8_t> value_;
+    uint32_t low_, state_ = 0;
+    std::vector<uint32_t> chance_, below_;
+    std::vector<Value> value_;
     bool good_ = false;
 };
 
 // Chances of at most `values` values: a byte or up to three for each, or a byte for up to 64 without any. Those of the
-// first kFewValues are returned.
-std::vector<uint32_t> read_chances(DracoReader& in, uint64_t values) {
+// first `kept` are returned.
+std::vector<uint32_t> read_chances(DracoReader& in, uint64_t values, uint64_t kept = kFewValues) {
     const uint64_t count = in.varint();
     if (count > values) in.fail();
     std::vector<uint32_t> chances;
@@ -64,7 +69,7 @@ std::vector<uint32_t> read_chances(DracoReader& in, uint64_t values) {
         for (int b = 0; b < more && more < 3; ++b) chance |= static_cast<uint32_t>(in.byte()) << (8 * b + 6);
         const uint64_t end = k + (more == 3 ? first >> 2 : 0) + 1;
         if (end > count) in.fail();
-        for (k = end; chances.size() < std::min(end, kFewValues);) chances.push_back(chance);
+        for (k = end; chances.size() < std::min(end, kept);) chances.push_back(chance);
     }
     return chances;
 }
@@ -121,8 +126,8 @@ void DracoReader::symbols(uint64_t count, uint64_t together, uint64_t values, st
     DracoReader block = this->block();
     if (coding == kRaw && !out) return;
     const uint64_t size = block.left_;
-    const int precision = coding == kRaw ? std::clamp(3 * bits / 2, 12, 20) : kTagPrecision;
-    Rans coded(precision, chances, block.data_, size);
+    const int precision = coding == kRaw ? precision_of(bits) : kTagPrecision;
+    Rans<uint8_t> coded(precision, chances, block.data_, size);
     if (!good_ || !coded.good()) return fail();
     if (coding == kRaw)
         for (uint64_t k = 0; k < count; ++k) out->push_back(coded.next());
@@ -134,6 +139,25 @@ void DracoReader::symbols(uint64_t count, uint64_t together, uint64_t values, st
         take((sum * together + 7) / 8);
     }
     rest_count_ = 0;
+}
+
+std::vector<uint32_t> DracoReader::numbers(uint64_t count, uint64_t together) {
+    const uint8_t coding = byte();
+    const int bits = coding == kRaw ? byte() : 0;
+    if (coding > kRaw || (coding == kRaw && (bits < 1 || bits > kMostBits))) fail();
+    const uint64_t most = coding == kRaw ? kMostValues : kMostTags;
+    const std::vector<uint32_t> chances = read_chances(*this, most, most);
+    const DracoReader block = this->block();
+    Rans<uint32_t> coded(coding == kRaw ? precision_of(bits) : kTagPrecision, chances, block.data_, block.left_);
+    std::vector<uint32_t> found;
+    if (!good_ || !coded.good()) return fail(), found;
+    found.reserve(count * together);
+    for (uint64_t k = 0; k < count && good_; ++k) {
+        const int size = coding == kTagged ? static_cast<int>(coded.next()) : 0;
+        for (uint64_t j = 0; j < together; ++j) found.push_back(coding == kRaw ? coded.next() : this->bits(size));
+    }
+    rest_count_ = 0;
+    return found;
 }
 
 }  // namespace meshreel

@@ -16,6 +16,7 @@ public:
     bool good() const { return good_; }
     bool at_end() const { return good_ && left_ == 0; }
     void fail() { good_ = false; }
+    uint64_t left() const { return left_; }
 
     // The next bytes, null where there are not so many.
     const uint8_t* take(uint64_t count);
@@ -28,6 +29,8 @@ public:
 
     // `count` groups of `together` symbols below `values`; they are stored unless `out` is null.
     void symbols(uint64_t count, uint64_t together, uint64_t values, std::vector<uint8_t>* out);
+    // The same of symbols below 2^32, all of which are stored.
+    std::vector<uint32_t> numbers(uint64_t count, uint64_t together);
 
     static constexpr uint64_t kAnyValue = uint64_t{1} << 32;
 

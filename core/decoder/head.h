@@ -1,0 +1,80 @@
+// The head of a file, checked, and where everything else lies. Beside src/meshreel/container/reader.py.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "records.h"
+
+namespace meshreel {
+
+enum Kind : uint8_t { kStatic = 1, kGroup, kColorsOf, kAtlasOf, kPicturesOf, kCompatibleOf, kSplatsOf };
+enum Form : uint8_t { kLaplacian = 1, kLayers, kDraco, kEmpty, kPatch, kVertexColors, kPlaces, kVideo, kGaussians };
+
+constexpr uint32_t kNoChunk = ~0u;
+constexpr int64_t kAllLayers = -1;  // as a number of layers
+
+struct Header {
+    double frame_rate, origin[3], scale, minimum[3], maximum[3];
+    std::string metadata;
+    int64_t first_time;
+    std::vector<uint64_t> intervals;
+};
+
+struct Layer {
+    uint64_t size;
+    uint32_t crc;
+};
+
+struct Chunk {
+    uint8_t kind, form;
+    uint16_t frames;
+    uint64_t track;
+    std::vector<uint64_t> depends_on;
+    std::vector<Layer> layers;
+    uint64_t offset = 0, first_frame = 0;
+
+    bool is_companion() const { return kind >= kColorsOf && kind <= kSplatsOf; }
+    uint64_t size() const;
+};
+
+struct Head {
+    Header header;
+    std::vector<Chunk> chunks;
+    std::vector<std::vector<uint32_t>> tracks;                    // numbers of the groups of each
+    std::map<std::pair<uint32_t, uint8_t>, uint32_t> companions;  // by coded chunk and kind
+    std::map<uint32_t, uint64_t> shown_from;                      // of each static chunk, the first frame that names it
+    std::vector<int64_t> times;                                   // of all frames, microseconds; or empty
+    uint64_t frames = 0, size = 0;                                // bytes of the whole file
+
+    uint32_t companion_of(uint32_t chunk, uint8_t kind) const;
+    uint32_t chunk_of_frame(uint64_t frame, size_t track) const;
+    // The newest static chunk that a group of the frame names, or kNoChunk.
+    uint32_t static_of_frame(uint64_t frame) const;
+    uint32_t group_before(uint32_t chunk) const;
+    double time_of(uint64_t frame) const;  // s
+    bool is_static(uint64_t chunk) const { return chunks[chunk].kind == kStatic; }
+};
+
+// Bytes that the first request is for.
+constexpr uint64_t kFirstRequest = 16384;
+
+// The size of the head, from the first bytes of a file of `file_size`. Throws FormatError.
+uint32_t head_size(const std::vector<uint8_t>& start, uint64_t file_size);
+// `data` is the head and no more. Throws FormatError.
+Head parse_head(const std::vector<uint8_t>& data, uint64_t file_size);
+
+// A chunk in words: its number, and what frames it holds.
+std::string describe(const Head& head, uint32_t chunk);
+
+// The laws of an index, entry by entry. Throws FormatError where one is broken. Fills in tracks and companions, and the
+// first frames of the chunks.
+void check_index(Head& head);
+
+// The value of a member of a JSON object if it is a string without escapes, else "".
+std::string text_member(const std::string& json, const std::string& name);
+
+}  // namespace meshreel

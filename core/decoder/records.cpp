@@ -1,0 +1,119 @@
+#include "records.h"
+
+#include <array>
+#include <cmath>
+#include <cstring>
+
+#include "format_error.h"
+#include "meshreel/entropy.h"
+
+namespace meshreel {
+namespace {
+
+constexpr uint64_t kSymbolsPerByte = 22'800;  // no stream says more (src/meshreel/coding/entropy.py)
+constexpr unsigned kRungs = 200;              // of the ladder of steps (src/meshreel/coding/steps.py)
+
+std::array<uint32_t, 256> crc_table() {
+    std::array<uint32_t, 256> table{};
+    for (uint32_t byte = 0; byte < 256; ++byte) {
+        uint32_t rest = byte;
+        for (int bit = 0; bit < 8; ++bit) rest = rest & 1 ? rest >> 1 ^ 0xEDB88320u : rest >> 1;
+        table[byte] = rest;
+    }
+    return table;
+}
+
+}  // namespace
+
+const uint8_t* Records::take(uint64_t size) {
+    require(size <= left_, "a record is truncated or damaged");
+    const uint8_t* from = at_;
+    at_ += size, left_ -= static_cast<size_t>(size);
+    return from;
+}
+
+void Records::finish(const char* what) const {
+    if (left_ > 0) throw FormatError(std::string(what) + ": " + std::to_string(left_) + " bytes too many");
+}
+
+uint64_t Records::number(int bytes) {
+    const uint8_t* from = take(static_cast<uint64_t>(bytes));
+    uint64_t value = 0;
+    for (int k = bytes - 1; k >= 0; --k) value = value << 8 | from[k];
+    return value;
+}
+
+double Records::f32() {
+    const uint32_t bits = u32();
+    float value;
+    std::memcpy(&value, &bits, sizeof value);
+    require(std::isfinite(value), "a number that is not finite");
+    return static_cast<double>(value);
+}
+
+double Records::f64() {
+    const uint64_t bits = number(8);
+    double value;
+    std::memcpy(&value, &bits, sizeof value);
+    require(std::isfinite(value), "a number that is not finite");
+    return value;
+}
+
+uint64_t Records::varint() {
+    uint64_t value = 0;
+    for (int shift = 0; shift < 70; shift += 7) {
+        const uint8_t byte = u8();
+        require(shift < 63 || byte <= 1, "a varint beyond 64 bits");
+        value |= static_cast<uint64_t>(byte & 0x7F) << shift;
+        if (byte & 0x80) continue;
+        require(shift == 0 || byte != 0, "a varint longer than it needs to be");
+        break;
+    }
+    return value;
+}
+
+uint8_t Records::choice(uint8_t first, uint8_t last) {
+    const uint8_t value = u8();
+    require(value >= first && value <= last, "a value that is none of those known");
+    return value;
+}
+
+void Records::skip_field() {
+    varint();  // columns
+    u8();      // step
+    blob(varint());
+    blob(varint());
+}
+
+void Records::skip_colors_level() {
+    u8();
+    skip_field();
+}
+
+std::vector<int32_t> decode_integers(const mr_bytes& data, uint64_t count) {
+    check_plausible(count, data.size);
+    std::vector<int32_t> values(static_cast<size_t>(count));
+    check(mr_decode_integers(data.data, data.size, values.size(), values.data()), "integers: ");
+    return values;
+}
+
+void check_plausible(uint64_t count, size_t size) {
+    require(count <= kSymbolsPerByte * (uint64_t{size} + 4) && (count > 0) == (size > 0),
+            "symbols that cannot come from so few bytes; the stream is damaged");
+}
+
+double step_of(unsigned level) {
+    constexpr double kEighths[8] = {4294967296.0, 3938502376.0, 3611622603.0, 3311872529.0,
+                                    3037000500.0, 2784941738.0, 2553802834.0, 2341847524.0};
+    require(level < kRungs, "a step that the ladder does not have");
+    return std::ldexp(kEighths[level % 8], -32 - static_cast<int>(level / 8));
+}
+
+uint32_t crc32(const uint8_t* data, size_t size) {
+    static const std::array<uint32_t, 256> table = crc_table();
+    uint32_t rest = ~0u;
+    for (size_t k = 0; k < size; ++k) rest = rest >> 8 ^ table[(rest ^ data[k]) & 0xFF];
+    return ~rest;
+}
+
+}  // namespace meshreel

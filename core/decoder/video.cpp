@@ -1,0 +1,244 @@
+#include "video.h"
+
+#include <algorithm>
+
+#include "budget.h"
+
+namespace meshreel {
+namespace {
+
+// Bytes of states that all tracks keep together, as in src/meshreel/decoder/cache.py.
+constexpr double kMostKept = 1 << 25;
+constexpr double kMostTogether = 8 * limits::kMostNumbers;
+
+}  // namespace
+
+void Refusals::check(uint32_t chunk, const std::vector<uint32_t>& dependents) {
+    const auto found = messages_.find(chunk);
+    if (found == messages_.end()) return;
+    const std::string message = found->second;
+    for (const uint32_t dependent : dependents) messages_[dependent] = message;
+    throw FormatError(message);
+}
+
+void Video::set_layers(int64_t layers) {
+    if (layers == layers_) return;
+    layers_ = layers;
+    tracks_ = std::vector<Cached>(head.tracks.size());
+    splats_ = {};
+    refused_ = lost_ = Refusals();  // other layers of a chunk may be whole
+}
+
+std::vector<uint8_t> Video::read(uint32_t chunk, int64_t layers) const {
+    try {
+        return source_.chunk(head, chunk, layers == kAllLayers ? kAllLayers : layers + 1);
+    } catch (const FormatError& error) {
+        throw FormatError(describe(head, chunk) + ": " + error.what());
+    } catch (const SourceError& error) {
+        throw SourceError(describe(head, chunk) + ": " + error.what());
+    }
+}
+
+Mesh Video::track(uint64_t frame, size_t number) {
+    const Group& group = group_of(frame, number);
+    double taken = 0, size = 0;
+    for (size_t other = 0; other < tracks_.size(); ++other) {
+        if (tracks_[other].chunk == kNoChunk) continue;
+        taken += tracks_[other].group.memory();
+        size += static_cast<double>(head.chunks[tracks_[other].chunk].size());
+    }
+    if (taken > limits::kTogether + limits::kPerByte * size)
+        for (size_t other = 0; other < tracks_.size(); ++other)
+            if (other != number) tracks_[other].chunk = kNoChunk, tracks_[other].group = Group();
+    lacking = tracks_[number].lacking;
+    return group.frame(static_cast<size_t>(frame - head.chunks[tracks_[number].chunk].first_frame));
+}
+
+Mesh Video::whole(uint64_t frame) {
+    Mesh mesh = background(frame);
+    std::string left_out = lacking;
+    mesh.places.clear();
+    double taken = 0, size = 0;
+    for (size_t number = 0; number < tracks_.size(); ++number) {
+        const Group& group = group_of(frame, number);
+        const Cached& cached = tracks_[number];
+        taken += group.memory(), size += static_cast<double>(head.chunks[cached.chunk].size());
+        require(number == 0 || taken <= std::min(limits::kTogether + limits::kPerByte * size, kMostTogether),
+                "tracks whose groups take more memory together than their bytes may");
+        append(mesh, group.frame(static_cast<size_t>(frame - head.chunks[cached.chunk].first_frame)));
+        if (left_out.empty()) left_out = cached.lacking;
+    }
+    lacking = left_out;
+    mesh.places.clear();
+    return mesh;
+}
+
+const Group& Video::group_of(uint64_t frame, size_t track) {
+    const uint32_t chunk = head.chunk_of_frame(frame, track);
+    Cached& cached = tracks_[track];
+    if (cached.chunk != chunk) decode(chunk, cached);
+    return cached.group;
+}
+
+Context Video::context_of(uint32_t chunk, const State* previous) const {
+    const double* origin = head.header.origin;
+    return {head.chunks[chunk].frames, layers_, previous, {head.header.scale, {origin[0], origin[1], origin[2]}}};
+}
+
+void Video::decode(uint32_t chunk, Cached& cached) {
+    const std::shared_ptr<State> before = state_before(chunk, cached);
+    const std::vector<uint8_t> payload = read(chunk, layers_);
+    cached.chunk = kNoChunk, cached.group = Group();
+    const Context context = context_of(chunk, before.get());
+    Continued made = refused_.of(head, chunk, [&] { return continue_group(view(payload), context); });
+    const int64_t layers = head.chunks[chunk].form == kLayers ? layers_ : kAllLayers;
+    cached.lacking = paint(chunk, context, layers, made);
+    const unsigned levels = made.canvas.empty() ? 0 : made.canvas[0].levels;
+    const std::string more = put_on_texture(chunk, levels, made.group.faces, made.group.places);
+    if (cached.lacking.empty()) cached.lacking = more;
+    keep(chunk, made.state, cached);
+    cached.group = std::move(made.group);
+    cached.chunk = chunk;
+}
+
+std::shared_ptr<State> Video::state_before(uint32_t chunk, Cached& cached) {
+    std::vector<uint32_t> chain(1, chunk);
+    refused_.check(chunk);
+    uint32_t before = head.group_before(chunk);
+    for (; before != kNoChunk && cached.states.count(before) == 0; before = head.group_before(before)) {
+        lost_.check(before, chain);
+        chain.push_back(before);
+    }
+    std::shared_ptr<State> state = before == kNoChunk ? nullptr : cached.states[before];
+    if (before == kNoChunk) cached.states.clear(), cached.kept = 0;
+    for (size_t link = chain.size() - 1; link > 0; --link) {
+        const uint32_t number = chain[link];
+        std::shared_ptr<State> after;
+        if (head.chunks[number].form == kLayers) {
+            const std::vector<uint8_t> payload = read(number, layers_);
+            Context context = context_of(number, state.get());
+            context.is_shown = false;
+            Continued made = lost_.of(head, number, [&] { return continue_group(view(payload), context); });
+            paint(number, context, static_cast<int64_t>(made.state->scalars.size()), made);
+            after = made.state;
+        }
+        keep(number, after, cached);
+        state = after;
+    }
+    return state;
+}
+
+void Video::keep(uint32_t chunk, const std::shared_ptr<State>& state, Cached& cached) const {
+    if (cached.states.count(chunk) > 0) return;
+    const double size = state ? state->memory() : 0;
+    if (cached.kept + size > kMostKept / count_of(tracks_.size())) cached.states.clear(), cached.kept = 0;
+    cached.states[chunk] = state;
+    cached.kept += size;
+}
+
+// Returns why there are no colours, where they are damaged: the surface is shown without them.
+template <class Paint>
+std::string Video::paint_with(uint32_t chunk, int64_t layers, Paint paint) {
+    const uint32_t of = head.companion_of(chunk, kColorsOf);
+    if (of == kNoChunk) return "";
+    try {
+        refused_.check(of);
+        const std::vector<uint8_t> data = read(of, layers);
+        refused_.of(head, of, [&] { paint(view(data)); });
+    } catch (const FormatError& error) {
+        return error.what();
+    }
+    return "";
+}
+
+std::string Video::paint(uint32_t chunk, const Context& context, int64_t layers, Continued& made) {
+    return paint_with(chunk, layers, [&](const mr_bytes& data) { paint_group(data, context, made); });
+}
+
+uint32_t Video::pictures_of(uint32_t chunk) const {
+    const uint32_t pictures = head.companion_of(chunk, kPicturesOf);
+    return pictures == kNoChunk ? head.companion_of(chunk, kCompatibleOf) : pictures;
+}
+
+// Returns why there are no places, where they are damaged.
+std::string Video::put_on_texture(uint32_t chunk, unsigned levels, const Faces& faces, std::vector<float>& places) {
+    const uint32_t pictures = pictures_of(chunk);
+    if (pictures == kNoChunk) return "";
+    try {
+        const uint32_t number = static_cast<uint32_t>(head.chunks[pictures].depends_on[1]);
+        const Atlas& found = atlas(number);
+        require(count_of(found.places->size()) * std::pow(4.0, levels) == 2 * count_of(faces->size()),
+                "an atlas of another mesh");
+        places = places_of(found, levels);
+    } catch (const FormatError& error) {
+        return error.what();
+    }
+    return "";
+}
+
+const Atlas& Video::atlas(uint32_t chunk) {
+    if (atlas_chunk_ == chunk) return atlas_;
+    refused_.check(chunk);
+    const std::vector<uint8_t> data = read(chunk, kAllLayers);
+    const std::vector<uint8_t> of = read(static_cast<uint32_t>(head.chunks[chunk].depends_on[0]), 0);
+    atlas_ = refused_.of(head, chunk, [&] { return decode_atlas(view(data), base_mesh(view(of))); });
+    atlas_chunk_ = chunk;
+    return atlas_;
+}
+
+Mesh Video::background(uint64_t frame) {
+    const uint32_t chunk = head.static_of_frame(frame);
+    lacking.clear();
+    if (chunk == kNoChunk) return Mesh();
+    const Mesh& mesh = state_of(chunk);
+    lacking = background_.lacking;
+    return mesh;
+}
+
+// Decodes from the last state, if this one was changed from it.
+const Mesh& Video::state_of(uint32_t chunk) {
+    std::vector<uint32_t> chain(1, chunk);
+    refused_.check(chunk);
+    while (chain.back() != background_.chunk && !head.chunks[chain.back()].depends_on.empty()) {
+        const uint32_t before = static_cast<uint32_t>(head.chunks[chain.back()].depends_on[0]);
+        refused_.check(before, chain);
+        chain.push_back(before);
+    }
+    if (chain.back() == background_.chunk) chain.pop_back();
+    else background_ = {};
+    try {
+        for (; !chain.empty(); chain.pop_back()) {
+            background_.mesh = decode_state(chain.back());
+            background_.chunk = chain.back();
+        }
+    } catch (...) {
+        background_ = {};
+        throw;
+    }
+    return background_.mesh;
+}
+
+Mesh Video::decode_state(uint32_t chunk) {
+    const std::vector<uint8_t> payload = read(chunk, kAllLayers);
+    const bool is_change = head.chunks[chunk].form == kPatch;
+    const Mesh* before = is_change ? &background_.mesh : nullptr;
+    const mr_placement place = context_of(chunk, nullptr).place;
+    Background made = refused_.of(head, chunk, [&] {
+        Background found = decode_background(view(payload), before, place);
+        background_.cost = is_change ? background_.cost + change_cost(*before, found.mesh) : 0;
+        background_.size = (is_change ? background_.size : 0) + count_of(payload.size());
+        require(background_.cost <= limits::kChain * allowance(background_.size),
+                "a background that costs more than its bytes may");
+        return found;
+    });
+    std::string& lacks = background_.lacking;
+    if (!is_change) lacks.clear();
+    const std::string unpainted =
+        paint_with(chunk, kAllLayers, [&](const mr_bytes& data) { paint_background(data, made); });
+    if (lacks.empty()) lacks = unpainted;
+    const std::string more = put_on_texture(chunk, 0, made.mesh.faces, made.mesh.places);
+    if (lacks.empty()) lacks = more;
+    return std::move(made.mesh);
+}
+
+}  // namespace meshreel
