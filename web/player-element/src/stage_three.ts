@@ -50,7 +50,7 @@ export class ThreeStage extends EventTarget implements Stage {
     this.#sorter = new Sorter(openOrder);
     this.#sorter.onorder = () => this.dispatchEvent(new Event("change"));
     this.#reel = new ReelScene(this.#sorter);
-    this.#renderer = new WebGLRenderer({ canvas, antialias: true, powerPreference: "high-performance" });
+    this.#renderer = new WebGLRenderer({ canvas, antialias: true, alpha: true, powerPreference: "high-performance" });
     this.#scene.add(this.#content);
     this.#content.add(this.#reel);
     const { signal } = this.#stop;
@@ -86,7 +86,8 @@ export class ThreeStage extends EventTarget implements Stage {
 
   set background(colour: string) {
     this.#background = colour;
-    this.#scene.background = new Color(colour); // not a clear colour: that would be lost with the context
+    const isOpaque = !/^rgba|\//.test(colour); // as a computed style is written; what lies behind the canvas has the colour, too
+    this.#scene.background = isOpaque ? new Color(colour) : null; // not a clear colour: that would be lost with the context
   }
 
   get camera(): string {
