@@ -5,10 +5,11 @@ import { MeshreelPlayer } from "./index.ts";
 import { recordingName } from "./format.ts";
 import { readParameters } from "./parameters.ts";
 
-function start(): void {
+async function start(): Promise<void> {
   const player = document.querySelector("meshreel-player");
   if (!(player instanceof MeshreelPlayer)) return;
   const { attributes, time, bench } = readParameters(location.search);
+  if (bench !== null) await MeshreelPlayer.engine.load(); // it measures from the opening on
   for (const [name, value] of attributes) {
     if (value === null) player.removeAttribute(name);
     else player.setAttribute(name, value);
@@ -25,4 +26,4 @@ function takeFocus(player: MeshreelPlayer): void {
   if (window.parent === window && isFree) player.focus({ preventScroll: true, focusVisible: false });
 }
 
-start();
+void start();

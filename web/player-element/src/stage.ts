@@ -64,6 +64,8 @@ export class GraphicsError extends Error {
 /** Where playbacks and stages come from; tests put others in. */
 export interface Engine {
   open(source: string | Blob, settings: Settings): Playback;
-  /** Throws GraphicsError where there is no WebGL 2. */
+  /** Fetches what stages are made with; null where that is there. Rejects where it cannot be fetched. */
+  load(): Promise<void> | null;
+  /** To be called after `load`. Throws GraphicsError where there is no WebGL 2. */
   stage(canvas: HTMLCanvasElement): Stage;
 }

@@ -220,6 +220,9 @@ export class FakeEngine implements Engine {
   playbacks: FakePlayback[] = [];
   stages: FakeStage[] = [];
   webgl = true;
+  load(): null {
+    return null;
+  }
   open(source: string | Blob, settings: Settings): FakePlayback {
     this.playbacks.push(new FakePlayback(source, settings));
     return this.playbacks.at(-1)!;

@@ -34,11 +34,6 @@ const FAR = 1000; // m
 const SEEK = 1; // s, each time that a held thumbstick repeats
 const INIT: XRSessionInit = { requiredFeatures: ["local-floor"], optionalFeatures: ["bounded-floor", "layers"] };
 
-/** Whether there is a headset that can show it. Never rejects. */
-export async function vrSupported(): Promise<boolean> {
-  return navigator.xr?.isSessionSupported("immersive-vr").catch(() => false) ?? false;
-}
-
 /** The recording in a headset, at true scale in front of the viewer. */
 export class VrSession {
   readonly #options: VrOptions;
