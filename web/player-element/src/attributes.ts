@@ -11,7 +11,7 @@ export type Theme = "auto" | "light" | "dark";
 /** Attributes whose change the element must hear of. */
 export const OBSERVED = [
   "src", "controls", "autoplay", "loop", "poster", "layers", "speed", "playbackrate", "interpolate", "mode", "camera",
-  "up", "stats", "background", "theme", "textures",
+  "up", "stats", "background", "theme", "textures", "ground",
 ] as const;
 
 /** What a text says, "" taken for nothing; null where it says nothing that the attribute can be. */
@@ -46,6 +46,7 @@ const RULES: Readonly<Record<string, { read: Reader<unknown>; wanted: string }>>
   camera: { read: readCamera, wanted: "six numbers with commas, as 0,1,3,0,1,0" },
   interpolate: { read: readSwitch, wanted: "on, or off" },
   textures: { read: readSwitch, wanted: "on, or off" },
+  ground: { read: readSwitch, wanted: "on, or off" },
   mode: { read: readMode, wanted: MODES.join(", ") },
   playbackrate: { read: readNumber, wanted: "a number" },
   layers: { read: readLayers, wanted: "auto, or a whole number of layers from 0" },
@@ -112,5 +113,5 @@ export function parseFlag(text: string | null): boolean {
 /** Properties that a page may have set before the element was defined. */
 export const PROPERTIES = [
   "src", "poster", "preload", "controls", "autoplay", "loop", "stats", "layers", "playbackRate", "interpolate", "textures", "mode", "theme",
-  "up", "background", "camera", "currentTime",
+  "up", "background", "camera", "currentTime", "ground",
 ];

@@ -1,5 +1,5 @@
 // What an address asks of the page: ?src, ?t, ?autoplay, ?loop, ?stats, ?mode, ?layers, ?camera, ?speed, ?theme, ?up, ?background,
-// ?poster, ?interpolate, ?textures, ?controls, ?bench. All but t and bench are attributes of the element.
+// ?poster, ?interpolate, ?textures, ?ground, ?controls, ?bench. All but t and bench are attributes of the element.
 
 export interface Parameters {
   /** Attributes to set; null to take one away. */
@@ -8,7 +8,7 @@ export interface Parameters {
   readonly bench: number | null; // s to measure for; null where it is not asked for
 }
 
-const TEXTS = ["src", "mode", "layers", "camera", "speed", "theme", "up", "background", "poster", "interpolate", "textures"];
+const TEXTS = ["src", "mode", "layers", "camera", "speed", "theme", "up", "background", "poster", "interpolate", "textures", "ground"];
 const BENCH = 20; // s, where none are given
 const FLAGS = ["autoplay", "loop", "stats", "controls"];
 

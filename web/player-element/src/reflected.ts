@@ -124,6 +124,14 @@ export class Reflected extends Element {
     this.setAttribute("textures", value ? "on" : "off");
   }
 
+  /** Whether what stands nowhere has a ground, with its shadow. */
+  get ground(): boolean {
+    return parse.parseSwitch(this.getAttribute("ground"));
+  }
+  set ground(value: boolean) {
+    this.setAttribute("ground", value ? "on" : "off");
+  }
+
   /** How surfaces look: where none is set, or one that the recording has not, `splats`, `color` or `shaded`, the first of these that it has. */
   get mode(): Mode {
     return parse.parseMode(this.getAttribute("mode"), this.info);

@@ -26,6 +26,7 @@ export interface Stage extends EventTarget {
   readonly far: ReadonlySet<number>; // tracks whose textures make no difference: they were drawn so small, or as splats
   mode: Mode;
   background: string; // a CSS colour
+  ground: boolean; // whether there is one, where the recording has none of its own
   camera: string; // as the attribute has it; "" fits the view
   up: Up | null; // the recording's axis that points up; null: as it says itself. A change fits the view.
   /** A new recording: forgets the last one's groups, fits the view. */

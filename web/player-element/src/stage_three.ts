@@ -1,7 +1,7 @@
 // A stage that draws with three.js: the recording, a camera that orbits it, and a headset.
 
 import type { Box, Info, Packed, Shown } from "@meshreel/player-core/types";
-import { ReelScene, Sorter, updateFar } from "@meshreel/player-three";
+import { Ground, ReelScene, Sorter, updateFar } from "@meshreel/player-three";
 import type { Mode, OrderWorker } from "@meshreel/player-three";
 import { VrSession } from "@meshreel/xr";
 import type { VrActions } from "@meshreel/xr";
@@ -31,6 +31,9 @@ export class ThreeStage extends EventTarget implements Stage {
   readonly #orbit: OrbitControls;
   readonly #stop = new AbortController();
   readonly #sorter: Sorter;
+  readonly #floor = new Ground();
+  #shaded: Shown | null = null; // whose shadow lies on it
+  ground = true;
   #reel: ReelScene;
   #box: Box | null = null; // of the recording, as it stands
   #info: Info | null = null; // of the recording
@@ -52,10 +55,13 @@ export class ThreeStage extends EventTarget implements Stage {
     this.#reel = new ReelScene(this.#sorter);
     this.#renderer = new WebGLRenderer({ canvas, antialias: true, alpha: true, powerPreference: "high-performance" });
     this.#scene.add(this.#content);
-    this.#content.add(this.#reel);
+    this.#content.add(this.#reel, this.#floor);
     const { signal } = this.#stop;
     canvas.addEventListener("webglcontextlost", () => this.dispatchEvent(new Event("lost")), { signal });
-    canvas.addEventListener("webglcontextrestored", () => this.dispatchEvent(new Event("restored")), { signal });
+    canvas.addEventListener("webglcontextrestored", () => {
+      this.#shaded = null;
+      this.dispatchEvent(new Event("restored"));
+    }, { signal });
     this.#orbit = new OrbitControls(this.#eye, canvas);
     this.#orbit.enableDamping = glides();
     this.#orbit.addEventListener("start", () => void (this.#isFit = false));
@@ -135,9 +141,19 @@ export class ThreeStage extends EventTarget implements Stage {
     else if (shown) updateFar(this.far, shown, this.#reel.worldToLocal(this.#place.copy(this.#eye.position)), this.canvas.height / (2 * TANGENT));
     this.#reel.splats.forEach((count, track) => void (count > 0 && this.far.add(track)));
     this.#reel.visible = shown !== null;
+    this.#shade(shown);
     const moves = !this.presenting && this.#orbit.update();
     this.#renderer.render(this.#scene, this.#eye);
     return moves;
+  }
+
+  /** The shadow is drawn anew where what is shown is another; a room has a floor of its own, and splats cast none. */
+  #shade(shown: Shown | null): void {
+    const isLit = this.#mode === "color" || this.#mode === "shaded" || this.#mode === "splats";
+    this.#floor.visible = this.ground && isLit && shown !== null && shown.background === null && !this.#reel.splats.some((count) => count > 0);
+    if (!this.#floor.visible || shown === this.#shaded) return;
+    this.#shaded = shown;
+    this.#floor.shade(this.#reel, this.#renderer);
   }
 
   resize(width: number, height: number, pixelRatio: number, covered: number): void {
@@ -193,6 +209,7 @@ export class ThreeStage extends EventTarget implements Stage {
     this.#stop.abort();
     this.#orbit.dispose();
     this.#reel.dispose();
+    this.#floor.dispose();
     this.#sorter.dispose();
     this.#renderer.dispose();
     this.#renderer.forceContextLoss();
@@ -217,8 +234,11 @@ export class ThreeStage extends EventTarget implements Stage {
   /** A recording on its floor, all of it in view. */
   #stand(info: Info): void {
     this.#info = info;
-    this.#reel.rotation.x = turnOf(info.metadata, this.#up);
-    this.#box = stoodUp(info.box, this.#reel.rotation.x);
+    const turn = turnOf(info.metadata, this.#up);
+    const box = (this.#box = stoodUp(info.box, turn));
+    this.#reel.stand(turn, box.minimum[1], box.size[1]);
+    this.#floor.lie(box);
+    this.#shaded = null;
     this.fit();
   }
 

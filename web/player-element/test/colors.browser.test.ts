@@ -26,7 +26,7 @@ describeInBrowser("the player and a recording's own colours", () => {
   afterAll(() => site.close());
 
   const open = async (file: string, controls = 0): Promise<{ page: Page; errors: string[] }> => {
-    const found = await site.visit(`player/index.html?src=/${file}.reel&background=white&controls=${controls}`);
+    const found = await site.visit(`player/index.html?src=/${file}.reel&background=white&ground=off&controls=${controls}`);
     await found.page.waitForFunction(() => (document.querySelector("meshreel-player")!.statistics?.triangles ?? 0) > 0);
     return found;
   };
@@ -74,6 +74,23 @@ describeInBrowser("the player and a recording's own colours", () => {
     expect(Object.keys(lit).length).toBeGreaterThan(Object.keys(others).length + 10);
     expect(errors).toEqual([]);
     await page.close();
+  });
+
+  test("a recording without a room has a ground with its shadow, unless there is to be none", async () => {
+    const seen: Record<string, number>[] = [];
+    for (const ground of ["on", "off"]) {
+      const { page, errors } = await site.visit(`player/index.html?src=/layers.reel&background=white&controls=0&mode=shaded&ground=${ground}`);
+      await page.waitForFunction(() => (document.querySelector("meshreel-player")!.statistics?.triangles ?? 0) > 0);
+      seen.push(await colorsOf(page));
+      await page.evaluate(() => void (document.querySelector("meshreel-player")!.mode = "normal")); // which says something of surfaces alone
+      await page.waitForTimeout(100);
+      seen.push(await colorsOf(page));
+      expect(errors).toEqual([]);
+      await page.close();
+    }
+    const [on, bare, off, normals] = seen.map((colors) => colors["255,255,255"]!);
+    expect(on).toBeLessThan(0.95 * off!);
+    expect([bare, normals]).toEqual([off, off]);
   });
 
   test.skipIf(!hasPython)("the key M goes through all looks, and colours are one of them where there are some", async () => {

@@ -150,6 +150,7 @@ export class FakeStage extends EventTarget implements Stage {
   readonly far = new Set<number>();
   mode: Mode = "shaded";
   background = "";
+  ground = true;
   up: Stage["up"] = null;
   camera = "1,1,1";
   draws = 0;

@@ -81,6 +81,21 @@ export class ReelScene extends Group {
     this.#look.flatNormals.value = flat;
   }
 
+  /** Stands the recording up: `turn` radians about x, then the lowest of it at `bottom`, `height` below the highest. */
+  stand(turn: number, bottom: number, height: number): void {
+    this.rotation.x = turn;
+    this.#look.up.value = [0, Math.cos(turn), -Math.sin(turn)];
+    this.#look.ground.value = [bottom, 1 / (height || 1)];
+  }
+
+  /** Has `draw` draw how close its surfaces are to an eye, as alpha. */
+  cast(draw: () => void): void {
+    const { value } = this.#look.mode;
+    this.#look.mode.value = -1;
+    draw();
+    this.#look.mode.value = value;
+  }
+
   /** Uploads a value's vertices and triangles now, so that showing it later costs nothing. RangeError where the GPU cannot hold it. */
   prepare(packed: Packed, renderer: WebGLRenderer): Upload {
     this.#listen(renderer);
