@@ -7,6 +7,7 @@ import { OBSERVED, PROPERTIES } from "./attributes.ts";
 import { Controls } from "./controls/controls.ts";
 import { PASSED } from "./events.ts";
 import { type Ranges, ranges } from "./ranges.ts";
+import { keepToSection } from "./section.ts";
 import type { Engine } from "./stage.ts";
 import type { Statistics } from "./stats.ts";
 import { View } from "./view.ts";
@@ -167,14 +168,14 @@ export class MeshreelPlayer extends Viewed {
     this.#startAt = this.currentTime;
     this.#open(this.#wished);
   }
-  /** Shows the scene in the headset; to be called from a click. */
-  async enterVr(): Promise<void> {
+  /** Shows the scene in the headset; with `passthrough` in the viewer's own room. To be called from a click. */
+  async enterVr(passthrough = false): Promise<void> {
     if (!this.view) throw new DOMException("there is no picture yet", "InvalidStateError");
     await this.view.enterVr({
       toggle: () => (this.paused ? void this.play().catch(() => undefined) : this.pause()),
       step: (frames) => this.step(frames),
       seekBy: (seconds) => (this.currentTime += seconds),
-    });
+    }, passthrough);
   }
   /** Lets a bench collect from now on what is decoded and drawn; what is given back ends that. Error where nothing is open. */
   measure(bench: Bench): () => void {
@@ -257,7 +258,7 @@ export class MeshreelPlayer extends Viewed {
   #makeView(): View {
     const { picture, cover } = this.#controls;
     const view = new View(MeshreelPlayer.engine, picture, cover, (event) => this.#onView(event));
-    for (const name of ["mode", "up", "ground"]) applyToStage(name, this, view.stage);
+    for (const name of ["mode", "up", "ground", "autorotate", "fly"]) applyToStage(name, this, view.stage);
     view.stage.background = this.#controls.background;
     return view;
   }
@@ -288,7 +289,10 @@ export class MeshreelPlayer extends Viewed {
     if (["canplay", "playing", "seeked"].includes(event.type)) this.#waiting = false;
     if (event.type === "waiting") this.#waiting = true;
     if (event.type === "pause" && this.#playable) this.#waiting = false;
-    if (event.type === "ended") this.#wished = false;
+    if (event.type === "ended") {
+      this.#wished = false;
+      queueMicrotask(() => keepToSection(this));
+    }
     if (event.type === "error") {
       this.#fail(detail instanceof Error ? detail : new Error("unknown"));
       return;
@@ -317,6 +321,7 @@ export class MeshreelPlayer extends Viewed {
   #onView(event: Event): void {
     if (event.type === "drawn") {
       if (this.view?.shows) this.#controls.drawn();
+      keepToSection(this);
     } else {
       if (event.type !== "change") this.dispatchEvent(new Event(event.type));
       this.#controls.onStage(event.type);

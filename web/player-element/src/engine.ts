@@ -33,13 +33,13 @@ export class RealEngine implements Engine {
     this.#files = files;
   }
 
-  open(source: string | Blob, { layers, interpolate, textures, splats, loop, playbackRate }: Settings): Player {
+  open(source: string | Blob, { layers, interpolate, textures, splats, loop, playbackRate, crossOrigin }: Settings): Player {
     const { worker, core, draco } = this.#files;
     const create = (): WorkerLike => openWorker(worker) as WorkerLike;
     const shared = (this.#shared ??= { workers: new WorkerPool({ create, core: bytesOf(core), draco: bytesOf(draco) }), users: 0 });
     shared.users++;
     const player = new PooledPlayer({
-      source: typeof source === "string" ? new HttpSource(source) : new BlobSource(source),
+      source: typeof source === "string" ? new HttpSource(source, { credentials: crossOrigin === "use-credentials" ? "include" : "same-origin" }) : new BlobSource(source),
       workers: shared.workers,
     });
     player.leave = () => this.#leave(shared);

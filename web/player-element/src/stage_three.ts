@@ -8,6 +8,7 @@ import type { VrActions } from "@meshreel/xr";
 import { Color, Group, PerspectiveCamera, Scene, Spherical, Vector3, WebGLRenderer } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import { readCamera } from "./attributes.ts";
+import { Fly } from "./fly.ts";
 import type { PictureStats, Stage } from "./stage.ts";
 import { stoodUp, turnOf } from "./upright.ts";
 import type { Up } from "./upright.ts";
@@ -41,7 +42,9 @@ export class ThreeStage extends EventTarget implements Stage {
   #mode: Mode = "shaded";
   #background = "";
   #free = 1; // of the picture's height: what the bar leaves
-  #isFit = true; // the camera was not moved by hand: it fits again when the picture's size changes
+  readonly #fly = new Fly(this.#eye, () => this.#flown());
+  #drawnAt = 0; // ms
+  isFit = true; // the camera was not moved by hand: it fits again when the picture's size changes
   #session: VrSession | null = null;
   readonly #place = new Vector3(); // of the eye, in the recording's space
   readonly far = new Set<number>();
@@ -64,7 +67,7 @@ export class ThreeStage extends EventTarget implements Stage {
     }, { signal });
     this.#orbit = new OrbitControls(this.#eye, canvas);
     this.#orbit.enableDamping = glides();
-    this.#orbit.addEventListener("start", () => void (this.#isFit = false));
+    this.#orbit.addEventListener("start", () => void (this.isFit = false));
     this.#orbit.addEventListener("change", () => this.#moved());
   }
 
@@ -106,6 +109,27 @@ export class ThreeStage extends EventTarget implements Stage {
     else this.fit();
   }
 
+  get autoRotate(): boolean {
+    return this.#orbit.autoRotate;
+  }
+
+  set autoRotate(on: boolean) {
+    this.#orbit.autoRotate = on && glides();
+    if (this.#orbit.autoRotate) this.dispatchEvent(new Event("change"));
+    else this.#rest();
+  }
+
+  get fly(): boolean {
+    return this.#fly.on;
+  }
+
+  set fly(on: boolean) {
+    if (on === this.#fly.on) return;
+    this.#orbit.enabled = !on;
+    if (on) this.#fly.begin(this.canvas);
+    else this.#fly.end();
+  }
+
   get up(): Up | null {
     return this.#up;
   }
@@ -142,7 +166,9 @@ export class ThreeStage extends EventTarget implements Stage {
     this.#reel.splats.forEach((count, track) => void (count > 0 && this.far.add(track)));
     this.#reel.visible = shown !== null;
     this.#shade(shown);
-    const moves = !this.presenting && this.#orbit.update();
+    const now = performance.now();
+    const moves = !this.presenting && (this.fly ? this.#fly.update(now) : this.#orbit.update(Math.min(0.1, (now - this.#drawnAt) / 1000)));
+    this.#drawnAt = now;
     this.#renderer.render(this.#scene, this.#eye);
     return moves;
   }
@@ -163,7 +189,7 @@ export class ThreeStage extends EventTarget implements Stage {
     this.#eye.aspect = width / height;
     this.#free = Math.max(0.2, 1 - covered / height);
     this.#eye.setViewOffset(width, height, 0, ((1 - this.#free) * height) / 2, width, height);
-    if (this.#isFit) this.fit();
+    if (this.isFit) this.fit();
   }
 
   fit(): void {
@@ -171,7 +197,7 @@ export class ThreeStage extends EventTarget implements Stage {
     const { middle } = this.#ball(this.#box);
     const distance = MARGIN * distanceOf(this.#box, TANGENT * this.#eye.aspect, TANGENT * this.#free);
     this.#look(middle.clone().addScaledVector(FROM, distance || 1), middle);
-    this.#isFit = true;
+    this.isFit = true;
   }
 
   orbit(right: number, up: number, closer: number): void {
@@ -188,7 +214,7 @@ export class ThreeStage extends EventTarget implements Stage {
     return new Promise((done, fail) => this.canvas.toBlob((blob) => (blob ? done(blob) : fail(new Error("no picture"))), "image/png"));
   }
 
-  async enterVr(frame: (now: number) => void, actions: VrActions): Promise<void> {
+  async enterVr(frame: (now: number) => void, actions: VrActions, passthrough: boolean): Promise<void> {
     const box = this.#box;
     if (this.#session !== null || !box) return;
     const onend = (): void => {
@@ -196,7 +222,7 @@ export class ThreeStage extends EventTarget implements Stage {
       this.dispatchEvent(new Event("vrend"));
     };
     const [renderer, camera, content] = [this.#renderer, this.#eye, this.#content];
-    this.#session = await VrSession.enter({ renderer, camera, content, box, actions, frame, onend });
+    this.#session = await VrSession.enter({ renderer, camera, content, box, actions, frame, onend, passthrough });
     this.dispatchEvent(new Event("vrstart"));
   }
 
@@ -206,6 +232,7 @@ export class ThreeStage extends EventTarget implements Stage {
 
   dispose(): void {
     this.exitVr();
+    this.#fly.end();
     this.#stop.abort();
     this.#orbit.dispose();
     this.#reel.dispose();
@@ -222,12 +249,24 @@ export class ThreeStage extends EventTarget implements Stage {
   }
 
   #look(eye: Vector3, target: Vector3): void {
-    this.#isFit = false;
-    this.#orbit.enableDamping = false; // a view that is asked for is there at once
+    this.isFit = false;
     this.#eye.position.copy(eye);
     this.#orbit.target.copy(target);
+    this.#rest(); // a view that is asked for is there at once
+    this.#moved();
+  }
+
+  /** Ends a glide. */
+  #rest(): void {
+    this.#orbit.enableDamping = false;
     this.#orbit.update();
     this.#orbit.enableDamping = glides();
+  }
+
+  /** What the camera looks at keeps before it: to go around that when flying ends. */
+  #flown(): void {
+    this.isFit = false;
+    this.#orbit.target.set(0, 0, -this.#fly.size / 4).applyQuaternion(this.#eye.quaternion).add(this.#eye.position);
     this.#moved();
   }
 
@@ -238,6 +277,7 @@ export class ThreeStage extends EventTarget implements Stage {
     const box = (this.#box = stoodUp(info.box, turn));
     this.#reel.stand(turn, box.minimum[1], box.size[1]);
     this.#floor.lie(box);
+    this.#fly.size = 2 * this.#ball(box).radius;
     this.#shaded = null;
     this.fit();
   }

@@ -1,6 +1,6 @@
 // What an element offers of its picture: camera, headset, screenshots.
 
-import { vrSupported } from "@meshreel/xr/supported";
+import { arSupported, vrSupported } from "@meshreel/xr/supported";
 import { Reflected } from "./reflected.ts";
 import type { View } from "./view.ts";
 
@@ -14,6 +14,10 @@ export class Viewed extends Reflected {
   }
   set camera(value: string) {
     this.setAttribute("camera", value);
+  }
+  /** Whether the view was changed since it fitted. */
+  get cameraMoved(): boolean {
+    return this.view !== null && !this.view.stage.isFit;
   }
   /** Looks at the whole scene. */
   fit(): void {
@@ -31,6 +35,9 @@ export class Viewed extends Reflected {
   }
   async vrSupported(): Promise<boolean> {
     return vrSupported();
+  }
+  async arSupported(): Promise<boolean> {
+    return arSupported();
   }
   exitVr(): void {
     this.view?.stage.exitVr();

@@ -151,6 +151,9 @@ export class FakeStage extends EventTarget implements Stage {
   mode: Mode = "shaded";
   background = "";
   ground = true;
+  autoRotate = false;
+  fly = false;
+  isFit = true;
   up: Stage["up"] = null;
   camera = "1,1,1";
   draws = 0;

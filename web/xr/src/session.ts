@@ -22,6 +22,7 @@ export interface VrOptions {
   readonly content: Object3D;
   readonly box: Box; // around the content, y up
   readonly actions: VrActions;
+  readonly passthrough?: boolean; // in the viewer's own room, seen by the headset's cameras
   /** Draws a picture, with a clock's milliseconds. Must not set the renderer's size or the camera. */
   frame(now: number): void;
   /** The session is over, whoever ended it, and everything is as before. */
@@ -58,7 +59,7 @@ export class VrSession {
     const { xr } = navigator;
     if (xr === undefined) throw new Error("this browser has no WebXR here; it needs https, or localhost");
     if (options.content.parent === null) throw new Error("the content is in no scene; add it to one first");
-    const entered = new VrSession(options, await xr.requestSession("immersive-vr", INIT));
+    const entered = new VrSession(options, await xr.requestSession(options.passthrough ? "immersive-ar" : "immersive-vr", INIT));
     await entered.#begin();
     return entered;
   }
@@ -137,7 +138,7 @@ export class VrSession {
     const head = space === null ? undefined : xr.getFrame().getViewerPose(space)?.transform;
     this.#placed = head !== undefined;
     if (head !== undefined) setViewer(this.#viewer, head.position, head.orientation);
-    place(this.#options.box, this.#viewer, this.#pose);
+    place(this.#options.box, this.#viewer, this.#pose, this.#options.passthrough);
     this.#grab.release();
   }
 
