@@ -139,6 +139,7 @@ describeInBrowser("the built player in a headset", () => {
   test("a bench during which the headset is entered measures the headset alone", async () => {
     const { page, errors } = await site.visit("player/index.html?src=/layers.reel&bench=2", [{ path: IWER }, installHeadset]);
     await page.waitForFunction(() => !document.querySelector("meshreel-player")!.paused);
+    await page.mouse.move(100, 100); // controls hide while it plays
     await page.locator("button.vr").click();
     const text = await page.waitForFunction(() => document.querySelector("pre")!.textContent!.split("\n").find((line) => line.startsWith("{")));
     expect(JSON.parse((await text.jsonValue())!)).toMatchObject({ place: "VR", displayRate: 72 });

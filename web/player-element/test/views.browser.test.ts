@@ -116,6 +116,15 @@ describeInBrowser("the page of a recording", () => {
     await page.close();
   });
 
+  test("without three.js an error says what is missing", async () => {
+    const page = await site.browser.newPage();
+    await page.route("**/three.js", (route) => route.abort());
+    await page.goto(new URL("player/index.html?src=/layers.reel", site.served.url).href);
+    await page.getByRole("alert").waitFor();
+    expect(await page.getByRole("alert").textContent()).toMatch(/player\/three\.js cannot be loaded/);
+    await page.close();
+  });
+
   test("it turns by itself, but not for viewers who prefer less motion", async () => {
     const { page } = await visit("&autorotate");
     const before = await camera(page);
