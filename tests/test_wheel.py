@@ -113,7 +113,16 @@ def test_an_installed_wheel_plays_a_file_with_the_player_that_it_brings(python, 
         assert '<meshreel-player src="/files/scene.reel"' in page
         [scripts] = re.findall(r'src="/(player/[^/"]+)/page.js"', page)
         names = {path.name for path in (ROOT / "src/meshreel/player").iterdir()}
-        assert {"meshreel-player.js", "worker.js", "order.js", "core.wasm", "draco.wasm", "page.js"} <= names
+        assert {
+            "meshreel-player.js",
+            "three.js",
+            "three.js.br",
+            "worker.js",
+            "order.js",
+            "core.wasm",
+            "draco.wasm",
+            "page.js",
+        } <= names
         assert "LICENSES.txt" in names
         for name in names:
             assert fetch(f"{address}{scripts}/{name}") == (ROOT / "src/meshreel/player" / name).read_bytes()

@@ -1,10 +1,11 @@
-// Builds the player into src/meshreel/player/, or into the folder MESHREEL_PLAYER: meshreel-player.js, which defines the element, the page
-// that `meshreel play` opens, the decoding worker, Draco, the worker that orders splats, and the licences of what is in them. core.wasm is put there before by
-// scripts/build_wasm.py. Two builds give the same bytes.
+// Builds the player into src/meshreel/player/, or into the folder MESHREEL_PLAYER: meshreel-player.js, which defines the element, three.js, which
+// draws, the page that `meshreel play` opens, the decoding worker, Draco, the worker that orders splats, the licences of what is in them, and each in
+// Brotli. core.wasm is put there before by scripts/build_wasm.py. Two builds give the same bytes.
 
 import { copyFileSync, mkdirSync, readdirSync, readFileSync, rmSync, writeFileSync } from "node:fs";
-import { join, resolve } from "node:path";
+import { extname, join, resolve } from "node:path";
 import { fileURLToPath } from "node:url";
+import { brotliCompressSync, constants } from "node:zlib";
 import { defineConfig } from "vite";
 import type { Plugin } from "vite";
 
@@ -15,6 +16,7 @@ const KEPT = new Set(["core.wasm"]);
 /** Built one after the other (`vite build --mode NAME`), so that each is one file of a known name. */
 export const ENTRIES: Readonly<Record<string, string>> = {
   "meshreel-player": "player-element/src/index.ts",
+  three: "player-element/src/stage_three.ts",
   worker: "player-core/src/worker_entry.ts",
   order: "player-three/src/order_worker.ts",
   page: "player-element/src/page.ts",
@@ -30,10 +32,18 @@ function rest(): Plugin {
     },
     writeBundle() {
       copyFileSync(join(here, "node_modules/draco3d/draco_decoder.wasm"), join(out, "draco.wasm"));
-      for (const name of ["index.html", "page.css"]) copyFileSync(join(here, "player-element/page", name), join(out, name));
+      const [page, styles] = ["index.html", "page.css"].map((name) => readFileSync(join(here, "player-element/page", name), "utf8"));
+      writeFileSync(join(out, "index.html"), inlined(page!, styles!.trim()));
+      writeFileSync(join(out, "page.css"), styles!);
       writeFileSync(join(out, "LICENSES.txt"), licences());
     },
   };
+}
+
+/** A page with its styles within it, so that it is seen at once; the link stays, for servers whose policy refuses those. */
+function inlined(page: string, styles: string): string {
+  const link = '<link rel="stylesheet" href="page.css">';
+  return page.replace(link, `<style>${styles}</style>`).replace("</body>", `${link}\n</body>`);
 }
 
 /** The page takes the element from the file that is built already. */
@@ -42,6 +52,38 @@ function beside(): Plugin {
     name: "meshreel-beside",
     enforce: "pre",
     resolveId: (source) => (source === "./index.ts" ? { id: "./meshreel-player.js", external: true } : null),
+  };
+}
+
+/** Behind the last build: what web servers send to browsers that take it. */
+function compressed(): Plugin {
+  return {
+    name: "meshreel-compressed",
+    writeBundle() {
+      for (const name of readdirSync(out)) {
+        if (![".js", ".wasm"].includes(extname(name))) continue;
+        const bytes = readFileSync(join(out, name));
+        const params = { [constants.BROTLI_PARAM_QUALITY]: constants.BROTLI_MAX_QUALITY, [constants.BROTLI_PARAM_SIZE_HINT]: bytes.length };
+        writeFileSync(join(out, `${name}.br`), brotliCompressSync(bytes, { params }));
+      }
+    },
+  };
+}
+
+/** three.js without the shaders of materials that are not used: a fifth of its bytes. A headset's hands have MeshBasicMaterial. */
+function withoutShaders(): Plugin {
+  const text = /^(?:var|const) ([\w$]+) = ("(?:[^"\\]|\\.)*");$/gm;
+  return {
+    name: "meshreel-without-shaders",
+    transform(code, id) {
+      if (!id.endsWith("three/build/three.module.js")) return null;
+      const texts = new Map([...code.matchAll(text)].map(([, name, literal]) => [name!, literal!]));
+      const nameOf = (chunk: string): string => new RegExp(`^\\s*${chunk}(?:: ([\\w$]+))?,?$`, "m").exec(code)?.[1] ?? chunk;
+      const kept = new Set(["meshbasic_vert", "meshbasic_frag"].map(nameOf));
+      for (const name of kept) for (const [, chunk] of (texts.get(name) ?? "").matchAll(/#include <(\w+)>/g)) kept.add(nameOf(chunk!));
+      if (kept.size < 20) this.error("three.js has its shaders elsewhere: look at withoutShaders");
+      return code.replaceAll(text, (whole, name: string, literal: string) => (kept.has(name) || !/gl_|#include|#if/.test(literal) ? whole : `const ${name} = "";`));
+    },
   };
 }
 
@@ -61,7 +103,7 @@ function licences(): string {
   const rule = `\n\n${"-".repeat(78)}\n\n`;
   return [
     "The player of meshreel. Apache License 2.0, at the end of this file. It contains:",
-    `three.js ${version("three")} (in meshreel-player.js), https://threejs.org\n\n${text("node_modules/three/LICENSE")}`,
+    `three.js ${version("three")} (in three.js), https://threejs.org\n\n${text("node_modules/three/LICENSE")}`,
     `draco3d ${version("draco3d")} (in worker.js; draco.wasm), https://github.com/google/draco\n\n` +
       "Copyright The Draco Authors. Apache License 2.0, at the end of this file.",
     "Eigen (in core.wasm), https://eigen.tuxfamily.org\n\nMozilla Public License 2.0, https://mozilla.org/MPL/2.0/; its source is unchanged.",
@@ -75,7 +117,7 @@ export default defineConfig(({ mode }) => {
     root: here,
     base: "./",
     publicDir: false,
-    plugins: name === "meshreel-player" ? [rest()] : name === "page" ? [beside()] : [withoutNode()],
+    plugins: name === "meshreel-player" ? [rest()] : name === "three" ? [withoutShaders()] : name === "page" ? [beside(), compressed()] : [withoutNode()],
     build: {
       outDir: out,
       emptyOutDir: false,

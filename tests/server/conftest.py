@@ -44,6 +44,7 @@ def player(tmp_path):
     made.mkdir()
     (made / "meshreel-player.js").write_text("export {};\n", encoding="utf-8")
     (made / "core.wasm").write_bytes(b"\0asm")
+    (made / "page.css").write_text("body { margin: 0; }\n", encoding="utf-8")
     return made
 
 

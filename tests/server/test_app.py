@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import re
+from base64 import b64encode
+from hashlib import sha256
 from html import unescape
 from urllib.parse import quote
 
@@ -111,7 +114,9 @@ def test_pages_run_no_script_but_the_player_and_may_be_embedded(client):
     assert "default-src 'none'" in policy and "script-src 'self' 'wasm-unsafe-eval'" in policy
     assert "frame-ancestors" not in policy and "x-frame-options" not in page.headers
     assert "cross-origin-embedder-policy" not in page.headers
-    assert "onclick" not in page.text and "<style" not in page.text and 'lang="en"' in page.text
+    styles = re.search("<style>(.*?)</style>", page.text, re.DOTALL)[1]
+    assert b64encode(sha256(styles.encode()).digest()).decode() in policy and "unsafe-inline" not in policy
+    assert "onclick" not in page.text and 'lang="en"' in page.text
 
 
 def test_a_poster_is_a_picture_and_a_plain_tile_where_nothing_can_be_shown(client):

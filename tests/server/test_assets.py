@@ -10,7 +10,7 @@ import pytest
 from starlette.testclient import TestClient
 
 from meshreel.server.app import make_app
-from meshreel.server.assets import takes_gzip
+from meshreel.server.assets import takes
 from meshreel.server.library import Library
 
 PLAYER = "/player/meshreel-player.js"
@@ -41,6 +41,14 @@ def test_text_and_wasm_are_compressed_for_those_who_take_it_and_reels_for_nobody
     assert "content-encoding" not in client.get("/files/walk.reel", headers={"Accept-Encoding": "gzip"}).headers
     small = client.get("/player/core.wasm", headers={"Accept-Encoding": "gzip"})
     assert "content-encoding" not in small.headers and small.content == b"\0asm"
+
+
+def test_brotli_that_came_with_the_build_is_sent_to_those_who_take_it(client, script):
+    (script.parent / f"{script.name}.br").write_bytes(b"brotli")
+    packed = client.head(PLAYER, headers={"Accept-Encoding": "gzip, br"})
+    assert packed.headers["content-encoding"] == "br" and packed.headers["content-length"] == "6"
+    assert client.get(PLAYER, headers={"Accept-Encoding": "gzip"}).text == TEXT
+    assert client.get(f"{PLAYER}.br").status_code == 404
 
 
 @pytest.mark.usefixtures("script")
@@ -78,7 +86,7 @@ def test_head_and_ranges_of_what_is_compressed_are_those_of_the_coding(client):
     ],
 )
 def test_gzip_is_sent_to_those_alone_who_say_so(accepted, taken):
-    assert takes_gzip(accepted) == taken
+    assert takes(accepted, "gzip") == taken
 
 
 def test_pages_name_the_player_by_its_contents_and_browsers_need_not_ask_again(client, script):

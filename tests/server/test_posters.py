@@ -201,3 +201,15 @@ def test_a_poster_stands_on_its_feet():
         rows = np.flatnonzero(shape.any(axis=1))
         assert shape[rows[-4:]].sum() > 5 * shape[rows[:4]].sum()
         assert (shape == shapes[0]).mean() > 0.99
+
+
+def test_a_poster_has_the_players_light_and_clay():
+    eye, up, height = np.tile([0.0, 0, 2], (4, 1)), np.array([0.0, 1, 0]), np.array([0.5, 0.5, 0.5, 0.01])
+    right, left, below, sole = pictures.lit(
+        np.array([[1.0, 0, 0.2], [-1, 0, 0.2], [0, -1, 0.2], [0, -1, 0.2]]), eye, up, height
+    )
+    assert right[1] > left[1] + 0.2 and below[1] > sole[1] + 0.1 > 0.1
+    front = pictures.CLAY * pictures.lit(np.array([[0.0, 0, 1]]), eye[:1], up, height[:1])
+    assert np.allclose(
+        front, [0.74, 0.73, 0.70], atol=0.02
+    )  # as the test of the player's shader has it: 0.87 of the colour

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Sequence
 from html import escape
 from importlib.resources import files
 
-_NAMES = ("meshreel-player.js", "worker.js", "order.js", "core.wasm", "draco.wasm")
+_NAMES = ("meshreel-player.js", "three.js", "worker.js", "order.js", "core.wasm", "draco.wasm")
 
 # The element, its files from memory (`meshreelFiles`, which the player looks at), and the recording given to it.
 _PAGE = """\

@@ -24,7 +24,7 @@ from ..errors import InputError
 from . import files
 from .assets import FRESH, PAGE, SAFE, Asset, Player, is_unchanged
 from .library import Facts, Library, as_text
-from .pages import PLAIN, gallery_page, player_page
+from .pages import PLAIN, gallery_page, player_page, policy
 from .posters import Posters
 
 EXPOSED = ("Accept-Ranges", "Content-Length", "Content-Range", "ETag")
@@ -125,9 +125,11 @@ class _Pages:
         return path
 
     def _watch(self, request: Request, name: str) -> Response:
-        edition, _ = self._player.load()
-        page = player_page(name, f"/player/{edition}" if edition else "/player")
-        return Asset.of(page.encode(), "text/html").answer(request.headers, PAGE)
+        edition, files = self._player.load()
+        styles = files["page.css"].body.decode() if "page.css" in files else ""
+        page = player_page(name, f"/player/{edition}" if edition else "/player", styles)
+        headers = PAGE | {"Content-Security-Policy": policy(styles)}
+        return Asset.of(page.encode(), "text/html").answer(request.headers, headers)
 
     def _gallery(self, request: Request) -> Response:
         title = as_text(self._library.folder.resolve().name) or "meshreel"

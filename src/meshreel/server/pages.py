@@ -1,21 +1,18 @@
 """HTML pages: the player of one file, and the gallery. In: names and entries. Out: HTML, with names escaped.
 
-Scripts and styles are separate files, so that the content security policy can refuse inline ones.
+Scripts are separate files, so that the content security policy can refuse inline ones. A player's page has its styles
+within it, whose sum the policy names: on a slow line something is seen as soon as the page is there.
 """
 
 from __future__ import annotations
 
+from base64 import b64encode
 from collections.abc import Sequence
+from hashlib import sha256
 from html import escape
 from urllib.parse import quote
 
 from .library import Entry
-
-# The player loads its own files, worker and wasm only. Any site may embed the page in a frame.
-POLICY = (
-    "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; worker-src 'self' blob:; "
-    "connect-src 'self' blob: data:; img-src 'self' blob: data:; style-src 'self'; base-uri 'none'; form-action 'none'"
-)
 
 _HEAD = """\
 <!doctype html>
@@ -26,8 +23,9 @@ _HEAD = """\
 <meta name="color-scheme" content="dark light">
 <title>{title}</title>
 <link rel="icon" href="data:,">
-<link rel="stylesheet" href="{style}">
 """
+# Until the script is there.
+_LOADING = '<svg class="loading" viewBox="0 0 48 48"><circle cx="24" cy="24" r="22"/></svg>'
 
 # A play mark, shown for files without a poster.
 PLAIN = (
@@ -35,23 +33,45 @@ PLAIN = (
 )
 
 
-def player_page(name: str, player: str) -> str:
+def policy(styles: str = "") -> str:
+    """Return the content security policy of a page with these styles within it.
+
+    The player loads its own files, worker and wasm only. Any site may embed the page in a frame.
+    """
+    known = f" 'sha256-{b64encode(sha256(styles.encode()).digest()).decode()}'" if styles else ""
+    return (
+        "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; worker-src 'self' blob:; "
+        "connect-src 'self' blob: data:; img-src 'self' blob: data:; "
+        f"style-src 'self'{known}; base-uri 'none'; form-action 'none'"
+    )
+
+
+def player_page(name: str, player: str, styles: str) -> str:
     """Return the page that plays one file in the whole window; its script reads the other parameters of the URL.
 
-    `player` is the address of the player's folder.
+    `player` is the address of the player's folder, and `styles` its page.css. What the player needs first is asked for
+    at once.
     """
     source = escape(f"/files/{quote(name)}")
-    head = _HEAD.format(title=escape(f"{name} · meshreel"), style=f"{player}/page.css")
+    preloads = "".join(
+        f'<link {how} href="{player}/{file}">\n'
+        for how, files in (
+            ('rel="modulepreload"', ("meshreel-player.js", "three.js")),
+            ('rel="preload" as="fetch" crossorigin', ("core.wasm", "draco.wasm")),
+        )
+        for file in files
+    )
     return (
-        f'{head}<script type="module" src="{player}/page.js"></script>\n</head>\n<body>\n'
-        f'<meshreel-player src="{source}" controls autoplay loop></meshreel-player>\n'
+        f"{_HEAD.format(title=escape(f'{name} · meshreel'))}<style>{styles}</style>\n{preloads}"
+        f'<script type="module" src="{player}/page.js"></script>\n</head>\n<body>\n'
+        f'<meshreel-player src="{source}" controls autoplay loop>{_LOADING}</meshreel-player>\n'
         "<noscript>The player needs JavaScript.</noscript>\n</body>\n</html>\n"
     )
 
 
 def gallery_page(title: str, entries: Sequence[Entry]) -> str:
     """Return the gallery, with a tile for each file."""
-    head = _HEAD.format(title=escape(f"{title} · meshreel"), style="/style.css")
+    head = _HEAD.format(title=escape(f"{title} · meshreel")) + '<link rel="stylesheet" href="/style.css">\n'
     tiles = "".join(map(_tile, entries))
     body = f"<ul>\n{tiles}</ul>" if entries else "<p>This folder has no .reel files.</p>"
     return f"{head}</head>\n<body>\n<main>\n<h1>{escape(title)}</h1>\n{body}\n</main>\n</body>\n</html>\n"

@@ -11,6 +11,8 @@ export class SlowSource implements Source {
   /** Bytes a second, shared by all reads that are open. */
   bytesPerSecond: number;
   latencyMs: number;
+  /** How much longer an answer may take: from 0 to 1 of the latency each. */
+  delay: () => number = () => 0;
   size: number | null;
   readonly reads: { readonly offset: number; readonly length: number; sent: number; state: "open" | "done" | "cancelled" }[] = [];
   error: Error | null = null; // for the next reads
@@ -29,6 +31,10 @@ export class SlowSource implements Source {
     return this.#measured.bitsPerSecond;
   }
 
+  get latency(): number {
+    return this.#measured.latency / 1000;
+  }
+
   get sentBytes(): number {
     return this.reads.reduce((sum, { sent }) => sum + sent, 0);
   }
@@ -36,11 +42,13 @@ export class SlowSource implements Source {
   async read(offset: number, length: number, take: Take, signal?: AbortSignal): Promise<void> {
     const read: (typeof this.reads)[number] = { offset, length, sent: 0, state: "open" };
     this.reads.push(read);
-    this.#measured.begin(performance.now());
-    this.#open++;
+    let comes = 0;
+    const transfer = this.#measured.begin(performance.now());
     try {
-      await after(this.latencyMs);
+      await after(this.latencyMs * (1 + this.delay()));
       if (this.error !== null) throw this.error;
+      transfer.answered(performance.now());
+      this.#open += comes = 1;
       const end = Math.min(offset + length, this.#bytes.length);
       let [at, due] = [offset, 0];
       while (at < end) {
@@ -52,7 +60,7 @@ export class SlowSource implements Source {
         if (piece.length === 0) continue;
         due -= piece.length;
         read.sent += piece.length;
-        this.#measured.add(piece.length, performance.now());
+        transfer.add(piece.length, performance.now());
         this.watch?.progress(piece.length);
         take(piece, at);
         at += piece.length;
@@ -60,8 +68,8 @@ export class SlowSource implements Source {
       read.state = "done";
     } finally {
       if (read.state === "open") read.state = "cancelled";
-      this.#open--;
-      this.#measured.end(performance.now());
+      this.#open -= comes;
+      transfer.end(performance.now());
     }
   }
 

@@ -15,6 +15,9 @@ export function applyToPlayback(name: string, settings: Reflected, playback: Pla
 
 export function applyToStage(name: string, settings: Reflected, stage: Stage): void {
   if (name === "mode") stage.mode = settings.mode;
+  if (name === "autorotate") stage.autoRotate = settings.autoRotate;
+  if (name === "fly") stage.fly = settings.fly;
+  if (name === "ground") stage.ground = settings.ground;
   if (name === "up") stage.up = settings.up;
   if (name === "camera") stage.camera = settings.getAttribute("camera") ?? "";
 }

@@ -11,7 +11,8 @@ export type Theme = "auto" | "light" | "dark";
 /** Attributes whose change the element must hear of. */
 export const OBSERVED = [
   "src", "controls", "autoplay", "loop", "poster", "layers", "speed", "playbackrate", "interpolate", "mode", "camera",
-  "up", "stats", "background", "theme", "textures",
+  "up", "stats", "background", "theme", "textures", "ground",
+  "autorotate", "fly", "section", "frames", "share", "muted", "playsinline", "crossorigin",
 ] as const;
 
 /** What a text says, "" taken for nothing; null where it says nothing that the attribute can be. */
@@ -36,6 +37,12 @@ export const readCamera: Reader<readonly number[]> = (text) => {
   return values.length === 6 && values.every((value) => value !== null) ? values : null;
 };
 
+/** From and to, s. */
+export const readSection: Reader<readonly [number, number]> = (text) => {
+  const [from, to, ...rest] = text.split(",").map(readNumber);
+  return typeof from === "number" && typeof to === "number" && rest.length === 0 && from >= 0 && to > from ? [from, to] : null;
+};
+
 const readSwitch: Reader<boolean> = (text) => {
   const word = words("on", "true", "yes", "1", "off", "false", "no", "0")(text);
   return word === null ? null : ["on", "true", "yes", "1"].includes(word);
@@ -46,9 +53,11 @@ const RULES: Readonly<Record<string, { read: Reader<unknown>; wanted: string }>>
   camera: { read: readCamera, wanted: "six numbers with commas, as 0,1,3,0,1,0" },
   interpolate: { read: readSwitch, wanted: "on, or off" },
   textures: { read: readSwitch, wanted: "on, or off" },
+  ground: { read: readSwitch, wanted: "on, or off" },
   mode: { read: readMode, wanted: MODES.join(", ") },
   playbackrate: { read: readNumber, wanted: "a number" },
   layers: { read: readLayers, wanted: "auto, or a whole number of layers from 0" },
+  section: { read: readSection, wanted: "where it begins and ends in seconds, as 1.5,4" },
   speed: { read: readNumber, wanted: "a number" },
   theme: { read: readTheme, wanted: "auto, light, dark" },
   up: { read: readUp, wanted: "y, z, -y, -z" },
@@ -112,5 +121,5 @@ export function parseFlag(text: string | null): boolean {
 /** Properties that a page may have set before the element was defined. */
 export const PROPERTIES = [
   "src", "poster", "preload", "controls", "autoplay", "loop", "stats", "layers", "playbackRate", "interpolate", "textures", "mode", "theme",
-  "up", "background", "camera", "currentTime",
+  "up", "background", "camera", "currentTime", "ground", "autoRotate", "fly", "section", "frames", "share", "muted", "playsInline", "crossOrigin",
 ];

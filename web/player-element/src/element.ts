@@ -2,16 +2,16 @@
 
 import type { Info, Packed, Playback } from "@meshreel/player-core/types";
 import type { Bench } from "@meshreel/player-three";
-import { vrSupported } from "@meshreel/xr";
 import { applyToPlayback, applyToStage } from "./apply.ts";
 import { OBSERVED, PROPERTIES } from "./attributes.ts";
 import { Controls } from "./controls/controls.ts";
 import { PASSED } from "./events.ts";
 import { type Ranges, ranges } from "./ranges.ts";
-import { Reflected } from "./reflected.ts";
+import { keepToSection } from "./section.ts";
 import type { Engine } from "./stage.ts";
 import type { Statistics } from "./stats.ts";
 import { View } from "./view.ts";
+import { Viewed } from "./viewed.ts";
 
 declare global {
   interface HTMLElementTagNameMap {
@@ -19,7 +19,7 @@ declare global {
   }
 }
 
-export class MeshreelPlayer extends Reflected {
+export class MeshreelPlayer extends Viewed {
   static readonly observedAttributes = OBSERVED;
   /** Where playbacks and stages come from; index.ts sets the real one before it defines the element. */
   static engine: Engine;
@@ -28,7 +28,6 @@ export class MeshreelPlayer extends Reflected {
   #source: Blob | null = null; // a file that was opened; it stands in for `src`
   #playback: Playback | null = null;
   #passing = new AbortController();
-  #view: View | null = null;
   #error: Error | null = null;
   #waiting = false;
   #playable = false;
@@ -36,6 +35,7 @@ export class MeshreelPlayer extends Reflected {
   #startAt = 0; // s; where to begin once the head is there
   #left: boolean | null = null; // whether it played when it was taken out of the document; null where it was not open
   #queued = false;
+  #early: Event[] = []; // that say there is a picture, and came before it could be drawn
 
   constructor() {
     super();
@@ -59,8 +59,8 @@ export class MeshreelPlayer extends Reflected {
       if (this.#playback !== null) this.#left = this.#wished;
       this.#controls.disconnect();
       this.#close();
-      this.#view?.dispose();
-      this.#view = null;
+      this.view?.dispose();
+      this.view = null;
     });
   }
 
@@ -88,7 +88,7 @@ export class MeshreelPlayer extends Reflected {
   async play(): Promise<void> {
     if (this.#playback === null && this.isConnected) this.#open();
     if (this.#playback === null) throw this.#error ?? new DOMException("there is nothing to play: set src", "NotSupportedError");
-    this.#view?.wake();
+    this.view?.wake();
     await this.#play(this.#playback);
   }
 
@@ -104,7 +104,7 @@ export class MeshreelPlayer extends Reflected {
     if (!Number.isFinite(seconds)) throw new TypeError(`currentTime ${seconds}: a finite number of seconds is needed`);
     this.#startAt = Math.max(0, seconds);
     if (this.#playback) this.#playback.currentTime = this.#startAt;
-    this.#view?.wake();
+    this.view?.wake();
   }
 
   get duration(): number {
@@ -145,72 +145,42 @@ export class MeshreelPlayer extends Reflected {
   get currentFrame(): number {
     return this.#playback?.currentFrame ?? 0;
   }
-  /** Where the camera is, as text that the attribute `camera` takes. */
-  get camera(): string {
-    return this.#view?.stage.camera ?? this.getAttribute("camera") ?? "";
-  }
-  set camera(value: string) {
-    this.setAttribute("camera", value);
-  }
   /** True while frames or bytes are waited for. */
   get waiting(): boolean {
     return this.#playback !== null && this.#error === null && (this.#waiting || this.seeking);
   }
   get statistics(): Statistics | null {
-    if (!this.#playback || !this.#view) return null;
-    return { ...this.#playback.stats, ...this.#view.stage.stats, fps: this.#view.fps, frameMs: this.#view.frameMs, drawn: this.#view.drawn };
+    if (!this.#playback || !this.view) return null;
+    return { ...this.#playback.stats, ...this.view.stage.stats, fps: this.view.fps, frameMs: this.view.frameMs, drawn: this.view.drawn };
   }
   /** Pauses and moves by a number of frames; a negative one goes back. */
   step(frames: number): void {
     this.#wished = false;
     this.#playback?.step(frames);
-    this.#view?.wake();
-  }
-  /** Looks at the whole scene. */
-  fit(): void {
-    this.#view?.stage.fit();
+    this.view?.wake();
   }
   /** Gives the keyboard to the picture, as the element itself takes no focus. */
   override focus(options?: FocusOptions): void {
     this.#controls.picture.focus(options);
-  }
-  /** Turns the camera about what it looks at, in radians to the right and up, and divides its distance by `closer`. TypeError where they are no numbers. */
-  orbit(right: number, up: number, closer = 1): void {
-    if (![right, up, closer].every(Number.isFinite) || closer <= 0) throw new TypeError(`orbit(${right}, ${up}, ${closer}): finite numbers are needed, the last above 0`);
-    this.#view?.stage.orbit(right, up, closer);
-  }
-  /** A PNG of the picture as it is seen now. */
-  async screenshot(): Promise<Blob> {
-    if (!this.#view) throw new DOMException("there is no picture yet", "InvalidStateError");
-    return this.#view.picture();
   }
   /** Opens a source that failed again, and continues where it stopped. */
   retry(): void {
     this.#startAt = this.currentTime;
     this.#open(this.#wished);
   }
-  async vrSupported(): Promise<boolean> {
-    return vrSupported();
-  }
-  /** Shows the scene in the headset; to be called from a click. */
-  async enterVr(): Promise<void> {
-    if (!this.#view) throw new DOMException("there is no picture yet", "InvalidStateError");
-    await this.#view.enterVr({
+  /** Shows the scene in the headset; with `passthrough` in the viewer's own room. To be called from a click. */
+  async enterVr(passthrough = false): Promise<void> {
+    if (!this.view) throw new DOMException("there is no picture yet", "InvalidStateError");
+    await this.view.enterVr({
       toggle: () => (this.paused ? void this.play().catch(() => undefined) : this.pause()),
       step: (frames) => this.step(frames),
       seekBy: (seconds) => (this.currentTime += seconds),
-    });
-  }
-  exitVr(): void {
-    this.#view?.stage.exitVr();
-  }
-  get presenting(): boolean {
-    return this.#view?.stage.presenting ?? false;
+    }, passthrough);
   }
   /** Lets a bench collect from now on what is decoded and drawn; what is given back ends that. Error where nothing is open. */
   measure(bench: Bench): () => void {
-    if (!this.#view || !this.#playback) throw new DOMException("there is nothing to measure: set src", "InvalidStateError");
-    return this.#view.measure(this.#playback, bench);
+    if (!this.view || !this.#playback) throw new DOMException("there is nothing to measure: set src", "InvalidStateError");
+    return this.view.measure(this.#playback, bench);
   }
 
   #queueLoad(): void {
@@ -232,20 +202,15 @@ export class MeshreelPlayer extends Reflected {
     this.#controls.refresh();
     const source = this.#source ?? this.src;
     if (source === "") return;
-    let playback: Playback;
-    let view: View;
-    try {
-      view = this.#view ??= this.#makeView();
-      playback = this.#playback = MeshreelPlayer.engine.open(source, this);
-    } catch (error) {
-      this.#fail(error instanceof Error ? error : new Error(String(error)));
-      return;
-    }
+    const loading = MeshreelPlayer.engine.load();
+    if (loading === null && !this.#hasView()) return;
+    const playback = (this.#playback = MeshreelPlayer.engine.open(source, this));
     if (this.#startAt > 0) playback.currentTime = this.#startAt;
     this.#waiting = true;
     this.#listen(playback);
     this.dispatchEvent(new Event("loadstart"));
-    view.show(playback);
+    if (loading === null) this.view!.show(playback);
+    else loading.then(() => this.#showLate(playback), (error: Error) => this.#playback === playback && this.#giveUp(error));
     const plays = wished || (this.autoplay && !matchMedia("(prefers-reduced-motion: reduce)").matches);
     if (plays) this.#play(playback).catch(() => undefined); // reported by the error event
   }
@@ -257,18 +222,43 @@ export class MeshreelPlayer extends Reflected {
 
   #close(): void {
     if (this.#playback === null) return;
-    this.#view?.show(null);
+    this.view?.show(null);
     this.#playback.dispose(); // reports what to release
     this.#passing.abort();
     this.#playback = null;
     this.#waiting = this.#playable = this.#wished = false;
+    this.#early = [];
     this.dispatchEvent(new Event("emptied"));
+  }
+
+  /** Shows what was opened before there was anything to show it with. */
+  #showLate(playback: Playback): void {
+    if (this.#playback !== playback || !this.#hasView()) return;
+    this.view!.show(playback);
+    if (playback.info) this.#begin();
+    for (const event of this.#early.splice(0)) this.#onPlayback(event);
+  }
+
+  /** False where there can be none, which is reported. */
+  #hasView(): boolean {
+    try {
+      this.view ??= this.#makeView();
+      return true;
+    } catch (error) {
+      this.#giveUp(error instanceof Error ? error : new Error(String(error)));
+      return false;
+    }
+  }
+
+  #giveUp(error: Error): void {
+    this.#close();
+    this.#fail(error);
   }
 
   #makeView(): View {
     const { picture, cover } = this.#controls;
     const view = new View(MeshreelPlayer.engine, picture, cover, (event) => this.#onView(event));
-    for (const name of ["mode", "up"]) applyToStage(name, this, view.stage);
+    for (const name of ["mode", "up", "ground", "autorotate", "fly"]) applyToStage(name, this, view.stage);
     view.stage.background = this.#controls.background;
     return view;
   }
@@ -278,43 +268,47 @@ export class MeshreelPlayer extends Reflected {
     const { signal } = this.#passing;
     for (const type of PASSED) playback.addEventListener(type, (event) => this.#onPlayback(event), { signal });
     playback.addEventListener("ready", (event) => this.#onReady((event as CustomEvent<Packed>).detail), { signal });
-    playback.addEventListener("release", (event) => this.#view?.stage.release((event as CustomEvent<Packed>).detail), { signal });
+    playback.addEventListener("release", (event) => this.view?.stage.release((event as CustomEvent<Packed>).detail), { signal });
   }
 
   #onReady(packed: Packed): void {
-    if (!this.#view) return;
+    if (!this.view) return;
     try {
-      this.#view.stage.prepare(packed);
+      this.view.stage.prepare(packed);
     } catch (error) {
       this.#onPlayback(new CustomEvent("warning", { detail: error }));
     }
-    this.#view.wake(); // it may be what is waited for
+    this.view.wake(); // it may be what is waited for
   }
 
   #onPlayback(event: Event): void {
     const detail: unknown = event instanceof CustomEvent ? event.detail : undefined;
+    if (!this.view && ["canplay", "playing"].includes(event.type)) return void this.#early.push(event);
     if (event.type === "loadedmetadata") this.#begin();
     if (event.type === "canplay") this.#playable = true;
     if (["canplay", "playing", "seeked"].includes(event.type)) this.#waiting = false;
     if (event.type === "waiting") this.#waiting = true;
     if (event.type === "pause" && this.#playable) this.#waiting = false;
-    if (event.type === "ended") this.#wished = false;
+    if (event.type === "ended") {
+      this.#wished = false;
+      queueMicrotask(() => keepToSection(this));
+    }
     if (event.type === "error") {
       this.#fail(detail instanceof Error ? detail : new Error("unknown"));
       return;
     }
     this.dispatchEvent(detail === undefined ? new Event(event.type) : new CustomEvent(event.type, { detail }));
     if (event.type === "warning" && detail instanceof Error) this.#controls.warn(detail.message);
-    this.#view?.wake();
+    this.view?.wake();
     this.#controls.refresh();
   }
 
   #begin(): void {
     const info = this.#playback?.info;
-    if (!info || !this.#view) return;
-    this.#view.stage.begin(info);
-    applyToStage("mode", this, this.#view.stage); // where none is set, the recording decides
-    if (this.getAttribute("camera")) applyToStage("camera", this, this.#view.stage);
+    if (!info || !this.view) return;
+    this.view.stage.begin(info);
+    applyToStage("mode", this, this.view.stage); // where none is set, the recording decides
+    if (this.getAttribute("camera")) applyToStage("camera", this, this.view.stage);
   }
 
   #fail(error: Error): void {
@@ -326,7 +320,8 @@ export class MeshreelPlayer extends Reflected {
 
   #onView(event: Event): void {
     if (event.type === "drawn") {
-      if (this.#view?.shows) this.#controls.drawn();
+      if (this.view?.shows) this.#controls.drawn();
+      keepToSection(this);
     } else {
       if (event.type !== "change") this.dispatchEvent(new Event(event.type));
       this.#controls.onStage(event.type);
@@ -335,16 +330,16 @@ export class MeshreelPlayer extends Reflected {
 
   #apply(name: string): void {
     if (this.#playback) applyToPlayback(name, this, this.#playback);
-    if (this.#view) applyToStage(name, this, this.#view.stage);
+    if (this.view) applyToStage(name, this, this.view.stage);
     if (name === "background" || name === "theme") this.applyBackground();
-    this.#view?.refresh();
+    this.view?.refresh();
   }
 
   /** Takes the background's colour from the styles again. */
   applyBackground(): void {
     const colour = this.#controls.background;
-    if (!this.#view || this.#view.stage.background === colour) return;
-    this.#view.stage.background = colour;
-    this.#view.refresh();
+    if (!this.view || this.view.stage.background === colour) return;
+    this.view.stage.background = colour;
+    this.view.refresh();
   }
 }

@@ -4,7 +4,7 @@ import { BlobSource, HttpSource, Player, WorkerPool, type WorkerLike } from "@me
 import type { OrderWorker } from "@meshreel/player-three";
 import { GraphicsError } from "./stage.ts";
 import type { Engine, Settings, Stage } from "./stage.ts";
-import { ThreeStage } from "./stage_three.ts";
+import type { ThreeStage } from "./stage_three.ts";
 
 /** Where the built player's other files lie. */
 export interface Files {
@@ -12,6 +12,7 @@ export interface Files {
   readonly core: URL;
   readonly draco: URL;
   readonly order: URL; // the worker that orders splats
+  readonly three: URL; // stage_three.ts and three.js: the largest part, which a player needs only with its first picture
 }
 
 const POOL_KEPT = 1000; // ms that workers are kept after the last player is closed: a change of `src` needs them again
@@ -25,18 +26,20 @@ interface Shared {
 export class RealEngine implements Engine {
   readonly #files: Files;
   #shared: Shared | null = null; // what the next player gets
+  #stages: { readonly ThreeStage: typeof ThreeStage } | null = null;
+  #loading: Promise<void> | null = null;
 
   constructor(files: Files) {
     this.#files = files;
   }
 
-  open(source: string | Blob, { layers, interpolate, textures, splats, loop, playbackRate }: Settings): Player {
+  open(source: string | Blob, { layers, interpolate, textures, splats, loop, playbackRate, crossOrigin }: Settings): Player {
     const { worker, core, draco } = this.#files;
     const create = (): WorkerLike => openWorker(worker) as WorkerLike;
-    const shared = (this.#shared ??= { workers: new WorkerPool({ create, core: core.href, draco: draco.href }), users: 0 });
+    const shared = (this.#shared ??= { workers: new WorkerPool({ create, core: bytesOf(core), draco: bytesOf(draco) }), users: 0 });
     shared.users++;
     const player = new PooledPlayer({
-      source: typeof source === "string" ? new HttpSource(source) : new BlobSource(source),
+      source: typeof source === "string" ? new HttpSource(source, { credentials: crossOrigin === "use-credentials" ? "include" : "same-origin" }) : new BlobSource(source),
       workers: shared.workers,
     });
     player.leave = () => this.#leave(shared);
@@ -47,9 +50,23 @@ export class RealEngine implements Engine {
     return player;
   }
 
+  load(): Promise<void> | null {
+    if (this.#stages !== null) return null;
+    return (this.#loading ??= this.#import(this.#files.three.href));
+  }
+
+  async #import(address: string): Promise<void> {
+    try {
+      this.#stages = (await import(/* @vite-ignore */ address)) as typeof import("./stage_three.ts");
+    } catch (error) {
+      this.#loading = null; // to be tried again
+      throw new Error(`${address} cannot be loaded; load the page again`, { cause: error });
+    }
+  }
+
   stage(canvas: HTMLCanvasElement): Stage {
     try {
-      return new ThreeStage(canvas, () => openWorker(this.#files.order) as OrderWorker);
+      return new this.#stages!.ThreeStage(canvas, () => openWorker(this.#files.order) as OrderWorker);
     } catch (error) {
       throw new GraphicsError(error instanceof Error ? error.message : String(error), { cause: error });
     }
@@ -67,6 +84,11 @@ export class RealEngine implements Engine {
   #forget(shared: Shared): void {
     if (this.#shared === shared) this.#shared = null;
   }
+}
+
+/** A file's bytes, once for all workers; its address where they do not come, so that a worker tells why. */
+function bytesOf(file: URL): Promise<ArrayBuffer | string> {
+  return fetch(file).then<ArrayBuffer | string>((response) => (response.ok ? response.arrayBuffer() : file.href)).catch(() => file.href);
 }
 
 /** A player that reports when it no longer needs the pool. */

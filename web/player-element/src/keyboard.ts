@@ -2,7 +2,8 @@
 
 export type Action =
   | "toggle" | "back" | "forward" | "first" | "last" | "previousFrame" | "nextFrame" | "fullscreen" | "vr" | "stats"
-  | "mode" | "loop" | "fit" | "help" | "close" | "turnLeft" | "turnRight" | "turnUp" | "turnDown" | "closer" | "farther";
+  | "mode" | "loop" | "fit" | "help" | "close" | "turnLeft" | "turnRight" | "turnUp" | "turnDown" | "closer" | "farther"
+  | "sectionFrom" | "sectionTo" | "sectionOff" | "autoRotate" | "fly" | "frames";
 
 /** What `actionOf` looks at of a KeyboardEvent. */
 export interface Key {
@@ -20,12 +21,17 @@ export const KEYS: readonly { shown: string; says: string; keys: Readonly<Record
   { shown: "Home End", says: "First, last frame", keys: { Home: "first", End: "last" } },
   { shown: ", .", says: "Previous, next frame", keys: { ",": "previousFrame", ".": "nextFrame" } },
   { shown: "L", says: "Loop on or off", keys: { l: "loop" } },
+  { shown: "[ ]", says: "Repeat from here, to here", keys: { "[": "sectionFrom", "]": "sectionTo" } },
+  { shown: "\\", says: "Repeat nothing", keys: { "\\": "sectionOff" } },
+  { shown: "N", says: "Frame numbers", keys: { n: "frames" } },
   {
     shown: "Shift + arrows", says: "Turn the view",
     keys: { "Shift+ArrowLeft": "turnLeft", "Shift+ArrowRight": "turnRight", "Shift+ArrowUp": "turnUp", "Shift+ArrowDown": "turnDown" },
   },
   { shown: "+ −", says: "Closer, farther", keys: { "+": "closer", "=": "closer", "-": "farther" } },
   { shown: "0", says: "Fit the view", keys: { 0: "fit" } },
+  { shown: "R", says: "Turn by itself", keys: { r: "autoRotate" } },
+  { shown: "G", says: "Fly: W A S D, Q E, drag, wheel", keys: { g: "fly" } },
   { shown: "M", says: "Next shading", keys: { m: "mode" } },
   { shown: "S", says: "Statistics", keys: { s: "stats" } },
   { shown: "F", says: "Full screen", keys: { f: "fullscreen" } },

@@ -1,22 +1,37 @@
 // The page that plays one recording over the whole window: the address says which, and how.
 
+import { followAddress } from "./address.ts";
 import { runBench } from "./bench_page.ts";
 import { MeshreelPlayer } from "./index.ts";
 import { recordingName } from "./format.ts";
 import { readParameters } from "./parameters.ts";
 
-function start(): void {
+async function start(): Promise<void> {
   const player = document.querySelector("meshreel-player");
   if (!(player instanceof MeshreelPlayer)) return;
   const { attributes, time, bench } = readParameters(location.search);
+  if (bench !== null) await MeshreelPlayer.engine.load(); // it measures from the opening on
+  apply(player, attributes, time);
+  if (bench !== null) void runBench(player, bench);
+  else {
+    const follow = (): void => {
+      const typed = readParameters(`?${location.hash.slice(1)}`);
+      apply(player, typed.attributes, typed.time);
+    };
+    follow(); // it goes before what stands in front of it
+    followAddress(player, follow);
+    player.share = true;
+  }
+  takeFocus(player);
+  if (player.src) document.title = `${recordingName(player.src)} · meshreel`;
+}
+
+function apply(player: MeshreelPlayer, attributes: ReadonlyMap<string, string | null>, time: number): void {
   for (const [name, value] of attributes) {
     if (value === null) player.removeAttribute(name);
     else player.setAttribute(name, value);
   }
   if (time > 0) player.currentTime = time;
-  if (bench !== null) void runBench(player, bench);
-  takeFocus(player);
-  if (player.src) document.title = `${recordingName(player.src)} · meshreel`;
 }
 
 /** So that keys act without a click, which would play. A frame of another page leaves the focus where that has it. */
@@ -25,4 +40,4 @@ function takeFocus(player: MeshreelPlayer): void {
   if (window.parent === window && isFree) player.focus({ preventScroll: true, focusVisible: false });
 }
 
-start();
+void start();

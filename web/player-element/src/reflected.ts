@@ -124,6 +124,81 @@ export class Reflected extends Element {
     this.setAttribute("textures", value ? "on" : "off");
   }
 
+  /** Whether what stands nowhere has a ground, with its shadow. */
+  get ground(): boolean {
+    return parse.parseSwitch(this.getAttribute("ground"));
+  }
+  set ground(value: boolean) {
+    this.setAttribute("ground", value ? "on" : "off");
+  }
+
+  /** Whether the camera goes around by itself; not for viewers who prefer reduced motion. */
+  get autoRotate(): boolean {
+    return parse.parseFlag(this.getAttribute("autorotate"));
+  }
+  set autoRotate(value: boolean) {
+    this.toggleAttribute("autorotate", value);
+  }
+
+  /** Whether the camera flies instead of going around something: for rooms. */
+  get fly(): boolean {
+    return parse.parseFlag(this.getAttribute("fly"));
+  }
+  set fly(value: boolean) {
+    this.toggleAttribute("fly", value);
+  }
+
+  /** The part that is played over and over, from and to, s; null for all. */
+  get section(): readonly [number, number] | null {
+    return parse.readSection(this.getAttribute("section") ?? "");
+  }
+  set section(value: readonly [number, number] | null) {
+    if (value === null) this.removeAttribute("section");
+    else this.setAttribute("section", value.map((time) => Number(time.toFixed(3))).join(","));
+  }
+
+  /** Whether the bar counts frames instead of seconds. */
+  get frames(): boolean {
+    return parse.parseFlag(this.getAttribute("frames"));
+  }
+  set frames(value: boolean) {
+    this.toggleAttribute("frames", value);
+  }
+
+  /** Whether the settings offer a link to what is seen: for pages whose address says it, as player/index.html. */
+  get share(): boolean {
+    return parse.parseFlag(this.getAttribute("share"));
+  }
+  set share(value: boolean) {
+    this.toggleAttribute("share", value);
+  }
+
+  /** As a video has it. Recordings have no sound yet. */
+  get muted(): boolean {
+    return parse.parseFlag(this.getAttribute("muted"));
+  }
+  set muted(value: boolean) {
+    this.toggleAttribute("muted", value);
+  }
+
+  /** As a video has it: it always plays in its place. */
+  get playsInline(): boolean {
+    return parse.parseFlag(this.getAttribute("playsinline"));
+  }
+  set playsInline(value: boolean) {
+    this.toggleAttribute("playsinline", value);
+  }
+
+  /** "use-credentials" sends cookies to another origin, too; as a video has it. */
+  get crossOrigin(): "anonymous" | "use-credentials" | null {
+    const text = this.getAttribute("crossorigin");
+    return text === null ? null : text.trim().toLowerCase() === "use-credentials" ? "use-credentials" : "anonymous";
+  }
+  set crossOrigin(value: string | null) {
+    if (value === null) this.removeAttribute("crossorigin");
+    else this.setAttribute("crossorigin", value);
+  }
+
   /** How surfaces look: where none is set, or one that the recording has not, `splats`, `color` or `shaded`, the first of these that it has. */
   get mode(): Mode {
     return parse.parseMode(this.getAttribute("mode"), this.info);

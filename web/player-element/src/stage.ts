@@ -26,6 +26,10 @@ export interface Stage extends EventTarget {
   readonly far: ReadonlySet<number>; // tracks whose textures make no difference: they were drawn so small, or as splats
   mode: Mode;
   background: string; // a CSS colour
+  autoRotate: boolean;
+  fly: boolean; // the camera moves through the scene, instead of around what it looks at
+  readonly isFit: boolean; // the view was not changed since it fitted
+  ground: boolean; // whether there is one, where the recording has none of its own
   camera: string; // as the attribute has it; "" fits the view
   up: Up | null; // the recording's axis that points up; null: as it says itself. A change fits the view.
   /** A new recording: forgets the last one's groups, fits the view. */
@@ -41,8 +45,8 @@ export interface Stage extends EventTarget {
   orbit(right: number, up: number, closer: number): void;
   /** Draws, and gives what it drew as a PNG: what was drawn before is gone with the picture that showed it. */
   picture(shown: Shown | null): Promise<Blob>;
-  /** From then on `draw` is called by the headset's frames, not by the page's. */
-  enterVr(frame: (now: number) => void, actions: VrActions): Promise<void>;
+  /** From then on `draw` is called by the headset's frames, not by the page's. `passthrough`: in the viewer's own room. */
+  enterVr(frame: (now: number) => void, actions: VrActions, passthrough: boolean): Promise<void>;
   exitVr(): void;
   dispose(): void;
 }
@@ -54,6 +58,7 @@ export interface Settings {
   readonly splats: boolean;
   readonly loop: boolean;
   readonly playbackRate: number;
+  readonly crossOrigin: string | null;
 }
 
 /** This browser cannot draw. */
@@ -64,6 +69,8 @@ export class GraphicsError extends Error {
 /** Where playbacks and stages come from; tests put others in. */
 export interface Engine {
   open(source: string | Blob, settings: Settings): Playback;
-  /** Throws GraphicsError where there is no WebGL 2. */
+  /** Fetches what stages are made with; null where that is there. Rejects where it cannot be fetched. */
+  load(): Promise<void> | null;
+  /** To be called after `load`. Throws GraphicsError where there is no WebGL 2. */
   stage(canvas: HTMLCanvasElement): Stage;
 }

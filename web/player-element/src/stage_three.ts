@@ -1,13 +1,14 @@
 // A stage that draws with three.js: the recording, a camera that orbits it, and a headset.
 
 import type { Box, Info, Packed, Shown } from "@meshreel/player-core/types";
-import { ReelScene, Sorter, updateFar } from "@meshreel/player-three";
+import { Ground, ReelScene, Sorter, updateFar } from "@meshreel/player-three";
 import type { Mode, OrderWorker } from "@meshreel/player-three";
 import { VrSession } from "@meshreel/xr";
 import type { VrActions } from "@meshreel/xr";
 import { Color, Group, Matrix4, PerspectiveCamera, Scene, Spherical, Vector3, WebGLRenderer } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import { readCamera } from "./attributes.ts";
+import { Fly } from "./fly.ts";
 import type { PictureStats, Stage } from "./stage.ts";
 import { stoodUp, turnOf } from "./upright.ts";
 import type { Up } from "./upright.ts";
@@ -31,6 +32,9 @@ export class ThreeStage extends EventTarget implements Stage {
   readonly #orbit: OrbitControls;
   readonly #stop = new AbortController();
   readonly #sorter: Sorter;
+  readonly #floor = new Ground();
+  #shaded: Shown | null = null; // whose shadow lies on it
+  ground = true;
   #reel: ReelScene;
   #box: Box | null = null; // of the recording, as it stands
   #info: Info | null = null; // of the recording
@@ -38,7 +42,9 @@ export class ThreeStage extends EventTarget implements Stage {
   #mode: Mode = "shaded";
   #background = "";
   #free = 1; // of the picture's height: what the bar leaves
-  #isFit = true; // the camera was not moved by hand: it fits again when the picture's size changes
+  readonly #fly = new Fly(this.#eye, () => this.#flown());
+  #drawnAt = 0; // ms
+  isFit = true; // the camera was not moved by hand: it fits again when the picture's size changes
   #session: VrSession | null = null;
   readonly #place = new Vector3(); // of the eye, in the recording's space
   readonly far = new Set<number>();
@@ -50,15 +56,18 @@ export class ThreeStage extends EventTarget implements Stage {
     this.#sorter = new Sorter(openOrder);
     this.#sorter.onorder = () => this.dispatchEvent(new Event("change"));
     this.#reel = new ReelScene(this.#sorter);
-    this.#renderer = new WebGLRenderer({ canvas, antialias: true, powerPreference: "high-performance" });
+    this.#renderer = new WebGLRenderer({ canvas, antialias: true, alpha: true, powerPreference: "high-performance" });
     this.#scene.add(this.#content);
-    this.#content.add(this.#reel);
+    this.#content.add(this.#reel, this.#floor);
     const { signal } = this.#stop;
     canvas.addEventListener("webglcontextlost", () => this.dispatchEvent(new Event("lost")), { signal });
-    canvas.addEventListener("webglcontextrestored", () => this.dispatchEvent(new Event("restored")), { signal });
+    canvas.addEventListener("webglcontextrestored", () => {
+      this.#shaded = null;
+      this.dispatchEvent(new Event("restored"));
+    }, { signal });
     this.#orbit = new OrbitControls(this.#eye, canvas);
     this.#orbit.enableDamping = glides();
-    this.#orbit.addEventListener("start", () => void (this.#isFit = false));
+    this.#orbit.addEventListener("start", () => void (this.isFit = false));
     this.#orbit.addEventListener("change", () => this.#moved());
   }
 
@@ -86,7 +95,8 @@ export class ThreeStage extends EventTarget implements Stage {
 
   set background(colour: string) {
     this.#background = colour;
-    this.#scene.background = new Color(colour); // not a clear colour: that would be lost with the context
+    const isOpaque = !/^rgba|\//.test(colour); // as a computed style is written; what lies behind the canvas has the colour, too
+    this.#scene.background = isOpaque ? new Color(colour) : null; // not a clear colour: that would be lost with the context
   }
 
   get camera(): string {
@@ -97,6 +107,27 @@ export class ThreeStage extends EventTarget implements Stage {
     const values = readCamera(text);
     if (values) this.#look(new Vector3(...values.slice(0, 3)), new Vector3(...values.slice(3)));
     else this.fit();
+  }
+
+  get autoRotate(): boolean {
+    return this.#orbit.autoRotate;
+  }
+
+  set autoRotate(on: boolean) {
+    this.#orbit.autoRotate = on && glides();
+    if (this.#orbit.autoRotate) this.dispatchEvent(new Event("change"));
+    else this.#rest();
+  }
+
+  get fly(): boolean {
+    return this.#fly.on;
+  }
+
+  set fly(on: boolean) {
+    if (on === this.#fly.on) return;
+    this.#orbit.enabled = !on;
+    if (on) this.#fly.begin(this.canvas);
+    else this.#fly.end();
   }
 
   get up(): Up | null {
@@ -134,9 +165,21 @@ export class ThreeStage extends EventTarget implements Stage {
     else if (shown) updateFar(this.far, shown, this.#reel.worldToLocal(this.#place.copy(this.#eye.position)), this.canvas.height / (2 * TANGENT));
     this.#reel.splats.forEach((count, track) => void (count > 0 && this.far.add(track)));
     this.#reel.visible = shown !== null;
-    const moves = !this.presenting && this.#orbit.update();
+    this.#shade(shown);
+    const now = performance.now();
+    const moves = !this.presenting && (this.fly ? this.#fly.update(now) : this.#orbit.update(Math.min(0.1, (now - this.#drawnAt) / 1000)));
+    this.#drawnAt = now;
     this.#renderer.render(this.#scene, this.#eye);
     return moves;
+  }
+
+  /** The shadow is drawn anew where what is shown is another; a room has a floor of its own, and splats cast none. */
+  #shade(shown: Shown | null): void {
+    const isLit = this.#mode === "color" || this.#mode === "shaded" || this.#mode === "splats";
+    this.#floor.visible = this.ground && isLit && shown !== null && shown.background === null && !this.#reel.splats.some((count) => count > 0);
+    if (!this.#floor.visible || shown === this.#shaded) return;
+    this.#shaded = shown;
+    this.#floor.shade(this.#reel, this.#renderer);
   }
 
   resize(width: number, height: number, pixelRatio: number, covered: number): void {
@@ -146,7 +189,7 @@ export class ThreeStage extends EventTarget implements Stage {
     this.#eye.aspect = width / height;
     this.#free = Math.max(0.2, 1 - covered / height);
     this.#eye.setViewOffset(width, height, 0, ((1 - this.#free) * height) / 2, width, height);
-    if (this.#isFit) this.fit();
+    if (this.isFit) this.fit();
   }
 
   fit(): void {
@@ -154,7 +197,7 @@ export class ThreeStage extends EventTarget implements Stage {
     const { middle } = this.#ball(this.#box);
     const distance = MARGIN * distanceOf(this.#box, TANGENT * this.#eye.aspect, TANGENT * this.#free);
     this.#look(middle.clone().addScaledVector(FROM, distance || 1), middle);
-    this.#isFit = true;
+    this.isFit = true;
   }
 
   orbit(right: number, up: number, closer: number): void {
@@ -171,7 +214,7 @@ export class ThreeStage extends EventTarget implements Stage {
     return new Promise((done, fail) => this.canvas.toBlob((blob) => (blob ? done(blob) : fail(new Error("no picture"))), "image/png"));
   }
 
-  async enterVr(frame: (now: number) => void, actions: VrActions): Promise<void> {
+  async enterVr(frame: (now: number) => void, actions: VrActions, passthrough: boolean): Promise<void> {
     const box = this.#box;
     if (this.#session !== null || !box) return;
     const onend = (): void => {
@@ -179,7 +222,7 @@ export class ThreeStage extends EventTarget implements Stage {
       this.dispatchEvent(new Event("vrend"));
     };
     const [renderer, camera, content] = [this.#renderer, this.#eye, this.#content];
-    this.#session = await VrSession.enter({ renderer, camera, content, box, actions, frame, onend });
+    this.#session = await VrSession.enter({ renderer, camera, content, box, actions, frame, onend, passthrough });
     this.dispatchEvent(new Event("vrstart"));
   }
 
@@ -189,9 +232,11 @@ export class ThreeStage extends EventTarget implements Stage {
 
   dispose(): void {
     this.exitVr();
+    this.#fly.end();
     this.#stop.abort();
     this.#orbit.dispose();
     this.#reel.dispose();
+    this.#floor.dispose();
     this.#sorter.dispose();
     this.#renderer.dispose();
     this.#renderer.forceContextLoss();
@@ -204,12 +249,24 @@ export class ThreeStage extends EventTarget implements Stage {
   }
 
   #look(eye: Vector3, target: Vector3): void {
-    this.#isFit = false;
-    this.#orbit.enableDamping = false; // a view that is asked for is there at once
+    this.isFit = false;
     this.#eye.position.copy(eye);
     this.#orbit.target.copy(target);
+    this.#rest(); // a view that is asked for is there at once
+    this.#moved();
+  }
+
+  /** Ends a glide. */
+  #rest(): void {
+    this.#orbit.enableDamping = false;
     this.#orbit.update();
     this.#orbit.enableDamping = glides();
+  }
+
+  /** What the camera looks at keeps before it: to go around that when flying ends. */
+  #flown(): void {
+    this.isFit = false;
+    this.#orbit.target.set(0, 0, -this.#fly.size / 4).applyQuaternion(this.#eye.quaternion).add(this.#eye.position);
     this.#moved();
   }
 
@@ -217,9 +274,13 @@ export class ThreeStage extends EventTarget implements Stage {
   #stand(info: Info): void {
     this.#info = info;
     const turn = turnOf(info.metadata, this.#up);
+    const box = (this.#box = stoodUp(info.box, turn));
     const [a, b, c, d, e, f, g, h, i] = info.rotation ?? [1, 0, 0, 0, 1, 0, 0, 0, 1];
-    this.#reel.quaternion.setFromRotationMatrix(new Matrix4().makeRotationX(turn).multiply(new Matrix4().set(a, b, c, 0, d, e, f, 0, g, h, i, 0, 0, 0, 0, 1)));
-    this.#box = stoodUp(info.box, turn);
+    const edited = new Matrix4().set(a, b, c, 0, d, e, f, 0, g, h, i, 0, 0, 0, 0, 1);
+    this.#reel.stand(new Matrix4().makeRotationX(turn).multiply(edited), box.minimum[1], box.size[1]);
+    this.#floor.lie(box);
+    this.#fly.size = 2 * this.#ball(box).radius;
+    this.#shaded = null;
     this.fit();
   }
 

@@ -101,8 +101,8 @@ export class View {
     return this.stage.picture(this.#last);
   }
 
-  async enterVr(actions: VrActions): Promise<void> {
-    await this.stage.enterVr((now) => this.#tick(now), actions);
+  async enterVr(actions: VrActions, passthrough: boolean): Promise<void> {
+    await this.stage.enterVr((now) => this.#tick(now), actions, passthrough);
   }
 
   /** Lets a bench collect from now on; what is given back ends that. */

@@ -26,15 +26,15 @@ describeInBrowser("the player and a recording's own colours", () => {
   afterAll(() => site.close());
 
   const open = async (file: string, controls = 0): Promise<{ page: Page; errors: string[] }> => {
-    const found = await site.visit(`player/index.html?src=/${file}.reel&background=white&controls=${controls}`);
+    const found = await site.visit(`player/index.html?src=/${file}.reel&background=white&ground=off&controls=${controls}`);
     await found.page.waitForFunction(() => (document.querySelector("meshreel-player")!.statistics?.triangles ?? 0) > 0);
     return found;
   };
 
-  /** The colours of the picture and how many pixels have each. */
-  const colorsOf = (page: Page): Promise<Record<string, number>> =>
-    page.evaluate(async () => {
-      const picture = await createImageBitmap(await document.querySelector("meshreel-player")!.screenshot());
+  /** The colours of a picture, or of the player's, and how many pixels have each. */
+  const colorsOf = (page: Page, png?: Buffer): Promise<Record<string, number>> =>
+    page.evaluate(async (address) => {
+      const picture = await createImageBitmap(await (address ? (await fetch(address)).blob() : document.querySelector("meshreel-player")!.screenshot()));
       const context = new OffscreenCanvas(picture.width, picture.height).getContext("2d")!;
       context.drawImage(picture, 0, 0);
       const { data } = context.getImageData(0, 0, picture.width, picture.height);
@@ -44,7 +44,20 @@ describeInBrowser("the player and a recording's own colours", () => {
         found[color] = (found[color] ?? 0) + 1;
       }
       return found;
-    });
+    }, png && `data:image/png;base64,${png.toString("base64")}`);
+
+  test("on a transparent background the page is seen around the recording", async () => {
+    site.write("clear.html", `<!doctype html><link rel="icon" href="data:,"><body style="margin:0;background:#ff8000"><script type="module" src="player/meshreel-player.js"></script>
+      <meshreel-player src="scene.reel" background="transparent"></meshreel-player>`);
+    const { page, errors } = await site.visit("clear.html");
+    await page.waitForFunction(() => (document.querySelector("meshreel-player")!.statistics?.triangles ?? 0) > 0);
+    const { "255,128,0": behind, "0,0,0": black = 0, ...others } = await colorsOf(page, await page.locator("meshreel-player").screenshot());
+    expect(behind).toBeGreaterThan(10_000);
+    expect(Object.keys(others).length).toBeGreaterThan(20);
+    expect(black).toBe(0);
+    expect(errors).toEqual([]);
+    await page.close();
+  });
 
   test.skipIf(!hasPython).each(NAMES)("%s.reel is shown in them, to the byte", async (name) => {
     const video = new Video(await nodeTools(), Uint8Array.from(Buffer.from(files[name].file, "base64")));
@@ -61,6 +74,23 @@ describeInBrowser("the player and a recording's own colours", () => {
     expect(Object.keys(lit).length).toBeGreaterThan(Object.keys(others).length + 10);
     expect(errors).toEqual([]);
     await page.close();
+  });
+
+  test("a recording without a room has a ground with its shadow, unless there is to be none", async () => {
+    const seen: Record<string, number>[] = [];
+    for (const ground of ["on", "off"]) {
+      const { page, errors } = await site.visit(`player/index.html?src=/layers.reel&background=white&controls=0&mode=shaded&ground=${ground}`);
+      await page.waitForFunction(() => (document.querySelector("meshreel-player")!.statistics?.triangles ?? 0) > 0);
+      seen.push(await colorsOf(page));
+      await page.evaluate(() => void (document.querySelector("meshreel-player")!.mode = "normal")); // which says something of surfaces alone
+      await page.waitForTimeout(100);
+      seen.push(await colorsOf(page));
+      expect(errors).toEqual([]);
+      await page.close();
+    }
+    const [on, bare, off, normals] = seen.map((colors) => colors["255,255,255"]!);
+    expect(on).toBeLessThan(0.95 * off!);
+    expect([bare, normals]).toEqual([off, off]);
   });
 
   test.skipIf(!hasPython)("the key M goes through all looks, and colours are one of them where there are some", async () => {

@@ -278,10 +278,10 @@ describeOnPage("controls of <meshreel-player>", (on) => {
     expect(await on.get((player) => player.currentTime)).toBe(1.25);
   });
 
-  test("warnings are shown for a while, the same once", async () => {
+  test("the last warning is shown for a while, with the number of others", async () => {
     await on.shown();
     await on.page.evaluate(() => ["group 3 is damaged", "group 3 is damaged", "slow"].forEach((text) => engine.playbacks[0]!.warn(text)));
-    expect(await on.page.locator(".toast").allTextContents()).toEqual(["group 3 is damaged", "slow"]);
+    expect(await on.page.locator(".toast").allTextContents()).toEqual(["slowand 1 more"]);
     expect(await on.page.locator(".toasts").getAttribute("aria-live")).toBe("polite");
   });
 

@@ -150,6 +150,10 @@ export class FakeStage extends EventTarget implements Stage {
   readonly far = new Set<number>();
   mode: Mode = "shaded";
   background = "";
+  ground = true;
+  autoRotate = false;
+  fly = false;
+  isFit = true;
   up: Stage["up"] = null;
   camera = "1,1,1";
   draws = 0;
@@ -220,6 +224,9 @@ export class FakeEngine implements Engine {
   playbacks: FakePlayback[] = [];
   stages: FakeStage[] = [];
   webgl = true;
+  load(): null {
+    return null;
+  }
   open(source: string | Blob, settings: Settings): FakePlayback {
     this.playbacks.push(new FakePlayback(source, settings));
     return this.playbacks.at(-1)!;

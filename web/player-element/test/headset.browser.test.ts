@@ -16,6 +16,8 @@ interface Headset {
   press(button: string, value: 0 | 1): void;
   /** What both eyes see, taken within a frame of the headset: shares of pixels that differ from the background. */
   eyes(): Promise<[number, number]>;
+  /** The picture's first pixel, with its alpha, of the last call of `eyes`. */
+  corner(): number[];
   frames(count: number): Promise<void>;
 }
 declare const headset: Headset;
@@ -45,7 +47,9 @@ function installHeadset(): void {
     }
     return found / (pixels.height * (to - from));
   };
+  let corner: number[] = [];
   const api: Headset = {
+    corner: () => corner,
     press: (button, value) => device.controllers.right?.updateButtonValue(button, value),
     async eyes() {
       const canvas = document.querySelector("canvas")!; // the device has taken the player's meanwhile
@@ -59,6 +63,7 @@ function installHeadset(): void {
       const context = new OffscreenCanvas(width, height).getContext("2d")!;
       context.drawImage(picture, 0, 0);
       const pixels = context.getImageData(0, 0, width, height);
+      corner = [...pixels.data.subarray(0, 4)];
       return [covered(pixels, 0, width >> 1), covered(pixels, width >> 1, width)];
     },
     async frames(more) {
@@ -103,6 +108,20 @@ describeInBrowser("the built player in a headset", () => {
     await page.close();
   }, 60_000);
 
+  test("in the viewer's own room nothing but the recording and its shadow is drawn", async () => {
+    const { page, errors } = await site.visit("player/index.html?src=/layers.reel&background=white", [{ path: IWER }, installHeadset]);
+    await page.waitForFunction(() => (document.querySelector("meshreel-player")!.statistics?.triangles ?? 0) > 0);
+    await page.locator("button.ar").click();
+    await page.waitForFunction(() => document.querySelector("meshreel-player")!.presenting);
+    await page.evaluate(() => headset.frames(3));
+    for (const share of await page.evaluate(() => headset.eyes())) expect(share).toBeGreaterThan(0.005);
+    expect(await page.evaluate(() => headset.corner())).toEqual([0, 0, 0, 0]); // where a headset shows the room
+    await page.evaluate(() => document.querySelector("meshreel-player")!.exitVr());
+    await page.waitForFunction(() => !document.querySelector("meshreel-player")!.presenting);
+    expect(errors).toEqual([]);
+    await page.close();
+  }, 60_000);
+
   test("both eyes see splats, where nothing else is drawn", async () => {
     site.write("splats.reel", readFileSync(join(ROOT, "conformance/v1/splats/splats.reel")));
     const { page, errors } = await site.visit("player/index.html?src=/splats.reel&t=0.28&background=white", [{ path: IWER }, installHeadset]); // without patches
@@ -120,6 +139,7 @@ describeInBrowser("the built player in a headset", () => {
   test("a bench during which the headset is entered measures the headset alone", async () => {
     const { page, errors } = await site.visit("player/index.html?src=/layers.reel&bench=2", [{ path: IWER }, installHeadset]);
     await page.waitForFunction(() => !document.querySelector("meshreel-player")!.paused);
+    await page.mouse.move(100, 100); // controls hide while it plays
     await page.locator("button.vr").click();
     const text = await page.waitForFunction(() => document.querySelector("pre")!.textContent!.split("\n").find((line) => line.startsWith("{")));
     expect(JSON.parse((await text.jsonValue())!)).toMatchObject({ place: "VR", displayRate: 72 });

@@ -103,6 +103,29 @@ describeOnPage("look of <meshreel-player>", (on) => {
     await expect.poll(opacity).toBe(1);
   });
 
+  test("on touch a tap brings the controls back for long enough to pause by another", async () => {
+    const input = await on.page.context().newCDPSession(on.page);
+    await input.send("Emulation.setTouchEmulationEnabled", { enabled: true });
+    const tap = async (selector: string) => {
+      const box = (await on.page.locator(selector).first().boundingBox())!;
+      await input.send("Input.dispatchTouchEvent", { type: "touchStart", touchPoints: [{ x: box.x + box.width / 2, y: box.y + box.height / 2 }] });
+      await input.send("Input.dispatchTouchEvent", { type: "touchEnd", touchPoints: [] });
+    };
+    const opacity = () => on.page.locator(".bar").evaluate((bar) => Number(getComputedStyle(bar).opacity));
+    await on.page.setViewportSize({ width: 390, height: 844 });
+    await on.shown("loop");
+    await tap(".picture");
+    await expect.poll(() => on.get((player) => player.paused)).toBe(false);
+    await expect.poll(opacity, { timeout: 5000 }).toBe(0);
+    await tap(".picture");
+    await on.page.waitForTimeout(1000); // longer than the bar takes to fade
+    expect([await opacity(), await on.get((player) => player.paused)]).toEqual([1, false]);
+    await tap(".row .play");
+    await expect.poll(() => on.get((player) => player.paused)).toBe(true);
+    await input.send("Emulation.setTouchEmulationEnabled", { enabled: false });
+    await input.detach();
+  });
+
   test("without controls there are none, and keys are the page's", async () => {
     await on.put('<meshreel-player src="walk.reel"></meshreel-player>');
     expect(await on.page.locator(".bar").isVisible()).toBe(false);

@@ -329,7 +329,10 @@ describeInBrowser("the built player", () => {
     await buildPlayer(join(site.folder, "again"));
     const files = readdirSync(join(site.folder, "player")).sort();
     expect(readdirSync(join(site.folder, "again")).sort()).toEqual(files);
-    expect(files).toEqual(["LICENSES.txt", "core.wasm", "draco.wasm", "index.html", "meshreel-player.js", "order.js", "page.css", "page.js", "worker.js"]);
+    expect(files).toEqual([
+      "LICENSES.txt", "core.wasm", "core.wasm.br", "draco.wasm", "draco.wasm.br", "index.html", "meshreel-player.js", "meshreel-player.js.br", "order.js", "order.js.br",
+      "page.css", "page.js", "page.js.br", "three.js", "three.js.br", "worker.js", "worker.js.br",
+    ]);
     for (const name of files) {
       const bytes = readFileSync(join(site.folder, "player", name));
       expect(bytes.equals(readFileSync(join(site.folder, "again", name))), name).toBe(true);
@@ -341,7 +344,8 @@ describeInBrowser("the built player", () => {
 
   test("the player is small enough for a page", () => {
     const size = (name: string) => gzipSync(readFileSync(join(site.folder, "player", name))).length;
-    expect(size("meshreel-player.js")).toBeLessThan(220_000);
+    expect(size("meshreel-player.js")).toBeLessThan(45_000);
+    expect(size("three.js")).toBeLessThan(140_000);
     expect(size("worker.js") + size("core.wasm") + size("draco.wasm")).toBeLessThan(250_000);
   });
 });

@@ -20,8 +20,9 @@ export function trackColor(track: number): Vector {
   return [r * share, g * share, b * share];
 }
 
-/** The colour of a track's lit surface: clay with a hue of the track's own. */
+/** The colour of a track's lit surface: clay, but for the first with a hue of the track's own. */
 export function trackClay(track: number): Vector {
+  if (track === 0) return CLAY;
   const hue = trackColor(track);
   return [mix(CLAY[0], hue[0]), mix(CLAY[1], hue[1]), mix(CLAY[2], hue[2])];
 }

@@ -1,5 +1,6 @@
 // Draws recordings with three.js.
 
+export { Ground } from "./ground.ts";
 export { ReelScene } from "./scene.ts";
 export { updateFar } from "./far.ts";
 export { Sorter } from "./sorter.ts";

@@ -13,10 +13,12 @@ import type { Feed } from "./shaders.ts";
 export interface Look {
   readonly mode: IUniform<number>;
   readonly flatNormals: IUniform<boolean>;
+  readonly up: IUniform<Vector>;
+  readonly ground: IUniform<readonly [number, number]>; // where it is along `up`, and 1 / the height of what stands on it
 }
 
 export function makeLook(): Look {
-  return { mode: { value: MODES.indexOf("shaded") }, flatNormals: { value: false } };
+  return { mode: { value: MODES.indexOf("shaded") }, flatNormals: { value: false }, up: { value: [0, 1, 0] }, ground: { value: [-1e6, 1] } };
 }
 
 /** Uniforms of a part: which vertices of which frames it shows. Names as in shaders.ts. */

@@ -1,7 +1,7 @@
 // The scene of a recording: takes packed values ahead of time, shows any of them with a few uniforms.
 
 import { Group } from "three";
-import type { WebGLRenderer } from "three";
+import type { Matrix4, WebGLRenderer } from "three";
 import { SPLATS_WIDTH } from "@meshreel/player-core/types";
 import type { Packed, Shown, TextureImage } from "@meshreel/player-core/types";
 import { BACKGROUND_CLAY, BACKGROUND_COLOR, trackClay, trackColor } from "./colors.ts";
@@ -79,6 +79,22 @@ export class ReelScene extends Group {
 
   set flat(flat: boolean) {
     this.#look.flatNormals.value = flat;
+  }
+
+  /** Stands the recording up: turned by a rotation, then the lowest of it at `bottom`, `height` below the highest. */
+  stand(turned: Matrix4, bottom: number, height: number): void {
+    this.quaternion.setFromRotationMatrix(turned);
+    const row = turned.elements;
+    this.#look.up.value = [row[1], row[5], row[9]]; // what points up in the recording's own axes
+    this.#look.ground.value = [bottom, 1 / (height || 1)];
+  }
+
+  /** Has `draw` draw how close its surfaces are to an eye, as alpha. */
+  cast(draw: () => void): void {
+    const { value } = this.#look.mode;
+    this.#look.mode.value = -1;
+    draw();
+    this.#look.mode.value = value;
   }
 
   /** Uploads a value's vertices and triangles now, so that showing it later costs nothing. RangeError where the GPU cannot hold it. */

@@ -142,7 +142,9 @@ export function surfaceVertex(feed: Feed): string {
 
 // The face's own normal comes from the picture: it looks at the viewer however the face is wound, which makes shading two-sided.
 export const SURFACE_FRAGMENT = `${PRECISION}
-uniform int mode; // the number of a Mode in modes.ts
+uniform int mode; // the number of a Mode in modes.ts; -1: the shadow on the ground, seen from below
+uniform vec3 up; // in the scene's own axes, as all here
+uniform vec2 ground; // where it is along that, and 1 / the height of what stands on it
 uniform bool flatNormals;
 uniform bool hasColors;
 uniform vec3 clay; // of a surface without colours of its own
@@ -162,10 +164,17 @@ in vec3 barycentric;
 #endif
 out vec4 fragment;
 
+// A matte surface in a soft room: a large lamp beside the viewer, a bright ceiling, a warm floor. What looks down close to the floor is in the
+// dark, which stands in for what surfaces hide from each other. Python's posters have the same sums (server/painter.py).
 vec3 shaded(vec3 n, vec3 own) {
-  float head = max(dot(n, normalize(toEye)), 0.0);
-  float sky = 0.5 + 0.5 * n.y;
-  return own * (0.22 + 0.2 * sky + 0.58 * head);
+  vec3 eye = normalize(toEye);
+  vec3 lamp = normalize(eye + 0.7 * up + 0.5 * normalize(cross(up, eye) + 1e-6));
+  float key = pow(max((dot(n, lamp) + 0.3) / 1.3, 0.0), 1.3);
+  float sky = 0.5 + 0.5 * dot(n, up);
+  float height = (dot(scenePosition, up) - ground.x) * ground.y; // 0 on the floor, 1 at the top
+  float hidden = (1.0 - sky) * exp(-7.0 * max(height, 0.0));
+  vec3 ambient = mix(vec3(0.27, 0.255, 0.245), vec3(0.43, 0.44, 0.46), sky);
+  return own * (ambient * (1.0 - 0.6 * hidden) + 0.68 * key * vec3(1.0, 0.985, 0.96));
 }
 
 #ifdef EDGES
@@ -191,6 +200,11 @@ void main() {
     own = texel;
   }
 #endif
+  if (mode < 0) {
+    float near = 1.0 - gl_FragCoord.z;
+    fragment = vec4(0.0, 0.0, 0.0, near * near);
+    return;
+  }
   vec3 result;
   if (mode == NORMAL_MODE) result = 0.5 * (n + 1.0);
   else if (mode == TRACKS_MODE) result = color;
@@ -200,6 +214,40 @@ void main() {
   result = mix(result, edgeColor, edge());
 #endif
   fragment = vec4(result, 1.0);
+}
+`;
+
+export const GROUND_VERTEX = `${PRECISION}
+uniform mat4 modelViewMatrix;
+uniform mat4 projectionMatrix;
+in vec3 position;
+out vec2 place; // 1 at the borders of the shadow's picture
+
+void main() {
+  place = position.xz;
+  gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.0);
+}
+`;
+
+// The picture's smaller copies are blurred ones: what touches the ground is sharp by the first, what hangs above is soft by the last.
+export const GROUND_FRAGMENT = `${PRECISION}
+uniform sampler2D shadow;
+uniform float rim;
+in vec2 place;
+out vec4 fragment;
+
+float blurred(vec2 uv, float lod) {
+  vec2 d = exp2(lod) * 0.6 / vec2(textureSize(shadow, 0));
+  return 0.25 * (textureLod(shadow, uv + d, lod).a + textureLod(shadow, uv - d, lod).a
+    + textureLod(shadow, uv + vec2(d.x, -d.y), lod).a + textureLod(shadow, uv + vec2(-d.x, d.y), lod).a);
+}
+
+void main() {
+  vec2 uv = 0.5 + 0.5 * place;
+  float dark = 0.3 * blurred(uv, 1.5) + 0.35 * blurred(uv, 3.0) + 0.4 * blurred(uv, 4.5);
+  float light = 0.08 * pow(max(1.0 - length(place) / rim, 0.0), 1.5);
+  dark = min(1.2 * dark, 0.8);
+  fragment = vec4(vec3(light * (1.0 - dark)), light + dark * (1.0 - light));
 }
 `;
 

@@ -1,4 +1,5 @@
-// A recording in a headset: WebXR's immersive-vr, drawn by three.js.
+// A recording in a headset: WebXR's immersive-vr and immersive-ar, drawn by three.js.
 
-export { vrSupported, VrSession } from "./session.ts";
+export { VrSession } from "./session.ts";
+export { arSupported, vrSupported } from "./supported.ts";
 export type { VrActions, VrOptions } from "./session.ts";

@@ -7,6 +7,7 @@ import type { Box } from "@meshreel/player-core/types";
 export const SCALES = { least: 0.05, most: 20 } as const;
 
 const DISTANCE = 1.5; // m from the viewer to the middle of the recording
+const MODEL = 1; // m: how wide a room is that stands in another
 const ROOM = 3; // m; what is larger is stood in, not looked at
 const UP = new Vector3(0, 1, 0);
 
@@ -40,14 +41,18 @@ export function applyPose(pose: Pose, object: Object3D): void {
   object.scale.setScalar(pose.scale);
 }
 
-/** Stands the recording in front of the viewer, or around them where it is a room: at true scale, its lowest point on the floor. */
-export function place(box: Box, viewer: Viewer, pose: Pose): void {
-  const distance = Math.max(box.size[0], box.size[2]) > ROOM ? 0 : DISTANCE;
+/**
+ * Stands the recording in front of the viewer, or around them where it is a room: at true scale, its lowest point on the floor. With `passthrough`
+ * they are in a room already: another one stands before them as a model.
+ */
+export function place(box: Box, viewer: Viewer, pose: Pose, passthrough = false): void {
+  const wide = Math.max(box.size[0], box.size[2]);
+  const distance = wide > ROOM && !passthrough ? 0 : DISTANCE;
   const [sin, cos] = [Math.sin(viewer.turn), Math.cos(viewer.turn)];
   const [x, z] = [box.minimum[0] + box.size[0] / 2, box.minimum[2] + box.size[2] / 2];
   pose.turn = viewer.turn;
-  pose.scale = 1;
-  pose.position.set(viewer.x - distance * sin - (cos * x + sin * z), -box.minimum[1], viewer.z - distance * cos - (cos * z - sin * x));
+  const scale = (pose.scale = wide > ROOM && passthrough ? MODEL / wide : 1);
+  pose.position.set(viewer.x - distance * sin - scale * (cos * x + sin * z), -scale * box.minimum[1], viewer.z - distance * cos - scale * (cos * z - sin * x));
 }
 
 /** Where a head is, and which way it looks, seen from above. */

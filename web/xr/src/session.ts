@@ -22,6 +22,7 @@ export interface VrOptions {
   readonly content: Object3D;
   readonly box: Box; // around the content, y up
   readonly actions: VrActions;
+  readonly passthrough?: boolean; // in the viewer's own room, seen by the headset's cameras
   /** Draws a picture, with a clock's milliseconds. Must not set the renderer's size or the camera. */
   frame(now: number): void;
   /** The session is over, whoever ended it, and everything is as before. */
@@ -33,11 +34,6 @@ const NEAR = 0.05; // m
 const FAR = 1000; // m
 const SEEK = 1; // s, each time that a held thumbstick repeats
 const INIT: XRSessionInit = { requiredFeatures: ["local-floor"], optionalFeatures: ["bounded-floor", "layers"] };
-
-/** Whether there is a headset that can show it. Never rejects. */
-export async function vrSupported(): Promise<boolean> {
-  return navigator.xr?.isSessionSupported("immersive-vr").catch(() => false) ?? false;
-}
 
 /** The recording in a headset, at true scale in front of the viewer. */
 export class VrSession {
@@ -63,7 +59,7 @@ export class VrSession {
     const { xr } = navigator;
     if (xr === undefined) throw new Error("this browser has no WebXR here; it needs https, or localhost");
     if (options.content.parent === null) throw new Error("the content is in no scene; add it to one first");
-    const entered = new VrSession(options, await xr.requestSession("immersive-vr", INIT));
+    const entered = new VrSession(options, await xr.requestSession(options.passthrough ? "immersive-ar" : "immersive-vr", INIT));
     await entered.#begin();
     return entered;
   }
@@ -142,7 +138,7 @@ export class VrSession {
     const head = space === null ? undefined : xr.getFrame().getViewerPose(space)?.transform;
     this.#placed = head !== undefined;
     if (head !== undefined) setViewer(this.#viewer, head.position, head.orientation);
-    place(this.#options.box, this.#viewer, this.#pose);
+    place(this.#options.box, this.#viewer, this.#pose, this.#options.passthrough);
     this.#grab.release();
   }
 

@@ -21,11 +21,11 @@ export interface FetcherEvents {
   failed(error: unknown): void; // a source gave up
 }
 
-const JOIN = 1024; // bytes; fetching unwanted ones costs less than a further request (guess)
+const JOIN = [1024, 1 / 4] as const; // bytes, at least, and share of those that come while a server answers: fetching unwanted ones costs less than a further request (guess)
 const URGENT_REQUESTS = 4; // at a time: the chunks of the frame at the play head may be scattered
 const REQUESTS = 6; // at a time: the number of connections that browsers open to a host
 const BATCH = [1 << 16, 1 << 22] as const; // bytes of a request, at least and at most; in between, those of one second
-const OVERLAP = 0.1; // s before a request has ended, the next one is made: at once they would only delay each other
+const OVERLAP = 0.1; // s before a request has ended, the next one is answered: at once they would only delay each other
 
 interface Held {
   pieces: Uint8Array[];
@@ -99,7 +99,7 @@ export class Fetcher {
     this.#wanted = new Set(wishes.map(({ chunk }) => chunk.offset));
     const missing = wishes.map((wish) => this.#missingOf(wish)).filter(({ from, to }) => from < to);
     for (const request of this.#requests) {
-      if (!missing.some(({ from, to }) => from <= request.at + JOIN && from < request.to && to > request.at)) request.controller.abort();
+      if (!missing.some(({ from, to }) => from <= request.at + this.#join && from < request.to && to > request.at)) request.controller.abort();
     }
     this.#requests = this.#requests.filter(({ controller }) => !controller.signal.aborted);
     const rest = missing.map((range) => this.#notOnItsWay(range)).filter(({ from, to }) => from < to);
@@ -149,8 +149,13 @@ export class Fetcher {
     return left <= this.#overlap && this.#requests.length < REQUESTS;
   }
 
+  /** Bytes: what comes until the first of the next request does, and some more. */
   get #overlap(): number {
-    return (OVERLAP * this.#source.bandwidth) / 8;
+    return ((OVERLAP + this.#source.latency) * this.#source.bandwidth) / 8;
+  }
+
+  get #join(): number {
+    return Math.max(JOIN[0], (JOIN[1] * this.#source.latency * this.#source.bandwidth) / 8);
   }
 
   /** Takes ranges that lie together from the start of `rest`. */
@@ -159,7 +164,7 @@ export class Fetcher {
     const most = bandwidth > 0 ? Math.min(Math.max(bandwidth / 8, BATCH[0]), BATCH[1]) : 4 * BATCH[0];
     const { from, when } = rest[0];
     let { to } = rest.shift()!;
-    while (rest.length > 0 && rest[0].from >= to && rest[0].from <= to + JOIN && rest[0].to <= from + most) ({ to } = rest.shift()!);
+    while (rest.length > 0 && rest[0].from >= to && rest[0].from <= to + this.#join && rest[0].to <= from + most) ({ to } = rest.shift()!);
     return { from, to, when };
   }
 

@@ -1,6 +1,6 @@
 // One request to a web server: asked, watched and counted while its body is read.
 
-import type { Bandwidth } from "./bandwidth.ts";
+import type { Bandwidth, Transfer } from "./bandwidth.ts";
 import { Lost } from "./http_answer.ts";
 
 export interface RequestOptions {
@@ -13,22 +13,21 @@ export interface RequestOptions {
 export class Answer {
   #response: Response | null = null;
   readonly #controller = new AbortController();
-  readonly #measured: Bandwidth;
+  readonly #transfer: Transfer;
   readonly #silenceMs: number;
   readonly #abort = (): void => this.#controller.abort();
   #signals: AbortSignal[];
   #timer: ReturnType<typeof setTimeout> | undefined;
   #wasSilent = false;
 
-  private constructor(measured: Bandwidth, silenceMs: number, signals: AbortSignal[]) {
-    this.#measured = measured;
+  private constructor(transfer: Transfer, silenceMs: number, signals: AbortSignal[]) {
+    this.#transfer = transfer;
     this.#silenceMs = silenceMs;
     this.#signals = signals;
     for (const signal of signals) {
       if (signal.aborted) this.#abort();
       signal.addEventListener("abort", this.#abort);
     }
-    this.#measured.begin(performance.now());
     this.#listen();
   }
 
@@ -39,11 +38,12 @@ export class Answer {
    */
   static async to(options: RequestOptions, range: readonly [number, number | null], measured: Bandwidth, signals: AbortSignal[]): Promise<Answer> {
     const { url, credentials } = options;
-    const answer = new Answer(measured, options.silenceMs, signals);
+    const answer = new Answer(measured.begin(performance.now()), options.silenceMs, signals);
     const [from, end] = range;
     const headers: HeadersInit = from === 0 && end === null ? {} : { Range: `bytes=${from}-${end === null ? "" : end - 1}` };
     try {
       answer.#response = await fetch(url, { headers, credentials, cache: "no-store", signal: answer.#controller.signal });
+      answer.#transfer.answered(performance.now());
       return answer;
     } catch (error) {
       answer.close();
@@ -67,7 +67,7 @@ export class Answer {
       }
       if (piece === undefined || piece.done) return;
       this.#listen();
-      this.#measured.add(piece.value.length, performance.now());
+      this.#transfer.add(piece.value.length, performance.now());
       yield piece.value;
     }
   }
@@ -82,7 +82,7 @@ export class Answer {
   close(): void {
     clearTimeout(this.#timer);
     for (const signal of this.#signals) signal.removeEventListener("abort", this.#abort);
-    this.#measured.end(performance.now());
+    this.#transfer.end(performance.now());
     this.#abort();
   }
 

@@ -48,6 +48,10 @@ export class HttpSource implements Source {
     return this.#measured.bitsPerSecond;
   }
 
+  get latency(): number {
+    return this.#measured.latency / 1000;
+  }
+
   expect(size: number): void {
     this.#expected = size;
   }

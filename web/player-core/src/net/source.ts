@@ -20,6 +20,8 @@ export interface Source {
   readonly isSelective: boolean;
   /** Bits a second as measured lately; 0 where nothing was measured or there is no network. */
   readonly bandwidth: number;
+  /** Seconds until an answer begins, as measured lately; 0 as well. */
+  readonly latency: number;
   watch: SourceWatch | null;
   /** Gives bytes from `offset` on, in their order, in pieces as they arrive; fewer than `length` only where the file ends. */
   read(offset: number, length: number, take: Take, signal?: AbortSignal): Promise<void>;
@@ -39,6 +41,7 @@ export async function readBytes(source: Source, offset: number, length: number, 
 abstract class LocalSource implements Source {
   readonly isSelective = true;
   readonly bandwidth = 0;
+  readonly latency = 0;
   watch: SourceWatch | null = null;
   abstract readonly size: number;
 

@@ -24,7 +24,9 @@ const AMPLE = 2; // s at hand: enough to try one layer more (guess)
 const PLENTY = 6; // s at hand: enough to use nearly all of the bandwidth (guess)
 const BEARABLE = 0.8; // load that a number of layers may cause (guess)
 const HOLD_MS = 2000; // between a change and a rise (guess)
-const PENALTY_MS = [15_000, 120_000] as const; // after decoding fell behind, first and at most, doubled each time
+const PROBE_MS = 8000; // with plenty at hand, until one layer more is tried than was measured to come in time: what is idle is not measured (guess)
+const PROBE = 1.5; // of the bandwidth measured: what that may take (guess)
+const PENALTY_MS = [15_000, 120_000] as const; // after decoding fell behind, or what was tried did, first and at most, doubled each time
 
 export class Adaptive {
   level: number;
@@ -35,7 +37,8 @@ export class Adaptive {
   #wanted: Wanted; // whose bytes count
   readonly #loads: number[] = []; // of each level at normal speed, as measured last
   #changed = -Infinity; // ms
-  #ceiling = Infinity; // level that decoding did not keep up with, less one
+  #probed = Infinity; // level that was tried
+  #ceiling = Infinity; // level that decoding or the network did not keep up with, less one
   #ceilingUntil = 0; // ms
   #penalty: number = PENALTY_MS[0];
 
@@ -55,7 +58,9 @@ export class Adaptive {
   /** The level for the groups that are fetched next. */
   decide(conditions: Conditions): number {
     const rates = this.rates(conditions.time);
-    const lower = Math.min(this.level, this.#forNetwork(rates, conditions), this.#forDecoding(rates, conditions));
+    const network = this.#forNetwork(rates, conditions);
+    if (network < this.level && this.level >= this.#probed) this.#refuse(conditions.now);
+    const lower = Math.min(this.level, network, this.#forDecoding(rates, conditions));
     const higher = this.#possible(rates, conditions);
     if (lower < this.level) this.#change(lower, conditions.now);
     else if (higher > this.level && conditions.now - this.#changed >= HOLD_MS) this.#change(higher, conditions.now);
@@ -82,16 +87,14 @@ export class Adaptive {
 
   #forNetwork(rates: readonly number[], { bandwidth, speed, fetched, isWaiting }: Conditions): number {
     if (bandwidth === 0 || fetched >= PLENTY / 2) return Infinity;
-    return affordable(rates, bandwidth / speed, isWaiting ? 0.5 : fetched < SCARCE ? 0.65 : 0.85);
+    return affordable(rates, bandwidth / speed, isWaiting ? 0.5 : fetched < SCARCE ? 0.65 : fetched < AMPLE ? 0.85 : 0.95); // the last is above what a rise asks for
   }
 
   #forDecoding(rates: readonly number[], { now, speed, load, decoded, fetched, isWaiting }: Conditions): number {
     if (load > 0) this.#loads[this.level] = load / speed;
     if (load <= 0.9 || (decoded >= AMPLE && !isWaiting) || fetched <= decoded) return Infinity;
     if (this.level === 0) return 0;
-    this.#ceiling = this.level - 1;
-    this.#ceilingUntil = now + this.#penalty;
-    this.#penalty = Math.min(2 * this.#penalty, PENALTY_MS[1]);
+    this.#refuse(now);
     let level = this.level - 1;
     const loadAt = (other: number): number => speed * (this.#loads[other] ?? ((load / speed) * rates[other]) / rates[this.level]);
     while (level > 0 && loadAt(level) > BEARABLE) level--;
@@ -102,7 +105,18 @@ export class Adaptive {
     if (decoded < AMPLE) return -1;
     const share = fetched >= PLENTY ? 0.9 : 0.7;
     const ceiling = now < this.#ceilingUntil ? this.#ceiling : Infinity;
-    return Math.min(affordable(rates, bandwidth / speed, share), this.#bearable(load, speed), ceiling);
+    const known = affordable(rates, bandwidth / speed, share);
+    const isProbe = known <= this.level && fetched >= PLENTY && now - this.#changed >= PROBE_MS && rates[this.level + 1] <= (PROBE * bandwidth) / speed;
+    const level = Math.min(isProbe ? this.level + 1 : known, rates.length - 1, this.#bearable(load, speed), ceiling);
+    if (level > this.level) this.#probed = isProbe ? level : Infinity;
+    return level;
+  }
+
+  /** This level is too much, for a while. */
+  #refuse(now: number): void {
+    this.#ceiling = this.level - 1;
+    this.#ceilingUntil = now + this.#penalty;
+    this.#penalty = Math.min(2 * this.#penalty, PENALTY_MS[1]);
   }
 
   /** The highest level that is known to decode in time; or the next one, where this one leaves half of the time. */

@@ -12,11 +12,14 @@ export interface WorkerLike {
   onmessageerror: ((event: unknown) => void) | null;
 }
 
+/** Bytes, or their URL. */
+type Wasm = ArrayBuffer | string;
+
 /** How workers are made: for example `create: () => new Worker(new URL("../decode/worker.ts", import.meta.url), { type: "module" })`. */
 export interface WorkerSetup {
   readonly create: () => WorkerLike;
-  readonly core: ArrayBuffer | string; // wasm bytes, or their URL
-  readonly draco: ArrayBuffer | string;
+  readonly core: Wasm | Promise<Wasm>;
+  readonly draco: Wasm | Promise<Wasm>;
   readonly count?: number; // workers; cores - 1 if not given, from 1 to 4
   readonly silenceMs?: number; // without an answer before a worker counts as dead; 30 000 if not given
 }
@@ -95,7 +98,7 @@ export class WorkerPool {
     const cores = globalThis.navigator?.hardwareConcurrency ?? 2;
     this.size = setup.count ?? Math.min(4, Math.max(1, cores - 1));
     this.#setup = setup;
-    for (let k = 0; k < this.size; k++) this.#start();
+    this.#start(); // the others when it has started: what it loads they then have from the browser's cache
   }
 
   /** A share for one file more. */
@@ -173,8 +176,11 @@ export class WorkerPool {
     worker.onmessage = ({ data }) => this.#hear(slot, data);
     worker.onerror = (event) => this.#replace(slot, event.message || "it ended");
     worker.onmessageerror = () => this.#replace(slot, "its answer cannot be read");
-    this.#watch(slot);
-    worker.postMessage({ type: "start", core: this.#setup.core, draco: this.#setup.draco }, []);
+    void Promise.all([this.#setup.core, this.#setup.draco]).then(([core, draco]) => {
+      if (!this.#slots.includes(slot)) return;
+      this.#watch(slot); // from now on: bytes may take long to come
+      worker.postMessage({ type: "start", core, draco }, []);
+    });
   }
 
   #hear(slot: Slot, message: FromWorker): void {
@@ -182,6 +188,7 @@ export class WorkerPool {
     if (message.type === "started") {
       slot.isStarted = true;
       this.#failedStarts = 0;
+      while (this.#slots.length < this.size) this.#start();
     } else if (!slot.isStarted) {
       return this.#replace(slot, message.type === "failed" ? message.message : "it answers before it has started");
     } else if (slot.running?.id === message.id) {

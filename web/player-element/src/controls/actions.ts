@@ -3,6 +3,8 @@
 import type { MeshreelPlayer } from "../element.ts";
 import { recordingName } from "../format.ts";
 import { type Action, seekStep } from "../keyboard.ts";
+import { linkOf } from "../address.ts";
+import { cut } from "../section.ts";
 import { modeName, nextMode } from "./choices.ts";
 
 /** What an action can ask of the controls. */
@@ -36,6 +38,15 @@ const ACTS: Readonly<Record<Action, Act>> = {
   loop: (player, surface) => {
     player.loop = !player.loop;
     surface.tell(player.loop ? "Loop on" : "Loop off");
+  },
+  sectionFrom: (player) => void (player.section = cut(player, "from")),
+  sectionTo: (player) => void (player.section = cut(player, "to")),
+  sectionOff: (player) => void (player.section = null),
+  frames: (player) => void (player.frames = !player.frames),
+  autoRotate: (player) => void (player.autoRotate = !player.autoRotate),
+  fly: (player, surface) => {
+    player.fly = !player.fly;
+    surface.tell(player.fly ? "Flying: W A S D, Q E, drag" : "Flying ended");
   },
   fit: (player) => player.fit(),
   turnLeft: (player) => player.orbit(-TURN, 0),
@@ -76,11 +87,21 @@ async function toggleFullscreen(player: MeshreelPlayer, surface: Surface): Promi
   }
 }
 
-async function toggleVr(player: MeshreelPlayer, surface: Surface): Promise<void> {
+export async function toggleVr(player: MeshreelPlayer, surface: Surface, passthrough = false): Promise<void> {
   if (player.presenting) player.exitVr();
-  else if (await player.vrSupported()) {
-    await player.enterVr().catch((error: Error) => surface.tell(`The headset did not start: ${error.message}`));
+  else if (await (passthrough ? player.arSupported() : player.vrSupported())) {
+    await player.enterVr(passthrough).catch((error: Error) => surface.tell(`The headset did not start: ${error.message}`));
   } else surface.tell("No headset was found");
+}
+
+/** Puts a link to what is seen on the clipboard. */
+export async function copyLink(player: MeshreelPlayer, surface: Surface): Promise<void> {
+  try {
+    await navigator.clipboard.writeText(linkOf(player));
+    surface.tell("Link copied");
+  } catch {
+    surface.tell("Copying is not allowed here");
+  }
 }
 
 /** Saves the picture as a file named after recording and frame. */

@@ -22,7 +22,8 @@ export class Activity {
     for (const type of ["pointermove", "pointerdown", "keydown", "focusin"]) {
       target.addEventListener(type, () => this.touch(), { signal });
     }
-    target.addEventListener("pointerleave", () => this.#sleep(), { signal });
+    // A finger leaves with each tap: what a tap has shown stays for its time.
+    target.addEventListener("pointerleave", ({ pointerType }) => { if (pointerType !== "touch") this.#sleep(); }, { signal });
     signal.addEventListener("abort", () => clearTimeout(this.#timer));
   }
 

@@ -14,6 +14,8 @@ export interface BarActs {
   act(action: Action): void;
   screenshot(): void;
   openFile(): void;
+  copyLink(): void;
+  enterAr(): void;
 }
 
 export class Bar {
@@ -22,6 +24,7 @@ export class Bar {
   readonly seek: SeekBar;
   /** Whether this browser has a headset; found out when the player enters a document. */
   headset = false;
+  passthrough = false; // and whether it shows the viewer's own room
   #player: MeshreelPlayer;
   #acts: BarActs;
   #more: Button;
@@ -70,8 +73,9 @@ export class Bar {
     this.seek.refresh();
     const { duration, currentTime, currentFrame, info } = this.#player;
     const digits = timeDigits(duration, info?.frameRate ?? 0);
-    setText(this.#now, formatTime(currentTime, digits));
-    setText(this.#all, ` / ${duration > 0 ? formatTime(duration, digits) : "–"}`);
+    const [now, all] = this.#player.frames && info ? [currentFrame + 1, info.frameCount] : [formatTime(currentTime, digits), duration > 0 ? formatTime(duration, digits) : "–"];
+    setText(this.#now, String(now));
+    setText(this.#all, ` / ${all}`);
     this.#time.title = info ? `Frame ${currentFrame + 1} of ${info.frameCount}` : "";
   }
 
@@ -109,7 +113,13 @@ export class Bar {
   }
 
   #rows(): Button[] {
+    const player = this.#player;
+    const { act } = this.#acts;
     return [
+      this.#button("frames", "N", () => ({ icon: "frames", label: "Frame numbers", pressed: player.frames }), () => act("frames")),
+      this.#button("autorotate", "R", () => ({ icon: "replay", label: "Turn by itself", pressed: player.autoRotate }), () => act("autoRotate")),
+      this.#button("fly", "G", () => ({ icon: "fly", label: "Fly through it", pressed: player.fly }), () => act("fly")),
+      this.#button("share", "", () => ({ icon: "link", label: "Copy link", shown: player.share, enabled: player.info !== null }), () => this.#acts.copyLink()),
       this.#button("open", "", () => ({ icon: "open", label: "Open a file" }), () => this.#acts.openFile()),
       this.#button("help", "?", () => ({ icon: "help", label: "Keys and gestures" }), () => this.#acts.act("help")),
     ];
@@ -120,12 +130,14 @@ export class Bar {
     const vr = (): Look => ({
       icon: "vr", label: player.presenting ? "Leave virtual reality" : "Virtual reality", shown: this.headset, enabled: player.info !== null,
     });
+    const ar = (): Look => ({ icon: "ar", label: "In your room", shown: this.passthrough && !player.presenting, enabled: player.info !== null });
     const screen = (): Look => {
       const full = document.fullscreenElement !== null;
       return { icon: full ? "exitFullscreen" : "fullscreen", label: full ? "Leave full screen" : "Full screen", shown: document.fullscreenEnabled };
     };
     return [
       this.#button("vr", "V", vr, () => this.#acts.act("vr")).element,
+      this.#button("ar", "", ar, () => this.#acts.enterAr()).element,
       this.#button("fullscreen", "F", screen, () => this.#acts.act("fullscreen")).element,
     ];
   }

@@ -5,7 +5,7 @@ import type { MeshreelPlayer } from "../element.ts";
 import { icon } from "../icons.ts";
 import { type Action, actionOf, takesKey, type Target } from "../keyboard.ts";
 import { styleSheet } from "../styles.ts";
-import { perform, saveScreenshot, type Surface } from "./actions.ts";
+import { copyLink, perform, saveScreenshot, type Surface, toggleVr } from "./actions.ts";
 import { acceptTaps, Activity, type Tap } from "./activity.ts";
 import { Bar } from "./bar.ts";
 import { make } from "./dom.ts";
@@ -40,7 +40,7 @@ export class Controls implements Surface {
     });
     const open = () => this.#file.click();
     const act = (action: Action) => this.#act(action);
-    this.#bar = new Bar(player, { act, openFile: open, screenshot: () => void saveScreenshot(player, this) });
+    this.#bar = new Bar(player, { act, openFile: open, screenshot: () => void saveScreenshot(player, this), copyLink: () => void copyLink(player, this), enterAr: () => void toggleVr(player, this, true) });
     this.#error = new ErrorPanel(() => player.retry(), open);
     this.#help = new HelpPanel(() => this.toggleHelp());
     this.#statistics = new StatisticsPanel(player);
@@ -208,7 +208,7 @@ export class Controls implements Surface {
   }
 
   async #findHeadset(signal: AbortSignal): Promise<void> {
-    this.#bar.headset = await this.#player.vrSupported();
+    [this.#bar.headset, this.#bar.passthrough] = await Promise.all([this.#player.vrSupported(), this.#player.arSupported()]);
     if (!signal.aborted) this.refresh();
   }
 }

@@ -105,31 +105,33 @@ export class ErrorPanel {
 
 const WARNING_TIME = 8000; // ms
 const TELLING_TIME = 1600; // ms
-const MOST_TOASTS = 3;
 
-/** Short messages that disappear after a while; screen readers announce them. */
+/** Short messages that disappear after a while; screen readers announce them. One of what was done and one warning at a time. */
 export class Toasts {
   readonly element = make("div", { class: "toasts", part: "toasts", role: "status", "aria-live": "polite" });
+  #warnings = new Set<string>(); // since none was shown
 
-  /** A warning: it stays longer; the same text is not shown twice at a time. */
+  /** A warning stays longer. It takes the place of the one before, and counts that. */
   warn(text: string): void {
-    if ([...this.element.children].some((toast) => toast.textContent === text)) return;
-    this.#add(make("div", { class: "toast warning", part: "toast" }, icon("warning"), make("span", {}, text)), WARNING_TIME);
+    if (this.element.querySelector(".warning") === null) this.#warnings.clear();
+    this.#warnings.add(text);
+    const others = this.#warnings.size > 1 ? [make("span", { class: "others" }, `and ${this.#warnings.size - 1} more`)] : [];
+    this.#show("warning", WARNING_TIME, icon("warning"), make("span", {}, text), ...others);
   }
 
-  /** What was just done; it takes the place of the one before. */
+  /** What was just done. */
   tell(text: string): void {
-    for (const toast of this.element.querySelectorAll(".told")) toast.remove();
-    this.#add(make("div", { class: "toast told", part: "toast" }, make("span", {}, text)), TELLING_TIME);
+    this.#show("told", TELLING_TIME, make("span", {}, text));
   }
 
   clear(): void {
     this.element.replaceChildren();
   }
 
-  #add(toast: HTMLElement, time: number): void {
+  #show(kind: string, time: number, ...content: readonly Node[]): void {
+    this.element.querySelector(`.${kind}`)?.remove();
+    const toast = make("div", { class: `toast ${kind}`, part: "toast" }, ...content);
     this.element.append(toast);
-    while (this.element.children.length > MOST_TOASTS) this.element.firstChild!.remove();
     setTimeout(() => toast.remove(), time);
   }
 }

@@ -20,7 +20,7 @@ export class SeekBar {
     this.input = make("input", {
       type: "range", min: "0", max: "0", step: "any", value: "0", part: "seek", class: "range", "aria-label": "Seek",
     });
-    this.element = make("div", { class: "seek" }, make("div", { class: "track", part: "track" }), this.input, this.#tip);
+    this.element = make("div", { class: "seek" }, make("div", { class: "track", part: "track" }, make("div", { class: "section" })), this.input, this.#tip);
     this.input.addEventListener("input", () => this.#drag());
     this.input.addEventListener("change", () => this.#drop());
     this.element.addEventListener("pointermove", (event) => this.#hover(event));
@@ -36,6 +36,9 @@ export class SeekBar {
     const time = this.#scrubbing ? Number(this.input.value) : currentTime;
     const end = buffered.length > 0 ? buffered.end(0) : currentTime;
     this.element.style.setProperty("--played", String(known ? time / duration : 0));
+    const [from, to] = this.#player.section ?? [0, 0];
+    this.element.style.setProperty("--from", String(known ? from / duration : 0));
+    this.element.style.setProperty("--to", String(known ? Math.min(1, to / duration) : 0));
     this.element.style.setProperty("--buffered", String(known ? end / duration : 0));
     this.input.setAttribute("aria-valuetext", known ? `${speakTime(time)} of ${speakTime(duration)}` : "nothing is open");
   }

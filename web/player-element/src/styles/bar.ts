@@ -32,11 +32,13 @@ export const BAR = `
 .button .icon { grid-area: 1 / 1; }
 .button.more[aria-expanded="true"] { background: var(--_hover); }
 
-.seek { position: relative; height: 20px; margin: 0 4px; touch-action: none; --played: 0; --buffered: 0; --hover: 0; }
+.seek { position: relative; height: 20px; margin: 0 4px; touch-action: none; --played: 0; --buffered: 0; --hover: 0; --from: 0; --to: 0; }
 .track { position: absolute; left: 7px; right: 7px; top: 8px; height: 4px; border-radius: 2px; overflow: hidden; background: var(--_line); }
 .track::before, .track::after { content: ""; position: absolute; inset: 0; transform-origin: 0 50%; }
 .track::before { background: var(--_quiet); opacity: .7; transform: scaleX(var(--buffered)); }
 .track::after { background: var(--_accent); transform: scaleX(var(--played)); }
+.section { position: absolute; z-index: 1; inset: 0 calc(100% * (1 - var(--to))) 0 calc(100% * var(--from)); border: solid var(--_warning); border-width: 0 2px; }
+.section::before { content: ""; position: absolute; inset: 0; background: var(--_warning); opacity: .35; }
 .range { position: absolute; inset: 0; ${TRACK} }
 .range:disabled { cursor: default; }
 .range::-webkit-slider-runnable-track { ${TRACK} }

@@ -43,6 +43,7 @@ export const BASE = `
 @media (prefers-color-scheme: dark) { :host { ${DARK} } }
 :host([theme="light"]) { ${LIGHT} }
 :host([theme="dark"]) { ${DARK} }
+:host([background]) { background: none; }
 :host([hidden]) { display: none; }
 :host(:fullscreen) { width: 100%; height: 100%; aspect-ratio: auto; border-radius: 0; }
 
@@ -58,7 +59,7 @@ export const BASE = `
 canvas { display: block; width: 100%; height: 100%; }
 .root[data-idle][data-playing][data-controls] .picture { cursor: none; }
 
-.poster { position: absolute; inset: 0; width: 100%; height: 100%; object-fit: contain; background: var(--_background); pointer-events: none; }
+.poster { position: absolute; inset: 0; width: 100%; height: 100%; object-fit: contain; pointer-events: none; }
 .poster:not([src]), .root[data-drawn] .poster, .root[data-error] .poster { display: none; }
 
 .icon { width: 24px; height: 24px; fill: currentColor; flex: none; }

@@ -59,5 +59,6 @@ kbd { padding: 1px 7px; border: 1px solid var(--_line); border-radius: 5px; back
   display: flex; align-items: center; gap: 8px; padding: 7px 14px; border: 1px solid var(--_line); border-radius: 8px; background: var(--_panel);
   overflow-wrap: anywhere; animation: come .15s;
 }
+.toast .others { color: var(--_quiet); white-space: nowrap; }
 .toast.warning .icon { width: 20px; height: 20px; color: var(--_warning); }
 `;

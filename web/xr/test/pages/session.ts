@@ -27,7 +27,7 @@ const reel = new ReelScene();
 content.add(reel);
 root.add(content);
 
-const [group, floor] = [makeGroup({ center: (t) => [-0.3 + 0.2 * t, 0, 0] }).packed, makeFloor(4).packed];
+const [group, floor] = [makeGroup({ isColored: true, center: (t) => [-0.3 + 0.2 * t, 0, 0] }).packed, makeFloor(4).packed];
 for (const packed of [group, floor]) reel.prepare(packed, renderer);
 
 let vr: VrSession | null = null;

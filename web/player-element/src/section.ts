@@ -1,0 +1,29 @@
+// Playing one part over and over.
+
+/** What it needs of a player. */
+export interface Sectioned {
+  readonly section: readonly [number, number] | null;
+  readonly duration: number;
+  readonly paused: boolean;
+  readonly ended: boolean;
+  readonly seeking: boolean;
+  currentTime: number;
+  play(): Promise<void>;
+}
+
+/** After each picture, and at the end: goes back to the section's start where its end is passed. */
+export function keepToSection(player: Sectioned): void {
+  const { section } = player;
+  if (section === null || player.seeking || (player.paused && !player.ended)) return;
+  const [from, to] = section;
+  if (player.currentTime < to && !player.ended) return;
+  player.currentTime = from;
+  if (player.paused) player.play().catch(() => undefined); // reported by the error event
+}
+
+/** The section with another start or end; null where it would have no length. */
+export function cut({ section, duration, currentTime }: Sectioned, end: "from" | "to"): readonly [number, number] | null {
+  const [from, to] = section ?? [0, duration];
+  const made = end === "from" ? [currentTime, to > currentTime ? to : duration] as const : [from < currentTime ? from : 0, currentTime] as const;
+  return made[1] > made[0] ? made : null;
+}

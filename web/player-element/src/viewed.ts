@@ -1,0 +1,48 @@
+// What an element offers of its picture: camera, headset, screenshots.
+
+import { arSupported, vrSupported } from "@meshreel/xr/supported";
+import { Reflected } from "./reflected.ts";
+import type { View } from "./view.ts";
+
+export class Viewed extends Reflected {
+  /** The picture; null before there is one. */
+  protected view: View | null = null;
+
+  /** Where the camera is, as text that the attribute `camera` takes. */
+  get camera(): string {
+    return this.view?.stage.camera ?? this.getAttribute("camera") ?? "";
+  }
+  set camera(value: string) {
+    this.setAttribute("camera", value);
+  }
+  /** Whether the view was changed since it fitted. */
+  get cameraMoved(): boolean {
+    return this.view !== null && !this.view.stage.isFit;
+  }
+  /** Looks at the whole scene. */
+  fit(): void {
+    this.view?.stage.fit();
+  }
+  /** Turns the camera about what it looks at, in radians to the right and up, and divides its distance by `closer`. TypeError where they are no numbers. */
+  orbit(right: number, up: number, closer = 1): void {
+    if (![right, up, closer].every(Number.isFinite) || closer <= 0) throw new TypeError(`orbit(${right}, ${up}, ${closer}): finite numbers are needed, the last above 0`);
+    this.view?.stage.orbit(right, up, closer);
+  }
+  /** A PNG of the picture as it is seen now. */
+  async screenshot(): Promise<Blob> {
+    if (!this.view) throw new DOMException("there is no picture yet", "InvalidStateError");
+    return this.view.picture();
+  }
+  async vrSupported(): Promise<boolean> {
+    return vrSupported();
+  }
+  async arSupported(): Promise<boolean> {
+    return arSupported();
+  }
+  exitVr(): void {
+    this.view?.stage.exitVr();
+  }
+  get presenting(): boolean {
+    return this.view?.stage.presenting ?? false;
+  }
+}

@@ -1,0 +1,141 @@
+// What viewers do beyond playing: flying, turning, repeating a part, counting frames, sending links.
+
+import type { Page } from "playwright-core";
+import { afterAll, beforeAll, expect, test } from "vitest";
+
+import { describeInBrowser } from "../../test/browser.ts";
+import { Site } from "./product.ts";
+
+describeInBrowser("the page of a recording", () => {
+  const site = new Site();
+  beforeAll(() => site.open(), 120_000);
+  afterAll(() => site.close());
+
+  const visit = async (rest: string): Promise<{ page: Page; errors: string[] }> => {
+    const found = await site.visit(`player/index.html?src=/layers.reel${rest}`);
+    await found.page.waitForFunction(() => (document.querySelector("meshreel-player")!.statistics?.triangles ?? 0) > 0);
+    return found;
+  };
+  const camera = (page: Page): Promise<number[]> => page.evaluate(() => document.querySelector("meshreel-player")!.camera.split(",").map(Number));
+  const hash = (page: Page): Promise<string> => page.evaluate(() => decodeURIComponent(location.hash));
+
+  test("its address follows time, camera and shading, and opens the same again", async () => {
+    const { page, errors } = await visit("");
+    expect(await hash(page)).toBe("");
+    await page.keyboard.press("End");
+    await page.keyboard.press("m");
+    await page.keyboard.press("Shift+ArrowLeft");
+    await expect.poll(() => hash(page)).toMatch(/^#t=[\d.]+&mode=normal&camera=[-\d.,]+$/);
+    const [address, wanted] = [page.url(), await camera(page)];
+    const state = () => document.querySelector("meshreel-player")!.currentFrame + document.querySelector("meshreel-player")!.mode;
+    const seen = await page.evaluate(state);
+    const again = await site.visit(address);
+    await expect.poll(() => again.page.evaluate(state)).toBe(seen);
+    await expect.poll(() => camera(again.page)).toEqual(wanted);
+    await again.page.evaluate(() => void (location.hash = "t=0&mode=tracks"));
+    await expect.poll(() => again.page.evaluate(() => document.querySelector("meshreel-player")!.mode)).toBe("tracks");
+    expect([...errors, ...again.errors]).toEqual([]);
+    await again.page.close();
+    await page.close();
+  });
+
+  test("a link to what is seen is copied", async () => {
+    const { page } = await visit("&t=0.04");
+    await page.context().grantPermissions(["clipboard-read", "clipboard-write"]);
+    await page.locator("button.more").click();
+    await page.locator(".settings button.share").click();
+    await page.locator(".toast").getByText("Link copied").waitFor();
+    expect(await page.evaluate(() => navigator.clipboard.readText())).toMatch(/layers\.reel&t=0\.04#t=0\.040$/);
+    await page.close();
+  });
+
+  test("a part is repeated, and marked on the bar", async () => {
+    const { page, errors } = await visit("&speed=0.5&section=0.1,0.25");
+    await page.keyboard.press("k");
+    const times = await page.evaluate(async () => {
+      const player = document.querySelector("meshreel-player")!;
+      const seen: number[] = [];
+      const started = performance.now();
+      while (performance.now() - started < 2500) {
+        await new Promise((done) => setTimeout(done, 15));
+        seen.push(player.currentTime);
+      }
+      return seen;
+    });
+    expect(times.filter((time, k) => k > 0 && time < times[k - 1]!).length).toBeGreaterThanOrEqual(2);
+    expect(Math.max(...times)).toBeLessThan(0.4);
+    expect(await page.evaluate(() => document.querySelector("meshreel-player")!.paused)).toBe(false);
+    expect((await page.locator(".section").boundingBox())!.width).toBeGreaterThan(10);
+    await page.keyboard.press("\\");
+    expect(await page.evaluate(() => document.querySelector("meshreel-player")!.section)).toBe(null);
+    expect(errors).toEqual([]);
+    await page.close();
+  });
+
+  test("the keys [ and ] set where a part begins and ends, N counts frames", async () => {
+    const { page } = await visit("");
+    const section = () => page.evaluate(() => document.querySelector("meshreel-player")!.section);
+    const duration = await page.evaluate(() => document.querySelector("meshreel-player")!.duration);
+    await page.keyboard.press("[");
+    expect(await section()).toEqual([0, Number(duration.toFixed(3))]);
+    await page.keyboard.press(".");
+    await page.keyboard.press("]");
+    const [from, to] = (await section())!;
+    expect([from, to > 0 && to < duration]).toEqual([0, true]);
+    await page.keyboard.press("n");
+    await expect.poll(() => page.locator(".time").textContent()).toMatch(/^2 \/ \d+$/);
+    await page.close();
+  });
+
+  test("G flies: W goes where the camera looks, a drag looks around from there, and S is no key of the statistics", async () => {
+    const { page, errors } = await visit("");
+    const [before] = [await camera(page)];
+    await page.keyboard.press("g");
+    await page.keyboard.down("w");
+    await page.waitForTimeout(400);
+    await page.keyboard.up("w");
+    const after = await camera(page);
+    const towards = before.slice(3).map((value, k) => value - before[k]!);
+    const went = after.slice(0, 3).map((value, k) => value - before[k]!);
+    const cosine = went.reduce((sum, value, k) => sum + value * towards[k]!, 0) / (Math.hypot(...went) * Math.hypot(...towards));
+    expect(Math.hypot(...went)).toBeGreaterThan(0.01);
+    expect(cosine).toBeGreaterThan(0.999);
+    await page.mouse.move(160, 80);
+    await page.mouse.down();
+    await page.mouse.move(220, 90, { steps: 4 });
+    await page.mouse.up();
+    const turned = await camera(page);
+    expect(turned.slice(0, 3)).toEqual(after.slice(0, 3));
+    expect(turned.slice(3)).not.toEqual(after.slice(3));
+    await page.keyboard.press("s");
+    expect(await page.evaluate(() => document.querySelector("meshreel-player")!.stats)).toBe(false);
+    await page.keyboard.press("g");
+    await page.keyboard.press("s");
+    expect(await page.evaluate(() => document.querySelector("meshreel-player")!.stats)).toBe(true);
+    expect(errors).toEqual([]);
+    await page.close();
+  });
+
+  test("without three.js an error says what is missing", async () => {
+    const page = await site.browser.newPage();
+    await page.route("**/three.js", (route) => route.abort());
+    await page.goto(new URL("player/index.html?src=/layers.reel", site.served.url).href);
+    await page.getByRole("alert").waitFor();
+    expect(await page.getByRole("alert").textContent()).toMatch(/player\/three\.js cannot be loaded/);
+    await page.close();
+  });
+
+  test("it turns by itself, but not for viewers who prefer less motion", async () => {
+    const { page } = await visit("&autorotate");
+    const before = await camera(page);
+    await expect.poll(async () => (await camera(page))[0]).not.toBe(before[0]);
+    await page.emulateMedia({ reducedMotion: "reduce" });
+    await page.evaluate(() => void (document.querySelector("meshreel-player")!.autoRotate = false));
+    await page.evaluate(() => void (document.querySelector("meshreel-player")!.autoRotate = true));
+    await page.waitForTimeout(1500); // until it has come to rest
+    const still = await camera(page);
+    await page.waitForTimeout(500);
+    expect(await camera(page)).toEqual(still);
+    await page.close();
+  });
+});
