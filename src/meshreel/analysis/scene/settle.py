@@ -29,7 +29,7 @@ class SettleOptions:
     """Conditions for a change of the room (decision 18)."""
 
     rest: float = 10.0  # s of uninterrupted rest before or after the change: people do not stand still for as long
-    still: float = 0.7  # s of the same where surface does not move by more than noise, as a crate's (decision 28)
+    still: float = 0.8  # s of the same where surface does not move by more than noise, as a crate's (decision 28)
     share: float = 0.8  # smallest share of the inspected frames in that time that have surface at the place
     least: float = 0.15  # m^2, smallest area that changes together
 
