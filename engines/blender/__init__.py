@@ -1,7 +1,7 @@
 """Blender add-on: imports .reel files as objects whose mesh follows the timeline.
 
-An object knows its file and the frame at which it begins; before each frame of the scene its mesh is replaced. Nothing
-else of the video is in the .blend file.
+An object knows its file and the frame at which it begins; before each frame of the scene its mesh is replaced. Of the
+video a .blend file has the frame that was shown last.
 """
 
 from __future__ import annotations

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -18,6 +19,7 @@ AXES = {
     "-z": ((1, 0, 0), (0, -1, 0), (0, 0, -1)),
 }
 OPEN = 8  # files that stay open
+CLOSE = 1e-5  # s: times in files are whole microseconds
 
 
 @dataclass(frozen=True)
@@ -36,15 +38,21 @@ def opened(path: str) -> Any:
     return meshreel.open(path)
 
 
+@lru_cache(maxsize=OPEN)
+def times_of(video: Any) -> list[float]:
+    """Return when each frame of a video is shown, s, counted from the first."""
+    times: list[float] = video.timestamps
+    return [time - times[0] for time in times]
+
+
 def frame_of(video: Any, scene_frame: int, start: int, scene_rate: float) -> int:
     """Return the number of the video's frame that is shown in a frame of a scene, by time; the ends hold."""
-    seconds = (scene_frame - start) / scene_rate
-    return min(max(int(seconds * video.frame_rate + 1e-6), 0), len(video) - 1)
+    return max(bisect_right(times_of(video), (scene_frame - start) / scene_rate + CLOSE) - 1, 0)
 
 
 def scene_frames(video: Any, scene_rate: float) -> int:
     """Return how many frames of a scene the whole video takes."""
-    return max(1, round(len(video) / video.frame_rate * scene_rate))
+    return max(1, round(video.duration * scene_rate))
 
 
 def arrays_of(video: Any, number: int) -> Arrays:

@@ -34,7 +34,7 @@ from .splats import ChainSplats
 from .videos import Videos
 
 USED = 0.43  # of a texture is on the surface, as unwrapped; measured on basketball_player
-COARSER = 2.0  # steps of vertex colours where pictures or splats are shown instead, at half of their bytes (guess)
+COARSER = 2.0  # steps of vertex colours beneath pictures, at half of their bytes (decision 28)
 MOST_FITTING = 1024  # texels, unless a larger texture is asked for: 2 mm on a person
 
 
@@ -130,8 +130,8 @@ class _Chain:
             self._splats.add(group.form, canvas, meshes, frames.numbers)
         colors = [_vertex_colors(paint, mesh) for paint, mesh in zip(paints, meshes, strict=True)]
         texture = options.texture if pictured and not self._groups and group.form == Form.LAYERS else None
-        is_hidden = texture is not None or self._video is not None or self._splats is not None
-        coding = replace(options.colors, step=COARSER * options.colors.step) if is_hidden else options.colors
+        is_covered = texture is not None or self._video is not None
+        coding = replace(options.colors, step=COARSER * options.colors.step) if is_covered else options.colors
         try:
             encoded = encode_group_colors(canvas, colors, coding, None if before is None else before.colors)
         except CostlyError:  # the summary tells of it

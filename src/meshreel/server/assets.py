@@ -107,8 +107,8 @@ class Player:
                     for name, body in bodies.items()
                     if not name.endswith(".br")
                 }
-                sums = "".join(f"{name} {asset.digest}\n" for name, asset in self._files.items())
-                self._edition = blake2b(sums.encode(), digest_size=SUM).hexdigest() if files else ""
+                digests = (f"{name} {blake2b(body, digest_size=SUM).hexdigest()}\n" for name, body in bodies.items())
+                self._edition = blake2b("".join(digests).encode(), digest_size=SUM).hexdigest() if files else ""
                 self._seen = seen
             return self._edition, self._files
 
