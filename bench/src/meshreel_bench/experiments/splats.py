@@ -48,9 +48,9 @@ PROMISES: tuple[Promise, ...] = (
         ),
     ),
     Reaches(
-        "crane60: held-out views of splats on preset `paper` against the uncompressed mesh",
+        "crane60: held-out views of new splats in each frame, as the paper has them, on preset `paper`",
         Which("crane60", TSMC),
-        (Bound("splats_psnr", -0.7, "dB", over_floor=True), at_most("mbps", 0.5, "Mbps")),
+        (Bound("splats_own_psnr", -0.7, "dB", over_floor=True), at_most("mbps", 0.5, "Mbps")),
     ),
 )
 BEST: Options = {"preset": "best", "quality": 50.0, "color": "vertices", "color_quality": 10.0}

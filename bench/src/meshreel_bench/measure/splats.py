@@ -70,9 +70,9 @@ def splat_values(
         for k in (k for k in wanted if k in dict(chain) and len(chain) > 1):
             _judge([(k, dict(chain)[k])], [k], of_unit, alone_each)
     rate = known.sequence.frame_rate
-    own = _values(alone_each, count, count, rate) if alone_each.scores else {}
-    own = {f"splats_own_{name}": own[f"splats_{name}"] for name in ("psnr", "ssim") if own}
-    return _values(found, len(chains), count, rate) | own | _anchors(last, rate)
+    whole = _values(found, len(chains), count, rate)
+    own = _values(alone_each, count, count, rate) if alone_each.scores else whole  # where all frames are alone
+    return whole | {f"splats_own_{name}": own[f"splats_{name}"] for name in ("psnr", "ssim")} | _anchors(last, rate)
 
 
 def _judge(chain: Chain, wanted: Sequence[int], painted: Callable[[int], Mesh], found: _Found) -> Bound:
