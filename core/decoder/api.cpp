@@ -102,9 +102,15 @@ void describe_file(const Head& head, meshreel_info& info) {
     info.tracks = static_cast<uint32_t>(head.tracks.size());
     info.up = up_of(header.metadata);
     for (int k = 0; k < 3; ++k) {
+        double low = 0, high = 0;  // of the box when it is turned
+        for (int j = 0; j < 3; ++j) {
+            const double turn = header.scale * head.edit.rotation[3 * k + j];
+            const auto ends = std::minmax({turn * header.minimum[j], turn * header.maximum[j]});
+            low += ends.first, high += ends.second;
+        }
         info.origin[k] = header.origin[k];
-        info.minimum[k] = header.origin[k] + header.scale * header.minimum[k];
-        info.maximum[k] = header.origin[k] + header.scale * header.maximum[k];
+        info.minimum[k] = header.origin[k] + low;
+        info.maximum[k] = header.origin[k] + high;
     }
     count_chunks(head, info);
 }
@@ -183,10 +189,11 @@ int32_t meshreel_decode(meshreel_video* video, uint64_t frame, int32_t part, mes
     return call(video, mesh, [&](Video& opened) -> int32_t {
         const char* fault = fault_of(opened.head, frame, part);
         if (fault) return refuse(*video, fault);
+        const uint64_t coded = opened.head.coded(frame);
         video->mesh = Mesh();
-        video->mesh = part == MESHREEL_WHOLE        ? opened.whole(frame)
-                      : part == MESHREEL_BACKGROUND ? opened.background(frame)
-                                                    : opened.track(frame, static_cast<size_t>(part));
+        video->mesh = part == MESHREEL_WHOLE        ? opened.whole(coded)
+                      : part == MESHREEL_BACKGROUND ? opened.background(coded)
+                                                    : opened.track(coded, static_cast<size_t>(part));
         show(*video, part, *mesh);
         video->error = opened.lacking;
         return MESHREEL_OK;
@@ -206,9 +213,10 @@ int32_t meshreel_picture(meshreel_video* video, uint64_t frame, int32_t part, in
             return refuse(*video, fault ? fault : "a whole frame has several textures: name a part");
         if (codec != MESHREEL_AV1 && codec != MESHREEL_H264) return refuse(*video, "a coding that is not known");
         const Head& head = opened.head;
-        const uint32_t chunk = part == MESHREEL_BACKGROUND ? head.static_of_frame(frame)
-                                                           : head.chunk_of_frame(frame, static_cast<size_t>(part));
-        video->picture = opened.picture(frame, chunk, codec == MESHREEL_AV1 ? kPicturesOf : kCompatibleOf);
+        const uint64_t coded = head.coded(frame);
+        const uint32_t chunk = part == MESHREEL_BACKGROUND ? head.static_of_frame(coded)
+                                                           : head.chunk_of_frame(coded, static_cast<size_t>(part));
+        video->picture = opened.picture(coded, chunk, codec == MESHREEL_AV1 ? kPicturesOf : kCompatibleOf);
         const Picture& found = video->picture;
         if (found.packet.empty()) return MESHREEL_OK;
         *packet = {found.packet.data(), found.packet.size(), found.stream, found.number, found.width, found.height};
@@ -221,7 +229,7 @@ int32_t meshreel_decode_splats(meshreel_video* video, uint64_t frame, int32_t tr
     return call(video, splats, [&](Video& opened) -> int32_t {
         const char* fault = fault_of(opened.head, frame, track);
         if (fault || track < 0) return refuse(*video, fault ? fault : "splats belong to a track");
-        video->splats = opened.splats(frame, static_cast<size_t>(track));
+        video->splats = opened.splats(opened.head.coded(frame), static_cast<size_t>(track));
         const Bound& found = video->splats;
         *splats = {found.opacities.size(), found.means.data(),     found.axes.data(),
                    found.scales.data(),    found.opacities.data(), found.colors.data()};

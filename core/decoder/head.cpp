@@ -11,6 +11,8 @@ namespace {
 
 constexpr uint8_t kMagic[8] = {0x52, 0x45, 0x45, 0x4c, 0x0d, 0x0a, 0x1a, 0x0a};
 constexpr int kVersion = 1;
+constexpr size_t kFlagsAt = 9;
+constexpr uint8_t kEdited = 1;  // the only flag
 constexpr size_t kPreamble = 14, kChecksum = 4;
 constexpr double kLargest = 1e15, kSmallest = 1e-15;  // of the numbers in a header
 
@@ -82,7 +84,7 @@ uint32_t head_size(const std::vector<uint8_t>& start, uint64_t file_size) {
     if (version != kVersion)
         throw FormatError("format version " + std::to_string(version) + ": this reader knows version " +
                           std::to_string(kVersion) + ", update meshreel");
-    require(in.u8() == 0, "flags that version 1 does not have");
+    require((in.u8() & ~kEdited) == 0, "flags that this reader does not know, update meshreel");
     const uint32_t size = in.u32();
     require(size >= kPreamble + kChecksum && size <= file_size, "the head is truncated or damaged");
     require(size <= limits::kMostHead, "a head of more bytes than it may have");
@@ -112,6 +114,9 @@ Head parse_head(const std::vector<uint8_t>& data, uint64_t file_size) {
     in.finish("Index");
     head.size = offset;
     check_index(head);
+    head.edit.end = head.frames;
+    if (data[kFlagsAt] & kEdited) head.edit = parse_edit(head.header.metadata, head.frames);
+    head.frames = head.edit.end - head.edit.first;
     read_times(head);
     double frames = 0;
     for (const Chunk& chunk : head.chunks) frames += chunk.kind == kGroup ? chunk.frames : 0;
@@ -158,8 +163,9 @@ std::string describe(const Head& head, uint32_t number) {
     const std::string name = "chunk " + std::to_string(number);
     if (chunk.frames == 0) return name + " (static)";
     const std::string track = head.tracks.size() == 1 ? "" : "track " + std::to_string(chunk.track) + ", ";
-    return name + " (" + track + "frames " + std::to_string(chunk.first_frame) + " to " +
-           std::to_string(chunk.first_frame + chunk.frames - 1) + ")";
+    const int64_t first = static_cast<int64_t>(chunk.first_frame) - static_cast<int64_t>(head.edit.first);
+    return name + " (" + track + "frames " + std::to_string(first) + " to " + std::to_string(first + chunk.frames - 1) +
+           ")";
 }
 
 }  // namespace meshreel

@@ -24,6 +24,13 @@ struct Header {
     std::vector<uint64_t> intervals;
 };
 
+// What of the coded frames is shown, and how it is turned.
+struct Edit {
+    uint64_t first = 0, end = 0;
+    bool is_turned = false;
+    double rotation[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};  // about the origin, row by row
+};
+
 struct Layer {
     uint64_t size;
     uint32_t crc;
@@ -43,19 +50,23 @@ struct Chunk {
 
 struct Head {
     Header header;
+    Edit edit;
     std::vector<Chunk> chunks;
     std::vector<std::vector<uint32_t>> tracks;                    // numbers of the groups of each
     std::map<std::pair<uint32_t, uint8_t>, uint32_t> companions;  // by coded chunk and kind
     std::map<uint32_t, uint64_t> shown_from;                      // of each static chunk, the first frame that names it
-    std::vector<int64_t> times;                                   // of all frames, microseconds; or empty
-    uint64_t frames = 0, size = 0;                                // bytes of the whole file
+    std::vector<int64_t> times;                                   // of all frames shown, microseconds; or empty
+    uint64_t frames = 0;                                          // shown
+    uint64_t size = 0;                                            // bytes of the whole file
 
+    // The number that a frame shown has among the coded ones, by which chunks are found.
+    uint64_t coded(uint64_t frame) const { return edit.first + frame; }
     uint32_t companion_of(uint32_t chunk, uint8_t kind) const;
     uint32_t chunk_of_frame(uint64_t frame, size_t track) const;
     // The newest static chunk that a group of the frame names, or kNoChunk.
     uint32_t static_of_frame(uint64_t frame) const;
     uint32_t group_before(uint32_t chunk) const;
-    double time_of(uint64_t frame) const;  // s
+    double time_of(uint64_t frame) const;  // s, of a frame shown
     bool is_static(uint64_t chunk) const { return chunks[chunk].kind == kStatic; }
 };
 
@@ -74,7 +85,15 @@ std::string describe(const Head& head, uint32_t chunk);
 // first frames of the chunks.
 void check_index(Head& head);
 
+// Reads the members of a JSON object as far as it is one, and returns whether all of it is: the text of each value,
+// which may be none, by its name, in which escapes stay. Of equal names the last counts.
+bool read_members(const std::string& json, std::map<std::string, std::string>& members);
 // The value of a member of a JSON object if it is a string without escapes, else "".
 std::string text_member(const std::string& json, const std::string& name);
+// The numbers of a JSON array of numbers, as they are written. Throws FormatError for anything else.
+std::vector<std::string> number_list(const std::string& json);
+
+// The edit that the metadata of a file of so many coded frames tells of. Throws FormatError.
+Edit parse_edit(const std::string& metadata, uint64_t frames);
 
 }  // namespace meshreel

@@ -54,6 +54,17 @@ void place_all(const mr_placement& placement, std::vector<double>& vertices) {
     for (size_t k = 0; k < vertices.size(); ++k) vertices[k] = placement.origin[k % 3] + placement.scale * vertices[k];
 }
 
+void turn_all(const double (&rotation)[9], const double (&origin)[3], std::vector<double>& vertices) {
+    for (size_t v = 0; v < vertices.size(); v += 3) {
+        double* at = vertices.data() + v;
+        const double x = at[0] - origin[0], y = at[1] - origin[1], z = at[2] - origin[2];
+        for (size_t k = 0; k < 3; ++k) {
+            const double* row = rotation + 3 * k;
+            at[k] = origin[k] + (row[0] * x + row[1] * y + row[2] * z);
+        }
+    }
+}
+
 Mesh without(const Mesh& mesh, const std::vector<uint8_t>& dropped) {
     std::vector<int32_t> kept, place(mesh.vertex_count(), -1);
     Mesh rest;

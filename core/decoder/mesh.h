@@ -47,6 +47,9 @@ Mesh subdivide_midpoint(const Mesh& mesh, unsigned levels);
 // Moves each coordinate to origin + scale * coordinate.
 void place_all(const mr_placement& placement, std::vector<double>& vertices);
 
+// Turns vertices about an origin by a rotation matrix, row by row.
+void turn_all(const double (&rotation)[9], const double (&origin)[3], std::vector<double>& vertices);
+
 // Drops the faces of which `dropped` is 1, and the vertices that no other face names.
 Mesh without(const Mesh& mesh, const std::vector<uint8_t>& dropped);
 

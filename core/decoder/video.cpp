@@ -97,8 +97,14 @@ void Video::decode(uint32_t chunk, Cached& cached) {
     const std::string more = put_on_texture(chunk, levels, made.group.faces, made.group.places);
     if (cached.lacking.empty()) cached.lacking = more;
     keep(chunk, made.state, cached);
+    turn(made.group.positions);
+    for (Mesh& mesh : made.group.added) turn(mesh.vertices);
     cached.group = std::move(made.group);
     cached.chunk = chunk;
+}
+
+void Video::turn(std::vector<double>& vertices) const {
+    if (head.edit.is_turned) turn_all(head.edit.rotation, head.header.origin, vertices);
 }
 
 std::shared_ptr<State> Video::state_before(uint32_t chunk, Cached& cached) {
@@ -190,7 +196,8 @@ Mesh Video::background(uint64_t frame) {
     const uint32_t chunk = head.static_of_frame(frame);
     lacking.clear();
     if (chunk == kNoChunk) return Mesh();
-    const Mesh& mesh = state_of(chunk);
+    Mesh mesh = state_of(chunk);
+    turn(mesh.vertices);  // not the state, to which changes are made
     lacking = background_.lacking;
     return mesh;
 }

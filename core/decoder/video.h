@@ -38,7 +38,7 @@ struct Picture {
     uint16_t width, height;
 };
 
-// Used by one thread at a time.
+// Used by one thread at a time. Frames are numbered as they are coded.
 class Video {
 public:
     explicit Video(const Source& source) : source_(source), head(read_head(source)), tracks_(head.tracks.size()) {}
@@ -71,6 +71,7 @@ private:
     template <class Paint>
     std::string paint_with(uint32_t chunk, int64_t layers, Paint paint);
     std::string paint(uint32_t chunk, const Context& context, int64_t layers, Continued& made);
+    void turn(std::vector<double>& vertices) const;
     std::string put_on_texture(uint32_t chunk, unsigned levels, const Faces& faces, std::vector<float>& places);
     const Mesh& state_of(uint32_t chunk);
     Mesh decode_state(uint32_t chunk);

@@ -16,7 +16,7 @@ namespace {
 using File = std::vector<uint8_t>;
 
 const char* const kFiles[] = {
-    "draco", "empty", "laplacian",     "layers",           "layers_open",      "layers_patched",
+    "cut",   "draco", "empty",         "laplacian",        "layers",           "layers_open",  "layers_patched",
     "mixed", "scene", "colored/scene", "colored/textures", "colored/vertices", "splats/splats"};
 
 File load(const std::string& name) {

@@ -1,0 +1,79 @@
+// Edits of a file: which of its coded frames are shown, and how they are turned. Beside src/meshreel/format/edit.py.
+#include <algorithm>
+#include <cmath>
+#include <locale>
+#include <sstream>
+
+#include "format_error.h"
+#include "head.h"
+
+namespace meshreel {
+namespace {
+
+constexpr double kClose = 1e-6;     // to a rotation
+constexpr double kMost = 2;         // of the numbers that may be one's
+constexpr size_t kMostDigits = 18;  // of a number of frames, which int64_t holds
+
+uint64_t frame_of(const std::string& number) {
+    require(number.find_first_of(".eE") == std::string::npos, "Header.metadata: edit.frames are no whole numbers");
+    require(number.size() <= kMostDigits, "Header.metadata: edit.frames are beyond all frames");
+    const int64_t frame = std::stoll(number);
+    require(frame >= 0, "Header.metadata: edit.frames are below 0");
+    return static_cast<uint64_t>(frame);
+}
+
+double double_of(const std::string& number) {
+    std::istringstream in(number);
+    in.imbue(std::locale::classic());  // whatever a program has set
+    double value = 2 * kMost;
+    in >> value;  // what is too large for a double is as large as one may be
+    require(std::fabs(value) <= kMost, "Header.metadata: edit.rotation has a number that no rotation has");
+    return value;
+}
+
+bool is_rotation(const double (&m)[9]) {
+    for (int i = 0; i < 3; ++i) {
+        for (int j = 0; j < 3; ++j) {
+            double product = i == j ? -1 : 0;
+            for (int k = 0; k < 3; ++k) product += m[3 * i + k] * m[3 * j + k];
+            if (std::fabs(product) > kClose) return false;
+        }
+    }
+    return m[0] * (m[4] * m[8] - m[5] * m[7]) - m[1] * (m[3] * m[8] - m[5] * m[6]) +
+               m[2] * (m[3] * m[7] - m[4] * m[6]) >
+           0;
+}
+
+void read_rotation(const std::vector<std::string>& numbers, Edit& edit) {
+    if (numbers.empty()) return;
+    require(numbers.size() == 9, "Header.metadata: edit.rotation has not nine numbers");
+    std::transform(numbers.begin(), numbers.end(), edit.rotation, double_of);
+    require(is_rotation(edit.rotation), "Header.metadata: edit.rotation is no rotation");
+    edit.is_turned = true;
+}
+
+}  // namespace
+
+Edit parse_edit(const std::string& metadata, uint64_t frames) {
+    std::map<std::string, std::string> all, items;
+    require(read_members(metadata, all), "Header.metadata: not a JSON object");
+    require(read_members(all["edit"], items), "Header.metadata: the file is edited, and no edit is told");
+    Edit edit;
+    edit.end = frames;
+    for (const auto& [name, value] : items) {
+        const bool is_frames = name == "frames";
+        require(is_frames || name == "rotation",
+                "Header.metadata: an edit that this reader does not know, update meshreel");
+        const std::vector<std::string> numbers = number_list(value);
+        if (!is_frames) {
+            read_rotation(numbers, edit);
+            continue;
+        }
+        require(numbers.size() == 2, "Header.metadata: edit.frames are no two numbers");
+        edit.first = frame_of(numbers[0]), edit.end = frame_of(numbers[1]);
+        require(edit.first < edit.end && edit.end <= frames, "Header.metadata: edit.frames are not those of the file");
+    }
+    return edit;
+}
+
+}  // namespace meshreel

@@ -1,0 +1,186 @@
+"""The C library follows the edits of a file as Python does, bit for bit, and refuses those that Python refuses."""
+
+from __future__ import annotations
+
+import shutil
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+from zlib import crc32
+
+import numpy as np
+import pytest
+
+import meshreel
+from meshreel import edit
+from meshreel.errors import FormatError
+from meshreel.format.layout import EDITED, MAGIC, VERSION, Checksum, Preamble
+from meshreel.format.records import least_size, pack
+from meshreel.types import Mesh
+from tests.decoder.c_abi import AV1, BACKGROUND, BAD_ARGUMENT, DAMAGED, CError, CVideo
+from tests.golden import GOLDEN
+
+pytestmark = pytest.mark.skipif(shutil.which("cmake") is None, reason="needs CMake, of the extra dev")
+TURN = [[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]]
+FILES = sorted(GOLDEN.rglob("*.reel"))
+
+
+@pytest.fixture(params=FILES, ids=lambda path: f"{path.parent.stem}-{path.stem}")
+def edited(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
+    """Return a golden file that is cut where it has frames enough, scaled, turned and moved."""
+    path, frames = request.param, len(meshreel.open(request.param))
+    if frames > 2:
+        edit.cut(path, tmp_path / "cut.reel", f"1:{min(frames - 1, 40)}")
+        path = tmp_path / "cut.reel"
+    edit.transform(path, tmp_path / "edited.reel", 0.5, TURN, (1, 2, 3))
+    return tmp_path / "edited.reel"
+
+
+def test_every_part_of_every_frame_is_cut_and_turned_as_by_python(edited: Path):
+    known = meshreel.open(edited)
+    assert known.reader.edit.rotation
+    with CVideo(edited.read_bytes()) as video:
+        assert [video.time(frame) for frame in range(video.info.frames)] == known.timestamps
+        assert (tuple(video.info.minimum), tuple(video.info.maximum)) == tuple(map(tuple, known.box))
+        for frame in [*range(len(known)), 0]:
+            for name, mesh in known.parts(frame).items():
+                check_same(mesh, video.decode(frame, BACKGROUND if name == "background" else int(name.split()[1])))
+            check_same(known[frame], video.decode(frame))
+
+
+def check_same(mesh: Mesh, found: dict[str, Any]) -> None:
+    np.testing.assert_array_equal(mesh.vertices, found["vertices"])
+    np.testing.assert_array_equal(mesh.faces, found["faces"])
+    if mesh.colors is not None and len(mesh.vertices):
+        np.testing.assert_array_equal(mesh.colors, found["colors"])
+
+
+def test_splats_are_turned_with_their_axes(tmp_path: Path):
+    edit.cut(GOLDEN / "splats/splats.reel", tmp_path / "cut.reel", "1:3")
+    edit.transform(tmp_path / "cut.reel", tmp_path / "edited.reel", rotation=TURN)
+    known = meshreel.open(tmp_path / "edited.reel")
+    with CVideo((tmp_path / "edited.reel").read_bytes()) as video:
+        found = [(known.splats(frame), video.splats(frame, 0)) for frame in range(len(known))]
+        assert any(wanted is not None for wanted, _ in found)
+        for wanted, arrays in found:
+            assert (wanted is None) == (arrays is None)
+            for name, array in (arrays or {}).items():
+                np.testing.assert_allclose(array, getattr(wanted, name), rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize(("name", "part"), [("textures", 0), ("scene", BACKGROUND)])
+def test_pictures_are_those_of_the_frames_that_are_shown(name: str, part: int, tmp_path: Path):
+    path = GOLDEN / f"colored/{name}.reel"
+    frames = len(meshreel.open(path))
+    edit.cut(path, tmp_path / "cut.reel", f"1:{frames}")
+    with CVideo(path.read_bytes()) as whole, CVideo((tmp_path / "cut.reel").read_bytes()) as cut:
+        assert meshreel.open(tmp_path / "cut.reel").reader.edit.first == 1
+        wanted = [picture and picture[0] for picture in (whole.picture(k, part, AV1) for k in range(1, frames))]
+        assert any(wanted)
+        assert [picture and picture[0] for picture in (cut.picture(k, part, AV1) for k in range(frames - 1))] == wanted
+
+
+ROTATION = "[1,0,0,0,0.6,-0.8,0,8e-1,0.6]"
+GOOD = [
+    "{}",
+    '{"frames":[0,3]}',
+    ' {"frames" : [ 1 , 3 ] , "rotation":[]} ',
+    '{"frames":[-0,1]}',
+    f'{{"rotation":{ROTATION}}}',
+    f'{{"frames":[1,2],"rotation":{ROTATION}}}',
+    '{"rotation":[1,0,0,0,1,0,0,0,1]}',
+    '{"rotation":[1.0000003,0,0,0,1,-4.5E-7,0,0.0e+5,1]}',
+]
+BAD = [
+    "null",
+    "7",
+    "[]",
+    '"edit"',
+    '{"frame":[0,3]}',
+    '{"frames":[0,3],"more":[]}',
+    '{"frames":[0,4]}',
+    '{"frames":[-1,3]}',
+    '{"frames":[2,2]}',
+    '{"frames":[2,1]}',
+    '{"frames":[0]}',
+    '{"frames":[0,1,2]}',
+    '{"frames":[0,2.0]}',
+    '{"frames":[0,2e0]}',
+    '{"frames":[0,"2"]}',
+    '{"frames":[false,true]}',
+    '{"frames":[0,99999999999999999999999999]}',
+    '{"frames":{}}',
+    '{"frames":null}',
+    '{"frames":[]}',
+    '{"rotation":[1,0,0,0,1,0,0,0]}',
+    '{"rotation":[1,0,0,0,1,0,0,0,1,0]}',
+    '{"rotation":[1,0,0,0,1,0,0,0,-1]}',
+    '{"rotation":[1,0,0,0,1,0,0,0,1.000002]}',
+    '{"rotation":[1,0,0,0,1,0,0,0,true]}',
+    '{"rotation":[[1,0,0],[0,1,0],[0,0,1]]}',
+    '{"rotation":[1e999,0,0,0,1,0,0,0,1]}',
+    '{"rotation":[1,0,0,0,1,0,0,0,NaN]}',
+    '{"rotation":7}',
+    '{"rotation":null}',
+]
+NO_JSON = [
+    '{"frames":[0,3}',
+    '{"frames":[0,03]}',
+    '{"frames":[0,3,]}',
+    '{"frames"[0,3]}',
+    '{"frames":[0,3],}',
+    "{",
+    "{,}",
+]
+
+
+def of_metadata(text: str) -> bytes:
+    """Return a file of three frames whose flag says that its metadata, any text, has an edit."""
+    data = (GOLDEN / "draco.reel").read_bytes()
+    reader = meshreel.open(data).reader
+    body = pack(replace(reader.header, metadata=text)) + pack(reader.index)
+    size = least_size(Preamble) + len(body) + least_size(Checksum)
+    head = pack(Preamble(MAGIC, VERSION, EDITED, size)) + body
+    return head + pack(Checksum(crc32(head))) + data[reader.head_size :]
+
+
+@pytest.mark.parametrize("text", [*GOOD, *BAD, *NO_JSON])
+def test_an_edit_is_refused_where_python_refuses_it(text: str):
+    data = of_metadata(f'{{"a":{{"edit":{{}}}},"b":"edit","edit":{text},"up":"z"}}')
+    if text not in GOOD:
+        with pytest.raises(FormatError):
+            meshreel.open(data)
+        with pytest.raises(CError, match=r"edit|JSON") as error:
+            CVideo(data)
+        assert error.value.status == DAMAGED
+        return
+    known = meshreel.open(data)
+    with CVideo(data) as video:
+        assert (video.info.frames, video.info.up) == (len(known), 1)
+        check_same(known[0], video.decode(0))
+
+
+@pytest.mark.parametrize(
+    "text", ["{}", "[]", "", '{"a":{"edit":{}}}', '{"edit":{}}}', '{"edit":{}', '{"edit":{} "a":1}']
+)
+def test_a_flag_without_an_edit_is_refused(text: str):
+    for opened in (meshreel.open, CVideo):
+        with pytest.raises((FormatError, CError), match="metadata"):
+            opened(of_metadata(text))
+
+
+def test_an_edit_without_the_flag_means_nothing_and_another_flag_is_refused():
+    data = bytearray(of_metadata('{"edit":{"frames":[0,1]}}'))
+    for flags, frames in ((0, 3), (1, 1), (2, None), (3, None)):
+        data[9] = flags
+        size = int.from_bytes(data[10:14], "little")
+        data[size - 4 : size] = crc32(data[: size - 4]).to_bytes(4, "little")
+        if frames is None:
+            with pytest.raises(CError, match="flags"):
+                CVideo(bytes(data))
+            continue
+        with CVideo(bytes(data)) as video:
+            assert video.info.frames == frames
+            with pytest.raises(CError) as error:
+                video.decode(frames)
+            assert error.value.status == BAD_ARGUMENT
