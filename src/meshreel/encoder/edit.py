@@ -73,8 +73,8 @@ def cut(source: Name, output: Name, frames: str, at_keys: bool = False) -> Edite
         numbers = kept_chunks(reader, whole)
         _check_known(path, (reader.chunks[number] for number in numbers))
         edit = Edit(shown.start - whole.start, shown.stop - whole.start, reader.edit.rotation)
-        times = {"first_time": round(1e6 * reader.timestamp(shown.start))}
-        header = replace(reader.header, **times, intervals=reader.header.intervals[shown.start : shown.stop - 1])
+        intervals = reader.header.intervals[shown.start : shown.stop - 1]
+        header = replace(reader.header, first_time=round(1e6 * reader.timestamp(shown.start)), intervals=intervals)
         lost = (ITEM, PART) if len(shown) == count else (ITEM, PART, *MEANS)  # means are those of all frames
         metadata = {name: value for name, value in reader.metadata.items() if name not in lost}
         keys = metadata.get("key_frames")
