@@ -32,6 +32,13 @@ def test_rotations_are_about_x_then_y_then_z(run, tmp_path):
     np.testing.assert_allclose(after, np.column_stack([z, x, y]), atol=1e-6)  # y to z, -z to y; then x to y, -y to x
 
 
+def test_the_example_turns_y_to_z(run, tmp_path):
+    assert run("transform", SCENE, "-o", tmp_path / "a.reel", "--rotate", "90", "0", "0", "--up", "z").code == 0
+    before, after = meshreel.open(SCENE)[2].vertices, meshreel.open(tmp_path / "a.reel")
+    np.testing.assert_allclose(after[2].vertices[:, 2], before[:, 1], atol=1e-6)
+    assert after.up == "z"
+
+
 def test_a_title_and_a_speed(run, tmp_path):
     assert run("tag", SCENE, "title=A walk", "take=3", "-o", tmp_path / "a.reel").code == 0
     assert run("retime", tmp_path / "a.reel", "--speed", "2", "-o", tmp_path / "b.reel").code == 0

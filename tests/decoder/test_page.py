@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import multiprocessing
+import os
 import pickle
 import re
 import struct
@@ -52,6 +53,16 @@ def test_a_large_file_is_a_table_that_says_how_to_play_it(monkeypatch):
     monkeypatch.setattr(module, "INLINE", 1000)
     shown = meshreel.open(SCENE)._repr_html_()
     assert "<table>" in shown and "14 frames" in shown and "meshreel play" in shown and "srcdoc" not in shown
+
+
+def test_a_closed_file_is_a_table_that_says_so_and_short_reads_are_continued(monkeypatch):
+    video, pread = meshreel.open(SCENE), os.pread
+    monkeypatch.setattr("os.pread", lambda file, length, offset: pread(file, min(length, 1000), offset))
+    assert video.reader.source.get_bytes(3, 2500) == SCENE.read_bytes()[3:2503]
+    video.close()
+    with pytest.raises(InputError, match=r"scene.reel: cannot be read at byte 0: it is closed"):
+        video.reader.source.get_bytes(0, 10)
+    assert "it is closed; open it again" in video._repr_html_() and "<table>" in video._repr_html_()
 
 
 def test_show_opens_a_page_that_is_whole(monkeypatch, tmp_path):

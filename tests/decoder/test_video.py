@@ -76,7 +76,7 @@ def test_a_video_is_shown_by_its_facts():
     facts = f"10 frames, 25 frames/s, {video.duration:.3g} s, {len(MIXED)} bytes, 1 track, no background"
     assert repr(video) == f"<meshreel.Video: {facts}>"
     assert repr(video.at(layers=1)) == f"<meshreel.Video: {facts}, at most 1 layer>"
-    assert f"<tr><th>size</th><td>{len(MIXED)} bytes</td></tr>" in video._repr_html_()
+    assert f"recording, {facts}" in video._repr_html_()
     assert "with background" in repr(meshreel.open(GOLDEN / "scene.reel"))
 
 

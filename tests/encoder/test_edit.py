@@ -17,8 +17,10 @@ from meshreel.container.reader import ReelReader
 from meshreel.container.sources import BytesSource
 from meshreel.container.writer import ReelWriter, pack_head
 from meshreel.encoder.edit import concat, cut, retime, tag, transform
+from meshreel.encoder.metadata import MEANS
 from meshreel.errors import FormatError, InputError
-from meshreel.format.layout import Header
+from meshreel.format.edit import is_rotation
+from meshreel.format.layout import EDITED, Header
 from tests.decoder.test_chains import DATA
 from tests.golden import GOLDEN, colored_record, frame_record
 from tests.metrics.shapes import sphere
@@ -50,8 +52,7 @@ def test_a_cut_shows_the_frames_that_were_asked_for_to_the_bit(tmp_path, path, f
     begin, end = (int(part) if part else None for part in frames.split(":"))
     after = meshreel.open(tmp_path / "a.reel")
     assert records(after) == records(before)[begin:end] and len(after) == done.frames
-    times = before.timestamps[begin:end]
-    assert np.diff(after.timestamps) == pytest.approx(np.diff(times)) and after.timestamps[0] == before.timestamps[0]
+    assert after.timestamps == pytest.approx(before.timestamps[begin:end], abs=1e-6)
     assert done.hidden + done.frames == sum(group.frame_count for group in after.reader.tracks[0])
     assert (flags_of(tmp_path / "a.reel") == 1) == (done.hidden > 0)
     for track in after.tracks:
@@ -99,11 +100,32 @@ def test_cuts_at_keys_join_to_the_frames_that_were_cut(tmp_path, chains):
     assert whole.metadata["history"] == [*cuts, f"concat of {len(pieces)} files"] and whole.metadata["preset"] == "best"
 
 
-def known(data: bytes) -> bytes:
+def test_cuts_of_a_scene_are_joined_with_all_their_frames(tmp_path):
+    before = meshreel.open(FILES[0])
+    (tmp_path / "scene.reel").write_bytes(known(FILES[0].read_bytes(), {"preset": "best", "noise_m": 0.002}))
+    cut(tmp_path / "scene.reel", tmp_path / "a.reel", ":1", at_keys=True)  # all of it: no group stands alone
+    concat([tmp_path / "a.reel"] * 2, tmp_path / "b.reel")
+    whole = meshreel.open(tmp_path / "b.reel")
+    assert records(whole) == 2 * records(before) and whole.metadata["noise_m"] == 0.002
+    assert "key_frames" not in whole.metadata
+
+
+def test_a_cut_has_no_means_of_the_whole_file_and_joins_without_them(tmp_path):
+    (tmp_path / "known.reel").write_bytes(known(DATA))
+    cut(tmp_path / "known.reel", tmp_path / "a.reel", ":3")
+    assert not meshreel.open(tmp_path / "a.reel").metadata.keys() & set(MEANS)
+    concat([tmp_path / "known.reel", tmp_path / "known.reel"], tmp_path / "b.reel")
+    assert meshreel.open(tmp_path / "b.reel").metadata["rms_m"] == 0.001
+    cut(tmp_path / "known.reel", tmp_path / "c.reel", ":")
+    assert meshreel.open(tmp_path / "c.reel").metadata["rms_m"] == 0.001
+
+
+def known(data: bytes, metadata: dict[str, object] | None = None) -> bytes:
     """A file with metadata as an encode writes them."""
     reader = ReelReader(BytesSource(data))
     means = {"rms_m": 0.001, "worst_rms_m": 0.002, "d2_psnr_paper": 60.0, "normal_error_deg": 1.0}
-    header = replace(reader.header, metadata=json.dumps({"preset": "best", "key_frames": [0, 5]} | means))
+    text = json.dumps(metadata or {"preset": "best", "key_frames": [0, 5]} | means)
+    header = replace(reader.header, metadata=text)
     return pack_head(header, reader.index) + data[reader.head_size :]
 
 
@@ -155,7 +177,7 @@ def test_frames_with_times_of_their_own_keep_them_through_cuts_speeds_and_joins(
     (tmp_path / "timed.reel").write_bytes(known(pack_head(header, reader.index) + DATA[reader.head_size :]))
     before = meshreel.open(tmp_path / "timed.reel").timestamps
     cut(tmp_path / "timed.reel", tmp_path / "a.reel", "2:6")
-    assert meshreel.open(tmp_path / "a.reel").timestamps == pytest.approx([t - before[2] for t in before[2:6]])
+    assert meshreel.open(tmp_path / "a.reel").timestamps == pytest.approx(before[2:6])
     retime(tmp_path / "timed.reel", tmp_path / "b.reel", speed=2)
     assert meshreel.open(tmp_path / "b.reel").timestamps == pytest.approx([t / 2 for t in before])
     concat([tmp_path / "timed.reel"] * 2, tmp_path / "c.reel")
@@ -189,6 +211,46 @@ def test_a_transform_moves_every_part_and_the_box_with_it(tmp_path, path):
     assert np.abs(back[0].vertices - before[0].vertices).max(initial=0) < 1e-6
 
 
+def test_what_the_metadata_have_in_metres_is_scaled_with_the_frames(tmp_path):
+    part = {"first_frame": 0, "of": 9, "totals": [4.0, 0.5, 60.0, None], "options": ""}
+    (tmp_path / "a.reel").write_bytes(known(DATA, {"rms_m": 0.002, "noise_m": None, "take": 3, "part": part}))
+    transform(tmp_path / "a.reel", tmp_path / "b.reel", 0.5)
+    found = meshreel.open(tmp_path / "b.reel").metadata
+    del found["history"]
+    part = part | {"totals": [1.0, 0.25, 60.0, None]}
+    assert found == {"rms_m": 0.001, "noise_m": None, "take": 3, "part": part}
+
+
+def test_rotations_after_one_another_are_still_a_rotation(tmp_path, chains):
+    angle, places = np.radians(10), [tmp_path / "a.reel", tmp_path / "b.reel"]
+    step = np.array([[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]])
+    step = np.round(step, 7)  # as a user may type it: 40 such products are off by more than a reader takes
+    assert not is_rotation(np.linalg.matrix_power(step, 40).ravel().tolist())
+    places[1].write_bytes(chains.read_bytes())
+    for k in range(40):
+        transform(places[1 - k % 2], places[k % 2], rotation=step)
+    turn = np.array(meshreel.open(places[1]).reader.edit.rotation).reshape(3, 3)
+    assert np.abs(turn @ turn.T - np.eye(3)).max() < 1e-14
+
+
+def test_the_axis_that_points_up_is_named_where_it_is_not_y(tmp_path, chains):
+    transform(chains, tmp_path / "a.reel", up="z")
+    transform(tmp_path / "a.reel", tmp_path / "b.reel", up="y")
+    assert meshreel.open(tmp_path / "a.reel").metadata["up"] == "z"
+    assert "up" not in meshreel.open(tmp_path / "b.reel").metadata
+
+
+def test_an_item_without_its_flag_does_not_come_to_count(tmp_path):
+    (tmp_path / "a.reel").write_bytes(known(DATA, {"edit": {"frames": [1, 3]}}))
+    for k, change in enumerate([lambda a, b: tag(a, b, {"x": 1}), lambda a, b: retime(a, b, speed=2)]):
+        change(tmp_path / "a.reel", tmp_path / f"b{k}.reel")
+        assert records(meshreel.open(tmp_path / f"b{k}.reel")) == records(meshreel.open(DATA))
+        assert "edit" not in meshreel.open(tmp_path / f"b{k}.reel").metadata
+    cut(FILES[0], tmp_path / "c.reel", "3:5")
+    tag(tmp_path / "c.reel", tmp_path / "d.reel", {"x": 1})
+    assert len(meshreel.open(tmp_path / "d.reel")) == 2
+
+
 def test_scale_and_translation_are_for_every_reader_and_up_is_a_name(tmp_path):
     transform(FILES[0], tmp_path / "a.reel", 0.001, translation=(0, 1, 0), up="z")
     before, after = meshreel.open(FILES[0]), meshreel.open(tmp_path / "a.reel")
@@ -217,13 +279,19 @@ def test_tags_are_added_and_taken_away_and_those_that_readers_use_are_not(tmp_pa
     ("call", "text"),
     [
         (lambda a, b: cut(a, b, "20:30"), "leave 0"),
+        (lambda a, b: cut(a, b, "1:30"), "frames 1:30 of 14 frames; give numbers from 0 to 14"),
+        (lambda a, b: cut(a, b, "-20:"), "frames -20: of 14 frames"),
         (lambda a, b: cut(a, b, "x"), "is not a range"),
         (lambda a, b: retime(a, b), "a frame rate or a speed"),
         (lambda a, b: retime(a, b, 25, 2), "a frame rate or a speed"),
         (lambda a, b: retime(a, b, speed=0), "speed 0: give a number"),
         (lambda a, b: retime(a, b, float("nan")), "frame rate nan: give a number"),
         (lambda a, b: transform(a, b, 0), "scale 0: give a number"),
-        (lambda a, b: transform(a, b, rotation=[[1, 0], [0, 1]]), "three rows of a rotation"),
+        (lambda a, b: transform(a, b, rotation=[[1, 0], [0, 1]]), "rotation .* give 3 x 3 finite numbers"),
+        (lambda a, b: transform(a, b, rotation=[[1, 0], [0]]), "rotation .* give 3 x 3 finite numbers"),
+        (lambda a, b: transform(a, b, rotation=np.full((3, 3), np.nan)), "rotation .* give 3 x 3 finite numbers"),
+        (lambda a, b: transform(a, b, translation=(1.0, 2.0)), "translation .*: give 3 finite numbers"),
+        (lambda a, b: transform(a, b, translation=(0, 0, np.inf)), "translation .* give 3 finite numbers"),
         (lambda a, b: transform(a, b, rotation=np.diag([1, 1, -1])), "three rows of a rotation"),
         (lambda a, b: transform(a, b, translation=(1e300, 0, 0)), "cannot be stored"),
         (lambda _, b: concat([], b), "no files to join"),
@@ -279,7 +347,7 @@ ITEMS = [
 @pytest.mark.parametrize("item", ITEMS)
 def test_an_edit_that_cannot_be_followed_is_refused(item):
     reader = ReelReader(BytesSource(FILES[0].read_bytes()))
-    head = pack_head(replace(reader.header, metadata=json.dumps({"edit": item})), reader.index)
+    head = pack_head(replace(reader.header, metadata=json.dumps({"edit": item})), reader.index, EDITED)
     with pytest.raises(FormatError, match=r"Header.metadata: edit"):
         meshreel.open(head + FILES[0].read_bytes()[reader.head_size :])
 

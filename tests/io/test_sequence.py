@@ -281,14 +281,29 @@ def test_a_person_900_m_tall_and_one_of_a_millimetre_are_pointed_out_and_the_sca
     assert "--scale 0.001 if it is in millimetres" in warning
     assert warnings_of(tmp_path, tall, tall, scale=0.001) == ()
     (small,) = warnings_of(tmp_path, tall, tall, scale=1e-6)
-    assert "is 0.000949 m from corner to corner" in small
+    assert "is 0.000949 m from corner to corner" in small and small.endswith("twice") and "give --scale 1000" in small
 
 
 def test_gaps_in_the_numbers_and_empty_frames_are_pointed_out(tmp_path):
     mesh = Mesh.of([[0, 0, 0], [0, 1, 0], [1, 0, 0]], [[0, 1, 2]])
-    gaps, empty = warnings_of(tmp_path, mesh, mesh, Mesh.empty(), mesh, Mesh.empty(), names=[3, 4, 5, 8, 11])
-    assert "4 frames are missing between the file names, the first between 5 and 8" in gaps
+    gaps, empty = warnings_of(tmp_path, mesh, mesh, Mesh.empty(), mesh, Mesh.empty(), names=[3, 4, 5, 6, 11])
+    assert "4 frames are missing between the file names, the first between 6 and 11" in gaps
     assert empty == "2 frames are empty (the first: frame 2): nothing is shown there"
+
+
+@pytest.mark.parametrize(
+    ("names", "lost"),
+    [
+        ([0, 33333, 66667, 100000, 133333, 166667], 0),  # microseconds of 30 frames/s
+        ([0, 3, 6, 10, 13], 0),
+        ([0, 1, 5, 6, 12], 0),  # no step is the usual one
+        ([0, 2, 4, 6, 10], 1),
+    ],
+)
+def test_only_steps_of_twice_the_usual_one_are_gaps(tmp_path, names, lost):
+    mesh = Mesh.of([[0, 0, 0], [0, 1, 0], [1, 0, 0]], [[0, 1, 2]])
+    found = warnings_of(tmp_path, *[mesh] * len(names), names=names)
+    assert found == () if lost == 0 else f"{lost} frames are missing" in found[0]
 
 
 def test_every_third_number_is_no_gap_and_one_empty_frame_is_named(tmp_path):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import platform
 import re
-import shutil
+import webbrowser
 from importlib.metadata import PackageNotFoundError, requires, version
 from importlib.resources import files
 from typing import Any
@@ -15,7 +15,6 @@ from .. import __version__
 from .console import Common
 
 _NEEDS = re.compile(r"([A-Za-z0-9._-]+)[^;]*(?:;.*extra == [\"']([a-z0-9]+)[\"'])?")
-_BROWSERS = ("chromium", "chromium-browser", "google-chrome", "firefox")
 _CODECS = {"AV1 decoded": "libdav1d", "AV1 encoded": "libsvtav1", "H.264 encoded": "libx264"}
 
 
@@ -23,7 +22,7 @@ def command(*, common: Common = Common()) -> None:
     """Tell what is installed, extra by extra, which video codecs there are, and whether a GPU and browser are found."""
     row: dict[str, Any] = {"meshreel": __version__, "python": platform.python_version(), "system": platform.platform()}
     row |= {"extras": _extras(), "codecs": _codecs(), "gpu": _gpu()}
-    row["browser"] = next(filter(None, map(shutil.which, _BROWSERS)), None)
+    row["browser"] = _browser()
     row["player"] = (files("meshreel") / "player" / "meshreel-player.js").is_file()
     table = Table("extra", "installed", "missing")
     for extra, packages in row["extras"].items():
@@ -35,7 +34,7 @@ def command(*, common: Common = Common()) -> None:
         f"meshreel {row['meshreel']}, Python {row['python']}, {row['system']}",
         table,
         f"codecs: {codecs or 'none (extra color)'}",
-        f"GPU: {row['gpu'] or 'none found; only --splats and --sam3 use one'}",
+        f"GPU: {row['gpu'] or 'none found; only --sam3 uses one'}",
         f"browser: {row['browser'] or 'none found; meshreel serve prints an address for another machine'}",
         f"player: {'built' if row['player'] else 'missing; run scripts/build-web, or install a wheel'}",
     )
@@ -61,6 +60,15 @@ def _codecs() -> dict[str, bool]:
     except ImportError:
         return {}
     return {name: codec in codecs_available for name, codec in _CODECS.items()}
+
+
+def _browser() -> str | None:
+    """Return the browser that `meshreel play` and `Video.show` open; None without one."""
+    try:
+        found = webbrowser.get()
+    except webbrowser.Error:
+        return None
+    return str(getattr(found, "name", type(found).__name__))
 
 
 def _gpu() -> str | None:

@@ -39,7 +39,11 @@ def cut(
     keys
         Cut where frames decode alone, before A and behind B, so that nothing is hidden.
     """
-    _tell(_checked(output), edit.cut(file, _checked(output), frames, keys), common)
+    done = edit.cut(file, _checked(output), frames, keys)
+    if done.hidden:
+        text = f"{done.hidden} hidden frames that the others are coded with are in it, too (--keys cuts without any)"
+        common.warn([f"{output}: {text}"])
+    _tell(_checked(output), done, common)
 
 
 def concat(inputs: list[str], /, *, output: Output, common: Common = Common()) -> None:
@@ -145,8 +149,5 @@ def _checked(output: str) -> Place:
 
 
 def _tell(place: Place, done: Edited, common: Common) -> None:
-    if done.hidden:
-        text = f"{done.hidden} hidden frames that the others are coded with are in it, too (--keys cuts without any)"
-        common.warn([f"{place}: {text}"])
     row = {"output": str(place), "frames": done.frames, "hidden": done.hidden, "bytes": done.size}
     common.result(row, f"{place}: {done.frames} frames, {done.size} bytes")

@@ -11,7 +11,7 @@ EXAMPLES = {
     "retime": ("walk.reel -o film.reel --fps 24", "walk.reel -o slow.reel --speed 0.25"),
     "transform": (
         "walk.reel -o small.reel --scale 0.001",
-        "walk.reel -o turned.reel --rotate 0 90 0 --up z",
+        "walk.reel -o turned.reel --rotate 90 0 0 --up z",
     ),
     "tag": ("walk.reel title='A walk' take=3 -o tagged.reel", "tagged.reel take= -o plain.reel"),
     "decode": ("scan.reel -o meshes --format ply", "room.reel -o background --only background"),

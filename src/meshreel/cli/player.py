@@ -36,5 +36,6 @@ def command(*, copy_to: Annotated[Path | None, Parameter()] = None, common: Comm
         for path in found:
             with replacing(copy_to / path.name) as file:
                 file.write(path.read_bytes())
-    text = f"{copy_to}: {len(found)} files; in a page beside that folder:\n{EMBED.format(folder=copy_to.name)}"
+    embed = EMBED.format(folder=copy_to.resolve().name)  # "." has no name
+    text = f"{copy_to}: {len(found)} files; in a page beside that folder:\n{embed}"
     common.result({"folder": str(copy_to), "files": [path.name for path in found]}, text)

@@ -5,9 +5,12 @@ from __future__ import annotations
 import os
 import threading
 from pathlib import Path
-from typing import Any, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 from ..errors import InputError
+
+if TYPE_CHECKING:
+    from .http import HttpSource, StoreSource
 
 
 @runtime_checkable
@@ -70,8 +73,8 @@ class StreamSource:
                 self._file.seek(offset)
                 data: bytes = self._file.read(length)
                 return data
-        except OSError as error:
-            raise InputError(f"{self._name}: cannot be read at byte {offset}: {error.strerror}") from error
+        except (OSError, ValueError) as error:  # a ValueError where the file is closed
+            raise _unreadable(self._name, offset, error) from error
 
     def close(self) -> None:
         self._file.close()
@@ -98,12 +101,30 @@ class FileSource(StreamSource):
         if not hasattr(os, "pread"):
             return super().get_bytes(offset, length)
         try:  # a forked process has a file of its own, but the same position in it
-            return os.pread(self._disk.fileno(), length, offset)
-        except OSError as error:
-            raise InputError(f"{self.path}: cannot be read at byte {offset}: {error.strerror}") from error
+            file = self._disk.fileno()
+            data = os.pread(file, length, offset)  # on Linux 2 GiB at the most
+            while len(data) < length and (more := os.pread(file, length - len(data), offset + len(data))):
+                data += more
+            return data
+        except (OSError, ValueError) as error:
+            raise _unreadable(str(self.path), offset, error) from error
 
     def __enter__(self) -> FileSource:
         return self
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+
+def source_at(place: str | Path) -> FileSource | HttpSource | StoreSource:
+    """Open a file on disk, or the source of ranges behind a URL. Raises InputError if it cannot be read."""
+    if isinstance(place, str) and "://" in place:
+        from .http import HttpSource, StoreSource
+
+        return HttpSource(place) if place.startswith(("http://", "https://")) else StoreSource(place)
+    return FileSource(place)
+
+
+def _unreadable(name: str, offset: int, error: Exception) -> InputError:
+    reason = getattr(error, "strerror", None) or ("it is closed; open it again" if "closed" in str(error) else error)
+    return InputError(f"{name}: cannot be read at byte {offset}: {reason}")

@@ -20,9 +20,7 @@ from typing import IO, Any, Protocol, runtime_checkable
 from ..errors import FormatError, InputError
 from ..format.budget import check_frames, check_head
 from ..format.checks import IndexChecks, check_header, parse_metadata
-from ..format.edit import ITEM
 from ..format.layout import (
-    EDITED,
     MAGIC,
     VERSION,
     Checksum,
@@ -230,12 +228,14 @@ class ReelWriter:
         self.size = len(head) + sum(map(len, self._chunks))
 
 
-def pack_head(header: Header, index: Index) -> bytes:
-    """Pack the head, which is everything before the chunks. Raises FormatError for one that no reader would read."""
+def pack_head(header: Header, index: Index, flags: int = 0) -> bytes:
+    """Pack the head, which is everything before the chunks. Raises FormatError for one that no reader would read.
+
+    Of the `flags`, EDITED lets the item `edit` of the metadata count.
+    """
     body = pack(header) + pack(index)
     size = least_size(Preamble) + len(body) + least_size(Checksum)
     check_head(size)
-    flags = EDITED if ITEM in parse_metadata(header.metadata) else 0
     data = pack(Preamble(MAGIC, VERSION, flags, size)) + body
     return data + pack(Checksum(zlib.crc32(data)))
 

@@ -10,23 +10,19 @@ import operator
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, overload
+from typing import Any, overload
 
 import numpy as np
 
-from ..container.reader import Chunk, ReelReader
-from ..container.sources import BytesSource, FileSource, Source, Stream, StreamSource
+from ..container.reader import ReelReader
+from ..container.sources import BytesSource, FileSource, Source, Stream, StreamSource, source_at
 from ..errors import FormatError, InputError
-from ..format.layout import Form
 from ..geometry.splats import Bound
 from ..geometry.topology import concatenate
 from ..shapes import Float, Float64
 from ..types import Mesh, Up
 from .pictures import Decoders
 from .tracks import Background, Track, moving_of_frame
-
-if TYPE_CHECKING:
-    from ..container.http import HttpSource, StoreSource
 
 BACKGROUND = "background"  # its name among the parts of a frame
 INLINE = 8_000_000  # bytes of a file that a notebook's output may hold (guess): saved notebooks hold 4/3 of it
@@ -43,20 +39,12 @@ def open(source: str | Path | bytes | Stream | Source) -> Video:
         source = BytesSource(source)
     if not isinstance(source, str | Path):
         return Video(ReelReader(source if isinstance(source, Source) else StreamSource(source)))
-    ranges = _source_at(source)
+    ranges = source_at(source)
     try:
         return Video(ReelReader(ranges), close=ranges.close, path=source)
     except FormatError as error:
         ranges.close()
         raise FormatError(f"{source}: {error}") from error
-
-
-def _source_at(place: str | Path) -> FileSource | HttpSource | StoreSource:
-    if isinstance(place, str) and "://" in place:
-        from ..container.http import HttpSource, StoreSource
-
-        return HttpSource(place) if place.startswith(("http://", "https://")) else StoreSource(place)
-    return FileSource(place)
 
 
 def _reopened(source: str | Path | Source, layers: int | None, colored: bool) -> Video:
@@ -217,25 +205,17 @@ class Video(Sequence[Mesh]):
         if out is not None and (out.ndim != 3 or len(out) != last - first or out.dtype.char not in "df"):
             text = f"an array of {out.dtype} {out.shape} for {last - first} frames"
             raise InputError(f"{text}: give one of float64 or float32, frames x vertices x 3")
-        shown, before = [*self.parts(first).values()], self.reader.chunks_of_frame(first)
+        shown, static = [*self.parts(first).values()], self.reader.static_of_frame(first)
         if out is None:
             out = np.empty((last - first, sum(len(mesh.vertices) for mesh in shown), 3))
         for row, frame in zip(out, range(first, last), strict=True):
-            parts, chunks = [*self.parts(frame).values()], self.reader.chunks_of_frame(frame)
+            parts = [*self.parts(frame).values()]
             if (count := sum(len(mesh.vertices) for mesh in parts)) != len(row) or row.shape[1:] != (3,):
                 raise InputError(f"frame {frame} has {count} vertices: the array has room for {len(row)}")
-            if not (self._follow(chunks, before) or all(map(_are_alike, parts, shown))):
+            if self.reader.static_of_frame(frame) != static or not _are_alike(parts, shown):
                 raise InputError(f"frame {frame} has other vertices than frame {first}: ask for the frames before it")
             np.concatenate([mesh.vertices for mesh in parts], out=row, casting="same_kind")
-            before = chunks
         return out
-
-    def _follow(self, chunks: tuple[Chunk, ...], before: tuple[Chunk, ...]) -> bool:
-        """Return whether groups go on with the vertices of those before, one after the other."""
-        return all(
-            chunk.form != Form.DRACO and (chunk == one or self.reader.group_before(chunk) == one)
-            for chunk, one in zip(chunks, before, strict=True)
-        )
 
     def __repr__(self) -> str:
         return f"<meshreel.Video: {', '.join(self._facts().values())}>"
@@ -247,11 +227,15 @@ class Video(Sequence[Mesh]):
         """
         from .page import table
 
+        facts = self._facts().items()
         if self.reader.size > INLINE:
             play = f"play it with video.show(), or in a terminal: meshreel play {self.path or 'FILE'}"
             note = f"{self.name} is larger than {INLINE / 1e6:g} MB: {play}"
-            return table(self._facts().items(), note)
-        return self._frame_of_page()
+            return table(facts, note)
+        try:
+            return self._frame_of_page()
+        except (InputError, OSError) as error:  # the file is closed, or the player is not built
+            return table(facts, str(error))
 
     def show(self) -> None:
         """Play the video: in a notebook below the cell; elsewhere in the browser, as a page in a temporary folder.
@@ -275,7 +259,7 @@ class Video(Sequence[Mesh]):
     @property
     def name(self) -> str:
         """Name of the file, without folders; "recording" for bytes and objects."""
-        return "recording" if self.path is None else str(self.path).rstrip("/").rpartition("/")[2]
+        return "recording" if self.path is None else Path(self.path).name
 
     def _frame_of_page(self) -> str:
         from .page import in_frame
@@ -310,8 +294,12 @@ def _counted(count: int, what: str) -> str:
     return f"{count} {what}" if count == 1 else f"{count} {what}s"
 
 
-def _are_alike(one: Mesh, other: Mesh) -> bool:
-    return np.array_equal(one.faces, other.faces) and len(one.vertices) == len(other.vertices)
+def _are_alike(parts: list[Mesh], others: list[Mesh]) -> bool:
+    """Return whether the parts of two frames, as many in each, have equally many vertices and the same faces."""
+    return all(
+        len(one.vertices) == len(other.vertices) and np.array_equal(one.faces, other.faces)
+        for one, other in zip(parts, others, strict=True)
+    )
 
 
 def _joined(meshes: list[Mesh]) -> Mesh:

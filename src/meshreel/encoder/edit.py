@@ -10,27 +10,26 @@ import json
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..container.reader import Chunk, ReelReader
-from ..container.sources import FileSource, StreamSource
+from ..container.sources import source_at
 from ..container.writer import pack_head
 from ..errors import FormatError, InputError
 from ..format.budget import check_frames
 from ..format.checks import check_header, check_index, parse_metadata
-from ..format.edit import ITEM, Edit, is_rotation, parse_edit
+from ..format.edit import ITEM, Edit, is_rotation, nearest_rotation, parse_edit
 from ..format.layout import EDITED, ChunkKind, Header, Index, IndexEntry
-from ..io.read import first_difference, read_input
+from ..io.read import first_difference
 from ..io.remote import Place, located, uploaded
 from ..io.sequence import SequenceOptions
 from ..io.write import check_apart, replacing
 from ..types import Up, check_up
-from .metadata import HISTORY, PART, joined_metadata, of_all_parts, place_of
-from .spans import kept_chunks, span_of
+from .file_intervals import interval_of, kept_chunks
+from .metadata import HISTORY, MEANS, PART, joined_metadata, of_all_parts, place_of, scaled_metadata, upright
 
 Name = str | Place
 Numbers = Sequence[Any] | np.ndarray
@@ -65,14 +64,19 @@ def cut(source: Name, output: Name, frames: str, at_keys: bool = False) -> Edite
     where frames stand alone. Raises InputError for frames that the file has not, and FormatError for a damaged one.
     """
     with _opened(located(source)) as (path, reader):
-        shown = SequenceOptions(frames=frames).chosen(reader.frame_count)
-        whole = span_of(reader, shown)
-        shown = range(max(whole.start, 0), min(whole.stop, reader.frame_count)) if at_keys else shown
+        count = reader.frame_count
+        shown = SequenceOptions(frames=frames).chosen(count)
+        if any(abs(int(number)) > count for number in frames.split(":") if number):
+            raise InputError(f"{path}: frames {frames} of {count} frames; give numbers from 0 to {count}")
+        whole = interval_of(reader, shown)
+        shown = range(max(whole.start, 0), min(whole.stop, count)) if at_keys else shown
         numbers = kept_chunks(reader, whole)
         _check_known(path, (reader.chunks[number] for number in numbers))
         edit = Edit(shown.start - whole.start, shown.stop - whole.start, reader.edit.rotation)
-        header = replace(reader.header, intervals=reader.header.intervals[shown.start : shown.stop - 1])
-        metadata = {name: value for name, value in reader.metadata.items() if name not in (ITEM, PART)}
+        intervals = reader.header.intervals[shown.start : shown.stop - 1]
+        header = replace(reader.header, first_time=round(1e6 * reader.timestamp(shown.start)), intervals=intervals)
+        lost = (ITEM, PART) if len(shown) == count else (ITEM, PART, *MEANS)  # means are those of all frames
+        metadata = {name: value for name, value in reader.metadata.items() if name not in lost}
         keys = metadata.get("key_frames")
         if isinstance(keys, list):
             metadata["key_frames"] = [key - shown.start for key in keys if isinstance(key, int) and key in shown]
@@ -84,8 +88,8 @@ def cut(source: Name, output: Name, frames: str, at_keys: bool = False) -> Edite
 def concat(sources: Sequence[Name], output: Name) -> Edited:
     """Join files one after the other: parts of a sequence, or cuts of one file.
 
-    One file is open at a time, and in memory where it is behind a URL. Raises InputError where files are not of one
-    sequence, and FormatError for a damaged file.
+    One file is open at a time. Raises InputError where files are not of one sequence, and FormatError for a damaged
+    file.
     """
     if not sources:
         raise InputError("no files to join; give at least one")
@@ -145,26 +149,30 @@ def transform(
     `rotation` is a matrix of 3 x 3. Scale and translation are exact and known to all readers; versions before this one
     refuse a rotated file. `up` names another axis that points up, and moves nothing.
     """
-    turn = np.eye(3) if rotation is None else np.asarray(rotation, np.float64)
+    turn = _numbers("rotation", np.eye(3) if rotation is None else rotation, (3, 3))
+    move = _numbers("translation", translation, (3,))
     if not 1e-9 <= scale <= 1e9:
         raise InputError(f"scale {scale}: give a number from 1e-9 to 1e9, as 0.001 for millimetres")
-    if turn.shape != (3, 3) or not is_rotation(turn.ravel().tolist()):
+    if not is_rotation(turn.ravel().tolist()):
         raise InputError(f"rotation {turn.tolist()}: give the three rows of a rotation matrix")
     if up is not None:
         check_up(up)
     with _opened(located(source)) as (path, reader):
-        head = reader.header
-        origin = scale * (turn @ np.array(head.origin)) + np.asarray(translation, np.float64)
+        head, turn = reader.header, turn if rotation is None else nearest_rotation(turn)
+        origin = scale * (turn @ np.array(head.origin)) + move
         header = replace(head, scale=scale * head.scale, origin=tuple(map(float, origin)))
         before = np.array(reader.edit.rotation).reshape(3, 3) if reader.edit.rotation else np.eye(3)
-        both = turn @ before
+        both = before if rotation is None else nearest_rotation(turn @ before)
         rotated = tuple(both.ravel().tolist()) if np.abs(both - np.eye(3)).max() > 1e-12 else ()
-        metadata = {name: value for name, value in reader.metadata.items() if name != ITEM}
-        metadata |= replace(reader.edit, rotation=rotated).item(reader.coded_count)
+        try:
+            metadata = scaled_metadata(reader.metadata, scale)
+        except (KeyError, TypeError, ValueError) as error:
+            raise _unknown(path, error) from None
         if up is not None:
-            metadata = metadata | {"up": up}
-        told = f"transform by {scale:g}, {np.round(turn, 6).tolist()}, {list(map(float, translation))}"
-        return _relabelled(path, reader, output, header, metadata | _history(metadata, told))
+            metadata = {name: value for name, value in metadata.items() if name != "up"} | upright(up)
+        told = f"transform by {scale:g}, {np.round(turn, 6).tolist()}, {move.tolist()}"
+        edit = replace(reader.edit, rotation=rotated)
+        return _relabelled(path, reader, output, header, metadata | _history(metadata, told), edit)
 
 
 def tag(source: Name, output: Name, values: dict[str, Any]) -> Edited:
@@ -194,8 +202,7 @@ def _check_alike(path: Place, reader: ReelReader, other: ReelReader, first: Plac
         joined_metadata(parts[-1:])
         begin, own = place_of(parts[0][0]), place_of(parts[-1][0])
     except (KeyError, TypeError, ValueError) as error:
-        text = f"{path}: its metadata are not those of meshreel encode ({error!r}); encode it again"
-        raise InputError(text) from None
+        raise _unknown(path, error) from None
     if ours != theirs:
         text = f"{path}: differs from {first}: {first_difference(ours, theirs)}"
         raise InputError(f"{text}; encode both with the same options")
@@ -203,6 +210,22 @@ def _check_alike(path: Place, reader: ReelReader, other: ReelReader, first: Plac
     if begin is not None and own is not None and own[0] != begin[0] + end:
         text = f"{path}: begins at frame {own[0]} of the sequence, and the next in turn is {begin[0] + end}"
         raise InputError(f"{text}; give each part once, in the order of the frames")
+
+
+def _unknown(path: Place, error: Exception) -> InputError:
+    return InputError(f"{path}: its metadata are not those of meshreel encode ({error!r}); encode it again")
+
+
+def _numbers(name: str, given: Numbers, shape: tuple[int, ...]) -> np.ndarray:
+    """Return numbers as an array. Raises InputError where they are not finite, or not of the shape."""
+    try:
+        array = np.asarray(given, np.float64)
+    except (TypeError, ValueError):
+        array = np.empty(0)
+    if array.shape != shape or not np.isfinite(array).all():
+        text = " ".join(repr(given).split())
+        raise InputError(f"{name} {text:.80}: give {' x '.join(map(str, shape))} finite numbers")
+    return array
 
 
 def _check_known(path: Place, chunks: Iterable[Chunk]) -> None:
@@ -249,8 +272,12 @@ def _piece(path: Place, reader: ReelReader, numbers: Iterable[int], known: dict[
     return _Piece(path, numbers, entries)
 
 
-def _relabelled(path: Place, reader: ReelReader, output: Name, header: Header, metadata: dict[str, Any]) -> Edited:
-    """Write a file with all its chunks, of unknown kinds, too, under another header."""
+def _relabelled(
+    path: Place, reader: ReelReader, output: Name, header: Header, metadata: dict[str, Any], edit: Edit | None = None
+) -> Edited:
+    """Write a file with all its chunks, of unknown kinds, too, under another header, with its own edit or another."""
+    metadata = {name: value for name, value in metadata.items() if name != ITEM}  # without the flag, it is none
+    metadata |= (edit or reader.edit).item(reader.coded_count)
     piece = _Piece(path, tuple(range(len(reader.chunks))), reader.index.chunks)
     return _written(located(output), _with(header, metadata), [piece])
 
@@ -263,10 +290,11 @@ def _written(output: Place, header: Header, pieces: Sequence[_Piece]) -> Edited:
         raise InputError(f"{output}: is the input, which it would replace; choose another name")
     try:
         metadata = parse_metadata(header.metadata)
-        edit = parse_edit(metadata, EDITED if ITEM in metadata else 0, coded)
+        flags = EDITED if ITEM in metadata else 0
+        edit = parse_edit(metadata, flags, coded)
         check_header(header, edit.end - edit.first)
         check_index(index)
-        head = pack_head(header, index)
+        head = pack_head(header, index, flags)
         size = len(head) + sum(layer.size for entry in index.chunks for layer in entry.layers)
         check_frames(sum(entry.frames for entry in index.chunks if entry.kind == ChunkKind.GROUP), size)
     except FormatError as error:
@@ -294,11 +322,8 @@ def _payloads(pieces: Sequence[_Piece]) -> Iterator[bytes]:
 
 @contextmanager
 def _opened(path: Place) -> Iterator[tuple[Place, ReelReader]]:
-    """Open a file for the block; one behind a URL is in memory meanwhile."""
-    if isinstance(path, Path):
-        source: StreamSource = FileSource(path)
-    else:
-        source = StreamSource(BytesIO(read_input(path, "check the URL and your rights")), str(path))
+    """Open a file for the block; of one behind a URL, the head and the chunks that are copied are fetched."""
+    source = source_at(path if isinstance(path, Path) else path.url)
     try:
         reader = ReelReader(source)
         yield path, reader

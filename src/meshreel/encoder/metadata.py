@@ -10,6 +10,7 @@ import hashlib
 import math
 from collections.abc import Sequence
 from dataclasses import asdict, astuple, dataclass
+from itertools import accumulate
 from typing import Any
 
 from ..format.edit import ITEM
@@ -19,7 +20,8 @@ from .summary import GroupSummary
 
 HISTORY = "history"  # of a file that was edited: what was done, in words
 PART = "part"  # of a file that is a part: its place, its exact totals, and a digest of its options
-_KEYS, _MEANS = "key_frames", ("rms_m", "worst_rms_m", "d2_psnr_paper", "normal_error_deg")
+_KEYS = "key_frames"
+MEANS = ("rms_m", "worst_rms_m", "d2_psnr_paper", "normal_error_deg")
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,11 +60,11 @@ class Totals:
     def from_metadata(metadata: dict[str, Any], frames: int) -> Totals:
         """Return the totals of a file of `frames` frames; where it is no part, from its rounded means.
 
-        Raises TypeError or ValueError for metadata that no encoder wrote.
+        Raises KeyError, TypeError or ValueError for metadata that have none, or that no encoder wrote.
         """
         if PART in metadata:
             return Totals(frames, *map(_number, metadata[PART]["totals"]))
-        rms, worst, psnr, angle = (_number(metadata[name]) for name in _MEANS)
+        rms, worst, psnr, angle = (_number(metadata[name]) for name in MEANS)
         return Totals(frames, frames * rms**2, worst, frames * psnr, frames * angle)
 
     @property
@@ -75,7 +77,7 @@ class Totals:
         """The means by their names, rounded."""
         root = (self.squares / self.frames) ** 0.5
         values = (root, self.worst, self.psnr / self.frames, self.angle / self.frames)
-        return {name: rounded(value) for name, value in zip(_MEANS, values, strict=True)}
+        return {name: rounded(value) for name, value in zip(MEANS, values, strict=True)}
 
 
 def metadata_of(
@@ -94,15 +96,31 @@ def metadata_of(
 def joined_metadata(parts: Sequence[tuple[dict[str, Any], int]]) -> dict[str, Any]:
     """Return the metadata of a whole from those of its parts and their numbers of frames, in order.
 
+    Key frames and means are joined where all parts have them: scenes have none, and cuts no means. Raises KeyError,
+    TypeError or ValueError for metadata that no encoder wrote.
+    """
+    dropped = {PART, ITEM} | {name for name in (_KEYS, *MEANS) if not all(name in metadata for metadata, _ in parts)}
+    found = {name: value for name, value in parts[0][0].items() if name not in dropped}
+    if _KEYS in found:
+        firsts = accumulate((frames for _, frames in parts), initial=0)
+        pairs = zip(firsts, parts, strict=False)  # the last of the firsts is the number of all frames
+        found[_KEYS] = [first + key for first, (metadata, _) in pairs for key in metadata[_KEYS]]
+    if all(name in found for name in MEANS):
+        found |= Totals.added([Totals.from_metadata(metadata, frames) for metadata, frames in parts]).means
+    return found
+
+
+def scaled_metadata(metadata: dict[str, Any], scale: float) -> dict[str, Any]:
+    """Return the metadata of a file whose frames are scaled: names in `_m` and the totals of a part are in metres.
+
     Raises KeyError, TypeError or ValueError for metadata that no encoder wrote.
     """
-    keys, first = list[int](), 0
-    for metadata, frames in parts:
-        keys += [first + key for key in metadata[_KEYS]]
-        first += frames
-    means = Totals.added([Totals.from_metadata(metadata, frames) for metadata, frames in parts]).means
-    shared = {name: value for name, value in parts[0][0].items() if name not in (PART, ITEM)}
-    return shared | {_KEYS: keys} | means
+    found = {name: _scaled(value, scale) if name.endswith("_m") else value for name, value in metadata.items()}
+    if PART in metadata and scale != 1:
+        squares, worst, *others = metadata[PART]["totals"]
+        exact = [None if squares is None else squares * scale**2, None if worst is None else worst * scale, *others]
+        found[PART] = metadata[PART] | {"totals": exact}
+    return found
 
 
 def of_all_parts(metadata: dict[str, Any]) -> dict[str, Any]:
@@ -110,7 +128,7 @@ def of_all_parts(metadata: dict[str, Any]) -> dict[str, Any]:
 
     Raises KeyError or TypeError for metadata that no encoder wrote.
     """
-    found = {name: value for name, value in metadata.items() if name not in (PART, ITEM, HISTORY, _KEYS, *_MEANS)}
+    found = {name: value for name, value in metadata.items() if name not in (PART, ITEM, HISTORY, _KEYS, *MEANS)}
     return found | ({"options": metadata[PART]["options"], "frames": metadata[PART]["of"]} if PART in metadata else {})
 
 
@@ -131,6 +149,10 @@ def upright(up: Up) -> dict[str, Any]:
 def rounded(value: float) -> float | None:
     """Round to four significant digits; None where JSON has no number."""
     return float(f"{value:.4g}") if math.isfinite(value) else None
+
+
+def _scaled(value: Any, scale: float) -> Any:
+    return rounded(value * scale) if type(value) in (int, float) and scale != 1 else value
 
 
 def _number(value: float | None) -> float:

@@ -48,6 +48,13 @@ def parse_edit(metadata: dict[str, Any], flags: int, frames: int) -> Edit:
     return Edit(shown[0], shown[1], tuple(map(float, rotation)))
 
 
+def nearest_rotation(matrix: np.ndarray) -> np.ndarray:
+    """Return the rotation nearest to a matrix of 3 x 3 that is almost one, so that products do not drift from it."""
+    left, _, right = np.linalg.svd(matrix)
+    found: np.ndarray = left @ right
+    return found
+
+
 def is_rotation(numbers: list[Any]) -> bool:
     """Return whether nine numbers, row by row, are a rotation matrix."""
     if len(numbers) != 9 or not all(type(number) in (int, float) and abs(number) <= 2 for number in numbers):

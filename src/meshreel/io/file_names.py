@@ -151,9 +151,9 @@ def _ordered(source: Place, root: _P, paths: list[_P]) -> tuple[tuple[_P, ...], 
 def _gaps(source: Place, numbers: Sequence[int]) -> tuple[str, ...]:
     """Return a warning of frame numbers that are left out, where most of them are one step apart."""
     steps = [after - before for before, after in pairwise(numbers)]
-    usual = Counter(steps).most_common(1)[0][0]
-    wide = [(before, step) for before, step in zip(numbers, steps, strict=False) if step > usual]
-    if not wide:
+    usual, count = Counter(steps).most_common(1)[0]
+    wide = [(before, step) for before, step in zip(numbers, steps, strict=False) if step >= 2 * usual]
+    if not wide or 2 * count <= len(steps):  # times in place of numbers have steps that differ a little
         return ()
     lost, (first, step) = sum(step // usual - 1 for _, step in wide), wide[0]
     text = f"{lost} frames are missing between the file names, the first between {first} and {first + step}"

@@ -221,6 +221,8 @@ def _warnings(seen: _Seen, remarks: tuple[str, ...]) -> Iterator[str]:
         yield f"{number} empty (the first: frame {min(seen.empty)}): nothing is shown there"
     if seen.smallest and seen.largest and (seen.largest[0] < _SIZES[0] or seen.smallest[0] > _SIZES[1]):
         size, units = seen.largest[0], "--scale 0.001 if it is in millimetres, 0.01 in centimetres"
+        if size < _SIZES[0]:
+            units = "--scale 1000 if it is in kilometres, or was scaled from millimetres twice"
         yield f"frame {seen.largest[1]} is {size:.3g} m from corner to corner: meshreel counts in metres; give {units}"
     if seen.smallest and seen.largest and seen.largest[0] > _SUSPICIOUS_RATIO * seen.smallest[0]:
         yield (

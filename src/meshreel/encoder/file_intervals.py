@@ -1,4 +1,4 @@
-"""Spans of a file that can stand alone: whole groups of all tracks, and all that these are predicted from.
+"""Intervals of a file, which can stand alone: whole groups of all tracks, and all that these are predicted from.
 
 In: a reader and frames. Out: the frames from which to which the file has to be kept, and the chunks of these.
 """
@@ -10,11 +10,11 @@ from ..format.checks import COMPANIONS
 from ..format.layout import ChunkKind
 
 
-def span_of(reader: ReelReader, frames: range) -> range:
-    """Return the shortest span that has some frames, and begins and ends with groups of all tracks.
+def interval_of(reader: ReelReader, frames: range) -> range:
+    """Return the shortest interval that has some frames, and begins and ends with groups of all tracks.
 
     It begins with groups that name no group before. Pictures of a background are counted from the first frame that it
-    is shown in, which a span then begins with. Hidden frames have numbers below 0, or from `frame_count` on.
+    is shown in, which an interval then begins with. Hidden frames have numbers below 0, or from `frame_count` on.
     """
     start, end = frames.start, frames.stop
     while True:
@@ -22,14 +22,14 @@ def span_of(reader: ReelReader, frames: range) -> range:
         earlier = min(_stands_alone(reader, group).first_frame for group in groups)
         later = max(own.first_frame + own.frame_count for own in (_group_at(of, end - 1) for of in reader.tracks))
         counted = [reader.shown_from(state) for state in _states(reader, range(start, end)) if _is_timed(reader, state)]
-        if (span := (min([earlier, *counted]), later)) == (start, end):
+        if (found := (min([earlier, *counted]), later)) == (start, end):
             return range(start, end)
-        start, end = span
+        start, end = found
 
 
-def kept_chunks(reader: ReelReader, span: range) -> list[int]:
-    """Return the numbers of the chunks that a span needs, in the order of the file."""
-    kept = {group.number for group in reader.groups if group.first_frame in span}
+def kept_chunks(reader: ReelReader, interval: range) -> list[int]:
+    """Return the numbers of the chunks that an interval needs, in the order of the file."""
+    kept = {group.number for group in reader.groups if group.first_frame in interval}
     waiting = list(kept)
     while waiting:
         new = set(reader.chunks[waiting.pop()].depends_on) - kept
