@@ -124,7 +124,7 @@ def test_an_installed_wheel_plays_a_file_with_the_player_that_it_brings(python, 
             "page.js",
         } <= names
         assert "LICENSES.txt" in names
-        for name in names:
+        for name in (name for name in names if not name.endswith(".br")):  # those are sent in the place of others
             assert fetch(f"{address}{scripts}/{name}") == (ROOT / "src/meshreel/player" / name).read_bytes()
         assert fetch(f"{address}files/scene.reel") == FILE.read_bytes()
     finally:

@@ -112,7 +112,10 @@ def _run(make: Callable[[], App], tokens: list[str], signals: _Signals) -> int:
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")  # a file name that the terminal cannot show is no error
     try:
-        command, bound, _ = make().parse_args(tokens, exit_on_error=False, print_error=False)
+        app = make()
+        if tokens and not tokens[0].startswith("-") and tokens[0] not in [*app]:  # the parser would import them all
+            return _report(f"error: {_unknown(tokens[0], app)}", FAILED)
+        command, bound, _ = app.parse_args(tokens, exit_on_error=False, print_error=False)
         with signals.raised():
             command(*bound.args, **bound.kwargs)
         return 0
@@ -141,7 +144,7 @@ def _noted(text: str, error: BaseException) -> str:
 def _text_of(error: Exception) -> str:
     from concurrent.futures.process import BrokenProcessPool
 
-    from cyclopts import CycloptsError, MissingArgumentError, UnknownCommandError
+    from cyclopts import CycloptsError, MissingArgumentError
 
     if isinstance(error, ImportError) and isinstance(error.__cause__, ModuleNotFoundError):
         error = error.__cause__  # raised by the import of the command's module
@@ -151,8 +154,6 @@ def _text_of(error: Exception) -> str:
         return f"{error.name} is missing; install it with: pip install 'meshreel[{extra}]'"
     if isinstance(error, MissingArgumentError) and error.argument is not None:
         return _missing(error, " ".join(["meshreel", *(error.command_chain or ())]))
-    if isinstance(error, UnknownCommandError) and error.unused_tokens:
-        return _unknown(error.unused_tokens[0])
     if isinstance(error, CycloptsError):
         return f"{text} (see meshreel --help)"
     if isinstance(error, BrokenProcessPool):
@@ -166,14 +167,14 @@ def _text_of(error: Exception) -> str:
     return f"{type(error).__name__}: {text}; this is a fault of meshreel: please report it with the output of --debug"
 
 
-def _unknown(name: str) -> str:
+def _unknown(name: str, app: App) -> str:
     """Name a command that does not exist, and those that it begins, or is like."""
-    if name == "bench":
+    program, names = app.name[0], [known for known in app if not known.startswith("-")]
+    if (program, name) == ("meshreel", "bench"):
         return "the bench is a distribution of its own; install it with: pip install meshreel-bench"
-    names = [*COMMANDS, "bench"]
     near = [known for known in names if known.startswith(name)] or get_close_matches(name, names)
     meant = f" Did you mean {' or '.join(near)}?" if near else ""
-    return f'Unknown command "{name}".{meant} Commands: {", ".join(names)} (see meshreel --help)'
+    return f'Unknown command "{name}".{meant} Commands: {", ".join(names)} (see {program} --help)'
 
 
 def _missing(error: MissingArgumentError, command: str) -> str:
