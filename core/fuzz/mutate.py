@@ -20,6 +20,7 @@ from meshreel.container.writer import pack_head
 from meshreel.errors import FormatError, InputError
 from meshreel.format import kinds
 from meshreel.format.layout import (
+    EDITED,
     Atlas,
     ChunkKind,
     ColorsLevel,
@@ -117,7 +118,8 @@ def assemble(header: Header, chunks: list[Chunk]) -> bytes:
         frames = chunk.entry.frames if chunk.entry.kind == ChunkKind.STATIC else _frames(payload, chunk.entry.frames)
         layers = tuple(Layer(len(layer), zlib.crc32(layer)) for layer in chunk.layers)
         entries.append(replace(chunk.entry, form=form, frames=frames, layers=layers))
-    return pack_head(header, Index(tuple(entries))) + b"".join(b"".join(chunk.layers) for chunk in chunks)
+    flags = EDITED if '"edit"' in header.metadata else 0
+    return pack_head(header, Index(tuple(entries)), flags) + b"".join(b"".join(chunk.layers) for chunk in chunks)
 
 
 def _frames(payload: bytes, known: int) -> int:

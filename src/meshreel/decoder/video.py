@@ -14,9 +14,10 @@ from typing import Any, overload
 
 import numpy as np
 
-from ..container.reader import ReelReader
+from ..container.reader import Chunk, ReelReader
 from ..container.sources import BytesSource, FileSource, Source, Stream, StreamSource, source_at
 from ..errors import FormatError, InputError
+from ..format.layout import Form
 from ..geometry.splats import Bound
 from ..geometry.topology import concatenate
 from ..shapes import Float, Float64
@@ -206,16 +207,26 @@ class Video(Sequence[Mesh]):
             text = f"an array of {out.dtype} {out.shape} for {last - first} frames"
             raise InputError(f"{text}: give one of float64 or float32, frames x vertices x 3")
         shown, static = [*self.parts(first).values()], self.reader.static_of_frame(first)
+        before = self.reader.chunks_of_frame(first)
         if out is None:
             out = np.empty((last - first, sum(len(mesh.vertices) for mesh in shown), 3))
         for row, frame in zip(out, range(first, last), strict=True):
-            parts = [*self.parts(frame).values()]
+            parts, chunks = [*self.parts(frame).values()], self.reader.chunks_of_frame(frame)
             if (count := sum(len(mesh.vertices) for mesh in parts)) != len(row) or row.shape[1:] != (3,):
                 raise InputError(f"frame {frame} has {count} vertices: the array has room for {len(row)}")
-            if self.reader.static_of_frame(frame) != static or not _are_alike(parts, shown):
+            is_same = self._follow(chunks, before) or _are_alike(parts, shown)
+            if self.reader.static_of_frame(frame) != static or not is_same:
                 raise InputError(f"frame {frame} has other vertices than frame {first}: ask for the frames before it")
             np.concatenate([mesh.vertices for mesh in parts], out=row, casting="same_kind")
+            before = chunks
         return out
+
+    def _follow(self, chunks: tuple[Chunk, ...], before: tuple[Chunk, ...]) -> bool:
+        """Return whether groups go on with the vertices of those before, one after the other."""
+        return all(
+            chunk.form != Form.DRACO and (chunk == one or self.reader.group_before(chunk) == one)
+            for chunk, one in zip(chunks, before, strict=True)
+        )
 
     def __repr__(self) -> str:
         return f"<meshreel.Video: {', '.join(self._facts().values())}>"
