@@ -51,7 +51,7 @@ def test_outside_a_terminal_lines_come_as_long_as_it_lasts(monkeypatch, capsys, 
     monkeypatch.setattr(console, "EVERY", 0.02)
     with Common(quiet=quiet).stages(8) as progress:
         progress("code", 3, 8)
-        time.sleep(0.2)
+        time.sleep(0.8)
     lines = capsys.readouterr().err.splitlines()
     time.sleep(0.1)
     assert capsys.readouterr().err == ""
