@@ -61,8 +61,8 @@ def _measured(match: re.Match[str]) -> str:
         return f"{path.stat().st_size / 1000:.0f} kB"
     import meshreel
 
-    video = meshreel.open(str(path))
-    return f"{len(video) / video.frame_rate:.2g} s"
+    with meshreel.open(str(path)) as video:
+        return f"{video.duration:.2g} s"
 
 
 def _sample(name: str) -> Path:
