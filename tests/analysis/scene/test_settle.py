@@ -8,9 +8,9 @@ import pytest
 from meshreel.analysis.scene.background import BackgroundOptions
 from meshreel.analysis.scene.cut import CutOptions
 from meshreel.analysis.scene.labelling import ByPlace
-from meshreel.analysis.scene.places import PlacesOptions
+from meshreel.analysis.scene.places import Places, PlacesOptions, Tally
 from meshreel.analysis.scene.segmentation import SegmentOptions, segment
-from meshreel.analysis.scene.settle import NEVER, SettleOptions
+from meshreel.analysis.scene.settle import NEVER, SettleOptions, find_rest
 from meshreel.analysis.scene.views import ViewsOptions
 from meshreel.analysis.survey import survey
 from meshreel.coding.background import decode_background, decode_change
@@ -22,6 +22,7 @@ from meshreel.format.budget import CostlyError
 from meshreel.geometry.closest_points import Surface
 from meshreel.geometry.derived_sequences import captured
 from meshreel.geometry.topology import concatenate, subdivide_midpoint, weld
+from meshreel.geometry.voxels import Lattice, neighbours
 from meshreel.types import Mesh, MeshList, Placement
 
 FRAMES, LIFTED, PUT = 28, 9, 18  # at 4 frames a second
@@ -161,3 +162,32 @@ def test_surface_that_settles_without_a_background_is_a_whole_background(scene: 
 
 def distance_to(mesh: Mesh, point: np.ndarray) -> float:
     return float(np.linalg.norm(Surface(mesh).closest(point[None]).points - point))
+
+
+WALL, HIDDEN = (20, 20), 5  # places of a side of a crate; so many columns are hidden when it comes to rest
+
+
+def stand(frames: int, seen_from: int, patch: slice) -> Places:
+    """A side of a crate that comes to rest in frame 6; some columns are passed in frame 2 and seen late again."""
+    lattice = Lattice(np.zeros(3), 0.05)
+    keys = np.sort(lattice.keys((np.argwhere(np.ones((*WALL, 1))) + 0.5) * 0.05))
+    column = lattice.cells(keys)[:, 0]
+    late = (column >= WALL[0] - HIDDEN) & np.isin(lattice.cells(keys)[:, 1], np.arange(*patch.indices(WALL[1])))
+    tally = Tally(len(keys))
+    for number in range(frames):
+        there = np.where(late, (number >= seen_from) | (number == 2), number >= 6)
+        tally.add(there, np.full(len(keys), number < 2))
+    return Places(lattice, keys, neighbours(keys), np.zeros((len(keys), 3)), tally)
+
+
+def rests(places: Places, holds: bool) -> list[int]:
+    every, options = np.ones(len(places.keys), bool), SettleOptions(rest=10.0, still=2.0)
+    rest = find_rest(places, every, range(16), 4.0, options, lambda some, _numbers: holds or len(some) > 200)
+    return np.bincount(np.minimum(rest.since, 99), minlength=100)[[7, 99]].tolist()
+
+
+def test_a_side_that_is_seen_late_rests_with_what_it_belongs_to() -> None:
+    all_of_it, small = WALL[0] * WALL[1], HIDDEN * 4
+    assert rests(stand(16, 12, slice(0, 4)), holds=True) == [all_of_it, 0]
+    assert rests(stand(16, 12, slice(0, 4)), holds=False) == [all_of_it - small, small]  # it moves: a person's hand
+    assert rests(stand(16, 14, slice(0, 4)), holds=True) == [all_of_it - small, small]  # two frames tell nothing

@@ -18,6 +18,7 @@ from .places import Places, Stay
 
 NEVER = np.iinfo(np.int32).max  # frame number that means "at no time"
 _FEWEST = 3  # smallest number of inspected frames with surface in a time of rest: a guess
+_SMALLEST = 10  # places: fewer that rest beside a change stay as they are, for speed: a guess
 _ALIKE = 1  # largest difference, in inspected frames, between neighbours that change together: a guess
 
 
@@ -65,17 +66,46 @@ def find_rest(
     `holds` tells whether the surface at some places is where it was in all of some frames: nobody stands so still.
     """
     rest = Rest.none(len(places.keys))
-    frames = np.asarray(numbers, np.int32)
-    late = _settled(places.tally.after, frames, frame_rate, options)
-    early = _settled(places.tally.before, -frames[::-1], frame_rate, options)
+    frames, tally = np.asarray(numbers, np.int32), places.tally
     least = round(options.least / places.lattice.size**2)
-    for at, order, out, sign in ((late, frames, rest.since, 1), (early, frames[::-1], rest.until, -1)):
-        for group in _together(places, moving & (at >= 0), at, least):
+    for stay, order, out, never in (
+        (tally.after, frames, rest.since, NEVER),
+        (tally.before, frames[::-1], rest.until, 0),
+    ):
+        at = _settled(stay, len(order), options.share)
+        lasts = abs(order[-1] - order[at]) >= min(options.rest, options.still) * frame_rate
+        for group in _together(places, moving & (at >= 0) & lasts, at, least):
             # When the last of these places has come to rest; what slows down is in its last place before it stands.
             last = min(int(at[group].max()) + 1, len(order) - 1)
             if abs(int(order[-1] - order[last])) >= options.rest * frame_rate or holds(group, order[last:].tolist()):
-                out[group] = order[last] if sign > 0 else order[last] + 1
+                out[group] = order[last] if never else order[last] + 1
+        _join(places, moving & (at >= 0), at, order, out, never, holds)
     return _with_unknown(places, moving, rest)
+
+
+def _join(
+    places: Places,
+    resting: Bool[np.ndarray, " P"],
+    at: Int64[np.ndarray, " P"],
+    order: Int32[np.ndarray, " T"],
+    out: Int32[np.ndarray, " P"],
+    never: int,
+    holds: Holds,
+) -> None:
+    """Let what rests beside a changed part of the room change with it, however small and late: its hidden sides.
+
+    Somebody who pushes a crate hides a side of it, which is seen piece by piece when the crate has long stood still.
+    """
+    waiting = _together(places, resting & (out == never), at, _SMALLEST)
+    while waiting:
+        reached = [bool((out[places.beside[group]] != never).any()) for group in waiting]
+        for group in (group for group, now in zip(waiting, reached, strict=True) if now):
+            near = out[places.beside[group]]
+            if holds(group, order[at[group].max() :].tolist()):
+                out[group] = np.bincount(near[near != never]).argmax()
+        if not any(reached):
+            return
+        waiting = [group for group, now in zip(waiting, reached, strict=True) if not now]
 
 
 def _with_unknown(places: Places, moving: Bool[np.ndarray, " P"], rest: Rest) -> Rest:
@@ -90,14 +120,10 @@ def _with_unknown(places: Places, moving: Bool[np.ndarray, " P"], rest: Rest) ->
     return Rest(until, since)
 
 
-def _settled(
-    stay: Stay, frames: Int32[np.ndarray, " T"], frame_rate: float, options: SettleOptions
-) -> Int64[np.ndarray, " P"]:
-    """Return the index of the first inspected frame of each place's rest; -1 if its stay is too short or too patchy."""
-    share = stay.count / (len(frames) - stay.first)
-    long = frames[-1] - frames[stay.first] >= min(options.rest, options.still) * frame_rate
-    full = (share >= options.share) & (stay.count >= _FEWEST)
-    return np.where((stay.first >= 0) & long & full, stay.first, -1).astype(np.int64)
+def _settled(stay: Stay, frames: int, least: float) -> Int64[np.ndarray, " P"]:
+    """Return the index of the first inspected frame of each place's rest; -1 if surface is there in too few."""
+    full = (stay.count >= least * (frames - stay.first)) & (stay.count >= _FEWEST)
+    return np.where((stay.first >= 0) & full, stay.first, -1).astype(np.int64)
 
 
 def _together(
