@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from jaxtyping import Int64
 
 from meshreel.analysis.scene.background import BackgroundOptions
 from meshreel.analysis.scene.cut import CutOptions
@@ -169,8 +170,8 @@ WALL, HIDDEN = (20, 20), 5  # places of a side of a crate; so many columns are h
 
 def stand(frames: int, seen_from: int, patch: slice) -> Places:
     """A side of a crate that comes to rest in frame 6; some columns are passed in frame 2 and seen late again."""
-    lattice = Lattice(np.zeros(3), 0.05)
-    keys = np.sort(lattice.keys((np.argwhere(np.ones((*WALL, 1))) + 0.5) * 0.05))
+    lattice = Lattice(np.zeros(3), 0.02)
+    keys = np.sort(lattice.keys((np.argwhere(np.ones((*WALL, 1))) + 0.5) * 0.02))
     column = lattice.cells(keys)[:, 0]
     late = (column >= WALL[0] - HIDDEN) & np.isin(lattice.cells(keys)[:, 1], np.arange(*patch.indices(WALL[1])))
     tally = Tally(len(keys))
@@ -182,7 +183,11 @@ def stand(frames: int, seen_from: int, patch: slice) -> Places:
 
 def rests(places: Places, holds: bool) -> list[int]:
     every, options = np.ones(len(places.keys), bool), SettleOptions(rest=10.0, still=2.0)
-    rest = find_rest(places, every, range(16), 4.0, options, lambda some, _numbers: holds or len(some) > 200)
+
+    def stands(groups: list[Int64[np.ndarray, " C"]], _numbers: list[int], _times: float) -> list[bool]:
+        return [holds or len(group) > 200 for group in groups]
+
+    rest = find_rest(places, every, range(16), 4.0, options, stands)
     return np.bincount(np.minimum(rest.since, 99), minlength=100)[[7, 99]].tolist()
 
 

@@ -77,8 +77,7 @@ class Observations:
 class Stay:
     """For each place, the uninterrupted stay of surface at the end of the inspected frames; or, reversed, at the start.
 
-    A stay begins with the first frame that has surface after the place was last seen free. At the end, it begins anew
-    when surface was in less than half of its frames, as where something passed before something else came to rest.
+    A stay begins with the first frame that has surface after the place was last seen free.
     """
 
     first: Int32[np.ndarray, " P"]  # index of that frame; -1 if the place is never seen free or has no surface after it
@@ -106,9 +105,6 @@ class Tally:
         self._after.count[free] = 0
         self._after.first[occupied & (self._after.first < 0)] = self.frames
         self._after.count[occupied] += 1
-        patchy = 2 * self._after.count < self.frames - self._after.first + 1
-        self._after.first[patchy] = -1
-        self._after.count[patchy] = 0
         self.occupied += occupied
         self.free += free
         self.frames += 1

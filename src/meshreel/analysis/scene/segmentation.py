@@ -16,7 +16,7 @@ from jaxtyping import Bool, Int64
 
 from ...errors import InputError
 from ...geometry.cameras import PinholeCamera
-from ...geometry.closest_points import distances
+from ...geometry.closest_points import Surface, distances
 from ...geometry.derived_sequences import CapturedSequence, Chosen, TurnedOver, captured
 from ...geometry.topology import edge_lengths, face_normals
 from ...geometry.voxels import Lattice
@@ -33,7 +33,7 @@ from .views import ViewsOptions, place_views
 _PROBES = 3  # frames used to place the views: a guess
 _WIDTH = 4.75  # smallest width of a cell, in median distances between two frames: decision 18
 _WIDEST = 4.0  # largest width of a cell, in edge lengths: decision 18
-_STILL = 1.5  # times the noise: surface that is farther off from one frame to another has moved (decision 28)
+_LOOKS = 5  # frames that are compared to see whether something stands still: a guess
 _THINNED = 7  # one vertex in this many is measured when two frames are compared: a guess, for speed
 
 
@@ -77,10 +77,11 @@ def _by_place(frames: CapturedSequence, chosen: Sequence[int], options: SegmentO
     places = find_places(Observations(some, views, pictures, report), lattice, options.places)
     moving = moving_places(places, options.cut)
 
-    def holds(some: Int64[np.ndarray, " C"], numbers: list[int]) -> bool:
-        first, *others = (frames[numbers[k]] for k in evenly(len(numbers), _PROBES))
-        there = np.isin(lattice.keys(first.vertices), places.keys[some])
-        return all(_apart(first, other, there) <= _STILL * noise for other in others)
+    def holds(groups: Sequence[Int64[np.ndarray, " C"]], numbers: list[int], times: float) -> list[bool]:
+        probes = [frames[numbers[k]] for k in evenly(len(numbers), _LOOKS)]
+        surfaces = [Surface(probe) for probe in probes]
+        keys = [lattice.keys(probe.vertices) for probe in probes]
+        return [_stands(surfaces, [np.isin(k, places.keys[g]) for k in keys], 2 * cell, times * noise) for g in groups]
 
     rest = find_rest(places, moving, chosen, frames.frame_rate, options.settle, holds)
     looks = _color_looks(frames, chosen, color_change.SIDE) if moving.any() else None
@@ -160,12 +161,32 @@ def _looking(
     return views
 
 
-def _apart(one: Mesh, other: Mesh, chosen: Bool[np.ndarray, " V"] | None = None) -> float:
-    """Return the median distance from (chosen) vertices of one frame to another frame, m.
+def _stands(probes: Sequence[Surface], there: Sequence[Bool[np.ndarray, " V"]], reach: float, limit: float) -> bool:
+    """Return whether chosen surface of the frame with most of it is in the same place, m, in all frames that have it.
+
+    A frame has it if it has surface within `reach` of at least half of it: people in front hide things at times.
+    """
+    counts = [np.count_nonzero(chosen) for chosen in there]
+    most = int(np.argmax(counts))
+    points, seen = probes[most].mesh.vertices[there[most]], 1
+    for number, probe in enumerate(probes):
+        if number == most or counts[most] == 0:
+            continue
+        gaps = probe.distances(points)
+        near = gaps[gaps <= reach]
+        if len(near) >= len(gaps) / 2:
+            seen += 1
+            if np.median(near) > limit:
+                return False
+    return seen >= len(probes) / 2
+
+
+def _apart(one: Mesh, other: Mesh) -> float:
+    """Return the median distance from vertices of one frame to another frame, m.
 
     Of whole frames this is noise: more than half of a scene stands still. Infinite where there is no surface.
     """
-    points = one.vertices[::_THINNED] if chosen is None else one.vertices[chosen]
+    points = one.vertices[::_THINNED]
     return float(np.median(distances(points, other))) if len(points) and not other.is_empty else np.inf
 
 

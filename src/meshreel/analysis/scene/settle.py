@@ -18,11 +18,14 @@ from .places import Places, Stay
 
 NEVER = np.iinfo(np.int32).max  # frame number that means "at no time"
 _FEWEST = 3  # smallest number of inspected frames with surface in a time of rest: a guess
-_SMALLEST = 10  # places: fewer that rest beside a change stay as they are, for speed: a guess
+_BESIDE = 0.1  # m from a change to what changes with it, at most: a guess
+_SMALLEST = 10  # places: fewer stay as they are, for speed: a guess
+_STILL = 1.5  # times the noise: surface that is farther off from one frame to another has moved (decision 28)
+_STILL_BESIDE = 2.0  # the same beside a change, where cameras often see at grazing angles: a guess
 _ALIKE = 1  # largest difference, in inspected frames, between neighbours that change together: a guess
 
 
-Holds = Callable[[Int64[np.ndarray, " C"], list[int]], bool]
+Holds = Callable[[Sequence[Int64[np.ndarray, " C"]], list[int], float], Sequence[bool]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,11 +62,12 @@ def find_rest(
     numbers: Sequence[int],
     frame_rate: float,
     options: SettleOptions = SettleOptions(),
-    holds: Holds = lambda _places, _numbers: False,
+    holds: Holds = lambda groups, _numbers, _times: [False] * len(groups),
 ) -> Rest:
     """Find when moving places rest; `numbers` are the numbers of the inspected frames.
 
-    `holds` tells whether the surface at some places is where it was in all of some frames: nobody stands so still.
+    `holds` tells for sets of places whether surface there is where it was in all of some frames, but for some times the
+    noise: nobody stands so still.
     """
     rest = Rest.none(len(places.keys))
     frames, tally = np.asarray(numbers, np.int32), places.tally
@@ -77,35 +81,40 @@ def find_rest(
         for group in _together(places, moving & (at >= 0) & lasts, at, least):
             # When the last of these places has come to rest; what slows down is in its last place before it stands.
             last = min(int(at[group].max()) + 1, len(order) - 1)
-            if abs(int(order[-1] - order[last])) >= options.rest * frame_rate or holds(group, order[last:].tolist()):
+            if (
+                abs(int(order[-1] - order[last])) >= options.rest * frame_rate
+                or holds([group], order[last:].tolist(), _STILL)[0]
+            ):
                 out[group] = order[last] if never else order[last] + 1
-        _join(places, moving & (at >= 0), at, order, out, never, holds)
+        _join(places, moving & (stay.first >= 0) & (stay.count >= _FEWEST), order, out, never, holds)
     return _with_unknown(places, moving, rest)
 
 
 def _join(
     places: Places,
     resting: Bool[np.ndarray, " P"],
-    at: Int64[np.ndarray, " P"],
     order: Int32[np.ndarray, " T"],
     out: Int32[np.ndarray, " P"],
     never: int,
     holds: Holds,
 ) -> None:
-    """Let what rests beside a changed part of the room change with it, however small and late: its hidden sides.
+    """Let what rests beside a changed part of the room change with it, however small, late and seldom seen.
 
-    Somebody who pushes a crate hides a side of it, which is seen piece by piece when the crate has long stood still.
+    Somebody who pushes a crate hides a side of it; the edge of a door that is ajar is seen by one camera at times.
     """
-    waiting = _together(places, resting & (out == never), at, _SMALLEST)
-    while waiting:
-        reached = [bool((out[places.beside[group]] != never).any()) for group in waiting]
-        for group in (group for group, now in zip(waiting, reached, strict=True) if now):
-            near = out[places.beside[group]]
-            if holds(group, order[at[group].max() :].tolist()):
-                out[group] = np.bincount(near[near != never]).argmax()
-        if not any(reached):
-            return
-        waiting = [group for group, now in zip(waiting, reached, strict=True) if not now]
+    changed, own = np.flatnonzero(out != never), np.flatnonzero(resting & (out == never))
+    if not len(changed):
+        return
+    gaps, nearest = cKDTree(places.middles[changed]).query(places.middles[own], distance_upper_bound=_BESIDE)
+    own, nearest = own[gaps < np.inf], nearest[gaps < np.inf]
+    times = out[changed[nearest]]
+    for time in np.unique(times):
+        some = own[times == time]
+        label = connected(places, some, lambda a, _: np.ones(len(a), bool))
+        groups = [some[label == number] for number in np.flatnonzero(np.bincount(label, minlength=1) >= _SMALLEST)]
+        after = order[order >= time] if never else order[order < time]
+        for group, stands in zip(groups, holds(groups, after.tolist(), _STILL_BESIDE), strict=True):
+            out[group] = time if stands else never
 
 
 def _with_unknown(places: Places, moving: Bool[np.ndarray, " P"], rest: Rest) -> Rest:
