@@ -38,7 +38,7 @@ DEFAULT_QUALITY = preset_options().quality
 class Coding:
     """Flags for the arguments of `preset_options`, and for targets."""
 
-    preset: Literal["best", "paper"] = "best"
+    preset: Literal["best", "paper", "paper-literal"] = "best"
     """`best` needs the fewest bits for its quality; `paper` is section 3 of the TSMC paper."""
     effort: Literal["fast", "normal", "thorough"] = "normal"
     """`fast` encodes in half the time, at a rate within a few per cent; `thorough` tries more templates, for the

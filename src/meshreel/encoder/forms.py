@@ -41,6 +41,7 @@ class EncodedGroup:
     fidelity: Fidelity
     predicted: bool = False  # from the group before
     key: int | None = None  # the frame, counted in the group, whose surface the others follow
+    canonical: bool = field(default=False, kw_only=True)  # its reference lies in the pose of eq. 5
     companions: tuple[Companion, ...] = field(default=(), kw_only=True)  # its colours, an atlas, pictures
     lost_colors: bool = field(default=False, kw_only=True)  # its frames have colours that a reader would refuse
     digests: tuple[str, ...] = field(default=(), kw_only=True)  # lines of `--debug-digests`

@@ -194,7 +194,7 @@ class Journal:
         """Return the groups that a record tells of. Raises InputError where no encoder wrote it."""
         found = []
         try:
-            for form, count, size, layers, predicted, key, fidelity, companions, lost_colors in head["groups"]:
+            for form, count, size, layers, predicted, key, fidelity, companions, *told in head["groups"]:
                 stored = Stored(self._file, offset, int(size))
                 offset += stored.size
                 others = list[Companion]()
@@ -203,7 +203,8 @@ class Journal:
                     offset += int(length)
                 error = Fidelity(*fidelity)
                 group = EncodedGroup(Form(form), count, b"", tuple(layers), error, predicted, key, stored)
-                found.append(replace(group, companions=tuple(others), lost_colors=lost_colors))
+                lost_colors, canonical = told
+                found.append(replace(group, companions=tuple(others), lost_colors=lost_colors, canonical=canonical))
         except (KeyError, TypeError, ValueError) as error:
             text = f"{self.path}: {_named(interval)} cannot be read ({error})"
             raise InputError(f"{text}; start over with --no-resume (resume=False)") from None
@@ -266,4 +267,4 @@ def _packed(group: EncodedGroup) -> list[Any]:
     fidelity = [float(value) for value in astuple(group.fidelity)]
     others = [[int(one.kind), len(one), [int(end) for end in one.layers]] for one in group.companions]
     geometry = [int(group.form), int(group.frame_count), len(group.payload), layers, bool(group.predicted), key]
-    return [*geometry, fidelity, others, group.lost_colors]
+    return [*geometry, fidelity, others, group.lost_colors, group.canonical]

@@ -21,7 +21,9 @@ from .summary import GroupSummary
 HISTORY = "history"  # of a file that was edited: what was done, in words
 PART = "part"  # of a file that is a part: its place, its exact totals, and a digest of its options
 _KEYS = "key_frames"
+_CANONICAL = "canonical_references"
 MEANS = ("rms_m", "worst_rms_m", "d2_psnr_paper", "normal_error_deg")
+_OF_GROUPS = (_KEYS, _CANONICAL, *MEANS)
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,12 +87,18 @@ def metadata_of(
 ) -> dict[str, Any]:
     """Return the metadata of a file that is no scene; a `part` is its first frame, and the frames of the whole."""
     totals, keys = Totals.of(groups), sorted({group.key for group in groups if group.key is not None})
-    found = {"preset": options.preset, "quality": rounded(options.quality), _KEYS: keys, **totals.means}
+    found = {**chosen_options(options, groups), _KEYS: keys, **totals.means}
     if part is None:
         return found | upright(up)
     digest = hashlib.sha256(repr(asdict(options)).encode()).hexdigest()[:16]
     place = {"first_frame": part[0], "of": part[1]}
     return found | upright(up) | {PART: place | {"totals": totals.exact, "options": digest}}
+
+
+def chosen_options(options: EncoderOptions, groups: Sequence[GroupSummary]) -> dict[str, Any]:
+    """Return the preset and the quality; of the paper's recipe also how many references lie in the pose of eq. 5."""
+    found = {"preset": options.preset, "quality": rounded(options.quality)}
+    return found | ({} if options.preset == "best" else {_CANONICAL: sum(group.canonical for group in groups)})
 
 
 def joined_metadata(parts: Sequence[tuple[dict[str, Any], int]]) -> dict[str, Any]:
@@ -99,12 +107,14 @@ def joined_metadata(parts: Sequence[tuple[dict[str, Any], int]]) -> dict[str, An
     Key frames and means are joined where all parts have them: scenes have none, and cuts no means. Raises KeyError,
     TypeError or ValueError for metadata that no encoder wrote.
     """
-    dropped = {PART, ITEM} | {name for name in (_KEYS, *MEANS) if not all(name in metadata for metadata, _ in parts)}
+    dropped = {PART, ITEM} | {name for name in _OF_GROUPS if not all(name in metadata for metadata, _ in parts)}
     found = {name: value for name, value in parts[0][0].items() if name not in dropped}
     if _KEYS in found:
         firsts = accumulate((frames for _, frames in parts), initial=0)
         pairs = zip(firsts, parts, strict=False)  # the last of the firsts is the number of all frames
         found[_KEYS] = [first + key for first, (metadata, _) in pairs for key in metadata[_KEYS]]
+    if _CANONICAL in found:
+        found[_CANONICAL] = sum(metadata[_CANONICAL] for metadata, _ in parts)
     if all(name in found for name in MEANS):
         found |= Totals.added([Totals.from_metadata(metadata, frames) for metadata, frames in parts]).means
     return found
@@ -128,7 +138,7 @@ def of_all_parts(metadata: dict[str, Any]) -> dict[str, Any]:
 
     Raises KeyError or TypeError for metadata that no encoder wrote.
     """
-    found = {name: value for name, value in metadata.items() if name not in (PART, ITEM, HISTORY, _KEYS, *MEANS)}
+    found = {name: value for name, value in metadata.items() if name not in (PART, ITEM, HISTORY, *_OF_GROUPS)}
     return found | ({"options": metadata[PART]["options"], "frames": metadata[PART]["of"]} if PART in metadata else {})
 
 

@@ -5,7 +5,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import Literal
 
 from ..analysis.appearance.calibrate import CalibrationOptions
 from ..analysis.appearance.splat_fit import FitSplatsOptions
@@ -37,9 +38,27 @@ STEP = LayerCodingOptions().step
 TEXTURE_SIZES = (128, 256, 512, 1024, 2048)
 
 
+_CHOICES = {  # of PaperOptions: ours, and the paper's
+    "pose": ("fit", "mds"),
+    "fit": ("surface", "nearest"),
+    "rounding": ("shaped", "plain"),
+    "steps": ("ladder", "uniform"),
+    "cuts": (True, False),
+}
+
+
 @dataclass(frozen=True, slots=True)
 class PaperOptions:
-    """Options of the paper's recipe (`paper.py`); the defaults are those of quality 50."""
+    """Options of the paper's recipe (`paper.py`); the defaults are those of quality 50.
+
+    The first five say where the recipe is better than the paper's words, or does as they say (preset `paper-literal`).
+    """
+
+    pose: Literal["fit", "mds"] = "fit"  # of the reference: whichever fits best (decision 6); that of eq. 5
+    fit: Literal["surface", "nearest"] = "surface"  # of the reference: to the surface; to the frames' nearest vertices
+    rounding: Literal["shaped", "plain"] = "shaped"  # of Laplacian coordinates (decision 5)
+    steps: Literal["ladder", "uniform"] = "ladder"  # the best for each component; the same for all
+    cuts: bool = True  # groups in two where a reference does not follow, then Draco; False: one group always
 
     group_size: int = 10  # most frames in a group, the paper's GoF
     reference_bits: int = 14  # of the reference's lattice (paper: qp = 14)
@@ -47,7 +66,7 @@ class PaperOptions:
     target: Fidelity = Fidelity(0.0005, 7.0, 0.0008)  # that every frame should reach, relative to its own diagonal
     track: TrackOptions = field(default_factory=TrackOptions)
     reference: ReferenceOptions = field(default_factory=ReferenceOptions)
-    fit: FitOptions = field(default_factory=FitOptions)
+    surface_fit: FitOptions = field(default_factory=FitOptions)
     groups: GroupOptions = field(default_factory=GroupOptions)
     displacements: DisplacementOptions = field(default_factory=DisplacementOptions)
     intra: IntraOptions = field(default_factory=IntraOptions)
@@ -56,6 +75,21 @@ class PaperOptions:
         _check_group_size(self.group_size)
         if not 1 <= self.reference_bits <= 20 or not 0 <= self.levels <= 4:
             raise InputError(f"reference bits {self.reference_bits}, levels {self.levels}: give 1 to 20 and 0 to 4")
+        for name, known in _CHOICES.items():
+            if getattr(self, name) not in known:
+                raise InputError(f"{name} {getattr(self, name)!r}: give {' or '.join(map(repr, known))}")
+
+    @property
+    def coded(self) -> DisplacementOptions:
+        """Options of the displacements with the chosen rounding and steps."""
+        zone = 0.5 if self.rounding == "plain" else self.displacements.dead_zone
+        offsets = (0,) if self.steps == "uniform" else self.displacements.offsets
+        return replace(self.displacements, dead_zone=zone, offsets=offsets)
+
+    @property
+    def is_literal(self) -> bool:
+        """Whether all is done as the paper's words say."""
+        return all(getattr(self, name) == words for name, (_, words) in _CHOICES.items())
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,8 +199,10 @@ class EncoderOptions:
 
     @property
     def preset(self) -> str:
-        """Name of the recipe: `paper` or `best`; a file records it."""
-        return "paper" if isinstance(self.method, PaperOptions) else "best"
+        """Name of the recipe: `best`, `paper` or `paper-literal`; a file records it."""
+        if isinstance(self.method, LayersOptions):
+            return "best"
+        return "paper-literal" if self.method.is_literal else "paper"
 
 
 def _check_group_size(size: int) -> None:

@@ -15,13 +15,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float64
 
-from ..analysis.fit.surface_fit import Fit, Guides, fit_frames
+from ..analysis.fit.surface_fit import Fit, Guides, fit_frames, snap_to_vertices
 from ..analysis.groups import cut_at
-from ..analysis.reference.extraction import extract_reference, predict
+from ..analysis.reference.extraction import MDS, extract_reference, predict
 from ..analysis.reference.track import track_centers
 from ..coding.reference_mesh import CodedReference, code_reference
 from ..errors import NoReferenceError
 from ..format.budget import CostlyError
+from ..format.layout import Form
 from ..types import Centers, Mesh
 from .digests import Digests, note
 from .forms import EncodedGroup, cheaper, empty_groups, intra_only, laplacian
@@ -37,6 +38,7 @@ class Fitted:
 
     reference: CodedReference
     positions: Float64[np.ndarray, "T V 3"]  # of its base's vertices, normalised
+    canonical: bool = False  # whether it lies in the pose of eq. 5
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,12 +87,12 @@ def find_groups(interval: Interval, options: PaperOptions, stages: Stages | None
 
 def analyze(
     frames: Sequence[Mesh], centers: Centers, options: PaperOptions, stages: Stages
-) -> tuple[CodedReference, Fit]:
-    """Return the reference of a group as decoded, and its fit to every frame (paper, sections 3.3.1 and 3.3.2).
+) -> tuple[Fitted, Float64[np.ndarray, " T"]]:
+    """Return the fitted reference of a group, as decoded, and each frame's residual (paper, sections 3.3.1 and 3.3.2).
 
     Raises NoReferenceError where no surface can be made of the frames.
     """
-    reference = extract_reference(frames, centers, options.reference)
+    reference = extract_reference(frames, centers, options.reference, options.pose == "mds")
     if reference.mesh.is_empty:
         raise NoReferenceError("no surface is common to the frames")
     stages.add("reference", len(frames))
@@ -98,9 +100,21 @@ def analyze(
     if coded.base.is_empty:
         raise NoReferenceError("the reference mesh has no faces left after Draco")
     predictions = predict(reference, coded.base, centers, options.reference.deform)
-    fit = fit_frames(coded.base.faces, predictions, frames, options.fit, Guides(key=reference.key))
+    fit = _fit(coded, predictions, frames, options, reference.key)
     stages.add("fit", len(frames))
-    return coded, fit
+    return Fitted(coded, fit.positions, reference.frame == MDS), fit.residuals
+
+
+def _fit(
+    coded: CodedReference,
+    predictions: Float64[np.ndarray, "T V 3"],
+    frames: Sequence[Mesh],
+    options: PaperOptions,
+    key: int,
+) -> Fit:
+    if options.fit == "nearest":
+        return snap_to_vertices(coded.base.faces, predictions, frames)
+    return fit_frames(coded.base.faces, predictions, frames, options.surface_fit, Guides(key=key))
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,14 +131,14 @@ class _Cutting:
         if len(frames) == 1:
             return [FoundGroup(frames, None)]
         try:
-            reference, fit = analyze(frames, centers, options, stages)
+            fitted, residuals = analyze(frames, centers, options, stages)
         except NoReferenceError:
             return [FoundGroup(frames, None)]
-        note(self.digests, "reference, coded", reference.base.vertices, reference.base.faces)
-        note(self.digests, "fit", fit.positions)
-        cut = cut_at(fit.residuals / target_of(frames, options.target, self.noise).distance, options.groups)
-        if cut is None:
-            return [FoundGroup(frames, Fitted(reference, fit.positions))]
+        note(self.digests, "reference, coded", fitted.reference.base.vertices, fitted.reference.base.faces)
+        note(self.digests, "fit", fitted.positions)
+        cut = cut_at(residuals / target_of(frames, options.target, self.noise).distance, options.groups)
+        if cut is None or not options.cuts:
+            return [FoundGroup(frames, fitted)]
         if depth == 0:
             return [FoundGroup(frames, None)]
         head, tail = frames[:cut], frames[cut:]
@@ -140,9 +154,10 @@ def _encode_group(found: FoundGroup, options: PaperOptions, noise: float) -> Ite
     frames = found.frames
     if found.fitted is not None:
         with suppress(CostlyError):
-            group = laplacian(frames, found.fitted.reference, found.fitted.positions, options.displacements)
-            is_fixed = options.displacements.basis_size is not None
-            yield group if is_fixed else cheaper(frames, group, options.intra)
+            group = laplacian(frames, found.fitted.reference, found.fitted.positions, options.coded)
+            is_fixed = options.displacements.basis_size is not None or not options.cuts
+            group = group if is_fixed else cheaper(frames, group, options.intra)
+            yield replace(group, canonical=found.fitted.canonical and group.form == Form.LAPLACIAN)
             return
     while frames:
         group = intra_only(frames, target_of(frames, options.target, noise), options.intra)

@@ -31,7 +31,8 @@ from .options import (
 )
 from .target import Fidelity
 
-PRESETS = ("best", "paper")
+LITERAL_ANCHORS = 400  # anchors of a reference in `paper-literal`: the paper gives no number (guess)
+PRESETS = ("best", "paper", "paper-literal")
 COLORS = ("auto", "texture", "vertices", "none")
 EFFORTS = ("fast", "normal", "thorough")
 
@@ -75,7 +76,7 @@ def preset_options(
     method = (
         layers_options(float(quality), effort)
         if preset == "best"
-        else paper_options(float(quality), centers, basis_size)
+        else paper_options(float(quality), centers, basis_size, preset == "paper-literal")
     )
     if group_size is not None:
         method = replace(method, group_size=group_size)
@@ -87,15 +88,26 @@ def preset_options(
     return options if key_interval is None else replace(options, key_interval=key_interval)
 
 
-def paper_options(quality: float = 50.0, centers: int | None = None, basis_size: int | None = None) -> PaperOptions:
-    """Return the options of the paper's recipe at a quality."""
+def paper_options(
+    quality: float = 50.0, centers: int | None = None, basis_size: int | None = None, literal: bool = False
+) -> PaperOptions:
+    """Return the options of the paper's recipe at a quality; `literal`: without what is better than the paper's words.
+
+    What the paper leaves open is then as in its release: vertices are displaced to the nearest of a frame's.
+    """
     step = displacement_step(quality)
     centers = 2000 if centers is None else centers
-    return PaperOptions(
+    options = PaperOptions(
         track=TrackOptions(centers=centers, samples=max(45_000, 4 * centers)),
         target=Fidelity(distance=0.5 * step + 0.0001, angle=7.0, worst=step),
         reference=ReferenceOptions(vertices=reference_vertices(quality)),
         displacements=DisplacementOptions(step=step, basis_size=basis_size),
+    )
+    if not literal:
+        return options
+    anchored = replace(options.displacements, anchor_count=LITERAL_ANCHORS)
+    return replace(
+        options, pose="mds", fit="nearest", rounding="plain", steps="uniform", cuts=False, displacements=anchored
     )
 
 

@@ -42,7 +42,7 @@ from .excerpt import Excerpt, write_survey
 from .interval import Interval
 from .job import Job
 from .journal import Journal, made_of, opened
-from .metadata import metadata_of, rounded, upright
+from .metadata import chosen_options, metadata_of, rounded, upright
 from .options import EncoderOptions
 from .paper import FindGroups, find_groups
 from .parts import Parts, take_apart
@@ -223,8 +223,8 @@ def _encode_scene(job: Job, file: BinaryIO, name: str, parts: Parts) -> Summary:
     with ReelWriter(file, make_header(sequence.frame_rate, seen, {}), name) as writer:
         coded = encode_bodies(job, parts)
         groups = _added_in_order(writer, coded.groups, states, seen)
-        metadata = {"preset": options.preset, "quality": rounded(options.quality), "noise_m": rounded(parts.noise)}
-        writer.header = make_header(sequence.frame_rate, seen, metadata | upright(sequence.up))
+        metadata = {**chosen_options(options, groups), "noise_m": rounded(parts.noise), **upright(sequence.up)}
+        writer.header = make_header(sequence.frame_rate, seen, metadata)
     measured = evenly(len(sequence), MEASURED)
     psnr = _measured(sequence, file, seen.diagonal, measured)
     size, tracks = sum(map(len, states)), 1 + max(group.track for group in groups)
@@ -260,7 +260,7 @@ def _added(writer: ReelWriter, each: TrackGroup, static: list[int], unit: float)
     fidelity = group.fidelity.scaled(unit)
     colors = sum(map(len, group.companions))
     facts = (group.form, group.frame_count, len(payload), fidelity, group.predicted)
-    return GroupSummary(*facts, key, track, each.share, colors, group.lost_colors)
+    return GroupSummary(*facts, key, track, each.share, colors, group.lost_colors, group.canonical)
 
 
 def _add_companions(writer: ReelWriter, of: int, companions: Sequence[Companion], before: int | None) -> None:

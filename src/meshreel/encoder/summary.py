@@ -23,6 +23,7 @@ class GroupSummary:
     share: float = 1.0  # of the vertices of its frames that the track has, where there is no background
     colors: int = 0  # bytes of its colours and pictures, beyond `size`
     lost_colors: bool = False  # its frames have colours that a reader would refuse
+    canonical: bool = False  # its reference lies in the pose of eq. 5
 
 
 @dataclass(frozen=True, slots=True)

@@ -74,7 +74,7 @@ def compute(sequence: MeshList, options: PaperOptions) -> Stages:
     reference = extract_reference(frames, centers, options.reference)
     coded = code_reference(reference.mesh, options.reference_bits, options.levels)
     predictions = predict(reference, coded.base, centers, options.reference.deform)
-    fit = fit_frames(coded.base.faces, predictions, frames, options.fit, Guides(key=reference.key))
+    fit = fit_frames(coded.base.faces, predictions, frames, options.surface_fit, Guides(key=reference.key))
     field = np.moveaxis(fit.positions, 0, 1) - coded.base.vertices[:, None]
     payload, layers = encode_laplacian(coded, field, options.displacements)
     moved = tuple(

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float64, Int32
+from scipy.spatial import cKDTree
 
 from ... import _core
 from ...errors import InputError
@@ -116,6 +117,22 @@ def fit_frames(
     positions = fit_surfaces(faces, predictions, surfaces, options, guides)
     pairs = zip(positions, surfaces, strict=True)
     return Fit(positions, np.array([_residual(Mesh.of(fitted, faces), surface) for fitted, surface in pairs]))
+
+
+def snap_to_vertices(
+    faces: Int32[np.ndarray, "F 3"], predictions: Float64[np.ndarray, "T V 3"], frames: Sequence[Mesh]
+) -> Fit:
+    """Move each predicted vertex to the nearest vertex of its frame, as the paper's released code does.
+
+    Neighbours may fall on one vertex. An empty frame keeps the prediction and has an infinite residual.
+    """
+    positions, residuals = predictions.copy(), np.full(len(frames), np.inf)
+    for number, frame in enumerate(frames):
+        if not frame.is_empty:
+            used = frame.vertices[np.unique(frame.faces)]
+            positions[number] = used[cKDTree(used).query(predictions[number])[1]]
+            residuals[number] = _residual(Mesh(positions[number], faces), FrameSurface(frame))
+    return Fit(positions, residuals)
 
 
 def _residual(fitted: Mesh, frame: FrameSurface | None) -> float:

@@ -70,8 +70,13 @@ class Reference:
     trials: tuple[Trial, ...]
 
 
-def extract_reference(frames: Sequence[Mesh], centers: Centers, options: ReferenceOptions) -> Reference:
-    """Extract the reference of a group in the pose that fits best; its mesh is empty if all frames are."""
+def extract_reference(
+    frames: Sequence[Mesh], centers: Centers, options: ReferenceOptions, canonical: bool = False
+) -> Reference:
+    """Extract the reference of a group in the pose that fits best; its mesh is empty if all frames are.
+
+    If `canonical`, the pose is that of eq. 5, and the surface of the middle frame comes first.
+    """
     assert len(frames) == len(centers), "one pose of the centers for each frame"
     distances = largest_distances(centers)
     kin = neighbours(affinity(distances, options.centers), options.deform)
@@ -80,17 +85,18 @@ def extract_reference(frames: Sequence[Mesh], centers: Centers, options: Referen
         return Reference(Mesh.empty(), centers.positions[0], 0, 0, kin, 0.0, ())
     tracked = GroupCenters(centers.positions[full], distances, kin)
     group = Group([frames[t] for t in full], tracked, options.deform, options.fuse)
-    canonical = reference_centers(distances, group.positions[len(full) // 2], options.centers)
-    trials = _trials(group, canonical.positions, options)
+    middle = len(full) // 2
+    spread = reference_centers(distances, group.positions[middle], options.centers)
+    trials = (Trial(MDS, middle, 0.0, 0.0),) if canonical else _trials(group, spread.positions, options)
     best = _best(trials, options)
-    pose = canonical.positions if best.frame == MDS else group.positions[best.frame]
+    pose = spread.positions if best.frame == MDS else group.positions[best.frame]
     mesh = group.fused(pose, best.key, options.fuse.poisson.depth, options.vertices)
     trials = tuple(
         replace(trial, frame=MDS if trial.frame == MDS else int(full[trial.frame]), key=int(full[trial.key]))
         for trial in trials
     )
     best = _best(trials, options)
-    return Reference(mesh, pose, best.frame, best.key, kin, canonical.stress, trials)
+    return Reference(mesh, pose, best.frame, best.key, kin, spread.stress, trials)
 
 
 def predict(reference: Reference, mesh: Mesh, centers: Centers, options: DeformOptions) -> Float64[np.ndarray, "T V 3"]:

@@ -81,10 +81,8 @@ def find_rest(
         for group in _together(places, moving & (at >= 0) & lasts, at, least):
             # When the last of these places has come to rest; what slows down is in its last place before it stands.
             last = min(int(at[group].max()) + 1, len(order) - 1)
-            if (
-                abs(int(order[-1] - order[last])) >= options.rest * frame_rate
-                or holds([group], order[last:].tolist(), _STILL)[0]
-            ):
+            long = abs(int(order[-1] - order[last])) >= options.rest * frame_rate
+            if long or holds([group], order[last:].tolist(), _STILL)[0]:
                 out[group] = order[last] if never else order[last] + 1
         _join(places, moving & (stay.first >= 0) & (stay.count >= _FEWEST), order, out, never, holds)
     return _with_unknown(places, moving, rest)

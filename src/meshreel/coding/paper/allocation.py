@@ -22,7 +22,6 @@ from . import quantize
 from .laplacian import System
 
 WORTH = 1.8  # squared steps per bit, slope of the curve of distortion over rate (measured; decision 5)
-LADDER = (0, -4, -2, 2, 4)  # steps tried for a component, in eighths of an octave from the base step; a guess
 LARGE = 1000  # vertices from which on a connected part gets all six anchors (decision 5): a guess
 
 
@@ -36,6 +35,7 @@ class DisplacementOptions:
     anchor_rule: AnchorRule = AnchorRule.FARTHEST
     anchor_count: int | None = None  # None: the better of six per connected part and one in twenty vertices
     anchor_weight: int = 4  # 1 to 255
+    offsets: tuple[int, ...] = (0, -4, -2, 2, 4)  # steps tried for a component, from `step`, octaves / 8 (guess)
     dead_zone: float | None = None  # plain rounding, up from this fraction of a step, .5 to 1; None: shaped rounding
 
     def __post_init__(self) -> None:
@@ -55,7 +55,8 @@ def alternatives(
         return (replace(options, anchor_count=min(options.anchor_count, vertices)),)
     sizes = np.bincount(components(faces, vertices)) if vertices else np.zeros(0)
     few = int(np.ceil(np.minimum(sizes[sizes > 1] / LARGE, 1.0) * 6).sum())
-    many = replace(options, anchor_count=max(vertices // 20, few), anchor_weight=1, dead_zone=0.6)
+    zone = 0.6 if options.dead_zone is None else options.dead_zone
+    many = replace(options, anchor_count=max(vertices // 20, few), anchor_weight=1, dead_zone=zone)
     return replace(options, anchor_count=few), many
 
 
@@ -82,7 +83,7 @@ def allocate(
     else:
         kept = basis.energies > (0.4 * options.step) ** 2  # weaker components are not tried (guess)
     coded = _Components(field, basis.only(kept), system, options)
-    ladder = [np.full(coded.count, rung_of(options.step) + offset) for offset in LADDER]
+    ladder = [np.full(coded.count, rung_of(options.step) + offset) for offset in options.offsets]
     values = np.array([coded.value(coded.rounded(rungs), rungs, neighbours) for rungs in ladder])
     rungs = np.choose(values.argmin(axis=0), ladder) if coded.count else ladder[0]
     pays = values.min(axis=0) < coded.dropped() if options.basis_size is None else np.ones(coded.count, dtype=bool)
