@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 
 import pytest
@@ -40,7 +41,7 @@ def test_a_quality_out_of_range_is_refused_with_its_value(quality):
 
 
 def test_an_unknown_preset_is_refused_by_name():
-    with pytest.raises(InputError, match="'worst'; known: best, paper"):
+    with pytest.raises(InputError, match="'worst'; known: best, paper, paper-literal"):
         preset_options("worst")
 
 
@@ -51,6 +52,15 @@ def test_options_of_the_other_preset_are_refused_with_the_remedy():
         preset_options(centers=300)
     with pytest.raises(InputError, match=r"key interval 2: .*`paper`"):
         preset_options("paper", key_interval=2.0)
+
+
+def test_the_literal_preset_differs_from_the_paper_in_every_choice_and_is_recorded():
+    ours, words = (preset_options(name).method for name in ("paper", "paper-literal"))
+    assert all(getattr(ours, name) != getattr(words, name) for name in ("pose", "fit", "rounding", "steps", "cuts"))
+    assert ours.coded == ours.displacements
+    assert (words.coded.dead_zone, words.coded.offsets) == (0.5, (0,))
+    assert EncoderOptions(method=words).preset == "paper-literal"
+    assert EncoderOptions(method=replace(words, fit="surface")).preset == "paper"
 
 
 @pytest.mark.parametrize("seconds", [0.0, -1.0, 600.1, 1e308, float("inf"), float("nan")])

@@ -60,6 +60,14 @@ def test_a_moving_body_is_coded_by_a_reference_and_its_displacements(body):
     assert len(video[0].faces) == len(video[2].faces)  # one connectivity a group, whatever the input's
 
 
+def test_the_literal_preset_keeps_one_group_in_the_mds_pose_where_ours_cuts(tmp_path):
+    one, other = sliding_sphere(2, levels=2), [Mesh.of(BALL.vertices * [1, 0.2, 3] + [0, 4, 0], BALL.faces)] * 2
+    _, summary = decoded(MeshList((*one, *other)), tmp_path / "a.reel", quick("paper-literal"))
+    assert [(group.form, group.frame_count, group.canonical) for group in summary.groups] == [(Form.LAPLACIAN, 4, True)]
+    metadata = meshreel.open(tmp_path / "a.reel").reader.metadata
+    assert (metadata["preset"], metadata["canonical_references"]) == ("paper-literal", 1)
+
+
 def test_what_the_summary_says_of_a_group_is_what_the_file_gives(body):
     sequence, path, summary = body
     video = meshreel.open(path)

@@ -80,6 +80,7 @@ class Stream(msgspec.Struct, frozen=True, omit_defaults=True):
     background_bytes: int = 0  # share of `bytes` that is sent once
     groups: list[Group] = []
     colors: ColorBytes | None = None
+    canonical: int = 0  # groups whose reference lies in the pose of eq. 5
 
 
 class Encoding(msgspec.Struct, frozen=True, omit_defaults=True):

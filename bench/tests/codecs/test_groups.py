@@ -98,5 +98,6 @@ def test_options_that_affect_the_rate_alone_are_not_shared(preset):
     rates = with_method(replace(options, quality=3.0), displacements=displacements)
     assert shared_options(rates) == shared_options(options)
     assert shared_options(replace(options, scene=None)) != shared_options(options)
-    fit = with_method(options, fit=replace(options.method.fit, anchor=0.5))
+    name = "fit" if preset == "best" else "surface_fit"
+    fit = with_method(options, **{name: replace(getattr(options.method, name), anchor=0.5)})
     assert (shared_options(fit) == shared_options(options)) == (preset == "best")

@@ -38,15 +38,6 @@ STEP = LayerCodingOptions().step
 TEXTURE_SIZES = (128, 256, 512, 1024, 2048)
 
 
-_CHOICES = {  # of PaperOptions: ours, and the paper's
-    "pose": ("fit", "mds"),
-    "fit": ("surface", "nearest"),
-    "rounding": ("shaped", "plain"),
-    "steps": ("ladder", "uniform"),
-    "cuts": (True, False),
-}
-
-
 @dataclass(frozen=True, slots=True)
 class PaperOptions:
     """Options of the paper's recipe (`paper.py`); the defaults are those of quality 50.
@@ -75,9 +66,6 @@ class PaperOptions:
         _check_group_size(self.group_size)
         if not 1 <= self.reference_bits <= 20 or not 0 <= self.levels <= 4:
             raise InputError(f"reference bits {self.reference_bits}, levels {self.levels}: give 1 to 20 and 0 to 4")
-        for name, known in _CHOICES.items():
-            if getattr(self, name) not in known:
-                raise InputError(f"{name} {getattr(self, name)!r}: give {' or '.join(map(repr, known))}")
 
     @property
     def coded(self) -> DisplacementOptions:
@@ -89,7 +77,8 @@ class PaperOptions:
     @property
     def is_literal(self) -> bool:
         """Whether all is done as the paper's words say."""
-        return all(getattr(self, name) == words for name, (_, words) in _CHOICES.items())
+        chosen = (self.pose, self.fit, self.rounding, self.steps, self.cuts)
+        return chosen == ("mds", "nearest", "plain", "uniform", False)
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from meshreel.analysis.fit.border import border_sides
-from meshreel.analysis.fit.surface_fit import FitOptions, Guides, fit_frames, strongest_components
+from meshreel.analysis.fit.surface_fit import FitOptions, Guides, fit_frames, snap_to_vertices, strongest_components
 from meshreel.errors import InputError
 from meshreel.geometry.topology import drop_unreferenced, face_normals, subdivide_midpoint
 from meshreel.types import Mesh
@@ -150,3 +150,12 @@ def test_a_key_outside_the_frames_and_missing_predictions_are_refused() -> None:
         fit_frames(template.faces, template.vertices[None], [ball(1)], FitOptions(), Guides(key=3))
     with pytest.raises(InputError, match="1 predictions for 2 frames"):
         fit_frames(template.faces, template.vertices[None], [ball(1)] * 2, FitOptions())
+
+
+def test_snapped_vertices_are_those_of_the_frame_and_an_empty_frame_keeps_the_prediction() -> None:
+    template, frame = ball(2), stretched(ball(3))
+    fit = snap_to_vertices(template.faces, np.stack([template.vertices] * 2), [frame, Mesh.empty()])
+    there = {tuple(vertex) for vertex in frame.vertices}
+    assert all(tuple(vertex) in there for vertex in fit.positions[0])
+    assert np.array_equal(fit.positions[1], template.vertices)
+    assert 0 < fit.residuals[0] < 0.02 and fit.residuals[1] == np.inf

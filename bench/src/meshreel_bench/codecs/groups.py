@@ -70,7 +70,8 @@ def shared_options(options: EncoderOptions) -> EncoderOptions:
 
 
 def _shared(options: PaperOptions) -> PaperOptions:
-    return replace(options, displacements=PaperOptions().displacements)
+    usual = PaperOptions()
+    return replace(options, displacements=usual.displacements, rounding=usual.rounding, steps=usual.steps)
 
 
 def _key(interval: Interval, options: PaperOptions) -> bytes:

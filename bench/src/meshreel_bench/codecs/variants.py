@@ -5,10 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-from meshreel.encoder.options import EncoderOptions, LayersOptions, SceneOptions
-from meshreel.encoder.presets import preset_options
+from meshreel.encoder.options import EncoderOptions, LayersOptions, PaperOptions, SceneOptions
+from meshreel.encoder.presets import LITERAL_ANCHORS, preset_options
 from meshreel.errors import InputError
 
+UNIFORM, IN_MDS_POSE, BOTH = "one step, plain rounding", "MDS pose, no cuts", "MDS pose, no cuts, one step"
+RELEASED, LARGER = "the release's step", "reference of 5000 vertices"
+RELEASED_STEP = 5e-5  # of a diagonal: the release has 1e-4 m, and people's diagonals are about 2 m
 Change = Callable[[EncoderOptions], EncoderOptions]
 
 
@@ -21,6 +24,23 @@ def _layers(change: Callable[[LayersOptions], LayersOptions]) -> Change:
         return replace(options, method=change(options.method))
 
     return changed
+
+
+def _paper(change: Callable[[PaperOptions], PaperOptions]) -> Change:
+    """A change of the paper's recipe."""
+
+    def changed(options: EncoderOptions) -> EncoderOptions:
+        if not isinstance(options.method, PaperOptions):
+            raise InputError("this variant changes the paper's recipe; use preset `paper` or `paper-literal`")
+        return replace(options, method=change(options.method))
+
+    return changed
+
+
+def _plain(options: PaperOptions) -> PaperOptions:
+    """One step, plain rounding, and as many anchors as `paper-literal` has."""
+    anchored = replace(options.displacements, anchor_count=LITERAL_ANCHORS)
+    return replace(options, rounding="plain", steps="uniform", displacements=anchored)
 
 
 def _background_from_meshes(options: EncoderOptions) -> EncoderOptions:
@@ -37,6 +57,11 @@ VARIANTS: dict[str, Change] = {
     "errors along the surface count": _layers(lambda o: replace(o, layers=replace(o.layers, tangential=1.0))),
     "groups alone": _layers(lambda o: replace(o, predict=False)),
     "no tails": _layers(lambda o: replace(o, tails=None)),
+    UNIFORM: _paper(_plain),
+    IN_MDS_POSE: _paper(lambda o: replace(o, pose="mds", cuts=False)),
+    BOTH: _paper(lambda o: replace(_plain(o), pose="mds", cuts=False)),
+    RELEASED: _paper(lambda o: replace(o, displacements=replace(o.displacements, step=RELEASED_STEP))),
+    LARGER: _paper(lambda o: replace(o, reference=replace(o.reference, vertices=5000))),
     "background from meshes": _background_from_meshes,
 }
 

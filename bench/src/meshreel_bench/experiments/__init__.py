@@ -13,6 +13,7 @@ EXPERIMENTS: dict[str, Study] = {
     "table1": figure6.TABLE_1,
     "table2": figure6.TABLE_2,
     "table3": splats.TABLE_3,
+    "ablation_paper": ablations.PAPER,
     "ablation_centers": ablations.CENTERS,
     "ablation_gof": ablations.GOF,
     "ablation_basis": ablations.BASIS,

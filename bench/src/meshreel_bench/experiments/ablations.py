@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from ..codecs.variants import BOTH, IN_MDS_POSE, RELEASED, UNIFORM
 from ..names import BEST, TSMC
-from .study import Study, Sweep
+from ..rows import Options
+from .study import D2, MASKED, NORMALS, SYMMETRIC, Bound, Measure, Needs, Study, Sweep, Which
 
+LITERAL_PRESET = "paper-literal"
+POSES = (Measure("canonical_groups", "groups in the MDS pose"), Measure("draco_frames", "frames of Draco", sign=-1))
 M = {"basis_size": (2, 5, 10)}
 CENTERS = Study(
     title="Number of volume centers, TSMC",
@@ -32,6 +36,46 @@ BASIS = Study(
         for quality in (20.0, 50.0, 80.0)
     ],
     anchor=TSMC,
+)
+RELEASE = {3: (2.23, 51.87), 5: (3.29, 54.35), 10: (5.78, 56.40), 30: (15.46, 59.02)}  # its Mbps and D2, dB, by m
+AT_10: Options = {"preset": "paper", "basis_size": 10}
+M_IS_10 = {name: {"basis_size": (10,)} for name in ("crane60", "procedural_room")}
+LITERAL = f"meshreel {LITERAL_PRESET} m, quality 50"
+PAPER = Study(
+    title="The paper as written: preset `paper` put back step by step",
+    sequences=("dancer", "crane60", "procedural_room"),
+    sweeps=(
+        Sweep(
+            "meshreel",
+            {"basis_size": (3, 5, 10, 30)},
+            {"preset": "paper"},
+            M_IS_10,
+        ),
+        *(Sweep("meshreel", {}, AT_10 | {"variant": name}) for name in (UNIFORM, IN_MDS_POSE, BOTH)),
+        Sweep(
+            "meshreel",
+            {"basis_size": (3, 5, 10, 30)},
+            {"preset": LITERAL_PRESET},
+            M_IS_10,
+        ),
+        Sweep("meshreel", {}, {"preset": LITERAL_PRESET, "basis_size": 10, "variant": RELEASED}),
+    ),
+    measures=(D2, MASKED, SYMMETRIC, NORMALS, *POSES),
+    frames={"crane60": 30, "procedural_room": 30},
+    promises=tuple(
+        Needs(
+            f"dancer, m = {m}: as written, less rate than the released code at its D2",
+            Which("dancer", LITERAL),
+            Bound("d2_psnr_paper", quality, "dB"),
+            "mbps",
+            mbps,
+        )
+        for m, (mbps, quality) in RELEASE.items()
+    ),
+    notes=(
+        "`paper-literal` is the paper's recipe word by word: the MDS pose, groups of ten frames without cuts, one step",
+        "for all components, plain rounding; a vertex is displaced to the nearest of the frame's, as the release does.",
+    ),
 )
 PARTS = (
     "no shared detail",

@@ -170,7 +170,7 @@ def _stream(codec: Codec, data: bytes, frames: int) -> Stream:
     once = sum(chunk.size for chunk in reader.chunks if chunk.kind == ChunkKind.STATIC)
     if isinstance(codec, BackgroundDracoCodec):
         once = codec.background_bytes(data)
-    return Stream(len(data), frames, once, groups, color_bytes(reader))
+    return Stream(len(data), frames, once, groups, color_bytes(reader), reader.metadata.get("canonical_references", 0))
 
 
 def _segmentation(known: Dataset) -> dict[str, float | None]:

@@ -93,6 +93,12 @@ def _of_groups(row: Row) -> tuple[float, int] | None:
     return (float(np.mean([group.frames for group in groups])), drawn) if groups else None
 
 
+def _drawn_frames(row: Row) -> float | None:
+    """Return how many frames, over all tracks, are of Draco."""
+    groups = row.stream.groups if row.stream else []
+    return sum(group.frames for group in groups if group.form == "draco") if groups else None
+
+
 def _at_rest(seconds: float | None, reference_s: float | None) -> float | None:
     """Return a time as it would be on the machine at rest, by the fixed loop's time beside it."""
     return None if seconds is None or reference_s is None else seconds * REST_S / reference_s
@@ -166,6 +172,8 @@ DERIVED: dict[str, Callable[[Row], float | None]] = {
     "border_step_db": _border_step,
     "group_frames": lambda row: found[0] if (found := _of_groups(row)) else None,
     "draco_groups": lambda row: found[1] if (found := _of_groups(row)) else None,
+    "draco_frames": _drawn_frames,
+    "canonical_groups": lambda row: row.stream.canonical if row.stream else None,
     "encode_s": lambda row: row.encoding.s if row.encoding else None,
     "encode_s_at_rest": lambda row: _at_rest(row.encoding.s, row.encoding.reference_s) if row.encoding else None,
     "encode_mb": lambda row: row.encoding.peak_rss_mb if row.encoding else None,

@@ -18,7 +18,7 @@ from .places import Places, Stay
 
 NEVER = np.iinfo(np.int32).max  # frame number that means "at no time"
 _FEWEST = 3  # smallest number of inspected frames with surface in a time of rest: a guess
-_BESIDE = 0.1  # m from a change to what changes with it, at most: a guess
+_BESIDE = 0.1  # m from a change to what is looked at as a part of it, step by step: a guess
 _SMALLEST = 10  # places: fewer stay as they are, for speed: a guess
 _STILL = 1.5  # times the noise: surface that is farther off from one frame to another has moved (decision 28)
 _STILL_BESIDE = 2.0  # the same beside a change, where cameras often see at grazing angles: a guess
@@ -100,19 +100,21 @@ def _join(
 
     Somebody who pushes a crate hides a side of it; the edge of a door that is ajar is seen by one camera at times.
     """
-    changed, own = np.flatnonzero(out != never), np.flatnonzero(resting & (out == never))
-    if not len(changed):
-        return
-    gaps, nearest = cKDTree(places.middles[changed]).query(places.middles[own], distance_upper_bound=_BESIDE)
-    own, nearest = own[gaps < np.inf], nearest[gaps < np.inf]
-    times = out[changed[nearest]]
-    for time in np.unique(times):
-        some = own[times == time]
-        label = connected(places, some, lambda a, _: np.ones(len(a), bool))
-        groups = [some[label == number] for number in np.flatnonzero(np.bincount(label, minlength=1) >= _SMALLEST)]
-        after = order[order >= time] if never else order[order < time]
-        for group, stands in zip(groups, holds(groups, after.tolist(), _STILL_BESIDE), strict=True):
-            out[group] = time if stands else never
+    waiting = resting & (out == never)
+    while (out != never).any():
+        changed, own = np.flatnonzero(out != never), np.flatnonzero(waiting)
+        gaps, nearest = cKDTree(places.middles[changed]).query(places.middles[own], distance_upper_bound=_BESIDE)
+        own, times = own[gaps < np.inf], out[changed[nearest[gaps < np.inf]]]
+        if not len(own):
+            return
+        waiting[own] = False
+        for time in np.unique(times):
+            some = own[times == time]
+            label = connected(places, some, lambda a, _: np.ones(len(a), bool))
+            groups = [some[label == number] for number in np.flatnonzero(np.bincount(label, minlength=1) >= _SMALLEST)]
+            after = order[order >= time] if never else order[order < time]
+            for group, stands in zip(groups, holds(groups, after.tolist(), _STILL_BESIDE), strict=True):
+                out[group] = time if stands else never
 
 
 def _with_unknown(places: Places, moving: Bool[np.ndarray, " P"], rest: Rest) -> Rest:
