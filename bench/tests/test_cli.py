@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import shlex
 from pathlib import Path
@@ -9,11 +10,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 from meshreel_bench.cli import describe, main, make_app, operating_point
-from meshreel_bench.rows import append_row
+from meshreel_bench.rows import append_row, read_rows
 from msgspec.structs import replace
 
 from bench.tests.made_up import failed, row
 from meshreel.errors import InputError
+from meshreel.geometry.cameras import pack_cameras
+from meshreel.io.write import write_mesh
+from meshreel.metrics.viewpoints import Box, ViewOptions, views_around
+from meshreel.types import Texture
 from tests.spheres import sliding_sphere
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "codecs.md"
@@ -37,6 +42,24 @@ def data(tmp_path):
     balls = sliding_sphere(2, levels=1)
     np.savez(tmp_path / "own.npz", vertices=np.stack([mesh.vertices for mesh in balls]), faces=balls[0].faces)
     return tmp_path
+
+
+def test_data_of_the_papers_authors_are_read_as_they_release_them(bench, tmp_path):
+    """Textured meshes and cameras, one a file."""
+    places = views_around(Box.of(sliding_sphere(1, levels=1)), ViewOptions(width=90, height=160))
+    for name in ("answering", "synthetic"):
+        (tmp_path / name / "meshes").mkdir(parents=True)
+        for number, mesh in enumerate(sliding_sphere(2, levels=1)):
+            uv = np.zeros((len(mesh.faces), 3, 2), np.float32)
+            textured = dataclasses.replace(mesh, uv=uv, texture=Texture.of(np.full((4, 4, 3), 90, np.uint8)))
+            write_mesh(textured, tmp_path / name / "meshes" / f"mesh_{number:02}.obj")
+        for number, place in enumerate(places):
+            (tmp_path / name / f"view_{number:02}.json").write_bytes(pack_cameras([place]))
+    rows = tmp_path / "rows.jsonl"
+    code, found, said = bench("run", "table1", "-o", rows, "--data", tmp_path, "--only", "draco", "--json")
+    assert code == 0 and found["failed"] == 0 and found["rows"] == 10 and "answering draco qp 6: " in said
+    known = {(one.point.sequence, one.metrics["ssim_masked"] > 0.5) for one in read_rows(rows)}
+    assert known == {("answering", True), ("synthetic", True)}
 
 
 def test_operating_points_on_a_users_sequence_are_measured_once_and_reported(bench, data):

@@ -39,6 +39,13 @@ def test_frames_come_in_the_order_of_their_numbers(tmp_path: Path) -> None:
     assert names_of(open_sequence(tmp_path)) == ["mesh_1.obj", "mesh_2.obj", "mesh_10.obj"]
 
 
+def test_a_folder_whose_frames_are_in_a_folder_meshes_stands_for_it(tmp_path: Path) -> None:
+    put(tmp_path, "meshes/mesh_01.obj", "meshes/mesh_00.obj", "view_00.json", "render/00_v_00.jpg")
+    assert names_of(open_sequence(tmp_path)) == ["mesh_00.obj", "mesh_01.obj"]
+    put(tmp_path, "own.obj")
+    assert names_of(open_sequence(tmp_path)) == ["own.obj"]
+
+
 def test_the_last_number_that_varies_is_the_frame_number(tmp_path: Path) -> None:
     put(tmp_path, "take2_009_v1.obj", "take2_010_v1.obj", "take2_0008_v1.obj")
     assert names_of(open_sequence(tmp_path)) == ["take2_0008_v1.obj", "take2_009_v1.obj", "take2_010_v1.obj"]

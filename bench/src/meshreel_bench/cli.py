@@ -19,7 +19,7 @@ from meshreel.cli.flags import Reading
 from meshreel.errors import InputError
 
 from .codecs import codec_names, codec_version, make_codec
-from .datasets import Store
+from .datasets import Store, released_in
 from .experiments import EXPERIMENTS, find_experiment
 from .experiments.study import Sweep as Points
 from .measure.runner import Sweep, run_points
@@ -58,7 +58,8 @@ class Selection:
     """Which points, of which data."""
 
     data: Path = DATA
-    """The folder of the benchmark's sequences."""
+    """The folder of the benchmark's sequences, or of those that TSMC's authors release: then of these, where there are
+    any, as answering/meshes/mesh_00.obj with answering/view_00.json."""
     small: bool = False
     """A point of each codec on a few procedural frames: minutes, and no data."""
     only: Annotated[tuple[str, ...], Parameter(consume_multiple=True, negative="")] = ()
@@ -70,12 +71,12 @@ class Selection:
 
     def points(self, name: str, ssim: bool) -> list[Point]:
         """Return the points of an experiment. Raises InputError where there are none."""
-        study = find_experiment(name)
-        others = [each for each in self.on if each not in study.sequences]
+        study, on = find_experiment(name), self.on or (() if self.small else released_in(self.data))
+        others = [each for each in on if each not in study.sequences]
         added = [Points(codec, {}, options) for codec, options in map(operating_point, self.add)]
-        points = list(study.extended(self.on if others else [], added).points(self.small))
+        points = list(study.extended(on if others else [], added).points(self.small))
         points = [point for point in points if point.codec in (self.only or [point.codec])]
-        points = [point for point in points if point.sequence in (self.on or [point.sequence])]
+        points = [point for point in points if point.sequence in (on or [point.sequence])]
         if not points:
             known = list(dict.fromkeys(point.codec for point in study.points(self.small)))
             of = f"{name}{' --small' if self.small else ''}"

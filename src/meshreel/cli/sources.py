@@ -100,8 +100,9 @@ class Masking:
     device: str = "cpu"
     """Device of SAM3 in torch's notation: cpu, cuda, cuda:1."""
     views: Path | None = None
-    """File of Open3D pinhole cameras of one size that look at the scene. By default, masks are made of the pictures of
-    a rig's colour cameras; without any, views are placed, and masks made of their normals."""
+    """File of Open3D pinhole cameras of one size that look at the scene, or a folder of view_00.json and so on. By
+    default, masks are made of the pictures of a rig's colour cameras; without any, views are placed, and masks made of
+    their normals."""
     up: Annotated[Up | None, Parameter(allow_leading_hyphen=True)] = None
     """Axis that points up, for players and for the pictures of placed views. By default the axis recorded with the
     cameras, or y."""

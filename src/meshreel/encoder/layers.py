@@ -16,6 +16,7 @@ from jaxtyping import Float64
 
 from ..analysis.fit.frame import FrameSurface
 from ..analysis.plan import Plan, PlannedGroup, best_plan, next_key, rival
+from ..coding.group import payload_bytes_by_purpose
 from ..format.layout import Form
 from .candidates import Ahead, Candidate, Followed
 from .digests import note
@@ -30,6 +31,7 @@ GOOD = 1.4  # targets: what leaves more is planned anew, though it stands still 
 STILL = 1.1  # times its usual residual that a template may leave without a new fit (guess)
 BY_RATE = 1.33  # the squared error falls with this power of the rate: 4 dB a doubling (decision 13)
 ANGLE_BY_RATE = 0.36  # the normal error falls with this power of the rate (measured on four bodies: decision 24)
+PATCHED = 0.5  # share of the bytes of a predicted group from which on a template of its own is tried (guess)
 LEAST = 1e-30  # error: its logarithm is finite
 Coded = tuple[EncodedGroup, Followed | None]  # a group, and the template that the next may begin with
 
@@ -153,6 +155,10 @@ class _Planner:
         numbers = ahead.numbers[each.first : each.stop]
         tried = [candidate, *(one for one in candidate.others(ahead) if one.follows(ahead, numbers))]
         coded = [self._with(ahead, numbers, coder, one) for one in tried]
+        if candidate.before is not None and ahead.noise > 0 and _is_patched(coded[0][0]):
+            fresh = Candidate.of_key(ahead, numbers[len(numbers) // 2], self._options)
+            fresh.follow(ahead)
+            coded += [self._with(ahead, numbers, coder, fresh)] if fresh.follows(ahead, numbers) else []
         return min(coded, key=lambda one: _cost([one], len(numbers), ahead.noise > 0))
 
     def _with(self, ahead: Ahead, numbers: range, coder: GroupCoder, candidate: Candidate) -> Coded:
@@ -170,6 +176,15 @@ class _Planner:
     def _coder(self, ahead: Ahead, some: slice) -> GroupCoder:
         chosen, digests = ahead.surfaces[some], ahead.digests
         return GroupCoder(chosen, ahead.target, ahead.noise, self._options, self._dearer, digests=digests)
+
+
+def _is_patched(group: EncodedGroup) -> bool:
+    """Return whether most of a group's bytes repeat, frame by frame, surface that its template lacks.
+
+    Noisy bodies show sides of themselves that the template's frames did not have: a door that opens.
+    """
+    sizes = payload_bytes_by_purpose(group.payload)
+    return group.form == Form.LAYERS and sizes.get("patches", 0) > PATCHED * len(group.payload)
 
 
 def _known(ahead: Ahead, candidates: Sequence[Candidate]) -> tuple[Float64[np.ndarray, "C T"], list[bool]]:

@@ -17,6 +17,7 @@ from ..errors import InputError
 from .meshes import EXTENSIONS
 from .remote import Place, Remote, located
 
+MESHES = "meshes"  # name of a folder of frames beside the cameras that look at them
 _MAGIC = re.compile(r"[*?\[]")
 _LAST = re.compile(r"(\d+)(?!.*\d)")
 _P = TypeVar("_P", bound=PurePath)
@@ -37,7 +38,10 @@ def is_pattern(name: str) -> bool:
 
 
 def find_frames(source: str | Path | Iterable[str | Path]) -> tuple[tuple[Place, ...], tuple[str, ...]]:
-    """Return the frame files of a source and warnings about their order. A list keeps its order."""
+    """Return the frame files of a source and warnings about their order. A list keeps its order.
+
+    A folder without mesh files whose frames are in a folder `meshes`, as TSMC's authors release theirs, stands for it.
+    """
     if not isinstance(source, str | Path):
         return tuple(located(path) for path in source), ()
     path = located(source)
@@ -48,7 +52,9 @@ def find_frames(source: str | Path | Iterable[str | Path]) -> tuple[tuple[Place,
     except OSError as error:  # a name that is too long, or a folder without permission
         raise InputError(f"{source}: cannot be read ({error.strerror}); check the path and its rights") from None
     if is_folder:
-        return _ordered(path, path, _of_one_kind(path))
+        inner = path / MESHES
+        folder = inner if inner.is_dir() and not any(map(_is_mesh, path.iterdir())) else path
+        return _ordered(folder, folder, _of_one_kind(folder))
     if path.exists():
         return (path,), ()
     if is_pattern(str(source)):

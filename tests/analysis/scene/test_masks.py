@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from meshreel.analysis.scene.masks import CAMERAS, ImageMasks, Masker, one_size, read_views
+from meshreel.analysis.scene.masks import CAMERAS, ImageMasks, Masker, one_size, read_view_file, read_views
 from meshreel.analysis.scene.pictures import write_views
 from meshreel.analysis.scene.segmentation import SegmentOptions, scene_views, segment_by
 from meshreel.analysis.scene.views import ViewsOptions, place_views
@@ -124,3 +124,14 @@ def test_views_are_placed_by_frames_that_have_a_surface_and_given_ones_are_taken
     assert scene_views(frames, replace(options, cameras=VIEWS)) == VIEWS
     with pytest.raises(InputError, match="has a surface"):
         scene_views(MeshList((Mesh.empty(),) * 2), options)
+
+
+def test_a_folder_of_cameras_one_a_file_is_read_in_the_order_of_their_numbers(tmp_path: Path):
+    with pytest.raises(InputError, match=r"holds no view_\*\.json; give .*folder"):
+        read_view_file(tmp_path)
+    for number, view in zip((2, 10, 1), VIEWS, strict=True):
+        (tmp_path / f"view_{number}.json").write_bytes(pack_cameras([view]))
+    assert read_view_file(tmp_path) == (VIEWS[2], VIEWS[0], VIEWS[1])
+    (tmp_path / "view_3.json").write_bytes(pack_cameras([replace(VIEWS[0], width=99)]))
+    with pytest.raises(InputError, match="99 x 60"):
+        read_view_file(tmp_path)

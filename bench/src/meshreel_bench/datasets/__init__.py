@@ -13,6 +13,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from meshreel.analysis.scene.masks import VIEW_FILES, read_view_file
 from meshreel.capture.procedural import SoftBodiesOptions, soft_bodies
 from meshreel.capture.recording import open_recording
 from meshreel.errors import InputError
@@ -20,7 +21,7 @@ from meshreel.geometry.cameras import PinholeCamera
 from meshreel.geometry.color_views import ColorFrames
 from meshreel.geometry.derived_sequences import Chosen
 from meshreel.geometry.topology import weld
-from meshreel.io.file_names import is_pattern
+from meshreel.io.file_names import MESHES, is_pattern
 from meshreel.io.sequence import FileSequence, SequenceOptions, open_sequence
 from meshreel.types import MeshSequence
 
@@ -51,6 +52,7 @@ REMESHED = {  # new connectivity in every frame: of a body, its first frames
     "samba60": ("samba", 60, RemeshOptions()),
     "dancer160k": ("dancer", 4, RemeshOptions(vertices=160_000, levels=2)),
 }
+RELEASED = ("answering", "drinking", "arena", "sitting", "synthetic")  # folders of the data of TSMC's authors
 NAMES = (DEMO, *SHAPES, SYNTHETIC, *SCENES, ROOM3, PROCEDURAL, WALKER, *RECORDINGS, *REMESHED)
 # Endings of names: the same sequence in another order, of the wanted length.
 PLAYED: dict[str, Callable[[MeshSequence, int], MeshSequence]] = {
@@ -103,7 +105,9 @@ class Store:
             body, most, options = REMESHED[name]
             source = _open_files(body, self.data, min(frames or most, most))
             return Dataset(RemeshedSequence(source, None if self.cache is None else self.cache / name, options))
-        return Dataset(_open_files(name, self.data, frames, self.own))
+        views = _found(name, self.data)
+        released = views.is_dir() and any(views.glob(VIEW_FILES))
+        return Dataset(_open_files(name, self.data, frames, self.own), read_view_file(views) if released else ())
 
     def digest(self, name: str) -> str | None:
         """Return a digest of a user's sequence and its options of reading; None for benchmark data."""
@@ -117,6 +121,11 @@ class Store:
         files = [path] if path.exists() else open_sequence(path).files
         read = (*map(checksum, files), self.own.frame_rate, self.own.frames, self.own.scale)
         return hashlib.sha256(repr(read).encode()).hexdigest()
+
+
+def released_in(data: Path) -> tuple[str, ...]:
+    """Return which sequences of TSMC's authors a folder holds."""
+    return tuple(name for name in RELEASED if (data / name / MESHES).is_dir())
 
 
 def forth_and_back(source: MeshSequence, count: int) -> Chosen:

@@ -15,6 +15,7 @@ from jaxtyping import Bool, UInt8
 from ...errors import InputError
 from ...geometry.cameras import PinholeCamera, unpack_cameras
 from ...geometry.raycast import Seen
+from ...io.file_names import last_number
 from ...io.mask_pictures import find_masks, read_mask
 from ...io.read import read_file
 from .color_looks import ColorLooks
@@ -82,8 +83,19 @@ def read_views(folder: Path) -> tuple[PinholeCamera, ...]:
     return read_view_file(folder / CAMERAS, "the cameras of the masks, as Open3D pinhole camera JSON")
 
 
+VIEW_FILES = "view_*.json"  # as TSMC's authors release the cameras of a scene
+
+
 def read_view_file(path: Path, wanted: str = "Open3D pinhole camera JSON") -> tuple[PinholeCamera, ...]:
-    """Read views, all of one size, from a file. Raises InputError, which says what is `wanted`, if it is invalid."""
+    """Read views, all of one size, from a file, or from the files `view_00.json` and so on of a folder.
+
+    Raises InputError, which says what is `wanted`, if they are invalid.
+    """
+    if path.is_dir():
+        files = sorted(path.glob(VIEW_FILES), key=lambda file: (last_number(file.stem) or 0, file.name))
+        if not files:
+            raise InputError(f"{path}: holds no {VIEW_FILES}; give {wanted}, or a folder with such files")
+        return one_size([view for file in files for view in read_view_file(file, wanted)], str(path))
     try:
         data = read_file(path)
     except OSError as error:
