@@ -75,7 +75,7 @@ def extract_reference(
 ) -> Reference:
     """Extract the reference of a group in the pose that fits best; its mesh is empty if all frames are.
 
-    If `canonical`, the pose is that of eq. 5, and the surface of the middle frame comes first.
+    If `canonical`, the pose is that of eq. 5; which frame's surface comes first is still chosen by the fit.
     """
     assert len(frames) == len(centers), "one pose of the centers for each frame"
     distances = largest_distances(centers)
@@ -85,9 +85,8 @@ def extract_reference(
         return Reference(Mesh.empty(), centers.positions[0], 0, 0, kin, 0.0, ())
     tracked = GroupCenters(centers.positions[full], distances, kin)
     group = Group([frames[t] for t in full], tracked, options.deform, options.fuse)
-    middle = len(full) // 2
-    spread = reference_centers(distances, group.positions[middle], options.centers)
-    trials = (Trial(MDS, middle, 0.0, 0.0),) if canonical else _trials(group, spread.positions, options)
+    spread = reference_centers(distances, group.positions[len(full) // 2], options.centers)
+    trials = _trials(group, spread.positions, options, canonical)
     best = _best(trials, options)
     pose = spread.positions if best.frame == MDS else group.positions[best.frame]
     mesh = group.fused(pose, best.key, options.fuse.poisson.depth, options.vertices)
@@ -104,11 +103,18 @@ def predict(reference: Reference, mesh: Mesh, centers: Centers, options: DeformO
     return moved_to(mesh, reference.pose, centers.positions, reference.neighbours, options)
 
 
-def _trials(group: Group, canonical: Float64[np.ndarray, "K 3"], options: ReferenceOptions) -> tuple[Trial, ...]:
-    """Try the poses of some key frames, each with its own surface first, then the MDS pose with the best of these."""
+def _trials(
+    group: Group, canonical: Float64[np.ndarray, "K 3"], options: ReferenceOptions, alone: bool
+) -> tuple[Trial, ...]:
+    """Try the poses of some key frames, each with its own surface first, then the MDS pose with the best of these.
+
+    If `alone`, only the MDS pose is tried, with the surface of each of them first.
+    """
     surfaces = [FrameSurface(frame) for frame in group.frames]
     count = min(options.keys, len(group.frames))
     keys = sorted({int(key) for key in (np.arange(count) + 0.5) * len(group.frames) / count})
+    if alone:
+        return tuple(_trial(group, surfaces, _Attempt(MDS, key, canonical), options) for key in keys)
     trials = [_trial(group, surfaces, _Attempt(key, key, group.positions[key]), options) for key in keys]
     if len(group.frames) > 1:
         best = sorted(trials, key=_misfit)[: options.canonical_keys]
