@@ -254,6 +254,9 @@ class SurfaceTree:
     def closest(
         self, queries: Float64[np.ndarray, "N 3"], reach: float, guesses: Int32[np.ndarray, " N"] | None = None
     ) -> tuple[Int32[np.ndarray, " N"], Float64[np.ndarray, "N 3"]]: ...
+    def cast(
+        self, origins: Float64[np.ndarray, "M 3"], ways: Float64[np.ndarray, "N 3"], weighted: bool
+    ) -> tuple[Int32[np.ndarray, " N"], Float64[np.ndarray, " N"], Float64[np.ndarray, "K 3"]]: ...
 
 class FitTarget:
     def __init__(

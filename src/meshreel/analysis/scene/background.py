@@ -15,7 +15,7 @@ from jaxtyping import Float64, Int64
 
 from ...geometry.closest_points import Surface
 from ...geometry.topology import without_fragments
-from ...geometry.tsdf import SIDE, extract, fill_grid
+from ...geometry.tsdf import SIDE, Grid, extract
 from ...geometry.voxels import Lattice, around, distinct, spread
 from ...types import Mesh
 
@@ -98,7 +98,7 @@ class _Sums:
         at = (which, inside[:, 2], inside[:, 1], inside[:, 0])
         distances[at] = means[known] / (_REACH * self._lattice.size)
         weights[at] = 1.0
-        mesh = extract(fill_grid(self._lattice.size, blocks.astype(np.int32), distances, weights), 0.5)
+        mesh = extract(Grid.of(self._lattice.size, blocks.astype(np.int32), distances, weights), 0.5)
         return Mesh(mesh.vertices + self._origin, mesh.faces)
 
     def _signed(self, mesh: Mesh) -> tuple[Int64[np.ndarray, " M"], Float64[np.ndarray, " M"]]:
