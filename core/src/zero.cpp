@@ -35,6 +35,23 @@ private:
     static int number(int a, int b) { return 8 * ((a ^ b) >> 1) + std::min(a, b); }  // of the edge between two corners
     static Edge edge(int number) { return {number % 8, number / 8}; }
 
+    static bool share_face(Edge a, Edge b) {
+        const int every = a.corner & b.corner, some = a.corner | b.corner | 1 << a.axis | 1 << b.axis;
+        return every != 0 || some != 7;
+    }
+
+    // The corner of a loop whose diagonals lie in no face of the cube, where the next cube may have the same ones.
+    static size_t apex_of(const std::vector<int>& loop) {
+        const size_t count = loop.size();
+        for (size_t apex = 0; apex < count; ++apex) {
+            bool inner = true;
+            for (size_t k = 2; k + 1 < count; ++k)
+                inner = inner && !share_face(edge(loop[apex]), edge(loop[(apex + k) % count]));
+            if (inner) return apex;
+        }
+        return 0;
+    }
+
     // Each face of the cube leads from where the surface goes in to where it comes out; the ways join to loops.
     static Triangles triangulate(int inside) {
         int next[24];
@@ -54,16 +71,17 @@ private:
             }
         Triangles triangles;
         for (int first = 0; first < 24; ++first) {
-            if (next[first] < 0) continue;
-            int second = next[first];
-            next[first] = -1;
-            while (next[second] != first) {
-                const int third = next[second];
-                triangles.push_back({edge(first), edge(second), edge(third)});
-                next[second] = -1;
-                second = third;
+            std::vector<int> loop;
+            for (int at = first; next[at] >= 0;) {
+                loop.push_back(at);
+                const int after = next[at];
+                next[at] = -1;
+                at = after;
             }
-            next[second] = -1;
+            const size_t count = loop.size(), apex = apex_of(loop);
+            for (size_t k = 1; k + 1 < count; ++k)
+                triangles.push_back(
+                    {edge(loop[apex]), edge(loop[(apex + k) % count]), edge(loop[(apex + k + 1) % count])});
         }
         return triangles;
     }
