@@ -13,6 +13,7 @@ namespace {
 
 constexpr double kFarthest = 1e8;     // blocks from the origin: their voxels have whole numbers of 32 bits
 constexpr size_t kRemembered = 4096;  // blocks met lately, which are not noted again
+constexpr size_t kApart = 4;          // rows and columns between pixels that touch blocks: single ones may fly
 constexpr double kStride = 0.25;      // of a block, along a ray
 constexpr size_t kSide = MR_BLOCK_SIDE;
 
@@ -27,8 +28,8 @@ public:
         const Vec right{picture.ways[0], picture.ways[3], picture.ways[6]};
         const Vec down{picture.ways[1], picture.ways[4], picture.ways[7]};
         const Vec ahead{picture.ways[2], picture.ways[5], picture.ways[8]};
-        for (size_t r = 0; r < picture.rows; ++r)
-            for (size_t c = 0; c < picture.columns; ++c) {
+        for (size_t r = 0; r < picture.rows; r += kApart)
+            for (size_t c = 0; c < picture.columns; c += kApart) {
                 const double depth = picture.depths[r * picture.columns + c];
                 if (!(depth > 0.0)) continue;
                 const double x = static_cast<double>(c) + 0.5, y = static_cast<double>(r) + 0.5;

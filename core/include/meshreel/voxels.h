@@ -29,8 +29,8 @@ struct mr_blocks {
     float *distances, *weights;  // count x 512; distances are positive outside
 };
 
-// The blocks that have something within `reach`, in the unit of `voxel`, before or behind a depth, ascending. `out`
-// keeps them.
+// The blocks that have something within `reach`, in the unit of `voxel`, before or behind the depth of every fourth
+// pixel of every fourth row, ascending. `out` keeps them.
 typedef struct mr_touched mr_touched;
 int mr_touched_create(const struct mr_depth* picture, double voxel, double reach, mr_touched** out,
                       const int32_t** blocks, size_t* count);
