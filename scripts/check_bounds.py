@@ -15,7 +15,7 @@ from typing import Any
 
 from scripts.reliability import ROOT, add_row
 
-EXTRAS = ("encode", "play", "usd", "cluster", "remote")  # which scripts/test-versions installs
+EXTRAS = ("cli", "encode", "demo", "play", "usd", "cluster", "remote")  # which scripts/test-versions installs
 FORM = re.compile(r"([\w.-]+)(?:\[\w+\])?>=([\d.]+)")  # of a requirement that is tested here
 
 
@@ -59,7 +59,7 @@ def store(which: str, report: str, seconds: float) -> None:
         (count["tests"] - count["skipped"], "tests"),
         count["failures"] + count["errors"],
         seconds,
-        f"NumPy {version('numpy')}, SciPy {version('scipy')}, Open3D {version('open3d')}",
+        f"NumPy {version('numpy')}, SciPy {version('scipy')}, libigl {version('libigl')}",
     )
 
 

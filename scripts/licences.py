@@ -1,6 +1,6 @@
 """Prints the licences of all that meshreel, each of its extras and its player bring, as far as installed here.
 
-Fails where a licence is not known, or where one of the GPL family comes with the base, `encode` or `play`.
+Fails where a licence is not known, or where one of the GPL family comes with any but those that may be any.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from pathlib import Path
 from packaging.requirements import Requirement
 
 PLAYER = Path(__file__).resolve().parents[1] / "src/meshreel/player/LICENSES.txt"
-EXTRAS = ("", "encode", "play", "usd", "cluster", "remote")
+EXTRAS = ("", "cli", "encode", "demo", "open3d", "play", "usd", "cluster", "remote")
 MAY_BE_ANY = {"usd"}  # asked for by name: the user decides
 COPYLEFT = re.compile(r"\b[AL]?GPL|General Public License", re.IGNORECASE)
 WEAK = re.compile(r"\bMPL|Mozilla|\bEPL|\bCDDL|LicenseRef", re.IGNORECASE)  # its own files only, or read it yourself

@@ -46,8 +46,7 @@ def small(preset_options: Any) -> Any:
 
     def options(*arguments: Any, **named: Any) -> Any:
         reference = ReferenceOptions(vertices=300, keys=1, trial_vertices=300)
-        poisson = replace(reference.fuse.poisson, depth=6)
-        reference = replace(reference, fuse=replace(reference.fuse, subdivisions=0, poisson=poisson))
+        reference = replace(reference, fuse=replace(reference.fuse, voxel=1.0))
         intra = IntraOptions(fractions=(0.5, 1.0), steps=(1.0,), levels=(0,))
         track = TrackOptions(centers=100, samples=5000)
         made = preset_options(*arguments, **named)

@@ -57,11 +57,11 @@ def _quick_layers(options: LayersOptions) -> LayersOptions:
 
 
 def _quick_paper(options: PaperOptions) -> PaperOptions:
-    fuse = replace(options.reference.fuse, poisson=replace(options.reference.fuse.poisson, depth=6))
+    fuse = replace(options.reference.fuse, voxel=1.0)
     return replace(
         options,
         intra=TRIALS,
         target=Fidelity(distance=0.003, angle=15.0, worst=0.006),
         track=replace(options.track, centers=min(options.track.centers, 150), samples=3000),
-        reference=replace(options.reference, vertices=150, keys=1, trial_depth=5, trial_vertices=150, fuse=fuse),
+        reference=replace(options.reference, vertices=150, keys=1, trial_vertices=150, fuse=fuse),
     )

@@ -130,7 +130,7 @@ def to_scene(mesh: Mesh) -> object:
 
 
 def to_open3d(mesh: Mesh) -> object:
-    pytest.importorskip("open3d", reason="needs the extra encode")
+    pytest.importorskip("open3d", reason="needs the extra open3d")
     return mesh.to_open3d()
 
 
@@ -189,7 +189,7 @@ def test_colors_that_are_not_those_of_the_vertices_are_refused():
 
 def test_open3d_missing_names_the_extra(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setitem(sys.modules, "open3d", None)
-    with pytest.raises(ImportError, match=r"meshreel\[encode\]"):
+    with pytest.raises(ImportError, match=r"meshreel\[open3d\]"):
         TRIANGLE.to_open3d()
 
 

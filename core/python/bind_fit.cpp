@@ -76,11 +76,14 @@ private:
 }  // namespace
 
 void bind_fit(nb::module_& m) {
-    nb::class_<PySurfaceTree>(m, "SurfaceTree", "A mesh with at least one face, prepared for closest-point queries.")
+    nb::class_<PySurfaceTree>(m, "SurfaceTree", "A mesh with at least one face, prepared for closest points and rays.")
         .def(nb::init<In<double, 2>, In<int32_t, 2>>(), "positions"_a, "faces"_a)
         .def("move", &PySurfaceTree::move, "positions"_a, "Gives the vertices other positions.")
         .def("closest", &PySurfaceTree::closest, "queries"_a, "reach"_a, "guesses"_a = nb::none(),
-             "The closest face to each query, -1 where none is within reach, and the weights of its corners.");
+             "The closest face to each query, -1 where none is within reach, and the weights of its corners.")
+        .def("cast", &PySurfaceTree::cast, "origins"_a, "ways"_a, "weighted"_a,
+             "The first face that each ray meets, -1 for none, the distance in lengths of its way, and the weights of "
+             "the corners there, if wanted. One origin is that of all rays.");
     nb::class_<FitTarget>(m, "FitTarget", "A frame prepared for fits, with samples on its open borders.")
         .def(nb::init<nb::object, In<double, 2>, In<int32_t, 2>, In<double, 2>, In<uint8_t, 1>, In<double, 2>,
                       In<double, 2>, In<double, 2>>(),

@@ -13,6 +13,7 @@ void bind_fit(nanobind::module_&);
 void bind_reading(nanobind::module_&);
 void bind_topology(nanobind::module_&);
 void bind_tracking(nanobind::module_&);
+void bind_voxels(nanobind::module_&);
 
 }  // namespace meshreel
 
@@ -28,4 +29,5 @@ NB_MODULE(_core, m) {
     meshreel::bind_reading(m);
     meshreel::bind_topology(m);
     meshreel::bind_tracking(m);
+    meshreel::bind_voxels(m);
 }

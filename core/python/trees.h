@@ -47,6 +47,17 @@ public:
         return nb::make_tuple(faces.shaped(count), weights.shaped(count, 3));
     }
 
+    nb::tuple cast(In<double, 2> origins, In<double, 2> ways, bool weighted) const {
+        const size_t count = ways.shape(0);
+        const bool one = origins.shape(0) == 1;
+        expect(are_vectors(ways, count) && are_vectors(origins, one ? 1 : count));
+        Buffer<int32_t> faces(count);
+        Buffer<double> distances(count), weights(weighted ? 3 * count : 0);
+        const mr_rays rays{origins.data(), ways.data(), count, one};
+        check(mr_tree_cast(tree_.get(), &rays, faces.data(), distances.data(), weighted ? weights.data() : nullptr));
+        return nb::make_tuple(faces.shaped(count), distances.shaped(count), weights.shaped(weighted ? count : 0, 3));
+    }
+
     const mr_tree* handle() const { return tree_.get(); }
 
 private:

@@ -30,6 +30,16 @@ public:
     // are visited along a curve, so that neighbours follow each other.
     void closest(const double* queries, size_t count, double reach, int32_t* faces, double* weights) const;
 
+    struct Rays {
+        const double *origins, *ways;  // count x 3
+        size_t count;
+        bool one_origin;  // for all
+    };
+
+    // What each ray meets first, -1: nothing; how many times its way off, infinite: nothing; and, unless `weights` is
+    // null, the weights of the corners there.
+    void cast(const Rays& rays, int32_t* faces, double* distances, double* weights) const;
+
     size_t face_count() const { return faces_.size(); }
     size_t vertex_count() const { return vertices_; }
     const std::array<int32_t, 3>& face(size_t f) const { return faces_[f]; }
@@ -66,6 +76,7 @@ private:
     Box box_of(int32_t child) const;
     float visit(const Block& block, const float* query, float best, int32_t& face) const;
     Hit exact(Vec query, int32_t face) const;
+    double met(int32_t face, Vec origin, Vec way, double* weights) const;
     Vec corner(int32_t face, int k) const { return load(&positions_[3 * static_cast<size_t>(faces_[face][k])]); }
 
     size_t vertices_;

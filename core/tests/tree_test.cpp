@@ -88,6 +88,50 @@ TEST(closest_points_are_those_of_all_faces_whatever_the_guess_and_after_moves) {
     mr_tree_destroy(tree);
 }
 
+TEST(rays_meet_the_nearest_of_all_faces) {
+    const Shape shape = triangles(1, 200);
+    const mr_mesh mesh = shape.view();
+    mr_tree* tree = nullptr;
+    CHECK(mr_tree_create(&mesh, &tree) == MR_OK);
+    Noise noise(4);
+    std::vector<double> origins, ways;
+    for (int k = 0; k < 3 * 500; ++k) {
+        origins.push_back(0.002 * noise.within(1000));
+        ways.push_back(0.001 * noise.within(1000) - origins.back());
+    }
+    std::vector<int32_t> faces(500);
+    std::vector<double> distances(500), weights(1500);
+    const mr_rays rays{origins.data(), ways.data(), 500, 0};
+    CHECK(mr_tree_cast(tree, &rays, faces.data(), distances.data(), weights.data()) == MR_OK);
+    size_t met = 0;
+    for (size_t r = 0; r < 500; ++r) {
+        const Vec from = load(&origins[3 * r]), way = load(&ways[3 * r]);
+        double least = HUGE_VAL;
+        for (size_t f = 0; f < shape.face_count(); ++f) {
+            Vec p[3];
+            for (size_t k = 0; k < 3; ++k)
+                p[k] = load(&shape.positions[3 * static_cast<size_t>(shape.faces[3 * f + k])]) - from;
+            const double a = dot(cross(p[1], p[2]), way), b = dot(cross(p[2], p[0]), way),
+                         c = dot(cross(p[0], p[1]), way), t = dot(p[0], cross(p[1], p[2])) / (a + b + c);
+            if (std::fabs(a) + std::fabs(b) + std::fabs(c) == std::fabs(a + b + c) && a + b + c != 0 && t >= 0)
+                least = std::min(least, t);
+        }
+        CHECK((faces[r] < 0) == std::isinf(least) && std::isinf(least) == std::isinf(distances[r]));
+        if (faces[r] < 0) continue;
+        ++met;
+        CHECK(std::fabs(distances[r] - least) < kEnough && static_cast<size_t>(faces[r]) < shape.face_count() / 2);
+        CHECK(std::fabs(weights[3 * r] + weights[3 * r + 1] + weights[3 * r + 2] - 1) < kEnough);
+    }
+    CHECK(met > 50 && met < 500);
+    std::vector<int32_t> again(500);
+    for (size_t r = 0; r < 500; ++r) {
+        const mr_rays one{&origins[3 * r], &ways[3 * r], 1, 1};
+        CHECK(mr_tree_cast(tree, &one, &again[r], &distances[r], nullptr) == MR_OK);
+    }
+    CHECK(again == faces);
+    mr_tree_destroy(tree);
+}
+
 TEST(trees_refuse_meshes_without_faces_and_faces_out_of_range) {
     Shape shape = tetrahedron();
     mr_tree* tree = nullptr;

@@ -3,7 +3,7 @@
 from typing import TypeAlias
 
 import numpy as np
-from jaxtyping import Float, Float64, Int32, Int64, UInt8
+from jaxtyping import Float, Float32, Float64, Int32, Int64, UInt8
 
 # bind_draco.cpp
 
@@ -254,6 +254,9 @@ class SurfaceTree:
     def closest(
         self, queries: Float64[np.ndarray, "N 3"], reach: float, guesses: Int32[np.ndarray, " N"] | None = None
     ) -> tuple[Int32[np.ndarray, " N"], Float64[np.ndarray, "N 3"]]: ...
+    def cast(
+        self, origins: Float64[np.ndarray, "M 3"], ways: Float64[np.ndarray, "N 3"], weighted: bool
+    ) -> tuple[Int32[np.ndarray, " N"], Float64[np.ndarray, " N"], Float64[np.ndarray, "K 3"]]: ...
 
 class FitTarget:
     def __init__(
@@ -339,3 +342,30 @@ class Deformation:
     def holds(
         self, rotations: Float64[np.ndarray, "N 3 3"], positions: Float64[np.ndarray, "N 3"], torn: float
     ) -> Float64[np.ndarray, " E"]: ...
+
+def touched_blocks(
+    depths: Float32[np.ndarray, "H W"],
+    projection: Float64[np.ndarray, "3 4"],
+    ways: Float64[np.ndarray, "3 3"],
+    eye: Float64[np.ndarray, " 3"],
+    voxel: float,
+    reach: float,
+) -> Int32[np.ndarray, "B 3"]: ...
+def integrate(
+    depths: Float32[np.ndarray, "H W"],
+    projection: Float64[np.ndarray, "3 4"],
+    ways: Float64[np.ndarray, "3 3"],
+    eye: Float64[np.ndarray, " 3"],
+    voxel: float,
+    reach: float,
+    blocks: Int32[np.ndarray, "B 3"],
+    distances: Float32[np.ndarray, "B 8 8 8"],
+    weights: Float32[np.ndarray, "B 8 8 8"],
+) -> None: ...
+def zero_level(
+    blocks: Int32[np.ndarray, "B 3"],
+    distances: Float32[np.ndarray, "B 8 8 8"],
+    weights: Float32[np.ndarray, "B 8 8 8"],
+    voxel: float,
+    least: float,
+) -> tuple[Float64[np.ndarray, "V 3"], Int32[np.ndarray, "F 3"]]: ...

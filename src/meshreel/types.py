@@ -149,9 +149,14 @@ class Mesh:
         return f"<meshreel.Mesh: {', '.join(facts)}>"
 
     def to_trimesh(self) -> trimesh.Trimesh:
-        """Return a copy as a `trimesh.Trimesh`, with the same vertices in the same order and their colours."""
-        import trimesh
+        """Return a copy as a `trimesh.Trimesh`, with the same vertices in the same order and their colours.
 
+        Raises ImportError without trimesh.
+        """
+        try:
+            import trimesh
+        except ImportError as error:
+            raise ImportError("Mesh.to_trimesh needs the extra `encode`: pip install 'meshreel[encode]'") from error
         mesh = self.copy()
         return trimesh.Trimesh(mesh.vertices, mesh.faces, vertex_colors=mesh.colors, process=False)
 
@@ -174,11 +179,11 @@ class Mesh:
         return found
 
     def to_open3d(self) -> Any:
-        """Return a copy as an `open3d.geometry.TriangleMesh`. Raises ImportError without the extra `encode`."""
+        """Return a copy as an `open3d.geometry.TriangleMesh`. Raises ImportError without Open3D."""
         try:
             import open3d
         except ImportError as error:
-            raise ImportError("Mesh.to_open3d needs the extra `encode`: pip install 'meshreel[encode]'") from error
+            raise ImportError("Mesh.to_open3d needs the extra `open3d`: pip install 'meshreel[open3d]'") from error
         mesh, utility = self.copy(), open3d.utility  # it refuses read-only arrays
         found = open3d.geometry.TriangleMesh(utility.Vector3dVector(mesh.vertices), utility.Vector3iVector(mesh.faces))
         if mesh.colors is not None:

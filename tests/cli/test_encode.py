@@ -118,7 +118,7 @@ def test_digests_of_all_stages_are_written_on_request(run, balls, tmp_path):
     said = run("encode", balls, "-o", tmp_path / "a.reel", "--debug-digests", tmp_path / "a.jsonl", "--quiet")
     assert (said.code, said.err) == (0, "")
     rows = [json.loads(line) for line in (tmp_path / "a.jsonl").read_text(encoding="utf-8").splitlines()]
-    assert {"numpy", "open3d"} <= set(rows[0]["libraries"])
+    assert {"numpy", "scipy"} <= set(rows[0]["libraries"])
     assert (rows[0]["stage"], rows[1]["stage"], rows[-1]["stage"]) == ("machine", "survey", "payload")
 
 

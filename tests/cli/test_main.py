@@ -78,8 +78,16 @@ def test_an_argument_that_is_missing_is_named_with_what_it_is(run, arguments, to
 def test_a_fault_of_ours_is_one_line_too():
     assert one_line(ValueError("a\nb")).startswith("ValueError: a b; this is a fault of meshreel")
     assert "fewer --jobs" in one_line(MemoryError())
-    missing = ModuleNotFoundError("No module named 'open3d'", name="open3d")
-    assert one_line(missing) == "open3d is missing; install it with: pip install 'meshreel[encode]'"
+    for name, extra in (("scipy.ndimage", "encode"), ("matplotlib.figure", "demo"), ("cyclopts", "cli")):
+        missing = ModuleNotFoundError(f"No module named '{name}'", name=name)
+        assert one_line(missing) == f"{name} is missing; install it with: pip install 'meshreel[{extra}]'"
+
+
+def test_without_the_extra_of_the_command_line_the_command_names_it():
+    script = "import sys; sys.modules['cyclopts'] = None; from meshreel.cli import main; sys.exit(main(['info', 'a']))"
+    answer = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
+    assert answer.returncode == 2 and answer.stderr.count("\n") == 1
+    assert "pip install 'meshreel[cli]'" in answer.stderr
 
 
 def test_decode_and_info_need_nothing_of_the_encoder(tmp_path):

@@ -31,8 +31,8 @@ def quicker(options: EncoderOptions) -> EncoderOptions:
     """Few centers, one key frame and few trials of the per-frame form; nothing that follows the quality is changed."""
     method = replace(options.method, intra=IntraOptions(fractions=(0.5, 1.0)))
     if isinstance(method, PaperOptions):
-        fuse = replace(method.reference.fuse, poisson=replace(method.reference.fuse.poisson, depth=6))
-        reference = replace(method.reference, keys=1, canonical_keys=1, trial_depth=5, trial_vertices=150, fuse=fuse)
+        fuse = replace(method.reference.fuse, voxel=1.0)
+        reference = replace(method.reference, keys=1, canonical_keys=1, trial_vertices=150, fuse=fuse)
         method = replace(method, reference=reference, track=replace(method.track, centers=150, samples=3000))
     return replace(options, method=method)
 

@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
-from meshreel.geometry.topology import face_normals
-from meshreel.geometry.tsdf import SIDE, extract, fill_grid, new_grid
+from meshreel.errors import InputError
+from meshreel.geometry.cameras import PinholeCamera
+from meshreel.geometry.depth import DepthPicture
+from meshreel.geometry.topology import border_edges, face_normals
+from meshreel.geometry.tsdf import SIDE, Grid, extract, integrate
 
 VOXEL = 0.05
 
@@ -15,7 +19,7 @@ def grid_of(field, weight=lambda points: np.ones(points.shape[:-1]), blocks=rang
     numbers = np.array([[i, j, k] for i in blocks for j in blocks for k in blocks], np.int32)
     inside = np.stack(np.meshgrid(*[np.arange(SIDE)] * 3, indexing="ij"), axis=-1)[..., ::-1]  # [k, j, i] is i, j, k
     points = VOXEL * (SIDE * numbers[:, None, None, None] + inside)
-    return fill_grid(VOXEL, numbers, field(points).astype(np.float32), weight(points).astype(np.float32))
+    return Grid.of(VOXEL, numbers, field(points).astype(np.float32), weight(points).astype(np.float32))
 
 
 def ball(points):
@@ -45,11 +49,65 @@ def test_unknown_voxels_have_no_surface_and_the_border_stays_open():
 
 
 def test_an_empty_grid_has_the_empty_mesh():
-    assert extract(new_grid(VOXEL), 0.5).is_empty
-    none = fill_grid(VOXEL, np.zeros((0, 3), np.int32), *[np.zeros((0, SIDE, SIDE, SIDE), np.float32)] * 2)
+    none = Grid.of(VOXEL, np.zeros((0, 3), np.int32), *[np.zeros((0, SIDE, SIDE, SIDE), np.float32)] * 2)
     assert extract(none, 0.5).is_empty
 
 
 def test_the_same_distances_give_the_same_mesh_whatever_the_order_of_blocks():
     one, other = extract(grid_of(ball), 0.5), extract(grid_of(ball, blocks=range(1, -3, -1)), 0.5)
     assert np.array_equal(one.vertices, other.vertices) and np.array_equal(one.faces, other.faces)
+
+
+def test_surface_of_any_signs_is_closed():
+    random = np.random.default_rng(0)
+    numbers = np.array([[i, j, k] for i in (0, 1) for j in (0, 1) for k in (0, 1)], np.int32)
+    inside = np.ones((16, 16, 16))
+    inside[1:-1, 1:-1, 1:-1] = random.choice([-1.0, 1.0], (14, 14, 14)) * random.uniform(0.2, 1, (14, 14, 14))
+    values = inside.reshape(2, SIDE, 2, SIDE, 2, SIDE).transpose(4, 2, 0, 1, 3, 5).reshape(8, SIDE, SIDE, SIDE)
+    mesh = extract(Grid.of(1.0, numbers, values.astype(np.float32), np.ones_like(values, np.float32)), 0.5)
+    assert len(mesh.faces) > 5000 and not len(border_edges(mesh))
+
+
+def wall(depth=1.0, eye=(0.0, 0.0, 0.0), size=(40, 30)) -> DepthPicture:
+    """The picture of a wall across the view of a camera that looks along +z, with a hole of 4 x 4 pixels."""
+    depths = np.full(size[::-1], 1000 * depth, np.uint16)
+    depths[10:14, 10:14] = 0
+    extrinsic = np.eye(4)
+    extrinsic[:3, 3] = -np.asarray(eye)
+    camera = PinholeCamera(*size, np.array([[40.0, 0, 20], [0, 40, 15], [0, 0, 1]]), extrinsic)
+    return DepthPicture(camera, depths, 0.001, 3.0)
+
+
+@pytest.mark.parametrize("eye", [(0, 0, 0), (-300.0, 200.0, 1000.0)])
+def test_a_wall_becomes_a_wall_that_faces_the_camera(eye):
+    mesh = extract(integrate([wall(eye=eye)], 0.02, 3.0), 0.5)
+    np.testing.assert_allclose(mesh.vertices[:, 2], eye[2] + 1, atol=1e-4)
+    assert (face_normals(mesh)[0][:, 2] < -0.999).all()
+    low, high = mesh.vertices.min(axis=0) - eye, mesh.vertices.max(axis=0) - eye
+    np.testing.assert_allclose((low[:2], high[:2]), ((-0.5, -0.375), (0.5, 0.375)), atol=0.05)
+    hole = np.abs(mesh.vertices[:, :2] - np.asarray(eye)[:2] - (-0.2, -0.075)).max(axis=1)
+    assert 0.04 < hole.min() < 0.07
+
+
+def test_a_pixel_that_flies_alone_has_no_surface():
+    picture = wall()
+    picture.depth[21, 21] = 500
+    assert extract(integrate([picture], 0.02, 3.0), 0.5).vertices[:, 2].min() > 0.9
+
+
+def test_what_one_camera_sees_through_is_carved_away():
+    flying, true = wall(0.9), wall(1.0)
+    flying.depth[:] = np.where(np.arange(40) < 20, flying.depth, 0)
+    mesh = extract(integrate([flying, true, true], 0.02, 3.0), 0.5)
+    assert mesh.vertices[:, 2].min() > 0.95
+
+
+def test_depths_beyond_the_farthest_and_no_pictures_have_no_surface():
+    assert extract(integrate([wall(3.5)], 0.02, 3.0), 0.5).is_empty
+    assert extract(integrate([], 0.02, 3.0), 0.5).is_empty
+
+
+def test_more_blocks_than_memory_should_hold_are_refused(monkeypatch):
+    monkeypatch.setattr("meshreel.geometry.tsdf.MOST_BLOCKS", 10)
+    with pytest.raises(InputError, match=r"blocks of 0\.16 m, over 10"):
+        integrate([wall()], 0.02, 3.0)

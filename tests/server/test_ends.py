@@ -41,7 +41,9 @@ def serve(folder):
     started = []
 
     def start(is_hung=False):
-        painter = f"import sys\nsys.modules['open3d'] = None\nfrom meshreel.server import painter\n{HANGS}"
+        painter = (
+            f"import sys\nsys.modules['meshreel.metrics.render'] = None\nfrom meshreel.server import painter\n{HANGS}"
+        )
         painter += "painter.poster = poster\npainter.main()\n"
         command = [sys.executable, "-c", SERVE, painter, str(folder), "hung" if is_hung else ""]
         process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)

@@ -178,7 +178,7 @@ def test_a_hostile_file_in_a_folder_that_is_served_has_a_plain_tile(client, fold
 @pytest.mark.parametrize("towards", [1, -1])
 def test_a_room_is_seen_from_where_it_is_open(towards):
     """A wall that faces +z or -z, whose right half (+x, as seen from +z) is lower than its left."""
-    pytest.importorskip("open3d")
+    pytest.importorskip("scipy")
     image = pytest.importorskip("PIL.Image")
     corners = np.array([[-1, 0, 0], [1, 0, 0], [1, 0.5, 0], [-1, 2, 0]], dtype=np.float64)
     faces = np.array([[0, 1, 2], [0, 2, 3]], dtype=np.int32)
@@ -190,7 +190,7 @@ def test_a_room_is_seen_from_where_it_is_open(towards):
 
 
 def test_a_poster_stands_on_its_feet():
-    pytest.importorskip("open3d")
+    pytest.importorskip("scipy")
     image = pytest.importorskip("PIL.Image")
     corners = np.array([[-2, 0, 0], [2, 0, 0], [0, 1, 0.1], [0, 1, -0.1]], dtype=np.float64)  # broad feet at y = 0
     hut = Mesh.of(corners, np.array([[0, 1, 2], [1, 0, 3], [0, 2, 3], [2, 1, 3]], dtype=np.int32))

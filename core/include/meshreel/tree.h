@@ -1,5 +1,5 @@
-// Closest points of a triangle mesh, found in a tree of boxes. Encoder only. One thread; single precision decides which
-// face is closest, relative to the middle of the mesh.
+// Closest points of a triangle mesh and rays that meet it, found in a tree of boxes. Encoder only. One thread; single
+// precision decides which face is closest, relative to the middle of the mesh.
 #pragma once
 
 #include "meshreel/status.h"
@@ -20,6 +20,17 @@ int mr_tree_move(mr_tree* tree, const double* positions);
 // begin with, the better the faster, or -1; where nothing is within `reach` it is -1 afterwards, and weights are 0.
 int mr_tree_closest(const mr_tree* tree, const double* queries, size_t count, double reach, int32_t* faces,
                     double* weights);
+
+// Rays from `origins` along `ways`, count x 3 each, or all from one origin.
+struct mr_rays {
+    const double *origins, *ways;
+    size_t count;
+    int one_origin;
+};
+
+// For each ray, the first face that it meets from either side, -1 for none; how many times its way that is off,
+// infinite for none; and, unless `weights` is null, the weights of the three corners there, (1, 0, 0) for none.
+int mr_tree_cast(const mr_tree* tree, const struct mr_rays* rays, int32_t* faces, double* distances, double* weights);
 
 #ifdef __cplusplus
 }

@@ -138,8 +138,7 @@ class _Rays:
 
     def __init__(self, mesh: Mesh) -> None:
         self._normals = face_normals(mesh)[0]
-        # About the world's origin, as in all earlier simulations: another origin would round depths differently.
-        self._rays = Rays(mesh, origin=np.zeros(3))
+        self._rays = Rays(mesh)
 
     def cast(self, camera: DepthCamera) -> tuple[Float64[np.ndarray, "H W"], Float64[np.ndarray, "H W"]]:
         """Return the depth along the optical axis, m, infinite for a miss, and the cosine between ray and normal."""
@@ -148,7 +147,7 @@ class _Rays:
         ahead = np.stack([(columns - cx) / fx, (rows - cy) / fy, np.ones(rows.shape)], axis=-1)
         turn, eye = camera.camera_to_world[:3, :3], camera.camera_to_world[:3, 3]
         directions = ahead @ turn.T
-        answer = self._rays.cast(np.broadcast_to(eye, (rows.size, 3)), directions.reshape(-1, 3))
+        answer = self._rays.cast(eye[None], directions.reshape(-1, 3))
         depth = answer.distances.reshape(rows.shape)  # directions go one metre along the axis
         cosines = np.zeros(depth.shape)
         hit = np.isfinite(depth)

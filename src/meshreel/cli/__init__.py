@@ -56,7 +56,11 @@ EDITS = ("cut", "concat", "retime", "transform", "tag")  # which share a module
 BENCH = "Measure codecs against each other."
 
 
-PLAY_NEEDS = ("starlette", "uvicorn", "trustme")  # packages of the extra `play`; all others are of `encode`
+EXTRAS = {  # of packages that are not in `encode`
+    **dict.fromkeys(("starlette", "uvicorn", "trustme"), "play"),
+    **dict.fromkeys(("matplotlib", "skimage"), "demo"),
+    **dict.fromkeys(("cyclopts", "rich"), "cli"),
+}
 
 
 class Terminated(BaseException):
@@ -144,14 +148,14 @@ def _noted(text: str, error: BaseException) -> str:
 def _text_of(error: Exception) -> str:
     from concurrent.futures.process import BrokenProcessPool
 
-    from cyclopts import CycloptsError, MissingArgumentError
-
     if isinstance(error, ImportError) and isinstance(error.__cause__, ModuleNotFoundError):
         error = error.__cause__  # raised by the import of the command's module
     text = " ".join(str(error).split()) or type(error).__name__
     if isinstance(error, ModuleNotFoundError) and not (error.name or "").startswith("meshreel"):
-        extra = "play" if error.name in PLAY_NEEDS else "encode"
+        extra = EXTRAS.get((error.name or "").split(".")[0], "encode")
         return f"{error.name} is missing; install it with: pip install 'meshreel[{extra}]'"
+    from cyclopts import CycloptsError, MissingArgumentError
+
     if isinstance(error, MissingArgumentError) and error.argument is not None:
         return _missing(error, " ".join(["meshreel", *(error.command_chain or ())]))
     if isinstance(error, CycloptsError):

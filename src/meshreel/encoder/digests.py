@@ -20,7 +20,7 @@ import numpy as np
 from .. import __version__
 
 WriteLines = Callable[[str], object]  # takes whole lines of JSON
-LIBRARIES = ("numpy", "scipy", "open3d", "libigl", "fast-simplification", "scikit-image", "DracoPy", "trimesh")
+LIBRARIES = ("numpy", "scipy", "libigl", "fast-simplification", "DracoPy", "trimesh")
 
 
 class Digests:

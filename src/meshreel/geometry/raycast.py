@@ -1,7 +1,6 @@
-"""Ray casting on a mesh, by Open3D's ray-casting scene (needs the extra `encode`).
+"""Ray casting on a mesh, by the core's tree of boxes.
 
-Open3D works in float32; coordinates are taken about an origin near the mesh, so that meshes far from the world's origin
-keep their millimetres.
+The tree decides in float32, about the middle of the mesh, which face a ray meets; the distance to it is float64.
 """
 
 from __future__ import annotations
@@ -13,6 +12,7 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Bool, Float32, Float64, Int32
 
+from .. import _core
 from ..types import Mesh
 from .cameras import PinholeCamera
 from .strict import inverse, products
@@ -39,42 +39,36 @@ class Seen:
 class Rays:
     """A mesh prepared for ray casting; rays meet faces from both sides, and no ray meets an empty mesh."""
 
-    def __init__(self, mesh: Mesh, origin: Float64[np.ndarray, " 3"] | None = None) -> None:
-        """Prepare a mesh; `origin` is the point about which coordinates become float32, by default the box's middle."""
-        import open3d as o3d
-
-        self._tensor = o3d.core.Tensor.from_numpy
-        self._scene = o3d.t.geometry.RaycastingScene()
-        self._origin = mesh.middle if origin is None else origin
+    def __init__(self, mesh: Mesh) -> None:
         self._mesh = mesh
-        if not mesh.is_empty:
-            vertices = (mesh.vertices - self._origin).astype(np.float32)
-            self._scene.add_triangles(self._tensor(vertices), self._tensor(mesh.faces.astype(np.uint32)))
+        self._tree = None if mesh.is_empty else _core.SurfaceTree(mesh.vertices, mesh.faces)
 
-    def cast(self, origins: Float64[np.ndarray, "N 3"], directions: Float64[np.ndarray, "N 3"]) -> Hit:
-        """Find the first intersection of each of N rays."""
-        rays = np.concatenate([origins - self._origin, directions], axis=1).astype(np.float32)
-        answer = self._scene.cast_rays(self._tensor(rays))
-        uv = answer["primitive_uvs"].numpy().astype(np.float64)
-        barycentric = np.stack([1 - uv.sum(axis=1), uv[:, 0], uv[:, 1]], axis=1)
-        return Hit(_faces(answer), answer["t_hit"].numpy().astype(np.float64), barycentric)
+    def cast(self, origins: Float64[np.ndarray, "M 3"], directions: Float64[np.ndarray, "N 3"]) -> Hit:
+        """Find the first intersection of each of N rays; they have N origins, or one."""
+        if self._tree is None:
+            weights = np.zeros((len(directions), 3))
+            weights[:, 0] = 1
+            return Hit(np.full(len(directions), -1, np.int32), np.full(len(directions), np.inf), weights)
+        origins, directions = np.ascontiguousarray(origins), np.ascontiguousarray(directions)
+        return Hit(*self._tree.cast(origins, directions, True))
 
     def look(self, camera: PinholeCamera) -> Seen:
         """Find the face and the depth that a camera sees at each pixel."""
-        rays = np.empty((camera.height, camera.width, 6), np.float32)
-        rays[..., :3] = camera.eye - self._origin
-        for axis, ways in enumerate(_ways(camera)):
-            rays[..., 3 + axis] = ways
-        answer = self._scene.cast_rays(self._tensor(rays))
-        return Seen(_faces(answer), answer["t_hit"].numpy())
+        shape = camera.height, camera.width
+        faces, depth = self._from(camera, np.stack([*_ways(camera)], axis=-1).reshape(-1, 3))
+        return Seen(faces.reshape(shape), depth.astype(np.float32).reshape(shape))
 
     def faces_in(self, camera: PinholeCamera, pixels: Bool[np.ndarray, "H W"]) -> Int32[np.ndarray, " N"]:
         """Find the face that a camera sees in each of some pixels, row by row; -1: none."""
-        rays = np.empty((np.count_nonzero(pixels), 6), np.float32)
-        rays[:, :3] = camera.eye - self._origin
-        for axis, ways in enumerate(_ways(camera)):
-            rays[:, 3 + axis] = ways[pixels]
-        return _faces(self._scene.cast_rays(self._tensor(rays)))
+        return self._from(camera, np.stack([ways[pixels] for ways in _ways(camera)], axis=-1))[0]
+
+    def _from(
+        self, camera: PinholeCamera, ways: Float64[np.ndarray, "N 3"]
+    ) -> tuple[Int32[np.ndarray, " N"], Float64[np.ndarray, " N"]]:
+        """Return the faces that rays of a camera meet, and the distances in lengths of their ways."""
+        if self._tree is None:
+            return np.full(len(ways), -1, np.int32), np.full(len(ways), np.inf)
+        return self._tree.cast(camera.eye[None], ways, False)[:2]
 
     def backs(self, camera: PinholeCamera, seen: Seen) -> Bool[np.ndarray, "H W"]:
         """Return where a camera sees the back of a face; `seen` is the result of `look`."""
@@ -113,8 +107,3 @@ def _ways(camera: PinholeCamera) -> Iterator[Float64[np.ndarray, "H W"]]:
     columns, rows = np.arange(camera.width) + 0.5, np.arange(camera.height)[:, None] + 0.5
     for right, down, ahead in products(inverse(camera.extrinsic[:3, :3]), inverse(camera.intrinsic)):
         yield right * columns + (down * rows + ahead)
-
-
-def _faces(answer: dict) -> Int32[np.ndarray, "..."]:
-    """Return the faces that rays hit; a miss, 2^32 - 1 in Open3D, becomes -1."""
-    return answer["primitive_ids"].numpy().view(np.int32)

@@ -53,9 +53,8 @@ class Colored:
         shape, image = pixels.crop.shape, np.ones((*pixels.crop.shape, 3), np.float32)
         if self._surface is None or 0 in shape:
             return ColorView(image, np.full(shape, -1, np.int32))
-        (rays, painted), pose = self._surface, pixels.camera.extrinsic
-        origins, directions = pixels.rays
-        hit = rays.cast((origins - pose[:3, 3]) @ pose[:3, :3], directions @ pose[:3, :3])
+        rays, painted = self._surface
+        hit = rays.cast(*pixels.world_rays)
         seen = hit.faces >= 0
         colors = painted.on(hit.faces[seen], hit.barycentric[seen])
         image.reshape(-1, 3)[seen] = np.clip(np.rint(colors), 0, 255) / 255

@@ -109,13 +109,19 @@ class Pixels:
         rows, columns = np.mgrid[crop.top : crop.bottom, crop.left : crop.right]
         return self.camera.rays(np.column_stack([columns.ravel(), rows.ravel()]) + 0.5)
 
+    @cached_property
+    def world_rays(self) -> tuple[Float64[np.ndarray, "N 3"], Float64[np.ndarray, "N 3"]]:
+        """Origins and unit directions of the same rays in world coordinates."""
+        (origins, directions), pose = self.rays, self.camera.extrinsic
+        return (origins - pose[:3, 3]) @ pose[:3, :3], directions @ pose[:3, :3]
+
 
 class Visible:
     """A mesh prepared for several views: its surface and its normals are computed once."""
 
     def __init__(self, mesh: Mesh) -> None:
         self.mesh = used_surface(mesh)
-        self._normals = welded_normals(self.mesh)
+        self._normals, self._rays = welded_normals(self.mesh), Rays(self.mesh)
 
     def look(self, pixels: Pixels) -> View:
         """Render the mesh in a crop of a camera's image."""
@@ -123,8 +129,7 @@ class Visible:
         if mesh.is_empty or 0 in crop.shape:
             covered, nothing = np.zeros(crop.shape, dtype=bool), np.zeros((0, 3))
             return View(crop, covered, mesh, nothing.astype(np.int32), nothing, nothing)
-        local = Mesh(_to_camera(mesh.vertices, pixels.camera), mesh.faces)  # about the eye
-        answer = Rays(local, origin=np.zeros(3)).cast(*pixels.rays)
+        answer = self._rays.cast(*pixels.world_rays)
         hit = answer.faces >= 0
         corners, weights = mesh.faces[answer.faces[hit]], answer.barycentric[hit]
         normals = interpolate(self._normals, corners, weights)
@@ -132,7 +137,7 @@ class Visible:
 
 
 def _to_camera(vertices: Float64[np.ndarray, "V 3"], camera: Camera) -> Float64[np.ndarray, "V 3"]:
-    """Return camera coordinates in float64: positions far from the origin become small before they become float32."""
+    """Return camera coordinates."""
     rotation = camera.extrinsic[:3, :3]
     eye = -np.linalg.solve(rotation, camera.extrinsic[:3, 3])
     return (vertices - eye) @ rotation.T

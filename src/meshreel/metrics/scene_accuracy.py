@@ -121,7 +121,7 @@ class Scene:
     @cached_property
     def rays(self) -> Rays:
         """Scene for ray casting, about `origin`."""
-        return Rays(self.mesh, np.zeros(3))
+        return Rays(self.mesh)
 
 
 def visible(scene: Scene, points: Scatter) -> Bool[np.ndarray, " N"]:

@@ -42,8 +42,8 @@ def main() -> None:
     die_with_parent()
     if hasattr(os, "nice"):
         os.nice(NICE)
-    with suppress(ModuleNotFoundError):  # without the renderer there are no posters
-        import open3d  # noqa: F401  (before the limits: it takes seconds and is no fault of a file)
+    with suppress(ModuleNotFoundError):  # without what draws there are no posters
+        from ..metrics import render  # noqa: F401  (before the limits: it takes a second and is no fault of a file)
     _limit_memory()
     paths: SimpleQueue[str] = SimpleQueue()
     Thread(target=_read, args=(paths,), daemon=True).start()
@@ -82,7 +82,7 @@ def _set_alarm(seconds: float) -> None:
 
 
 def poster(path: Path) -> bytes | None:
-    """Return a PNG, None for damaged and empty files and without the renderer (extra `encode`)."""
+    """Return a PNG, None for damaged and empty files and without what draws it (extra `encode`)."""
     try:
         with open_video(path) as video:
             frames = (video[index] for index in range(min(len(video), LOOKED_AT)))

@@ -6,16 +6,14 @@ import numpy as np
 
 from meshreel.analysis.reference.deform import DeformOptions
 from meshreel.analysis.reference.extraction import MDS, Reference, ReferenceOptions, extract_reference, predict
-from meshreel.analysis.reference.fuse import FuseOptions
 from meshreel.geometry.closest_points import Surface
 from meshreel.geometry.decimate import has_boundary
-from meshreel.geometry.poisson import PoissonOptions
 from meshreel.geometry.topology import components, face_normals, subdivide_midpoint
 from meshreel.types import Centers, Mesh
 
 from .test_deform import ball, inside, rotation
 
-QUICK = ReferenceOptions(vertices=500, trial_depth=4, keys=2, fuse=FuseOptions(poisson=PoissonOptions(depth=5)))
+QUICK = ReferenceOptions(vertices=500, keys=2)
 RADIUS = 0.1
 
 
@@ -91,7 +89,7 @@ def test_surface_that_the_key_frame_lacks_comes_from_other_frames() -> None:
     frames = [whole, Mesh(whole.vertices, hole), whole]
     first = inside((0, 0, 0))
     centers = Centers(np.stack([first] * 3), np.zeros(len(first), np.int32))
-    one_key = ReferenceOptions(vertices=500, keys=1, trial_depth=4, fuse=QUICK.fuse)
+    one_key = ReferenceOptions(vertices=500, keys=1)
     reference = extract_reference(frames, centers, one_key)
     assert reference.key == 1
     assert reference.mesh.vertices[:, 2].max() > 0.095

@@ -19,7 +19,7 @@ from ..rows import Encoding
 NUMBERS, STEPS = 200_000, 200_000  # of the fixed loop
 SAMPLES, PAUSE = 5, 1.0  # of the loop before and after what is measured, and s between two meanwhile (guess)
 ON_TIME = hasattr(signal, "setitimer")  # not on Windows
-LATE = ("open3d", "scipy.spatial", "scipy.sparse.csgraph", "fast_simplification", "igl")  # imported where needed
+LATE = ("scipy.spatial", "scipy.sparse.csgraph", "fast_simplification", "igl")  # imported where needed
 
 
 def reference_s() -> float:

@@ -36,7 +36,7 @@ class ReferenceOptions:
     canonical_keys: int = 2  # the best of these, tried with the MDS pose, too
     canonical_gain: float = 0.85  # the MDS pose must leave at most this share of the best frame's misfit
     trial_frames: int = 4  # frames to which a trial is fitted
-    trial_depth: int = 7  # Poisson depth of a trial
+    trial_voxel: float = 1.0  # of a trial, in mean edges of the frames' meshes
     trial_vertices: int = 2000  # vertices of a trial's mesh
     centers: ReferenceCenterOptions = field(default_factory=ReferenceCenterOptions)
     deform: DeformOptions = field(default_factory=DeformOptions)
@@ -89,7 +89,7 @@ def extract_reference(
     trials = _trials(group, spread.positions, options, canonical)
     best = _best(trials, options)
     pose = spread.positions if best.frame == MDS else group.positions[best.frame]
-    mesh = group.fused(pose, best.key, options.fuse.poisson.depth, options.vertices)
+    mesh = group.fused(pose, best.key, options.fuse.voxel, options.vertices)
     trials = tuple(
         replace(trial, frame=MDS if trial.frame == MDS else int(full[trial.frame]), key=int(full[trial.key]))
         for trial in trials
@@ -136,7 +136,7 @@ def _trial(group: Group, surfaces: list[FrameSurface], attempt: _Attempt, option
     frame, key, pose = attempt.frame, attempt.key, attempt.pose
     if len(surfaces) == 1:
         return Trial(frame, key, 0.0, 0.0)  # nothing to choose from
-    mesh = group.fused(pose, key, options.trial_depth, min(options.vertices, options.trial_vertices))
+    mesh = group.fused(pose, key, options.trial_voxel, min(options.vertices, options.trial_vertices))
     if mesh.is_empty:
         return Trial(frame, key, np.inf, np.inf)
     tried = sorted({key, *np.linspace(0, len(surfaces) - 1, options.trial_frames).round().astype(int).tolist()})

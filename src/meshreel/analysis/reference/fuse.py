@@ -1,31 +1,31 @@
 """Fuse all frames of a group into one surface in one pose of the centers (paper, section 3.3.2).
 
-In: frames, centers, a pose, a key frame. Out: the dense points of the frames deformed to the pose, and their mesh.
+In: frames, centers, a pose, a key frame. Out: the surfaces of the frames deformed to the pose, and their mean.
 
-Differs from the paper: the key frame's points come first, and other frames add what it lacks; faces that tear in the
-deformation, or join parts that are separate in some frame, are cut; no surface is made far from all points.
+Differs from the paper: the key frame's surface comes first, and other frames add what it lacks; faces that tear in the
+deformation, or join parts that are separate in some frame, are cut; surfaces are joined by the mean of their signed
+distances, not by Poisson reconstruction, so that none is made far from all.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float32, Float64, Int32, Int64
 
 from ...geometry.decimate import decimate
-from ...geometry.poisson import PoissonOptions, drop_small, reconstruct, thin_out
-from ...geometry.rigid import apply, rotate
+from ...geometry.mean_surface import MeanOptions, MeanSurface
+from ...geometry.rigid import apply
 from ...geometry.topology import (
     clean,
     close_holes,
+    drop_small,
+    drop_unreferenced,
     large_pieces,
-    longest_edges,
-    subdivide_midpoint,
     unique_edges,
     vertex_areas,
-    vertex_normals,
 )
 from ...types import Mesh
 from .centers import center_spacing
@@ -33,21 +33,18 @@ from .deform import Binding, DeformOptions, Neighbours, bind, blended, center_mo
 
 Edges = tuple[Int64[np.ndarray, "E 2"], Int64[np.ndarray, "F 3"]]  # result of geometry.topology.unique_edges
 
-SPARSE_ROUNDS = 4  # largest number of midpoint rounds for large faces: a guess
-
 
 @dataclass(frozen=True, slots=True)
 class FuseOptions:
-    """Options of the fusion of the frames' points; lengths in mean edges of the frames' meshes; guesses."""
+    """Options of the fusion of the frames; lengths in mean edges of the frames' meshes; guesses."""
 
-    subdivisions: int = 1  # midpoint rounds that make each frame's points dense
-    cover: float = 0.3  # a frame adds points where earlier ones have less than this share of its surface
-    cell: float = 0.75  # points are averaged in cells of this size
-    reach: float = 1.5  # surface farther than this from every point is removed
+    voxel: float = 0.5  # of the grid on which surfaces are joined
+    cover: float = 0.3  # a frame adds surface where earlier ones have less than this share of its own
+    reach: float = 2.0  # voxels: surfaces closer than this are joined to their mean
+    past: float = 1.5  # voxels by which pieces are continued past their borders, so that they meet
     torn: float = 3.0  # an edge that grows to more than this factor, plus half a center spacing, tears
     smallest: float = 0.01  # connected bits with less than this share of the largest one's faces are dropped
     hole: float = 0.08  # holes with a shorter perimeter, which cuts leave, are closed; share of the mesh's diagonal
-    poisson: PoissonOptions = field(default_factory=PoissonOptions)
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,46 +70,36 @@ class Group:
             np.mean([_lengths(f.vertices, e).mean() for f, (e, _) in zip(frames, self.edges, strict=True)])
         )
         self.bindings = [bind(frame, pose, kin, self.deform) for frame, pose in zip(frames, positions, strict=True)]
-        self.normals = [vertex_normals(frame) for frame in frames]
         self.parting = [self._parting(*each) for each in zip(self.edges, self.bindings, positions, strict=True)]
 
     def sent(self, mesh: Mesh, pose: Float64[np.ndarray, "K 3"]) -> Float64[np.ndarray, "T V 3"]:
         """Deform the vertices of a mesh in this pose to each frame."""
         return moved_to(mesh, pose, self.positions, self.kin, self.deform)
 
-    def cloud(
-        self, pose: Float64[np.ndarray, "K 3"], key: int, subdivisions: int
-    ) -> tuple[Float64[np.ndarray, "N 3"], Float64[np.ndarray, "N 3"]]:
-        """Return points and outward normals of the surface in a pose: the key frame's, then those of surface it lacks.
+    def pieces(self, pose: Float64[np.ndarray, "K 3"], key: int) -> list[Mesh]:
+        """Return the surface in a pose in pieces: the key frame's, then what it lacks, from the frames next to it.
 
-        Where tracking drifts, frames disagree by more than their detail: all points together would form many sheets.
+        Where tracking drifts, frames disagree by more than their detail: the mean of all would be blurred.
         """
-        covered = np.zeros(len(pose))
-        points, normals = [np.zeros((0, 3))], [np.zeros((0, 3))]
+        covered, found = np.zeros(len(pose)), list[Mesh]()
         for t in sorted(range(len(self.frames)), key=lambda t: (abs(t - key), t)):
-            moved, turned, faces = self._moved(t, pose)
+            moved, faces = self._moved(t, pose)
             nearest = self.bindings[t].nearest
             area = np.bincount(nearest, vertex_areas(Mesh(self.frames[t].vertices, faces)), len(pose))
             wanted = self._around(covered) < self.fuse.cover * self._around(area)
             covered += np.where(wanted, area, 0)
-            faces = faces[wanted[nearest][faces].any(axis=1)]
-            more, turned = _dense(moved, turned, faces, subdivisions, self.edge)
-            points.append(more)
-            normals.append(turned)
-        return thin_out(np.concatenate(points), np.concatenate(normals), self.fuse.cell * self.edge)
+            found.append(drop_unreferenced(Mesh(moved, faces[wanted[nearest][faces].any(axis=1)])))
+        return found
 
-    def fused(self, pose: Float64[np.ndarray, "K 3"], key: int, depth: int, vertices: int) -> Mesh:
-        """Make one mesh in a pose with about `vertices` vertices, no surface far from points, no face that tears."""
-        poisson, final = self.fuse.poisson, depth >= self.fuse.poisson.depth
-        options = replace(
-            poisson,
-            depth=depth,
-            reach=self.fuse.reach * self.edge,
-            smallest=self.fuse.smallest,
-            vertices=max(poisson.vertices, 4 * vertices) if final else vertices,
-        )
-        subdivisions = self.fuse.subdivisions if final else 0
-        mesh = decimate(reconstruct(*self.cloud(pose, key, subdivisions), options), vertices)
+    def fused(self, pose: Float64[np.ndarray, "K 3"], key: int, voxel: float, vertices: int) -> Mesh:
+        """Make one mesh in a pose with about `vertices` vertices, no surface far from the frames', no face that tears.
+
+        `voxel` is in mean edges of the frames' meshes.
+        """
+        mean = MeanSurface(voxel * self.edge, MeanOptions(reach=self.fuse.reach, past=self.fuse.past))
+        for piece in self.pieces(pose, key):
+            mean.add(piece)
+        mesh = decimate(drop_small(mean.surface(1), self.fuse.smallest), vertices)
         if mesh.is_empty:
             return mesh
         edges = unique_edges(mesh.faces)
@@ -124,8 +111,8 @@ class Group:
 
     def _moved(
         self, t: int, pose: Float64[np.ndarray, "K 3"]
-    ) -> tuple[Float64[np.ndarray, "V 3"], Float64[np.ndarray, "V 3"], Int32[np.ndarray, "F 3"]]:
-        """Return a frame's vertices and normals in a pose, and those of its faces that do not tear on the way."""
+    ) -> tuple[Float64[np.ndarray, "V 3"], Int32[np.ndarray, "F 3"]]:
+        """Return a frame's vertices in a pose, and those of its faces that do not tear on the way."""
         frame, binding = self.frames[t], self.bindings[t]
         turns = blended(binding, center_motions(self.positions[t], pose, self.kin), self.kin)
         points = apply(turns, frame.vertices)
@@ -133,7 +120,7 @@ class Group:
         spoiled[frame.faces[self.parting[t] | self._torn(frame.vertices, points, self.edges[t])]] = True
         faces = frame.faces[~spoiled[frame.faces].any(axis=1)]
         faces = faces[large_pieces(faces, len(points), self.fuse.smallest)]  # else: bound to the wrong body's centers
-        return points, rotate(turns, self.normals[t]), faces
+        return points, faces
 
     def _parting(self, edges: Edges, binding: Binding, pose: Float64[np.ndarray, "K 3"]) -> Bool[np.ndarray, " F"]:
         """Return the faces that join centers which are much farther from each other in some frame than in this pose."""
@@ -152,32 +139,6 @@ class Group:
     def _around(self, amounts: Float64[np.ndarray, " K"]) -> Float64[np.ndarray, " K"]:
         """Sum amounts over each center's neighbourhood: surface passes between neighbours from frame to frame."""
         return np.sum(amounts[self.kin.indices] * self.kin.affinities, axis=1)
-
-
-def _dense(
-    points: Float64[np.ndarray, "V 3"],
-    normals: Float64[np.ndarray, "V 3"],
-    faces: Int32[np.ndarray, "F 3"],
-    subdivisions: int,
-    longest: float,
-) -> tuple[Float64[np.ndarray, "N 3"], Float64[np.ndarray, "N 3"]]:
-    """Return points and normals of some faces and their midpoints: `subdivisions` rounds for all, more for large faces.
-
-    A flat sole may have few, large triangles: without points inside, it would count as far from the data.
-    """
-    found, turned = [], []
-    for round_ in range(max(subdivisions, SPARSE_ROUNDS) + 1):
-        used = np.zeros(len(points), bool)
-        used[faces] = True
-        faces = (np.cumsum(used) - 1)[faces].astype(np.int32)
-        points, normals = points[used], normals[used]
-        found.append(points)
-        turned.append(normals)
-        finer, finer_normals = (subdivide_midpoint(Mesh(a, faces)) for a in (points, normals))
-        points, normals, faces = finer.vertices, finer_normals.vertices, finer.faces
-        if round_ >= subdivisions:
-            faces = faces[longest_edges(points, faces) > longest]
-    return np.concatenate(found), np.concatenate(turned)
 
 
 def _lengths(vertices: Float64[np.ndarray, "V 3"], edges: np.ndarray) -> Float64[np.ndarray, " E"]:

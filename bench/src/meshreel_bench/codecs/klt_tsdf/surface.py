@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Bool, Float64, Int32, Int64
 
 from meshreel.geometry.topology import drop_unreferenced
-from meshreel.geometry.tsdf import extract, fill_grid
+from meshreel.geometry.tsdf import Grid, extract
 from meshreel.geometry.voxels import distinct
 from meshreel.types import Mesh
 
@@ -106,7 +106,7 @@ def polygonize(field: Field) -> Mesh:
     at = (which, inside[:, 2], inside[:, 1], inside[:, 0])
     values[at] = field.values / (ONE * STEP_ONE)
     known[at] = 1.0
-    mesh = extract(fill_grid(1.0, places_of(keys).astype(np.int32), values, known), 0.5)
+    mesh = extract(Grid.of(1.0, places_of(keys).astype(np.int32), values, known), 0.5)
     return Mesh(mesh.vertices + origin, mesh.faces)
 
 
