@@ -1,4 +1,4 @@
-"""Audio files of a tone, made here: their time is what they sound like, so that a player that is out of step is found."""
+"""Audio files of a tone, made here, for tests of what is heard."""
 
 from __future__ import annotations
 
