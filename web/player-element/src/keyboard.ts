@@ -21,7 +21,7 @@ export const KEYS: readonly { shown: string; says: string; keys: Readonly<Record
   { shown: "Home End", says: "First, last frame", keys: { Home: "first", End: "last" } },
   { shown: ", .", says: "Previous, next frame", keys: { ",": "previousFrame", ".": "nextFrame" } },
   { shown: "L", says: "Loop on or off", keys: { l: "loop" } },
-  { shown: "U", says: "Sound on or off", keys: { u: "mute" } },
+  { shown: "U", says: "Mute or unmute", keys: { u: "mute" } },
   { shown: "↑ ↓", says: "Louder, quieter", keys: { ArrowUp: "louder", ArrowDown: "quieter" } },
   { shown: "[ ]", says: "Repeat from here, to here", keys: { "[": "sectionFrom", "]": "sectionTo" } },
   { shown: "\\", says: "Repeat nothing", keys: { "\\": "sectionOff" } },

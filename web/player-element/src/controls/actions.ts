@@ -42,7 +42,7 @@ const ACTS: Readonly<Record<Action, Act>> = {
   },
   mute: (player, surface) => {
     player.muted = !player.muted;
-    surface.tell(player.muted ? "Sound off" : "Sound on");
+    surface.tell(player.muted ? "Muted" : "Sound on");
   },
   louder: (player, surface) => setVolume(player, surface, LOUDER),
   quieter: (player, surface) => setVolume(player, surface, -LOUDER),

@@ -11,7 +11,7 @@ export class Volume {
 
   constructor(player: MeshreelPlayer, mute: () => void) {
     this.#player = player;
-    const look = () => (this.#isSilent ? { icon: "silent", label: "Sound on" } as const : { icon: "sound", label: "Sound off" } as const);
+    const look = () => (this.#isSilent ? { icon: "silent", label: "Unmute" } as const : { icon: "sound", label: "Mute" } as const);
     this.#button = new Button("mute", "U", look, () => (this.#isSilent && player.volume === 0 ? this.#set(1) : mute()));
     this.#slider.addEventListener("input", () => this.#set(this.#slider.valueAsNumber));
     this.element = make("div", { class: "volume" }, this.#button.element, this.#slider);
