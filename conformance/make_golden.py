@@ -70,8 +70,9 @@ def main(folder: Path) -> None:
                 add(writer, group)
     with golden(folder, "scene", header()) as writer:
         add_scene(writer)
+    (folder / "audio").mkdir(exist_ok=True)
     heard = packed_audio(tone(0.3), -0.04, 500_000)
-    with golden(folder, "audio", header(intervals=(40_000, 20_000)), heard) as writer:
+    with golden(folder, "audio/audio", header(intervals=(40_000, 20_000)), heard) as writer:
         add(writer, still)
     (folder / "colored").mkdir(exist_ok=True)
     with golden(folder, "colored/vertices", header()) as writer:

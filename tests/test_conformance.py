@@ -12,7 +12,7 @@ from meshreel.format.checks import COMPANIONS
 from meshreel.format.layout import ChunkKind
 from tests.golden import GOLDEN, audio_record, colored_record, frame_record, planes, splats_records
 
-FILES = sorted(GOLDEN.glob("*.reel"))
+FILES = sorted([*GOLDEN.glob("*.reel"), *GOLDEN.glob("audio/*.reel")])
 COLORED = sorted(GOLDEN.glob("colored/*.reel"))
 
 

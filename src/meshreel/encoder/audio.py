@@ -86,7 +86,7 @@ def audio_type(data: bytes, name: str) -> AudioType:
             return AudioType.MP4
     elif (coded := _coded(data)) is not None:
         return coded
-    raise InputError(f"{name}: {_found(data)}, which is no audio that browsers play everywhere; {_REMEDY}")
+    raise InputError(f"{name}: {_found(data)}, which no .reel file keeps; {_REMEDY}")
 
 
 def _boxes(data: bytes) -> Iterator[tuple[bytes, bytes]]:

@@ -33,9 +33,9 @@ const TYPES: Readonly<Record<number, string>> = {
 export class Sound {
   /** The audio element; null before it is there. */
   voice: Voice | null = null;
-  readonly #make: () => Voice;
+  readonly #make: (() => Voice) | null; // null: there is no audio here, as in Node
   readonly #events: SoundEvents;
-  #load: (() => Promise<AudioFile>) | null = null; // null: there is nothing to fetch, or it was asked for
+  #load: (() => Promise<void>) | null = null; // null: there is nothing to fetch, or it was asked for
   #from = 0; // microseconds, of the first frame
   #start = 0; // s from the first frame to the first sample
   #end = 0; // s of sound; 0 before it is there
@@ -47,9 +47,9 @@ export class Sound {
   #muted = false;
   #volume = 1;
 
-  constructor(events: SoundEvents, make = (): Voice => new Audio()) {
+  constructor(events: SoundEvents, make?: () => Voice) {
     this.#events = events;
-    this.#make = make;
+    this.#make = make ?? ("Audio" in globalThis ? () => new Audio() : null);
   }
 
   get muted(): boolean {
@@ -78,9 +78,10 @@ export class Sound {
   /** Knows from now on where the file has what is heard. */
   open(head: Head, source: Source, signal: AbortSignal): void {
     const { audio } = head;
-    if (audio === null) return;
+    const make = this.#make;
+    if (audio === null || make === null) return;
     this.#from = head.header.firstTime;
-    this.#load = () => fileOf(audio, source, signal);
+    this.#load = async () => this.#open(await fileOf(audio, source, signal), make());
   }
 
   /** Fetches, unless it is muted: to be called when the first frame is there. */
@@ -147,12 +148,11 @@ export class Sound {
     this.#load = null;
     this.#isPending = true;
     this.#since = NaN;
-    load().then((file) => this.#open(file), (error: unknown) => this.#fail(error));
+    load().catch((error: unknown) => this.#fail(error));
   }
 
-  #open({ start, type, data }: AudioFile): void {
+  #open({ start, type, data }: AudioFile, voice: Voice): void {
     this.#start = (start - this.#from) / 1e6;
-    const voice = this.#make();
     voice.addEventListener("loadedmetadata", () => {
       this.#end = voice.duration - END;
       this.voice = voice;
