@@ -5,6 +5,7 @@ import { describe, expect, test, vi } from "vitest";
 import { Head } from "../src/format/reader.ts";
 import { audio, group, makeReel } from "./reel.ts";
 import type { FakeChunk } from "./reel.ts";
+import type { PlayerOptions } from "../src/player.ts";
 import { pass, useRig } from "./rig.ts";
 
 const RATE = 1e6; // bytes a second
@@ -67,9 +68,9 @@ const rig = useRig();
 const groups = (count = 25): FakeChunk[] => Array.from({ length: count }, () => group(10, [2000]));
 let voice: FakeVoice;
 
-function begin(chunk: FakeChunk, made = new FakeVoice()): void {
+function begin(chunk: FakeChunk, made = new FakeVoice(), more: Partial<PlayerOptions> = {}): void {
   voice = made;
-  rig.begin(makeReel([...groups(1), chunk, ...groups(24)], { frameRate: 25 }), RATE, { voice: () => voice as unknown as HTMLAudioElement });
+  rig.begin(makeReel([...groups(1), chunk, ...groups(24)], { frameRate: 25 }), RATE, { voice: () => voice as unknown as HTMLAudioElement, ...more });
 }
 const drift = (start = 0): number => voice.currentTime + start - rig.player.currentTime;
 
@@ -104,7 +105,20 @@ describe("sound", () => {
     expect(rig.player.currentTime).toBeGreaterThan(4.5);
   });
 
-  test("is silent while the picture stalls, or while nothing is displayed", async () => {
+  test("is silent while the picture stalls, and in step behind that", async () => {
+    begin(audio(5000), new FakeVoice(), { bufferSeconds: 2, decodedSeconds: 1 });
+    await Promise.all([rig.player.play(), pass(1)]);
+    rig.source.bytesPerSecond = 1;
+    await pass(5);
+    expect([rig.player.stats.stalls, voice.paused]).toEqual([1, true]);
+    expect(Math.abs(drift())).toBeLessThan(0.1); // it stands where it was; play begins at the picture's place
+    rig.source.bytesPerSecond = RATE;
+    await pass(2);
+    expect([voice.paused, voice.plays]).toEqual([false, 2]);
+    expect(Math.abs(drift())).toBeLessThan(0.035);
+  });
+
+  test("is silent while nothing is displayed", async () => {
     begin(audio(5000));
     await Promise.all([rig.player.play(), pass(1)]);
     rig.viewer.stop();
