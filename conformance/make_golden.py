@@ -32,6 +32,7 @@ from meshreel.coding.reference_mesh import CodedReference, code_reference
 from meshreel.container.writer import Companion, ReelWriter
 from meshreel.decoder.video import Video
 from meshreel.decoder.video import open as open_video
+from meshreel.encoder.audio import packed_audio
 from meshreel.encoder.options import TextureOptions
 from meshreel.encoder.videos import Videos, layered_pictures
 from meshreel.format.layout import ChunkKind, Header
@@ -39,9 +40,10 @@ from meshreel.format.records import pack
 from meshreel.geometry.atlas import Layout
 from meshreel.geometry.topology import concatenate
 from meshreel.types import Mesh
-from tests.golden import colored_record, frame_record, planes, splats_records
+from tests.golden import audio_record, colored_record, frame_record, planes, splats_records
 from tests.spheres import deforming_sphere
 from tests.splats import some_splats
+from tests.tones import tone
 
 FRAMES = 4
 COLORS = ColorCodingOptions(step=1 / 24)
@@ -68,6 +70,10 @@ def main(folder: Path) -> None:
                 add(writer, group)
     with golden(folder, "scene", header()) as writer:
         add_scene(writer)
+    (folder / "audio").mkdir(exist_ok=True)
+    heard = packed_audio(tone(0.3), -0.04, 500_000)
+    with golden(folder, "audio/audio", header(intervals=(40_000, 20_000)), heard) as writer:
+        add(writer, still)
     (folder / "colored").mkdir(exist_ok=True)
     with golden(folder, "colored/vertices", header()) as writer:
         painted = Painted(writer)
@@ -90,11 +96,11 @@ def main(folder: Path) -> None:
 
 
 @contextmanager
-def golden(folder: Path, name: str, head: Header) -> Iterator[ReelWriter]:
+def golden(folder: Path, name: str, head: Header, audio: bytes = b"") -> Iterator[ReelWriter]:
     """A writer of a file and then of what it must decode to; of nothing where the file is there."""
     path = folder / f"{name}.reel"
     kept = path.exists()
-    with ReelWriter(io.BytesIO() if kept else path, head) as writer:
+    with ReelWriter(io.BytesIO() if kept else path, head, audio=audio) as writer:
         yield writer
     if not kept:
         path.with_suffix(".json").write_text(json.dumps(record(open_video(path)), indent=1) + "\n")
@@ -320,7 +326,7 @@ def record(video: Video) -> dict[str, object]:
     if video.reader.is_colored:
         shown = sorted({*range(min(len(video), 12)), *range(0, len(video), 49), *range(len(video) - 4, len(video))})
         return {"parts": {str(frame): colored_record(video, frame) for frame in shown}, "planes": planes(video.reader)}
-    return {
+    return audio_record(video) | {
         "frame_rate": video.frame_rate,
         "timestamps": video.timestamps,
         "frames": [frame_record(mesh) for mesh in video],

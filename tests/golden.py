@@ -33,6 +33,14 @@ def frame_record(mesh: Mesh) -> dict[str, object]:
     }
 
 
+def audio_record(video: Video) -> dict[str, object]:
+    """What is heard; nothing where nothing is."""
+    if (audio := video.audio) is None:
+        return {}
+    found = {"type": audio.media_type, "start": audio.start, "sha256": hashlib.sha256(audio.data).hexdigest()}
+    return {"audio": found}
+
+
 def colored_record(video: Video, frame: int) -> dict[str, dict[str, object]]:
     """Of each part of a frame its colours, and the places of its corners, of which NaN is stored as -1."""
     found = dict[str, dict[str, object]]()

@@ -10,9 +10,9 @@ import pytest
 import meshreel
 from meshreel.format.checks import COMPANIONS
 from meshreel.format.layout import ChunkKind
-from tests.golden import GOLDEN, colored_record, frame_record, planes, splats_records
+from tests.golden import GOLDEN, audio_record, colored_record, frame_record, planes, splats_records
 
-FILES = sorted(GOLDEN.glob("*.reel"))
+FILES = sorted([*GOLDEN.glob("*.reel"), *GOLDEN.glob("audio/*.reel")])
 COLORED = sorted(GOLDEN.glob("colored/*.reel"))
 
 
@@ -21,6 +21,7 @@ def test_there_is_a_golden_file_for_each_form():
     assert forms == {"LAPLACIAN", "LAYERS", "DRACO", "EMPTY"}
     chunks = [chunk for path in FILES for chunk in meshreel.open(path).reader.chunks]
     assert {chunk.form.name for chunk in chunks if chunk.kind == ChunkKind.STATIC} == {"DRACO", "PATCH"}
+    assert any(chunk.kind == ChunkKind.AUDIO for chunk in chunks)
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
@@ -31,6 +32,7 @@ def test_a_golden_file_decodes_bit_for_bit(path):
     assert video.timestamps == wanted["timestamps"]
     assert [frame_record(mesh) for mesh in video] == wanted["frames"]
     assert [frame_record(mesh) for mesh in video.at(1)] == wanted["frames_with_one_component"]
+    assert audio_record(video) == {name: value for name, value in wanted.items() if name == "audio"}
 
 
 def test_there_is_a_golden_file_for_each_companion_of_a_group_and_of_a_background():

@@ -18,6 +18,7 @@ constexpr double kColors = 96 << 20, kPainted = 32, kPainting = 256;
 constexpr double kMostFaces = 64'000'000;     // faces or vertices of a group
 constexpr double kMostNumbers = 536'870'912;  // of a group's places: 4 GiB
 constexpr uint32_t kMostHead = 64 << 20;      // bytes
+constexpr uint64_t kMostAudio = 256 << 20;    // bytes of a chunk of audio
 
 }  // namespace limits
 

@@ -11,8 +11,19 @@
 
 namespace meshreel {
 
-enum Kind : uint8_t { kStatic = 1, kGroup, kColorsOf, kAtlasOf, kPicturesOf, kCompatibleOf, kSplatsOf };
-enum Form : uint8_t { kLaplacian = 1, kLayers, kDraco, kEmpty, kPatch, kVertexColors, kPlaces, kVideo, kGaussians };
+enum Kind : uint8_t { kStatic = 1, kGroup, kColorsOf, kAtlasOf, kPicturesOf, kCompatibleOf, kSplatsOf, kAudio };
+enum Form : uint8_t {
+    kLaplacian = 1,
+    kLayers,
+    kDraco,
+    kEmpty,
+    kPatch,
+    kVertexColors,
+    kPlaces,
+    kVideo,
+    kGaussians,
+    kAudioFile
+};
 
 constexpr uint32_t kNoChunk = ~0u;
 constexpr int64_t kAllLayers = -1;  // as a number of layers

@@ -30,6 +30,7 @@ public:
         if (entry.kind == kStatic) add_static(entry);
         else if (entry.kind == kGroup) add_group(entry);
         else if (entry.is_companion()) add_companion(entry);
+        else if (entry.kind == kAudio) add_audio(entry);
     }
 
     void finish() {
@@ -107,6 +108,17 @@ private:
         wholes_[number_] = {before, is_base, is_base || entry.form == kLaplacian, -1, 0};
     }
 
+    // What is heard is not this library's: it only keeps the laws.
+    void add_audio(const Chunk& entry) {
+        uint64_t size = 0;
+        for (const Layer& layer : entry.layers)
+            size = std::min(size + std::min(layer.size, limits::kMostAudio + 1), limits::kMostAudio + 1);
+        need(!has_audio_ && entry.form == kAudioFile && !entry.frames && !entry.track && entry.depends_on.empty() &&
+                 size <= limits::kMostAudio,
+             "audio besides other audio, not on its own, or too much");
+        has_audio_ = true;
+    }
+
     void add_companion(Chunk& entry) {
         const uint64_t of = entry.depends_on.empty() ? ~uint64_t{0} : entry.depends_on[0];
         need(whole(of) && head_.companion_of(static_cast<uint32_t>(of), entry.kind) == kNoChunk,
@@ -135,6 +147,7 @@ private:
 
     Head& head_;
     uint32_t number_ = 0;
+    bool has_audio_ = false;
     std::vector<uint64_t> frames_;  // of each track so far
     std::pair<uint64_t, int64_t> place_{0, -1};
     std::map<uint64_t, Whole> wholes_;

@@ -16,8 +16,8 @@ namespace {
 using File = std::vector<uint8_t>;
 
 const char* const kFiles[] = {
-    "cut",   "draco", "empty",         "laplacian",        "layers",           "layers_open",  "layers_patched",
-    "mixed", "scene", "colored/scene", "colored/textures", "colored/vertices", "splats/splats"};
+    "cut",   "draco", "empty",       "laplacian",     "layers",           "layers_open",      "layers_patched",
+    "mixed", "scene", "audio/audio", "colored/scene", "colored/textures", "colored/vertices", "splats/splats"};
 
 File load(const std::string& name) {
     std::ifstream file(CONFORMANCE + name + ".reel", std::ios::binary);

@@ -56,6 +56,15 @@ class Texture:
         return self.read()
 
 
+@dataclass(frozen=True, slots=True)
+class Audio:
+    """An audio file that belongs to frames, byte for byte as it was given."""
+
+    data: bytes = field(repr=False)
+    media_type: str  # as audio/ogg
+    start: float  # s after the first frame; below 0 where its beginning is not heard
+
+
 @dataclass(frozen=True, slots=True, repr=False)
 class Mesh:
     """A triangle mesh, which may have no faces and no vertices (an empty frame), and may have colours.

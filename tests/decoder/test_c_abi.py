@@ -42,7 +42,8 @@ from tests.decoder.c_abi import (
 from tests.golden import GOLDEN
 
 pytestmark = pytest.mark.skipif(shutil.which("cmake") is None, reason="needs CMake, of the extra dev")
-GEOMETRY = sorted([*GOLDEN.glob("*.reel"), *GOLDEN.glob("splats/*.reel")])
+PLAIN = sorted([*GOLDEN.glob("*.reel"), *GOLDEN.glob("audio/*.reel")])
+GEOMETRY = sorted([*PLAIN, *GOLDEN.glob("splats/*.reel")])
 COLORED = sorted(GOLDEN.glob("colored/*.reel"))
 EXACT = Header(30.0, (0.0, 0.0, 0.0), 1.0, (-1.0, -1.0, -1.0), (1.0, 1.0, 1.0), "{}")
 named = {"ids": lambda path: path.stem}
@@ -64,7 +65,7 @@ def record(found: dict) -> dict[str, object]:
     }
 
 
-@pytest.mark.parametrize("path", sorted(GOLDEN.glob("*.reel")), **named)
+@pytest.mark.parametrize("path", PLAIN, **named)
 def test_a_golden_file_decodes_bit_for_bit(path: Path):
     wanted = json.loads(path.with_suffix(".json").read_text())
     with CVideo(path.read_bytes()) as video:

@@ -21,12 +21,14 @@ STATIC = IndexEntry(ChunkKind.STATIC, Form.DRACO, 0, 0, (), (Layer(9, 0),))
 GROUP = IndexEntry(ChunkKind.GROUP, Form.DRACO, 5, 0, (), (Layer(9, 0),))
 SECOND = replace(GROUP, track=1)
 PATCH = replace(STATIC, form=Form.PATCH, depends_on=(0,))
+AUDIO = IndexEntry(ChunkKind.AUDIO, Form.AUDIO_FILE, 0, 0, (), (Layer(9, 0),))
 
 
 def test_written_heads_pass():
     check_header(HEADER, 10)
     check_header(replace(HEADER, intervals=(1, 2)), 3)
     check_index(Index((STATIC, replace(GROUP, depends_on=(0,)))))
+    check_index(Index((AUDIO, GROUP)))
     check_index(Index((GROUP, STATIC, replace(GROUP, depends_on=(0, 1)), replace(GROUP, depends_on=(2,)))))
     check_index(
         Index((STATIC, GROUP, SECOND, PATCH, replace(GROUP, depends_on=(1, 3)), replace(SECOND, depends_on=(2,))))
@@ -65,6 +67,13 @@ def test_a_header_that_means_nothing_is_refused(change):
         ((GROUP, replace(STATIC, depends_on=(0,))), r"chunk 1: a static chunk of form DRACO depends on \(0,\)"),
         ((replace(GROUP, depends_on=(0,)),), "neither a static chunk"),
         ((replace(GROUP, depends_on=(1 << 60,)),), "neither a static chunk"),
+        ((AUDIO, GROUP, AUDIO), "chunk 2: audio besides other audio"),
+        ((GROUP, replace(AUDIO, depends_on=(0,))), "chunk 1: audio .* not on its own"),
+        ((GROUP, replace(AUDIO, form=Form.DRACO)), "not on its own"),
+        ((GROUP, replace(AUDIO, frames=5)), "not on its own"),
+        ((GROUP, replace(AUDIO, track=1)), "not on its own"),
+        ((GROUP, replace(AUDIO, layers=(Layer(1 << 29, 0), Layer(1 << 29, 0)))), "1073741824 bytes of audio, over"),
+        ((AUDIO,), "no frames"),
     ],
 )
 def test_an_index_that_contradicts_itself_is_refused(chunks, message):

@@ -112,6 +112,7 @@ def test_pages_run_no_script_but_the_player_and_may_be_embedded(client):
     page = client.get("/watch/walk.reel")
     policy = page.headers["content-security-policy"]
     assert "default-src 'none'" in policy and "script-src 'self' 'wasm-unsafe-eval'" in policy
+    assert "media-src blob:" in policy  # audio
     assert "frame-ancestors" not in policy and "x-frame-options" not in page.headers
     assert "cross-origin-embedder-policy" not in page.headers
     styles = re.search("<style>(.*?)</style>", page.text, re.DOTALL)[1]

@@ -12,8 +12,8 @@ export const PYTHON = join(ROOT, process.platform === "win32" ? ".venv/Scripts/p
 export const hasPython = existsSync(PYTHON);
 
 /** What a module of the sources writes to its standard output. Error where it fails. */
-export function runModule(name: string): Buffer {
-  return execFileSync(PYTHON, ["-m", name], { cwd: ROOT, maxBuffer: 1 << 26 });
+export function runModule(name: string, ...values: readonly (string | number)[]): Buffer {
+  return execFileSync(PYTHON, ["-m", name, ...values.map(String)], { cwd: ROOT, maxBuffer: 1 << 26 });
 }
 
 /** What a script writes to its standard output. Error where it fails. */

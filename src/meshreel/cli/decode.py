@@ -18,7 +18,7 @@ from ..errors import FormatError, InputError
 from ..export.frames import Part, check_part, write_frames
 from ..export.splats import check_splats, write_splats
 from ..geometry.topology import concatenate
-from ..io.write import frame_names, left_over, make_folder
+from ..io.write import check_apart, frame_names, left_over, make_folder, replacing
 from ..types import Mesh, Texture
 from .console import Common
 
@@ -32,6 +32,7 @@ def command(
     layers: int | None = None,
     only: Part = "all",
     splats: Annotated[bool, Parameter(negative="")] = False,
+    audio: Annotated[bool, Parameter(negative="")] = False,
     common: Common = Common(),
 ) -> None:
     """Decode a .reel file into a directory of meshes.
@@ -53,10 +54,15 @@ def command(
         Of a scene, only the background or only the moving bodies; by default whole frames.
     splats
         Write the splats of each frame in place of meshes: PLY or SPZ files for viewers of 3D Gaussian splatting.
+    audio
+        Write the audio file instead, as it was given, to the file that --output names.
     """
     if layers is not None and layers < 0:
         raise InputError(f"--layers must not be negative, got {layers}")
     video = open_video(file).at(layers)
+    if audio:
+        _write_audio(file, video, output, common)
+        return
     check_part(file, video.reader, only)
     if splats:
         _write_splats(file, video, output, format, common)
@@ -98,6 +104,18 @@ def command(
         raise FormatError(f"{text}; copy the file again")
     row = {"output": str(output), "frames": len(video), "format": format, "frame_rate": video.frame_rate}
     common.result(row, f"{output}: {len(video)} {format} files")
+
+
+def _write_audio(file: Path, video: Video, output: Path, common: Common) -> None:
+    """Write the audio file, byte for byte. Raises InputError where there is none."""
+    found = video.audio
+    if found is None:
+        raise InputError(f"{file}: has no audio; meshreel tag --audio adds one")
+    check_apart(output, [file])
+    with replacing(output) as sink:
+        sink.write(found.data)
+    row = {"output": str(output), "bytes": len(found.data), "type": found.media_type, "start_s": found.start}
+    common.result(row, f"{output}: {len(found.data)} bytes of {found.media_type}")
 
 
 def _write_splats(file: Path, video: Video, output: Path, format: str, common: Common) -> None:

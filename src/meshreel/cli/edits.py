@@ -67,7 +67,7 @@ def concat(inputs: list[str], /, *, output: Output, common: Common = Common()) -
 def retime(
     file: File, /, *, output: Output, fps: float | None = None, speed: float | None = None, common: Common = Common()
 ) -> None:
-    """Write a .reel file that plays at another frame rate or speed; nothing is encoded again.
+    """Write a .reel file that plays at another frame rate or speed, without audio; nothing is encoded again.
 
     Parameters
     ----------
@@ -76,7 +76,11 @@ def retime(
     speed
         How many times as fast it plays, as 0.5 for half the speed.
     """
-    _tell(_checked(output), edit.retime(file, _checked(output), fps, speed), common)
+    done = edit.retime(file, _checked(output), fps, speed)
+    if done.lost_audio:
+        text = "its audio is left out, which would be out of step; meshreel tag --audio adds one of the new speed"
+        common.warn([f"{output}: {text}"])
+    _tell(_checked(output), done, common)
 
 
 def transform(
@@ -116,21 +120,33 @@ def transform(
 
 def tag(
     file: File,
-    values: Annotated[list[str], Parameter(negative="")],
+    values: Annotated[list[str] | None, Parameter(negative="")] = None,
     /,
     *,
     output: Output,
+    audio: str | None = None,
+    audio_start: float | None = None,
+    no_audio: Annotated[bool, Parameter(negative="")] = False,
     common: Common = Common(),
 ) -> None:
-    """Write a .reel file with other metadata, which `meshreel info` shows.
+    """Write a .reel file with other metadata, which `meshreel info` shows, or other audio.
 
     Parameters
     ----------
     values
         NAME=VALUE, as title="A walk" or take=3 (numbers, true, false and JSON are taken as such); NAME= takes it away.
+    audio
+        An audio file that players play with the frames, in place of one that is there: Opus, AAC or MP3, kept as it is.
+    audio_start
+        Seconds from the first frame to the beginning of the audio, also of one that is there; below 0, that much of it
+        is left out.
+    no_audio
+        Take the audio away.
     """
+    if no_audio and (audio, audio_start) != (None, None):
+        raise InputError("--no-audio takes away what --audio and --audio-start are for; give one of them")
     tags: dict[str, Any] = {}
-    for value in values:
+    for value in values or []:
         name, sign, text = value.partition("=")
         if not sign:
             raise InputError(f"{value!r}: give NAME=VALUE, as title=Walk")
@@ -138,7 +154,8 @@ def tag(
             tags[name] = json.loads(text) if text else None
         except ValueError:
             tags[name] = text
-    _tell(_checked(output), edit.tag(file, _checked(output), tags), common)
+    heard = b"" if no_audio else audio
+    _tell(_checked(output), edit.tag(file, _checked(output), tags, audio=heard, audio_start=audio_start), common)
 
 
 def _checked(output: str) -> Place:

@@ -26,7 +26,7 @@ from ..io.sequence import SequenceOptions
 from ..io.write import check_apart, replacing
 from ..types import MeshSequence
 from .console import Common
-from .flags import Reading
+from .flags import Hearing, Reading
 from .sources import Masking, open_source
 from .workers import workers
 
@@ -178,6 +178,7 @@ def command(
     parting: Parting = Parting(),
     masking: Masking = Masking(),
     part: Part = Part(),
+    hearing: Hearing = Hearing(),
     jobs: int = 1,
     cluster: str | None = None,
     resume: bool | None = None,
@@ -216,6 +217,7 @@ def command(
     if debug_digests is not None and (resume or coding.goal() is not None):
         raise InputError("--debug-digests describes one whole encode: leave out --resume and targets")
     part.check(coding, masking)
+    heard = hearing.payload()
     source = open_source(inputs, reading if part.survey is None else replace(reading, frames=":"), common)
     scene = parting.scene(preset_options().scene or SceneOptions(), masking)
 
@@ -232,6 +234,7 @@ def command(
         _lines(debug_digests, place, sequence.files) as digests,
     ):
         encoder = Encoder(sequence, executor, progress, masker, digests, excerpt)
+        encoder.audio = heard
         if goal is None:
             summary = encoder.encode(place, options, resume)
         else:
@@ -267,6 +270,7 @@ def summary_row(summary: Summary, frame_rate: float) -> dict[str, Any]:
         "mbps": _mbps(summary.size, summary, frame_rate),
         "d2_psnr_paper": summary.psnr if math.isfinite(summary.psnr) else None,
         "scene": None if summary.scene is None else _scene_row(summary, summary.scene, frame_rate),
+        "audio_bytes": summary.audio,
         "work": summary.work,
         "groups": [
             {
@@ -289,6 +293,8 @@ def _scene_row(summary: Summary, scene: SceneSummary, frame_rate: float) -> dict
     sizes = {"background": scene.background}
     for track in range(scene.tracks):
         sizes[f"track {track}"] = sum(group.size + group.colors for group in summary.groups if group.track == track)
+    if summary.audio:
+        sizes["audio"] = summary.audio
     sizes["other"] = summary.size - sum(sizes.values())
     return {
         "tracks": scene.tracks,
@@ -320,6 +326,7 @@ def describe(row: dict[str, Any]) -> str:
     counted = ", ".join(f"{count} {'group' if count == 1 else 'groups'} of form {form}" for count, form in counts)
     tracks = 1 + max(group["track"] for group in row["groups"])
     scene = ("" if tracks == 1 else f"{tracks} tracks, ") if row["scene"] is None else _describe_scene(row["scene"])
+    scene += f"audio {row['audio_bytes']} bytes, " if row["audio_bytes"] else ""
     before = f", {row['continued']} intervals from before" if row["continued"] else ""
     return f"{row['frames']} frames, {row['bytes']} bytes, {row['mbps']:.3f} Mbps, {scene}{counted}{before}"
 

@@ -8,6 +8,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from ..encoder.audio import packed_audio
 from ..errors import InputError
 from ..geometry.topology import weld
 from ..io.sequence import SequenceOptions
@@ -72,3 +73,20 @@ class Knowing:
     def __post_init__(self) -> None:
         if self.truth_every < 1:
             raise InputError(f"--truth-every {self.truth_every}: give 1 for all frames, 6 for every sixth")
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, slots=True)
+class Hearing:
+    """Flags for what is heard with the frames."""
+
+    audio: str | None = None
+    """An audio file that players play with the frames: Opus (.opus, .webm), AAC (.m4a, .aac) or MP3, kept as it is."""
+    audio_start: float = 0.0
+    """Seconds from the first frame to the beginning of --audio; below 0, that much of it is left out."""
+
+    def payload(self) -> bytes:
+        """Return the bytes of a chunk. Raises InputError for another file."""
+        if self.audio is None and self.audio_start:
+            raise InputError(f"--audio-start {self.audio_start:g}: needs --audio, the file that begins then")
+        return b"" if self.audio is None else packed_audio(self.audio, self.audio_start)

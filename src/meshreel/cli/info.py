@@ -61,6 +61,7 @@ def command(
     told = f"recorded at encode: {recorded or 'nothing'}"
     common.result(row, head, _looks(row), told, *tables, _groups(row, more))
     common.warn(f"background: {state['error']}" for state in row["background"] if "error" in state)
+    common.warn([f"audio: {row['audio']['error']}"] if "error" in (row["audio"] or {}) else [])
     common.warn(f"group {i}: {group['error']}" for i, group in enumerate(row["groups"]) if "error" in group)
 
 
@@ -71,6 +72,9 @@ def _looks(row: dict[str, Any]) -> str:
     mesh, hidden = row["first_surface"], row["frames_hidden"]
     what = f"frame {mesh['frame']}: {mesh['vertices']} vertices, {mesh['faces']} faces" if mesh else "no surface found"
     parts = [f"box {box} m, {row['up']} is up", what, f"{row['layers']} layers", f"colour: {row['color']}"]
+    if (heard := row["audio"]) is not None:
+        begin = f", from {heard['start_s']:g} s" if "start_s" in heard else ""
+        parts.append(f"audio: {heard.get('type', 'damaged')}, {heard['bytes']} bytes{begin}")
     return "; ".join([*parts, *([f"{hidden} frames more are hidden"] if hidden else [])])
 
 
@@ -94,11 +98,14 @@ def describe_file(file: Path) -> dict[str, Any]:
         shown = reader.static_ranges(range(reader.frame_count))
         static = [chunk for chunk in reader.chunks if chunk.kind == ChunkKind.STATIC]
         surface = _first_surface(reader)
+        audio = _describe_audio(reader, there)
         states = [_describe_state(reader, chunk, there, shown.get(chunk.number, [])) for chunk in static]
     tracks = [_describe_track(reader, number, groups) for number in range(len(reader.tracks))]
     several = len(tracks) > 1
     of_tracks = [_renamed(track, several) for track in tracks]
-    sizes = _sum([{"header and index": reader.head_size}, *(state["bytes_by_content"] for state in states), *of_tracks])
+    heard = [] if audio is None else [audio["bytes_by_content"]]
+    whole = {"header and index": reader.head_size}
+    sizes = _sum([whole, *(state["bytes_by_content"] for state in states), *of_tracks, *heard])
     return {
         "frames": reader.frame_count,
         "frame_rate": reader.frame_rate,
@@ -108,6 +115,7 @@ def describe_file(file: Path) -> dict[str, Any]:
         "first_surface": surface,
         "layers": max(group["layers"] for group in groups),
         "color": _color(reader),
+        "audio": audio,
         "frames_hidden": reader.coded_count - reader.frame_count,
         "bytes": reader.size,
         "bytes_missing": reader.size - there,
@@ -139,6 +147,17 @@ def _color(reader: ReelReader) -> str:
         ChunkKind.SPLATS: "splats",
     }
     return ", ".join(name for kind, name in kinds.items() if any(c.kind == kind for c in reader.chunks)) or "none"
+
+
+def _describe_audio(reader: ReelReader, there: int) -> dict[str, Any] | None:
+    """Describe what is heard, and when it begins after the first frame; None where there is nothing."""
+    if reader.audio is None:
+        return None
+    row = {"bytes": reader.audio.size} | _contents(reader, reader.audio, there, lambda payload: {"audio": len(payload)})
+    with suppress(FormatError):
+        if (found := Video(reader).audio) is not None:
+            row |= {"type": found.media_type, "start_s": found.start}
+    return row
 
 
 def megabits(size: int, reader: ReelReader) -> float:

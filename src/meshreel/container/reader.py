@@ -14,9 +14,21 @@ import numpy as np
 
 from ..errors import FormatError
 from ..format.budget import check_frames, check_head
-from ..format.checks import COMPANIONS, check_header, check_index, parse_metadata
+from ..format.checks import COMPANIONS, check_header, check_index, parse_metadata, unpack_audio
 from ..format.edit import parse_edit
-from ..format.layout import EDITED, MAGIC, VERSION, Checksum, ChunkKind, Form, Header, Index, Layer, Preamble
+from ..format.layout import (
+    EDITED,
+    MAGIC,
+    VERSION,
+    AudioFile,
+    Checksum,
+    ChunkKind,
+    Form,
+    Header,
+    Index,
+    Layer,
+    Preamble,
+)
 from ..format.records import least_size, unpack, unpack_all
 from ..shapes import Float64
 from ..types import Up, known_up
@@ -58,7 +70,7 @@ class Chunk:
     def __str__(self) -> str:
         what = f"{ChunkKind(self.kind).name.lower()}, " if self.kind in COMPANIONS else ""
         if self.frame_count == 0:
-            return f"chunk {self.number} ({what}static)"
+            return f"chunk {self.number} ({'audio' if self.kind == ChunkKind.AUDIO else f'{what}static'})"
         track = "" if self.is_alone else f"track {self.track}, "
         return (
             f"chunk {self.number} ({what}{track}frames {self.first_frame} to {self.first_frame + self.frame_count - 1})"
@@ -146,6 +158,20 @@ class ReelReader:
     def has_textures(self) -> bool:
         """Whether the file has pictures, in any coding."""
         return any(chunk.form == Form.VIDEO for chunk in self._companions.values())
+
+    @property
+    def audio(self) -> Chunk | None:
+        """The chunk that has what is heard, if any."""
+        return next((chunk for chunk in self.chunks if chunk.kind == ChunkKind.AUDIO), None)
+
+    def read_audio(self) -> AudioFile | None:
+        """Read what is heard; None where there is nothing. A FormatError names the chunk."""
+        if (chunk := self.audio) is None:
+            return None
+        try:
+            return unpack_audio(self.read_chunk(chunk.number))
+        except FormatError as error:
+            raise error if str(error).startswith(str(chunk)) else FormatError(f"{chunk}: {error}") from error
 
     def companion_of(self, chunk: Chunk, kind: ChunkKind) -> Chunk | None:
         """Return the chunk of a kind that belongs to a chunk, or None."""

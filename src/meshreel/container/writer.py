@@ -11,7 +11,7 @@ import tempfile
 import zlib
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import accumulate
 from pathlib import Path
 from types import TracebackType
@@ -19,7 +19,7 @@ from typing import IO, Any, Protocol, runtime_checkable
 
 from ..errors import FormatError, InputError
 from ..format.budget import check_frames, check_head
-from ..format.checks import IndexChecks, check_header, parse_metadata
+from ..format.checks import IndexChecks, check_header, check_index, parse_metadata
 from ..format.layout import (
     MAGIC,
     VERSION,
@@ -35,6 +35,8 @@ from ..format.layout import (
 from ..format.records import least_size, pack
 from ..io.unfinished import FULL, sync_folder, unfinished
 from .sources import Stream
+
+AUDIO_PIECE = 1 << 16  # bytes of an audio chunk's layers: 8 s of 64 kbit/s (guess)
 
 
 @runtime_checkable
@@ -87,11 +89,12 @@ class ReelWriter:
     folder, disk full), where no frame was added, or where a value cannot be stored.
     """
 
-    def __init__(self, output: str | Path | Sink, header: Header, name: str = "the output") -> None:
-        """Write to `output`; `name` is what error messages call a Sink."""
+    def __init__(self, output: str | Path | Sink, header: Header, name: str = "the output", audio: bytes = b"") -> None:
+        """Write to `output`; `name` is what error messages call a Sink, `audio` a payload of form AUDIO_FILE."""
         self._output = Path(output) if isinstance(output, str | Path) else output
         self._name = str(self._output) if isinstance(self._output, Path) else name
         self.header = header  # may be replaced until the block ends, to store measured values as metadata
+        self._audio = audio
         self.size = 0  # bytes of the whole file, known when the block has ended
         self._entries: list[IndexEntry] = []
         self._chunks: list[Stored] = []
@@ -204,6 +207,11 @@ class ReelWriter:
     def _finish(self) -> None:
         self._checks.finish()
         check_header(self.header, self.frame_count)
+        if self._audio:
+            index, place = with_audio(Index(tuple(self._entries)), self._audio)
+            check_index(index)
+            self._entries = list(index.chunks)
+            self._chunks.insert(place, self._kept(self._audio))
         head = pack_head(self.header, Index(tuple(self._entries)))
         size = len(head) + sum(layer.size for entry in self._entries for layer in entry.layers)
         check_frames(sum(self._checks.frames), size)
@@ -238,6 +246,30 @@ def pack_head(header: Header, index: Index, flags: int = 0) -> bytes:
     check_head(size)
     data = pack(Preamble(MAGIC, VERSION, flags, size)) + body
     return data + pack(Checksum(zlib.crc32(data)))
+
+
+def with_audio(index: Index, payload: bytes) -> tuple[Index, int]:
+    """Return an index with an AUDIO chunk more, and its number.
+
+    It lies behind all that the first frame needs, and before the rest, so that a file can be heard while it arrives.
+    """
+    later, frames = len(index.chunks), dict[int, int]()
+    for number, entry in enumerate(index.chunks):
+        if entry.kind == ChunkKind.GROUP:
+            if entry.track in frames:
+                later = number
+                break
+            frames[entry.track] = number
+    audio = IndexEntry(ChunkKind.AUDIO, Form.AUDIO_FILE, 0, 0, (), _layers(payload, _pieces(len(payload))))
+    moved = [
+        replace(entry, depends_on=tuple(number + (number >= later) for number in entry.depends_on))
+        for entry in index.chunks
+    ]
+    return Index((*moved[:later], audio, *moved[later:])), later
+
+
+def _pieces(size: int) -> tuple[int, ...]:
+    return (*range(AUDIO_PIECE, size, AUDIO_PIECE), size)
 
 
 def _open_spool(output: Path | Sink) -> IO[bytes]:

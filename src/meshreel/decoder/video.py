@@ -17,11 +17,11 @@ import numpy as np
 from ..container.reader import Chunk, ReelReader
 from ..container.sources import BytesSource, FileSource, Source, Stream, StreamSource, source_at
 from ..errors import FormatError, InputError
-from ..format.layout import Form
+from ..format.layout import MEDIA_TYPES, Form
 from ..geometry.splats import Bound
 from ..geometry.topology import concatenate
 from ..shapes import Float, Float64
-from ..types import Mesh, Up
+from ..types import Audio, Mesh, Up
 from .pictures import Decoders
 from .tracks import Background, Track, moving_of_frame
 
@@ -130,6 +130,17 @@ class Video(Sequence[Mesh]):
     def metadata(self) -> dict[str, Any]:
         """Values that the encoder recorded, such as preset and quality; decoding does not need them."""
         return self.reader.metadata
+
+    @property
+    def audio(self) -> Audio | None:
+        """The audio file that belongs to the frames, byte for byte; None where there is none.
+
+        Raises FormatError where it is damaged.
+        """
+        record, head = self.reader.read_audio(), self.reader.header
+        if record is None:
+            return None
+        return Audio(record.data, MEDIA_TYPES[record.type], (record.start - head.first_time) / 1e6)
 
     @property
     def box(self) -> tuple[Float64[np.ndarray, "3"], Float64[np.ndarray, "3"]]:

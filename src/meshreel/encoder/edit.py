@@ -6,64 +6,39 @@ What was edited is kept in the metadata. Needs nothing of the extra `encode`.
 
 from __future__ import annotations
 
-import json
-from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass, replace
-from pathlib import Path
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from ..container.reader import Chunk, ReelReader
-from ..container.sources import source_at
-from ..container.writer import pack_head
-from ..errors import FormatError, InputError
-from ..format.budget import check_frames
-from ..format.checks import check_header, check_index, parse_metadata
-from ..format.edit import ITEM, Edit, is_rotation, nearest_rotation, parse_edit
-from ..format.layout import EDITED, ChunkKind, Header, Index, IndexEntry
+from ..container.reader import ReelReader
+from ..errors import InputError
+from ..format.edit import ITEM, Edit, is_rotation, nearest_rotation
+from ..format.layout import Header
 from ..io.read import first_difference
-from ..io.remote import Place, located, uploaded
+from ..io.remote import Place, located
 from ..io.sequence import SequenceOptions
-from ..io.write import check_apart, replacing
 from ..types import Up, check_up
+from .audio import Given, JoinedAudio, packed_audio
+from .copies import Edited, Piece, check_known, opened, piece_of, silent, with_metadata, written
 from .file_intervals import interval_of, kept_chunks
 from .metadata import HISTORY, MEANS, PART, joined_metadata, of_all_parts, place_of, scaled_metadata, upright
 
 Name = str | Place
 Numbers = Sequence[Any] | np.ndarray
 Part = tuple[dict[str, Any], int]  # the metadata of a file, and its number of frames
-_MOST = 0xFFFF  # bytes of metadata (FORMAT.md)
 _OWN = ("key_frames", PART, HISTORY, ITEM, "up")  # metadata that `tag` leaves alone: others are computed from them
-
-
-@dataclass(frozen=True, slots=True)
-class Edited:
-    """What became of the files."""
-
-    frames: int  # shown
-    size: int  # bytes
-    hidden: int = 0  # frames that are in the file and not shown: those that the first or last shown ones are coded with
-    missing: int = 0  # frames of the sequence that no file has, where the files say of what they are parts
-
-
-@dataclass(frozen=True, slots=True)
-class _Piece:
-    """Chunks of a file, in its order."""
-
-    path: Place
-    numbers: tuple[int, ...]
-    entries: tuple[IndexEntry, ...]
 
 
 def cut(source: Name, output: Name, frames: str, at_keys: bool = False) -> Edited:
     """Write frames A:B (B excluded) of a file.
 
     Frames that these are coded with are kept and hidden, unless `at_keys`: then the cut is made before A and behind B,
-    where frames stand alone. Raises InputError for frames that the file has not, and FormatError for a damaged one.
+    where frames stand alone. Audio is kept whole, and stays in step. Raises InputError for frames that the file has
+    not, and FormatError for a damaged one.
     """
-    with _opened(located(source)) as (path, reader):
+    with opened(located(source)) as (path, reader):
         count = reader.frame_count
         shown = SequenceOptions(frames=frames).chosen(count)
         if any(abs(int(number)) > count for number in frames.split(":") if number):
@@ -71,7 +46,7 @@ def cut(source: Name, output: Name, frames: str, at_keys: bool = False) -> Edite
         whole = interval_of(reader, shown)
         shown = range(max(whole.start, 0), min(whole.stop, count)) if at_keys else shown
         numbers = kept_chunks(reader, whole)
-        _check_known(path, (reader.chunks[number] for number in numbers))
+        check_known(path, (reader.chunks[number] for number in numbers))
         edit = Edit(shown.start - whole.start, shown.stop - whole.start, reader.edit.rotation)
         intervals = reader.header.intervals[shown.start : shown.stop - 1]
         header = replace(reader.header, first_time=round(1e6 * reader.timestamp(shown.start)), intervals=intervals)
@@ -81,21 +56,21 @@ def cut(source: Name, output: Name, frames: str, at_keys: bool = False) -> Edite
         if isinstance(keys, list):
             metadata["key_frames"] = [key - shown.start for key in keys if isinstance(key, int) and key in shown]
         metadata |= edit.item(len(whole)) | _history(metadata, f"cut {shown.start}:{shown.stop}")
-        piece = _piece(path, reader, numbers, {})
-    return _written(located(output), _with(header, metadata), [piece])
+        piece = piece_of(path, reader, numbers)
+    return written(located(output), with_metadata(header, metadata), [piece])
 
 
 def concat(sources: Sequence[Name], output: Name) -> Edited:
     """Join files one after the other: parts of a sequence, or cuts of one file.
 
-    One file is open at a time. Raises InputError where files are not of one sequence, and FormatError for a damaged
-    file.
+    One file is open at a time. Where some have audio, it must be the same at the same time, as in cuts of one file.
+    Raises InputError where files are not of one sequence, and FormatError for a damaged file.
     """
     if not sources:
         raise InputError("no files to join; give at least one")
-    pieces, parts, heads, hidden = list[_Piece](), list[Part](), list[ReelReader](), [0, 0]
+    pieces, parts, heads, hidden, audio = list[Piece](), list[Part](), list[ReelReader](), [0, 0], JoinedAudio()
     for source in sources:
-        with _opened(located(source)) as (path, reader):
+        with opened(located(source)) as (path, reader):
             first = heads[0] if heads else reader
             parts.append((reader.metadata, reader.frame_count))
             _check_alike(path, reader, first, located(sources[0]), parts)
@@ -104,9 +79,9 @@ def concat(sources: Sequence[Name], output: Name) -> Edited:
                 text = f"{path}: hides {ends[0]} frames at its begin and {ends[1]} at its end, and would show them"
                 raise InputError(f"{text}; cut it with --keys")
             hidden = [hidden[0] or ends[0], ends[1]]
-            known = {n: sum(len(piece.numbers) for piece in pieces) + n for n in range(len(reader.chunks))}
-            pieces.append(_piece(path, reader, range(len(reader.chunks)), known))
+            pieces.append(piece_of(path, reader, silent(reader), sum(len(piece.numbers) for piece in pieces)))
             heads.append(reader)
+            audio.add(path, reader.read_audio(), _begin_of_last(heads) - reader.header.first_time)
     frames = sum(count for _, count in parts)
     header, place = _timed(heads), place_of(parts[0][0])
     edit = Edit(hidden[0], hidden[0] + frames, heads[0].edit.rotation)
@@ -114,18 +89,18 @@ def concat(sources: Sequence[Name], output: Name) -> Edited:
     if place is None and len(sources) > 1:
         before = [told for of, _ in parts for told in _history(of)[HISTORY]]
         metadata |= _history({HISTORY: [*dict.fromkeys(before)]}, f"concat of {len(sources)} files")
-    done = _written(located(output), _with(header, metadata), pieces)
+    done = written(located(output), with_metadata(header, metadata), pieces, audio.payload)
     return replace(done, missing=max(place[1] - frames, 0) if place else 0)
 
 
 def retime(source: Name, output: Name, frame_rate: float | None = None, speed: float | None = None) -> Edited:
-    """Write a file that plays at another frame rate (1/s, and evenly), or `speed` times as fast."""
+    """Write a file that plays at another frame rate (1/s, and evenly), or `speed` times as fast, without its audio."""
     if (frame_rate is None) == (speed is None):
         raise InputError("give a frame rate or a speed, and not both")
     factor = frame_rate if speed is None else speed
     if factor is None or not 1e-3 <= factor <= 1e6:
         raise InputError(f"{'frame rate' if speed is None else 'speed'} {factor}: give a number from 0.001 to 1000000")
-    with _opened(located(source)) as (path, reader):
+    with opened(located(source)) as (path, reader):
         head = reader.header
         if speed is None:
             header, told = replace(head, frame_rate=factor, first_time=0, intervals=()), f"retime to {factor:g}/s"
@@ -133,7 +108,9 @@ def retime(source: Name, output: Name, frame_rate: float | None = None, speed: f
             intervals = tuple(max(round(interval / speed), 1) for interval in head.intervals)
             header = replace(head, frame_rate=head.frame_rate * speed, intervals=intervals)
             told = f"retime by {speed:g}"
-        return _relabelled(path, reader, output, header, reader.metadata | _history(reader.metadata, told))
+        silent, metadata = None if reader.audio is None else b"", reader.metadata | _history(reader.metadata, told)
+        done = _relabelled(path, reader, output, header, metadata, audio=silent)
+        return replace(done, lost_audio=silent is not None)
 
 
 def transform(
@@ -157,7 +134,7 @@ def transform(
         raise InputError(f"rotation {turn.tolist()}: give the three rows of a rotation matrix")
     if up is not None:
         check_up(up)
-    with _opened(located(source)) as (path, reader):
+    with opened(located(source)) as (path, reader):
         head, turn = reader.header, turn if rotation is None else nearest_rotation(turn)
         origin = scale * (turn @ np.array(head.origin)) + move
         header = replace(head, scale=scale * head.scale, origin=tuple(map(float, origin)))
@@ -175,13 +152,33 @@ def transform(
         return _relabelled(path, reader, output, header, metadata | _history(metadata, told), edit)
 
 
-def tag(source: Name, output: Name, values: dict[str, Any]) -> Edited:
-    """Write a file with other metadata: each name with its value, which JSON can hold; None takes a name away."""
+def tag(
+    source: Name,
+    output: Name,
+    values: dict[str, Any] | None = None,
+    *,
+    audio: Given | None = None,
+    audio_start: float | None = None,
+) -> Edited:
+    """Write a file with other metadata or audio.
+
+    `values` are names with values that JSON can hold; None takes a name away. `audio` is a path, a URL or the bytes of
+    an audio file, in place of one that the file has; no bytes take that away. It begins `audio_start` seconds after the
+    first frame (0), which may also move the audio that the file has. Raises InputError for other audio or values.
+    """
+    values = values or {}
     if own := [name for name in values if name in _OWN or not name]:
         raise InputError(f"{own[0]!r} is no name for a tag: readers use it; choose another, as title")
-    with _opened(located(source)) as (path, reader):
+    with opened(located(source)) as (path, reader):
         metadata = {name: value for name, value in (reader.metadata | values).items() if value is not None}
-        return _relabelled(path, reader, output, reader.header, metadata)
+        if audio is None and audio_start is not None:
+            if (known := reader.read_audio()) is None:
+                raise InputError(f"{path}: has no audio that could begin at {audio_start:g} s; give one, too")
+            audio = known.data
+        payload = None if audio is None else b""
+        if audio:
+            payload = packed_audio(audio, audio_start or 0.0, reader.header.first_time)
+        return _relabelled(path, reader, output, reader.header, metadata, audio=payload)
 
 
 def _check_alike(path: Place, reader: ReelReader, other: ReelReader, first: Place, parts: Sequence[Part]) -> None:
@@ -196,7 +193,7 @@ def _check_alike(path: Place, reader: ReelReader, other: ReelReader, first: Plac
             raise InputError(f"{text}; encode both with --survey FILE, which meshreel survey writes")
     if reader.edit.rotation != other.edit.rotation:
         raise InputError(f"{path}: is rotated otherwise than {first}; transform both in the same way")
-    _check_known(path, reader.chunks)
+    check_known(path, reader.chunks)
     try:
         ours, theirs = of_all_parts(other.metadata), of_all_parts(reader.metadata)
         joined_metadata(parts[-1:])
@@ -228,11 +225,6 @@ def _numbers(name: str, given: Numbers, shape: tuple[int, ...]) -> np.ndarray:
     return array
 
 
-def _check_known(path: Place, chunks: Iterable[Chunk]) -> None:
-    if unknown := [chunk for chunk in chunks if chunk.kind not in list(ChunkKind)]:
-        raise InputError(f"{path}: {unknown[0]} is of a kind that this version cannot copy; update meshreel")
-
-
 def _timed(readers: Sequence[ReelReader]) -> Header:
     """Return the header of files one after the other, with the times that their frames have in them."""
     first = readers[0].header
@@ -251,84 +243,30 @@ def _history(metadata: dict[str, Any], *told: str) -> dict[str, Any]:
     return {HISTORY: [*map(str, before if isinstance(before, list) else ()), *told]}
 
 
-def _with(header: Header, metadata: dict[str, Any]) -> Header:
-    try:
-        text = json.dumps(metadata, separators=(",", ":"), allow_nan=False)
-    except (TypeError, ValueError) as error:
-        raise InputError(f"metadata that JSON cannot hold ({error}); give text, numbers, lists or objects") from None
-    if len(text) > _MOST:
-        raise InputError(f"metadata of {len(text)} bytes: a file holds {_MOST}; give shorter tags, or join fewer files")
-    return replace(header, metadata=text)
-
-
-def _piece(path: Place, reader: ReelReader, numbers: Iterable[int], known: dict[int, int]) -> _Piece:
-    """Return chunks of a file with the numbers that they get: `known`, or one after the other."""
-    numbers = tuple(numbers)
-    places = known or {number: place for place, number in enumerate(numbers)}
-    entries = tuple(
-        replace(entry, depends_on=tuple(places[number] for number in entry.depends_on))
-        for entry in (reader.index.chunks[number] for number in numbers)
-    )
-    return _Piece(path, numbers, entries)
+def _begin_of_last(readers: Sequence[ReelReader]) -> int:
+    """Return when the frames of the last of files begin that lie one after the other, microseconds."""
+    header, frames = _timed(readers), sum(reader.frame_count for reader in readers[:-1])
+    before = sum(header.intervals[:frames]) if header.intervals else round(1e6 * frames / header.frame_rate)
+    return header.first_time + before
 
 
 def _relabelled(
-    path: Place, reader: ReelReader, output: Name, header: Header, metadata: dict[str, Any], edit: Edit | None = None
+    path: Place,
+    reader: ReelReader,
+    output: Name,
+    header: Header,
+    metadata: dict[str, Any],
+    edit: Edit | None = None,
+    audio: bytes | None = None,
 ) -> Edited:
-    """Write a file with all its chunks, of unknown kinds, too, under another header, with its own edit or another."""
+    """Write a file with all its chunks, of unknown kinds, too, under another header, with its own edit or another.
+
+    Without `audio` it keeps its own; with a payload, or with no bytes, unknown kinds are refused.
+    """
     metadata = {name: value for name, value in metadata.items() if name != ITEM}  # without the flag, it is none
     metadata |= (edit or reader.edit).item(reader.coded_count)
-    piece = _Piece(path, tuple(range(len(reader.chunks))), reader.index.chunks)
-    return _written(located(output), _with(header, metadata), [piece])
-
-
-def _written(output: Place, header: Header, pieces: Sequence[_Piece]) -> Edited:
-    """Write the chunks of all pieces under one head; the file appears when it is complete."""
-    index = Index(tuple(entry for piece in pieces for entry in piece.entries))
-    coded = sum(entry.frames for entry in index.chunks if entry.kind == ChunkKind.GROUP and entry.track == 0)
-    if output in [piece.path for piece in pieces]:
-        raise InputError(f"{output}: is the input, which it would replace; choose another name")
-    try:
-        metadata = parse_metadata(header.metadata)
-        flags = EDITED if ITEM in metadata else 0
-        edit = parse_edit(metadata, flags, coded)
-        check_header(header, edit.end - edit.first)
-        check_index(index)
-        head = pack_head(header, index, flags)
-        size = len(head) + sum(layer.size for entry in index.chunks for layer in entry.layers)
-        check_frames(sum(entry.frames for entry in index.chunks if entry.kind == ChunkKind.GROUP), size)
-    except FormatError as error:
-        raise InputError(f"{output}: cannot be stored: {error}") from error
-    with uploaded(output) as place:
-        check_apart(place, [piece.path for piece in pieces if isinstance(piece.path, Path)])
-        with replacing(place) as file:
-            file.write(head)
-            for payload in _payloads(pieces):
-                file.write(payload)
-    return Edited(edit.end - edit.first, size, coded - (edit.end - edit.first))
-
-
-def _payloads(pieces: Sequence[_Piece]) -> Iterator[bytes]:
-    for piece in pieces:
-        with _opened(piece.path) as (path, reader):
-            for number, entry in zip(piece.numbers, piece.entries, strict=True):
-                if number >= len(reader.chunks) or reader.chunks[number].layers != entry.layers:
-                    raise InputError(f"{path}: changed while it was read; start again when it is complete")
-                try:
-                    yield reader.read_chunk(number)
-                except FormatError as error:
-                    raise FormatError(f"{path}: {error}") from error
-
-
-@contextmanager
-def _opened(path: Place) -> Iterator[tuple[Place, ReelReader]]:
-    """Open a file for the block; of one behind a URL, the head and the chunks that are copied are fetched."""
-    source = source_at(path if isinstance(path, Path) else path.url)
-    try:
-        reader = ReelReader(source)
-        yield path, reader
-    except FormatError as error:
-        known = str(error).startswith(str(path))
-        raise error if known else FormatError(f"{path}: {error}") from error
-    finally:
-        source.close()
+    piece = Piece(path, tuple(range(len(reader.chunks))), reader.index.chunks)
+    if audio is not None:
+        check_known(path, reader.chunks)
+        piece = piece_of(path, reader, silent(reader))
+    return written(located(output), with_metadata(header, metadata), [piece], audio or b"")

@@ -28,7 +28,7 @@ def interval_of(reader: ReelReader, frames: range) -> range:
 
 
 def kept_chunks(reader: ReelReader, interval: range) -> list[int]:
-    """Return the numbers of the chunks that an interval needs, in the order of the file."""
+    """Return the numbers of the chunks that an interval needs, and of audio, in the order of the file."""
     kept = {group.number for group in reader.groups if group.first_frame in interval}
     waiting = list(kept)
     while waiting:
@@ -36,7 +36,7 @@ def kept_chunks(reader: ReelReader, interval: range) -> list[int]:
         kept |= new
         waiting += new
     kept |= {c.number for c in reader.chunks if c.kind in COMPANIONS and c.depends_on[0] in kept}
-    return sorted(kept)
+    return sorted(kept | ({reader.audio.number} if reader.audio else set()))
 
 
 def _group_at(groups: tuple[Chunk, ...], frame: int) -> Chunk:

@@ -37,6 +37,7 @@ from ..io.remote import Place
 from ..metrics.distance import PSNR_CEILING, psnr
 from ..types import MeshSequence, as_sequence, evenly
 from .appearance import as_installed
+from .audio import Given, packed_audio
 from .digests import WriteLines
 from .excerpt import Excerpt, write_survey
 from .interval import Interval
@@ -72,6 +73,8 @@ def encode(
     executor: Executor | None = None,
     progress: Progress | None = None,
     resume: bool | None = None,
+    audio: Given | None = None,
+    audio_start: float = 0.0,
 ) -> Summary:
     """Encode meshes as a .reel file at `path`, also a URL (extra `remote`); it appears only when it is complete.
 
@@ -81,7 +84,9 @@ def encode(
     `preset_options`. Most of a scene stands still: it becomes a background and bodies. Bodies
     that never touch are coded apart in any sequence. With an executor, intervals are encoded side by side, to the same
     bytes; memory then holds an interval for each worker and one more. Warns of surface that the file lacks.
-    Raises InputError for frames that cannot be used, before anything is encoded.
+    `audio` is a path, a URL or the bytes of an audio file (Opus, AAC, MP3), kept as it is, which begins `audio_start`
+    seconds after the first frame. Raises InputError for frames or audio that cannot be used, before anything is
+    encoded.
 
     The intervals that are done are kept in `NAME.part` beside the output until it is complete. After an encode that was
     stopped, `resume=True` continues with the next interval, to the same bytes; False starts over; None raises
@@ -92,7 +97,10 @@ def encode(
     elif (quality, preset, effort, color) != (QUALITY, PRESET, EFFORT, COLOR):
         text = f"options and quality {quality:g}, preset {preset!r}, effort {effort!r}, color {color!r}"
         raise InputError(f"{text}: options already have them; leave these out, or give preset_options(...) as options")
-    summary = Encoder(Welded(as_sequence(sequence)), executor, progress).encode(path, options, resume)
+    heard = b"" if audio is None else packed_audio(audio, audio_start)
+    encoder = Encoder(Welded(as_sequence(sequence)), executor, progress)
+    encoder.audio = heard
+    summary = encoder.encode(path, options, resume)
     for text in summary.warnings:
         warnings.warn(text, stacklevel=2)
     return summary
@@ -113,11 +121,12 @@ class Encoder:
         """Take executor and progress as `encode` does; with a `masker`, whose masks mark moving pixels, it is a scene.
 
         `digests` takes lines of JSON, one for each stage. Of an `excerpt`, only its frames are encoded. The attributes
-        `progress` and `find`, which finds the groups of the paper's recipe, may be replaced between encodes.
+        `progress`, `audio` and `find`, which finds the groups of the paper's recipe, may be replaced between encodes.
         """
         self.sequence, self._executor, self._masker = Unchanging(captured(sequence)), executor, masker
         self.progress, self.digests, self._excerpt = progress, digests, excerpt
         self.find: FindGroups = find_groups
+        self.audio = b""  # payload of `packed_audio` that files get
         self._scene: tuple[SegmentOptions, BackgroundOptions, Parts] | None = None
         self._calibrated = cache(partial(Calibrated, self.sequence))
         self._stands: bool | None = masker is not None or None  # most stands still; None: unknown yet
@@ -164,7 +173,8 @@ class Encoder:
         made = made_of(self.sequence, options, self._masker)
         journal.begin(made if excerpt is None else made | {"part": str(excerpt.frames)})
         name = str(journal.output)
-        summary = _encode_tracked(job, file, name, seen) if parts is None else _encode_scene(job, file, name, parts)
+        encoded = partial(_encode_tracked, seen=seen) if parts is None else partial(_encode_scene, parts=parts)
+        summary = encoded(job, file, name, audio=self.audio)
         texts = summary.warnings + (lacking if any(group.colors for group in summary.groups) else ())
         return replace(summary, work=since(before), warnings=texts, continued=journal.continued)
 
@@ -197,12 +207,12 @@ class Encoder:
         return self._scene[2]
 
 
-def _encode_tracked(job: Job, file: BinaryIO, name: str, seen: Survey) -> Summary:
+def _encode_tracked(job: Job, file: BinaryIO, name: str, seen: Survey, audio: bytes) -> Summary:
     """Encode a sequence in which everything may move; errors call the output `name`."""
     sequence, options = job.sequence, job.options
     groups: list[GroupSummary] = []
     job.note("survey", seen.low, seen.high, seen.diagonals, seen.dropped, seen.pieces)
-    with ReelWriter(file, make_header(sequence.frame_rate, seen, {}), name) as writer:
+    with ReelWriter(file, make_header(sequence.frame_rate, seen, {}), name, audio) as writer:
         for encoded in encode_tracked(job, seen):
             groups += [_added(writer, each, [], seen.diagonal) for each in encoded]
         excerpt = job.excerpt
@@ -210,17 +220,17 @@ def _encode_tracked(job: Job, file: BinaryIO, name: str, seen: Survey) -> Summar
         metadata = metadata_of(options, groups, sequence.up, part)
         writer.header = make_header(sequence.frame_rate, seen, metadata)
     texts = warnings_of(seen) if job.excerpt is None else ()  # the survey told of them
-    return Summary(writer.size, tuple(groups), (*texts, *_bare(groups)))
+    return Summary(writer.size, tuple(groups), (*texts, *_bare(groups)), audio=len(audio))
 
 
-def _encode_scene(job: Job, file: BinaryIO, name: str, parts: Parts) -> Summary:
+def _encode_scene(job: Job, file: BinaryIO, name: str, parts: Parts, audio: bytes) -> Summary:
     """Encode a scene with a background; errors call the output `name`."""
     sequence, options, seen = job.sequence, job.options, parts.seen
     job.note("survey", seen.low, seen.high, seen.diagonals, seen.unit)
     job.note("background and noise", parts.background.vertices, parts.background.faces, parts.noise, parts.deviation)
     states = colored_states(sequence, parts, job.scene.background, options.appearance)
     job.note("background, coded", *(state.payload for state in states))
-    with ReelWriter(file, make_header(sequence.frame_rate, seen, {}), name) as writer:
+    with ReelWriter(file, make_header(sequence.frame_rate, seen, {}), name, audio) as writer:
         coded = encode_bodies(job, parts)
         groups = _added_in_order(writer, coded.groups, states, seen)
         metadata = {**chosen_options(options, groups), "noise_m": rounded(parts.noise), **upright(sequence.up)}
@@ -232,7 +242,7 @@ def _encode_scene(job: Job, file: BinaryIO, name: str, parts: Parts) -> Summary:
     scene = SceneSummary(size, faces, parts.noise, psnr, tuple(measured), tracks)
     moves = any(group.form != Form.EMPTY for group in groups)
     texts = (*warnings_of(seen), *_warnings_of_scene(parts, moves, coded.dropped), *_bare(groups, states))
-    return Summary(writer.size, tuple(groups), texts, scene)
+    return Summary(writer.size, tuple(groups), texts, scene, audio=len(audio))
 
 
 def _added_in_order(

@@ -47,6 +47,7 @@ class Summary:
     warnings: tuple[str, ...] = ()  # about surface that was not kept, a line each
     scene: SceneSummary | None = None  # of a scene with a background
     continued: int = 0  # intervals that an earlier run, which was stopped, had done
+    audio: int = 0  # bytes of what is heard
     work: Work = field(default_factory=dict)  # that this run did
 
     @property

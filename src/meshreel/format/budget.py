@@ -41,6 +41,7 @@ class Limits:
     texel: int = 2  # of a picture that is decoded
     videos: int = 176 << 20  # memory that the decoders of all videos may take, and per_byte more: of 2048 x 2048
     splat: int = 1024  # of a splat, bound in a frame
+    audio: int = 256 << 20  # bytes of a chunk of audio, which is held whole: hours (guess)
     held: int = 44  # of a texel of a video, whose decoder keeps up to 16 pictures (H.264; measured: 42)
 
 

@@ -6,7 +6,9 @@ import json
 from typing import Any, NoReturn
 
 from ..errors import FormatError
-from .layout import ChunkKind, Form, Header, Index, IndexEntry
+from .budget import LIMITS, CostlyError
+from .layout import AudioFile, ChunkKind, Form, Header, Index, IndexEntry
+from .records import unpack_all
 
 # Limits of the format, stated in FORMAT.md, with room to spare.
 LARGEST = 1e15  # of the numbers in a header: keeps everything computed from them finite (guess)
@@ -57,6 +59,7 @@ class IndexChecks:
         # By coded chunk and kind, the number of the chunk that has its colours, its atlas or its pictures.
         self.companions: dict[tuple[int, int], int] = {}
         self._atlases: dict[int, int] = {}  # of each group with pictures, the number of its atlas
+        self._has_audio = False
         self._count = 0
 
     def add(self, entry: IndexEntry) -> int:
@@ -86,6 +89,8 @@ class IndexChecks:
                 self._bearers.add(number)
         elif entry.kind in COMPANIONS:
             self._add_companion(entry)
+        elif entry.kind == ChunkKind.AUDIO:
+            self._add_audio(entry)
         self._count += 1
         return number
 
@@ -149,6 +154,14 @@ class IndexChecks:
         last = None if before is None else self.companions.get((before, kind))
         return () if last is None or before is None else ((self._atlases[before], last),)
 
+    def _add_audio(self, entry: IndexEntry) -> None:
+        size = sum(layer.size for layer in entry.layers)
+        if self._has_audio or entry.form != Form.AUDIO_FILE or entry.frames or entry.track or entry.depends_on:
+            raise FormatError(f"chunk {self._count}: audio besides other audio, or not on its own")
+        if size > LIMITS.audio:
+            raise CostlyError(f"chunk {self._count}: {size} bytes of audio, over {LIMITS.audio}")
+        self._has_audio = True
+
     def _add_group(self, entry: IndexEntry) -> None:
         number, track = self._count, entry.track
         if entry.form == Form.PATCH:
@@ -183,6 +196,14 @@ def check_index(index: Index) -> None:
     for entry in index.chunks:
         checks.add(entry)
     checks.finish()
+
+
+def unpack_audio(payload: bytes) -> AudioFile:
+    """Unpack the payload of an AUDIO chunk. Raises FormatError for one without a file, or that begins nowhere near."""
+    record = unpack_all(AudioFile, payload)
+    if record.form != Form.AUDIO_FILE or not record.data or abs(record.start) > LARGEST:
+        raise FormatError(f"audio of {len(record.data)} bytes that begins at {record.start} microseconds")
+    return record
 
 
 def parse_metadata(text: str) -> dict[str, Any]:

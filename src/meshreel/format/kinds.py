@@ -134,7 +134,7 @@ class Choice:
         return self.number.least
 
     def pack(self, value: int) -> bytes:
-        return self.number.pack(self.values(value))
+        return self.number.pack(value if self.is_open else self.values(value))
 
     def unpack(self, data: bytes, offset: int) -> tuple[int, int]:
         value, offset = self.number.unpack(data, offset)

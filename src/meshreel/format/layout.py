@@ -30,6 +30,7 @@ class ChunkKind(IntEnum):
     PICTURES = 5  # the textures of a group's frames, or of a background
     COMPATIBLE = 6  # the same in a coding that more devices know
     SPLATS = 7  # Gaussians on the faces of a group and of those predicted from it
+    AUDIO = 8  # what is heard with the frames
 
 
 class Form(IntEnum):
@@ -44,6 +45,7 @@ class Form(IntEnum):
     PLACES = 7  # places of corners in a texture
     VIDEO = 8  # pictures of a video: one a frame, of a background one each `interval` frames
     GAUSSIANS = 9  # splats, the most important first
+    AUDIO_FILE = 10  # an audio file as it was given
 
 
 class AnchorRule(IntEnum):
@@ -100,8 +102,8 @@ class IndexEntry:
 
     kind: Annotated[int, Choice(U8, ChunkKind, is_open=True), "purpose"]
     form: Annotated[int, Choice(U8, Form, is_open=True), "coding; equal to the first byte of the chunk"]
-    frames: Annotated[int, U16, "number of frames; 0 if and only if STATIC or a companion of one"]
-    track: Annotated[int, Varint(), "number of the moving body, from 0; 0 if STATIC"]
+    frames: Annotated[int, U16, "number of frames; 0 if and only if STATIC, a companion of one, or AUDIO"]
+    track: Annotated[int, Varint(), "number of the moving body, from 0; 0 if STATIC or AUDIO"]
     depends_on: Annotated[
         tuple[int, ...],
         List(U8, Varint()),
@@ -323,6 +325,29 @@ class GaussiansLayer:
     colors: Annotated[bytes, Blob(Varint()), "3 n integers: lumas, then both differences, each less the splat before"]
 
 
+class AudioType(IntEnum):
+    """Container and coding of an audio file."""
+
+    OGG = 1  # Opus in Ogg: audio/ogg
+    WEBM = 2  # Opus in WebM: audio/webm
+    MP4 = 3  # AAC in MP4 (.m4a): audio/mp4
+    ADTS = 4  # AAC in ADTS: audio/aac
+    MPEG = 5  # MP3: audio/mpeg
+
+
+MEDIA_TYPES = dict(zip(AudioType, ("audio/ogg", "audio/webm", "audio/mp4", "audio/aac", "audio/mpeg"), strict=True))
+
+
+@dataclass(frozen=True, slots=True)
+class AudioFile:
+    """The payload of a chunk of form AUDIO_FILE; its layers are pieces of it."""
+
+    form: Annotated[Form, Choice(U8, Form), "AUDIO_FILE"]
+    type: Annotated[AudioType, Choice(U8, AudioType), "what the file is"]
+    start: Annotated[int, I64, "when it begins, microseconds of the clock that first_time is of"]
+    data: Annotated[bytes, Rest(), "the file, at least one byte"]
+
+
 @dataclass(frozen=True, slots=True)
 class EmptyGroup:
     """The payload of a group of form EMPTY."""
@@ -348,4 +373,5 @@ PAYLOADS = (
     Pictures,
     Gaussians,
     GaussiansLayer,
+    AudioFile,
 )

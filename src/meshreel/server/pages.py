@@ -41,7 +41,7 @@ def policy(styles: str = "") -> str:
     known = f" 'sha256-{b64encode(sha256(styles.encode()).digest()).decode()}'" if styles else ""
     return (
         "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; worker-src 'self' blob:; "
-        "connect-src 'self' blob: data:; img-src 'self' blob: data:; "
+        "connect-src 'self' blob: data:; img-src 'self' blob: data:; media-src blob:; "
         f"style-src 'self'{known}; base-uri 'none'; form-action 'none'"
     )
 

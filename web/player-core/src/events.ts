@@ -1,4 +1,4 @@
-// An EventTarget whose listeners know the types of a playback's events.
+// An EventTarget whose listeners know the types of a playback's events, and how often it tells of bytes.
 
 import type { PlaybackEvents } from "./types.ts";
 
@@ -14,3 +14,19 @@ export interface PlaybackTarget extends EventTarget {
 }
 
 export const PlaybackTarget = EventTarget as { new (): PlaybackTarget; prototype: PlaybackTarget };
+
+/** Counts bytes that came, and says when to tell of them. */
+export class Progress {
+  bytes = 0;
+  #told = 0;
+  #toldAt = 0; // ms
+
+  /** Whether some came since it was last asked; while more come, not oftener than every `everyMs`. */
+  isNew(isFetching: boolean, everyMs: number): boolean {
+    const now = performance.now();
+    if (this.bytes === this.#told || (isFetching && now - this.#toldAt < everyMs)) return false;
+    this.#told = this.bytes;
+    this.#toldAt = now;
+    return true;
+  }
+}

@@ -7,5 +7,5 @@ export { WorkerPool, type WorkerLike, type WorkerSetup } from "./time/pool.ts";
 export type { DecodeJob, FromWorker, ToWorker } from "./protocol.ts";
 export { BlobSource, BytesSource, type Source, type SourceWatch, type Take } from "./net/source.ts";
 export type {
-  Box, Info, Layers, Packed, PackedGroup, PackedSplats, PackedStatic, PackedVertices, Playback, PlaybackEvents, Shown, Stats,
+  Box, Heard, Info, Layers, Packed, PackedGroup, PackedSplats, PackedStatic, PackedVertices, Playback, PlaybackEvents, Shown, Stats,
 } from "./types.ts";

@@ -2,10 +2,12 @@
 
 import { Clock } from "./time/clock.ts";
 import { SourceError } from "./errors.ts";
-import { PlaybackTarget } from "./events.ts";
+import { PlaybackTarget, Progress } from "./events.ts";
 import { open } from "./net/opening.ts";
 import { WorkerPool } from "./time/pool.ts";
 import type { Share, WorkerSetup } from "./time/pool.ts";
+import { Sound } from "./time/sound.ts";
+import type { Voice } from "./time/sound.ts";
 import { NO_STATS, Session } from "./session.ts";
 import type { Limits } from "./session.ts";
 import type { Source } from "./net/source.ts";
@@ -15,11 +17,13 @@ import type { Info, Layers, Playback, PlaybackEvents, Shown, Stats } from "./typ
 export interface PlayerOptions extends Partial<Limits> {
   readonly source: Source; // the player's own from here on: `dispose` closes it
   readonly workers: WorkerSetup | WorkerPool; // a pool may be shared and is not disposed of
+  readonly voice?: () => Voice; // makes what plays audio; an audio element if not given
 }
 
 const LIMITS: Limits = { bufferSeconds: 10, decodedSeconds: 3, memory: 1 << 28 };
 
 const TICK_MS = 250; // between plans, and between events of time and progress, while it plays
+const UNSEEN_MS = 1000; // without a picture: the page is hidden
 const SOON_MS = 40; // from a group's arrival to the next plan while it plays: there are some more until then
 const ENOUGH = [0.25, 1] as const; // s of display time that must be at hand to start, and to go on after a stall
 
@@ -40,6 +44,7 @@ export class Player extends PlaybackTarget implements Playback {
   #layers: Layers = "auto";
   #textures = true;
   #level = NaN; // layers beyond the first, as last reported by `layerschange`
+  readonly sound: Sound;
   interpolate = true;
   splats = true;
   #paused = true;
@@ -49,23 +54,23 @@ export class Player extends PlaybackTarget implements Playback {
   #hasStalled = false; // since it last ran
   #isStallNew = false; // and was not reported
   #stalls = 0;
-  #bytes = 0; // that came from the source
-  #toldBytes = 0;
-  #toldAt = 0; // ms
+  readonly #progress = new Progress(); // of bytes from the source
+  #updated = 0; // ms, when a picture was last asked for
   #plays: { resolve: () => void; reject: (error: Error) => void }[] = [];
   #waking: ReturnType<typeof setTimeout> | undefined;
   #wakesIn = Infinity; // ms, as it was set
   #ticking: ReturnType<typeof setInterval> | undefined;
 
-  constructor({ source, workers, ...limits }: PlayerOptions) {
+  constructor({ source, workers, voice, ...limits }: PlayerOptions) {
     super();
+    this.sound = new Sound({ changed: () => this.#wake(), volume: () => this.#tell("volumechange"), warn: (error) => this.#tell("warning", error) }, voice);
     this.#source = source;
     this.#limits = { ...LIMITS, ...limits };
     this.#ownsPool = !(workers instanceof WorkerPool);
     this.#pool = workers instanceof WorkerPool ? workers : new WorkerPool(workers);
     this.#share = this.#pool.open();
     this.#share.onfatal = (error) => this.#fail(error);
-    source.watch = { warn: (error) => this.#tell("warning", error), progress: (bytes) => void (this.#bytes += bytes) };
+    source.watch = { warn: (error) => this.#tell("warning", error), progress: (bytes) => void (this.#progress.bytes += bytes) };
   }
 
   get info(): Info | null {
@@ -91,11 +96,9 @@ export class Player extends PlaybackTarget implements Playback {
   get currentFrame(): number {
     return this.#clock?.timeline.frameAt(this.#clock.time) ?? 0;
   }
-
   get currentTime(): number {
     return this.#clock?.time ?? this.#start;
   }
-
   set currentTime(time: number) {
     if (!Number.isFinite(time)) throw new TypeError(`a time of ${time}: give seconds`);
     if (this.#clock === null) this.#start = Math.max(0, time);
@@ -105,7 +108,6 @@ export class Player extends PlaybackTarget implements Playback {
   get loop(): boolean {
     return this.#loop;
   }
-
   set loop(loop: boolean) {
     this.#loop = loop;
     if (this.#clock) this.#clock.loop = loop;
@@ -148,7 +150,7 @@ export class Player extends PlaybackTarget implements Playback {
 
   get stats(): Stats {
     const found = this.#session?.statsAt(this.currentTime, this.#loop) ?? NO_STATS;
-    return { ...found, bandwidthMbps: this.#source.bandwidth / 1e6, fetchedBytes: this.#bytes, stalls: this.#stalls };
+    return { ...found, bandwidthMbps: this.#source.bandwidth / 1e6, fetchedBytes: this.#progress.bytes, stalls: this.#stalls };
   }
 
   /** Reads the head and goes on to fetch; `play` does so by itself. Rejects with what the event `error` carries. */
@@ -192,6 +194,7 @@ export class Player extends PlaybackTarget implements Playback {
     const { picture, timeline } = session;
     if (far) session.textures.far = far;
     if (this.splats !== session.decoding.wanted.splats) this.#wake();
+    this.#updated = performance.now();
     clock.advance(now);
     const frame = timeline.frameAt(clock.time);
     const isShown = picture.show(frame, this.interpolate ? timeline.blendAt(clock.time, frame) : 0);
@@ -215,6 +218,7 @@ export class Player extends PlaybackTarget implements Playback {
     this.#source.watch = null;
     this.#source.close();
     this.#session?.close();
+    this.sound.close();
     this.#session = this.#clock = null;
     this.#share.close();
     if (this.#ownsPool) this.#pool.dispose();
@@ -232,6 +236,8 @@ export class Player extends PlaybackTarget implements Playback {
         textured: () => this.#onTexture(),
       }, this.#textures);
       this.#clock = new Clock(this.#session.timeline);
+      this.#clock.lead = this.sound;
+      this.sound.open(opened.head, this.#source, this.#closed.signal);
       this.#clock.rate = this.#rate;
       this.#clock.loop = this.#loop;
       this.#clock.time = this.#session.timeline.clamp(this.#start);
@@ -266,7 +272,8 @@ export class Player extends PlaybackTarget implements Playback {
     const [session, clock] = [this.#session, this.#clock];
     if (session === null || clock === null || this.#error !== null) return;
     session.pump({ time: clock.time, speed: this.#rate, loop: this.#loop, layers: this.#layers, splats: this.splats, isWaiting: this.#hasStalled && !clock.isRunning });
-    this.#tellProgress(session);
+    if (this.#progress.isNew(session.fetcher.isFetching, TICK_MS)) this.#tell("progress");
+    if (performance.now() - this.#updated > UNSEEN_MS) this.sound.rest(); // time stands still while nothing is displayed
     const level = this.#layers === "auto" ? session.level : this.#layers;
     if (level !== this.#level) {
       this.#level = level;
@@ -286,6 +293,7 @@ export class Player extends PlaybackTarget implements Playback {
   #goOn(session: Session, clock: Clock): void {
     if (!this.#canPlay) {
       this.#canPlay = true;
+      this.sound.begin();
       this.#tell("canplay");
     }
     if (this.#seeking) {
@@ -295,7 +303,7 @@ export class Player extends PlaybackTarget implements Playback {
     }
     if (this.#paused || clock.isRunning || clock.isAtEnd) return;
     const enough = ENOUGH[this.#hasStalled ? 1 : 0] * this.#rate;
-    if (!session.isSated && session.readyAhead(clock.time, this.#loop, enough) < enough) return;
+    if (!this.sound.isReady || (!session.isSated && session.readyAhead(clock.time, this.#loop, enough) < enough)) return;
     clock.start();
     this.#hasStalled = false;
     this.#tell("playing");
@@ -333,14 +341,6 @@ export class Player extends PlaybackTarget implements Playback {
     if (this.#clock?.isRunning) return; // it is looked for with each picture
     this.#tell("texturechange");
     this.#wake();
-  }
-
-  #tellProgress(session: Session): void {
-    const now = performance.now();
-    if (this.#bytes === this.#toldBytes || (session.fetcher.isFetching && now - this.#toldAt < TICK_MS)) return;
-    this.#toldBytes = this.#bytes;
-    this.#toldAt = now;
-    this.#tell("progress");
   }
 
   #tell(type: keyof PlaybackEvents, detail?: unknown): void {

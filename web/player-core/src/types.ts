@@ -147,6 +147,7 @@ export interface Info {
   readonly hasColors: boolean; // whether some of it has colours of its own
   readonly hasTextures: boolean; // whether some of these are in textures
   readonly hasSplats: boolean; // whether some of it has splats
+  readonly hasAudio: boolean; // whether something is heard with it
   readonly metadata: Readonly<Record<string, unknown>>;
 }
 
@@ -184,12 +185,20 @@ export interface PlaybackEvents {
   progress: Event; // bytes have come
   ended: Event;
   ratechange: Event;
+  volumechange: Event; // or muting
   layerschange: Event;
   texturechange: Event; // a texture of what is shown came, or went
   ready: CustomEvent<Packed>; // decoded: upload it ahead of time
   release: CustomEvent<Packed>; // will not be shown again soon: free what was made of it
   warning: CustomEvent<Error>; // playback goes on: a damaged group is skipped, the network is tried again
   error: CustomEvent<Error>; // nothing more can be played
+}
+
+/** What is heard with a recording, where it has something. */
+export interface Heard {
+  muted: boolean; // set by itself, where the browser plays nothing aloud before the viewer has done something
+  volume: number; // 0 to 1
+  readonly voice: Pick<HTMLAudioElement, "currentTime" | "paused"> | null; // the audio element, once it can play
 }
 
 /** A player without a picture: it fetches, decodes and keeps time. `Player` in player.ts is the one there is. */
@@ -201,6 +210,7 @@ export interface Playback extends EventTarget {
   readonly seeking: boolean;
   readonly currentFrame: number;
   readonly stats: Stats;
+  readonly sound: Heard;
   currentTime: number; // s from the first frame; setting it seeks
   loop: boolean;
   playbackRate: number; // within PLAYBACK_RATES

@@ -7,6 +7,9 @@ import { beforeAll, describe, expect, test } from "vitest";
 
 import type { Tools } from "../src/decode/group.ts";
 import { Video } from "../src/decode/decoder.ts";
+import { AudioFile, AudioType } from "../src/format/layout.gen.ts";
+import { Head } from "../src/format/reader.ts";
+import { unpackAll } from "../src/format/records.ts";
 import type { Mesh } from "../src/mesh.ts";
 import { ROOT, nodeTools } from "./tools.ts";
 
@@ -42,6 +45,15 @@ function recordOf(mesh: Mesh): FrameRecord {
 let tools: Tools;
 beforeAll(async () => {
   tools = await nodeTools();
+});
+
+test("the audio of a golden file is what Python wrote", () => {
+  const data = new Uint8Array(readFileSync(`${FOLDER}/audio/audio.reel`));
+  const { audio } = JSON.parse(readFileSync(`${FOLDER}/audio/audio.json`, "utf8")) as { audio: { start: number; sha256: string } };
+  const { info, audio: chunk, header } = Head.parse(data);
+  const file = unpackAll(AudioFile, data.subarray(chunk!.offset, chunk!.offset + chunk!.size));
+  expect([info.hasAudio, file.type, (file.start - header.firstTime) / 1e6]).toEqual([true, AudioType.OGG, audio.start]);
+  expect(createHash("sha256").update(file.data).digest("hex")).toBe(audio.sha256);
 });
 
 test("there is a golden file of each form", () => {

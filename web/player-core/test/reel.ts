@@ -1,10 +1,10 @@
 // Files made of noise: an index as told, and payloads that nothing but a stand-in for a worker can decode.
 
 import { crc32 } from "../src/format/crc.ts";
-import { ChunkKind, Form } from "../src/format/layout.gen.ts";
+import { AudioType, ChunkKind, Form } from "../src/format/layout.gen.ts";
 import { noise } from "./server.ts";
 
-const KINDS = { static: ChunkKind.STATIC, group: ChunkKind.GROUP, colors: ChunkKind.COLORS, atlas: ChunkKind.ATLAS, pictures: ChunkKind.PICTURES, compatible: ChunkKind.COMPATIBLE, splats: ChunkKind.SPLATS, future: 200 };
+const KINDS = { static: ChunkKind.STATIC, group: ChunkKind.GROUP, colors: ChunkKind.COLORS, atlas: ChunkKind.ATLAS, pictures: ChunkKind.PICTURES, compatible: ChunkKind.COMPATIBLE, splats: ChunkKind.SPLATS, audio: ChunkKind.AUDIO, future: 200 };
 
 export interface FakeChunk {
   readonly kind: keyof typeof KINDS;
@@ -29,6 +29,14 @@ export function group(frames: number, layers: readonly number[], more: Partial<F
 /** Colours of a group of ten frames, or of what `more` says; `dependsOn`: that chunk, then the colours that they are predicted from. */
 export function colors(dependsOn: readonly number[], layers: readonly number[], more: Partial<FakeChunk> = {}): FakeChunk {
   return { kind: "colors", form: Form.VERTEX_COLORS, frames: 10, track: 0, dependsOn, layers, ...more };
+}
+
+/** An audio file of so many bytes, of Opus in Ogg, that begins `start` seconds after the first frame. */
+export function audio(bytes: number, start = 0, more: Partial<FakeChunk> = {}): FakeChunk {
+  const body = noise(bytes + 10, 3);
+  body[1] = AudioType.OGG;
+  new DataView(body.buffer).setBigInt64(2, BigInt(Math.round(1e6 * start)), true);
+  return { kind: "audio", form: Form.AUDIO_FILE, frames: 0, track: 0, dependsOn: [], layers: [body.length], body, ...more };
 }
 
 export function background(bytes: number, dependsOn: readonly number[] = []): FakeChunk {

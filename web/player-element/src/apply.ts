@@ -10,6 +10,8 @@ export function applyToPlayback(name: string, settings: Reflected, playback: Pla
   if (name === "speed" || name === "playbackrate") playback.playbackRate = settings.playbackRate;
   if (name === "textures") playback.textures = settings.textures;
   if (name === "mode") playback.splats = settings.splats;
+  if (name === "muted") playback.sound.muted = settings.muted;
+  if (name === "volume") playback.sound.volume = settings.volume;
   if (name === "interpolate") playback.interpolate = settings.interpolate;
 }
 

@@ -12,7 +12,7 @@ export type Theme = "auto" | "light" | "dark";
 export const OBSERVED = [
   "src", "controls", "autoplay", "loop", "poster", "layers", "speed", "playbackrate", "interpolate", "mode", "camera",
   "up", "stats", "background", "theme", "textures", "ground",
-  "autorotate", "fly", "section", "frames", "share", "muted", "playsinline", "crossorigin",
+  "autorotate", "fly", "section", "frames", "share", "muted", "volume", "playsinline", "crossorigin",
 ] as const;
 
 /** What a text says, "" taken for nothing; null where it says nothing that the attribute can be. */
@@ -43,6 +43,11 @@ export const readSection: Reader<readonly [number, number]> = (text) => {
   return typeof from === "number" && typeof to === "number" && rest.length === 0 && from >= 0 && to > from ? [from, to] : null;
 };
 
+const readVolume: Reader<number> = (text) => {
+  const volume = readNumber(text);
+  return volume !== null && volume >= 0 && volume <= 1 ? volume : null;
+};
+
 const readSwitch: Reader<boolean> = (text) => {
   const word = words("on", "true", "yes", "1", "off", "false", "no", "0")(text);
   return word === null ? null : ["on", "true", "yes", "1"].includes(word);
@@ -61,6 +66,7 @@ const RULES: Readonly<Record<string, { read: Reader<unknown>; wanted: string }>>
   speed: { read: readNumber, wanted: "a number" },
   theme: { read: readTheme, wanted: "auto, light, dark" },
   up: { read: readUp, wanted: "y, z, -y, -z" },
+  volume: { read: readVolume, wanted: "a number from 0 to 1" },
 };
 
 /** What is wrong with an attribute's value, in a line; null where nothing is. */
@@ -73,6 +79,11 @@ export function complaint(name: string, text: string): string | null {
 /** A speed from 0.1 to 4; 1 where the text is none. */
 export function parseSpeed(text: string | null): number {
   return Math.min(PLAYBACK_RATES.most, Math.max(PLAYBACK_RATES.least, readNumber(text ?? "") ?? 1));
+}
+
+/** A volume from 0 to 1; 1 where the text is none. */
+export function parseVolume(text: string | null): number {
+  return readVolume(text ?? "") ?? 1;
 }
 
 /** Layers beyond the first, or "auto" where the text is no whole number from 0. */
@@ -121,5 +132,5 @@ export function parseFlag(text: string | null): boolean {
 /** Properties that a page may have set before the element was defined. */
 export const PROPERTIES = [
   "src", "poster", "preload", "controls", "autoplay", "loop", "stats", "layers", "playbackRate", "interpolate", "textures", "mode", "theme",
-  "up", "background", "camera", "currentTime", "ground", "autoRotate", "fly", "section", "frames", "share", "muted", "playsInline", "crossOrigin",
+  "up", "background", "camera", "currentTime", "ground", "autoRotate", "fly", "section", "frames", "share", "muted", "volume", "playsInline", "crossOrigin",
 ];

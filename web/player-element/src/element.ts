@@ -1,6 +1,6 @@
 // <meshreel-player>: an element like <video>, whose picture can be looked at from all sides.
 
-import type { Info, Packed, Playback } from "@meshreel/player-core/types";
+import type { Heard, Info, Packed, Playback } from "@meshreel/player-core/types";
 import type { Bench } from "@meshreel/player-three";
 import { applyToPlayback, applyToStage } from "./apply.ts";
 import { OBSERVED, PROPERTIES } from "./attributes.ts";
@@ -145,6 +145,10 @@ export class MeshreelPlayer extends Viewed {
   get currentFrame(): number {
     return this.#playback?.currentFrame ?? 0;
   }
+  /** What plays the sound of the recording; null where there is none, or not yet. */
+  get audio(): Heard["voice"] {
+    return this.#playback?.sound.voice ?? null;
+  }
   /** True while frames or bytes are waited for. */
   get waiting(): boolean {
     return this.#playback !== null && this.#error === null && (this.#waiting || this.seeking);
@@ -288,6 +292,7 @@ export class MeshreelPlayer extends Viewed {
     if (event.type === "canplay") this.#playable = true;
     if (["canplay", "playing", "seeked"].includes(event.type)) this.#waiting = false;
     if (event.type === "waiting") this.#waiting = true;
+    if (event.type === "volumechange" && this.#playback) this.muted = this.#playback.sound.muted;
     if (event.type === "pause" && this.#playable) this.#waiting = false;
     if (event.type === "ended") {
       this.#wished = false;

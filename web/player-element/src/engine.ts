@@ -33,7 +33,7 @@ export class RealEngine implements Engine {
     this.#files = files;
   }
 
-  open(source: string | Blob, { layers, interpolate, textures, splats, loop, playbackRate, crossOrigin }: Settings): Player {
+  open(source: string | Blob, { layers, interpolate, textures, splats, loop, playbackRate, muted, volume, crossOrigin }: Settings): Player {
     const { worker, core, draco } = this.#files;
     const create = (): WorkerLike => openWorker(worker) as WorkerLike;
     const shared = (this.#shared ??= { workers: new WorkerPool({ create, core: bytesOf(core), draco: bytesOf(draco) }), users: 0 });
@@ -45,6 +45,7 @@ export class RealEngine implements Engine {
     player.leave = () => this.#leave(shared);
     // Workers that could not be started are not tried again by their pool: whoever tries again gets new ones.
     player.addEventListener("error", () => this.#forget(shared));
+    Object.assign(player.sound, { muted, volume });
     Object.assign(player, { layers, interpolate, textures, splats, loop, playbackRate });
     player.load().catch(() => undefined); // reported by the error event
     return player;

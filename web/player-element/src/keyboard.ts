@@ -3,7 +3,7 @@
 export type Action =
   | "toggle" | "back" | "forward" | "first" | "last" | "previousFrame" | "nextFrame" | "fullscreen" | "vr" | "stats"
   | "mode" | "loop" | "fit" | "help" | "close" | "turnLeft" | "turnRight" | "turnUp" | "turnDown" | "closer" | "farther"
-  | "sectionFrom" | "sectionTo" | "sectionOff" | "autoRotate" | "fly" | "frames";
+  | "mute" | "louder" | "quieter" | "sectionFrom" | "sectionTo" | "sectionOff" | "autoRotate" | "fly" | "frames";
 
 /** What `actionOf` looks at of a KeyboardEvent. */
 export interface Key {
@@ -21,6 +21,8 @@ export const KEYS: readonly { shown: string; says: string; keys: Readonly<Record
   { shown: "Home End", says: "First, last frame", keys: { Home: "first", End: "last" } },
   { shown: ", .", says: "Previous, next frame", keys: { ",": "previousFrame", ".": "nextFrame" } },
   { shown: "L", says: "Loop on or off", keys: { l: "loop" } },
+  { shown: "U", says: "Mute or unmute", keys: { u: "mute" } },
+  { shown: "↑ ↓", says: "Louder, quieter", keys: { ArrowUp: "louder", ArrowDown: "quieter" } },
   { shown: "[ ]", says: "Repeat from here, to here", keys: { "[": "sectionFrom", "]": "sectionTo" } },
   { shown: "\\", says: "Repeat nothing", keys: { "\\": "sectionOff" } },
   { shown: "N", says: "Frame numbers", keys: { n: "frames" } },
@@ -47,6 +49,11 @@ export function actionOf(event: Key): Action | null {
   if (event.key === "Escape") return "close";
   if (event.key.length === 1) return ACTIONS.get(event.key.toLowerCase()) ?? null; // Shift is in the character already
   return ACTIONS.get(event.shiftKey ? `Shift+${event.key}` : event.key) ?? null;
+}
+
+/** Whether an action is for recordings that have sound: of others, its key is left to the page. */
+export function isOfSound(action: Action): boolean {
+  return ["mute", "louder", "quieter"].includes(action);
 }
 
 /** Seconds that an arrow key seeks: a tenth of the recording, at most five seconds. */

@@ -173,12 +173,20 @@ export class Reflected extends Element {
     this.toggleAttribute("share", value);
   }
 
-  /** As a video has it. Recordings have no sound yet. */
+  /** Whether nothing is heard, and nothing of it fetched; set by itself where the browser allows no sound before the viewer did something. */
   get muted(): boolean {
     return parse.parseFlag(this.getAttribute("muted"));
   }
   set muted(value: boolean) {
     this.toggleAttribute("muted", value);
+  }
+
+  /** How loud it is, 0 to 1. */
+  get volume(): number {
+    return parse.parseVolume(this.getAttribute("volume"));
+  }
+  set volume(value: number) {
+    this.setAttribute("volume", String(Number(value.toFixed(3))));
   }
 
   /** As a video has it: it always plays in its place. */

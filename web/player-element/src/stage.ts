@@ -58,6 +58,8 @@ export interface Settings {
   readonly splats: boolean;
   readonly loop: boolean;
   readonly playbackRate: number;
+  readonly muted: boolean;
+  readonly volume: number;
   readonly crossOrigin: string | null;
 }
 

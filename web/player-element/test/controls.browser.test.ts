@@ -56,7 +56,7 @@ describeOnPage("controls of <meshreel-player>", (on) => {
 
   test("arrows, Home and End seek, also from the seek bar", async () => {
     await on.shown();
-    for (const focus of [".picture", "input.range"]) {
+    for (const focus of [".picture", ".seek .range"]) {
       await on.page.locator(focus).focus();
       const times = [];
       for (const key of ["End", "ArrowLeft", "Home", "ArrowRight", "ArrowRight"]) {
@@ -71,7 +71,7 @@ describeOnPage("controls of <meshreel-player>", (on) => {
   test("dragging the seek bar seeks, holds playing meanwhile, and goes on after it", async () => {
     await on.shown();
     await on.get((player) => player.play());
-    const box = (await on.page.locator("input.range").boundingBox())!;
+    const box = (await on.page.locator(".seek .range").boundingBox())!;
     await on.page.mouse.move(box.x + box.width / 4, box.y + box.height / 2);
     await on.page.mouse.down();
     expect(await on.get((player) => player.paused)).toBe(true);
@@ -87,7 +87,7 @@ describeOnPage("controls of <meshreel-player>", (on) => {
     await on.shown();
     await on.get((player) => void (player.currentTime = 0.5));
     await on.eventually((player) => !player.seeking);
-    const bar = on.page.locator("input.range");
+    const bar = on.page.locator(".seek .range");
     await expect.poll(() => bar.getAttribute("aria-valuetext")).toBe("0.5 seconds of 2 seconds");
     expect(await bar.getAttribute("aria-label")).toBe("Seek");
     const style = await on.page.locator(".seek").evaluate((node) => ["--played", "--buffered"].map((name) => Number(node.style.getPropertyValue(name))));

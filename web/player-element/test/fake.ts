@@ -8,7 +8,7 @@ import type { Engine, Settings, Stage } from "../src/stage.ts";
 
 export const INFO: Info = {
   frameCount: 48, frameRate: 24, duration: 2, origin: [0, 0, 0], box: { minimum: [-1, 0, -1], size: [2, 2, 2] }, trackCount: 1,
-  mostLayers: 3, size: 123_456, hasColors: false, hasTextures: false, hasSplats: false, metadata: {},
+  mostLayers: 3, size: 123_456, hasColors: false, hasTextures: false, hasSplats: false, hasAudio: false, metadata: {},
 };
 
 /** Keeps time like a real one; a head comes after 10 ms, a seek takes 20 ms. An address with "404" in it fails. */
@@ -23,6 +23,7 @@ export class FakePlayback extends EventTarget implements Playback {
   textures: boolean;
   splats: boolean;
   layers: Layers;
+  readonly sound = { muted: false, volume: 1, voice: null };
   stalled = false; // set by tests
   updates = 0;
   disposed = false;
@@ -41,6 +42,7 @@ export class FakePlayback extends EventTarget implements Playback {
     this.textures = settings.textures;
     this.splats = settings.splats;
     this.layers = settings.layers;
+    Object.assign(this.sound, { muted: settings.muted, volume: settings.volume });
     const bad = typeof source === "string" && source.includes("404");
     this.#later(10, () => (bad ? this.fail(`${String(source)}: not found (404), check the address`, "missing") : this.#head()));
   }

@@ -1,7 +1,7 @@
 // What the records of a head must satisfy beyond their bytes; FormatError where they do not. Beside format/checks.py.
 
 import { FormatError } from "../errors.ts";
-import { ChunkKind, Form } from "./layout.gen.ts";
+import { ChunkKind, Form, LIMITS } from "./layout.gen.ts";
 import type { Header, Index, IndexEntry } from "./layout.gen.ts";
 
 const LARGEST = 1e15;
@@ -60,6 +60,7 @@ class IndexChecks {
   private readonly whole = new Map<number, Whole>(); // each STATIC and GROUP
   private readonly companions = new Map<string, number>(); // by coded chunk and kind, the number of what belongs to it
   private readonly atlases = new Map<number, number>(); // of each group with pictures, the number of its atlas
+  private hasAudio = false;
   private count = 0;
 
   add(entry: IndexEntry): void {
@@ -73,6 +74,7 @@ class IndexChecks {
     if (isStatic) this.changes.set(this.count, this.changesOf(entry, name));
     else if (isWhole) this.addGroup(entry, name);
     else if (COMPANIONS.has(entry.kind)) this.addCompanion(entry, name);
+    else if (entry.kind === ChunkKind.AUDIO) this.addAudio(entry, name);
     if (isWhole) this.whole.set(this.count, this.wholeOf(entry));
     this.count += 1;
   }
@@ -129,6 +131,14 @@ class IndexChecks {
 
   private companion(of: number, kind: number): number | undefined {
     return this.companions.get(`${of} ${kind}`);
+  }
+
+  private addAudio({ form, frames, track, dependsOn, layers }: IndexEntry, name: string): void {
+    const isAlone = !this.hasAudio && form === Form.AUDIO_FILE && frames === 0 && track === 0 && dependsOn.length === 0;
+    require(isAlone, `${name}: audio besides other audio, or not on its own`);
+    const size = layers.reduce((sum, layer) => sum + layer.size, 0);
+    require(size <= LIMITS.audio, `${name}: ${size} bytes of audio, over ${LIMITS.audio}`);
+    this.hasAudio = true;
   }
 
   private addGroup(entry: IndexEntry, name: string): void {

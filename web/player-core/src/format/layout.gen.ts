@@ -33,6 +33,7 @@ export const LIMITS = {
   texel: 2,
   videos: 184549376,
   splat: 1024,
+  audio: 268435456,
   held: 44,
 } as const;
 
@@ -44,6 +45,7 @@ export const ChunkKind = {
   PICTURES: 5,
   COMPATIBLE: 6,
   SPLATS: 7,
+  AUDIO: 8,
 } as const;
 
 export const Form = {
@@ -56,6 +58,7 @@ export const Form = {
   PLACES: 7,
   VIDEO: 8,
   GAUSSIANS: 9,
+  AUDIO_FILE: 10,
 } as const;
 
 export const AnchorRule = {
@@ -76,6 +79,14 @@ export const Presence = {
 export const VideoCodec = {
   AV1: 1,
   H264: 2,
+} as const;
+
+export const AudioType = {
+  OGG: 1,
+  WEBM: 2,
+  MP4: 3,
+  ADTS: 4,
+  MPEG: 5,
 } as const;
 
 /** The first bytes of a file: its signature, and the size of the head. */
@@ -128,8 +139,8 @@ export const Layer: Kind<Layer> = record("Layer", {
 export interface IndexEntry {
   readonly kind: number; // purpose
   readonly form: number; // coding; equal to the first byte of the chunk
-  readonly frames: number; // number of frames; 0 if and only if STATIC or a companion of one
-  readonly track: number; // number of the moving body, from 0; 0 if STATIC
+  readonly frames: number; // number of frames; 0 if and only if STATIC, a companion of one, or AUDIO
+  readonly track: number; // number of the moving body, from 0; 0 if STATIC or AUDIO
   readonly dependsOn: readonly number[]; // numbers of the earlier chunks that it needs: for a GROUP, the STATIC chunk it is shown with and the GROUP right before it in its track; for a STATIC of form PATCH, the STATIC chunk that it changes; for COLORS, the chunk whose vertices have them and, where they are predicted, the COLORS of the group before; for ATLAS, the GROUP whose base mesh, or the STATIC whose faces, it places; for SPLATS, the GROUP whose base mesh they are on; for PICTURES and COMPATIBLE, the GROUP, the ATLAS, and but for the first of this, that of the group before
   readonly layers: readonly Layer[]; // at least one
 }
@@ -414,4 +425,18 @@ export const GaussiansLayer: Kind<GaussiansLayer> = record("GaussiansLayer", {
   scales: blob(varint),
   opacities: blob(varint),
   colors: blob(varint),
+});
+
+/** The payload of a chunk of form AUDIO_FILE; its layers are pieces of it. */
+export interface AudioFile {
+  readonly form: number; // AUDIO_FILE
+  readonly type: number; // what the file is
+  readonly start: number; // when it begins, microseconds of the clock that first_time is of
+  readonly data: Uint8Array; // the file, at least one byte
+}
+export const AudioFile: Kind<AudioFile> = record("AudioFile", {
+  form: choice(u8, Form),
+  type: choice(u8, AudioType),
+  start: i64,
+  data: rest,
 });

@@ -21,7 +21,7 @@ export const RENDITIONS: readonly Rendition[] = ["pictures", "compatible"];
 export interface Chunk {
   readonly number: number;
   /** Companions come with a chunk of frames or of the background, and add to it; "unknown": what this player does not decode, and never fetches. */
-  readonly kind: "static" | "group" | CompanionKind | "unknown";
+  readonly kind: "static" | "group" | CompanionKind | "audio" | "unknown";
   readonly form: number;
   readonly track: number; // 0 for static
   readonly firstFrame: number; // of a group and of its companions
@@ -40,6 +40,7 @@ export class Head {
   readonly tracks: readonly (readonly Chunk[])[]; // the groups of each
   /** What is fetched as one, in the order of the file: a chunk, or a layer of a background's pictures, which is a video of its own. */
   readonly pieces: readonly Chunk[];
+  readonly audio: Chunk | null; // what is heard
   private readonly companions = new Map<number, readonly CompanionChunk[]>(); // by the chunk that they add to
   private readonly shown = new Map<number, number>(); // of each static chunk, the first frame of the first group that names it
   private readonly times: Float64Array; // s from the first frame; empty where they follow from the rate
@@ -51,6 +52,7 @@ export class Head {
     edit: Edit,
   ) {
     this.tracks = byTrack(chunks);
+    this.audio = chunks.find(({ kind }) => kind === "audio") ?? null;
     for (const chunk of chunks) if (isCompanion(chunk)) this.companions.set(chunk.dependsOn[0], [...this.companionsOf(chunks[chunk.dependsOn[0]]), chunk]);
     this.pieces = chunks.flatMap((chunk) => (isVideo(chunk) && chunk.frameCount === 0 ? layersOf(chunk) : [chunk]));
     for (const { kind, dependsOn, firstFrame } of chunks) if (kind === "group") for (const other of dependsOn) if (!this.shown.has(other)) this.shown.set(other, firstFrame);
@@ -198,6 +200,7 @@ function layersOf(chunk: Chunk): Chunk[] {
 /** "chunk 3 (track 0, frames 10 to 19)", for messages. */
 export function describe(chunk: Pick<Chunk, "number" | "kind" | "track" | "firstFrame" | "frameCount">): string {
   const { number, kind, track, firstFrame, frameCount } = chunk;
+  if (kind === "audio") return `chunk ${number} (audio)`;
   if (kind === "unknown") return `chunk ${number} (of another kind)`;
   const what = isCompanionKind(kind) ? `${kind}, ` : "";
   if (frameCount === 0) return `chunk ${number} (${what}static)`;
@@ -240,6 +243,8 @@ function kindOf(kind: number): Chunk["kind"] {
       return "compatible";
     case ChunkKind.SPLATS:
       return "splats";
+    case ChunkKind.AUDIO:
+      return "audio";
     default:
       return "unknown";
   }
@@ -284,6 +289,7 @@ function infoOf(
     hasColors: chunks.some((chunk) => chunk.kind === "colors" || isVideo(chunk)),
     hasTextures: chunks.some(isVideo),
     hasSplats: chunks.some((chunk) => chunk.kind === "splats"),
+    hasAudio: chunks.some((chunk) => chunk.kind === "audio"),
     metadata,
   };
 }

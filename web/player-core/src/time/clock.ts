@@ -1,6 +1,9 @@
 // Content time from display time.
 
 const LONGEST_STEP = 0.5; // s of display time; where nothing was displayed for longer, time stood still
+const PULL = 0.15; // s in which two thirds of a difference to what leads are made up for: it may not tell its time evenly
+const NEAR = 0.03; // s that it is never off by, but where it stands still until that is so
+const ASTRAY = 0.5; // s from which on what leads has to come back: it went on while nothing was displayed
 const ROUNDING = 1e-6; // s; a time that is less than this short of a frame's own is that frame's
 
 /** When each frame is shown, s from the first. No table: a head of some kilobytes may announce millions of frames. */
@@ -39,12 +42,21 @@ export class Timeline {
   }
 }
 
+/** What may lead a clock. */
+export interface Lead {
+  /** Where it is, s, as the clock runs and is at `time`; NaN while the clock is to wait; null where it leads nowhere. */
+  at(time: number, rate: number): number | null;
+  /** The clock stands, or jumps. */
+  rest(): void;
+}
+
 /** Runs with the display: moves `time` by what has passed between two pictures. Allocates nothing while it runs. */
 export class Clock {
   readonly timeline: Timeline;
   time = 0; // s
   rate = 1;
   loop = false;
+  lead: Lead | null = null;
   #isRunning = false;
   #last = NaN; // ms, of the picture before
   #before = 0; // s, time at the picture before
@@ -65,6 +77,7 @@ export class Clock {
 
   stop(): void {
     this.#isRunning = false;
+    this.lead?.rest();
   }
 
   get isAtEnd(): boolean {
@@ -78,13 +91,27 @@ export class Clock {
     this.#before = this.time;
     if (!this.#isRunning || !(passed > 0)) return;
     const { duration } = this.timeline;
-    this.time += Math.min(passed, LONGEST_STEP) * this.rate;
-    if (this.time >= duration) this.time = this.loop ? this.time % duration : duration;
+    this.#step(Math.min(passed, LONGEST_STEP));
+    if (this.time < duration) return;
+    this.time = this.loop ? this.time % duration : duration;
+    this.lead?.rest();
   }
 
   /** Stops, and takes the last step back: what it led to is not at hand. */
   hold(): void {
     this.time = this.#before;
-    this.#isRunning = false;
+    this.stop();
+  }
+
+  #step(passed: number): void {
+    const led = this.lead?.at(this.time, this.rate) ?? null;
+    if (Number.isNaN(led)) return;
+    const expected = this.time + passed * this.rate;
+    const error = led === null ? 0 : led - expected;
+    if (Math.abs(error) > ASTRAY) this.lead?.rest(); // it begins again where the clock is
+    else {
+      const pulled = expected + error * (1 - Math.exp(-passed / PULL));
+      this.time = Math.max(this.time, led === null ? expected : Math.min(Math.max(pulled, led - NEAR), led + NEAR));
+    }
   }
 }

@@ -17,6 +17,7 @@ export interface Surface {
 
 const TURN = Math.PI / 24; // of a key
 const CLOSER = 1.15;
+const LOUDER = 0.1; // of a key
 
 type Act = (player: MeshreelPlayer, surface: Surface) => void;
 
@@ -39,6 +40,12 @@ const ACTS: Readonly<Record<Action, Act>> = {
     player.loop = !player.loop;
     surface.tell(player.loop ? "Loop on" : "Loop off");
   },
+  mute: (player, surface) => {
+    player.muted = !player.muted;
+    surface.tell(player.muted ? "Muted" : "Sound on");
+  },
+  louder: (player, surface) => setVolume(player, surface, LOUDER),
+  quieter: (player, surface) => setVolume(player, surface, -LOUDER),
   sectionFrom: (player) => void (player.section = cut(player, "from")),
   sectionTo: (player) => void (player.section = cut(player, "to")),
   sectionOff: (player) => void (player.section = null),
@@ -72,6 +79,12 @@ function seekBy(player: MeshreelPlayer, direction: number): void {
   if (!(player.duration > 0)) return;
   const time = player.currentTime + direction * seekStep(player.duration);
   player.currentTime = Math.min(player.duration, Math.max(0, time));
+}
+
+function setVolume(player: MeshreelPlayer, surface: Surface, more: number): void {
+  player.volume = Math.min(1, Math.max(0, player.volume + more));
+  if (more > 0) player.muted = false;
+  surface.tell(`Volume ${Math.round(100 * player.volume)} %`);
 }
 
 function lastFrame(player: MeshreelPlayer): void {

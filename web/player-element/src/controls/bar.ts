@@ -8,6 +8,7 @@ import { parseLayers } from "../attributes.ts";
 import { layersChoices, layersValue, modeChoices, speedChoices } from "./choices.ts";
 import { Button, type Look, make, Menu, setText } from "./dom.ts";
 import { SeekBar } from "./seek.ts";
+import { Volume } from "./volume.ts";
 
 /** What the bar asks of the controls around it. */
 export interface BarActs {
@@ -45,7 +46,9 @@ export class Bar {
     this.#more.element.setAttribute("aria-controls", "settings");
     this.#time.append(this.#now, this.#all);
     const row = make("div", { class: "row" }, ...this.#transport(), this.#time, make("span", { class: "space" }));
-    row.append(...this.#tools().map((button) => button.element), this.#more.element, ...this.#screens());
+    const volume = new Volume(player, () => acts.act("mute"));
+    this.#parts.push(volume);
+    row.append(volume.element, ...this.#tools().map((button) => button.element), this.#more.element, ...this.#screens());
     this.element = make("div", { class: "bar", part: "controls", role: "group", "aria-label": "Player controls" }, this.seek.element, row);
   }
 

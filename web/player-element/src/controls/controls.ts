@@ -3,7 +3,7 @@
 import { acceptDrops } from "../drop.ts";
 import type { MeshreelPlayer } from "../element.ts";
 import { icon } from "../icons.ts";
-import { type Action, actionOf, takesKey, type Target } from "../keyboard.ts";
+import { type Action, actionOf, isOfSound, takesKey, type Target } from "../keyboard.ts";
 import { styleSheet } from "../styles.ts";
 import { copyLink, perform, saveScreenshot, type Surface, toggleVr } from "./actions.ts";
 import { acceptTaps, Activity, type Tap } from "./activity.ts";
@@ -174,7 +174,7 @@ export class Controls implements Surface {
       return;
     }
     const action = actionOf(event);
-    if (action === null) return;
+    if (action === null || (isOfSound(action) && !player.info?.hasAudio)) return;
     if (action !== "close") event.preventDefault();
     this.#act(action);
   }

@@ -16,6 +16,8 @@ export const BAR = `
 .root:has(.settings:not([hidden])) .bar { opacity: 1 !important; translate: none !important; pointer-events: auto !important; }
 .row { display: flex; align-items: center; gap: 2px; min-width: 0; }
 .space { flex: 1; min-width: 0; }
+.volume { display: flex; align-items: center; flex: none; }
+.volume .range { position: static; flex: none; width: 64px; margin: 0 6px 0 0; background: linear-gradient(var(--_line) 0 0) center / 100% 4px no-repeat; }
 .time { padding: 0 6px; white-space: nowrap; }
 .time .all { color: var(--_quiet); }
 
@@ -73,7 +75,7 @@ export const BAR = `
 .settings .tool { display: none; }
 @container player (max-height: 280px) { .settings :is(.choice, .button) { min-height: 34px; height: 34px; } .choice select { height: 28px; } }
 @container player (max-width: 620px) { .row .tool { display: none; } .settings .tool { display: flex; } }
-@container player (max-width: 400px) { .row .step { display: none; } }
+@container player (max-width: 400px) { .row .step, .volume .range { display: none; } }
 @container player (max-width: 300px) { .time .all { display: none; } }
 @container player (max-width: 400px) { .bar { padding: 0 2px 2px; } .row { gap: 0; } }
 `;
