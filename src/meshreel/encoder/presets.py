@@ -12,6 +12,7 @@ from ..analysis.appearance.splat_fit import FitSplatsOptions
 from ..analysis.follow.embedded import Stage
 from ..analysis.follow.template import TemplateOptions
 from ..analysis.reference.extraction import ReferenceOptions
+from ..analysis.reference.fuse import FuseOptions
 from ..analysis.reference.track import TrackOptions
 from ..analysis.scene.background import BackgroundOptions
 from ..coding.appearance.colors import ColorCodingOptions
@@ -31,6 +32,7 @@ from .options import (
 )
 from .target import Fidelity
 
+LITERAL_DEPTH = 9  # of Poisson reconstruction (paper, section 3.3.2)
 LITERAL_ANCHORS = 400  # anchors of a reference in `paper-literal`: the paper gives no number (guess)
 PRESETS = ("best", "paper", "paper-literal")
 COLORS = ("auto", "texture", "vertices", "none")
@@ -106,8 +108,16 @@ def paper_options(
     if not literal:
         return options
     anchored = replace(options.displacements, anchor_count=LITERAL_ANCHORS)
+    reference = replace(options.reference, fuse=FuseOptions(poisson=LITERAL_DEPTH))
     return replace(
-        options, pose="mds", fit="nearest", rounding="plain", steps="uniform", cuts=False, displacements=anchored
+        options,
+        reference=reference,
+        pose="mds",
+        fit="nearest",
+        rounding="plain",
+        steps="uniform",
+        cuts=False,
+        displacements=anchored,
     )
 
 

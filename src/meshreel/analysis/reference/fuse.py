@@ -4,7 +4,7 @@ In: frames, centers, a pose, a key frame. Out: the surfaces of the frames deform
 
 Differs from the paper: the key frame's surface comes first, and other frames add what it lacks; faces that tear in the
 deformation, or join parts that are separate in some frame, are cut; surfaces are joined by the mean of their signed
-distances, not by Poisson reconstruction, so that none is made far from all.
+distances, not by Poisson reconstruction, so that none is made far from all. `FuseOptions.poisson` has the paper's way.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from jaxtyping import Bool, Float32, Float64, Int32, Int64
 
 from ...geometry.decimate import decimate
 from ...geometry.mean_surface import MeanOptions, MeanSurface
+from ...geometry.poisson import poisson_surface
 from ...geometry.rigid import apply
 from ...geometry.topology import (
     clean,
@@ -24,8 +25,10 @@ from ...geometry.topology import (
     drop_small,
     drop_unreferenced,
     large_pieces,
+    subdivide_midpoint,
     unique_edges,
     vertex_areas,
+    vertex_normals,
 )
 from ...types import Mesh
 from .centers import center_spacing
@@ -38,7 +41,8 @@ Edges = tuple[Int64[np.ndarray, "E 2"], Int64[np.ndarray, "F 3"]]  # result of g
 class FuseOptions:
     """Options of the fusion of the frames; lengths in mean edges of the frames' meshes; guesses."""
 
-    voxel: float = 0.5  # of the grid on which surfaces are joined
+    poisson: int | None = None  # depth of the paper's reconstruction, which then joins surfaces (paper: 9)
+    voxel: float = 0.5  # of the grid on which surfaces are joined otherwise
     cover: float = 0.3  # a frame adds surface where earlier ones have less than this share of its own
     reach: float = 2.0  # voxels: surfaces closer than this are joined to their mean
     past: float = 1.5  # voxels by which pieces are continued past their borders, so that they meet
@@ -96,10 +100,7 @@ class Group:
 
         `voxel` is in mean edges of the frames' meshes.
         """
-        mean = MeanSurface(voxel * self.edge, MeanOptions(reach=self.fuse.reach, past=self.fuse.past))
-        for piece in self.pieces(pose, key):
-            mean.add(piece)
-        mesh = decimate(drop_small(mean.surface(1), self.fuse.smallest), vertices)
+        mesh = decimate(drop_small(self._joined(self.pieces(pose, key), voxel), self.fuse.smallest), vertices)
         if mesh.is_empty:
             return mesh
         edges = unique_edges(mesh.faces)
@@ -108,6 +109,20 @@ class Group:
             bad |= self._torn(mesh.vertices, moved, edges)
         whole = drop_small(clean(Mesh.of(mesh.vertices, mesh.faces[~bad])), self.fuse.smallest)
         return close_holes(whole, self.fuse.hole * mesh.diagonal)
+
+    def _joined(self, pieces: Sequence[Mesh], voxel: float) -> Mesh:
+        """Return one surface of several."""
+        if self.fuse.poisson is not None:
+            pieces = [subdivide_midpoint(piece) for piece in pieces]
+            points, normals = (
+                np.concatenate(several)
+                for several in ([p.vertices for p in pieces], [vertex_normals(p) for p in pieces])
+            )
+            return poisson_surface(points, normals, self.fuse.poisson, self.edge)
+        mean = MeanSurface(voxel * self.edge, MeanOptions(reach=self.fuse.reach, past=self.fuse.past))
+        for piece in pieces:
+            mean.add(piece)
+        return mean.surface(1)
 
     def _moved(
         self, t: int, pose: Float64[np.ndarray, "K 3"]
