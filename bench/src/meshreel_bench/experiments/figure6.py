@@ -48,6 +48,8 @@ SYSTEMS = (
     Sweep("meshreel", {"quality": (20.0, 50.0, 80.0)}, PAPER, only=("synthetic4", *BODIES), small=FEW),
     Sweep("tvmc", {"qp": (5, 7, 9, 11)}, on={ROOM: {"qp": (5, 7, 9)}}, small=FEW | {"vertices": 600}),
     Sweep("draco", BITS, on={ROOM: {"qp": (6, 8, 10)}}, sampled=SCENES),
+    Sweep("draco", {"level": (0, 2, 4, 5, 6, 8, 10)}, {"qp": 9}, only=("dancer",)),  # every one that differs
+    Sweep("meshoptimizer", BITS, only=BODIES),
     Sweep("klt_tsdf", VOXELS, on=LARGE, sampled=(ROOM,), small={"cells": 96}),
     Sweep("necgs", {"channels": (8, 16)}, {"device": "cpu"}, sampled=SCENES, small=QUICK),
     Sweep("decimated_draco", FRACTIONS, on=OF_SCENES, sampled=SCENES),
