@@ -41,7 +41,10 @@ def test_the_dynamic_ratio_is_that_of_the_truth_and_everything_without_a_backgro
 def test_points_of_v_dmc_are_rows_whose_rate_is_the_published_one():
     rows = anchor_rows("dancer")
     assert {each.name for each in rows} == {VDMC, VDMC_HERE} and len(rows) == 6
-    assert rows[0].mbps == pytest.approx(1.15, rel=1e-5) and rows[0].metrics == {"d2_psnr_paper": 65.8}
+    assert rows[0].mbps == pytest.approx(1.15, rel=1e-5) and rows[0].metrics == {
+        "d2_psnr_paper": 65.8,
+        "mpeg_d1_psnr": 70.21,
+    }
     assert {each.point.sequence for each in anchor_rows()} == {"dancer", "basketball_player", "mitch"}
 
 

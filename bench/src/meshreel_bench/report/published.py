@@ -28,6 +28,7 @@ class Published(msgspec.Struct, frozen=True):
     symmetric_psnr: float | None = None  # dB
     normal_error_deg: float | None = None
     ssim_masked: float | None = None
+    mpeg_d1_psnr: float | None = None  # dB
 
 
 class Table(msgspec.Struct, frozen=True):
@@ -57,6 +58,7 @@ def _row(table: Table, point: Published) -> Row:
         "symmetric_psnr": point.symmetric_psnr,
         "normal_error_deg": point.normal_error_deg,
         "ssim_masked": point.ssim_masked,
+        "mpeg_d1_psnr": point.mpeg_d1_psnr,
     }
     size = round(point.mbps * 1e6 / 8 * table.frames / FRAME_RATE)
     return Row(
