@@ -33,6 +33,7 @@ from .options import (
 from .target import Fidelity
 
 KNEE = 85.0  # quality above which steps are halved every 8 points: the curve ended for want of steps (decision 31)
+DENSEST = 95.0  # quality from which the template is as it is: a denser one's normals are worse (decision 31)
 EXACT = 98.0  # quality from which layers that miss the target give way to Draco in every frame (decision 31)
 EXACT_ANGLE = 2.4  # degrees that such frames have at most: three show on a headset
 # Candidates of these frames: where few vertices are lost, a coarser lattice costs less than it spoils.
@@ -122,7 +123,7 @@ def layers_options(quality: float = 50.0, effort: str = "normal") -> LayersOptio
     step = motion_step(quality)
     options = LayersOptions(
         target=Fidelity(distance=0.2 * step + 0.00005, angle=7.0, worst=step),
-        template=TemplateOptions(error=rounded(0.00088 * (step / 0.0012) ** 0.55)),
+        template=TemplateOptions(error=rounded(0.00088 * (motion_step(min(quality, DENSEST)) / 0.0012) ** 0.55)),
         layers=LayerCodingOptions(step=step),
         displacements=DisplacementOptions(step=displacement_step(quality)),
         tolerance=tolerance(quality),
