@@ -34,7 +34,7 @@ from .target import Fidelity
 
 KNEE = 85.0  # quality above which steps are halved every 8 points: the curve ended for want of steps (decision 31)
 DENSEST = 95.0  # quality from which the template is as it is: a denser one's normals are worse (decision 31)
-EXACT = 98.0  # quality from which layers that miss the target give way to Draco in every frame (decision 31)
+EXACT = 99.0  # quality from which layers that miss the target give way to Draco in every frame (decision 31)
 EXACT_ANGLE = 2.4  # degrees that such frames have at most: three show on a headset
 # Candidates of these frames: where few vertices are lost, a coarser lattice costs less than it spoils.
 EXACT_INTRA = IntraOptions((0.04, 0.08, 0.15, 0.25, 0.35, 0.45, 0.5, 0.55, 0.7, 1.0), (3.5, 2.4, 1.7, 1.2, 0.8, 0.5))
@@ -120,9 +120,9 @@ def paper_options(
 
 def layers_options(quality: float = 50.0, effort: str = "normal") -> LayersOptions:
     """Return the options of the recipe of layers at a quality."""
-    step = motion_step(quality)
+    step, coarser = motion_step(quality), _step(quality)
     options = LayersOptions(
-        target=Fidelity(distance=0.2 * step + 0.00005, angle=7.0, worst=step),
+        target=Fidelity(distance=0.2 * coarser + 0.00005, angle=7.0, worst=coarser),  # what templates reach
         template=TemplateOptions(error=rounded(0.00088 * (motion_step(min(quality, DENSEST)) / 0.0012) ** 0.55)),
         layers=LayerCodingOptions(step=step),
         displacements=DisplacementOptions(step=displacement_step(quality)),
@@ -171,6 +171,11 @@ def motion_step(quality: float) -> float:
     Above the knee every 8 points.
     """
     return rounded(0.0018 * 2 ** ((50 - min(quality, KNEE)) / 25 - max(quality - KNEE, 0.0) / 8))
+
+
+def _step(quality: float) -> float:
+    """The same without a knee."""
+    return rounded(0.0018 * 2 ** ((50 - quality) / 25))
 
 
 def appearance_options(
