@@ -49,7 +49,7 @@ SYSTEMS = (
     Sweep("meshreel", {"quality": (20.0, 50.0, 80.0)}, PAPER, only=("synthetic4", *BODIES), small=FEW),
     Sweep("tvmc", {"qp": (5, 7, 9, 11)}, on={ROOM: {"qp": (5, 7, 9)}}, small=FEW | {"vertices": 600}),
     Sweep("draco", BITS, on={ROOM: {"qp": (6, 8, 10)}}, sampled=SCENES),
-    Sweep("draco", {"level": (0, 2, 4, 5, 6, 8, 10)}, {"qp": 9}, only=("dancer",)),  # every one that differs
+    Sweep("draco", {"level": (2, 4, 10)}, {"qp": 9}, only=("dancer",)),  # 5 is as 4, 6 and 8 as 7
     Sweep("meshoptimizer", BITS, only=BODIES),
     Sweep("klt_tsdf", VOXELS, on=LARGE, sampled=(ROOM,), small={"cells": 96}),
     Sweep("necgs", {"channels": (8, 16)}, {"device": "cpu"}, sampled=SCENES, small=QUICK),

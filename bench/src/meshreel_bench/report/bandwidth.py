@@ -32,6 +32,7 @@ def headline_table(rows: Sequence[Row]) -> Iterator[str]:
         for system in SYSTEMS:
             cells = [_needed(rated(rows, name), system, measure) for name in names]
             yield f"| {title(system)}, {measure.name} {WANTED:g} | {' | '.join(cells)} |"
+    yield f"| AOM PMC (cannot be run yet) |{' |' * len(names)}"
 
 
 def vdmc_table(rows: Sequence[Row]) -> Iterator[str]:
