@@ -12,7 +12,7 @@ from meshreel.coding.group import decode_group
 from meshreel.coding.reference_mesh import CodedReference, code_on_lattice
 from meshreel.encoder import layers_group
 from meshreel.encoder.forms import EncodedGroup
-from meshreel.encoder.layers_group import FLAT, MOST_FOR_EDGES, GroupCoder
+from meshreel.encoder.layers_group import MOST_FOR_EDGES, GroupCoder
 from meshreel.encoder.target import Fidelity, measure, target_of
 from meshreel.format.layout import Form
 from meshreel.types import Mesh
@@ -58,10 +58,12 @@ def test_without_a_floor_no_draco_is_tried_where_the_layers_hold(monkeypatch: py
 def test_a_group_whose_edges_are_lost_is_coded_one_by_one_with_its_edges():
     options, target = replace(OPTIONS, floor=False), target_of(FRAMES, OPTIONS.target, 0.0)
     flat = coded(options, errors=(0.01,) * 3, target=replace(target, angle=3.0))
-    assert flat.form == Form.LAYERS and 2.5 * FLAT < flat.fidelity.angle <= 3.0 * FLAT
+    assert flat.form == Form.LAYERS and 2.5 * options.flat < flat.fidelity.angle <= 3.0 * options.flat
     sharp = coded(options, errors=(0.01,) * 3, target=replace(target, angle=2.5))
     assert sharp.form == Form.DRACO and sharp.fidelity.angle <= 2.5
     assert len(sharp.payload) <= MOST_FOR_EDGES * len(flat.payload)
+    strict = replace(options, flat=1.0)
+    assert coded(strict, errors=(0.01,) * 3, target=replace(target, angle=3.0)).form == Form.DRACO
 
 
 def test_a_template_that_has_collapsed_is_replaced_by_frames_that_stand_alone():

@@ -34,6 +34,14 @@ def test_more_quality_means_finer_steps_and_more_vertices():
     assert all(a.target.distance > b.target.distance for a, b in pairwise(best))
 
 
+def test_above_the_knee_steps_fall_faster_and_at_the_top_the_target_must_be_reached():
+    low, knee, high, top = (preset_options("best", quality).method for quality in (60, 85, 97, 100))
+    assert low.layers.step == pytest.approx(2 * knee.layers.step) and knee.flat == high.flat == low.flat
+    assert high.layers.step < knee.layers.step / 2 and high.target.angle == low.target.angle
+    assert top.flat == 1.0 and top.target.angle < 2.5 and top.target.distance < 1e-4  # 80 dB of the diagonal
+    assert set(top.intra.fractions) > set(high.intra.fractions) - {0.25, 0.5}
+
+
 @pytest.mark.parametrize("quality", [-1, 100.5, float("nan")])
 def test_a_quality_out_of_range_is_refused_with_its_value(quality):
     with pytest.raises(InputError, match="0 to 100"):

@@ -10,6 +10,7 @@ from meshreel.errors import InputError
 from meshreel.geometry.cameras import pack_cameras
 from meshreel.metrics.comparison import ComparisonOptions, compare_sequences
 from meshreel.metrics.distance import PSNR_CEILING, surface_errors
+from meshreel.metrics.mpeg import MpegOptions, mpeg_errors
 from meshreel.metrics.ssim import ssim_normals
 from meshreel.metrics.viewpoints import Box, ViewOptions, views_around
 from meshreel.types import Mesh, MeshList
@@ -64,6 +65,15 @@ def test_key_frames_can_be_left_out_of_the_means():
     assert row["key_frames"] == [0]
     only = compare_sequences(MeshList((BODY,)), MeshList((BODY,)), options).to_row()
     assert "d2_psnr_paper_without_keys" not in only
+
+
+def test_mpegs_measures_are_there_where_they_are_asked_for():
+    options = ComparisonOptions(ssim=False, mpeg=MpegOptions(pixels=32, grid=64))
+    row = compare_sequences(ORIGINALS, DECODED, options).to_row()
+    last = mpeg_errors(BODY, DECODED[2], Box.of(ORIGINALS), options.mpeg)
+    assert row["mpeg_d1_psnr_worst"] == last.d1 and row["ibsm_geometry_psnr_worst"] == last.geometry
+    assert row["mpeg_d2_psnr"] > row["mpeg_d2_psnr_worst"] == last.d2
+    assert "ibsm_luma_psnr" not in row
 
 
 def test_a_row_is_strict_json_even_where_values_are_infinite():

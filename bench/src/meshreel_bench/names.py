@@ -9,6 +9,9 @@ TUNED = "meshreel paper"  # the same system, the quality varied and the basis ch
 TVMC, DRACO, KLT, NECGS = "tvmc", "draco", "klt_tsdf", "necgs"
 DECIMATED, SUBDIVIDED = "decimated_draco", "decimated_draco_subdivided"
 ONCE, ONCE_SUBDIVIDED = "background_once_draco", "background_once_draco_subdivided"
+MESHOPT = "meshoptimizer"
+FLOOR_RATIO = "dynamic_ratio"  # metric of the truth itself: share of the vertices of what moves
+VDMC, VDMC_HERE = "vdmc", "vdmc on our frames"  # of others: only in plots
 USUAL = {"centers": 2000, "group_size": 10}  # the paper's own
 
 _TITLES = {
@@ -22,6 +25,8 @@ _TITLES = {
     SUBDIVIDED: "Draco, decimated, subdivided",
     ONCE: "background once, Draco",
     ONCE_SUBDIVIDED: "background once, Draco, subdivided",
+    VDMC: "V-DMC TM4, its own sheet (300 frames, with UVs)",
+    VDMC_HERE: "V-DMC TM4, our ten frames (with UVs)",
 }
 
 

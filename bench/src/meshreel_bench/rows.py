@@ -13,7 +13,7 @@ from meshreel.errors import InputError
 
 Option = str | int | float | bool | None
 Options = dict[str, Option]
-Metrics = Literal["distances", "views", "parallel views", "regions", "colors", "depth", "splats"]
+Metrics = Literal["distances", "views", "parallel views", "regions", "colors", "depth", "splats", "mpeg"]
 
 
 class Point(msgspec.Struct, frozen=True):
@@ -26,7 +26,7 @@ class Point(msgspec.Struct, frozen=True):
     sampled: bool = False  # the codec is given some frames of a scene only: it is slow, or codes every frame alone
     # distances alone; also pictures, from where the cameras stood or from four sides (perspective, or parallel); people
     # and background of a simulated scene against truth and input; colours of parallel views and cameras' pictures;
-    # all frames of a recording by its depth pictures; or splats on the decoded mesh, by pictures of these
+    # all frames of a recording by its depth pictures; splats on the decoded mesh, by pictures of these; or MPEG's own
     metrics: Metrics = "views"
 
     @property

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from meshreel_bench.measure.point import dynamic_ratio
 from meshreel_bench.measure.segmentation import score_labels
 
 from meshreel.errors import InputError
+from meshreel.types import Mesh
 
 
 def labels(*numbers):
@@ -34,3 +36,9 @@ def test_labels_that_do_not_fit_are_told():
         score_labels([labels(1)], [labels(1), labels(1)])
     with pytest.raises(InputError, match="0 frames"):
         score_labels([], [])
+
+
+def test_the_dynamic_ratio_is_the_share_of_the_vertices_of_faces_that_move():
+    square = Mesh.of([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
+
+    assert dynamic_ratio([(square, labels(0, 0)), (square, labels(1, 0))]) == 3 / 8

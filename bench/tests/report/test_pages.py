@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 from meshreel_bench.experiments.study import D2, MASKED, NORMALS
-from meshreel_bench.names import BEST
+from meshreel_bench.names import BEST, VDMC, VDMC_HERE
 from meshreel_bench.report import pages
 from meshreel_bench.report.looks import looks_of
 from meshreel_bench.report.pages import write_report
@@ -46,6 +46,14 @@ def test_a_plot_has_a_panel_for_each_measure_and_a_line_for_each_curve_and_the_f
     assert "higher" in first.get_title(loc="right") and "lower" in third.get_title(loc="right")
     assert [line.get_label() for line in first.lines] == [BEST, "zipmesh", "the truth itself"]
     assert len(second.lines) == 2 and first.get_title(loc="left") == "ball, 10 frames"
+
+
+def test_plots_of_figure_6_have_the_points_of_v_dmc_and_no_table_has():
+    (part,) = pages.parts_of([row("dancer", BEST, 1.0, 60)])
+    assert {each.name for each in part.drawn} == {BEST, VDMC, VDMC_HERE} and len(part.rows) == 1
+    figure = curves_figure(part.drawn, (D2, NORMALS), looks_of([BEST, VDMC, VDMC_HERE]), "mbps")
+    assert [len(panel.lines) for panel in figure.axes] == [3, 2]  # its sheet knows no normals
+    assert figure.axes[0].get_title(loc="left") == "dancer, 10 frames"
 
 
 def test_curves_that_are_not_known_have_looks_of_their_own():

@@ -13,6 +13,7 @@ from ..errors import InputError
 from ..geometry.topology import weld
 from ..io.sequence import SequenceOptions
 from ..metrics.comparison import ComparisonOptions
+from ..metrics.mpeg import MpegOptions
 from ..metrics.viewpoints import ViewOptions
 from ..types import Up
 
@@ -54,10 +55,14 @@ class Looking:
     """The axis that points up."""
     keys: Annotated[tuple[int, ...], Parameter(consume_multiple=True, negative="")] = ()
     """Key frames: means without them are printed, too. By default those that the .reel file names."""
+    mpeg: Annotated[bool, Parameter(negative="")] = False
+    """Also compare by MPEG's measures, as mmetric and V-DMC's conditions have them: D1, D2 and IBSM (some 20 seconds
+    per frame)."""
 
     def options(self) -> ComparisonOptions:
         """Return the options of `compare_sequences`."""
-        return ComparisonOptions(self.cameras, ViewOptions(self.width, self.height, up=self.up), self.ssim, self.keys)
+        views, mpeg = ViewOptions(self.width, self.height, up=self.up), MpegOptions() if self.mpeg else None
+        return ComparisonOptions(self.cameras, views, self.ssim, self.keys, mpeg)
 
 
 @Parameter(name="*")

@@ -26,7 +26,6 @@ from .options import LayersOptions
 from .tails import find_tails
 from .target import Fidelity, measure
 
-FLAT = 2.0  # times the wanted normal error beyond which edges are lost (guess)
 MOST_FOR_EDGES = 4  # times the bytes that frames with their edges may cost (guess)
 TOO_COARSE = 1.5  # targets that the layers' distance may reach before the Laplacian form is tried (guess)
 
@@ -92,7 +91,7 @@ class GroupCoder:
 
     def _sharp(self, group: EncodedGroup) -> EncodedGroup | None:
         """Return the `draco` form of a group whose edges are lost, as those of few, large faces; else None."""
-        if group.fidelity.angle <= FLAT * self.target.angle:
+        if group.fidelity.angle <= self.options.flat * self.target.angle:
             return None
         found = cheapest_intra(self.frames, self.target, MOST_FOR_EDGES * len(group.payload), self.options.intra)
         return found and EncodedGroup(Form.DRACO, len(self.frames), found[0], (), found[1])

@@ -100,6 +100,7 @@ class LayersOptions:
     layers: LayerCodingOptions = field(default_factory=LayerCodingOptions)
     tails: TailOptions | None = field(default_factory=TailOptions)  # None: no patches
     displacements: DisplacementOptions = field(default_factory=DisplacementOptions)  # where layers miss the target
+    flat: float = 2.0  # times the wanted normal error beyond which edges are lost: frames are of Draco then (guess)
     measured: int | None = None  # frames of a group whose fidelity is measured, at most; None: all
     floor: bool = True  # Draco is tried in place of every group, not only where nothing else holds
     intra: IntraOptions = field(default_factory=IntraOptions)

@@ -21,6 +21,7 @@ from ..coding.layers.coder import LayerCodingOptions
 from ..coding.paper.displacements import DisplacementOptions
 from ..errors import InputError
 from ..geometry.strict import rounded
+from .draco import IntraOptions
 from .options import (
     AppearanceOptions,
     EncoderOptions,
@@ -33,6 +34,12 @@ from .options import (
 from .target import Fidelity
 
 LITERAL_DEPTH = 9  # of Poisson reconstruction (paper, section 3.3.2)
+KNEE = 85.0  # quality above which steps are halved every 8 points: the curve ended for want of steps (decision 33)
+DENSEST = 95.0  # quality from which the template is as it is: a denser one's normals are worse (decision 33)
+EXACT = 99.0  # quality from which layers that miss the target give way to Draco in every frame (decision 33)
+EXACT_ANGLE = 2.4  # degrees that such frames have at most: three show on a headset
+# Candidates of these frames: where few vertices are lost, a coarser lattice costs less than it spoils.
+EXACT_INTRA = IntraOptions((0.04, 0.08, 0.15, 0.25, 0.35, 0.45, 0.5, 0.55, 0.7, 1.0), (3.5, 2.4, 1.7, 1.2, 0.8, 0.5))
 LITERAL_ANCHORS = 400  # anchors of a reference in `paper-literal`: the paper gives no number (guess)
 PRESETS = ("best", "paper", "paper-literal")
 COLORS = ("auto", "texture", "vertices", "none")
@@ -123,14 +130,17 @@ def paper_options(
 
 def layers_options(quality: float = 50.0, effort: str = "normal") -> LayersOptions:
     """Return the options of the recipe of layers at a quality."""
-    step = motion_step(quality)
+    step, coarser = motion_step(quality), _step(quality)
     options = LayersOptions(
-        target=Fidelity(distance=0.2 * step + 0.00005, angle=7.0, worst=step),
-        template=TemplateOptions(error=rounded(0.00088 * (step / 0.0012) ** 0.55)),
+        target=Fidelity(distance=0.2 * coarser + 0.00005, angle=7.0, worst=coarser),  # what templates reach
+        template=TemplateOptions(error=rounded(0.00088 * (motion_step(min(quality, DENSEST)) / 0.0012) ** 0.55)),
         layers=LayerCodingOptions(step=step),
         displacements=DisplacementOptions(step=displacement_step(quality)),
         tolerance=tolerance(quality),
     )
+    if quality >= EXACT:
+        target = Fidelity(distance=0.43 * step, angle=EXACT_ANGLE, worst=step)
+        options = replace(options, target=target, flat=1.0, intra=EXACT_INTRA)
     if effort == "fast":
         return _fast(options)
     if effort == "thorough":  # more keys, tried also where a plan is good already, and more templates (decision 24)
@@ -166,7 +176,15 @@ def _fast(options: LayersOptions) -> LayersOptions:
 
 
 def motion_step(quality: float) -> float:
-    """Quantiser step of the base's motion as a fraction of the diagonal: .0018 at 50, halved every 25 points."""
+    """Quantiser step of the base's motion as a fraction of the diagonal: .0018 at 50, halved every 25 points.
+
+    Above the knee every 8 points.
+    """
+    return rounded(0.0018 * 2 ** ((50 - min(quality, KNEE)) / 25 - max(quality - KNEE, 0.0) / 8))
+
+
+def _step(quality: float) -> float:
+    """The same without a knee."""
     return rounded(0.0018 * 2 ** ((50 - quality) / 25))
 
 

@@ -20,12 +20,14 @@ from ..types import Mesh
 from .color import color_errors
 from .color_render import render_errors
 from .distance import PSNR_CEILING, SurfaceErrors, surface_errors
+from .mpeg import MpegOptions, mpeg_errors
 from .ssim import ssim_normals
 from .viewpoints import Box, Camera, ViewOptions, read_cameras, views_around
 
 Row = dict[str, Any]
 _COLORS = ("y_psnr", "u_psnr", "v_psnr", "yuv_psnr", "view_y_psnr", "view_y_psnr_inside")
-_PSNRS = ("d2_psnr_paper", "d1_psnr", "d2_psnr", "symmetric_psnr", *_COLORS)
+_MPEG = ("mpeg_d1_psnr", "mpeg_d2_psnr", "ibsm_geometry_psnr", "ibsm_luma_psnr")
+_PSNRS = ("d2_psnr_paper", "d1_psnr", "d2_psnr", "symmetric_psnr", *_COLORS, *_MPEG)
 _LARGER_IS_BETTER = (*_PSNRS, "ssim", "ssim_masked", "view_ssim")
 
 
@@ -37,6 +39,7 @@ class ComparisonOptions:
     views: ViewOptions = field(default_factory=ViewOptions)  # used where no cameras are given
     ssim: bool = True  # rendering and SSIM take about 2 s per frame at 1920 x 1080
     keys: Sequence[int] = ()  # key frames, without which aggregates are also computed
+    mpeg: MpegOptions | None = None  # also by MPEG's measures: about 20 s per frame at mmetric's size of pictures
 
     def __post_init__(self) -> None:
         if any(key < 0 for key in self.keys):
@@ -81,6 +84,7 @@ def compare_sequences(
     """Measure `decoded` against `originals`, frame by frame (two MeshSequences of equal length)."""
     options = options or ComparisonOptions()
     cameras = _cameras(originals, options) if options.ssim else ()
+    box = Box.of(originals) if options.mpeg is not None else Box.of(())
     rows: list[Row] = []
     empty: list[bool] = []
     others = iter(decoded)
@@ -89,6 +93,11 @@ def compare_sequences(
         if other is None:
             raise InputError(f"the decoded sequence ends after {len(rows)} frames and the original does not")
         rows.append(frame_row(mesh, other, cameras))
+        if options.mpeg is not None:
+            found = mpeg_errors(mesh, other, box, options.mpeg)
+            rows[-1] |= dict(zip(_MPEG, (found.d1, found.d2, found.geometry, found.luma), strict=True))
+            if found.luma is None:
+                rows[-1].pop(_MPEG[-1])
         # Vertices alone and faces without area are no surface.
         empty.append(bool(rows[-1]["diagonal_m"] == rows[-1]["rms_forward_m"] == 0))
     if next(others, None) is not None:

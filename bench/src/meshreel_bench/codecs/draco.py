@@ -9,10 +9,11 @@ import tempfile
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import ClassVar, NamedTuple
+from typing import NamedTuple
 
 import DracoPy
 import msgspec
+import numpy as np
 
 from meshreel.analysis.survey import Survey, survey
 from meshreel.coding.intra import encode_empty, encode_intra
@@ -27,6 +28,7 @@ from ..codec import Progress
 from .base import Options, TwoSteps
 
 LARGE = 100_000  # faces; a larger mesh is decimated in two steps, as QEM to a number of vertices takes some rounds
+LEVEL = 7  # of compression, that of this project's own streams
 ALONE = "DracoPy"  # in place of this project's own decoder
 ON_THE_WAY = 3  # vertices after the first step, in those that are wanted
 
@@ -40,19 +42,32 @@ class Point(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class DracoCodec(Options):
-    """Draco per frame, compression level 7."""
+    """Draco per frame."""
 
-    name: ClassVar[str] = "draco"
     qp: int = 10  # bits along each frame's longest side
+    level: int = LEVEL  # of compression, 0 to 10: ten less Draco's speed; others than 7 are meshes without a file
 
     def __post_init__(self) -> None:
         check_qp(self.qp)
+        if not 0 <= self.level <= 10:
+            raise InputError(f"level {self.level}: give 0 to 10")
+
+    @property
+    def name(self) -> str:
+        """The name in rows and plots."""
+        return "draco" if self.level == LEVEL else "draco, other levels"
 
     def encode(self, sequence: MeshSequence, progress: Progress | None = None) -> bytes:
         """Return a .reel file of single frames."""
+        if self.level != LEVEL:
+            return encode_alone(((mesh.vertices, mesh.faces) for mesh in sequence), self.qp, self.level)
         seen = survey(sequence)
         frames = Frames(sequence.frame_rate, seen, (seen.normalise(frame) for frame in sequence))
         return write_frames(frames, [Point(self.qp)] * len(sequence), progress)
+
+    def decode(self, data: bytes) -> Sequence[Mesh]:
+        """Return the frames, from the bytes alone."""
+        return Options.decode(self, data) if self.level == LEVEL else decode_alone(data)
 
 
 class Frames(NamedTuple):
@@ -99,18 +114,26 @@ class DecimatedDracoCodec(TwoSteps):
     def code(self, analysis: Frames, progress: Progress | None = None) -> bytes:
         """Return a .reel file of single frames."""
         if self.decoder:
-            unit, center, how = analysis.seen.unit, analysis.seen.center, {"quantization_bits": self.qp}
-            meshes = [(unit * mesh.vertices + center, mesh.faces) for mesh in analysis.meshes]
-            return msgspec.msgpack.encode([bytes(DracoPy.encode(*m, compression_level=7, **how)) for m in meshes])
+            unit, center = analysis.seen.unit, analysis.seen.center
+            return encode_alone(((unit * mesh.vertices + center, mesh.faces) for mesh in analysis.meshes), self.qp)
         points = [Point(self.qp, self.levels)] * len(analysis.seen.diagonals)
         return write_frames(analysis, points, progress)
 
     def decode(self, data: bytes) -> Sequence[Mesh]:
         """Return the frames, from the bytes alone."""
-        if not self.decoder:
-            return Options.decode(self, data)
-        meshes = map(DracoPy.decode, msgspec.msgpack.decode(data, type=list[bytes]))
-        return [Mesh.of(mesh.points, mesh.faces) for mesh in meshes]
+        return decode_alone(data) if self.decoder else Options.decode(self, data)
+
+
+def encode_alone(meshes: Iterable[tuple[np.ndarray, np.ndarray]], qp: int, level: int = LEVEL) -> bytes:
+    """Return meshes, of vertices and faces, by DracoPy without a file around them; an empty one has no bytes."""
+    how = {"quantization_bits": qp, "compression_level": level}
+    return msgspec.msgpack.encode([bytes(DracoPy.encode(*mesh, **how)) if len(mesh[1]) else b"" for mesh in meshes])
+
+
+def decode_alone(data: bytes) -> list[Mesh]:
+    """Return the meshes of `encode_alone`."""
+    found = [DracoPy.decode(each) if each else None for each in msgspec.msgpack.decode(data, type=list[bytes])]
+    return [Mesh.empty() if mesh is None else Mesh.of(mesh.points, mesh.faces) for mesh in found]
 
 
 def check_point(fraction: float, qp: int, levels: int) -> None:

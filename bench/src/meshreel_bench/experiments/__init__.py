@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from meshreel.errors import InputError
 
-from . import ablations, color, figure6, layers, recordings, scenes, speed, splats, targets
+from . import ablations, color, figure6, layers, mpeg, recordings, scenes, speed, splats, targets
 from .study import Study
 
 # In the order of the report.
 EXPERIMENTS: dict[str, Study] = {
     "figure6": figure6.STUDY,
+    "mpeg": mpeg.STUDY,
     "table1": figure6.TABLE_1,
     "table2": figure6.TABLE_2,
     "table3": splats.TABLE_3,

@@ -44,10 +44,13 @@ FEW = {"centers": 200}  # for `--small`
 QUALITIES, BITS = {"quality": (10.0, 35.0, 60.0, 85.0)}, {"qp": (6, 7, 8, 9, 10)}
 SYSTEMS = (
     Sweep("meshreel", QUALITIES, {"preset": "best"}, {ROOM: {"quality": (0.0, 35.0, 80.0)}}),
+    Sweep("meshreel", {"quality": (95.0, 100.0)}, {"preset": "best"}, only=BODIES[:3]),  # where V-DMC's best points lie
     Sweep("meshreel", {"basis_size": (*M["basis_size"], 30)}, PAPER, FEWER_M, small=FEW | {"basis_size": 2}),
     Sweep("meshreel", {"quality": (20.0, 50.0, 80.0)}, PAPER, only=("synthetic4", *BODIES), small=FEW),
     Sweep("tvmc", {"qp": (5, 7, 9, 11)}, on={ROOM: {"qp": (5, 7, 9)}}, small=FEW | {"vertices": 600}),
     Sweep("draco", BITS, on={ROOM: {"qp": (6, 8, 10)}}, sampled=SCENES),
+    Sweep("draco", {"level": (2, 4, 10)}, {"qp": 9}, only=("dancer",)),  # 5 is as 4, 6 and 8 as 7
+    Sweep("meshoptimizer", BITS, only=BODIES),
     Sweep("klt_tsdf", VOXELS, on=LARGE, sampled=(ROOM,), small={"cells": 96}),
     Sweep("necgs", {"channels": (8, 16)}, {"device": "cpu"}, sampled=SCENES, small=QUICK),
     Sweep("decimated_draco", FRACTIONS, on=OF_SCENES, sampled=SCENES),

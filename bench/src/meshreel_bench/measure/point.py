@@ -7,12 +7,13 @@ theirs. In a codec's place `captured` is the truth itself, `segmentation` the en
 from __future__ import annotations
 
 import pickle
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import Any
 
 import msgspec
+import numpy as np
 
 from meshreel.container.reader import ReelReader
 from meshreel.container.sources import BytesSource
@@ -30,13 +31,14 @@ from ..datasets.scenes import FOUND, TRUE, SceneFrames
 from ..datasets.solid import InColours, coloured
 from ..experiments.study import FLOOR
 from ..experiments.study import FOUND as SEGMENTATION
+from ..names import FLOOR_RATIO
 from ..rows import Encoding, Group, Point, Row, Stream
 from .clock import StageTimer, cost_of
 from .color import color_bytes
 from .decode import decoded_apart
 from .maker import maker
 from .metrics import Measured, measure_frames
-from .segmentation import score_labels
+from .segmentation import Labels, score_labels
 from .splats import splat_values
 
 TRUTH_NAME, UNCOMPRESSED = "the truth itself", "uncompressed"
@@ -70,6 +72,8 @@ def measure_point(point: Point, store: Store) -> Row:
             raise InputError("the truth itself is known of simulated scenes only")
         clean = [known.scene.truth[number].mesh for number in numbers]
         metrics, per_frame = measure_frames(Measured(known, numbers, clean), point.metrics)
+        scene = known.scene
+        metrics[FLOOR_RATIO] = dynamic_ratio((scene.meshes[number], scene.labels(number)) for number in numbers)
         return msgspec.structs.replace(row, name=TRUTH_NAME, metrics=metrics, per_frame=per_frame)
     codec = make_codec(point.codec, point.options)
     decoder = pickle.dumps(codec)  # before it has seen a frame, so that it can keep none
@@ -91,6 +95,13 @@ def measure_point(point: Point, store: Store) -> Row:
         metrics=metrics,
         per_frame=per_frame,
     )
+
+
+def dynamic_ratio(frames: Iterable[tuple[Mesh, Labels]]) -> float:
+    """Return the share of vertices of faces that move, which labels say (the paper's table 1)."""
+    counts = [(len(np.unique(mesh.faces[moves])), len(np.unique(mesh.faces))) for mesh, moves in frames]
+    moving, every = (sum(numbers) for numbers in zip(*counts, strict=True))
+    return moving / max(every, 1)
 
 
 def _uncompressed(row: Row, known: Dataset, painted: Callable[[int], Mesh]) -> Row:

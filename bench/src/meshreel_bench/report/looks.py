@@ -5,7 +5,23 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from ..names import BEST, DECIMATED, DRACO, KLT, NECGS, ONCE, ONCE_SUBDIVIDED, PAINTED, SUBDIVIDED, TEXTURED, TSMC, TVMC
+from ..names import (
+    BEST,
+    DECIMATED,
+    DRACO,
+    KLT,
+    MESHOPT,
+    NECGS,
+    ONCE,
+    ONCE_SUBDIVIDED,
+    PAINTED,
+    SUBDIVIDED,
+    TEXTURED,
+    TSMC,
+    TVMC,
+    VDMC,
+    VDMC_HERE,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,6 +50,9 @@ KNOWN: dict[str, Look] = {
     SUBDIVIDED: Look("#1B3A5C", "D", size=2.8),
     ONCE: Look("#000000", "<"),
     ONCE_SUBDIVIDED: Look("#777777", "H"),
+    MESHOPT: Look("#66A61E", "p"),
+    VDMC: Look("#999999", "s", 1.6),
+    VDMC_HERE: Look("#000000", "s", 1.6),
     "Draco with colours, avif": Look("#0072B2", "^"),
     "Draco with colours, av1": Look("#009E73", "P", size=4.2),
     "Draco with colours, vertices": Look("#CC79A7", "X", size=4.2),

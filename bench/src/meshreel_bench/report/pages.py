@@ -19,12 +19,14 @@ from .equal import rate_table
 from .headline import headline
 from .looks import looks_of
 from .plots import plot_curves
+from .published import anchor_rows
 from .reproducing import reproducing_page
 from .values import curve_of, rated, sequences
 from .verdicts import verdicts
 
 FOLDER = "results"  # of appendices, plots and the README's numbers, beside the pages
 OPEN = "figure6"  # the experiment that rows belong to which none declares: other codecs, other sequences
+BESIDE = (OPEN, "mpeg")  # experiments in whose plots V-DMC's points are
 SHOWN = ("synthetic4", "dancer", "room2")  # sequences whose curves are on the first page
 TEXT = "results.md"  # package data: the first page, with a line {NAME} for each part that is made
 
@@ -43,6 +45,12 @@ class Part:
         """Rows that have a rate and a quality."""
         return rated(self.rows)
 
+    @property
+    def drawn(self) -> list[Row]:
+        """Rows of its plots: some have V-DMC's points beside those that were measured."""
+        there = sequences(self.rows) if self.name in BESIDE else []
+        return [*self.rows, *(row for row in anchor_rows() if row.point.sequence in there)]
+
 
 def parts_of(rows: Sequence[Row]) -> list[Part]:
     """Return the experiments that have rows; a point of several experiments is in each of them."""
@@ -60,16 +68,16 @@ def write_report(rows: Sequence[Row], folder: Path) -> list[Path]:
     """Write the pages and their plots into a folder; return the paths."""
     make_folder(folder / FOLDER)
     parts = parts_of(rows)
-    looks = looks_of(curve_of(row) for part in parts for row in part.rated)
+    looks = looks_of(curve_of(row) for part in parts for row in rated(part.drawn))
     pages = {Path("results.md"): _first_page(parts)}
     plots = list[Path]()
     for part in parts:
         pages[Path(FOLDER, f"appendix-{part.name}.md")] = list(_appendix(part))
         if part.rated:
             path = folder / FOLDER / f"{part.name}.png"
-            plots.append(plot_curves(part.rows, part.study.measures[:2], looks, path, part.study.rate))
+            plots.append(plot_curves(part.drawn, part.study.measures[:2], looks, path, part.study.rate))
     for part, sequence in _shown(parts):
-        own = [row for row in part.rows if row.point.sequence == sequence]
+        own = [row for row in part.drawn if row.point.sequence == sequence]
         plots.append(plot_curves(own, (D2, MASKED), looks, folder / FOLDER / _plot_name(part, sequence)))
     if page := reproducing_page([row for part in parts if part.name in (OPEN, "table3") for row in part.rows]):
         pages[Path("reproducing.md")] = page

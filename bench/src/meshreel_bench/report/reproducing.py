@@ -5,41 +5,17 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from importlib.resources import files
 
-import msgspec
-
 from ..names import BEST, TSMC, TUNED
 from ..rows import Row
+from .bandwidth import headline_table, vdmc_table
+from .published import RELEASED, TABLE_1, TABLE_2, Published
 from .values import curve_of, rated, value
 
 SCENES = ("room2", "living_room", "procedural_room")
 SYNTHETIC = "synthetic4"
 SLACK_DB, SHORT = 0.1, " †"  # a point that is worse by more is marked
 PAPER_3 = (("TSMC", 6.13, 25.35, 0.9462), ("uncompressed", 357.6, 26.46, 0.9594))  # LMG of 2026: name, Mbps, dB, SSIM
-DATA = "published.json"  # package data, each table with its source: the paper's, and what its released code reaches
 TEXT = "reproducing.md"  # package data: the page, with a line {NAME} for each table
-
-
-class Published(msgspec.Struct, frozen=True):
-    """Numbers of a system; None: not published."""
-
-    system: str  # as the source has it
-    codec: str  # the curve of ours that stands beside it
-    d2_psnr: float  # dB
-    ssim: float | None = None  # whole pictures, four views
-    decode_ms: float | None = None  # a frame
-    mbps: float | None = None
-
-
-class Table(msgspec.Struct, frozen=True):
-    """Systems of one source."""
-
-    source: str
-    systems: list[Published]
-
-
-_TABLES = msgspec.json.decode((files(__package__) / DATA).read_bytes(), type=dict[str, Table])
-TABLE_1, TABLE_2 = _TABLES["table_1"].systems, _TABLES["table_2"].systems
-RELEASED = {name: _TABLES[name].systems for name in ("dancer", "synthetic4")}
 
 
 def reproducing_page(rows: Sequence[Row]) -> list[str]:
@@ -49,8 +25,10 @@ def reproducing_page(rows: Sequence[Row]) -> list[str]:
         return []
     tables = {"{table_1}": _table_1, "{table_2}": _table_2, "{released}": _released}
     page = (files(__package__) / TEXT).read_text(encoding="utf-8")
+    every = [row for row in rows if row.point.metrics == "views"]  # the truth itself has no rate
     drawn = [row for row in rated(rows) if row.point.metrics == "splats"]
     lines = {text: list(table(own)) for text, table in tables.items()} | {"{table_3}": list(_table_3(drawn))}
+    lines |= {"{headline}": list(headline_table(every)), "{vdmc}": list(vdmc_table(own))}
     return [line for text in page.splitlines() for line in lines.get(text, [text])]
 
 
