@@ -57,7 +57,7 @@ def test_data_of_the_papers_authors_are_read_as_they_release_them(bench, tmp_pat
             (tmp_path / name / f"view_{number:02}.json").write_bytes(pack_cameras([place]))
     rows = tmp_path / "rows.jsonl"
     code, found, said = bench("run", "table1", "-o", rows, "--data", tmp_path, "--only", "draco", "--json")
-    assert code == 0 and found["failed"] == 0 and found["rows"] == 10 and "answering draco qp 6: " in said
+    assert code == 0 and found["failed"] == 0 and found["rows"] == 10 and "answering draco qp 6 level 7: " in said
     known = {(one.point.sequence, one.metrics["ssim_masked"] > 0.5) for one in read_rows(rows)}
     assert known == {("answering", True), ("synthetic", True)}
 
@@ -67,7 +67,7 @@ def test_operating_points_on_a_users_sequence_are_measured_once_and_reported(ben
     chosen = ("--on", "own", "--only", "draco", "--add", "draco:qp=12", "--no-ssim", "--json")
     run = ("run", "figure6", "-o", rows, "--data", data, *chosen)
     code, first, said = bench(*run)
-    assert code == 0 and first["rows"] == 6 and first["failed"] == 0 and "own draco qp 12: " in said
+    assert code == 0 and first["rows"] == 6 and first["failed"] == 0 and "own draco qp 12 level 7: " in said
     code, _, said = bench(*run)
     assert code == 0 and said.count("(measured before)") == 6 and len(rows.read_text().splitlines()) == 6
     code, found, _ = bench("report", rows, "-o", data / "out", "--json")

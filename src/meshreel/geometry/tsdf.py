@@ -23,6 +23,7 @@ SIDE = 8  # voxels along a side of a block; the core's
 TRUNCATION = 3.0  # voxels before and behind a depth that it constrains (guess)
 GRAZING = 4.0  # the same where surface is seen at grazing angles, from one side (decision 28)
 SEEN = 0.5  # weight above which a voxel is known: one measurement is enough (guess)
+ALIKE = 2.0**-16  # voxels: vertices that are nearer to each other are one (guess)
 MOST_BLOCKS = 500_000  # bounds memory: 2 GB (guess)
 
 
@@ -88,7 +89,8 @@ def extract(grid: Grid, least: float) -> Mesh:
     vertices, faces = _core.zero_level(grid.blocks, grid.distances, grid.weights, grid.voxel, least)
     if not len(faces):
         return Mesh.empty()
-    return _ordered(clean(weld(Mesh(vertices, faces))))
+    step = grid.voxel * ALIKE  # a level through a voxel is met from all its sides, but for rounding in one place
+    return _ordered(clean(weld(Mesh(np.rint(vertices / step) * step, faces))))
 
 
 def _ordered(mesh: Mesh) -> Mesh:

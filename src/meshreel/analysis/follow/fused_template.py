@@ -29,7 +29,7 @@ FINEST = 1024  # voxels along the frames at most: bounds memory (guess)
 class FusedOptions:
     """Options of the fusion of frames into a template (values: decision 16)."""
 
-    noise: float = 1.4  # smallest voxel, in RMS noise: finer ones resolve noise
+    noise: float = 7.25  # smallest voxel, in RMS noise: finer ones resolve noise, which every frame would pay for
     spacing: float = 0.7  # smallest voxel, in median edge lengths of the frames: finer ones resolve nothing
     reach: float = 1.5  # voxels: a frame agrees with surface up to this distance from its own
     agree: float = 0.18  # smallest share of the frames that must agree, and at least two of them
