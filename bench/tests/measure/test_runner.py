@@ -96,8 +96,9 @@ def test_rows_that_are_there_are_not_measured_again_unless_they_failed_and_it_is
 
 
 def test_a_row_has_rate_times_and_metrics_of_what_a_fresh_process_decodes(store, tmp_path):
-    [row] = run_points([Point("ball", "draco", {"qp": 9, "level": 7}, metrics="distances")], tmp_path / "rows.jsonl", Sweep(store))
-    assert row.name == "draco" and row.options == {"qp": 9, "level": 7} and row.frames == 2 and row.measured_frames == [0, 1]
+    options = {"qp": 9, "level": 7}
+    [row] = run_points([Point("ball", "draco", options, metrics="distances")], tmp_path / "rows.jsonl", Sweep(store))
+    assert row.name == "draco" and row.options == options and row.frames == 2 and row.measured_frames == [0, 1]
     assert row.stream.bytes > 100 and [group.form for group in row.stream.groups] == ["draco"] * 2
     assert row.encoding.reference_s > 0 and row.decoding.reference_s > 0 and row.encoding.work == {}
     assert row.encoding.s > 0 and row.decoding.vertices == 18 and row.decoding.frame_ms > 0
