@@ -14,6 +14,8 @@
 namespace meshreel {
 namespace {
 
+// Squared sine of an angle: thinner faces are lines, whose border would have no weight (guess).
+constexpr double kNeedle = 1e-10;
 constexpr double kFlat = 1e-3;  // of the cubed mean of the diagonal: determinants below leave a direction open (guess)
 
 // The sum of squared distances from weighted planes: p A p + 2 b p + c.
@@ -178,14 +180,16 @@ private:
         queue_.push({merged(a, b).first, a, b, versions_[at(a)], versions_[at(b)]});
     }
 
-    // Whether a face of `v` that `other` has not would turn over if `v` were at a place.
+    // Whether a face of `v` that `other` has not would turn over, or become a line, if `v` were at a place.
     bool turns_over(int32_t v, int32_t other, Vec place) const {
         for (int32_t slot = first_[at(v)]; slot >= 0; slot = next_[at(slot)]) {
             const size_t f = at(slot) / 3, k = at(slot) % 3;
             const int32_t* face = &faces_[3 * f];
             if (face[0] < 0 || face[0] == other || face[1] == other || face[2] == other) continue;
             const Vec b = corner(f, k + 1), c = corner(f, k + 2);
-            if (dot(cross(b - corner(f, k), c - corner(f, k)), cross(b - place, c - place)) <= 0) return true;
+            const Vec before = cross(b - corner(f, k), c - corner(f, k)), after = cross(b - place, c - place);
+            if (dot(before, after) <= 0) return true;
+            if (dot(after, after) < kNeedle * dot(b - place, b - place) * dot(c - place, c - place)) return true;
         }
         return false;
     }

@@ -88,6 +88,24 @@ TEST(closest_points_are_those_of_all_faces_whatever_the_guess_and_after_moves) {
     mr_tree_destroy(tree);
 }
 
+TEST(the_closest_point_of_a_face_that_is_a_line_but_for_rounding_is_beside_the_query) {
+    Shape shape;  // from the decimation of a room: the corner line of two walls
+    shape.positions = {
+        2.22044605e-16, -1.11022302e-16, 2.34, -2.66453526e-14, -6.28386232e-14, 0.06, 1.11022302e-16, 0.0, 2.40};
+    shape.faces = {0, 1, 2};
+    const mr_mesh mesh = shape.view();
+    mr_tree* tree = nullptr;
+    CHECK(mr_tree_create(&mesh, &tree) == MR_OK);
+    for (int k = 1; k < 40; ++k) {
+        const double query[3] = {0.0, 0.0, 0.06 * k};
+        int32_t face = -1;
+        double w[3];
+        CHECK(mr_tree_closest(tree, query, 1, HUGE_VAL, &face, w) == MR_OK && face == 0);
+        CHECK(std::fabs(2.34 * w[0] + 0.06 * w[1] + 2.40 * w[2] - query[2]) < 1e-9);
+    }
+    mr_tree_destroy(tree);
+}
+
 TEST(rays_meet_the_nearest_of_all_faces) {
     const Shape shape = triangles(1, 200);
     const mr_mesh mesh = shape.view();

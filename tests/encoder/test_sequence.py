@@ -114,10 +114,10 @@ def test_draco_takes_a_group_that_costs_less_that_way(tmp_path):
 
 
 def test_a_group_is_cut_where_one_reference_cannot_follow(tmp_path):
-    one, other = sliding_sphere(2, levels=2), [Mesh.of(BALL.vertices * [1, 0.2, 3] + [0, 4, 0], BALL.faces)] * 2
+    one, other = sliding_sphere(2, levels=2), [Mesh.of(BALL.vertices * [1, 0.2, 3] + [0, 1, 0], BALL.faces)] * 2
     video, summary = decoded(MeshList((*one, *other)), tmp_path / "a.reel")
     assert len(summary.groups) > 1
-    assert sum(group.frame_count for group in summary.groups) == 4
+    assert summary.groups[0].frame_count == 2
     assert max(percent(a, b) for a, b in zip((*one, *other), video, strict=True)) < 2
 
 

@@ -32,6 +32,9 @@ _TITLES = {
 
 def title(name: str) -> str:
     """Return what a legend calls a curve; what a variant changes stays behind the title of what it is a variant of."""
+    begin, end = f"{TUNED}, ", TSMC.removeprefix(TUNED)  # of a variant of which m is varied
+    if name.startswith(begin) and name.endswith(end):
+        return f"{_TITLES[TSMC]}, {name.removeprefix(begin).removesuffix(end)}"
     known = [base for base in _TITLES if name == base or name.startswith(f"{base}, ")]
     if not known:
         return name

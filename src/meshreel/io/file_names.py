@@ -52,9 +52,11 @@ def find_frames(source: str | Path | Iterable[str | Path]) -> tuple[tuple[Place,
     except OSError as error:  # a name that is too long, or a folder without permission
         raise InputError(f"{source}: cannot be read ({error.strerror}); check the path and its rights") from None
     if is_folder:
-        inner = path / MESHES
-        folder = inner if inner.is_dir() and not any(map(_is_mesh, path.iterdir())) else path
-        return _ordered(folder, folder, _of_one_kind(folder))
+        folder, found = path, _listed(path)
+        if not found and (path / MESHES).is_dir():
+            folder, found = path / MESHES, _listed(path / MESHES)
+        _check_kind(folder, found)
+        return _ordered(folder, folder, found)
     if path.exists():
         return (path,), ()
     if is_pattern(str(source)):
@@ -107,13 +109,12 @@ def _has_mesh_name(path: PurePath) -> bool:
     return path.suffix.lower() in EXTENSIONS and not path.name.startswith(".")
 
 
-def _of_one_kind(folder: Path) -> list[Path]:
+def _listed(folder: Path) -> list[Path]:
+    """Return the mesh files of a folder."""
     try:
-        found = [path for path in folder.iterdir() if _is_mesh(path)]
+        return [path for path in folder.iterdir() if _is_mesh(path)]
     except OSError as error:
         raise InputError(f"{folder}: cannot be read ({error.strerror}); check its rights") from None
-    _check_kind(folder, found)
-    return found
 
 
 def _check_kind(folder: Place, found: Sequence[PurePath]) -> None:

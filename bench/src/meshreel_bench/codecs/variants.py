@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import TypeVar
 
 from meshreel.encoder.options import EncoderOptions, LayersOptions, PaperOptions, SceneOptions
 from meshreel.encoder.presets import LITERAL_ANCHORS, preset_options
@@ -13,28 +14,26 @@ UNIFORM, IN_MDS_POSE, BOTH = "one step, plain rounding", "MDS pose, no cuts", "M
 RELEASED, LARGER = "the release's step", "reference of 5000 vertices"
 RELEASED_STEP = 5e-5  # of a diagonal: the release has 1e-4 m, and people's diagonals are about 2 m
 Change = Callable[[EncoderOptions], EncoderOptions]
+Method = TypeVar("Method", LayersOptions, PaperOptions)
+
+
+def _method(kind: type[Method], change: Callable[[Method], Method], text: str) -> Change:
+    """A change of one recipe; `text` says for errors which, and what presets it has."""
+
+    def changed(options: EncoderOptions) -> EncoderOptions:
+        if not isinstance(options.method, kind):
+            raise InputError(f"this variant changes {text}")
+        return replace(options, method=change(options.method))
+
+    return changed
 
 
 def _layers(change: Callable[[LayersOptions], LayersOptions]) -> Change:
-    """A change of the recipe of layers."""
-
-    def changed(options: EncoderOptions) -> EncoderOptions:
-        if not isinstance(options.method, LayersOptions):
-            raise InputError("this variant changes the recipe of layers; use preset `best`")
-        return replace(options, method=change(options.method))
-
-    return changed
+    return _method(LayersOptions, change, "the recipe of layers; use preset `best`")
 
 
 def _paper(change: Callable[[PaperOptions], PaperOptions]) -> Change:
-    """A change of the paper's recipe."""
-
-    def changed(options: EncoderOptions) -> EncoderOptions:
-        if not isinstance(options.method, PaperOptions):
-            raise InputError("this variant changes the paper's recipe; use preset `paper` or `paper-literal`")
-        return replace(options, method=change(options.method))
-
-    return changed
+    return _method(PaperOptions, change, "the paper's recipe; use preset `paper` or `paper-literal`")
 
 
 def _plain(options: PaperOptions) -> PaperOptions:

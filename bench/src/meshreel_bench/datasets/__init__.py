@@ -105,9 +105,9 @@ class Store:
             body, most, options = REMESHED[name]
             source = _open_files(body, self.data, min(frames or most, most))
             return Dataset(RemeshedSequence(source, None if self.cache is None else self.cache / name, options))
-        views = _found(name, self.data)
-        released = views.is_dir() and any(views.glob(VIEW_FILES))
-        return Dataset(_open_files(name, self.data, frames, self.own), read_view_file(views) if released else ())
+        folder = _found(name, self.data)
+        seen_from = read_view_file(folder) if folder.is_dir() and any(folder.glob(VIEW_FILES)) else ()
+        return Dataset(_open_files(name, self.data, frames, self.own), seen_from)
 
     def digest(self, name: str) -> str | None:
         """Return a digest of a user's sequence and its options of reading; None for benchmark data."""

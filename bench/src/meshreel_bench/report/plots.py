@@ -26,6 +26,7 @@ LONG = 24  # letters of a sequence's title that have room beside another (guess)
 _HEIGHT = 2.3  # inches, of a line of panels
 _LINE = 0.155  # inches, of the legend, from one to the next
 WIDE = 34  # letters of a curve's title of which three do not fit a line (guess)
+WIDER = 52  # of which two do not fit (guess)
 _SETTINGS: dict[Any, Any] = {
     **dict.fromkeys(("font.size", "axes.titlesize", "axes.labelsize", "legend.fontsize"), 7.0),
     "xtick.labelsize": 6.5,
@@ -56,7 +57,8 @@ def curves_figure(rows: Sequence[Row], measures: Sequence[Measure], looks: Mappi
     shown = [row for row in rated(rows) if any(value(row, measure.key) is not None for measure in measures)]
     sequences = list(dict.fromkeys(row.point.sequence for row in shown))
     names = {curve_of(row) for row in shown}
-    columns = 2 if max(len(title(name)) for name in names) > WIDE else 3
+    longest = max(len(title(name)) for name in names)
+    columns = 3 if longest <= WIDE else 2 if longest <= WIDER else 1
     legend_lines = -(-len(names) // columns)
     size = (WIDTH, _HEIGHT * len(sequences) + 0.3 + _LINE * legend_lines)
     figure = Figure(figsize=size, layout="constrained", facecolor="white")

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 import numpy as np
 from jaxtyping import Bool, Int64
@@ -77,10 +78,13 @@ def _by_place(frames: CapturedSequence, chosen: Sequence[int], options: SegmentO
     places = find_places(Observations(some, views, pictures, report), lattice, options.places)
     moving = moving_places(places, options.cut)
 
+    @lru_cache(maxsize=1)  # places beside a change are asked for step by step, all in the same frames
+    def looked_at(numbers: tuple[int, ...]) -> tuple[list[Surface], list[Int64[np.ndarray, " V"]]]:
+        surfaces = [Surface(frames[numbers[k]]) for k in evenly(len(numbers), _LOOKS)]
+        return surfaces, [lattice.keys(surface.mesh.vertices) for surface in surfaces]
+
     def holds(groups: Sequence[Int64[np.ndarray, " C"]], numbers: list[int], times: float) -> list[bool]:
-        probes = [frames[numbers[k]] for k in evenly(len(numbers), _LOOKS)]
-        surfaces = [Surface(probe) for probe in probes]
-        keys = [lattice.keys(probe.vertices) for probe in probes]
+        surfaces, keys = looked_at(tuple(numbers))
         return [_stands(surfaces, [np.isin(k, places.keys[g]) for k in keys], 2 * cell, times * noise) for g in groups]
 
     rest = find_rest(places, moving, chosen, frames.frame_rate, options.settle, holds)

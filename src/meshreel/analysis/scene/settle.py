@@ -109,9 +109,9 @@ def _join(
             return
         waiting[own] = False
         for time in np.unique(times):
-            some = own[times == time]
-            label = connected(places, some, lambda a, _: np.ones(len(a), bool))
-            groups = [some[label == number] for number in np.flatnonzero(np.bincount(label, minlength=1) >= _SMALLEST)]
+            reached = np.zeros_like(waiting)
+            reached[own[times == time]] = True
+            groups = _together(places, reached, np.zeros(len(reached), np.int64), _SMALLEST)
             after = order[order >= time] if never else order[order < time]
             for group, stands in zip(groups, holds(groups, after.tolist(), _STILL_BESIDE), strict=True):
                 out[group] = time if stands else never
