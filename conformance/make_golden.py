@@ -15,6 +15,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from meshreel.coding.appearance.atlas import encode_atlas
 from meshreel.coding.appearance.colors import ColorCodingOptions
@@ -62,6 +63,7 @@ def main(folder: Path) -> None:
         "layers": (header(), layers_groups(ball(), (1, 10, 3))),
         "layers_open": (header(), [nothing, *layers_groups(patches(), (4, 1)), *layers_groups(ball(), (2,))]),
         "layers_patched": (header(), patched_groups()),
+        "layers_posed": (header(), layers_groups(patches(), (5, 3), turn=0.3)),
         "mixed": (header(intervals=(40_000, 20_000, 33_333) * 3), [nothing, moving, still, (1, *nothing[1:])]),
     }
     for name, (head, groups) in files.items():
@@ -282,13 +284,18 @@ def patches() -> CodedReference:
     return code_reference(Mesh.of(both, np.concatenate([faces, faces + side * side])), 9, 1)
 
 
-def layers_groups(reference: CodedReference, sizes: tuple[int, ...]) -> list[Group]:
-    """Groups of so many frames of a mesh that stretches and ripples, each after the first predicted from the last."""
+def layers_groups(reference: CodedReference, sizes: tuple[int, ...], turn: float = 0.0) -> list[Group]:
+    """Groups of so many frames of a mesh that stretches and ripples, each after the first predicted from the last.
+
+    It turns by an angle a frame, rad, about an axis.
+    """
     points, groups, first = reference.base.vertices, list[Group](), 0
     state: LayersState | None = None
     for frames in sizes:
         time = (first + np.arange(frames))[:, None, None]
+        turns = Rotation.from_rotvec(turn * time[:, :, 0] * np.array([0.6, 0.0, 0.8])).as_matrix()
         wanted = points * (1 + 0.01 * time) + 0.004 * np.sin(30 * points[:, [1, 2, 0]] + 0.2 * time)
+        wanted = np.einsum("tij,tvj->tvi", turns, wanted) if turn else wanted
         coded = encode_layers(
             reference, wanted, LayerCodingOptions(step=0.001, detail_ratios=(0.8, 1.1), price=0.12), state
         )

@@ -25,11 +25,12 @@ public:
         const uint8_t* byte = take(1);
         return byte ? *byte : 0;
     }
-    bool one_of_two() {
+    uint8_t at_most(uint8_t largest) {
         const uint8_t value = u8();
-        good_ = good_ && value <= 1;
-        return value == 1;
+        good_ = good_ && value <= largest;
+        return value;
     }
+    bool one_of_two() { return at_most(1) == 1; }
     uint64_t varint() {
         uint64_t value = 0;
         for (int shift = 0; shift < 70; shift += 7) {
@@ -81,15 +82,33 @@ double step_of(int level) {
     return std::ldexp(kEighths[level % 8], -32 - level / 8);
 }
 
-int decode_basis(const CodedField& record, size_t width, bool has_mean, FieldStreams& out) {
-    const size_t columns = static_cast<size_t>(record.columns), head = has_mean ? 1 + width : 0;
+// Poses, each coded as its difference from the one before: all shifts, then all turns.
+std::vector<Pose> poses_of(const int32_t* values, size_t frames, int bits) {
+    const auto vec = [&](size_t k) {
+        const auto number = [&](size_t i) { return std::ldexp(static_cast<double>(values[i]), -bits); };
+        return Vec{number(3 * k), number(3 * k + 1), number(3 * k + 2)};
+    };
+    std::vector<Pose> out;
+    Pose pose{identity(), {0, 0, 0}};
+    for (size_t t = 0; t < frames; ++t) {
+        pose = {product(turn(vec(frames + t)), pose.turn), pose.shift + vec(t)};
+        out.push_back(pose);
+    }
+    return out;
+}
+
+int decode_basis(const CodedField& record, size_t width, Common common, FieldStreams& out) {
+    const size_t columns = static_cast<size_t>(record.columns);
+    const size_t head = common == Common::kNone ? 0 : 1 + (common == Common::kPoses ? 2 : 1) * width;
     const size_t count = head + columns * width - columns * (columns > 0 ? columns - 1 : 0) / 2;
     if (!is_plausible(count, record.basis.size)) return MR_BAD_BASIS;
     std::vector<int32_t> values(count);
     if (mr_decode_integers(record.basis.data, record.basis.size, count, values.data()) != MR_OK) return MR_BAD_BASIS;
     out.means.assign(width, 0.0);
-    if (has_mean) {
-        if (values[0] < 0 || values[0] > kMostMeanBits) return MR_BAD_MEAN;
+    if (head > 0 && (values[0] < 0 || values[0] > kMostMeanBits)) return MR_BAD_MEAN;
+    if (common == Common::kPoses) {
+        out.poses = poses_of(values.data() + 1, width / 3, values[0]);
+    } else if (common == Common::kShifts) {
         for (size_t t = 0; t < width; ++t) out.means[t] = std::ldexp(static_cast<double>(values[1 + t]), -values[0]);
     }
     out.vectors.resize(std::max(columns, size_t{1}) * width);  // room for one, so that pointers can be counted from it
@@ -111,7 +130,7 @@ bool parse(const mr_bytes& bytes, LayersGroup& record) {
     record.frames = fields.u8();
     fields.skip(1 + 8);  // levels and step
     fields.blob();       // the base mesh
-    record.has_mean = fields.one_of_two();
+    record.common = static_cast<Common>(fields.at_most(2));
     record.motion = fields.field();
     return fields.is_done();
 }
@@ -141,9 +160,9 @@ Field FieldStreams::over(const mr_graph& graph, size_t first) {
             nullptr};
 }
 
-int decode_streams(const CodedField& record, const mr_graph& graph, size_t width, bool has_mean, FieldStreams& out) {
+int decode_streams(const CodedField& record, const mr_graph& graph, size_t width, Common common, FieldStreams& out) {
     if (record.columns > width || record.step_level >= kStepLevels) return MR_BAD_COLUMNS;
-    const int status = decode_basis(record, width, has_mean, out);
+    const int status = decode_basis(record, width, common, out);
     if (status != MR_OK) return status;
     out.columns = static_cast<size_t>(record.columns);
     const uint64_t count = uint64_t{out.columns} * graph.count;

@@ -11,10 +11,19 @@
 namespace meshreel {
 namespace {
 
+Vec middle_of(const mr_mesh& mesh) {
+    Vec sum{0, 0, 0};
+    for (size_t v = 0; v < mesh.vertices; ++v) sum = sum + load(mesh.positions + 3 * v);
+    const double count = static_cast<double>(mesh.vertices);
+    return {sum.x / count, sum.y / count, sum.z / count};
+}
+
 // Writes the rows of vertices order[0], order[1] ...: their displacements, frame after frame x, y and z, from their
-// places in `base`. Returns false where a number is not finite.
-bool place_rows(FieldRows& field, const int32_t* order, const mr_mesh& base, size_t frames, double* rows) {
+// places in `base`, or in the poses of it, if there are any. Returns false where a number is not finite.
+bool place_rows(FieldRows& field, const int32_t* order, const mr_mesh& base, size_t frames, const Pose* poses,
+                double* rows) {
     std::vector<double> block(kRowBlock * 3 * frames);
+    const Vec middle = middle_of(base);
     double waste = 0.0;  // of numbers that are not finite: any other number times 0 is 0
     for (size_t first = 0; first < base.vertices; first += kRowBlock) {
         const size_t count = std::min(kRowBlock, base.vertices - first);
@@ -22,10 +31,13 @@ bool place_rows(FieldRows& field, const int32_t* order, const mr_mesh& base, siz
         for (size_t p = 0; p < count; ++p) {
             const double* moved = block.data() + 3 * frames * p;
             const size_t v = static_cast<size_t>(order[first + p]);
-            for (size_t k = 0; k < 3; ++k) {
-                double* out = rows + (3 * v + k) * frames;
-                const double from = base.positions[3 * v + k];
-                for (size_t t = 0; t < frames; ++t) out[t] = moved[3 * t + k] + from, waste += out[t] * 0.0;
+            double* out = rows + 3 * v * frames;
+            const Vec place = load(base.positions + 3 * v);
+            for (size_t t = 0; t < frames; ++t) {
+                const Vec from = poses ? poses[t].turn * (place - middle) + middle + poses[t].shift : place;
+                const Vec now = load(moved + 3 * t) + from;
+                out[t] = now.x, out[frames + t] = now.y, out[2 * frames + t] = now.z;
+                waste += now.x * 0.0 + now.y * 0.0 + now.z * 0.0;
             }
         }
     }
@@ -40,10 +52,12 @@ int decode_motion(const LayersGroup& record, const mr_mesh& base, size_t first, 
     const std::unique_ptr<mr_hierarchy, void (*)(mr_hierarchy*)> owner(made, mr_hierarchy_destroy);
     const mr_graph graph = mr_hierarchy_graph(made);
     FieldStreams streams;
-    status = decode_streams(record.motion, graph, size_t{3} * record.frames, record.has_mean, streams);
+    status = decode_streams(record.motion, graph, size_t{3} * record.frames, record.common, streams);
     if (status != MR_OK) return status;
     FieldRows field(streams.over(graph, 3 * first));
-    return place_rows(field, mr_hierarchy_order(made), base, record.frames - first, rows) ? MR_OK : MR_NOT_FINITE;
+    const Pose* poses = streams.poses.empty() ? nullptr : streams.poses.data() + first;
+    const size_t frames = record.frames - first;
+    return place_rows(field, mr_hierarchy_order(made), base, frames, poses, rows) ? MR_OK : MR_NOT_FINITE;
 }
 
 }  // namespace
@@ -57,7 +71,7 @@ int mr_decode_field(const mr_bytes* record, const mr_graph* graph, size_t width,
     if (!parse(*record, coded)) return MR_BAD_RECORD;
     return guarded(MR_NO_MEMORY, [&]() -> int {
         FieldStreams streams;
-        const int status = decode_streams(coded, *graph, width, has_mean != 0, streams);
+        const int status = decode_streams(coded, *graph, width, has_mean ? Common::kShifts : Common::kNone, streams);
         if (status == MR_OK) FieldRows(streams.over(*graph)).next(graph->count, rows);
         return status;
     });

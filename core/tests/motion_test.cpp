@@ -1,11 +1,13 @@
+#include <cmath>
+
 #include "check.h"
 #include "shapes.h"
 
 namespace {
 
 // A LayersGroup record (FORMAT.md) of two frames without a base mesh.
-Bytes group(const Bytes& motion, uint8_t has_mean, uint8_t form = 2, uint8_t origin = 0) {
-    Bytes out{form, origin, 2, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, has_mean};
+Bytes group(const Bytes& motion, uint8_t common, uint8_t form = 2, uint8_t origin = 0) {
+    Bytes out{form, origin, 2, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, common};
     out.insert(out.end(), motion.begin(), motion.end());
     return out;
 }
@@ -31,6 +33,25 @@ TEST(a_motion_without_columns_moves_all_vertices_by_the_mean) {
                 CHECK(rows[(3 * v + k) * 2 + t] == base.positions[3 * v + k] + 1 + k + 3 * t);
 }
 
+TEST(poses_turn_a_base_about_its_middle_and_shift_it_each_from_the_pose_before) {
+    Shape base = tetrahedron();
+    // with one bit: shifts by (.5, 0, 0) twice; turns about z by 90 degrees (the tangent of half is 1, so 2) twice
+    const Bytes poses = coded_field(0, 0, integers({1, 1, 0, 0, 1, 0, 0, 0, 0, 4, 0, 0, 4}), {});
+    std::vector<double> rows;
+    CHECK(decode(group(poses, 2), base, 2, rows) == MR_OK);
+    double middle[3] = {0, 0, 0};
+    for (size_t v = 0; v < 4; ++v)
+        for (size_t k = 0; k < 3; ++k) middle[k] += base.positions[3 * v + k] / 4;
+    for (size_t v = 0; v < 4; ++v) {
+        const double x = base.positions[3 * v] - middle[0], y = base.positions[3 * v + 1] - middle[1];
+        const double wanted[2][3] = {{-y + middle[0] + 0.5, x + middle[1], base.positions[3 * v + 2]},
+                                     {-x + middle[0] + 1.0, -y + middle[1], base.positions[3 * v + 2]}};
+        for (size_t t = 0; t < 2; ++t)
+            for (size_t k = 0; k < 3; ++k) CHECK(std::fabs(rows[(3 * v + k) * 2 + t] - wanted[t][k]) < 1e-12);
+    }
+    CHECK(decode(group(kMean, 2), base, 2, rows) == MR_BAD_BASIS);
+}
+
 TEST(places_of_the_last_frame_are_those_of_the_motion) {
     const Shape base = tetrahedron();
     const Bytes record = group(kMean, 1);
@@ -54,7 +75,7 @@ TEST(a_motion_record_has_one_length_and_form_and_number_of_frames) {
         CHECK(decode(Bytes(record.begin(), record.begin() + size), tetrahedron(), 2, rows) == MR_BAD_RECORD);
     CHECK(decode(record, tetrahedron(), 3, rows) == MR_BAD_RECORD);
     CHECK(decode(group(kMean, 1, 3), tetrahedron(), 2, rows) == MR_BAD_RECORD);
-    CHECK(decode(group(kMean, 2), tetrahedron(), 2, rows) == MR_BAD_RECORD);
+    CHECK(decode(group(kMean, 3), tetrahedron(), 2, rows) == MR_BAD_RECORD);
     CHECK(decode(group(kMean, 1, 2, 2), tetrahedron(), 2, rows) == MR_BAD_RECORD);
 }
 

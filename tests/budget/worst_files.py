@@ -29,6 +29,7 @@ from meshreel.format.layout import (
     ChunkKind,
     CodedField,
     ColorsLevel,
+    Common,
     Component,
     DisplacementHead,
     DracoGroup,
@@ -38,7 +39,6 @@ from meshreel.format.layout import (
     LayersGroup,
     LayersLevel,
     Origin,
-    Presence,
     StaticPatch,
     VertexColors,
 )
@@ -126,7 +126,7 @@ def layers(data: bytes, levels: int, frames: int, patched: bool = False, predict
     base = decode_mesh(data, STEP)
     motion = field(hierarchy(base).graph, 3 * frames, 3 * frames, has_mean=True)
     origin = Origin.PREVIOUS if predicted else Origin.ALONE
-    head = LayersGroup(Form.LAYERS, origin, frames, levels, STEP, b"" if predicted else data, Presence.PRESENT, motion)
+    head = LayersGroup(Form.LAYERS, origin, frames, levels, STEP, b"" if predicted else data, Common.SHIFTS, motion)
     payload, faces, vertices = pack(head), base.faces, len(base.vertices)
     for _ in range(levels):
         near = connectivity(faces, vertices)
@@ -185,7 +185,7 @@ def layered(size: int, levels: int = 2, predicted: int = 0) -> bytes:
 def still(levels: int, frames: int) -> bytes:
     """A group predicted from another, where nothing moves."""
     nothing = CodedField(0, 80, b"", b"")
-    head = LayersGroup(Form.LAYERS, Origin.PREVIOUS, frames, levels, STEP, b"", Presence.ABSENT, nothing)
+    head = LayersGroup(Form.LAYERS, Origin.PREVIOUS, frames, levels, STEP, b"", Common.NONE, nothing)
     return pack(head) + levels * pack(LayersLevel(Origin.PREVIOUS, 16, 16, nothing))
 
 

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from meshreel.coding import entropy
 from meshreel.coding.appearance.atlas import decode_atlas, encode_atlas
@@ -28,6 +29,7 @@ from meshreel.format.layout import (
     Atlas,
     CodedField,
     ColorsLevel,
+    Common,
     DisplacementHead,
     Gaussians,
     GaussiansLayer,
@@ -56,7 +58,7 @@ def require(condition: bool) -> None:
 def decoder() -> dict[str, Any]:
     """What the document's Python defines."""
     names: dict[str, Any] = {"np": np, "math": math, "sqrt": math.sqrt, "require": require}
-    names |= {value.name: value for values in (AnchorRule, Origin) for value in values}
+    names |= {value.name: value for values in (AnchorRule, Common, Origin) for value in values}
     for block in re.findall(r"```python\n(.*?)```", DOCUMENT.read_text(encoding="utf-8"), re.DOTALL):
         exec(block, names)
     return names
@@ -141,8 +143,8 @@ def told_by(decoder: dict[str, Any], payload: bytes, before: dict[str, Any] | No
     return np.array(places), np.array(faces), left
 
 
-@pytest.mark.parametrize("frames", [1, 3])
-def test_the_document_decodes_layers_to_the_bit(decoder: dict[str, Any], frames: int) -> None:
+@pytest.mark.parametrize(("frames", "turn"), [(1, 0.0), (3, 0.0), (3, 0.4)])
+def test_the_document_decodes_layers_to_the_bit(decoder: dict[str, Any], frames: int, turn: float) -> None:
     reference = code_reference(body(), 9, 2)
     generator = np.random.default_rng(5)
     state: LayersState | None = None
@@ -151,8 +153,11 @@ def test_the_document_decodes_layers_to_the_bit(decoder: dict[str, Any], frames:
         shape = subdivide_midpoint(reference.mesh, 2).vertices
         time = np.arange(frames)[:, None, None] + round_number * frames
         wanted = shape * (1 + 0.02 * time) + 0.003 * generator.normal(size=(frames, *shape.shape))
+        turns = Rotation.from_rotvec(turn * time[:, :, 0] * np.array([0.6, 0.0, 0.8])).as_matrix()
+        wanted = np.einsum("tij,tvj->tvi", turns, wanted)
         payload = encode_layers(reference, wanted, LayerCodingOptions(step=4e-3), state).payload
         faces, positions, state = decode_layers(payload, None, state)
+        assert (records.unpack(LayersGroup, payload)[0].common == Common.POSES) == (turn > 0)
         told, told_faces, left = told_by(decoder, payload, left)
         np.testing.assert_array_equal(told_faces, faces)
         np.testing.assert_array_equal(told, positions)

@@ -168,11 +168,12 @@ class DisplacementHead:
     basis: Annotated[bytes, Blob(Varint()), "integers: 3 T of the mean, then 3 T of each component's direction"]
 
 
-class Presence(IntEnum):
-    """Whether an optional part is present."""
+class Common(IntEnum):
+    """Motion that all vertices of a mesh share."""
 
-    ABSENT = 0
-    PRESENT = 1
+    NONE = 0
+    SHIFTS = 1
+    POSES = 2
 
 
 class Origin(IntEnum):
@@ -202,7 +203,7 @@ class LayersGroup:
     levels: Annotated[int, U8, "L, midpoint subdivisions of the base mesh"]
     step: Annotated[float, F64, "spacing of the base's lattice, above 0: decoded vertices are rounded to multiples"]
     base: Annotated[bytes, Blob(Varint()), "the base mesh, Draco; no bytes where its origin is PREVIOUS"]
-    has_mean: Annotated[Presence, Choice(U8, Presence), "whether the basis of the motion has a mean"]
+    common: Annotated[Common, Choice(U8, Common), "motion that all vertices share, before the basis"]
     motion: Annotated[CodedField, Nested(CodedField), "the displacements of the base's vertices"]
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from ... import _core
 from ...errors import FormatError, InputError
 from ...format.budget import Size, check_cost, layers_cost
-from ...format.layout import Form, LayersGroup, LayersLevel, LayersPatches, Origin, Presence
+from ...format.layout import Form, LayersGroup, LayersLevel, LayersPatches, Origin
 from ...format.records import pack, unpack, unpack_all
 from ...geometry.subdivision import heights, refine, subdivide, write_frames
 from ...shapes import Float64, Int32
@@ -111,14 +111,11 @@ def encode_layers(
     frames, levels = len(positions), reference.levels
     base = reference.mesh if previous is None else Mesh(previous.base, previous.faces)
     _check_input(positions, base)
-    field, known = encode_trajectories(
-        positions[:, : len(base.vertices)], base, options.rate(0, noise), options.tangential
-    )
+    motion = encode_trajectories(positions[:, : len(base.vertices)], base, options.rate(0, noise), options.tangential)
+    known = motion.decoded
     origin = Origin.ALONE if previous is None else Origin.PREVIOUS
     data = reference.data if previous is None else b""
-    head = LayersGroup(
-        Form.LAYERS, origin, frames, levels, reference.step, data, Presence(field.has_mean), field.record
-    )
+    head = LayersGroup(Form.LAYERS, origin, frames, levels, reference.step, data, motion.common, motion.record)
     layers = [pack(head)]
     scalars: list[Float64[np.ndarray, "T _"]] = []
     faces = base.faces

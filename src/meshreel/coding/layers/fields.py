@@ -6,7 +6,7 @@ The basis as decoded is orthonormal, so all columns share one step. A column is 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -42,6 +42,11 @@ class Rate:
         """Quantiser step, in the field's unit."""
         return step_of(self.rung)
 
+    @property
+    def common_bits(self) -> int:
+        """Fraction bits of motion that all vertices share: it is rounded to a sixteenth of a step."""
+        return min(max(strict.ceil_log2(8.0 / self.step), 0), MOST_BITS)
+
 
 @dataclass(frozen=True, slots=True)
 class SurfaceWeight:
@@ -63,17 +68,19 @@ class EncodedField:
 
 
 def encode_field(
-    trajectories: Float64[np.ndarray, "V C"], graph: Graph, rate: Rate, surface: SurfaceWeight | None = None
+    trajectories: Float64[np.ndarray, "V C"],
+    graph: Graph,
+    rate: Rate,
+    surface: SurfaceWeight | None = None,
+    before: Int32[np.ndarray, " N"] | None = None,
 ) -> EncodedField:
-    """Encode the columns that pay, quantised in a closed loop; `surface` marks positions, which also have a mean."""
+    """Encode the columns that pay, quantised in a closed loop; `surface` marks positions, which also have a mean.
+
+    Integers `before` the basis take the mean's place, as of poses: what they say is no part of the trajectories.
+    """
     width = trajectories.shape[1]
-    mean = trajectories.mean(axis=0) if surface is not None and len(trajectories) else np.zeros(width)
-    bits = min(max(strict.ceil_log2(8.0 / rate.step), 0), MOST_BITS)  # rounds the mean to a sixteenth of a step
-    mean = np.rint(np.ldexp(mean, bits))
-    worth = rate.price * rate.step**2 * strict.log2(2 * np.abs(mean) + 1).sum()
-    has_mean = bool(len(trajectories) * (np.ldexp(mean, -bits) ** 2).sum() > worth)
-    side = np.append(bits, mean).astype(np.int32) if has_mean else np.zeros(0, np.int32)
-    centered = trajectories - (np.ldexp(mean, -bits) if has_mean else 0.0)
+    mean = np.zeros(0, np.int32) if surface is None or before is not None else _mean(trajectories, rate)
+    centered = trajectories - (np.ldexp(mean, -rate.common_bits) if len(mean) else 0.0)
     basis = klt.fit_about(np.zeros(width), centered)
     least = np.full(len(basis.energies), max(LEAST_RMS * rate.step, rate.least))
     least[:1] = LEAST_RMS * rate.step  # what stands still on a body is no noise, however small
@@ -82,10 +89,26 @@ def encode_field(
     while not (pays := coded.pays()).all():
         kept = kept[pays]
         coded = _Columns(centered, basis.only(kept), graph, rate, surface)
-    packed = entropy.encode_integers(np.concatenate([side, coded.basis]))
-    record = CodedField(len(kept), rate.rung, packed, coded.stream)
-    decoded = decode_field(record, graph, width, has_mean)
-    return EncodedField(record, has_mean, decoded, 8 * len(packed), 8 * len(coded.stream))
+    side = np.append(rate.common_bits, mean).astype(np.int32) if len(mean) else mean
+    record = CodedField(len(kept), rate.rung, _packed(side, coded.basis), coded.stream)
+    decoded = decode_field(record, graph, width, len(mean) > 0)
+    if before is not None:
+        record = replace(record, basis=_packed(before, coded.basis))
+    return EncodedField(record, len(mean) > 0, decoded, 8 * len(record.basis), 8 * len(coded.stream))
+
+
+def _mean(trajectories: Float64[np.ndarray, "V C"], rate: Rate) -> Int32[np.ndarray, " N"]:
+    """Return the mean as integers; none where it does not pay."""
+    if not len(trajectories):
+        return np.zeros(0, np.int32)
+    mean = np.rint(np.ldexp(trajectories.mean(axis=0), rate.common_bits))
+    worth = rate.price * rate.step**2 * strict.log2(2 * np.abs(mean) + 1).sum()
+    pays = len(trajectories) * (np.ldexp(mean, -rate.common_bits) ** 2).sum() > worth
+    return mean.astype(np.int32)[: len(mean) if pays else 0]
+
+
+def _packed(side: Int32[np.ndarray, " N"], basis: Int32[np.ndarray, " M"]) -> bytes:
+    return entropy.encode_integers(np.concatenate([side, basis]))
 
 
 def decode_field(record: CodedField, graph: Graph, width: int, has_mean: bool) -> Float64[np.ndarray, "V C"]:

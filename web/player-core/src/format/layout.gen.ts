@@ -71,9 +71,10 @@ export const Origin = {
   PREVIOUS: 1,
 } as const;
 
-export const Presence = {
-  ABSENT: 0,
-  PRESENT: 1,
+export const Common = {
+  NONE: 0,
+  SHIFTS: 1,
+  POSES: 2,
 } as const;
 
 export const VideoCodec = {
@@ -241,7 +242,7 @@ export interface LayersGroup {
   readonly levels: number; // L, midpoint subdivisions of the base mesh
   readonly step: number; // spacing of the base's lattice, above 0: decoded vertices are rounded to multiples
   readonly base: Uint8Array; // the base mesh, Draco; no bytes where its origin is PREVIOUS
-  readonly hasMean: number; // whether the basis of the motion has a mean
+  readonly common: number; // motion that all vertices share, before the basis
   readonly motion: CodedField; // the displacements of the base's vertices
 }
 export const LayersGroup: Kind<LayersGroup> = record("LayersGroup", {
@@ -251,7 +252,7 @@ export const LayersGroup: Kind<LayersGroup> = record("LayersGroup", {
   levels: u8,
   step: f64,
   base: blob(varint),
-  hasMean: choice(u8, Presence),
+  common: choice(u8, Common),
   motion: nested(() => CodedField),
 });
 
