@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
+import pytest
 
 from meshreel.analysis.follow.template import base_mesh
+from meshreel.encoder import layers as layered
+from meshreel.encoder.candidates import Candidate
 from meshreel.encoder.interval import Interval
 from meshreel.encoder.layers import encode_interval
 from meshreel.encoder.options import LayersOptions
@@ -55,3 +60,18 @@ def test_a_noisy_sheet_with_moving_holes_is_one_group_and_nearer_to_the_truth_th
         before.append(np.sqrt(np.mean(gaps(frame, inner) ** 2)))
         after.append(np.sqrt(np.mean(gaps(shown, inner) ** 2)))
     assert max(after) < 0.6 * min(before)
+
+
+@pytest.mark.parametrize(("share", "keys"), [(1.0, [1]), (0.0, [1, 4])])
+def test_a_template_of_its_own_is_tried_where_patches_are_most_of_a_predicted_group(
+    share: float, keys: list[int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tried, of_key = list[int](), Candidate.of_key
+    monkeypatch.setattr(layered, "PATCHED", share)
+    monkeypatch.setattr(Candidate, "of_key", lambda *a: tried.append(a[1]) or of_key(*a))
+    frames = [noisy(sheet(0.004 * t), NOISE, t) for t in range(6)]
+    shown = [with_hole(mesh, 0.0, 0.05, 0.04) if t < 3 else mesh for t, mesh in enumerate(frames)]  # then it is closed
+    groups = list(encode_interval(Interval(shown, NOISE), replace(BEST, group_size=3)))
+    assert [group.frame_count for group in groups] == [3, 3]
+    assert tried == keys
+    assert groups[1].predicted or share == 0.0
