@@ -11,7 +11,7 @@ from meshreel.analysis.scene.cut import CutOptions
 from meshreel.analysis.scene.labelling import ByPlace
 from meshreel.analysis.scene.places import Places, PlacesOptions, Tally
 from meshreel.analysis.scene.segmentation import SegmentOptions, segment
-from meshreel.analysis.scene.settle import NEVER, SettleOptions, find_rest
+from meshreel.analysis.scene.settle import NEVER, Rest, SettleOptions, find_rest
 from meshreel.analysis.scene.views import ViewsOptions
 from meshreel.analysis.survey import survey
 from meshreel.coding.background import decode_background, decode_change
@@ -23,7 +23,7 @@ from meshreel.format.budget import CostlyError
 from meshreel.geometry.closest_points import Surface
 from meshreel.geometry.derived_sequences import captured
 from meshreel.geometry.topology import concatenate, subdivide_midpoint, weld
-from meshreel.geometry.voxels import Lattice, neighbours
+from meshreel.geometry.voxels import Lattice, neighbours, spread
 from meshreel.types import Mesh, MeshList, Placement
 
 FRAMES, LIFTED, PUT = 28, 9, 18  # at 4 frames a second
@@ -196,3 +196,18 @@ def test_a_side_that_is_seen_late_rests_with_what_it_belongs_to() -> None:
     assert rests(stand(16, 12, slice(0, 4)), holds=True) == [all_of_it, 0]
     assert rests(stand(16, 12, slice(0, 4)), holds=False) == [all_of_it - small, small]  # it moves: a person's hand
     assert rests(stand(16, 15, slice(0, 4)), holds=True) == [all_of_it - small, small]  # two frames tell nothing
+
+
+@pytest.mark.parametrize(("away", "side", "moves"), [(0.04, 0.2, False), (0.04, 0.5, True), (0.3, 0.2, True)])
+def test_a_small_bit_beside_what_has_come_to_rest_is_flicker(away: float, side: float, moves: bool) -> None:
+    door = sheet((0, 0, 0), (1, 0, 0), (0, 1, 0), 5)
+    bit = sheet((0.2, 0.2, away), (side, 0, 0), (0, side, 0), 3)
+    both = concatenate([door, bit])
+    lattice = Lattice(np.full(3, -1.0), 0.02)
+    keys = np.unique(lattice.keys(spread(both, 0.01)[0]))
+    own = np.isin(keys, lattice.keys(spread(door, 0.01)[0]))
+    rest = replace(Rest.none(len(keys)), since=np.where(own, 5, NEVER).astype(np.int32))
+    by = ByPlace(0.02, lattice, keys, np.ones(len(keys), bool), rest, 0.0)
+    assert by.moving(4, both).all()
+    assert not by.moving(5, both)[: len(door.faces)].any()
+    assert (by.moving(5, both)[len(door.faces) :] == moves).all()

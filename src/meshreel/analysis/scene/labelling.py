@@ -21,10 +21,11 @@ from ...geometry.voxels import Lattice, spread
 from ...types import Mesh
 from .color_change import ColorChange
 from .masks import Masker
-from .settle import Rest
+from .settle import BESIDE, NEVER, Rest
 from .votes import Votes
 
 _REMEMBERED = 600  # frames whose labels are kept, some 50 kB each: a guess, enough for seconds of a scene
+_BIT = 0.2  # m^2: less surface that moves by itself, beside what has come to rest, flickers (decision 28)
 _ELSEWHERE = 2.0  # cells: surface farther from the middle of every known place is at no place (decision 18)
 
 
@@ -117,7 +118,20 @@ class ByPlace:
         if self.colors is not None and moving.any():
             unlike = self.colors.faces(frame, mesh) & ~self.faces_at(mesh, self.chosen & ~chosen)
             moving = _reached(mesh, moving, unlike)
-        return without_islands(mesh, moving, self.island)
+        return without_islands(mesh, self._without_flicker(frame, mesh, moving), self.island)
+
+    def _without_flicker(self, frame: int, mesh: Mesh, moving: Bool[np.ndarray, " F"]) -> Bool[np.ndarray, " F"]:
+        """Return the moving faces without bits of what has come to rest: its edges are measured now and then."""
+        since, until = self._beside
+        beside = (frame >= since) | (frame < until)
+        if not (moving.any() and beside.any()):
+            return moving
+        area, label = _areas(mesh, moving)
+        near = self.faces_at(mesh, beside)[moving]
+        apart = np.bincount(label, np.where(near, -1.0, 1.0), len(mesh.vertices)) > 0  # most faces are not beside it
+        kept = moving.copy()
+        kept[moving] = (area >= _BIT) | apart[label]
+        return kept
 
     def still_at_first(self, frame: int, mesh: Mesh) -> Bool[np.ndarray, " F"]:
         """Return True for each face of frame `frame` that belongs to the room as it is in the first frame."""
@@ -153,6 +167,18 @@ class ByPlace:
             reach = _ELSEWHERE * self.lattice.size
             number[unknown] = self._tree.query(points[unknown], distance_upper_bound=reach)[1]
         return number
+
+    @cached_property
+    def _beside(self) -> tuple[Int64[np.ndarray, " P"], Int64[np.ndarray, " P"]]:
+        """For each place from when on, and until when, the nearest place that comes to rest, or leaves it, does."""
+        found = list[Int64[np.ndarray, " P"]]()
+        for times, never in ((self.rest.since, NEVER), (self.rest.until, 0)):
+            own, middles = np.flatnonzero(times != never), self.lattice.centers(self.keys)
+            nearest = np.full(len(times), len(own))
+            if len(own):
+                nearest = cKDTree(middles[own]).query(middles, distance_upper_bound=BESIDE)[1]
+            found.append(np.append(times[own], never)[nearest])
+        return found[0], found[1]
 
     @cached_property
     def _tree(self) -> Any:
