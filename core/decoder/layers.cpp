@@ -30,7 +30,7 @@ LayersRecords read(const mr_bytes& data, int64_t most) {
     found.is_alone = in.choice(0, 1) == 0;
     found.frames = in.u8(), found.levels = in.u8(), found.step = in.f64();
     found.base = in.blob(in.varint());
-    in.choice(0, 2);  // common
+    in.choice(0, 2);  // shared
     in.skip_field();
     found.layers.push_back(in.since(0));
     const unsigned levels =

@@ -146,14 +146,14 @@ inline void put_blob(Bytes& out, const Bytes& bytes) {
     out.insert(out.end(), bytes.begin(), bytes.end());
 }
 
-// Appends a CodedField record over a graph, with `common` rows of numbers before its basis.
-inline void put_field(Input& in, const mr_graph& graph, size_t width, size_t common, Bytes& out) {
+// Appends a CodedField record over a graph, with `head` integers before its basis.
+inline void put_field(Input& in, const mr_graph& graph, size_t width, size_t head, Bytes& out) {
     size_t columns = in.u8();
     uint8_t level = in.u8();
     if (columns != 255) columns %= width + 1;
     if (level != 255) level %= 200;
     const size_t known = columns > width ? 0 : columns;
-    const size_t basis = (common > 0 ? 1 + common * width : 0) + known * width - known * (known > 0 ? known - 1 : 0) / 2;
+    const size_t basis = head + known * width - known * (known > 0 ? known - 1 : 0) / 2;
     put_varint(out, columns);
     out.push_back(level);
     put_blob(out, stream_of(in, basis, encoded_integers));

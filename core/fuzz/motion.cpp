@@ -9,12 +9,12 @@ Bytes record_of(Input& in, const Mesh& base, size_t frames) {
     Bytes record{2, static_cast<uint8_t>(in.u8() % 2), static_cast<uint8_t>(frames), in.u8()};
     record.resize(record.size() + 8);  // step: Python's to check
     put_blob(record, in.bytes());
-    const uint8_t common = in.u8() % 3;
-    record.push_back(common);
+    const uint8_t shared = in.u8() % 3;
+    record.push_back(shared);
     mr_hierarchy* hierarchy = nullptr;
     const mr_mesh mesh = base.view();
     if (mr_hierarchy_create(&mesh, &hierarchy) != MR_OK) return record;
-    put_field(in, mr_hierarchy_graph(hierarchy), 3 * frames, common, record);
+    put_field(in, mr_hierarchy_graph(hierarchy), 3 * frames, shared > 0 ? 1 + 3 * shared * frames : 0, record);
     mr_hierarchy_destroy(hierarchy);
     const uint8_t damage = in.u8();
     if (damage == 255) record[in.u16() % record.size()] ^= in.u8();

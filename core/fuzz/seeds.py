@@ -78,7 +78,7 @@ def watch_calls(write: Write) -> None:
         group = unpack_all(LayersGroup, record)
         for target in ("least_squares", "subdivision", "packing"):
             write(target, mesh(base.vertices, base.faces) + bytes(range(1, 200)))
-        head = bytes([frames - 1, group.origin, group.levels]) + raw(group.base)[1:] + bytes([group.common])
+        head = bytes([frames - 1, group.origin, group.levels]) + raw(group.base)[1:] + bytes([group.shared])
         write("motion", mesh(base.vertices, base.faces) + head + field(group.motion) + b"\0")
 
     def level(record: bytes, near: Any, known: Any, before: Any, *_: Any) -> None:

@@ -108,11 +108,12 @@ nb::tuple encode_field(InOut<int32_t, 2> symbols, const Graph& graph) {
     return nb::make_tuple(nb::bytes(bytes.data(), size), sizes.shaped(weights.columns));
 }
 
-Out<double, 2> decode_field(const nb::bytes& record, const Graph& graph, size_t width, bool has_mean) {
+Out<double, 2> decode_field(const nb::bytes& record, const Graph& graph, size_t width, size_t head) {
     const mr_bytes bytes = bytes_of(record);
     const mr_graph nodes = graph.view();
+    expect(head <= INT32_MAX);
     Buffer<double> rows(graph.count() * width);
-    check_decoded(mr_decode_field(&bytes, &nodes, width, has_mean, rows.data()));
+    check_decoded(mr_decode_field(&bytes, &nodes, width, head, rows.data()));
     return rows.shaped(graph.count(), width);
 }
 

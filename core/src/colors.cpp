@@ -113,7 +113,7 @@ private:
     template <class Visit>
     int each_row(const CodedField& record, const mr_graph& graph, Visit visit) {
         FieldStreams streams;
-        const int status = decode_streams(record, graph, width_, Common::kNone, streams);
+        const int status = decode_streams(record, graph, width_, 0, streams);
         if (status != MR_OK) return status;
         FieldRows values(streams.over(graph));
         std::vector<double> block(kRowBlock * width_);

@@ -11,7 +11,6 @@ namespace meshreel {
 namespace {
 
 constexpr int kStepLevels = 200;   // of the ladder of steps (src/meshreel/coding/steps.py)
-constexpr int kMostMeanBits = 30;  // a mean that is a diagonal long still fits 32 bits
 constexpr uint8_t kLayers = 2;     // Form.LAYERS of src/meshreel/format/layout.py
 
 // Fields of a record in turn. Beyond the end, or after a number that is not in its shortest form, all of them are 0.
@@ -82,35 +81,14 @@ double step_of(int level) {
     return std::ldexp(kEighths[level % 8], -32 - level / 8);
 }
 
-// Poses, each coded as its difference from the one before: all shifts, then all turns.
-std::vector<Pose> poses_of(const int32_t* values, size_t frames, int bits) {
-    const auto vec = [&](size_t k) {
-        const auto number = [&](size_t i) { return std::ldexp(static_cast<double>(values[i]), -bits); };
-        return Vec{number(3 * k), number(3 * k + 1), number(3 * k + 2)};
-    };
-    std::vector<Pose> out;
-    Pose pose{identity(), {0, 0, 0}};
-    for (size_t t = 0; t < frames; ++t) {
-        pose = {product(turn(vec(frames + t)), pose.turn), pose.shift + vec(t)};
-        out.push_back(pose);
-    }
-    return out;
-}
-
-int decode_basis(const CodedField& record, size_t width, Common common, FieldStreams& out) {
+int decode_basis(const CodedField& record, size_t width, size_t head, FieldStreams& out) {
     const size_t columns = static_cast<size_t>(record.columns);
-    const size_t head = common == Common::kNone ? 0 : 1 + (common == Common::kPoses ? 2 : 1) * width;
     const size_t count = head + columns * width - columns * (columns > 0 ? columns - 1 : 0) / 2;
     if (!is_plausible(count, record.basis.size)) return MR_BAD_BASIS;
     std::vector<int32_t> values(count);
     if (mr_decode_integers(record.basis.data, record.basis.size, count, values.data()) != MR_OK) return MR_BAD_BASIS;
+    out.head.assign(values.begin(), values.begin() + static_cast<ptrdiff_t>(head));
     out.means.assign(width, 0.0);
-    if (head > 0 && (values[0] < 0 || values[0] > kMostMeanBits)) return MR_BAD_MEAN;
-    if (common == Common::kPoses) {
-        out.poses = poses_of(values.data() + 1, width / 3, values[0]);
-    } else if (common == Common::kShifts) {
-        for (size_t t = 0; t < width; ++t) out.means[t] = std::ldexp(static_cast<double>(values[1 + t]), -values[0]);
-    }
     out.vectors.resize(std::max(columns, size_t{1}) * width);  // room for one, so that pointers can be counted from it
     return mr_orthonormal_inverse(values.data() + head, columns, width, out.vectors.data());
 }
@@ -130,7 +108,7 @@ bool parse(const mr_bytes& bytes, LayersGroup& record) {
     record.frames = fields.u8();
     fields.skip(1 + 8);  // levels and step
     fields.blob();       // the base mesh
-    record.common = static_cast<Common>(fields.at_most(2));
+    record.shared = static_cast<Shared>(fields.at_most(2));
     record.motion = fields.field();
     return fields.is_done();
 }
@@ -160,9 +138,9 @@ Field FieldStreams::over(const mr_graph& graph, size_t first) {
             nullptr};
 }
 
-int decode_streams(const CodedField& record, const mr_graph& graph, size_t width, Common common, FieldStreams& out) {
+int decode_streams(const CodedField& record, const mr_graph& graph, size_t width, size_t head, FieldStreams& out) {
     if (record.columns > width || record.step_level >= kStepLevels) return MR_BAD_COLUMNS;
-    const int status = decode_basis(record, width, common, out);
+    const int status = decode_basis(record, width, head, out);
     if (status != MR_OK) return status;
     out.columns = static_cast<size_t>(record.columns);
     const uint64_t count = uint64_t{out.columns} * graph.count;

@@ -7,7 +7,6 @@
 
 #include "field_rows.h"
 #include "meshreel/layers.h"
-#include "rigid3.h"
 #include "scratch.h"
 
 namespace meshreel {
@@ -18,12 +17,12 @@ struct CodedField {
     mr_bytes basis, symbols;
 };
 
-// Motion that all vertices share, coded before the basis: Common of src/meshreel/format/layout.py.
-enum class Common : uint8_t { kNone, kShifts, kPoses };
+// SharedMotion of src/meshreel/format/layout.py: what moves all vertices alike, coded before the basis.
+enum class Shared : uint8_t { kNone, kShifts, kPoses };
 
 struct LayersGroup {
     uint8_t frames;
-    Common common;
+    Shared shared;
     CodedField motion;
 };
 
@@ -46,16 +45,10 @@ bool parse(const mr_bytes& bytes, LayersLevel& record);
 // The same of a CodedField and a ColorsLevel for each of `levels`.
 bool parse(const mr_bytes& bytes, CodedField& base, std::vector<ColorsLevel>& levels);
 
-// A turn about the middle of a base mesh, then a shift.
-struct Pose {
-    Matrix turn;
-    Vec shift;
-};
-
 // What the streams of a CodedField hold.
 struct FieldStreams {
-    std::vector<double> vectors, means;
-    std::vector<Pose> poses;  // of every frame, if that is what is common
+    std::vector<int32_t> head;  // integers before those of the basis
+    std::vector<double> vectors, means;  // means: zeros
     Array<double> differences;  // of values and what predicts them, as FieldRows takes them
     size_t columns;
 
@@ -63,7 +56,7 @@ struct FieldStreams {
     Field over(const mr_graph& graph, size_t first = 0);
 };
 
-// Returns a status. The graph must be causal; poses take three numbers of `width` a frame. May throw std::bad_alloc.
-int decode_streams(const CodedField& record, const mr_graph& graph, size_t width, Common common, FieldStreams& out);
+// Returns a status. The graph must be causal; `head` integers lie before the basis. May throw std::bad_alloc.
+int decode_streams(const CodedField& record, const mr_graph& graph, size_t width, size_t head, FieldStreams& out);
 
 }  // namespace meshreel

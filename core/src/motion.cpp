@@ -1,5 +1,6 @@
 // Decoding of a field, and of the motion of a group's base mesh.
 #include <algorithm>
+#include <cmath>
 #include <memory>
 #include <vector>
 
@@ -7,9 +8,31 @@
 #include "field_record.h"
 #include "guarded.h"
 #include "meshreel/layers.h"
+#include "rigid3.h"
 
 namespace meshreel {
 namespace {
+
+constexpr int kMostBits = 30;  // of the integers of shared motion: a shift by a diagonal still fits 32 bits
+
+// A turn about the middle of a base mesh, then a shift.
+struct Pose {
+    Matrix turn;
+    Vec shift;
+};
+
+// Poses, each coded as its difference from the one before: all shifts, then all turns.
+std::vector<Pose> poses_of(const std::vector<double>& numbers) {
+    const size_t frames = numbers.size() / 6;
+    std::vector<Pose> out;
+    Pose pose{identity(), {0, 0, 0}};
+    for (size_t t = 0; t < frames; ++t) {
+        const double* shift = numbers.data() + 3 * t;
+        pose = {product(turn(load(shift + 3 * frames)), pose.turn), pose.shift + load(shift)};
+        out.push_back(pose);
+    }
+    return out;
+}
 
 Vec middle_of(const mr_mesh& mesh) {
     Vec sum{0, 0, 0};
@@ -52,12 +75,20 @@ int decode_motion(const LayersGroup& record, const mr_mesh& base, size_t first, 
     const std::unique_ptr<mr_hierarchy, void (*)(mr_hierarchy*)> owner(made, mr_hierarchy_destroy);
     const mr_graph graph = mr_hierarchy_graph(made);
     FieldStreams streams;
-    status = decode_streams(record.motion, graph, size_t{3} * record.frames, record.common, streams);
+    const size_t width = size_t{3} * record.frames;
+    const size_t head = record.shared == Shared::kNone ? 0 : 1 + (record.shared == Shared::kPoses ? 2 : 1) * width;
+    status = decode_streams(record.motion, graph, width, head, streams);
     if (status != MR_OK) return status;
+    const int bits = head > 0 ? streams.head[0] : 0;
+    if (bits < 0 || bits > kMostBits) return MR_BAD_SHARED;
+    std::vector<double> shared;
+    for (size_t k = 1; k < head; ++k) shared.push_back(std::ldexp(static_cast<double>(streams.head[k]), -bits));
+    std::vector<Pose> poses;
+    if (record.shared == Shared::kPoses) poses = poses_of(shared);
+    if (record.shared == Shared::kShifts) streams.means = shared;
     FieldRows field(streams.over(graph, 3 * first));
-    const Pose* poses = streams.poses.empty() ? nullptr : streams.poses.data() + first;
-    const size_t frames = record.frames - first;
-    return place_rows(field, mr_hierarchy_order(made), base, frames, poses, rows) ? MR_OK : MR_NOT_FINITE;
+    const Pose* own = poses.empty() ? nullptr : poses.data() + first;
+    return place_rows(field, mr_hierarchy_order(made), base, record.frames - first, own, rows) ? MR_OK : MR_NOT_FINITE;
 }
 
 }  // namespace
@@ -65,13 +96,13 @@ int decode_motion(const LayersGroup& record, const mr_mesh& base, size_t first, 
 
 using namespace meshreel;
 
-int mr_decode_field(const mr_bytes* record, const mr_graph* graph, size_t width, int has_mean, double* rows) {
+int mr_decode_field(const mr_bytes* record, const mr_graph* graph, size_t width, size_t head, double* rows) {
     if (!is_causal(*graph)) return MR_NOT_CAUSAL;
     CodedField coded;
     if (!parse(*record, coded)) return MR_BAD_RECORD;
     return guarded(MR_NO_MEMORY, [&]() -> int {
         FieldStreams streams;
-        const int status = decode_streams(coded, *graph, width, has_mean ? Common::kShifts : Common::kNone, streams);
+        const int status = decode_streams(coded, *graph, width, head, streams);
         if (status == MR_OK) FieldRows(streams.over(*graph)).next(graph->count, rows);
         return status;
     });

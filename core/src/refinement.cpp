@@ -184,7 +184,7 @@ public:
             std::fill(weights_.begin() + begin, weights_.begin() + end, weight);
         }
         const mr_graph graph{level.edge_count, level.starts, level.near, weights_.data()};
-        const int status = decode_streams(record.scalars, graph, level.frames, Common::kNone, streams_);
+        const int status = decode_streams(record.scalars, graph, level.frames, 0, streams_);
         if (status != MR_OK) return status;
         if (record.follows && !level.previous) return MR_NO_PREVIOUS;
         field_ = streams_.over(graph, first);

@@ -14,7 +14,7 @@ const char* mr_message(int status) {
         case MR_BAD_COLUMNS:
             return "a field has more columns than its rows have numbers, or a step that does not exist";
         case MR_BAD_BASIS: return "the integers of a basis are truncated or damaged";
-        case MR_BAD_MEAN: return "the mean of a basis has more bits than a mean may have";
+        case MR_BAD_SHARED: return "motion that all vertices share has more bits than it may have";
         case MR_NO_DIRECTION: return "a basis vector without a direction";
         case MR_BAD_SYMBOLS: return "the symbols of a field are truncated or damaged";
         case MR_NO_PREVIOUS: return "a level that is counted from a group which is not at hand, or not to this level";

@@ -6,8 +6,8 @@
 namespace {
 
 // A LayersGroup record (FORMAT.md) of two frames without a base mesh.
-Bytes group(const Bytes& motion, uint8_t common, uint8_t form = 2, uint8_t origin = 0) {
-    Bytes out{form, origin, 2, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, common};
+Bytes group(const Bytes& motion, uint8_t shared, uint8_t form = 2, uint8_t origin = 0) {
+    Bytes out{form, origin, 2, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, shared};
     out.insert(out.end(), motion.begin(), motion.end());
     return out;
 }
@@ -50,6 +50,10 @@ TEST(poses_turn_a_base_about_its_middle_and_shift_it_each_from_the_pose_before) 
             for (size_t k = 0; k < 3; ++k) CHECK(std::fabs(rows[(3 * v + k) * 2 + t] - wanted[t][k]) < 1e-12);
     }
     CHECK(decode(group(kMean, 2), base, 2, rows) == MR_BAD_BASIS);
+    for (int bits : {-1, 31}) {
+        const Bytes wrong = coded_field(0, 0, integers({bits, 0, 0, 0, 0, 0, 0}), {});
+        CHECK(decode(group(wrong, 1), base, 2, rows) == MR_BAD_SHARED);
+    }
 }
 
 TEST(places_of_the_last_frame_are_those_of_the_motion) {

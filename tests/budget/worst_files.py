@@ -29,7 +29,6 @@ from meshreel.format.layout import (
     ChunkKind,
     CodedField,
     ColorsLevel,
-    Common,
     Component,
     DisplacementHead,
     DracoGroup,
@@ -39,6 +38,7 @@ from meshreel.format.layout import (
     LayersGroup,
     LayersLevel,
     Origin,
+    SharedMotion,
     StaticPatch,
     VertexColors,
 )
@@ -113,10 +113,9 @@ def base_of(size: int, costs: Callable[[Size], int], levels: int) -> tuple[bytes
     return data, most_levels(lambda levels: costs(replace(shape, levels=levels)), len(data))
 
 
-def field(graph: Graph, columns: int, width: int, has_mean: bool = False) -> CodedField:
-    mean = np.zeros((1 + width) * has_mean, np.int32)
+def field(graph: Graph, columns: int, width: int, head: int = 0) -> CodedField:
     vectors = orthonormal.forward(np.eye(width)[:columns], np.full(columns, 6.0))
-    basis = entropy.encode_integers(np.concatenate([mean, vectors]))
+    basis = entropy.encode_integers(np.concatenate([np.zeros(head, np.int32), vectors]))
     symbols, _ = _core.encode_field(np.zeros((columns, len(graph.starts) - 1), np.int32), graph.core)
     return CodedField(columns, 80, basis, symbols)
 
@@ -124,9 +123,11 @@ def field(graph: Graph, columns: int, width: int, has_mean: bool = False) -> Cod
 def layers(data: bytes, levels: int, frames: int, patched: bool = False, predicted: bool = False) -> bytes:
     """A group with as many columns as there can be, and faces dropped and added in every second frame."""
     base = decode_mesh(data, STEP)
-    motion = field(hierarchy(base).graph, 3 * frames, 3 * frames, has_mean=True)
+    motion = field(hierarchy(base).graph, 3 * frames, 3 * frames, head=1 + 6 * frames)
     origin = Origin.PREVIOUS if predicted else Origin.ALONE
-    head = LayersGroup(Form.LAYERS, origin, frames, levels, STEP, b"" if predicted else data, Common.SHIFTS, motion)
+    head = LayersGroup(
+        Form.LAYERS, origin, frames, levels, STEP, b"" if predicted else data, SharedMotion.POSES, motion
+    )
     payload, faces, vertices = pack(head), base.faces, len(base.vertices)
     for _ in range(levels):
         near = connectivity(faces, vertices)
@@ -185,7 +186,7 @@ def layered(size: int, levels: int = 2, predicted: int = 0) -> bytes:
 def still(levels: int, frames: int) -> bytes:
     """A group predicted from another, where nothing moves."""
     nothing = CodedField(0, 80, b"", b"")
-    head = LayersGroup(Form.LAYERS, Origin.PREVIOUS, frames, levels, STEP, b"", Common.NONE, nothing)
+    head = LayersGroup(Form.LAYERS, Origin.PREVIOUS, frames, levels, STEP, b"", SharedMotion.NONE, nothing)
     return pack(head) + levels * pack(LayersLevel(Origin.PREVIOUS, 16, 16, nothing))
 
 

@@ -29,13 +29,13 @@ from meshreel.format.layout import (
     Atlas,
     CodedField,
     ColorsLevel,
-    Common,
     DisplacementHead,
     Gaussians,
     GaussiansLayer,
     LayersGroup,
     LayersLevel,
     Origin,
+    SharedMotion,
     StaticPatch,
     VertexColors,
 )
@@ -58,7 +58,7 @@ def require(condition: bool) -> None:
 def decoder() -> dict[str, Any]:
     """What the document's Python defines."""
     names: dict[str, Any] = {"np": np, "math": math, "sqrt": math.sqrt, "require": require}
-    names |= {value.name: value for values in (AnchorRule, Common, Origin) for value in values}
+    names |= {value.name: value for values in (AnchorRule, Origin, SharedMotion) for value in values}
     for block in re.findall(r"```python\n(.*?)```", DOCUMENT.read_text(encoding="utf-8"), re.DOTALL):
         exec(block, names)
     return names
@@ -157,7 +157,7 @@ def test_the_document_decodes_layers_to_the_bit(decoder: dict[str, Any], frames:
         wanted = np.einsum("tij,tvj->tvi", turns, wanted)
         payload = encode_layers(reference, wanted, LayerCodingOptions(step=4e-3), state).payload
         faces, positions, state = decode_layers(payload, None, state)
-        assert (records.unpack(LayersGroup, payload)[0].common == Common.POSES) == (turn > 0)
+        assert (records.unpack(LayersGroup, payload)[0].shared == SharedMotion.POSES) == (turn > 0)
         told, told_faces, left = told_by(decoder, payload, left)
         np.testing.assert_array_equal(told_faces, faces)
         np.testing.assert_array_equal(told, positions)

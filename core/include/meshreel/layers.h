@@ -53,9 +53,10 @@ int mr_predict_surface(const struct mr_graph* graph, const struct mr_surface* su
 // are zero.
 int mr_orthonormal_inverse(const int32_t* symbols, size_t count, size_t width, double* vectors);
 
-// The rows of a CodedField record over a graph: `width` numbers for each value. Row v is mean + the sum over k, in
-// order, of vector k * decoded[k][v], where decoded[k][v] = prediction + step * symbol[k][v].
-int mr_decode_field(const struct mr_bytes* record, const struct mr_graph* graph, size_t width, int has_mean,
+// The rows of a CodedField record over a graph: `width` numbers for each value. Row v is the sum over k, in order, of
+// vector k * decoded[k][v], where decoded[k][v] = prediction + step * symbol[k][v]. `head` integers before the basis
+// are left out.
+int mr_decode_field(const struct mr_bytes* record, const struct mr_graph* graph, size_t width, size_t head,
                     double* rows);
 
 // The motion of a LayersGroup record of `frames` frames over its decoded base mesh, as rows: for each vertex the x of

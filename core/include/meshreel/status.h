@@ -21,7 +21,7 @@ enum mr_status {
     MR_BAD_RECORD,    // the fields of a record do not fit its bytes
     MR_BAD_COLUMNS,   // more columns than numbers in a row, or a step that the ladder does not have
     MR_BAD_BASIS,     // the integers of a basis: see MR_BAD_STREAM
-    MR_BAD_MEAN,      // more bits than a mean may have
+    MR_BAD_SHARED,    // more bits than motion that all vertices share may have
     MR_NO_DIRECTION,  // a basis vector of zeros
     MR_BAD_SYMBOLS,   // the symbols of a field: see MR_BAD_STREAM
     MR_NO_PREVIOUS,   // a level is counted from another group, which the caller does not have

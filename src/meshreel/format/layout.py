@@ -168,8 +168,8 @@ class DisplacementHead:
     basis: Annotated[bytes, Blob(Varint()), "integers: 3 T of the mean, then 3 T of each component's direction"]
 
 
-class Common(IntEnum):
-    """Motion that all vertices of a mesh share."""
+class SharedMotion(IntEnum):
+    """What moves all vertices of a mesh alike."""
 
     NONE = 0
     SHIFTS = 1
@@ -189,7 +189,7 @@ class CodedField:
 
     columns: Annotated[int, Varint(), "M, number of basis vectors"]
     step_level: Annotated[int, U8, "k: the quantiser's step is 2^(-k/8)"]
-    basis: Annotated[bytes, Blob(Varint()), "integers: the basis"]
+    basis: Annotated[bytes, Blob(Varint()), "integers: what moves all vertices alike, if anything, then the basis"]
     symbols: Annotated[bytes, Blob(Varint()), "one stream: the symbols of all columns"]
 
 
@@ -203,7 +203,7 @@ class LayersGroup:
     levels: Annotated[int, U8, "L, midpoint subdivisions of the base mesh"]
     step: Annotated[float, F64, "spacing of the base's lattice, above 0: decoded vertices are rounded to multiples"]
     base: Annotated[bytes, Blob(Varint()), "the base mesh, Draco; no bytes where its origin is PREVIOUS"]
-    common: Annotated[Common, Choice(U8, Common), "motion that all vertices share, before the basis"]
+    shared: Annotated[SharedMotion, Choice(U8, SharedMotion), "what moves all vertices alike"]
     motion: Annotated[CodedField, Nested(CodedField), "the displacements of the base's vertices"]
 
 

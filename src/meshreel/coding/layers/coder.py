@@ -111,12 +111,14 @@ def encode_layers(
     frames, levels = len(positions), reference.levels
     base = reference.mesh if previous is None else Mesh(previous.base, previous.faces)
     _check_input(positions, base)
-    motion = encode_trajectories(positions[:, : len(base.vertices)], base, options.rate(0, noise), options.tangential)
-    known = motion.decoded
+    shared, motion = encode_trajectories(
+        positions[:, : len(base.vertices)], base, options.rate(0, noise), options.tangential
+    )
     origin = Origin.ALONE if previous is None else Origin.PREVIOUS
     data = reference.data if previous is None else b""
-    head = LayersGroup(Form.LAYERS, origin, frames, levels, reference.step, data, motion.common, motion.record)
+    head = LayersGroup(Form.LAYERS, origin, frames, levels, reference.step, data, shared, motion)
     layers = [pack(head)]
+    known = np.ascontiguousarray(np.moveaxis(decode_trajectories(layers[0], base, frames), 2, 0))
     scalars: list[Float64[np.ndarray, "T _"]] = []
     faces = base.faces
     for number in range(1, levels + 1):

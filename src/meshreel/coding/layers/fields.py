@@ -6,7 +6,7 @@ The basis as decoded is orthonormal, so all columns share one step. A column is 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -21,7 +21,7 @@ from ..steps import step_of
 from . import orthonormal
 from .graph import Graph
 
-MOST_BITS = 30  # fraction bits of a mean, so that one of a diagonal's length fits 32 bits
+NOTHING = np.zeros(0, np.int32)
 FINENESS = 20.0  # rounding a basis vector moves its column's typical weight by about 1 / FINENESS of a step: a guess
 LEAST_SCALE = 6.0  # smallest scale of a basis vector: rounding moves each of its numbers by at most 1/12; a guess
 MOST_SCALE = 2.0**24  # largest scale of a basis vector, far within 32 bits
@@ -42,11 +42,6 @@ class Rate:
         """Quantiser step, in the field's unit."""
         return step_of(self.rung)
 
-    @property
-    def common_bits(self) -> int:
-        """Fraction bits of motion that all vertices share: it is rounded to a sixteenth of a step."""
-        return min(max(strict.ceil_log2(8.0 / self.step), 0), MOST_BITS)
-
 
 @dataclass(frozen=True, slots=True)
 class SurfaceWeight:
@@ -61,7 +56,6 @@ class EncodedField:
     """Record of a field, the decoded field, and its bits."""
 
     record: CodedField
-    has_mean: bool
     decoded: Float64[np.ndarray, "V C"]
     basis_bits: int
     symbol_bits: int
@@ -72,48 +66,33 @@ def encode_field(
     graph: Graph,
     rate: Rate,
     surface: SurfaceWeight | None = None,
-    before: Int32[np.ndarray, " N"] | None = None,
+    head: Int32[np.ndarray, " N"] = NOTHING,
 ) -> EncodedField:
-    """Encode the columns that pay, quantised in a closed loop; `surface` marks positions, which also have a mean.
+    """Encode the columns that pay, quantised in a closed loop; `surface` marks positions.
 
-    Integers `before` the basis take the mean's place, as of poses: what they say is no part of the trajectories.
+    Integers of the `head`, as of motion that all vertices share, are packed before those of the basis.
     """
     width = trajectories.shape[1]
-    mean = np.zeros(0, np.int32) if surface is None or before is not None else _mean(trajectories, rate)
-    centered = trajectories - (np.ldexp(mean, -rate.common_bits) if len(mean) else 0.0)
-    basis = klt.fit_about(np.zeros(width), centered)
+    basis = klt.fit_about(np.zeros(width), trajectories)
     least = np.full(len(basis.energies), max(LEAST_RMS * rate.step, rate.least))
     least[:1] = LEAST_RMS * rate.step  # what stands still on a body is no noise, however small
     kept = np.flatnonzero(basis.energies > least**2)
-    coded = _Columns(centered, basis.only(kept), graph, rate, surface)
+    coded = _Columns(trajectories, basis.only(kept), graph, rate, surface)
     while not (pays := coded.pays()).all():
         kept = kept[pays]
-        coded = _Columns(centered, basis.only(kept), graph, rate, surface)
-    side = np.append(rate.common_bits, mean).astype(np.int32) if len(mean) else mean
-    record = CodedField(len(kept), rate.rung, _packed(side, coded.basis), coded.stream)
-    decoded = decode_field(record, graph, width, len(mean) > 0)
-    if before is not None:
-        record = replace(record, basis=_packed(before, coded.basis))
-    return EncodedField(record, len(mean) > 0, decoded, 8 * len(record.basis), 8 * len(coded.stream))
+        coded = _Columns(trajectories, basis.only(kept), graph, rate, surface)
+    packed = entropy.encode_integers(np.concatenate([head, coded.basis]))
+    record = CodedField(len(kept), rate.rung, packed, coded.stream)
+    decoded = decode_field(record, graph, width, len(head))
+    return EncodedField(record, decoded, 8 * len(packed), 8 * len(coded.stream))
 
 
-def _mean(trajectories: Float64[np.ndarray, "V C"], rate: Rate) -> Int32[np.ndarray, " N"]:
-    """Return the mean as integers; none where it does not pay."""
-    if not len(trajectories):
-        return np.zeros(0, np.int32)
-    mean = np.rint(np.ldexp(trajectories.mean(axis=0), rate.common_bits))
-    worth = rate.price * rate.step**2 * strict.log2(2 * np.abs(mean) + 1).sum()
-    pays = len(trajectories) * (np.ldexp(mean, -rate.common_bits) ** 2).sum() > worth
-    return mean.astype(np.int32)[: len(mean) if pays else 0]
+def decode_field(record: CodedField, graph: Graph, width: int, head: int = 0) -> Float64[np.ndarray, "V C"]:
+    """Decode the trajectories of a record with a head of so many integers.
 
-
-def _packed(side: Int32[np.ndarray, " N"], basis: Int32[np.ndarray, " M"]) -> bytes:
-    return entropy.encode_integers(np.concatenate([side, basis]))
-
-
-def decode_field(record: CodedField, graph: Graph, width: int, has_mean: bool) -> Float64[np.ndarray, "V C"]:
-    """Decode the trajectories of a record. Raises FormatError if it is damaged or has another width."""
-    return _core.decode_field(pack(record), graph.core, width, has_mean)
+    Raises FormatError if it is damaged or has another width or head.
+    """
+    return _core.decode_field(pack(record), graph.core, width, head)
 
 
 class _Columns:

@@ -12,54 +12,46 @@ from dataclasses import dataclass
 import numpy as np
 
 from ... import _core
-from ...format.layout import CodedField, Common, Form, LayersGroup, Origin
-from ...format.records import pack
+from ...format.layout import CodedField, SharedMotion
+from ...geometry import strict
 from ...geometry.rigid import fit_rigid, multiply, quaternions
+from ...geometry.strict import rotations_of
 from ...geometry.topology import vertex_normals
 from ...shapes import Float64, Int32
 from ...types import Mesh
-from .. import entropy
-from .fields import Rate, SurfaceWeight, encode_field
+from .fields import NOTHING, Rate, SurfaceWeight, encode_field
 from .graph import hierarchy
 
+MOST_BITS = 30  # fraction bits of shared motion, so that a shift by a diagonal fits 32 bits
 _RIGID = 0.25  # largest share of the energy of motion without its mean that poses leave where they are tried (guess)
 _MOST_TURN = 2.0  # largest twice the tangent of half a turn from a frame to the next, 90 degrees (guess)
 
 
 @dataclass(frozen=True, slots=True)
-class EncodedMotion:
-    """Motion of a base mesh as coded, and its places as they decode."""
+class _Alike:
+    """What moves all vertices alike: its integers (FORMAT.md, "Fields"), and where it brings them."""
 
-    common: Common
-    record: CodedField
-    decoded: Float64[np.ndarray, "T V 3"]
-
-    @property
-    def size(self) -> int:
-        """Bytes of the streams."""
-        return len(self.record.basis) + len(self.record.symbols)
+    kind: SharedMotion
+    head: Int32[np.ndarray, " N"]
+    places: Float64[np.ndarray, "T V 3"]
 
 
 def encode_trajectories(
     positions: Float64[np.ndarray, "T V 3"], base: Mesh, rate: Rate, tangential: float
-) -> EncodedMotion:
+) -> tuple[SharedMotion, CodedField]:
     """Encode the motion of the base's vertices, with a pose for each frame where that takes fewer bytes.
 
     `tangential` is the weight of a squared error along the surface: where on it a vertex lies hardly shows.
     """
-    still = np.broadcast_to(base.vertices, positions.shape)
-    plain = _encoded(positions, base, still, None, rate, tangential)
-    poses = _poses(positions, base, rate)
-    if poses is None:
-        return plain
-    alone = CodedField(0, rate.rung, entropy.encode_integers(poses), b"")
-    head = LayersGroup(Form.LAYERS, Origin.PREVIOUS, len(positions), 0, 1.0, b"", Common.POSES, alone)
-    posed = np.ascontiguousarray(np.moveaxis(decode_trajectories(pack(head), base, len(positions)), 2, 0))
-    moved = positions - still
-    if ((positions - posed) ** 2).sum() > _RIGID * ((moved - moved.mean(axis=1, keepdims=True)) ** 2).sum():
-        return plain
-    rigid = _encoded(positions, base, posed, poses, rate, tangential)
-    return rigid if rigid.size < plain.size else plain
+    places = hierarchy(base)
+    frames = [vertex_normals(Mesh(np.ascontiguousarray(frame), base.faces)) for frame in positions]
+    normals = np.stack(frames, axis=1)[places.order].reshape(len(base.vertices), -1)
+    surface, coded = SurfaceWeight(np.ascontiguousarray(normals), tangential), list[tuple[SharedMotion, CodedField]]()
+    for alike in (_shifts(positions, base, rate), _poses(positions, base, rate)):
+        if alike is not None:
+            offsets = np.moveaxis(positions - alike.places, 0, 1)[places.order].reshape(normals.shape)
+            coded.append((alike.kind, encode_field(offsets, places.graph, rate, surface, alike.head).record))
+    return min(coded, key=lambda one: len(one[1].basis) + len(one[1].symbols))
 
 
 def decode_trajectories(record: bytes, base: Mesh, frames: int) -> Float64[np.ndarray, "V 3 T"]:
@@ -75,41 +67,43 @@ def decode_last_places(record: bytes, base: Mesh, frames: int) -> Float64[np.nda
     return _core.decode_last_places(record, base.vertices, base.faces, frames)
 
 
-def _encoded(
-    positions: Float64[np.ndarray, "T V 3"],
-    base: Mesh,
-    alike: Float64[np.ndarray, "T V 3"],
-    poses: Int32[np.ndarray, " N"] | None,
-    rate: Rate,
-    tangential: float,
-) -> EncodedMotion:
-    """Encode the displacements from where the vertices are if all move alike, as `poses` say, if any."""
-    places = hierarchy(base)
-    offsets = np.moveaxis(positions - alike, 0, 1)[places.order]
-    frames = [vertex_normals(Mesh(np.ascontiguousarray(frame), base.faces)) for frame in positions]
-    normals = np.stack(frames, axis=1)[places.order].reshape(len(base.vertices), -1)
-    surface = SurfaceWeight(np.ascontiguousarray(normals), tangential)
-    field = encode_field(offsets.reshape(len(base.vertices), -1), places.graph, rate, surface, poses)
-    known = np.empty_like(positions)
-    known[:, places.order] = np.moveaxis(field.decoded.reshape(offsets.shape), 0, 1) + alike[:, places.order]
-    shared = Common.SHIFTS if field.has_mean else Common.NONE
-    return EncodedMotion(shared if poses is None else Common.POSES, field.record, known)
+def _bits(rate: Rate) -> int:
+    """Return the fraction bits of shared motion: it is rounded to a sixteenth of a step."""
+    return min(max(strict.ceil_log2(8.0 / rate.step), 0), MOST_BITS)
 
 
-def _poses(positions: Float64[np.ndarray, "T V 3"], base: Mesh, rate: Rate) -> Int32[np.ndarray, " N"] | None:
-    """Return the integers of a pose for each frame (FORMAT.md, "Fields"); None where one turns too far."""
-    frames, bits = len(positions), rate.common_bits
-    turned = quaternions(
-        fit_rigid(np.broadcast_to(base.vertices, positions.shape), positions, np.ones(positions.shape[:2]))[0]
-    )
-    shifts = np.rint(np.ldexp((positions - base.vertices).mean(axis=1), bits))
-    turns, known = np.zeros((frames, 3)), np.array([[1.0, 0.0, 0.0, 0.0]])
-    for t in range(frames):
+def _shifts(positions: Float64[np.ndarray, "T V 3"], base: Mesh, rate: Rate) -> _Alike:
+    """Return the mean shift of each frame; no motion where it does not pay."""
+    offsets, bits = positions - base.vertices, _bits(rate)
+    mean = np.rint(np.ldexp(offsets.mean(axis=1), bits))
+    worth = rate.price * rate.step**2 * strict.log2(2 * np.abs(mean) + 1).sum()
+    if not len(base.vertices) * (np.ldexp(mean, -bits) ** 2).sum() > worth:
+        return _Alike(SharedMotion.NONE, NOTHING, np.broadcast_to(base.vertices, positions.shape))
+    head = np.append(bits, mean.ravel()).astype(np.int32)
+    return _Alike(SharedMotion.SHIFTS, head, base.vertices + np.ldexp(mean, -bits)[:, None])
+
+
+def _poses(positions: Float64[np.ndarray, "T V 3"], base: Mesh, rate: Rate) -> _Alike | None:
+    """Return a pose for each frame; None where one turns too far, or where poses explain little of the motion."""
+    rest, bits = np.broadcast_to(base.vertices, positions.shape), _bits(rate)
+    turned = quaternions(fit_rigid(rest, positions, np.ones(positions.shape[:2]))[0])
+    shifts = np.rint(np.ldexp((positions - rest).mean(axis=1), bits))
+    turns, known = np.zeros((len(positions), 3)), np.array([[1.0, 0.0, 0.0, 0.0]])
+    for t in range(len(positions)):
         left = multiply(turned[t : t + 1], known * [1, -1, -1, -1])[0]
-        if 2 * np.linalg.norm(left[1:]) > _MOST_TURN * abs(left[0]):
+        if 2 * strict.norm(left[1:]) > _MOST_TURN * abs(left[0]):
             return None
         turns[t] = np.rint(np.ldexp(2 * left[1:] / left[0], bits))
         known = multiply(np.append(1.0, np.ldexp(turns[t], -bits - 1))[None], known)
-        known /= np.linalg.norm(known)
+        known /= strict.norm(known)
+        turned[t] = known[0]
+    middle = base.vertices.mean(axis=0)
+    arms = np.broadcast_to(base.vertices - middle, positions.shape)
+    away = strict.products(arms, np.swapaxes(rotations_of(turned), 1, 2))
+    posed = away + middle + np.ldexp(shifts, -bits)[:, None]
+    free = positions - rest - (positions - rest).mean(axis=1, keepdims=True)
+    if ((positions - posed) ** 2).sum() > _RIGID * (free**2).sum():
+        return None
     steps = np.diff(shifts, axis=0, prepend=0)
-    return np.concatenate([[bits], steps.ravel(), turns.ravel()]).astype(np.int32)
+    head = np.concatenate([[bits], steps.ravel(), turns.ravel()]).astype(np.int32)
+    return _Alike(SharedMotion.POSES, head, posed)

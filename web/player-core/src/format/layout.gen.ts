@@ -71,7 +71,7 @@ export const Origin = {
   PREVIOUS: 1,
 } as const;
 
-export const Common = {
+export const SharedMotion = {
   NONE: 0,
   SHIFTS: 1,
   POSES: 2,
@@ -224,7 +224,7 @@ export const DisplacementHead: Kind<DisplacementHead> = record("DisplacementHead
 export interface CodedField {
   readonly columns: number; // M, number of basis vectors
   readonly stepLevel: number; // k: the quantiser's step is 2^(-k/8)
-  readonly basis: Uint8Array; // integers: the basis
+  readonly basis: Uint8Array; // integers: what moves all vertices alike, if anything, then the basis
   readonly symbols: Uint8Array; // one stream: the symbols of all columns
 }
 export const CodedField: Kind<CodedField> = record("CodedField", {
@@ -242,7 +242,7 @@ export interface LayersGroup {
   readonly levels: number; // L, midpoint subdivisions of the base mesh
   readonly step: number; // spacing of the base's lattice, above 0: decoded vertices are rounded to multiples
   readonly base: Uint8Array; // the base mesh, Draco; no bytes where its origin is PREVIOUS
-  readonly common: number; // motion that all vertices share, before the basis
+  readonly shared: number; // what moves all vertices alike
   readonly motion: CodedField; // the displacements of the base's vertices
 }
 export const LayersGroup: Kind<LayersGroup> = record("LayersGroup", {
@@ -252,7 +252,7 @@ export const LayersGroup: Kind<LayersGroup> = record("LayersGroup", {
   levels: u8,
   step: f64,
   base: blob(varint),
-  common: choice(u8, Common),
+  shared: choice(u8, SharedMotion),
   motion: nested(() => CodedField),
 });
 
