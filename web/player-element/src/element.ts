@@ -325,7 +325,7 @@ export class MeshreelPlayer extends Viewed {
 
   #onView(event: Event): void {
     if (event.type === "drawn") {
-      if (this.view?.shows) this.#controls.drawn();
+      if (this.view?.shows) this.#controls.drawn(this.view.canvas, this.view.frame);
       keepToSection(this);
     } else {
       if (event.type !== "change") this.dispatchEvent(new Event(event.type));

@@ -94,6 +94,11 @@ export class View {
     return this.#last !== null;
   }
 
+  /** The frame that was drawn last; -1 before the first. */
+  get frame(): number {
+    return this.#last?.frame ?? -1;
+  }
+
   /** A PNG of the picture of this moment, whether or not it was drawn before. */
   picture(): Promise<Blob> {
     const shown = this.#playback?.update(this.#clock) ?? null; // the clock does not move
