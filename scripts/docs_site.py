@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import posixpath
 import re
@@ -30,9 +31,20 @@ def on_files(files: Any, config: Any) -> Any:
         sample = _sample(name)
         poster = sample.with_suffix(".png")
         added += [(f"samples/{name}", sample), (f"samples/{Path(name).stem}.png", poster if poster.exists() else ROOM)]
+    for path in sorted((ROOT / "docs" / "examples").glob("*.ipynb")):
+        page = f"examples/{path.stem}.md"
+        files.append(File.generated(config, page, content=_page_of(path)))
     for place, path in added:
         files.append(File.generated(config, place, abs_src_path=str(path)))
     return files
+
+
+def _page_of(notebook: Path) -> str:
+    """A notebook as a page: its text, and its code as blocks."""
+    cells = json.loads(notebook.read_text(encoding="utf-8"))["cells"]
+    texts = [("".join(cell["source"]), cell["cell_type"] == "code") for cell in cells]
+    blocks = [f"```python\n{text}\n```" if is_code else text for text, is_code in texts]
+    return "\n\n".join([*blocks, f"[Download this notebook]({notebook.name})"]) + "\n"
 
 
 def on_page_markdown(markdown: str, page: Any, config: Any, files: Any) -> str:
@@ -47,6 +59,8 @@ def on_page_markdown(markdown: str, page: Any, config: Any, files: Any) -> str:
     def moved(match: re.Match[str]) -> str:
         to = posixpath.normpath(posixpath.join(folder, match[2]))
         place = HOME if to == "README.md" else to.removeprefix("docs/")
+        if here == "examples/index.md" and place.endswith(".ipynb"):
+            place = str(Path(place).with_suffix(".md").as_posix())
         is_page = place in files.src_uris or not (ROOT / to).exists()  # what is nowhere is left for mkdocs to refuse
         if not is_page:
             return match[1]

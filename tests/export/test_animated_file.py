@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -81,6 +82,29 @@ def test_every_frame_is_shown_at_its_time_as_the_decoder_has_it(tmp_path, path, 
     for frame, time in enumerate(times(video)):
         assert_shows(seen(played.shown(time)), parts_of(video, frame), video[frame].diagonal)
     assert [found.name for found in tmp_path.iterdir()] == [target.name]
+
+
+@pytest.mark.parametrize("path", FILES, ids=names)
+def test_a_compressed_file_is_smaller_and_valid(tmp_path, path):
+    pytest.importorskip("meshoptimizer")
+    plain, packed = tmp_path / "a.glb", tmp_path / "b.glb"
+    for target in (plain, packed):
+        export(meshreel.open(path), target, options=ExportOptions(compressed=target is packed))
+    if PlayedGlb(plain).binary:
+        assert packed.stat().st_size < plain.stat().st_size
+    (issues,) = validate(packed)
+    found = {message["code"] for message in issues["messages"]} - {"UNUSED_OBJECT"}
+    assert found <= {"UNSUPPORTED_EXTENSION", "BUFFER_MISSING_GLB_DATA", "UNRESOLVED_REFERENCE"}
+
+
+def test_only_glb_is_compressed_and_the_error_names_the_extra(tmp_path, monkeypatch):
+    options, video = ExportOptions(compressed=True), meshreel.open(GOLDEN / "layers.reel")
+    with pytest.raises(InputError, match=r"a\.usdc: only \.glb is compressed"):
+        export(video, tmp_path / "a.usdc", options=options)
+    monkeypatch.setitem(sys.modules, "meshoptimizer", None)
+    with pytest.raises(InputError, match=r"pip install 'meshreel\[glb\]'"):
+        export(video, tmp_path / "a.glb", options=options)
+    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize("layers", [0, 1, 2])

@@ -13,6 +13,7 @@ const ALLOWED: Readonly<Record<string, readonly RegExp[]>> = {
   "player-three": [/^three$/, /^@meshreel\/player-core\/types$/],
   xr: [/^three$/, /^@meshreel\/player-core\/types$/],
   "player-element": [/^three(\/|$)/, /^@meshreel\/(player-core|player-three|xr)(\/|$)/],
+  "meshreel-three": [/^three$/, /^meshreel-player\/files$/, /^@meshreel\/(player-core|player-three)$/],
 };
 
 /** The rooms of player-core and what each may import besides its own files; GROUND and what stands loose above the rooms are rooms, too. */
@@ -27,7 +28,7 @@ const ROOMS: Readonly<Record<string, readonly string[]>> = {
   ground: [],
 };
 const LOOSE: Readonly<Record<string, string>> = {
-  index: "door", worker_entry: "door", player: "player", session: "player",
+  index: "door", worker_entry: "door", player: "player", players: "player", session: "player",
   events: "ground", protocol: "ground", mesh: "ground", bytes: "ground", errors: "ground", types: "ground",
 };
 

@@ -43,6 +43,7 @@ class ExportOptions:
         None  # axis of the meshes that points up, None: as the .reel file names it; in the exported file it is +y
     )
     texture: bool = False  # of each frame in USD, of each shape's first in GLB: glTF cannot change a picture in time
+    compressed: bool = False  # GLB alone: EXT_meshopt_compression and KHR_mesh_quantization
 
     def __post_init__(self) -> None:
         if self.layers is not None and self.layers < 0:
@@ -77,7 +78,7 @@ def export(
     tracks = tuple(Track(reader, number, options.layers, decoders=decoders) for number in numbers)
     source = _Source(reader, tracks, Background(reader, decoders=decoders), frames, options.texture)
     written = 0
-    with _writer(path, _animation(reader, frames, options.up or reader.up)) as writer:
+    with _writer(path, _animation(reader, frames, options.up or reader.up), options.compressed) as writer:
         if options.only != "moving":
             for shape in _states(source):
                 writer.add(shape)
@@ -88,11 +89,13 @@ def export(
     return written
 
 
-def _writer(path: Path, animation: Animation) -> AbstractContextManager[AnimationWriter]:
+def _writer(path: Path, animation: Animation, compressed: bool) -> AbstractContextManager[AnimationWriter]:
     check_output(path)
     extension = path.suffix.lower()
     if extension == ".glb":
-        return animated_glb(path, animation)
+        return animated_glb(path, animation, compressed)
+    if compressed:
+        raise InputError(f"{path}: only .glb is compressed; name such a file, or leave compression out")
     if extension in EXTENSIONS:
         return animated_usd(path, animation)
     raise InputError(f"{path}: {extension or 'no'} extension is not one of .glb, {', '.join(EXTENSIONS)}; choose one")

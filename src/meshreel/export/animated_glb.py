@@ -2,14 +2,16 @@
 
 In: shapes, one after the other. Out: a file whose binary chunk is never in memory as a whole. Core glTF, but for what
 `GlbFile` says of colours: a scale of 0 hides a node, as the specification ("Transformations") says, and weights are
-interpolated linearly between frames.
+interpolated linearly between frames. A compressed file has streams of meshoptimizer (EXT_meshopt_compression), and
+places as 16-bit numbers on a lattice of each shape, which its node moves to where it is (KHR_mesh_quantization).
 """
 
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from functools import partial
 from itertools import chain
 from pathlib import Path
@@ -19,9 +21,12 @@ import numpy as np
 
 from ..errors import InputError
 from ..io.glb_file import COLORS, PLACES, Faces, GlbFile, cut_at_seams, light
+from ..io.meshopt import by_use, check_meshopt
 from ..io.write import replacing
-from .shapes import Animation, Shape, changes, unit_normals
+from .shapes import Animation, Points, Shape, changes, unit_normals
 
+BITS = 14  # of places along the longest side of a shape in a compressed file, as gltfpack has by default
+_ROUNDED = {"NORMAL": 6, COLORS: 10}  # bits behind the point, guesses: half a degree of normals, a 2048th of light
 _MATERIAL = {
     "name": "surface",
     "doubleSided": True,  # surfaces may be open
@@ -30,13 +35,16 @@ _MATERIAL = {
 
 
 @contextmanager
-def animated_glb(path: Path, animation: Animation) -> Iterator[GlbWriter]:
+def animated_glb(path: Path, animation: Animation, compressed: bool = False) -> Iterator[GlbWriter]:
     """Open a writer of shapes; the file appears at the end of the block, and not at all if the block fails.
 
-    Raises InputError if the file cannot be written, or if float32 times cannot distinguish its frames.
+    Compressing needs the extra `glb`. Raises InputError if the file cannot be written, or if float32 times cannot
+    distinguish its frames.
     """
     with replacing(path) as file, tempfile.TemporaryFile(dir=path.parent) as spool:
-        writer = GlbWriter(path, animation, spool)
+        if compressed:
+            check_meshopt()
+        writer = GlbWriter(path, animation, spool, compressed)
         yield writer
         writer.finish(file)
 
@@ -44,8 +52,8 @@ def animated_glb(path: Path, animation: Animation) -> Iterator[GlbWriter]:
 class GlbWriter:
     """Writer that spools arrays to a temporary file and collects their glTF description."""
 
-    def __init__(self, path: Path, animation: Animation, spool: IO[bytes]) -> None:
-        self._file = GlbFile(spool, str(path), "export fewer frames or layers, or to USD")
+    def __init__(self, path: Path, animation: Animation, spool: IO[bytes], compressed: bool) -> None:
+        self._file = GlbFile(spool, str(path), "export fewer frames or layers, or to USD", compressed)
         self._animation, self._times = animation, _times(path, animation)
         root = animation.root
         moved = {} if np.array_equal(root, np.eye(4)) else {"matrix": root.T.reshape(-1).tolist()}
@@ -57,14 +65,17 @@ class GlbWriter:
 
     def add(self, shape: Shape) -> None:
         """Write a shape. Raises InputError if the file would exceed the size of a GLB file."""
-        mesh = self._file.add("meshes", {"name": shape.name, "primitives": self._primitives(shape)})
-        node = {"name": shape.name, "mesh": mesh}
+        primitives, lattice = self._primitives(shape)
+        mesh = self._file.add("meshes", {"name": shape.name, "primitives": primitives})
+        node: dict[str, Any] = {"name": shape.name, "mesh": mesh}
+        if self._file.compressed:
+            node |= {"translation": lattice.low.tolist(), "scale": [lattice.step] * 3}
         if shape.shown[0][0] > 0:
             node["scale"] = [0, 0, 0]  # as in the first frame, for viewers that do not animate
         if shape.part not in self._parts:
             self._parts[shape.part] = self._child(0, {"name": shape.part})
         self._child(self._parts[shape.part], node)
-        self._animate(shape, len(self._nodes) - 1)
+        self._animate(shape, len(self._nodes) - 1, lattice.step)
 
     def finish(self, file: BinaryIO) -> None:
         """Write the complete file: header, description, and the spooled arrays."""
@@ -75,7 +86,7 @@ class GlbWriter:
             tree["animations"] = [{"name": "frames", "channels": self._channels, "samplers": self._samplers}]
         self._file.finish(file, tree)
 
-    def _primitives(self, shape: Shape) -> list[dict[str, Any]]:
+    def _primitives(self, shape: Shape) -> tuple[list[dict[str, Any]], _Lattice]:
         """Write vertices and faces: what is seen of the first frame, and the difference of each other frame from it."""
         file, points = self._file, iter(shape.frames)
         first = next(points)
@@ -84,18 +95,40 @@ class GlbWriter:
         if shape.uv is not None and first.texture is not None:
             origins, corners, uv = cut_at_seams(shape.faces, shape.uv)
             picture, places = file.put_picture(first.texture.pixels, shape), {PLACES: file.put_places(uv, shape)}
-        file.open_vertices()
-        frames, base = list[dict[str, int]](), dict[str, np.ndarray]()
-        for frame in chain([first], points):
-            known = {"POSITION": self._animation.local(shape, frame.vertices), "NORMAL": unit_normals(frame)}
-            known |= {} if frame.colors is None or shape.pictured.all() else {COLORS: light(frame.colors)}
-            known = {name: values[origins] for name, values in known.items()}
-            shown = {name: values - base[name] if base else values for name, values in known.items()}
-            frames.append({name: file.put(row, "VEC3", shape, name == "POSITION") for name, row in shown.items()})
-            base = base or known
+        elif file.compressed:
+            origins, corners = by_use(shape.faces, len(first.vertices))
+        rows, lattice = self._rows(shape, chain([first], points), origins), _Lattice(np.zeros(3), 1.0)
+        if file.compressed:
+            kept = list(rows)
+            lattice = _Lattice.around([row["POSITION"] for row in kept])
+            rows = iter([row | {"POSITION": lattice.numbers(row["POSITION"])} for row in kept])
+        frames = self._put(_differences(rows), shape)
         frames[0] |= places
         material = None if shape.pictured.all() else self._material(first.colors is not None)
-        return file.put_faces(Faces(corners, shape.pictured, picture, material), frames, shape)
+        return file.put_faces(Faces(corners, shape.pictured, picture, material), frames, shape), lattice
+
+    def _rows(self, shape: Shape, frames: Iterable[Points], origins: np.ndarray) -> Iterator[dict[str, np.ndarray]]:
+        """Yield the attributes of each frame."""
+        for frame in frames:
+            row = {"POSITION": self._animation.local(shape, frame.vertices), "NORMAL": unit_normals(frame)}
+            row |= {} if frame.colors is None or shape.pictured.all() else {COLORS: light(frame.colors)}
+            if self._file.compressed and frame.colors is not None:
+                del row["NORMAL"]  # colours show without light
+            yield {name: values[origins] for name, values in row.items()}
+
+    def _put(self, rows: Iterable[dict[str, np.ndarray]], shape: Shape) -> list[dict[str, int]]:
+        """Write frames, in one view, or compressed in one for each attribute; return their accessors."""
+        if not self._file.compressed:
+            self._file.open_vertices()
+            put = partial(self._file.put, kind="VEC3", what=shape)
+            return [{name: put(row, bounded=name == "POSITION") for name, row in each.items()} for each in rows]
+        kept = list(rows)
+        frames: list[dict[str, int]] = [{} for _ in kept]
+        for name in kept[0]:
+            self._file.open_vertices(8 if name == "POSITION" else 12, _ROUNDED.get(name, 0))
+            for frame, row in zip(frames, kept, strict=True):
+                frame[name] = self._file.put(row[name], "VEC3", shape, name == "POSITION")
+        return frames
 
     def _material(self, colored: bool) -> int:
         """Return the material of faces without a place in a picture."""
@@ -103,7 +136,7 @@ class GlbWriter:
             self._materials[colored] = self._file.put_unlit({}) if colored else self._file.add("materials", _MATERIAL)
         return self._materials[colored]
 
-    def _animate(self, shape: Shape, node: int) -> None:
+    def _animate(self, shape: Shape, node: int, size: float) -> None:
         """Write the channels that show, hide and move a shape; a still shape that is always shown has none."""
         count = len(self._animation.times)
         if shape.count == 1 and shape.shown == ((0, count),):
@@ -113,7 +146,7 @@ class GlbWriter:
         shown = list(changes(shape, count))
         keys = self._times[[frame for frame, _ in shown] + [count]]  # with the end of the last frame
         states = np.array([is_shown for _, is_shown in shown] + [shown[-1][1]], np.float32)
-        values = np.repeat(states[:, None], 3, axis=1)
+        values = np.repeat(np.float32(size) * states[:, None], 3, axis=1)
         times = put(keys, "SCALAR", bounded=True)
         self._channel(node, "scale", (times, put(values, "VEC3")), "STEP")
         if shape.count > 1:
@@ -129,6 +162,32 @@ class GlbWriter:
         self._nodes.append(node)
         self._nodes[parent].setdefault("children", []).append(len(self._nodes) - 1)
         return len(self._nodes) - 1
+
+
+@dataclass(frozen=True, slots=True)
+class _Lattice:
+    """Places as whole numbers: low + step * number, m."""
+
+    low: np.ndarray
+    step: float
+
+    @classmethod
+    def around(cls, frames: Sequence[np.ndarray]) -> _Lattice:
+        """Return one of BITS bits along the longest side."""
+        low = np.min([places.min(axis=0) for places in frames], axis=0).astype(np.float64)
+        side = float((np.max([places.max(axis=0) for places in frames], axis=0) - low).max())
+        return cls(low, float(np.float32((side or 1.0) / (2**BITS - 1))))
+
+    def numbers(self, places: np.ndarray) -> np.ndarray:
+        return np.rint((places - self.low) / self.step).astype(np.int16)
+
+
+def _differences(rows: Iterable[dict[str, np.ndarray]]) -> Iterator[dict[str, np.ndarray]]:
+    """Yield the first frame, and how each other one differs from it."""
+    base = dict[str, np.ndarray]()
+    for row in rows:
+        yield {name: values - base[name] if base else values for name, values in row.items()}
+        base = base or row
 
 
 def _times(path: Path, animation: Animation) -> np.ndarray:

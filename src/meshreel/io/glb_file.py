@@ -17,15 +17,17 @@ import numpy as np
 from jaxtyping import Bool, Float32, Int32, Int64, UInt8, UInt16
 
 from ..errors import InputError
+from .meshopt import ATTRIBUTES, TRIANGLES, exponential, pack_stream
 from .pictures import pack_picture
 
 MOST_BYTES = (1 << 32) - 1  # of a GLB file, whose header has 32 bits for its length (glTF 2.0, "GLB File Format")
 COLORS, PLACES = "COLOR_0", "TEXCOORD_0"
 PASSED_OVER = "_COLOR_0"  # a name that begins with _ is an application's own (glTF 2.0)
-_FLOAT, _U16, _U32 = 5126, 5123, 5125
+_COMPONENTS = {"f4": 5126, "i2": 5122, "u2": 5123, "u4": 5125}  # of accessors, by numpy's names
 _VERTICES, _INDICES = 34962, 34963  # targets of a buffer view (glTF 2.0)
 _RESTART = 65535  # largest value of 16 bits: restarts a primitive, so it is no index (glTF 2.0)
 _UNLIT = "KHR_materials_unlit"
+_MESHOPT = ["EXT_meshopt_compression", "KHR_mesh_quantization"]
 _MATT = {"metallicFactor": 0.0, "roughnessFactor": 0.9}  # for viewers without the extension
 
 
@@ -42,23 +44,34 @@ class Faces:
 class GlbFile:
     """A GLB file in the making."""
 
-    def __init__(self, spool: IO[bytes] | BytesIO, name: str, remedy: str = "write fewer") -> None:
+    def __init__(
+        self, spool: IO[bytes] | BytesIO, name: str, remedy: str = "write fewer", compressed: bool = False
+    ) -> None:
         """Write arrays to an empty `spool` first; `name` begins error messages, `remedy` ends that of its length."""
         self._spool, self._name, self._remedy = spool, name, remedy
-        self._size = 0
-        self._tree: dict[str, list[Any]] = {}
+        self._size = self._plain = 0  # bytes written, and those of the buffer that compressed views stand for
+        self._tree: dict[str, list[Any]] = {"extensionsRequired": _MESHOPT.copy()} if compressed else {}
+        self._used = {*_MESHOPT} if compressed else set[str]()
+        self._loose = bytearray()  # of the newest view, until it is complete
+        self._coding: tuple[str, int, int] | None = None  # of the newest view: mode, stride, bits of the filter
+        self.compressed = compressed
 
     def add(self, kind: str, item: dict[str, Any]) -> int:
         """Append an item to a list of the description, as "meshes", and return its number."""
         self._tree.setdefault(kind, []).append(item)
         return len(self._tree[kind]) - 1
 
-    def open_vertices(self, stride: int = 12) -> None:
-        """Begin a buffer view of attributes of vertices, so many bytes for each; each `put` extends it."""
-        self.open_view(byteStride=stride, target=_VERTICES)
+    def open_vertices(self, stride: int = 12, bits: int = 0) -> None:
+        """Begin a buffer view of attributes of vertices, so many bytes for each; each `put` extends it.
 
-    def open_view(self, **others: int) -> None:
-        """Begin a buffer view."""
+        `bits`: where the file is compressed, floats are rounded to multiples of 2^-bits; 0 keeps them.
+        """
+        self.open_view((ATTRIBUTES, stride, bits), byteStride=stride, target=_VERTICES)
+
+    def open_view(self, coding: tuple[str, int, int] | None = (ATTRIBUTES, 4, 0), **others: int) -> None:
+        """Begin a buffer view; `coding` says how it is compressed where the file is, and None that it never is."""
+        self._close()
+        self._coding = coding if self.compressed else None
         self.add("bufferViews", {"buffer": 0, "byteOffset": self._size, "byteLength": 0, **others})
 
     def put(self, values: np.ndarray, kind: str, what: object = "its arrays", bounded: bool = False) -> int:
@@ -66,13 +79,16 @@ class GlbFile:
         accessor: dict[str, Any] = {
             "bufferView": len(self._tree["bufferViews"]) - 1,
             "byteOffset": self._tree["bufferViews"][-1]["byteLength"],
-            "componentType": {"f4": _FLOAT, "u2": _U16, "u4": _U32}[values.dtype.str[1:]],
+            "componentType": _COMPONENTS[values.dtype.str[1:]],
             "count": len(values),
             "type": kind,
         }
         if bounded:
             low, high = values.min(axis=0), values.max(axis=0)
             accessor |= {"min": np.atleast_1d(low).tolist(), "max": np.atleast_1d(high).tolist()}
+        stride = self._tree["bufferViews"][-1].get("byteStride", 0) // values.itemsize
+        if values.ndim > 1 and stride > values.shape[1]:
+            values = np.pad(values, ((0, 0), (0, stride - values.shape[1])))
         self._append(values.astype(values.dtype.newbyteorder("<"), copy=False).tobytes(), what)
         return self.add("accessors", accessor)
 
@@ -84,7 +100,7 @@ class GlbFile:
     def put_picture(self, pixels: UInt8[np.ndarray, "H W 3"], what: object = "its picture") -> int:
         """Append a picture and return the number of the material that shows it."""
         data = pack_picture(pixels)
-        self.open_view()
+        self.open_view(None)
         self._append(data, what)
         self._tree["bufferViews"][-1]["byteLength"] = len(data)
         image = self.add("images", {"bufferView": len(self._tree["bufferViews"]) - 1, "mimeType": "image/png"})
@@ -92,7 +108,7 @@ class GlbFile:
 
     def put_unlit(self, surface: dict[str, Any]) -> int:
         """Add a material that shows colours as they are, and return its number."""
-        self._tree["extensionsUsed"] = [_UNLIT]
+        self._used.add(_UNLIT)
         looks = {"pbrMetallicRoughness": surface | _MATT, "extensions": {_UNLIT: {}}}
         return self.add("materials", {"doubleSided": True} | looks)
 
@@ -115,14 +131,18 @@ class GlbFile:
         return found
 
     def _put_corners(self, corners: Int32[np.ndarray, "F 3"], what: object) -> int:
-        self.open_view(target=_INDICES)
         short = int(corners.max()) < _RESTART
+        self.open_view((TRIANGLES, 2 if short else 4, 0), target=_INDICES)
         return self.put(corners.reshape(-1).astype("<u2" if short else "<u4"), "SCALAR", what)
 
     def finish(self, file: BinaryIO | BytesIO, scene: dict[str, Any]) -> None:
         """Write the complete file: header, description, and the spooled arrays."""
-        buffers = {"buffers": [{"byteLength": self._size}]} if self._size else {}
-        text = json.dumps(scene | self._tree | buffers, separators=(",", ":"), allow_nan=False).encode()
+        self._close()
+        buffers: dict[str, Any] = {"buffers": [{"byteLength": self._size}]} if self._size else {}
+        if self._plain:
+            buffers["buffers"].append({"byteLength": self._plain, "extensions": {_MESHOPT[0]: {"fallback": True}}})
+        used = {"extensionsUsed": sorted(self._used)} if self._used else {}
+        text = json.dumps(scene | self._tree | used | buffers, separators=(",", ":"), allow_nan=False).encode()
         text += b" " * (-len(text) % 4)
         chunks = [(b"JSON", len(text)), *([(b"BIN\0", self._size)] if self._size else [])]
         total = 12 + sum(8 + size for _, size in chunks)
@@ -133,12 +153,35 @@ class GlbFile:
             self._spool.seek(0)
             shutil.copyfileobj(self._spool, file, 1 << 20)
 
+    def _close(self) -> None:
+        """Compress the newest view, which then stands in a buffer that no file has."""
+        if self._coding is None or not self._loose:
+            return
+        view, (mode, stride, bits), data = self._tree["bufferViews"][-1], self._coding, bytes(self._loose)
+        filtered = exponential(np.frombuffer(data, "<f4"), bits).astype("<u4").tobytes() if bits else data
+        stream = pack_stream(filtered, mode, stride)
+        about = {"byteLength": len(stream), "byteStride": stride, "count": len(data) // stride, "mode": mode}
+        about |= {"filter": "EXPONENTIAL"} if bits else {}
+        view["extensions"] = {_MESHOPT[0]: {"buffer": 0, "byteOffset": self._size} | about}
+        view |= {"buffer": 1, "byteOffset": self._plain, "byteLength": len(data)}
+        self._plain += len(data) + -len(data) % 4
+        self._loose.clear()
+        self._write(stream, "its arrays")
+
     def _append(self, data: bytes, what: object) -> None:
+        if self._coding is None:
+            self._tree["bufferViews"][-1]["byteLength"] += self._write(data, what)
+        else:
+            self._loose += data
+            self._tree["bufferViews"][-1]["byteLength"] += len(data)
+
+    def _write(self, data: bytes, what: object) -> int:
+        """Write to a place that is a multiple of 4, and return the number of bytes."""
         data += bytes(-len(data) % 4)
         self._check(self._size + len(data), what)
         self._spool.write(data)
         self._size += len(data)
-        self._tree["bufferViews"][-1]["byteLength"] += len(data)
+        return len(data)
 
     def _check(self, size: int, what: object) -> None:
         if size > MOST_BYTES:

@@ -3,6 +3,7 @@
 export { FormatError, SourceError, type FormatErrorKind, type SourceErrorKind } from "./errors.ts";
 export { HttpSource, type HttpOptions } from "./net/http_source.ts";
 export { Player, type PlayerOptions } from "./player.ts";
+export { openWorker, Players, type WorkerFiles } from "./players.ts";
 export { WorkerPool, type WorkerLike, type WorkerSetup } from "./time/pool.ts";
 export type { DecodeJob, FromWorker, ToWorker } from "./protocol.ts";
 export { BlobSource, BytesSource, type Source, type SourceWatch, type Take } from "./net/source.ts";

@@ -1,10 +1,10 @@
 // Attributes and properties: what a page writes, and what the player takes from it. Nothing here knows the DOM.
 
 import { PLAYBACK_RATES } from "@meshreel/player-core/types";
-import type { Info, Layers } from "@meshreel/player-core/types";
-import { MODES } from "@meshreel/player-three/modes";
-import type { Mode } from "@meshreel/player-three/modes";
-import type { Up } from "./upright.ts";
+import type { Layers } from "@meshreel/player-core/types";
+import { MODES, shownMode } from "@meshreel/player-three/modes";
+import type { Looks, Mode } from "@meshreel/player-three/modes";
+import type { Up } from "@meshreel/player-three/upright";
 
 export type Theme = "auto" | "light" | "dark";
 
@@ -91,18 +91,9 @@ export function parseLayers(text: string | null): Layers {
   return readLayers(text ?? "") ?? "auto";
 }
 
-/** What a recording may look like. */
-export type Looks = Pick<Info, "hasColors" | "hasSplats">;
-
 /** How surfaces look where the text is none: by splats, or in colours, or shaded, whichever of these comes first that the recording has. */
 export function parseMode(text: string | null, has: Looks | null): Mode {
-  const mode = readMode(text ?? "") ?? "splats";
-  return [mode, "color" as const].find((some) => modesOf(has).includes(some)) ?? "shaded";
-}
-
-/** Modes that a recording can be shown in. */
-export function modesOf(has: Looks | null): readonly Mode[] {
-  return MODES.filter((mode) => (mode !== "splats" || has?.hasSplats) && (mode !== "color" || has?.hasColors));
+  return shownMode(readMode(text ?? "") ?? "splats", has);
 }
 
 /** Whether splats are wanted where there are some. */

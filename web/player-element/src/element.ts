@@ -1,7 +1,7 @@
 // <meshreel-player>: an element like <video>, whose picture can be looked at from all sides.
 
 import type { Heard, Info, Packed, Playback } from "@meshreel/player-core/types";
-import type { Bench } from "@meshreel/player-three";
+import type { Bench } from "@meshreel/player-three/bench";
 import { applyToPlayback, applyToStage } from "./apply.ts";
 import { OBSERVED, PROPERTIES } from "./attributes.ts";
 import { Controls } from "./controls/controls.ts";
@@ -191,10 +191,10 @@ export class MeshreelPlayer extends Viewed {
     if (this.#queued) return;
     this.#queued = true;
     queueMicrotask(() => {
+      const isAsked = this.#queued && this.isConnected;
       this.#queued = false;
-      if (!this.isConnected) return;
-      if (this.#left === null && this.preload === "none" && !this.autoplay && !this.#source) this.#close();
-      else this.#open(this.#left === true);
+      if (isAsked && this.#left === null && this.preload === "none" && !this.autoplay && !this.#source) this.#close();
+      else if (isAsked) this.#open(this.#left === true);
       this.#controls.refresh();
     });
   }
@@ -203,6 +203,7 @@ export class MeshreelPlayer extends Viewed {
   #open(wished = false): void {
     this.#close();
     this.#left = this.#error = null;
+    this.#queued = false; // `play` came first
     this.#controls.refresh();
     const source = this.#source ?? this.src;
     if (source === "") return;
@@ -290,10 +291,9 @@ export class MeshreelPlayer extends Viewed {
     if (!this.view && ["canplay", "playing"].includes(event.type)) return void this.#early.push(event);
     if (event.type === "loadedmetadata") this.#begin();
     if (event.type === "canplay") this.#playable = true;
-    if (["canplay", "playing", "seeked"].includes(event.type)) this.#waiting = false;
+    if (["canplay", "playing", "seeked"].includes(event.type) || (event.type === "pause" && this.#playable)) this.#waiting = false;
     if (event.type === "waiting") this.#waiting = true;
     if (event.type === "volumechange" && this.#playback) this.muted = this.#playback.sound.muted;
-    if (event.type === "pause" && this.#playable) this.#waiting = false;
     if (event.type === "ended") {
       this.#wished = false;
       queueMicrotask(() => keepToSection(this));
@@ -325,7 +325,7 @@ export class MeshreelPlayer extends Viewed {
 
   #onView(event: Event): void {
     if (event.type === "drawn") {
-      if (this.view?.shows) this.#controls.drawn();
+      if (this.view?.shows) this.#controls.drawn(this.view.canvas, this.view.frame);
       keepToSection(this);
     } else {
       if (event.type !== "change") this.dispatchEvent(new Event(event.type));

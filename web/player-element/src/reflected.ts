@@ -3,7 +3,7 @@
 import type { Info, Layers } from "@meshreel/player-core/types";
 import type { Mode } from "@meshreel/player-three/modes";
 import * as parse from "./attributes.ts";
-import type { Up } from "./upright.ts";
+import type { Up } from "@meshreel/player-three/upright";
 
 // Pages that are made on a server import this where there are no elements.
 const Element = globalThis.HTMLElement ?? (class {} as typeof HTMLElement);

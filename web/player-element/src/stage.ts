@@ -2,8 +2,8 @@
 
 import type { Info, Layers, Packed, Playback, Shown } from "@meshreel/player-core/types";
 import type { Mode } from "@meshreel/player-three/modes";
-import type { VrActions } from "@meshreel/xr";
-import type { Up } from "./upright.ts";
+import type { VrActions } from "@meshreel/xr/actions";
+import type { Up } from "@meshreel/player-three/upright";
 
 /** Numbers of the picture, for the overlay. */
 export interface PictureStats {

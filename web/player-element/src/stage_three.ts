@@ -1,17 +1,16 @@
 // A stage that draws with three.js: the recording, a camera that orbits it, and a headset.
 
 import type { Box, Info, Packed, Shown } from "@meshreel/player-core/types";
-import { Ground, ReelScene, Sorter, updateFar } from "@meshreel/player-three";
+import { Ground, ReelScene, Sorter, standing, updateFar } from "@meshreel/player-three";
 import type { Mode, OrderWorker } from "@meshreel/player-three";
 import { VrSession } from "@meshreel/xr";
 import type { VrActions } from "@meshreel/xr";
-import { Color, Group, Matrix4, PerspectiveCamera, Scene, Spherical, Vector3, WebGLRenderer } from "three";
+import { Color, Group, PerspectiveCamera, Scene, Spherical, Vector3, WebGLRenderer } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import { readCamera } from "./attributes.ts";
 import { Fly } from "./fly.ts";
 import type { PictureStats, Stage } from "./stage.ts";
-import { stoodUp, turnOf } from "./upright.ts";
-import type { Up } from "./upright.ts";
+import type { Up } from "@meshreel/player-three/upright";
 
 const FOV = 45; // degrees, of the picture's height
 const TANGENT = Math.tan((FOV * Math.PI) / 360); // of half of that
@@ -273,11 +272,9 @@ export class ThreeStage extends EventTarget implements Stage {
   /** A recording on its floor, all of it in view. */
   #stand(info: Info): void {
     this.#info = info;
-    const turn = turnOf(info.metadata, this.#up);
-    const box = (this.#box = stoodUp(info.box, turn));
-    const [a, b, c, d, e, f, g, h, i] = info.rotation ?? [1, 0, 0, 0, 1, 0, 0, 0, 1];
-    const edited = new Matrix4().set(a, b, c, 0, d, e, f, 0, g, h, i, 0, 0, 0, 0, 1);
-    this.#reel.stand(new Matrix4().makeRotationX(turn).multiply(edited), box.minimum[1], box.size[1]);
+    const { turned, box } = standing(info, this.#up);
+    this.#box = box;
+    this.#reel.stand(turned, box.minimum[1], box.size[1]);
     this.#floor.lie(box);
     this.#fly.size = 2 * this.#ball(box).radius;
     this.#shaded = null;

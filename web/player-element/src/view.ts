@@ -1,8 +1,8 @@
 // The picture: a canvas in a box, its stage, and the loop that draws only where something changed.
 
 import type { Packed, Playback, Shown } from "@meshreel/player-core/types";
-import type { Bench } from "@meshreel/player-three";
-import type { VrActions } from "@meshreel/xr";
+import type { Bench } from "@meshreel/player-three/bench";
+import type { VrActions } from "@meshreel/xr/actions";
 import type { Engine, Stage } from "./stage.ts";
 
 /** A longer gap between two pictures is a page that was hidden or a machine that slept: time stood still meanwhile. */
@@ -92,6 +92,11 @@ export class View {
   /** True once something of the playback was drawn. */
   get shows(): boolean {
     return this.#last !== null;
+  }
+
+  /** The frame that was drawn last; -1 before the first. */
+  get frame(): number {
+    return this.#last?.frame ?? -1;
   }
 
   /** A PNG of the picture of this moment, whether or not it was drawn before. */

@@ -80,7 +80,33 @@ describeOnPage("controls of <meshreel-player>", (on) => {
     await on.page.mouse.up();
     await on.eventually((player) => !player.paused && !player.seeking);
     expect(await on.get((player) => player.currentTime)).toBeGreaterThan(0.97);
-    expect(await on.page.locator(".tip").textContent()).toBe("0:01.00");
+    expect(await on.page.locator(".tip").textContent()).toBe("0:01.00 · 25");
+  });
+
+  test("a picture of the time pointed at is shown where it was seen before, with the frame's number, and nothing is drawn for it", async () => {
+    await on.shown("muted");
+    await on.get((player) => void (player.currentTime = 1));
+    await on.eventually((player) => !player.seeking);
+    await on.page.waitForTimeout(200);
+    const box = (await on.page.locator(".seek .range").boundingBox())!;
+    const point = async (share: number): Promise<boolean> => {
+      await on.page.mouse.move(box.x + 7 + share * (box.width - 14), box.y + box.height / 2);
+      return on.page.locator(".thumbnail").isVisible();
+    };
+    const draws = await on.page.evaluate(() => engine.stages[0]!.draws);
+    expect(await point(0.75)).toBe(false);
+    expect(await on.page.locator(".tip").textContent()).toBe("0:01.50 · 37");
+    expect(await point(0.5)).toBe(true);
+    const colours = await on.page.locator(".thumbnail").evaluate((node: HTMLCanvasElement) => {
+      const { data } = node.getContext("2d")!.getImageData(0, 0, node.width, node.height);
+      return new Set(Array.from({ length: data.length / 4 }, (_, k) => data.slice(4 * k, 4 * k + 3).join())).size;
+    });
+    expect(colours).toBeGreaterThan(1);
+    expect(await on.page.evaluate(() => engine.stages[0]!.draws)).toBe(draws);
+    if (process.env.MESHREEL_PICTURES) await on.page.screenshot({ path: `${process.env.MESHREEL_PICTURES}/thumbnail.png` });
+    await on.get((player) => void (player.src = "other.reel"));
+    await on.eventually((player) => player.readyState === 4);
+    expect(await point(0.49)).toBe(false);
   });
 
   test("the seek bar says its time and shows what is buffered", async () => {

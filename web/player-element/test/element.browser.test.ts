@@ -32,6 +32,18 @@ describeOnPage("<meshreel-player>", (on) => {
     expect(await on.page.evaluate(() => engine.playbacks.every(({ disposed }) => disposed))).toBe(true);
   });
 
+  test("playing right after it was made plays what is opened, once", async () => {
+    await on.put("", false);
+    const played = await on.page.evaluate(async () => {
+      const player = document.createElement("meshreel-player");
+      player.src = "walk.reel";
+      document.body.append(player);
+      await player.play();
+      return [player.paused, engine.playbacks.length];
+    });
+    expect(played).toEqual([false, 1]);
+  });
+
   test("removal disposes everything, a move nothing, and it works when put in again", async () => {
     await on.put('<section></section><meshreel-player src="walk.reel" controls stats></meshreel-player>');
     const disposed = () => on.page.evaluate(() => [...engine.playbacks, ...engine.stages].map((one) => one.disposed));

@@ -11,7 +11,7 @@ import { readParameters, readTime } from "../src/parameters.ts";
 import { ranges } from "../src/ranges.ts";
 import { GraphicsError } from "../src/stage.ts";
 import { statisticsLines } from "../src/stats.ts";
-import { stoodUp, turnOf } from "../src/upright.ts";
+import { stoodUp, turnOf } from "@meshreel/player-three/upright";
 import { goesOn } from "../src/view.ts";
 import { FakePlayback, INFO } from "./fake.ts";
 

@@ -2,4 +2,5 @@
 
 export { VrSession } from "./session.ts";
 export { arSupported, vrSupported } from "./supported.ts";
-export type { VrActions, VrOptions } from "./session.ts";
+export type { VrActions } from "./actions.ts";
+export type { VrOptions } from "./session.ts";

@@ -2,18 +2,12 @@
 
 import type { Object3D, PerspectiveCamera, WebGLRenderer } from "three";
 import type { Box } from "@meshreel/player-core/types";
+import type { VrActions } from "./actions.ts";
 import { Grab } from "./grab.ts";
 import { Hand } from "./hand.ts";
 import { keep } from "./keep.ts";
 import { applyPose, makePose, place, setViewer } from "./pose.ts";
 import type { Viewer } from "./pose.ts";
-
-export interface VrActions {
-  /** Plays, or pauses. */
-  toggle(): void;
-  step(frames: number): void;
-  seekBy(seconds: number): void;
-}
 
 export interface VrOptions {
   readonly renderer: WebGLRenderer;

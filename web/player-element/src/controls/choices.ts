@@ -1,8 +1,7 @@
 // What the menus offer.
 
 import type { Layers } from "@meshreel/player-core/types";
-import type { Mode } from "@meshreel/player-three/modes";
-import { type Looks, modesOf } from "../attributes.ts";
+import { modesOf, type Looks, type Mode } from "@meshreel/player-three/modes";
 import { formatSpeed } from "../format.ts";
 import type { Choice } from "./dom.ts";
 

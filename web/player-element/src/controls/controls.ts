@@ -104,8 +104,9 @@ export class Controls implements Surface {
   }
 
   /** After each picture: moves the seek bar, not more often than the eye needs. */
-  drawn(): void {
+  drawn(canvas: HTMLCanvasElement, frame: number): void {
     this.#root.setAttribute("data-drawn", "");
+    if (this.#player.controls) this.#bar.seek.drawn(canvas, frame);
     const now = performance.now();
     if (now - this.#timed < TIME_EVERY || !this.#player.controls) return;
     this.#timed = now;

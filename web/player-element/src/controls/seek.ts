@@ -3,6 +3,7 @@
 import { formatTime, speakTime, timeDigits } from "../format.ts";
 import type { MeshreelPlayer } from "../element.ts";
 import { make, setText } from "./dom.ts";
+import { Thumbnails } from "./thumbnails.ts";
 
 const THUMB = 14; // px; as in styles/bar.ts
 
@@ -10,7 +11,8 @@ export class SeekBar {
   readonly element: HTMLElement;
   readonly input: HTMLInputElement;
   #player: MeshreelPlayer;
-  #tip = make("span", { class: "tip", part: "tip", "aria-hidden": "true" });
+  readonly #label = make("span", { class: "at" });
+  readonly #thumbnails = new Thumbnails();
   #scrubbing = false;
   #resume = false; // it played before it was dragged
   #wanted: number | null = null;
@@ -20,11 +22,13 @@ export class SeekBar {
     this.input = make("input", {
       type: "range", min: "0", max: "0", step: "any", value: "0", part: "seek", class: "range", "aria-label": "Seek",
     });
-    this.element = make("div", { class: "seek" }, make("div", { class: "track", part: "track" }, make("div", { class: "section" })), this.input, this.#tip);
+    this.element = make("div", { class: "seek" }, make("div", { class: "track", part: "track" }, make("div", { class: "section" })), this.input,
+      make("span", { class: "tip", part: "tip", "aria-hidden": "true" }, this.#thumbnails.element, this.#label));
     this.input.addEventListener("input", () => this.#drag());
     this.input.addEventListener("change", () => this.#drop());
     this.element.addEventListener("pointermove", (event) => this.#hover(event));
     player.addEventListener("seeked", () => this.#follow());
+    player.addEventListener("emptied", () => this.#thumbnails.clear());
   }
 
   refresh(): void {
@@ -43,9 +47,16 @@ export class SeekBar {
     this.input.setAttribute("aria-valuetext", known ? `${speakTime(time)} of ${speakTime(duration)}` : "nothing is open");
   }
 
+  /** After a picture of a frame was drawn into a canvas, in the same task. */
+  drawn(canvas: HTMLCanvasElement, frame: number): void {
+    const { info, presenting } = this.#player;
+    if (info && !presenting) this.#thumbnails.take(canvas, frame / info.frameCount);
+  }
+
   #drag(): void {
     if (!this.#scrubbing) {
       this.#scrubbing = true;
+      this.element.toggleAttribute("data-scrubbing", true); // without a mouse the tip is seen while it lasts
       this.#resume = !this.#player.paused && !this.#player.ended;
       if (this.#resume) this.#player.pause();
     }
@@ -65,6 +76,7 @@ export class SeekBar {
   #drop(): void {
     this.#follow();
     this.#scrubbing = false;
+    this.element.toggleAttribute("data-scrubbing", false);
     if (this.#resume) this.#player.play().catch(() => undefined); // reported by the error event
     this.#resume = false;
     this.refresh();
@@ -76,6 +88,9 @@ export class SeekBar {
     if (!(duration > 0) || width <= THUMB) return;
     const part = Math.min(1, Math.max(0, (event.clientX - left - THUMB / 2) / (width - THUMB)));
     this.element.style.setProperty("--hover", String(part));
-    setText(this.#tip, formatTime(part * duration, timeDigits(duration, this.#player.info?.frameRate ?? 0)));
+    const { frameRate, frameCount } = this.#player.info ?? { frameRate: 0, frameCount: 0 };
+    const frame = Math.min(frameCount, Math.floor(part * duration * frameRate + 1e-6) + 1);
+    setText(this.#label, `${formatTime(part * duration, timeDigits(duration, frameRate))} · ${frame}`);
+    this.#thumbnails.show(part);
   }
 }

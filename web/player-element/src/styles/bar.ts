@@ -54,7 +54,13 @@ export const BAR = `
   position: absolute; bottom: 22px; left: calc(7px + var(--hover) * (100% - 14px)); translate: -50%; padding: 2px 6px; border-radius: 5px;
   background: var(--_panel); border: 1px solid var(--_line); font-size: 12px; opacity: 0; pointer-events: none; white-space: nowrap;
 }
-@media (hover: hover) { .seek:hover .tip:not(:empty) { opacity: 1; } }
+.tip:not(:has(.at:not(:empty))) { display: none; }
+.tip:has(.thumbnail:not([hidden])) { left: clamp(72px, calc(7px + var(--hover) * (100% - 14px)), calc(100% - 72px)); }
+.thumbnail { display: block; height: 72px; margin: 2px auto 3px; border-radius: 3px; }
+.thumbnail[hidden] { display: none; }
+.at { display: block; text-align: center; }
+.seek[data-scrubbing] .tip { opacity: 1; }
+@media (hover: hover) { .seek:hover .tip { opacity: 1; } }
 
 .settings {
   position: absolute; right: 6px; bottom: calc(var(--_button) + 34px); width: 250px; max-width: calc(100% - 12px);

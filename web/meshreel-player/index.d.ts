@@ -1,0 +1,1 @@
+export { MeshreelPlayer } from "./types/player-element/src/element.js";

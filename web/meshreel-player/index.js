@@ -1,0 +1,5 @@
+// Importing this defines <meshreel-player>.
+
+import "./addresses.js";
+
+export { MeshreelPlayer } from "./meshreel-player.js";
