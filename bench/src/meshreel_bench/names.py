@@ -12,6 +12,7 @@ ONCE, ONCE_SUBDIVIDED = "background_once_draco", "background_once_draco_subdivid
 MESHOPT = "meshoptimizer"
 FLOOR_RATIO = "dynamic_ratio"  # metric of the truth itself: share of the vertices of what moves
 VDMC, VDMC_HERE = "vdmc", "vdmc on our frames"  # of others: only in plots
+OURS, PUBLISHED = "ours", "published"  # trackers of volumes
 USUAL = {"centers": 2000, "group_size": 10}  # the paper's own
 
 _TITLES = {

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from ..codecs.variants import BOTH, IN_MDS_POSE, RELEASED, UNIFORM
+from ..codecs.variants import BOTH, FROM_MESHES, IN_MDS_POSE, RELEASED, TOGETHER, UNIFORM
 from ..names import BEST, TSMC
 from ..rows import Options
+from .scenes import MEASURES
 from .study import D2, MASKED, NORMALS, SYMMETRIC, Bound, Measure, Needs, Study, Sweep, Which
 
 LITERAL_PRESET = "paper-literal"
@@ -12,7 +13,7 @@ POSES = (Measure("canonical_groups", "groups in the MDS pose"), Measure("draco_f
 M = {"basis_size": (2, 5, 10)}
 CENTERS = Study(
     title="Number of volume centers, TSMC",
-    sequences=("dancer",),
+    sequences=("dancer", "mitch"),
     sweeps=[
         Sweep("meshreel", M, {"preset": "paper", "centers": k, "group_size": 10}) for k in (1000, 2000, 3000, 4000)
     ],
@@ -20,12 +21,12 @@ CENTERS = Study(
 )
 GOF = Study(
     title="Frames of a group, TSMC",
-    sequences=("crane60",),
+    sequences=("crane60", "samba60"),
     sweeps=[
         Sweep("meshreel", {"basis_size": (2, 3, 5)}, {"preset": "paper", "centers": 2000, "group_size": size})
         for size in (5, 10, 15)
     ],
-    frames={"crane60": 30},
+    frames={"crane60": 30, "samba60": 30},
     anchor=TSMC,
 )
 BASIS = Study(
@@ -100,4 +101,16 @@ STAGES = Study(
     anchor=BEST,
     frames={LONG: 32},
     notes=("Positive: without the part more rate is needed.",),
+)
+SCENE = Study(
+    title="A scene: one sequence of all that moves against a track a body, and a background from meshes against depth",
+    sequences=("room2",),
+    sweeps=(
+        Sweep("meshreel", AROUND, WHOLE),
+        *(Sweep("meshreel", QUALITIES, WHOLE | {"variant": part}) for part in (TOGETHER, FROM_MESHES)),
+    ),
+    metrics="regions",
+    measures=MEASURES,
+    anchor=BEST,
+    frames={"room2": 30},
 )

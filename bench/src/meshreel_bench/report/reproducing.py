@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from importlib.resources import files
 
+from ..experiments.study import TRACKER
 from ..names import BEST, TSMC, TUNED
 from ..rows import Row
 from .bandwidth import headline_table, vdmc_table
@@ -29,6 +30,7 @@ def reproducing_page(rows: Sequence[Row]) -> list[str]:
     drawn = [row for row in rated(rows) if row.point.metrics == "splats"]
     lines = {text: list(table(own)) for text, table in tables.items()} | {"{table_3}": list(_table_3(drawn))}
     lines |= {"{headline}": list(headline_table(every)), "{vdmc}": list(vdmc_table(own))}
+    lines["{tracker}"] = list(_tracker([row for row in rows if row.point.codec == TRACKER]))
     return [line for text in page.splitlines() for line in lines.get(text, [text])]
 
 
@@ -77,6 +79,15 @@ def _table_3(rows: Sequence[Row]) -> Iterator[str]:
             own = "" if known["own_psnr"] is None else f"{known['own_psnr']}, {known['own_ssim']}"
             cells += [own, known["per_frame_mbps"], here, known["mbps"]]
         yield f"| {' | '.join(map(str, cells))} |"
+
+
+def _tracker(rows: Sequence[Row]) -> Iterator[str]:
+    yield "| sequence | tracker | RMS, mm | in the last frame | 95 % below | truth within | CPU s a frame |"
+    yield "|---|---|---|---|---|---|---|"
+    for row in rows:
+        keys = ("center_rms_mm", "center_rms_last_mm", "center_95_mm", "truth_rms_mm", "track_s")
+        cells = [f"{value(row, key) or 0.0:.3g}" for key in keys]
+        yield f"| {row.point.sequence}, {row.frames} frames | {row.options['method']} | {' | '.join(cells)} |"
 
 
 def _heads(columns: Sequence[str]) -> Iterator[str]:
