@@ -12,7 +12,7 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float32, Float64, Int32, Int64
+from jaxtyping import Float32, Float64, Int8, Int32, Int64
 
 from meshreel.geometry.topology import drop_unreferenced
 from meshreel.types import Mesh
@@ -59,29 +59,29 @@ def cut(distances: Float32[np.ndarray, "K K K"]) -> Cut:
     inside = (distances < 0).astype(np.uint8)
     ends = (slice(None, -1), slice(1, None))
     cases = np.zeros((resolution - 1,) * 3, np.uint8)
-    for corner, (i, j, k) in enumerate(_CORNERS):
+    for corner, (i, j, k) in enumerate(CORNERS):
         cases |= inside[ends[i], ends[j], ends[k]] << np.uint8(corner)
     cells = np.flatnonzero((cases > 0) & (cases < 255))
     strides = np.array([resolution**2, resolution, 1])
     origins = np.stack(np.unravel_index(cells, cases.shape), axis=1) @ strides
-    local = _table()[cases.reshape(-1)[cells]]
+    local = triangles_of_cases()[cases.reshape(-1)[cells]]
     used = local[..., 0] >= 0
-    starts, axes = (np.array(_EDGES) @ [1, 0])[local], (np.array(_EDGES) @ [0, 1])[local]
-    first = origins[:, None, None] + (np.array(_CORNERS) @ strides)[starts]
+    starts, axes = (np.array(EDGES) @ [1, 0])[local], (np.array(EDGES) @ [0, 1])[local]
+    first = origins[:, None, None] + (np.array(CORNERS) @ strides)[starts]
     keys, faces = np.unique((first * 3 + axes)[used], return_inverse=True)
     low = keys // 3
     return Cut(low, low + strides[keys % 3], faces.reshape(-1, 3).astype(np.int32))
 
 
-_CORNERS = [(n & 1, n >> 1 & 1, n >> 2) for n in range(8)]
-_EDGES = [(n, axis) for axis in range(3) for n in range(8) if not n >> axis & 1]  # first corner, axis
+CORNERS = [(n & 1, n >> 1 & 1, n >> 2) for n in range(8)]
+EDGES = [(n, axis) for axis in range(3) for n in range(8) if not n >> axis & 1]  # first corner, axis
 
 
 @cache
-def _table() -> Int64[np.ndarray, "N T 3"]:
-    """Return the triangles of each case as numbers of `_EDGES`, filled up with -1."""
+def triangles_of_cases() -> Int8[np.ndarray, "N T 3"]:
+    """Return the triangles of each case (bit n: corner n is inside) as numbers of `EDGES`, filled up with -1."""
     cases = [_triangles(case) for case in range(256)]
-    table = np.full((256, max(map(len, cases)), 3), -1)
+    table = np.full((256, max(map(len, cases)), 3), -1, np.int8)
     for case, triangles in enumerate(cases):
         table[case, : len(triangles)] = np.reshape(triangles, (-1, 3))
     return table
@@ -114,7 +114,7 @@ def _steps(side: list[int], case: int) -> list[tuple[int, int]]:
     crossed = []
     for a, b in zip(side, side[1:] + side[:1], strict=True):
         if (case >> a ^ case >> b) & 1:
-            crossed.append((_EDGES.index((min(a, b), (a ^ b).bit_length() - 1)), bool(case >> b & 1)))
+            crossed.append((EDGES.index((min(a, b), (a ^ b).bit_length() - 1)), bool(case >> b & 1)))
     if crossed and not crossed[0][1]:
         crossed = crossed[1:] + crossed[:1]
     return [(crossed[n][0], crossed[n + 1][0]) for n in range(0, len(crossed), 2)]
