@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from meshreel.errors import InputError
 
-from . import ablations, color, figure6, layers, mpeg, recordings, scenes, speed, splats, targets, tracker
+from . import ablations, color, figure6, layers, mpeg, recordings, scenes, speed, splats, tracker
 from .study import Study
 
 # In the order of the report.
@@ -24,7 +24,6 @@ EXPERIMENTS: dict[str, Study] = {
     "scenes": scenes.STUDY,
     "recordings": recordings.STUDY,
     "layers": layers.STUDY,
-    "targets": targets.STUDY,
     "speed": speed.STUDY,
     "tracker": tracker.STUDY,
     "color": color.STUDY,

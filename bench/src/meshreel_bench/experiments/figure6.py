@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from ..codecs.necgs import QUICK
 from ..codecs.variants import LARGER
-from ..names import BEST, DRACO, KLT, NECGS, TVMC
+from ..names import BEST, DRACO, KLT, NECGS, TUNED, TVMC
 from ..rows import Options
 from .study import (
     D2,
@@ -45,6 +45,7 @@ LONGER = {name: values[1:4] for name, values in FINER.items()}
 M = {"basis_size": (2, 4, 10)}
 LARGE = dict.fromkeys(("synthetic4", *SCENES), FINER)
 FEWER_M = dict.fromkeys(SCENES[1:], M) | {ROOM: {"basis_size": (3, 10)}}
+NECGS_FULL: Options = {"configuration": "full"}  # hours without a GPU
 FEW = {"centers": 200}  # for `--small`
 
 QUALITIES, BITS = {"quality": (10.0, 35.0, 60.0, 85.0)}, {"qp": (6, 7, 8, 9, 10)}
@@ -61,6 +62,7 @@ SYSTEMS = (
     Sweep("meshoptimizer", BITS, only=BODIES),
     Sweep("klt_tsdf", VOXELS, on=LARGE, sampled=(ROOM,), small={"cells": 96}),
     Sweep("necgs", {"channels": (8, 16)}, {"device": "cpu"}, sampled=SCENES, small=QUICK),
+    Sweep("necgs", {}, NECGS_FULL, only=("dancer", "synthetic4"), small=QUICK),
     Sweep("decimated_draco", FRACTIONS, on=OF_SCENES, sampled=SCENES),
     Sweep("decimated_draco", FRACTIONS, {"levels": 1}, OF_SCENES, ("synthetic4", *SCENES[1:], *BODIES), sampled=SCENES),
     Sweep("background_once_draco", FRACTIONS, on={ROOM: FEWER}, only=SCENES),
@@ -93,6 +95,15 @@ PROMISES: tuple[Promise, ...] = (
         Which("synthetic4", TVMC),
         (at_most("mbps", 25.0, "Mbps"), Bound("d2_psnr_paper", 68.3, "dB")),
     ),
+    *(
+        Always(f"{body}: worst frame of TSMC", Which(body, TUNED), Bound("d2_psnr_paper_worst", 55.0, "dB"))
+        for body in BODIES[1:3]
+    ),
+    Reaches(
+        "dancer, TSMC at quality 50: CPU s a frame of the encode and of its tracking, faces without area",
+        Which("dancer", TUNED, {"quality": 50.0, "basis_size": None}),
+        (at_most("encode_s", 8.0, "s"), at_most("encode_s.track", 2.0, "s"), at_most("degenerate_faces", 0)),
+    ),
     Rises(TVMC, D2),
     Rises(KLT, D2),
     Always(
@@ -123,6 +134,7 @@ LONG = Study(
         Sweep("tvmc", {"qp": (5, 7, 9)}),
         Sweep("klt_tsdf", LONGER),
         Sweep("necgs", {"channels": (16, 32)}),
+        Sweep("necgs", {}, NECGS_FULL),
     ),
     best=BEST,
     promises=(LeastRate(BEST, (D2, MASKED)),),

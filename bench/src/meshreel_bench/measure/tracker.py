@@ -18,6 +18,7 @@ from meshreel.analysis.reference.track import LEAST_AFFINITY, TrackOptions, trac
 from meshreel.analysis.survey import survey
 from meshreel.errors import InputError
 from meshreel.geometry.inside import interior_samples
+from meshreel.geometry.rigid import fit_rigid
 from meshreel.geometry.topology import vertex_normals
 from meshreel.types import Mesh, MeshSequence
 
@@ -62,15 +63,10 @@ def carried(frames: Sequence[Mesh], centers: Float64[np.ndarray, "K 3"], count: 
     away = np.einsum("kjd,kjd->kj", normals[found], first.vertices[found] - centers[:, None]) > 0
     order = np.argsort(~away, axis=1, kind="stable")[:, :count]
     near, ways = (np.take_along_axis(each, order, axis=1) for each in (found, ways))
-    weights = 1 / np.maximum(ways, 1e-9) ** 2
-    weights /= weights.sum(axis=1, keepdims=True)
-    before = first.vertices[near]
-    middles = np.einsum("kj,kjd->kd", weights, before)
+    before, weights = first.vertices[near], 1 / np.maximum(ways, 1e-9) ** 2
     for frame in frames[1:]:
-        now = frame.vertices[near]
-        means = np.einsum("kj,kjd->kd", weights, now)
-        turns = rotations(np.einsum("kj,kja,kjb->kab", weights, before - middles[:, None], now - means[:, None]))
-        track.append(np.einsum("kab,kb->ka", turns, centers - middles) + means)
+        turns, shifts = fit_rigid(before, frame.vertices[near], weights)
+        track.append(np.einsum("kab,kb->ka", turns, centers) + shifts)
     return np.stack(track)
 
 
@@ -101,14 +97,6 @@ def published_track(frames: Sequence[Mesh], first: Float64[np.ndarray, "K 3"], o
     return np.stack(track)
 
 
-def rotations(products: Float64[np.ndarray, "K 3 3"]) -> Float64[np.ndarray, "K 3 3"]:
-    """Return the rotations that fit sums of products, before by after, best (Kabsch)."""
-    u, _, vt = np.linalg.svd(products)
-    flip = np.ones((len(u), 3))
-    flip[:, 2] = np.sign(np.linalg.det(u) * np.linalg.det(vt))
-    return np.einsum("kba,kb,kcb->kac", vt, flip, u)
-
-
 def _samples(frames: Sequence[Mesh], options: TrackOptions) -> Iterator[Float64[np.ndarray, "N 3"]]:
     """Yield the points that our tracker has."""
     for t, frame in enumerate(frames):
@@ -128,7 +116,9 @@ def _rigid(affinity: np.ndarray, before: np.ndarray, now: np.ndarray) -> tuple[n
     weights = affinity / np.maximum(affinity.sum(axis=1, keepdims=True), 1e-300)
     p, q = weights @ before, weights @ now
     products = weights @ (before[:, :, None] * now[:, None]).reshape(-1, 9)
-    turns = rotations(products.reshape(-1, 3, 3) - p[:, :, None] * q[:, None])
+    u, _, vt = np.linalg.svd(products.reshape(-1, 3, 3) - p[:, :, None] * q[:, None])
+    u[:, :, 2] *= np.sign(np.linalg.det(u) * np.linalg.det(vt))[:, None]
+    turns = np.swapaxes(u @ vt, 1, 2)  # Kabsch
     return turns, q - np.einsum("kab,kb->ka", turns, p)
 
 

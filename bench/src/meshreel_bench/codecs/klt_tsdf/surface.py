@@ -10,24 +10,21 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Int32, Int64, UInt8
+from jaxtyping import Bool, Int32, Int64
 
 from meshreel.geometry.voxels import distinct, moved
 from meshreel.types import Mesh
 
-from ..necgs.cubes import CORNERS, EDGES, triangles_of_cases
+from ..necgs.cubes import cases_of, cut
 from .basis import ONE
-from .grid import POINTS, SIDE, VOLUME, block_keys
+from .grid import OFFSETS, POINTS, SIDE, VOLUME, block_keys
 from .weights import LARGEST, STEP_ONE, Model, distances
 
 _SURE = 3 * ONE * STEP_ONE  # three voxels: what is farther has no more of a vote
 _BARELY = ONE * STEP_ONE // 64
 _MOST = 1 << 27  # of a distance, 8 voxels: eight of these fit in 32 bits
 _NEAR = ONE * STEP_ONE  # a voxel: what is farther from the zero level shows nowhere
-_STEPS = np.array([POINTS**2, POINTS, 1])  # between a block's values, by axis
 _HIGH = np.indices((2, 2, 2)).reshape(3, -1).T  # from a block to those that have some of its voxels as their first ones
-_STARTS = (np.array(CORNERS) @ _STEPS)[[first for first, _ in EDGES]].astype(np.int32)  # of a cell's edges
-_AXES = np.array([axis for _, axis in EDGES], np.int32)
 VOXELS = SIDE**3  # voxels of a block that are no other's
 
 
@@ -94,14 +91,6 @@ def _closed(
     return values
 
 
-def cases_of(values: Int32[np.ndarray, "B P P P"]) -> UInt8[np.ndarray, " C"]:
-    """Which corners of each cell are inside, a bit for each as in `CORNERS`; cells are numbered block by block."""
-    inside = (values < 0).view(np.uint8)
-    pairs = inside[:, :-1] | inside[:, 1:] << np.uint8(1)
-    fours = pairs[:, :, :-1] | pairs[:, :, 1:] << np.uint8(2)
-    return (fours[..., :-1] | fours[..., 1:] << np.uint8(4)).reshape(-1)
-
-
 def crossed(field: Field, chosen: Bool[np.ndarray, " B"]) -> Int64[np.ndarray, " C"]:
     """The numbers of the cells of the chosen blocks that the zero level passes through, sorted by their places."""
     cells = np.flatnonzero(cases_of(field.values[chosen]) - np.uint8(1) < 254)  # 0 and 255 are not crossed
@@ -111,26 +100,13 @@ def crossed(field: Field, chosen: Bool[np.ndarray, " B"]) -> Int64[np.ndarray, "
 
 def polygonize(field: Field) -> tuple[Mesh, Int64[np.ndarray, " F"]]:
     """The zero level inside the blocks, in voxel units, and the number of each face's cell."""
-    cases = cases_of(field.values)
-    cells = np.flatnonzero(cases - np.uint8(1) < 254)
-    edges = triangles_of_cases()[cases[cells]]
-    used = edges[..., 0] >= 0
-    cells, edges = np.repeat(cells, used.sum(axis=1)), edges[used]
-    block, cell = np.divmod(cells, VOXELS)
-    corner = VOLUME * block + POINTS**2 * (cell >> 6) + POINTS * (cell >> 3 & 7) + (cell & 7)
-    lows = corner.astype(np.int32)[:, None] + _STARTS[edges]  # numbers among all values
-    keys = 3 * field.voxels.reshape(-1)[lows] + _AXES[edges]
-    low_of = np.full(3 * (int(field.voxels.max(initial=-1)) + 1), -1, np.int32)
-    low_of[keys] = lows
-    made = np.flatnonzero(low_of >= 0)
-    low, axis = low_of[made], made % 3
-    values = field.values.reshape(-1)
-    ends = values[low], values[low + _STEPS[axis]]
-    block, inner = np.divmod(low, VOLUME)
-    vertices = (SIDE * field.places[block] + np.stack([inner // 81, inner // 9 % 9, inner % 9], axis=1)).astype(float)
-    vertices[np.arange(len(made)), axis] += ends[0] / (ends[0] - ends[1])
-    low_of[made] = np.arange(len(made), dtype=np.int32)
-    return Mesh.of(vertices, low_of[keys]), cells
+    found, values = cut(field.values, field.voxels), field.values.reshape(-1)
+    low, high = values[found.low], values[found.high]
+    block, inner = np.divmod(found.low, VOLUME)
+    vertices = (SIDE * field.places[block] + OFFSETS[inner]).astype(np.float64)
+    axis = np.argmax(OFFSETS[found.high - VOLUME * block] != OFFSETS[inner], axis=1)
+    vertices[np.arange(len(low)), axis] += low / (low - high)
+    return Mesh.of(vertices, found.faces), found.cells
 
 
 def cells_at(cells: Int64[np.ndarray, " C"], field: Field) -> Int64[np.ndarray, "C 3"]:
