@@ -51,5 +51,5 @@ def test_every_part_that_is_switched_off_is_a_variant():
 
 
 def test_an_unknown_experiment_is_refused():
-    with pytest.raises(InputError, match="no experiment is called 'figure7'; known: ablation_basis"):
+    with pytest.raises(InputError, match="no experiment is called 'figure7'; known: ablation_centers"):
         find_experiment("figure7")

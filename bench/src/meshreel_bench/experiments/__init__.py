@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from meshreel.errors import InputError
 
-from . import ablations, color, figure6, layers, mpeg, recordings, scenes, speed, splats, tracker
+from . import ablations, color, figure6, layers, mpeg, recordings, scenes, speed, splats
 from .study import Study
 
 # In the order of the report.
@@ -18,14 +18,13 @@ EXPERIMENTS: dict[str, Study] = {
     "ablation_paper": ablations.PAPER,
     "ablation_centers": ablations.CENTERS,
     "ablation_gof": ablations.GOF,
-    "ablation_basis": ablations.BASIS,
     "ablation_stages": ablations.STAGES,
     "ablation_scene": ablations.SCENE,
     "scenes": scenes.STUDY,
     "recordings": recordings.STUDY,
     "layers": layers.STUDY,
     "speed": speed.STUDY,
-    "tracker": tracker.STUDY,
+    "tracker": ablations.TRACKERS,
     "color": color.STUDY,
 }
 

@@ -197,8 +197,6 @@ class Study:
     promises: Sequence[Promise] = ()
     floors: Sequence[str] = ()  # sequences of which the truth itself is measured
     frames: Mapping[str, int] = field(default_factory=dict)  # the first ones of a sequence; none given: all
-    common: tuple[Measure, float] | None = None  # table of each curve's point nearest to this quality
-    common_mbps: float | None = None  # the same by rate
     rate: str = "mbps"  # of plots: name of a row's value
     notes: Sequence[str] = ()  # Markdown, before the tables
 

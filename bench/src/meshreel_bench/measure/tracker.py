@@ -6,9 +6,8 @@ of Dvorak et al. (2022) as they describe it, from our first frame's centers and 
 
 from __future__ import annotations
 
-import math
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from jaxtyping import Float64
@@ -41,13 +40,13 @@ def tracker_values(sequence: MeshSequence, method: str) -> dict[str, float | Non
     track = track_centers(frames, options).positions if method == OURS else published_track(frames, first, options)
     seconds = time.process_time() - start
     truth, other = (carried(frames, track[0], count) for count in BOUND)
-    errors = np.linalg.norm(track - truth, axis=2)[1:] * seen.diagonal * 1000
-    spread = np.linalg.norm(truth - other, axis=2)[1:] * seen.diagonal * 1000
+    errors, spread = (np.linalg.norm(a - truth, axis=2)[1:] * seen.diagonal * 1000 for a in (track, other))
+    rms = lambda values: float(np.sqrt(np.mean(values**2)))  # noqa: E731
     return {
-        "center_rms_mm": _rms(errors),
-        "center_rms_last_mm": _rms(errors[-1]),
+        "center_rms_mm": rms(errors),
+        "center_rms_last_mm": rms(errors[-1]),
         "center_95_mm": float(np.percentile(errors, 95)),
-        "truth_rms_mm": _rms(spread),  # how differently two ways to carry centers along move them
+        "truth_rms_mm": rms(spread),  # how differently two ways to carry centers along move them
         "track_s": seconds / len(frames),
     }
 
@@ -72,11 +71,11 @@ def carried(frames: Sequence[Mesh], centers: Float64[np.ndarray, "K 3"], count: 
 
 def published_track(frames: Sequence[Mesh], first: Float64[np.ndarray, "K 3"], options: TrackOptions) -> Track:
     """Return centers that balance an even spread and rigidity, round by round, by affinities of all pairs so far."""
-    track, samples = [first], _samples(frames, options)
-    points = next(samples)
+    draw = lambda t: interior_samples(frames[t], options.samples, np.random.default_rng((options.seed, t))).points  # noqa: E731
+    track, points = [first], draw(0)
     distance, difference = _squared(first), np.zeros((len(first), len(first)))
-    for following in samples:
-        before = track[-1]
+    for t in range(1, len(frames)):
+        before, following = track[-1], draw(t)
         affinity = np.exp2(-distance / options.reach**2 - difference / options.agreement**2)
         affinity[affinity < LEAST_AFFINITY] = 0
         np.fill_diagonal(affinity, 0)
@@ -86,8 +85,7 @@ def published_track(frames: Sequence[Mesh], first: Float64[np.ndarray, "K 3"], o
             turns, shifts = _rigid(affinity, before, now)
             rigid = np.einsum("kab,kb->ka", turns, before) + shifts
             moved = np.where(is_owner[:, None], (even + rigid) / 2, rigid)
-            largest = np.abs(moved - now).max()
-            now = moved
+            now, largest = moved, np.abs(moved - now).max()
             if largest < STILL:
                 break
         distance = np.maximum(distance, _squared(now))
@@ -95,12 +93,6 @@ def published_track(frames: Sequence[Mesh], first: Float64[np.ndarray, "K 3"], o
         track.append(now)
         points = following
     return np.stack(track)
-
-
-def _samples(frames: Sequence[Mesh], options: TrackOptions) -> Iterator[Float64[np.ndarray, "N 3"]]:
-    """Yield the points that our tracker has."""
-    for t, frame in enumerate(frames):
-        yield interior_samples(frame, options.samples, np.random.default_rng((options.seed, t))).points
 
 
 def _owned_means(points: np.ndarray, centers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -139,7 +131,3 @@ def _differences(points: np.ndarray, centers: np.ndarray, turns: np.ndarray, shi
 def _squared(centers: np.ndarray) -> np.ndarray:
     norms = np.einsum("kd,kd->k", centers, centers)
     return np.maximum(norms[:, None] + norms - 2 * centers @ centers.T, 0)
-
-
-def _rms(values: np.ndarray) -> float:
-    return math.sqrt(float(np.mean(values**2)))

@@ -35,8 +35,8 @@ def keep(key: str, state: Any) -> None:
 
     if (path := _path(key)) is not None:
         path.parent.mkdir(parents=True, exist_ok=True)
-        torch.save(state, path.with_suffix(f".{os.getpid()}"))
-        path.with_suffix(f".{os.getpid()}").replace(path)
+        torch.save(state, part := path.with_suffix(f".{os.getpid()}"))
+        part.replace(path)
 
 
 def _path(key: str) -> Path | None:
