@@ -1,6 +1,6 @@
 """Accuracy of volume tracking (paper, section 3.1) where the motion is known: frames that keep their connectivity.
 
-In: a sequence, one of METHODS. Out: how far centers are from where the volume takes them. *published*: the forward pass
+In: a sequence, a tracker. Out: how far centers are from where the volume takes them. *published*: the forward pass
 of Dvorak et al. (2022) as they describe it, from our first frame's centers and with the same samples of the volume.
 """
 
@@ -23,7 +23,7 @@ from meshreel.types import Mesh, MeshSequence
 
 from ..names import OURS, PUBLISHED
 
-BOUND = (24, 8)  # vertices that take a center along, and half as far for how sure that is: guesses
+BOUND = (24, 8)  # vertices that take a center along, and fewer, to see how sure that is: guesses
 STILL = 5e-5  # of the diagonal: moves below it end the rounds; 0.1 mm on a person, a guess
 Track = Float64[np.ndarray, "T K 3"]
 
