@@ -61,7 +61,8 @@ def value_table(rows: Sequence[Row]) -> list[str]:
     for row in rows:
         found = {"encode peak (MB)": value(row, "encode_mb")} if row.stream else {}
         kept = {key: number for key, number in row.metrics.items() if not key.endswith("_worst") or "iou" in key}
-        head = {"sequence": text(row.point.sequence), "measured": text(f"{row.name} {_listed(row.options)}".strip()), "frames": str(row.frames)}
+        measured = text(f"{row.name} {_listed(row.options)}".strip())
+        head = {"sequence": text(row.point.sequence), "measured": measured, "frames": str(row.frames)}
         listed = ", ".join(f"{key} {_cell(number)}" for key, number in (found | kept).items())
         records.append(head | {"values": text(listed)})
     return markdown(pd.DataFrame(records)) if records else []
