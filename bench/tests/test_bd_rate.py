@@ -54,7 +54,6 @@ def test_only_the_overlap_counts():
     result = bd_rate(anchor, test)
     assert (result.low, result.high) == (53, 59)
     assert result.percent == pytest.approx(-50)
-    assert str(result) == "b against a: -50.0 % over 53 to 59"
 
 
 def test_qualities_above_a_limit_do_not_count():
@@ -69,7 +68,6 @@ def test_without_common_quality_there_is_no_number_and_a_reason():
     result = bd_rate(_curve("a", [1, 2], [50, 53]), _curve("b", [1, 2], [60, 63]))
     assert result.percent is None
     assert "a 50 to 53" in result.reason and "b 60 to 63" in result.reason
-    assert "no BD-rate" in str(result)
     touching = bd_rate(_curve("a", [1, 2], [50, 53]), _curve("b", [1, 2], [53, 63]))
     assert touching.percent is None
 
@@ -79,7 +77,6 @@ def test_a_test_whose_cheapest_point_beats_the_whole_anchor_has_a_bound():
     result = bd_bound(anchor, test)
     assert result.at_most and (result.low, result.high) == (50, 56)
     assert result.percent == pytest.approx(100 * (0.5 / 2 - 1))  # 2 is the anchor's mean rate: 1 to 4, logarithmic
-    assert "at most" in str(result)
     worse = _curve("c", [0.5, 1, 2], [55, 60, 63])  # the same codec, had it gone lower
     assert bd_bound(anchor, worse) == bd_rate(anchor, worse) and not bd_bound(anchor, worse).at_most
     below = bd_bound(anchor, test, 53)

@@ -101,7 +101,7 @@ def test_rows_of_one_name_and_different_content_make_no_report(bench, tmp_path):
 
 def test_experiments_and_codecs_are_listed(bench):
     _, found, _ = bench("list", "--json")
-    assert {"experiment": "table2", "sequences": ["synthetic4"], "points": 33} in found["experiments"]
+    assert {"experiment": "table2", "sequences": ["synthetic4"], "points": 36} in found["experiments"]
     _, found, _ = bench("codecs", "--json")
     assert found["codecs"]["tvmc"] == "meshreel-bench"
 
@@ -116,6 +116,7 @@ def test_the_commands_of_codecs_md_parse():
 
 def test_an_operating_point_is_a_codec_and_its_options():
     assert operating_point("decimated_draco:fraction=0.5,qp=9") == ("decimated_draco", {"fraction": 0.5, "qp": 9})
+    assert operating_point("necgs:full,seed=2") == ("necgs", {"configuration": "full", "seed": 2})
     with pytest.raises(InputError, match="does not take"):
         operating_point("draco:bits=9")
 

@@ -50,14 +50,6 @@ class BdRate:
     reason: str = ""  # why `percent` is None
     at_most: bool = False  # `percent` is an upper bound: the test's cheapest point is better than the whole anchor
 
-    def __str__(self) -> str:
-        if self.percent is None:
-            return f"{self.test} against {self.anchor}: no BD-rate ({self.reason})"
-        text = f"{self.percent:+.1f} % over {self.low:.4g} to {self.high:.4g}"
-        if self.at_most:
-            text += ", at most: its cheapest point is better than all of the other's"
-        return f"{self.test} against {self.anchor}: {text}"
-
 
 def bd_rate(anchor: Curve, test: Curve, highest: float = math.inf) -> BdRate:
     """Return the mean change of rate at equal quality over the overlap up to `highest`; nothing is extrapolated.

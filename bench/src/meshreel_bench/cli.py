@@ -67,7 +67,8 @@ class Selection:
     on: Annotated[tuple[str, ...], Parameter(consume_multiple=True, negative="")] = ()
     """Only the points on these sequences, as `synthetic4`; or on any other: a name below the data, or a path."""
     add: Annotated[tuple[str, ...], Parameter(consume_multiple=True, negative="")] = ()
-    """More operating points, of any codec, as `zipmesh` or `draco:qp=12` (`codec:option=value,option=value`)."""
+    """More operating points, of any codec, as `zipmesh`, `draco:qp=12` (`codec:option=value,option=value`), or
+    `necgs:full` (`codec:configuration`)."""
 
     def points(self, name: str, ssim: bool) -> list[Point]:
         """Return the points of an experiment. Raises InputError where there are none."""
@@ -90,7 +91,9 @@ def operating_point(point: str) -> tuple[str, Options]:
     options: Options = {}
     for each in listed.split(",") if listed else ():
         name, sign, found = each.partition("=")
-        if not (sign and name):
+        if not sign and name.isidentifier():
+            name, found = "configuration", name
+        elif not (sign and name):
             raise InputError(f"operating point {point!r}: {each!r} is no option=value")
         try:
             options[name] = json.loads(found)

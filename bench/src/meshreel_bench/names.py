@@ -6,12 +6,13 @@ BEST = "meshreel best"
 TEXTURED, PAINTED = f"{BEST}, texture", f"{BEST}, vertices"  # in colour
 TSMC = "meshreel paper m, quality 50"  # as the paper has it: the number of basis vectors is varied
 TUNED = "meshreel paper"  # the same system, the quality varied and the basis chosen by it: spares what m alone cannot
-TVMC, DRACO, KLT, NECGS = "tvmc", "draco", "klt_tsdf", "necgs"
+TVMC, DRACO, KLT, NECGS, NECGS_FULL = "tvmc", "draco", "klt_tsdf", "necgs", "necgs_full"
 DECIMATED, SUBDIVIDED = "decimated_draco", "decimated_draco_subdivided"
 ONCE, ONCE_SUBDIVIDED = "background_once_draco", "background_once_draco_subdivided"
 MESHOPT = "meshoptimizer"
 FLOOR_RATIO = "dynamic_ratio"  # metric of the truth itself: share of the vertices of what moves
 VDMC, VDMC_HERE = "vdmc", "vdmc on our frames"  # of others: only in plots
+OURS, PUBLISHED = "ours", "published"  # trackers of volumes
 USUAL = {"centers": 2000, "group_size": 10}  # the paper's own
 
 _TITLES = {
@@ -21,6 +22,7 @@ _TITLES = {
     DRACO: "Draco",
     KLT: "KLT on TSDF",
     NECGS: "NeCGS (small configuration)",
+    NECGS_FULL: "NeCGS (its authors' configuration)",
     DECIMATED: "Draco, decimated",
     SUBDIVIDED: "Draco, decimated, subdivided",
     ONCE: "background once, Draco",

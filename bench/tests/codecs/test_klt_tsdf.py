@@ -17,7 +17,7 @@ from meshreel_bench.codecs.klt_tsdf.blocks import (
     encode_places,
 )
 from meshreel_bench.codecs.klt_tsdf.grid import VOLUME, prepared, sample, voxel_index
-from meshreel_bench.codecs.klt_tsdf.surface import Field, crossed, polygonize
+from meshreel_bench.codecs.klt_tsdf.surface import Field, cells_at, crossed, polygonize
 
 from meshreel.capture.procedural import SoftBodiesOptions, soft_bodies
 from meshreel.errors import FormatError, InputError
@@ -194,14 +194,14 @@ def test_the_basis_is_orthonormal_to_its_rounding_and_survives_coding():
 def test_crossed_cells_are_those_that_have_faces(body):
     mesh = body[0]
     found = sample(prepared(Mesh((mesh.vertices - mesh.vertices.min(axis=0)) * 32 / mesh.diagonal, mesh.faces)))
-    keys, index = voxel_index(found.places)
-    values = np.zeros(len(keys))
-    values[index] = np.rint(found.values * 2**24)
-    field = Field(found.places, keys, index, np.where(values == 0, 1.0, values))
+    index = voxel_index(found.places)[1].astype(np.int32).reshape(-1, 9, 9, 9)
+    values = np.rint(found.values * 2**24).astype(np.int32).reshape(index.shape)
+    field = Field(found.places, np.where(values == 0, 1, values), index)
     cells = crossed(field, np.ones(len(found.places), bool))
-    decoded = polygonize(field)
-    having = np.unique(np.floor(decoded.vertices[decoded.faces].mean(axis=1)).astype(int), axis=0)
-    assert np.array_equal(np.unique(cells, axis=0), having)
+    decoded, numbers = polygonize(field)
+    having = np.floor(decoded.vertices[decoded.faces].mean(axis=1)).astype(int)
+    assert np.array_equal(cells_at(numbers, field), having) and len(border_edges(decoded)) == 0
+    assert np.array_equal(np.sort(cells), np.unique(numbers))
 
 
 def test_places_and_bits_come_back():

@@ -116,6 +116,25 @@ def test_the_same_frames_give_the_same_bytes_and_these_the_same_meshes_in_any_pr
     assert fresh == fingerprint(TINY.decode(balls)) == fingerprint(TINY.decode(balls)[::-1][::-1])
 
 
+@torch_only
+def test_an_encode_that_was_killed_goes_on_to_the_same_bytes(monkeypatch, tmp_path):
+    pair, epochs = MeshList(BALLS.meshes[:2]), list[int]()
+    whole = replace(HASTY, workers=2).encode(pair)  # processes fit the same
+    assert whole == HASTY.encode(pair)
+    monkeypatch.setenv("MESHREEL_NECGS_KEEP", str(tmp_path))
+    monkeypatch.setattr("meshreel_bench.codecs.necgs.train.KEPT_S", 0.0)
+
+    def killed(stage, done, _total):
+        if stage == "train" and done == 3:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        HASTY.encode(pair, killed)
+    monkeypatch.setattr("meshreel_bench.codecs.necgs.fit.fit_volume", lambda *_: pytest.fail("fitted again"))
+    assert HASTY.encode(pair, lambda stage, done, _: epochs.append(done) if stage == "train" else None) == whole
+    assert epochs[0] == 4
+
+
 def _settings_of(torch):
     strict = torch.are_deterministic_algorithms_enabled(), torch.utils.deterministic.fill_uninitialized_memory
     return torch.get_num_threads(), *strict, torch.get_rng_state()
@@ -232,6 +251,8 @@ def test_naming_the_codec_does_not_load_torch():
 def test_every_configuration_is_a_codec():
     assert make_codec("necgs", {}) == NecgsCodec()
     assert make_codec("necgs", QUICK).shape.layers == ((16, 64), (8, 48), (6, 32), (4, 4))
+    full = make_codec("necgs", {"configuration": "full", "epochs": 7})
+    assert (full.name, full.resolution, full.channels, full.epochs, full.workers) == ("necgs_full", 128, 64, 7, 0)
 
 
 @pytest.mark.parametrize(
@@ -248,6 +269,7 @@ def test_every_configuration_is_a_codec():
         ({"rate": float("nan")}, "rate nan"),
         ({"structure": -1.0}, "structure -1.0: give a weight of 0 to 1000"),
         ({"structure": float("inf")}, "structure inf"),
+        ({"configuration": "huge"}, "configuration 'huge': give small or full"),
         ({"blocks": 8}, "does not take"),
     ],
 )

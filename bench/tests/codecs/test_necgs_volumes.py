@@ -48,7 +48,7 @@ def coded(frames: int = 3, seed: int = 0) -> Coded:
 def test_the_surface_of_any_signs_is_closed_and_each_edge_is_walked_both_ways_alike():
     distances = np.ones((10, 10, 10), np.float32)
     distances[1:-1, 1:-1, 1:-1] = np.random.default_rng(1).normal(size=(8, 8, 8))
-    found = cut(distances)
+    found = cut(distances[None])
     _, face_edges = unique_edges(found.faces)
     assert len(found.faces) > 1000
     assert set(np.bincount(face_edges.reshape(-1)) % 2) == {0}

@@ -67,3 +67,14 @@ def test_the_data_set_is_made_of_the_body_and_has_sixty_frames_at_most(tmp_path)
     assert [path.parent.name for path in (tmp_path / "cache").rglob("*.ply")] == ["crane60"]
     with pytest.raises(InputError, match="samba"):
         Store(tmp_path).open("samba60")
+
+
+def test_two_pass_each_other_and_share_no_connectivity(tmp_path):
+    for body in ("crane", "samba"):
+        np.savez(tmp_path / f"{body}.npz", vertices=np.stack([0.2 * BALL.vertices] * 150), faces=BALL.faces)
+    long = Store(tmp_path, tmp_path / "cache").open("synthetic2x150").sequence
+    shown = {number: long[number] for number in (0, 74, 149)}
+    widths = [float(np.ptp(mesh.vertices[:, 0])) for mesh in shown.values()]
+    assert len(long) == 150 and np.allclose(widths, [2.6, 0.9, 2.6], atol=0.02)
+    assert components(shown[74].faces, len(shown[74].vertices)).max() == 1 and not equal(shown[0], shown[149])
+    assert len(Store(tmp_path).open("synthetic2x150", 3).sequence) == 3

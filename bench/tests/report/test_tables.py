@@ -7,14 +7,11 @@ import pandas as pd
 from meshreel_bench.experiments.study import D2, MASKED, NORMALS
 from meshreel_bench.report.equal import rate_ratio, rate_table
 from meshreel_bench.report.tables import (
-    DAGGER,
     bd_table,
-    comparable_table,
     failure_table,
     maker_table,
     markdown,
     point_table,
-    ranked,
     summary_table,
     text,
     value_table,
@@ -36,14 +33,6 @@ def test_text_is_no_markup_and_words_stay_as_they_are():
 def test_columns_of_which_nothing_is_known_are_left_out():
     table = pd.DataFrame([{"a": "x", "b": None, "c": 0.123456}, {"a": "y", "b": None, "c": float("nan")}])
     assert markdown(table) == ["| a | c |", "|---|---|", "| x | 0.1235 |", "| y |  |"]
-
-
-def test_the_best_number_is_bold_and_the_second_italic_among_those_of_a_group():
-    table = pd.DataFrame({"name": list("abcde"), "dB": [3.0, 1.0, 2.0, 9.0, 3.0]})
-    lines = markdown(ranked(table, {"dB": 1}, ["g", "g", "g", None, "g"]))
-    assert lines[0] == "| name | dB ↑ |"
-    assert [line.split(" | ")[1].rstrip(" |") for line in lines[2:]] == ["**3**", "1", "*2*", "9", "**3**"]
-    assert "**" not in "".join(markdown(ranked(table.head(1), {"dB": 1})))
 
 
 def test_points_are_listed_curve_by_curve_from_the_lowest_rate_on():
@@ -84,13 +73,6 @@ def test_rates_at_equal_quality_are_told_in_times_of_the_best():
     assert rate_ratio(ROWS, "draco", "best", D2) > 3 and rate_table(DRACO, "best", (D2,)) == []
     worse = [row("ball", "worse", rate, 50 + rate) for rate in (1.0, 2.0)]
     assert "- (up to 52 dB at 2)" in rate_table([*BEST, *worse], "best", (D2,))[3]
-
-
-def test_codecs_are_compared_near_a_rate_or_a_quality_and_far_ones_are_marked():
-    lines = comparable_table(ROWS, 2.0, None)
-    assert "| best | 2 | **70**" in lines[3] and "| draco | 2 | *58*" in lines[2]
-    lines = comparable_table(ROWS, 70.0, D2)
-    assert f"draco {DAGGER}" in lines[2] and lines[-1].startswith(f"{DAGGER} No point within 1 dB of 70 dB")
 
 
 def test_failures_floors_and_makers_are_listed():

@@ -12,6 +12,7 @@ from meshreel.errors import InputError
 
 UNIFORM, IN_MDS_POSE, BOTH = "one step, plain rounding", "MDS pose, no cuts", "MDS pose, no cuts, one step"
 RELEASED, LARGER = "the release's step", "reference of 5000 vertices"
+TOGETHER, FROM_MESHES = "one sequence", "background from meshes"  # of a scene
 RELEASED_STEP = 5e-5  # of a diagonal: the release has 1e-4 m, and people's diagonals are about 2 m
 Change = Callable[[EncoderOptions], EncoderOptions]
 Method = TypeVar("Method", LayersOptions, PaperOptions)
@@ -42,9 +43,8 @@ def _plain(options: PaperOptions) -> PaperOptions:
     return replace(options, rounding="plain", steps="uniform", displacements=anchored)
 
 
-def _background_from_meshes(options: EncoderOptions) -> EncoderOptions:
-    scene = options.scene or SceneOptions()
-    return replace(options, scene=replace(scene, background=replace(scene.background, depth=False)))
+def _scene(change: Callable[[SceneOptions], SceneOptions]) -> Change:
+    return lambda options: replace(options, scene=change(options.scene or SceneOptions()))
 
 
 VARIANTS: dict[str, Change] = {
@@ -61,7 +61,8 @@ VARIANTS: dict[str, Change] = {
     BOTH: _paper(lambda o: replace(_plain(o), pose="mds", cuts=False)),
     RELEASED: _paper(lambda o: replace(o, displacements=replace(o.displacements, step=RELEASED_STEP))),
     LARGER: _paper(lambda o: replace(o, reference=replace(o.reference, vertices=5000))),
-    "background from meshes": _background_from_meshes,
+    FROM_MESHES: _scene(lambda o: replace(o, background=replace(o.background, depth=False))),
+    TOGETHER: _scene(lambda o: replace(o, bodies=replace(o.bodies, cell=1e4))),  # all pieces are near each other
 }
 
 

@@ -1,4 +1,4 @@
-"""Sequences by name: bodies, four of them side by side, scenes, recordings; or any folder.
+"""Sequences by name: bodies, two or four of them side by side, scenes, recordings; or any folder.
 
 In: a name, the folder of the benchmark data, a folder to keep things in. Out: a Dataset. Benchmark data are compared
 with their checksums; other sequences have a digest, which rows carry. Sequences of files are welded: seams count as one
@@ -12,6 +12,8 @@ import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+
+import numpy as np
 
 from meshreel.analysis.scene.masks import VIEW_FILES, read_view_file
 from meshreel.capture.procedural import SoftBodiesOptions, soft_bodies
@@ -50,10 +52,14 @@ SCALES = {"basketball_player": 0.1, "textured/basketball_player": 0.1}  # to met
 REMESHED = {  # new connectivity in every frame: of a body, its first frames
     "crane60": ("crane", 60, RemeshOptions()),
     "samba60": ("samba", 60, RemeshOptions()),
+    "crane150": ("crane", 150, RemeshOptions()),
+    "samba150": ("samba", 150, RemeshOptions()),
     "dancer160k": ("dancer", 4, RemeshOptions(vertices=160_000, levels=2)),
 }
 RELEASED = ("answering", "drinking", "arena", "sitting", "synthetic")  # folders of the data of TSMC's authors
-NAMES = (DEMO, *SHAPES, SYNTHETIC, *SCENES, ROOM3, PROCEDURAL, WALKER, *RECORDINGS, *REMESHED)
+LONG, LONG_FRAMES = "synthetic2x150", 150  # crane150, and samba150 that passes close by
+FAR, NEAR = 2.2, 0.5  # m, of the second body's way: surfaces are 1.2 m apart first, 0.06 in the middle, 0.7 last
+NAMES = (DEMO, *SHAPES, SYNTHETIC, LONG, *SCENES, ROOM3, PROCEDURAL, WALKER, *RECORDINGS, *REMESHED)
 # Endings of names: the same sequence in another order, of the wanted length.
 PLAYED: dict[str, Callable[[MeshSequence, int], MeshSequence]] = {
     "-backwards": lambda sequence, count: Chosen(sequence, range(len(sequence))[::-1][:count]),
@@ -101,6 +107,10 @@ class Store:
             count = min(frames or SYNTHETIC_FRAMES, SYNTHETIC_FRAMES)
             bodies = [(_open_files(body, self.data, count), place) for body, place in BODIES.items()]
             return Dataset(SideBySide(bodies))
+        if name == LONG:
+            first, second = (self.open(body, frames).sequence for body in ("crane150", "samba150"))
+            x = FAR - (FAR - NEAR) * np.sin(np.pi * np.arange(LONG_FRAMES) / (LONG_FRAMES - 1)) ** 2
+            return Dataset(SideBySide([(first, (0.0, 0.0, 0.0)), (second, x[:, None] * [1.0, 0.0, 0.0])]))
         if name in REMESHED:
             body, most, options = REMESHED[name]
             source = _open_files(body, self.data, min(frames or most, most))

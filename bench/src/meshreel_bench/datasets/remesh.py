@@ -22,7 +22,9 @@ from meshreel.io.meshes import read_mesh
 from meshreel.io.write import write_mesh
 from meshreel.types import Frames, Mesh, MeshSequence
 
-Place = tuple[float, float, float]  # m, added to the coordinates
+Place = (
+    tuple[float, float, float] | Float64[np.ndarray, "T 3"]
+)  # m, added to the coordinates; of each frame, where it moves
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,8 +69,8 @@ class SideBySide(Frames):
 
     def __getitem__(self, index: int) -> Mesh:
         number = range(len(self))[index]
-        frames = ((body[number], place) for body, place in self._bodies)
-        return concatenate([Mesh.of(mesh.vertices + place, mesh.faces) for mesh, place in frames])
+        frames = ((body[number], np.atleast_2d(place)) for body, place in self._bodies)
+        return concatenate([Mesh.of(mesh.vertices + way[number % len(way)], mesh.faces) for mesh, way in frames])
 
 
 def remesh(mesh: Mesh, seed: int, options: RemeshOptions = RemeshOptions()) -> Mesh:

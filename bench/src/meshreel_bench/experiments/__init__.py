@@ -4,26 +4,27 @@ from __future__ import annotations
 
 from meshreel.errors import InputError
 
-from . import ablations, color, figure6, layers, mpeg, recordings, scenes, speed, splats, targets
+from . import ablations, color, figure6, layers, mpeg, recordings, scenes, speed, splats
 from .study import Study
 
 # In the order of the report.
 EXPERIMENTS: dict[str, Study] = {
     "figure6": figure6.STUDY,
     "mpeg": mpeg.STUDY,
+    "long": figure6.LONG,
     "table1": figure6.TABLE_1,
     "table2": figure6.TABLE_2,
     "table3": splats.TABLE_3,
     "ablation_paper": ablations.PAPER,
     "ablation_centers": ablations.CENTERS,
     "ablation_gof": ablations.GOF,
-    "ablation_basis": ablations.BASIS,
     "ablation_stages": ablations.STAGES,
+    "ablation_scene": ablations.SCENE,
     "scenes": scenes.STUDY,
     "recordings": recordings.STUDY,
     "layers": layers.STUDY,
-    "targets": targets.STUDY,
     "speed": speed.STUDY,
+    "tracker": ablations.TRACKERS,
     "color": color.STUDY,
 }
 

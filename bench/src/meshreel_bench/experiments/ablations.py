@@ -1,18 +1,19 @@
-"""Ablations of TSMC as the paper has it (section 4.4), and of the preset `best` part by part."""
+"""Ablations of TSMC as the paper has it (section 4.4), of preset `best` part by part, and trackers (section 3.1)."""
 
 from __future__ import annotations
 
-from ..codecs.variants import BOTH, IN_MDS_POSE, RELEASED, UNIFORM
-from ..names import BEST, TSMC
+from ..codecs.variants import BOTH, FROM_MESHES, IN_MDS_POSE, RELEASED, TOGETHER, UNIFORM
+from ..names import BEST, OURS, PUBLISHED, TSMC
 from ..rows import Options
-from .study import D2, MASKED, NORMALS, SYMMETRIC, Bound, Measure, Needs, Study, Sweep, Which
+from .scenes import MEASURES
+from .study import D2, MASKED, NORMALS, SYMMETRIC, TRACKER, Bound, Measure, Needs, NoMore, Study, Sweep, Which
 
 LITERAL_PRESET = "paper-literal"
 POSES = (Measure("canonical_groups", "groups in the MDS pose"), Measure("draco_frames", "frames of Draco", sign=-1))
 M = {"basis_size": (2, 5, 10)}
 CENTERS = Study(
     title="Number of volume centers, TSMC",
-    sequences=("dancer",),
+    sequences=("dancer", "mitch"),
     sweeps=[
         Sweep("meshreel", M, {"preset": "paper", "centers": k, "group_size": 10}) for k in (1000, 2000, 3000, 4000)
     ],
@@ -20,21 +21,12 @@ CENTERS = Study(
 )
 GOF = Study(
     title="Frames of a group, TSMC",
-    sequences=("crane60",),
+    sequences=("crane60", "samba60"),
     sweeps=[
         Sweep("meshreel", {"basis_size": (2, 3, 5)}, {"preset": "paper", "centers": 2000, "group_size": size})
         for size in (5, 10, 15)
     ],
-    frames={"crane60": 30},
-    anchor=TSMC,
-)
-BASIS = Study(
-    title="Number of basis vectors m at several qualities of the rest, TSMC",
-    sequences=("dancer",),
-    sweeps=[
-        Sweep("meshreel", {"basis_size": (1, 2, 3, 5, 8, 10)}, {"preset": "paper", "quality": quality})
-        for quality in (20.0, 50.0, 80.0)
-    ],
+    frames={"crane60": 30, "samba60": 30},
     anchor=TSMC,
 )
 RELEASE = {3: (2.23, 51.87), 5: (3.29, 54.35), 10: (5.78, 56.40), 30: (15.46, 59.02)}  # its Mbps and D2, dB, by m
@@ -100,4 +92,38 @@ STAGES = Study(
     anchor=BEST,
     frames={LONG: 32},
     notes=("Positive: without the part more rate is needed.",),
+)
+SCENE = Study(
+    title="A scene: one sequence of all that moves against a track a body, and a background from meshes against depth",
+    sequences=("room2",),
+    sweeps=(
+        Sweep("meshreel", AROUND, WHOLE),
+        *(Sweep("meshreel", QUALITIES, WHOLE | {"variant": part}) for part in (TOGETHER, FROM_MESHES)),
+    ),
+    metrics="regions",
+    measures=MEASURES,
+    anchor=BEST,
+    frames={"room2": 30},
+)
+CAPTURED = ("crane", "samba")
+TURNING = ("gears", "prism")
+TRACKERS = Study(
+    title="Volume tracking against known motion",
+    sequences=(*CAPTURED, *TURNING),
+    sweeps=(Sweep(TRACKER, {"method": (OURS, PUBLISHED)}),),
+    frames=dict.fromkeys(CAPTURED, 30) | dict.fromkeys(TURNING, 10),
+    promises=tuple(
+        NoMore(
+            f"{name}: distance of centers from the true motion against the published energy's",
+            Which(name, TRACKER, {"method": OURS}),
+            "center_rms_mm",
+            1.0,
+            (Which(name, TRACKER, {"method": PUBLISHED}),),
+        )
+        for name in (*CAPTURED, *TURNING)
+    ),
+    notes=(
+        "Centers of the first frame are the same for both. The true motion of one is that of the surface around it, as",
+        "rigid as it can be; `truth_rms_mm` is by how much that differs with the number of vertices it is taken from.",
+    ),
 )

@@ -197,15 +197,13 @@ class Study:
     promises: Sequence[Promise] = ()
     floors: Sequence[str] = ()  # sequences of which the truth itself is measured
     frames: Mapping[str, int] = field(default_factory=dict)  # the first ones of a sequence; none given: all
-    common: tuple[Measure, float] | None = None  # table of each curve's point nearest to this quality
-    common_mbps: float | None = None  # the same by rate
     rate: str = "mbps"  # of plots: name of a row's value
     notes: Sequence[str] = ()  # Markdown, before the tables
 
     def points(self, small: bool = False) -> Iterator[Point]:
         """Yield all points, sequence by sequence; where `small`, one of each sweep on a few procedural frames."""
         if small:
-            own = {sweep.small_point().key: sweep.small_point() for sweep in self.sweeps if sweep.codec != FOUND}
+            own = {sweep.small_point().key: sweep.small_point() for sweep in self.sweeps if sweep.codec not in INSTEAD}
             yield from own.values()
             return
         for sequence in self.sequences:
@@ -220,4 +218,5 @@ class Study:
         return replace(self, sequences=sequences or self.sequences, sweeps=(*self.sweeps, *sweeps))
 
 
-FLOOR, FOUND = "captured", "segmentation"  # in a codec's place: the truth itself, and labels of what moves
+# In a codec's place: the truth itself, labels of what moves, and tracked centers.
+FLOOR, FOUND, TRACKER = INSTEAD = "captured", "segmentation", "tracker"

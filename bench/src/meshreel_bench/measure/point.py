@@ -1,7 +1,8 @@
 """Measurement of a point: rate of all bytes, metrics of decoded frames, times of both directions.
 
-Bodies are judged by all frames, scenes by some. A codec is given all, or those of a sampled point; the rate is then
-theirs. In a codec's place `captured` is the truth itself, `segmentation` the encoder's labels of what moves.
+Bodies are judged by all frames, long ones and scenes by some. A codec is given all, or those of a sampled point; the
+rate is then theirs. In a codec's place `captured` is the truth itself, `segmentation` the encoder's labels of what
+moves, `tracker` centers of the volume.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ from ..codecs.scenes import BackgroundDracoCodec
 from ..datasets import Dataset, Store
 from ..datasets.scenes import FOUND, TRUE, SceneFrames
 from ..datasets.solid import InColours, coloured
-from ..experiments.study import FLOOR
+from ..experiments.study import FLOOR, TRACKER
 from ..experiments.study import FOUND as SEGMENTATION
 from ..names import FLOOR_RATIO
 from ..rows import Encoding, Group, Point, Row, Stream
@@ -40,8 +41,10 @@ from .maker import maker
 from .metrics import Measured, measure_frames
 from .segmentation import Labels, score_labels
 from .splats import splat_values
+from .tracker import tracker_values
 
 TRUTH_NAME, UNCOMPRESSED = "the truth itself", "uncompressed"
+LONG = 60  # frames: half as many of a longer sequence are compared by pictures
 SOME = 10  # frames of a scene that a sampled point has; of all other points every second of these is measured
 KEYS = "key_frames"  # of a file's metadata: numbers of the frames that others are predicted from
 
@@ -59,12 +62,15 @@ def measure_point(point: Point, store: Store) -> Row:
     if painted is not None:  # colours tell where the surface slides
         known = replace(known, sequence=InColours(known.sequence, painted))
     count = len(known.sequence)
-    some = evenly(count, SOME) if known.cameras else list(range(count))
+    is_long = count > LONG and point.metrics == "views"
+    some = evenly(count, SOME if known.cameras else LONG // 2 if is_long else count)
     whole = not known.cameras or point.sampled or point.metrics == "regions"
     numbers = list(range(count)) if point.metrics == "depth" else some if whole else some[::2]
     row = empty_row(point, store, frames=count, frame_rate=known.sequence.frame_rate, measured_frames=numbers)
     if point.codec == SEGMENTATION:
         return msgspec.structs.replace(row, metrics=_segmentation(known))
+    if point.codec == TRACKER:
+        return msgspec.structs.replace(row, metrics=tracker_values(known.sequence, str(point.options["method"])))
     if point.codec == FLOOR:
         if painted is not None:
             return _uncompressed(row, known, painted)

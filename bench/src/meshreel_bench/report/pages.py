@@ -79,7 +79,9 @@ def write_report(rows: Sequence[Row], folder: Path) -> list[Path]:
     for part, sequence in _shown(parts):
         own = [row for row in part.drawn if row.point.sequence == sequence]
         plots.append(plot_curves(own, (D2, MASKED), looks, folder / FOLDER / _plot_name(part, sequence)))
-    if page := reproducing_page([row for part in parts if part.name in (OPEN, "table3") for row in part.rows]):
+    if page := reproducing_page(
+        [row for part in parts if part.name in (OPEN, "long", "table3", "tracker") for row in part.rows]
+    ):
         pages[Path("reproducing.md")] = page
     if found := headline({part.name: part.rows for part in parts}):
         pages[Path(FOLDER, "headline.json")] = json.dumps(found, indent=2).splitlines()
@@ -154,10 +156,6 @@ def _appendix(part: Part) -> Iterator[str]:
         yield from (f"## {tables.text(name)}", "")
         for table in (*_comparisons(study, own), tables.point_table(own, study.measures)):
             yield from (*table, "") if table else ()
-    for measure, wanted in ((None, study.common_mbps), *([study.common] if study.common else [])):
-        if wanted is not None:
-            near = f"{wanted:g} Mbps" if measure is None else measure.shown(wanted)
-            yield from (f"## Near {near}", "", *tables.comparable_table(part.rows, wanted, measure), "")
     if others := [row for row in part.rows if not (row.stream and row.metrics)]:
         yield from ("## Without rate or quality", "", *tables.value_table(others), "")
     if part.failed:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from importlib.resources import files
 
+from ..experiments.study import TRACKER
 from ..names import BEST, TSMC, TUNED
 from ..rows import Row
 from .bandwidth import headline_table, vdmc_table
@@ -12,7 +13,7 @@ from .published import RELEASED, TABLE_1, TABLE_2, Published
 from .values import curve_of, rated, value
 
 SCENES = ("room2", "living_room", "procedural_room")
-SYNTHETIC = "synthetic4"
+FOUR_AND_TWO = ("synthetic4", "synthetic2x150")  # people
 SLACK_DB, SHORT = 0.1, " †"  # a point that is worse by more is marked
 PAPER_3 = (("TSMC", 6.13, 25.35, 0.9462), ("uncompressed", 357.6, 26.46, 0.9594))  # LMG of 2026: name, Mbps, dB, SSIM
 TEXT = "reproducing.md"  # package data: the page, with a line {NAME} for each table
@@ -21,7 +22,7 @@ TEXT = "reproducing.md"  # package data: the page, with a line {NAME} for each t
 def reproducing_page(rows: Sequence[Row]) -> list[str]:
     """Return the lines of the page; no lines where no row is of a sequence that the paper's tables stand beside."""
     own = [row for row in rated(rows) if row.point.metrics == "views"]
-    if not {row.point.sequence for row in own} & {*SCENES, SYNTHETIC, *RELEASED}:
+    if not {row.point.sequence for row in own} & {*SCENES, *FOUR_AND_TWO, *RELEASED}:
         return []
     tables = {"{table_1}": _table_1, "{table_2}": _table_2, "{released}": _released}
     page = (files(__package__) / TEXT).read_text(encoding="utf-8")
@@ -29,6 +30,7 @@ def reproducing_page(rows: Sequence[Row]) -> list[str]:
     drawn = [row for row in rated(rows) if row.point.metrics == "splats"]
     lines = {text: list(table(own)) for text, table in tables.items()} | {"{table_3}": list(_table_3(drawn))}
     lines |= {"{headline}": list(headline_table(every)), "{vdmc}": list(vdmc_table(own))}
+    lines["{tracker}"] = list(_tracker([row for row in rows if row.point.codec == TRACKER]))
     return [line for text in page.splitlines() for line in lines.get(text, [text])]
 
 
@@ -41,12 +43,12 @@ def _table_1(rows: Sequence[Row]) -> Iterator[str]:
 
 
 def _table_2(rows: Sequence[Row]) -> Iterator[str]:
-    yield from _heads(["paper", f"here, {SYNTHETIC}"])
-    own = rated(rows, SYNTHETIC)
+    yield from _heads(["paper", *(f"here, {name}" for name in FOUR_AND_TWO)])
     for system in (*TABLE_2, None):
         codec = BEST if system is None else system.codec
         wanted = TABLE_2[0].d2_psnr if system is None else system.d2_psnr
-        yield _line(system, codec, [_published(system), _as_good(own, codec, wanted)])
+        found = [_as_good(rated(rows, name), codec, wanted) for name in FOUR_AND_TWO]
+        yield _line(system, codec, [_published(system), *found])
 
 
 def _released(rows: Sequence[Row]) -> Iterator[str]:
@@ -77,6 +79,15 @@ def _table_3(rows: Sequence[Row]) -> Iterator[str]:
             own = "" if known["own_psnr"] is None else f"{known['own_psnr']}, {known['own_ssim']}"
             cells += [own, known["per_frame_mbps"], here, known["mbps"]]
         yield f"| {' | '.join(map(str, cells))} |"
+
+
+def _tracker(rows: Sequence[Row]) -> Iterator[str]:
+    yield "| sequence | tracker | RMS, mm | in the last frame | 95 % below | truth within | CPU s a frame |"
+    yield "|---|---|---|---|---|---|---|"
+    for row in rows:
+        keys = ("center_rms_mm", "center_rms_last_mm", "center_95_mm", "truth_rms_mm", "track_s")
+        cells = [f"{value(row, key) or 0.0:.1f}" for key in keys]
+        yield f"| {row.point.sequence}, {row.frames} frames | {row.options['method']} | {' | '.join(cells)} |"
 
 
 def _heads(columns: Sequence[str]) -> Iterator[str]:

@@ -3,21 +3,16 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Hashable, Mapping, Sequence
-from math import log
+from collections.abc import Sequence
 
 import pandas as pd
 
 from ..bd_rate import bd_rate
-from ..experiments.study import D2, MASKED, NORMALS, SSIM, Measure
+from ..experiments.study import Measure
 from ..rows import Options, Row
 from .looks import in_order
 from .values import curve, curve_of, rated, sequences, value
 from .verdicts import Verdict
-
-NEAR = 1.25  # factor of a rate within which points are compared
-NEAR_DB = 1.0  # of a PSNR
-DAGGER, ARROWS = "†", {1: " ↑", -1: " ↓"}
 
 
 def text(found: object) -> str:
@@ -34,24 +29,6 @@ def markdown(table: pd.DataFrame) -> list[str]:
     heads = [str(name) for name in known.columns]
     lines = [f"| {' | '.join(heads)} |", "|" + "---|" * len(heads)]
     return lines + [f"| {' | '.join(map(_cell, line))} |" for line in known.itertuples(index=False, name=None)]
-
-
-def ranked(table: pd.DataFrame, signs: Mapping[str, int], groups: Sequence[Hashable] | None = None) -> pd.DataFrame:
-    """Return the table with the best number of each column, and group, bold and the second italic, arrows in heads.
-
-    `signs` is 1 where more is better, -1 where less is; rows whose group is None have no rank.
-    """
-    groups = groups if groups is not None else [True] * len(table)
-    marked = table.astype(object)
-    for name, sign in signs.items():
-        numbers = pd.to_numeric(table[name], errors="coerce").map(lambda number: float(f"{number:.4g}"))
-        own = numbers.groupby(pd.Series(groups, index=table.index, dtype=object))  # None is in no group
-        ranks, counts = own.rank(method="dense", ascending=sign < 0), own.transform("count")
-        for index, rank in ranks.items():
-            mark = {1.0: "**", 2.0: "*"}.get(rank, "") if counts[index] > 1 else ""
-            if mark:
-                marked.loc[index, name] = f"{mark}{_cell(table.loc[index, name])}{mark}"
-    return marked.rename(columns={name: name + ARROWS.get(sign, "") for name, sign in signs.items()})
 
 
 def point_table(rows: Sequence[Row], measures: Sequence[Measure]) -> list[str]:
@@ -84,7 +61,8 @@ def value_table(rows: Sequence[Row]) -> list[str]:
     for row in rows:
         found = {"encode peak (MB)": value(row, "encode_mb")} if row.stream else {}
         kept = {key: number for key, number in row.metrics.items() if not key.endswith("_worst") or "iou" in key}
-        head = {"sequence": text(row.point.sequence), "measured": text(row.name), "frames": str(row.frames)}
+        measured = text(f"{row.name} {_listed(row.options)}".strip())
+        head = {"sequence": text(row.point.sequence), "measured": measured, "frames": str(row.frames)}
         listed = ", ".join(f"{key} {_cell(number)}" for key, number in (found | kept).items())
         records.append(head | {"values": text(listed)})
     return markdown(pd.DataFrame(records)) if records else []
@@ -136,27 +114,6 @@ def bd_cell(rows: Sequence[Row], test: str, other: str, measure: Measure) -> str
     return f"{found.percent:+.1f} % ({span})"
 
 
-def comparable_table(rows: Sequence[Row], wanted: float, measure: Measure | None) -> list[str]:
-    """Return each curve's point nearest to a quality or a rate, ranked among those of a sequence where it is near."""
-    records, groups = list[dict[str, object]](), list[Hashable]()
-    for sequence in sequences(rows):
-        for name, row in _nearest(rated(rows, sequence), wanted, measure).items():
-            near = _distance(row, wanted, measure) <= 1 + 1e-9
-            head = {"sequence": text(sequence), "codec": text(name) + ("" if near else f" {DAGGER}"), "Mbps": row.mbps}
-            records.append(head | {each.label: value(row, each.key) for each in _COMPARED})
-            groups.append(sequence if near else None)
-    if not records:
-        return []
-    signs = {each.label: each.sign for each in _COMPARED if measure is None or each.key != measure.key}
-    lines = markdown(ranked(pd.DataFrame(records), signs if measure is None else {"Mbps": -1} | signs, groups))
-    limit = f"a factor of {NEAR:g} of {wanted:g} Mbps" if measure is None else f"{NEAR_DB:g} dB of {wanted:g} dB"
-    note = f"{DAGGER} No point within {limit}: the nearest is shown, and is not ranked."
-    return [*lines, "", note] if None in groups else lines
-
-
-_COMPARED = (D2, SSIM, MASKED, NORMALS, Measure("decode_ms", "decode", " ms/frame", -1))
-
-
 def verdict_table(found: Sequence[Verdict]) -> list[str]:
     """Return targets and what was measured."""
     records = [{"target": text(v.text), "bound": v.bound, "measured": text(v.value or ""), " ": v.word} for v in found]
@@ -190,23 +147,6 @@ def _cell(cell: object) -> str:
     if isinstance(cell, str):
         return cell
     return "" if cell is None or pd.isna(cell) else f"{cell:.4g}"
-
-
-def _nearest(rows: Sequence[Row], wanted: float, measure: Measure | None) -> dict[str, Row]:
-    """Return the nearest row of each curve, in order; of two the cheaper one."""
-    found = {}
-    for name in in_order(map(curve_of, rows)):
-        own = [row for row in rows if curve_of(row) == name and (not measure or value(row, measure.key) is not None)]
-        if own:
-            found[name] = min(own, key=lambda row: (_distance(row, wanted, measure), row.mbps))
-    return found
-
-
-def _distance(row: Row, wanted: float, measure: Measure | None) -> float:
-    """Return the distance of a row from the wanted rate or value, in units of NEAR or NEAR_DB."""
-    if measure is None:
-        return abs(log(row.mbps / wanted)) / log(NEAR)
-    return abs((value(row, measure.key) or 0.0) - wanted) / NEAR_DB
 
 
 def _listed(options: Options) -> str:

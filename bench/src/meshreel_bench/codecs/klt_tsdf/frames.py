@@ -13,12 +13,13 @@ import numpy as np
 from jaxtyping import Float64, Int32, Int64
 
 from meshreel.geometry.closest_points import Surface
+from meshreel.geometry.topology import drop_unreferenced
 from meshreel.types import Mesh
 
 from .basis import join, split
 from .blocks import decode_bits, decode_places, decode_symbols, encode_bits, encode_places, encode_symbols
-from .grid import SIDE, block_keys, prepared, sample
-from .surface import Field, cells_of, crossed, field_of, polygonize, without
+from .grid import prepared, sample
+from .surface import VOXELS, Field, cells_at, crossed, field_of, polygonize
 from .weights import Model, forward
 
 _FAR = 1.5  # voxels from the surface beyond which decoded surface is left out
@@ -59,36 +60,36 @@ def decode_group(data: bytes, count: int, width: int) -> Group:
 def decode_frame(group: Group, number: int, model: Model) -> Mesh:
     """A frame of a group, in voxel units."""
     field = field_of(group.places[number], group.symbols[number], model)
-    return without(polygonize(field), _decode_omitted(group.omitted[number], field))
+    (mesh, cells), omitted = polygonize(field), _decode_omitted(group.omitted[number], field)
+    if not len(omitted):
+        return mesh
+    kept = np.ones(VOXELS * len(field.places), bool)
+    kept[omitted] = False
+    return drop_unreferenced(Mesh(mesh.vertices, mesh.faces[kept[cells]]))
 
 
 def _encode_omitted(mesh: Mesh, field: Field) -> bytes:
     """Which blocks leave surface out, and which of their cells; nothing where none does."""
-    cells = _wrong(mesh, polygonize(field))
+    cells = _wrong(mesh, *polygonize(field))
     if len(cells) == 0:
         return b""
     chosen = np.zeros(len(field.places), bool)
-    every = crossed(field, ~chosen)
-    cells = cells[np.isin(cells, block_keys(every))]
-    owners = _owners(every, field)
-    chosen[owners[np.isin(block_keys(every), cells)]] = True
-    if not chosen.any():
-        return b""
-    seen = every[chosen[owners]]
-    return join([encode_bits(chosen, field.places), encode_bits(np.isin(block_keys(seen), cells), seen)])
+    chosen[cells // VOXELS] = True
+    seen = crossed(field, chosen)
+    return join([encode_bits(chosen, field.places), encode_bits(np.isin(seen, cells), cells_at(seen, field))])
 
 
-def _decode_omitted(data: bytes, field: Field) -> Int64[np.ndarray, "C 3"]:
-    """The cells that are left out."""
+def _decode_omitted(data: bytes, field: Field) -> Int64[np.ndarray, " C"]:
+    """The numbers of the cells that are left out."""
     if not data:
-        return np.zeros((0, 3), np.int64)
+        return np.zeros(0, np.int64)
     first, second = split(data, 2)
     cells = crossed(field, decode_bits(first, field.places))
-    return cells[decode_bits(second, cells)]
+    return cells[decode_bits(second, cells_at(cells, field))]
 
 
-def _wrong(mesh: Mesh, decoded: Mesh) -> Int64[np.ndarray, " C"]:
-    """The keys of the cells most of whose decoded faces are where the mesh is not."""
+def _wrong(mesh: Mesh, decoded: Mesh, cells: Int64[np.ndarray, " F"]) -> Int64[np.ndarray, " C"]:
+    """The numbers of the cells, of those of the faces, most of whose decoded faces are where the mesh is not."""
     if decoded.is_empty or mesh.is_empty:
         return np.zeros(0, np.int64)
     middles = decoded.vertices[decoded.faces].mean(axis=1)
@@ -98,11 +99,6 @@ def _wrong(mesh: Mesh, decoded: Mesh) -> Int64[np.ndarray, " C"]:
     squared = np.einsum("nd,nd->n", away, away)
     along = np.einsum("nd,nd->n", away, surface.normals[hits.faces])
     past = surface.past_border(hits) & (squared - along**2 > _PAST**2)
-    keys, index = np.unique(cells_of(decoded), return_inverse=True)
+    numbers, index = np.unique(cells, return_inverse=True)
     share = np.bincount(index, past | (squared > _FAR**2)) / np.bincount(index)
-    return keys[share > 0.5]
-
-
-def _owners(cells: Int64[np.ndarray, "C 3"], field: Field) -> Int64[np.ndarray, " C"]:
-    """The number of the block that each cell is in."""
-    return np.searchsorted(block_keys(field.places), block_keys(cells // SIDE))
+    return numbers[share > 0.5]

@@ -71,11 +71,6 @@ def block_keys(places: Int64[np.ndarray, "B 3"]) -> Int64[np.ndarray, " B"]:
     return _CELLS.keys(places + 0.5)
 
 
-def places_of(keys: Int64[np.ndarray, " B"]) -> Int64[np.ndarray, "B 3"]:
-    """The inverse of `block_keys`."""
-    return _CELLS.cells(keys)
-
-
 def signed_distances(
     mesh: Mesh, points: Float64[np.ndarray, "N 3"]
 ) -> tuple[Float64[np.ndarray, " N"], Bool[np.ndarray, " N"]]:

@@ -15,7 +15,7 @@ Differs from the publication:
   fade. `encode` refuses sets of which training has lost a frame.
 - Networks narrow as the authors' do, in proportion to `channels`; no head layer, no grids of 256. The defaults are a
   quarter as wide with fewer, faster steps, and weight the structural similarities 1 instead of 10. The publication's
-  point, for a GPU: `resolution=128, channels=64, epochs=400, fitting=100, batch=4, rate=1e-3, structure=10`.
+  point, for a GPU: `necgs:full`.
 Where the publication is silent, the authors' code decides: truncation at 2 cells, a deformation of 1 is half a cell,
 windows of 11 points for the structural similarity, a rise of the learning rate over a fifth of the epochs.
 """

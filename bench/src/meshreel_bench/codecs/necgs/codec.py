@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+import multiprocessing
+import os
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, fields
 from functools import partial
-from typing import Any, ClassVar
+from itertools import repeat
+from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float16, Float32
@@ -18,11 +22,15 @@ from ...codec import Progress
 from ..base import DecodedFrames, TwoSteps
 from .cubes import extract
 from .grid import Placement, box_of, place_grids, truncated_distances
+from .keep import keep, key_of, recall
 from .shape import BITS, MOST_CHANNELS, MOST_FEATURES, RESOLUTIONS, Shape
 from .stream import Coded, decode_stream, encode_stream
 
 # For tests and a first look: limbs and heads, no faces, in seconds.
 QUICK: dict[str, Any] = {"resolution": 32, "channels": 8, "epochs": 60, "fitting": 10}
+# The publication's own, for a GPU; of its authors' code what it does not tell.
+FULL: dict[str, Any] = {"resolution": 128, "channels": 64, "epochs": 400, "fitting": 100, "batch": 4, "rate": 1e-3}
+FULL |= {"structure": 10.0, "workers": 0}
 MOST_STRUCTURE = 1000.0  # a guess
 KEPT = 0.1  # least share of inside points that original and decoded volume have in common; a guess
 
@@ -41,7 +49,7 @@ class FittedVolumes:
 class NecgsCodec(TwoSteps):
     """A set of frames as one network and one feature per frame. Needs the extra `necgs` on both sides."""
 
-    name: ClassVar[str] = "necgs"
+    configuration: str = "small"  # full: its authors', where an option below is not given
     resolution: int = 64  # K, points along a side of the grid: 16, 32, 64 or 128
     features: int = 16  # C, channels of an embedded feature of 4 x 4 x 4 points
     channels: int = 16  # of the network's first module; sets the rate
@@ -53,8 +61,14 @@ class NecgsCodec(TwoSteps):
     structure: float = 1.0  # weight of the structural similarities in the loss
     seed: int = 0
     device: str = "auto"  # a name of torch's; auto: a GPU if there is one
+    workers: int = 1  # processes that fit volumes; 0: one a core
 
     def __post_init__(self) -> None:
+        if self.configuration not in ("small", "full"):
+            raise InputError(f"configuration {self.configuration!r}: give small or full")
+        for field in fields(self) if self.configuration == "full" else ():
+            if field.name in FULL and getattr(self, field.name) == field.default:
+                object.__setattr__(self, field.name, FULL[field.name])
         if self.resolution not in RESOLUTIONS:
             raise InputError(f"resolution {self.resolution}: give one of {', '.join(map(str, RESOLUTIONS))}")
         for name, value, least, most in (
@@ -65,6 +79,7 @@ class NecgsCodec(TwoSteps):
             ("fitting", self.fitting, 0, 10_000),
             ("batch", self.batch, 1, 1024),
             ("seed", self.seed, 0, 2**31),
+            ("workers", self.workers, 0, 1024),
         ):
             if not least <= value <= most:
                 raise InputError(f"{name} {value}: give {least} to {most}")
@@ -72,6 +87,11 @@ class NecgsCodec(TwoSteps):
             raise InputError(f"rate {self.rate}: give a learning rate above 0, at most 1")
         if not 0 <= self.structure <= MOST_STRUCTURE:
             raise InputError(f"structure {self.structure}: give a weight of 0 to {MOST_STRUCTURE:g}")
+
+    @property
+    def name(self) -> str:
+        """The name in rows and plots."""
+        return "necgs" if self.configuration == "small" else "necgs_full"
 
     @property
     def shape(self) -> Shape:
@@ -86,19 +106,26 @@ class NecgsCodec(TwoSteps):
     def analyse(self, sequence: MeshSequence, progress: Progress | None = None) -> FittedVolumes:
         """Return the volume of each frame. Raises InputError without the extra and for frames that are not finite."""
         _need_torch()
-        from .fit import fit_volume
-
         boxes = [box_of(_checked(mesh, number)) for number, mesh in enumerate(sequence)]
         placement = place_grids(boxes, self.resolution)
         full, trimmed, volumes = np.array([box is not None for box in boxes], bool), False, list[np.ndarray]()
-        for number in np.flatnonzero(full).tolist():
-            mesh = placement.inverse(sequence[number], number, self.resolution)
-            distances, sheets = truncated_distances(mesh, self.resolution)
+        numbers = np.flatnonzero(full).tolist()
+        meshes = (placement.inverse(sequence[number], number, self.resolution) for number in numbers)
+        for number, (volume, sheets) in zip(numbers, self._fitted(meshes), strict=True):
             trimmed |= sheets
-            volumes.append(fit_volume(distances, mesh, self.fitting).astype(np.float16))  # half the memory
+            volumes.append(volume)
             if progress is not None:
                 progress("volumes", number + 1, len(boxes))
         return FittedVolumes(placement, full, trimmed, volumes)
+
+    def _fitted(self, meshes: Iterator[Mesh]) -> Iterator[tuple[Float16[np.ndarray, "K K K 4"], bool]]:
+        """Yield the volume of each mesh, and whether it has sheets; processes fit the same as this one would."""
+        how = repeat(self.resolution), repeat(self.fitting)
+        if self.workers == 1:
+            yield from map(fitted, meshes, *how)
+            return
+        with ProcessPoolExecutor(self.workers or os.cpu_count(), multiprocessing.get_context("spawn")) as executor:
+            yield from executor.map(fitted, meshes, *how)
 
     def code(self, analysis: FittedVolumes, progress: Progress | None = None) -> bytes:
         """Return the stream. Raises InputError where training ends without the surface of a frame."""
@@ -156,6 +183,20 @@ class _Decoded(DecodedFrames):
         """Return the TSDF-Def volume of a frame; rows number the frames that are not empty."""
         assert self._network is not None, "a set with surface has a network"
         return self._network.volume(self._coded.features[row])
+
+
+def fitted(mesh: Mesh, resolution: int, steps: int) -> tuple[Float16[np.ndarray, "K K K 4"], bool]:
+    """Return the volume of a mesh in cells, and whether it has sheets."""
+    import torch
+
+    from .fit import fit_volume
+
+    key = key_of(("volume", resolution, steps, mesh.vertices, mesh.faces))
+    if (known := recall(key)) is None:
+        distances, sheets = truncated_distances(mesh, resolution)
+        volume = fit_volume(distances, mesh, steps).astype(np.float16)  # half the memory
+        keep(key, known := (torch.from_numpy(volume), sheets))
+    return known[0].numpy(), known[1]
 
 
 def _shared_inside(a: Float32[np.ndarray, "K K K 4"], b: Float32[np.ndarray, "K K K 4"]) -> float:

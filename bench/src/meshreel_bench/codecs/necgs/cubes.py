@@ -12,7 +12,7 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float32, Float64, Int32, Int64
+from jaxtyping import Float32, Float64, Int8, Int32, Int64, UInt8
 
 from meshreel.geometry.topology import drop_unreferenced
 from meshreel.types import Mesh
@@ -23,17 +23,18 @@ STEEP = 0.8  # change along an edge, of which a surface has half: a flip of sign
 
 @dataclass(frozen=True, slots=True)
 class Cut:
-    """Topology of the surface of a grid of K x K x K points; V vertices on edges of the grid."""
+    """Topology of the surface of grids of points; V vertices on edges of a grid."""
 
     low: Int64[np.ndarray, " V"]  # flat number of the edge's first point
     high: Int64[np.ndarray, " V"]  # of its second point, one further along an axis
     faces: Int32[np.ndarray, "F 3"]  # counter-clockwise from outside
+    cells: Int64[np.ndarray, " F"]  # flat number of each face's cell
 
 
 def extract(volume: Float32[np.ndarray, "K K K 4"], trimmed: bool) -> Mesh:
     """Return the mesh of a TSDF-Def volume, in cells; `trimmed` leaves out flips of sign far from any surface."""
     resolution, flat = len(volume), volume.reshape(-1, 4).astype(np.float64)
-    found = cut(volume[..., 0])
+    found = cut(volume[None, ..., 0])
     vertices = place(flat[found.low], flat[found.high], *(grid_points(n, resolution) for n in (found.low, found.high)))
     faces = found.faces
     if trimmed:
@@ -53,35 +54,48 @@ def grid_points(numbers: Int64[np.ndarray, " N"], resolution: int) -> Float64[np
     return np.stack(np.unravel_index(numbers, (resolution,) * 3), axis=1).astype(np.float64)
 
 
-def cut(distances: Float32[np.ndarray, "K K K"]) -> Cut:
-    """Return the edges where the sign changes, and the faces between these."""
-    resolution = len(distances)
-    inside = (distances < 0).astype(np.uint8)
-    ends = (slice(None, -1), slice(1, None))
-    cases = np.zeros((resolution - 1,) * 3, np.uint8)
-    for corner, (i, j, k) in enumerate(_CORNERS):
-        cases |= inside[ends[i], ends[j], ends[k]] << np.uint8(corner)
-    cells = np.flatnonzero((cases > 0) & (cases < 255))
-    strides = np.array([resolution**2, resolution, 1])
-    origins = np.stack(np.unravel_index(cells, cases.shape), axis=1) @ strides
-    local = _table()[cases.reshape(-1)[cells]]
-    used = local[..., 0] >= 0
-    starts, axes = (np.array(_EDGES) @ [1, 0])[local], (np.array(_EDGES) @ [0, 1])[local]
-    first = origins[:, None, None] + (np.array(_CORNERS) @ strides)[starts]
-    keys, faces = np.unique((first * 3 + axes)[used], return_inverse=True)
-    low = keys // 3
-    return Cut(low, low + strides[keys % 3], faces.reshape(-1, 3).astype(np.int32))
+def cut(values: np.ndarray, voxels: Int32[np.ndarray, "B P P P"] | None = None) -> Cut:
+    """Return the edges where the sign changes in B blocks of P x P x P points, and the faces between these.
+
+    `voxels` are the points' numbers, one for all blocks that share a point; without, none is shared.
+    """
+    side, cases = values.shape[1], cases_of(values)
+    strides = np.array([side**2, side, 1])
+    cells = np.flatnonzero(cases - np.uint8(1) < 254)  # 0 and 255 are not cut
+    edges = triangles_of_cases()[cases[cells]]
+    used = edges[..., 0] >= 0
+    cells, edges = np.repeat(cells, used.sum(axis=1)), edges[used]
+    block, cell = np.divmod(cells, (side - 1) ** 3)
+    x, y, z = np.unravel_index(cell, (side - 1,) * 3)
+    corners = (side**3 * block + side**2 * x + side * y + z).astype(np.int32)
+    starts, axes = ((np.array(EDGES) @ way).astype(np.int32) for way in ([1, 0], [0, 1]))
+    lows = corners[:, None] + (np.array(CORNERS) @ strides).astype(np.int32)[starts][edges]
+    keys = 3 * (lows if voxels is None else voxels.reshape(-1)[lows]) + axes[edges]
+    found = np.full(3 * (values.size if voxels is None else int(voxels.max(initial=-1)) + 1), -1, np.int32)
+    found[keys] = lows
+    made = np.flatnonzero(found >= 0)
+    low = found[made].astype(np.int64)
+    found[made] = np.arange(len(made), dtype=np.int32)
+    return Cut(low, low + strides[made % 3], found[keys], cells)
 
 
-_CORNERS = [(n & 1, n >> 1 & 1, n >> 2) for n in range(8)]
-_EDGES = [(n, axis) for axis in range(3) for n in range(8) if not n >> axis & 1]  # first corner, axis
+def cases_of(values: np.ndarray) -> UInt8[np.ndarray, " C"]:
+    """Return which corners of each cell of B x P x P x P points are inside, a bit for each as in `CORNERS`."""
+    inside = (values < 0).view(np.uint8)
+    pairs = inside[:, :-1] | inside[:, 1:] << np.uint8(1)
+    fours = pairs[:, :, :-1] | pairs[:, :, 1:] << np.uint8(2)
+    return (fours[..., :-1] | fours[..., 1:] << np.uint8(4)).reshape(-1)
+
+
+CORNERS = [(n & 1, n >> 1 & 1, n >> 2) for n in range(8)]
+EDGES = [(n, axis) for axis in range(3) for n in range(8) if not n >> axis & 1]  # first corner, axis
 
 
 @cache
-def _table() -> Int64[np.ndarray, "N T 3"]:
-    """Return the triangles of each case as numbers of `_EDGES`, filled up with -1."""
+def triangles_of_cases() -> Int8[np.ndarray, "N T 3"]:
+    """Return the triangles of each case (bit n: corner n is inside) as numbers of `EDGES`, filled up with -1."""
     cases = [_triangles(case) for case in range(256)]
-    table = np.full((256, max(map(len, cases)), 3), -1)
+    table = np.full((256, max(map(len, cases)), 3), -1, np.int8)
     for case, triangles in enumerate(cases):
         table[case, : len(triangles)] = np.reshape(triangles, (-1, 3))
     return table
@@ -114,7 +128,7 @@ def _steps(side: list[int], case: int) -> list[tuple[int, int]]:
     crossed = []
     for a, b in zip(side, side[1:] + side[:1], strict=True):
         if (case >> a ^ case >> b) & 1:
-            crossed.append((_EDGES.index((min(a, b), (a ^ b).bit_length() - 1)), bool(case >> b & 1)))
+            crossed.append((EDGES.index((min(a, b), (a ^ b).bit_length() - 1)), bool(case >> b & 1)))
     if crossed and not crossed[0][1]:
         crossed = crossed[1:] + crossed[:1]
     return [(crossed[n][0], crossed[n + 1][0]) for n in range(0, len(crossed), 2)]

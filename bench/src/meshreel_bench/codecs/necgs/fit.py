@@ -26,7 +26,7 @@ _MOST_SAMPLES = 60_000
 def fit_volume(distances: Float32[np.ndarray, "K K K"], mesh: Mesh, steps: int) -> Float32[np.ndarray, "K K K 4"]:
     """Return the volume after `steps` steps from zero deformations."""
     start = np.concatenate([distances[..., None], np.zeros((*distances.shape, 3), np.float32)], axis=-1)
-    first = cut(distances)
+    first = cut(distances[None])
     if steps == 0 or not len(first.faces):
         return start
     surface = Surface(mesh)
@@ -54,7 +54,7 @@ def _descended(start: np.ndarray, surface: Surface, samples: np.ndarray, steps: 
 
 def _error(volume: Tensor, resolution: int, surface: Surface, samples: np.ndarray) -> Tensor | None:
     """Return squared distances both ways, cells^2, plus the size of deformations; None if no surface is left."""
-    found = cut(volume.detach()[:, 0].numpy().reshape((resolution,) * 3))
+    found = cut(volume.detach()[:, 0].numpy().reshape((1, *(resolution,) * 3)))
     if not len(found.faces):
         return None
     low, high = volume[found.low], volume[found.high]

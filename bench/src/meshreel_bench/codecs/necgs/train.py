@@ -6,13 +6,16 @@ The loss is eq. 3: the mean absolute error, 5 times that of points near the surf
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 import torch
 from torch import Tensor
 
 from .codec import NecgsCodec
+from .keep import keep, key_of, recall
 from .network import choose_device, decode_volumes, initial_parameters, repeatable, rounded, to_symbols
 from .shape import SIDE
 
@@ -20,6 +23,7 @@ NEAR = 5.0  # lambda 1 of eq. 3
 SMALL_FEATURES = 0.1  # weight of the features' mean size, as in the authors' code
 _WARM = 0.2  # share of the epochs in which the learning rate rises
 _WINDOW, _SIGMA = 11, 1.5  # points, of the structural similarity
+KEPT_S = 30.0  # between two states that are kept
 _STABLE = (0.01**2, 0.03**2)
 
 Volumes = Sequence[np.ndarray]  # K x K x K x 4 each
@@ -36,7 +40,8 @@ def train(volumes: Volumes, options: NecgsCodec, report: Report) -> tuple[np.nda
     parameters = [p.to(place).requires_grad_() for p in initial_parameters(shape, options.seed + 1)]
     adam = torch.optim.Adam([features, *parameters], lr=options.rate)
     window = _gauss(shape.resolution).to(place)
-    for epoch in range(options.epochs):
+    key, last = key_of(("training", options, *volumes)), time.monotonic()
+    for epoch in range(_resumed(recall(key), [features, *parameters], adam, generator), options.epochs):
         batches = torch.randperm(len(volumes), generator=generator).split(options.batch)
         for step, numbers in enumerate(batches):
             adam.param_groups[0]["lr"] = options.rate * _pace((epoch + step / len(batches)) / options.epochs)
@@ -47,9 +52,26 @@ def train(volumes: Volumes, options: NecgsCodec, report: Report) -> tuple[np.nda
             errors, lacking = _loss(made, truth.contiguous(), window)
             (errors + options.structure * lacking + SMALL_FEATURES * chosen.abs().mean()).backward()
             adam.step()
+        if time.monotonic() - last >= KEPT_S:
+            tensors = [each.detach() for each in (features, *parameters)]
+            keep(key, (epoch + 1, tensors, adam.state_dict(), generator.get_state()))
+            last = time.monotonic()
         report(epoch + 1, options.epochs)
     symbols = to_symbols(features, shape.bits).reshape(len(volumes), -1)
     return symbols, [to_symbols(p, shape.bits) for p in parameters]
+
+
+def _resumed(state: Any, tensors: Sequence[Tensor], adam: torch.optim.Adam, generator: torch.Generator) -> int:
+    """Return the epoch to go on with, after a state that was kept, if there is one."""
+    if state is None:
+        return 0
+    epoch, known, steps, random = state
+    with torch.no_grad():
+        for own, other in zip(tensors, known, strict=True):
+            own.copy_(other)
+    adam.load_state_dict(steps)
+    generator.set_state(random)
+    return int(epoch)
 
 
 def _pace(done: float) -> float:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import ClassVar
 
 import numpy as np
 
@@ -24,21 +23,21 @@ from .tracked import MOST_CELLS, encode_tracked
 from .tracking import Tracked, Tracking, Untracked, track_sequence
 from .video import TvmcVideo
 
+USUAL = 2000  # vertices of a reference
 LEAST_QP, MOST_QP = 2, 16  # bits; guesses
 
 
 def quality_of_vertices(vertices: int) -> float:
     """Return the quality, 0 to 100, whose reference mesh is nearest to this number of vertices."""
-    return min(max(50 + 50 * math.log(max(vertices, 1) / 2000, 2.5), 0.0), 100.0)
+    return min(max(50 + 50 * math.log(max(vertices, 1) / USUAL, 2.5), 0.0), 100.0)
 
 
 @dataclass(frozen=True, slots=True)
 class TvmcCodec(Prepared):
     """TVMC* with displacements of `qp` bits; operating points that differ in `qp` alone share an analysis."""
 
-    name: ClassVar[str] = "tvmc"
     qp: int = 9  # bits along the longest side of the widest frame's displacements
-    vertices: int = 2000  # of the reference, before its subdivision
+    vertices: int = USUAL  # of the reference, before its subdivision
     group_size: int = 10  # largest number of frames in a group
     centers: int = 2000
 
@@ -46,6 +45,11 @@ class TvmcCodec(Prepared):
         if not LEAST_QP <= self.qp <= MOST_QP:
             raise InputError(f"qp {self.qp}: give {LEAST_QP} to {MOST_QP} bits")
         _ = self.encoder_options  # raises InputError for invalid options
+
+    @property
+    def name(self) -> str:
+        """The name in rows and plots; a larger reference makes another curve."""
+        return "tvmc" if self.vertices <= USUAL else f"tvmc, {self.vertices} vertices"
 
     @property
     def encoder_options(self) -> EncoderOptions:
