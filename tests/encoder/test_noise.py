@@ -74,4 +74,4 @@ def test_a_template_of_its_own_is_tried_where_patches_are_most_of_a_predicted_gr
     groups = list(encode_interval(Interval(shown, NOISE), replace(BEST, group_size=3)))
     assert [group.frame_count for group in groups] == [3, 3]
     assert tried == keys
-    assert groups[1].predicted or share == 0.0
+    assert share == 0.0 or groups[1].predicted

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from meshreel.metrics.flicker import Patch, turned
+from meshreel.metrics.flicker import Patch, angles_after_motion
 from meshreel.types import Mesh
 
 AXES = np.array([0.3, 0.9, 0.2])  # m, of an ellipsoid like a person
@@ -31,7 +31,7 @@ def rms(before, after):
     other = np.cross(after.normals, across)
     corners = [after.points + 1e-4 * (np.cos(a) * across + np.sin(a) * other) for a in np.radians([0, 120, 240])]
     surface = Mesh.of(np.stack(corners, axis=1).reshape(-1, 3), np.arange(3 * len(after.points)).reshape(-1, 3))
-    found = turned(before, after, surface)
+    found = angles_after_motion(before, after, surface)
     assert len(found) > 3900
     return np.sqrt(np.mean(found**2))
 
@@ -55,7 +55,11 @@ def test_normals_that_change_flicker_by_as_much():
 
 def test_bodies_apart_and_no_bodies_have_no_flicker():
     nothing = Patch(np.zeros((0, 3)), np.zeros((0, 3)))
-    assert len(turned(nothing, body(), Mesh.empty())) == len(turned(body(), nothing, Mesh.empty())) == 0
+    assert (
+        len(angles_after_motion(nothing, body(), Mesh.empty()))
+        == len(angles_after_motion(body(), nothing, Mesh.empty()))
+        == 0
+    )
     far = Patch(body().points + (9.0, 0.0, 0.0), body().normals)
     triangle = Mesh.of(np.eye(3), [[0, 1, 2]])
-    assert len(turned(body(), far, triangle)) == 0
+    assert len(angles_after_motion(body(), far, triangle)) == 0

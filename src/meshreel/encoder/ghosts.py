@@ -22,7 +22,7 @@ POOLED = 3  # rings of faces around each that are judged together, so that no cr
 
 
 def ghosts(frames: Sequence[ShownFrame], faces: Int32[np.ndarray, "F 3"], far: float | None) -> Bool[np.ndarray, "T F"]:
-    """Return the decoded faces of surface, more than a bit, that frames do not have.
+    """Mark decoded faces, in regions larger than `HOLE` or `SHARD`, that the frames lack.
 
     Of noisy bodies these are faces farther than `far`, squared, where a camera saw through, and such as cameras face
     and hardly ever measure. Of clean ones, which have no `far`, they are shards: faces that face away from the frame's

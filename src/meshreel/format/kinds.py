@@ -71,14 +71,11 @@ class Number:
         return self.code not in "fd" or all(map(math.isfinite, values))
 
 
-_SIZES = {code: struct.calcsize("<" + code) for code in "BHIQhiqfd"}
+_SIZES = {code: struct.calcsize("<" + code) for code in "BHIqfd"}
 
 U8 = Number("u8", "B")
 U16 = Number("u16", "H")
 U32 = Number("u32", "I")
-U64 = Number("u64", "Q")
-I16 = Number("i16", "h")
-I32 = Number("i32", "i")
 I64 = Number("i64", "q")
 F32 = Number("f32", "f")
 F64 = Number("f64", "d")

@@ -19,12 +19,12 @@ from ..geometry.cameras import PinholeCamera
 from ..geometry.depth import STEP, DepthFrames, DepthPicture, apart
 from ..types import Frames, Mesh, evenly
 from .comparison import Row
-from .flicker import Patch, turned
+from .flicker import Patch, angles_after_motion
 from .render import Crop, Pixels, View, Visible
 
-BESIDE = 2  # pixels around a step or a hole that do not count
+ASIDE = 2  # pixels around a step or a hole that do not count (guess)
 NEAR = (0.03, 0.015)  # m, and share of the depth, within which surface covers a measurement
-RUN = 0.01  # m^2, of a connected area that is not covered, from which on it is a lost run
+LEAST_LOST = 0.01  # m^2, of a connected area that is not covered, from which on it is a lost run (guess)
 USUAL = 0.95  # quantile over time of a pixel's depth: how far it is where nobody stands (guess)
 SELDOM = 0.2  # share of all frames in which a pixel is as far as usual, below which this is a body as well (guess)
 SPECK = 12  # pixels: smaller areas that are nearer than usual are noise (guess)
@@ -81,11 +81,11 @@ class Judged:
         return self.shown < self.depth - self.near
 
     def lost_runs(self, part: str) -> Float64[np.ndarray, " N"]:
-        """Return the areas of connected pixels that are not covered, m^2, of at least `RUN`, largest first."""
+        """Return the areas of connected pixels that are not covered, m^2, of at least `LEAST_LOST`, largest first."""
         runs, count = label(self.of(part) & ~self.covered)
         focal = self.camera.intrinsic[0, 0] * self.camera.intrinsic[1, 1]
         areas = np.bincount(runs.reshape(-1), (self.depth**2 / focal).reshape(-1), count + 1)[1:]
-        return np.sort(areas[areas >= RUN])[::-1]
+        return np.sort(areas[areas >= LEAST_LOST])[::-1]
 
     def patch(self) -> Patch:
         """Return the decoded surface that covers measurements of a body."""
@@ -174,7 +174,7 @@ def clear_pixels(picture: DepthPicture) -> Bool[np.ndarray, "H W"]:
     """Return the pixels of a depth picture that have a measurement, with no step in depth and no hole beside them."""
     depth = picture.depth.astype(np.float64)
     most, least = maximum_filter(depth, 3), minimum_filter(depth, 3)
-    return ~binary_dilation((least <= 0) | (most - least > STEP * depth), iterations=BESIDE - 1)
+    return ~binary_dilation((least <= 0) | (most - least > STEP * depth), iterations=ASIDE - 1)
 
 
 def _counts(views: Sequence[Judged]) -> Row:
@@ -203,9 +203,9 @@ def _changes(before: Mapping[int, Judged], now: Mapping[int, Judged], refreshed:
     steps, angles = np.concatenate(moved), np.zeros(0)
     if pairs:
         first, other = (Patch.join(each.patch() for each in views) for views in zip(*pairs, strict=True))
-        angles = turned(first, other, pairs[0][1].view.mesh)
-    sums = {"still_changes": len(steps), "still_flicker_m": float(steps @ steps)}
-    return sums | {"body_changes": len(angles), "body_flicker_deg": float(angles @ angles)}
+        angles = angles_after_motion(first, other, pairs[0][1].view.mesh)
+    sums = {"still_changes": len(steps), "still_squares_m2": float(steps @ steps)}
+    return sums | {"body_changes": len(angles), "body_squares_deg2": float(angles @ angles)}
 
 
 def _rates(sums: Row, frames: int) -> Row:
@@ -217,8 +217,8 @@ def _rates(sums: Row, frames: int) -> Row:
         row[f"{part}_lost_runs"] = sums[f"{part}_lost_runs"] / frames
         row[f"{part}_largest_lost_m2"] = sums[f"{part}_largest_lost_m2"]
     row |= {name: int(sums[name]) for name in ("limbs_shown", "limbs_lost")}
-    for name, count in (("still_flicker_m", "still_changes"), ("body_flicker_deg", "body_changes")):
-        square = _share(sums[name], sums[count])
+    for name, squares in (("still_flicker_m", "still_squares_m2"), ("body_flicker_deg", "body_squares_deg2")):
+        square = _share(sums[squares], sums[f"{name.split('_')[0]}_changes"])
         row[name] = None if square is None else float(np.sqrt(square))
     return row
 

@@ -46,7 +46,7 @@ class Patch:
         return Patch(self.points[which], self.normals[which])
 
 
-def turned(before: Patch, after: Patch, surface: Mesh) -> Float64[np.ndarray, " M"]:
+def angles_after_motion(before: Patch, after: Patch, surface: Mesh) -> Float64[np.ndarray, " M"]:
     """Return the angles between the normals of points and those where motion brings them in the next frame, degrees.
 
     `surface` is all that the next frame shows, `after` the points of it that are of the body: points that none of these

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from meshreel.capture.recordings import open_take
-from meshreel.capture.recordings.takes import FLIP
+from meshreel.capture.recordings.record3d import FLIP
 from meshreel.errors import InputError
 from meshreel.io.pictures import pack_picture
 from tests.capture.recordings import files

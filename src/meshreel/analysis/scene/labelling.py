@@ -25,7 +25,7 @@ from .settle import BESIDE, NEVER, Rest
 from .votes import Votes
 
 _REMEMBERED = 600  # frames whose labels are kept, some 50 kB each: a guess, enough for seconds of a scene
-_BIT = 0.2  # m^2: less surface that moves by itself, beside what has come to rest, flickers (decision 28)
+_FLICKER_AREA = 0.2  # m^2: less surface that moves by itself, beside what has come to rest, flickers (decision 28)
 _ELSEWHERE = 2.0  # cells: surface farther from the middle of every known place is at no place (decision 18)
 
 
@@ -130,7 +130,7 @@ class ByPlace:
         near = self.faces_at(mesh, beside)[moving]
         apart = np.bincount(label, np.where(near, -1.0, 1.0), len(mesh.vertices)) > 0  # most faces are not beside it
         kept = moving.copy()
-        kept[moving] = (area >= _BIT) | apart[label]
+        kept[moving] = (area >= _FLICKER_AREA) | apart[label]
         return kept
 
     def still_at_first(self, frame: int, mesh: Mesh) -> Bool[np.ndarray, " F"]:
@@ -170,7 +170,7 @@ class ByPlace:
 
     @cached_property
     def _beside(self) -> tuple[Int64[np.ndarray, " P"], Int64[np.ndarray, " P"]]:
-        """For each place from when on, and until when, the nearest place that comes to rest, or leaves it, does."""
+        """For each place, when the nearest resting place within `BESIDE` joins the room, and when one leaves it."""
         found = list[Int64[np.ndarray, " P"]]()
         for times, never in ((self.rest.since, NEVER), (self.rest.until, 0)):
             own, middles = np.flatnonzero(times != never), self.lattice.centers(self.keys)

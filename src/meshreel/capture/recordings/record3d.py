@@ -18,10 +18,11 @@ from ...errors import InputError
 from ...io.file_names import last_number
 from ...io.read import MOST_BYTES, read_file
 from ..poses import pose_of
-from .takes import FLIP, Lens, Picture, Pictures, Sensor, Stream, Take, picture_size, reading
+from .takes import Lens, Picture, Pictures, Sensor, Stream, Take, picture_size, reading
 
 KIND = "a Record3D recording (.r3d, or the folder of its export EXR + JPG)"
 EXPORT = "EXR_RGBD"
+FLIP = np.diag([1.0, -1.0, -1.0, 1.0])  # from x right, y down, z forward to ARKit's x right, y up, z backward
 
 
 def fits(path: Path) -> bool:

@@ -18,7 +18,6 @@ from ...io.pictures import opened
 
 Picture = np.ndarray | bytes  # depths H x W in the sensor's unit, integers or floats; colours H x W x 3; a PNG or JPEG
 Pictures = Iterator[tuple[float, Picture]]  # each with its time on the take's clock, s
-FLIP = np.diag([1.0, -1.0, -1.0, 1.0])  # from x right, y down, z forward to ARKit's x right, y up, z backward
 
 
 @dataclass(frozen=True, slots=True)
