@@ -121,7 +121,7 @@ def test_a_texture_that_cannot_be_read_ends_the_encoding_with_its_name(tmp_path:
     whole = (tmp_path / "frame_1.png").read_bytes()
     (tmp_path / "frame_1.png").write_bytes(whole[: len(whole) // 2])
     options = replace(quick(), appearance=appearance_options(50.0, "auto"))
-    with pytest.raises(InputError, match=r"frame_1.png: cannot be read .*write it again, or give --color none"):
+    with pytest.raises(InputError, match=r"frame_1.png: cannot be read .*write it again, or encode with --color none"):
         Encoder(open_sequence(tmp_path)).encode(tmp_path / "a.reel", replace(options, scene=None))
     assert not (tmp_path / "a.reel").exists()
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -20,6 +21,7 @@ from ..errors import FormatError, InputError
 from ..export.splats import check_splats
 from ..format.layout import MAGIC, ChunkKind
 from ..geometry.cameras import PinholeCamera
+from ..geometry.derived_sequences import Chosen
 from ..geometry.topology import weld
 from ..io.sequence import SequenceOptions, open_sequence
 from ..metrics.comparison import ComparisonOptions, compare_sequences
@@ -63,7 +65,7 @@ def command(
         The original sequence: a directory, a glob, a file, an .npz or a rig's folder. Give --frames and --scale as for
         `encode`.
     decoded
-        A .reel file, or the decoded meshes.
+        A .reel file, or the decoded meshes; --frames chooses from it, too, unless it has just these frames.
     sheet
         Write a PNG of original, decoded mesh and error heat map, seen from --cameras, from a rig's cameras, or from the
         front.
@@ -75,14 +77,17 @@ def command(
     """
     if sheet is not None and not sheet.parent.is_dir():
         raise InputError(f"{sheet}: there is no folder {sheet.parent}; make it or choose another")
+    if sheet is not None:
+        import_module("matplotlib")  # where it is missing, that is said before minutes of measuring
     source = open_source([originals], reading, common)
-    sequence, other = source.sequence, open_decoded(decoded, reading)
+    sequence, stored = source.sequence, open_decoded(decoded, reading)
+    other = stored if len(stored) == len(sequence) else Chosen(stored, reading.options().chosen(len(stored)))
     if len(sequence) != len(other):
         raise InputError(f"{originals} has {len(sequence)} frames and {decoded} {len(other)}; choose with --frames A:B")
     shown = SheetOptions(sheet_frames, cameras=_sheet_cameras(looking, sequence), up=looking.up)
     if splats:
         if not isinstance(other, Video):
-            raise InputError(f"{decoded}: --splats needs a .reel file")
+            raise InputError(f"{decoded}: --splats needs a .reel file with the frames of {originals}; see meshreel cut")
         check_splats(other, decoded)
     truth = None if knowing.truth is None else open_truth(knowing.truth, reading, len(sequence))
     try:
@@ -98,9 +103,9 @@ def command(
             write_sheet(sequence, other, sheet, shown)
     except FormatError as error:  # names the chunk, but not the file
         raise FormatError(f"{decoded}: {error}; copy the file again, or compare frames before it") from None
-    warnings = [*source.warnings, *(f"{decoded}: {w}" for w in getattr(other, "warnings", ()))]
+    warnings = [*source.warnings, *(f"{decoded}: {w}" for w in getattr(stored, "warnings", ()))]
     warnings += _other(row, originals, decoded)
-    _tell({"warnings": warnings} | _rate(decoded, other) | row, sheet, common)
+    _tell({"warnings": warnings} | _rate(decoded, stored) | row, sheet, common)
 
 
 def _other(row: dict[str, Any], originals: str, decoded: str) -> Iterator[str]:

@@ -97,8 +97,9 @@ def command(
         paths = [output / name for name in names]
         failed = write_frames(decode, paths, lambda done: progress("decode", done, len(video)))
     if failed:
-        text = f"{file}: {failed[0]}; {len(failed)} of {len(video)} frames are lost, the others are written"
-        raise FormatError(f"{text}; copy the file again")
+        raise FormatError(
+            f"{file}: {failed[0]}; {_lost(len(failed), len(video))}; copy the file again, or encode it anew"
+        )
     if pale:
         text = f"{file}: {pale[0]}; {len(pale)} of {len(video)} frames are written without their colours"
         raise FormatError(f"{text}; copy the file again")
@@ -129,8 +130,9 @@ def _write_splats(file: Path, video: Video, output: Path, format: str, common: C
     with common.stages(len(video)) as progress:
         failed = _write_all(video, [output / name for name in names], progress)
     if failed:
-        text = f"{file}: {failed[0]}; {len(failed)} of {len(video)} frames are lost, the others are written"
-        raise FormatError(f"{text}; copy the file again")
+        raise FormatError(
+            f"{file}: {failed[0]}; {_lost(len(failed), len(video))}; copy the file again, or encode it anew"
+        )
     row = {"output": str(output), "frames": len(video), "format": format, "frame_rate": video.frame_rate}
     common.result(row, f"{output}: splats of {len(video)} frames, {format} files")
 
@@ -157,3 +159,7 @@ def _write_all(video: Video, paths: Sequence[Path], progress: Callable[[str, int
             path.unlink(missing_ok=True)
         progress("decode", number + 1, len(paths))
     return failed
+
+
+def _lost(failed: int, count: int) -> str:
+    return f"{failed} of {count} frames are lost, the others are written" if failed < count else "all frames are lost"

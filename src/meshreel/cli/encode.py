@@ -316,7 +316,8 @@ def _describe_scene(row: dict[str, Any]) -> str:
     rates = row["mbps_by_content"]
     moving = sum(rate for name, rate in rates.items() if name.startswith("track"))
     background = f"background {row['background_bytes']} bytes ({rates['background']:.3f} Mbps)"
-    return f"{background}, {row['tracks']} tracks ({moving:.3f} Mbps), noise {1000 * row['noise_m']:.2g} mm, "
+    tracks = "1 track" if row["tracks"] == 1 else f"{row['tracks']} tracks"
+    return f"{background}, {tracks} ({moving:.3f} Mbps), noise {1000 * row['noise_m']:.2g} mm, "
 
 
 def describe(row: dict[str, Any]) -> str:

@@ -37,12 +37,14 @@ def read_picture(place: Place) -> UInt8[np.ndarray, "H W 3"]:
 @lru_cache(maxsize=4)  # as many as a frame and its neighbours have (guess)
 def _read(place: Place, changed: int) -> UInt8[np.ndarray, "H W 3"]:
     del changed
-    return parse_picture(read_input(place, "check it, or give --color none"), str(place))
+    return parse_picture(read_input(place, "check it, or encode with --color none"), str(place))
 
 
 def parse_picture(data: bytes, where: str) -> UInt8[np.ndarray, "H W 3"]:
     """Return the picture in the bytes of a file; errors as `read_picture`, which begin with `where`."""
-    with opened(data, where, "give PNG or JPEG, or --color none", "write it again, or give --color none") as image:
+    with opened(
+        data, where, "give PNG or JPEG, or --color none", "write it again, or encode with --color none"
+    ) as image:
         if image.mode in DEEP:
             pixels = np.repeat((np.asarray(image).astype(np.float64)[..., None] / 257).round(), 3, axis=2)
             pixels = np.clip(pixels, 0, 255).astype(np.uint8)

@@ -46,7 +46,9 @@ def read_input(path: Place, remedy: str = "check the path and its rights", where
 def read_json(path: Place, remedy: str) -> dict[str, Any]:
     """Return the object in a file of JSON. Raises InputError, which says what to do."""
     try:
-        record = json.loads(read_input(path, remedy).decode("utf-8-sig"))  # some editors begin with a mark
+        record = json.loads(
+            read_input(path, "check it and its rights").decode("utf-8-sig")
+        )  # some editors begin with a mark
     except (ValueError, RecursionError) as error:
         raise InputError(f"{path}: cannot be read ({error}); {remedy}") from None
     if not isinstance(record, dict):

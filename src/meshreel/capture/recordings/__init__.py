@@ -39,15 +39,18 @@ def readers() -> tuple[Reader, ...]:
 
 
 def is_rig(path: Path) -> bool:
-    """Return whether a folder is a rig's."""
-    return any((path / name).is_file() for name in (RIG, SINGLE))
+    """Return whether a folder is a rig's. Raises InputError for a folder without permission."""
+    try:
+        return any((path / name).is_file() for name in (RIG, SINGLE))
+    except PermissionError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror}); check its rights") from None
 
 
 def is_take(path: Path) -> bool:
     """Return whether some reader knows a file or folder; a rig is none."""
     try:
         return not is_rig(path) and any(reader.fits(path) for reader in readers())
-    except OSError:  # a name that is too long, or a folder without permission
+    except (OSError, InputError):  # a name that is too long, or a folder without permission
         return False
 
 
