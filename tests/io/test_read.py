@@ -63,7 +63,7 @@ def test_what_is_no_picture_ends_at_once(tmp_path, make, of):
 @pytest.mark.parametrize("make", [os.mkfifo, zeros, sparse])
 def test_what_is_no_description_of_a_rig_ends_at_once(tmp_path, make):
     make(tmp_path / "rig.json")
-    with pytest.raises(InputError, match=r"rig.json: cannot be read \(it .*give JSON"):
+    with pytest.raises(InputError, match=r"rig.json: cannot be read \(it .*check it and its rights"):
         read_rig(tmp_path)
 
 

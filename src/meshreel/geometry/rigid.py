@@ -6,8 +6,8 @@ All functions are batched. A dual quaternion is a row of 8: real part (w, x, y, 
 from __future__ import annotations
 
 import numpy as np
-from jaxtyping import Float64
 
+from ..shapes import Float64
 from . import strict
 
 DEGENERATE = 1e-10  # share of the largest singular value below which one does not constrain the rotation (guess)
