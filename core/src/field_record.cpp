@@ -10,8 +10,8 @@
 namespace meshreel {
 namespace {
 
-constexpr int kStepLevels = 200;   // of the ladder of steps (src/meshreel/coding/steps.py)
-constexpr uint8_t kLayers = 2;     // Form.LAYERS of src/meshreel/format/layout.py
+constexpr int kStepLevels = 200;  // of the ladder of steps (src/meshreel/coding/steps.py)
+constexpr uint8_t kLayers = 2;    // Form.LAYERS of src/meshreel/format/layout.py
 
 // Fields of a record in turn. Beyond the end, or after a number that is not in its shortest form, all of them are 0.
 class Fields {

@@ -47,9 +47,9 @@ bool parse(const mr_bytes& bytes, CodedField& base, std::vector<ColorsLevel>& le
 
 // What the streams of a CodedField hold.
 struct FieldStreams {
-    std::vector<int32_t> head;  // integers before those of the basis
+    std::vector<int32_t> head;           // integers before those of the basis
     std::vector<double> vectors, means;  // means: zeros
-    Array<double> differences;  // of values and what predicts them, as FieldRows takes them
+    Array<double> differences;           // of values and what predicts them, as FieldRows takes them
     size_t columns;
 
     // The numbers of each row from the first-th on.
