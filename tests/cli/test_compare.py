@@ -47,6 +47,13 @@ def test_a_file_against_its_own_meshes_is_all_but_exact(run, decoded, tmp_path):
     json.dumps(row, allow_nan=False)
 
 
+def test_frames_are_chosen_from_a_file_as_from_the_originals(run, decoded):
+    row = run("compare", decoded, FILE, "--no-ssim", "--json", "--frames", "2:6").row
+    assert row["frames_compared"] == 4 and row["bytes"] == FILE.stat().st_size
+    assert row["d2_psnr_paper"] > 110
+    assert failed(run("compare", decoded, FILE, "--frames", "2:6", "--splats"), "with the frames of", "meshreel cut")
+
+
 def with_metadata(path, metadata):
     """The golden file with other metadata, at a path."""
     reader = meshreel.open(FILE).reader

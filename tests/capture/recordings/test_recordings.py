@@ -8,11 +8,12 @@ import sys
 import types
 import zipfile
 import zlib
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from meshreel.capture.recordings import open_take
+from meshreel.capture.recordings import is_rig, open_take
 from meshreel.capture.recordings.record3d import FLIP
 from meshreel.errors import InputError
 from meshreel.io.pictures import pack_picture
@@ -262,3 +263,12 @@ def test_what_is_written_as_docs_and_other_tools_have_it_is_read(tmp_path, made)
     text = (folder / "depth.txt").read_bytes()
     (folder / "depth.txt").write_bytes(text.replace(b"0.png", b"\xff.png"))
     assert same(made(folder)[0])
+
+
+def test_a_folder_without_rights_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refused(_path: Path) -> bool:
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(Path, "is_file", refused)
+    with pytest.raises(InputError, match=f"{tmp_path.name}: cannot be read .Permission denied.; check its rights"):
+        is_rig(tmp_path)
