@@ -22,9 +22,8 @@ from meshreel.io.meshes import read_mesh
 from meshreel.io.write import write_mesh
 from meshreel.types import Frames, Mesh, MeshSequence
 
-Place = (
-    tuple[float, float, float] | Float64[np.ndarray, "T 3"]
-)  # m, added to the coordinates; of each frame, where it moves
+# m, added to the coordinates; a row for each frame, where it moves
+Place = tuple[float, float, float] | Float64[np.ndarray, "T 3"]
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,6 +7,7 @@ The basis as decoded is orthonormal, so all columns share one step. A column is 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -51,14 +52,29 @@ class SurfaceWeight:
     tangential: float  # weight of a squared error along the surface, 0 to 1
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class EncodedField:
-    """Record of a field, the decoded field, and its bits."""
+    """Record of a field over a graph, and what follows from it."""
 
     record: CodedField
-    decoded: Float64[np.ndarray, "V C"]
-    basis_bits: int
-    symbol_bits: int
+    graph: Graph
+    width: int  # numbers of a trajectory
+    head: int  # integers before those of the basis
+
+    @cached_property
+    def decoded(self) -> Float64[np.ndarray, "V C"]:
+        """The trajectories as the record decodes to, made when they are asked for."""
+        return decode_field(self.record, self.graph, self.width, self.head)
+
+    @property
+    def basis_bits(self) -> int:
+        """Bits of the basis and of what lies before it."""
+        return 8 * len(self.record.basis)
+
+    @property
+    def symbol_bits(self) -> int:
+        """Bits of the symbols."""
+        return 8 * len(self.record.symbols)
 
 
 def encode_field(
@@ -82,9 +98,7 @@ def encode_field(
         kept = kept[pays]
         coded = _Columns(trajectories, basis.only(kept), graph, rate, surface)
     packed = entropy.encode_integers(np.concatenate([head, coded.basis]))
-    record = CodedField(len(kept), rate.rung, packed, coded.stream)
-    decoded = decode_field(record, graph, width, len(head))
-    return EncodedField(record, decoded, 8 * len(packed), 8 * len(coded.stream))
+    return EncodedField(CodedField(len(kept), rate.rung, packed, coded.stream), graph, width, len(head))
 
 
 def decode_field(record: CodedField, graph: Graph, width: int, head: int = 0) -> Float64[np.ndarray, "V C"]:
