@@ -14,7 +14,7 @@ from jaxtyping import Bool, Float64, Int32, Int64
 from ..geometry.topology import components, connected_faces
 from .shown_frame import ShownFrame
 
-SHARD = 2e-5  # squared diagonals: half a square centimetre of a body that faces the wrong way shows (guess)
+SHARD = 1e-5  # squared diagonals: half a square centimetre of a body that faces the wrong way shows (guess)
 HOLE = 0.002  # squared diagonals of surface, half a foot, missed where it lacks, seen where it is not (guess)
 SELDOM = 0.25  # share of the frames in which cameras face surface, below which its measurements are noise (guess)
 OFTEN = 0.3  # share of the frames in which cameras must face it, for that to be said (guess)
