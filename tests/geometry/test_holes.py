@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from meshreel.geometry.topology import close_holes, face_normals, unique_edges
+from meshreel.geometry.holes import close_holes
+from meshreel.geometry.topology import face_normals, unique_edges
 from meshreel.types import Mesh
 from tests.spheres import deforming_sphere
 
@@ -43,3 +44,22 @@ def test_large_holes_stay_open():
 
 def test_an_empty_mesh_has_no_holes():
     assert close_holes(Mesh.empty(), 1.0).is_empty
+
+
+def test_holes_that_meet_at_a_vertex_are_closed_each_for_itself():
+    a, b = BALL.faces[0][0], BALL.faces[0][1]
+    ring = set(BALL.faces[(BALL.faces == a).any(axis=1)].reshape(-1))
+    beyond = next(v for v in BALL.faces[(BALL.faces == b).any(axis=1)].reshape(-1) if v not in ring)
+    far = [v for v in BALL.faces[(BALL.faces == beyond).any(axis=1)].reshape(-1) if v not in ring]
+    across = next(v for v in far if len(ring & set(BALL.faces[(BALL.faces == v).any(axis=1)].reshape(-1))) == 1)
+    holed = without_ring(without_ring(BALL, a), across)
+    closed = close_holes(holed, 0.5 * np.pi)
+    assert open_edges(closed) == 0 and len(closed.vertices) == len(BALL.vertices) + 2
+
+
+def test_a_hole_that_a_camera_saw_through_stays_open():
+    holed = without_ring(without_ring(BALL, 5), 200)
+    near = BALL.vertices[5]
+    closed = close_holes(holed, 0.5 * np.pi, lambda points: np.linalg.norm(points - near, axis=1) < 0.3)
+    assert 0 < open_edges(closed) < open_edges(holed)
+    assert len(closed.vertices) == len(BALL.vertices) + 1

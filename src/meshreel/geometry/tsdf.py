@@ -21,8 +21,10 @@ from .topology import clean, weld
 
 SIDE = 8  # voxels along a side of a block; the core's
 TRUNCATION = 3.0  # voxels before and behind a depth that it constrains (guess)
-GRAZING = 4.0  # the same where surface is seen at grazing angles, from one side (decision 28)
+GRAZING = 4.0  # the same where surface is seen at grazing angles (decision 28)
+ALONE = 8.0  # the same where one camera sees all: nothing is known behind a surface (decision 28)
 SEEN = 0.5  # weight above which a voxel is known: one measurement is enough (guess)
+FREE = 1.0  # the core's distance, in truncations, of what is farther before a surface
 ALIKE = 2.0**-16  # voxels: vertices that are nearer to each other are one (guess)
 MOST_BLOCKS = 500_000  # bounds memory: 2 GB (guess)
 
@@ -52,16 +54,19 @@ class Grid:
         return Grid(voxel, blocks[order], distances[order], weights[order])
 
 
-def integrate(pictures: Sequence[DepthPicture], voxel: float, truncation: float) -> Grid:
+def integrate(
+    pictures: Sequence[DepthPicture], voxel: float, truncation: float, hidden: Sequence[DepthPicture] = ()
+) -> Grid:
     """Integrate depth pictures into a grid, within `truncation` voxels of their surfaces.
 
     Every picture is integrated into the blocks of all pictures: where one camera sees through what another took for
-    surface (flying pixels, noise), it carves it away. Raises InputError where the surface takes more than `MOST_BLOCKS`
-    blocks.
+    surface (flying pixels, noise), it carves it away. Surface of `hidden` pictures is guessed, not measured: it counts
+    where no picture tells anything, and is no sign of free space. Raises InputError where the surface takes more than
+    `MOST_BLOCKS` blocks.
     """
-    views = [_view(picture) for picture in pictures]
+    views, guessed = ([_view(picture) for picture in some] for some in (pictures, hidden))
     reach = truncation * voxel
-    blocks = [_core.touched_blocks(*view, voxel, reach) for view in views]
+    blocks = [_core.touched_blocks(*view, voxel, reach) for view in (*views, *guessed)]
     union = np.unique(np.concatenate([np.zeros((0, 3), np.int32), *blocks]), axis=0)
     if len(union) > MOST_BLOCKS:
         text = f"surface in {len(union)} blocks of {SIDE * voxel:g} m, over {MOST_BLOCKS}"
@@ -69,6 +74,12 @@ def integrate(pictures: Sequence[DepthPicture], voxel: float, truncation: float)
     distances, weights = np.zeros((2, len(union), SIDE, SIDE, SIDE), np.float32)
     for view in views:
         _core.integrate(*view, voxel, reach, union, distances, weights)
+    if guessed:
+        guesses, times = np.zeros((2, *distances.shape), np.float32)
+        for view in guessed:
+            _core.integrate(*view, voxel, reach, union, guesses, times)
+        told = (weights == 0) & (times > 0) & (guesses < FREE)
+        distances[told], weights[told] = guesses[told], times[told]
     return Grid(voxel, union, distances, weights)
 
 

@@ -14,10 +14,11 @@ import numpy as np
 from jaxtyping import Bool, Float32
 from scipy.ndimage import binary_dilation
 
-from ...geometry.depth import DepthPicture
+from ...geometry.depth import STEP, DepthPicture, FreeSpace
+from ...geometry.holes import close_holes
 from ...geometry.raycast import Rays, pixels_near
 from ...geometry.topology import face_normals, part_of, without_fragments
-from ...geometry.tsdf import GRAZING, SEEN, extract, integrate
+from ...geometry.tsdf import ALONE, GRAZING, SEEN, extract, integrate
 from ...types import Mesh
 from .background import BackgroundOptions
 
@@ -27,6 +28,7 @@ OPEN = 0.3  # least share of the moments in which a pixel is not hidden that mus
 SMOOTH, SPREAD, ROUNDS = 2, 1.5, 2  # pixels around, standard deviation in pixels, and rounds of smoothing (decision 28)
 SIMILAR = 4.0  # times the noise, standard deviation of the inverse depths that are averaged (decision 28)
 SECOND_MEDIAN = 0.6745 * 6**0.5  # of the absolute second difference of normally distributed values, in deviations
+PAST = 1  # pixels by which surfaces go on where something hides them (decision 28)
 FINER = 3  # times the rows and columns of the pictures, interpolated, that are fused (decision 28)
 
 
@@ -45,9 +47,10 @@ def fuse_still_depth(moments: Iterable[Moment], voxel: float, options: Backgroun
     if not usual:
         return Mesh.empty()
     usual = [_smooth(picture) for picture in usual]
-    fine = [picture.finer(FINER) for picture in usual]
-    mesh = extract(integrate(fine, options.finer * voxel, GRAZING), SEEN)
-    return without_fragments(_facing(mesh, usual, options.facing), options.fragment)
+    fine, past = ([one.finer(FINER) for one in some] for some in (usual, [_continued(one) for one in usual]))
+    mesh = extract(integrate(fine, options.finer * voxel, GRAZING if len(usual) > 1 else ALONE, past), SEEN)
+    whole = without_fragments(_facing(mesh, usual, options.facing), options.fragment)
+    return close_holes(whole, options.hole, FreeSpace.of(usual).at)
 
 
 def usual_pictures(moments: Iterable[Moment], options: BackgroundOptions = BackgroundOptions()) -> list[DepthPicture]:
@@ -108,6 +111,28 @@ def _smooth(picture: DepthPicture) -> DepthPicture:
                 weights += weight
         inverse = np.where(inverse > 0, sums / np.maximum(weights, np.float32(1e-9)), 0)
     return replace(picture, depth=np.where(inverse > 0, 1 / np.where(inverse > 0, inverse, 1), 0).astype(np.float32))
+
+
+def _continued(picture: DepthPicture) -> DepthPicture:
+    """Return the surfaces of a depth picture a few pixels past their borders, where a nearer one or nothing is measured.
+
+    On a grid each surface ends a voxel before what hides it; between the two, one would see through the room.
+    """
+    depth = np.pad(picture.depth, 1)
+    known = depth > 0
+    inverse = np.where(known, 1 / np.where(known, depth, 1), 0).astype(np.float32)
+    found = np.zeros_like(inverse)
+    for _ in range(PAST):
+        seen, guesses = np.where(found > 0, found, inverse), np.zeros_like(inverse)
+        for axis, way in ((0, 1), (0, -1), (1, 1), (1, -1)):
+            here, before = np.roll(seen, way, axis), np.roll(seen, 2 * way, axis)
+            flat = np.abs(here - before) <= STEP * here
+            guess = np.where(flat, 2 * here - before, here)
+            hidden = (here > 0) & (found == 0) & ((inverse == 0) | (guess < (1 - STEP) * inverse))
+            guesses = np.maximum(guesses, np.where(hidden, guess, 0))  # the nearest of several
+        found = np.where(guesses > 0, guesses, found)
+    found = found[1:-1, 1:-1]
+    return replace(picture, depth=np.where(found > 0, 1 / np.where(found > 0, found, 1), 0).astype(np.float32))
 
 
 def _noise(inverse: Float32[np.ndarray, "H W"]) -> float:
