@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Bool, Float64, Int64
 
 from ..types import Mesh
+from .topology import unique_edges
 
 
 def close_holes(
@@ -16,29 +17,54 @@ def close_holes(
     perimeter: float,
     stay_open: Callable[[Float64[np.ndarray, "N 3"]], Bool[np.ndarray, " N"]] | None = None,
 ) -> Mesh:
-    """Close the simple loops of the border of at most this perimeter, in the unit of the vertices, by a fan each.
+    """Close the simple loops of the border of at most this perimeter, in the unit of the vertices, by least area.
 
-    Longer loops stay open: soles missing from a capture, sleeves, the rim of what a camera saw. So do loops whose fan
-    has a face with its middle where `stay_open` says so.
+    Longer loops stay open: soles missing from a capture, sleeves, the rim of what a camera saw. So do loops that only
+    faces close with an edge that the mesh has already, or one with its middle where `stay_open` says so. No vertex is
+    added: cracks are zipped.
     """
-    loops = [loop for loop in _loops(mesh) if _length(mesh.vertices[loop]) <= perimeter]
-    middles = [mesh.vertices[loop].mean(axis=0) for loop in loops]
-    if stay_open is not None and loops:
-        rims = [mesh.vertices[loop] for loop in loops]
-        fans = [(rim + np.roll(rim, -1, axis=0) + middle) / 3 for rim, middle in zip(rims, middles, strict=True)]
-        free = np.split(stay_open(np.concatenate(fans)), np.cumsum([len(fan) for fan in fans])[:-1])
-        closed = [number for number, each in enumerate(free) if not each.any()]
-        loops, middles = [loops[number] for number in closed], [middles[number] for number in closed]
-    count = len(mesh.vertices)
-    faces = [  # wound against the loop
-        np.stack([np.roll(loop, -1), loop, np.full(len(loop), count + number)], axis=1)
-        for number, loop in enumerate(loops)
-    ]
-    return Mesh.of(np.concatenate([mesh.vertices, *(m[None] for m in middles)]), np.concatenate([mesh.faces, *faces]))
+    edges = unique_edges(mesh.faces)[0].astype(np.int64)
+    known, patches = edges[:, 0] * len(mesh.vertices) + edges[:, 1], list[Int64[np.ndarray, "n 3"]]()
+    for loop in _loops(mesh):
+        rim = mesh.vertices[loop]
+        if np.linalg.norm(rim - np.roll(rim, -1, axis=0), axis=1).sum() <= perimeter:
+            pairs = np.sort(np.stack(np.broadcast_arrays(loop[:, None], loop[None])), axis=0)
+            taken = np.isin(pairs[0] * len(mesh.vertices) + pairs[1], known)
+            patches.extend([loop[patch[:, ::-1]] for patch in [_least_area(rim, taken)] if len(patch)])
+    if stay_open is not None and patches:
+        middles = mesh.vertices[np.concatenate(patches)].mean(axis=1)
+        free = np.split(stay_open(middles), np.cumsum([len(patch) for patch in patches])[:-1])
+        patches = [patch for patch, each in zip(patches, free, strict=True) if not each.any()]
+    return Mesh.of(mesh.vertices, np.concatenate([mesh.faces, *patches]))
 
 
-def _length(loop: Float64[np.ndarray, "n 3"]) -> float:
-    return float(np.linalg.norm(loop - np.roll(loop, -1, axis=0), axis=1).sum())
+def _least_area(rim: Float64[np.ndarray, "n 3"], taken: Bool[np.ndarray, "n n"]) -> Int64[np.ndarray, "m 3"]:
+    """Return the faces with the least area that close a loop, wound as it (Barequet and Sharir 1995).
+
+    None has a diagonal that is taken; there are no faces where no others close it.
+    """
+    count = len(rim)
+    least, middle = np.zeros((count, count)), np.zeros((count, count), np.int64)
+    for length in range(2, count):
+        first = np.arange(count - length)
+        between, last = first[:, None] + np.arange(1, length), first + length
+        sides = rim[between] - rim[first][:, None], (rim[last] - rim[first])[:, None]
+        areas = np.linalg.norm(np.cross(*sides), axis=2) / 2
+        sums = least[first[:, None], between] + least[between, last[:, None]] + areas
+        if length < count - 1:
+            sums[taken[first, last]] = np.inf
+        middle[first, last] = between[first, best := sums.argmin(axis=1)]
+        least[first, last] = sums[first, best]
+    if not np.isfinite(least[0, -1]):
+        return np.zeros((0, 3), np.int64)
+    faces, spans = [], [(0, count - 1)]
+    while spans:
+        start, end = spans.pop()
+        if end - start >= 2:
+            at = int(middle[start, end])
+            faces.append((start, at, end))
+            spans += [(start, at), (at, end)]
+    return np.array(faces)
 
 
 def _loops(mesh: Mesh) -> Iterator[Int64[np.ndarray, " n"]]:

@@ -27,7 +27,7 @@ class BackgroundOptions:
     finer: float = 0.75  # voxel of a fusion from depth, in voxels of the frames: averaged depth has less noise
     facing: float = 0.15  # cosine: faces that no camera sees more frontally lie between two real surfaces
     fragment: float = 0.02  # m^2: connected pieces with less area are dropped
-    hole: float = 0.2  # m: shorter loops of its border are closed where no camera saw through (decision 28)
+    hole: float = 0.4  # m: shorter loops of its border are closed where no camera saw through (decision 28)
     coarse: float = 0.5  # RMS distance from the fused surface that decimation may cost, in RMS noise of a frame
     lattice: float = 0.3  # spacing of the lattice, in RMS noise of a frame
     refresh: float | None = None  # s between two copies of the background in the file; None: one copy
