@@ -29,7 +29,8 @@ def close_holes(
         rim = mesh.vertices[loop]
         if np.linalg.norm(rim - np.roll(rim, -1, axis=0), axis=1).sum() <= perimeter:
             pairs = np.sort(np.stack(np.broadcast_arrays(loop[:, None], loop[None])), axis=0)
-            taken = np.isin(pairs[0] * len(mesh.vertices) + pairs[1], known)
+            keys = pairs[0] * len(mesh.vertices) + pairs[1]
+            taken = known[np.minimum(np.searchsorted(known, keys), len(known) - 1)] == keys
             patches.extend([loop[patch[:, ::-1]] for patch in [_least_area(rim, taken)] if len(patch)])
     if stay_open is not None and patches:
         middles = mesh.vertices[np.concatenate(patches)].mean(axis=1)
