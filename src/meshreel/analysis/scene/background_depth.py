@@ -114,7 +114,7 @@ def _smooth(picture: DepthPicture) -> DepthPicture:
 
 
 def _continued(picture: DepthPicture) -> DepthPicture:
-    """Return the surfaces of a depth picture a few pixels past their borders, where a nearer one or nothing is measured.
+    """Return the surfaces of a depth picture past their borders, where a nearer one or nothing is measured.
 
     On a grid each surface ends a voxel before what hides it; between the two, one would see through the room.
     """
