@@ -31,6 +31,7 @@ def test_small_holes_are_closed_with_faces_that_look_outwards():
     holed = without_ring(without_ring(BALL, 5), 200)
     closed = close_holes(holed, 0.5 * np.pi)
     assert open_edges(holed) > 0 and open_edges(closed) == 0
+    assert len(closed.vertices) == len(BALL.vertices)
     new = Mesh.of(closed.vertices, closed.faces[len(holed.faces) :])
     outwards = new.vertices[new.faces].mean(axis=1) - BALL.vertices.mean(axis=0)
     assert (np.einsum("fd,fd->f", face_normals(new)[0], outwards) > 0).all()
@@ -54,7 +55,7 @@ def test_holes_that_meet_at_a_vertex_are_closed_each_for_itself():
     across = next(v for v in far if len(ring & set(BALL.faces[(BALL.faces == v).any(axis=1)].reshape(-1))) == 1)
     holed = without_ring(without_ring(BALL, a), across)
     closed = close_holes(holed, 0.5 * np.pi)
-    assert open_edges(closed) == 0
+    assert open_edges(closed) == 0 and len(closed.vertices) == len(BALL.vertices)
 
 
 def test_a_hole_that_a_camera_saw_through_stays_open():
@@ -62,6 +63,7 @@ def test_a_hole_that_a_camera_saw_through_stays_open():
     near = BALL.vertices[5]
     closed = close_holes(holed, 0.5 * np.pi, lambda points: np.linalg.norm(points - near, axis=1) < 0.3)
     assert 0 < open_edges(closed) < open_edges(holed)
+    assert len(closed.vertices) == len(BALL.vertices)
 
 
 def test_the_faces_of_a_flat_hole_have_its_area_and_no_vertex_is_added():

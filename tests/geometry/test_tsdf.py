@@ -111,3 +111,19 @@ def test_more_blocks_than_memory_should_hold_are_refused(monkeypatch):
     monkeypatch.setattr("meshreel.geometry.tsdf.MOST_BLOCKS", 10)
     with pytest.raises(InputError, match=r"blocks of 0\.16 m, over 10"):
         integrate([wall()], 0.02, 3.0)
+
+
+def test_guessed_surface_counts_only_where_no_picture_tells_anything():
+    near, far = np.zeros((40, 40), np.float32), np.zeros((40, 40), np.float32)
+    near[:, :20], far[:] = 1.0, 2.0
+    camera = PinholeCamera(40, 40, np.array([[40.0, 0, 20], [0, 40, 20], [0, 0, 1]]), np.eye(4))
+    seen, guessed = (DepthPicture(camera, depth, 1.0, 5.0) for depth in (near, far))
+    plain, more = integrate([seen], VOXEL, 3.0), integrate([seen], VOXEL, 3.0, [guessed])
+    places = {tuple(block): number for number, block in enumerate(more.blocks)}
+    of_plain = [places[tuple(block)] for block in plain.blocks]
+    told = plain.weights > 0
+    assert np.array_equal(more.distances[of_plain][told], plain.distances[told])
+    assert not np.array_equal(more.weights > 0, integrate([guessed], VOXEL, 3.0).weights > 0)
+    alone = extract(more, 0.5).vertices
+    assert (np.abs(alone[:, 2] - 2) < VOXEL).any() and (np.abs(alone[:, 2] - 1) < VOXEL).any()
+    assert ((np.abs(alone[:, 2] - 2) < VOXEL) | (alone[:, 2] < 1 + 3 * VOXEL)).all()  # no surface between them

@@ -17,6 +17,7 @@ from tests.capture.depth_scenes import RADIUS, WALL, camera, measured
 
 VOXEL = 0.02
 AHEAD = camera("ahead", 0)
+SHARP = camera("sharp", 0, size=192)
 SIGMA = 8.0  # mm
 
 
@@ -109,3 +110,27 @@ def test_a_floor_seen_at_a_grazing_angle_has_no_cracks():
     seen = Rays(mesh).look(AHEAD.view).depth
     inside = binary_erosion(depth > 0, iterations=2)
     assert np.mean(np.isfinite(seen[inside])) > 0.99
+
+
+def slits(depth: np.ndarray) -> int:
+    """Rays, four a pixel each way, that meet no fused surface amid measured depth."""
+    picture = SHARP.picture(depth)
+    mesh = fuse_still_depth([Moment([picture], Mesh.empty(), np.zeros(0, bool))], VOXEL)
+    inside = np.repeat(np.repeat(binary_erosion(depth > 0, iterations=6), 4, axis=0), 4, axis=1)
+    return int((inside & ~np.isfinite(Rays(mesh).look(picture.finer(4).camera).depth)).sum())
+
+
+def test_a_step_and_what_it_hides_leave_no_slit_between_them():
+    depth = np.full((SHARP.height, SHARP.width), 3000, np.uint16)
+    depth[:, SHARP.width // 2 :] = 2000
+    assert slits(depth) == 0
+
+
+def test_what_a_camera_does_not_measure_is_closed_if_small():
+    depth = np.full((AHEAD.height, AHEAD.width), 2000, np.uint16)
+    depth[40:43, 40:43] = 0
+    mesh = fuse_still_depth([Moment([AHEAD.picture(depth)], Mesh.empty(), np.zeros(0, bool))], VOXEL)
+    assert np.isfinite(Rays(mesh).look(AHEAD.view).depth[38:46, 38:46]).all()
+    depth[30:60, 30:60] = 0
+    mesh = fuse_still_depth([Moment([AHEAD.picture(depth)], Mesh.empty(), np.zeros(0, bool))], VOXEL)
+    assert not np.isfinite(Rays(mesh).look(AHEAD.view).depth[40:50, 40:50]).any()

@@ -28,7 +28,6 @@ OPEN = 0.3  # least share of the moments in which a pixel is not hidden that mus
 SMOOTH, SPREAD, ROUNDS = 2, 1.5, 2  # pixels around, standard deviation in pixels, and rounds of smoothing (decision 28)
 SIMILAR = 4.0  # times the noise, standard deviation of the inverse depths that are averaged (decision 28)
 SECOND_MEDIAN = 0.6745 * 6**0.5  # of the absolute second difference of normally distributed values, in deviations
-PAST = 1  # pixels by which surfaces go on where something hides them (decision 28)
 FINER = 3  # times the rows and columns of the pictures, interpolated, that are fused (decision 28)
 
 
@@ -96,7 +95,7 @@ def _smooth(picture: DepthPicture) -> DepthPicture:
 
     Inverse depths are averaged, so that planes stay planes, with those around that are about as far.
     """
-    inverse = np.where(picture.depth > 0, 1 / np.where(picture.depth > 0, picture.depth, 1), 0).astype(np.float32)
+    inverse = _inverse(picture.depth)
     (height, width), similar = inverse.shape, np.float32(max(SIMILAR * _noise(inverse), 1e-6))
     places = range(-SMOOTH, SMOOTH + 1)
     for _ in range(ROUNDS):
@@ -110,29 +109,27 @@ def _smooth(picture: DepthPicture) -> DepthPicture:
                 sums += weight * there
                 weights += weight
         inverse = np.where(inverse > 0, sums / np.maximum(weights, np.float32(1e-9)), 0)
-    return replace(picture, depth=np.where(inverse > 0, 1 / np.where(inverse > 0, inverse, 1), 0).astype(np.float32))
+    return replace(picture, depth=_inverse(inverse))
 
 
 def _continued(picture: DepthPicture) -> DepthPicture:
-    """Return the surfaces of a depth picture past their borders, where a nearer one or nothing is measured.
+    """Return the surfaces of a depth picture a pixel past their borders, where a nearer one or nothing is measured.
 
     On a grid each surface ends a voxel before what hides it; between the two, one would see through the room.
     """
-    depth = np.pad(picture.depth, 1)
-    known = depth > 0
-    inverse = np.where(known, 1 / np.where(known, depth, 1), 0).astype(np.float32)
-    found = np.zeros_like(inverse)
-    for _ in range(PAST):
-        seen, guesses = np.where(found > 0, found, inverse), np.zeros_like(inverse)
-        for axis, way in ((0, 1), (0, -1), (1, 1), (1, -1)):
-            here, before = np.roll(seen, way, axis), np.roll(seen, 2 * way, axis)
-            flat = np.abs(here - before) <= STEP * here
-            guess = np.where(flat, 2 * here - before, here)
-            hidden = (here > 0) & (found == 0) & ((inverse == 0) | (guess < (1 - STEP) * inverse))
-            guesses = np.maximum(guesses, np.where(hidden, guess, 0))  # the nearest of several
-        found = np.where(guesses > 0, guesses, found)
-    found = found[1:-1, 1:-1]
-    return replace(picture, depth=np.where(found > 0, 1 / np.where(found > 0, found, 1), 0).astype(np.float32))
+    inverse, found = np.pad(_inverse(picture.depth), 1), np.zeros((1, 1), np.float32)
+    for axis, way in ((0, 1), (0, -1), (1, 1), (1, -1)):
+        here, before = np.roll(inverse, way, axis), np.roll(inverse, 2 * way, axis)
+        guess = np.where(np.abs(here - before) <= STEP * here, 2 * here - before, here)
+        hidden = (here > 0) & ((inverse == 0) | (guess < (1 - STEP) * inverse))
+        found = np.maximum(found, np.where(hidden, guess, 0))  # the nearest of several
+    return replace(picture, depth=_inverse(found[1:-1, 1:-1]))
+
+
+def _inverse(values: Float32[np.ndarray, "H W"]) -> Float32[np.ndarray, "H W"]:
+    """Return inverse depths of depths, or depths of inverse ones; 0 stays 0."""
+    known = values > 0
+    return np.where(known, 1 / np.where(known, values, 1), 0).astype(np.float32)
 
 
 def _noise(inverse: Float32[np.ndarray, "H W"]) -> float:
