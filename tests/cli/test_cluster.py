@@ -7,6 +7,7 @@ import signal
 import sys
 from dataclasses import replace
 
+import distributed
 import pytest
 from distributed import LocalCluster
 
@@ -53,6 +54,17 @@ def test_a_worker_that_is_killed_costs_no_byte(cluster, balls, tmp_path):
     assert killed
     Encoder(balls).encode(tmp_path / "one.reel", EACH_ALONE)
     assert (tmp_path / "many.reel").read_bytes() == (tmp_path / "one.reel").read_bytes()
+
+
+def test_a_result_of_a_worker_that_is_gone_is_a_result(cluster, monkeypatch):
+    with workers(1, cluster.scheduler_address) as executor:
+        monkeypatch.setattr(distributed.Future, "status", "lost")
+        assert executor.submit(divmod, 7, 2).result(10.0) == (3, 1)
+
+
+def test_what_a_call_raises_is_raised_here(cluster):
+    with workers(1, cluster.scheduler_address) as executor, pytest.raises(ZeroDivisionError):
+        executor.submit(divmod, 7, 0).result(10.0)
 
 
 def test_workers_of_other_versions_are_refused(cluster, monkeypatch):

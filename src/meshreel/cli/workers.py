@@ -7,17 +7,21 @@ from __future__ import annotations
 
 import multiprocessing
 import signal
-from collections.abc import Iterator
-from concurrent.futures import Executor, ProcessPoolExecutor
+from collections.abc import Callable, Iterator
+from concurrent.futures import Executor, Future, ProcessPoolExecutor
 from contextlib import contextmanager
+from functools import partial
 from multiprocessing.context import SpawnContext, SpawnProcess
 from multiprocessing.queues import SimpleQueue
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from .. import __version__
 from ..encoder.worker import Told, die_with_parent, end_with_parent, tell_to
 from ..errors import InputError
 from ..io.read import first_difference
+
+if TYPE_CHECKING:
+    from distributed import Client
 
 _BLOCKS = hasattr(signal, "pthread_sigmask")
 CONNECTS = 10.0  # s, in which a scheduler answers (guess)
@@ -71,13 +75,7 @@ def _cluster(address: str) -> Iterator[Executor]:
             if theirs != own:
                 text = f"{worker}: is not installed as this machine is: {first_difference(theirs, own)}"
                 raise InputError(f"{text} here; bytes would depend on who encodes: install the same versions")
-        executor: Executor = client.get_executor(pure=False)  # what is at a path may change
-        try:
-            yield executor
-        except BaseException:
-            executor.shutdown(wait=False)
-            raise
-        executor.shutdown()
+        yield _ClusterWorkers(client)  # what is not done when the client leaves is cancelled
 
 
 def installed() -> dict[str, Any]:
@@ -85,6 +83,34 @@ def installed() -> dict[str, Any]:
     from ..encoder.digests import versions
 
     return {"meshreel": __version__, "libraries": versions()}
+
+
+class _ClusterWorkers(Executor):
+    """Workers of a Dask cluster.
+
+    Not the client's own executor: it takes a result for an error where the worker dies right after it has sent it.
+    """
+
+    def __init__(self, client: Client) -> None:
+        self._client = client
+
+    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+        """Have a worker call a function; a worker that is lost has its call done by another one."""
+        future = Future[Any]()
+        call = self._client.submit(fn, *args, pure=False, **kwargs)  # what is at a path may change
+        future.add_done_callback(lambda done: call.cancel() if done.cancelled() else None)
+        call.add_done_callback(partial(_hand_over, future))
+        return future
+
+
+def _hand_over(future: Future[Any], call: Any) -> None:
+    """Give the future what the call returned or raised."""
+    if not future.set_running_or_notify_cancel():
+        return
+    try:
+        future.set_result(call.result())
+    except BaseException as error:
+        future.set_exception(error)
 
 
 class _Workers(ProcessPoolExecutor):
