@@ -71,6 +71,16 @@ def test_a_hole_of_known_size_is_not_covered_and_is_a_lost_run():
     assert judged([holed, MEASURED[1], MEASURED[2]])["still_lost_runs"] == 0
 
 
+def test_a_slit_beside_a_step_is_a_crack_though_no_clear_pixel_tells_of_it():
+    slit = MEASURED[1].copy()
+    slit[20:80, 29] = 0  # beside the box, where partly nothing is measured
+    holed = scene(BODY)
+    holed[20:30, 29] = 0
+    found = judged([MEASURED[0], slit, MEASURED[2]], [MEASURED[0], holed, MEASURED[2]])
+    assert found["all_covered"] == 1
+    assert found["cracks"] == pytest.approx((60 - 10 - 2) / (3 * SIZE**2 - 10))  # open at the picture's edge
+
+
 def test_a_ghost_is_invented_and_hides_what_it_stands_before():
     found = judged([scene(BODY), *MEASURED[1:]])
     ghost = found["per_frame"][0]

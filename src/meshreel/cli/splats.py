@@ -53,7 +53,7 @@ def held_out(sequence: MeshSequence, video: Video, number: int) -> tuple[SplatVi
 
 def errors(bound: Bound, view: SplatView) -> tuple[float, float]:
     """Return the mean squared error, of values 0 to 1, and SSIM of a picture of splats; unknown pixels are left out."""
-    found = np.clip(draw((bound.means, bound.axes, bound.scales, bound.opacities, bound.colors), view.camera), 0, 1)
+    found = np.clip(draw(bound, view.camera), 0, 1)
     known = np.isfinite(view.pixels)
     wanted = np.where(known, view.pixels, found).astype(np.float64)
     inside = slice(BORDER, -BORDER)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from jaxtyping import Float64
@@ -17,7 +18,7 @@ from ..analysis.fit.closeness import Closeness
 from ..analysis.fit.frame import FrameSurface
 from ..analysis.fit.slide import Slide
 from ..analysis.fit.surface_fit import Fitting, strongest_components
-from ..analysis.follow.embedded import Tracker
+from ..analysis.follow.embedded import Painter, Tracker
 from ..analysis.follow.fused_template import fused_mesh
 from ..analysis.follow.template import base_mesh, shared_detail
 from ..coding.layers.coder import LayersState
@@ -58,6 +59,10 @@ class Ahead:
         """Return the frame with a number."""
         return self.surfaces[number - self.first]
 
+    def painter(self, number: int) -> Painter:
+        """Return what finds who knows the colours of the frame with a number."""
+        return partial(self.paint, number, self.at(number).mesh)
+
 
 @dataclass(frozen=True, slots=True)
 class Followed:
@@ -69,6 +74,7 @@ class Followed:
     closeness: Closeness
     residual: float  # usual residual of its fits, RMS
     slide: Slide | None = None  # to where its colours were; None: it has none
+    paint: Painter | None = None  # finds what knows the colours of the last frame
 
 
 class Candidate:
@@ -88,7 +94,9 @@ class Candidate:
     @classmethod
     def of_key(cls, ahead: Ahead, key: int, options: LayersOptions, tracker: Tracker | None = None) -> Candidate:
         """Return the template of a key frame ahead; `tracker` is that of another template of the same key."""
-        found = cls(ahead, key, options, tracker or Tracker(ahead.at(key).mesh, key, options.embedded, ahead.noise))
+        if tracker is None:
+            tracker = Tracker(ahead.at(key).mesh, key, options.embedded, ahead.noise, ahead.painter(key))
+        found = cls(ahead, key, options, tracker)
         if ahead.noise == 0 or not found._lay_fused(ahead):
             found._lay(ahead)
         return found
@@ -97,7 +105,8 @@ class Candidate:
     def of_group(cls, ahead: Ahead, before: Followed, options: LayersOptions) -> Candidate:
         """Return the template at the end of the group before, whose last frame is its key."""
         surface, key = Mesh(before.positions, before.reference.base.faces), ahead.first - 1
-        found = cls(ahead, key, options, Tracker(surface, key, options.embedded, ahead.noise), before)
+        tracker = Tracker(surface, key, options.embedded, ahead.noise, before.paint)
+        found = cls(ahead, key, options, tracker, before)
         found._take(before.reference, before.positions, before.closeness)
         found._rest, found._usual, found.slide = before.positions, before.residual, before.slide
         return found
@@ -169,10 +178,13 @@ class Candidate:
                 found[number - numbers.start] = self.slide.to(positions[number - numbers.start], paint)
         return found
 
-    def followed(self, state: LayersState, positions: Float64[np.ndarray, "V 3"], numbers: range) -> Followed:
+    def followed(
+        self, ahead: Ahead, state: LayersState, positions: Float64[np.ndarray, "V 3"], numbers: range
+    ) -> Followed:
         """Return the template at the end of a group of these frames, for the group after it."""
         usual = self._usual if self.before else float(np.median([self._residuals[number] for number in numbers]))
-        return Followed(self.reference, state, positions, self._closeness, usual, self.slide)
+        slide, paint = self.slide, ahead.painter(numbers[-1])
+        return Followed(self.reference, state, positions, self._closeness, usual, slide, paint)
 
     def _limit(self, ahead: Ahead) -> float:
         """Return the residual beyond which a frame is lost: there is none below a key that is lost itself."""
@@ -188,7 +200,7 @@ class Candidate:
                 return
             residual = self._tracker.residual(number)
             if residual is None:
-                residual = self._tracker.step(number, ahead.at(number))
+                residual = self._tracker.step(number, ahead.at(number), ahead.painter(number))
             if residual > self._tracker.limits.lost:
                 self._ends[side] = number
                 return

@@ -76,8 +76,10 @@ class _Planner:
         meshes = [surface.mesh for surface in self._surfaces.values()]
         note(digests, "frames", *(array for mesh in meshes for array in (mesh.vertices, mesh.faces)))
         target = target_of(meshes, self._options.target, noise)
-        surfaces, paint, rate = list(self._surfaces.values()), self._interval.paint, self._interval.frame_rate
-        return Ahead(self._at, surfaces, noise, target, digests, paint, rate)
+        ahead = Ahead(
+            self._at, list(self._surfaces.values()), noise, target, digests, frame_rate=self._interval.frame_rate
+        )
+        return ahead if self._options.slide is None else replace(ahead, paint=self._interval.paint)
 
     def _standing(self, ahead: Ahead) -> list[Coded]:
         """Code the template where it was, if its residual there is hardly larger than usual: a fit would only slide."""
@@ -171,7 +173,7 @@ class _Planner:
             return group, None
         numbers = numbers[: group.frame_count]
         key = numbers.index(candidate.key) if candidate.key in numbers else None
-        return replace(group, key=key), candidate.followed(state, positions[len(numbers) - 1], numbers)
+        return replace(group, key=key), candidate.followed(ahead, state, positions[len(numbers) - 1], numbers)
 
     def _coder(self, ahead: Ahead, some: slice) -> GroupCoder:
         chosen, digests = ahead.surfaces[some], ahead.digests

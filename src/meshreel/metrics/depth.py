@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 from jaxtyping import Bool, Float64
-from scipy.ndimage import binary_dilation, distance_transform_edt, label, maximum_filter, minimum_filter
+from scipy.ndimage import binary_closing, binary_dilation, distance_transform_edt, label, maximum_filter, minimum_filter
 
 from ..geometry.cameras import PinholeCamera
 from ..geometry.depth import STEP, DepthFrames, DepthPicture, apart
@@ -79,6 +79,12 @@ class Judged:
     def invented(self) -> Bool[np.ndarray, "H W"]:
         """Pixels in which decoded surface stands where the camera saw through."""
         return self.shown < self.depth - self.near
+
+    @property
+    def cracks(self) -> Bool[np.ndarray, "H W"]:
+        """Pixels in which something was measured and nothing decoded, in slits between decoded surface."""
+        slits = binary_closing(self.view.covered, iterations=ASIDE) & ~self.view.covered
+        return slits & (self.depth > 0)
 
     def lost_runs(self, part: str) -> Float64[np.ndarray, " N"]:
         """Return the areas of connected pixels that are not covered, m^2, of at least `LEAST_LOST`, largest first."""
@@ -150,10 +156,12 @@ def judge(judged: DepthJudge, decoded: Frames, numbers: Iterable[int], refreshes
     """Judge some decoded frames; return numbers over all of them, and under `per_frame` those of each.
 
     By part: the shares of pixels `covered` and `invented`, the number of `lost_runs` a frame and the area of the
-    largest. `limbs_shown` counts the frames that show the lower third of a body, `limbs_lost` those of them whose
-    decoded mesh has not half of it. From a frame to the next: `still_flicker_m` is the RMS change of decoded depth
-    where both measured what stands still, `body_flicker_deg` that of normals on bodies, motion taken out. `refreshes`
-    are the frames in which another background begins: its change does not count. Shares of nothing are None.
+    largest. `cracks` is the share of all measured pixels, those beside steps, too, in slits of up to four pixels where
+    nothing was decoded: few, and seen first. `limbs_shown` counts the frames that show the lower third of a body,
+    `limbs_lost` those of them whose decoded mesh has not half of it. From a frame to the next: `still_flicker_m` is the
+    RMS change of decoded depth where both measured what stands still, `body_flicker_deg` that of normals on bodies,
+    motion taken out.
+    `refreshes` are the frames in which another background begins: its change is left out. Shares of nothing are None.
     """
     rows, before = list[Row](), dict[int, Judged]()
     for number in numbers:
@@ -190,7 +198,8 @@ def _counts(views: Sequence[Judged]) -> Row:
             f"{part}_lost_runs": len(runs),
             f"{part}_largest_lost_m2": float(runs.max(initial=0.0)),
         }
-    return row
+    row["measured"] = sum(int((each.depth > 0).sum()) for each in views)
+    return row | {"cracks": sum(int(each.cracks.sum()) for each in views)}
 
 
 def _changes(before: Mapping[int, Judged], now: Mapping[int, Judged], refreshed: bool) -> Row:
@@ -216,6 +225,7 @@ def _rates(sums: Row, frames: int) -> Row:
             row[name] = _share(sums[name], sums[f"{part}_pixels"])
         row[f"{part}_lost_runs"] = sums[f"{part}_lost_runs"] / frames
         row[f"{part}_largest_lost_m2"] = sums[f"{part}_largest_lost_m2"]
+    row["cracks"] = _share(sums["cracks"], sums["measured"])
     row |= {name: int(sums[name]) for name in ("limbs_shown", "limbs_lost")}
     for name, squares in (("still_flicker_m", "still_squares_m2"), ("body_flicker_deg", "body_squares_deg2")):
         square = _share(sums[squares], sums[f"{name.split('_')[0]}_changes"])

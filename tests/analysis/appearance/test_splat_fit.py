@@ -36,7 +36,7 @@ def frame(by: float, cameras: int = 4, turn: float = 0.0) -> SplatFrame:
 
 def shown(bound: Bound, view: SplatView) -> float:
     """Return the PSNR of a picture of splats, dB."""
-    picture = draw((bound.means, bound.axes, bound.scales, bound.opacities, bound.colors), view.camera)
+    picture = draw(bound, view.camera)
     return -10 * float(np.log10(np.square(picture - view.pixels).mean()))
 
 

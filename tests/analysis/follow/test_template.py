@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
 from meshreel.analysis.follow import template
-from meshreel.analysis.follow.template import CURVATURE, FEWEST, TemplateOptions, base_mesh, shared_detail
+from meshreel.analysis.follow.template import CURVATURE, FEWEST, NOISY_ERROR, TemplateOptions, base_mesh, shared_detail
 from meshreel.geometry.closest_points import Surface
 from meshreel.geometry.subdivision import heights, levels_of, refine
 from meshreel.types import Mesh
@@ -30,6 +32,17 @@ def test_the_base_mesh_has_about_the_requested_error(body: Mesh, error: float) -
 def test_a_smaller_error_takes_more_vertices() -> None:
     counts = [len(base_mesh(ROUGH, TemplateOptions(error=error)).vertices) for error in (2e-3, 1e-3, 5e-4, 2e-4)]
     assert counts == sorted(counts) and len(set(counts)) == 4
+
+
+def test_a_limb_that_coarse_meshes_lose_breaks_no_search() -> None:
+    limbs = [Mesh.of(BALL.vertices * [0.5, 0.02, 0.02] + [0, y, 0], BALL.faces) for y in np.linspace(-0.4, 0.4, 6)]
+    parts = [BALL, *limbs]
+    first = np.cumsum([0, *(len(part.vertices) for part in parts[:-1])])
+    faces = np.concatenate([part.faces + at for part, at in zip(parts, first, strict=True)])
+    body = Mesh.of(np.concatenate([part.vertices for part in parts]), faces)
+    for error, noise in ((7e-4, 0.0), (4e-4, 6e-4)):
+        aim = math.hypot(error, NOISY_ERROR * noise)
+        assert aim / 1.4 < rms(body, base_mesh(body, TemplateOptions(error=error), noise)) < 1.4 * aim
 
 
 def test_a_base_mesh_has_neither_fewer_vertices_than_a_body_needs_nor_more_than_the_frame_has() -> None:
@@ -103,4 +116,4 @@ def test_the_search_for_the_number_of_vertices_ends(monkeypatch: pytest.MonkeyPa
         template, "decimate", lambda mesh, count, border: (asked.append(count), real(mesh, count, border))[1]
     )
     base_mesh(ROUGH, TemplateOptions(error=1e-5))
-    assert len(asked) <= template.ROUNDS + 1
+    assert len(asked) <= template.MOST_ROUNDS

@@ -29,8 +29,8 @@ RATES = {  # of Adam, in the units of `Splats`; logarithms of scales, and logits
     "colors": 2e-2,
 }
 LARGER, LONGER = 1.0, 0.7  # of logarithms: scales from those in the beginning, and from their mean (guess)
-LAST = 0.1  # share of the rates at the end
-FIRST_OPACITY = 0.9
+LAST = 0.1  # share of the rates at the end (guess)
+FIRST_OPACITY = 0.9  # (guess)
 DEAD = 0.05  # of the mean of what splats add to pictures: less is as good as unseen (guess)
 
 

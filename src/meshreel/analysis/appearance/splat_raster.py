@@ -13,10 +13,11 @@ import numpy as np
 from jaxtyping import Float32, Float64, Int64
 
 from ...geometry.cameras import PinholeCamera
+from ...geometry.splats import Bound
 
 BLUR = 0.3  # pixels squared, added to the variances of what is drawn: no Gaussian falls between pixels
-LEAST = 1 / 255  # opacity that is drawn
-MOST = 0.999  # opacity, so that what is behind has a gradient
+LEAST = 1 / 255  # opacity that is drawn: less changes no picture of 8 bits
+MOST = 0.999  # opacity, so that what is behind has a gradient (guess)
 SPENT = 1e-4  # share of the light, below which what is behind is not drawn
 NEAR = 1e-6  # lengths before the camera, within which nothing is drawn
 WHITE = 1.0  # the background, as of `metrics.color_render`
@@ -159,10 +160,7 @@ def _stable_order(pixels: Int64[np.ndarray, " P"]) -> Int64[np.ndarray, " P"]:
     return order
 
 
-def draw(
-    bound: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray], camera: PinholeCamera
-) -> Float32[np.ndarray, "H W 3"]:
-    """Return the picture of Gaussians on white: their means, axes, scales, opacities and colours, sRGB, 0 to 1."""
-    means, axes, scales, opacities, colors = bound
-    flat = project(np, means, axes, scales, camera_matrices(camera))
-    return Drawing(flat, opacities, colors, (camera.height, camera.width)).picture.astype(np.float32)
+def draw(bound: Bound, camera: PinholeCamera) -> Float32[np.ndarray, "H W 3"]:
+    """Return the picture of Gaussians on white, sRGB, 0 to 1."""
+    flat = project(np, bound.means, bound.axes, bound.scales, camera_matrices(camera))
+    return Drawing(flat, bound.opacities, bound.colors, (camera.height, camera.width)).picture.astype(np.float32)

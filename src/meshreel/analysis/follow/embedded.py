@@ -9,7 +9,7 @@ It replaces the paper's volume tracking (section 3.1) in preset `best` (docs/dec
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,12 +20,14 @@ from ... import _core
 from ...errors import InputError
 from ...geometry import work
 from ...geometry.closest_points import Surface, area_samples
+from ...geometry.painted import Paint
 from ...geometry.rigid import quaternions
 from ...geometry.strict import products, rotations_of
 from ...geometry.topology import clean, vertex_normals
 from ...types import Mesh
 from ..fit.closeness import shared_distance
 from ..fit.frame import ON_BORDER, FrameSurface
+from .color_start import ColoredPlaces
 from .embedded_graph import Binding, DeformationGraph, build_graph, farthest_first
 from .embedded_pose import Pose, moved, rotation, turned, unmoved
 from .rigid import RigidBody, RigidMotion
@@ -33,6 +35,8 @@ from .rigid import RigidBody, RigidMotion
 NORMAL_REACH = 0.01  # diagonals, weight of a difference of unit normals in a search: a guess
 LOST = 3.0  # RMS distances of the noise that a residual may have in addition: legs come and go (decision 16)
 BACK_ROUNDS = 2  # rounds of the inverse, the first of which only estimates the nodes that move a point: a guess
+Painter = Callable[[], Paint | None]  # finds what knows the colours of a frame, if anything does
+CLEARLY = 0.8  # times the residual that a start by colour must fall below: it is rougher where shape suffices (guess)
 UNUSUAL = 1.25  # a frame is retried if its residual exceeds this many times the median so far (decision 15)
 
 
@@ -69,7 +73,15 @@ class EmbeddedOptions:
 class Tracker:
     """Tracker of a key frame's mesh: registers one frame at a time, outward from the key in either direction."""
 
-    def __init__(self, key_mesh: Mesh, key: int, options: EmbeddedOptions | None = None, noise: float = 0.0) -> None:
+    def __init__(
+        self,
+        key_mesh: Mesh,
+        key: int,
+        options: EmbeddedOptions | None = None,
+        noise: float = 0.0,
+        paint: Painter | None = None,
+    ) -> None:
+        """Take the key's mesh; `paint` is asked for what knows its colours if shape alone leads astray."""
         self.options, self.key = options or EmbeddedOptions(), key
         self.limits, self._noise = self.options.limits(noise), noise
         self.mesh = clean(key_mesh)
@@ -87,13 +99,16 @@ class Tracker:
         self._all = self._graph.bind(self.mesh.vertices, self._graph.cells, o.neighbours)
         self._poses = {key: Pose.at(self._graph.nodes)}
         self._residuals = {key: 0.0}
+        self._paint = paint
+        self._colored: ColoredPlaces | None = None
         self._body = RigidBody(self.mesh, noise) if noise > 0 else None  # what bends costs clean bodies nothing
         self._rigid = {} if self._body is None else {key: RigidMotion.none()}
 
-    def step(self, frame: int, mesh: Mesh | FrameSurface) -> float:
+    def step(self, frame: int, mesh: Mesh | FrameSurface, paint: Painter | None = None) -> float:
         """Register a frame, starting from the nearest registered frame between it and the key; return its residual.
 
-        An empty frame gets its neighbour's pose and an infinite residual. A frame may be registered again.
+        An empty frame gets its neighbour's pose and an infinite residual. A frame may be registered again. `paint` is
+        asked for what knows the frame's colours.
         """
         if frame == self.key:
             raise InputError(f"frame {frame} is the key: it needs no registration; step to another")
@@ -103,7 +118,7 @@ class Tracker:
         work.count("frames tracked")
         pose, residual = self._poses[self._known(frame)], np.inf
         if surface is not None:
-            pose, residual = self._follow(frame, surface)
+            pose, residual = self._follow(frame, surface, paint)
         self._poses[frame], self._residuals[frame] = pose, residual
         if surface is not None and self._body is not None and self._known(frame) in self._rigid:
             start = RigidMotion.between(self._graph.nodes, pose.positions)
@@ -154,23 +169,31 @@ class Tracker:
         """Return the registered frames with a measured pose: the key, and all that are not empty."""
         return [frame for frame, residual in self._residuals.items() if residual < np.inf]
 
-    def _follow(self, frame: int, surface: FrameSurface) -> tuple[Pose, float]:
+    def _follow(self, frame: int, surface: FrameSurface, paint: Painter | None) -> tuple[Pose, float]:
         """Register a frame from several starts until one is good enough; return the best pose and its residual."""
         o, last = self.options, self._known(frame)
         there = surface.sampled(o.samples)
         usual = np.median([r for r in self._residuals.values() if 0 < r < np.inf] or [0.0])  # noise is not failure
         starts = self._starts(frame, there)
         best = self._poses[last], np.inf
+        enough = max(self.limits.doubt, UNUSUAL * float(usual))
         tries = [(starts[0], o.torn[0]), (starts[0], o.torn[1]), *((start, o.torn[0]) for start in starts[1:])]
         for start, torn in tries:
-            pose = self._rounds(self._fine, self._carried(start, there, torn), there, o.fine, torn)
-            residual = self._measure(pose, surface)
-            if residual < best[1]:
-                best = pose, residual
-            if residual < max(self.limits.doubt, UNUSUAL * float(usual)):
+            found = self._from(start, there, torn, surface)
+            best = found if found[1] < best[1] else best
+            if found[1] < enough:
                 return best
+        for start in self._by_color(starts[0], surface, paint):
+            found = self._from(start, there, o.torn[0], surface)
+            if found[1] < CLEARLY * best[1] or found[1] <= self.limits.lost < best[1]:
+                best = found
         stay = self._poses[last], self._measure(self._poses[last], surface)
         return best if best[1] < stay[1] else stay
+
+    def _from(self, start: Pose, there: _core.DeformTarget, torn: float, surface: FrameSurface) -> tuple[Pose, float]:
+        """Return the pose that is found from a start, and its residual."""
+        pose = self._rounds(self._fine, self._carried(start, there, torn), there, self.options.fine, torn)
+        return pose, self._measure(pose, surface)
 
     def _starts(self, frame: int, surface: _core.DeformTarget) -> list[Pose]:
         """Return the neighbour's pose and its extrapolation, the one that matches the frame better first."""
@@ -187,6 +210,20 @@ class Tracker:
             for pose in poses
         ]
         return poses if weights[0] >= weights[1] else poses[::-1]
+
+    def _by_color(self, pose: Pose, surface: FrameSurface, paint: Painter | None) -> Iterator[Pose]:
+        """Yield the pose shifted to where the frame has the colours of the key, if both are known."""
+        theirs = paint() if paint is not None else None
+        if theirs is None:
+            return
+        if self._paint is not None and (own := self._paint()) is not None:
+            self._colored = ColoredPlaces(self.mesh, self._samples, own)
+        self._paint = None
+        if self._colored is not None:
+            points = moved(self._fine.points, self._fine.nodes, self._fine.binding, pose)
+            offsets = self._colored.offsets(pose.positions, points, surface, self.options.samples, theirs)
+            if offsets is not None:
+                yield Pose(pose.rotations, pose.positions + offsets)
 
     def _carried(self, pose: Pose, surface: _core.DeformTarget, torn: float) -> Pose:
         """Move a pose by a coarse graph whose rest is that pose, so that its detail stays."""

@@ -24,7 +24,8 @@ NOISY_BORDER = 100.0  # weight of open borders under noise: a coarse base cuts t
 FEWEST = 40  # smallest number of vertices of a base mesh, enough for a body's limbs: a guess
 DECAY = 1.2  # the error of quadric decimation falls with this power of the number of vertices (measured on bodies)
 CURVATURE = 52  # 64ths, lift of midpoints, between the coder's 48 and 58 (decision 14)
-ROUNDS = 2  # rounds of the search for the number of vertices: a guess
+NEAR, FAR = 0.05, 0.25  # logarithms of errors that are no reason to go on, in the first rounds and after: guesses
+ROUNDS, MOST_ROUNDS = 3, 8  # first rounds of the search for the number of vertices, and all of them: guesses
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,16 +42,22 @@ def base_mesh(key: Mesh, options: TemplateOptions, noise: float = 0.0) -> Mesh:
     """Decimate the key frame until its error is about `options.error`."""
     most, aim = len(key.vertices), math.hypot(options.error, NOISY_ERROR * noise)
     border = NOISY_BORDER if noise else options.border
-    count = min(max(most // 20, FEWEST), most)
-    for left in reversed(range(ROUNDS + 1)):
+    count, tried = min(max(most // 20, FEWEST), most), dict[int, tuple[float, Mesh]]()
+    while len(tried) < MOST_ROUNDS and count not in tried:
         base = decimate(key, max(count, 4), border)
         error = _rms(key, base)
-        if left == 0 or error == 0.0 or abs(np.log(error / aim)) < 0.05:
+        if error == 0.0 and not noise:
+            return base  # of a clean frame nothing is better than itself
+        tried[count] = math.log(error / aim) if error else -math.inf, base
+        if abs(tried[count][0]) < (NEAR if len(tried) < ROUNDS else FAR):
             break
+        # Where a limb is lost the law does not hold: what is between too few and too many is tried.
+        few = max((each for each, (off, _) in tried.items() if off > 0), default=FEWEST)
+        many = min((each for each, (off, _) in tried.items() if off <= 0 and each > few), default=most)
         wanted = round(len(base.vertices) * (error / aim) ** (1 / DECAY))
-        if (count := min(max(wanted, FEWEST), most)) == len(base.vertices):
-            break
-    return base
+        is_known = few in tried and many in tried and not few < wanted < many
+        count = round(math.sqrt(few * many)) if is_known else min(max(wanted, FEWEST), most)
+    return min(tried.values(), key=lambda one: abs(one[0]))[1]
 
 
 def shared_detail(
