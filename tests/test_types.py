@@ -187,6 +187,14 @@ def test_colors_that_are_not_those_of_the_vertices_are_refused():
         as_sequence([wrong])
 
 
+@pytest.mark.parametrize("value", [float("nan"), float("inf"), -2.0, 255.0, 300])
+def test_a_colour_that_is_none_is_refused(value: float):
+    wrong = to_open4d(TRIANGLE)
+    wrong.geometry.colors = np.array([[1, 0, 0], [0, value, 0], [0, 0, 1]]) * (2 if value == 300 else 1)
+    with pytest.raises(InputError, match=r"frame 0: a colour has the value"):
+        as_sequence([wrong])
+
+
 def test_open3d_missing_names_the_extra(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setitem(sys.modules, "open3d", None)
     with pytest.raises(ImportError, match=r"meshreel\[open3d\]"):

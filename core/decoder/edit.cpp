@@ -1,8 +1,6 @@
 // Edits of a file: which of its coded frames are shown, and how they are turned. Beside src/meshreel/format/edit.py.
 #include <algorithm>
 #include <cmath>
-#include <locale>
-#include <sstream>
 
 #include "format_error.h"
 #include "head.h"
@@ -22,11 +20,8 @@ uint64_t frame_of(const std::string& number) {
     return static_cast<uint64_t>(frame);
 }
 
-double double_of(const std::string& number) {
-    std::istringstream in(number);
-    in.imbue(std::locale::classic());  // whatever a program has set
-    double value = 2 * kMost;
-    in >> value;  // what is too large for a double is as large as one may be
+double entry_of(const std::string& number) {
+    const double value = double_of(number);
     require(std::fabs(value) <= kMost, "Header.metadata: edit.rotation has a number that no rotation has");
     return value;
 }
@@ -47,7 +42,7 @@ bool is_rotation(const double (&m)[9]) {
 void read_rotation(const std::vector<std::string>& numbers, Edit& edit) {
     if (numbers.empty()) return;
     require(numbers.size() == 9, "Header.metadata: edit.rotation has not nine numbers");
-    std::transform(numbers.begin(), numbers.end(), edit.rotation, double_of);
+    std::transform(numbers.begin(), numbers.end(), edit.rotation, entry_of);
     require(is_rotation(edit.rotation), "Header.metadata: edit.rotation is no rotation");
     edit.is_turned = true;
 }
@@ -55,12 +50,12 @@ void read_rotation(const std::vector<std::string>& numbers, Edit& edit) {
 }  // namespace
 
 Edit parse_edit(const std::string& metadata, uint64_t frames) {
-    std::map<std::string, std::string> all, items;
-    require(read_members(metadata, all), "Header.metadata: not a JSON object");
-    require(read_members(all["edit"], items), "Header.metadata: the file is edited, and no edit is told");
+    const std::map<std::string, std::string> all = members_of(metadata);
+    const auto item = all.find("edit");
+    require(item != all.end(), "Header.metadata: the file is edited, and no edit is told");
     Edit edit;
     edit.end = frames;
-    for (const auto& [name, value] : items) {
+    for (const auto& [name, value] : members_of(item->second)) {
         const bool is_frames = name == "frames";
         require(is_frames || name == "rotation",
                 "Header.metadata: an edit that this reader does not know, update meshreel");

@@ -114,6 +114,7 @@ Head parse_head(const std::vector<uint8_t>& data, uint64_t file_size) {
     in.finish("Index");
     head.size = offset;
     check_index(head);
+    members_of(head.header.metadata);  // is one JSON object, whether or not an edit is read from it
     head.edit.end = head.frames;
     if (data[kFlagsAt] & kEdited) head.edit = parse_edit(head.header.metadata, head.frames);
     head.frames = head.edit.end - head.edit.first;

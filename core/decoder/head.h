@@ -96,13 +96,15 @@ std::string describe(const Head& head, uint32_t chunk);
 // first frames of the chunks.
 void check_index(Head& head);
 
-// Reads the members of a JSON object as far as it is one, and returns whether all of it is: the text of each value,
-// which may be none, by its name, in which escapes stay. Of equal names the last counts.
-bool read_members(const std::string& json, std::map<std::string, std::string>& members);
-// The value of a member of a JSON object if it is a string without escapes, else "".
+// The members of a JSON object: the text of each value as it is written, by its name; of equal names the last counts.
+// Throws FormatError for anything else, nested values among it.
+std::map<std::string, std::string> members_of(const std::string& json);
+// The value of a member of a JSON object if it is a string, else "".
 std::string text_member(const std::string& json, const std::string& name);
 // The numbers of a JSON array of numbers, as they are written. Throws FormatError for anything else.
 std::vector<std::string> number_list(const std::string& json);
+// A number of JSON; infinite where no double is as large.
+double double_of(const std::string& number);
 
 // The edit that the metadata of a file of so many coded frames tells of. Throws FormatError.
 Edit parse_edit(const std::string& metadata, uint64_t frames);

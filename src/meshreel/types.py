@@ -310,9 +310,10 @@ def _colors_of(item: object, count: int, where: str) -> UInt8[np.ndarray, "V 3"]
         return None
     if found.ndim != 2 or found.shape[0] != count or found.shape[1] not in (3, 4):
         raise InputError(f"{where}: colours of shape {found.shape}; give {count} x 3, one of each vertex")
-    if found.dtype.kind == "f":
-        found = (255 * np.clip(found, 0, 1)).round()
-    return np.ascontiguousarray(found[:, :3], np.uint8)
+    found, most = found[:, :3], 1 if found.dtype.kind == "f" else 255
+    if not (known := (found >= -most) & (found <= 2 * most)).all():  # blended ones go a little beyond
+        raise InputError(f"{where}: a colour has the value {found[~known][0]:g}; give fractions of 1, or bytes")
+    return np.ascontiguousarray((np.clip(found, 0, most) * (255 / most)).round(), np.uint8)
 
 
 def _rows_of_three(values: object, what: str) -> np.ndarray:

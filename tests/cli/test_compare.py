@@ -178,7 +178,9 @@ def test_frames_of_a_rig_are_judged_by_its_depth_pictures(run, rig, tmp_path):
     found = run("compare", rig, rig / "larger", "--no-ssim", "--json").row["depth"]
     assert len(found["decoded"]["per_frame"]) == found["originals"]["frames_judged"] == 3
     assert found["originals"]["all_covered"] > 0.95 and found["decoded"]["all_invented"] < 0.05
-    said = run("compare", rig, rig / "larger", "--no-ssim")
+    said = run("compare", rig, rig / "larger")  # no pictures are rendered unless they are asked for
+    assert "ssim" not in said.out and "frames_empty" not in said.out and "frames_compared" in said.out
+    assert "ssim" in run("compare", rig, rig / "larger", "--ssim", "--width", "32", "--height", "32").out
     assert "by the depth pictures, 3 frames" in said.out and "another recording" not in said.err
     (tmp_path / "far").mkdir()
     for number, mesh in enumerate(open_sequence(rig / "larger")):

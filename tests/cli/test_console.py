@@ -38,12 +38,28 @@ def test_the_time_left_is_that_of_the_frames_so_far(staged):
 def test_a_line_tells_of_all_stages_that_are_not_done(staged):
     progress, clock = staged
     assert line_of(progress.bars.tasks) == ""
-    for stage, done in (("survey", 100), ("code", 0), ("track", 1)):
+    progress("survey", 100, 100)
+    clock.now = 30.0
+    assert line_of(progress.bars.tasks) == "meshreel: survey is done; 0:00:30 so far"
+    for stage, done in (("code", 0), ("track", 1)):
         progress(stage, done, 100)
-    clock.now = 90.0
-    assert line_of(progress.bars.tasks) == "meshreel: code 0, track 1 of 100 frames; 0:01:30 so far"
+    clock.now = 120.0
+    assert line_of(progress.bars.tasks) == "meshreel: code 0, track 1 of 100 frames; 0:02:00 so far"
     progress("code", 10, 100)
-    assert line_of(progress.bars.tasks).endswith("code 10, track 1 of 100 frames; 0:01:30 so far, about 0:13:30 left")
+    assert line_of(progress.bars.tasks).endswith("code 10, track 1 of 100 frames; 0:02:00 so far, about 0:13:30 left")
+
+
+def test_a_stage_that_begins_again_counts_its_time_anew(staged):
+    progress, clock = staged
+    progress("code", 0, 100)
+    clock.now = 1000.0
+    progress("code", 100, 100)
+    (task,) = progress.bars.tasks
+    assert task.finished
+    progress("code", 0, 100)
+    clock.now = 1010.0
+    progress("code", 10, 100)
+    assert not task.finished and left(task) == 90.0
 
 
 @pytest.mark.parametrize("quiet", [False, True])

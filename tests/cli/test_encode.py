@@ -12,8 +12,9 @@ import pytest
 import meshreel
 from meshreel.cli.encode import command
 from meshreel.encoder.presets import preset_options
+from meshreel.errors import InputError
 from meshreel.io.sequence import SequenceOptions
-from tests.cli.conftest import failed
+from tests.cli.conftest import Said, failed
 
 TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\n"
 
@@ -286,3 +287,20 @@ def test_more_effort_is_more_work_on_the_same_frames(run, balls, tmp_path):
         work.append(said.row["work"]["closest points"])
     assert work == sorted(set(work))
     assert failed(run("encode", balls, "-o", tmp_path / "c.reel", "--effort", "lazy"), "lazy", "fast")
+
+
+def test_what_is_missing_for_colours_is_told_before_anything_is_encoded(run, tmp_path, monkeypatch):
+    def encode(*_: object) -> None:
+        raise InputError("encoding began")
+
+    monkeypatch.setattr("meshreel.encoder.appearance.find_spec", lambda _: None)
+    monkeypatch.setattr("meshreel.cli.encode.Encoder.encode", encode)
+    lines = TRIANGLE.replace("\n", " 1 0 0\n") + "f 1 2 3\n"
+    for color, warned in (("auto", True), ("vertices", False)):
+        said = run("encode", obj(tmp_path, "a.obj", lines), "-o", tmp_path / "a.reel", "--color", color)
+        assert ("no textures: av and xatlas missing" in said.err) == warned
+        assert failed(Said(said.code, said.out, said.err.splitlines(keepends=True)[-1]), "encoding began")
+    said = run("encode", obj(tmp_path, "b.obj", TRIANGLE + "f 1 2 3\n"), "-o", tmp_path / "a.reel")
+    assert failed(said, "encoding began") and "textures" not in said.err
+    said = run("encode", tmp_path / "recording", "-o", tmp_path / "a.reel", "--splats", "100")
+    assert failed(said, "torch", "meshreel[splats]")

@@ -9,7 +9,7 @@ import meshreel
 from meshreel.coding.intra import encode_empty
 from meshreel.container.writer import ReelWriter
 from tests.cli.conftest import FILE, SCENE, failed
-from tests.container.files import HEADER
+from tests.container.files import HEADER, PAYLOADS
 from tests.golden import GOLDEN
 
 
@@ -49,6 +49,16 @@ def test_a_damaged_group_is_reported_and_the_others_shown(run, tmp_path):
     assert said.code == 0
     assert ["error" in group for group in said.row["groups"]] == [False, True, False, False]
     assert "group 1: chunk 1 (frames 2 to 5)" in said.err
+
+
+def test_a_group_that_does_not_decode_is_named_when_all_groups_are_asked_for(run, tmp_path):
+    with ReelWriter(tmp_path / "a.reel", HEADER) as writer:
+        writer.add_group(0, 2, encode_empty(), depends_on=(writer.add_static(PAYLOADS[0]),))
+        writer.add_group(2, 3, PAYLOADS[3])
+    said = run("info", tmp_path / "a.reel", "--groups", "--json")
+    assert said.code == 0 and ["error" in group for group in said.row["groups"]] == [False, True]
+    assert "group 1: chunk 2 (frames 2 to 4)" in said.err and "background: " in said.err
+    assert run("info", FILE, "--groups").err == run("info", SCENE, "--groups").err == ""
 
 
 def test_a_truncated_file_is_reported_with_its_existing_and_missing_bytes(run, tmp_path):

@@ -12,10 +12,10 @@ import pytest
 
 from meshreel.container.reader import FIRST_REQUEST, ReelReader
 from meshreel.container.sources import BytesSource, FileSource, Source
-from meshreel.container.writer import ReelWriter
+from meshreel.container.writer import ReelWriter, pack_head
 from meshreel.errors import InputError
 from meshreel.format.checks import MOST_TRACKS
-from meshreel.format.layout import ChunkKind, EmptyGroup, Form
+from meshreel.format.layout import ChunkKind, EmptyGroup, Form, Index, Layer
 from meshreel.format.records import pack
 from tests.container.files import FRAMES, HEADER, PAYLOADS, small_file
 from tests.golden import GOLDEN
@@ -152,6 +152,15 @@ def test_where_there_are_several_tracks_a_chunk_names_its_own():
         "chunk 4 (track 1, frames 4 to 6)",
         "chunk 5 (track 0, frames 6 to 9)",
     ]
+
+
+def test_a_chunk_of_a_kind_to_come_may_have_any_track_and_frames():
+    reader = ReelReader(BytesSource(small_file()))
+    entry = replace(reader.index.chunks[-1], kind=200, track=300, depends_on=(), layers=(Layer(1, 0),))
+    data = pack_head(reader.header, Index((*reader.index.chunks, entry)))
+    more = ReelReader(BytesSource(data + small_file()[reader.head_size :] + b"?"))
+    assert [chunk.number for chunk in more.groups] == [chunk.number for chunk in reader.groups]
+    assert (more.chunks[-1].kind, more.chunks[-1].track) == (200, 300)
 
 
 def test_the_largest_number_of_tracks_is_read_quickly():

@@ -134,13 +134,15 @@ NO_JSON = [
 ]
 
 
-def of_metadata(text: str) -> bytes:
-    """Return a file of three frames whose flag says that its metadata, any text, has an edit."""
+def of_metadata(text: str | bytes, flags: int = EDITED) -> bytes:
+    """Return a file of three frames with any text as its metadata, whose flag says that it has an edit."""
     data = (GOLDEN / "draco.reel").read_bytes()
     reader = meshreel.open(data).reader
-    body = pack(replace(reader.header, metadata=text)) + pack(reader.index)
+    written = text.encode() if isinstance(text, str) else text
+    header = pack(replace(reader.header, metadata="x" * len(written))).replace(b"x" * len(written), written)
+    body = header + pack(reader.index)
     size = least_size(Preamble) + len(body) + least_size(Checksum)
-    head = pack(Preamble(MAGIC, VERSION, EDITED, size)) + body
+    head = pack(Preamble(MAGIC, VERSION, flags, size)) + body
     return head + pack(Checksum(crc32(head))) + data[reader.head_size :]
 
 
@@ -167,6 +169,67 @@ def test_a_flag_without_an_edit_is_refused(text: str):
     for opened in (meshreel.open, CVideo):
         with pytest.raises((FormatError, CError), match="metadata"):
             opened(of_metadata(text))
+
+
+JSON = r""" {"up" : "z", "a":[1, -2.5e+3,true,false,null,{"b\u00e9":"\ud83d\ude00 \n\"/"}],"d":{}, "c":"\\é€😀"} """
+NOT_WRITTEN = [
+    "",
+    "[]",
+    "7",
+    "{}x",
+    "\ufeff{}",
+    "{} \0",
+    '{"a":NaN}',
+    '{"a":-Infinity}',
+    '{"a":1e999}',
+    '{"a":"\\ud800"}',
+]
+NOT_WRITTEN += [
+    '{"a":"\\ud800\\u0041"}',
+    '{"a":"\\ude00"}',
+    '{"a":"\t"}',
+    '{"a":"\\x"}',
+    '{"a":tru}',
+    '{"a":}',
+    "{a:1}",
+]
+NOT_WRITTEN += [f'{{"a":{"[" * 2000}{"]" * 2000}}}', f'{{"a":{"1" * 4301}}}', '{"a":[1 2]}', '{"a":{"b"}}', '{"a":[1}}']
+
+
+def is_refused(data: bytes) -> bool:
+    """Return whether the C library refuses a file, which it must where Python does, and only there."""
+    try:
+        known = meshreel.open(data)
+    except FormatError:
+        with pytest.raises(CError) as error:
+            CVideo(data)
+        assert error.value.status == DAMAGED
+        return True
+    with CVideo(data) as video:
+        assert ("y", "z", "-y", "-z")[video.info.up] == known.reader.up
+    return False
+
+
+@pytest.mark.parametrize("text", NOT_WRITTEN)
+def test_metadata_that_are_no_json_are_refused_without_an_edit_too(text: str):
+    assert is_refused(of_metadata(text, flags=0))
+
+
+def test_metadata_with_other_bytes_are_refused_where_python_refuses_them():
+    numbers, text = np.random.default_rng(5), JSON.encode()
+    assert not is_refused(of_metadata(text, flags=0))
+    assert not is_refused(of_metadata(f'{{"a":{"1" * 4300},"\\u0075p":"\\u007a"}}', flags=0))
+    verdicts = list[bool]()
+    for _ in range(1500):
+        changed = bytearray(text)
+        for at in numbers.integers(len(text), size=numbers.integers(1, 3)):
+            changed[at] = (
+                numbers.choice(list(b'"\\{}[],:0e.u \n\xc3\xe2\x80'))
+                if numbers.random() < 0.7
+                else numbers.integers(256)
+            )
+        verdicts.append(is_refused(of_metadata(bytes(changed), flags=0)))
+    assert 100 < sum(verdicts) < 1400
 
 
 def test_an_edit_without_the_flag_means_nothing_and_another_flag_is_refused():

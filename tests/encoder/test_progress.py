@@ -34,6 +34,14 @@ def test_work_on_a_group_counts_up_to_the_longest_group_and_again_from_the_next(
     assert {stage for stage, *_ in told} == {"track", "code", "fit"}
 
 
+def test_what_is_fitted_is_tracked_though_a_key_is_not(told):
+    stages, told = told
+    interval = IntervalStages(stages, 4, 4)
+    interval.hear("frames tracked", 3)
+    interval.hear("frames fitted", 4)
+    assert told == [("track", 3, 40), ("track", 4, 40), ("fit", 4, 40)]
+
+
 def test_what_is_coded_has_passed_all_stages_and_no_stage_goes_back(told):
     stages, told = told
     interval = IntervalStages(stages, 10, 4)

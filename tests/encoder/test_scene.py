@@ -130,7 +130,7 @@ def test_the_same_scene_gives_the_same_bytes_with_an_executor_too(tmp_path):
         encoded(ROLLING, tmp_path / "b.reel", executor=executor, progress=record)
     assert (tmp_path / "b.reel").read_bytes() == (tmp_path / "a.reel").read_bytes()
     assert {stage: done[-1] for stage, done in stages.items()} == dict.fromkeys(
-        ("survey", "segment", "background", "code", "track", "fit"), 4
+        ("survey", "segment", "background", "noise", "room", "code", "track", "fit"), 4
     )
     for stage in ("segment", "background"):  # frame by frame, and not all at the end
         assert sorted(stages[stage]) == stages[stage] and len(set(stages[stage])) > 2

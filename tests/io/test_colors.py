@@ -125,6 +125,47 @@ def test_ply_colors_of_all_kinds_are_8_bits(tmp_path: Path, kind: str, one: str)
     assert read_mesh(tmp_path / "m.ply").mesh.colors.tolist() == [[255, 0, 0], [0, 255, 0], [0, 0, 255]]
 
 
+@pytest.mark.parametrize(
+    ("kind", "row", "told"),
+    [
+        ("float", "0 nan 0", r"vertex 1 has the colour \(0, nan, 0\), and 1 in all are not within 0 to 1"),
+        ("float", "inf 0 0", r"colour \(inf, 0, 0\)"),
+        ("float", "0 -7 0", r"colour \(0, -7, 0\)"),
+        ("float", "0 0 1e6", r"colour \(0, 0, 1e\+06\), and 1 in all are not within 0 to 255"),
+        ("int", "0 90000 0", r"colour \(0, 90000, 0\)"),
+        ("uchar", "0 nan 0", r"colour \(0, nan, 0\)"),
+    ],
+)
+def test_a_colour_that_is_none_is_refused_with_file_vertex_and_value(
+    tmp_path: Path, kind: str, row: str, told: str
+) -> None:
+    names = "".join(f"property {kind} {name}\n" for name in ("red", "green", "blue"))
+    head = f"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n{names}"
+    rows = f"0 0 0 1 0 0\n1 0 0 {row}\n0 1 0 0 0 1\n3 0 1 2\n"
+    text = f"{head}element face 1\nproperty list uchar int vertex_indices\nend_header\n{rows}"
+    (tmp_path / "m.ply").write_text(text)
+    with pytest.raises(InputError, match=rf"m.ply: .*{told}"):
+        read_mesh(tmp_path / "m.ply")
+
+
+@pytest.mark.parametrize("extension", ["obj", "npz", "glb"])
+def test_a_colour_that_is_no_number_is_refused_in_every_format(tmp_path: Path, extension: str) -> None:
+    path, colors = tmp_path / f"m.{extension}", np.full((3, 3), 0.5, np.float32)
+    colors[1, 0] = np.nan
+    corner = np.eye(3)
+    if extension == "obj":
+        path.write_text("v 0 0 0 1 0 0\nv 1 0 0 nan 0 0\nv 0 1 0 1 0 0\nf 1 2 3\n")
+    elif extension == "npz":
+        np.savez(path, vertices=corner[None], faces=[[0, 1, 2]], colors=colors)
+    else:
+        write_mesh(replace(Mesh.of(corner, [[0, 1, 2]]), colors=np.full((3, 3), 255, np.uint8)), path)
+        data = path.read_bytes()
+        at = data.rindex(np.ones(9, "<f4").tobytes()) + 12
+        path.write_bytes(data[:at] + np.array([np.nan], "<f4").tobytes() + data[at + 4 :])
+    with pytest.raises(InputError, match=rf"m.{extension}.*vertex 1 has the colour \(nan, "):
+        open_sequence(path)[0]
+
+
 @pytest.mark.parametrize("order", "<>")
 def test_colors_of_16_bits_have_the_same_scale_in_either_byte_order(order: str) -> None:
     assert eight_bits(np.array([[0, 300, 65535]], f"{order}u2")).tolist() == [[0, 1, 255]]

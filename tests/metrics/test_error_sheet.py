@@ -1,10 +1,11 @@
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from meshreel.errors import InputError
-from meshreel.metrics.error_sheet import SheetOptions, error_at_pixels, write_sheet
+from meshreel.metrics.error_sheet import SheetOptions, _rows, error_at_pixels, write_sheet
 from meshreel.metrics.render import Crop, look
 from meshreel.metrics.viewpoints import Box, ViewOptions, views_around
 from meshreel.types import Mesh, MeshList
@@ -37,6 +38,19 @@ def test_a_sheet_is_a_png_with_a_line_for_each_frame(tmp_path: Path, unit: str):
     picture = image.imread(path)
     assert picture.shape[0] > 2 * 64 and picture.shape[1] > 3 * 64
     assert picture[..., :3].std() > 0.02
+
+
+def test_frames_have_the_numbers_of_the_sequence_that_they_are_of_and_their_colours():
+    red, plain = (replace(BODY, colors=np.tile(np.uint8([255, 0, 0]), (len(BODY.vertices), 1))), BODY)
+    options = SheetOptions(frames=(12,), first=10, height=64)
+    (row,) = _rows(MeshList((plain, plain, red)), MeshList((plain, plain, red)), options)
+    assert row.label.startswith("frame 12\n")
+    for picture in row.pictures:
+        assert np.array_equal(np.unique(picture[row.original.covered], axis=0), [[1, 0, 0]])
+    (row,) = _rows(MeshList((red,) * 3), MeshList((plain,) * 3), options)
+    assert np.array_equal(row.pictures[0], row.original.colors)
+    with pytest.raises(InputError, match="frames 10 to 12"):
+        list(_rows(MeshList((red,) * 3), MeshList((plain,) * 3), SheetOptions(frames=(0,), first=10)))
 
 
 def test_a_sheet_is_seen_from_the_cameras_that_are_given(tmp_path: Path):

@@ -19,7 +19,7 @@ import numpy as np
 from jaxtyping import Float64, UInt16
 
 from ..errors import InputError
-from ..geometry.cameras import PinholeCamera
+from ..geometry.cameras import PinholeCamera, scaled_lens
 from ..geometry.depth import DepthPicture
 from ..io.depth_pictures import read_depth
 from ..io.read import read_json
@@ -90,9 +90,7 @@ class DepthCamera:
 
     def resized(self, width: int, height: int) -> DepthCamera:
         """Return the camera with pictures of another size; the middle of pixel i is at i."""
-        ratios = (width / self.width, height / self.height)
-        focal = (self.focal[0] * ratios[0], self.focal[1] * ratios[1])
-        center = ((self.center[0] + 0.5) * ratios[0] - 0.5, (self.center[1] + 0.5) * ratios[1] - 0.5)
+        focal, center = scaled_lens(self.focal, self.center, width / self.width, height / self.height)
         return replace(self, width=width, height=height, focal=focal, center=center)
 
     def in_range(self, depth: UInt16[np.ndarray, "H W"]) -> UInt16[np.ndarray, "H W"]:

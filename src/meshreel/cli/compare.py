@@ -12,7 +12,6 @@ import numpy as np
 from cyclopts import Parameter
 from rich.table import Table
 
-from ..capture.recording import Recording
 from ..capture.truth import Truth, read_truth
 from ..container.sources import FileSource
 from ..decoder.video import Video
@@ -21,7 +20,7 @@ from ..errors import FormatError, InputError
 from ..export.splats import check_splats
 from ..format.layout import MAGIC, ChunkKind
 from ..geometry.cameras import PinholeCamera
-from ..geometry.derived_sequences import Chosen
+from ..geometry.derived_sequences import CapturedSequence, Chosen, captured
 from ..geometry.topology import weld
 from ..io.sequence import SequenceOptions, open_sequence
 from ..metrics.comparison import ComparisonOptions, compare_sequences
@@ -37,7 +36,7 @@ from .sources import open_source
 from .splats import compare_splats
 
 ALIKE = 0.2  # share of what depth measured: a decoded scene that covers less is of another recording (guess)
-BESIDE = {"truth": "against the truth", "depth": "by the depth pictures"}  # parts of a row with numbers of both
+OF_BOTH = {"truth": "against the truth", "depth": "by the depth pictures"}  # parts of a row with numbers of both
 
 
 def command(
@@ -70,7 +69,7 @@ def command(
         Write a PNG of original, decoded mesh and error heat map, seen from --cameras, from a rig's cameras, or from the
         front.
     sheet_frames
-        Frames in the sheet; by default the first, the middle and the last.
+        Frames in the sheet, by their numbers in DECODED; by default the first, the middle and the last.
     splats
         Compare pictures of the splats of a .reel file, too: with renders of coloured originals from cameras that were
         not fitted to, or with the pictures of a rig. PSNR and SSIM are of pictures that are cut to the bodies.
@@ -81,10 +80,12 @@ def command(
         import_module("matplotlib")  # where it is missing, that is said before minutes of measuring
     source = open_source([originals], reading, common)
     sequence, stored = source.sequence, open_decoded(decoded, reading)
-    other = stored if len(stored) == len(sequence) else Chosen(stored, reading.options().chosen(len(stored)))
+    same = len(stored) == len(sequence)
+    numbers = range(len(stored)) if same else reading.options().chosen(len(stored))  # of the frames in `decoded`
+    other = stored if same else Chosen(stored, numbers)
     if len(sequence) != len(other):
         raise InputError(f"{originals} has {len(sequence)} frames and {decoded} {len(other)}; choose with --frames A:B")
-    shown = SheetOptions(sheet_frames, cameras=_sheet_cameras(looking, sequence), up=looking.up)
+    shown = SheetOptions(sheet_frames, _sheet_cameras(looking, sequence), up=looking.up, first=numbers.start)
     if splats:
         if not isinstance(other, Video):
             raise InputError(f"{decoded}: --splats needs a .reel file with the frames of {originals}; see meshreel cut")
@@ -92,7 +93,7 @@ def command(
     truth = None if knowing.truth is None else open_truth(knowing.truth, reading, len(sequence))
     try:
         with common.stages(len(sequence)) as progress:
-            row = _measured(sequence, other, _options(looking, other), progress)
+            row = _measured(sequence, other, _options(looking, sequence, other), progress)
             if splats and isinstance(other, Video):
                 row |= compare_splats(sequence, other, progress)
             if truth is not None:
@@ -119,7 +120,7 @@ def _other(row: dict[str, Any], originals: str, decoded: str) -> Iterator[str]:
 def _tell(row: dict[str, Any], sheet: Path | None, common: Common) -> None:
     """Print warnings and tables, or JSON."""
     common.warn(row["warnings"])
-    texts: list[object] = [both_table(title, row[name]) for name, title in BESIDE.items() if name in row]
+    texts: list[object] = [both_table(title, row[name]) for name, title in OF_BOTH.items() if name in row]
     texts += [f"picture: {sheet}"] if sheet is not None else []
     common.result(row, metric_table(row), *_cameras(row), *texts)
 
@@ -129,7 +130,7 @@ def _measured(
 ) -> dict[str, Any]:
     """Compare the meshes of all frames, and judge those of a rig by its depth pictures."""
     row = compare_sequences(sequence, counted(other, progress), options).to_row()
-    return row | {"depth": by_depth(sequence, other, progress)} if isinstance(sequence, Recording) else row
+    return row if captured(sequence).depth is None else row | {"depth": by_depth(captured(sequence), other, progress)}
 
 
 def _rate(decoded: str, other: MeshSequence) -> dict[str, Any]:
@@ -147,9 +148,12 @@ def open_decoded(decoded: str, reading: Reading) -> MeshSequence:
     return open_sequence(decoded, SequenceOptions(reading.fps, weld=weld))
 
 
-def _options(looking: Looking, decoded: MeshSequence) -> ComparisonOptions:
-    """Return the options that were asked for; key frames are those that a file names where none are given."""
-    options = looking.options()
+def _options(looking: Looking, sequence: MeshSequence, decoded: MeshSequence) -> ComparisonOptions:
+    """Return the options that were asked for; key frames are those that a file names where none are given.
+
+    By default, no pictures are rendered of what is judged by its own depth pictures.
+    """
+    options = looking.options(captured(sequence).depth is None)
     if isinstance(decoded, Video) and not options.keys:
         return replace(options, keys=recorded_keys(decoded.reader.metadata, len(decoded)))
     return options
@@ -159,7 +163,8 @@ def _sheet_cameras(looking: Looking, sequence: MeshSequence) -> tuple[PinholeCam
     """Return the given cameras, or those of the rig that have the picture size of its first one."""
     if looking.cameras is not None:
         return tuple(read_cameras(looking.cameras))
-    views = [camera.view for camera in sequence.rig.cameras] if isinstance(sequence, Recording) else []
+    depth = captured(sequence).depth
+    views = [picture.camera for picture in ([] if depth is None else depth[0]) if picture is not None]
     return tuple(view for view in views if (view.width, view.height) == (views[0].width, views[0].height))
 
 
@@ -187,8 +192,9 @@ def against_truth(
     return compare_with_truth(sequence, other, clean, numbers, lambda done: progress("truth", done, len(numbers)))
 
 
-def by_depth(sequence: Recording, decoded: MeshSequence, progress: StageBars) -> dict[str, Any]:
-    """Judge decoded frames by the depth pictures of a recording, and beside them its own frames."""
+def by_depth(sequence: CapturedSequence, decoded: MeshSequence, progress: StageBars) -> dict[str, Any]:
+    """Judge decoded frames by the depth pictures of a recording, which it has, and beside them its own frames."""
+    assert sequence.depth is not None
     judged = DepthJudge(sequence.depth, len(sequence), UP_AXES[sequence.up])
     chunks = decoded.reader.chunks if isinstance(decoded, Video) else ()
     refreshes = {chunk.first_frame for chunk in chunks if chunk.kind == ChunkKind.STATIC}
@@ -227,13 +233,18 @@ def recorded_keys(metadata: dict[str, Any], count: int) -> tuple[int, ...]:
 
 
 def metric_table(row: dict[str, Any]) -> Table:
-    """Return a table of metrics, one per line: mean over frames, worst frame, and mean without key frames."""
+    """Return a table of metrics, one per line: mean over frames, worst frame, and mean without key frames.
+
+    What no frame has, and counts of no frames, are left out.
+    """
     columns = {"mean": "", "worst frame": "_worst"}
     if any(name.endswith("_without_keys") for name in row):
         columns["without key frames"] = "_without_keys"
     table = Table("metric", *columns)
     for name, value in row.items():
         if name.endswith(("_worst", "_without_keys")) or not isinstance(value, (int, float, type(None))):
+            continue
+        if value is None or (name in ("frames_empty", "frames_missing") and not value):
             continue
         table.add_row(name, *(_number(row.get(name + ending)) for ending in columns.values()))
     return table

@@ -108,6 +108,9 @@ class StageBars:
         """Show that `done` of `total` frames have passed `stage`."""
         if stage not in self.tasks:
             self.tasks[stage] = self.bars.add_task(stage, total=total, first=done)
+        task = next(task for task in self.bars.tasks if task.id == self.tasks[stage])
+        if done < task.completed:  # the next encode of a search for a target
+            self.bars.reset(task.id, total=total, completed=done, first=done)
         self.bars.update(self.tasks[stage], completed=done, total=total)
 
 
@@ -148,15 +151,18 @@ def _lines(bars: Progress, counted: str) -> Iterator[None]:
 
 
 def line_of(tasks: Iterable[Task], counted: str = "frames") -> str:
-    """Return a line that tells how far the unfinished stages are, empty where there is none."""
-    open_ones = [task for task in tasks if not task.finished]
-    if not open_ones:
+    """Return a line that tells how far the unfinished stages are, or the last one that is done; empty before any."""
+    if not (all_of_them := list(tasks)):
         return ""
+    began = min(task.start_time or 0.0 for task in all_of_them)
+    so_far = f"{_clock(all_of_them[0].get_time() - began)} so far"
+    open_ones = [task for task in all_of_them if not task.finished]
+    if not open_ones:
+        return f"meshreel: {all_of_them[-1].description} is done; {so_far}"
     counts = ", ".join(f"{task.description} {task.completed:.0f}" for task in open_ones)
     lefts = [seconds for task in open_ones if (seconds := left(task)) is not None]
-    so_far = _clock(max(task.elapsed or 0.0 for task in open_ones))
     rest = f", about {_clock(max(lefts))} left" if lefts else ""
-    return f"meshreel: {counts} of {open_ones[0].total:.0f} {counted}; {so_far} so far{rest}"
+    return f"meshreel: {counts} of {open_ones[0].total:.0f} {counted}; {so_far}{rest}"
 
 
 def _clock(seconds: float | None) -> str:

@@ -51,7 +51,7 @@ def command(
         Largest number of layers (subdivisions, or KLT components) to decode of each group beyond its first: fewer
         give coarser, valid meshes from fewer bytes.
     only
-        Of a scene, only the background or only the moving bodies; by default whole frames.
+        Of a scene, only the background, once for each change of it, or only the moving bodies; by default whole frames.
     splats
         Write the splats of each frame in place of meshes: PLY or SPZ files for viewers of 3D Gaussian splatting.
     audio
@@ -76,6 +76,8 @@ def command(
     }
     parts = every[only]
     lost = _not_kept(video.reader, format)
+    pictured = video.background if video.reader.has_textures and not lost else lambda _: None
+    written = _changes(video.reader, pictured) if only == "background" else range(len(video))
     common.warn(lost)
     bare, pale = video.at(layers, colors=False), list[FormatError]()
 
@@ -91,20 +93,39 @@ def command(
             return mesh
 
     make_folder(output)
-    names = frame_names(len(video), format)
+    every_name = frame_names(len(video), format)
+    names = [every_name[frame] for frame in written]
     common.warn(left_over(output, names, f"frame_*.{format}"))
-    with common.stages(len(video)) as progress:
+    with common.stages(len(names)) as progress:
         paths = [output / name for name in names]
-        failed = write_frames(decode, paths, lambda done: progress("decode", done, len(video)))
+        failed = write_frames(lambda at: decode(written[at]), paths, lambda done: progress("decode", done, len(names)))
     if failed:
         raise FormatError(
-            f"{file}: {failed[0]}; {_lost(len(failed), len(video))}; copy the file again, or encode it anew"
+            f"{file}: {failed[0]}; {_lost(len(failed), len(names))}; copy the file again, or encode it anew"
         )
     if pale:
-        text = f"{file}: {pale[0]}; {len(pale)} of {len(video)} frames are written without their colours"
+        text = f"{file}: {pale[0]}; {len(pale)} of {len(names)} frames are written without their colours"
         raise FormatError(f"{text}; copy the file again")
     row = {"output": str(output), "frames": len(video), "format": format, "frame_rate": video.frame_rate}
-    common.result(row, f"{output}: {len(video)} {format} files")
+    row |= {"files": len(names)}
+    once = ", the background once for each change of it, as the first frame that shows it"
+    common.result(row, f"{output}: {len(names)} {format} files{once if only == 'background' else ''}")
+
+
+def _changes(reader: ReelReader, pictured: Callable[[int], Mesh | None]) -> Sequence[int]:
+    """Return the frames at which another background is shown, or the same one as another object of `pictured`."""
+    found, before, seen = list[int](), -1, None
+    for frame in range(reader.frame_count):
+        if (chunk := reader.static_of_frame(frame)) is None:
+            continue
+        try:
+            shown = pictured(frame)
+        except FormatError:
+            shown = None  # which is told when it is written
+        if chunk.number != before or shown is not seen:
+            found.append(frame)
+        before, seen = chunk.number, shown
+    return found
 
 
 def _write_audio(file: Path, video: Video, output: Path, common: Common) -> None:

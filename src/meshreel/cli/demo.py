@@ -21,7 +21,7 @@ from ..encoder.presets import preset_options
 from ..encoder.sequence import encode
 from ..errors import InputError
 from ..metrics.error_sheet import SheetOptions, write_sheet
-from .compare import BESIDE, against_truth, both_table
+from .compare import OF_BOTH, against_truth, both_table
 from .console import Common, StageBars, called_as
 from .encode import describe, summary_row
 from .info import describe_file, rate_table
@@ -77,7 +77,7 @@ def command(
     common.result(
         {"output": str(output), "warnings": summary.warnings} | row,
         rate_table(row),
-        both_table(BESIDE["truth"], truth),
+        both_table(OF_BOTH["truth"], truth),
         f"{file}: {describe(row)}",
         f"picture: {picture}",
         f"recording: {output / 'rig'}",

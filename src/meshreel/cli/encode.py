@@ -12,6 +12,7 @@ from typing import Annotated, Any, Literal
 
 from cyclopts import Parameter
 
+from ..encoder.appearance import as_installed
 from ..encoder.digests import WriteLines, machine_line
 from ..encoder.excerpt import Excerpt, part_of, read_survey
 from ..encoder.options import EncoderOptions, SceneOptions
@@ -19,6 +20,7 @@ from ..encoder.presets import preset_options
 from ..encoder.quality import Goal, encode_to
 from ..encoder.recipe import longest_interval
 from ..encoder.sequence import Encoder
+from ..encoder.static import is_colored
 from ..encoder.summary import SceneSummary, Summary
 from ..errors import InputError
 from ..io.remote import Place, located
@@ -218,7 +220,6 @@ def command(
         raise InputError("--debug-digests describes one whole encode: leave out --resume and targets")
     part.check(coding, masking)
     heard = hearing.payload()
-    source = open_source(inputs, reading if part.survey is None else replace(reading, frames=":"), common)
     scene = parting.scene(preset_options().scene or SceneOptions(), masking)
 
     def options_at(quality: float) -> EncoderOptions:
@@ -226,8 +227,12 @@ def command(
 
     goal, quality = coding.goal(), DEFAULT_QUALITY if coding.quality is None else coding.quality
     options = options_at(quality)
+    lacking = as_installed(options)[1]  # raises InputError before recordings are read
+    source = open_source(inputs, reading if part.survey is None else replace(reading, frames=":"), common)
     sequence, masker = masking.upright(source), masking.masker(len(source.sequence))
     excerpt = part.excerpt(sequence, reading.frames, options)
+    if lacking and (sequence.colors is not None or is_colored(sequence)):
+        common.warn(lacking)  # not after minutes
     with (
         common.stages(len(sequence if excerpt is None else excerpt.frames)) as progress,
         workers(jobs, cluster) as executor,
@@ -242,7 +247,7 @@ def command(
     warnings = (*source.warnings, *getattr(masker, "remarks", ()), *summary.warnings)
     if summary.scene is None and parting.background_refresh is not None:
         warnings += ("no background was found that could be sent again: --background-refresh does nothing",)
-    common.warn(warnings)
+    common.warn(text for text in warnings if text not in lacking)
     row = summary_row(summary, sequence.frame_rate) | {"quality": quality}
     common.result({"output": str(place), "warnings": warnings} | row, f"{place}: {describe(row)}; {_reached(row)}")
 

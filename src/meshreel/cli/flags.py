@@ -43,8 +43,9 @@ class Reading:
 class Looking:
     """Flags for the metrics, cameras and key frames of a comparison."""
 
-    ssim: bool = True
-    """Also render pictures and compare them by SSIM (some seconds per frame)."""
+    ssim: bool | None = None
+    """Also render pictures and compare them by SSIM (some seconds per frame, half a minute of a room). By default not
+    where a rig's depth pictures judge the frames."""
     cameras: Path | None = None
     """File of Open3D pinhole cameras for SSIM; by default four views around the sequence."""
     width: int = _VIEWS.width
@@ -59,10 +60,11 @@ class Looking:
     """Also compare by MPEG's measures, as mmetric and V-DMC's conditions have them: D1, D2 and IBSM (some 20 seconds
     per frame)."""
 
-    def options(self) -> ComparisonOptions:
-        """Return the options of `compare_sequences`."""
+    def options(self, ssim: bool) -> ComparisonOptions:
+        """Return the options of `compare_sequences`, with SSIM as given where it is neither asked for nor excluded."""
+        ssim = (ssim or self.cameras is not None) if self.ssim is None else self.ssim
         views, mpeg = ViewOptions(self.width, self.height, up=self.up), MpegOptions() if self.mpeg else None
-        return ComparisonOptions(self.cameras, views, self.ssim, self.keys, mpeg)
+        return ComparisonOptions(self.cameras, views, ssim, self.keys, mpeg)
 
 
 @Parameter(name="*")

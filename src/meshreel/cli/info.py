@@ -15,6 +15,7 @@ from ..coding.group import payload_bytes_by_purpose
 from ..container.reader import Chunk, ReelReader
 from ..container.sources import FileSource
 from ..decoder.video import Video
+from ..decoder.video import open as open_video
 from ..errors import FormatError
 from ..format.layout import ChunkKind, Form
 from .console import Common
@@ -43,9 +44,12 @@ def command(
     file
         The .reel file.
     groups
-        Show all groups, tracks and states of the background, however long the file is.
+        Show all groups, tracks and states of the background, however long the file is, and decode them: those that do
+        not decode are warned of, even if their checksums are right.
     """
     row = describe_file(file)
+    if groups:
+        _decode_all(file, row)
     size = f"{row['bytes']} bytes"
     if missing := row["bytes_missing"]:
         size = f"{row['bytes'] - missing} of {size} ({missing} are missing: the file is truncated)"
@@ -63,6 +67,20 @@ def command(
     common.warn(f"background: {state['error']}" for state in row["background"] if "error" in state)
     common.warn([f"audio: {row['audio']['error']}"] if "error" in (row["audio"] or {}) else [])
     common.warn(f"group {i}: {group['error']}" for i, group in enumerate(row["groups"]) if "error" in group)
+
+
+def _decode_all(file: Path, row: dict[str, Any]) -> None:
+    """Decode each group and state of the background that is shown; one that does not decode gets an error."""
+    with open_video(file) as video:
+        shown = [(state, state["ranges"][0][0], video.background) for state in row["background"] if state["ranges"]]
+        for group in row["groups"]:
+            if group["frames"]:
+                shown.append((group, group["first_frame"], video.tracks[group["track"]].__getitem__))
+        for described, frame, decode in shown:
+            try:
+                decode(frame)
+            except FormatError as error:
+                described.setdefault("error", str(error))
 
 
 def _looks(row: dict[str, Any]) -> str:

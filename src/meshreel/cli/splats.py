@@ -9,7 +9,6 @@ import numpy as np
 from ..analysis.appearance.splat_fit import SplatView
 from ..analysis.appearance.splat_raster import draw
 from ..analysis.appearance.splat_views import GOLDEN, rendered, ring, taken
-from ..capture.recording import Recording
 from ..decoder.video import Video
 from ..encoder.progress import Progress
 from ..errors import InputError
@@ -44,8 +43,8 @@ def compare_splats(sequence: MeshSequence, video: Video, progress: Progress) -> 
 
 def held_out(sequence: MeshSequence, video: Video, number: int) -> tuple[SplatView, ...]:
     """Return pictures of a frame: a rig's, or renders from where no encoder looked."""
-    if isinstance(sequence, Recording) and sequence.colors is not None:
-        pictures = [picture for picture in sequence.colors[number] if picture is not None]
+    if (colors := captured(sequence).colors) is not None:
+        pictures = [picture for picture in colors[number] if picture is not None]
         return taken(pictures, video.moving(number), sequence[number], SIZE)
     mesh, up = sequence[number], captured(sequence).up
     return rendered(mesh, ring(mesh, VIEWS, SIZE, GOLDEN * number + ASIDE, up)) if mesh.is_colored else ()

@@ -290,7 +290,8 @@ def _chunks(index: Index, offset: int, first_frame: int) -> tuple[Chunk, ...]:
         chunk = Chunk(*place, entry.track, len(frames) == 1)
         chunks.append(chunk)
         offset = chunk.end
-        frames[entry.track] += entry.frames if is_group else 0
+        if is_group:  # only their tracks are checked: a kind to come may have any
+            frames[entry.track] += entry.frames
     return tuple(chunks)
 
 

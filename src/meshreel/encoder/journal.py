@@ -9,6 +9,7 @@ Where a record is torn or damaged, the journal ends before it.
 from __future__ import annotations
 
 import json
+import os
 import struct
 import zlib
 from collections.abc import Iterable, Iterator, Sequence
@@ -63,7 +64,10 @@ class Journal:
             try:
                 self._open()
             except BaseException:
-                self._file.close()
+                if os.fstat(self._file.fileno()).st_size == 0:  # no room for its first bytes
+                    discard(self._file, self.path)
+                else:
+                    self._file.close()
                 raise
         return self
 

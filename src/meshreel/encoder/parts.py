@@ -119,7 +119,7 @@ def take_apart(
         _check_nothing_lost(sequence, segmentation, options.background)
     changes = [_change(sequence, segmentation, frame, options.background) for frame in segmentation.changes]
     stages.reach("background", 1.0)
-    found = _measured(sequence, segmentation, background, changes)
+    found = _measured(sequence, segmentation, background, changes, stages)
     unit = float(np.median(found.sizes)) if found.sizes else 0.0
     seen = replace(seen, scale=unit or seen.diagonal)
     depth, some = sequence.depth, evenly(len(sequence), PROBES)
@@ -216,7 +216,7 @@ def _mean_square(gaps: Float64[np.ndarray, " N"]) -> float:
 
 
 def _measured(
-    sequence: CapturedSequence, segmentation: Segmentation, background: Mesh, changes: Sequence[Change]
+    sequence: CapturedSequence, segmentation: Segmentation, background: Mesh, changes: Sequence[Change], stages: Stages
 ) -> _Measured:
     """Measure noise and bodies in some frames; still surface that is far from the background is no noise."""
     far, depth = OUTLIER * segmentation.noise, sequence.depth
@@ -227,6 +227,7 @@ def _measured(
         return _room_after(background, changes[:count])
 
     for number in evenly(len(sequence), PROBES):
+        stages.reach("noise", number / len(sequence))
         mesh = sequence[number]
         moves = segmentation.moving(number, mesh)
         moving = part_of(mesh, moves)
@@ -248,6 +249,7 @@ def _measured(
                 inside &= _as_far(still.vertices, moving.vertices, depth[number])
             squares.append(_mean_square(gaps[inside]))
             lost += float(areas[(gaps[still.faces] >= far).all(axis=1)].sum())
+    stages.reach("noise", 1.0)
     astray = lost / whole if whole else 0.0
     if not squares:
         return _Measured(0.0, 0.0, sizes, astray)

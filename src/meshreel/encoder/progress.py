@@ -61,4 +61,6 @@ class IntervalStages(Stages):
         """Count work on the next group, whose frames may be worked on more than once."""
         if (stage := STEPS.get(kind)) is not None:
             self._since_group[stage] = min(self._since_group.get(stage, 0) + number, self._group_size)
-            self.reach_frame(stage, self._reached.get("code", 0) + self._since_group[stage])
+            done = self._reached.get("code", 0) + self._since_group[stage]
+            for passed in ("track", "fit") if stage == "fit" else (stage,):  # what is fitted was tracked, or is a key
+                self.reach_frame(passed, done)

@@ -228,7 +228,9 @@ def _encode_scene(job: Job, file: BinaryIO, name: str, parts: Parts, audio: byte
     sequence, options, seen = job.sequence, job.options, parts.seen
     job.note("survey", seen.low, seen.high, seen.diagonals, seen.unit)
     job.note("background and noise", parts.background.vertices, parts.background.faces, parts.noise, parts.deviation)
+    job.stages.add("room", 0)
     states = colored_states(sequence, parts, job.scene.background, options.appearance)
+    job.stages.reach("room", 1.0)
     job.note("background, coded", *(state.payload for state in states))
     with ReelWriter(file, make_header(sequence.frame_rate, seen, {}), name, audio) as writer:
         coded = encode_bodies(job, parts)

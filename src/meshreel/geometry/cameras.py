@@ -98,6 +98,13 @@ class PinholeCamera:
         }
 
 
+def scaled_lens(
+    focal: tuple[float, float], center: tuple[float, float], x: float, y: float
+) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Return focal lengths and principal point, pixels, of pictures that are scaled; the middle of pixel i is at i."""
+    return (focal[0] * x, focal[1] * y), ((center[0] + 0.5) * x - 0.5, (center[1] + 0.5) * y - 0.5)
+
+
 def pack_cameras(cameras: Sequence[PinholeCamera]) -> bytes:
     """Pack cameras into the JSON of an Open3D PinholeCameraTrajectory."""
     record = {

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
-from jaxtyping import Bool, Float32, Float64, Int64, UInt16
+from jaxtyping import Bool, Float, Float32, Float64, Int64, UInt16
 from scipy.ndimage import minimum_filter
 
 from ..types import Placement
@@ -45,8 +45,7 @@ class DepthPicture:
         angle, neighbouring rows are far apart in depth: on a grid of distances it would be stairs, and have cracks. No
         depth between two surfaces comes up: pixels farther apart than `STEP` are not mixed.
         """
-        known = self.depth > 0
-        inverse = np.where(known, 1.0 / np.where(known, self.depth, 1), 0.0)
+        inverse = inverse_depths(self.depth)
         rows, columns = (_between(count, factor) for count in inverse.shape)
         nearest = inverse[rows.nearest][:, columns.nearest]
         sums, weights = np.zeros(nearest.shape), np.zeros(nearest.shape)
@@ -60,6 +59,12 @@ class DepthPicture:
         intrinsic = np.diag([factor, factor, 1.0]) @ self.camera.intrinsic
         height, width = depth.shape
         return replace(self, camera=PinholeCamera(width, height, intrinsic, self.camera.extrinsic), depth=depth)
+
+
+def inverse_depths(values: UInt16[np.ndarray, "H W"] | Float32[np.ndarray, "H W"]) -> Float[np.ndarray, "H W"]:
+    """Return inverse depths of depths, or depths of inverse ones; 0 stays 0."""
+    known = values > 0
+    return np.where(known, 1.0 / np.where(known, values, 1), 0.0)
 
 
 @dataclass(frozen=True, slots=True)

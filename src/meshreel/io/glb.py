@@ -44,6 +44,8 @@ def parse_glb(data: bytes) -> Polygons:
         why = unknown or ("several materials" if len(pictures) > 1 else "a texture (it is in another file)")
         lost = frozenset({why} if (pictures or unknown) and picture is None else ())
         return _joined(parts, _dropped(tree) | lost, picture)
+    except Unreadable:
+        raise
     except Exception as error:  # a foreign parser may raise anything for a damaged file
         raise Unreadable(f"GLB cannot be read ({type(error).__name__}: {error})") from None
 

@@ -19,6 +19,7 @@ from jaxtyping import Bool, Float32, Int32, Int64, UInt8, UInt16
 from ..errors import InputError
 from .meshopt import ATTRIBUTES, TRIANGLES, exponential, pack_stream
 from .pictures import pack_picture
+from .polygons import shares_of
 
 MOST_BYTES = (1 << 32) - 1  # of a GLB file, whose header has 32 bits for its length (glTF 2.0, "GLB File Format")
 COLORS, PLACES = "COLOR_0", "TEXCOORD_0"
@@ -219,9 +220,12 @@ def to_linear(colors: UInt8[np.ndarray, "V 3"]) -> UInt16[np.ndarray, "V 3"]:
 
 
 def from_linear(light: np.ndarray) -> UInt8[np.ndarray, "V 3"]:
-    """Return linear light, integers whose largest number is all of it or shares of 1, as sRGB."""
+    """Return linear light, integers whose largest number is all of it or shares of 1, as sRGB.
+
+    Raises Unreadable for what is no number, or far from these limits.
+    """
     most = np.iinfo(light.dtype).max if light.dtype.kind in "iu" else 1.0
-    shares = np.clip(np.nan_to_num(light.astype(np.float64) / most), 0.0, 1.0)
+    shares = shares_of(light, most)
     s = np.where(shares <= 0.0031308, 12.92 * shares, 1.055 * shares ** (1 / 2.4) - 0.055)
     return np.rint(255 * s).astype(np.uint8)
 

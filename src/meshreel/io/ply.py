@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .. import _core
-from .polygons import Dropped, Polygons, Unreadable, eight_bits
+from .polygons import Dropped, Polygons, Unreadable, eight_bits, shares_of
 from .text_lines import Lines, whole
 
 _TYPES = {
@@ -82,7 +82,7 @@ def _of_kind(element: _Element, values: np.ndarray, name: str) -> np.ndarray:
     if dtype.kind not in "iu" or values.dtype == dtype:
         return values
     limits = np.iinfo(dtype)
-    return np.clip(np.nan_to_num(values), limits.min, limits.max).astype(dtype)
+    return (shares_of(values, limits.max) * limits.max).round().astype(dtype)
 
 
 def _header(lines: list[str]) -> tuple[str, list[_Element]]:

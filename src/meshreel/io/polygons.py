@@ -37,15 +37,28 @@ class Polygons:
 def eight_bits(values: np.ndarray) -> UInt8[np.ndarray, "..."]:
     """Return colours in 8 bits: of 16 bits without sign all are a 1, of fractions 1 is; others are 0 to 255.
 
-    Fractions beyond 2 are not such: some write 0 to 255 as text. Blended ones go a little beyond 1.
+    Fractions beyond 2 are not such: some write 0 to 255 as text. Raises Unreadable as `shares_of` does.
     """
     if values.dtype.kind in "iu":
         most = 65535.0 if values.dtype.kind == "u" and values.dtype.itemsize == 2 else 255.0
     else:
         finite = values[np.isfinite(values)]
         most = 1.0 if finite.max(initial=0.0) <= 2.0 else 255.0
-    shares = np.nan_to_num(values.astype(np.float64) / most, nan=0.0, posinf=1.0, neginf=0.0)
-    return (np.clip(shares, 0.0, 1.0) * 255.0).round().astype(np.uint8)
+    return (shares_of(values, most) * 255.0).round().astype(np.uint8)
+
+
+def shares_of(colors: np.ndarray, most: float) -> Float64[np.ndarray, "V 3"]:
+    """Return colours as shares, 0 to 1, of what is all of one; blended ones go a little beyond it.
+
+    Raises Unreadable for what is no number, or not nearly within these limits.
+    """
+    shares = colors.astype(np.float64) / most
+    strange = np.flatnonzero(~((shares >= -1.0) & (shares <= 2.0)).all(axis=1))
+    if len(strange):
+        red, green, blue = colors[strange[0]]
+        text = f"vertex {strange[0]} has the colour ({red:g}, {green:g}, {blue:g})"
+        raise Unreadable(f"{text}, and {len(strange)} in all are not within 0 to {most:g}")
+    return np.clip(shares, 0.0, 1.0)
 
 
 def triangulate(polygons: Polygons) -> Int64[np.ndarray, "F 3"]:

@@ -1,8 +1,8 @@
 """Comparison sheet: original, decoded mesh and error heat map of chosen frames in one PNG.
 
-Two sequences -> PNG. The first two columns show normals as colors (see `render`). The heat map shows, where a ray meets
-the original, the distance of that point from the decoded surface; pixels that only the decoded mesh covers (invented
-surface) are magenta. Drawn by matplotlib's Agg, without a display.
+Two sequences -> PNG. The first two columns show the colours of frames that have some, else normals as colors (see
+`render`). The heat map shows, where a ray meets the original, the distance of that point from the decoded surface;
+pixels that only the decoded mesh covers (invented surface) are magenta. Drawn by matplotlib's Agg, without a display.
 """
 
 from __future__ import annotations
@@ -20,8 +20,9 @@ from ..geometry.cameras import PinholeCamera
 from ..geometry.closest_points import Surface
 from ..io.write import replacing
 from ..types import UP_AXES, Frames, Mesh
+from .color_render import Colored
 from .distance import surface_errors
-from .render import Crop, View, look
+from .render import Crop, Pixels, View, look
 from .surface_samples import used_surface
 from .viewpoints import Box, ViewOptions, views_around
 
@@ -36,11 +37,12 @@ _LEAST_LIMIT = 1e-3  # % or mm; below it the color bar would show rounding (gues
 class SheetOptions:
     """Frames, cameras and size of a sheet."""
 
-    frames: tuple[int, ...] = ()  # empty: first, middle and last
+    frames: tuple[int, ...] = ()  # their numbers; empty: first, middle and last
     cameras: tuple[PinholeCamera, ...] = ()  # of one size; empty: one before all that is shown
     height: int = 480  # pixels of one picture
     unit: str = "percent"  # of the heat map: percent (of the diagonal) or mm
     up: str = "y"  # the axis that points up: y, z, -y or -z
+    first: int = 0  # number of the first frame, where the frames are some of a longer sequence
 
     def __post_init__(self) -> None:
         if len({(camera.width, camera.height) for camera in self.cameras}) > 1:
@@ -54,6 +56,7 @@ class SheetRow:
     label: str
     original: View
     decoded: View
+    pictures: tuple[np.ndarray, np.ndarray]  # of both, H x W x 3, 0 to 1
     errors: Float64[np.ndarray, " N"]  # in the sheet's unit, one for each covered pixel of the original
 
 
@@ -82,10 +85,11 @@ def _rows(originals: Frames, decoded: Frames, options: SheetOptions) -> Iterator
     count = len(originals)
     if count != len(decoded) or count == 0:
         raise InputError(f"a sheet needs as many decoded frames as originals: {len(decoded)} and {count}")
-    frames = options.frames or tuple(sorted({0, count // 2, count - 1}))
-    if not all(0 <= frame < count for frame in frames):
-        raise InputError(f"frames {frames}: the sequence has frames 0 to {count - 1}")
-    pairs = [(frame, originals[frame], decoded[frame]) for frame in frames]
+    first = options.first
+    frames = options.frames or tuple(sorted({first, first + count // 2, first + count - 1}))
+    if not all(first <= frame < first + count for frame in frames):
+        raise InputError(f"frames {frames}: the sequence has frames {first} to {first + count - 1}")
+    pairs = [(frame, originals[frame - first], decoded[frame - first]) for frame in frames]
     cameras = _cameras([mesh for _, mesh, _ in pairs], options)
     for frame, mesh, other in pairs:
         measured = surface_errors(mesh, other)
@@ -93,8 +97,18 @@ def _rows(originals: Frames, decoded: Frames, options: SheetOptions) -> Iterator
         label = f"frame {frame}\nD2 {measured.d2_psnr_paper:.1f} dB\nnormals {measured.angle:.1f}°"
         for camera in cameras:
             whole = Crop(0, camera.height, 0, camera.width)
-            seen = look(mesh, camera, whole)
-            yield SheetRow(label, seen, look(other, camera, whole), factor * error_at_pixels(seen, other))
+            seen, found = look(mesh, camera, whole), look(other, camera, whole)
+            yield SheetRow(
+                label, seen, found, _pictures(mesh, other, seen, found, camera), factor * error_at_pixels(seen, other)
+            )
+
+
+def _pictures(mesh: Mesh, other: Mesh, seen: View, found: View, camera: PinholeCamera) -> tuple[np.ndarray, np.ndarray]:
+    """Return pictures of both in their colours where both have some, else of their normals."""
+    if not (mesh.is_colored and other.is_colored):
+        return seen.colors, found.colors
+    pixels = Pixels(camera, seen.crop)
+    return Colored(mesh).look(pixels).colors, Colored(other).look(pixels).colors
 
 
 def _cameras(meshes: list[Mesh], options: SheetOptions) -> list[PinholeCamera]:
@@ -125,8 +139,8 @@ def _draw(rows: list[SheetRow], options: SheetOptions) -> Any:
     for i, row in enumerate(rows):
         top = _TOP + i * (height + _GAP)
         panels = [axes_at(_LEFT + k * (width + _GAP), top, width, height) for k in range(3)]
-        panels[0].imshow(row.original.colors)
-        panels[1].imshow(row.decoded.colors)
+        panels[0].imshow(row.pictures[0])
+        panels[1].imshow(row.pictures[1])
         image = _heat_map(panels[2], row, limit)
         panels[0].set_ylabel(row.label)
         for panel, title in zip(panels, _COLUMNS, strict=True):

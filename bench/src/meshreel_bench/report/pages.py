@@ -26,7 +26,7 @@ from .verdicts import verdicts
 
 FOLDER = "results"  # of appendices, plots and the README's numbers, beside the pages
 OPEN = "figure6"  # the experiment that rows belong to which none declares: other codecs, other sequences
-BESIDE = (OPEN, "mpeg")  # experiments in whose plots V-DMC's points are
+WITH_VDMC = (OPEN, "mpeg")  # experiments in whose plots V-DMC's points are
 SHOWN = ("synthetic4", "dancer", "room2")  # sequences whose curves are on the first page
 TEXT = "results.md"  # package data: the first page, with a line {NAME} for each part that is made
 
@@ -48,7 +48,7 @@ class Part:
     @property
     def drawn(self) -> list[Row]:
         """Rows of its plots: some have V-DMC's points beside those that were measured."""
-        there = sequences(self.rows) if self.name in BESIDE else []
+        there = sequences(self.rows) if self.name in WITH_VDMC else []
         return [*self.rows, *(row for row in anchor_rows() if row.point.sequence in there)]
 
 

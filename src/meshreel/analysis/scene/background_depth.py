@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Bool, Float32
 from scipy.ndimage import binary_dilation
 
-from ...geometry.depth import STEP, DepthPicture, FreeSpace
+from ...geometry.depth import STEP, DepthPicture, FreeSpace, inverse_depths
 from ...geometry.holes import close_holes
 from ...geometry.raycast import Rays, pixels_near
 from ...geometry.topology import face_normals, part_of, without_fragments
@@ -22,7 +22,7 @@ from ...geometry.tsdf import ALONE, GRAZING, SEEN, extract, integrate
 from ...types import Mesh
 from .background import BackgroundOptions
 
-BESIDE = 3  # pixels around moving surface that are ignored: a guess
+RIM = 3  # pixels around moving surface that are ignored: a guess
 HIDDEN = np.float32(-1)  # in place of a depth: what stands still is not seen there
 OPEN = 0.3  # least share of the moments in which a pixel is not hidden that must have a depth there (guess)
 SMOOTH, SPREAD, ROUNDS = 2, 1.5, 2  # pixels around, standard deviation in pixels, and rounds of smoothing (decision 28)
@@ -71,11 +71,11 @@ def usual_pictures(moments: Iterable[Moment], options: BackgroundOptions = Backg
 
 
 def _still(picture: DepthPicture, rays: Rays, moment: Moment) -> np.ndarray:
-    """Return the depths of a picture, `HIDDEN` for pixels that see moving faces or lie within `BESIDE` of some."""
+    """Return the depths of a picture, `HIDDEN` for pixels that see moving faces or lie within `RIM` of some."""
     moves = pixels_near(picture.camera, Mesh(moment.mesh.vertices, moment.mesh.faces[~moment.still]))
     faces = rays.faces_in(picture.camera, moves)  # of the whole mesh: what stands still may hide what moves
     moves[moves] = (faces >= 0) & ~np.append(moment.still, True)[faces]
-    return np.where(binary_dilation(moves, iterations=BESIDE), HIDDEN, picture.depth.astype(np.float32))
+    return np.where(binary_dilation(moves, iterations=RIM), HIDDEN, picture.depth.astype(np.float32))
 
 
 def _medians(stack: Float32[np.ndarray, "T H W"], options: BackgroundOptions) -> Float32[np.ndarray, "H W"]:
@@ -95,7 +95,7 @@ def _smooth(picture: DepthPicture) -> DepthPicture:
 
     Inverse depths are averaged, so that planes stay planes, with those around that are about as far.
     """
-    inverse = _inverse(picture.depth)
+    inverse = inverse_depths(picture.depth)
     (height, width), similar = inverse.shape, np.float32(max(SIMILAR * _noise(inverse), 1e-6))
     places = range(-SMOOTH, SMOOTH + 1)
     for _ in range(ROUNDS):
@@ -109,7 +109,7 @@ def _smooth(picture: DepthPicture) -> DepthPicture:
                 sums += weight * there
                 weights += weight
         inverse = np.where(inverse > 0, sums / np.maximum(weights, np.float32(1e-9)), 0)
-    return replace(picture, depth=_inverse(inverse))
+    return replace(picture, depth=inverse_depths(inverse))
 
 
 def _continued(picture: DepthPicture) -> DepthPicture:
@@ -117,19 +117,13 @@ def _continued(picture: DepthPicture) -> DepthPicture:
 
     On a grid each surface ends a voxel before what hides it; between the two, one would see through the room.
     """
-    inverse, found = np.pad(_inverse(picture.depth), 1), np.zeros((1, 1), np.float32)
+    inverse, found = np.pad(inverse_depths(picture.depth), 1), np.zeros((1, 1), np.float32)
     for axis, way in ((0, 1), (0, -1), (1, 1), (1, -1)):
         here, before = np.roll(inverse, way, axis), np.roll(inverse, 2 * way, axis)
         guess = np.where(np.abs(here - before) <= STEP * here, 2 * here - before, here)
         hidden = (here > 0) & ((inverse == 0) | (guess < (1 - STEP) * inverse))
         found = np.maximum(found, np.where(hidden, guess, 0))  # the nearest of several
-    return replace(picture, depth=_inverse(found[1:-1, 1:-1]))
-
-
-def _inverse(values: Float32[np.ndarray, "H W"]) -> Float32[np.ndarray, "H W"]:
-    """Return inverse depths of depths, or depths of inverse ones; 0 stays 0."""
-    known = values > 0
-    return np.where(known, 1 / np.where(known, values, 1), 0).astype(np.float32)
+    return replace(picture, depth=inverse_depths(found[1:-1, 1:-1]))
 
 
 def _noise(inverse: Float32[np.ndarray, "H W"]) -> float:

@@ -28,7 +28,7 @@ from ...geometry.voxels import Lattice, around, distinct, spread
 from ...types import Mesh
 
 MOST_RINGS = 4  # largest number of rings added around moving faces where the background has a gap: a guess
-BESIDE = 0.9  # m around moving surface where what the room lacks is taken for moving, too: a guess
+AROUND = 0.9  # m around moving surface where what the room lacks is taken for moving, too: a guess
 SPECK = 0.002  # m^2: smaller pieces that the room lacks are noise: a guess
 RING = 2.0  # cells, the longest edge of a face in a ring, so that large faces of a wall stay out of it: a guess
 
@@ -101,7 +101,7 @@ def beyond(mesh: Mesh, moves: Bool[np.ndarray, " F"], room: Surface, far: float)
     if not moves.any():
         return moves
     corners = mesh.vertices[mesh.faces[moves]].reshape(-1, 3)
-    low, high = corners.min(axis=0) - BESIDE, corners.max(axis=0) + BESIDE
+    low, high = corners.min(axis=0) - AROUND, corners.max(axis=0) + AROUND
     near = ((mesh.vertices >= low) & (mesh.vertices <= high)).all(axis=1)[mesh.faces].all(axis=1) & ~moves
     off = np.zeros(len(mesh.vertices), bool)
     asked = np.unique(mesh.faces[near])

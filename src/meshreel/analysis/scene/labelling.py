@@ -21,7 +21,7 @@ from ...geometry.voxels import Lattice, spread
 from ...types import Mesh
 from .color_change import ColorChange
 from .masks import Masker
-from .settle import BESIDE, NEVER, Rest
+from .settle import NEAR_CHANGE, NEVER, Rest
 from .votes import Votes
 
 _REMEMBERED = 600  # frames whose labels are kept, some 50 kB each: a guess, enough for seconds of a scene
@@ -170,13 +170,13 @@ class ByPlace:
 
     @cached_property
     def _beside(self) -> tuple[Int64[np.ndarray, " P"], Int64[np.ndarray, " P"]]:
-        """For each place, when the nearest resting place within `BESIDE` joins the room, and when one leaves it."""
+        """For each place, when the nearest resting place within `NEAR_CHANGE` joins the room, and when one leaves."""
         found = list[Int64[np.ndarray, " P"]]()
         for times, never in ((self.rest.since, NEVER), (self.rest.until, 0)):
             own, middles = np.flatnonzero(times != never), self.lattice.centers(self.keys)
             nearest = np.full(len(times), len(own))
             if len(own):
-                nearest = cKDTree(middles[own]).query(middles, distance_upper_bound=BESIDE)[1]
+                nearest = cKDTree(middles[own]).query(middles, distance_upper_bound=NEAR_CHANGE)[1]
             found.append(np.append(times[own], never)[nearest])
         return found[0], found[1]
 

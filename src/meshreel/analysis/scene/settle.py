@@ -18,7 +18,7 @@ from .places import Places, Stay
 
 NEVER = np.iinfo(np.int32).max  # frame number that means "at no time"
 _FEWEST = 3  # smallest number of inspected frames with surface in a time of rest: a guess
-BESIDE = 0.1  # m from a change to what is looked at as a part of it, step by step: a guess
+NEAR_CHANGE = 0.1  # m from a change to what is looked at as a part of it, step by step: a guess
 _SMALLEST = 10  # places: fewer stay as they are, for speed: a guess
 _STILL = 1.5  # times the noise: surface that is farther off from one frame to another has moved (decision 28)
 _STILL_BESIDE = 2.0  # the same beside a change, where cameras often see at grazing angles: a guess
@@ -103,7 +103,7 @@ def _join(
     waiting = resting & (out == never)
     while (out != never).any():
         changed, own = np.flatnonzero(out != never), np.flatnonzero(waiting)
-        gaps, nearest = cKDTree(places.middles[changed]).query(places.middles[own], distance_upper_bound=BESIDE)
+        gaps, nearest = cKDTree(places.middles[changed]).query(places.middles[own], distance_upper_bound=NEAR_CHANGE)
         own, times = own[gaps < np.inf], out[changed[nearest[gaps < np.inf]]]
         if not len(own):
             return

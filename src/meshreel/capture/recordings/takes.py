@@ -14,6 +14,7 @@ import numpy as np
 from jaxtyping import Float64
 
 from ...errors import InputError
+from ...geometry.cameras import scaled_lens
 from ...io.pictures import opened
 
 Picture = np.ndarray | bytes  # depths H x W in the sensor's unit, integers or floats; colours H x W x 3; a PNG or JPEG
@@ -42,9 +43,8 @@ class Lens:
 
     def resized(self, width: int, height: int) -> Lens:
         """Return the lens for pictures of another size."""
-        x, y = width / self.width, height / self.height
-        center = ((self.center[0] + 0.5) * x - 0.5, (self.center[1] + 0.5) * y - 0.5)
-        return replace(self, width=width, height=height, focal=(self.focal[0] * x, self.focal[1] * y), center=center)
+        focal, center = scaled_lens(self.focal, self.center, width / self.width, height / self.height)
+        return replace(self, width=width, height=height, focal=focal, center=center)
 
 
 @dataclass(frozen=True, slots=True)
