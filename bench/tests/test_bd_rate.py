@@ -39,7 +39,7 @@ def test_published_examples_are_met_as_far_as_cubic_and_pchip_agree(pair: tuple[
     assert bd_rate(*pair).percent == pytest.approx(published, abs=0.2)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(st.floats(0.1, 10), st.lists(st.floats(0.1, 3), min_size=2, max_size=6))
 def test_a_constant_factor_of_rate_is_the_bd_rate(factor: float, steps: list[float]):
     qualities = list(50 + np.cumsum(steps))
@@ -104,7 +104,7 @@ def test_the_hull_keeps_what_no_mixture_of_others_beats():
     assert hull("none", []).rates == []
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(st.lists(st.tuples(st.floats(0.1, 10), st.floats(40, 80)), min_size=2, max_size=20))
 def test_the_hull_is_convex_and_no_point_is_under_it(points: list[tuple[float, float]]):
     found = hull("all", [_curve("a", [p[0] for p in points], [p[1] for p in points])])

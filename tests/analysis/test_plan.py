@@ -59,7 +59,7 @@ def test_a_step_of_the_quality_at_a_cut_has_a_price():
     assert first[2] in (6, 7)  # from 1.8 to 1.7
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.integers(1, 3), st.integers(1, 5), st.randoms(use_true_random=False))
 def test_no_other_way_is_cheaper(count, frames, random):
     residuals = np.array([[random.choice([0.3, 0.9, 1.6, np.inf]) for _ in range(frames)] for _ in range(count)])

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from meshreel.coding.background import decode_background, decode_change, encode_background, encode_change
@@ -57,7 +57,6 @@ def test_after_a_change_there_are_the_faces_left_and_behind_them_those_added() -
     assert set(after.faces.reshape(-1).tolist()) == set(range(len(after.vertices)))  # no vertex without a face
 
 
-@settings(deadline=None)
 @given(st.lists(st.booleans(), min_size=len(BEFORE.faces), max_size=len(BEFORE.faces)))
 def test_any_faces_may_go_and_no_others_do(bits: list[bool]) -> None:
     dropped = np.array(bits)

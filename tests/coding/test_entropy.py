@@ -8,7 +8,7 @@ import hypothesis.extra.numpy as hnp
 import hypothesis.strategies as st
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 
 from meshreel import _core
 from meshreel.coding import entropy
@@ -111,7 +111,6 @@ def test_every_truncation_and_an_extra_byte_are_errors_for_integers(values: list
             entropy.decode_integers(bad, len(values))
 
 
-@settings(deadline=None)
 @given(seed=st.integers(0, 2**32 - 1), scale=st.sampled_from([0.02, 0.3, 5.0, 1e6]), extra=st.integers(0, 255))
 def test_every_truncation_and_an_extra_byte_are_errors_for_weights(seed: int, scale: float, extra: int) -> None:
     symbols = np.random.default_rng(seed).laplace(0, scale, (64, 2)).astype(np.int32)
@@ -131,7 +130,6 @@ def test_the_last_bytes_cannot_be_dropped_even_where_the_rest_is_silence() -> No
             entropy.decode_integers(data[:k], len(values))
 
 
-@settings(deadline=None)
 @given(position=st.integers(0, 10**6), value=st.integers(1, 255))
 def test_a_flipped_byte_gives_other_symbols_or_an_error(position: int, value: int) -> None:
     symbols = np.random.default_rng(1).laplace(0, 2, (64, 1)).astype(np.int32)
@@ -141,7 +139,6 @@ def test_a_flipped_byte_gives_other_symbols_or_an_error(position: int, value: in
     _assert_refused_or_other(bytes(stream), symbols, neighbours)
 
 
-@settings(deadline=None)
 @given(st.binary(max_size=200), st.integers(0, 64))
 def test_garbage_never_crashes(data: bytes, count: int) -> None:
     neighbours = entropy.causal_neighbours(np.zeros((0, 3), np.int32), count)

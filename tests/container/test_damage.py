@@ -160,7 +160,7 @@ def test_absurd_sizes_cost_no_memory(data):
     assert peak < 1_000_000
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.one_of(st.binary(max_size=200), records(Index).map(lambda index: pack(HEADER) + pack(index))))
 def test_any_head_with_a_matching_checksum_is_read_or_refused(body):
     try:

@@ -275,7 +275,7 @@ def plans(draw) -> list[list[tuple[int, bool, int | None]]]:
     return made
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(plans(), st.randoms())
 def test_any_scene_is_frame_by_frame_the_newest_background_and_the_bodies_that_are_there(plan, random):
     file = io.BytesIO()

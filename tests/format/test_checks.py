@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from meshreel.errors import FormatError
@@ -137,7 +137,6 @@ def test_the_largest_numbers_of_tracks_and_patches_pass_and_larger_ones_are_refu
         check_index(Index((*chain, GROUP)))
 
 
-@settings(deadline=None)
 @given(st.lists(st.lists(st.integers(1, 9), min_size=1, max_size=6), min_size=1, max_size=5), st.randoms())
 def test_groups_of_any_tracks_of_one_length_pass_in_one_order_only(tracks, random):
     length = max(map(sum, tracks))
@@ -158,7 +157,6 @@ def test_groups_of_any_tracks_of_one_length_pass_in_one_order_only(tracks, rando
             check_index(Index(tuple(shuffled)))
 
 
-@settings(deadline=None)
 @given(records(Index))
 def test_any_index_passes_or_is_refused_and_what_passes_leads_somewhere(index):
     try:

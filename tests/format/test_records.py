@@ -67,7 +67,7 @@ class One:
     layers: Annotated[tuple[Layer, ...], List(U8, Nested(Layer)), ""] = ()
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(records(Everything))
 def test_unpack_undoes_pack(record):
     assert unpack_all(Everything, pack(record)) == record
@@ -75,7 +75,7 @@ def test_unpack_undoes_pack(record):
 
 @pytest.mark.parametrize("record_type", RECORDS + PAYLOADS, ids=lambda record: record.__name__)
 def test_unpack_undoes_pack_for_every_record_of_the_layout(record_type):
-    @settings(max_examples=25, deadline=None)
+    @settings(max_examples=25)
     @given(records(record_type))
     def law(record):
         data = pack(record)
@@ -85,7 +85,7 @@ def test_unpack_undoes_pack_for_every_record_of_the_layout(record_type):
     law()
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.data())
 def test_every_truncation_is_a_format_error(data):
     record = data.draw(records(One))
@@ -95,7 +95,7 @@ def test_every_truncation_is_a_format_error(data):
         unpack(One, whole[:cut])
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.binary(max_size=60))
 def test_any_bytes_give_a_record_or_a_format_error(data):
     for record_type in (Everything, *RECORDS, *PAYLOADS):

@@ -17,7 +17,7 @@ def random_motions(rng: np.random.Generator, count: int) -> tuple[np.ndarray, np
     return q * np.sign(np.linalg.det(q))[:, None, None], rng.standard_normal((count, 3))
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(SEEDS)
 def test_a_fit_recovers_the_motion_of_any_solid_neighbourhood(seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -49,7 +49,7 @@ def test_weights_of_zero_do_not_divide_by_zero() -> None:
     assert np.isfinite(translations).all()
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(SEEDS)
 def test_a_dual_quaternion_moves_as_its_matrix_does_and_its_inverse_undoes_it(seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -63,7 +63,7 @@ def test_a_dual_quaternion_moves_as_its_matrix_does_and_its_inverse_undoes_it(se
     np.testing.assert_allclose(rigid.apply(motions * [1.0, -1, -1, -1, 1, -1, -1, -1], moved), points, atol=1e-12)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(SEEDS)
 def test_a_blend_of_one_motion_in_both_signs_is_that_motion(seed: int) -> None:
     rng = np.random.default_rng(seed)

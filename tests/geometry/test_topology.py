@@ -99,7 +99,7 @@ def assert_as_formulas(mesh: Mesh) -> None:
         np.testing.assert_array_equal(one, other)
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(MESHES)
 def test_small_meshes_with_everything_twice_are_treated_as_numpys_formulas_say(mesh: Mesh) -> None:
     assert_as_formulas(mesh)
@@ -175,7 +175,7 @@ def test_unreferenced_vertices_are_removed_and_the_others_keep_their_order() -> 
     assert mesh.vertices[:, 0].tolist() == [3, 9, 15] and mesh.faces.tolist() == [[2, 0, 1]]
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(FACES)
 def test_components_are_those_of_a_search_in_the_order_of_their_first_vertex(
     drawn: tuple[int, list[list[int]]],

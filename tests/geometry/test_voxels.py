@@ -6,7 +6,7 @@ import itertools
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from meshreel.geometry.voxels import Lattice, around, distinct, moved, neighbours, spread
@@ -25,7 +25,6 @@ def keys_of(cells: list[tuple[int, int, int]]) -> np.ndarray:
     return Lattice(np.zeros(3), 1.0).keys(np.array(cells, float).reshape(-1, 3) + 0.5)
 
 
-@settings(deadline=None)
 @given(CELLS)
 def test_keys_and_cells_invert_each_other(cells):
     lattice, wanted = Lattice(np.array([0.3, -7.0, 1e3]), 0.02), np.array(cells, np.int64).reshape(-1, 3)
@@ -34,13 +33,11 @@ def test_keys_and_cells_invert_each_other(cells):
     assert np.array_equal(lattice.keys(lattice.centers(keys)), keys)
 
 
-@settings(deadline=None)
 @given(CELLS)
 def test_keys_are_ordered_by_position(cells):
     assert [*map(tuple, Lattice(np.zeros(3), 1.0).cells(np.sort(keys_of(cells))).tolist())] == sorted(cells)
 
 
-@settings(deadline=None)
 @given(st.tuples(PLACES, PLACES, PLACES), st.floats(0.005, 0.1))
 def test_a_lattice_near_a_mesh_has_room_for_kilometres_around_it(place, size):
     mesh = shifted(sphere(1.0, 1), place)
@@ -64,7 +61,6 @@ def test_points_beyond_all_keys_are_at_the_border():
     assert cells.tolist() == [[HALF - 2, 0, 2 - HALF]]
 
 
-@settings(deadline=None)
 @given(NEAR, st.tuples(*[st.integers(-3, 3)] * 3))
 def test_moved_cells_differ_by_the_offset(cells, offset):
     lattice = Lattice(np.zeros(3), 1.0)
@@ -72,13 +68,11 @@ def test_moved_cells_differ_by_the_offset(cells, offset):
     assert np.array_equal(found, np.array(cells, np.int64).reshape(-1, 3) + offset)
 
 
-@settings(deadline=None)
 @given(st.lists(st.integers(0, 50)))
 def test_distinct_keys_are_those_of_unique(keys):
     assert np.array_equal(distinct(np.array(keys, np.int64)), np.unique(np.array(keys, np.int64)))
 
 
-@settings(deadline=None)
 @given(NEAR)
 def test_around_gives_exactly_the_cells_beside(cells):
     steps = list(itertools.product((-1, 0, 1), repeat=3))
@@ -86,7 +80,6 @@ def test_around_gives_exactly_the_cells_beside(cells):
     assert np.array_equal(around(distinct(keys_of(cells))), np.sort(keys_of(sorted(wanted))))
 
 
-@settings(deadline=None)
 @given(NEAR)
 def test_neighbours_are_beside_each_other_and_mutual(cells):
     keys = distinct(keys_of(cells))
@@ -100,7 +93,6 @@ def test_neighbours_are_beside_each_other_and_mutual(cells):
 triangles = st.lists(st.tuples(*[st.floats(-1, 1)] * 9), min_size=1, max_size=6)
 
 
-@settings(deadline=None)
 @given(triangles, st.floats(0.05, 3.0))
 def test_points_are_spread_over_every_face_and_leave_no_part_of_it_out(corners, spacing):
     mesh = Mesh.of(np.array(corners).reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3))

@@ -22,14 +22,14 @@ def read(data: bytes, **how) -> list[float]:
     return lines.values(np.arange(len(lines)), **how)[0].tolist()
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(st.lists(st.one_of(DECIMALS, PRINTED), max_size=20))
 def test_numbers_are_those_of_float_to_the_bit(words: list[str]) -> None:
     found = read(" ".join(words).encode())
     assert [value.hex() for value in found] == [float(word).hex() for word in words]
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(st.text(alphabet="0123456789+-.eEinfty", min_size=1, max_size=6))
 def test_a_word_is_a_number_where_it_is_one_to_float(word: str) -> None:
     try:

@@ -90,7 +90,7 @@ def test_errors_swap_direction_with_their_meshes():
     assert there.angle == pytest.approx(back.angle, rel=1e-3)
 
 
-@settings(max_examples=5, deadline=None)
+@settings(max_examples=5)
 @given(st.floats(1e-3, 1e3), st.integers(0, 100))
 def test_decibels_and_angles_do_not_depend_on_the_unit(scale: float, seed: int):
     a, b = noisy(sphere(levels=3), 0.01, seed), noisy(sphere(levels=3), 0.02, seed + 1)

@@ -14,7 +14,7 @@ from meshreel.types import Mesh
 from tests.spheres import sliding_sphere
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     count=st.integers(1, 300),
     spread=st.sampled_from([0, 1, 15, 16383]),

@@ -88,7 +88,7 @@ def test_bits_alone_without_any_body_are_kept_where_they_last():
     assert find_bodies([at(0, mesh=BIT)] * 5, CELL).dropped == 0
 
 
-@settings(deadline=None, max_examples=30)
+@settings(max_examples=30)
 @given(
     st.lists(
         st.lists(

@@ -23,7 +23,7 @@ def cost(moving, moves, rests, links, weights) -> int:
     return int(moves[~moving].sum() + rests[moving].sum() + weights[cut].sum())
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(COSTS, COSTS, st.dictionaries(st.sampled_from(PAIRS), st.integers(1, 40), max_size=12))
 def test_the_cut_is_the_least_of_all(moves, rests, links):
     moves, rests = np.array(moves), np.array(rests)

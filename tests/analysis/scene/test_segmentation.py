@@ -165,7 +165,7 @@ def test_a_piece_that_rests_alone_keeps_its_label_and_one_that_moves_alone_does_
     assert not without_islands(both, ~large, 1e-3).any()
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(st.lists(st.booleans(), min_size=128, max_size=128), st.floats(0, 1e-3))
 def test_no_island_that_something_else_surrounds_is_left_of_those_that_move(bits, least):
     chosen = np.array(bits)

@@ -168,7 +168,7 @@ def test_every_truncation_and_a_byte_too_many_are_refused() -> None:
         decode_layers(CODED.payload + b"\0")
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(st.integers(0, len(CODED.payload) - 1), st.integers(1, 255))
 def test_a_damaged_byte_decodes_to_a_finite_mesh_or_is_refused(where: int, flip: int) -> None:
     damaged = bytearray(CODED.payload)

@@ -35,7 +35,7 @@ def trajectories(frames: int = 4) -> np.ndarray:
     return np.ascontiguousarray(np.moveaxis(offsets, 0, 1)[hierarchy(MESH).order].reshape(COUNT, -1))
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.integers(1, 40), st.integers(0, 40), st.integers(0, 2**32), st.sampled_from([2.0, 30.0, 5000.0, 2.0**24]))
 def test_a_basis_comes_back_orthonormal_and_near(width: int, count: int, seed: int, scale: float) -> None:
     count = min(count, width)
@@ -98,7 +98,7 @@ def test_errors_move_to_where_they_do_not_show() -> None:
     assert errors[1] < errors[0] and bits[1] < 1.02 * bits[0]
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.integers(0, 2**32), st.integers(1, 6), st.floats(0, 31))
 def test_any_symbols_come_back_from_one_stream(seed: int, columns: int, size: float) -> None:
     generator = np.random.default_rng(seed)
@@ -137,7 +137,7 @@ def test_trajectories_too_long_for_the_step_are_refused() -> None:
         encode_field(1e4 * trajectories(), GRAPH, Rate(RUNGS - 1, 0.1))
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(st.data())
 def test_damaged_records_decode_to_rows_or_to_an_error_of_the_format(data: st.DataObject) -> None:
     coded = encode_field(trajectories(), GRAPH, Rate(72, 0.1), ROUND)

@@ -28,7 +28,7 @@ def any_mesh(draw: st.DrawFn) -> Mesh:
     return Mesh.of(0.1 * np.array(places), np.array(faces).reshape(-1, 3))
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(any_mesh())
 def test_every_vertex_has_one_place_and_is_predicted_by_earlier_ones(mesh: Mesh) -> None:
     found = hierarchy(mesh)
@@ -66,7 +66,7 @@ def test_a_fan_of_many_leaves_and_a_complete_graph_take_no_time() -> None:
     assert len(hierarchy(complete).order) == 300
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(any_mesh())
 def test_subdivision_is_that_of_the_topology_module(mesh: Mesh) -> None:
     level = subdivide(mesh.faces, len(mesh.vertices))

@@ -190,7 +190,7 @@ def test_a_damaged_record_is_refused(damage: dict[str, object]) -> None:
         decode_patches(replace(RECORD, **damage), FRAMES, FACES)  # type: ignore[arg-type]
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.integers(0, len(pack(RECORD)) - 1), st.integers(1, 255))
 def test_flipped_bits_give_a_valid_mesh_or_a_format_error(at: int, flip: int) -> None:
     data = bytearray(PAYLOAD)

@@ -122,7 +122,7 @@ def test_every_truncation_and_a_byte_too_many_are_refused() -> None:
         decode_displacements(DATA + b"\0", BASE)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.integers(0, len(DATA) - 1), st.integers(1, 255))
 def test_a_damaged_byte_decodes_to_finite_numbers_or_is_refused(where: int, flip: int) -> None:
     damaged = bytearray(DATA)
