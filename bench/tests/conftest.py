@@ -2,7 +2,7 @@
 
 from jaxtyping import install_import_hook
 
-import tests.conftest  # noqa: F401  (its settings)
+import tests.conftest  # its settings
 import tests.typecheck  # noqa: F401  (the hook finds it by name)
 from tests.cli.conftest import balls, quick_presets, run, scan  # noqa: F401
 
