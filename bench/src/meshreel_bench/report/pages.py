@@ -75,7 +75,8 @@ def write_report(rows: Sequence[Row], folder: Path) -> list[Path]:
         pages[Path(FOLDER, f"appendix-{part.name}.md")] = list(_appendix(part))
         if part.rated:
             path = folder / FOLDER / f"{part.name}.png"
-            plots.append(plot_curves(part.drawn, part.study.measures[:2], looks, path, part.study.rate))
+            x = part.study.rate, part.study.over
+            plots.append(plot_curves(part.drawn, part.study.measures[:2], looks, path, x))
     for part, sequence in _shown(parts):
         own = [row for row in part.drawn if row.point.sequence == sequence]
         plots.append(plot_curves(own, (D2, MASKED), looks, folder / FOLDER / _plot_name(part, sequence)))
