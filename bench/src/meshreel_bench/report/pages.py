@@ -81,7 +81,7 @@ def write_report(rows: Sequence[Row], folder: Path) -> list[Path]:
         own = [row for row in part.drawn if row.point.sequence == sequence]
         plots.append(plot_curves(own, (D2, MASKED), looks, folder / FOLDER / _plot_name(part, sequence)))
     if page := reproducing_page(
-        [row for part in parts if part.name in (OPEN, "long", "table3", "tracker") for row in part.rows]
+        [row for part in parts if part.name in (OPEN, "long", "table3", "tracker", "headset") for row in part.rows]
     ):
         pages[Path("reproducing.md")] = page
     if found := headline({part.name: part.rows for part in parts}):
