@@ -151,7 +151,7 @@ def _appendix(part: Part) -> Iterator[str]:
     if found := verdicts(study, part.rows):
         yield from ("## Targets", "", *tables.verdict_table(found), "")
     if part.rated:
-        yield from (f"![{title(part.name)}: quality against rate]({part.name}.png)", "")
+        yield from (f"![{title(part.name)}: quality against {study.over.split(' (')[0]}]({part.name}.png)", "")
     for name in sequences(part.rows):
         own = rated(part.rows, name)
         yield from (f"## {tables.text(name)}", "")

@@ -99,7 +99,7 @@ def _figure_9(rows: Sequence[Row]) -> Iterator[str]:
     yield f"| sequence, level | triangles | holds {FILM} at | {' | '.join(heads)} |"
     yield "|" + "---|" * (3 + len(heads))
     cases: dict[tuple[str, object], dict[object, Row]] = {}
-    for row in rated(rows):
+    for row in sorted(rated(rows), key=lambda row: (row.point.sequence, str(row.options["level"]))):
         if row.options["rate"] == FILM:
             cases.setdefault((row.point.sequence, row.options["level"]), {})[row.options["throttle"]] = row
     for (sequence, level), found in cases.items():
