@@ -20,7 +20,7 @@ RESULTS = Path(__file__).resolve().parents[2] / "docs" / "results"
 def test_every_point_is_declared_once_and_its_codec_takes_its_options(name):
     for small in (False, True):
         points = list(EXPERIMENTS[name].points(small))
-        assert (points or name == "tracker") and len({point.key for point in points}) == len(points)
+        assert (points or name in ("tracker", "headset")) and len({point.key for point in points}) == len(points)
         for point in points:
             if point.codec not in INSTEAD:
                 make_codec(point.codec, dict(point.options))

@@ -41,7 +41,7 @@ def test_rows_of_anybodys_codec_are_in_the_appendix_of_figure_6(tmp_path):
 
 def test_a_plot_has_a_panel_for_each_measure_and_a_line_for_each_curve_and_the_floor():
     rows = [*ROWS, floor("ball", d2_psnr_paper=62.0)]
-    figure = curves_figure(rows, (D2, MASKED, NORMALS), looks_of([BEST, "zipmesh"]), "mbps")
+    figure = curves_figure(rows, (D2, MASKED, NORMALS), looks_of([BEST, "zipmesh"]))
     first, second, third = figure.axes
     assert "higher" in first.get_title(loc="right") and "lower" in third.get_title(loc="right")
     assert [line.get_label() for line in first.lines] == [BEST, "zipmesh", "the truth itself"]
@@ -51,7 +51,7 @@ def test_a_plot_has_a_panel_for_each_measure_and_a_line_for_each_curve_and_the_f
 def test_plots_of_figure_6_have_the_points_of_v_dmc_and_no_table_has():
     (part,) = pages.parts_of([row("dancer", BEST, 1.0, 60)])
     assert {each.name for each in part.drawn} == {BEST, VDMC, VDMC_HERE} and len(part.rows) == 1
-    figure = curves_figure(part.drawn, (D2, NORMALS), looks_of([BEST, VDMC, VDMC_HERE]), "mbps")
+    figure = curves_figure(part.drawn, (D2, NORMALS), looks_of([BEST, VDMC, VDMC_HERE]))
     assert [len(panel.lines) for panel in figure.axes] == [3, 2]  # its sheet knows no normals
     assert figure.axes[0].get_title(loc="left") == "dancer, 10 frames"
 

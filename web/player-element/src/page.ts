@@ -10,7 +10,12 @@ async function start(): Promise<void> {
   const player = document.querySelector("meshreel-player");
   if (!(player instanceof MeshreelPlayer)) return;
   const { attributes, time, bench } = readParameters(location.search);
-  if (bench !== null) await MeshreelPlayer.engine.load(); // it measures from the opening on
+  const opened = player.getAttribute("src"); // of a server's page
+  if (bench !== null) {
+    player.removeAttribute("src"); // it measures from the opening on
+    await MeshreelPlayer.engine.load();
+    if (opened !== null) player.setAttribute("src", opened);
+  }
   apply(player, attributes, time);
   if (bench !== null) void runBench(player, bench);
   else {

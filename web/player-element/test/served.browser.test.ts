@@ -15,12 +15,13 @@ describeInBrowser("the player of meshreel play", () => {
     const browser = await launchBrowser();
     try {
       const [line] = (await once(server.stdout, "data")) as [Buffer];
+      const address = (JSON.parse(line.toString()) as { addresses: string[] }).addresses[0];
       const page = await browser.newPage();
       const errors: string[] = [];
       page.on("pageerror", (error) => errors.push(String(error)));
       page.on("console", (message) => void (message.type() === "error" && errors.push(message.text())));
       const load = async (): Promise<PerformanceResourceTiming[]> => {
-        await page.goto((JSON.parse(line.toString()) as { addresses: string[] }).addresses[0]);
+        await page.goto(address);
         await page.waitForFunction(() => (document.querySelector("meshreel-player")?.statistics?.triangles ?? 0) > 0);
         const entries = await page.evaluate(() => performance.getEntriesByType("resource").map((entry) => entry.toJSON() as PerformanceResourceTiming));
         return entries.filter((entry) => /\/player\/[0-9a-f]{24}\/[^/]*\.(js|css|wasm)$/.test(entry.name));
@@ -32,6 +33,9 @@ describeInBrowser("the player of meshreel play", () => {
       expect(first.every((entry) => entry.transferSize > 0)).toBe(true);
       expect(second.map((entry) => entry.transferSize)).toEqual(second.map(() => 0));
       expect(second.length).toBe(first.length);
+      await page.goto(`${address}?bench=1`); // a page that has its recording before the bench begins
+      const text = await page.waitForFunction(() => document.querySelector("pre")?.textContent!.split("\n").find((each) => each.startsWith("{")), undefined, { timeout: 90_000 });
+      expect((JSON.parse((await text.jsonValue())!) as { groups: number }).groups).toBeGreaterThan(0);
       expect(errors).toEqual([]);
     } finally {
       await browser.close();

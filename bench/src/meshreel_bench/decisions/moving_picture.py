@@ -18,7 +18,8 @@ from PIL import Image
 import meshreel
 from meshreel.capture.rig import read_cameras
 
-WEB = Path(__file__).parents[4] / "web"
+from ..playing import WEB, playing
+
 FRAMES = 45  # of the recording
 ALL = 99  # layers: no file has more
 SIZE = (640, 420)  # pixels, width and height
@@ -49,16 +50,10 @@ def main(folder: Path = Path("docs/pictures"), demo: Path | None = None) -> None
 
 def played(file: Path, frames: range, folder: Path) -> list[Image.Image]:
     """Return what the player shows of some frames."""
-    play = [sys.executable, "-u", "-m", "meshreel", "play", str(file), "--no-browser", "--json"]
-    with subprocess.Popen(play, stdout=subprocess.PIPE, text=True) as server:
-        try:
-            assert server.stdout is not None
-            address = json.loads(server.stdout.readline())["addresses"][0]
-            query = f"?autoplay=0&controls=0&layers={ALL}&interpolate=off&background=white&camera={CAMERA}"
-            values = [address + query, folder, *SIZE, *frames]
-            subprocess.run(["node", "frames.mjs", *map(str, values)], cwd=WEB, check=True)
-        finally:
-            server.terminate()
+    query = f"?autoplay=0&controls=0&layers={ALL}&interpolate=off&background=white&camera={CAMERA}"
+    with playing(file) as address:
+        values = [address + query, folder, *SIZE, *frames]
+        subprocess.run(["node", "frames.mjs", *map(str, values)], cwd=WEB, check=True)
     return [Image.open(folder / f"{frame}.png").convert("RGB") for frame in frames]
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from meshreel.errors import InputError
 
-from . import ablations, color, figure6, layers, mpeg, recordings, scenes, speed, splats
+from . import ablations, color, figure6, headset, layers, mpeg, recordings, scenes, speed, splats
 from .study import Study
 
 # In the order of the report.
@@ -25,6 +25,7 @@ EXPERIMENTS: dict[str, Study] = {
     "layers": layers.STUDY,
     "speed": speed.STUDY,
     "tracker": ablations.TRACKERS,
+    "headset": headset.STUDY,
     "color": color.STUDY,
 }
 

@@ -198,6 +198,7 @@ class Study:
     floors: Sequence[str] = ()  # sequences of which the truth itself is measured
     frames: Mapping[str, int] = field(default_factory=dict)  # the first ones of a sequence; none given: all
     rate: str = "mbps"  # of plots: name of a row's value
+    over: str = "rate (Mbps)"  # what that is
     notes: Sequence[str] = ()  # Markdown, before the tables
 
     def points(self, small: bool = False) -> Iterator[Point]:
@@ -218,5 +219,5 @@ class Study:
         return replace(self, sequences=sequences or self.sequences, sweeps=(*self.sweeps, *sweeps))
 
 
-# In a codec's place: the truth itself, labels of what moves, and tracked centers.
-FLOOR, FOUND, TRACKER = INSTEAD = "captured", "segmentation", "tracker"
+# In a codec's place: the truth itself, labels of what moves, tracked centers, and playing.
+FLOOR, FOUND, TRACKER, HEADSET = INSTEAD = "captured", "segmentation", "tracker", "headset"

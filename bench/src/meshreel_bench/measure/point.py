@@ -2,7 +2,7 @@
 
 Bodies are judged by all frames, long ones and scenes by some. A codec is given all, or those of a sampled point; the
 rate is then theirs. In a codec's place `captured` is the truth itself, `segmentation` the encoder's labels of what
-moves, `tracker` centers of the volume.
+moves, `tracker` centers of the volume, `headset` playing a file of `best`.
 """
 
 from __future__ import annotations
@@ -30,13 +30,15 @@ from ..codecs.scenes import BackgroundDracoCodec
 from ..datasets import Dataset, Store
 from ..datasets.scenes import FOUND, TRUE, SceneFrames
 from ..datasets.solid import InColours, coloured
-from ..experiments.study import FLOOR, TRACKER
+from ..experiments.headset import AARCH64, ENCODED
+from ..experiments.study import FLOOR, HEADSET, TRACKER
 from ..experiments.study import FOUND as SEGMENTATION
 from ..names import FLOOR_RATIO
 from ..rows import Encoding, Group, Point, Row, Stream
 from .clock import StageTimer, cost_of
 from .color import color_bytes
 from .decode import decoded_apart
+from .headset import aarch64_values, headset_values
 from .maker import maker
 from .metrics import Measured, measure_frames
 from .segmentation import Labels, score_labels
@@ -71,6 +73,8 @@ def measure_point(point: Point, store: Store) -> Row:
         return msgspec.structs.replace(row, metrics=_segmentation(known))
     if point.codec == TRACKER:
         return msgspec.structs.replace(row, metrics=tracker_values(known.sequence, str(point.options["method"])))
+    if point.codec == HEADSET:
+        return _played(row, store)
     if point.codec == FLOOR:
         if painted is not None:
             return _uncompressed(row, known, painted)
@@ -101,6 +105,19 @@ def measure_point(point: Point, store: Store) -> Row:
         metrics=metrics,
         per_frame=per_frame,
     )
+
+
+def _played(row: Row, store: Store) -> Row:
+    """Return the row of a file of `best` that is played in a browser, or decoded for another processor."""
+    data, options = _file(row.point.sequence, row.point.frames, store), row.point.options
+    row = msgspec.structs.replace(row, options=ENCODED | options, measured_frames=list(range(row.frames)))
+    if options.get("machine") == AARCH64:
+        return msgspec.structs.replace(row, metrics=aarch64_values(data))
+    level, throttle, rate = (int(str(options[name])) for name in ("level", "throttle", "rate"))
+    layers = [chunk.layers[: level + 1] for chunk in ReelReader(BytesSource(data)).chunks]
+    stream = Stream(sum(layer.size for several in layers for layer in several), row.frames)
+    values = headset_values(data, level, throttle, rate) | {"throttle": throttle}
+    return msgspec.structs.replace(row, name=f"level {level}, {rate} Hz", stream=stream, metrics=values)
 
 
 def dynamic_ratio(frames: Iterable[tuple[Mesh, Labels]]) -> float:
@@ -134,6 +151,12 @@ def empty_row(point: Point, store: Store, **known: Any) -> Row:
 @lru_cache(maxsize=1)
 def _opened(name: str, frames: int | None, store: Store) -> Dataset:
     return store.open(name, frames)
+
+
+@lru_cache(maxsize=1)
+def _file(name: str, frames: int | None, store: Store) -> bytes:
+    """Return the file that is played; all points of a sequence share it."""
+    return make_codec("meshreel", ENCODED).encode(_opened(name, frames, store).sequence)
 
 
 def _sampled(known: Dataset, numbers: Sequence[int]) -> MeshSequence:

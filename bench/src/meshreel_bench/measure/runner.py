@@ -15,6 +15,7 @@ import msgspec
 from ..codec import TwoStepCodec
 from ..codecs import codec_version, make_codec
 from ..datasets import Store
+from ..experiments.study import HEADSET
 from ..rows import Point, Row, append_row, read_rows
 from .point import empty_row, measure_points
 from .worker import WorkerError, end_all, in_fresh_process
@@ -67,7 +68,9 @@ def runs_of(points: Sequence[Point]) -> list[list[Point]]:
 
 
 def _shared(point: Point) -> object:
-    """Return what is equal for points that share an analysis."""
+    """Return what is equal for points that share an analysis, or the file that is played."""
+    if point.codec == HEADSET:
+        return point.sequence, point.codec
     try:
         codec = make_codec(point.codec, point.options)
         if isinstance(codec, TwoStepCodec):

@@ -61,6 +61,11 @@ KNOWN: dict[str, Look] = {
     "b: background once, decimated Draco": Look("#000000", "<"),
     "b: background once, decimated Draco, subdivided": Look("#777777", "H"),
     "b: background once, decimated Draco, labels found": Look("#8F8F1F", "x", size=4.2),
+    **{
+        f"level {level}, {rate} Hz": Look(color, marker)
+        for rate, color in ((24, "#009E73"), (30, "#0072B2"), (72, "#D55E00"))
+        for level, marker in enumerate("vos")
+    },
 }
 # For all others, by their place among the sorted names: 8 colors and 5 markers make 40 pairs.
 _COLORS = ("#882255", "#6699CC", "#999933", "#332288", "#AA4499", "#661100", "#44AA99", "#66A61E")

@@ -75,12 +75,13 @@ def write_report(rows: Sequence[Row], folder: Path) -> list[Path]:
         pages[Path(FOLDER, f"appendix-{part.name}.md")] = list(_appendix(part))
         if part.rated:
             path = folder / FOLDER / f"{part.name}.png"
-            plots.append(plot_curves(part.drawn, part.study.measures[:2], looks, path, part.study.rate))
+            x = part.study.rate, part.study.over
+            plots.append(plot_curves(part.drawn, part.study.measures[:2], looks, path, x))
     for part, sequence in _shown(parts):
         own = [row for row in part.drawn if row.point.sequence == sequence]
         plots.append(plot_curves(own, (D2, MASKED), looks, folder / FOLDER / _plot_name(part, sequence)))
     if page := reproducing_page(
-        [row for part in parts if part.name in (OPEN, "long", "table3", "tracker") for row in part.rows]
+        [row for part in parts if part.name in (OPEN, "long", "table3", "tracker", "headset") for row in part.rows]
     ):
         pages[Path("reproducing.md")] = page
     if found := headline({part.name: part.rows for part in parts}):
@@ -150,7 +151,7 @@ def _appendix(part: Part) -> Iterator[str]:
     if found := verdicts(study, part.rows):
         yield from ("## Targets", "", *tables.verdict_table(found), "")
     if part.rated:
-        yield from (f"![{title(part.name)}: quality against rate]({part.name}.png)", "")
+        yield from (f"![{title(part.name)}: quality against {study.over.split(' (')[0]}]({part.name}.png)", "")
     for name in sequences(part.rows):
         own = rated(part.rows, name)
         yield from (f"## {tables.text(name)}", "")

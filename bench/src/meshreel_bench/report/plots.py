@@ -20,6 +20,7 @@ from ..rows import Row
 from .looks import Look
 from .values import curve_of, floors, rated, value
 
+RATE = ("mbps", "rate (Mbps)")
 WIDTH = 17 / 2.54  # inches
 DPI = 130
 LONG = 24  # letters of a sequence's title that have room beside another (guess)
@@ -39,17 +40,19 @@ _BETTER = {1: "↑ higher is better", -1: "↓ lower is better"}
 
 
 def plot_curves(
-    rows: Sequence[Row], measures: Sequence[Measure], looks: Mapping[str, Look], path: Path, rate: str = "mbps"
+    rows: Sequence[Row], measures: Sequence[Measure], looks: Mapping[str, Look], path: Path, x: tuple[str, str] = RATE
 ) -> Path:
-    """Write quality against rate of every curve of `looks`; a dotted line is what the truth reaches."""
+    """Write quality against `x`, a value and what it is, of each curve; a dotted line is what the truth reaches."""
     with _settings():
-        figure = curves_figure(rows, measures, looks, rate)
+        figure = curves_figure(rows, measures, looks, x)
         with replacing(path) as file:
             figure.savefig(file, format="png", dpi=DPI, metadata={"Software": None})
     return path
 
 
-def curves_figure(rows: Sequence[Row], measures: Sequence[Measure], looks: Mapping[str, Look], rate: str) -> Any:
+def curves_figure(
+    rows: Sequence[Row], measures: Sequence[Measure], looks: Mapping[str, Look], x: tuple[str, str] = RATE
+) -> Any:
     """Return the figure of `plot_curves`."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -67,7 +70,7 @@ def curves_figure(rows: Sequence[Row], measures: Sequence[Measure], looks: Mappi
     for panels, sequence in zip(lines, sequences, strict=True):
         own = [row for row in rows if row.point.sequence == sequence]
         for panel, measure in zip(panels, measures, strict=True):
-            _draw(panel, own, measure, looks, rate)
+            _draw(panel, own, measure, looks, x)
         name = f"{sequence}, {rated(own)[0].frames} frames"
         name += "\n" * (len(name) > LONG)  # over what stands at the right
         panels[0].set_title(name, loc="left", fontweight="bold")
@@ -83,9 +86,9 @@ def curves_figure(rows: Sequence[Row], measures: Sequence[Measure], looks: Mappi
     return figure
 
 
-def _draw(panel: Any, rows: Sequence[Row], measure: Measure, looks: Mapping[str, Look], rate: str) -> None:
+def _draw(panel: Any, rows: Sequence[Row], measure: Measure, looks: Mapping[str, Look], x: tuple[str, str]) -> None:
     """Draw one panel: the first look last, over the others."""
-    own, rates = rated(rows), [value(row, rate) or row.mbps for row in rated(rows)]
+    own, rates = rated(rows), [value(row, x[0]) or row.mbps for row in rated(rows)]
     for place, (name, look) in enumerate(looks.items()):
         pairs = zip(rates, own, strict=True)
         found = [(mbps, value(row, measure.key)) for mbps, row in pairs if curve_of(row) == name]
@@ -95,7 +98,7 @@ def _draw(panel: Any, rows: Sequence[Row], measure: Measure, looks: Mapping[str,
             panel.plot(*zip(*points, strict=True), **style, label=_label(name), zorder=3 - place / len(looks))
     if (floor := floors(rows).get(measure.key)) is not None:
         panel.axhline(floor, color="gray", linestyle=":", lw=1.2, label="the truth itself")
-    panel.set(xlabel="rate (Mbps)", ylabel=measure.label, xscale="log")
+    panel.set(xlabel=x[1], ylabel=measure.label, xscale="log")
     panel.set_title(_BETTER[measure.sign], loc="right", color="dimgray", fontsize=6.5, pad=3)
     panel.grid()
     set_rates(panel, rates)

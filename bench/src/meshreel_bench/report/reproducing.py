@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from importlib.resources import files
 
-from ..experiments.study import TRACKER
+from ..experiments.headset import FILM, HOLDS, THROTTLES
+from ..experiments.study import HEADSET, TRACKER
 from ..names import BEST, TSMC, TUNED
 from ..rows import Row
 from .bandwidth import headline_table, vdmc_table
@@ -21,6 +22,8 @@ TEXT = "reproducing.md"  # package data: the page, with a line {NAME} for each t
 
 def reproducing_page(rows: Sequence[Row]) -> list[str]:
     """Return the lines of the page; no lines where no row is of a sequence that the paper's tables stand beside."""
+    played = [row for row in rows if row.point.codec == HEADSET]
+    rows = [row for row in rows if row.point.codec != HEADSET]
     own = [row for row in rated(rows) if row.point.metrics == "views"]
     if not {row.point.sequence for row in own} & {*SCENES, *FOUR_AND_TWO, *RELEASED}:
         return []
@@ -31,6 +34,7 @@ def reproducing_page(rows: Sequence[Row]) -> list[str]:
     lines = {text: list(table(own)) for text, table in tables.items()} | {"{table_3}": list(_table_3(drawn))}
     lines |= {"{headline}": list(headline_table(every)), "{vdmc}": list(vdmc_table(own))}
     lines["{tracker}"] = list(_tracker([row for row in rows if row.point.codec == TRACKER]))
+    lines["{figure_9}"] = list(_figure_9(played))
     return [line for text in page.splitlines() for line in lines.get(text, [text])]
 
 
@@ -88,6 +92,31 @@ def _tracker(rows: Sequence[Row]) -> Iterator[str]:
         keys = ("center_rms_mm", "center_rms_last_mm", "center_95_mm", "truth_rms_mm", "track_s")
         cells = [f"{value(row, key) or 0.0:.1f}" for key in keys]
         yield f"| {row.point.sequence}, {row.frames} frames | {row.options['method']} | {' | '.join(cells)} |"
+
+
+def _figure_9(rows: Sequence[Row]) -> Iterator[str]:
+    heads = ("decoding a group, ms", "main thread a picture, ms", "99 % below, ms", "shown a second", "uploads, MB/s")
+    yield f"| sequence, level | triangles | holds {FILM} at | {' | '.join(heads)} |"
+    yield "|" + "---|" * (3 + len(heads))
+    cases: dict[tuple[str, object], dict[object, Row]] = {}
+    for row in sorted(rated(rows), key=lambda row: (row.point.sequence, str(row.options["level"]))):
+        if row.options["rate"] == FILM:
+            cases.setdefault((row.point.sequence, row.options["level"]), {})[row.options["throttle"]] = row
+    for (sequence, level), found in cases.items():
+        own = [found[each] for each in THROTTLES if each in found]
+        keys = ("decode_group_ms", "main_ms", "main_99_ms", "fps", "upload_mb_s")
+        cells = [" / ".join(f"{value(row, key) or 0.0:.3g}" for row in own) for key in keys]
+        yield f"| {sequence}, {level} | {value(own[0], 'triangles'):.0f} | {_strongest(found)} | {' | '.join(cells)} |"
+
+
+def _strongest(rows: Mapping[object, Row]) -> str:
+    """Return by how much a browser may be slower and still shows and decodes all in time."""
+    holds = ""
+    for throttle, row in sorted(rows.items(), key=lambda pair: float(str(pair[0]))):
+        if (value(row, "shown_share") or 0.0) < HOLDS or (value(row, "decode_load") or 0.0) > 1:
+            return holds or "none"
+        holds = str(throttle)
+    return f"{holds} or more"
 
 
 def _heads(columns: Sequence[str]) -> Iterator[str]:

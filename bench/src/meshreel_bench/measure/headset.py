@@ -1,0 +1,90 @@
+"""A headset, without one: what playing takes of a browser that is slowed down, and what an aarch64 decodes.
+
+In: a .reel file, a level, a display's rate, a throttle. Out: values of the player's `?bench` page in headless Chromium,
+by `web/headset.mjs`. The file is joined to itself, so that groups are decoded and uploaded while it plays.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from math import ceil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from meshreel.container.reader import ReelReader
+from meshreel.container.sources import BytesSource
+from meshreel.encoder.edit import concat
+from meshreel.errors import InputError
+
+from ..experiments.headset import AARCH64, HOLDS
+from ..playing import ROOT, WEB, playing
+
+SECONDS = 3.0  # of playing that is measured
+BUFFERED = 3.0  # s that the player decodes ahead, and that come before the measured ones
+Values = dict[str, float | None]
+
+
+def headset_values(data: bytes, level: int, throttle: float, rate: float) -> Values:
+    """Return what playing levels up to one takes, the better of two tries where the first loses pictures.
+
+    InputError without the checkout, Node or Chromium.
+    """
+    with tempfile.TemporaryDirectory() as name:
+        once, long = Path(name, "once.reel"), Path(name, "long.reel")
+        once.write_bytes(data)
+        reader = ReelReader(BytesSource(data))
+        concat([once] * ceil((SECONDS + BUFFERED) * reader.header.frame_rate / reader.frame_count), long)
+        with playing(long) as address:
+            numbers = (SECONDS, throttle, rate)
+            command = ["node", "headset.mjs", f"{address}?layers={level}&controls=0", *map(str, numbers)]
+            tries = [_values(json.loads(_output(command, WEB)), rate)]
+            if tries[0]["shown_share"] < HOLDS:
+                tries.append(_values(json.loads(_output(command, WEB)), rate))
+    best = max(tries, key=lambda values: values["shown_share"])  # other jobs only take pictures away
+    return {**best}
+
+
+def _values(found: dict[str, Any], rate: float) -> dict[str, float]:
+    report, pictures = found["report"], found["pictures"]
+    return {
+        "decode_group_ms": report["decodeMs"]["median"],
+        "decode_load": report["decodeLoad"],
+        "main_ms": float(np.median(pictures)),
+        "main_99_ms": float(np.percentile(pictures, 99)),
+        "dropped": report["dropped"],
+        "fps": found["drawn"] / found["seconds"],
+        "shown_share": min(found["drawn"] / (found["seconds"] * rate), 1.0),
+        "heap_mb": found["heap"] / 1e6,
+        "upload_mb_s": found["uploaded"] / found["seconds"] / 1e6,
+        "triangles": report["triangles"],
+    }
+
+
+def aarch64_values(data: bytes) -> Values:
+    """Return whether frames of a file that an aarch64 decodes, under QEMU, are those of this machine, to the bit."""
+    with tempfile.TemporaryDirectory() as name:
+        path = Path(name, "file.reel")
+        path.write_bytes(data)
+        told = _output([str(ROOT / "scripts" / AARCH64), str(path)], ROOT, PYTHON=sys.executable)
+    size, _, same = told.splitlines()[0].rsplit(": ", 1)[1].split(", ")[:3]
+    return {"decoded_mb": int(size.split()[0]) / 1e6, "same": float(same.startswith("equal"))}
+
+
+def _output(command: list[str], folder: Path, **environment: str) -> str:
+    try:
+        done = subprocess.run(
+            command, cwd=folder, env={**os.environ, **environment}, capture_output=True, text=True, check=True
+        )
+    except FileNotFoundError as error:
+        raise InputError(f"{command[0]}: {error.strerror}; run in a checkout, after `scripts/setup web`") from None
+    except subprocess.CalledProcessError as error:
+        raise InputError(
+            f"{command[0]} failed: {(error.stderr or error.stdout)[-200:]}; `scripts/setup web` brings what it needs"
+        ) from None
+    return done.stdout

@@ -1,0 +1,32 @@
+"""The page of the paper's numbers: what a browser that is slowed down still holds."""
+
+from __future__ import annotations
+
+from meshreel_bench.report.reproducing import reproducing_page
+from meshreel_bench.rows import Point, Row, Stream
+
+from bench.tests.made_up import row
+
+
+def played(level, throttle, share, load=0.5):
+    options = {"level": level, "throttle": throttle, "rate": 24}
+    keys = ("decode_group_ms", "main_ms", "main_99_ms", "fps", "upload_mb_s", "triangles")
+    metrics = dict.fromkeys(keys, 10.0 * throttle) | {"shown_share": share, "decode_load": load}
+    point = Point("dancer", "headset", options)
+    return Row(point=point, name=f"level {level}", options=options, stream=Stream(1, 1), metrics=metrics)
+
+
+def test_figure_9_tells_the_strongest_throttle_below_which_all_is_held():
+    rows = [played(0, 1, 1.0), played(0, 4, 0.96), played(0, 6, 0.9), played(0, 10, 1.0)]
+    rows += [played(1, 1, 1.0), played(1, 4, 1.0, load=1.5), played(2, 1, 0.5), played(3, 4, 0.99), played(3, 1, 0.99)]
+    lines = [
+        line for line in reproducing_page([row("dancer", "draco", 1.0, 60), *rows]) if line.startswith("| dancer, ")
+    ]
+    assert [line.split(" | ")[2] for line in lines] == ["4", "1", "none", "4 or more"]
+    assert lines[0].split(" | ")[1:4] == ["10", "4", "10 / 40 / 60"]
+
+
+def test_what_is_played_is_in_no_other_table():
+    page = reproducing_page([row("dancer", "draco", 1.0, 60)])
+    with_played = reproducing_page([row("dancer", "draco", 1.0, 60), played(0, 1, 1.0)])
+    assert [line for line in with_played if line not in page] == [line for line in with_played if "dancer, 0" in line]
