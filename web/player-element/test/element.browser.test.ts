@@ -58,7 +58,7 @@ describeOnPage("<meshreel-player>", (on) => {
     });
     await on.page.evaluate(() => new Promise((done) => setTimeout(done)));
     expect(await disposed()).toEqual([true, true]);
-    expect(await on.page.evaluate("kept.shadowRoot.querySelectorAll('canvas').length")).toBe(0);
+    expect(await on.page.evaluate("kept.shadowRoot.querySelectorAll('canvas:not(.thumbnail)').length")).toBe(0);
     await on.page.evaluate("document.body.append(kept)");
     await on.eventually((player) => player.readyState === 4);
     expect(await on.get((player) => [player.currentTime, player.paused])).toEqual([1, true]);
