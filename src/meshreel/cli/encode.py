@@ -231,8 +231,9 @@ def command(
     source = open_source(inputs, reading if part.survey is None else replace(reading, frames=":"), common)
     sequence, masker = masking.upright(source), masking.masker(len(source.sequence))
     excerpt = part.excerpt(sequence, reading.frames, options)
-    if lacking and (sequence.colors is not None or is_colored(sequence)):
-        common.warn(lacking)  # not after minutes
+    here = jobs == 1 and cluster is None  # where workers read, this process reads no frame
+    early = lacking if sequence.colors is not None or (lacking and here and is_colored(sequence)) else ()
+    common.warn(early)  # not after minutes
     with (
         common.stages(len(sequence if excerpt is None else excerpt.frames)) as progress,
         workers(jobs, cluster) as executor,
@@ -247,7 +248,7 @@ def command(
     warnings = (*source.warnings, *getattr(masker, "remarks", ()), *summary.warnings)
     if summary.scene is None and parting.background_refresh is not None:
         warnings += ("no background was found that could be sent again: --background-refresh does nothing",)
-    common.warn(text for text in warnings if text not in lacking)
+    common.warn(text for text in warnings if text not in early)
     row = summary_row(summary, sequence.frame_rate) | {"quality": quality}
     common.result({"output": str(place), "warnings": warnings} | row, f"{place}: {describe(row)}; {_reached(row)}")
 

@@ -160,8 +160,8 @@ def judge(judged: DepthJudge, decoded: Frames, numbers: Iterable[int], refreshes
     nothing was decoded: few, and seen first. `limbs_shown` counts the frames that show the lower third of a body,
     `limbs_lost` those of them whose decoded mesh has not half of it. From a frame to the next: `still_flicker_m` is the
     RMS change of decoded depth where both measured what stands still, `body_flicker_deg` that of normals on bodies,
-    motion taken out.
-    `refreshes` are the frames in which another background begins: its change is left out. Shares of nothing are None.
+    motion taken out. `refreshes` are the frames in which another background begins: its change does not count. Shares
+    of nothing are None.
     """
     rows, before = list[Row](), dict[int, Judged]()
     for number in numbers:
