@@ -11,6 +11,7 @@ DECIMATED, SUBDIVIDED = "decimated_draco", "decimated_draco_subdivided"
 ONCE, ONCE_SUBDIVIDED = "background_once_draco", "background_once_draco_subdivided"
 MESHOPT = "meshoptimizer"
 FLOOR_RATIO = "dynamic_ratio"  # metric of the truth itself: share of the vertices of what moves
+FOUND_NAME = "what is found to move"  # the row of a recording in the place of its truth
 VDMC, VDMC_HERE = "vdmc", "vdmc on our frames"  # of others: only in plots
 OURS, PUBLISHED = "ours", "published"  # trackers of volumes
 USUAL = {"centers": 2000, "group_size": 10}  # the paper's own

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from meshreel_bench.measure.point import dynamic_ratio
+from meshreel_bench.datasets import Store
+from meshreel_bench.measure.point import dynamic_ratio, measure_point
 from meshreel_bench.measure.segmentation import score_labels
+from meshreel_bench.names import FLOOR_RATIO, FOUND_NAME
+from meshreel_bench.rows import Point
 
 from meshreel.errors import InputError
 from meshreel.types import Mesh
+from tests.shared_data import ROOT
 
 
 def labels(*numbers):
@@ -42,3 +46,11 @@ def test_the_dynamic_ratio_is_the_share_of_the_vertices_of_faces_that_move():
     square = Mesh.of([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
 
     assert dynamic_ratio([(square, labels(0, 0)), (square, labels(1, 0))]) == 3 / 8
+
+
+def test_the_share_of_a_recording_whose_truth_nobody_knows_is_that_of_what_is_found(tmp_path):
+    if not ROOT.exists():
+        pytest.skip(f"benchmark data not present: {ROOT}")
+    row = measure_point(Point("living_room", "captured", {}, 8), Store(ROOT, tmp_path))
+    assert row.name == FOUND_NAME and list(row.metrics) == [FLOOR_RATIO]
+    assert 0.01 < row.metrics[FLOOR_RATIO] < 0.1  # one person in a room

@@ -5,7 +5,7 @@ from __future__ import annotations
 import msgspec
 import pytest
 from meshreel_bench.experiments.study import D2
-from meshreel_bench.names import BEST, DRACO, FLOOR_RATIO, VDMC, VDMC_HERE
+from meshreel_bench.names import BEST, DRACO, FLOOR_RATIO, FOUND_NAME, VDMC, VDMC_HERE
 from meshreel_bench.report.bandwidth import RAW, headline_table, vdmc_table
 from meshreel_bench.report.published import anchor_rows
 from meshreel_bench.rows import Decoding
@@ -36,6 +36,8 @@ def test_the_dynamic_ratio_is_that_of_the_truth_and_everything_without_a_backgro
     other = msgspec.structs.replace(scene, point=msgspec.structs.replace(scene.point, sequence="real"))
     lines = list(headline_table([row("ball", BEST, 1.0, 60), scene, floor("room", **{FLOOR_RATIO: 0.125}), other]))
     assert [cell.strip() for cell in cells(lines, "dynamic ratio")[1:]] == ["100 %", "12.5 %", "not known"]
+    found = msgspec.structs.replace(floor("real", **{FLOOR_RATIO: 0.25}), name=FOUND_NAME)
+    assert cells(list(headline_table([other, found])), "dynamic ratio")[1].strip() == "25.0 % (as found)"
 
 
 def test_points_of_v_dmc_are_rows_whose_rate_is_the_published_one():

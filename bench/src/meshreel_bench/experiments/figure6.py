@@ -119,7 +119,7 @@ STUDY = Study(
     measures=(D2, MASKED, SSIM, NORMALS, *MEASURED_TRUTH),
     best=BEST,
     promises=PROMISES,
-    floors=(ROOM, "procedural_room"),
+    floors=SCENES,
     frames={"demo": 10, "procedural_room": 30},
     notes=NOTES,
 )

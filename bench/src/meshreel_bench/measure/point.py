@@ -16,6 +16,7 @@ from typing import Any
 import msgspec
 import numpy as np
 
+from meshreel.analysis.scene.segmentation import segment
 from meshreel.container.reader import ReelReader
 from meshreel.container.sources import BytesSource
 from meshreel.errors import InputError
@@ -33,7 +34,7 @@ from ..datasets.solid import InColours, coloured
 from ..experiments.headset import AARCH64, ENCODED
 from ..experiments.study import FLOOR, HEADSET, TRACKER
 from ..experiments.study import FOUND as SEGMENTATION
-from ..names import FLOOR_RATIO
+from ..names import FLOOR_RATIO, FOUND_NAME
 from ..rows import Encoding, Group, Point, Row, Stream
 from .clock import StageTimer, cost_of
 from .color import color_bytes
@@ -79,7 +80,7 @@ def measure_point(point: Point, store: Store) -> Row:
         if painted is not None:
             return _uncompressed(row, known, painted)
         if known.scene is None:
-            raise InputError("the truth itself is known of simulated scenes only")
+            return msgspec.structs.replace(row, name=FOUND_NAME, metrics=_found_ratio(known.sequence))
         clean = [known.scene.truth[number].mesh for number in numbers]
         metrics, per_frame = measure_frames(Measured(known, numbers, clean), point.metrics)
         scene = known.scene
@@ -125,6 +126,12 @@ def dynamic_ratio(frames: Iterable[tuple[Mesh, Labels]]) -> float:
     counts = [(len(np.unique(mesh.faces[moves])), len(np.unique(mesh.faces))) for mesh, moves in frames]
     moving, every = (sum(numbers) for numbers in zip(*counts, strict=True))
     return moving / max(every, 1)
+
+
+def _found_ratio(frames: MeshSequence) -> dict[str, float | None]:
+    """Return the share of a recording whose truth nobody knows: by what the encoder finds to move."""
+    found, meshes = segment(frames), ((number, frames[number]) for number in range(len(frames)))
+    return {FLOOR_RATIO: dynamic_ratio((mesh, found.moving(number, mesh)) for number, mesh in meshes)}
 
 
 def _uncompressed(row: Row, known: Dataset, painted: Callable[[int], Mesh]) -> Row:

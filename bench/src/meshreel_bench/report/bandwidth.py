@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 
 from ..bd_rate import rate_at, reach
 from ..experiments.study import D2, MASKED, NORMALS, SSIM, SYMMETRIC, Measure
-from ..names import BEST, DRACO, FLOOR_RATIO, KLT, NECGS, TSMC, TVMC, title
+from ..names import BEST, DRACO, FLOOR_RATIO, FOUND_NAME, KLT, NECGS, TSMC, TVMC, title
 from ..rows import Row
 from .published import anchor_rows
 from .values import curve, rated, sequences, value
@@ -78,9 +78,9 @@ def _raw_mbps(rows: Sequence[Row]) -> float | None:
 def _dynamic(rows: Sequence[Row], sequence: str) -> str:
     """Return the share of the vertices that move: all where there is no background."""
     own = [row for row in rows if row.point.sequence == sequence]
-    known = [each for row in own if (each := row.metrics.get(FLOOR_RATIO)) is not None]
+    known = [(each, row.name) for row in own if (each := row.metrics.get(FLOOR_RATIO)) is not None]
     if known:
-        return f"{100 * known[0]:.1f} %"
+        return f"{100 * known[0][0]:.1f} %" + " (as found)" * (known[0][1] == FOUND_NAME)
     return "not known" if any(row.stream and row.stream.background_bytes for row in own) else "100 %"
 
 
