@@ -56,6 +56,17 @@ def vdmc_table(rows: Sequence[Row]) -> Iterator[str]:
         yield f"| {anchor.point.sequence} | {' | '.join(cells)} |"
 
 
+def vdmc_times(rows: Sequence[Row], measure: Measure) -> list[float]:
+    """Return how many times the rate of `best` V-DMC needs where both are as good, by its points, the least first."""
+    found = list[float]()
+    for anchor in anchor_rows():
+        known = value(anchor, measure.key)
+        own = curve(rated(rows, anchor.point.sequence), BEST, measure)
+        if known is not None and own and (rate := rate_at(own, measure.sign * known).rate) is not None:
+            found.append(round(anchor.mbps / rate, 2))
+    return sorted(found)
+
+
 def _needed(rows: Sequence[Row], system: str, measure: Measure) -> str:
     """Return the rate for the SSIM, interpolated, and how many times less that is than the input has."""
     points, raw = curve(rows, system, measure), _raw_mbps(rows)

@@ -6,9 +6,10 @@ from collections.abc import Mapping, Sequence
 from statistics import mean, median
 from typing import Any
 
-from ..experiments.study import D2
+from ..experiments.study import D2, MASKED
 from ..names import BEST, DECIMATED, DRACO, TVMC, title
 from ..rows import Row
+from .bandwidth import vdmc_times
 from .equal import rate_ratio
 from .values import rated, value
 
@@ -29,7 +30,8 @@ def headline(studies: Mapping[str, Sequence[Row]]) -> dict[str, Any]:
         return {}
     size = round(mean(person["kilobytes"] for person in people))
     person = {"triangles": TRIANGLES, "seconds": SECONDS, "kilobytes": size, "quality": QUALITY, "from": people}
-    return {"person": person, "times_larger_at_equal_d2": found}
+    vdmc = {measure.key: vdmc_times(studies.get("figure6", ()), measure) for measure in (D2, MASKED)}
+    return {"person": person, "times_larger_at_equal_d2": found, "vdmc_times": vdmc}
 
 
 def _is_person(row: Row) -> bool:
