@@ -21,8 +21,8 @@ from meshreel.errors import InputError
 from .codecs import codec_names, codec_version, make_codec
 from .datasets import Store, released_in
 from .experiments import EXPERIMENTS, find_experiment
-from .experiments.study import Sweep as Points
-from .measure.runner import Sweep, run_points
+from .experiments.study import Sweep
+from .measure.runner import Measuring, run_points
 from .report.values import value
 from .report.verdicts import Verdict, verdicts
 from .rows import Options, Point, Row, failed_rows, join_rows, measured_rows, read_rows
@@ -39,7 +39,7 @@ class Running:
     """How points are measured."""
 
     jobs: int = 1
-    """Points to measure side by side, each in a process; the rows are the same but for times."""
+    """Sweep to measure side by side, each in a process; the rows are the same but for times."""
     limit: float = 3600.0
     """Seconds that a point may take; one that takes longer, crashes or decodes nonsense becomes a row that says so."""
     retry: Annotated[bool, Parameter(negative="")] = False
@@ -74,7 +74,7 @@ class Selection:
         """Return the points of an experiment. Raises InputError where there are none."""
         study, on = find_experiment(name), self.on or (() if self.small else released_in(self.data))
         others = [each for each in on if each not in study.sequences]
-        added = [Points(codec, {}, options) for codec, options in map(operating_point, self.add)]
+        added = [Sweep(codec, {}, options) for codec, options in map(operating_point, self.add)]
         points = list(study.extended(on if others else [], added).points(self.small))
         points = [point for point in points if point.codec in (self.only or [point.codec])]
         points = [point for point in points if point.sequence in (on or [point.sequence])]
@@ -130,7 +130,7 @@ def run(
         raise InputError(f"--output {output}: give a file, as rows.jsonl; {CACHE} is a folder beside it")
     points = selection.points(experiment, running.ssim)
     store = Store(selection.data.absolute(), output.absolute().with_suffix(CACHE), reading.options())
-    sweep = Sweep(store, running.limit, running.retry, running.jobs)
+    how = Measuring(store, running.limit, running.retry, running.jobs)
     with common.stages(len(points)) as progress:
         done = 0
 
@@ -141,7 +141,7 @@ def run(
             before = "" if new else " (before; --retry tries again)" if row.failed else " (measured before)"
             common.note(f"{done}/{len(points)} {describe(row)}{before}")
 
-        rows = run_points(points, output, sweep, report)
+        rows = run_points(points, output, how, report)
     failed = failed_rows(rows)
     common.warn(tuple(describe(row) for row in failed))
     found = verdicts(find_experiment(experiment), measured_rows(rows))

@@ -7,6 +7,8 @@ from typing import Any, Protocol, runtime_checkable
 
 from meshreel.types import Mesh, MeshSequence
 
+from .rows import ColorBytes
+
 Progress = Callable[[str, int, int], None]  # stage, frames done, frames of the sequence
 
 
@@ -42,3 +44,19 @@ class TwoStepCodec(Codec, Protocol):
 
     def code(self, analysis: Any, progress: Progress | None = None) -> bytes:
         """Return the bytes; the analysis stays as it was."""
+
+
+@runtime_checkable
+class BackgroundCodec(Codec, Protocol):
+    """A codec that sends what stands still apart."""
+
+    def background_bytes(self, data: bytes) -> int:
+        """Return the share of the bytes that is sent once."""
+
+
+@runtime_checkable
+class ColorCodec(Codec, Protocol):
+    """A codec of colours in a container of its own."""
+
+    def color_bytes(self, data: bytes) -> ColorBytes | None:
+        """Return the share of the bytes that colours take; None where there are none."""

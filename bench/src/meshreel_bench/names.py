@@ -6,6 +6,7 @@ BEST = "meshreel best"
 TEXTURED, PAINTED = f"{BEST}, texture", f"{BEST}, vertices"  # in colour
 TSMC = "meshreel paper m, quality 50"  # as the paper has it: the number of basis vectors is varied
 TUNED = "meshreel paper"  # the same system, the quality varied and the basis chosen by it: spares what m alone cannot
+LITERAL = "meshreel paper-literal m, quality 50"  # the same system as near to the text as is known
 TVMC, DRACO, KLT, NECGS, NECGS_FULL = "tvmc", "draco", "klt_tsdf", "necgs", "necgs_full"
 DECIMATED, SUBDIVIDED = "decimated_draco", "decimated_draco_subdivided"
 ONCE, ONCE_SUBDIVIDED = "background_once_draco", "background_once_draco_subdivided"
@@ -19,6 +20,7 @@ USUAL = {"centers": 2000, "group_size": 10}  # the paper's own
 _TITLES = {
     TSMC: "TSMC (meshreel paper, m varied)",
     TUNED: "TSMC (meshreel paper, quality varied)",
+    LITERAL: "TSMC (meshreel paper-literal, m varied)",
     TVMC: "TVMC*",
     DRACO: "Draco",
     KLT: "KLT on TSDF",

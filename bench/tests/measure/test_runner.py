@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from meshreel_bench import codecs
 from meshreel_bench.datasets import Store
-from meshreel_bench.measure.runner import Sweep, run_points, runs_of
+from meshreel_bench.measure.runner import Measuring, run_points, runs_of
 from meshreel_bench.rows import Point, read_rows
 
 from meshreel.errors import InputError
@@ -73,7 +73,7 @@ def test_a_timeout_a_crash_and_a_wrong_answer_cost_their_own_rows(store, tmp_pat
         "text": "no meshreel.Mesh",
     }
     points = [odd(how) for how in (*reasons, "well")]
-    rows = run_points(points, tmp_path / "rows.jsonl", Sweep(store, limit_s=45, jobs=2))
+    rows = run_points(points, tmp_path / "rows.jsonl", Measuring(store, limit_s=45, jobs=2))
     assert [row.point for row in rows] == points and rows[-1].failed is None and rows[-1].stream.bytes == 4
     for row, reason in zip(rows, reasons.values(), strict=False):
         assert reason in row.failed and row.made_by is not None and row.codec_version == "odd-codec 1"
@@ -84,7 +84,9 @@ def test_rows_that_are_there_are_not_measured_again_unless_they_failed_and_it_is
 
     def run(**how):
         heard.clear()
-        run_points(points, file, Sweep(store, **how), lambda row, new: heard.append((row.point.options["how"], new)))
+        run_points(
+            points, file, Measuring(store, **how), lambda row, new: heard.append((row.point.options["how"], new))
+        )
         return heard
 
     assert run() == [("well", True), ("no bytes", True)]
@@ -97,7 +99,9 @@ def test_rows_that_are_there_are_not_measured_again_unless_they_failed_and_it_is
 
 def test_a_row_has_rate_times_and_metrics_of_what_a_fresh_process_decodes(store, tmp_path):
     options = {"qp": 9, "level": 7}
-    [row] = run_points([Point("ball", "draco", options, metrics="distances")], tmp_path / "rows.jsonl", Sweep(store))
+    [row] = run_points(
+        [Point("ball", "draco", options, metrics="distances")], tmp_path / "rows.jsonl", Measuring(store)
+    )
     assert row.name == "draco" and row.options == options and row.frames == 2 and row.measured_frames == [0, 1]
     assert row.stream.bytes > 100 and [group.form for group in row.stream.groups] == ["draco"] * 2
     assert row.encoding.reference_s > 0 and row.decoding.reference_s > 0 and row.encoding.work == {}
@@ -108,7 +112,7 @@ def test_a_row_has_rate_times_and_metrics_of_what_a_fresh_process_decodes(store,
 
 def test_a_missing_sequence_is_no_codecs_failure(store, tmp_path):
     with pytest.raises(InputError, match="no sequence 'nobody'"):
-        run_points([Point("nobody", "draco")], tmp_path / "rows.jsonl", Sweep(store))
+        run_points([Point("nobody", "draco")], tmp_path / "rows.jsonl", Measuring(store))
 
 
 def test_points_that_share_an_analysis_are_one_run():

@@ -52,7 +52,7 @@ def test_plots_of_figure_6_have_the_points_of_v_dmc_and_no_table_has():
     (part,) = pages.parts_of([row("dancer", BEST, 1.0, 60)])
     assert {each.name for each in part.drawn} == {BEST, VDMC, VDMC_HERE} and len(part.rows) == 1
     figure = curves_figure(part.drawn, (D2, NORMALS), looks_of([BEST, VDMC, VDMC_HERE]))
-    assert [len(panel.lines) for panel in figure.axes] == [3, 2]  # its sheet knows no normals
+    assert [len(panel.lines) for panel in figure.axes] == [2, 2]  # its sheet knows neither
     assert figure.axes[0].get_title(loc="left") == "dancer, 10 frames"
 
 

@@ -19,14 +19,13 @@ def played(level, throttle, share, load=0.5):
 def test_figure_9_tells_the_strongest_throttle_below_which_all_is_held():
     rows = [played(0, 1, 1.0), played(0, 4, 0.96), played(0, 6, 0.9), played(0, 10, 1.0)]
     rows += [played(1, 1, 1.0), played(1, 4, 1.0, load=1.5), played(2, 1, 0.5), played(3, 4, 0.99), played(3, 1, 0.99)]
-    lines = [
-        line for line in reproducing_page([row("dancer", "draco", 1.0, 60), *rows]) if line.startswith("| dancer, ")
-    ]
+    page = reproducing_page({"figure6": [row("dancer", "draco", 1.0, 60)], "headset": rows})
+    lines = [line for line in page if line.startswith("| dancer, ")]
     assert [line.split(" | ")[2] for line in lines] == ["4", "1", "none", "4 or more"]
     assert lines[0].split(" | ")[1:4] == ["10", "4", "10 / 40 / 60"]
 
 
 def test_what_is_played_is_in_no_other_table():
-    page = reproducing_page([row("dancer", "draco", 1.0, 60)])
-    with_played = reproducing_page([row("dancer", "draco", 1.0, 60), played(0, 1, 1.0)])
+    page = reproducing_page(own := {"figure6": [row("dancer", "draco", 1.0, 60)]})
+    with_played = reproducing_page(own | {"headset": [played(0, 1, 1.0)]})
     assert [line for line in with_played if line not in page] == [line for line in with_played if "dancer, 0" in line]

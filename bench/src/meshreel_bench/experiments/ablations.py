@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..codecs.variants import BOTH, FROM_MESHES, IN_MDS_POSE, RELEASED, TOGETHER, UNIFORM
-from ..names import BEST, OURS, PUBLISHED, TSMC
+from ..names import BEST, LITERAL, OURS, PUBLISHED, TSMC
 from ..rows import Options
 from .scenes import MEASURES
 from .study import D2, MASKED, NORMALS, SYMMETRIC, TRACKER, Bound, Measure, Needs, NoMore, Study, Sweep, Which
@@ -32,7 +32,6 @@ GOF = Study(
 RELEASE = {3: (2.23, 51.87), 5: (3.29, 54.35), 10: (5.78, 56.40), 30: (15.46, 59.02)}  # its Mbps and D2, dB, by m
 AT_10: Options = {"preset": "paper", "basis_size": 10}
 M_IS_10 = {name: {"basis_size": (10,)} for name in ("crane60", "procedural_room")}
-LITERAL = f"meshreel {LITERAL_PRESET} m, quality 50"
 PAPER = Study(
     title="The paper as written: preset `paper` put back step by step",
     sequences=("dancer", "crane60", "procedural_room"),
@@ -65,8 +64,10 @@ PAPER = Study(
         for m, (mbps, quality) in RELEASE.items()
     ),
     notes=(
-        "`paper-literal` is the paper's recipe word by word: the MDS pose, groups of ten frames without cuts, one step",
-        "for all components, plain rounding; a vertex is displaced to the nearest of the frame's, as the release does.",
+        "`paper-literal` is as near to the paper's text as is known: the MDS pose, groups of ten frames without cuts,",
+        "one step for all components, plain rounding; the surface through all frames is Poisson's, and a vertex is",
+        "displaced to the nearest of the frame's, as the release does. Pose with cuts, and step with rounding, are put",
+        "back on their own; surface and displacement come together in `paper-literal`.",
     ),
 )
 PARTS = (

@@ -141,7 +141,7 @@ LONG = Study(
     notes=(
         "Length is what NeCGS, KLT and TSMC were made for: what they send once is shared by many frames. All are",
         "coded, 30 are measured. Frames share no connectivity; the two are apart, pass at 6 cm, and are apart again.",
-        "NeCGS was stopped and went on several times (`MESHREEL_NECGS_KEEP`): its encode time is of the last run alone.",
+        "NeCGS was stopped and went on (`MESHREEL_NECGS_KEEP`): its encode time is of the last of several runs alone.",
     ),
 )
 TABLE_1 = Study(

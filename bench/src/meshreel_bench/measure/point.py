@@ -24,10 +24,8 @@ from meshreel.format.layout import MAGIC, ChunkKind
 from meshreel.geometry.derived_sequences import Chosen
 from meshreel.types import Mesh, MeshSequence, evenly
 
-from ..codec import Codec, TwoStepCodec
+from ..codec import BackgroundCodec, Codec, ColorCodec, TwoStepCodec
 from ..codecs import codec_version, make_codec
-from ..codecs.colored_draco import ColoredDracoCodec
-from ..codecs.scenes import BackgroundDracoCodec
 from ..datasets import Dataset, Store
 from ..datasets.scenes import FOUND, TRUE, SceneFrames
 from ..datasets.solid import InColours, coloured
@@ -205,8 +203,9 @@ def _encoded(codec: Codec, source: MeshSequence, what: object) -> tuple[bytes, E
 def _stream(codec: Codec, data: bytes, frames: int) -> Stream:
     """Return size, groups and what is sent once; no groups of bytes that are no .reel file."""
     if not data.startswith(MAGIC):
-        colors = codec.color_bytes(data) if isinstance(codec, ColoredDracoCodec) else None
-        return Stream(len(data), frames, colors=colors)
+        once = codec.background_bytes(data) if isinstance(codec, BackgroundCodec) else 0
+        colors = codec.color_bytes(data) if isinstance(codec, ColorCodec) else None
+        return Stream(len(data), frames, once, colors=colors)
     reader = ReelReader(BytesSource(data))
     keys = {int(key) for key in reader.metadata.get(KEYS, ())}
     groups = list[Group]()
@@ -215,7 +214,7 @@ def _stream(codec: Codec, data: bytes, frames: int) -> Stream:
         form = chunk.form_name
         groups.append(Group(chunk.first_frame, chunk.frame_count, form, chunk.size, min(own, default=None)))
     once = sum(chunk.size for chunk in reader.chunks if chunk.kind == ChunkKind.STATIC)
-    if isinstance(codec, BackgroundDracoCodec):
+    if isinstance(codec, BackgroundCodec):
         once = codec.background_bytes(data)
     return Stream(len(data), frames, once, groups, color_bytes(reader), reader.metadata.get("canonical_references", 0))
 

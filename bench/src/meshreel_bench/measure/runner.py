@@ -24,7 +24,7 @@ Report = Callable[[Row, bool], None]  # of a row, and whether it is new
 
 
 @dataclass(frozen=True, slots=True)
-class Sweep:
+class Measuring:
     """How points are measured."""
 
     store: Store
@@ -33,30 +33,30 @@ class Sweep:
     jobs: int = 1  # points side by side
 
 
-def run_points(points: Sequence[Point], file: Path, sweep: Sweep, report: Report = lambda *_: None) -> list[Row]:
+def run_points(points: Sequence[Point], file: Path, how: Measuring, report: Report = lambda *_: None) -> list[Row]:
     """Return the rows of all points, and append each new one to the file as soon as it is there.
 
     Those that are in the file count, unless sequence or codec have changed. InputError where a sequence is missing.
     """
     wanted, stored = {point.key for point in points}, read_rows(file) if file.exists() else []
-    found = {row.point.key: row for row in stored if row.point.key in wanted and _is_valid(row, sweep)}
+    found = {row.point.key: row for row in stored if row.point.key in wanted and _is_valid(row, how)}
     missing = [point for point in points if point.key not in found]
     for row in [found[point.key] for point in points if point.key in found]:
         report(row, False)
     for sequence, frames in dict.fromkeys((point.sequence, point.frames) for point in missing):
-        sweep.store.open(sequence, frames)  # what takes long to make is made once, before processes need it
-    for row in _measured(runs_of(missing), sweep):
+        how.store.open(sequence, frames)  # what takes long to make is made once, before processes need it
+    for row in _measured(runs_of(missing), how):
         append_row(file, row)
         found[row.point.key] = row
         report(row, True)
     return [found[point.key] for point in points]
 
 
-def _is_valid(row: Row, sweep: Sweep) -> bool:
+def _is_valid(row: Row, how: Measuring) -> bool:
     """Whether a row stands for its point as it would be measured now."""
-    if row.failed and sweep.retry:
+    if row.failed and how.retry:
         return False
-    return row.source == sweep.store.digest(row.point.sequence) and row.codec_version == codec_version(row.point.codec)
+    return row.source == how.store.digest(row.point.sequence) and row.codec_version == codec_version(row.point.codec)
 
 
 def runs_of(points: Sequence[Point]) -> list[list[Point]]:
@@ -80,15 +80,15 @@ def _shared(point: Point) -> object:
     return point.key
 
 
-def _measured(runs: Sequence[list[Point]], sweep: Sweep) -> Iterator[Row]:
-    if sweep.jobs == 1:
+def _measured(runs: Sequence[list[Point]], how: Measuring) -> Iterator[Row]:
+    if how.jobs == 1:
         for run in runs:
-            yield from _rows_of(run, sweep)
+            yield from _rows_of(run, how)
         return
-    with ThreadPoolExecutor(sweep.jobs) as executor:
+    with ThreadPoolExecutor(how.jobs) as executor:
         longest_first = sorted(runs, key=len, reverse=True)
         try:
-            calls = [executor.submit(lambda run: list(_rows_of(run, sweep)), each) for each in longest_first]
+            calls = [executor.submit(lambda run: list(_rows_of(run, how)), each) for each in longest_first]
             for done in as_completed(calls):
                 yield from done.result()
         except BaseException:
@@ -97,16 +97,16 @@ def _measured(runs: Sequence[list[Point]], sweep: Sweep) -> Iterator[Row]:
             raise
 
 
-def _rows_of(run: Sequence[Point], sweep: Sweep) -> Iterator[Row]:
+def _rows_of(run: Sequence[Point], how: Measuring) -> Iterator[Row]:
     """Yield the rows of a run from a process of its own, and from another one after a point that ends it."""
     left = list(run)
     while left:
         try:
-            for row in in_fresh_process(measure_points, left, sweep.store, limit_s=sweep.limit_s):
+            for row in in_fresh_process(measure_points, left, how.store, limit_s=how.limit_s):
                 yield row
                 left.pop(0)
         except WorkerError as error:
             if not left:
                 return
-            row = empty_row(left.pop(0), sweep.store)
+            row = empty_row(left.pop(0), how.store)
             yield msgspec.structs.replace(row, failed=str(error))

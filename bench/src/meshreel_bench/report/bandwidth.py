@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from ..bd_rate import rate_at, reach
+from ..experiments.mpeg import D1
 from ..experiments.study import D2, MASKED, NORMALS, SSIM, SYMMETRIC, Measure
 from ..names import BEST, DRACO, FLOOR_RATIO, FOUND_NAME, KLT, NECGS, TSMC, TVMC, title
 from ..rows import Row
@@ -37,7 +38,7 @@ def headline_table(rows: Sequence[Row]) -> Iterator[str]:
 
 def vdmc_table(rows: Sequence[Row]) -> Iterator[str]:
     """Yield V-DMC's points, each beside the rates at which `best` is as good by what is known of it."""
-    measures = (D2, SYMMETRIC, NORMALS, MASKED)
+    measures = (D1, D2, SYMMETRIC, NORMALS, MASKED)
     yield f"| sequence | V-DMC | {' | '.join(f'`best` at equal {measure.name}' for measure in measures)} |"
     yield "|" + "---|" * (len(measures) + 2)
     for anchor in anchor_rows():

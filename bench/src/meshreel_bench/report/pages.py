@@ -25,7 +25,7 @@ from .values import curve_of, rated, sequences
 from .verdicts import verdicts
 
 FOLDER = "results"  # of appendices, plots and the README's numbers, beside the pages
-OPEN = "figure6"  # the experiment that rows belong to which none declares: other codecs, other sequences
+OPEN = "figure6"  # the experiment that rows belong to which none declares, not in small: other codecs, other sequences
 WITH_VDMC = (OPEN, "mpeg")  # experiments in whose plots V-DMC's points are
 SHOWN = ("synthetic4", "dancer", "room2")  # sequences whose curves are on the first page
 TEXT = "results.md"  # package data: the first page, with a line {NAME} for each part that is made
@@ -56,9 +56,11 @@ def parts_of(rows: Sequence[Row]) -> list[Part]:
     """Return the experiments that have rows; a point of several experiments is in each of them."""
     declared = {name: {point.key for point in study.points()} for name, study in EXPERIMENTS.items()}
     every = set[str]().union(*declared.values())
-    parts = []
+    others = {row.point.key for row in rows} - every
+    homes = (name for name, study in EXPERIMENTS.items() if others <= {point.key for point in study.points(small=True)})
+    home, parts = next(homes, OPEN), []
     for name, study in EXPERIMENTS.items():
-        own = [r for r in rows if r.point.key in declared[name] or (name == OPEN and r.point.key not in every)]
+        own = [row for row in rows if row.point.key in declared[name] | (others if name == home else set())]
         if own:
             parts.append(Part(name, study, measured_rows(own), failed_rows(own)))
     return parts
@@ -80,11 +82,10 @@ def write_report(rows: Sequence[Row], folder: Path) -> list[Path]:
     for part, sequence in _shown(parts):
         own = [row for row in part.drawn if row.point.sequence == sequence]
         plots.append(plot_curves(own, (D2, MASKED), looks, folder / FOLDER / _plot_name(part, sequence)))
-    if page := reproducing_page(
-        [row for part in parts if part.name in (OPEN, "long", "table3", "tracker", "headset") for row in part.rows]
-    ):
+    studies = {part.name: part.rows for part in parts}
+    if page := reproducing_page(studies):
         pages[Path("reproducing.md")] = page
-    if found := headline({part.name: part.rows for part in parts}):
+    if found := headline(studies):
         pages[Path(FOLDER, "headline.json")] = json.dumps(found, indent=2).splitlines()
     for name, lines in pages.items():
         with replacing(folder / name) as file:
@@ -108,7 +109,7 @@ def _plot_name(part: Part, sequence: str) -> str:
 
 def _first_page(parts: Sequence[Part]) -> list[str]:
     """Return what to believe, three plots and one table."""
-    paper = reproducing_page([row for part in parts if part.name == OPEN for row in part.rows])
+    paper = reproducing_page({part.name: part.rows for part in parts if part.name == OPEN})
     made = {
         "{verdicts}": _kept_promises(parts),
         "{reproducing}": ["The numbers of the paper beside ours: [reproducing.md](reproducing.md)."] if paper else [],

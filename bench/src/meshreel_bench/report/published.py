@@ -21,7 +21,7 @@ class Published(msgspec.Struct, frozen=True):
 
     system: str  # as the source has it
     codec: str  # the curve of ours that stands beside it, or its own
-    d2_psnr: float  # dB
+    d2_psnr: float | None = None  # dB
     ssim: float | None = None  # whole pictures, four views
     decode_ms: float | None = None  # a frame
     mbps: float | None = None

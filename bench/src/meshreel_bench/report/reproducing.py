@@ -5,62 +5,74 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from importlib.resources import files
 
+from ..datasets import RELEASED as DATA_OF_AUTHORS
+from ..experiments import EXPERIMENTS
 from ..experiments.headset import FILM, HOLDS, THROTTLES
-from ..experiments.study import HEADSET, TRACKER
-from ..names import BEST, TSMC, TUNED
+from ..names import BEST, LITERAL, TSMC, TUNED
 from ..rows import Row
 from .bandwidth import headline_table, vdmc_table
 from .published import RELEASED, TABLE_1, TABLE_2, Published
 from .values import curve_of, rated, value
 
-SCENES = ("room2", "living_room", "procedural_room")
-FOUR_AND_TWO = ("synthetic4", "synthetic2x150")  # people
+*AUTHORS, AUTHORS_FOUR = DATA_OF_AUTHORS
+SCENES = ("room2", "living_room", "procedural_room", *AUTHORS)
+FOUR_AND_TWO = ("synthetic4", "synthetic2x150", AUTHORS_FOUR)  # people
 SLACK_DB, SHORT = 0.1, " †"  # a point that is worse by more is marked
 PAPER_3 = (("TSMC", 6.13, 25.35, 0.9462), ("uncompressed", 357.6, 26.46, 0.9594))  # LMG of 2026: name, Mbps, dB, SSIM
 TEXT = "reproducing.md"  # package data: the page, with a line {NAME} for each table
 
 
-def reproducing_page(rows: Sequence[Row]) -> list[str]:
-    """Return the lines of the page; no lines where no row is of a sequence that the paper's tables stand beside."""
-    played = [row for row in rows if row.point.codec == HEADSET]
-    rows = [row for row in rows if row.point.codec != HEADSET]
-    own = [row for row in rated(rows) if row.point.metrics == "views"]
+def reproducing_page(studies: Mapping[str, Sequence[Row]]) -> list[str]:
+    """Return the lines of the page from the rows of experiments; none where no row stands beside the paper's."""
+    every = [row for name in ("figure6", "long") for row in studies.get(name, ())]  # the truth itself has no rate
+    own = rated(every)
     if not {row.point.sequence for row in own} & {*SCENES, *FOUR_AND_TWO, *RELEASED}:
         return []
-    tables = {"{table_1}": _table_1, "{table_2}": _table_2, "{released}": _released}
+    literal = [row for row in rated(studies.get("ablation_paper", ())) if curve_of(row) == LITERAL]
     page = (files(__package__) / TEXT).read_text(encoding="utf-8")
-    every = [row for row in rows if row.point.metrics == "views"]  # the truth itself has no rate
-    drawn = [row for row in rated(rows) if row.point.metrics == "splats"]
-    lines = {text: list(table(own)) for text, table in tables.items()} | {"{table_3}": list(_table_3(drawn))}
-    lines |= {"{headline}": list(headline_table(every)), "{vdmc}": list(vdmc_table(own))}
-    lines["{tracker}"] = list(_tracker([row for row in rows if row.point.codec == TRACKER]))
-    lines["{figure_9}"] = list(_figure_9(played))
+    lines = {
+        "{table_1}": _table_1(own),
+        "{table_2}": _table_2(own),
+        "{table_3}": _table_3(rated(studies.get("table3", ()))),
+        "{headline}": headline_table(every),
+        "{vdmc}": vdmc_table([*own, *studies.get("mpeg", ())]),
+        "{tracker}": _tracker(studies.get("tracker", ())),
+        "{figure_9}": _figure_9(studies.get("headset", ())),
+        "{released}": _released([*own, *literal]),
+        "{experiments}": [f"All experiments: {', '.join(f'`{name}`' for name in EXPERIMENTS)}; those which share"],
+    }
     return [line for text in page.splitlines() for line in lines.get(text, [text])]
 
 
 def _table_1(rows: Sequence[Row]) -> Iterator[str]:
-    scenes = [scene for scene in SCENES if rated(rows, scene)] or list(SCENES)
+    scenes = _measured(rows, SCENES)
     yield from _heads(["paper", *(f"here, {scene}" for scene in scenes)])
     for system in (*TABLE_1, None):
         codec = BEST if system is None else system.codec
         yield _line(system, codec, [_published(system), *(_near_best(rated(rows, scene), codec) for scene in scenes)])
 
 
+def _measured(rows: Sequence[Row], names: Sequence[str]) -> list[str]:
+    return [name for name in names if rated(rows, name)] or list(names[:1])
+
+
 def _table_2(rows: Sequence[Row]) -> Iterator[str]:
-    yield from _heads(["paper", *(f"here, {name}" for name in FOUR_AND_TWO)])
+    names = _measured(rows, FOUR_AND_TWO)
+    yield from _heads(["paper", *(f"here, {name}" for name in names)])
     for system in (*TABLE_2, None):
         codec = BEST if system is None else system.codec
-        wanted = TABLE_2[0].d2_psnr if system is None else system.d2_psnr
-        found = [_as_good(rated(rows, name), codec, wanted) for name in FOUR_AND_TWO]
+        wanted = _wanted(system or TABLE_2[0])
+        found = [_as_good(rated(rows, name), codec, wanted) for name in names]
         yield _line(system, codec, [_published(system), *found])
 
 
 def _released(rows: Sequence[Row]) -> Iterator[str]:
-    yield "| sequence | released code | the same system here | `best` |"
-    yield "|---|---|---|---|"
+    yield "| sequence | released code | preset `paper-literal` | preset `paper`, m varied | `best` |"
+    yield "|---|---|---|---|---|"
     for name, each in [(name, each) for name, several in RELEASED.items() for each in several]:
         own = rated(rows, name)
-        cells = [_as_good(own, codec, each.d2_psnr) for codec in (each.codec, BEST)]
+        shown = _as_good(own, LITERAL, _wanted(each)) if each.codec == TSMC else ""
+        cells = [shown, *(_as_good(own, codec, _wanted(each)) for codec in (each.codec, BEST))]
         ssim = "" if each.ssim is None else f", SSIM {each.ssim:.3f}"
         yield f"| {name} | {each.system}: {each.mbps:g} Mbps, {each.d2_psnr:g} dB{ssim} | {' | '.join(cells)} |"
 
@@ -149,15 +161,14 @@ def _shown(row: Row | None) -> str:
 def _setting(row: Row) -> str:
     """Return what TSMC is set to: several of its options choose a rate."""
     name = curve_of(row)
-    if name == TSMC:
+    if name in (TSMC, LITERAL):
         return f" (m {row.options['basis_size']})"
     return f" (quality {row.options.get('quality', 50):g})" if name == TUNED else ""
 
 
 def _of(rows: Sequence[Row], codec: str) -> list[Row]:
-    """Return a codec's rows from the cheapest on; of TSMC those of both its curves."""
-    curves = (TSMC, TUNED) if codec == TSMC else (codec,)
-    return sorted((row for row in rows if curve_of(row) in curves), key=lambda row: row.mbps)
+    """Return a codec's rows from the cheapest on."""
+    return sorted((row for row in rows if curve_of(row) == codec), key=lambda row: row.mbps)
 
 
 def _near_best(rows: Sequence[Row], codec: str) -> str:
@@ -173,6 +184,10 @@ def _as_good(rows: Sequence[Row], codec: str, db: float) -> str:
     if good:
         return _shown(good[0])
     return _shown(max(own, key=_d2, default=None)) + SHORT * bool(own)
+
+
+def _wanted(system: Published) -> float:
+    return system.d2_psnr or 0.0
 
 
 def _d2(row: Row) -> float:

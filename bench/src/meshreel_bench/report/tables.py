@@ -11,7 +11,7 @@ from ..bd_rate import bd_rate
 from ..experiments.study import Measure
 from ..rows import Options, Row
 from .looks import in_order
-from .values import curve, curve_of, rated, sequences, value
+from .values import curve, curve_of, is_twin, rated, sequences, value
 from .verdicts import Verdict
 
 
@@ -90,7 +90,7 @@ def summary_table(rows: Sequence[Row], one: str, measure: Measure) -> list[str]:
         own = rated(rows, sequence)
         names = in_order(map(curve_of, own))
         for other in names if one in names else ():
-            if other != one:
+            if other != one and not is_twin(other, measure):
                 records.setdefault(other, {})[text(sequence)] = bd_cell(own, one, other, measure)
     if not records:
         return []

@@ -12,8 +12,8 @@ import numpy as np
 from meshreel.encoder.surveying import SLICE
 
 from ..bd_rate import Curve, hull
-from ..experiments.study import FLOOR, Measure
-from ..names import USUAL
+from ..experiments.study import D2, FLOOR, Measure
+from ..names import ONCE_SUBDIVIDED, SUBDIVIDED, USUAL
 from ..rows import ColorBytes, Group, Row
 
 SECONDS = 10.0  # in which a background is sent once, for `mbps_background_10s`
@@ -198,6 +198,11 @@ def curve_of(row: Row) -> str:
     for key, usual in USUAL.items():
         parts += [f"{key} {row.options[key]}"] if row.options.get(key) not in (None, usual) else []
     return ", ".join([row.name, *parts])
+
+
+def is_twin(name: str, measure: Measure) -> bool:
+    """Return whether a curve is another one's by this measure: midpoints of flat faces move no surface."""
+    return measure.key == D2.key and name in (SUBDIVIDED, ONCE_SUBDIVIDED)
 
 
 def rated(rows: Iterable[Row], sequence: str | None = None) -> list[Row]:

@@ -24,7 +24,7 @@ from ..experiments.study import (
     Which,
 )
 from ..rows import Row
-from .values import curve, curve_of, floors, hull_of, rated, sequences, value
+from .values import curve, curve_of, floors, hull_of, is_twin, rated, sequences, value
 
 # Misses that weigh the same where the row nearest to all bounds is looked for (guess); others count in the bound's own.
 STEPS = {"Mbps": 0.03, "dB": 0.5, "degrees": 0.25, "SSIM": 0.01}
@@ -155,7 +155,9 @@ def _least_rate(promise: LeastRate, own: Sequence[Row]) -> Verdict:
     text = f"{sequence}: {promise.curve} needs less rate than every other codec wherever both reach a quality"
     met, lost, beyond = list[bool | None](), list[str](), dict[str, list[str]]()
     for name in dict.fromkeys(map(curve_of, own)):
-        for measure in promise.measures if name != promise.curve else ():
+        for measure in promise.measures:
+            if name == promise.curve or is_twin(name, measure):
+                continue
             best, other = curve(own, promise.curve, measure), curve(own, name, measure)
             several = min(len(best.rates), len(other.rates)) > 1  # a point is no range
             met.append(beats(best, other, measure.least) if several else None)

@@ -18,7 +18,7 @@ from meshreel.types import Mesh
 
 from ...codec import Progress
 from ..meshreel import Prepared
-from .layout import MAGIC, VERSION, Group, Kind, State, Stream, pack_stream
+from .layout import MAGIC, VERSION, Group, Kind, State, Stream, pack_stream, unpack_stream
 from .tracked import MOST_CELLS, encode_tracked
 from .tracking import Tracked, Tracking, Untracked, track_sequence
 from .video import TvmcVideo
@@ -90,6 +90,10 @@ class TvmcCodec(Prepared):
         width = max((float(np.ptp(field, axis=0).max()) for field in fields), default=0.0)  # of the widest frame's box
         largest = max((float(np.abs(field).max()) for field in fields), default=0.0)
         return max(width / (2**self.qp - 1), largest / MOST_CELLS) or 1.0
+
+    def background_bytes(self, data: bytes) -> int:
+        """Return the size of all states of the background in the stream."""
+        return sum(len(state.payload) for state in unpack_stream(data).states)
 
     def decode(self, data: bytes) -> Sequence[Mesh]:
         """Return the frames, from the bytes alone, each decoded on access."""
