@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import msgspec
 import pytest
-from meshreel_bench.rows import Point, append_row, join_rows, read_rows
+from meshreel_bench.rows import Point, append_row, disagreements, join_rows, read_rows
 
 from bench.tests.made_up import failed, floor, row
 from meshreel.errors import InputError
@@ -68,3 +69,11 @@ def test_of_a_point_the_last_row_of_a_file_counts_and_of_several_files_the_first
 def test_points_that_differ_in_frames_or_metrics_are_different_points():
     points = [Point("a", "b"), Point("a", "b", frames=3), Point("a", "b", metrics="regions"), Point("a", "b", {"q": 1})]
     assert len({point.key for point in points}) == 4
+
+
+def test_points_that_two_experiments_measured_with_other_bytes_are_found():
+    seen, smaller, alike, other = (row("ball", "best", rate, 60.0) for rate in (2.0, 1.0, 2.01, 3.0))
+    smaller, alike = (msgspec.structs.replace(each, point=seen.point) for each in (smaller, alike))
+    distances = msgspec.structs.replace(smaller, point=msgspec.structs.replace(seen.point, metrics="distances"))
+    assert disagreements([seen, distances, other]) == [(distances, seen)]
+    assert disagreements([seen, alike, other, failed("ball", "draco", "no luck")]) == []

@@ -19,7 +19,7 @@ from meshreel.cli.flags import Reading
 from meshreel.errors import InputError
 
 from .codecs import codec_names, codec_version, make_codec
-from .datasets import Store, released_in
+from .datasets import Store, released_in, views_missing
 from .experiments import EXPERIMENTS, find_experiment
 from .experiments.study import Sweep
 from .measure.runner import Measuring, run_points
@@ -79,9 +79,13 @@ class Selection:
         points = [point for point in points if point.codec in (self.only or [point.codec])]
         points = [point for point in points if point.sequence in (on or [point.sequence])]
         if not points:
-            known = list(dict.fromkeys(point.codec for point in study.points(self.small)))
+            known = {point.codec: point.sequence for point in study.points(self.small)}
             of = f"{name}{' --small' if self.small else ''}"
-            raise InputError(f"{of} has no points of {' '.join(self.only or self.on)}; its codecs: {', '.join(known)}")
+            if not known:
+                raise InputError(f"{of} has no points: it measures no codec; leave out --small")
+            where = f" on {' '.join(on)}" if on else ""
+            text = f"{of} has no points of {' '.join(self.only or known)}{where}"
+            raise InputError(f"{text}; its codecs: {', '.join(known)}; --only leaves out what --add adds, too")
         return points if ssim else [msgspec.structs.replace(point, metrics="distances") for point in points]
 
 
@@ -130,6 +134,7 @@ def run(
         raise InputError(f"--output {output}: give a file, as rows.jsonl; {CACHE} is a folder beside it")
     points = selection.points(experiment, running.ssim)
     store = Store(selection.data.absolute(), output.absolute().with_suffix(CACHE), reading.options())
+    common.warn(views_missing(selection.data, [point.sequence for point in points]))
     how = Measuring(store, running.limit, running.retry, running.jobs)
     with common.stages(len(points)) as progress:
         done = 0
@@ -237,10 +242,13 @@ def _measured(row: Row) -> str:
     return ", ".join([*parts, *(f"{number:.2f} {unit}" for number, unit in found if number is not None)])
 
 
-def verdict_table(found: Sequence[Verdict]) -> Table:
-    """Return the targets that rows decide, or all where none does, a line each."""
+def verdict_table(found: Sequence[Verdict]) -> Table | str:
+    """Return the targets that rows decide, a line each, or a line that says that they decide none."""
+    decided = [each for each in found if each.value is not None]
+    if not decided:
+        return f"these points decide none of {len(found)} targets; `meshreel-bench report` makes curves of them"
     table = Table("target", "bound", "measured", "")
-    for verdict in [each for each in found if each.value is not None] or found:
+    for verdict in decided:
         table.add_row(verdict.text, verdict.bound, verdict.value or "", verdict.word)
     return table
 

@@ -11,6 +11,8 @@ import msgspec
 
 from meshreel.errors import InputError
 
+AGREE = 0.01  # of the bytes: less is a container, or another order of vertices (guess)
+
 Option = str | int | float | bool | None
 Options = dict[str, Option]
 Metrics = Literal["distances", "views", "parallel views", "regions", "colors", "depth", "splats", "mpeg"]
@@ -157,6 +159,20 @@ def join_rows(files: Iterable[Sequence[Row]]) -> list[Row]:
         if known is None or (known.failed and not row.failed):
             found[row.point.key] = row
     return list(found.values())
+
+
+def disagreements(rows: Iterable[Row]) -> list[tuple[Row, Row]]:
+    """Return pairs of rows of one operating point that experiments measured with bytes that differ by over 1 %."""
+    found: dict[str, list[Row]] = {}
+    for row in rows:
+        if row.stream and not row.failed and row.decoding:  # no part of a stream, as levels that are played
+            found.setdefault(msgspec.structs.replace(row.point, metrics="views").key, []).append(row)
+    pairs = [(min(own, key=_size), max(own, key=_size)) for own in found.values()]
+    return [(least, most) for least, most in pairs if _size(most) > (1 + AGREE) * _size(least)]
+
+
+def _size(row: Row) -> int:
+    return row.stream.bytes if row.stream else 0
 
 
 def append_row(path: Path, row: Row) -> None:

@@ -5,7 +5,9 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import msgspec
 import pytest
+from meshreel_bench.experiments import EXPERIMENTS
 from meshreel_bench.experiments.study import D2, MASKED, NORMALS
 from meshreel_bench.names import BEST, VDMC, VDMC_HERE
 from meshreel_bench.report import pages
@@ -82,3 +84,9 @@ def test_the_headline_is_the_size_of_a_person_and_how_much_larger_others_are(tmp
     sizes = [1.5 * each["bytes"] / 1000 for each in found["person"]["from"]]  # two seconds are measured
     assert found["person"]["kilobytes"] == round(sum(sizes) / len(sizes))
     assert all(others["median"] > 1 for others in found["times_larger_at_equal_d2"].values())
+
+
+def test_small_points_of_an_experiment_are_in_its_own_appendix():
+    small = list(EXPERIMENTS["ablation_paper"].points(small=True))
+    rows = [msgspec.structs.replace(row("demo", BEST, 1.0, 60), point=point) for point in small]
+    assert [part.name for part in pages.parts_of(rows)] == ["ablation_paper"]

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -135,7 +135,13 @@ class Store:
 
 def released_in(data: Path) -> tuple[str, ...]:
     """Return which sequences of TSMC's authors a folder holds."""
-    return tuple(name for name in RELEASED if (data / name / MESHES).is_dir())
+    return tuple(name for name in RELEASED if any((data / name / MESHES).glob("*")))
+
+
+def views_missing(data: Path, names: Iterable[str]) -> tuple[str, ...]:
+    """Return a line for each sequence of the authors without the views that its pictures are to be seen from."""
+    lacking = [name for name in released_in(data) if name in names and not any((data / name).glob(VIEW_FILES))]
+    return tuple(f"{data / name}: no {VIEW_FILES}; pictures are seen from views around the meshes" for name in lacking)
 
 
 def forth_and_back(source: MeshSequence, count: int) -> Chosen:
@@ -148,7 +154,12 @@ def _scene(name: str, data: Path, frames: int | None, cache: Path | None) -> Dat
     if name in SCENES:
         for source in (ROOM, *(Path(PERFORMERS, f"{body}.npz") for body in PEOPLE)):
             check_source(data / source, source)
-    scene = open_scene(name, data, _kept(name, cache), frames)
+    try:
+        scene = open_scene(name, data, _kept(name, cache), frames)
+    except InputError as error:
+        if not (data / ROOM).exists():
+            error.add_note("--data is the folder of the benchmark's data, or of answering/meshes ... of TSMC's authors")
+        raise
     return Dataset(scene.meshes, scene.meshes.cameras, scene, scene.meshes.colors)
 
 

@@ -33,7 +33,10 @@ def _decode(decoder: bytes, data: bytes, numbers: Sequence[int], frames: int) ->
     """Yield times, then the meshes; `decoder` was pickled before its codec has seen a sequence."""
     decode: Callable[[bytes], Sequence[Mesh]] = pickle.loads(decoder).decode
     start = time.process_time()
-    decode(data)[0]
+    opened = decode(data)
+    if not hasattr(opened, "__getitem__") or len(opened) == 0:
+        raise InputError(f"decodes a {type(opened).__name__} without frames, of {frames}")
+    opened[0]
     first_ms = 1e3 * (time.process_time() - start)
     passes = [_pass_ms(decode, data)]
     while len(passes) < PASSES and len(passes) * passes[0] < SLOW_MS:

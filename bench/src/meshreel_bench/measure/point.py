@@ -77,6 +77,8 @@ def measure_point(point: Point, store: Store) -> Row:
     if point.codec == FLOOR:
         if painted is not None:
             return _uncompressed(row, known, painted)
+        if known.scene is None and not known.cameras:
+            raise InputError("the truth itself is known of simulated scenes, and what moves of those with cameras")
         if known.scene is None:
             return msgspec.structs.replace(row, name=FOUND_NAME, metrics=_found_ratio(known.sequence))
         clean = [known.scene.truth[number].mesh for number in numbers]

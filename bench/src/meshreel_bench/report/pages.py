@@ -13,7 +13,7 @@ from meshreel.io.write import make_folder, replacing
 from ..experiments import EXPERIMENTS
 from ..experiments.study import D2, MASKED, Study
 from ..names import title
-from ..rows import Row, failed_rows, measured_rows
+from ..rows import Row, disagreements, failed_rows, measured_rows
 from . import tables
 from .equal import rate_table
 from .headline import headline
@@ -111,7 +111,7 @@ def _first_page(parts: Sequence[Part]) -> list[str]:
     """Return what to believe, three plots and one table."""
     paper = reproducing_page({part.name: part.rows for part in parts if part.name == OPEN})
     made = {
-        "{verdicts}": _kept_promises(parts),
+        "{verdicts}": [*_kept_promises(parts), *_doubts(parts)],
         "{reproducing}": ["The numbers of the paper beside ours: [reproducing.md](reproducing.md)."] if paper else [],
         "{plots}": [
             line
@@ -125,6 +125,21 @@ def _first_page(parts: Sequence[Part]) -> list[str]:
     }
     page = (files(__package__) / TEXT).read_text(encoding="utf-8")
     return [line for text in page.splitlines() for line in made.get(text, [text])]
+
+
+def _doubts(parts: Sequence[Part]) -> list[str]:
+    """Return points that two experiments measured with different bytes: the encoder changed between them."""
+    pairs = disagreements(row for part in parts for row in part.rows)
+    if not pairs:
+        return []
+    head = (
+        "Measured by two experiments with different bytes, as the encoder changed between them; the next run mends it:"
+    )
+    lines = [
+        f"{a.point.sequence}, {a.name}, {tables.operating_point(a)}: {a.mbps:.4g} and {b.mbps:.4g} Mbps"
+        for a, b in pairs
+    ]
+    return ["", head, "", *(f"- {tables.text(line)}" for line in lines)]
 
 
 def _kept_promises(parts: Sequence[Part]) -> list[str]:
@@ -149,7 +164,8 @@ def _appendix(part: Part) -> Iterator[str]:
     yield from (f"# {study.title}", "")
     yield from ("```", f"meshreel-bench run {part.name} -o {part.name}.jsonl --data DATA", "```", "")
     yield from (*study.notes, "") if study.notes else ()
-    if found := verdicts(study, part.rows):
+    found = verdicts(study, part.rows)
+    if any(verdict.value is not None for verdict in found):
         yield from ("## Targets", "", *tables.verdict_table(found), "")
     if part.rated:
         yield from (f"![{title(part.name)}: quality against {study.over.split(' (')[0]}]({part.name}.png)", "")

@@ -38,7 +38,11 @@ def point_table(rows: Sequence[Row], measures: Sequence[Measure]) -> list[str]:
     for row in sorted(rows, key=lambda row: (order.index(curve_of(row)), row.mbps)):
         assert row.stream is not None
         stages, work = (row.encoding.stages_s, row.encoding.work) if row.encoding else ({}, {})
-        record: dict[str, object] = {"codec": text(row.name), "operating point": text(_point(row)), "Mbps": row.mbps}
+        record: dict[str, object] = {
+            "codec": text(row.name),
+            "operating point": text(operating_point(row)),
+            "Mbps": row.mbps,
+        }
         record |= {measure.label: value(row, measure.key) for measure in measures}
         record |= {
             "worst frame (dB)": value(row, "d2_psnr_paper_worst"),
@@ -153,7 +157,8 @@ def _listed(options: Options) -> str:
     return ", ".join(f"{key} {option}" for key, option in options.items() if option is not None)
 
 
-def _point(row: Row) -> str:
+def operating_point(row: Row) -> str:
+    """Return the options of a point, and how much of a sequence it has."""
     assert row.stream is not None
     coded = row.stream.coded_frames
     first = "" if row.point.frames is None else f"; first {row.frames} frames"

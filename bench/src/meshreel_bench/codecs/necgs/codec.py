@@ -215,4 +215,6 @@ def _need_torch() -> None:
     try:
         import torch  # noqa: F401
     except ImportError as error:
-        raise InputError(f"NeCGS needs the extra necgs ({error}): pip install 'meshreel[necgs]'") from None
+        raise InputError(
+            f"NeCGS needs the extra necgs ({error}): pip install 'meshreel-bench[necgs]', in a clone './bench[necgs]'"
+        ) from None
