@@ -237,7 +237,7 @@ def test_bytes_of_others_are_refused():
 
 def test_without_torch_the_extra_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "torch", None)
-    with pytest.raises(InputError, match=r"meshreel\[necgs\]"):
+    with pytest.raises(InputError, match=r"meshreel-bench\[necgs\]"):
         HASTY.encode(BALLS)
 
 
