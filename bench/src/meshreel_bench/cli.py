@@ -39,7 +39,7 @@ class Running:
     """How points are measured."""
 
     jobs: int = 1
-    """Sweep to measure side by side, each in a process; the rows are the same but for times."""
+    """Points to measure side by side, each in a process; the rows are the same but for times."""
     limit: float = 3600.0
     """Seconds that a point may take; one that takes longer, crashes or decodes nonsense becomes a row that says so."""
     retry: Annotated[bool, Parameter(negative="")] = False
@@ -79,7 +79,7 @@ class Selection:
         points = [point for point in points if point.codec in (self.only or [point.codec])]
         points = [point for point in points if point.sequence in (on or [point.sequence])]
         if not points:
-            known = {point.codec: point.sequence for point in study.points(self.small)}
+            known = list(dict.fromkeys(point.codec for point in study.points(self.small)))
             of = f"{name}{' --small' if self.small else ''}"
             if not known:
                 raise InputError(f"{of} has no points: it measures no codec; leave out --small")

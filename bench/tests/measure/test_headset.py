@@ -23,7 +23,7 @@ def test_what_decoding_takes_grows_with_the_throttle():
         assert 0 < found["main_ms"] <= found["main_99_ms"] and found["heap_mb"] > 1 and found["upload_mb_s"] > 0
         assert 0 < found["fps"] < 25.5 and found["shown_share"] <= 1 and found["triangles"] > 100
     # of the page nothing is asked: beside other jobs, DevTools' pauses miss pictures of less than a millisecond
-    assert slow["decode_group_ms"] > fast["decode_group_ms"]
+    assert slow["decode_group_ms"] > 2 * fast["decode_group_ms"]
 
 
 def test_what_is_missing_to_play_is_named(monkeypatch):

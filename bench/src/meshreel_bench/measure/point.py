@@ -204,8 +204,8 @@ def _encoded(codec: Codec, source: MeshSequence, what: object) -> tuple[bytes, E
 
 def _stream(codec: Codec, data: bytes, frames: int) -> Stream:
     """Return size, groups and what is sent once; no groups of bytes that are no .reel file."""
+    once = codec.background_bytes(data) if isinstance(codec, BackgroundCodec) else 0
     if not data.startswith(MAGIC):
-        once = codec.background_bytes(data) if isinstance(codec, BackgroundCodec) else 0
         colors = codec.color_bytes(data) if isinstance(codec, ColorCodec) else None
         return Stream(len(data), frames, once, colors=colors)
     reader = ReelReader(BytesSource(data))
@@ -215,9 +215,7 @@ def _stream(codec: Codec, data: bytes, frames: int) -> Stream:
         own = keys & set(range(chunk.first_frame, chunk.first_frame + chunk.frame_count))
         form = chunk.form_name
         groups.append(Group(chunk.first_frame, chunk.frame_count, form, chunk.size, min(own, default=None)))
-    once = sum(chunk.size for chunk in reader.chunks if chunk.kind == ChunkKind.STATIC)
-    if isinstance(codec, BackgroundCodec):
-        once = codec.background_bytes(data)
+    once = once or sum(chunk.size for chunk in reader.chunks if chunk.kind == ChunkKind.STATIC)
     return Stream(len(data), frames, once, groups, color_bytes(reader), reader.metadata.get("canonical_references", 0))
 
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from ..bd_rate import rate_at, reach
+from ..bd_rate import RateAt, rate_at, reach
 from ..experiments.mpeg import D1
 from ..experiments.study import D2, MASKED, NORMALS, SSIM, SYMMETRIC, Measure
 from ..names import BEST, DRACO, FLOOR_RATIO, FOUND_NAME, KLT, NECGS, TSMC, TVMC, title
@@ -42,11 +42,9 @@ def vdmc_table(rows: Sequence[Row]) -> Iterator[str]:
     yield f"| sequence | V-DMC | {' | '.join(f'`best` at equal {measure.name}' for measure in measures)} |"
     yield "|" + "---|" * (len(measures) + 2)
     for anchor in anchor_rows():
-        own = rated(rows, anchor.point.sequence)
         cells = [f"{title(anchor.name)}, {anchor.point.options['rate']}: {anchor.mbps:.4g} Mbps"]
         for measure in measures:
-            known = value(anchor, measure.key)
-            found = None if known is None else rate_at(curve(own, BEST, measure), measure.sign * known)
+            known, found = value(anchor, measure.key), _best_beside(anchor, rows, measure)
             if known is None or found is None:
                 cells.append("")
             elif found.rate is None:
@@ -59,13 +57,14 @@ def vdmc_table(rows: Sequence[Row]) -> Iterator[str]:
 
 def vdmc_times(rows: Sequence[Row], measure: Measure) -> list[float]:
     """Return how many times the rate of `best` V-DMC needs where both are as good, by its points, the least first."""
-    found = list[float]()
-    for anchor in anchor_rows():
-        known = value(anchor, measure.key)
-        own = curve(rated(rows, anchor.point.sequence), BEST, measure)
-        if known is not None and own and (rate := rate_at(own, measure.sign * known).rate) is not None:
-            found.append(round(anchor.mbps / rate, 2))
-    return sorted(found)
+    pairs = [(anchor, _best_beside(anchor, rows, measure)) for anchor in anchor_rows()]
+    return sorted(round(anchor.mbps / found.rate, 2) for anchor, found in pairs if found and found.rate is not None)
+
+
+def _best_beside(anchor: Row, rows: Sequence[Row], measure: Measure) -> RateAt | None:
+    """Return the rate at which `best` is as good as a point; None where the point's quality is not known."""
+    known, own = value(anchor, measure.key), rated(rows, anchor.point.sequence)
+    return None if known is None else rate_at(curve(own, BEST, measure), measure.sign * known)
 
 
 def _needed(rows: Sequence[Row], system: str, measure: Measure) -> str:

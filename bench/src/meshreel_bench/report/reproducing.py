@@ -24,7 +24,8 @@ TEXT = "reproducing.md"  # package data: the page, with a line {NAME} for each t
 
 def reproducing_page(studies: Mapping[str, Sequence[Row]]) -> list[str]:
     """Return the lines of the page from the rows of experiments; none where no row stands beside the paper's."""
-    every = [row for name in ("figure6", "long") for row in studies.get(name, ())]  # the truth itself has no rate
+    both = [row for name in ("figure6", "long") for row in studies.get(name, ())]
+    every = [row for row in both if row.point.metrics == "views"]  # the truth itself has no rate
     own = rated(every)
     if not {row.point.sequence for row in own} & {*SCENES, *FOUR_AND_TWO, *RELEASED}:
         return []
