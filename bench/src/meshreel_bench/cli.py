@@ -136,17 +136,20 @@ def run(
     store = Store(selection.data.absolute(), output.absolute().with_suffix(CACHE), reading.options())
     common.warn(views_missing(selection.data, [point.sequence for point in points]))
     how = Measuring(store, running.limit, running.retry, running.jobs)
-    with common.stages(len(points)) as progress:
+    with common.stages(len(points), "points") as progress:
         done = 0
+
+        def opening(sequence: str) -> None:
+            common.note(f"opening {sequence}; scenes are simulated once, in minutes, and kept in {store.cache}")
 
         def report(row: Row, new: bool) -> None:
             nonlocal done
             done += 1
-            progress("points", done, len(points))
+            progress("measured", done, len(points))
             before = "" if new else " (before; --retry tries again)" if row.failed else " (measured before)"
             common.note(f"{done}/{len(points)} {describe(row)}{before}")
 
-        rows = run_points(points, output, how, report)
+        rows = run_points(points, output, how, report, opening)
     failed = failed_rows(rows)
     common.warn(tuple(describe(row) for row in failed))
     found = verdicts(find_experiment(experiment), measured_rows(rows))

@@ -157,9 +157,9 @@ def _text_of(error: Exception) -> str:
     from cyclopts import CycloptsError, MissingArgumentError
 
     if isinstance(error, MissingArgumentError) and error.argument is not None:
-        return _missing(error, " ".join(["meshreel", *(error.command_chain or ())]))
+        return _missing(error, " ".join([program(), *(error.command_chain or ())]))
     if isinstance(error, CycloptsError):
-        return f"{text} (see meshreel --help)"
+        return f"{text} (see {program()} --help)"
     if isinstance(error, BrokenProcessPool):
         return "a worker process died, out of memory perhaps; give fewer --jobs"
     if type(error).__module__.startswith("distributed."):
@@ -192,8 +192,14 @@ def _missing(error: MissingArgumentError, command: str) -> str:
 
 
 def _report(text: str, code: int) -> int:
-    print(f"meshreel: {text}", file=sys.stderr)
+    print(f"{program()}: {text}", file=sys.stderr)
     return code
+
+
+def program() -> str:
+    """Return the name that messages begin with: `meshreel`, or that of a program which begins so, as the bench's."""
+    name = os.path.basename(sys.argv[0]).removesuffix(".exe") if sys.argv else ""  # noqa: PTH119  (see the module)
+    return name if name.startswith("meshreel-") else "meshreel"
 
 
 def _stopped(number: int, error: BaseException) -> int:
@@ -238,6 +244,6 @@ class _Signals:
         self.heard.append(number)
         terminated = number == signal.SIGTERM
         if not self.raises:
-            os.write(2, f"meshreel: {_STOPPED[terminated]}\n".encode())
+            os.write(2, f"{program()}: {_STOPPED[terminated]}\n".encode())
             os._exit(TERMINATED if terminated else INTERRUPTED)
         raise Terminated if terminated else KeyboardInterrupt

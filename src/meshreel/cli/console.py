@@ -28,6 +28,8 @@ from rich.progress import (
 )
 from rich.text import Text
 
+from . import program
+
 EVERY = 10.0  # s, between two lines of progress outside a terminal
 
 
@@ -47,7 +49,7 @@ class Common:
         """Print warnings on standard error, one per line."""
         for text in texts:
             if not self.quiet:
-                print(f"meshreel: warning: {text}", file=sys.stderr)
+                print(f"{program()}: warning: {text}", file=sys.stderr)
 
     def note(self, text: str) -> None:
         """Print a line on standard error, above the progress bars."""
@@ -158,11 +160,11 @@ def line_of(tasks: Iterable[Task], counted: str = "frames") -> str:
     so_far = f"{_clock(all_of_them[0].get_time() - began)} so far"
     open_ones = [task for task in all_of_them if not task.finished]
     if not open_ones:
-        return f"meshreel: {all_of_them[-1].description} is done; {so_far}"
+        return f"{program()}: {all_of_them[-1].description} is done; {so_far}"
     counts = ", ".join(f"{task.description} {task.completed:.0f}" for task in open_ones)
     lefts = [seconds for task in open_ones if (seconds := left(task)) is not None]
     rest = f", about {_clock(max(lefts))} left" if lefts else ""
-    return f"meshreel: {counts} of {open_ones[0].total:.0f} {counted}; {so_far}{rest}"
+    return f"{program()}: {counts} of {open_ones[0].total:.0f} {counted}; {so_far}{rest}"
 
 
 def _clock(seconds: float | None) -> str:

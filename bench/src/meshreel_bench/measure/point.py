@@ -56,8 +56,24 @@ def measure_points(points: Sequence[Point], store: Store) -> Iterator[Row]:
         yield measure_point(point, store)
 
 
+@dataclass(frozen=True, slots=True)
+class _Case:
+    """A point, opened."""
+
+    row: Row  # so far without what is measured
+    known: Dataset
+    store: Store
+    some: Sequence[int]  # numbers of the frames that a sampled point has
+    painted: Callable[[int], Mesh] | None = None  # of a point that splats judge: its frames in colours
+
+
 def measure_point(point: Point, store: Store) -> Row:
     """Return the row of a point. Raises InputError where it cannot be measured, and whatever its codec raises."""
+    case = _case(point, store)
+    return STAND_INS.get(point.codec, _coded)(case)
+
+
+def _case(point: Point, store: Store) -> _Case:
     known = _opened(point.sequence, point.frames, store)
     painted = coloured(point.sequence, store, point.frames) if point.metrics == "splats" else None
     if painted is not None:  # colours tell where the surface slides
@@ -68,32 +84,21 @@ def measure_point(point: Point, store: Store) -> Row:
     whole = not known.cameras or point.sampled or point.metrics == "regions"
     numbers = list(range(count)) if point.metrics == "depth" else some if whole else some[::2]
     row = empty_row(point, store, frames=count, frame_rate=known.sequence.frame_rate, measured_frames=numbers)
-    if point.codec == SEGMENTATION:
-        return msgspec.structs.replace(row, metrics=_segmentation(known))
-    if point.codec == TRACKER:
-        return msgspec.structs.replace(row, metrics=tracker_values(known.sequence, str(point.options["method"])))
-    if point.codec == HEADSET:
-        return _played(row, store)
-    if point.codec == FLOOR:
-        if painted is not None:
-            return _uncompressed(row, known, painted)
-        if known.scene is None and not known.cameras:
-            raise InputError("the truth itself is known of simulated scenes, and what moves of those with cameras")
-        if known.scene is None:
-            return msgspec.structs.replace(row, name=FOUND_NAME, metrics=_found_ratio(known.sequence))
-        clean = [known.scene.truth[number].mesh for number in numbers]
-        metrics, per_frame = measure_frames(Measured(known, numbers, clean), point.metrics)
-        scene = known.scene
-        metrics[FLOOR_RATIO] = dynamic_ratio((scene.meshes[number], scene.labels(number)) for number in numbers)
-        return msgspec.structs.replace(row, name=TRUTH_NAME, metrics=metrics, per_frame=per_frame)
+    return _Case(row, known, store, some, painted)
+
+
+def _coded(case: _Case) -> Row:
+    """Return the row of a codec: what it needs, and what its decoder makes of the bytes in a fresh process."""
+    row, known, point = case.row, case.known, case.row.point
     codec = make_codec(point.codec, point.options)
     decoder = pickle.dumps(codec)  # before it has seen a frame, so that it can keep none
-    source = _sampled(known, some) if point.sampled else known.sequence
+    source = _sampled(known, case.some) if point.sampled else known.sequence
     data, encoding = _encoded(codec, source, (point.sequence, point.frames, point.sampled))
-    wanted = list(range(len(some))) if point.sampled else numbers
+    numbers = row.measured_frames
+    wanted = list(range(len(case.some))) if point.sampled else numbers
     decoding, meshes = decoded_apart(decoder, data, wanted, len(source))
-    if painted is not None:
-        metrics, per_frame = dict[str, float | None](splat_values(known, painted, meshes, numbers, data)), {}
+    if case.painted is not None:
+        metrics, per_frame = dict[str, float | None](splat_values(known, case.painted, meshes, numbers, data)), {}
     else:
         metrics, per_frame = measure_frames(Measured(known, numbers, meshes, data), point.metrics)
     return msgspec.structs.replace(
@@ -108,9 +113,32 @@ def measure_point(point: Point, store: Store) -> Row:
     )
 
 
-def _played(row: Row, store: Store) -> Row:
+def _truth(case: _Case) -> Row:
+    """Return the row of what nobody coded: meshes under splats, clean ones of a scene, or what a recording moves."""
+    row, known = case.row, case.known
+    if case.painted is not None:
+        return _uncompressed(row, known, case.painted)
+    if known.scene is None and not known.cameras:
+        raise InputError("the truth itself is known of simulated scenes, and what moves of those with cameras")
+    if known.scene is None:
+        return msgspec.structs.replace(row, name=FOUND_NAME, metrics=_found_ratio(known.sequence))
+    scene, numbers = known.scene, row.measured_frames
+    clean = [scene.truth[number].mesh for number in numbers]
+    metrics, per_frame = measure_frames(Measured(known, numbers, clean), row.point.metrics)
+    metrics[FLOOR_RATIO] = dynamic_ratio((scene.meshes[number], scene.labels(number)) for number in numbers)
+    return msgspec.structs.replace(row, name=TRUTH_NAME, metrics=metrics, per_frame=per_frame)
+
+
+def _tracked(case: _Case) -> Row:
+    """Return the row of a tracker of volumes."""
+    values = tracker_values(case.known.sequence, str(case.row.point.options["method"]))
+    return msgspec.structs.replace(case.row, metrics=values)
+
+
+def _played(case: _Case) -> Row:
     """Return the row of a file of `best` that is played in a browser, or decoded for another processor."""
-    data, options = _file(row.point.sequence, row.point.frames, store), row.point.options
+    row, point = case.row, case.row.point
+    data, options = _file(point.sequence, point.frames, case.store), point.options
     row = msgspec.structs.replace(row, options=ENCODED | options, measured_frames=list(range(row.frames)))
     if options.get("machine") == AARCH64:
         return msgspec.structs.replace(row, metrics=aarch64_values(data))
@@ -219,9 +247,18 @@ def _stream(codec: Codec, data: bytes, frames: int) -> Stream:
     return Stream(len(data), frames, once, groups, color_bytes(reader), reader.metadata.get("canonical_references", 0))
 
 
-def _segmentation(known: Dataset) -> dict[str, float | None]:
-    """Return how well the encoder's labels of what moves fit the true ones, over all frames."""
-    if known.scene is None:
+def _segmented(case: _Case) -> Row:
+    """Return the row of how well the encoder's labels of what moves fit the true ones, over all frames."""
+    if case.known.scene is None:
         raise InputError("a segmentation is judged on simulated scenes only, whose labels are known")
-    scene, numbers = known.scene, range(len(known.sequence))
-    return score_labels((scene.judged(i, FOUND) for i in numbers), (scene.judged(i, TRUE) for i in numbers))
+    scene, numbers = case.known.scene, range(len(case.known.sequence))
+    scores = score_labels((scene.judged(i, FOUND) for i in numbers), (scene.judged(i, TRUE) for i in numbers))
+    return msgspec.structs.replace(case.row, metrics=scores)
+
+
+STAND_INS: dict[str, Callable[[_Case], Row]] = {
+    SEGMENTATION: _segmented,
+    TRACKER: _tracked,
+    HEADSET: _played,
+    FLOOR: _truth,
+}

@@ -33,10 +33,17 @@ class Measuring:
     jobs: int = 1  # points side by side
 
 
-def run_points(points: Sequence[Point], file: Path, how: Measuring, report: Report = lambda *_: None) -> list[Row]:
+def run_points(
+    points: Sequence[Point],
+    file: Path,
+    how: Measuring,
+    report: Report = lambda *_: None,
+    opening: Callable[[str], None] = lambda _: None,
+) -> list[Row]:
     """Return the rows of all points, and append each new one to the file as soon as it is there.
 
-    Those that are in the file count, unless sequence or codec have changed. InputError where a sequence is missing.
+    Those that are in the file count, unless sequence or codec have changed. `opening` is told each sequence before it
+    is opened, which takes minutes where it has to be made. InputError where a sequence is missing.
     """
     wanted, stored = {point.key for point in points}, read_rows(file) if file.exists() else []
     found = {row.point.key: row for row in stored if row.point.key in wanted and _is_valid(row, how)}
@@ -44,6 +51,7 @@ def run_points(points: Sequence[Point], file: Path, how: Measuring, report: Repo
     for row in [found[point.key] for point in points if point.key in found]:
         report(row, False)
     for sequence, frames in dict.fromkeys((point.sequence, point.frames) for point in missing):
+        opening(sequence)
         how.store.open(sequence, frames)  # what takes long to make is made once, before processes need it
     for row in _measured(runs_of(missing), how):
         append_row(file, row)
