@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from meshreel.encoder import forms
@@ -46,3 +48,12 @@ def test_a_body_of_few_faces_is_left_to_draco():
     chosen = cheaper(BALLS, group, OPTIONS)
     assert (chosen.form, chosen.payload, chosen.fidelity) == (Form.DRACO, payload, fidelity)
     assert chosen.frame_count == 2 and fidelity.distance < ASKED.distance / 2
+
+
+def test_finer_steps_are_tried_where_another_frame_needs_them_and_only_where_asked():
+    fine, middle = (next(iter(sliding_sphere(1, levels=levels))) for levels in (4, 1))  # small faces tilt more
+    asked, options = Fidelity(distance=0.01, angle=0.6, worst=0.1), replace(OPTIONS, steps=(2.0, 1.0))
+    assert cheapest_intra([middle], asked, 1e6, options) is not None
+    assert cheapest_intra([fine, middle], asked, 1e6, options) is None
+    found = cheapest_intra([fine, middle], asked, 1e6, replace(options, finer=True))
+    assert found is not None and found[1].reaches(asked)

@@ -26,6 +26,7 @@ class IntraOptions:
     fractions: tuple[float, ...] = (0.04, 0.08, 0.15, 0.25, 0.5, 1.0)  # of the vertices kept
     steps: tuple[float, ...] = (2.0, 1.4, 1.0, 0.7, 0.5, 0.35)  # lattice steps, in units of the distance to reach
     levels: tuple[int, ...] = (1, 0)  # midpoint subdivisions in the decoder
+    finer: bool = False  # where the step that one frame needs fails on others, finer ones are tried, which takes longer
 
 
 def cheapest_intra(
@@ -78,10 +79,13 @@ def _on_one_frame(
         for levels in options.levels:
             if not _reaches(original, reduced, affordable[-1][0], levels, target):
                 continue  # the finest step is the best one
+            reached = False
             for step, size in affordable:
-                if step == affordable[-1][0] or _reaches(original, reduced, step, levels, target):
+                reached = reached or step == affordable[-1][0] or _reaches(original, reduced, step, levels, target)
+                if reached:  # finer ones do, too
                     yield size, fraction, step, levels
-                    break
+                    if not options.finer:
+                        break
 
 
 def _reaches(original: Original, reduced: Mesh, step: float, levels: int, target: Fidelity) -> bool:

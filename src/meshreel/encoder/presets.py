@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+
 from ..analysis.appearance.splat_fit import FitSplatsOptions
 from ..analysis.follow.embedded import Stage
 from ..analysis.follow.template import TemplateOptions
@@ -37,9 +39,14 @@ LITERAL_DEPTH = 9  # of Poisson reconstruction (paper, section 3.3.2)
 KNEE = 85.0  # quality above which steps are halved every 8 points: the curve ended for want of steps (decision 33)
 DENSEST = 95.0  # quality from which the template is as it is: a denser one's normals are worse (decision 33)
 EXACT = 99.0  # quality from which layers that miss the target give way to Draco in every frame (decision 33)
-EXACT_ANGLE = 2.4  # degrees that such frames have at most: three show on a headset
+EXACT_ANGLE = 1.85  # degrees that such frames have at most: pictures show normals more than distances (decision 33)
+EXACT_DISTANCE = (0.55, 0.43)  # of the motion's step, RMS, at EXACT and at 100
 # Candidates of these frames: where few vertices are lost, a coarser lattice costs less than it spoils.
-EXACT_INTRA = IntraOptions((0.04, 0.08, 0.15, 0.25, 0.35, 0.45, 0.5, 0.55, 0.7, 1.0), (3.5, 2.4, 1.7, 1.2, 0.8, 0.5))
+EXACT_INTRA = IntraOptions(
+    fractions=(0.04, 0.08, 0.15, 0.25, 0.35, 0.45, 0.5, 0.55, 0.6, 0.7, 1.0),
+    steps=(4.5, 3.5, 2.4, 1.7, 1.2, 0.8, 0.5),
+    finer=True,
+)
 LITERAL_ANCHORS = 400  # anchors of a reference in `paper-literal`: the paper gives no number (guess)
 PRESETS = ("best", "paper", "paper-literal")
 COLORS = ("auto", "texture", "vertices", "none")
@@ -139,7 +146,8 @@ def layers_options(quality: float = 50.0, effort: str = "normal") -> LayersOptio
         tolerance=tolerance(quality),
     )
     if quality >= EXACT:
-        target = Fidelity(distance=0.43 * step, angle=EXACT_ANGLE, worst=step)
+        share = rounded(np.interp(quality, (EXACT, 100.0), EXACT_DISTANCE))
+        target = Fidelity(distance=share * step, angle=EXACT_ANGLE, worst=step)
         options = replace(options, target=target, flat=1.0, intra=EXACT_INTRA)
     if effort == "fast":
         return _fast(options)

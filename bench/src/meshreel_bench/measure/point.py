@@ -97,10 +97,10 @@ def _coded(case: _Case) -> Row:
     numbers = row.measured_frames
     wanted = list(range(len(case.some))) if point.sampled else numbers
     decoding, meshes = decoded_apart(decoder, data, wanted, len(source))
-    if case.painted is not None:
-        metrics, per_frame = dict[str, float | None](splat_values(known, case.painted, meshes, numbers, data)), {}
-    else:
+    if case.painted is None:
         metrics, per_frame = measure_frames(Measured(known, numbers, meshes, data), point.metrics)
+    else:
+        metrics, per_frame = dict(splat_values(known, case.painted, meshes, numbers, data)), {}
     return msgspec.structs.replace(
         row,
         name=codec.name,
