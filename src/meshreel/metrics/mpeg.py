@@ -114,7 +114,8 @@ def _crossed(
     a, b, c = (flat[which, corner] for corner in range(3))
     ways = [(b, c), (c, a), (a, b)]
     shares = np.stack([_turn(end - start, lines - start) for start, end in ways], axis=1)
-    shares /= _turn(b - a, c - a)[:, None]
+    with np.errstate(divide="ignore", invalid="ignore"):  # no line is inside a face that is seen edge-on
+        shares /= _turn(b - a, c - a)[:, None]
     inside = (shares >= 0).all(axis=1)
     which, lines, shares = which[inside], lines[inside], shares[inside]
     points = np.empty((len(which), 3))
