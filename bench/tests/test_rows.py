@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import msgspec
 import pytest
-from meshreel_bench.rows import Point, append_row, disagreements, join_rows, read_rows
+from meshreel_bench.rows import Point, append_row, checked, disagreements, join_rows, read_rows
 
 from bench.tests.made_up import failed, floor, row
 from meshreel.errors import InputError
@@ -38,6 +38,9 @@ def test_a_row_that_was_not_written_to_its_end_is_left_out_and_replaced(tmp_path
         ('{"point": {"sequence": "a", "codec": "b"}, "name": "b", "frames": "ten"}', "Expected `int`, got `str`"),
         ('{"point": {"sequence": "a", "codec": "b"}, "name": "b", "speed": 1}', "unknown field `speed`"),
         ("no JSON", "line 2: not a row: .*; delete that line"),
+        ('{"point":' * 3000, "line 2: not a row: .*; delete that line"),
+        ('{"point": {"sequence": "a", "codec": "b"}, "name": "b", "frame_rate": 0}', "line 2: not a row: .*> 0"),
+        ('{"point": {"sequence": "a", "codec": "b"}, "name": "b", "stream": {"bytes": 9, "coded_frames": 0}}', ">= 1"),
     ],
 )
 def test_a_line_that_is_no_row_is_refused(tmp_path, line, reason):
@@ -46,6 +49,24 @@ def test_a_line_that_is_no_row_is_refused(tmp_path, line, reason):
     file.write_bytes(file.read_bytes() + line.encode() + b"\n")
     with pytest.raises(InputError, match=reason):
         read_rows(file)
+
+
+def test_a_last_line_that_ends_without_a_break_is_kept_if_it_is_whole_and_refused_if_it_is_no_row(tmp_path):
+    file, rows = tmp_path / "rows.jsonl", [row("ball", "best", rate, 60.0) for rate in (1.0, 2.0, 3.0)]
+    for each in rows[:2]:
+        append_row(file, each)
+    file.write_bytes(file.read_bytes().rstrip(b"\n"))
+    append_row(file, rows[2])
+    assert read_rows(file) == rows
+    (tmp_path / "notes.txt").write_bytes(b"my only copy\xe9")
+    with pytest.raises(InputError, match="line 1: not a row"):
+        read_rows(tmp_path / "notes.txt")
+
+
+@pytest.mark.parametrize("options", [{"q": float("nan")}, {"q": b"a"}, {"q": object()}, {"q": [1]}, {1: 2}, None])
+def test_a_row_that_could_not_be_read_again_is_refused_before_it_is_written(options):
+    with pytest.raises(InputError, match="codec 'best'"):
+        checked(msgspec.structs.replace(row("ball", "best", 1.0, 60.0), options=options))
 
 
 def test_what_is_no_file_of_rows_is_refused(tmp_path):

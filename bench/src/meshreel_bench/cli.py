@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -30,6 +29,7 @@ from .rows import Options, Point, Row, failed_rows, join_rows, measured_rows, re
 HELP = "Measure codecs against each other, and make tables and plots of the rows."
 CACHE = ".cache"  # ending of the folder beside the rows where sequences are kept
 DATA = Path("../shared/data")
+LONGEST = 1e6  # s, of a point: eleven days
 command = App(name="bench", help=HELP)  # of `meshreel bench`
 
 
@@ -48,8 +48,9 @@ class Running:
     """Render and compare pictures too (slower)."""
 
     def __post_init__(self) -> None:
-        if self.jobs < 1 or not 0 < self.limit < math.inf:
-            raise InputError(f"--jobs {self.jobs}, --limit {self.limit:g}: give at least 1, and seconds above 0")
+        if self.jobs < 1 or not 0 < self.limit <= LONGEST:
+            text = f"give at least 1, and seconds above 0, {LONGEST:g} at most"
+            raise InputError(f"--jobs {self.jobs}, --limit {self.limit:g}: {text}")
 
 
 @Parameter(name="*")
@@ -74,8 +75,12 @@ class Selection:
         """Return the points of an experiment. Raises InputError where there are none."""
         study, on = find_experiment(name), self.on or (() if self.small else released_in(self.data))
         others = [each for each in on if each not in study.sequences]
+        for each in others:
+            if any("\ud800" <= sign <= "\udfff" for sign in each):
+                raise InputError(f"--on {each!r}: the name is not UTF-8, which rows are; rename it")
         added = [Sweep(codec, {}, options) for codec, options in map(operating_point, self.add)]
-        points = list(study.extended(on if others else [], added).points(self.small))
+        every = study.extended(on if others else [], added).points(self.small)
+        points = list({point.key: point for point in every}.values())  # what is added may be there already
         points = [point for point in points if point.codec in (self.only or [point.codec])]
         points = [point for point in points if point.sequence in (on or [point.sequence])]
         if not points:
@@ -101,6 +106,8 @@ def operating_point(point: str) -> tuple[str, Options]:
             raise InputError(f"operating point {point!r}: {each!r} is no option=value")
         try:
             options[name] = json.loads(found)
+            if isinstance(options[name], (list, dict)):
+                raise InputError(f"operating point {point!r}: {name} is a list or an object; give a number or a text")
         except json.JSONDecodeError:
             options[name] = found  # text without quotes
     make_codec(codec, options)  # refuses what it does not know
@@ -214,9 +221,9 @@ def codecs(*, common: Common = Common()) -> None:
 
 def check_one_source(rows: Sequence[Row]) -> None:
     """Raise InputError where rows of one name are of sequences of different content, which share no curve."""
-    sources: dict[str, str] = {}
+    sources: dict[str, str | None] = {}
     for row in rows:
-        if row.source and sources.setdefault(row.point.sequence, row.source) != row.source:
+        if sources.setdefault(row.point.sequence, row.source) != row.source:
             text = f"rows of {row.point.sequence} are of sequences of different content, or read in different ways"
             raise InputError(f"{text}; make a report of each, or delete the lines of one")
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
 import msgspec
 
@@ -13,6 +13,9 @@ from meshreel.errors import InputError
 
 AGREE = 0.01  # of the bytes: less is a container, or another order of vertices (guess)
 
+BEGINNING = b'{"point":'  # of a row
+Count = Annotated[int, msgspec.Meta(gt=0)]
+Positive = Annotated[float, msgspec.Meta(gt=0)]
 Option = str | int | float | bool | None
 Options = dict[str, Option]
 Metrics = Literal["distances", "views", "parallel views", "regions", "colors", "depth", "splats", "mpeg"]
@@ -77,8 +80,8 @@ class ColorBytes(msgspec.Struct, frozen=True, omit_defaults=True):
 class Stream(msgspec.Struct, frozen=True, omit_defaults=True):
     """Encoded sequence."""
 
-    bytes: int
-    coded_frames: int
+    bytes: Count
+    coded_frames: Count
     background_bytes: int = 0  # share of `bytes` that is sent once
     groups: list[Group] = []
     colors: ColorBytes | None = None
@@ -112,7 +115,7 @@ class Row(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True, forbid_
     name: str  # of the codec, as it calls itself: points of one name are a curve
     options: Options = {}  # of the codec, its defaults included
     frames: int = 0  # of the sequence
-    frame_rate: float = 30.0  # 1/s
+    frame_rate: Positive = 30.0  # 1/s
     measured_frames: list[int] = []
     stream: Stream | None = None
     encoding: Encoding | None = None
@@ -143,11 +146,33 @@ def read_rows(path: Path) -> list[Row]:
             continue
         try:
             rows.append(msgspec.json.decode(line, type=Row))
-        except msgspec.DecodeError as error:
-            if number == len(lines) and not isinstance(error, msgspec.ValidationError):
+        except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
+            if number == len(lines) and _is_cut(line):
                 continue  # a sweep that was killed while it wrote
             raise InputError(f"{path}, line {number}: not a row: {error}; delete that line") from None
     return join_rows([rows[::-1]])[::-1]
+
+
+def checked(row: Row) -> Row:
+    """Return a row that can be written and read again. InputError where a codec's name or options cannot."""
+    try:
+        again = msgspec.json.decode(msgspec.json.encode(row), type=Row)
+    except (TypeError, ValueError, RecursionError, msgspec.MsgspecError) as error:
+        raise InputError(f"codec {row.point.codec!r}: name, options, stages or sizes make no row: {error}") from None
+    if (again.name, again.options) != (row.name, row.options):
+        raise InputError(f"codec {row.point.codec!r}: options {row.options} are none of JSON's; give numbers and texts")
+    return row
+
+
+def _is_cut(line: bytes) -> bool:
+    """Whether a last line is the beginning of a row."""
+    if not (line.startswith(BEGINNING) or BEGINNING.startswith(line)):
+        return False
+    try:
+        msgspec.json.decode(line)
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError):
+        return True
+    return False
 
 
 def join_rows(files: Iterable[Sequence[Row]]) -> list[Row]:
@@ -175,14 +200,27 @@ def _size(row: Row) -> int:
     return row.stream.bytes if row.stream else 0
 
 
+def check_writable(path: Path) -> None:
+    """Raise InputError where rows cannot be appended to a file, before they are measured."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with path.open("ab"):
+            pass
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written ({error.strerror or error}); choose another file") from None
+
+
 def append_row(path: Path, row: Row) -> None:
     """Append a row to a file, in the place of a last line that was not written to its end."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with path.open("a+b") as file:
             file.seek(0)
-            file.truncate(file.read().rfind(b"\n") + 1)
-            file.write(msgspec.json.encode(row) + b"\n")
+            data = file.read()
+            last = data[data.rfind(b"\n") + 1 :]
+            if last and _is_cut(last):
+                file.truncate(len(data) - len(last))
+            file.write(b"\n" * bool(last and not _is_cut(last)) + msgspec.json.encode(row) + b"\n")
     except OSError as error:
         text = f"{path}: cannot be written ({error.strerror or error})"
         raise InputError(f"{text}; free space, or choose another file") from None

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
 import time
+from pathlib import Path
 
 import pytest
 from meshreel_bench.measure.worker import WorkerError, in_fresh_process
@@ -51,3 +54,28 @@ def test_a_process_that_ends_or_takes_too_long_says_why(how, reason):
         next(values)
     with pytest.raises(OSError, match="No such process"):
         os.kill(pid, 0)
+
+
+def starting():
+    """Yield the process that it has started and leaves."""
+    yield subprocess.Popen([sys.executable, "-c", "import time; time.sleep(600)"]).pid
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="reads /proc")
+@pytest.mark.parametrize("whole", [True, False])
+def test_what_a_codec_has_started_ends_with_its_process(whole):
+    values = in_fresh_process(starting, limit_s=60)
+    pid = next(values)
+    assert list(values) == [] if whole else values.close() is None
+    deadline = time.monotonic() + 30
+    while _runs(pid):
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+
+
+def _runs(pid):
+    """Whether a process runs; one that has ended may wait for whoever adopted it."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except FileNotFoundError:
+        return False

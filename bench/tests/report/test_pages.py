@@ -17,6 +17,7 @@ from meshreel_bench.report.plots import curves_figure
 from meshreel_bench.rows import join_rows, read_rows
 
 from bench.tests.made_up import failed, floor, row
+from meshreel.errors import InputError
 
 DOCS = Path(__file__).resolve().parents[3] / "docs"
 ROWS = [row("ball", codec, rate, 55 + 5 * rate) for codec in (BEST, "zipmesh") for rate in (0.5, 1.0, 2.0)]
@@ -24,7 +25,11 @@ ROWS = [row("ball", codec, rate, 55 + 5 * rate) for codec in (BEST, "zipmesh") f
 
 @pytest.fixture
 def no_plots(monkeypatch):
-    monkeypatch.setattr(pages, "plot_curves", lambda *about: about[3])  # the path
+    def plotted(_rows, _measures, _looks, path, *_):
+        path.write_bytes(b"")
+        return path
+
+    monkeypatch.setattr(pages, "plot_curves", plotted)
 
 
 def test_rows_of_anybodys_codec_are_in_the_appendix_of_figure_6(tmp_path):
@@ -39,6 +44,24 @@ def test_rows_of_anybodys_codec_are_in_the_appendix_of_figure_6(tmp_path):
     assert {
         path: path.read_bytes() for path in write_report([*ROWS, failed("ball", "other", "no <luck>")], tmp_path)
     } == again
+
+
+def test_a_report_that_cannot_be_written_leaves_the_one_before_as_it_was(tmp_path):
+    files = write_report(ROWS, tmp_path)
+    before = {path: path.read_bytes() for path in files}
+    (tmp_path / "results" / "figure6-cube.png").mkdir()
+    with pytest.raises(InputError, match=r"figure6-cube\.png: is a folder"):
+        write_report([*ROWS, *(row("cube", BEST, rate, 60 + rate) for rate in (1.0, 2.0))], tmp_path)
+    assert {path: path.read_bytes() for path in files} == before
+    assert {path.name for path in tmp_path.iterdir()} == {"results.md", "results"}
+
+
+@pytest.mark.usefixtures("no_plots")
+def test_a_sequence_without_a_quality_has_no_plot_and_names_that_look_alike_have_two(tmp_path):
+    blank = row("cube", BEST, 1.0, 60, metrics={"d2_psnr_paper": None})
+    alike = [row(name, BEST, 1.0, 60) for name in ("./a/scan", "./a_scan")]
+    names = [path.name for path in write_report([blank, *alike], tmp_path) if path.suffix == ".png"]
+    assert len(set(names)) == len(names) == 3 and not any("cube" in name for name in names)
 
 
 def test_a_plot_has_a_panel_for_each_measure_and_a_line_for_each_curve_and_the_floor():

@@ -23,7 +23,11 @@ def codec_names() -> list[str]:
 def make_codec(name: str, options: dict[str, Any]) -> Codec:
     """Return the codec of that name at the operating point `options`. Raises InputError where there is none."""
     made = _called(name, _loaded(name), options)
-    if not isinstance(made, Codec):
+    try:
+        whole = isinstance(made, Codec)  # evaluates properties
+    except (Exception, SystemExit) as error:
+        raise InputError(f"codec {name!r}: its name or options raise {type(error).__name__}: {error}") from error
+    if not whole:
         lacking = [part for part in ("name", "options", "encode", "decode") if not hasattr(made, part)]
         raise InputError(f"codec {name!r} is a {type(made).__name__} without {', '.join(lacking)}; see docs/codecs.md")
     return made

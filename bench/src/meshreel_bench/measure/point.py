@@ -33,7 +33,7 @@ from ..experiments.headset import AARCH64, ENCODED
 from ..experiments.study import FLOOR, HEADSET, TRACKER
 from ..experiments.study import FOUND as SEGMENTATION
 from ..names import FLOOR_RATIO, FOUND_NAME
-from ..rows import Encoding, Group, Point, Row, Stream
+from ..rows import Encoding, Group, Point, Row, Stream, checked
 from .clock import StageTimer, cost_of
 from .color import color_bytes
 from .decode import decoded_apart
@@ -53,7 +53,7 @@ KEYS = "key_frames"  # of a file's metadata: numbers of the frames that others a
 def measure_points(points: Sequence[Point], store: Store) -> Iterator[Row]:
     """Yield the row of each point; those that share an analysis should come together."""
     for point in points:
-        yield measure_point(point, store)
+        yield checked(measure_point(point, store))
 
 
 @dataclass(frozen=True, slots=True)
@@ -225,7 +225,7 @@ def _encoded(codec: Codec, source: MeshSequence, what: object) -> tuple[bytes, E
         data = codec.code(_LAST.analysis, timer) if isinstance(codec, TwoStepCodec) else codec.encode(source, timer)
     if type(data) is not bytes or not data:
         raise InputError(
-            f"{codec.name} encodes to {type(data).__name__} of length {len(data)}; give bytes, one at least"
+            f"{codec.name} encodes to {'no byte' if data == b'' else type(data).__name__}; give bytes, one at least"
         )
     return data, cost_of([*before, timer], len(source))
 

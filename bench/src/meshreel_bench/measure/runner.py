@@ -16,7 +16,7 @@ from ..codec import TwoStepCodec
 from ..codecs import codec_version, make_codec
 from ..datasets import Store
 from ..experiments.study import HEADSET
-from ..rows import Point, Row, append_row, read_rows
+from ..rows import Point, Row, append_row, check_writable, read_rows
 from .point import empty_row, measure_points
 from .worker import WorkerError, end_all, in_fresh_process
 
@@ -50,6 +50,8 @@ def run_points(
     missing = [point for point in points if point.key not in found]
     for row in [found[point.key] for point in points if point.key in found]:
         report(row, False)
+    if missing:
+        check_writable(file)
     for sequence, frames in dict.fromkeys((point.sequence, point.frames) for point in missing):
         opening(sequence)
         how.store.open(sequence, frames)  # what takes long to make is made once, before processes need it

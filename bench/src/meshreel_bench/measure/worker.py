@@ -8,7 +8,9 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
+import sys
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 from typing import Any
@@ -37,7 +39,7 @@ def in_fresh_process(task: Callable[..., Iterator[Any]], *about: object, limit_s
         while (value := _received(here, process, limit_s)) is not None:
             yield value[0]
     finally:
-        process.kill()
+        _end(process)
         process.join()
         _LIVE.discard(process)
         here.close()
@@ -46,7 +48,15 @@ def in_fresh_process(task: Callable[..., Iterator[Any]], *about: object, limit_s
 def end_all() -> None:
     """End all processes that other threads wait for."""
     for process in list(_LIVE):
-        process.kill()
+        _end(process)
+
+
+def _end(process: BaseProcess) -> None:
+    """End a process that nobody has joined, and those that it has started, but for those that left its group."""
+    if sys.platform != "win32" and process.pid:
+        with suppress(ProcessLookupError, PermissionError):  # it ended before it had a group
+            os.killpg(process.pid, signal.SIGKILL)
+    process.kill()
 
 
 def _received(here: Connection, process: BaseProcess, limit_s: float | None) -> tuple[Any] | None:
@@ -68,6 +78,8 @@ def _received(here: Connection, process: BaseProcess, limit_s: float | None) -> 
 def _answer(there: Connection, task: Callable[..., Iterator[Any]], about: tuple[object, ...]) -> None:
     """Run the task in the fresh process; its standard output goes to standard error."""
     os.dup2(2, 1)
+    if sys.platform != "win32":
+        os.setsid()  # what a codec starts is ended with it
     end_with_parent()
     try:
         for value in task(*about):

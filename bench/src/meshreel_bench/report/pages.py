@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
+import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
 
+from meshreel.errors import InputError
 from meshreel.io.write import make_folder, replacing
 
 from ..experiments import EXPERIMENTS
@@ -18,7 +21,7 @@ from . import tables
 from .equal import rate_table
 from .headline import headline
 from .looks import looks_of
-from .plots import plot_curves
+from .plots import drawable, plot_curves
 from .published import anchor_rows
 from .reproducing import reproducing_page
 from .values import curve_of, rated, sequences
@@ -46,6 +49,11 @@ class Part:
         return rated(self.rows)
 
     @property
+    def is_drawn(self) -> bool:
+        """Whether it has a plot."""
+        return drawable(self.rows, self.study.measures[:2])
+
+    @property
     def drawn(self) -> list[Row]:
         """Rows of its plots: some have V-DMC's points beside those that were measured."""
         there = sequences(self.rows) if self.name in WITH_VDMC else []
@@ -69,13 +77,26 @@ def parts_of(rows: Sequence[Row]) -> list[Part]:
 def write_report(rows: Sequence[Row], folder: Path) -> list[Path]:
     """Write the pages and their plots into a folder; return the paths."""
     make_folder(folder / FOLDER)
+    with tempfile.TemporaryDirectory(prefix=".unfinished-", dir=folder) as name:
+        written = _write(rows, Path(name))
+        paths = [folder / path.relative_to(name) for path in written]
+        if taken := [path for path in paths if path.is_dir()]:
+            raise InputError(f"{taken[0]}: is a folder, where a file of the report belongs; move it")
+        for source, path in zip(written, paths, strict=True):
+            source.replace(path)
+    return paths
+
+
+def _write(rows: Sequence[Row], folder: Path) -> list[Path]:
+    """Write a report into an empty folder."""
+    make_folder(folder / FOLDER)
     parts = parts_of(rows)
     looks = looks_of(curve_of(row) for part in parts for row in rated(part.drawn))
     pages = {Path("results.md"): _first_page(parts)}
     plots = list[Path]()
     for part in parts:
         pages[Path(FOLDER, f"appendix-{part.name}.md")] = list(_appendix(part))
-        if part.rated:
+        if part.is_drawn:
             path = folder / FOLDER / f"{part.name}.png"
             x = part.study.rate, part.study.over
             plots.append(plot_curves(part.drawn, part.study.measures[:2], looks, path, x))
@@ -97,14 +118,16 @@ def _shown(parts: Sequence[Part]) -> list[tuple[Part, str]]:
     """Return the sequences whose curves are on the first page."""
     for part in parts:
         if part.name == OPEN:
-            names = sequences(part.rows)
+            own = {name: [row for row in part.rows if row.point.sequence == name] for name in sequences(part.rows)}
+            names = [name for name, several in own.items() if drawable(several, (D2, MASKED))]
             return [(part, name) for name in ([each for each in SHOWN if each in names] or names[:3])]
     return []
 
 
 def _plot_name(part: Part, sequence: str) -> str:
     safe = "".join(sign if sign.isalnum() or sign in "._-" else "_" for sign in sequence)[-80:]
-    return f"{part.name}-{safe}.png"
+    other = "" if safe == sequence else f"-{hashlib.sha256(sequence.encode()).hexdigest()[:8]}"
+    return f"{part.name}-{safe}{other}.png"
 
 
 def _first_page(parts: Sequence[Part]) -> list[str]:
@@ -167,7 +190,7 @@ def _appendix(part: Part) -> Iterator[str]:
     found = verdicts(study, part.rows)
     if any(verdict.value is not None for verdict in found):
         yield from ("## Targets", "", *tables.verdict_table(found), "")
-    if part.rated:
+    if part.is_drawn:
         yield from (f"![{title(part.name)}: quality against {study.over.split(' (')[0]}]({part.name}.png)", "")
     for name in sequences(part.rows):
         own = rated(part.rows, name)

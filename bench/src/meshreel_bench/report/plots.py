@@ -50,6 +50,11 @@ def plot_curves(
     return path
 
 
+def drawable(rows: Sequence[Row], measures: Sequence[Measure]) -> bool:
+    """Whether rows have anything that `plot_curves` draws."""
+    return any(value(row, measure.key) is not None for row in rated(rows) for measure in measures)
+
+
 def curves_figure(
     rows: Sequence[Row], measures: Sequence[Measure], looks: Mapping[str, Look], x: tuple[str, str] = RATE
 ) -> Any:
