@@ -218,9 +218,11 @@ def append_row(path: Path, row: Row) -> None:
             file.seek(0)
             data = file.read()
             last = data[data.rfind(b"\n") + 1 :]
-            if last and _is_cut(last):
+            if _is_cut(last):
                 file.truncate(len(data) - len(last))
-            file.write(b"\n" * bool(last and not _is_cut(last)) + msgspec.json.encode(row) + b"\n")
+            elif last:
+                file.write(b"\n")
+            file.write(msgspec.json.encode(row) + b"\n")
     except OSError as error:
         text = f"{path}: cannot be written ({error.strerror or error})"
         raise InputError(f"{text}; free space, or choose another file") from None

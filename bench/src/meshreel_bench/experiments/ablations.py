@@ -68,8 +68,7 @@ PAPER = Study(
         "`paper-literal` is as near to the paper's text as is known: the MDS pose, groups of ten frames without cuts,",
         "one step for all components, plain rounding; the surface through all frames is Poisson's, and a vertex is",
         "displaced to the nearest of the frame's, as the release does. Pose with cuts, and step with rounding, are put",
-        "back on their own; surface and displacement come together in `paper-literal`, which a larger reference takes",
-        "no further at m = 30.",
+        "back on their own; surface and displacement come together in `paper-literal`.",
     ),
 )
 PARTS = (
