@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import os
+import signal
 import socket
 import struct
 import sys
@@ -115,7 +116,8 @@ class Server(uvicorn.Server):
 
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:
         super().handle_exit(sig, frame)
-        timer = threading.Timer(LAST_RESORT, self._leave, [128 + sig])
+        code = 0 if sig == signal.SIGINT else 128 + sig  # Ctrl-C is the regular end, also where it takes long
+        timer = threading.Timer(LAST_RESORT, self._leave, [code])
         timer.daemon = True
         timer.start()
 
