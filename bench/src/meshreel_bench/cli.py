@@ -152,7 +152,8 @@ def run(
         def report(row: Row, new: bool) -> None:
             nonlocal done
             done += 1
-            progress("measured", done, len(points))
+            if new:  # the others take no time, which the time left is reckoned from
+                progress("measured", done, len(points))
             before = "" if new else " (before; --retry tries again)" if row.failed else " (measured before)"
             common.note(f"{done}/{len(points)} {describe(row)}{before}")
 

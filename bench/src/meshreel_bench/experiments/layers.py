@@ -27,7 +27,7 @@ BACKWARDS = tuple(f"{body}-backwards" for body in REMESHED)
 QUALITIES: dict[str, Values] = {
     "dancer": {"quality": (5.0, 20.0, 35.0, 45.0, 50.0, 65.0, 80.0, 95.0)},
     "basketball_player": {"quality": (5.0, 20.0, 35.0, 50.0, 65.0, 80.0, 95.0)},
-    "mitch": {"quality": (50.0, 65.0, 67.5, 69.0, 80.0)},
+    "mitch": {"quality": (50.0, 65.0, 67.0, 69.0, 80.0)},
     **{body: {"quality": (25.0, 50.0, 75.0)} for body in REMESHED},
     "collision": {"quality": (50.0,)},
     **{body: {"quality": (50.0,)} for body in BACKWARDS},
