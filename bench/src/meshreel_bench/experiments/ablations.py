@@ -76,8 +76,8 @@ PAPER = Study(
         "`paper-literal` is as near to the paper's text as is known: the MDS pose, groups of ten frames without cuts,",
         "one step for all components, plain rounding; the surface through all frames is Poisson's, and a vertex is",
         "displaced to the nearest of the frame's, as the release does. Pose with cuts, and step with rounding, are put",
-        "back on their own; surface and displacement come together in `paper-literal`. Nearest vertices are what limits",
-        f"it at m = 30: more centers, {MORE_CENTERS}, predict better where they are, and {RELEASED} codes them finely.",
+        "back on their own; surface and displacement come together in `paper-literal`. Nearest vertices are its limit",
+        f"at m = 30: more centers, {MORE_CENTERS}, predict better where they are, and {RELEASED} codes them finely.",
     ),
 )
 PARTS = (
