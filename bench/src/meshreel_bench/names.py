@@ -7,6 +7,7 @@ TEXTURED, PAINTED = f"{BEST}, texture", f"{BEST}, vertices"  # in colour
 TSMC = "meshreel paper m, quality 50"  # as the paper has it: the number of basis vectors is varied
 TUNED = "meshreel paper"  # the same system, the quality varied and the basis chosen by it: spares what m alone cannot
 LITERAL = "meshreel paper-literal m, quality 50"  # the same system as near to the text as is known
+LITERAL_FINEST = "meshreel paper-literal, the release's step m, quality 50, centers 4000"
 TVMC, DRACO, KLT, NECGS, NECGS_FULL = "tvmc", "draco", "klt_tsdf", "necgs", "necgs_full"
 DECIMATED, SUBDIVIDED = "decimated_draco", "decimated_draco_subdivided"
 ONCE, ONCE_SUBDIVIDED = "background_once_draco", "background_once_draco_subdivided"

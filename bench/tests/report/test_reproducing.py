@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import msgspec
 from meshreel_bench.report.reproducing import reproducing_page
 from meshreel_bench.rows import Point, Row, Stream
 
@@ -29,3 +30,32 @@ def test_what_is_played_is_in_no_other_table():
     page = reproducing_page(own := {"figure6": [row("dancer", "draco", 1.0, 60)]})
     with_played = reproducing_page(own | {"headset": [played(0, 1, 1.0)]})
     assert [line for line in with_played if line not in page] == [line for line in with_played if "dancer, 0" in line]
+
+
+def literal(m, mbps, db, **options):
+    variant = f", {options['variant']}" if options else ""
+    made = row("dancer", f"meshreel paper-literal{variant} m", mbps, db)
+    return msgspec.structs.replace(
+        made, options={"preset": "paper-literal", "quality": 50.0, "basis_size": m} | options
+    )
+
+
+def test_beside_the_released_code_stands_the_paper_as_written_with_more_centers_only_where_the_usual_are_short():
+    finest = {"centers": 4000, "variant": "the release's step"}
+    rows = [
+        literal(3, 0.5, 52.0),
+        literal(10, 1.0, 57.0),
+        literal(10, 2.0, 58.0, **finest),
+        literal(30, 6.0, 59.5, **finest),
+    ]
+    page = reproducing_page({"figure6": [row("dancer", "draco", 1.0, 60)], "ablation_paper": rows})
+    shown = [line.split(" | ")[2] for line in page if line.startswith("| dancer | m = ")]
+    assert [cell.partition("(")[2] for cell in shown] == [
+        "m 3)",
+        "m 10)",
+        "m 10)",
+        "m 30, 4000 centers, the release's step)",
+    ]
+    short = reproducing_page({"figure6": [row("dancer", "draco", 1.0, 60)], "ablation_paper": rows[:2]})
+    shown = [line.split(" | ")[2] for line in short if line.startswith("| dancer | m = ")]
+    assert [cell.endswith("†") for cell in shown] == [False, False, False, True]

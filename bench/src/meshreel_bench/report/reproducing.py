@@ -8,12 +8,13 @@ from importlib.resources import files
 from ..datasets import RELEASED as DATA_OF_AUTHORS
 from ..experiments import EXPERIMENTS
 from ..experiments.headset import FILM, HOLDS, THROTTLES
-from ..names import BEST, LITERAL, TSMC, TUNED
+from ..names import BEST, LITERAL, LITERAL_FINEST, TSMC, TUNED
 from ..rows import Row
 from .bandwidth import headline_table, vdmc_table
 from .published import RELEASED, TABLE_1, TABLE_2, Published
 from .values import curve_of, rated, value
 
+WRITTEN = (LITERAL, LITERAL_FINEST)  # the second where the first does not reach
 *AUTHORS, AUTHORS_FOUR = DATA_OF_AUTHORS
 SCENES = ("room2", "living_room", "procedural_room", *AUTHORS)
 FOUR_AND_TWO = ("synthetic4", "synthetic2x150", AUTHORS_FOUR)  # people
@@ -29,7 +30,7 @@ def reproducing_page(studies: Mapping[str, Sequence[Row]]) -> list[str]:
     own = rated(every)
     if not {row.point.sequence for row in own} & {*SCENES, *FOUR_AND_TWO, *RELEASED}:
         return []
-    literal = [row for row in rated(studies.get("ablation_paper", ())) if curve_of(row) == LITERAL]
+    literal = [row for row in rated(studies.get("ablation_paper", ())) if curve_of(row) in WRITTEN]
     page = (files(__package__) / TEXT).read_text(encoding="utf-8").replace("{canonical}", _canonical(own))
     lines = {
         "{table_1}": _table_1(own),
@@ -78,7 +79,8 @@ def _released(rows: Sequence[Row]) -> Iterator[str]:
     yield "|---|---|---|---|---|"
     for name, each in [(name, each) for name, several in RELEASED.items() for each in several]:
         own = rated(rows, name)
-        shown = _as_good(own, LITERAL, _wanted(each)) if each.codec == TSMC else ""
+        written = [_as_good(own, codec, _wanted(each)) for codec in WRITTEN if _of(own, codec)] or [_shown(None)]
+        shown = min(written, key=lambda cell: cell.endswith(SHORT)) if each.codec == TSMC else ""
         cells = [shown, *(_as_good(own, codec, _wanted(each)) for codec in (each.codec, BEST))]
         ssim = "" if each.ssim is None else f", SSIM {each.ssim:.3f}"
         yield f"| {name} | {each.system}: {each.mbps:g} Mbps, {each.d2_psnr:g} dB{ssim} | {' | '.join(cells)} |"
@@ -168,8 +170,9 @@ def _shown(row: Row | None) -> str:
 def _setting(row: Row) -> str:
     """Return what TSMC is set to: several of its options choose a rate."""
     name = curve_of(row)
-    if name in (TSMC, LITERAL):
-        return f" (m {row.options['basis_size']})"
+    if name in (TSMC, *WRITTEN):
+        finest = f", {row.options['centers']} centers, {row.options['variant']}" if name == LITERAL_FINEST else ""
+        return f" (m {row.options['basis_size']}{finest})"
     return f" (quality {row.options.get('quality', 50):g})" if name == TUNED else ""
 
 
