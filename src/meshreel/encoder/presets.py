@@ -40,7 +40,7 @@ KNEE = 85.0  # quality above which steps are halved every 8 points: the curve en
 DENSEST = 95.0  # quality from which the template is as it is: a denser one's normals are worse (decision 33)
 EXACT = 99.0  # quality from which layers that miss the target give way to Draco in every frame (decision 33)
 EXACT_ANGLE = 1.85  # degrees that such frames have at most: pictures show normals more than distances (decision 33)
-EXACT_DISTANCE = (0.5, 0.43)  # of the motion's step, RMS, at EXACT and at 100
+EXACT_DISTANCE = (0.53, 0.43)  # of the motion's step, RMS, at EXACT and at 100
 # Candidates of these frames: where few vertices are lost, a coarser lattice costs less than it spoils.
 EXACT_INTRA = IntraOptions(
     fractions=(0.04, 0.08, 0.15, 0.25, 0.35, 0.45, 0.5, 0.55, 0.6, 0.7, 1.0),
