@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import msgspec
 import pytest
-from meshreel_bench.rows import Point, append_row, checked, disagreements, join_rows, read_rows
+from meshreel_bench.rows import Point, append_row, checked, disagreements, join_rows, mixtures, read_rows
 
 from bench.tests.made_up import failed, floor, row
 from meshreel.errors import InputError
@@ -98,3 +98,14 @@ def test_points_that_two_experiments_measured_with_other_bytes_are_found():
     distances = msgspec.structs.replace(smaller, point=msgspec.structs.replace(seen.point, metrics="distances"))
     assert disagreements([seen, distances, other]) == [(distances, seen)]
     assert disagreements([seen, alike, other, failed("ball", "draco", "no luck")]) == []
+
+
+def test_rows_of_data_that_were_made_anew_are_found():
+    def measured(sequence, codec, diagonal):
+        made = row(sequence, codec, 1.0, 60.0)
+        return msgspec.structs.replace(made, metrics=made.metrics | {"diagonal_m": diagonal})
+
+    old, new, newest = (measured("room", "draco", diagonal) for diagonal in (4.0, 4.01, 4.02))
+    other_frames, elsewhere = measured("room", "best", 4.0112), measured("hall", "draco", 6.0)
+    assert mixtures([old, new, elsewhere, other_frames, newest]) == [[[new, other_frames], [old], [newest]]]
+    assert mixtures([new, other_frames, elsewhere, row("room", "draco", 1.0, 60.0)]) == []

@@ -12,6 +12,7 @@ import msgspec
 from meshreel.errors import InputError
 
 AGREE = 0.01  # of the bytes: less is a container, or another order of vertices (guess)
+ALIKE = 1e-3  # of a mean diagonal: those of other frames of one recording differ by up to 6e-4 (measured)
 
 BEGINNING = b'{"point":'  # of a row
 Count = Annotated[int, msgspec.Meta(gt=0)]
@@ -194,6 +195,25 @@ def disagreements(rows: Iterable[Row]) -> list[tuple[Row, Row]]:
             found.setdefault(msgspec.structs.replace(row.point, metrics="views").key, []).append(row)
     pairs = [(min(own, key=_size), max(own, key=_size)) for own in found.values()]
     return [(least, most) for least, most in pairs if _size(most) > (1 + AGREE) * _size(least)]
+
+
+def mixtures(rows: Iterable[Row]) -> list[list[list[Row]]]:
+    """Return the rows of sequences that were made anew between, by make, the one with most rows first."""
+    found: dict[object, list[tuple[float, Row]]] = {}
+    for row in rows:
+        if diagonal := (row.metrics or {}).get("diagonal_m"):
+            found.setdefault((row.point.sequence, row.frames), []).append((diagonal, row))
+    several = []
+    for measured in found.values():
+        makes, last = list[list[Row]](), 0.0
+        for diagonal, row in sorted(measured, key=lambda pair: pair[0]):
+            if diagonal > (1 + ALIKE) * last:
+                makes.append([])
+            makes[-1].append(row)
+            last = diagonal
+        if len(makes) > 1:
+            several.append(sorted(makes, key=len, reverse=True))
+    return several
 
 
 def _size(row: Row) -> int:

@@ -74,6 +74,11 @@ def test_the_least_rate_is_needed_on_every_sequence():
     worse = [row("cube", "best", rate, 50 + rate) for rate in (1.0, 2.0)]
     better = [row("cube", "draco", rate, 55 + rate) for rate in (0.5, 1.0)]
     assert [each.met for each in judged(promise, [*ROWS, *worse, *better])] == [True, False]
+    noise = [*worse, *better, floor("cube", ssim_masked=0.54)]
+    [found] = judged(promise, noise)
+    assert (
+        "not draco (D2, paper form); not draco (masked SSIM, which is beyond that of the truth itself)" in found.value
+    )
 
 
 def test_quality_rises_with_rate_or_the_fall_is_shown():

@@ -16,7 +16,7 @@ from meshreel.io.write import make_folder, replacing
 from ..experiments import EXPERIMENTS
 from ..experiments.study import D2, MASKED, Study
 from ..names import title
-from ..rows import Row, disagreements, failed_rows, measured_rows
+from ..rows import Row, disagreements, failed_rows, measured_rows, mixtures
 from . import tables
 from .equal import rate_table
 from .headline import headline
@@ -151,18 +151,28 @@ def _first_page(parts: Sequence[Part]) -> list[str]:
 
 
 def _doubts(parts: Sequence[Part]) -> list[str]:
-    """Return points that two experiments measured with different bytes: the encoder changed between them."""
-    pairs = disagreements(row for part in parts for row in part.rows)
-    if not pairs:
-        return []
-    head = (
-        "Measured by two experiments with different bytes, as the encoder changed between them; the next run mends it:"
-    )
-    lines = [
+    """Return what cannot be compared: points whose bytes differ by experiment, codecs that were given other data."""
+    names = {id(row): part.name for part in reversed(parts) for row in part.rows}
+    rows = [row for part in parts for row in part.rows]
+    points = [
         f"{a.point.sequence}, {a.name}, {tables.operating_point(a)}: {a.mbps:.4g} and {b.mbps:.4g} Mbps"
-        for a, b in pairs
+        for a, b in disagreements(rows)
     ]
-    return ["", head, "", *(f"- {tables.text(line)}" for line in lines)]
+    data = [
+        f"{most[0].point.sequence}: {', '.join(dict.fromkeys(f'{row.name} ({names[id(row)]})' for row in other))}"
+        for most, *others in mixtures(rows)
+        for other in others
+    ]
+    lists = {
+        "Measured by two experiments with different bytes, as the encoder changed between them": points,
+        "Measured on other data than most, as scenes were made anew between (their diagonals differ)": data,
+    }
+    return [
+        line
+        for head, lines in lists.items()
+        if lines
+        for line in ("", f"{head}; the next run mends it:", "", *(f"- {tables.text(each)}" for each in lines))
+    ]
 
 
 def _kept_promises(parts: Sequence[Part]) -> list[str]:

@@ -147,11 +147,11 @@ def _ends(promise: Gains, own: Sequence[Row]) -> list[Verdict]:
 
 @_judged.register
 def _(promise: LeastRate, rows: Sequence[Row]) -> list[Verdict]:
-    return [_least_rate(promise, rated(rows, sequence)) for sequence in sequences(rows)]
+    return [_least_rate(promise, rows, sequence) for sequence in sequences(rows)]
 
 
-def _least_rate(promise: LeastRate, own: Sequence[Row]) -> Verdict:
-    sequence = own[0].point.sequence
+def _least_rate(promise: LeastRate, rows: Sequence[Row], sequence: str) -> Verdict:
+    own, truth = rated(rows, sequence), floors(row for row in rows if row.point.sequence == sequence)
     text = f"{sequence}: {promise.curve} needs less rate than every other codec wherever both reach a quality"
     met, lost, beyond = list[bool | None](), list[str](), dict[str, list[str]]()
     for name in dict.fromkeys(map(curve_of, own)):
@@ -161,7 +161,10 @@ def _least_rate(promise: LeastRate, own: Sequence[Row]) -> Verdict:
             best, other = curve(own, promise.curve, measure), curve(own, name, measure)
             several = min(len(best.rates), len(other.rates)) > 1  # a point is no range
             met.append(beats(best, other, measure.least) if several else None)
-            lost += [f"not {name} ({measure.name})"] if met[-1] is False else []
+            if met[-1] is False:
+                least = max(min(best.qualities), min(other.qualities))
+                noise = measure.sign > 0 and least > truth.get(measure.key, inf)  # all that is compared is noise
+                lost.append(f"not {name} ({measure.name}{', which is beyond that of the truth itself' * noise})")
             if several and max(other.qualities) > max(best.qualities) + measure.least:
                 beyond.setdefault(measure.name, []).append(name)
     decided = [left for left in met if left is not None]
