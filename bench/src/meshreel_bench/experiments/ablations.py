@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..codecs.variants import BOTH, FROM_MESHES, IN_MDS_POSE, RELEASED, TOGETHER, UNIFORM
-from ..names import BEST, LITERAL, LITERAL_FINEST, OURS, PUBLISHED, TSMC
+from ..names import BEST, LITERAL, LITERAL_FINEST, MORE_CENTERS, OURS, PUBLISHED, TSMC
 from ..rows import Options
 from .scenes import MEASURES
 from .study import D2, MASKED, NORMALS, SYMMETRIC, TRACKER, Bound, Measure, Needs, NoMore, Study, Sweep, Which
@@ -30,7 +30,6 @@ GOF = Study(
     anchor=TSMC,
 )
 RELEASE = {3: (2.23, 51.87), 5: (3.29, 54.35), 10: (5.78, 56.40), 30: (15.46, 59.02)}  # its Mbps and D2, dB, by m
-MORE_CENTERS = 4000  # twice the usual: where they are few, limbs far from the key frame's snap to other vertices
 AT_10: Options = {"preset": "paper", "basis_size": 10}
 M_IS_10 = {name: {"basis_size": (10,)} for name in ("crane60", "procedural_room")}
 PAPER = Study(

@@ -79,8 +79,8 @@ def _released(rows: Sequence[Row]) -> Iterator[str]:
     yield "|---|---|---|---|---|"
     for name, each in [(name, each) for name, several in RELEASED.items() for each in several]:
         own = rated(rows, name)
-        written = [_as_good(own, codec, _wanted(each)) for codec in WRITTEN if _of(own, codec)] or [_shown(None)]
-        shown = min(written, key=lambda cell: cell.endswith(SHORT)) if each.codec == TSMC else ""
+        reaching = (codec for codec in WRITTEN if any(_d2(row) >= _wanted(each) for row in _of(own, codec)))
+        shown = _as_good(own, next(reaching, LITERAL), _wanted(each)) if each.codec == TSMC else ""
         cells = [shown, *(_as_good(own, codec, _wanted(each)) for codec in (each.codec, BEST))]
         ssim = "" if each.ssim is None else f", SSIM {each.ssim:.3f}"
         yield f"| {name} | {each.system}: {each.mbps:g} Mbps, {each.d2_psnr:g} dB{ssim} | {' | '.join(cells)} |"
