@@ -6,7 +6,7 @@ const [address, ...numbers] = process.argv.slice(2);
 const [seconds, throttle, rate] = numbers.map(Number);
 const SIZE = { width: 320, height: 240 }; // pixels: few, as they are drawn by software, which a headset's are not
 const POLLING = 100; // ms; by pictures, which are what is measured, it would disturb them
-const PATIENCE = 300_000; // ms
+const PATIENCE = 300_000; // ms for the whole: some of what is asked of a page has no limit of its own
 
 /** In the page: a display of `rate` pictures a second in the place of the browser's, and a meter of JavaScript and uploads. */
 function install(rate) {
@@ -51,12 +51,17 @@ function slowAnswers(throttle) {
   self.addEventListener("message", () => (began = performance.now()));
   self.postMessage = (message, transfer) => {
     Atomics.wait(cell, 0, 0, (throttle - 1) * (performance.now() - began));
+    began = performance.now(); // what comes next without a message of its own has not taken this
     message.ms *= throttle;
     if (message.packed) message.packed.decodeMs *= throttle;
     post(message, transfer);
   };
 }
 
+setTimeout(() => {
+  console.error(`${address} is not played within ${PATIENCE / 1000} s`);
+  process.exit(1); // and the browser with it
+}, PATIENCE).unref();
 const args = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]; // drawn by software: the same on every machine
 const browser = await chromium.launch({ executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium", args });
 const page = await browser.newPage({ viewport: SIZE });
@@ -68,7 +73,7 @@ await page.route("**/worker.js", async (route) => {
 const tools = await page.context().newCDPSession(page);
 await tools.send("Emulation.setCPUThrottlingRate", { rate: throttle });
 await page.goto(`${address}&autoplay=0&bench=${seconds}`);
-const wait = (test) => page.waitForFunction(test, undefined, { polling: POLLING, timeout: PATIENCE });
+const wait = (test) => page.waitForFunction(test, undefined, { polling: POLLING, timeout: 0 });
 await wait(() => document.querySelector("meshreel-player")?.paused === false);
 await page.evaluate(() => restartMeter());
 await page.waitForTimeout(1000 * seconds);

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -35,6 +38,19 @@ def packets(crf: int = 20, codec: VideoCodec = VideoCodec.AV1) -> list[bytes]:
     for one in PICTURES:
         found += encoder.add(to_i420(one))
     return found + encoder.finish()
+
+
+@pytest.mark.skipif(
+    not hasattr(os, "sched_getscheduler") or os.geteuid() != 0, reason="SVT makes threads urgent on Linux, as root"
+)
+def test_encoding_leaves_no_thread_more_urgent_than_it_was() -> None:
+    encoder, before = VideoEncoder(96, 64, VideoOptions()), os.sched_getscheduler(0)
+    encoder.add(to_i420(PICTURES[0]))
+    threads = [int(task.name) for task in Path("/proc/self/task").iterdir()]
+    assert len(threads) > 3  # SVT's own
+    assert {os.sched_getscheduler(thread) for thread in threads} == {before}
+    child = subprocess.run([sys.executable, "-c", "import os; print(os.sched_getscheduler(0))"], capture_output=True)
+    assert int(child.stdout) == before
 
 
 def test_h264_that_is_cut_short_is_refused_and_not_concealed() -> None:

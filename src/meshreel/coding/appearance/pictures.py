@@ -9,9 +9,12 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from fractions import Fraction
+from pathlib import Path
+from threading import get_native_id
 from typing import Any, Literal
 
 import numpy as np
@@ -70,6 +73,8 @@ class VideoEncoder:
             context.options = {"crf": str(options.crf), "preset": str(options.preset), "svtav1-params": params}
         else:
             context.options = {"crf": f"{H264_SCALE * options.crf + H264_OFFSET:.1f}", "x264-params": X264}
+        with _as_urgent_as_before():
+            context.open()
         self._codec, self._count = codec, 0
 
     def add(self, planes: UInt8[np.ndarray, "R W"]) -> list[bytes]:
@@ -216,6 +221,30 @@ def _without_comments(packet: bytes) -> bytes:
 
 def _halved(plane: np.ndarray) -> np.ndarray:
     return (plane[::2, ::2] + plane[1::2, ::2] + plane[::2, 1::2] + plane[1::2, 1::2]) / 4
+
+
+@contextmanager
+def _as_urgent_as_before() -> Iterator[None]:
+    """Give this thread and those that the block starts the scheduling that this one has had.
+
+    Where it runs as root, SVT makes its caller and its own threads the most urgent of the machine (`SCHED_FIFO`, 99):
+    they would not share a processor with anything else, and all that the process starts afterwards would be like them.
+    """
+    if not hasattr(os, "sched_getscheduler"):  # macOS, Windows: SVT changes nothing
+        yield
+        return
+    policy, urgency, others = os.sched_getscheduler(0), os.sched_getparam(0), _threads()
+    try:
+        yield
+    finally:
+        if os.sched_getscheduler(0) != policy:
+            for thread in (_threads() - others) | {get_native_id()}:
+                with suppress(ProcessLookupError):  # it has ended
+                    os.sched_setscheduler(thread, policy, urgency)
+
+
+def _threads() -> set[int]:
+    return {int(task.name) for task in Path("/proc/self/task").iterdir()}
 
 
 def _context(codec: str, mode: Literal["r", "w"]) -> Any:
