@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import threading
 import webbrowser
-from contextlib import suppress
 from pathlib import Path
 from typing import Annotated
 
@@ -42,8 +41,7 @@ def command(
         if browser:  # in a thread: a text browser returns only when it is closed
             threading.Thread(target=_open, args=(found[0], common), daemon=True).start()
 
-    with suppress(KeyboardInterrupt):  # the regular end of the server
-        run(make_app(Library.of_file(file), hosts=server.hosts), server, announce)
+    run(make_app(Library.of_file(file), hosts=server.hosts), server, announce)
 
 
 def _open(address: str, common: Common) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
 from pathlib import Path
 from typing import Annotated
 
@@ -39,5 +38,4 @@ def command(
         text = f"serving {folder} at {' '.join(found)}  (Ctrl-C stops)"
         common.result({"folder": str(folder), "addresses": found}, text)
 
-    with suppress(KeyboardInterrupt):  # the regular end of the server
-        run(make_app(Library(folder), cors=cors, hosts=server.hosts), server, announce)
+    run(make_app(Library(folder), cors=cors, hosts=server.hosts), server, announce)

@@ -116,7 +116,7 @@ class Server(uvicorn.Server):
 
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:
         super().handle_exit(sig, frame)
-        code = 0 if sig == signal.SIGINT else 128 + sig  # Ctrl-C is the regular end, also where it takes long
+        code = 0 if sig == signal.SIGINT else 128 + sig  # also where it takes long, Ctrl-C is the regular end
         timer = threading.Timer(LAST_RESORT, self._leave, [code])
         timer.daemon = True
         timer.start()

@@ -53,8 +53,9 @@ class ServerOptions:
 def run(
     app: Starlette, options: ServerOptions, announce: Callable[[list[str]], None], limits: Limits = Limits()
 ) -> None:
-    """Serve until SIGINT or SIGTERM. `announce` gets the addresses as soon as the server listens.
+    """Serve until SIGINT, which is the regular end, or SIGTERM.
 
+    `announce` gets the addresses as soon as the server listens.
     Raises InputError if the host is unknown or the port is taken.
     """
     logging.getLogger("uvicorn.error").addFilter(is_news)
@@ -72,8 +73,9 @@ def run(
             timeout_keep_alive=math.ceil(limits.request),
             ssl_context_factory=(lambda *_: encryption) if encryption else None,
         )
-        announce(addresses(options, listener.getsockname()[1]))
-        Server(config, room_for_files(limits)).run(sockets=[listener])
+        with suppress(KeyboardInterrupt):
+            announce(addresses(options, listener.getsockname()[1]))
+            Server(config, room_for_files(limits)).run(sockets=[listener])
 
 
 def addresses(options: ServerOptions, port: int) -> list[str]:
