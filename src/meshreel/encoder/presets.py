@@ -39,12 +39,12 @@ LITERAL_DEPTH = 9  # of Poisson reconstruction (paper, section 3.3.2)
 KNEE = 85.0  # quality above which steps are halved every 8 points: the curve ended for want of steps (decision 33)
 DENSEST = 95.0  # quality from which the template is as it is: a denser one's normals are worse (decision 33)
 EXACT = 99.0  # quality from which layers that miss the target give way to Draco in every frame (decision 33)
-EXACT_ANGLE = 1.85  # degrees that such frames have at most: pictures show normals more than distances (decision 33)
-EXACT_DISTANCE = (0.53, 0.43)  # of the motion's step, RMS, at EXACT and at 100
+EXACT_ANGLE = 1.95  # degrees that such frames have at most: pictures show normals more than distances (decision 33)
+EXACT_DISTANCE = (0.5, 0.43)  # of the motion's step, RMS, at EXACT and at 100
 # Candidates of these frames: where few vertices are lost, a coarser lattice costs less than it spoils.
 EXACT_INTRA = IntraOptions(
-    fractions=(0.04, 0.08, 0.15, 0.25, 0.35, 0.45, 0.5, 0.55, 0.6, 0.7, 1.0),
-    steps=(4.5, 3.5, 2.4, 1.7, 1.2, 0.8, 0.5),
+    fractions=(0.04, 0.08, 0.15, 0.25, 0.35, 0.4, 0.45, 0.475, 0.5, 0.525, 0.55, 0.575, 0.6, 0.65, 0.7, 1.0),
+    steps=(4.5, 3.7, 3.0, 2.4, 2.0, 1.7, 1.4, 1.2, 1.0, 0.8, 0.5),
     finer=True,
 )
 LITERAL_ANCHORS = 400  # anchors of a reference in `paper-literal`: the paper gives no number (guess)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..names import BEST
-from .study import Measure, Study, Sweep
+from .study import LeastRate, Measure, Study, Sweep
 
 D1 = Measure("mpeg_d1_psnr", "D1 of MPEG", " dB", least=0.5)
 POINT_TO_PLANE = Measure("mpeg_d2_psnr", "D2 of MPEG", " dB", least=0.5)
@@ -19,6 +19,7 @@ STUDY = Study(
     metrics="mpeg",
     measures=(D1, POINT_TO_PLANE, GEOMETRY),
     best=BEST,
+    promises=(LeastRate(BEST, (D1, POINT_TO_PLANE, GEOMETRY)),),
     notes=(
         "Measured as mmetric does under V-DMC's conditions, but for the box, which is that of the frames here, and for",
         "pictures of 512 pixels instead of 2048, which tell the same to some tenths of a decibel. V-DMC's sheet is of",
