@@ -39,8 +39,8 @@ LITERAL_DEPTH = 9  # of Poisson reconstruction (paper, section 3.3.2)
 KNEE = 85.0  # quality above which steps are halved every 8 points: the curve ended for want of steps (decision 33)
 DENSEST = 95.0  # quality from which the template is as it is: a denser one's normals are worse (decision 33)
 EXACT = 99.0  # quality from which layers that miss the target give way to Draco in every frame (decision 33)
-EXACT_ANGLE = 1.95  # degrees that such frames have at most: pictures show normals more than distances (decision 33)
-EXACT_DISTANCE = (0.5, 0.43)  # of the motion's step, RMS, at EXACT and at 100
+EXACT_DISTANCE = (0.5, 0.43)  # of the motion's step, RMS, that such frames have at most, at EXACT and at 100
+EXACT_ANGLE = (1.95, 1.85)  # degrees that they have at most: pictures show normals more than distances
 # Candidates of these frames: where few vertices are lost, a coarser lattice costs less than it spoils.
 EXACT_INTRA = IntraOptions(
     fractions=(0.04, 0.08, 0.15, 0.25, 0.35, 0.4, 0.45, 0.475, 0.5, 0.525, 0.55, 0.575, 0.6, 0.65, 0.7, 1.0),
@@ -146,8 +146,8 @@ def layers_options(quality: float = 50.0, effort: str = "normal") -> LayersOptio
         tolerance=tolerance(quality),
     )
     if quality >= EXACT:
-        share = rounded(np.interp(quality, (EXACT, 100.0), EXACT_DISTANCE))
-        target = Fidelity(distance=share * step, angle=EXACT_ANGLE, worst=step)
+        share, angle = (rounded(np.interp(quality, (EXACT, 100.0), ends)) for ends in (EXACT_DISTANCE, EXACT_ANGLE))
+        target = Fidelity(distance=share * step, angle=angle, worst=step)
         options = replace(options, target=target, flat=1.0, intra=EXACT_INTRA)
     if effort == "fast":
         return _fast(options)
