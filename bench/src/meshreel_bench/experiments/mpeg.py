@@ -12,7 +12,7 @@ STUDY = Study(
     title="By MPEG's measures, beside V-DMC",
     sequences=("dancer", "basketball_player", "mitch"),
     sweeps=(
-        Sweep("meshreel", {"quality": (10.0, 35.0, 60.0, 85.0, 95.0, 99.0, 100.0)}, {"preset": "best"}),
+        Sweep("meshreel", {"quality": (10.0, 35.0, 60.0, 85.0, 95.0, 98.0, 99.0, 100.0)}, {"preset": "best"}),
         Sweep("draco", {"qp": (8, 9, 10)}),
         Sweep("decimated_draco", {"fraction": (0.08, 0.2, 0.5), "qp": (9, 10, 11)}),
     ),
