@@ -27,7 +27,7 @@ HEAVY = (
     "unittest",
 )
 LATER = ("meshreel.coding.paper", "DracoPy", "html", *HEAVY)  # what some files need, or none
-MOST_OPENING = 2.5  # CPU times of importing NumPy that opening a file may take: 1.8 alone, up to 2.3 beside other jobs
+MOST_OPENING = 2.0  # CPU times of importing NumPy that opening a file may take (guess; with jaxtyping it takes more)
 ENCODER_SIDE = ("analysis", "capture", "metrics", "encoder", "export", "server", "cli", "io")
 
 LOOK = f"""
@@ -69,7 +69,7 @@ def least_seconds(*codes: str) -> list[float]:
     """Return the least CPU time of fresh processes that run each code, with compiled modules and one thread of BLAS."""
     environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
     environment.pop("PYTHONDONTWRITEBYTECODE", None)
-    times = [[seconds(code, environment) for code in codes] for _ in range(7)]  # in turn: other jobs disturb all alike
+    times = [[seconds(code, environment) for code in codes] for _ in range(15)]  # in turn: other jobs disturb all alike
     return [min(of_one) for of_one in zip(*times, strict=True)]
 
 

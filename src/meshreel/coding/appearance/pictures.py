@@ -230,21 +230,27 @@ def _as_urgent_as_before() -> Iterator[None]:
     Where it runs as root, SVT makes its caller and its own threads the most urgent of the machine (`SCHED_FIFO`, 99):
     they would not share a processor with anything else, and all that the process starts afterwards would be like them.
     """
-    if not hasattr(os, "sched_getscheduler"):  # macOS, Windows: SVT changes nothing
-        yield
-        return
-    policy, urgency, others = os.sched_getscheduler(0), os.sched_getparam(0), _threads()
+    before, others = _scheduling(), _threads()
     try:
         yield
     finally:
-        if os.sched_getscheduler(0) != policy:
+        if before is not None and _scheduling() != before:
             for thread in (_threads() - others) | {get_native_id()}:
                 with suppress(ProcessLookupError):  # it has ended
-                    os.sched_setscheduler(thread, policy, urgency)
+                    os.sched_setscheduler(thread, *before)
+
+
+def _scheduling() -> tuple[int, Any] | None:
+    """Return policy and priority of this thread; None on macOS, Windows (SVT changes neither) and with musl."""
+    try:
+        return os.sched_getscheduler(0), os.sched_getparam(0)
+    except (AttributeError, OSError):
+        return None
 
 
 def _threads() -> set[int]:
-    return {int(task.name) for task in Path("/proc/self/task").iterdir()}
+    tasks = Path("/proc/self/task")
+    return {int(task.name) for task in tasks.iterdir()} if tasks.exists() else set()
 
 
 def _context(codec: str, mode: Literal["r", "w"]) -> Any:
