@@ -1,4 +1,4 @@
-// The page of bench.browser.test.ts: 50k vertices that move before 300k that do not, into 64 x 64 pixels.
+// The page of bench.timed.test.ts: 50k vertices that move before 300k that do not, into 64 x 64 pixels.
 
 import { PerspectiveCamera, Scene, WebGLRenderer } from "three";
 import type { Shown } from "@meshreel/player-core/types";
