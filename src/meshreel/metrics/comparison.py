@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -19,9 +20,9 @@ from ..errors import InputError
 from ..types import Mesh
 from .color import color_errors
 from .color_render import render_errors
-from .distance import PSNR_CEILING, SurfaceErrors, surface_errors
+from .distance import PSNR_CEILING, Original, SurfaceErrors, surface_errors
 from .mpeg import MpegOptions, mpeg_errors
-from .ssim import ssim_normals
+from .ssim import Remembered, ssim_normals
 from .viewpoints import Box, Camera, ViewOptions, read_cameras, views_around
 
 Row = dict[str, Any]
@@ -76,23 +77,40 @@ class Comparison:
         return finite(row)
 
 
+class OriginalFrame:
+    """An original mesh that keeps its samples and pictures, for comparisons with what several codecs make of it."""
+
+    def __init__(self, mesh: Mesh) -> None:
+        self.mesh = mesh
+
+    @cached_property
+    def surface(self) -> Original:
+        """The mesh, prepared for distances."""
+        return Original(self.mesh)
+
+    @cached_property
+    def pictures(self) -> Remembered:
+        """The mesh, prepared for pictures."""
+        return Remembered(self.mesh)
+
+
 def compare_sequences(
-    originals: Iterable[Mesh],
+    originals: Iterable[Mesh | OriginalFrame],
     decoded: Iterable[Mesh],
     options: ComparisonOptions | None = None,
 ) -> Comparison:
     """Measure `decoded` against `originals`, frame by frame (two MeshSequences of equal length)."""
     options = options or ComparisonOptions()
     cameras = _cameras(originals, options) if options.ssim else ()
-    box = Box.of(originals) if options.mpeg is not None else Box.of(())
+    box = Box.of(map(_mesh, originals)) if options.mpeg is not None else Box.of(())
     rows: list[Row] = []
     empty: list[bool] = []
     others = iter(decoded)
-    for mesh in originals:
-        other = next(others, None)
+    for given in originals:
+        mesh, other = _mesh(given), next(others, None)
         if other is None:
             raise InputError(f"the decoded sequence ends after {len(rows)} frames and the original does not")
-        rows.append(frame_row(mesh, other, cameras))
+        rows.append(frame_row(given, other, cameras))
         if options.mpeg is not None:
             found = mpeg_errors(mesh, other, box, options.mpeg)
             rows[-1] |= dict(zip(_MPEG, (found.d1, found.d2, found.geometry, found.luma), strict=True))
@@ -107,9 +125,10 @@ def compare_sequences(
     return Comparison(tuple(rows), tuple(empty), tuple(cameras), tuple(options.keys))
 
 
-def frame_row(original: Mesh, decoded: Mesh, cameras: Sequence[Camera]) -> Row:
-    """Return the metrics of one frame by name; SSIM only with cameras."""
-    row = _distance_row(surface_errors(original, decoded))
+def frame_row(given: Mesh | OriginalFrame, decoded: Mesh, cameras: Sequence[Camera]) -> Row:
+    """Return the metrics of one frame, given its original, by name; SSIM only with cameras."""
+    prepared = given if isinstance(given, OriginalFrame) else OriginalFrame(given)
+    original, row = prepared.mesh, _distance_row(surface_errors(prepared.surface, decoded))
     if original.is_colored and decoded.is_colored:
         colors = color_errors(original, decoded)
         row |= {"y_psnr": colors.y, "u_psnr": colors.u, "v_psnr": colors.v, "yuv_psnr": colors.yuv}
@@ -117,7 +136,7 @@ def frame_row(original: Mesh, decoded: Mesh, cameras: Sequence[Camera]) -> Row:
             views = render_errors(original, decoded, cameras)
             row |= {"view_y_psnr": views.y_union, "view_y_psnr_inside": views.y_inside, "view_ssim": views.ssim}
     if cameras:
-        ssim = ssim_normals(original, decoded, cameras)
+        ssim = ssim_normals(prepared.pictures, decoded, cameras)
         row |= {"ssim": ssim.whole, "ssim_masked": ssim.masked}
     return row
 
@@ -154,10 +173,14 @@ def _distance_row(errors: SurfaceErrors) -> Row:
     return row
 
 
-def _cameras(originals: Iterable[Mesh], options: ComparisonOptions) -> Sequence[Camera]:
+def _mesh(given: Mesh | OriginalFrame) -> Mesh:
+    return given.mesh if isinstance(given, OriginalFrame) else given
+
+
+def _cameras(originals: Iterable[Mesh | OriginalFrame], options: ComparisonOptions) -> Sequence[Camera]:
     if options.cameras is not None:
         return read_cameras(options.cameras) if isinstance(options.cameras, Path) else options.cameras
-    return views_around(Box.of(originals), options.views)
+    return views_around(Box.of(map(_mesh, originals)), options.views)
 
 
 def finite(row: Row) -> Row:

@@ -9,13 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
-from jaxtyping import Float64
+from jaxtyping import Bool, Float32, Float64
 from scipy.ndimage import uniform_filter
 
 from ..types import Mesh
-from .render import Picture, Pixels, Visible, crop_of
+from .render import Crop, Picture, Pixels, Visible, crop_of
 from .viewpoints import Camera
 
 _SIDE = 7  # pixels, side of the SSIM window: scikit-image's default
@@ -33,10 +34,39 @@ class NormalSsim:
     masked: float  # over pixels that either mesh covers, views that see neither left out
 
 
-def ssim_normals(original: Mesh, decoded: Mesh, cameras: Sequence[Camera]) -> NormalSsim:
+@dataclass(frozen=True, slots=True)
+class _Drawn:
+    """A normal-colored picture without the surface behind it (`render.Picture`)."""
+
+    covered: Bool[np.ndarray, "H W"]
+    colors: Float32[np.ndarray, "H W 3"]
+
+
+class Remembered:
+    """A mesh that keeps its normal-colored pictures, for comparisons with several meshes from the same cameras."""
+
+    def __init__(self, mesh: Mesh) -> None:
+        self.mesh = mesh
+        self._drawn = list[tuple[Camera, Crop, _Drawn]]()
+
+    @cached_property
+    def _visible(self) -> Visible:
+        return Visible(self.mesh)
+
+    def look(self, pixels: Pixels) -> Picture:
+        """Render the mesh in a crop of a camera's image, or return the picture from before."""
+        for camera, crop, drawn in self._drawn:
+            if camera is pixels.camera and crop == pixels.crop:
+                return drawn
+        view = self._visible.look(pixels)
+        self._drawn.append((pixels.camera, pixels.crop, _Drawn(view.covered, view.colors)))
+        return self._drawn[-1][-1]
+
+
+def ssim_normals(original: Mesh | Remembered, decoded: Mesh, cameras: Sequence[Camera]) -> NormalSsim:
     """Compute SSIM between the normal-colored renderings of two meshes (paper, section 4: four views)."""
-    pair = Visible(original), Visible(decoded)
-    views = [Pixels(camera, crop_of([original, decoded], camera, MARGIN)) for camera in cameras]
+    pair = original if isinstance(original, Remembered) else Remembered(original), Visible(decoded)
+    views = [Pixels(camera, crop_of([pair[0].mesh, decoded], camera, MARGIN)) for camera in cameras]
     scores = [ssim_view(pair[0].look(pixels), pair[1].look(pixels), pixels) for pixels in views]
     counted = [masked for _, masked in scores if masked is not None]
     return NormalSsim(float(np.mean([whole for whole, _ in scores])), float(np.mean(counted)) if counted else 1.0)

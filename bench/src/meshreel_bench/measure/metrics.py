@@ -19,7 +19,7 @@ from meshreel.format.layout import MAGIC, ChunkKind
 from meshreel.geometry.closest_points import Surface
 from meshreel.geometry.derived_sequences import Chosen, captured
 from meshreel.geometry.topology import components, drop_unreferenced, face_normals, weld
-from meshreel.metrics.comparison import ComparisonOptions, compare_sequences, finite
+from meshreel.metrics.comparison import ComparisonOptions, OriginalFrame, compare_sequences, finite
 from meshreel.metrics.depth import DepthJudge, judge
 from meshreel.metrics.mpeg import MpegOptions
 from meshreel.metrics.scene_accuracy import Scene, people_flicker, scene_means, scene_row
@@ -65,18 +65,20 @@ def measure_frames(frames: Measured, metrics: Metrics) -> tuple[Values, PerFrame
 
 
 def _to_input(frames: Measured, metrics: Metrics) -> tuple[Values, PerFrame]:
-    originals = Chosen(frames.known.sequence, frames.numbers)
-    cameras: Sequence[Camera] | None = frames.known.cameras or None
+    known = frames.known
+    originals = Chosen(known.sequence, frames.numbers)
+    prepared = None if known.scene is None else [_original(known.scene, number) for number in frames.numbers]
+    cameras: Sequence[Camera] | None = known.cameras or None
     if cameras is None and metrics in ("parallel views", "colors"):
         cameras = parallel_views_around(Box.of(originals))
     mpeg = MpegOptions(PIXELS) if metrics == "mpeg" else None
     options = ComparisonOptions(cameras, ssim=metrics not in ("distances", "depth", "mpeg"), mpeg=mpeg)
-    row: dict[str, Any] = compare_sequences(originals, frames.decoded, options).to_row()
+    row: dict[str, Any] = compare_sequences(prepared or originals, frames.decoded, options).to_row()
     if row.pop("frames_empty") == row["frames_compared"]:
         raise InputError("no frame has a face with an area; give a sequence with surface")
     per_frame = {key: [frame[key] for frame in row["per_frame"]] for key in KEPT if key in row["per_frame"][0]}
     values: Values = {key: value for key, value in row.items() if key not in NO_METRICS}
-    if not frames.known.cameras:  # scans of scenes are many pieces from the start
+    if not known.cameras:  # scans of scenes are many pieces from the start
         values["bridges"] = sum(count_bridges(a, b) for a, b in zip(originals, frames.decoded, strict=True))
         values["degenerate_faces"] = sum(map(count_degenerate, frames.decoded))
     return values, per_frame
@@ -148,7 +150,12 @@ def _flicker(scene: SceneData, numbers: Sequence[int], video: Frames) -> Values:
     return dict(zip(names, (own, noisy, own / noisy if noisy else None), strict=True))
 
 
-@lru_cache(maxsize=10)  # 2 GB: what is prepared for one point serves the next
+@lru_cache(maxsize=10)  # 3 GB of large scenes: what is prepared for one point serves the next
+def _original(scene: SceneData, number: int) -> OriginalFrame:
+    return OriginalFrame(scene.meshes[number])
+
+
+@lru_cache(maxsize=10)  # 2 GB
 def _true(scene: SceneData, number: int) -> Scene:
     return scene.true(number)
 
