@@ -14,6 +14,7 @@ from meshreel_bench.report import pages
 from meshreel_bench.report.looks import looks_of
 from meshreel_bench.report.pages import write_report
 from meshreel_bench.report.plots import curves_figure
+from meshreel_bench.report.values import curve_of, rated
 from meshreel_bench.rows import join_rows, read_rows
 
 from bench.tests.made_up import failed, floor, row
@@ -84,6 +85,14 @@ def test_plots_of_figure_6_have_the_points_of_v_dmc_and_no_table_has():
 def test_curves_that_are_not_known_have_looks_of_their_own():
     looks = looks_of(["b", "a", BEST])
     assert list(looks) == [BEST, "a", "b"] and looks["a"] != looks["b"]
+
+
+@pytest.mark.parametrize("path", sorted((DOCS / "results").glob("*.jsonl")), ids=lambda path: path.stem)
+def test_the_colours_of_one_page_tell_the_variants_of_a_codec(path):
+    rows = rated(read_rows(path))
+    variants = {curve_of(row) for row in rows if "variant" in row.point.options}
+    looks = looks_of(map(curve_of, rows))
+    assert len({looks[name].color for name in variants}) == len(variants)
 
 
 @pytest.mark.usefixtures("no_plots")

@@ -91,7 +91,9 @@ def _write(rows: Sequence[Row], folder: Path) -> list[Path]:
     """Write a report into an empty folder."""
     make_folder(folder / FOLDER)
     parts = parts_of(rows)
-    looks = looks_of(curve_of(row) for part in parts for row in rated(part.drawn))
+    looks = {
+        part.name: looks_of(map(curve_of, rated(part.drawn))) for part in parts
+    }  # colours tell the curves of a page
     pages = {Path("results.md"): _first_page(parts)}
     plots = list[Path]()
     for part in parts:
@@ -99,10 +101,10 @@ def _write(rows: Sequence[Row], folder: Path) -> list[Path]:
         if part.is_drawn:
             path = folder / FOLDER / f"{part.name}.png"
             x = part.study.rate, part.study.over
-            plots.append(plot_curves(part.drawn, part.study.measures[:2], looks, path, x))
+            plots.append(plot_curves(part.drawn, part.study.measures[:2], looks[part.name], path, x))
     for part, sequence in _shown(parts):
         own = [row for row in part.drawn if row.point.sequence == sequence]
-        plots.append(plot_curves(own, (D2, MASKED), looks, folder / FOLDER / _plot_name(part, sequence)))
+        plots.append(plot_curves(own, (D2, MASKED), looks[part.name], folder / FOLDER / _plot_name(part, sequence)))
     studies = {part.name: part.rows for part in parts}
     if page := reproducing_page(studies):
         pages[Path("reproducing.md")] = page
