@@ -101,11 +101,13 @@ def test_points_that_two_experiments_measured_with_other_bytes_are_found():
 
 
 def test_rows_of_data_that_were_made_anew_are_found():
-    def measured(sequence, codec, diagonal):
+    def measured(sequence, codec, diagonal, name="diagonal_m"):
         made = row(sequence, codec, 1.0, 60.0)
-        return msgspec.structs.replace(made, metrics=made.metrics | {"diagonal_m": diagonal})
+        return msgspec.structs.replace(made, metrics=made.metrics | {name: diagonal})
 
     old, new, newest = (measured("room", "draco", diagonal) for diagonal in (4.0, 4.01, 4.02))
     other_frames, elsewhere = measured("room", "best", 4.0112), measured("hall", "draco", 6.0)
     assert mixtures([old, new, elsewhere, other_frames, newest]) == [[[new, other_frames], [old], [newest]]]
     assert mixtures([new, other_frames, elsewhere, row("room", "draco", 1.0, 60.0)]) == []
+    parts = measured("room", "best", 4.03, "input_diagonal_m")  # of a scene's people, its background and all of it
+    assert mixtures([old, parts]) == [[[old], [parts]]]

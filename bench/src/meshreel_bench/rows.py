@@ -201,7 +201,7 @@ def mixtures(rows: Iterable[Row]) -> list[list[list[Row]]]:
     """Return the rows of sequences that were made anew between, by make, the one with most rows first."""
     found: dict[object, list[tuple[float, Row]]] = {}
     for row in rows:
-        if diagonal := (row.metrics or {}).get("diagonal_m"):
+        if diagonal := row.metrics.get("diagonal_m") or row.metrics.get("input_diagonal_m"):
             found.setdefault((row.point.sequence, row.frames), []).append((diagonal, row))
     several = []
     for measured in found.values():
