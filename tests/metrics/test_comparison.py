@@ -8,9 +8,10 @@ import pytest
 
 from meshreel.errors import InputError
 from meshreel.geometry.cameras import pack_cameras
-from meshreel.metrics.comparison import ComparisonOptions, compare_sequences
+from meshreel.metrics.comparison import ComparisonOptions, OriginalFrame, compare_sequences
 from meshreel.metrics.distance import PSNR_CEILING, surface_errors
 from meshreel.metrics.mpeg import MpegOptions, mpeg_errors
+from meshreel.metrics.render import Visible
 from meshreel.metrics.ssim import ssim_normals
 from meshreel.metrics.viewpoints import Box, ViewOptions, views_around
 from meshreel.types import Mesh, MeshList
@@ -35,6 +36,21 @@ def test_aggregates_are_the_mean_and_the_worst_of_the_frames():
     assert row["rms_forward_percent"] == pytest.approx(100 * row["rms_forward_m"] / BODY.diagonal)
     assert [f["d1_psnr"] for f in row["per_frame"]] == [e.d1_psnr for e in errors]
     assert row["frames_compared"] == 3 and "ssim" not in row
+
+
+def test_an_original_frame_is_drawn_once_for_several_comparisons_and_changes_no_number(monkeypatch):
+    drawn, look = list[Mesh](), Visible.look
+    monkeypatch.setattr(Visible, "look", lambda self, pixels: (drawn.append(self.mesh), look(self, pixels))[1])
+    cameras = views_around(Box.of(ORIGINALS), SMALL)
+    options = ComparisonOptions(cameras)
+    prepared = [OriginalFrame(mesh) for mesh in ORIGINALS]
+    plain = compare_sequences(ORIGINALS, DECODED, options)
+    drawn.clear()
+    assert compare_sequences(prepared, DECODED, options) == plain
+    assert len(drawn) == 2 * len(ORIGINALS) * len(cameras)
+    drawn.clear()
+    assert compare_sequences(prepared, DECODED, options) == plain
+    assert len(drawn) == len(ORIGINALS) * len(cameras)  # of what is decoded
 
 
 def test_ssim_uses_views_around_the_whole_sequence_and_prints_them():

@@ -99,20 +99,23 @@ def compare_sequences(
     decoded: Iterable[Mesh],
     options: ComparisonOptions | None = None,
 ) -> Comparison:
-    """Measure `decoded` against `originals`, frame by frame (two MeshSequences of equal length)."""
+    """Measure `decoded` against `originals`, frame by frame (two sequences of equal length).
+
+    What an `OriginalFrame` has prepared serves its later comparisons from the same cameras.
+    """
     options = options or ComparisonOptions()
     cameras = _cameras(originals, options) if options.ssim else ()
-    box = Box.of(map(_mesh, originals)) if options.mpeg is not None else Box.of(())
+    box = Box.of(_prepared(original).mesh for original in originals) if options.mpeg is not None else Box.of(())
     rows: list[Row] = []
     empty: list[bool] = []
     others = iter(decoded)
-    for given in originals:
-        mesh, other = _mesh(given), next(others, None)
+    for original in map(_prepared, originals):
+        other = next(others, None)
         if other is None:
             raise InputError(f"the decoded sequence ends after {len(rows)} frames and the original does not")
-        rows.append(frame_row(given, other, cameras))
+        rows.append(frame_row(original, other, cameras))
         if options.mpeg is not None:
-            found = mpeg_errors(mesh, other, box, options.mpeg)
+            found = mpeg_errors(original.mesh, other, box, options.mpeg)
             rows[-1] |= dict(zip(_MPEG, (found.d1, found.d2, found.geometry, found.luma), strict=True))
             if found.luma is None:
                 rows[-1].pop(_MPEG[-1])
@@ -125,15 +128,15 @@ def compare_sequences(
     return Comparison(tuple(rows), tuple(empty), tuple(cameras), tuple(options.keys))
 
 
-def frame_row(given: Mesh | OriginalFrame, decoded: Mesh, cameras: Sequence[Camera]) -> Row:
-    """Return the metrics of one frame, given its original, by name; SSIM only with cameras."""
-    prepared = given if isinstance(given, OriginalFrame) else OriginalFrame(given)
-    original, row = prepared.mesh, _distance_row(surface_errors(prepared.surface, decoded))
-    if original.is_colored and decoded.is_colored:
-        colors = color_errors(original, decoded)
+def frame_row(original: Mesh | OriginalFrame, decoded: Mesh, cameras: Sequence[Camera]) -> Row:
+    """Return the metrics of one frame by name; SSIM only with cameras."""
+    prepared = _prepared(original)
+    mesh, row = prepared.mesh, _distance_row(surface_errors(prepared.surface, decoded))
+    if mesh.is_colored and decoded.is_colored:
+        colors = color_errors(mesh, decoded)
         row |= {"y_psnr": colors.y, "u_psnr": colors.u, "v_psnr": colors.v, "yuv_psnr": colors.yuv}
         if cameras:
-            views = render_errors(original, decoded, cameras)
+            views = render_errors(mesh, decoded, cameras)
             row |= {"view_y_psnr": views.y_union, "view_y_psnr_inside": views.y_inside, "view_ssim": views.ssim}
     if cameras:
         ssim = ssim_normals(prepared.pictures, decoded, cameras)
@@ -173,14 +176,14 @@ def _distance_row(errors: SurfaceErrors) -> Row:
     return row
 
 
-def _mesh(given: Mesh | OriginalFrame) -> Mesh:
-    return given.mesh if isinstance(given, OriginalFrame) else given
+def _prepared(original: Mesh | OriginalFrame) -> OriginalFrame:
+    return original if isinstance(original, OriginalFrame) else OriginalFrame(original)
 
 
 def _cameras(originals: Iterable[Mesh | OriginalFrame], options: ComparisonOptions) -> Sequence[Camera]:
     if options.cameras is not None:
         return read_cameras(options.cameras) if isinstance(options.cameras, Path) else options.cameras
-    return views_around(Box.of(map(_mesh, originals)), options.views)
+    return views_around(Box.of(_prepared(original).mesh for original in originals), options.views)
 
 
 def finite(row: Row) -> Row:

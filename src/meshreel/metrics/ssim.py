@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from jaxtyping import Bool, Float32, Float64
@@ -46,12 +45,8 @@ class Remembered:
     """A mesh that keeps its normal-colored pictures, for comparisons with several meshes from the same cameras."""
 
     def __init__(self, mesh: Mesh) -> None:
-        self.mesh = mesh
+        self.mesh, self._visible = mesh, Visible(mesh)
         self._drawn = list[tuple[Camera, Crop, _Drawn]]()
-
-    @cached_property
-    def _visible(self) -> Visible:
-        return Visible(self.mesh)
 
     def look(self, pixels: Pixels) -> Picture:
         """Render the mesh in a crop of a camera's image, or return the picture from before."""

@@ -91,9 +91,8 @@ def _write(rows: Sequence[Row], folder: Path) -> list[Path]:
     """Write a report into an empty folder."""
     make_folder(folder / FOLDER)
     parts = parts_of(rows)
-    looks = {
-        part.name: looks_of(map(curve_of, rated(part.drawn))) for part in parts
-    }  # colours tell the curves of a page
+    # Colours tell the curves of a page apart.
+    looks = {part.name: looks_of(map(curve_of, rated(part.drawn))) for part in parts}
     pages = {Path("results.md"): _first_page(parts)}
     plots = list[Path]()
     for part in parts:
