@@ -33,9 +33,9 @@ from meshreel.coding.reference_mesh import CodedReference, code_reference
 from meshreel.container.writer import Companion, ReelWriter
 from meshreel.decoder.video import Video
 from meshreel.decoder.video import open as open_video
-from meshreel.encoder.audio import packed_audio
-from meshreel.encoder.options import TextureOptions
-from meshreel.encoder.videos import Videos, layered_pictures
+from meshreel.edit.audio import packed_audio
+from meshreel.encoder.appearance.options import TextureOptions
+from meshreel.encoder.appearance.videos import Videos, layered_pictures
 from meshreel.format.layout import ChunkKind, Header
 from meshreel.format.records import pack
 from meshreel.geometry.atlas import Layout

@@ -102,8 +102,8 @@ def run(setting: Setting, out: Path, work: list[tuple[str, str, float]]) -> dict
 def encode_all(work: list[tuple[str, str, float]], out: Path, jobs: int) -> dict[str, str]:
     """Encode all work in this process; return the digest of each file."""
     from meshreel.cli.encode import workers
-    from meshreel.encoder.presets import preset_options
     from meshreel.encoder.sequence import Encoder
+    from meshreel.encoder.settings.presets import preset_options
     from meshreel.types import Mesh, MeshList
     from tests.small_options import quick
 

@@ -6,7 +6,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from meshreel.encoder.edit import retime, tag
+from meshreel.edit.edits import retime, tag
 from tests.golden import GOLDEN
 from tests.tones import tone
 

@@ -41,8 +41,8 @@ def small(preset_options: Any) -> Any:
     """A preset's options with little of everything, so that a page runs in seconds."""
     from meshreel.analysis.reference.extraction import ReferenceOptions
     from meshreel.analysis.reference.track import TrackOptions
-    from meshreel.encoder.draco import IntraOptions
-    from meshreel.encoder.options import PaperOptions
+    from meshreel.encoder.group.draco import IntraOptions
+    from meshreel.encoder.paper.options import PaperOptions
 
     def options(*arguments: Any, **named: Any) -> Any:
         reference = ReferenceOptions(vertices=300, keys=1, trial_vertices=300)

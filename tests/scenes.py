@@ -12,7 +12,7 @@ from meshreel.analysis.scene.background import BackgroundOptions
 from meshreel.analysis.scene.places import PlacesOptions
 from meshreel.analysis.scene.segmentation import SegmentOptions
 from meshreel.analysis.scene.views import ViewsOptions
-from meshreel.encoder.options import EncoderOptions, SceneOptions
+from meshreel.encoder.settings.options import EncoderOptions, SceneOptions
 from meshreel.geometry.topology import concatenate, weld
 from meshreel.types import Mesh
 

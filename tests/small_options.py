@@ -7,10 +7,12 @@ from dataclasses import replace
 from meshreel.analysis.follow.embedded import EmbeddedOptions, Stage
 from meshreel.analysis.scene.segmentation import SegmentOptions
 from meshreel.analysis.scene.views import ViewsOptions
-from meshreel.encoder.draco import IntraOptions
-from meshreel.encoder.options import EncoderOptions, LayersOptions, PaperOptions, SceneOptions
-from meshreel.encoder.presets import preset_options
-from meshreel.encoder.target import Fidelity
+from meshreel.encoder.group.draco import IntraOptions
+from meshreel.encoder.group.target import Fidelity
+from meshreel.encoder.layers.options import LayersOptions
+from meshreel.encoder.paper.options import PaperOptions
+from meshreel.encoder.settings.options import EncoderOptions, SceneOptions
+from meshreel.encoder.settings.presets import preset_options
 
 VIEWS = ViewsOptions(count=6, width=120, height=90, places=4, samples=500)
 TRIALS = IntraOptions(fractions=(1.0,), steps=(1.4, 0.7), levels=(0,))

@@ -14,9 +14,9 @@ from .errors import FormatError, InputError, MeshreelError
 if TYPE_CHECKING:
     from .decoder.video import Video, open
     from .encoder import edit
-    from .encoder.options import EncoderOptions
-    from .encoder.presets import preset_options
     from .encoder.sequence import encode
+    from .encoder.settings.options import EncoderOptions
+    from .encoder.settings.presets import preset_options
     from .io.sequence import SequenceOptions, open_sequence
     from .types import Mesh, MeshList, MeshSequence, as_sequence
 
@@ -44,12 +44,12 @@ __all__ = [
 _LATER = {
     **dict.fromkeys(("Video", "open"), ".decoder.video"),
     **dict.fromkeys(("Mesh", "MeshList", "MeshSequence", "as_sequence"), ".types"),
-    "EncoderOptions": ".encoder.options",
+    "EncoderOptions": ".encoder.settings.options",
     "SequenceOptions": ".io.sequence",
-    "edit": ".encoder.edit",
+    "edit": ".edit",
     "encode": ".encoder.sequence",
     "open_sequence": ".io.sequence",
-    "preset_options": ".encoder.presets",
+    "preset_options": ".encoder.settings.presets",
 }
 
 

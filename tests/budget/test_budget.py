@@ -19,11 +19,11 @@ from meshreel.coding.paper import laplacian
 from meshreel.container.reader import ReelReader
 from meshreel.container.sources import BytesSource
 from meshreel.container.writer import ReelWriter
-from meshreel.encoder.forms import IntraOptions, intra_only
-from meshreel.encoder.interval import Interval
-from meshreel.encoder.layers import encode_interval
-from meshreel.encoder.presets import layers_options
-from meshreel.encoder.target import Fidelity
+from meshreel.encoder.group.forms import IntraOptions, intra_only
+from meshreel.encoder.group.interval import Interval
+from meshreel.encoder.group.target import Fidelity
+from meshreel.encoder.layers.recipe import encode_interval
+from meshreel.encoder.settings.presets import layers_options
 from meshreel.errors import FormatError, InputError
 from meshreel.format import budget
 from meshreel.format.budget import LIMITS, Chain, CostlyError, Size

@@ -11,7 +11,7 @@ import pytest
 
 import meshreel
 from meshreel.cli.encode import command
-from meshreel.encoder.presets import preset_options
+from meshreel.encoder.settings.presets import preset_options
 from meshreel.errors import InputError
 from meshreel.io.sequence import SequenceOptions
 from tests.cli.conftest import Said, failed
@@ -273,7 +273,7 @@ def test_any_name_that_a_file_may_have_can_be_the_output(run, tmp_path):
 
 
 def test_a_size_that_no_header_holds_is_reported_before_anything_is_coded(run, tmp_path, monkeypatch):
-    monkeypatch.setattr("meshreel.encoder.recipe.encode_interval", lambda *_: pytest.fail("coded"))
+    monkeypatch.setattr("meshreel.encoder.run.schedule.encode_interval", lambda *_: pytest.fail("coded"))
     obj(tmp_path, "f0.obj", TRIANGLE.replace("1", "1e12") + "f 1 2 3\n")
     assert failed(run("encode", tmp_path, "-o", tmp_path / "a.reel", "--scale", "1e9"), "Header.scale")
 
@@ -293,7 +293,7 @@ def test_what_is_missing_for_colours_is_told_before_anything_is_encoded(run, tmp
     def encode(*_: object) -> None:
         raise InputError("encoding began")
 
-    monkeypatch.setattr("meshreel.encoder.appearance.find_spec", lambda _: None)
+    monkeypatch.setattr("meshreel.encoder.appearance.colors.find_spec", lambda _: None)
     monkeypatch.setattr("meshreel.cli.encode.Encoder.encode", encode)
     lines = TRIANGLE.replace("\n", " 1 0 0\n") + "f 1 2 3\n"
     for color, warned in (("auto", True), ("vertices", False)):

@@ -12,8 +12,8 @@ from PIL import Image
 import meshreel
 from meshreel.capture.recording import open_recording
 from meshreel.cli.encode import describe
-from meshreel.encoder.interval import Interval
-from meshreel.encoder.paper import encode_interval
+from meshreel.encoder.group.interval import Interval
+from meshreel.encoder.paper.recipe import encode_interval
 from meshreel.io.depth_pictures import write_depth
 from meshreel.io.write import write_mesh
 from tests.capture.depth_scenes import camera, measured, record
@@ -36,7 +36,7 @@ def quick_bodies(monkeypatch):
         alone = [frames] if frames[0].is_empty else [[frame] for frame in frames]
         return [group for some in alone for group in encode_interval(Interval(some), QUICK, stages)]
 
-    monkeypatch.setattr("meshreel.encoder.layers.encode_interval", frame_by_frame)
+    monkeypatch.setattr("meshreel.encoder.layers.recipe.encode_interval", frame_by_frame)
 
 
 def test_a_scene_is_reported_by_its_contents_and_info_agrees(run, scan, tmp_path):

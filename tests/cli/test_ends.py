@@ -123,7 +123,7 @@ if __name__ == "__main__":
 PLAIN = """
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
-from meshreel.encoder.worker import end_with_parent
+from meshreel.encoder.run.worker import end_with_parent
 
 def workers(jobs):
     return ProcessPoolExecutor(jobs, get_context("spawn"), end_with_parent)

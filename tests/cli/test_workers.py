@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from meshreel.cli.workers import workers
-from meshreel.encoder.worker import tell
+from meshreel.encoder.run.worker import tell
 
 
 def test_what_workers_tell_arrives_once():

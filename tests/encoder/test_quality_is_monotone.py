@@ -9,10 +9,11 @@ import pytest
 
 from meshreel.capture.procedural import SoftBodiesOptions, soft_bodies
 from meshreel.decoder.video import open as open_video
-from meshreel.encoder.draco import IntraOptions
-from meshreel.encoder.options import EncoderOptions, PaperOptions
-from meshreel.encoder.presets import preset_options
+from meshreel.encoder.group.draco import IntraOptions
+from meshreel.encoder.paper.options import PaperOptions
 from meshreel.encoder.sequence import encode
+from meshreel.encoder.settings.options import EncoderOptions
+from meshreel.encoder.settings.presets import preset_options
 from meshreel.geometry.decimate import decimate
 from meshreel.geometry.topology import weld
 from meshreel.io.sequence import SequenceOptions, open_sequence

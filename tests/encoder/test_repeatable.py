@@ -18,9 +18,9 @@ import pytest
 from threadpoolctl import threadpool_info
 
 import meshreel
-from meshreel.encoder.digests import Digests, line_of, note
-from meshreel.encoder.presets import appearance_options
+from meshreel.encoder.group.digests import Digests, line_of, note
 from meshreel.encoder.sequence import Encoder
+from meshreel.encoder.settings.presets import appearance_options
 from meshreel.format.layout import ChunkKind
 from meshreel.geometry.topology import concatenate
 from meshreel.types import Mesh, MeshList, Texture

@@ -14,7 +14,7 @@ import pytest
 
 import meshreel
 from meshreel.capture.procedural import SoftBodiesOptions, soft_bodies
-from meshreel.encoder.draco import IntraOptions
+from meshreel.encoder.group.draco import IntraOptions
 from meshreel.encoder.sequence import encode
 from meshreel.errors import InputError
 from meshreel.format.layout import Form

@@ -13,7 +13,7 @@ import meshreel
 from meshreel.analysis.scene.masks import read_views
 from meshreel.capture.rig import read_rig
 from meshreel.capture.truth import _labels
-from meshreel.encoder.journal import Journal
+from meshreel.encoder.run.journal import Journal
 from meshreel.errors import InputError
 from meshreel.io import read
 from meshreel.io.depth_pictures import read_depth

@@ -12,7 +12,7 @@ from meshreel_bench.codecs.draco import DecimatedDracoCodec
 
 from meshreel.analysis.scene.segmentation import SegmentOptions
 from meshreel.decoder.video import open as open_video
-from meshreel.encoder.options import SceneOptions
+from meshreel.encoder.settings.options import SceneOptions
 from meshreel.errors import FormatError, InputError
 from meshreel.format.layout import ChunkKind
 from meshreel.geometry.closest_points import Surface, distances

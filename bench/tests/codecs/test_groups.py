@@ -11,10 +11,10 @@ from meshreel_bench.codecs.tvmc.tracking import track_sequence
 
 from meshreel.capture.procedural import SoftBodiesOptions, soft_bodies
 from meshreel.encoder import paper
-from meshreel.encoder.interval import Interval
-from meshreel.encoder.options import EncoderOptions
+from meshreel.encoder.group.interval import Interval
+from meshreel.encoder.group.target import Fidelity
 from meshreel.encoder.sequence import Encoder, encode
-from meshreel.encoder.target import Fidelity
+from meshreel.encoder.settings.options import EncoderOptions
 from meshreel.types import Mesh, MeshList
 from tests.scenes import ball, quick_scene, with_room
 from tests.small_options import quick, with_method

@@ -16,8 +16,8 @@ from meshreel_bench.codecs.tvmc.tracking import Tracked, track_sequence
 from meshreel_bench.codecs.tvmc.video import TvmcVideo
 
 from meshreel.capture.procedural import SoftBodiesOptions, soft_bodies
-from meshreel.encoder.presets import reference_vertices
 from meshreel.encoder.sequence import Encoder
+from meshreel.encoder.settings.presets import reference_vertices
 from meshreel.errors import FormatError, InputError, NoReferenceError
 from meshreel.geometry.closest_points import distances
 from meshreel.geometry.topology import concatenate
@@ -141,7 +141,7 @@ def test_what_no_reference_follows_is_cut_or_coded_frame_by_frame(monkeypatch):
     def none(*_):
         raise NoReferenceError("none")
 
-    monkeypatch.setattr("meshreel.encoder.paper.analyze", none)
+    monkeypatch.setattr("meshreel.encoder.paper.recipe.analyze", none)
     plain = SMALL.encode(frames)
     assert kinds(plain) == [(0, 3, Kind.DRACO)]
     for data in (cut, plain):
@@ -166,7 +166,7 @@ def test_coordinates_around_a_million_keep_their_millimetres():
     ],
 )
 def test_options_out_of_range_are_refused(options, words, monkeypatch):
-    from meshreel.encoder.presets import preset_options
+    from meshreel.encoder.settings.presets import preset_options
 
     monkeypatch.setattr(f"{CODEC}.preset_options", preset_options)
     with pytest.raises(InputError, match=words):

@@ -14,6 +14,7 @@ from rich.table import Table
 
 from ..capture.truth import Truth, read_truth
 from ..container.sources import FileSource
+from ..decoder.describe import describe_file
 from ..decoder.video import Video
 from ..decoder.video import open as open_video
 from ..errors import FormatError, InputError
@@ -31,7 +32,6 @@ from ..metrics.viewpoints import read_cameras
 from ..types import UP_AXES, Frames, MeshSequence
 from .console import Common, StageBars
 from .flags import Knowing, Looking, Reading
-from .info import describe_file
 from .sources import open_source
 from .splats import compare_splats
 

@@ -16,15 +16,16 @@ from ..capture.recording import Recording, open_recording
 from ..capture.rig import RIG, read_cameras
 from ..capture.simulated_rig import TRUTH
 from ..capture.truth import read_truth
+from ..decoder.describe import describe_file
 from ..decoder.video import open as open_video
-from ..encoder.presets import preset_options
 from ..encoder.sequence import encode
+from ..encoder.settings.presets import preset_options
 from ..errors import InputError
 from ..metrics.error_sheet import SheetOptions, write_sheet
 from .compare import OF_BOTH, against_truth, both_table
 from .console import Common, StageBars, called_as
 from .encode import describe, summary_row
-from .info import describe_file, rate_table
+from .info import rate_table
 from .workers import workers
 
 _QUALITY = preset_options().quality

@@ -8,8 +8,8 @@ from typing import Annotated, Any
 import numpy as np
 from cyclopts import Parameter
 
-from ..encoder import edit
-from ..encoder.edit import Edited
+from .. import edit
+from ..edit.edits import Edited
 from ..errors import InputError
 from ..io.remote import Place, located
 from ..types import Up

@@ -12,16 +12,15 @@ from typing import Annotated, Any, Literal
 
 from cyclopts import Parameter
 
-from ..encoder.appearance import as_installed
-from ..encoder.digests import WriteLines, machine_line
-from ..encoder.excerpt import Excerpt, part_of, read_survey
-from ..encoder.options import EncoderOptions, SceneOptions
-from ..encoder.presets import preset_options
-from ..encoder.quality import Goal, encode_to
-from ..encoder.recipe import longest_interval
+from ..encoder.file.summary import SceneSummary, Summary
+from ..encoder.group.digests import WriteLines, machine_line
+from ..encoder.rate_control import Goal, encode_to
+from ..encoder.run.excerpt import Excerpt, part_of, read_survey
+from ..encoder.run.schedule import longest_interval
+from ..encoder.scene.static import is_colored
 from ..encoder.sequence import Encoder
-from ..encoder.static import is_colored
-from ..encoder.summary import SceneSummary, Summary
+from ..encoder.settings.options import EncoderOptions, SceneOptions, as_installed
+from ..encoder.settings.presets import preset_options
 from ..errors import InputError
 from ..io.remote import Place, located
 from ..io.sequence import SequenceOptions

@@ -8,7 +8,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from ..encoder.audio import packed_audio
+from ..edit.audio import packed_audio
 from ..errors import InputError
 from ..geometry.topology import weld
 from ..io.sequence import SequenceOptions

@@ -15,9 +15,9 @@ from ..analysis.scene.masks import CAMERAS, Masker
 from ..analysis.scene.pictures import write_views
 from ..analysis.scene.preview import FrameViews, label_colors, look_at_labels, sheet
 from ..analysis.scene.segmentation import mask_views, scene_views, segment, segment_by
-from ..encoder.labels import FrameLabels, label_frames
-from ..encoder.options import EncoderOptions, SceneOptions
-from ..encoder.presets import preset_options
+from ..encoder.scene.labels import FrameLabels, label_frames
+from ..encoder.settings.options import EncoderOptions, SceneOptions
+from ..encoder.settings.presets import preset_options
 from ..errors import InputError
 from ..geometry.cameras import pack_cameras
 from ..io.mask_pictures import is_mask

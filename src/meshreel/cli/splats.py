@@ -10,7 +10,7 @@ from ..analysis.appearance.splat_fit import SplatView
 from ..analysis.appearance.splat_raster import draw
 from ..analysis.appearance.splat_views import GOLDEN, rendered, ring, taken
 from ..decoder.video import Video
-from ..encoder.progress import Progress
+from ..encoder.group.progress import Progress
 from ..errors import InputError
 from ..geometry.derived_sequences import captured
 from ..geometry.splats import Bound

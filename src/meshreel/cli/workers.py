@@ -16,7 +16,7 @@ from multiprocessing.queues import SimpleQueue
 from typing import TYPE_CHECKING, Any
 
 from .. import __version__
-from ..encoder.worker import Told, die_with_parent, end_with_parent, tell_to
+from ..encoder.run.worker import Told, die_with_parent, end_with_parent, tell_to
 from ..errors import InputError
 from ..io.read import first_difference
 
@@ -80,7 +80,7 @@ def _cluster(address: str) -> Iterator[Executor]:
 
 def installed() -> dict[str, Any]:
     """Return the versions on which bytes depend."""
-    from ..encoder.digests import versions
+    from ..encoder.group.digests import versions
 
     return {"meshreel": __version__, "libraries": versions()}
 

@@ -27,6 +27,8 @@ from ..analysis.survey import Survey
 from ..coding.background import decode_background
 from ..container.writer import Companion, ReelWriter
 from ..decoder.video import open as open_video
+from ..edit.audio import Given, packed_audio
+from ..edit.metadata import rounded, upright
 from ..errors import InputError
 from ..format.layout import ChunkKind, Form, Header
 from ..geometry.closest_points import distances
@@ -36,25 +38,23 @@ from ..geometry.work import since, so_far
 from ..io.remote import Place
 from ..metrics.distance import PSNR_CEILING, psnr
 from ..types import MeshSequence, as_sequence, evenly
-from .appearance import as_installed
-from .audio import Given, packed_audio
-from .digests import WriteLines
-from .excerpt import Excerpt, write_survey
-from .interval import Interval
-from .job import Job
-from .journal import Journal, made_of, opened
-from .metadata import chosen_options, metadata_of, rounded, upright
-from .options import EncoderOptions
-from .paper import FindGroups, find_groups
-from .parts import Parts, take_apart
-from .presets import preset_options
-from .progress import Progress, Stages
-from .scene import Tracks, encode_bodies, scene_intervals
-from .static import Static, colored_states, is_colored
-from .summary import GroupSummary, SceneSummary, Summary
-from .surveying import surveyed
-from .tracks import TrackGroup, encode_tracked, intervals_of, tracked_bodies
-from .views import Calibrated
+from .file.metadata import chosen_options, metadata_of
+from .file.summary import GroupSummary, SceneSummary, Summary
+from .group.digests import WriteLines
+from .group.interval import Interval
+from .group.progress import Progress, Stages
+from .group.views import Calibrated
+from .paper.recipe import FindGroups, find_groups
+from .run.excerpt import Excerpt, write_survey
+from .run.job import Job
+from .run.journal import Journal, made_of, opened
+from .run.surveying import surveyed
+from .scene.parts import Parts, take_apart
+from .scene.scene import Tracks, encode_bodies, scene_intervals
+from .scene.static import Static, colored_states, is_colored
+from .scene.tracks import TrackGroup, encode_tracked, intervals_of, tracked_bodies
+from .settings.options import EncoderOptions, as_installed
+from .settings.presets import preset_options
 
 QUALITY, PRESET, EFFORT, COLOR = 50.0, "best", "normal", "auto"  # the default operating point (decision 9)
 MEASURED = 4  # frames of a scene that are compared with the decoded ones (guess)

@@ -21,7 +21,7 @@ import numpy as np
 from jaxtyping import Float64
 
 from ..decoder.video import open as open_video
-from ..encoder.worker import die_with_parent
+from ..encoder.run.worker import die_with_parent
 from ..errors import MeshreelError
 from ..types import Mesh
 

@@ -15,10 +15,10 @@ from meshreel.analysis.scene.settle import NEVER, Rest, SettleOptions, find_rest
 from meshreel.analysis.scene.views import ViewsOptions
 from meshreel.analysis.survey import survey
 from meshreel.coding.background import decode_background, decode_change
-from meshreel.encoder.options import SceneOptions
-from meshreel.encoder.parts import take_apart
-from meshreel.encoder.progress import Stages
-from meshreel.encoder.static import encode_static
+from meshreel.encoder.group.progress import Stages
+from meshreel.encoder.scene.parts import take_apart
+from meshreel.encoder.scene.static import encode_static
+from meshreel.encoder.settings.options import SceneOptions
 from meshreel.format.budget import CostlyError
 from meshreel.geometry.closest_points import Surface
 from meshreel.geometry.derived_sequences import captured
@@ -123,7 +123,7 @@ def test_a_change_that_costs_more_than_its_bytes_may_is_a_whole_background(scene
     def costly(payload: bytes, before: Mesh) -> Mesh:
         raise CostlyError(f"{len(payload)} bytes for {len(before.faces)} faces")
 
-    monkeypatch.setattr("meshreel.encoder.static.decode_change", costly)
+    monkeypatch.setattr("meshreel.encoder.scene.static.decode_change", costly)
     options = SceneOptions(OPTIONS)
     parts = take_apart(captured(scene), survey(scene), options, Stages(None, FRAMES))
     states = encode_static(parts, FRAMES, 4.0, options.background)

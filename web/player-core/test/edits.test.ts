@@ -12,7 +12,7 @@ import { hasPython, PYTHON, ROOT } from "../../test/python.ts";
 const SCRIPT = `
 import json, sys, tempfile
 import numpy as np, meshreel
-from meshreel.encoder.edit import cut, transform
+from meshreel.edit.edits import cut, transform
 with tempfile.TemporaryDirectory() as folder:
     cut("conformance/v1/scene.reel", folder + "/a.reel", "4:9")
     transform(folder + "/a.reel", folder + "/b.reel", 2.0, [[0, 0, 1], [0.6, 0.8, 0], [-0.8, 0.6, 0]], [1, 2, 3])

@@ -23,9 +23,9 @@ sys.path.insert(0, str(Path(__file__).parents[3]))
 from meshreel.coding.appearance.pictures import VideoEncoder, VideoOptions, to_i420
 from meshreel.decoder.video import Video
 from meshreel.decoder.video import open as open_video
-from meshreel.encoder.options import EncoderOptions
-from meshreel.encoder.presets import appearance_options
 from meshreel.encoder.sequence import Encoder
+from meshreel.encoder.settings.options import EncoderOptions
+from meshreel.encoder.settings.presets import appearance_options
 from meshreel.format.layout import VideoCodec
 from meshreel.geometry.atlas import MOST_SIDE
 from meshreel.geometry.derived_sequences import Welded

@@ -8,10 +8,10 @@ from typing import ClassVar
 
 from meshreel.analysis.scene.probe import is_scene
 from meshreel.analysis.survey import survey
-from meshreel.encoder.options import SceneOptions
-from meshreel.encoder.parts import take_apart
-from meshreel.encoder.progress import Stages
-from meshreel.encoder.static import Static, encode_static
+from meshreel.encoder.group.progress import Stages
+from meshreel.encoder.scene.parts import take_apart
+from meshreel.encoder.scene.static import Static, encode_static
+from meshreel.encoder.settings.options import SceneOptions
 from meshreel.geometry.derived_sequences import captured
 from meshreel.geometry.topology import part_of
 from meshreel.types import Mesh, MeshSequence

@@ -11,11 +11,12 @@ from dataclasses import replace
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from meshreel.encoder.interval import Interval
-from meshreel.encoder.options import EncoderOptions, PaperOptions
-from meshreel.encoder.paper import Fitted, FoundGroup, find_groups
-from meshreel.encoder.progress import Stages
+from meshreel.encoder.group.interval import Interval
+from meshreel.encoder.group.progress import Stages
+from meshreel.encoder.paper.options import PaperOptions
+from meshreel.encoder.paper.recipe import Fitted, FoundGroup, find_groups
 from meshreel.encoder.sequence import Encoder
+from meshreel.encoder.settings.options import EncoderOptions
 
 Found = tuple[tuple[int, Fitted | None], ...]  # of each group its number of frames, and the reference that follows them
 

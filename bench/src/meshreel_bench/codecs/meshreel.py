@@ -6,9 +6,9 @@ import tempfile
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from meshreel.encoder.options import EncoderOptions
-from meshreel.encoder.presets import preset_options
 from meshreel.encoder.sequence import Encoder
+from meshreel.encoder.settings.options import EncoderOptions
+from meshreel.encoder.settings.presets import preset_options
 from meshreel.types import MeshSequence
 
 from ..codec import Progress

@@ -6,8 +6,10 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import TypeVar
 
-from meshreel.encoder.options import EncoderOptions, LayersOptions, PaperOptions, SceneOptions
-from meshreel.encoder.presets import LITERAL_ANCHORS, preset_options
+from meshreel.encoder.layers.options import LayersOptions
+from meshreel.encoder.paper.options import PaperOptions
+from meshreel.encoder.settings.options import EncoderOptions, SceneOptions
+from meshreel.encoder.settings.presets import LITERAL_ANCHORS, preset_options
 from meshreel.errors import InputError
 
 UNIFORM, IN_MDS_POSE, BOTH = "one step, plain rounding", "MDS pose, no cuts", "MDS pose, no cuts, one step"

@@ -16,8 +16,8 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float64, UInt8
 
-from meshreel.encoder.presets import preset_options
 from meshreel.encoder.sequence import Encoder
+from meshreel.encoder.settings.presets import preset_options
 from meshreel.errors import InputError
 from meshreel.geometry.closest_points import Surface
 from meshreel.geometry.derived_sequences import DerivedSequence

@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from meshreel.analysis.reference.extraction import MDS
-from meshreel.encoder.options import PaperOptions
+from meshreel.encoder.paper.options import PaperOptions
 from meshreel.geometry.topology import components as connected
 from meshreel.metrics.error_sheet import SheetOptions, write_sheet
 from meshreel.metrics.viewpoints import Box

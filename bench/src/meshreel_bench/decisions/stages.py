@@ -18,7 +18,7 @@ from meshreel.coding import klt
 from meshreel.coding.group import decode_group, payload_bytes_by_purpose
 from meshreel.coding.paper.group import encode_laplacian
 from meshreel.coding.reference_mesh import CodedReference, code_reference
-from meshreel.encoder.options import PaperOptions
+from meshreel.encoder.paper.options import PaperOptions
 from meshreel.geometry.topology import vertex_normals
 from meshreel.types import Centers, Mesh, MeshList
 

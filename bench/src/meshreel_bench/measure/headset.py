@@ -19,7 +19,7 @@ import numpy as np
 
 from meshreel.container.reader import ReelReader
 from meshreel.container.sources import BytesSource
-from meshreel.encoder.edit import concat
+from meshreel.edit.edits import concat
 from meshreel.errors import InputError
 
 from ..experiments.headset import AARCH64, HOLDS

@@ -9,7 +9,7 @@ from functools import cache
 from pathlib import Path
 
 from meshreel import __version__
-from meshreel.encoder.digests import processor
+from meshreel.encoder.group.digests import processor
 
 from ..rows import Maker
 

@@ -15,7 +15,7 @@ from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 from typing import Any
 
-from meshreel.encoder.worker import end_with_parent
+from meshreel.encoder.run.worker import end_with_parent
 
 _SPAWN = multiprocessing.get_context("spawn")  # a forked process would have what its parent has in memory
 _ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from meshreel.encoder.surveying import SLICE
+from meshreel.encoder.run.surveying import SLICE
 
 from ..bd_rate import Curve, hull
 from ..experiments.study import D2, FLOOR, Measure

@@ -9,10 +9,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from meshreel.coding.layers.patches import run_lengths
-from meshreel.encoder.options import EncoderOptions, PaperOptions
-from meshreel.encoder.presets import preset_options
-from meshreel.encoder.progress import Stages
+from meshreel.encoder.group.progress import Stages
+from meshreel.encoder.paper.options import PaperOptions
 from meshreel.encoder.sequence import Encoder
+from meshreel.encoder.settings.options import EncoderOptions
+from meshreel.encoder.settings.presets import preset_options
 from meshreel.errors import InputError
 from meshreel.types import Mesh
 

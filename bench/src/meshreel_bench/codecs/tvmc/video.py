@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 from meshreel.coding.background import decode_background, decode_change
 from meshreel.coding.intra import decode_intra
-from meshreel.encoder.options import MOST_FRAMES
+from meshreel.encoder.group.interval import MOST_FRAMES
 from meshreel.format.layout import Form
 from meshreel.geometry.topology import concatenate
 from meshreel.types import Mesh, Placement

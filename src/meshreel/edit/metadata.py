@@ -1,0 +1,131 @@
+"""Metadata of files that are joined, cut or scaled: from the metadata of parts to those of a whole.
+
+In: JSON objects as an encoder wrote them (`encoder.file.metadata`). Out: the same of the edited file.
+Means over frames are joined from exact totals, so that parts give the metadata of one encode.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import astuple, dataclass
+from itertools import accumulate
+from typing import Any
+
+from ..format.edit import ITEM
+from ..types import Up
+
+HISTORY = "history"  # of a file that was edited: what was done, in words
+PART = "part"  # of a file that is a part: its place, its exact totals, and a digest of its options
+KEYS = "key_frames"
+CANONICAL = "canonical_references"
+MEANS = ("rms_m", "worst_rms_m", "d2_psnr_paper", "normal_error_deg")
+_OF_GROUPS = (KEYS, CANONICAL, *MEANS)
+
+
+@dataclass(frozen=True, slots=True)
+class Totals:
+    """Sums over frames, from which the means in the metadata are made."""
+
+    frames: int
+    squares: float  # m^2, of the distance
+    worst: float  # m, the largest
+    psnr: float  # dB
+    angle: float  # degrees
+
+    @staticmethod
+    def added(parts: Sequence[Totals]) -> Totals:
+        """Return the totals of all parts; sums are exact before they are rounded once."""
+        frames, squares, worst, psnr, angle = zip(*map(astuple, parts), strict=True)
+        return Totals(sum(frames), math.fsum(squares), max(worst), math.fsum(psnr), math.fsum(angle))
+
+    @staticmethod
+    def from_metadata(metadata: dict[str, Any], frames: int) -> Totals:
+        """Return the totals of a file of `frames` frames; where it is no part, from its rounded means.
+
+        Raises KeyError, TypeError or ValueError for metadata that have none, or that no encoder wrote.
+        """
+        if PART in metadata:
+            return Totals(frames, *map(_number, metadata[PART]["totals"]))
+        rms, worst, psnr, angle = (_number(metadata[name]) for name in MEANS)
+        return Totals(frames, frames * rms**2, worst, frames * psnr, frames * angle)
+
+    @property
+    def exact(self) -> list[float | None]:
+        """The sums without rounding, for JSON."""
+        return [value if math.isfinite(value) else None for value in astuple(self)[1:]]
+
+    @property
+    def means(self) -> dict[str, float | None]:
+        """The means by their names, rounded."""
+        root = (self.squares / self.frames) ** 0.5
+        values = (root, self.worst, self.psnr / self.frames, self.angle / self.frames)
+        return {name: rounded(value) for name, value in zip(MEANS, values, strict=True)}
+
+
+def joined_metadata(parts: Sequence[tuple[dict[str, Any], int]]) -> dict[str, Any]:
+    """Return the metadata of a whole from those of its parts and their numbers of frames, in order.
+
+    Key frames and means are joined where all parts have them: scenes have none, and cuts no means. Raises KeyError,
+    TypeError or ValueError for metadata that no encoder wrote.
+    """
+    dropped = {PART, ITEM} | {name for name in _OF_GROUPS if not all(name in metadata for metadata, _ in parts)}
+    found = {name: value for name, value in parts[0][0].items() if name not in dropped}
+    if KEYS in found:
+        firsts = accumulate((frames for _, frames in parts), initial=0)
+        pairs = zip(firsts, parts, strict=False)  # the last of the firsts is the number of all frames
+        found[KEYS] = [first + key for first, (metadata, _) in pairs for key in metadata[KEYS]]
+    if CANONICAL in found:
+        found[CANONICAL] = sum(metadata[CANONICAL] for metadata, _ in parts)
+    if all(name in found for name in MEANS):
+        found |= Totals.added([Totals.from_metadata(metadata, frames) for metadata, frames in parts]).means
+    return found
+
+
+def scaled_metadata(metadata: dict[str, Any], scale: float) -> dict[str, Any]:
+    """Return the metadata of a file whose frames are scaled: names in `_m` and the totals of a part are in metres.
+
+    Raises KeyError, TypeError or ValueError for metadata that no encoder wrote.
+    """
+    found = {name: _scaled(value, scale) if name.endswith("_m") else value for name, value in metadata.items()}
+    if PART in metadata and scale != 1:
+        squares, worst, *others = metadata[PART]["totals"]
+        exact = [None if squares is None else squares * scale**2, None if worst is None else worst * scale, *others]
+        found[PART] = metadata[PART] | {"totals": exact}
+    return found
+
+
+def of_all_parts(metadata: dict[str, Any]) -> dict[str, Any]:
+    """Return the metadata that all parts of a sequence have in common, the digest of their options among them.
+
+    Raises KeyError or TypeError for metadata that no encoder wrote.
+    """
+    found = {name: value for name, value in metadata.items() if name not in (PART, ITEM, HISTORY, *_OF_GROUPS)}
+    return found | ({"options": metadata[PART]["options"], "frames": metadata[PART]["of"]} if PART in metadata else {})
+
+
+def place_of(metadata: dict[str, Any]) -> tuple[int, int] | None:
+    """Return the first frame of a part, and how many frames its sequence has; None for a file that is no part.
+
+    Raises KeyError, TypeError or ValueError for metadata that no encoder wrote.
+    """
+    part = metadata.get(PART)
+    return None if part is None else (int(part["first_frame"]), int(part["of"]))
+
+
+def upright(up: Up) -> dict[str, Any]:
+    """Return the metadata that tells players which axis points up; none for y, their default."""
+    return {} if up == "y" else {"up": up}
+
+
+def rounded(value: float) -> float | None:
+    """Round to four significant digits; None where JSON has no number."""
+    return float(f"{value:.4g}") if math.isfinite(value) else None
+
+
+def _scaled(value: Any, scale: float) -> Any:
+    return rounded(value * scale) if type(value) in (int, float) and scale != 1 else value
+
+
+def _number(value: float | None) -> float:
+    return math.inf if value is None else float(value)

@@ -1,0 +1,67 @@
+"""Pictures of an atlas as video: as AV1, and where asked for as H.264, which more devices play.
+
+In: pictures in their order. Out: the payloads of chunks of kind PICTURES and COMPATIBLE.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from itertools import accumulate
+
+import numpy as np
+from jaxtyping import UInt8
+
+from ...coding.appearance.pictures import VideoEncoder, encode_pictures, to_i420
+from ...container.writer import Companion
+from ...format.layout import LAYER_PICTURES, ChunkKind, VideoCodec
+from ...geometry.atlas import Layout
+from .options import TextureOptions
+
+
+class Videos:
+    """One video of pictures in each coding that the file is to have."""
+
+    def __init__(self, layout: Layout, options: TextureOptions) -> None:
+        """Open the encoders. Raises InputError where PyAV or one of its encoders is missing."""
+        self._codecs = {ChunkKind.PICTURES: VideoCodec.AV1}
+        if options.compatible:
+            self._codecs[ChunkKind.COMPATIBLE] = VideoCodec.H264
+        size = layout.width, layout.height
+        self._encoders = {kind: VideoEncoder(*size, options.video, codec) for kind, codec in self._codecs.items()}
+        self._packets = {kind: list[bytes]() for kind in self._codecs}
+
+    def add(self, pixels: UInt8[np.ndarray, "H W 3"]) -> None:
+        """Encode the next picture, in sRGB."""
+        planes = to_i420(pixels)
+        for kind, encoder in self._encoders.items():
+            self._packets[kind] += encoder.add(planes)
+
+    def finish(self, counts: Sequence[int], interval: int = 1) -> list[list[Companion]]:
+        """End the videos; return what belongs to each of the groups with so many pictures, as they follow."""
+        found: list[list[Companion]] = [[] for _ in counts]
+        for kind, encoder in self._encoders.items():
+            packets = iter(self._packets[kind] + encoder.finish())
+            for own, count in zip(found, counts, strict=True):
+                some = [next(packets) for _ in range(count)]
+                own.append(Companion(kind, encode_pictures(some, self._codecs[kind], interval)))
+        return found
+
+
+def layered_pictures(
+    layout: Layout,
+    frames: range,
+    picture_of: Callable[[int], UInt8[np.ndarray, "H W 3"]],
+    options: TextureOptions,
+) -> list[Companion]:
+    """Return the pictures of a background in some frames, each shown until the next; a layer is a video of its own."""
+    layers = list[list[Companion]]()
+    for start in range(0, len(frames), LAYER_PICTURES):
+        some, videos = frames[start : start + LAYER_PICTURES], Videos(layout, options)
+        for frame in some:
+            videos.add(picture_of(frame))
+        layers += videos.finish([len(some)], frames.step)
+    found = list[Companion]()
+    for same in zip(*layers, strict=True):
+        payload = b"".join(companion.read() for companion in same)
+        found.append(Companion(same[0].kind, payload, tuple(accumulate(map(len, same)))))
+    return found

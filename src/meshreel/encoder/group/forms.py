@@ -1,0 +1,116 @@
+"""Forms of a group: coded groups and the choice of the cheaper form.
+
+In -> out: the frames of a group, and a reference that follows them or none -> an EncodedGroup with its fidelity.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from jaxtyping import Float64
+
+from ...coding.group import decode_group
+from ...coding.intra import encode_empty
+from ...coding.paper.displacements import DisplacementOptions
+from ...coding.paper.group import encode_laplacian
+from ...coding.reference_mesh import CodedReference
+from ...container.writer import Companion, Stored
+from ...errors import InputError
+from ...format.budget import CostlyError
+from ...format.layout import Form
+from ...geometry.work import Work
+from ...types import Mesh
+from .draco import IntraOptions, cheapest_intra, finest_intra
+from .target import NO_ERROR, Fidelity, measure
+
+# Times the bytes that half the distance (6 dB) may cost: a finer template gains 4 dB for that (decision 7).
+MOST_FOR_HALF = 2
+MOST_EMPTY = 65_535  # frames of a group without surface: what its field in the index holds
+
+
+@dataclass(frozen=True, slots=True)
+class EncodedGroup:
+    """The payload of a group and the fidelity measured on it."""
+
+    form: Form
+    frame_count: int
+    payload: bytes
+    layers: tuple[int, ...]  # k + 1 layers decode with k components, or to k levels
+    fidelity: Fidelity
+    predicted: bool = False  # from the group before
+    key: int | None = None  # the frame, counted in the group, whose surface the others follow
+    canonical: bool = field(default=False, kw_only=True)  # its reference lies in the pose of eq. 5
+    companions: tuple[Companion, ...] = field(default=(), kw_only=True)  # its colours, an atlas, pictures
+    lost_colors: bool = field(default=False, kw_only=True)  # its frames have colours that a reader would refuse
+    digests: tuple[str, ...] = field(default=(), kw_only=True)  # lines of `--debug-digests`
+    stored: Stored | None = None  # where the payload is, in place of `payload`, of a group that a journal has
+    work: Work = field(default_factory=dict, kw_only=True)  # that another process did until this group was done
+
+
+def laplacian(
+    frames: Sequence[Mesh],
+    reference: CodedReference,
+    positions: Float64[np.ndarray, "T V 3"],
+    options: DisplacementOptions,
+) -> EncodedGroup:
+    """Encode a group in the `laplacian` form. Raises CostlyError where readers would refuse it."""
+    try:
+        payload, layers = encode_laplacian(reference, displacement_field(reference, positions), options)
+    except ValueError as error:  # least squares that are singular, or whose elimination fills in
+        raise CostlyError(f"laplacian: {error}") from error
+    fidelity = measure(frames, decode_group(payload, len(frames)))
+    return EncodedGroup(Form.LAPLACIAN, len(frames), payload, layers, fidelity)
+
+
+def displacement_field(
+    reference: CodedReference, positions: Float64[np.ndarray, "T V 3"]
+) -> Float64[np.ndarray, "V T 3"]:
+    """Return the offsets of a reference's vertices to their positions in each frame (paper, section 3.3.2)."""
+    return np.ascontiguousarray(np.moveaxis(positions, 0, 1) - reference.base.vertices[:, None])
+
+
+def most_for(group: EncodedGroup) -> float:
+    """Return the bytes a frame up to which `cheaper` takes Draco in place of a group."""
+    return MOST_FOR_HALF * len(group.payload) / group.frame_count
+
+
+def cheaper(frames: Sequence[Mesh], group: EncodedGroup, options: IntraOptions) -> EncodedGroup:
+    """Return the group, or its `draco` form where that is the better bargain.
+
+    That is where Draco is as good and smaller, or so much better that no finer template would reach it for the bytes,
+    as on bodies of few, large faces.
+    """
+    size = len(group.payload)
+    found = cheapest_intra(frames, group.fidelity, most_for(group) * len(frames), options)
+    if found is None:
+        return group
+    payload, fidelity = found
+    if len(payload) >= size and fidelity.distance > group.fidelity.distance / 2:
+        return group
+    return EncodedGroup(Form.DRACO, len(frames), payload, (), fidelity)
+
+
+def intra_only(frames: Sequence[Mesh], target: Fidelity, options: IntraOptions) -> EncodedGroup:
+    """Encode frames in the `draco` form at the target's fidelity, or as finely as that form can.
+
+    Where its bytes may not hold so many frames, the group has only the first of them. Raises InputError where they may
+    not hold one.
+    """
+    found = cheapest_intra(frames, target, np.inf, options)
+    try:
+        payload, fidelity = found or finest_intra(frames, target.distance)
+    except CostlyError as error:
+        if len(frames) > 1:
+            return intra_only(frames[: len(frames) // 2], target, options)
+        raise InputError(
+            f"a mesh of {len(frames[0].faces)} faces: {error}, which no reader takes; simplify it"
+        ) from error
+    return EncodedGroup(Form.DRACO, len(frames), payload, (), fidelity)
+
+
+def empty_groups(count: int) -> Iterator[EncodedGroup]:
+    """Yield the groups of `count` frames without surface."""
+    for start in range(0, count, MOST_EMPTY):
+        yield EncodedGroup(Form.EMPTY, min(MOST_EMPTY, count - start), encode_empty(), (), NO_ERROR)

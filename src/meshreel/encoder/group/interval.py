@@ -1,0 +1,127 @@
+"""Intervals: frames of one track that need no others to be encoded, with the noise that they have."""
+
+from __future__ import annotations
+
+import copy
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+
+from ...analysis.pieces import piece_of_faces
+from ...analysis.survey import Survey
+from ...errors import InputError
+from ...geometry.depth import FreeSpace
+from ...geometry.derived_sequences import DerivedSequence
+from ...geometry.painted import Paint, Painted
+from ...geometry.topology import clean, part_of
+from ...types import Frames, Mesh, Up
+from .digests import Digests
+from .views import Sight, Views
+
+MOST_FRAMES = 64  # in a group: the tracker's distances and the basis grow with it (guess)
+
+
+@dataclass(frozen=True, slots=True)
+class Interval:
+    """Frames that are encoded together and need no others; all are empty or none is."""
+
+    frames: Frames  # normalised
+    noise: float = 0.0  # RMS distance of the frames from the truth, normalised; 0: a clean capture
+    frame_rate: float = field(default=30.0, kw_only=True)  # 1/s
+    first_frame: int = 0  # its number in the sequence
+    track: int = 0
+    digests: Digests | None = field(default=None, kw_only=True)  # of what its stages compute; None: nobody asks
+    # Digest of the frames; empty where they are frames of the sequence, or pieces of them: it has their digests.
+    surface: str = ""
+    up: Up = field(default="y", kw_only=True)  # the axis that points up
+    views: Views | None = field(default=None, kw_only=True)  # of colour cameras
+    sight: Sight | None = field(default=None, kw_only=True)  # of depth cameras
+    weight: Fraction = field(default=Fraction(1), kw_only=True)  # of each frame in progress: bodies share a frame
+    larger: float = field(default=1.0, kw_only=True)  # times, the whole frames than the body: targets are of the former
+
+    @property
+    def stop(self) -> int:
+        """The number of the frame that follows."""
+        return self.first_frame + len(self.frames)
+
+    def to_send(self) -> Interval:
+        """Return the interval for a worker process, which reads those of its frames that are in files."""
+        frames = self.frames.only() if isinstance(self.frames, NormalisedFrames) else self.frames
+        views = None if self.views is None else self.views.only(range(self.first_frame, self.stop))
+        return replace(self, frames=frames, views=views)
+
+    def paint(self, number: int, mesh: Mesh) -> Paint | None:
+        """Return what knows the colours of a frame, counted from the first, whose mesh this is; None: nothing does."""
+        if mesh.is_empty or not (mesh.is_colored or self.views is not None):
+            return None
+        return Painted(mesh) if self.views is None else self.views.at(self.first_frame + number)
+
+    def free(self, number: int) -> FreeSpace | None:
+        """Return what was seen through in a frame, counted from the first; None where nobody knows."""
+        return None if self.sight is None else self.sight.at(self.first_frame + number)
+
+    @property
+    def observed(self) -> Any:
+        """What reading the frames has shown, for `learn` of the interval that was sent."""
+        return self.frames.observed if isinstance(self.frames, NormalisedFrames) else None
+
+    def learn(self, observed: Any) -> None:
+        """Take what a worker observed. Raises InputError for a frame that has changed since it was read first."""
+        if isinstance(self.frames, NormalisedFrames):
+            self.frames.learn(observed)
+
+
+class NormalisedFrames(Frames):
+    """Frames of a sequence in normalised coordinates, computed on access."""
+
+    def __init__(self, sequence: DerivedSequence, seen: Survey, numbers: range) -> None:
+        self._sequence, self._seen, self._numbers = sequence, seen, numbers
+
+    def __len__(self) -> int:
+        return len(self._numbers)
+
+    def __getitem__(self, index: int) -> Mesh:
+        return self._seen.normalise(self._sequence[self._numbers[index]])
+
+    def only(self) -> NormalisedFrames:
+        """Return the same frames, with nothing else of their sequence."""
+        found = copy.copy(self)
+        found._sequence, found._seen = self._sequence.only(self._numbers), self._seen.without_frames()
+        return found
+
+    @property
+    def observed(self) -> Any:
+        """What the sequence observed."""
+        return self._sequence.observed
+
+    def learn(self, observed: Any) -> None:
+        """Take what the same frames observed in another process."""
+        self._sequence.learn(observed)
+
+
+class BodyFrames(NormalisedFrames):
+    """One body of frames of a sequence, cut out on access."""
+
+    def __init__(
+        self, sequence: DerivedSequence, seen: Survey, numbers: range, body: int, bodies: tuple[tuple[int, ...], ...]
+    ) -> None:
+        """Take of each frame the pieces that are this body; `bodies` has the body of each piece of each frame."""
+        super().__init__(sequence, seen, numbers)
+        self._body, self._bodies = body, bodies
+
+    def __getitem__(self, index: int) -> Mesh:
+        """Return the body in a frame. Raises InputError for a survey that has other pieces of the frame."""
+        mesh, bodies = clean(self._sequence[self._numbers[index]]), self._bodies[index]
+        pieces = piece_of_faces(mesh)
+        if (count := 1 + int(pieces.max(initial=0))) != len(bodies):
+            text = f"{self._sequence.name(self._numbers[index])}: has {count} large pieces, in its survey {len(bodies)}"
+            raise InputError(f"{text}; write it again with meshreel survey")
+        return self._seen.normalise(part_of(mesh, np.array(bodies)[pieces] == self._body))
+
+
+def check_group_size(size: int) -> None:
+    """Raise InputError for a group that may hold no frame, or more than `MOST_FRAMES`."""
+    if not 1 <= size <= MOST_FRAMES:
+        raise InputError(f"group size must be in 1 to {MOST_FRAMES}, got {size}")

@@ -1,0 +1,254 @@
+"""Templates that may follow the next frames: of a key frame or of the group before, followed outward until lost.
+
+In: the next frames. Out: for each candidate its residual on each frame that it follows, and its fit to those of a
+group. What is known of a candidate stays with it, so that no frame is tracked or fitted twice with one template.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+from jaxtyping import Float64
+
+from ...analysis.fit.closeness import Closeness
+from ...analysis.fit.frame import FrameSurface
+from ...analysis.fit.slide import Slide
+from ...analysis.fit.surface_fit import Fitting, strongest_components
+from ...analysis.follow.embedded import Painter, Tracker
+from ...analysis.follow.fused_template import fused_mesh
+from ...analysis.follow.template import base_mesh, shared_detail
+from ...coding.layers.coder import LayersState
+from ...coding.reference_mesh import CodedReference, code_on_lattice
+from ...geometry.painted import Paint
+from ...types import Mesh
+from ..group.digests import Digests, note
+from ..group.target import Fidelity
+from .options import LayersOptions
+
+LATTICE = 0.33  # spacing of the base's lattice, in steps: the motion codes what it rounds away (decision 14)
+LATTICE_ALONE = 0.8  # the same for a single frame, whose base need not move (decision 14)
+MOTIONS = 18.0  # 1/s: so many motions of a noisy body tell from noise (decision 28)
+LATER, EARLIER = 1, -1  # sides of a key
+
+
+@dataclass(frozen=True, slots=True)
+class Ahead:
+    """The frames that the next group may have, prepared for matching."""
+
+    first: int  # number of the first of them in its interval
+    surfaces: list[FrameSurface]
+    noise: float  # RMS distance of the frames from the truth, normalised
+    target: Fidelity  # that the frames should reach, normalised
+    digests: Digests | None = None
+    paint: Callable[[int, Mesh], Paint | None] = lambda *_: None  # as `Interval.paint`
+    frame_rate: float = 30.0  # 1/s
+
+    def __len__(self) -> int:
+        return len(self.surfaces)
+
+    @property
+    def numbers(self) -> range:
+        """Numbers of the frames in their interval."""
+        return range(self.first, self.first + len(self))
+
+    def at(self, number: int) -> FrameSurface:
+        """Return the frame with a number."""
+        return self.surfaces[number - self.first]
+
+    def painter(self, number: int) -> Painter:
+        """Return what finds who knows the colours of the frame with a number."""
+        return partial(self.paint, number, self.at(number).mesh)
+
+
+@dataclass(frozen=True, slots=True)
+class Followed:
+    """The template at the end of a group, from which the next group may be predicted."""
+
+    reference: CodedReference
+    state: LayersState  # as decoded
+    positions: Float64[np.ndarray, "V 3"]  # its fit to the last frame
+    closeness: Closeness
+    residual: float  # usual residual of its fits, RMS
+    slide: Slide | None = None  # to where its colours were; None: it has none
+    paint: Painter | None = None  # finds what knows the colours of the last frame
+
+
+class Candidate:
+    """A template that is followed outward from its key, the frame on which it lies, for as long as it fits."""
+
+    def __init__(
+        self, ahead: Ahead, key: int, options: LayersOptions, tracker: Tracker, before: Followed | None = None
+    ) -> None:
+        """Follow the surface of a tracker that begins at the key; `of_key` and `of_group` also give it a template."""
+        self.key, self.before, self._options, self._noise = key, before, options, ahead.noise
+        self._tolerated = options.tolerance * ahead.noise
+        self._target, self._tracker = ahead.target.distance, tracker
+        self._fits, self._residuals = dict[int, Float64[np.ndarray, "V 3"]](), dict[int, float]()
+        self.slide: Slide | None = None
+        self._ends = dict[int, int]()  # by side, the frame where the template is lost
+
+    @classmethod
+    def of_key(cls, ahead: Ahead, key: int, options: LayersOptions, tracker: Tracker | None = None) -> Candidate:
+        """Return the template of a key frame ahead; `tracker` is that of another template of the same key."""
+        if tracker is None:
+            tracker = Tracker(ahead.at(key).mesh, key, options.embedded, ahead.noise, ahead.painter(key))
+        found = cls(ahead, key, options, tracker)
+        if ahead.noise == 0 or not found._lay_fused(ahead):
+            found._lay(ahead)
+        return found
+
+    @classmethod
+    def of_group(cls, ahead: Ahead, before: Followed, options: LayersOptions) -> Candidate:
+        """Return the template at the end of the group before, whose last frame is its key."""
+        surface, key = Mesh(before.positions, before.reference.base.faces), ahead.first - 1
+        tracker = Tracker(surface, key, options.embedded, ahead.noise, before.paint)
+        found = cls(ahead, key, options, tracker, before)
+        found._take(before.reference, before.positions, before.closeness)
+        found._rest, found._usual, found.slide = before.positions, before.residual, before.slide
+        return found
+
+    def others(self, ahead: Ahead) -> list[Candidate]:
+        """Return templates of the same key with other errors, already followed, where these are tried."""
+        if self.before is not None:
+            return []
+        o, found = self._options, list[Candidate]()
+        for error in o.errors:
+            options = replace(o, template=replace(o.template, error=error * o.template.error), errors=())
+            found.append(Candidate.of_key(ahead, self.key, options, self._tracker))
+            found[-1].follow(ahead)
+        return found
+
+    def follow(self, ahead: Ahead) -> None:
+        """Track and fit the frames ahead on both sides of the key, up to one that is lost."""
+        if self._usual == np.inf:
+            return  # nothing is left of the key's surface as it would be coded
+        for side in (LATER, EARLIER):
+            for number in self._tracked(ahead, side):
+                if number not in self._residuals:
+                    self._fit(ahead, number)
+                if self._residuals[number] > self._limit(ahead):
+                    self._ends[side] = number
+                    break
+
+    def residuals(self, ahead: Ahead) -> Float64[np.ndarray, " T"]:
+        """Return the residuals on the frames ahead, in units of the distance to reach; infinite where it is lost."""
+        found = np.array([self._residuals.get(number, np.inf) for number in ahead.numbers])
+        return np.where(found <= self._limit(ahead), found / ahead.target.distance, np.inf)
+
+    def follows(self, ahead: Ahead, numbers: range) -> bool:
+        """Return whether none of these frames is lost."""
+        return bool(np.isfinite(self.residuals(ahead)[numbers.start - ahead.first : numbers.stop - ahead.first]).all())
+
+    def fit(self, ahead: Ahead, numbers: range) -> Float64[np.ndarray, "T V 3"]:
+        """Return the final fits to successive frames that it follows: near what one shape explains."""
+        if len(numbers) > 1 and (rigid := self._tracker.rigid(numbers)) is not None:
+            return np.stack([motion.of(self._points) for motion in rigid])
+        first = np.stack([self._fits[number] for number in numbers])
+        if not self._options.fit.components or len(numbers) == 1:
+            return first
+        first = self._slid(ahead, numbers, first)
+        count = len(self.reference.mesh.vertices)
+        usual = first.copy()
+        if self._noise > 0:  # what the base does beyond its strongest motions is noise
+            most = math.ceil(MOTIONS * len(first) / ahead.frame_rate)
+            usual[:, :count] = strongest_components(first[:, :count], len(first) // 2, most)
+        detail = shared_detail(self.reference.mesh.faces, count, self.reference.levels)
+        triples = zip(numbers, detail(usual), first, strict=True)
+        return np.stack([self._fitting.second(ahead.at(number), *both) for number, *both in triples])
+
+    def _slid(
+        self, ahead: Ahead, numbers: range, positions: Float64[np.ndarray, "T V 3"]
+    ) -> Float64[np.ndarray, "T V 3"]:
+        """Return fits to frames, slid to where these have the colours of the key frame, if they have colours."""
+        options, faces = self._options.slide, self.reference.base.faces
+        if options is None:
+            return positions
+        if self.slide is None and (paint := ahead.paint(self.key, ahead.at(self.key).mesh)) is not None:
+            self.slide = Slide(faces, self._fits[self.key], paint, options)
+        if self.slide is None:
+            return positions
+        pairs = [(number, ahead.paint(number, ahead.at(number).mesh)) for number in numbers if number != self.key]
+        found = positions.copy()
+        for number, paint in pairs:
+            if paint is not None:
+                found[number - numbers.start] = self.slide.to(positions[number - numbers.start], paint)
+        return found
+
+    def followed(
+        self, ahead: Ahead, state: LayersState, positions: Float64[np.ndarray, "V 3"], numbers: range
+    ) -> Followed:
+        """Return the template at the end of a group of these frames, for the group after it."""
+        usual = self._usual if self.before else float(np.median([self._residuals[number] for number in numbers]))
+        slide, paint = self.slide, ahead.painter(numbers[-1])
+        return Followed(self.reference, state, positions, self._closeness, usual, slide, paint)
+
+    def _limit(self, ahead: Ahead) -> float:
+        """Return the residual beyond which a frame is lost: there is none below a key that is lost itself."""
+        limit, target = self._options.plan_for(ahead.noise).limit, ahead.target.distance
+        return 0.0 if self._usual > limit * target and self.before is None else limit * max(target, self._usual)
+
+    def _tracked(self, ahead: Ahead, side: int) -> Iterator[int]:
+        """Yield frames outward from the key for as long as the key's surface is tracked."""
+        numbers = ahead.numbers
+        later, earlier = range(self.key + 1, numbers.stop), range(self.key - 1, numbers.start - 1, -1)
+        for number in later if side == LATER else earlier:
+            if number == self._ends.get(side):
+                return
+            residual = self._tracker.residual(number)
+            if residual is None:
+                residual = self._tracker.step(number, ahead.at(number), ahead.painter(number))
+            if residual > self._tracker.limits.lost:
+                self._ends[side] = number
+                return
+            yield number
+
+    def _lay_fused(self, ahead: Ahead) -> bool:
+        """Make the template of what all tracked frames have in common; return False where nothing is left of it."""
+        tracked = sorted([self.key, *(number for side in (LATER, EARLIER) for number in self._tracked(ahead, side))])
+        surfaces = [ahead.at(number) for number in tracked]
+        fused = fused_mesh(self._tracker.motion(tracked), surfaces, self._noise, self._options.fused)
+        if fused.is_empty or (reference := self._coded(ahead, fused)) is None:
+            return False
+        placed = reference.base.vertices
+        fitting = Fitting(reference.base.faces, len(placed), self._options.fit, self._tolerated)
+        self._rest = fitting.first(FrameSurface(fused), placed, placed)
+        self._take(reference, self._rest)
+        self._fit(ahead, self.key)
+        self._usual = self._residuals[self.key]
+        return True
+
+    def _lay(self, ahead: Ahead) -> None:
+        """Make the template of the key frame's surface."""
+        self._usual = np.inf
+        if (reference := self._coded(ahead, ahead.at(self.key).mesh)) is not None:
+            self._rest = reference.base.vertices
+            self._take(reference, self._rest)
+            self._fit(ahead, self.key)
+            self._rest, self._usual = self._fits[self.key], self._residuals[self.key]
+
+    def _coded(self, ahead: Ahead, surface: Mesh) -> CodedReference | None:
+        """Return a base mesh of a surface as decoded; None where nothing is left of it."""
+        o = self._options
+        lattice = o.layers.step_above(self._tolerated) * (LATTICE if len(ahead) > 1 else LATTICE_ALONE)
+        reference = code_on_lattice(base_mesh(surface, o.template, self._tolerated), lattice, o.template.levels)
+        note(ahead.digests, "template, coded", reference.base.vertices, reference.base.faces)
+        return None if reference.mesh.is_empty else reference
+
+    def _take(
+        self, reference: CodedReference, points: Float64[np.ndarray, "V 3"], closeness: Closeness | None = None
+    ) -> None:
+        """Let the template's vertices at the key be carried by the tracked surface."""
+        faces = reference.base.faces
+        self.reference, self._points, self._binding = reference, points, self._tracker.bound(Mesh(points, faces))
+        self._fitting = Fitting(faces, len(points), self._options.fit, self._tolerated)
+        self._closeness = closeness or Closeness(faces, points, self._target, self._noise)
+
+    def _fit(self, ahead: Ahead, number: int) -> None:
+        prediction = self._tracker.placed(number, self._points, self._binding)
+        positions = self._fitting.first(ahead.at(number), self._rest, prediction)
+        self._fits[number], self._residuals[number] = positions, self._closeness.of(positions, ahead.at(number))
+        note(ahead.digests, "first fit", self.key, number, positions)

@@ -1,0 +1,119 @@
+"""Coding of one group of layers: its template's motion, patches where they pay, or the form that is cheaper.
+
+In: frames, the positions of a template on them. Out: an EncodedGroup with its fidelity, and the decoder's state.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from jaxtyping import Float64, Int32
+
+from ...analysis.fit.frame import FrameSurface
+from ...coding.layers.coder import EncodedLayers, LayersState, encode_layers
+from ...coding.reference_mesh import CodedReference
+from ...format.budget import CostlyError
+from ...format.layout import Form
+from ...format.records import pack
+from ...types import Mesh
+from ..group.digests import Digests, note
+from ..group.draco import cheapest_intra
+from ..group.forms import EncodedGroup, cheaper, intra_only, laplacian, most_for
+from ..group.target import Fidelity, measure
+from .options import LayersOptions
+from .tails import find_tails
+
+MOST_FOR_EDGES = 4  # times the bytes that frames with their edges may cost (guess)
+TOO_COARSE = 1.5  # targets that the layers' distance may reach before the Laplacian form is tried (guess)
+
+
+@dataclass(frozen=True, slots=True)
+class GroupCoder:
+    """What the coding of a group depends on, beside its template."""
+
+    surfaces: Sequence[FrameSurface]
+    target: Fidelity  # that the frames should reach, normalised
+    noise: float  # RMS distance of the frames from the truth, normalised
+    options: LayersOptions
+    dearer: float = 0.0  # bytes a frame, for which Draco was tried and was no bargain
+    digests: Digests | None = field(default=None, kw_only=True)
+
+    @property
+    def frames(self) -> list[Mesh]:
+        """The frames themselves."""
+        return [surface.mesh for surface in self.surfaces]
+
+    def alone(self) -> EncodedGroup:
+        """Encode the frames one by one; only the first of them where bytes may not hold more."""
+        return intra_only(self.frames, self.target, self.options.intra)
+
+    def layers(
+        self, reference: CodedReference, positions: Float64[np.ndarray, "T V 3"], previous: LayersState | None
+    ) -> tuple[EncodedGroup, LayersState | None]:
+        """Encode the frames in their cheapest form; the state is None where that form is not `layers`.
+
+        With a `previous` state they are predicted from it. Where the bytes of a group may not hold so many frames, it
+        has only the first of them.
+        """
+        try:
+            noise = self.options.tolerance * self.noise
+            encoded = encode_layers(reference, positions, self.options.layers, previous, noise)
+        except CostlyError:
+            if len(self.surfaces) == 1:
+                return self.alone(), None
+            half = len(self.surfaces) // 2
+            return replace(self, surfaces=self.surfaces[:half]).layers(reference, positions[:half], previous)
+        note(self.digests, "fields and symbols", encoded.payload)
+        shown = self._with_tails(encoded, reference.base.faces)
+        note(self.digests, "patches", shown.payload[len(encoded.payload) :])
+        count = len(self.surfaces)
+        most = min(self.options.measured or count, count)
+        some = [(2 * k + 1) * count // (2 * most) for k in range(most)]
+        fidelity = measure([self.surfaces[k].mesh for k in some], [shown.frames[k] for k in some])
+        note(self.digests, "fidelity", fidelity)
+        is_predicted = previous is not None
+        chosen = EncodedGroup(Form.LAYERS, len(self.surfaces), shown.payload, shown.layers, fidelity, is_predicted)
+        if self.noise == 0 and fidelity.distance > TOO_COARSE * self.target.distance:
+            with suppress(CostlyError):
+                other = laplacian(self.frames, reference, positions, self.options.displacements)
+                if other.fidelity.reaches(fidelity) and len(other.payload) < len(chosen.payload):
+                    chosen = other
+        if not np.isfinite(chosen.fidelity.distance) or any(mesh.is_empty for mesh in shown.frames):
+            return self.alone(), None  # the template has collapsed: nothing is comparable
+        if (sharp := self._sharp(chosen)) is not None:
+            return sharp, None
+        if self.options.floor and most_for(chosen) > self.dearer:
+            chosen = cheaper(self.frames, chosen, self.options.intra)
+        return chosen, encoded.state if chosen.form == Form.LAYERS else None
+
+    def _sharp(self, group: EncodedGroup) -> EncodedGroup | None:
+        """Return the `draco` form of a group whose edges are lost, as those of few, large faces; else None."""
+        if group.fidelity.angle <= self.options.flat * self.target.angle:
+            return None
+        found = cheapest_intra(self.frames, self.target, MOST_FOR_EDGES * len(group.payload), self.options.intra)
+        return found and EncodedGroup(Form.DRACO, len(self.frames), found[0], (), found[1])
+
+    def _with_tails(self, encoded: EncodedLayers, faces: Int32[np.ndarray, "F 3"]) -> _Shown:
+        """Return the encoded layers, with a layer of patches where that pays."""
+        payload, layers = encoded.payload, encoded.layers
+        decoded = [Mesh(positions, faces) for positions in encoded.positions]
+        if self.options.tails is None:
+            return _Shown(payload, layers, decoded)
+        known, free = [surface.surface for surface in self.surfaces], [surface.free for surface in self.surfaces]
+        found = find_tails(known, decoded, len(payload), self.options.tails, noise=self.noise, free=free)
+        if found is None:
+            return _Shown(payload, layers, decoded)
+        payload += pack(found.record)
+        return _Shown(payload, (*layers, len(payload)), found.frames)
+
+
+@dataclass(frozen=True, slots=True)
+class _Shown:
+    """A payload of layers, and the frames that it decodes to."""
+
+    payload: bytes
+    layers: tuple[int, ...]  # where each ends
+    frames: list[Mesh]

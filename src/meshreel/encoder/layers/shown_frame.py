@@ -1,0 +1,140 @@
+"""A frame beside what is decoded of it: how far each is from the other, face by face.
+
+In: a frame's surface, the decoded mesh, and what cameras saw through. Out: squared distances, and what changes of them
+where faces are dropped or patched.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from jaxtyping import Bool, Float64, Int32, Int64
+
+from ...geometry.closest_points import Surface
+from ...geometry.depth import FreeSpace
+from ...geometry.strict import dot
+from ...geometry.topology import connected_faces, face_normals
+from ...types import Mesh
+
+BODY = 0.98  # share of the surface; the rest is the tails (decision 13)
+FAR = 0.006  # diagonals: surface farther than that has no counterpart (1 cm on a body, as for keys: decision 24)
+TINY = 1e-300  # of areas: a mesh may have none
+
+
+class ShownFrame:
+    """A frame and its decoded mesh, sampled at vertices and centroids, with the distances between both."""
+
+    def __init__(self, surface: Surface, decoded: Mesh, free: FreeSpace | None = None) -> None:
+        original, self._free = surface.mesh, free
+        self.original, self.decoded, self.surface, self.knows_free = original, decoded, surface, free is not None
+        self.points, areas = _samples(original)
+        shares = np.bincount(original.faces.reshape(-1), np.repeat(areas / 12, 3), len(original.vertices))
+        weights = np.concatenate([shares, 0.75 * areas])
+        self.weights = weights / weights.sum()
+        self.squared, self.hit = squared_distances(Surface(decoded), self.points)
+        points, self.areas = _samples(decoded)
+        self._nearest = squared_distances(self.surface, points)  # of the decoded mesh's samples
+        self.apart = self._of_free(points, self._nearest[0], decoded)  # of each decoded face, squared
+        self.errors = (
+            dot(self.weights, self.squared),
+            dot(self.areas, self.apart) / max(float(self.areas.sum()), TINY),
+        )
+
+    def wrong(self) -> Bool[np.ndarray, " F"]:
+        """Return the decoded faces that face away from the frame's surface, or are farther from it than `FAR`."""
+        middles = slice(len(self.decoded.vertices), None)  # of its samples
+        squared, hits = (each[middles] for each in self._nearest)
+        facing = np.einsum("nd,nd->n", face_normals(self.decoded)[0], self.surface.normals[hits])
+        return (facing < 0) | (squared > FAR**2)
+
+    def measured(self, far: float) -> tuple[Bool[np.ndarray, " F"], Bool[np.ndarray, " F"]]:
+        """Return the decoded faces that cameras face, and those that are within a squared distance of the surface."""
+        middles = len(self.decoded.vertices)
+        points = self.decoded.vertices[self.decoded.faces].mean(axis=1)
+        there = self._nearest[0][middles:] <= far
+        if self._free is None:
+            return np.zeros_like(there), there
+        return self._free.faced(points, face_normals(self.decoded)[0]), there
+
+    def body(self) -> float:
+        """Return the mean squared distance from the frame to the decoded mesh except its farthest 2 %."""
+        order = np.argsort(self.squared, kind="stable")
+        inside = order[: np.searchsorted(np.cumsum(self.weights[order]), BODY)]
+        return dot(self.weights[inside], self.squared[inside])
+
+    def gains(self, gone: Bool[np.ndarray, " F"]) -> Float64[np.ndarray, " F"]:
+        """Return how much each face lowers the mean of both errors when all these faces are dropped."""
+        invented = self.areas * (self.apart - self.errors[1]) / max(self.areas.sum(), TINY)
+        lost = self.weights * (self.left(gone) - self.squared)
+        return (invented * gone - np.bincount(self.hit, lost, len(gone))) / 2
+
+    def left(self, gone: Bool[np.ndarray, " F"] | None) -> Float64[np.ndarray, " N"]:
+        """Return squared distances from the frame's samples to the decoded mesh without the dropped faces."""
+        if gone is None or not gone.any():
+            return self.squared
+        if gone.all():
+            return np.full(len(self.squared), np.inf)
+        squared = self.squared.copy()
+        moved = gone[self.hit]
+        kept = Surface(Mesh(self.decoded.vertices, self.decoded.faces[~gone]))
+        squared[moved] = squared_distances(kept, self.points[moved])[0]
+        return squared
+
+    def errors_with(self, gone: Bool[np.ndarray, " F"], patch: Mesh, least: float) -> tuple[float, float]:
+        """Return mean squared distances, forward and backward, with a patch and without the dropped faces.
+
+        Samples that are nearer than `least` (squared) are not asked whether the patch is nearer still.
+        """
+        squared, areas, apart = self.left(gone), self.areas * ~gone, self.apart
+        if not patch.is_empty:
+            far = np.flatnonzero(squared > least)
+            squared = squared.copy()
+            squared[far] = np.minimum(squared[far], squared_distances(Surface(patch), self.points[far])[0])
+            more = self._apart(patch)
+            areas, apart = np.concatenate([areas, more[0]]), np.concatenate([apart, more[1]])
+        return dot(self.weights, squared), dot(areas, apart) / float(areas.sum()) if areas.any() else np.inf
+
+    def lost(self, squared: Float64[np.ndarray, " N"], limit: float) -> Iterator[Int64[np.ndarray, " S"]]:
+        """Yield connected faces, with a rim, that are farther than a squared limit from the decoded mesh."""
+        faces, count = self.original.faces, len(self.original.vertices)
+        far = _of_faces(squared, faces) > limit
+        touched = np.zeros(count, bool)
+        touched[faces[far]] = True
+        wide = np.flatnonzero(touched[faces].any(axis=1))
+        labels = connected_faces(faces[wide], count)
+        order = np.argsort(labels, kind="stable")
+        yield from np.split(wide[order], np.flatnonzero(np.diff(labels[order])) + 1) if len(wide) else ()
+
+    def samples_of(self, faces: Int64[np.ndarray, " S"]) -> Int64[np.ndarray, " n"]:
+        """Return the numbers of the samples on some of the frame's faces."""
+        return np.concatenate([np.unique(self.original.faces[faces]), len(self.original.vertices) + faces])
+
+    def _apart(self, mesh: Mesh) -> tuple[Float64[np.ndarray, " F"], Float64[np.ndarray, " F"]]:
+        points, areas = _samples(mesh)
+        return areas, self._of_free(points, squared_distances(self.surface, points)[0], mesh)
+
+    def _of_free(
+        self, points: Float64[np.ndarray, "N 3"], squared: Float64[np.ndarray, " N"], mesh: Mesh
+    ) -> Float64[np.ndarray, " F"]:
+        """Return mean squared distances of faces from those of samples, which count where a camera saw through them."""
+        if self._free is not None:
+            squared = np.where(self._free.at(points), squared, 0.0)
+        return _of_faces(squared, mesh.faces)
+
+
+def _samples(mesh: Mesh) -> tuple[Float64[np.ndarray, "N 3"], Float64[np.ndarray, " F"]]:
+    return np.concatenate([mesh.vertices, mesh.vertices[mesh.faces].mean(axis=1)]), face_normals(mesh)[1]
+
+
+def squared_distances(
+    surface: Surface, points: Float64[np.ndarray, "N 3"]
+) -> tuple[Float64[np.ndarray, " N"], Int32[np.ndarray, " N"]]:
+    """Return the squared distances of points from a surface, and the faces that are closest."""
+    hits = surface.closest(points)
+    return ((hits.points - points) ** 2).sum(axis=1), hits.faces
+
+
+def _of_faces(squared: Float64[np.ndarray, " N"], faces: Int32[np.ndarray, "F 3"]) -> Float64[np.ndarray, " F"]:
+    """Return means over the faces; 1/12 for each corner and 3/4 for the centroid integrate quadratics exactly."""
+    return squared[faces].sum(axis=1) / 12 + 0.75 * squared[-len(faces) :]

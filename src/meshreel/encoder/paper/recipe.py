@@ -1,0 +1,165 @@
+"""The paper's recipe: an interval of frames is tracked, fitted to one reference, cut where the fit fails, and coded.
+
+In -> out: frames in normalised coordinates -> groups with their fidelity (paper, sections 3.1 and 3.3). An interval
+needs no other frames, so intervals can be spread over processes.
+
+Differs from the paper: groups are not all of one length, and frames that no reference follows are coded one by one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Float64
+
+from ...analysis.fit.surface_fit import Fit, Guides, fit_frames, snap_to_vertices
+from ...analysis.groups import cut_at
+from ...analysis.reference.extraction import MDS, extract_reference, predict
+from ...analysis.reference.track import track_centers
+from ...coding.reference_mesh import CodedReference, code_reference
+from ...errors import NoReferenceError
+from ...format.budget import CostlyError
+from ...format.layout import Form
+from ...types import Centers, Mesh
+from ..group.digests import Digests, note
+from ..group.forms import EncodedGroup, cheaper, empty_groups, intra_only, laplacian
+from ..group.interval import Interval
+from ..group.progress import Stages
+from ..group.target import target_of
+from .options import PaperOptions
+
+
+@dataclass(frozen=True, slots=True)
+class Fitted:
+    """A reference that follows the frames of a group, and its positions in each."""
+
+    reference: CodedReference
+    positions: Float64[np.ndarray, "T V 3"]  # of its base's vertices, normalised
+    canonical: bool = False  # whether it lies in the pose of eq. 5
+
+
+@dataclass(frozen=True, slots=True)
+class FoundGroup:
+    """Frames that become one group, with the reference that follows them."""
+
+    frames: Sequence[Mesh]
+    fitted: Fitted | None  # None: no reference follows them
+
+
+FindGroups = Callable[[Interval, PaperOptions, "Stages | None"], list[FoundGroup]]
+
+
+def encode_interval(
+    interval: Interval, options: PaperOptions, stages: Stages | None = None, find: FindGroups | None = None
+) -> list[EncodedGroup]:
+    """Encode an interval as one group, or as several where one reference cannot follow.
+
+    `find` replaces `find_groups`, to reuse the references of an earlier encode.
+    """
+    count = len(interval.frames)
+    stages = stages or Stages(None, count)
+    if interval.frames[0].is_empty:
+        groups = list(empty_groups(count))
+    else:
+        found = (find or find_groups)(interval, options, stages)
+        groups = [group for one in found for group in _encode_group(one, options, interval.noise)]
+    stages.add("code", count)
+    return groups
+
+
+def find_groups(interval: Interval, options: PaperOptions, stages: Stages | None = None) -> list[FoundGroup]:
+    """Cut an interval into groups that one reference follows each, or none does; every frame has a surface.
+
+    The interval is cut where the fit fails, `options.groups.depth` times at most.
+    """
+    frames = list(interval.frames)
+    stages = stages or Stages(None, len(frames))
+    if len(frames) == 1:
+        return [FoundGroup(frames, None)]
+    centers = track_centers(frames, options.track)
+    note(interval.digests, "centers", centers.positions)
+    stages.add("track", len(frames))
+    return _Cutting(options, interval.noise, interval.digests).groups(frames, centers, options.groups.depth, stages)
+
+
+def analyze(
+    frames: Sequence[Mesh], centers: Centers, options: PaperOptions, stages: Stages
+) -> tuple[Fitted, Float64[np.ndarray, " T"]]:
+    """Return the fitted reference of a group, as decoded, and each frame's residual (paper, sections 3.3.1 and 3.3.2).
+
+    Raises NoReferenceError where no surface can be made of the frames.
+    """
+    reference = extract_reference(frames, centers, options.reference, options.pose == "mds")
+    if reference.mesh.is_empty:
+        raise NoReferenceError("no surface is common to the frames")
+    stages.add("reference", len(frames))
+    coded = code_reference(reference.mesh, options.reference_bits, options.levels)
+    if coded.base.is_empty:
+        raise NoReferenceError("the reference mesh has no faces left after Draco")
+    predictions = predict(reference, coded.base, centers, options.reference.deform)
+    fit = _fit(coded, predictions, frames, options, reference.key)
+    stages.add("fit", len(frames))
+    return Fitted(coded, fit.positions, reference.frame == MDS), fit.residuals
+
+
+def _fit(
+    coded: CodedReference,
+    predictions: Float64[np.ndarray, "T V 3"],
+    frames: Sequence[Mesh],
+    options: PaperOptions,
+    key: int,
+) -> Fit:
+    if options.fit == "nearest":
+        return snap_to_vertices(coded.base.faces, predictions, frames)
+    return fit_frames(coded.base.faces, predictions, frames, options.surface_fit, Guides(key=key))
+
+
+@dataclass(frozen=True, slots=True)
+class _Cutting:
+    """How an interval is cut into groups."""
+
+    options: PaperOptions
+    noise: float
+    digests: Digests | None = None
+
+    def groups(self, frames: Sequence[Mesh], centers: Centers, depth: int, stages: Stages) -> list[FoundGroup]:
+        """Cut frames as `find_groups` does, from tracked centers; `depth` times at most."""
+        options = self.options
+        if len(frames) == 1:
+            return [FoundGroup(frames, None)]
+        try:
+            fitted, residuals = analyze(frames, centers, options, stages)
+        except NoReferenceError:
+            return [FoundGroup(frames, None)]
+        note(self.digests, "reference, coded", fitted.reference.base.vertices, fitted.reference.base.faces)
+        note(self.digests, "fit", fitted.positions)
+        cut = cut_at(residuals / target_of(frames, options.target, self.noise).distance, options.groups)
+        if cut is None or not options.cuts:
+            return [FoundGroup(frames, fitted)]
+        if depth == 0:
+            return [FoundGroup(frames, None)]
+        head, tail = frames[:cut], frames[cut:]
+        known = replace(centers, positions=centers.positions[:cut])
+        retracked = track_centers(tail, options.track)  # centers that were lost before the cut would spoil the tail
+        quick = replace(self, options=replace(options, reference=options.reference.fewer_trials()))
+        again = Stages(None, len(frames))  # these frames have been through the stages once
+        return [*quick.groups(head, known, depth - 1, again), *quick.groups(tail, retracked, depth - 1, again)]
+
+
+def _encode_group(found: FoundGroup, options: PaperOptions, noise: float) -> Iterator[EncodedGroup]:
+    """Yield a group in the cheaper of both forms, or in the only one it can have; its halves where bytes are few."""
+    frames = found.frames
+    if found.fitted is not None:
+        with suppress(CostlyError):
+            group = laplacian(frames, found.fitted.reference, found.fitted.positions, options.coded)
+            is_fixed = options.displacements.basis_size is not None or not options.cuts
+            group = group if is_fixed else cheaper(frames, group, options.intra)
+            yield replace(group, canonical=found.fitted.canonical and group.form == Form.LAPLACIAN)
+            return
+    while frames:
+        group = intra_only(frames, target_of(frames, options.target, noise), options.intra)
+        yield group
+        frames = frames[group.frame_count :]

@@ -1,0 +1,164 @@
+"""The choice of the recipe: an interval becomes groups by the paper's recipe or by that of layers.
+
+In -> out: an interval, the options of a recipe -> groups, in order. An interval needs no other frames, so that
+intervals can be encoded side by side, and those that an earlier run had done are taken from its journal.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+from threadpoolctl import threadpool_limits
+
+from ...geometry.work import add, heard, since, so_far
+from ...types import evenly
+from ..appearance.colors import colored_groups, has_pictures
+from ..appearance.options import AppearanceOptions
+from ..group.digests import Digests, note
+from ..group.forms import EncodedGroup
+from ..group.interval import Interval
+from ..group.progress import IntervalStages, Stages
+from ..layers import recipe as layers
+from ..layers.options import LayersOptions
+from ..paper import recipe as paper
+from ..settings.options import EncoderOptions, MethodOptions
+from .job import Job
+from .side_by_side import Call, as_done
+from .worker import end_with_parent, tell
+
+
+def encode_intervals(job: Job, intervals: Iterable[Interval]) -> Iterator[list[EncodedGroup]]:
+    """Yield the groups of each interval, in order; with an executor, its workers encode them in any order.
+
+    Where the job has a journal, the groups are those that it has, or are stored in it as soon as they are there: what
+    waits here for an earlier interval has no payloads.
+    """
+    job.stages.add("code", 0)  # the time that a frame takes is counted from here
+    for groups, lines in _one_by_one(job, intervals) if job.executor is None else _side_by_side(job, intervals):
+        if job.digests is not None:
+            job.digests(lines)
+        yield groups
+
+
+_Done = tuple[list[EncodedGroup], str]  # and lines of digests
+
+
+def _one_by_one(job: Job, intervals: Iterable[Interval]) -> Iterator[_Done]:
+    """Encode intervals here, each when it is asked for."""
+    for interval in map(partial(_noting, job), intervals):
+        stages = _stages_of(job, interval)
+        if (known := _known(job, interval, stages)) is not None:
+            yield known, ""
+            continue
+        with heard(stages.hear):
+            groups = list(encode_interval(interval, job.options.method, stages, job.find, job.options.appearance))
+        yield _kept(job, interval, groups)
+
+
+def _side_by_side(job: Job, intervals: Iterable[Interval]) -> Iterator[_Done]:
+    """Encode intervals in workers: which read their frames themselves, where frames are in files."""
+    assert job.executor is not None
+    ready, sent, next_one = dict[int, _Done](), dict[int, tuple[Interval, IntervalStages]](), 0
+    told = getattr(job.executor, "told", None)  # workers of the command line tell of each frame
+
+    def calls() -> Iterator[Call]:
+        for number, interval in enumerate(map(partial(_noting, job), intervals)):
+            stages = _stages_of(job, interval)
+            if (known := _known(job, interval, stages)) is not None:
+                ready[number] = known, ""
+                continue
+            sent[number] = interval, stages
+            yield number, encode_sent, (interval.to_send(), job.options, number)
+
+    def look() -> None:
+        for number, stage, done in told() if told is not None else ():
+            if number in sent:
+                sent[number][1].reach_frame(stage, done)
+
+    for number, (groups, observed) in as_done(job.executor, calls(), None if told is None else look):
+        interval, stages = sent.pop(number)
+        interval.learn(observed)
+        stages.reach("code", 1.0)
+        for group in groups:
+            add(group.work)
+        ready[number] = _kept(job, interval, groups)
+        while next_one in ready:
+            yield ready.pop(next_one)
+            next_one += 1
+    yield from (ready[number] for number in sorted(ready))
+
+
+def _noting(job: Job, interval: Interval) -> Interval:
+    """Return the interval with what collects its digests, where they are wanted."""
+    if job.digests is None:
+        return interval
+    return replace(interval, digests=Digests(interval.track, interval.first_frame))
+
+
+def _stages_of(job: Job, interval: Interval) -> IntervalStages:
+    return IntervalStages(job.stages, len(interval.frames), job.options.method.group_size, interval.weight)
+
+
+def _known(job: Job, interval: Interval, stages: IntervalStages) -> list[EncodedGroup] | None:
+    """Return the groups of an interval from the journal of an earlier run, None where it has them not."""
+    known = None if job.journal is None else job.journal.take(interval)
+    if known is not None:
+        stages.reach("code", 1.0)
+    return known
+
+
+def _kept(job: Job, interval: Interval, groups: list[EncodedGroup]) -> _Done:
+    """Store the groups of an interval where there is a journal; return them and their lines of digests."""
+    lines = "".join(line for group in groups for line in group.digests)
+    return groups if job.journal is None else job.journal.keep(interval, groups), lines
+
+
+def encode_interval(
+    interval: Interval,
+    options: MethodOptions,
+    stages: Stages | None = None,
+    find: paper.FindGroups | None = None,
+    appearance: AppearanceOptions | None = None,
+) -> Iterator[EncodedGroup]:
+    """Encode an interval as groups, in order, by the recipe whose options are given; with colours by `appearance`.
+
+    `find` finds the groups of the paper's recipe; pass another to reuse an earlier analysis.
+    """
+    options = replace(options, target=options.target.scaled(interval.larger))
+    if isinstance(options, LayersOptions):
+        if appearance is None:  # what is not kept does not tell where the surface is, either
+            options = replace(options, slide=None)
+        some = (interval.frames[number] for number in evenly(len(interval.frames), 3))
+        splats = appearance is not None and appearance.splats is not None
+        if interval.noise or splats or has_pictures(interval, some, appearance):  # a frame in the `draco` form has none
+            options = replace(options, floor=False)
+        groups = layers.encode_interval(interval, options, stages)
+    else:
+        groups = iter(paper.encode_interval(interval, options, stages, find))
+    for group in colored_groups(groups, interval, appearance, stages):
+        note(interval.digests, "payload", group.form.name, group.payload, *(one.read() for one in group.companions))
+        yield group if interval.digests is None else replace(group, digests=interval.digests.take())
+
+
+def encode_sent(interval: Interval, options: EncoderOptions, number: int) -> tuple[list[EncodedGroup], Any]:
+    """Encode an interval in a worker process, which ends with its parent; the result can be pickled.
+
+    Return the groups, and what reading the frames has shown.
+    """
+    end_with_parent()
+    count = len(interval.frames)
+    stages = IntervalStages(Stages(partial(tell, number), count), count, options.method.group_size)
+    with threadpool_limits(1), heard(stages.hear):
+        before = so_far()
+        *others, last = encode_interval(interval, options.method, stages, None, options.appearance)
+        return [*others, replace(last, work=since(before))], interval.observed
+
+
+def longest_interval(options: EncoderOptions, frame_rate: float) -> int:
+    """Return how many frames an interval has at most: a key interval of layers, or one group of the paper's recipe."""
+    if isinstance(options.method, LayersOptions):
+        return max(1, round(options.key_interval * frame_rate))
+    return options.method.group_size

@@ -1,0 +1,256 @@
+"""Taking a scene apart: moving surface, background, noise, and the size of the moving bodies (paper, section 3.2).
+
+In: the frames of a scene, options. Out: Parts, which the encoding of every interval of the scene uses.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property, lru_cache
+
+import numpy as np
+from jaxtyping import Bool, Float64
+
+from ...analysis.scene.background import BackgroundOptions, fuse_background
+from ...analysis.scene.background_depth import Moment, fuse_still_depth
+from ...analysis.scene.bodies import beyond, ring, with_ring
+from ...analysis.scene.labelling import Segmentation
+from ...analysis.scene.masks import Masker
+from ...analysis.scene.segmentation import segment, segment_by
+from ...analysis.survey import Survey, check_one_unit
+from ...errors import InputError
+from ...geometry.closest_points import Surface
+from ...geometry.depth import DepthPicture, FreeSpace
+from ...geometry.derived_sequences import CapturedSequence, ChosenParts
+from ...geometry.topology import components, concatenate, face_normals, part_of
+from ...types import Mesh, MeshSequence, evenly
+from ..group.progress import Stages
+from ..settings.options import SceneOptions
+
+MOST_NOISE = 0.05  # RMS, of the diagonal of a body: beyond, nothing is left of a hand (guess)
+PROBES = 12  # frames, at most, in which moving surface is measured (guess)
+LOST = 0.5  # share of a frame's faces that may stand still where no background was found (guess)
+SEEN_THROUGH = 2  # of the probed frames, in which a place must be free that something stands at for a while (guess)
+APART, LEAST_APART = 4.0, 0.03  # deviations, and m: what is farther from the room is not of it (guess)
+OUTLIER = 3.0  # times the segmentation's `noise`: still surface farther from the background is no noise (guess)
+TAIL = 4.0  # standard deviations, by the median, beyond which a distance is no noise (guess)
+AS_FAR, FEWEST = 0.25, 1000  # share of the range, and vertices at least, from which the noise of bodies is told (guess)
+NORMAL_MEDIAN = 0.6745  # of the absolute value of what is normally distributed, in standard deviations
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """A change of the room from a frame on."""
+
+    frame: int
+    came: Mesh  # m, surface that stands still from this frame on
+
+
+@dataclass(frozen=True)
+class Parts:
+    """The parts of a scene, which all of its intervals share."""
+
+    seen: Survey  # of the scene; its unit is the diagonal of the largest body that moves, or its own where nothing does
+    segmentation: Segmentation
+    background: Mesh  # m, as in the first frame; empty where nothing stands still
+    changes: list[Change]
+    noise: float  # m, RMS distance of still surface, as far off as bodies, from the background: what bodies have
+    deviation: float  # m, the same by the median, as a standard deviation: without its tails
+    astray: float = 0.0  # share of the frames' surface that stands still, but is not in the background
+    free: tuple[FreeSpace, ...] = ()  # of some frames; none where no depth is known
+    _rooms: dict[int, Surface | None] = field(default_factory=dict, repr=False)
+
+    @property
+    def body_noise(self) -> float:
+        """RMS distance of the bodies from the truth, normalised: as noisy as the surface that stands still."""
+        return min(self.noise / self.seen.unit, MOST_NOISE)
+
+    @cached_property
+    def surface(self) -> Surface | None:
+        """The background, prepared for queries; None where there is none."""
+        return None if self.background.is_empty else Surface(self.background)
+
+    def moving(self, frame: int, mesh: Mesh) -> Mesh:
+        """Cut the surface that moves out of a frame, with what the room does not have there."""
+        by, moves = self.segmentation, self.segmentation.moving(frame, mesh)
+        if (room := self._room(sum(change.frame <= frame for change in self.changes))) is not None:
+            more = beyond(mesh, moves, room, max(APART * self.deviation, LEAST_APART))
+            moves |= more & self._is_left(mesh, more & ~moves)
+        return with_ring(mesh, moves, by.cell, self.surface)
+
+    def _is_left(self, mesh: Mesh, chosen: Bool[np.ndarray, " F"]) -> Bool[np.ndarray, " F"]:
+        """Return which of some faces were seen through in other frames: room that is measured now and then was not."""
+        if not self.free:
+            return chosen
+        middles = mesh.vertices[mesh.faces[chosen]].mean(axis=1)
+        seen = sum(free.at(middles).astype(np.int64) for free in self.free)
+        found = chosen.copy()
+        found[chosen] = seen >= min(SEEN_THROUGH, len(self.free))
+        return found
+
+    def _room(self, changes: int) -> Surface | None:
+        """Return the room after some changes, prepared for queries: all that stood there since the first frame."""
+        if not changes:
+            return self.surface
+        if changes not in self._rooms:
+            self._rooms.clear()
+            self._rooms[changes] = _room_after(self.background, self.changes[:changes])
+        return self._rooms[changes]
+
+
+def take_apart(
+    sequence: CapturedSequence, seen: Survey, options: SceneOptions, stages: Stages, masker: Masker | None = None
+) -> Parts:
+    """Separate a scene into background and moving surface; by the masks of a masker where there is one.
+
+    Raises InputError where frames are of different units, or of another than metres.
+    """
+    check_one_unit(seen)
+    segmentation: Segmentation
+    if masker is None:
+        segmentation = segment(sequence, options.segment, lambda share: stages.reach("segment", share))
+    else:
+        segmentation = segment_by(masker, sequence, options.segment)
+    stages.reach("segment", 1.0)
+    background = _background(sequence, segmentation, options.background, stages)
+    if background.is_empty:
+        _check_nothing_lost(sequence, segmentation, options.background)
+    changes = [_change(sequence, segmentation, frame, options.background) for frame in segmentation.changes]
+    stages.reach("background", 1.0)
+    found = _measured(sequence, segmentation, background, changes, stages)
+    unit = float(np.median(found.sizes)) if found.sizes else 0.0
+    seen = replace(seen, scale=unit or seen.diagonal)
+    depth, some = sequence.depth, evenly(len(sequence), PROBES)
+    free = () if depth is None else tuple(FreeSpace.of(depth[number]) for number in some)
+    return Parts(seen, segmentation, background, changes, found.noise, found.deviation, found.astray, free)
+
+
+def _check_nothing_lost(sequence: MeshSequence, segmentation: Segmentation, options: BackgroundOptions) -> None:
+    """Raise InputError where there is no background, but much of a frame stands still: the file would lack it."""
+    for number in evenly(len(sequence), options.frames):
+        mesh = sequence[number]
+        still = segmentation.still_at_first(number, mesh)
+        if still.sum() > LOST * len(mesh.faces):
+            text = f"frame {number}: {still.sum()} of {len(mesh.faces)} faces stand still, but are too small for a room"
+            size = f"the frame is {mesh.diagonal:.3g} m large; is it in metres? If not, give --scale"
+            raise InputError(f"{text}: {size}; if so, encode with --dynamic-only")
+
+
+def _background(
+    sequence: CapturedSequence, segmentation: Segmentation, options: BackgroundOptions, stages: Stages
+) -> Mesh:
+    """Fuse the surface that stands still at first, from the cameras' depth where it is known."""
+    numbers, cell = evenly(len(sequence), options.frames), segmentation.cell
+
+    def stands(number: int, mesh: Mesh) -> Bool[np.ndarray, " F"]:
+        stages.reach("background", number / len(sequence))
+        return segmentation.still_at_first(number, mesh)
+
+    if options.depth and sequence.depth is not None:
+        return _fused(sequence, numbers, stands, cell, options)
+
+    def clear(number: int, mesh: Mesh) -> Bool[np.ndarray, " F"]:
+        still = stands(number, mesh)
+        return still & ~ring(mesh, ~still, cell)
+
+    return fuse_background(ChosenParts(sequence, numbers, clear), cell, options)
+
+
+def _fused(
+    sequence: CapturedSequence,
+    numbers: Sequence[int],
+    still: Callable[[int, Mesh], Bool[np.ndarray, " F"]],
+    cell: float,
+    options: BackgroundOptions,
+) -> Mesh:
+    """Fuse the still faces of some frames from their depth pictures, which are known."""
+    depth = sequence.depth
+    assert depth is not None
+    meshes = ((number, sequence[number]) for number in numbers)
+    return fuse_still_depth((Moment(depth[k], mesh, still(k, mesh)) for k, mesh in meshes), cell, options)
+
+
+def _change(sequence: CapturedSequence, segmentation: Segmentation, frame: int, options: BackgroundOptions) -> Change:
+    numbers = [frame + number for number in evenly(len(sequence) - frame, options.frames)]
+    if options.depth and sequence.depth is not None:
+        room = _fused(sequence, numbers, lambda k, mesh: ~segmentation.moving(k, mesh), segmentation.cell, options)
+        return Change(frame, part_of(room, segmentation.came(frame, room)))
+    later = ChosenParts(sequence, numbers, lambda _, mesh: segmentation.came(frame, mesh))
+    return Change(frame, fuse_background(later, segmentation.cell, options))
+
+
+def _room_after(background: Mesh, changes: Sequence[Change]) -> Surface | None:
+    """Return all that stood in the room up to some changes, prepared for queries; None where that is nothing."""
+    there = concatenate([background, *(change.came for change in changes)])
+    return None if there.is_empty else Surface(there)
+
+
+@dataclass(frozen=True, slots=True)
+class _Measured:
+    """Noise, body sizes and stray surface measured in some frames."""
+
+    noise: float  # m, RMS distance of still surface from the background
+    deviation: float  # m, the same by the median
+    sizes: list[float]  # m, diagonals of the largest body of each frame
+    astray: float  # share of all surface that stands still far from the background
+
+
+def _as_far(
+    points: Float64[np.ndarray, "N 3"], bodies: Float64[np.ndarray, "M 3"], cameras: list[DepthPicture | None]
+) -> Bool[np.ndarray, " N"]:
+    """Return which points are about as far from the nearest camera as bodies are: a sensor's noise grows with range."""
+    eyes = [picture.camera.eye for picture in cameras if picture is not None]
+    if not eyes or not len(bodies):
+        return np.ones(len(points), bool)
+    own, theirs = (np.min([np.linalg.norm(some - eye, axis=1) for eye in eyes], axis=0) for some in (points, bodies))
+    near = np.abs(own / max(float(np.median(theirs)), 1e-9) - 1) <= AS_FAR
+    return near if near.sum() >= FEWEST else np.ones(len(points), bool)
+
+
+def _mean_square(gaps: Float64[np.ndarray, " N"]) -> float:
+    """Return the mean square of distances that are noise: far beyond the usual one, surface is another."""
+    usual = gaps[gaps <= TAIL / NORMAL_MEDIAN * float(np.median(gaps))] if len(gaps) else gaps
+    return float((usual**2).mean()) if len(usual) else 0.0
+
+
+def _measured(
+    sequence: CapturedSequence, segmentation: Segmentation, background: Mesh, changes: Sequence[Change], stages: Stages
+) -> _Measured:
+    """Measure noise and bodies in some frames; still surface that is far from the background is no noise."""
+    far, depth = OUTLIER * segmentation.noise, sequence.depth
+    squares, deviations, sizes, lost, whole = [], [], list[float](), 0.0, 0.0
+
+    @lru_cache(maxsize=1)
+    def room_after(count: int) -> Surface | None:
+        return _room_after(background, changes[:count])
+
+    for number in evenly(len(sequence), PROBES):
+        stages.reach("noise", number / len(sequence))
+        mesh = sequence[number]
+        moves = segmentation.moving(number, mesh)
+        moving = part_of(mesh, moves)
+        if moves.any():
+            label = components(moving.faces, len(moving.vertices))
+            largest = moving.vertices[label == np.bincount(label).argmax()]
+            sizes.append(Mesh(largest, moving.faces[:0]).diagonal)
+        still = part_of(mesh, ~moves)
+        areas = face_normals(still)[1]
+        whole += float(face_normals(mesh)[1].sum())
+        room = room_after(sum(change.frame <= number for change in changes))
+        if room is None:
+            lost += float(areas.sum())
+        elif not still.is_empty:
+            gaps = room.distances(still.vertices)
+            deviations.append(float(np.median(gaps)) / NORMAL_MEDIAN)
+            inside = gaps < far
+            if depth is not None:
+                inside &= _as_far(still.vertices, moving.vertices, depth[number])
+            squares.append(_mean_square(gaps[inside]))
+            lost += float(areas[(gaps[still.faces] >= far).all(axis=1)].sum())
+    stages.reach("noise", 1.0)
+    astray = lost / whole if whole else 0.0
+    if not squares:
+        return _Measured(0.0, 0.0, sizes, astray)
+    return _Measured(math.sqrt(float(np.mean(squares))), float(np.mean(deviations)), sizes, astray)

@@ -1,0 +1,155 @@
+"""The chunks of a scene: its background once, and each moving body as groups of its own track (paper, section 3.2).
+
+In: a job, the parts of its scene. Out: the payloads of the file, in the order of time. A key interval is read once; in
+memory is its moving surface.
+
+Normalised coordinates have the middle of the scene's box as origin and the size of what moves as unit, so that a
+quality means the same for a person in a room as for one alone.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from itertools import pairwise
+
+from ...analysis.scene.bodies import BodyOptions, at_most, find_bodies, same_bodies
+from ...analysis.scene.labelling import Segmentation
+from ...analysis.survey import Survey
+from ...format.checks import MOST_TRACKS
+from ...geometry.derived_sequences import digest
+from ...types import Mesh, MeshSequence
+from ..group.forms import empty_groups
+from ..group.interval import Interval
+from ..group.views import Sight, Views
+from ..run.job import Job
+from ..run.schedule import encode_intervals, longest_interval
+from ..settings.options import EncoderOptions
+from .parts import Parts
+from .static import refreshes
+from .tracks import TrackGroup
+
+
+@dataclass(frozen=True, slots=True)
+class CodedBodies:
+    """The moving bodies as encoded."""
+
+    groups: list[TrackGroup]  # in the order of the file
+    dropped: int  # faces of pieces that were there for a moment only, and are in none of the groups
+
+
+def encode_bodies(job: Job, parts: Parts) -> CodedBodies:
+    """Encode the groups of all tracks; each track has all frames, and no group has frames with surface and without.
+
+    The intervals of the whole scene are one stream: workers need not wait for the last body of a key interval.
+    """
+    tracks, found = Tracks(parts.segmentation.cell, job.scene.bodies), list[TrackGroup]()
+    places = deque[tuple[int, int]]()  # track and first frame of intervals that are not encoded yet
+
+    def intervals() -> Iterator[Interval]:
+        for interval in scene_intervals(job, parts, tracks):
+            places.append((interval.track, interval.first_frame))
+            yield interval
+
+    for groups in encode_intervals(job, intervals()):
+        track, first = places.popleft()
+        for group in groups:
+            found.append(TrackGroup(track, first, group))
+            first += group.frame_count
+    found += tracks.late()
+    return CodedBodies(sorted(found, key=lambda each: (each.first_frame, each.track)), tracks.dropped)
+
+
+def scene_intervals(job: Job, parts: Parts, tracks: Tracks) -> Iterator[Interval]:
+    """Yield the intervals of all tracks of a scene, in the order of time."""
+    for frames in key_intervals(job.sequence, parts.segmentation, job.options):
+        found = track_intervals(job, parts, frames, tracks)
+        weight = Fraction(len(frames), sum(len(interval.frames) for interval in found))
+        yield from (replace(interval, weight=weight) for interval in found)
+
+
+def track_intervals(job: Job, parts: Parts, frames: range, tracks: Tracks) -> list[Interval]:
+    """Assign the moving surface of a key interval to tracks, and cut each track where frames cannot share an interval.
+
+    Frames can where all have a surface or none has, and where they are of about one scale.
+    """
+    moving, found = [parts.moving(k, job.sequence[k]) for k in frames], list[Interval]()
+    longest = longest_interval(job.options, job.sequence.frame_rate)
+    for track, meshes in tracks.of(moving):
+        normalised = [parts.seen.normalise(mesh) for mesh in meshes]
+        for cut in _cut(normalised, frames, parts.seen, longest):
+            some = normalised[cut.start : cut.stop]
+            one = Interval(some, parts.body_noise, frames.start + cut.start, track, digest(some))
+            found.append(
+                replace(
+                    one,
+                    up=job.sequence.up,
+                    views=Views.of(job.sequence, parts.seen),
+                    sight=Sight.of(job.sequence, parts.seen),
+                    frame_rate=job.sequence.frame_rate,
+                )
+            )
+    return found
+
+
+def key_intervals(sequence: MeshSequence, segmentation: Segmentation, options: EncoderOptions) -> Iterator[range]:
+    """Yield the key intervals of a scene, of even lengths, cut also where the background changes or is sent again."""
+    count, frame_rate = len(sequence), sequence.frame_rate
+    longest = max(1, round(options.key_interval * frame_rate))
+    others = set(segmentation.changes)
+    if options.scene is not None:
+        others |= set(refreshes(count, frame_rate, options.scene.background))
+    for start, stop in pairwise(sorted({0, count} | others)):
+        pieces = -(-(stop - start) // longest)
+        yield from (range(a, b) for a, b in pairwise(start + (stop - start) * k // pieces for k in range(pieces + 1)))
+
+
+def _cut(meshes: Sequence[Mesh], frames: range, seen: Survey, longest: int) -> list[range]:
+    """Cut a body's frames into intervals of at most `longest` frames.
+
+    They are cut, too, where the scene begins or ends to have a surface: frames without are shown without background.
+    """
+    cuts = [k for k in range(1, len(frames)) if seen.is_bare(frames[k]) != seen.is_bare(frames[k - 1])]
+    found = []
+    for start, stop in pairwise([0, *cuts, len(frames)]):
+        sizes = replace(seen, diagonals=tuple(mesh.diagonal for mesh in meshes[start:stop]))
+        found += [range(start + some.start, start + some.stop) for some in sizes.intervals(longest)]
+    return found
+
+
+class Tracks:
+    """Assigns the bodies of each key interval to tracks: to their own from before, or to one that is free."""
+
+    def __init__(self, cell: float, options: BodyOptions) -> None:
+        self._cell, self._options = cell, options
+        self._last: list[Mesh] = []  # of each track, in the last frame so far
+        self._frames = 0
+        self._began: list[int] = []  # the first frame of each track's first key interval
+        self.dropped = 0  # faces that are in no track
+
+    def of(self, moving: Sequence[Mesh]) -> list[tuple[int, list[Mesh]]]:
+        """Return each track's mesh in each frame of the next key interval."""
+        apart = find_bodies(moving, self._cell, self._options)
+        bodies, self.dropped = at_most(apart.meshes, MOST_TRACKS), self.dropped + apart.dropped
+        before = same_bodies(self._last, [body[0] for body in bodies], self._cell, self._options)
+        free = [number for number in range(len(self._last) + len(bodies) + 1) if number not in before]
+        numbers = [free.pop(0) if old < 0 else old for old in before]
+        count = max([len(self._last), 1, *(number + 1 for number in numbers)])
+        empty = [Mesh.empty()] * len(moving)
+        found = [empty] * count
+        for number, body in zip(numbers, bodies, strict=True):
+            found[number] = body
+        self._began += [self._frames] * (count - len(self._began))
+        self._last = [meshes[-1] for meshes in found]
+        self._frames += len(moving)
+        return list(enumerate(found))
+
+    def late(self) -> Iterator[TrackGroup]:
+        """Yield the empty frames that tracks have before the key interval in which they began."""
+        for track, began in enumerate(self._began):
+            first = 0
+            for group in empty_groups(began):
+                yield TrackGroup(track, first, group)
+                first += group.frame_count

@@ -1,0 +1,273 @@
+"""The background of a scene as chunks: once as a whole, then its changes, with their colours (paper, section 3.2).
+
+In: the parts of a scene. Out: the payloads of its states, in the order of time.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Bool, Float64, UInt8
+
+from ...analysis.appearance.background import median_colors
+from ...analysis.appearance.bake import Texels, picture, texels_of
+from ...analysis.appearance.unwrap import projected, unwrap
+from ...analysis.scene.background import BackgroundOptions
+from ...analysis.survey import Survey
+from ...coding.appearance.atlas import encode_atlas
+from ...coding.appearance.pictures import MOST_CRF
+from ...coding.background import changed, decode_background, decode_change, encode_background, encode_change
+from ...coding.colored import background_canvas, encode_group_colors
+from ...container.writer import Companion
+from ...format.budget import Chain, CostlyError
+from ...format.layout import ChunkKind
+from ...geometry.atlas import Layout
+from ...geometry.closest_points import distances
+from ...geometry.color_views import spread_colors
+from ...geometry.decimate import decimate_faces
+from ...geometry.derived_sequences import CapturedSequence
+from ...geometry.painted import Paint, Painted
+from ...geometry.topology import clean, face_normals, vertex_normals
+from ...types import Mesh, MeshSequence, Placement, evenly
+from ..appearance.colors import fitting_size
+from ..appearance.options import AppearanceOptions, TextureOptions
+from ..appearance.videos import layered_pictures
+from ..group.views import Views
+from .parts import Change, Parts
+
+FRACTIONS = (0.75, 0.5, 0.35, 0.22, 0.15, 0.1, 0.07, 0.045, 0.03, 0.02)  # of the background's vertices (decision 19)
+HALVINGS = 2  # of the factor between two fractions, in search for a smaller mesh that is near enough (guess)
+LEAST_NOISE = 1e-4  # of the unit: the noise that a background is coded for, at least (guess)
+STILL_FRAMES = 16  # in which a background is looked at for its colours, at most (guess)
+PICTURES_A_SECOND = 8  # of a background: shadows move slowly (guess)
+FINER = 2  # of the rate factor of a background's pictures than of a body's (guess)
+ENLARGED = 9  # coarser for each doubling of its texels along a pixel: 38 dB of living_room at .06 Mbps, quality 50
+NEAR = 3.0  # times the noise, within which a frame shows a place of the background (guess)
+LEAST_NEAR = 0.01  # m, the same at least (guess)
+
+
+@dataclass(frozen=True, slots=True)
+class Static:
+    """A state of the background from a frame on: whole, or a patch of the one before."""
+
+    frame: int
+    payload: bytes
+    is_patch: bool
+    companions: tuple[Companion, ...] = ()  # the colours of its vertices, or of those that the patch adds
+    lost_colors: bool = False  # it has colours that a reader would refuse
+
+    def __len__(self) -> int:
+        return len(self.payload) + sum(map(len, self.companions))
+
+
+def encode_static(
+    parts: Parts, count: int, frame_rate: float, options: BackgroundOptions, pictured: bool = False
+) -> list[Static]:
+    """Encode the states of the background: as few faces as stay about as near to it as the noise.
+
+    The first state is whole, as are those of a refresh; each change of the room is a patch of the state before, but for
+    a background with pictures, whose atlas is of a whole state.
+    """
+    noise = max(parts.deviation / parts.seen.unit, LEAST_NOISE)
+    step, most = options.lattice * noise, options.coarse * noise
+    payload, state = _coded(_normalised(parts.background, parts.seen), most, step)
+    found = [] if state.is_empty else [Static(0, payload, False)]
+    chain, changes = Chain(0, len(payload)), {change.frame: change for change in parts.changes}
+    again = set(refreshes(count, frame_rate, options)) | (set(changes) if pictured else set())
+    for frame in sorted({*changes, *again} - {0}):
+        whole = state.is_empty or frame in again
+        if change := changes.get(frame):
+            came = _coded(_normalised(change.came, parts.seen), most, step)[1]
+            before, gone = state, _gone(parts, state, change)
+            payload = encode_change(before, gone, came, step)
+            try:
+                state = decode_change(payload, before)
+                chain = chain.then(before, state, len(payload))
+            except CostlyError:  # no reader would decode it
+                state, whole = changed(before, gone, came), True
+        if whole and not state.is_empty:
+            payload = encode_background(state, step)
+            state = decode_background(payload)  # the next patch counts faces in the decoded order
+            chain = Chain(0, len(payload))
+        if not (whole and state.is_empty):
+            found.append(Static(frame, payload, not whole))
+    return found
+
+
+def refreshes(count: int, frame_rate: float, options: BackgroundOptions) -> range:
+    """Return the frames at which the whole background is sent; the first frame is one of them."""
+    return range(0, count, count if options.refresh is None else max(1, round(options.refresh * frame_rate)))
+
+
+def _gone(parts: Parts, state: Mesh, change: Change) -> Bool[np.ndarray, " F"]:
+    """Return a mask of the background's faces, normalised, that a change removes."""
+    place = Placement(parts.seen.unit, tuple(parts.seen.center))
+    return parts.segmentation.gone(change.frame, place.of(state))
+
+
+def _coded(mesh: Mesh, most: float, step: float) -> tuple[bytes, Mesh]:
+    """Encode a mesh with the fewest vertices that stay within an RMS distance; return payload and decoded mesh."""
+    if mesh.is_empty:
+        return b"", mesh
+    steps = [clean(mesh)]  # each from the one before: these are nearer to the mesh than what is made from it at once
+    for fraction in FRACTIONS:
+        steps.append(decimate_faces(steps[-1], max(4, round(2 * fraction * len(mesh.vertices)))))
+    failed, best, found = 0, mesh, (b"", mesh)
+    for best in reversed(steps):
+        found = _stored(best, step)
+        if is_near := _is_near(mesh, found[1], most):
+            break
+        failed = len(best.faces)
+    for _ in range(HALVINGS if failed and is_near else 0):
+        small = decimate_faces(best, round((failed * len(best.faces)) ** 0.5))
+        stored = _stored(small, step)
+        if _is_near(mesh, stored[1], most):
+            best, found = small, stored
+        else:
+            failed = len(small.faces)
+    return found
+
+
+def _normalised(mesh: Mesh, seen: Survey) -> Mesh:
+    return mesh.at((mesh.vertices - seen.center) / seen.unit)
+
+
+def colored_states(
+    sequence: CapturedSequence, parts: Parts, background: BackgroundOptions, options: AppearanceOptions | None
+) -> list[Static]:
+    """Encode the states of the background with the colours that still surface has from each state to the next."""
+    if options is None or not is_colored(sequence):
+        return encode_static(parts, len(sequence), sequence.frame_rate, background)
+    found, mesh, looks, bare = list[Static](), Mesh.empty(), _Looks(sequence, parts), False
+    texture = options.texture if options.texture and (options.texture.always or looks.has_pictures) else None
+    states = encode_static(parts, len(sequence), sequence.frame_rate, background, texture is not None)
+    ends = [state.frame for state in states[1:]] + [len(sequence)]
+    for state, end in zip(states, ends, strict=True):
+        mesh = decode_change(state.payload, mesh) if state.is_patch else decode_background(state.payload)
+        canvas, bare = background_canvas(state.payload), bare and state.is_patch  # what changes it has no colours, too
+        [coded] = canvas.meshes
+        frames, count = range(state.frame, end), len(mesh.vertices)
+        surface = (
+            _Unwrapped.of(mesh, *looks.layout(mesh, frames, texture.size)) if texture and not state.is_patch else None
+        )
+        points, normals = [mesh.vertices], [vertex_normals(mesh)]
+        if surface is not None:
+            points, normals = [*points, surface.places], [*normals, surface.normals]
+        colors, seen = looks.colors(frames, np.concatenate(points), np.concatenate(normals))
+        shown = spread_colors(mesh, colors[:count].astype(np.float64), seen[:count])[count - coded.vertices :]
+        try:
+            encoded = encode_group_colors(canvas, [shown], options.colors, None)
+        except CostlyError:  # the summary tells of it
+            bare = True
+        if bare:
+            found.append(replace(state, lost_colors=True))
+            continue
+        companions = [Companion(ChunkKind.COLORS, encoded.payload)]
+        if surface is not None and texture is not None:
+            companions.append(Companion(ChunkKind.ATLAS, encode_atlas(mesh, surface.layout)))
+            companions += _pictured(surface, (colors[count:], seen[count:]), frames, looks, texture)
+        found.append(replace(state, companions=tuple(companions)))
+    return found
+
+
+def is_colored(sequence: MeshSequence) -> bool:
+    """Return whether some frames of a sequence have colours."""
+    return any(sequence[number].is_colored for number in evenly(len(sequence), 3))
+
+
+@dataclass(frozen=True, slots=True)
+class _Unwrapped:
+    """The texels of a background, and where they are."""
+
+    layout: Layout
+    scale: float  # texels along a pixel of the cameras; 1 where there are none
+    texels: Texels
+    places: Float64[np.ndarray, "N 3"]
+    normals: Float64[np.ndarray, "N 3"]
+
+    @staticmethod
+    def of(mesh: Mesh, layout: Layout, scale: float) -> _Unwrapped:
+        texels = texels_of(layout, 0)
+        return _Unwrapped(layout, scale, texels, texels.places(mesh), face_normals(mesh)[0][texels.faces])
+
+
+def _pictured(
+    surface: _Unwrapped,
+    usual: tuple[UInt8[np.ndarray, "N 3"], Bool[np.ndarray, " N"]],
+    frames: range,
+    looks: _Looks,
+    options: TextureOptions,
+) -> list[Companion]:
+    """Return a slow video of what a background looks like, where shadows move: what a frame hides is as usual."""
+    crf = options.video.crf - FINER + round(ENLARGED * math.log2(max(1.0, surface.scale)))
+    video = replace(options.video, crf=min(max(1, crf), MOST_CRF))
+
+    def picture_of(frame: int) -> UInt8[np.ndarray, "H W 3"]:
+        colors, seen = looks.moment(min(frame + some.step // 2, frames[-1]), surface.places, surface.normals)
+        return picture(surface.texels, np.where(seen[:, None], colors, usual[0]), usual[1] | seen)
+
+    some = frames[:: max(1, round(looks.frame_rate / PICTURES_A_SECOND))]
+    return layered_pictures(surface.layout, some, picture_of, replace(options, video=video))
+
+
+class _Looks:
+    """What the frames of a scene show of its still surface, in normalised coordinates."""
+
+    def __init__(self, sequence: CapturedSequence, parts: Parts) -> None:
+        self._sequence, self._parts, self._views = sequence, parts, Views.of(sequence, parts.seen)
+        self.has_pictures = self._views is not None or sequence[0].texture is not None
+        self.frame_rate = sequence.frame_rate
+
+    def colors(
+        self, frames: range, points: Float64[np.ndarray, "N 3"], normals: Float64[np.ndarray, "N 3"]
+    ) -> tuple[UInt8[np.ndarray, "N 3"], Bool[np.ndarray, " N"]]:
+        """Return the usual colours of places over some frames, and which of them are known.
+
+        What some frame shows away from steps in depth is taken from such frames: at steps, who stands there shines in.
+        """
+        some = self._some(frames, STILL_FRAMES)
+        if self._views is None:
+            return median_colors(points, normals, map(self._paint, some))
+        colors, known = median_colors(points, normals, (self._views.at(number, clear=True) for number in some))
+        rest = np.flatnonzero(~known)
+        colors[rest], known[rest] = median_colors(points[rest], normals[rest], map(self._paint, some))
+        return colors, known
+
+    def moment(
+        self, number: int, points: Float64[np.ndarray, "N 3"], normals: Float64[np.ndarray, "N 3"]
+    ) -> tuple[UInt8[np.ndarray, "N 3"], Bool[np.ndarray, " N"]]:
+        """Return the colours of places in one frame, and which of them it shows, away from the border of what moves."""
+        paint = self._paint(number) if self._views is None else self._views.at(number, clear=True)
+        colors, seen = paint.at(points, normals)
+        return np.clip(np.rint(colors), 0, 255).astype(np.uint8), seen
+
+    def layout(self, mesh: Mesh, frames: range, size: int | None) -> tuple[Layout, float]:
+        """Return the places of a background in a texture, as cameras see it where there are some, and its scale."""
+        if self._views is None:
+            return unwrap(mesh, size or fitting_size([self._paint(frames.start)], [mesh])), 1.0
+        return projected(mesh, self._views.at(self._some(frames, 1)[0], hides=mesh))
+
+    def _some(self, frames: range, most: int) -> list[int]:
+        return [frames.start + number for number in evenly(len(frames), most)]
+
+    def _paint(self, number: int) -> Paint:
+        if self._views is not None:
+            return self._views.at(number)
+        seen = self._parts.seen
+        mesh = self._sequence[number]
+        still = mesh.with_faces(~self._parts.segmentation.moving(number, mesh))
+        far = max(NEAR * self._parts.noise, LEAST_NEAR) / seen.unit
+        return Painted(still.at((still.vertices - seen.center) / seen.unit), far)
+
+
+def _stored(mesh: Mesh, step: float) -> tuple[bytes, Mesh]:
+    """Return the payload of a background, and what it decodes to."""
+    payload = encode_background(mesh, step)
+    return payload, decode_background(payload)
+
+
+def _is_near(mesh: Mesh, small: Mesh, most: float) -> bool:
+    """Return whether a simplified mesh is within an RMS distance of the vertices of a mesh."""
+    return not small.is_empty and float(np.sqrt((distances(mesh.vertices, small) ** 2).mean())) <= most

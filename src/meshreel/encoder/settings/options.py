@@ -1,0 +1,78 @@
+"""Options of the encoder: a recipe with its own options, how a scene is taken apart, and the key interval.
+
+`EncoderOptions()` is what `encode` uses by default; `presets.preset_options` makes options for a preset and a quality.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from importlib.util import find_spec
+
+from ...analysis.scene.background import BackgroundOptions
+from ...analysis.scene.bodies import BodyOptions
+from ...analysis.scene.segmentation import SegmentOptions
+from ...errors import InputError
+from ..appearance.options import AppearanceOptions
+from ..layers.options import LayersOptions
+from ..paper.options import PaperOptions
+
+MOST_SECONDS = 600  # of a key interval: viewers who join late decode that much before the first picture (guess)
+
+
+MethodOptions = PaperOptions | LayersOptions  # the class names the recipe
+
+
+@dataclass(frozen=True, slots=True)
+class SceneOptions:
+    """Options of the separation of a scene into a background and moving bodies."""
+
+    segment: SegmentOptions = field(default_factory=SegmentOptions)
+    background: BackgroundOptions = field(default_factory=BackgroundOptions)
+    bodies: BodyOptions = field(default_factory=BodyOptions)
+
+
+@dataclass(frozen=True, slots=True)
+class EncoderOptions:
+    """Options of the encoder: a recipe, and for scenes how they are taken apart."""
+
+    method: MethodOptions = field(default_factory=LayersOptions)
+    scene: SceneOptions | None = field(default_factory=SceneOptions)  # None: no background is looked for
+    appearance: AppearanceOptions | None = AppearanceOptions()  # None: colours are left out
+    key_interval: float = 4.0  # s, at most, from one random-access point to the next; of a scene in both recipes
+    quality: float = 50.0  # 0 to 100, which the other options were made from; a file records it
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.quality <= 100:
+            raise InputError(f"quality must be in 0 to 100, got {self.quality:g}")
+        if not isinstance(self.method, MethodOptions):
+            raise InputError(f"method {self.method!r}: give PaperOptions or LayersOptions, or use preset_options")
+        if self.scene is not None and not isinstance(self.scene, SceneOptions):
+            raise InputError(f"scene {self.scene!r}: give SceneOptions, or None where nothing stands still")
+        if not 0 < self.key_interval <= MOST_SECONDS:
+            raise InputError(f"key interval {self.key_interval:g}: give seconds, above 0 and at most {MOST_SECONDS}")
+
+    @property
+    def preset(self) -> str:
+        """Name of the recipe: `best`, `paper` or `paper-literal`; a file records it."""
+        if isinstance(self.method, LayersOptions):
+            return "best"
+        return "paper-literal" if self.method.is_literal else "paper"
+
+
+def as_installed(options: EncoderOptions) -> tuple[EncoderOptions, tuple[str, ...]]:
+    """Return options without textures where the packages for these are missing, unless they are asked for; a warning.
+
+    Raises InputError where they are asked for.
+    """
+    appearance = options.appearance
+    if appearance is not None and appearance.splats is not None and find_spec("torch") is None:
+        raise InputError("splats are fitted by torch: pip install 'meshreel[splats]'")
+    if appearance is None or appearance.texture is None:
+        return options, ()
+    missing = [name for name in ("av", "xatlas") if find_spec(name) is None]
+    if not missing:
+        return options, ()
+    text = f"no textures: {' and '.join(missing)} missing; pip install 'meshreel[color]'"
+    if appearance.texture.always:
+        raise InputError(f"{text}, or give --color vertices")
+    return replace(options, appearance=replace(appearance, texture=None)), (f"{text}; colours of vertices are kept",)

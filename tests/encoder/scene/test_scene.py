@@ -1,0 +1,435 @@
+"""A scene in a file: round trips of its parts, tracks over key intervals, and warnings about lost surface."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import meshreel
+import meshreel.encoder.scene.scene as scene
+from meshreel.analysis.scene.background import BackgroundOptions
+from meshreel.analysis.scene.labelling import ByPlace
+from meshreel.analysis.scene.segmentation import scene_views
+from meshreel.analysis.scene.settle import Rest
+from meshreel.analysis.survey import survey
+from meshreel.coding.background import decode_background
+from meshreel.coding.intra import decode_intra, encode_empty, encode_intra
+from meshreel.encoder.group.forms import EncodedGroup
+from meshreel.encoder.group.progress import Stages
+from meshreel.encoder.group.target import NO_ERROR, target_of
+from meshreel.encoder.run.job import Job
+from meshreel.encoder.scene.parts import Parts, take_apart
+from meshreel.encoder.scene.scene import encode_bodies
+from meshreel.encoder.scene.static import encode_static
+from meshreel.encoder.scene.tracks import TrackGroup
+from meshreel.encoder.sequence import Encoder, encode
+from meshreel.errors import InputError
+from meshreel.format.checks import MOST_TRACKS
+from meshreel.format.layout import Form
+from meshreel.geometry.closest_points import distances
+from meshreel.geometry.derived_sequences import captured
+from meshreel.geometry.topology import concatenate, face_normals
+from meshreel.geometry.voxels import Lattice
+from meshreel.types import Mesh, MeshList, Placement
+from tests import small_scene
+from tests.metrics.shapes import moved, plane, sphere
+from tests.scenes import CELL, NOISE, RADIUS, SIDE, ball, of_body, quick_scene, room, with_room
+
+NONE = Mesh.empty()
+BODIES = [ball(0.5 + 0.35 * t) for t in range(4)]
+ROLLING = with_room(BODIES)
+OPTIONS = quick_scene(group_size=3)
+FAR = np.array([1e6, -1e6, 2e6])
+
+
+def in_scene(options, **changes):
+    """The options with other values of how a scene is segmented."""
+    return replace(options, scene=replace(options.scene, segment=replace(options.scene.segment, **changes)))
+
+
+def encoded(frames, path, options=OPTIONS, rate=30.0, **more):
+    """The frames that come back and the summary."""
+    sequence = MeshList(tuple(frames), rate)
+    summary = encode(sequence, path, options=options, **more)
+    video = meshreel.open(path)
+    assert len(video) == len(frames) == summary.frame_count and path.stat().st_size == summary.size
+    return video, summary
+
+
+def statics(video) -> set[int]:
+    """Numbers of the chunks that frames are shown with."""
+    found = (video.reader.static_of_frame(frame) for frame in range(len(video)))
+    return {chunk.offset for chunk in found if chunk is not None}
+
+
+def rms(points, mesh) -> float:
+    return float(np.sqrt((distances(points, mesh) ** 2).mean()))
+
+
+def assert_rolls(video, offset=(0.0, 0.0, 0.0)):
+    """Each frame is the room and the ball where it is, within the noise or so."""
+    for number, body in enumerate(BODIES[: len(video)]):
+        found, clean = video[number], moved(concatenate([room(), body]), offset)
+        assert rms(clean.vertices, found) < 2.5 * NOISE
+        high = found.vertices[(found.vertices - offset > 0.15).all(axis=1)]  # what is not at the floor or the walls
+        assert len(high) > 100 and rms(high, clean) < 2.5 * NOISE
+
+
+@pytest.fixture
+def plainly(monkeypatch):
+    """Bodies coded frame by frame, where it does not matter how: a fraction of the time."""
+
+    def coded(interval, options, stages=None):
+        del options, stages
+        frames = interval.frames
+        if frames[0].is_empty:
+            return [EncodedGroup(Form.EMPTY, len(frames), encode_empty(), (), NO_ERROR)]
+        assert not any(mesh.is_empty for mesh in frames)
+        return [EncodedGroup(Form.DRACO, len(frames), encode_intra(list(frames), 1e-3, 0), (), NO_ERROR)]
+
+    monkeypatch.setattr("meshreel.encoder.layers.recipe.encode_interval", coded)
+
+
+@pytest.fixture(scope="module")
+def rolling(tmp_path_factory):
+    path = tmp_path_factory.mktemp("rolling") / "a.reel"
+    return path, *encoded(ROLLING, path)
+
+
+def test_a_scene_comes_back_as_it_was_without_its_noise(rolling):
+    _, video, summary = rolling
+    assert_rolls(video)
+    assert summary.scene is not None and summary.scene.tracks == 1 and summary.warnings == ()
+    assert 0.5 * NOISE < summary.scene.noise < 3 * NOISE  # borders and the floor under the ball count, too
+    assert summary.psnr > 20 * np.log10(4 / NOISE) - 8
+
+
+def test_the_background_is_in_the_file_once_and_shared_by_all_frames(rolling):
+    _, video, summary = rolling
+    faces = summary.scene.faces
+    assert 0 < summary.scene.background < summary.size and len(statics(video)) == 1
+    first = video[0]
+    for mesh in video:
+        assert np.array_equal(mesh.vertices[mesh.faces[:faces]], first.vertices[first.faces[:faces]])
+
+
+def test_the_unit_is_the_size_of_what_moves(rolling):
+    _, video, _ = rolling
+    assert video.reader.header.scale == pytest.approx(2 * np.sqrt(3) * RADIUS, rel=0.1)
+
+
+@pytest.mark.usefixtures("plainly")
+def test_the_same_scene_gives_the_same_bytes_with_an_executor_too(tmp_path):
+    stages: dict[str, list[int]] = {}
+    encoded(ROLLING, tmp_path / "a.reel")
+    with ThreadPoolExecutor(2) as executor:
+        record = lambda stage, done, _: stages.setdefault(stage, []).append(done)  # noqa: E731
+        encoded(ROLLING, tmp_path / "b.reel", executor=executor, progress=record)
+    assert (tmp_path / "b.reel").read_bytes() == (tmp_path / "a.reel").read_bytes()
+    assert {stage: done[-1] for stage, done in stages.items()} == dict.fromkeys(
+        ("survey", "segment", "background", "noise", "room", "code", "track", "fit"), 4
+    )
+    for stage in ("segment", "background"):  # frame by frame, and not all at the end
+        assert sorted(stages[stage]) == stages[stage] and len(set(stages[stage])) > 2
+
+
+@pytest.mark.usefixtures("plainly")
+def test_a_scene_that_is_encoded_again_is_taken_apart_once(tmp_path, monkeypatch):
+    count = []
+    monkeypatch.setattr("meshreel.encoder.sequence.take_apart", lambda *args: count.append(1) or take_apart(*args))
+    encoder = Encoder(MeshList(tuple(ROLLING), 4.0))
+    for quality in (30, 60):
+        encoder.encode(tmp_path / f"{quality}.reel", quick_scene(quality=quality))
+    assert len(count) == 1
+    encoded(ROLLING, tmp_path / "alone.reel", quick_scene(quality=60), rate=4.0)
+    assert (tmp_path / "alone.reel").read_bytes() == (tmp_path / "60.reel").read_bytes()
+    other = quick_scene(quality=60)
+    encoder.encode(tmp_path / "other.reel", in_scene(other, threshold=0.4))
+    assert len(count) == 3
+    for _ in range(2):  # cameras of the same numbers, made anew
+        views = scene_views(MeshList(tuple(ROLLING), 4.0), other.scene.segment)
+        cameras = tuple(replace(view, extrinsic=view.extrinsic.copy()) for view in views)
+        encoder.encode(tmp_path / "given.reel", in_scene(other, cameras=cameras))
+    assert len(count) == 4
+
+
+def test_preset_paper_has_scenes_too(tmp_path):
+    options = quick_scene("paper", group_size=1)
+    video, summary = encoded(ROLLING, tmp_path / "a.reel", options)
+    assert summary.scene is not None and len(statics(video)) == 1
+    assert_rolls(video)
+
+
+@pytest.mark.parametrize("preset", ["paper", "best"])
+def test_bodies_need_not_be_nearer_to_noisy_frames_than_the_truth_is(preset, monkeypatch, tmp_path):
+    noises, coded = [], scene.encode_intervals
+    monkeypatch.setattr(
+        scene,
+        "encode_intervals",
+        lambda job, some: coded(job, (noises.append(i.noise) or i for i in some)),
+    )
+    video, _ = encoded(ROLLING, tmp_path / "a.reel", quick_scene(preset, group_size=1))
+    assert noises
+    target = quick_scene(preset).method.target
+    for noise in noises:
+        assert 0.5 * NOISE < noise * video.reader.header.scale < 3 * NOISE
+        clean = target_of(ROLLING, target, 0.0).distance
+        assert target_of(ROLLING, target, noise).distance == pytest.approx(np.hypot(clean, noise))
+
+
+def test_where_everything_may_move_no_background_is_looked_for(tmp_path, monkeypatch):
+    monkeypatch.setattr("meshreel.encoder.sequence.is_scene", None)
+    small = [Mesh.of(plane(1.0, 6).vertices, plane(1.0, 6).faces)] * 2
+    options = replace(quick_scene("paper", group_size=1), scene=None)
+    video, summary = encoded(small, tmp_path / "a.reel", options)
+    assert summary.scene is None and not statics(video) and rms(small[1].vertices, video[1]) < 0.01
+
+
+@pytest.mark.usefixtures("plainly")
+def test_where_nothing_moves_the_file_is_a_background(tmp_path):
+    video, summary = encoded(with_room([ball(1.2)] * 4), tmp_path / "a.reel")
+    assert [group.form for group in summary.groups] == [Form.EMPTY] and summary.scene.tracks == 1
+    assert rms(concatenate([room(), ball(1.2)]).vertices, video[3]) < 2.5 * NOISE
+    assert summary.scene.background > 0.7 * summary.size
+
+
+def test_where_all_moves_there_is_no_scene(tmp_path):
+    frames = [moved(plane(1.0, 6), (0.4 * t, 0.3 * t, 0.5 * t)) for t in range(2)]
+    video, summary = encoded(frames, tmp_path / "a.reel", quick_scene("paper", group_size=1))
+    assert summary.scene is None and rms(frames[1].vertices, video[1]) < 0.01
+
+
+@pytest.mark.usefixtures("plainly")
+def test_a_clean_scene_needs_few_faces_for_its_flat_walls(tmp_path):
+    video, summary = encoded(with_room([NONE] * 3, sigma=0.0), tmp_path / "a.reel")
+    assert summary.scene.faces < 0.3 * len(room().faces)
+    inner = room().vertices[room().vertices.max(axis=1) < SIDE - 1.5 * CELL]  # at a border, up to a cell is missing
+    assert rms(inner, video[0]) < 0.1 * CELL
+
+
+@pytest.mark.usefixtures("plainly")
+def test_a_frame_without_surface_stays_without(tmp_path):
+    frames = [*ROLLING[:2], NONE, *ROLLING[2:]]
+    video, summary = encoded(frames, tmp_path / "a.reel")
+    assert [mesh.is_empty for mesh in video] == [False, False, True, False, False]
+    assert summary.scene is not None and len(statics(video)) == 1
+    assert rms(ROLLING[2].vertices, video[3]) < 3 * NOISE and summary.psnr > 30
+
+
+@pytest.mark.usefixtures("plainly")
+def test_a_first_frame_without_surface_is_legal(tmp_path):
+    video, _ = encoded([NONE, NONE, *ROLLING[:3]], tmp_path / "a.reel")
+    assert [mesh.is_empty for mesh in video] == [True, True, False, False, False]
+    assert rms(ROLLING[0].vertices, video[2]) < 3 * NOISE
+
+
+def test_one_frame_is_no_scene(tmp_path):
+    video, summary = encoded([plane(1.0, 6)], tmp_path / "a.reel")
+    assert summary.scene is None and rms(plane(1.0, 6).vertices, video[0]) < 0.01
+
+
+@pytest.mark.usefixtures("plainly")
+def test_a_scene_far_from_the_origin_keeps_its_millimetres(tmp_path, rolling):
+    video, summary = encoded([moved(mesh, FAR) for mesh in ROLLING], tmp_path / "a.reel")
+    assert_rolls(video, FAR)
+    assert summary.scene.noise == pytest.approx(rolling[2].scene.noise, rel=0.5)  # its cells are in other places
+    assert summary.psnr > rolling[2].psnr - 1.0
+
+
+@pytest.mark.usefixtures("plainly")
+def test_a_vertex_that_no_face_has_does_not_make_the_scene_larger(tmp_path):
+    stray = [Mesh.of([*mesh.vertices, [1e7, 0, 0]], mesh.faces) for mesh in ROLLING[:3]]
+    video, summary = encoded(stray, tmp_path / "a.reel")
+    assert max(video.reader.header.maximum) < 10 and summary.psnr > 30
+
+
+@pytest.mark.usefixtures("plainly")
+def test_the_background_may_be_sent_again(tmp_path):
+    options = replace(OPTIONS, scene=replace(OPTIONS.scene, background=BackgroundOptions(frames=4, refresh=0.2)))
+    video, summary = encoded(ROLLING, tmp_path / "a.reel", options, rate=10.0)
+    assert len(statics(video)) == 2
+    assert_rolls(video)
+    firsts = [group for group in summary.groups if not group.predicted]
+    assert len(firsts) >= 2  # who joins at the second needs nothing before
+
+
+@pytest.mark.usefixtures("plainly")
+def test_bits_that_are_dropped_are_counted_for_the_user(tmp_path):
+    """Where the ball was, a bit is left in one frame, far from where it is now."""
+    bit = moved(sphere(0.05, 2), (0.5, 1.2, 2 * RADIUS + 0.5 * CELL))
+    frames = with_room([*BODIES[:3], concatenate([BODIES[3], bit])])
+    _, summary = encoded(frames, tmp_path / "a.reel")
+    assert summary.warnings == (
+        f"{len(bit.faces)} faces of bits that move, far from all bodies and there only for a moment, are not kept",
+    )
+
+
+# tracks over segments, with a segmentation that is known
+
+
+class AllMoves(ByPlace):
+    """Everything moves, whatever it is."""
+
+    def moving(self, frame, mesh):
+        del frame
+        return np.ones(len(mesh.faces), bool)
+
+
+ALL = AllMoves(CELL, Lattice(np.zeros(3), CELL), np.zeros(0, np.int64), np.zeros(0, bool), Rest.none(0), 0.0)
+
+
+def tracks(frames: list[Mesh], interval: int = 2) -> list[str]:
+    """Return which frames of each track have a body, where key intervals have `interval` frames."""
+    sequence = MeshList(tuple(frames), 1.0)
+    seen = replace(survey(sequence), scale=1.0)
+    parts = Parts(seen, ALL, NONE, [], 0.0, 0.0)
+    options = replace(OPTIONS, key_interval=float(interval))
+    coded = encode_bodies(Job(captured(sequence), options, None, Stages(None, len(frames))), parts)
+    assert coded.dropped == 0
+    assert coded.groups == sorted(coded.groups, key=lambda each: (each.first_frame, each.track))
+    count = max(each.track for each in coded.groups) + 1
+    return [shown(coded.groups, track, len(frames)) for track in range(count)]
+
+
+def shown(groups: list[TrackGroup], track: int, frames: int) -> str:
+    """Of each frame of a track, whether it has a group with surface (x) or one without (.); each exactly one."""
+    found = [""] * frames
+    for each in groups:
+        if each.track == track:
+            for frame in range(each.first_frame, each.first_frame + each.group.frame_count):
+                found[frame] += "." if each.group.form == Form.EMPTY else "x"
+    return "".join(found)
+
+
+SMALL = sphere(0.3, 2)
+
+
+def at(*places: float) -> Mesh:
+    return concatenate([moved(SMALL, (x, 0, 0)) for x in places]) if places else NONE
+
+
+@pytest.mark.usefixtures("plainly")
+def test_one_body_has_one_track():
+    assert tracks([at(0.1 * t) for t in range(4)]) == ["xxxx"]
+
+
+@pytest.mark.usefixtures("plainly")
+def test_a_body_that_enters_late_has_a_track_that_was_empty_before():
+    assert tracks([at(0), at(0), at(0), at(0), at(0, 3), at(0, 3)]) == ["xxxxxx", "....xx"]
+
+
+@pytest.mark.usefixtures("plainly")
+def test_the_track_of_a_body_that_enters_within_an_interval_begins_with_an_empty_frame():
+    assert tracks([at(0), at(0, 3), at(0, 3), at(0, 3)]) == ["xxxx", ".xxx"]
+
+
+@pytest.mark.usefixtures("plainly")
+def test_the_track_of_a_body_that_left_is_empty_and_free_for_another_body():
+    assert tracks([at(0, 3), at(0, 3), at(0), at(0), at(0), at(0)]) == ["xxxxxx", "xx...."]
+    assert tracks([at(0, 3), at(0, 3), at(0), at(0), at(0, 6), at(0, 6)]) == ["xxxxxx", "xx..xx"]
+
+
+@pytest.mark.usefixtures("plainly")
+def test_frames_without_bodies_are_one_track_without_surface():
+    assert tracks([at()] * 4) == ["...."]
+    assert tracks([at(0), at(0), at(), at(), at(0), at(0)]) == ["xx..xx"]
+
+
+@pytest.mark.usefixtures("plainly")
+def test_bodies_that_meet_go_on_in_one_track_and_bodies_that_part_get_another():
+    meeting = [at(0, 1.5), at(0.3, 1.2), at(0.46, 1.04), at(0.5, 1.0)]
+    assert sorted(tracks(meeting)) == ["xx..", "xxxx"]
+    assert tracks([at(1.3, 1.7), at(1.3, 1.7), at(1.0, 2.0), at(1.0, 2.0)]) == ["xxxx", "..xx"]
+
+
+@pytest.mark.usefixtures("plainly")
+def test_a_body_keeps_its_track_whatever_the_order_of_faces():
+    frames = [at(0, 3), at(0, 3), at(3, 0), at(3, 0)]
+    assert tracks(frames) == ["xxxx", "xxxx"]
+
+
+@pytest.mark.usefixtures("plainly")
+def test_a_body_with_a_frame_of_faces_without_area_is_coded_as_not_there():
+    flat = Mesh.of(np.zeros((3, 3)), [[0, 1, 2]])
+    assert tracks([at(0), flat, at(0), at(0)], interval=4) == ["x.xx"]
+
+
+@pytest.mark.usefixtures("plainly")
+def test_more_bodies_than_a_file_has_tracks_share_some():
+    plate = plane(0.5, 1)
+    many = concatenate([moved(plate, (k % 17, k // 17, 0)) for k in range(MOST_TRACKS + 20)])
+    sequence = MeshList((many, many), 1.0)
+    seen = replace(survey(sequence), scale=1.0)
+    coded = encode_bodies(
+        Job(captured(sequence), OPTIONS, None, Stages(None, 2)), Parts(seen, ALL, NONE, [], CELL, 0.0, 0.0)
+    )
+    assert {each.track for each in coded.groups} == set(range(MOST_TRACKS)) and coded.dropped == 0
+    faces = [len(decode_intra(each.group.payload)[0].faces) for each in coded.groups if each.first_frame == 0]
+    assert sum(faces) == len(many.faces)
+
+
+@pytest.mark.usefixtures("plainly")
+def test_a_background_is_no_finer_than_its_noise_asks_for():
+    seen = replace(survey(MeshList((room(),))), scale=1.0)
+    sizes = []
+    for noise in (0.0, 0.002, 0.01):
+        parts, options = (
+            Parts(seen, ALL, with_room([NONE], sigma=0.002)[0], [], CELL, noise, noise),
+            BackgroundOptions(),
+        )
+        payload = encode_static(parts, 1, 30.0, options)[0].payload
+        place = Placement(1.0, tuple(seen.center))
+        away = rms(parts.background.vertices, decode_background(payload, place))
+        assert away <= max(options.coarse * noise, 1e-4)
+        sizes.append(len(payload))
+    assert sizes[0] > sizes[1] > sizes[2]
+
+
+@pytest.mark.usefixtures("plainly")
+def test_taking_a_scene_apart_finds_its_background_and_its_noise():
+    sequence = captured(MeshList(tuple(ROLLING)))
+    parts = take_apart(sequence, survey(sequence, cleaned=False), OPTIONS.scene, Stages(None, 4))
+    assert rms(parts.background.vertices, room()) < NOISE
+    assert 0.5 * NOISE < parts.noise < 3 * NOISE and parts.segmentation.cell == pytest.approx(CELL, rel=0.2)
+    number = 2
+    assert (parts.segmentation.moving(number, ROLLING[number]) == of_body(ROLLING[number])).mean() > 0.98
+
+
+@pytest.mark.usefixtures("plainly")
+def test_a_scene_in_which_nothing_is_found_to_move_gives_a_warning(tmp_path):
+    """Two frames of balls that move by less than two cells."""
+    _, summary = encoded(small_scene.scene(2), tmp_path / "a.reel")
+    (warning,) = summary.warnings
+    assert warning.startswith("nothing moves by more than 0.16 m") and "--dynamic-only" in warning
+
+
+@pytest.mark.usefixtures("plainly")
+def test_still_surface_that_is_in_no_part_of_the_file_gives_a_warning(tmp_path):
+    """Twenty-five still leaves, each too small for the background, are dropped."""
+    leaf = Mesh.of(0.1 * np.eye(3) + 0.9, [[0, 1, 2]])
+    leaves = concatenate([moved(leaf, (0.25 * k, 0.25 * j, 0)) for k in range(5) for j in range(5)])
+    frames = [concatenate([frame, leaves]) for frame in ROLLING]
+    _, summary = encoded(frames, tmp_path / "a.reel")
+    areas = [face_normals(mesh)[1].sum() for mesh in (leaves, frames[0])]
+    (warning,) = [line for line in summary.warnings if "stands still" in line]
+    assert warning.startswith(f"{100 * areas[0] / areas[1]:.1f} % of the surface") and "--dynamic-only" in warning
+
+
+def test_a_scene_that_is_not_in_metres_is_refused_with_its_size(tmp_path):
+    small = MeshList(tuple(Mesh(mesh.vertices * 1e-3, mesh.faces) for mesh in small_scene.scene(4)), 10.0)
+    with pytest.raises(InputError, match=r"frame 0: \d+ of \d+ faces stand still.*is 0\.00\d+ m large.*--scale"):
+        encode(small, tmp_path / "a.reel", options=quick_scene())
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_frame_in_another_unit_is_refused_by_its_number(tmp_path):
+    frames = list(small_scene.scene(12))
+    frames[2] = Mesh(frames[2].vertices * 1000, frames[2].faces)
+    with pytest.raises(
+        InputError, match=r"frame 2 is 3\.\d+e\+03 m large, half of the frames at most 3\.\d+ m; correct its unit"
+    ):
+        encode(MeshList(tuple(frames), 10.0), tmp_path / "a.reel", options=quick_scene())
+    assert list(tmp_path.iterdir()) == []
