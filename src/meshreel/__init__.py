@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 from .errors import FormatError, InputError, MeshreelError
 
 if TYPE_CHECKING:
+    from . import edit
     from .decoder.video import Video, open
-    from .encoder import edit
     from .encoder.sequence import encode
     from .encoder.settings.options import EncoderOptions
     from .encoder.settings.presets import preset_options

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from ....meshreel import __version__
+from ... import __version__
 
 WriteLines = Callable[[str], object]  # takes whole lines of JSON
 LIBRARIES = ("numpy", "scipy", "libigl", "fast-simplification", "DracoPy", "trimesh")

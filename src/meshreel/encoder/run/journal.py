@@ -19,7 +19,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, BinaryIO
 
-from ....meshreel import __version__
+from ... import __version__
 from ...container.writer import Companion, Stored
 from ...errors import InputError
 from ...format.layout import ChunkKind, Form
