@@ -22,7 +22,7 @@ from meshreel.container.writer import ReelWriter
 from meshreel.encoder.group.forms import IntraOptions, intra_only
 from meshreel.encoder.group.interval import Interval
 from meshreel.encoder.group.target import Fidelity
-from meshreel.encoder.layers.recipe import encode_interval
+from meshreel.encoder.layers.recipe import LayersRecipe
 from meshreel.encoder.settings.presets import layers_options
 from meshreel.errors import FormatError, InputError
 from meshreel.format import budget
@@ -185,14 +185,14 @@ def test_a_file_has_no_more_frames_than_its_bytes_may(tmp_path: Path):
 def test_a_group_that_readers_would_refuse_is_coded_as_shorter_ones(monkeypatch: pytest.MonkeyPatch):
     frames = [Mesh(points, ball(1).base.faces) for points in moving(ball(1), 2)]
     options = replace(layers_options(50), tails=None)
-    [whole] = encode_interval(Interval(frames), options)
+    [whole] = LayersRecipe(options).encode(Interval(frames))
     assert whole.form == Form.LAYERS
     head = read_layers(whole.payload).head
     one = budget.layers_cost(Size.of(worst.decode_mesh(head.base, head.step), head.levels), 1)
     monkeypatch.setattr(budget, "LIMITS", budget.Limits(free=one, per_byte=1))
     with pytest.raises(CostlyError):
         decode_group(whole.payload, 2)
-    groups = list(encode_interval(Interval(frames), options))
+    groups = list(LayersRecipe(options).encode(Interval(frames)))
     assert [group.frame_count for group in groups] == [1, 1]
 
 

@@ -6,7 +6,7 @@ import pytest
 
 import meshreel
 from tests.cli.conftest import FILE, SCENE, failed
-from tests.encoder.test_audio import OPUS
+from tests.edit.test_audio import OPUS
 
 
 @pytest.fixture

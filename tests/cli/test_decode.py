@@ -9,7 +9,7 @@ import meshreel
 from meshreel.format.layout import ChunkKind
 from meshreel.io.sequence import open_sequence
 from tests.cli.conftest import FILE, SCENE, failed
-from tests.encoder.test_appearance import BODY, textured, written
+from tests.encoder.appearance.test_colors import BODY, textured, written
 from tests.golden import GOLDEN
 
 

@@ -13,7 +13,7 @@ import meshreel
 from meshreel.capture.recording import open_recording
 from meshreel.cli.encode import describe
 from meshreel.encoder.group.interval import Interval
-from meshreel.encoder.paper.recipe import encode_interval
+from meshreel.encoder.paper.recipe import PaperRecipe
 from meshreel.io.depth_pictures import write_depth
 from meshreel.io.write import write_mesh
 from tests.capture.depth_scenes import camera, measured, record
@@ -30,13 +30,13 @@ QUICK = quick("paper").method
 def quick_bodies(monkeypatch):
     """Bodies coded frame by frame: what is told of a scene does not depend on how its bodies are coded."""
 
-    def frame_by_frame(interval, options, stages):
-        del options
+    def frame_by_frame(recipe, interval, stages):
+        del recipe
         frames = interval.frames
         alone = [frames] if frames[0].is_empty else [[frame] for frame in frames]
-        return [group for some in alone for group in encode_interval(Interval(some), QUICK, stages)]
+        return [group for some in alone for group in PaperRecipe(QUICK).encode(Interval(some), stages)]
 
-    monkeypatch.setattr("meshreel.encoder.layers.recipe.encode_interval", frame_by_frame)
+    monkeypatch.setattr("meshreel.encoder.layers.recipe.LayersRecipe.encode", frame_by_frame)
 
 
 def test_a_scene_is_reported_by_its_contents_and_info_agrees(run, scan, tmp_path):

@@ -12,7 +12,7 @@ import pytest
 import meshreel
 from meshreel.cli import main
 from tests.cli.conftest import FILE, SCENE, failed
-from tests.encoder.test_appearance import BODY, textured, written
+from tests.encoder.appearance.test_colors import BODY, textured, written
 from tests.golden import GOLDEN
 from tests.play_glb import PlayedGlb
 

@@ -15,7 +15,7 @@ from meshreel.errors import FormatError, InputError
 from meshreel.format.layout import AudioFile, AudioType, Form
 from meshreel.format.records import pack
 from tests.decoder.test_chains import DATA
-from tests.encoder.test_edit import known, records
+from tests.edit.test_edits import known, records
 from tests.golden import GOLDEN
 from tests.metrics.shapes import sphere
 from tests.tones import tone

@@ -21,7 +21,7 @@ from meshreel.geometry.painted import Painted
 from meshreel.geometry.topology import concatenate
 from meshreel.io.sequence import open_sequence
 from meshreel.types import GREY, Mesh, Texture
-from tests.encoder.test_appearance import BODY, CHECKS, COLORED, textured, written
+from tests.encoder.appearance.test_colors import BODY, CHECKS, COLORED, textured, written
 from tests.export.test_animated_file import play, seen, times
 from tests.gltf_validator import validate
 from tests.metrics.shapes import sphere

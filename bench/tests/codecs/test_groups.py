@@ -10,9 +10,9 @@ from meshreel_bench.codecs.groups import GroupStore, prepare, shared_options
 from meshreel_bench.codecs.tvmc.tracking import track_sequence
 
 from meshreel.capture.procedural import SoftBodiesOptions, soft_bodies
-from meshreel.encoder import paper
 from meshreel.encoder.group.interval import Interval
 from meshreel.encoder.group.target import Fidelity
+from meshreel.encoder.paper.recipe import find_groups
 from meshreel.encoder.sequence import Encoder, encode
 from meshreel.encoder.settings.options import EncoderOptions
 from meshreel.types import Mesh, MeshList
@@ -31,12 +31,11 @@ def with_basis(size: int) -> EncoderOptions:
 @pytest.fixture
 def analysed(monkeypatch):
     """Numbers of frames of the intervals that were analysed, in order."""
-    seen, find = list[int](), paper.find_groups
-    for module in (stored, paper):
-        monkeypatch.setattr(
-            module, "find_groups", lambda some, *rest: seen.append(len(some.frames)) or find(some, *rest)
-        )
-    return seen
+    counts = list[int]()
+    monkeypatch.setattr(
+        stored, "find_groups", lambda some, *rest: counts.append(len(some.frames)) or find_groups(some, *rest)
+    )
+    return counts
 
 
 def test_a_prepared_encoder_analyses_each_interval_once_and_writes_the_bytes_of_an_unprepared_one(analysed, tmp_path):
@@ -62,9 +61,9 @@ def test_an_encoder_that_was_prepared_for_other_options_analyses_again(analysed,
 @pytest.mark.parametrize("codec", ["meshreel", "tvmc"])
 def test_bodies_of_a_noisy_scene_are_analysed_once_with_their_noise(codec, monkeypatch, tmp_path):
     """`encode` and the tracking of TVMC reuse the analyses that `prepare` kept."""
-    noises, find = list[float](), paper.find_groups
+    noises = list[float]()
     monkeypatch.setattr(
-        stored, "find_groups", lambda interval, *rest: noises.append(interval.noise) or find(interval, *rest)
+        stored, "find_groups", lambda interval, *rest: noises.append(interval.noise) or find_groups(interval, *rest)
     )
     options, rolling = quick_scene("paper", group_size=2), with_room([ball(0.5 + 0.35 * t) for t in range(4)])
     prepared = Encoder(MeshList(tuple(rolling)))
@@ -84,18 +83,18 @@ def test_kept_groups_are_those_that_find_groups_returns():
     groups = replace(PAPER.method.groups, depth=1)
     options = replace(PAPER.method, target=Fidelity(1e-7, 1.0, 1e-7), groups=groups)  # never reached
     store.keep(Interval(ball), options)
-    kept, found = store.find(Interval(ball), options), paper.find_groups(Interval(ball), options)
+    kept, found = store.find(Interval(ball), options), find_groups(Interval(ball), options)
     assert [len(group.frames) for group in kept] == [len(group.frames) for group in found] and len(kept) > 1
     for ours, theirs in zip(kept, found, strict=True):
         assert all(a is b for a, b in zip(ours.frames, theirs.frames, strict=True))
         assert (ours.fitted is None) == (theirs.fitted is None)
 
 
-@pytest.mark.parametrize("preset", ["paper", "best"])
-def test_options_that_affect_the_rate_alone_are_not_shared(preset):
+@pytest.mark.parametrize(("preset", "coding"), [("paper", "displacements"), ("best", "layers")])
+def test_options_that_affect_the_rate_alone_are_not_shared(preset, coding):
     options = quick(preset)
-    displacements = replace(options.method.displacements, step=0.05)
-    rates = with_method(replace(options, quality=3.0), displacements=displacements)
+    finer = {coding: replace(getattr(options.method, coding), step=0.05)}
+    rates = with_method(replace(options, quality=3.0), **finer)
     assert shared_options(rates) == shared_options(options)
     assert shared_options(replace(options, scene=None)) != shared_options(options)
     name = "fit" if preset == "best" else "surface_fit"

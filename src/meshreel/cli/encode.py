@@ -16,7 +16,6 @@ from ..encoder.file.summary import SceneSummary, Summary
 from ..encoder.group.digests import WriteLines, machine_line
 from ..encoder.rate_control import Goal, encode_to
 from ..encoder.run.excerpt import Excerpt, part_of, read_survey
-from ..encoder.run.schedule import longest_interval
 from ..encoder.scene.static import is_colored
 from ..encoder.sequence import Encoder
 from ..encoder.settings.options import EncoderOptions, SceneOptions, as_installed
@@ -157,7 +156,7 @@ class Part:
         found = _PART.fullmatch(self.part)
         if found is None or len(chosen) < len(sequence):
             raise InputError(f"--part {self.part}: give K/N, as 3/100, and leave --frames out")
-        intervals = surveyed.seen.intervals(longest_interval(options, sequence.frame_rate))
+        intervals = surveyed.seen.intervals(options.recipe().longest(sequence.frame_rate))
         return Excerpt(surveyed, part_of(intervals, int(found[1]), int(found[2])))
 
     def check(self, coding: Coding, masking: Masking) -> None:

@@ -188,7 +188,8 @@ class Encoder:
         stages = Stages(self.progress, len(self.sequence) if self._excerpt is None else len(self._excerpt.frames))
         how = None if options.appearance is None else options.appearance.calibration
         sequence = self.sequence if how is None else self._calibrated(how)
-        job = Job(sequence, options, self._executor, stages, self.find, digests=self.digests)
+        recipe = options.recipe(self.find)
+        job = Job(sequence, options, self._executor, stages, recipe, digests=self.digests)
         return replace(job, excerpt=self._excerpt)
 
     def _is_scene(self, options: EncoderOptions) -> bool:

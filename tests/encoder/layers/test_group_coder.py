@@ -30,7 +30,7 @@ def coded(options=OPTIONS, errors=(0.0, 0.0, 0.0), target: Fidelity | None = Non
     off = rng.normal(size=reference.base.vertices.shape)
     positions = np.stack([reference.base.vertices + [0.01 * t, 0, 0] + error * off for t, error in enumerate(errors)])
     surfaces = [FrameSurface(frame) for frame in FRAMES]
-    return GroupCoder(surfaces, target or target_of(FRAMES, options.target, 0.0), 0.0, options).layers(
+    return GroupCoder(surfaces, target or target_of(FRAMES, options.target, 0.0), 0.0, options, options.floor).layers(
         reference, positions, None
     )[0]
 
@@ -69,6 +69,6 @@ def test_a_group_whose_edges_are_lost_is_coded_one_by_one_with_its_edges():
 def test_a_template_that_has_collapsed_is_replaced_by_frames_that_stand_alone():
     options, reference = replace(OPTIONS, floor=False), template()
     surfaces = [FrameSurface(frame) for frame in FRAMES]
-    coder = GroupCoder(surfaces, target_of(FRAMES, options.target, 0.0), 0.0, options)
+    coder = GroupCoder(surfaces, target_of(FRAMES, options.target, 0.0), 0.0, options, options.floor)
     group, state = coder.layers(reference, np.zeros((3, len(reference.base.vertices), 3)), None)
     assert group.form == Form.DRACO and state is None and np.isfinite(group.fidelity.distance)

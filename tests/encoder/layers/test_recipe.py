@@ -20,7 +20,7 @@ from meshreel.encoder.group.interval import Interval
 from meshreel.encoder.group.target import measure
 from meshreel.encoder.layers import recipe as layered
 from meshreel.encoder.layers.group_coder import GroupCoder
-from meshreel.encoder.layers.recipe import encode_interval
+from meshreel.encoder.layers.recipe import LayersRecipe
 from meshreel.format.layout import Form
 from meshreel.types import Mesh
 from tests.crossed_arms import FRAMES, arms, stray_share
@@ -53,7 +53,7 @@ def decoded(groups: Sequence[EncodedGroup]) -> list[Mesh]:
 
 def coded(frames: Sequence[Mesh], options=OPTIONS) -> list[EncodedGroup]:
     """The groups, after a look at what holds for all: frames are all there, and qualities are those of the bytes."""
-    groups = list(encode_interval(Interval(frames), options))
+    groups = list(LayersRecipe(options).encode(Interval(frames)))
     assert sum(group.frame_count for group in groups) == len(frames)
     assert max(group.frame_count for group in groups) <= options.group_size or groups[0].form == Form.EMPTY
     assert not groups[0].predicted
@@ -104,7 +104,7 @@ def test_a_frame_is_prepared_once_for_all_that_is_tried_with_it(monkeypatch: pyt
 
     monkeypatch.setattr(layered, "FrameSurface", Counted)
     other = Mesh.of(BALL.vertices * [1.6, 0.3, 0.8] + [0, 0.3, 0], BALL.faces)
-    first = next(encode_interval(Interval([BALL, BALL, BALL, other, other]), quick(group_size=5).method))
+    first = next(LayersRecipe(quick(group_size=5).method).encode(Interval([BALL, BALL, BALL, other, other])))
     assert first.frame_count < 5 and len(prepared) == 5  # though it is cut, and tried anew
 
 
@@ -126,7 +126,7 @@ def test_of_two_close_plans_the_one_whose_groups_turn_out_cheaper_is_taken(monke
     for sign, count in ((1, 4), (-1, 2)):  # as if fewer groups were cheaper, or more
         monkeypatch.setattr(layered, "_cost", lambda groups, *_, sign=sign: sign * len(groups))
         sizes.clear()
-        first = next(encode_interval(Interval(frames), OPTIONS))
+        first = next(LayersRecipe(OPTIONS).encode(Interval(frames)))
         assert first.frame_count == count and sorted(sizes) == [2, 2, 4]
 
 
@@ -208,7 +208,7 @@ class Asked(Sequence[Mesh]):
 
 def test_only_the_frames_of_one_group_are_asked_for_at_a_time():
     frames = Asked([BALL] * 6)
-    groups = encode_interval(Interval(frames), replace(OPTIONS, group_size=2))
+    groups = LayersRecipe(replace(OPTIONS, group_size=2)).encode(Interval(frames))
     for number in range(3):
         frames.asked.clear()
         next(groups)
@@ -218,8 +218,8 @@ def test_only_the_frames_of_one_group_are_asked_for_at_a_time():
 def test_the_same_frames_give_the_same_bytes():
     frames = list(deforming_sphere(2, levels=2))
     frames = [Mesh.of(mesh.vertices / 4, mesh.faces) for mesh in frames]
-    assert [list(encode_interval(Interval(frames), OPTIONS))] * 2 == [
-        list(encode_interval(Interval(frames), OPTIONS)) for _ in range(2)
+    assert [list(LayersRecipe(OPTIONS).encode(Interval(frames)))] * 2 == [
+        list(LayersRecipe(OPTIONS).encode(Interval(frames))) for _ in range(2)
     ]
 
 

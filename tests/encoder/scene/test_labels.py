@@ -7,7 +7,7 @@ import numpy as np
 from meshreel.encoder.scene.labels import label_frames
 from meshreel.geometry.topology import concatenate
 from meshreel.types import Mesh, MeshList
-from tests.encoder.test_scene import ALL, NONE, SMALL, at
+from tests.encoder.scene.test_scene import ALL, NONE, SMALL, at
 from tests.metrics.shapes import moved, sphere
 from tests.scenes import quick_scene
 

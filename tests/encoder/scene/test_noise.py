@@ -13,7 +13,7 @@ from meshreel.encoder.group.target import target_of
 from meshreel.encoder.layers import recipe as layered
 from meshreel.encoder.layers.candidates import Candidate
 from meshreel.encoder.layers.options import LayersOptions
-from meshreel.encoder.layers.recipe import encode_interval
+from meshreel.encoder.layers.recipe import LayersRecipe
 from meshreel.format.layout import Form
 from meshreel.types import Mesh
 from tests.coding.decoded_layers import decode_layers
@@ -50,7 +50,7 @@ def test_a_noisy_sheet_with_moving_holes_is_one_group_and_nearer_to_the_truth_th
     truth = [sheet(0.004 * t) for t in range(6)]
     holes = np.linspace(-0.15, 0.15, 6)
     frames = [with_hole(noisy(mesh, NOISE, t), holes[t], 0.05, 0.04) for t, mesh in enumerate(truth)]
-    (group,) = encode_interval(Interval(frames, NOISE), BEST)
+    (group,) = LayersRecipe(BEST).encode(Interval(frames, NOISE))
     assert group.form == Form.LAYERS
     faces, positions, _ = decode_layers(group.payload[: group.layers[BEST.template.levels]])
     before, after = [], []
@@ -71,7 +71,7 @@ def test_a_template_of_its_own_is_tried_where_patches_are_most_of_a_predicted_gr
     monkeypatch.setattr(Candidate, "of_key", lambda *a: tried.append(a[1]) or of_key(*a))
     frames = [noisy(sheet(0.004 * t), NOISE, t) for t in range(6)]
     shown = [with_hole(mesh, 0.0, 0.05, 0.04) if t < 3 else mesh for t, mesh in enumerate(frames)]  # then it is closed
-    groups = list(encode_interval(Interval(shown, NOISE), replace(BEST, group_size=3)))
+    groups = list(LayersRecipe(replace(BEST, group_size=3)).encode(Interval(shown, NOISE)))
     assert [group.frame_count for group in groups] == [3, 3]
     assert tried == keys
     assert groups[1].predicted  # what was tried is no cheaper

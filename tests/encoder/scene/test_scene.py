@@ -82,15 +82,15 @@ def assert_rolls(video, offset=(0.0, 0.0, 0.0)):
 def plainly(monkeypatch):
     """Bodies coded frame by frame, where it does not matter how: a fraction of the time."""
 
-    def coded(interval, options, stages=None):
-        del options, stages
+    def coded(recipe, interval, stages=None):
+        del recipe, stages
         frames = interval.frames
         if frames[0].is_empty:
             return [EncodedGroup(Form.EMPTY, len(frames), encode_empty(), (), NO_ERROR)]
         assert not any(mesh.is_empty for mesh in frames)
         return [EncodedGroup(Form.DRACO, len(frames), encode_intra(list(frames), 1e-3, 0), (), NO_ERROR)]
 
-    monkeypatch.setattr("meshreel.encoder.layers.recipe.encode_interval", coded)
+    monkeypatch.setattr("meshreel.encoder.layers.recipe.LayersRecipe.encode", coded)
 
 
 @pytest.fixture(scope="module")

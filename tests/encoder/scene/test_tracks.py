@@ -14,7 +14,7 @@ from meshreel.coding.intra import encode_empty, encode_intra
 from meshreel.encoder.group.forms import EncodedGroup
 from meshreel.encoder.group.interval import BodyFrames, Interval, NormalisedFrames
 from meshreel.encoder.group.target import NO_ERROR, Fidelity, target_of
-from meshreel.encoder.run import schedule as recipe
+from meshreel.encoder.layers.recipe import LayersRecipe
 from meshreel.encoder.sequence import Encoder
 from meshreel.errors import InputError
 from meshreel.format.layout import Form
@@ -24,7 +24,7 @@ from meshreel.io.sequence import SequenceOptions, open_sequence
 from meshreel.io.write import write_mesh
 from meshreel.metrics.distance import surface_errors
 from meshreel.types import Mesh, MeshList
-from tests.encoder.test_side_by_side import Scrambled
+from tests.encoder.run.test_side_by_side import Scrambled
 from tests.metrics.shapes import moved, sphere
 from tests.small_bodies import body
 from tests.small_options import quick
@@ -61,7 +61,7 @@ def surfaces(video) -> list[list[bool]]:
 def plainly(monkeypatch):
     """Bodies coded frame by frame, where it does not matter how: a fraction of the time."""
 
-    def encode_interval(interval, *_):
+    def encode(_, interval, *__):
         frames = list(interval.frames)
         if frames[0].is_empty:
             yield EncodedGroup(Form.EMPTY, len(frames), encode_empty(), (), NO_ERROR)
@@ -69,7 +69,7 @@ def plainly(monkeypatch):
         for mesh in frames:
             yield EncodedGroup(Form.DRACO, 1, encode_intra([mesh], 1e-4, 0), (), Fidelity(0.1, 2.0, 0.3, 60.0))
 
-    monkeypatch.setattr(recipe.layers, "encode_interval", encode_interval)
+    monkeypatch.setattr(LayersRecipe, "encode", encode)
 
 
 TWO = frames_of(body(1), [at(3 + 0.2 * t, mesh) for t, mesh in enumerate(body(3))])
@@ -104,12 +104,12 @@ def test_the_measures_that_are_told_are_those_of_whole_frames(two):
 def test_targets_are_relative_to_the_whole_frame(monkeypatch, tmp_path):
     seen: list[float] = []
 
-    def encode_interval(interval, options, *_):
-        target = target_of(list(interval.frames), options.target, 0.0)
+    def encode(recipe, interval, *_):
+        target = target_of(list(interval.frames), recipe.options.target.scaled(interval.larger), 0.0)
         seen.append(target.distance / OPTIONS.method.target.distance)
         return iter([EncodedGroup(Form.EMPTY, len(interval.frames), encode_empty(), (), NO_ERROR)])
 
-    monkeypatch.setattr(recipe.layers, "encode_interval", encode_interval)
+    monkeypatch.setattr(LayersRecipe, "encode", encode)
     encoded(frames_of([BALL] * 3, [at(4 + t) for t in range(3)]), tmp_path / "a.reel")
     wanted = np.linalg.norm([6, 2, 2]) / np.linalg.norm([8, 2, 2])  # the first frame and the box of all
     assert seen == pytest.approx([wanted, wanted])
@@ -163,9 +163,7 @@ def test_one_body_is_coded_as_whole_frames_are(tmp_path):
     wanted = [
         group.payload
         for numbers in seen.intervals(round(OPTIONS.key_interval * sequence.frame_rate))
-        for group in recipe.encode_interval(
-            Interval(NormalisedFrames(DerivedSequence(sequence), seen, numbers)), OPTIONS.method
-        )
+        for group in OPTIONS.recipe().encode(Interval(NormalisedFrames(DerivedSequence(sequence), seen, numbers)))
     ]
     assert [video.reader.read_chunk(chunk.number) for chunk in video.reader.groups] == wanted
 
@@ -201,15 +199,15 @@ def test_workers_cut_their_body_out_of_files_that_they_read(tmp_path):
 def test_a_stopped_encode_continues_with_the_bodies_that_are_missing(tmp_path, monkeypatch):
     sequence = frames_of([BALL] * 6, [at(4 + t) for t in range(6)])
     encoded(sequence, tmp_path / "whole.reel")
-    coded, calls = recipe.layers.encode_interval, list[tuple[int, int]]()
+    coded, calls = LayersRecipe.encode, list[tuple[int, int]]()
 
-    def stops(interval, *rest):
+    def stops(recipe, interval, *rest):
         calls.append((interval.first_frame, interval.track))
         if len(calls) == 2:
             raise KeyboardInterrupt
-        return coded(interval, *rest)
+        return coded(recipe, interval, *rest)
 
-    monkeypatch.setattr(recipe.layers, "encode_interval", stops)
+    monkeypatch.setattr(LayersRecipe, "encode", stops)
     with pytest.raises(KeyboardInterrupt):
         Encoder(sequence).encode(tmp_path / "a.reel", OPTIONS)
     with pytest.raises(InputError, match="has 1 intervals"):

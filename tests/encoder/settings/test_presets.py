@@ -19,9 +19,9 @@ def test_the_default_options_are_those_that_encode_takes_by_default():
     assert preset_options("paper").method == PaperOptions()
 
 
-def test_the_laplacian_form_follows_the_quality_in_every_preset():
+def test_the_laplacian_form_follows_the_quality():
     for quality in (0, 25, 50, 100):
-        steps = {preset_options(preset, quality).method.displacements.step for preset in PRESETS}
+        steps = {preset_options(preset, quality).method.displacements.step for preset in PRESETS[1:]}
         assert steps == {displacement_step(quality)}
 
 

@@ -9,13 +9,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from jaxtyping import Float64
 
-from ...coding.group import decode_group
 from ...coding.intra import encode_empty
-from ...coding.paper.displacements import DisplacementOptions
-from ...coding.paper.group import encode_laplacian
-from ...coding.reference_mesh import CodedReference
 from ...container.writer import Companion, Stored
 from ...errors import InputError
 from ...format.budget import CostlyError
@@ -23,7 +18,7 @@ from ...format.layout import Form
 from ...geometry.work import Work
 from ...types import Mesh
 from .draco import IntraOptions, cheapest_intra, finest_intra
-from .target import NO_ERROR, Fidelity, measure
+from .target import NO_ERROR, Fidelity
 
 # Times the bytes that half the distance (6 dB) may cost: a finer template gains 4 dB for that (decision 7).
 MOST_FOR_HALF = 2
@@ -47,28 +42,6 @@ class EncodedGroup:
     digests: tuple[str, ...] = field(default=(), kw_only=True)  # lines of `--debug-digests`
     stored: Stored | None = None  # where the payload is, in place of `payload`, of a group that a journal has
     work: Work = field(default_factory=dict, kw_only=True)  # that another process did until this group was done
-
-
-def laplacian(
-    frames: Sequence[Mesh],
-    reference: CodedReference,
-    positions: Float64[np.ndarray, "T V 3"],
-    options: DisplacementOptions,
-) -> EncodedGroup:
-    """Encode a group in the `laplacian` form. Raises CostlyError where readers would refuse it."""
-    try:
-        payload, layers = encode_laplacian(reference, displacement_field(reference, positions), options)
-    except ValueError as error:  # least squares that are singular, or whose elimination fills in
-        raise CostlyError(f"laplacian: {error}") from error
-    fidelity = measure(frames, decode_group(payload, len(frames)))
-    return EncodedGroup(Form.LAPLACIAN, len(frames), payload, layers, fidelity)
-
-
-def displacement_field(
-    reference: CodedReference, positions: Float64[np.ndarray, "T V 3"]
-) -> Float64[np.ndarray, "V T 3"]:
-    """Return the offsets of a reference's vertices to their positions in each frame (paper, section 3.3.2)."""
-    return np.ascontiguousarray(np.moveaxis(positions, 0, 1) - reference.base.vertices[:, None])
 
 
 def most_for(group: EncodedGroup) -> float:

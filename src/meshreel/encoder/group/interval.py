@@ -39,6 +39,7 @@ class Interval:
     views: Views | None = field(default=None, kw_only=True)  # of colour cameras
     sight: Sight | None = field(default=None, kw_only=True)  # of depth cameras
     weight: Fraction = field(default=Fraction(1), kw_only=True)  # of each frame in progress: bodies share a frame
+    pictured: bool = field(default=False, kw_only=True)  # with textures or splats, which frames of Draco cannot have
     larger: float = field(default=1.0, kw_only=True)  # times, the whole frames than the body: targets are of the former
 
     @property

@@ -6,7 +6,6 @@ In: frames, the positions of a template on them. Out: an EncodedGroup with its f
 from __future__ import annotations
 
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -21,13 +20,12 @@ from ...format.records import pack
 from ...types import Mesh
 from ..group.digests import Digests, note
 from ..group.draco import cheapest_intra
-from ..group.forms import EncodedGroup, cheaper, intra_only, laplacian, most_for
+from ..group.forms import EncodedGroup, cheaper, intra_only, most_for
 from ..group.target import Fidelity, measure
 from .options import LayersOptions
 from .tails import find_tails
 
 MOST_FOR_EDGES = 4  # times the bytes that frames with their edges may cost (guess)
-TOO_COARSE = 1.5  # targets that the layers' distance may reach before the Laplacian form is tried (guess)
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,6 +36,7 @@ class GroupCoder:
     target: Fidelity  # that the frames should reach, normalised
     noise: float  # RMS distance of the frames from the truth, normalised
     options: LayersOptions
+    floor: bool = True  # Draco is tried in place of every group, not only where nothing else holds
     dearer: float = 0.0  # bytes a frame, for which Draco was tried and was no bargain
     digests: Digests | None = field(default=None, kw_only=True)
 
@@ -76,16 +75,11 @@ class GroupCoder:
         note(self.digests, "fidelity", fidelity)
         is_predicted = previous is not None
         chosen = EncodedGroup(Form.LAYERS, len(self.surfaces), shown.payload, shown.layers, fidelity, is_predicted)
-        if self.noise == 0 and fidelity.distance > TOO_COARSE * self.target.distance:
-            with suppress(CostlyError):
-                other = laplacian(self.frames, reference, positions, self.options.displacements)
-                if other.fidelity.reaches(fidelity) and len(other.payload) < len(chosen.payload):
-                    chosen = other
         if not np.isfinite(chosen.fidelity.distance) or any(mesh.is_empty for mesh in shown.frames):
             return self.alone(), None  # the template has collapsed: nothing is comparable
         if (sharp := self._sharp(chosen)) is not None:
             return sharp, None
-        if self.options.floor and most_for(chosen) > self.dearer:
+        if self.floor and most_for(chosen) > self.dearer:
             chosen = cheaper(self.frames, chosen, self.options.intra)
         return chosen, encoded.state if chosen.form == Form.LAYERS else None
 

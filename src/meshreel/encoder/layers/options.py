@@ -11,7 +11,6 @@ from ...analysis.follow.fused_template import FusedOptions
 from ...analysis.follow.template import TemplateOptions
 from ...analysis.plan import PlanOptions
 from ...coding.layers.coder import LayerCodingOptions
-from ...coding.paper.displacements import DisplacementOptions
 from ...errors import InputError
 from ..group.draco import IntraOptions
 from ..group.interval import check_group_size
@@ -39,7 +38,6 @@ class LayersOptions:
     errors: tuple[float, ...] = ()  # of a key's further templates, which are tried: times `template.error`
     layers: LayerCodingOptions = field(default_factory=LayerCodingOptions)
     tails: TailOptions | None = field(default_factory=TailOptions)  # None: no patches
-    displacements: DisplacementOptions = field(default_factory=DisplacementOptions)  # where layers miss the target
     flat: float = 2.0  # times the wanted normal error beyond which edges are lost: frames are of Draco then (guess)
     measured: int | None = None  # frames of a group whose fidelity is measured, at most; None: all
     floor: bool = True  # Draco is tried in place of every group, not only where nothing else holds

@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 from jaxtyping import Float64
@@ -36,21 +37,45 @@ LEAST = 1e-30  # error: its logarithm is finite
 Coded = tuple[EncodedGroup, Followed | None]  # a group, and the template that the next may begin with
 
 
-def encode_interval(interval: Interval, options: LayersOptions, stages: Stages | None = None) -> Iterator[EncodedGroup]:
-    """Yield the groups of an interval; only the frames of one plan are in memory at a time."""
-    frames = interval.frames
-    stages = stages or Stages(None, len(frames))
-    groups = empty_groups(len(frames)) if frames[0].is_empty else _Planner(interval, options).groups()
-    for group in groups:
-        stages.add("code", group.frame_count)
-        yield group
+@dataclass(frozen=True, slots=True)
+class LayersRecipe:
+    """The recipe of preset `best`: templates that follow the surface, coded in layers."""
+
+    options: LayersOptions
+    key_interval: float = 4.0  # s, at most, from one random-access point to the next
+    colored: bool = True  # the file keeps colours, which then also tell where the surface is
+
+    name: ClassVar[str] = "best"
+    bodies_apart: ClassVar[bool] = True
+
+    @property
+    def group_size(self) -> int:
+        """The largest number of frames in a group."""
+        return self.options.group_size
+
+    def longest(self, frame_rate: float) -> int:
+        """Return the number of frames in a key interval."""
+        return max(1, round(self.key_interval * frame_rate))
+
+    def encode(self, interval: Interval, stages: Stages | None = None) -> Iterator[EncodedGroup]:
+        """Yield the groups of an interval; only the frames of one plan are in memory at a time."""
+        frames = interval.frames
+        stages = stages or Stages(None, len(frames))
+        groups = empty_groups(len(frames)) if frames[0].is_empty else _Planner(interval, self).groups()
+        for group in groups:
+            stages.add("code", group.frame_count)
+            yield group
 
 
 class _Planner:
     """Plans the next frames of an interval and codes them, until none is left."""
 
-    def __init__(self, interval: Interval, options: LayersOptions) -> None:
-        self._interval, self._options, self._at = interval, options, 0
+    def __init__(self, interval: Interval, recipe: LayersRecipe) -> None:
+        self._interval, self._options, self._at = interval, recipe.options, 0
+        self._colored = recipe.colored
+        self._target = recipe.options.target.scaled(interval.larger)
+        # A frame in the `draco` form has no pictures, and codes noise.
+        self._floor = recipe.options.floor and not (interval.noise or interval.pictured)
         self._surfaces = dict[int, FrameSurface]()
         self._candidates, self._tried = list[Candidate](), set[int]()  # of key frames; their numbers
         self._before: Followed | None = None
@@ -75,11 +100,11 @@ class _Planner:
         self._surfaces = {at: known.get(at) or FrameSurface(frames[at], free(at)) for at in numbers}
         meshes = [surface.mesh for surface in self._surfaces.values()]
         note(digests, "frames", *(array for mesh in meshes for array in (mesh.vertices, mesh.faces)))
-        target = target_of(meshes, self._options.target, noise)
+        target = target_of(meshes, self._target, noise)
         ahead = Ahead(
             self._at, list(self._surfaces.values()), noise, target, digests, frame_rate=self._interval.frame_rate
         )
-        return ahead if self._options.slide is None else replace(ahead, paint=self._interval.paint)
+        return replace(ahead, paint=self._interval.paint) if self._options.slide and self._colored else ahead
 
     def _standing(self, ahead: Ahead) -> list[Coded]:
         """Code the template where it was, if its residual there is hardly larger than usual: a fit would only slide."""
@@ -177,7 +202,7 @@ class _Planner:
 
     def _coder(self, ahead: Ahead, some: slice) -> GroupCoder:
         chosen, digests = ahead.surfaces[some], ahead.digests
-        return GroupCoder(chosen, ahead.target, ahead.noise, self._options, self._dearer, digests=digests)
+        return GroupCoder(chosen, ahead.target, ahead.noise, self._options, self._floor, self._dearer, digests=digests)
 
 
 def _is_patched(group: EncodedGroup) -> bool:

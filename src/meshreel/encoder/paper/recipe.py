@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 from jaxtyping import Float64
@@ -19,16 +20,19 @@ from ...analysis.fit.surface_fit import Fit, Guides, fit_frames, snap_to_vertice
 from ...analysis.groups import cut_at
 from ...analysis.reference.extraction import MDS, extract_reference, predict
 from ...analysis.reference.track import track_centers
+from ...coding.group import decode_group
+from ...coding.paper.displacements import DisplacementOptions
+from ...coding.paper.group import encode_laplacian
 from ...coding.reference_mesh import CodedReference, code_reference
 from ...errors import NoReferenceError
 from ...format.budget import CostlyError
 from ...format.layout import Form
 from ...types import Centers, Mesh
 from ..group.digests import Digests, note
-from ..group.forms import EncodedGroup, cheaper, empty_groups, intra_only, laplacian
+from ..group.forms import EncodedGroup, cheaper, empty_groups, intra_only
 from ..group.interval import Interval
 from ..group.progress import Stages
-from ..group.target import target_of
+from ..group.target import measure, target_of
 from .options import PaperOptions
 
 
@@ -52,24 +56,6 @@ class FoundGroup:
 FindGroups = Callable[[Interval, PaperOptions, "Stages | None"], list[FoundGroup]]
 
 
-def encode_interval(
-    interval: Interval, options: PaperOptions, stages: Stages | None = None, find: FindGroups | None = None
-) -> list[EncodedGroup]:
-    """Encode an interval as one group, or as several where one reference cannot follow.
-
-    `find` replaces `find_groups`, to reuse the references of an earlier encode.
-    """
-    count = len(interval.frames)
-    stages = stages or Stages(None, count)
-    if interval.frames[0].is_empty:
-        groups = list(empty_groups(count))
-    else:
-        found = (find or find_groups)(interval, options, stages)
-        groups = [group for one in found for group in _encode_group(one, options, interval.noise)]
-    stages.add("code", count)
-    return groups
-
-
 def find_groups(interval: Interval, options: PaperOptions, stages: Stages | None = None) -> list[FoundGroup]:
     """Cut an interval into groups that one reference follows each, or none does; every frame has a surface.
 
@@ -83,6 +69,42 @@ def find_groups(interval: Interval, options: PaperOptions, stages: Stages | None
     note(interval.digests, "centers", centers.positions)
     stages.add("track", len(frames))
     return _Cutting(options, interval.noise, interval.digests).groups(frames, centers, options.groups.depth, stages)
+
+
+@dataclass(frozen=True, slots=True)
+class PaperRecipe:
+    """The paper's recipe; `find` may keep what it found, so that references of an earlier encode are used again."""
+
+    options: PaperOptions
+    find: FindGroups = find_groups
+
+    bodies_apart: ClassVar[bool] = False
+
+    @property
+    def name(self) -> str:
+        """The name of the preset."""
+        return "paper-literal" if self.options.is_literal else "paper"
+
+    @property
+    def group_size(self) -> int:
+        """The largest number of frames in a group, the paper's GoF."""
+        return self.options.group_size
+
+    def longest(self, frame_rate: float) -> int:
+        """Return the number of frames in a group, at any rate: an interval is one group."""
+        del frame_rate
+        return self.options.group_size
+
+    def encode(self, interval: Interval, stages: Stages | None = None) -> Iterator[EncodedGroup]:
+        """Yield an interval as one group, or as several where one reference cannot follow."""
+        count = len(interval.frames)
+        stages = stages or Stages(None, count)
+        if interval.frames[0].is_empty:
+            yield from empty_groups(count)
+        else:
+            for found in self.find(interval, self.options, stages):
+                yield from _encode_group(found, self.options, interval.noise)
+        stages.add("code", count)
 
 
 def analyze(
@@ -163,3 +185,25 @@ def _encode_group(found: FoundGroup, options: PaperOptions, noise: float) -> Ite
         group = intra_only(frames, target_of(frames, options.target, noise), options.intra)
         yield group
         frames = frames[group.frame_count :]
+
+
+def laplacian(
+    frames: Sequence[Mesh],
+    reference: CodedReference,
+    positions: Float64[np.ndarray, "T V 3"],
+    options: DisplacementOptions,
+) -> EncodedGroup:
+    """Encode a group in the `laplacian` form. Raises CostlyError where readers would refuse it."""
+    try:
+        payload, layers = encode_laplacian(reference, displacement_field(reference, positions), options)
+    except ValueError as error:  # least squares that are singular, or whose elimination fills in
+        raise CostlyError(f"laplacian: {error}") from error
+    fidelity = measure(frames, decode_group(payload, len(frames)))
+    return EncodedGroup(Form.LAPLACIAN, len(frames), payload, layers, fidelity)
+
+
+def displacement_field(
+    reference: CodedReference, positions: Float64[np.ndarray, "T V 3"]
+) -> Float64[np.ndarray, "V T 3"]:
+    """Return the offsets of a reference's vertices to their positions in each frame (paper, section 3.3.2)."""
+    return np.ascontiguousarray(np.moveaxis(positions, 0, 1) - reference.base.vertices[:, None])

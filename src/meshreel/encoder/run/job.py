@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from ...geometry.derived_sequences import DerivedSequence
 from ..group.digests import WriteLines, line_of
 from ..group.progress import Stages
-from ..paper.recipe import FindGroups, find_groups
+from ..recipe import Recipe
 from ..settings.options import EncoderOptions, SceneOptions
 from .excerpt import Excerpt
 from .journal import Journal
@@ -22,7 +22,7 @@ class Job:
     options: EncoderOptions
     executor: Executor | None
     stages: Stages
-    find: FindGroups = find_groups  # of the paper's recipe
+    recipe: Recipe
     journal: Journal | None = None  # of the output; None where groups are not kept
     digests: WriteLines | None = None  # of what the stages compute; None where nobody asks
     excerpt: Excerpt | None = None  # the frames that are encoded; None: all

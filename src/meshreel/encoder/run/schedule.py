@@ -1,7 +1,6 @@
-"""The choice of the recipe: an interval becomes groups by the paper's recipe or by that of layers.
+"""Encoding of the intervals of a job, here or side by side in workers, in any order.
 
-In -> out: an interval, the options of a recipe -> groups, in order. An interval needs no other frames, so that
-intervals can be encoded side by side, and those that an earlier run had done are taken from its journal.
+In -> out: a job, its intervals -> their groups, in order; those that an earlier run had done come from its journal.
 """
 
 from __future__ import annotations
@@ -14,17 +13,12 @@ from typing import Any
 from threadpoolctl import threadpool_limits
 
 from ...geometry.work import add, heard, since, so_far
-from ...types import evenly
-from ..appearance.colors import colored_groups, has_pictures
 from ..appearance.options import AppearanceOptions
-from ..group.digests import Digests, note
+from ..group.digests import Digests
 from ..group.forms import EncodedGroup
 from ..group.interval import Interval
 from ..group.progress import IntervalStages, Stages
-from ..layers import recipe as layers
-from ..layers.options import LayersOptions
-from ..paper import recipe as paper
-from ..settings.options import EncoderOptions, MethodOptions
+from ..recipe import Recipe, encode_interval
 from .job import Job
 from .side_by_side import Call, as_done
 from .worker import end_with_parent, tell
@@ -54,7 +48,7 @@ def _one_by_one(job: Job, intervals: Iterable[Interval]) -> Iterator[_Done]:
             yield known, ""
             continue
         with heard(stages.hear):
-            groups = list(encode_interval(interval, job.options.method, stages, job.find, job.options.appearance))
+            groups = list(encode_interval(interval, job.recipe, job.options.appearance, stages))
         yield _kept(job, interval, groups)
 
 
@@ -71,7 +65,7 @@ def _side_by_side(job: Job, intervals: Iterable[Interval]) -> Iterator[_Done]:
                 ready[number] = known, ""
                 continue
             sent[number] = interval, stages
-            yield number, encode_sent, (interval.to_send(), job.options, number)
+            yield number, encode_sent, (interval.to_send(), job.recipe, job.options.appearance, number)
 
     def look() -> None:
         for number, stage, done in told() if told is not None else ():
@@ -99,7 +93,7 @@ def _noting(job: Job, interval: Interval) -> Interval:
 
 
 def _stages_of(job: Job, interval: Interval) -> IntervalStages:
-    return IntervalStages(job.stages, len(interval.frames), job.options.method.group_size, interval.weight)
+    return IntervalStages(job.stages, len(interval.frames), job.recipe.group_size, interval.weight)
 
 
 def _known(job: Job, interval: Interval, stages: IntervalStages) -> list[EncodedGroup] | None:
@@ -116,49 +110,17 @@ def _kept(job: Job, interval: Interval, groups: list[EncodedGroup]) -> _Done:
     return groups if job.journal is None else job.journal.keep(interval, groups), lines
 
 
-def encode_interval(
-    interval: Interval,
-    options: MethodOptions,
-    stages: Stages | None = None,
-    find: paper.FindGroups | None = None,
-    appearance: AppearanceOptions | None = None,
-) -> Iterator[EncodedGroup]:
-    """Encode an interval as groups, in order, by the recipe whose options are given; with colours by `appearance`.
-
-    `find` finds the groups of the paper's recipe; pass another to reuse an earlier analysis.
-    """
-    options = replace(options, target=options.target.scaled(interval.larger))
-    if isinstance(options, LayersOptions):
-        if appearance is None:  # what is not kept does not tell where the surface is, either
-            options = replace(options, slide=None)
-        some = (interval.frames[number] for number in evenly(len(interval.frames), 3))
-        splats = appearance is not None and appearance.splats is not None
-        if interval.noise or splats or has_pictures(interval, some, appearance):  # a frame in the `draco` form has none
-            options = replace(options, floor=False)
-        groups = layers.encode_interval(interval, options, stages)
-    else:
-        groups = iter(paper.encode_interval(interval, options, stages, find))
-    for group in colored_groups(groups, interval, appearance, stages):
-        note(interval.digests, "payload", group.form.name, group.payload, *(one.read() for one in group.companions))
-        yield group if interval.digests is None else replace(group, digests=interval.digests.take())
-
-
-def encode_sent(interval: Interval, options: EncoderOptions, number: int) -> tuple[list[EncodedGroup], Any]:
+def encode_sent(
+    interval: Interval, recipe: Recipe, appearance: AppearanceOptions | None, number: int
+) -> tuple[list[EncodedGroup], Any]:
     """Encode an interval in a worker process, which ends with its parent; the result can be pickled.
 
     Return the groups, and what reading the frames has shown.
     """
     end_with_parent()
     count = len(interval.frames)
-    stages = IntervalStages(Stages(partial(tell, number), count), count, options.method.group_size)
+    stages = IntervalStages(Stages(partial(tell, number), count), count, recipe.group_size)
     with threadpool_limits(1), heard(stages.hear):
         before = so_far()
-        *others, last = encode_interval(interval, options.method, stages, None, options.appearance)
+        *others, last = encode_interval(interval, recipe, appearance, stages)
         return [*others, replace(last, work=since(before))], interval.observed
-
-
-def longest_interval(options: EncoderOptions, frame_rate: float) -> int:
-    """Return how many frames an interval has at most: a key interval of layers, or one group of the paper's recipe."""
-    if isinstance(options.method, LayersOptions):
-        return max(1, round(options.key_interval * frame_rate))
-    return options.method.group_size

@@ -25,7 +25,7 @@ from ..group.forms import empty_groups
 from ..group.interval import Interval
 from ..group.views import Sight, Views
 from ..run.job import Job
-from ..run.schedule import encode_intervals, longest_interval
+from ..run.schedule import encode_intervals
 from ..settings.options import EncoderOptions
 from .parts import Parts
 from .static import refreshes
@@ -76,7 +76,7 @@ def track_intervals(job: Job, parts: Parts, frames: range, tracks: Tracks) -> li
     Frames can where all have a surface or none has, and where they are of about one scale.
     """
     moving, found = [parts.moving(k, job.sequence[k]) for k in frames], list[Interval]()
-    longest = longest_interval(job.options, job.sequence.frame_rate)
+    longest = job.recipe.longest(job.sequence.frame_rate)
     for track, meshes in tracks.of(moving):
         normalised = [parts.seen.normalise(mesh) for mesh in meshes]
         for cut in _cut(normalised, frames, parts.seen, longest):

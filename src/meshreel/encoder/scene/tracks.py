@@ -22,9 +22,8 @@ from ...metrics.distance import PSNR_CEILING, psnr
 from ..group.forms import EncodedGroup, empty_groups
 from ..group.interval import BodyFrames, Interval, NormalisedFrames
 from ..group.views import Views
-from ..layers.options import LayersOptions
 from ..run.job import Job
-from ..run.schedule import encode_intervals, longest_interval
+from ..run.schedule import encode_intervals
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,8 +60,8 @@ def tracked_bodies(job: Job, seen: Survey) -> TrackedBodies:
 
     Of an excerpt, these are the key intervals of the whole sequence as far as its frames go.
     """
-    numbered = seen.intervals(longest_interval(job.options, job.sequence.frame_rate))
-    if isinstance(job.options.method, LayersOptions):
+    numbered = seen.intervals(job.recipe.longest(job.sequence.frame_rate))
+    if job.recipe.bodies_apart:
         whole = list(zip(numbered, _tracked(seen, numbered), strict=True))
     else:
         whole = [(frames, [Body(0)]) for frames in numbered]

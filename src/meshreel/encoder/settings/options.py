@@ -14,7 +14,9 @@ from ...analysis.scene.segmentation import SegmentOptions
 from ...errors import InputError
 from ..appearance.options import AppearanceOptions
 from ..layers.options import LayersOptions
+from ..layers.recipe import LayersRecipe
 from ..paper.options import PaperOptions
+from ..paper.recipe import FindGroups, PaperRecipe, find_groups
 
 MOST_SECONDS = 600  # of a key interval: viewers who join late decode that much before the first picture (guess)
 
@@ -51,12 +53,16 @@ class EncoderOptions:
         if not 0 < self.key_interval <= MOST_SECONDS:
             raise InputError(f"key interval {self.key_interval:g}: give seconds, above 0 and at most {MOST_SECONDS}")
 
+    def recipe(self, find: FindGroups = find_groups) -> LayersRecipe | PaperRecipe:
+        """Return the method with its options; `find` finds the groups of the paper's."""
+        if isinstance(self.method, LayersOptions):
+            return LayersRecipe(self.method, self.key_interval, self.appearance is not None)
+        return PaperRecipe(self.method, find)
+
     @property
     def preset(self) -> str:
         """Name of the recipe: `best`, `paper` or `paper-literal`; a file records it."""
-        if isinstance(self.method, LayersOptions):
-            return "best"
-        return "paper-literal" if self.method.is_literal else "paper"
+        return self.recipe().name
 
 
 def as_installed(options: EncoderOptions) -> tuple[EncoderOptions, tuple[str, ...]]:

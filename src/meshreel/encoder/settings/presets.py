@@ -137,7 +137,6 @@ def layers_options(quality: float = 50.0, effort: str = "normal") -> LayersOptio
         target=Fidelity(distance=0.2 * coarser + 0.00005, angle=7.0, worst=coarser),  # what templates reach
         template=TemplateOptions(error=rounded(0.00088 * (motion_step(min(quality, DENSEST)) / 0.0012) ** 0.55)),
         layers=LayerCodingOptions(step=step),
-        displacements=DisplacementOptions(step=displacement_step(quality)),
         tolerance=tolerance(quality),
     )
     if quality >= EXACT:
