@@ -10,13 +10,13 @@ from functools import cache, partial
 import numpy as np
 
 from meshreel.analysis.appearance.calibrate import halved
-from meshreel.capture.figure import Pose, figure
-from meshreel.capture.implicit import polygonize
-from meshreel.capture.procedural import grid_of_frame
-from meshreel.capture.rig import DepthCamera
-from meshreel.capture.simulated_color import ColorSensorOptions, Painter, SimulatedColor
-from meshreel.capture.solid_colors import WALKER, person_colors
-from meshreel.geometry.cameras import looking_at
+from meshreel.capture.rig.cameras import DepthCamera, posed
+from meshreel.capture.simulated.figure import Pose, figure
+from meshreel.capture.simulated.implicit import polygonize
+from meshreel.capture.simulated.procedural import grid_of_frame
+from meshreel.capture.simulated.simulated_color import ColorSensorOptions, Painter, SimulatedColor
+from meshreel.capture.simulated.solid_colors import WALKER, person_colors
+from meshreel.geometry.cameras import Camera, CameraPose, looking_at
 from meshreel.geometry.color_views import ColorPicture
 from meshreel.types import Mesh, MeshSequence
 from tests.metrics.shapes import sphere
@@ -88,11 +88,11 @@ def around(sensor: ColorSensorOptions, count: int = 6, width: int = 512, seed: i
         angle = 2 * math.pi * number / count
         eye = np.array([2.6 * math.sin(angle), 1.6 if number % 2 else 0.8, 2.6 * math.cos(angle)])
         pose = looking_at(eye, np.array([0.0, 0.9, 0.0]))
-        focal, center = 0.8 * height / 1.75 * 2.6, ((width - 1) / 2, (height - 1) / 2)
-        depth = DepthCamera(f"c{number}", width, height, (focal, focal), center, pose)
-        found.append(SimulatedColor.beside(depth, sensor, random))
+        focal = 0.8 * height / 1.75 * 2.6
+        view = Camera(width, height, (focal, focal), (width / 2, height / 2), CameraPose.of_camera(pose))
+        found.append(SimulatedColor.beside(DepthCamera(f"c{number}", view), sensor, random))
     poses = [np.array(eye.record("", random)["camera_to_world"]).reshape(4, 4) for eye in found]
-    return [(eye, replace(eye.camera, camera_to_world=pose)) for eye, pose in zip(found, poses, strict=True)]
+    return [(eye, posed(eye.camera, pose)) for eye, pose in zip(found, poses, strict=True)]
 
 
 def _pose(index: int) -> Pose:

@@ -10,9 +10,9 @@ import numpy as np
 from jaxtyping import Float64
 from scipy.spatial.transform import Rotation
 
-from meshreel.capture.figure import Pose, figure
-from meshreel.capture.implicit import Body, capsule, polygonize
-from meshreel.capture.procedural import grid_of_frame
+from meshreel.capture.simulated.figure import Pose, figure
+from meshreel.capture.simulated.implicit import Body, capsule, polygonize
+from meshreel.capture.simulated.procedural import grid_of_frame
 from meshreel.geometry.closest_points import Surface
 from meshreel.geometry.topology import face_normals
 from meshreel.types import Mesh

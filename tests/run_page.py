@@ -28,7 +28,7 @@ def main(page: Path, given: bool) -> None:
 def give() -> None:
     """Makes a folder `scan`, and the presets small."""
     import meshreel
-    from meshreel.capture.procedural import SoftBodiesOptions, soft_bodies
+    from meshreel.capture.simulated.procedural import SoftBodiesOptions, soft_bodies
     from meshreel.io.write import write_mesh
 
     meshreel.preset_options = small(meshreel.preset_options)  # type: ignore[assignment]

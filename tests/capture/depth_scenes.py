@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from meshreel.capture.rig import DepthCamera, write_rig
+from meshreel.capture.rig.cameras import DepthCamera
+from meshreel.capture.rig.rig import write_rig
+from meshreel.geometry.cameras import Camera, CameraPose
 from meshreel.io.depth_pictures import write_depth
 
 RADIUS, WALL = 0.4, 1.2  # m; the ball is at the origin, the wall behind it at z = WALL
@@ -16,17 +18,14 @@ def camera(name="front", side=0.0, size=96, **changed):
     turn = np.array([[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]])
     pose = np.eye(4)
     pose[:3, :3], pose[:3, 3] = turn, turn @ [0, 0, -2]
-    values = {"focal": (float(size), float(size)), "center": (size / 2 - 0.5, size / 2 - 0.5), "camera_to_world": pose}
-    return DepthCamera(name, size, size, **(values | {"depth_range": (0.2, 4.0)} | changed))
+    view = Camera(size, size, (float(size), float(size)), (size / 2, size / 2), CameraPose.of_camera(pose))
+    return DepthCamera(name, view, **({"depth_range": (0.2, 4.0)} | changed))
 
 
 def measured(camera, ball=(0.0, 0.0, 0.0), wall=True):
     """What a camera measures of the ball and the wall, in its unit; 0 where it sees neither."""
-    rows, columns = np.mgrid[: camera.height, : camera.width]
-    (fx, fy), (cx, cy) = camera.focal, camera.center
-    rays = np.stack([(columns - cx) / fx, (rows - cy) / fy, np.ones(rows.shape)], axis=-1)
-    turn, eye = camera.camera_to_world[:3, :3], camera.camera_to_world[:3, 3]
-    rays = rays @ turn.T
+    turn, eye = camera.view.pose.to_world[:3, :3], camera.view.pose.to_world[:3, 3]
+    rays = camera.view.ahead @ turn.T
     away = eye - np.asarray(ball)
     a, b, c = (rays**2).sum(axis=-1), rays @ away, away @ away - RADIUS**2
     inside = b * b - a * c

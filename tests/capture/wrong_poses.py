@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from scipy.spatial.transform import Rotation
+
+from meshreel.capture.rig.cameras import posed
 
 
 def direction(random):
@@ -17,10 +17,10 @@ def wrong(cameras, random, degrees=1.0, metres=0.02):
     """Cameras each turned about its own place and shifted, in random directions."""
     found = []
     for camera in cameras:
-        pose = camera.camera_to_world.copy()
+        pose = camera.view.pose.to_world.copy()
         pose[:3, :3] = Rotation.from_rotvec(degrees * direction(random), degrees=True).as_matrix() @ pose[:3, :3]
         pose[:3, 3] += metres * direction(random)
-        found.append(replace(camera, camera_to_world=pose))
+        found.append(posed(camera, pose))
     return tuple(found)
 
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from meshreel.capture.rig import read_rig
+from meshreel.capture.rig.cameras import posed
+from meshreel.capture.rig.rig import read_rig
 from meshreel.cli import main
 from meshreel.cli.calibrate import BEFORE
 from tests.capture.depth_scenes import camera, record
@@ -33,7 +33,7 @@ def apart(path, folder):
     """How far the middle camera is from its place, as the others see it, m."""
     (folder / "rig.json").write_bytes(path.read_bytes())
     places = [
-        one.camera_to_world[:3, 3] - true.camera_to_world[:3, 3]
+        one.view.pose.to_world[:3, 3] - true.view.pose.to_world[:3, 3]
         for one, true in zip(read_rig(folder).cameras, CAMERAS, strict=True)
     ]
     return float(np.linalg.norm(places[1] - (places[0] + places[2]) / 2))
@@ -72,8 +72,8 @@ def test_poses_of_a_file_are_taken_with_their_scale(rig, tmp_path, capsys):
     command = ["calibrate", str(rig), "-o", str(out), "--poses", str(given), "--scale", "0.001", "--no-refine"]
     assert main(command) == 0 and "given cameras" in capsys.readouterr().out
     (rig / "rig.json").write_bytes(out.read_bytes())
-    shifted = replace(CAMERAS[1], camera_to_world=CAMERAS[1].camera_to_world + np.pad(SHIFT[:, None], ((0, 1), (3, 0))))
-    assert np.allclose(read_rig(rig).cameras[1].camera_to_world, shifted.camera_to_world)
+    shifted = posed(CAMERAS[1], CAMERAS[1].view.pose.to_world + np.pad(SHIFT[:, None], ((0, 1), (3, 0))))
+    assert np.allclose(read_rig(rig).cameras[1].view.pose.to_world, shifted.view.pose.to_world)
 
 
 @pytest.mark.parametrize(

@@ -11,8 +11,8 @@ import pytest
 from PIL import Image
 
 import meshreel
-from meshreel.capture.rig import read_rig
-from meshreel.capture.simulated_rig import SceneFrame, simulate_rig
+from meshreel.capture.rig.rig import read_rig
+from meshreel.capture.simulated.simulated_rig import SceneFrame, simulate_rig
 from meshreel.container.writer import ReelWriter
 from meshreel.geometry.cameras import pack_cameras
 from meshreel.io.sequence import open_sequence

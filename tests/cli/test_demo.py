@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import meshreel
-from meshreel.capture.demo_room import RoomOptions, record_room
-from meshreel.capture.recording import open_recording
-from meshreel.capture.truth import read_truth
+from meshreel.capture.rig.recording import open_recording
+from meshreel.capture.simulated.demo_room import RoomOptions, record_room
+from meshreel.capture.simulated.truth import read_truth
 from meshreel.cli.console import called_as
 from tests.capture.depth_scenes import camera, record
 from tests.cli.conftest import failed

@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import pytest
 
-from meshreel.capture.procedural import SoftBodiesOptions, soft_bodies
+from meshreel.capture.simulated.procedural import SoftBodiesOptions, soft_bodies
 from meshreel.decoder.video import open as open_video
 from meshreel.encoder.group.draco import IntraOptions
 from meshreel.encoder.paper.options import PaperOptions

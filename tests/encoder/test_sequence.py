@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import meshreel
-from meshreel.capture.procedural import SoftBodiesOptions, soft_bodies
+from meshreel.capture.simulated.procedural import SoftBodiesOptions, soft_bodies
 from meshreel.encoder.group.draco import IntraOptions
 from meshreel.encoder.sequence import encode
 from meshreel.errors import InputError

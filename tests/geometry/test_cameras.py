@@ -10,20 +10,20 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from meshreel.errors import InputError
-from meshreel.geometry.cameras import PinholeCamera, pack_cameras, unpack_cameras
+from meshreel.geometry.cameras import Camera, pack_cameras, unpack_cameras
 
 angle, length = st.floats(-3, 3), st.floats(-1e3, 1e3)
 
 
 @st.composite
-def cameras(draw: st.DrawFn) -> PinholeCamera:
+def cameras(draw: st.DrawFn) -> Camera:
     a, b = draw(angle), draw(angle)
     about_x = np.array([[1, 0, 0], [0, np.cos(a), -np.sin(a)], [0, np.sin(a), np.cos(a)]])
     about_y = np.array([[np.cos(b), 0, np.sin(b)], [0, 1, 0], [-np.sin(b), 0, np.cos(b)]])
     extrinsic = np.eye(4)
     extrinsic[:3, :3], extrinsic[:3, 3] = about_x @ about_y, [draw(length), draw(length), draw(length)]
     intrinsic = np.array([[draw(st.floats(50, 500)), 0, 31], [0, draw(st.floats(50, 500)), 25], [0, 0, 1.0]])
-    return PinholeCamera(64, 48, intrinsic, extrinsic)
+    return Camera.of(64, 48, intrinsic, extrinsic)
 
 
 @given(cameras())
@@ -54,7 +54,7 @@ def test_other_bytes_are_input_errors_that_name_their_source(data):
 
 
 def test_an_intrinsic_matrix_that_does_not_end_in_0_0_1_is_refused():
-    record = json.loads(pack_cameras([PinholeCamera(64, 48, np.eye(3), np.eye(4))]))
+    record = json.loads(pack_cameras([Camera.of(64, 48, np.eye(3), np.eye(4))]))
     record["parameters"][0]["intrinsic"]["intrinsic_matrix"][8] = 2.0
     with pytest.raises(InputError, match=r"0\.0, 2\.0"):
         unpack_cameras(json.dumps(record).encode(), "these")
@@ -78,13 +78,14 @@ def put(place: str, number: int, value: float):
         (put("extrinsic", 3, 0.5), r"last row is \[0\.5, 0\.0, 0\.0, 1\.0\] and not 0 0 0 1"),
         (put("extrinsic", 12, 1e12), r"over 1e\+09"),
         (put("extrinsic", 12, float("nan")), "not finite"),
+        (put("intrinsic", 3, 0.5), "the skew 0.5, not 0"),
         (put("intrinsic", 0, -1.0), "focal lengths -1 and 1, not above 0"),
         (put("intrinsic", 4, 0.0), "focal lengths 1 and 0"),
         (put("intrinsic", 0, 1e300), r"over 1e\+09"),
     ],
 )
 def test_an_impossible_camera_is_refused_with_its_number(change, words):
-    record = json.loads(pack_cameras([PinholeCamera(64, 48, np.eye(3), np.eye(4))] * 2))
+    record = json.loads(pack_cameras([Camera.of(64, 48, np.eye(3), np.eye(4))] * 2))
     change(record["parameters"][1])
     with pytest.raises(InputError, match=f"these: .*camera number 1: .*{words}.*mend it"):
         unpack_cameras(json.dumps(record).encode(), "these")

@@ -7,14 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from meshreel.geometry.cameras import PinholeCamera
+from meshreel.geometry.cameras import Camera, CameraPose
 from meshreel.geometry.color_views import ColorPicture, ColorViews, sampled, spread_colors
 from meshreel.geometry.topology import concatenate, subdivide_midpoint
 from meshreel.types import GREY, Mesh, Placement
 
 SIDE = 80
 INTRINSIC = np.array([[100.0, 0, 40], [0, 100, 40], [0, 0, 1]])
-AHEAD = PinholeCamera(SIDE, SIDE, INTRINSIC, np.eye(4))  # looks along +z
+AHEAD = Camera.of(SIDE, SIDE, INTRINSIC, np.eye(4))  # looks along +z
 PIXELS = np.stack([*np.meshgrid(np.arange(SIDE), np.arange(SIDE)), np.zeros((SIDE, SIDE))], axis=2).astype(np.uint8)
 WALL = subdivide_midpoint(
     Mesh.of([[-1, -1, 2], [1, -1, 2], [1, 1, 2], [-1, 1, 2]], [[0, 2, 1], [0, 3, 2]]), 3
@@ -41,7 +41,7 @@ def test_the_camera_that_looks_squarely_counts_most() -> None:
     aside = np.eye(4)
     aside[:3, :3] = [[0.8, 0, -0.6], [0, 1, 0], [0.6, 0, 0.8]]
     aside[:3, 3] = [1.2, 0, 0.4]  # looks at the wall's middle from its side
-    other = ColorPicture(replace(AHEAD, extrinsic=aside), np.full_like(PIXELS, 200))
+    other = ColorPicture(replace(AHEAD, pose=CameraPose.of_world(aside)), np.full_like(PIXELS, 200))
     dark = ColorPicture(AHEAD, np.full_like(PIXELS, 100))
     colors, seen = ColorViews([dark, other], WALL).at(np.array([[0.0, 0, 2]]), NORMALS[:1])
     eye = other.camera.eye - [0, 0, 2]
@@ -56,7 +56,8 @@ def test_a_lens_bends_as_opencv_says() -> None:
     r = x * x + y * y
     bend = 1 + k1 * r + k2 * r**2 + k3 * r**3
     bent = [x * bend + 2 * p1 * x * y + p2 * (r + 2 * x * x), y * bend + p1 * (r + 2 * y * y) + 2 * p2 * x * y]
-    found, depth = ColorPicture(AHEAD, PIXELS, distortion).project(np.array([[2 * x, 2 * y, 2.0], [0, 0, -1]]))
+    picture = ColorPicture(replace(AHEAD, distortion=distortion), PIXELS)
+    found, depth = picture.project(np.array([[2 * x, 2 * y, 2.0], [0, 0, -1]]))
     np.testing.assert_allclose(found[0], 100 * np.array(bent) + 40)
     assert np.isnan(found[1]).all() and depth.tolist() == [2.0, -1.0]
 
@@ -64,7 +65,7 @@ def test_a_lens_bends_as_opencv_says() -> None:
 def test_normalised_coordinates_have_the_same_pixels() -> None:
     place = Placement(2.5, (0.3, -0.2, 0.7))
     points = np.array([[0.1, 0.2, 2.0], [-0.4, 0.3, 3.0]])
-    picture = ColorPicture(AHEAD, PIXELS, (0.1, 0, 0, 0, 0))
+    picture = ColorPicture(replace(AHEAD, distortion=(0.1,)), PIXELS)
     found, depth = picture.placed(place).project((points - place.origin) / place.scale)
     np.testing.assert_allclose(found, picture.project(points)[0])
     np.testing.assert_allclose(depth * place.scale, points[:, 2])

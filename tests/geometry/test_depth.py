@@ -5,22 +5,22 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from meshreel.geometry.cameras import PinholeCamera
+from meshreel.geometry.cameras import Camera
 from meshreel.geometry.depth import DepthPicture, FreeSpace
 from meshreel.types import Placement
 
 WIDTH, HEIGHT, FOCAL = 64, 128, 60.0
-CAMERA = PinholeCamera(WIDTH, HEIGHT, np.array([[FOCAL, 0, WIDTH / 2], [0, FOCAL, HEIGHT / 2], [0, 0, 1.0]]), np.eye(4))
+CAMERA = Camera.of(WIDTH, HEIGHT, np.array([[FOCAL, 0, WIDTH / 2], [0, FOCAL, HEIGHT / 2], [0, 0, 1.0]]), np.eye(4))
 
 
-def rays(camera: PinholeCamera) -> np.ndarray:
+def rays(camera: Camera) -> np.ndarray:
     """Directions of all pixels, a metre along the optical axis."""
     columns, rows = np.meshgrid(np.arange(camera.width) + 0.5, np.arange(camera.height) + 0.5)
     homogeneous = np.stack([columns, rows, np.ones_like(rows)], axis=-1)
     return homogeneous @ np.linalg.inv(camera.intrinsic).T
 
 
-def floor(camera: PinholeCamera, below: float = 1.2) -> np.ndarray:
+def floor(camera: Camera, below: float = 1.2) -> np.ndarray:
     """Depth of a floor below the camera, m; 0 above the horizon and beyond 5 m."""
     down = rays(camera)[..., 1]
     with np.errstate(divide="ignore"):

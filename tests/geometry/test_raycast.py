@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from meshreel.geometry.cameras import PinholeCamera
+from meshreel.geometry.cameras import Camera
 from meshreel.geometry.raycast import Rays, pixels_near
 from meshreel.types import Mesh
 from tests.metrics.shapes import moved, plane, sphere
@@ -15,11 +15,11 @@ BALL = moved(sphere(0.5, 3), (0, 0, 3))
 WALL = moved(plane(8.0, 8), (-4, -4, 3))  # z = 3, faces the other way
 
 
-def camera(eye=(0.0, 0.0, 0.0)) -> PinholeCamera:
+def camera(eye=(0.0, 0.0, 0.0)) -> Camera:
     """Looks along +z."""
     extrinsic = np.eye(4)
     extrinsic[:3, 3] = -np.asarray(eye)
-    return PinholeCamera(80, 60, INTRINSIC, extrinsic)
+    return Camera.of(80, 60, INTRINSIC, extrinsic)
 
 
 def test_a_wall_has_one_depth_and_every_pixel_sees_the_face_that_it_should():
@@ -101,7 +101,7 @@ def test_a_view_sees_what_its_rays_meet():
     turned = np.eye(4)
     turned[:3, :3] = np.array([[0.0, 0, -1], [0, 1, 0], [1, 0, 0]])
     turned[:3, 3] = [0.3, -0.2, 4.0]
-    view, rays = PinholeCamera(80, 60, INTRINSIC, turned), Rays(sphere(levels=3))
+    view, rays = Camera.of(80, 60, INTRINSIC, turned), Rays(sphere(levels=3))
     rows, columns = np.mgrid[:60, :80]
     _, local = view.rays(np.stack([columns.ravel() + 0.5, rows.ravel() + 0.5], axis=1))
     hit = rays.cast(np.broadcast_to(view.eye, local.shape), local @ turned[:3, :3])

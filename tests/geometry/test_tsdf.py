@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from meshreel.errors import InputError
-from meshreel.geometry.cameras import PinholeCamera
+from meshreel.geometry.cameras import Camera
 from meshreel.geometry.depth import DepthPicture
 from meshreel.geometry.topology import border_edges, face_normals
 from meshreel.geometry.tsdf import SIDE, Grid, extract, integrate
@@ -74,7 +74,7 @@ def wall(depth=1.0, eye=(0.0, 0.0, 0.0), size=(40, 30)) -> DepthPicture:
     depths[10:14, 10:14] = 0
     extrinsic = np.eye(4)
     extrinsic[:3, 3] = -np.asarray(eye)
-    camera = PinholeCamera(*size, np.array([[40.0, 0, 20], [0, 40, 15], [0, 0, 1]]), extrinsic)
+    camera = Camera.of(*size, np.array([[40.0, 0, 20], [0, 40, 15], [0, 0, 1]]), extrinsic)
     return DepthPicture(camera, depths, 0.001, 3.0)
 
 
@@ -116,7 +116,7 @@ def test_more_blocks_than_memory_should_hold_are_refused(monkeypatch):
 def test_guessed_surface_counts_only_where_no_picture_tells_anything():
     near, far = np.zeros((40, 40), np.float32), np.zeros((40, 40), np.float32)
     near[:, :20], far[:] = 1.0, 2.0
-    camera = PinholeCamera(40, 40, np.array([[40.0, 0, 20], [0, 40, 20], [0, 0, 1]]), np.eye(4))
+    camera = Camera.of(40, 40, np.array([[40.0, 0, 20], [0, 40, 20], [0, 0, 1]]), np.eye(4))
     seen, guessed = (DepthPicture(camera, depth, 1.0, 5.0) for depth in (near, far))
     plain, more = integrate([seen], VOXEL, 3.0), integrate([seen], VOXEL, 3.0, [guessed])
     places = {tuple(block): number for number, block in enumerate(more.blocks)}

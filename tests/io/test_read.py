@@ -11,8 +11,8 @@ import pytest
 
 import meshreel
 from meshreel.analysis.scene.masks import read_views
-from meshreel.capture.rig import read_rig
-from meshreel.capture.truth import _labels
+from meshreel.capture.rig.rig import read_rig
+from meshreel.capture.simulated.truth import _labels
 from meshreel.encoder.run.journal import Journal
 from meshreel.errors import InputError
 from meshreel.io import read

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from meshreel.geometry.cameras import PinholeCamera
+from meshreel.geometry.cameras import Camera
 from meshreel.geometry.depth import DepthPicture
 from meshreel.metrics.depth import DepthJudge, clear_pixels, judge
 from meshreel.types import Mesh
 
 SIZE, FOCAL, WALL, BOX = 80, 80.0, 2.0, 1.5  # pixels, pixels, m, m
-CAMERA = PinholeCamera(SIZE, SIZE, np.array([[FOCAL, 0, SIZE / 2], [0, FOCAL, SIZE / 2], [0, 0, 1]]), np.eye(4))
+CAMERA = Camera.of(SIZE, SIZE, np.array([[FOCAL, 0, SIZE / 2], [0, FOCAL, SIZE / 2], [0, 0, 1]]), np.eye(4))
 UP = (0.0, -1.0, 0.0)
 PIXEL = (WALL / FOCAL) ** 2  # m^2, of one on the wall
 BODY = (slice(20, 80), slice(30, 50))  # rows and columns of the box, which stands on the picture's lower end

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from meshreel.geometry.cameras import PinholeCamera
+from meshreel.geometry.cameras import Camera
 from meshreel.metrics.render import Crop, crop_of, look
 from meshreel.metrics.viewpoints import Box, ViewOptions, views_around
 from meshreel.types import Mesh
@@ -12,7 +12,7 @@ SMALL = ViewOptions(160, 120)
 FAR = ViewOptions(64, 64, fov=1.0)  # rays are nearly parallel
 
 
-def render_normals(mesh: Mesh, camera: PinholeCamera) -> np.ndarray:
+def render_normals(mesh: Mesh, camera: Camera) -> np.ndarray:
     return look(mesh, camera, Crop(0, camera.height, 0, camera.width)).colors
 
 

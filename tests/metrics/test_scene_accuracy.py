@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from meshreel.errors import InputError
-from meshreel.geometry.cameras import PinholeCamera
+from meshreel.geometry.cameras import Camera
 from meshreel.metrics.distance import PSNR_CEILING
 from meshreel.metrics.scene_accuracy import (
     Scene,
@@ -34,7 +34,7 @@ def sight(offset=(0, 0, 0), size=160, **limits):
     pose[:3, 3] = np.array([0, 0, 3.0]) + offset
     focal = size * 4 / 3
     intrinsic = np.array([[focal, 0, size / 2], [0, focal, size / 2], [0, 0, 1]])
-    return Sight(PinholeCamera(size, size, intrinsic, np.linalg.inv(pose)), **limits)
+    return Sight(Camera.of(size, size, intrinsic, np.linalg.inv(pose)), **limits)
 
 
 def parts(ball=None, wall=None):

@@ -9,7 +9,7 @@ from meshreel_bench.codecs import groups as stored
 from meshreel_bench.codecs.groups import GroupStore, prepare, shared_options
 from meshreel_bench.codecs.tvmc.tracking import track_sequence
 
-from meshreel.capture.procedural import SoftBodiesOptions, soft_bodies
+from meshreel.capture.simulated.procedural import SoftBodiesOptions, soft_bodies
 from meshreel.encoder.group.interval import Interval
 from meshreel.encoder.group.target import Fidelity
 from meshreel.encoder.paper.recipe import find_groups

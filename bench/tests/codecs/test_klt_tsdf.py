@@ -19,7 +19,7 @@ from meshreel_bench.codecs.klt_tsdf.blocks import (
 from meshreel_bench.codecs.klt_tsdf.grid import VOLUME, prepared, sample, voxel_index
 from meshreel_bench.codecs.klt_tsdf.surface import Field, cells_at, crossed, polygonize
 
-from meshreel.capture.procedural import SoftBodiesOptions, soft_bodies
+from meshreel.capture.simulated.procedural import SoftBodiesOptions, soft_bodies
 from meshreel.errors import FormatError, InputError
 from meshreel.geometry.topology import border_edges, components, part_of
 from meshreel.metrics.distance import surface_errors

@@ -17,7 +17,7 @@ from meshreel_bench.codecs.necgs.cubes import extract
 from meshreel_bench.codecs.necgs.grid import box_of, place_grids, truncated_distances
 from meshreel_bench.codecs.necgs.stream import decode_stream, encode_stream
 
-from meshreel.capture.procedural import SoftBodiesOptions, soft_bodies
+from meshreel.capture.simulated.procedural import SoftBodiesOptions, soft_bodies
 from meshreel.errors import FormatError, InputError
 from meshreel.metrics.distance import surface_errors
 from meshreel.types import Mesh, MeshList

@@ -9,7 +9,7 @@ from meshreel_bench.codecs.necgs.grid import MARGIN, Placement, box_of, place_gr
 from meshreel_bench.codecs.necgs.shape import Shape, dequantize, quantize
 from meshreel_bench.codecs.necgs.stream import Coded, decode_stream, encode_stream
 
-from meshreel.capture.procedural import SoftBodiesOptions, soft_bodies
+from meshreel.capture.simulated.procedural import SoftBodiesOptions, soft_bodies
 from meshreel.errors import FormatError, InputError
 from meshreel.geometry.closest_points import Surface
 from meshreel.geometry.topology import border_edges, concatenate, face_normals, unique_edges

@@ -15,7 +15,7 @@ from meshreel_bench.codecs.tvmc.tracked import decode_tracked, encode_tracked
 from meshreel_bench.codecs.tvmc.tracking import Tracked, track_sequence
 from meshreel_bench.codecs.tvmc.video import TvmcVideo
 
-from meshreel.capture.procedural import SoftBodiesOptions, soft_bodies
+from meshreel.capture.simulated.procedural import SoftBodiesOptions, soft_bodies
 from meshreel.encoder.sequence import Encoder
 from meshreel.encoder.settings.presets import reference_vertices
 from meshreel.errors import FormatError, InputError, NoReferenceError

@@ -16,9 +16,9 @@ from meshreel_bench.measure.point import measure_point
 from meshreel_bench.report.values import value
 from meshreel_bench.rows import Point
 
-from meshreel.capture.procedural import soft_bodies
-from meshreel.capture.recording import open_recording
-from meshreel.capture.simulated_rig import SceneFrame, SensorOptions, simulate_rig
+from meshreel.capture.rig.recording import open_recording
+from meshreel.capture.simulated.procedural import soft_bodies
+from meshreel.capture.simulated.simulated_rig import SceneFrame, SensorOptions, simulate_rig
 from meshreel.errors import InputError
 from meshreel.geometry.closest_points import Surface
 from meshreel.metrics.scene_accuracy import compare_with_truth

@@ -9,9 +9,9 @@ import pytest
 from meshreel_bench.codecs.meshreel import MeshreelCodec
 from meshreel_bench.measure.color import color_bytes, picture_psnrs, picture_squares, swimming
 
-from meshreel.capture.rig import DepthCamera
 from meshreel.decoder.video import open as open_video
 from meshreel.format.layout import ChunkKind
+from meshreel.geometry.cameras import Camera, CameraPose
 from meshreel.geometry.color_views import ColorPicture
 from meshreel.types import Mesh, MeshList
 from tests.metrics.rendered import render_colors
@@ -19,7 +19,7 @@ from tests.spheres import sliding_sphere
 
 BALL = sliding_sphere(1, levels=4)[0]
 EYE = np.array([[1.0, 0, 0, 0], [0, -1, 0, 0], [0, 0, -1, 4], [0, 0, 0, 1]])  # looks at the ball from +z
-CAMERA = DepthCamera("eye", 120, 100, (110.0, 110.0), (59.5, 49.5), EYE).view
+CAMERA = Camera(120, 100, (110.0, 110.0), (60.0, 50.0), CameraPose.of_camera(EYE))
 
 
 def painted(grey, mesh=BALL):

@@ -10,14 +10,14 @@ import numpy as np
 from cyclopts import Parameter
 from rich.table import Table
 
-from ..capture.board import BoardOptions, poses_by_board
-from ..capture.calibrate import Calibration
-from ..capture.calibrate import refine as refined
-from ..capture.calibration_sheet import write_calibration_sheet
-from ..capture.poses import read_poses
-from ..capture.recording import open_recording
-from ..capture.rig import RIG, SINGLE
-from ..capture.rig_poses import described, posed_by, with_poses
+from ..capture.calibration.board import BoardOptions, poses_by_board
+from ..capture.calibration.calibrate import Calibration
+from ..capture.calibration.calibrate import refine as refined
+from ..capture.calibration.calibration_sheet import write_calibration_sheet
+from ..capture.calibration.poses import read_poses
+from ..capture.calibration.rig_poses import described, posed_by, with_poses
+from ..capture.rig.recording import open_recording
+from ..capture.rig.rig import RIG, SINGLE
 from ..errors import InputError
 from ..io.write import check_apart, replacing
 from .console import Common
@@ -85,7 +85,7 @@ def command(
     if refine:
         with common.stages(0, "rounds") as progress:
             calibration = refined(found, progress)
-        found = with_poses(found, {one.name: one.camera_to_world for one in calibration.cameras}, {})
+        found = with_poses(found, {one.name: one.view.pose.to_world for one in calibration.cameras}, {})
         warnings += calibration.warnings
         write_calibration_sheet(
             calibration, found.up, path.with_name("calibration.png") if in_place else path.with_suffix(".png")

@@ -11,12 +11,12 @@ from typing import Annotated, Any, Literal
 
 from cyclopts import Parameter
 
-from ..capture.color_cameras import ColorCamera
-from ..capture.fusion import FusionOptions
-from ..capture.recording import Recording, open_recording
 from ..capture.recordings import is_rig, open_take
 from ..capture.recordings.takes import Stream, Take
-from ..capture.rig import DepthCamera, Rig, read_rig
+from ..capture.rig.cameras import ColorCamera, DepthCamera
+from ..capture.rig.fusion import FusionOptions
+from ..capture.rig.recording import Recording, open_recording
+from ..capture.rig.rig import Rig, read_rig
 from ..errors import InputError
 from ..io.read import first_difference, read_json
 from ..io.sequence import CAPTURED
@@ -115,7 +115,7 @@ def _rig_row(rig: Rig) -> dict[str, Any]:
     streams += [("depth", camera, files) for camera, files in zip(rig.cameras, rig.files, strict=True)]
     streams += [("color", camera, camera.files) for camera in rig.color_cameras]
     cameras = [
-        {"name": one.name, "kind": kind, "width": one.width, "height": one.height, "pictures": len(files)}
+        {"name": one.name, "kind": kind, "width": one.view.width, "height": one.view.height, "pictures": len(files)}
         for kind, one, files in streams
     ]
     about = {"path": str(rig.folder), "kind": "a rig", "frames": len(rig.frames), "frame_rate": rig.frame_rate}

@@ -12,7 +12,7 @@ import numpy as np
 from cyclopts import Parameter
 from rich.table import Table
 
-from ..capture.truth import Truth, read_truth
+from ..capture.simulated.truth import Truth, read_truth
 from ..container.sources import FileSource
 from ..decoder.describe import describe_file
 from ..decoder.video import Video
@@ -20,7 +20,7 @@ from ..decoder.video import open as open_video
 from ..errors import FormatError, InputError
 from ..export.splats import check_splats
 from ..format.layout import MAGIC, ChunkKind
-from ..geometry.cameras import PinholeCamera
+from ..geometry.cameras import Camera
 from ..geometry.derived_sequences import CapturedSequence, Chosen, captured
 from ..geometry.topology import weld
 from ..io.sequence import SequenceOptions, open_sequence
@@ -159,7 +159,7 @@ def _options(looking: Looking, sequence: MeshSequence, decoded: MeshSequence) ->
     return options
 
 
-def _sheet_cameras(looking: Looking, sequence: MeshSequence) -> tuple[PinholeCamera, ...]:
+def _sheet_cameras(looking: Looking, sequence: MeshSequence) -> tuple[Camera, ...]:
     """Return the given cameras, or those of the rig that have the picture size of its first one."""
     if looking.cameras is not None:
         return tuple(read_cameras(looking.cameras))

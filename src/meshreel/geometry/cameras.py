@@ -1,14 +1,15 @@
 """Pinhole cameras, packed into and unpacked from Open3D's pinhole camera JSON.
 
 A camera looks along +z of its own frame, with x to the right and y down, as in Open3D and OpenCV. Pixel (column i,
-row j) covers [i, i + 1) x [j, j + 1); its ray goes through the middle.
+row j) covers [i, i + 1) x [j, j + 1), and its middle is at i + 1/2, j + 1/2. Files in which the middles of pixels are
+whole numbers (rig.json, calibrations of OpenCV) are converted where they are read and written.
 """
 
 from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -17,13 +18,12 @@ from jaxtyping import Float64, Int64
 from ..errors import InputError
 from .strict import inverse, products
 
+Matrix = Float64[np.ndarray, "4 4"]
 _RIGID = 1e-3  # largest error of an entry of R R^T: some tools write few digits (guess)
 _LARGEST = 1e9  # largest number of a matrix: keeps everything computed from it finite (guess)
 
 
-def looking_at(
-    eye: Float64[np.ndarray, "3"], target: Float64[np.ndarray, "3"], up: int = 1
-) -> Float64[np.ndarray, "4 4"]:
+def looking_at(eye: Float64[np.ndarray, "3"], target: Float64[np.ndarray, "3"], up: int = 1) -> Matrix:
     """Return the matrix from camera to world of a camera at a place that looks at another; axis `up` points up."""
     forward = target - eye
     forward /= np.linalg.norm(forward)
@@ -35,29 +35,98 @@ def looking_at(
     return pose
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class PinholeCamera:
-    """Perspective camera; cameras with equal numbers are equal, so that options with cameras can be compared."""
+def broken(matrix: Matrix) -> str:
+    """Return why a matrix is no rotation with a translation, as a clause that follows its name; empty where it is."""
+    if not np.isfinite(matrix).all():
+        return "has a number that is not finite"
+    turn, last = matrix[:3, :3], matrix[3].tolist()
+    if not np.allclose(last, (0, 0, 0, 1)):
+        return f"has the last row {last} and not 0 0 0 1"
+    if np.abs(turn @ turn.T - np.eye(3)).max() > _RIGID or np.linalg.det(turn) < 0:
+        return "is no rotation with a translation"
+    return ""
 
-    width: int
-    height: int
-    intrinsic: Float64[np.ndarray, "3 3"]  # pixels; the last row is 0 0 1
-    extrinsic: Float64[np.ndarray, "4 4"]  # world to camera
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CameraPose:
+    """Place of a camera in the world: both matrices are kept, so that the one that was given keeps its bits."""
+
+    to_world: Matrix  # camera to world
+    from_world: Matrix  # world to camera
+
+    @staticmethod
+    def of_camera(to_world: Matrix) -> CameraPose:
+        """Return the pose of a matrix from camera to world."""
+        return CameraPose(to_world, np.linalg.inv(to_world))
+
+    @staticmethod
+    def of_world(from_world: Matrix) -> CameraPose:
+        """Return the pose of a matrix from world to camera, which other programs call extrinsic."""
+        return CameraPose(np.linalg.inv(from_world), from_world)
 
     def __eq__(self, other: object) -> bool:
-        if not isinstance(other, PinholeCamera):
-            return NotImplemented
-        sizes = (self.width, self.height) == (other.width, other.height)
-        pairs = ((self.intrinsic, other.intrinsic), (self.extrinsic, other.extrinsic))
-        return sizes and all(np.array_equal(a, b) for a, b in pairs)
+        return isinstance(other, CameraPose) and np.array_equal(self.from_world, other.from_world)
 
     def __hash__(self) -> int:
-        return hash((self.width, self.height))
+        return hash(tuple(self.from_world.flat))
+
+
+@dataclass(frozen=True, slots=True)
+class Camera:
+    """Pinhole camera whose lens bends as OpenCV's `k1 k2 p1 p2 k3 k4 k5 k6` say; equal numbers make equal cameras.
+
+    Rays and what is computed from them (`seen`, `raycast`) leave the bends out.
+    """
+
+    width: int  # pixels
+    height: int  # pixels
+    focal: tuple[float, float]  # pixels, along x and y
+    center: tuple[float, float]  # pixels, where the optical axis meets the picture
+    pose: CameraPose = CameraPose.of_camera(np.eye(4))
+    distortion: tuple[float, ...] = ()  # missing coefficients are 0
+
+    @staticmethod
+    def of(width: int, height: int, intrinsic: Float64[np.ndarray, "3 3"], extrinsic: Matrix) -> Camera:
+        """Return the camera of two matrices: camera coordinates to homogeneous pixels, and world to camera."""
+        (fx, _, cx), (_, fy, cy) = intrinsic[:2].tolist()
+        return Camera(width, height, (fx, fy), (cx, cy), CameraPose.of_world(extrinsic))
+
+    @property
+    def intrinsic(self) -> Float64[np.ndarray, "3 3"]:
+        """Camera coordinates to homogeneous pixels."""
+        return np.array([[self.focal[0], 0.0, self.center[0]], [0.0, self.focal[1], self.center[1]], [0.0, 0.0, 1.0]])
+
+    @property
+    def extrinsic(self) -> Matrix:
+        """World to camera."""
+        return self.pose.from_world
 
     @property
     def eye(self) -> Float64[np.ndarray, " 3"]:
         """Position of the camera in world coordinates."""
         return -products(inverse(self.extrinsic[:3, :3]), self.extrinsic[:3, 3:])[:, 0]
+
+    @property
+    def straight(self) -> Camera:
+        """The camera without the bends of its lens."""
+        return replace(self, distortion=())
+
+    def resized(self, width: int, height: int) -> Camera:
+        """Return the camera with pictures of another size that show the same."""
+        x, y = width / self.width, height / self.height
+        focal, center = (self.focal[0] * x, self.focal[1] * y), (self.center[0] * x, self.center[1] * y)
+        return replace(self, width=width, height=height, focal=focal, center=center)
+
+    def local(self, points: Float64[np.ndarray, "N 3"]) -> Float64[np.ndarray, "N 3"]:
+        """Return points of the world in the camera frame."""
+        return products(points, self.extrinsic[:3, :3].T) + self.extrinsic[:3, 3]
+
+    @property
+    def ahead(self) -> Float64[np.ndarray, "H W 3"]:
+        """The point at depth 1 that each pixel sees, in the camera frame."""
+        rows, columns = np.mgrid[: self.height, : self.width] + 0.5
+        (fx, fy), (cx, cy) = self.focal, self.center
+        return np.stack([(columns - cx) / fx, (rows - cy) / fy, np.ones(rows.shape)], axis=-1)
 
     def rays(self, pixels: Float64[np.ndarray, "N 2"]) -> tuple[np.ndarray, np.ndarray]:
         """Return the rays from the eye through image positions: origins and unit directions in the camera frame."""
@@ -68,20 +137,28 @@ class PinholeCamera:
     def project(self, points: Float64[np.ndarray, "N 3"]) -> Float64[np.ndarray, "N 2"]:
         """Project points of the camera frame to image positions; points that are not in front give NaN."""
         depth = np.where(points[:, 2:] > 0, points[:, 2:], np.nan)
-        return products(points, self.intrinsic.T)[:, :2] / depth
+        if not any(self.distortion):
+            return products(points, self.intrinsic.T)[:, :2] / depth
+        with np.errstate(all="ignore"):
+            x, y = bent(points[:, 0] / depth[:, 0], points[:, 1] / depth[:, 0], self.distortion)
+        return products(np.stack([x, y, np.ones(len(x))], axis=1), self.intrinsic.T)[:, :2]
 
     def seen(
         self, points: Float64[np.ndarray, "P 3"]
     ) -> tuple[Int64[np.ndarray, " N"], Int64[np.ndarray, " N"], Float64[np.ndarray, " N"]]:
-        """Project points of the world; return the pixels, counted row by row, of those inside the picture, the numbers
-        of these points, and their depths.
-        """
-        local = products(points, self.extrinsic[:3, :3].T) + self.extrinsic[:3, 3]
-        with np.errstate(invalid="ignore"):
-            columns, rows = np.floor(self.project(local)).T
-        inside = np.flatnonzero((columns >= 0) & (columns < self.width) & (rows >= 0) & (rows < self.height))
-        pixels = rows[inside].astype(np.int64) * self.width + columns[inside].astype(np.int64)
+        """Project points of the world; return what `pixels` does, and the depths of the points inside the picture."""
+        local = self.local(points)
+        pixels, inside = self.pixels(local)
         return pixels, inside, local[inside, 2]
+
+    def pixels(self, points: Float64[np.ndarray, "P 3"]) -> tuple[Int64[np.ndarray, " N"], Int64[np.ndarray, " N"]]:
+        """Project points of the camera frame; return the pixels, counted row by row, of those inside the picture, and
+        the numbers of these points.
+        """
+        with np.errstate(invalid="ignore"):
+            columns, rows = np.floor(self.project(points)).T
+        inside = np.flatnonzero((columns >= 0) & (columns < self.width) & (rows >= 0) & (rows < self.height))
+        return rows[inside].astype(np.int64) * self.width + columns[inside].astype(np.int64), inside
 
     def record(self) -> dict[str, Any]:
         """Return the camera as a record of Open3D's JSON, in which matrices are stored column by column."""
@@ -98,14 +175,18 @@ class PinholeCamera:
         }
 
 
-def scaled_lens(
-    focal: tuple[float, float], center: tuple[float, float], x: float, y: float
-) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Return focal lengths and principal point, pixels, of pictures that are scaled; the middle of pixel i is at i."""
-    return (focal[0] * x, focal[1] * y), ((center[0] + 0.5) * x - 0.5, (center[1] + 0.5) * y - 0.5)
+def bent(
+    x: Float64[np.ndarray, "*S"], y: Float64[np.ndarray, "*S"], distortion: tuple[float, ...]
+) -> tuple[Float64[np.ndarray, "*S"], Float64[np.ndarray, "*S"]]:
+    """Return where a lens shows places of the plane at depth 1; `distortion` is OpenCV's, missing numbers are 0."""
+    k1, k2, p1, p2, k3, k4, k5, k6 = (*distortion, *[0.0] * 8)[:8]
+    r2 = x * x + y * y
+    bend = (1 + r2 * (k1 + r2 * (k2 + r2 * k3))) / (1 + r2 * (k4 + r2 * (k5 + r2 * k6)))
+    bent_x = x * bend + 2 * p1 * x * y + p2 * (r2 + 2 * x * x)
+    return bent_x, y * bend + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y
 
 
-def pack_cameras(cameras: Sequence[PinholeCamera]) -> bytes:
+def pack_cameras(cameras: Sequence[Camera]) -> bytes:
     """Pack cameras into the JSON of an Open3D PinholeCameraTrajectory."""
     record = {
         "class_name": "PinholeCameraTrajectory",
@@ -116,9 +197,9 @@ def pack_cameras(cameras: Sequence[PinholeCamera]) -> bytes:
     return (json.dumps(record, indent=1) + "\n").encode()
 
 
-def unpack_cameras(data: bytes, name: str) -> list[PinholeCamera]:
+def unpack_cameras(data: bytes, name: str) -> list[Camera]:
     """Unpack an Open3D PinholeCameraParameters or PinholeCameraTrajectory; errors name the data `name`."""
-    found: list[PinholeCamera] = []
+    found: list[Camera] = []
     try:
         record = json.loads(data)
         for entry in record.get("parameters", [record]):
@@ -131,7 +212,7 @@ def unpack_cameras(data: bytes, name: str) -> list[PinholeCamera]:
         raise InputError(f"{text}; mend it or leave it out") from error
 
 
-def _camera(entry: dict[str, Any]) -> PinholeCamera:
+def _camera(entry: dict[str, Any]) -> Camera:
     intrinsic = np.array(entry["intrinsic"]["intrinsic_matrix"], dtype=np.float64).reshape(3, 3).T
     extrinsic = np.array(entry["extrinsic"], dtype=np.float64).reshape(4, 4).T
     width, height = int(entry["intrinsic"]["width"]), int(entry["intrinsic"]["height"])
@@ -143,12 +224,10 @@ def _camera(entry: dict[str, Any]) -> PinholeCamera:
         raise ValueError(f"image size {width} x {height}")
     if not np.array_equal(intrinsic[2], (0, 0, 1)):
         raise ValueError(f"an intrinsic matrix whose last row is {intrinsic[2].tolist()} and not 0 0 1")
+    if intrinsic[0, 1] or intrinsic[1, 0]:
+        raise ValueError(f"an intrinsic matrix with the skew {intrinsic[0, 1] or intrinsic[1, 0]:g}, not 0")
     if not (intrinsic[0, 0] > 0 and intrinsic[1, 1] > 0):
         raise ValueError(f"focal lengths {intrinsic[0, 0]:g} and {intrinsic[1, 1]:g}, not above 0")
-    turn = extrinsic[:3, :3]
-    if np.abs(turn @ turn.T - np.eye(3)).max() > _RIGID or np.linalg.det(turn) < 0:
-        raise ValueError("an extrinsic matrix that is no rotation with a translation, column by column")
-    if not np.allclose(extrinsic[3], (0, 0, 0, 1)):
-        raise ValueError(f"an extrinsic matrix whose last row is {extrinsic[3].tolist()} and not 0 0 0 1")
-    np.linalg.inv(intrinsic)  # raises where singular
-    return PinholeCamera(width, height, intrinsic, extrinsic)
+    if reason := broken(extrinsic):
+        raise ValueError(f"an extrinsic matrix, column by column, that {reason}")
+    return Camera.of(width, height, intrinsic, extrinsic)

@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Bool, Float32, Float64, UInt8
 
 from ..types import GREY, Mesh, Placement
-from .cameras import PinholeCamera
+from .cameras import Camera, CameraPose
 from .raycast import Rays
 from .strict import products
 from .topology import face_normals
@@ -28,43 +28,24 @@ STEP = 0.03  # of the depth between neighbours: a step (guess)
 
 @dataclass(frozen=True, slots=True)
 class ColorPicture:
-    """A picture in sRGB with the camera that took it; its lens bends as OpenCV's `k1 k2 p1 p2 k3 k4 k5 k6` say."""
+    """A picture in sRGB with the camera that took it."""
 
-    camera: PinholeCamera
+    camera: Camera
     pixels: UInt8[np.ndarray, "H W 3"]
-    distortion: tuple[float, ...] = (0.0,) * 5
     gains: tuple[float, float, float] = (1.0, 1.0, 1.0)  # by which its channels are too bright
 
     def project(
         self, points: Float64[np.ndarray, "N 3"]
     ) -> tuple[Float64[np.ndarray, "N 2"], Float64[np.ndarray, " N"]]:
         """Return positions in the picture, NaN for points that are not in front, and depths along the optical axis."""
-        local = products(points, self.camera.extrinsic[:3, :3].T) + self.camera.extrinsic[:3, 3]
-        depth = local[:, 2]
-        if not any(self.distortion):
-            return self.camera.project(local), depth
-        with np.errstate(all="ignore"):
-            x, y = local[:, 0] / np.where(depth > 0, depth, np.nan), local[:, 1] / np.where(depth > 0, depth, np.nan)
-            bent_x, bent_y = bent(x, y, self.distortion)
-        return products(np.stack([bent_x, bent_y, np.ones(len(x))], axis=1), self.camera.intrinsic.T)[:, :2], depth
+        local = self.camera.local(points)
+        return self.camera.project(local), local[:, 2]
 
     def placed(self, place: Placement) -> ColorPicture:
         """Return the picture for places in normalised coordinates."""
-        camera, origin = self.camera, np.asarray(place.origin)
-        extrinsic = camera.extrinsic.copy()
+        origin, extrinsic = np.asarray(place.origin), self.camera.extrinsic.copy()
         extrinsic[:3, 3] = (products(extrinsic[:3, :3], origin[:, None])[:, 0] + extrinsic[:3, 3]) / place.scale
-        return replace(self, camera=replace(camera, extrinsic=extrinsic))
-
-
-def bent(
-    x: Float64[np.ndarray, "*S"], y: Float64[np.ndarray, "*S"], distortion: tuple[float, ...]
-) -> tuple[Float64[np.ndarray, "*S"], Float64[np.ndarray, "*S"]]:
-    """Return where a lens shows places of the plane at depth 1; `distortion` is OpenCV's, missing numbers are 0."""
-    k1, k2, p1, p2, k3, k4, k5, k6 = (*distortion, *[0.0] * 8)[:8]
-    r2 = x * x + y * y
-    bend = (1 + r2 * (k1 + r2 * (k2 + r2 * k3))) / (1 + r2 * (k4 + r2 * (k5 + r2 * k6)))
-    bent_x = x * bend + 2 * p1 * x * y + p2 * (r2 + 2 * x * x)
-    return bent_x, y * bend + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y
+        return replace(self, camera=replace(self.camera, pose=CameraPose.of_world(extrinsic)))
 
 
 @runtime_checkable
@@ -109,7 +90,7 @@ class ColorViews:
         for view in self.views:
             camera, depth = view.picture.camera, view.picture.project(middles)[1]
             cosine = np.cbrt(view.weights(middles, normals))  # less near steps
-            finest = camera.intrinsic[0, 0] * camera.intrinsic[1, 1] / np.maximum(depth, 1e-9) ** 2
+            finest = camera.focal[0] * camera.focal[1] / np.maximum(depth, 1e-9) ** 2
             most = np.maximum(most, finest * cosine * areas)
         return float(most.sum())
 
@@ -123,9 +104,8 @@ class View:
         self.picture, self._margin, self._clear, camera = picture, margin, clear, picture.camera
         self._shrink = max(1, -(-max(camera.width, camera.height) // MOST_SIDE))
         width, height = -(-camera.width // self._shrink), -(-camera.height // self._shrink)
-        intrinsic = camera.intrinsic.copy()
-        intrinsic[:2] /= self._shrink
-        self._depth = rays.look(PinholeCamera(width, height, intrinsic, camera.extrinsic)).depth
+        intrinsic = camera.intrinsic / [[self._shrink], [self._shrink], [1.0]]
+        self._depth = rays.look(Camera.of(width, height, intrinsic, camera.extrinsic)).depth
         steps = _steps(_smooth(self._depth) if clear else self._depth)
         self._from_step = distance_transform_edt(~steps) * self._shrink
 

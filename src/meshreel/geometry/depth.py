@@ -11,7 +11,7 @@ from jaxtyping import Bool, Float, Float32, Float64, Int64, UInt16
 from scipy.ndimage import minimum_filter
 
 from ..types import Placement
-from .cameras import PinholeCamera
+from .cameras import Camera
 
 FACING = 0.3  # cosine between a surface and the way to a camera from which on the camera measures it (guess)
 THROUGH = (0.03, 0.015)  # m, and share of the depth, by which a camera must see past a place to know it is free (guess)
@@ -33,7 +33,7 @@ def depth_noise(depth: Float64[np.ndarray, "..."]) -> Float64[np.ndarray, "..."]
 class DepthPicture:
     """Depths along the optical axis of a camera; 0 is no measurement."""
 
-    camera: PinholeCamera
+    camera: Camera
     depth: UInt16[np.ndarray, "H W"] | Float32[np.ndarray, "H W"]
     unit: float  # m, of a depth of 1
     far: float  # m, beyond which no depth counts
@@ -56,9 +56,7 @@ class DepthPicture:
                 sums += weight * values
                 weights += weight
         depth = np.where(sums > 0, weights / np.where(sums > 0, sums, 1), 0).astype(np.float32)
-        intrinsic = np.diag([factor, factor, 1.0]) @ self.camera.intrinsic
-        height, width = depth.shape
-        return replace(self, camera=PinholeCamera(width, height, intrinsic, self.camera.extrinsic), depth=depth)
+        return replace(self, camera=self.camera.resized(depth.shape[1], depth.shape[0]), depth=depth)
 
 
 def inverse_depths(values: UInt16[np.ndarray, "H W"] | Float32[np.ndarray, "H W"]) -> Float[np.ndarray, "H W"]:
@@ -100,7 +98,7 @@ class FreeSpace:
     def _world(self, points: Float64[np.ndarray, "N 3"]) -> Float64[np.ndarray, "N 3"]:
         return np.asarray(self.place.origin) + self.place.scale * points
 
-    def _measured(self, world: Float64[np.ndarray, "N 3"]) -> Iterator[tuple[PinholeCamera, Any, Any, Any, Any]]:
+    def _measured(self, world: Float64[np.ndarray, "N 3"]) -> Iterator[tuple[Camera, Any, Any, Any, Any]]:
         """Yield each camera, the numbers of the places in its picture, what it measured there, how far they are, and by
         how much more or less it must have measured to tell, m.
         """

@@ -14,7 +14,7 @@ from jaxtyping import Bool, Float32, Float64, Int32
 
 from .. import _core
 from ..types import Mesh
-from .cameras import PinholeCamera
+from .cameras import Camera
 from .strict import inverse, products
 from .topology import face_normals
 
@@ -52,25 +52,25 @@ class Rays:
         origins, directions = np.ascontiguousarray(origins), np.ascontiguousarray(directions)
         return Hit(*self._tree.cast(origins, directions, True))
 
-    def look(self, camera: PinholeCamera) -> Seen:
+    def look(self, camera: Camera) -> Seen:
         """Find the face and the depth that a camera sees at each pixel."""
         shape = camera.height, camera.width
         faces, depth = self._from(camera, np.stack([*_ways(camera)], axis=-1).reshape(-1, 3))
         return Seen(faces.reshape(shape), depth.astype(np.float32).reshape(shape))
 
-    def faces_in(self, camera: PinholeCamera, pixels: Bool[np.ndarray, "H W"]) -> Int32[np.ndarray, " N"]:
+    def faces_in(self, camera: Camera, pixels: Bool[np.ndarray, "H W"]) -> Int32[np.ndarray, " N"]:
         """Find the face that a camera sees in each of some pixels, row by row; -1: none."""
         return self._from(camera, np.stack([ways[pixels] for ways in _ways(camera)], axis=-1))[0]
 
     def _from(
-        self, camera: PinholeCamera, ways: Float64[np.ndarray, "N 3"]
+        self, camera: Camera, ways: Float64[np.ndarray, "N 3"]
     ) -> tuple[Int32[np.ndarray, " N"], Float64[np.ndarray, " N"]]:
         """Return the faces that rays of a camera meet, and the distances in lengths of their ways."""
         if self._tree is None:
             return np.full(len(ways), -1, np.int32), np.full(len(ways), np.inf)
         return self._tree.cast(camera.eye[None], ways, False)[:2]
 
-    def backs(self, camera: PinholeCamera, seen: Seen) -> Bool[np.ndarray, "H W"]:
+    def backs(self, camera: Camera, seen: Seen) -> Bool[np.ndarray, "H W"]:
         """Return where a camera sees the back of a face; `seen` is the result of `look`."""
         if self._mesh.is_empty:
             return np.zeros(seen.faces.shape, bool)
@@ -83,12 +83,12 @@ class Rays:
         return face_normals(self._mesh)[0]
 
 
-def pixels_near(camera: PinholeCamera, mesh: Mesh) -> Bool[np.ndarray, "H W"]:
+def pixels_near(camera: Camera, mesh: Mesh) -> Bool[np.ndarray, "H W"]:
     """Return the pixels in the boxes of the projected faces, a pixel wider: a camera sees the faces in no others.
 
     These are all pixels where the plane of the camera cuts a face.
     """
-    local = products(mesh.vertices, camera.extrinsic[:3, :3].T) + camera.extrinsic[:3, 3]
+    local = camera.local(mesh.vertices)
     ahead = (local[:, 2] > 0)[mesh.faces]
     if (ahead.any(axis=1) & ~ahead.all(axis=1)).any():
         return np.ones((camera.height, camera.width), bool)
@@ -102,7 +102,7 @@ def pixels_near(camera: PinholeCamera, mesh: Mesh) -> Bool[np.ndarray, "H W"]:
     return steps.cumsum(axis=0).cumsum(axis=1)[:-1, :-1] > 0
 
 
-def _ways(camera: PinholeCamera) -> Iterator[Float64[np.ndarray, "H W"]]:
+def _ways(camera: Camera) -> Iterator[Float64[np.ndarray, "H W"]]:
     """Yield the ray directions of all pixels, one world axis at a time; each goes one metre along the optical axis."""
     columns, rows = np.arange(camera.width) + 0.5, np.arange(camera.height)[:, None] + 0.5
     for right, down, ahead in products(inverse(camera.extrinsic[:3, :3]), inverse(camera.intrinsic)):

@@ -17,7 +17,7 @@ from ..types import Mesh
 from .color import PEAK, TO_YUV, psnr
 from .render import Pixels, crop_of
 from .ssim import MARGIN, ssim_view
-from .viewpoints import Camera
+from .viewpoints import AnyCamera
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +61,7 @@ class Colored:
         return ColorView(image, hit.faces.reshape(shape))
 
 
-def render_errors(original: Mesh, decoded: Mesh, cameras: Sequence[Camera]) -> RenderErrors:
+def render_errors(original: Mesh, decoded: Mesh, cameras: Sequence[AnyCamera]) -> RenderErrors:
     """Compare pictures of two meshes in their colours; where no view sees any, they are equal."""
     pair, scores = (Colored(original), Colored(decoded)), list[float]()
     squares, counts = np.zeros(2), np.zeros(2)

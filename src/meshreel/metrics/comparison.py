@@ -23,7 +23,7 @@ from .color_render import render_errors
 from .distance import PSNR_CEILING, Original, SurfaceErrors, surface_errors
 from .mpeg import MpegOptions, mpeg_errors
 from .ssim import Remembered, ssim_normals
-from .viewpoints import Box, Camera, ViewOptions, read_cameras, views_around
+from .viewpoints import AnyCamera, Box, ViewOptions, read_cameras, views_around
 
 Row = dict[str, Any]
 _COLORS = ("y_psnr", "u_psnr", "v_psnr", "yuv_psnr", "view_y_psnr", "view_y_psnr_inside")
@@ -36,7 +36,7 @@ _LARGER_IS_BETTER = (*_PSNRS, "ssim", "ssim_masked", "view_ssim")
 class ComparisonOptions:
     """Options of a comparison."""
 
-    cameras: Path | Sequence[Camera] | None = None  # Open3D pinhole JSON; None: four views around the originals
+    cameras: Path | Sequence[AnyCamera] | None = None  # Open3D pinhole JSON; None: four views around the originals
     views: ViewOptions = field(default_factory=ViewOptions)  # used where no cameras are given
     ssim: bool = True  # rendering and SSIM take about 2 s per frame at 1920 x 1080
     keys: Sequence[int] = ()  # key frames, without which aggregates are also computed
@@ -53,7 +53,7 @@ class Comparison:
 
     frames: tuple[Row, ...]  # metrics of each frame; inf and nan are kept here
     empty: tuple[bool, ...]  # frames without surface on both sides
-    cameras: tuple[Camera, ...]
+    cameras: tuple[AnyCamera, ...]
     keys: tuple[int, ...]
 
     def to_row(self) -> Row:
@@ -128,7 +128,7 @@ def compare_sequences(
     return Comparison(tuple(rows), tuple(empty), tuple(cameras), tuple(options.keys))
 
 
-def frame_row(original: Mesh | OriginalFrame, decoded: Mesh, cameras: Sequence[Camera]) -> Row:
+def frame_row(original: Mesh | OriginalFrame, decoded: Mesh, cameras: Sequence[AnyCamera]) -> Row:
     """Return the metrics of one frame by name; SSIM only with cameras."""
     prepared = _prepared(original)
     mesh, row = prepared.mesh, _distance_row(surface_errors(prepared.surface, decoded))
@@ -180,7 +180,7 @@ def _prepared(original: Mesh | OriginalFrame) -> OriginalFrame:
     return original if isinstance(original, OriginalFrame) else OriginalFrame(original)
 
 
-def _cameras(originals: Iterable[Mesh | OriginalFrame], options: ComparisonOptions) -> Sequence[Camera]:
+def _cameras(originals: Iterable[Mesh | OriginalFrame], options: ComparisonOptions) -> Sequence[AnyCamera]:
     if options.cameras is not None:
         return read_cameras(options.cameras) if isinstance(options.cameras, Path) else options.cameras
     return views_around(Box.of(_prepared(original).mesh for original in originals), options.views)

@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import Bool, Float64
 from scipy.ndimage import binary_closing, binary_dilation, distance_transform_edt, label, maximum_filter, minimum_filter
 
-from ..geometry.cameras import PinholeCamera
+from ..geometry.cameras import Camera
 from ..geometry.depth import STEP, DepthFrames, DepthPicture, apart
 from ..types import Frames, Mesh, evenly
 from .comparison import Row
@@ -40,7 +40,7 @@ PARTS = ("all", "still", "body")
 class Judged:
     """One camera's picture of one frame beside what was decoded; masks of its pixels."""
 
-    camera: PinholeCamera
+    camera: Camera
     depth: Float64[np.ndarray, "H W"]  # m, measured
     view: View  # of the decoded surface
     clear: Bool[np.ndarray, "H W"]  # those that count
@@ -56,7 +56,7 @@ class Judged:
         still = self.of("still") & self.covered
         if not self.body.any():
             return still
-        return still & (distance_transform_edt(~self.body) * self.depth > FOOT * self.camera.intrinsic[0, 0])
+        return still & (distance_transform_edt(~self.body) * self.depth > FOOT * self.camera.focal[0])
 
     @cached_property
     def shown(self) -> Float64[np.ndarray, "H W"]:
@@ -89,7 +89,7 @@ class Judged:
     def lost_runs(self, part: str) -> Float64[np.ndarray, " N"]:
         """Return the areas of connected pixels that are not covered, m^2, of at least `LEAST_LOST`, largest first."""
         runs, count = label(self.of(part) & ~self.covered)
-        focal = self.camera.intrinsic[0, 0] * self.camera.intrinsic[1, 1]
+        focal = self.camera.focal[0] * self.camera.focal[1]
         areas = np.bincount(runs.reshape(-1), (self.depth**2 / focal).reshape(-1), count + 1)[1:]
         return np.sort(areas[areas >= LEAST_LOST])[::-1]
 
@@ -238,7 +238,7 @@ def _share(part: float, whole: float) -> float | None:
 
 
 def _points(
-    camera: PinholeCamera, depth: Float64[np.ndarray, "H W"], pixels: Bool[np.ndarray, "H W"]
+    camera: Camera, depth: Float64[np.ndarray, "H W"], pixels: Bool[np.ndarray, "H W"]
 ) -> Float64[np.ndarray, "N 3"]:
     """Return the measured places of some pixels in world coordinates, m."""
     rows, columns = np.nonzero(pixels)

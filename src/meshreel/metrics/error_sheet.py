@@ -16,7 +16,7 @@ import numpy as np
 from jaxtyping import Float64
 
 from ..errors import InputError
-from ..geometry.cameras import PinholeCamera
+from ..geometry.cameras import Camera
 from ..geometry.closest_points import Surface
 from ..io.write import replacing
 from ..types import UP_AXES, Frames, Mesh
@@ -38,7 +38,7 @@ class SheetOptions:
     """Frames, cameras and size of a sheet."""
 
     frames: tuple[int, ...] = ()  # their numbers; empty: first, middle and last
-    cameras: tuple[PinholeCamera, ...] = ()  # of one size; empty: one before all that is shown
+    cameras: tuple[Camera, ...] = ()  # of one size; empty: one before all that is shown
     height: int = 480  # pixels of one picture
     unit: str = "percent"  # of the heat map: percent (of the diagonal) or mm
     up: str = "y"  # the axis that points up: y, z, -y or -z
@@ -103,7 +103,7 @@ def _rows(originals: Frames, decoded: Frames, options: SheetOptions) -> Iterator
             )
 
 
-def _pictures(mesh: Mesh, other: Mesh, seen: View, found: View, camera: PinholeCamera) -> tuple[np.ndarray, np.ndarray]:
+def _pictures(mesh: Mesh, other: Mesh, seen: View, found: View, camera: Camera) -> tuple[np.ndarray, np.ndarray]:
     """Return pictures of both in their colours where both have some, else of their normals."""
     if not (mesh.is_colored and other.is_colored):
         return seen.colors, found.colors
@@ -111,7 +111,7 @@ def _pictures(mesh: Mesh, other: Mesh, seen: View, found: View, camera: PinholeC
     return Colored(mesh).look(pixels).colors, Colored(other).look(pixels).colors
 
 
-def _cameras(meshes: list[Mesh], options: SheetOptions) -> list[PinholeCamera]:
+def _cameras(meshes: list[Mesh], options: SheetOptions) -> list[Camera]:
     if options.cameras:
         return list(options.cameras)
     box = Box.of(meshes)

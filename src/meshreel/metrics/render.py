@@ -19,7 +19,7 @@ from ..geometry.topology import blend
 from ..types import Mesh
 from .normals import interpolate, welded_normals
 from .surface_samples import used_surface
-from .viewpoints import Camera
+from .viewpoints import AnyCamera
 
 BACKGROUND = 1.0  # white
 
@@ -63,7 +63,7 @@ class View:
         return image
 
 
-def crop_of(meshes: list[Mesh], camera: Camera, border: int = 8) -> Crop:
+def crop_of(meshes: list[Mesh], camera: AnyCamera, border: int = 8) -> Crop:
     """Return the crop of all pixels that can see a mesh, widened by `border` pixels and clipped to the image."""
     full = Crop(0, camera.height, 0, camera.width)
     vertices = np.concatenate([m.vertices for m in meshes])
@@ -78,7 +78,7 @@ def crop_of(meshes: list[Mesh], camera: Camera, border: int = 8) -> Crop:
     return Crop(int(low[1]), int(high[1]), int(low[0]), int(high[0]))
 
 
-def look(mesh: Mesh, camera: Camera, crop: Crop) -> View:
+def look(mesh: Mesh, camera: AnyCamera, crop: Crop) -> View:
     """Return the camera's view of the mesh in the crop."""
     return Visible(mesh).look(Pixels(camera, crop))
 
@@ -99,7 +99,7 @@ class Picture(Protocol):
 class Pixels:
     """Crop of a camera's picture, with the rays through its pixels, which all meshes rendered there share."""
 
-    def __init__(self, camera: Camera, crop: Crop) -> None:
+    def __init__(self, camera: AnyCamera, crop: Crop) -> None:
         self.camera, self.crop = camera, crop
 
     @cached_property
@@ -136,7 +136,7 @@ class Visible:
         return View(crop, hit.reshape(crop.shape), mesh, corners, weights, normals)
 
 
-def _to_camera(vertices: Float64[np.ndarray, "V 3"], camera: Camera) -> Float64[np.ndarray, "V 3"]:
+def _to_camera(vertices: Float64[np.ndarray, "V 3"], camera: AnyCamera) -> Float64[np.ndarray, "V 3"]:
     """Return camera coordinates."""
     rotation = camera.extrinsic[:3, :3]
     eye = -np.linalg.solve(rotation, camera.extrinsic[:3, 3])

@@ -25,7 +25,7 @@ import numpy as np
 from jaxtyping import Bool, Float32, Float64
 
 from ..errors import InputError
-from ..geometry.cameras import PinholeCamera
+from ..geometry.cameras import Camera
 from ..geometry.closest_points import Surface, carried_labels
 from ..geometry.raycast import Rays
 from ..geometry.topology import face_normals
@@ -55,7 +55,7 @@ class SightOptions:
 class Sight:
     """A camera that saw the scene, with the range of its depths."""
 
-    camera: PinholeCamera
+    camera: Camera
     near: float = 0.0  # m along the optical axis: nothing nearer is measured
     far: float = math.inf  # m: nor farther
 
@@ -284,7 +284,7 @@ def _only(points: Scatter, kept: Bool[np.ndarray, " N"]) -> Scatter:
     return Scatter(points.points[kept], points.faces[kept], points.barycentric[kept], points.area * share)
 
 
-def _picture(scene: Scene, camera: PinholeCamera) -> Picture:
+def _picture(scene: Scene, camera: Camera) -> Picture:
     shape = (camera.height, camera.width)
     colors = np.full((*shape, 3), BACKGROUND, np.float32)
     covered, dynamic = np.zeros(shape, bool), np.zeros(shape, bool)

@@ -16,7 +16,7 @@ from scipy.ndimage import uniform_filter
 
 from ..types import Mesh
 from .render import Crop, Picture, Pixels, Visible, crop_of
-from .viewpoints import Camera
+from .viewpoints import AnyCamera
 
 _SIDE = 7  # pixels, side of the SSIM window: scikit-image's default
 _UNBIASED = _SIDE**2 / (_SIDE**2 - 1)  # of covariances in a window
@@ -46,7 +46,7 @@ class Remembered:
 
     def __init__(self, mesh: Mesh) -> None:
         self.mesh, self._visible = mesh, Visible(mesh)
-        self._drawn = list[tuple[Camera, Crop, _Drawn]]()
+        self._drawn = list[tuple[AnyCamera, Crop, _Drawn]]()
 
     def look(self, pixels: Pixels) -> Picture:
         """Render the mesh in a crop of a camera's image, or return the picture from before."""
@@ -58,7 +58,7 @@ class Remembered:
         return self._drawn[-1][-1]
 
 
-def ssim_normals(original: Mesh | Remembered, decoded: Mesh, cameras: Sequence[Camera]) -> NormalSsim:
+def ssim_normals(original: Mesh | Remembered, decoded: Mesh, cameras: Sequence[AnyCamera]) -> NormalSsim:
     """Compute SSIM between the normal-colored renderings of two meshes (paper, section 4: four views)."""
     pair = original if isinstance(original, Remembered) else Remembered(original), Visible(decoded)
     views = [Pixels(camera, crop_of([pair[0].mesh, decoded], camera, MARGIN)) for camera in cameras]

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
 
@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import Float64
 
 from ..errors import InputError
-from ..geometry.cameras import PinholeCamera, unpack_cameras
+from ..geometry.cameras import Camera, CameraPose, unpack_cameras
 from ..io.read import read_input
 from ..types import UP_AXES, Mesh, check_up
 
@@ -23,8 +23,8 @@ MARGIN = 1.05  # times the box, so that nothing touches the border (guess)
 
 
 @runtime_checkable
-class Camera(Protocol):
-    """Interface between a renderer and a camera."""
+class AnyCamera(Protocol):
+    """Interface between a renderer and a camera, perspective or parallel."""
 
     @property
     def width(self) -> int:
@@ -93,7 +93,7 @@ class Box:
         return self.high - self.low
 
 
-def views_around(box: Box, options: ViewOptions = ViewOptions()) -> list[PinholeCamera]:
+def views_around(box: Box, options: ViewOptions = ViewOptions()) -> list[Camera]:
     """Return perspective views of the box from its front, right, back and left, all at the same distance.
 
     The viewer of the front is at +z if y is up and at -y if z is up; at -z and +y if -y and -z are up. The distance
@@ -103,14 +103,12 @@ def views_around(box: Box, options: ViewOptions = ViewOptions()) -> list[Pinhole
     tangent = math.tan(math.radians(options.fov) / 2)
     distance = across / 2 + MARGIN * max(height, across * options.height / options.width) / 2 / tangent
     focal = options.height / 2 / tangent
-    intrinsic = np.array([[focal, 0, options.width / 2], [0, focal, options.height / 2], [0, 0, 1]])
-    return [
-        PinholeCamera(options.width, options.height, intrinsic, looking(box.center, axes, distance))
-        for axes in sides(options.up)
-    ]
+    one = Camera(options.width, options.height, (focal, focal), (options.width / 2, options.height / 2))
+    poses = [CameraPose.of_world(looking(box.center, axes, distance)) for axes in sides(options.up)]
+    return [replace(one, pose=pose) for pose in poses]
 
 
-def read_cameras(path: Path) -> list[PinholeCamera]:
+def read_cameras(path: Path) -> list[Camera]:
     """Read the cameras of an Open3D PinholeCameraParameters or PinholeCameraTrajectory JSON file."""
     return unpack_cameras(read_input(path, "give Open3D pinhole camera JSON"), str(path))
 

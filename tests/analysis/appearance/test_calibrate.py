@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from meshreel.analysis.appearance.calibrate import CalibrationOptions, Correction, Moment, calibrate, fit_gains
-from meshreel.capture.simulated_color import shade_of
+from meshreel.capture.simulated.simulated_color import shade_of
 from meshreel.geometry.color_views import ColorPicture, ColorViews
 from meshreel.geometry.topology import face_normals
 from meshreel.metrics.color import TO_YUV

@@ -11,6 +11,7 @@ from meshreel.analysis.appearance.splat_fit import FitSplatsOptions, SplatFrame,
 from meshreel.analysis.appearance.splat_raster import Drawing, Flat, camera_matrices, draw, project
 from meshreel.analysis.appearance.splat_views import rendered, ring, taken
 from meshreel.errors import InputError
+from meshreel.geometry.cameras import CameraPose
 from meshreel.geometry.color_views import ColorPicture
 from meshreel.geometry.splats import Bound, Carrier, bind
 from meshreel.geometry.topology import subdivide_midpoint
@@ -135,7 +136,7 @@ def test_a_picture_fills_its_longer_side() -> None:
 
 def test_a_camera_that_sees_nothing_gives_no_view() -> None:
     camera = ring(PAINTED, 1, 48, 0.0)[0]
-    behind = replace(camera, extrinsic=np.diag([-1.0, 1, -1, 1]) @ camera.extrinsic)
+    behind = replace(camera, pose=CameraPose.of_world(np.diag([-1.0, 1, -1, 1]) @ camera.extrinsic))
     pixels = np.full((camera.height, camera.width, 3), 90, np.uint8)
     assert taken([ColorPicture(behind, pixels)], PAINTED, PAINTED, 48) == ()
 

@@ -9,7 +9,7 @@ from meshreel.analysis.fit.frame import FrameSurface
 from meshreel.analysis.follow.embedded import EmbeddedOptions, Motion, Stage, Tracker
 from meshreel.analysis.follow.embedded_pose import Pose
 from meshreel.analysis.follow.embedded_pose import moved as moved_by
-from meshreel.capture.procedural import SoftBodiesOptions, soft_bodies
+from meshreel.capture.simulated.procedural import SoftBodiesOptions, soft_bodies
 from meshreel.errors import InputError
 from meshreel.geometry.topology import clean, drop_unreferenced, subdivide_midpoint, vertex_normals
 from meshreel.types import Mesh

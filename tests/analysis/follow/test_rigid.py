@@ -7,7 +7,7 @@ import pytest
 
 from meshreel.analysis.fit.frame import FrameSurface
 from meshreel.analysis.follow.rigid import RigidBody, RigidMotion
-from meshreel.capture.demo_room import box
+from meshreel.capture.simulated.demo_room import box
 from meshreel.geometry.strict import rotations_of
 from meshreel.geometry.topology import subdivide_midpoint
 from meshreel.types import Mesh

@@ -8,7 +8,7 @@ from scipy.ndimage import binary_erosion
 
 from meshreel.analysis.scene.background import BackgroundOptions
 from meshreel.analysis.scene.background_depth import Moment, fuse_still_depth, usual_pictures
-from meshreel.capture.fusion import FusionOptions, fuse_depths
+from meshreel.capture.rig.fusion import FusionOptions, fuse_depths
 from meshreel.geometry.closest_points import distances
 from meshreel.geometry.derived_sequences import captured
 from meshreel.geometry.raycast import Rays

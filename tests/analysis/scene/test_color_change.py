@@ -8,7 +8,7 @@ import pytest
 from meshreel.analysis.scene.color_change import ColorChange
 from meshreel.analysis.scene.color_looks import ColorLooks
 from meshreel.analysis.scene.labelling import ByPlace, Rest
-from meshreel.geometry.cameras import PinholeCamera, looking_at
+from meshreel.geometry.cameras import Camera, looking_at
 from meshreel.geometry.color_views import ColorPicture
 from meshreel.geometry.raycast import Rays
 from meshreel.geometry.voxels import Lattice, spread
@@ -17,7 +17,7 @@ from tests.analysis.scene.test_views import box, together
 
 FLOOR, SKIN, SHADE = (180, 160, 150), (190, 130, 110), 0.6
 POSE = np.linalg.inv(looking_at(np.array([0.3, 2.0, 1.2]), np.array([0.0, 0, 0])))
-EYE = PinholeCamera(160, 120, np.array([[140.0, 0, 80], [0, 140, 60], [0, 0, 1]]), POSE)
+EYE = Camera.of(160, 120, np.array([[140.0, 0, 80], [0, 140, 60], [0, 0, 1]]), POSE)
 ROOM = box((-1, -0.1, -1), (1, 0, 1))
 FOOT = box((-0.1, 0.0, -0.1), (0.15, 0.05, 0.1))
 COME = together(ROOM, FOOT)

@@ -6,15 +6,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from meshreel.analysis.scene.color_looks import ColorLooks, ahead_of
-from meshreel.geometry.cameras import PinholeCamera
+from meshreel.analysis.scene.color_looks import ColorLooks
+from meshreel.geometry.cameras import Camera
 from meshreel.geometry.color_views import ColorPicture
 
 POSE = np.eye(4)
-CAMERA = PinholeCamera(100, 60, np.array([[80.0, 0, 49], [0, 80, 31], [0, 0, 1]]), POSE)
+CAMERA = Camera.of(100, 60, np.array([[80.0, 0, 49], [0, 80, 31], [0, 0, 1]]), POSE)
 
 
-def ramp(camera: PinholeCamera) -> np.ndarray:
+def ramp(camera: Camera) -> np.ndarray:
     """A picture whose red is the column and whose green is the row."""
     rows, columns = np.mgrid[: camera.height, : camera.width]
     return np.stack([columns, rows, 0 * rows], axis=2).astype(np.uint8)
@@ -27,12 +27,12 @@ def test_a_straight_camera_s_picture_is_kept_and_a_missing_one_is_none():
 
 
 def test_views_have_one_size_and_show_a_point_where_the_camera_saw_it():
-    other = PinholeCamera(200, 200, np.array([[150.0, 0, 100], [0, 150, 100], [0, 0, 1]]), POSE)
-    pictures = [ColorPicture(CAMERA, ramp(CAMERA)), ColorPicture(other, ramp(other), (0.1, 0.0, 0.0, 0.0, 0.0))]
+    other = Camera.of(200, 200, np.array([[150.0, 0, 100], [0, 150, 100], [0, 0, 1]]), POSE)
+    pictures = [ColorPicture(CAMERA, ramp(CAMERA)), ColorPicture(replace(other, distortion=(0.1,)), ramp(other))]
     looks = ColorLooks([pictures], 0)
     assert {(view.width, view.height) for view in looks.views} == {(100, 60)}
     row, column = 20, 70
-    point = 2 * ahead_of(looks.views[1])[row, column][None]
+    point = 2 * looks.views[1].ahead[row, column][None]
     at = pictures[1].project(point)[0][0] - 0.5  # the ramp's values are those of the middles of pixels
     assert np.allclose(looks.at(0, 1)[row, column, :2], at, atol=0.51)
 

@@ -6,7 +6,7 @@ import pytest
 
 from meshreel.capture.recordings import open_take
 from meshreel.capture.recordings.to_rig import write_takes
-from meshreel.capture.rig import read_rig
+from meshreel.capture.rig.rig import read_rig
 
 
 @pytest.fixture

@@ -39,8 +39,8 @@ def same(rig, rows=slice(None), unit=1.0):
 def test_a_tum_folder_has_depth_in_fifths_of_millimetres_and_its_pose(tmp_path, made):
     rig, remarks = made(files.tum(tmp_path / "desk"))
     assert same(rig) and remarks == [] and rig.cameras[0].name == "desk-camera"
-    assert rig.cameras[0].camera_to_world[:3, 3].tolist() == PLACE
-    assert np.allclose(rig.color_cameras[0].camera_to_world, rig.cameras[0].camera_to_world)
+    assert rig.cameras[0].view.pose.to_world[:3, 3].tolist() == PLACE
+    assert np.allclose(rig.color_cameras[0].view.pose.to_world, rig.cameras[0].view.pose.to_world)
 
 
 def test_a_tum_folder_may_have_associations_alone_in_either_order(tmp_path, made):
@@ -62,15 +62,15 @@ def test_a_stray_scanner_folder_has_a_larger_video_and_loses_uncertain_depth(tmp
     rig, remarks = made(files.stray(tmp_path / "scan"))
     assert same(rig, slice(1, None)) and remarks == [] and not rig.depth(0, 0)[0].any()
     color = rig.color_cameras[0]
-    assert (color.width, color.intrinsic[0, 0], color.intrinsic[0, 2]) == (2 * SIZE, 2 * SIZE, SIZE - 0.5)
-    assert rig.cameras[0].focal == (SIZE, SIZE) and np.allclose(rig.cameras[0].center, SIZE / 2 - 0.5)
-    assert np.allclose(rig.cameras[0].camera_to_world, np.block([[np.eye(3), np.c_[PLACE]], [0, 0, 0, 1]]))
+    assert (color.view.width, color.view.focal[0], color.view.center[0]) == (2 * SIZE, 2 * SIZE, SIZE)
+    assert rig.cameras[0].view.focal == (SIZE, SIZE) and np.allclose(rig.cameras[0].view.center, SIZE / 2)
+    assert np.allclose(rig.cameras[0].view.pose.to_world, np.block([[np.eye(3), np.c_[PLACE]], [0, 0, 0, 1]]))
 
 
 def test_the_export_of_record3d_turns_from_the_axes_of_the_phone(tmp_path, made):
     pytest.importorskip("OpenEXR")
     rig, _ = made(files.exr(tmp_path / "scan"))
-    assert same(rig) and np.allclose(rig.cameras[0].camera_to_world[:3, :3], FLIP[:3, :3]) and rig.up == "y"
+    assert same(rig) and np.allclose(rig.cameras[0].view.pose.to_world[:3, :3], FLIP[:3, :3]) and rig.up == "y"
 
 
 def test_an_r3d_is_read_with_lzfse_and_without_it_says_what_to_export(tmp_path, made, monkeypatch):
@@ -105,9 +105,9 @@ def test_bags_of_all_kinds_have_the_same_camera(tmp_path, made, form):
             bag.image("/front/infra/image_raw", DEPTHS[number], "16UC1", time)
     rig, remarks = made(path)
     assert same(rig) and remarks == [] and rig.cameras[0].name == "room-front-depth-image_raw"
-    assert np.allclose(rig.cameras[0].camera_to_world[:3, 3], PLACE)
-    assert np.allclose(rig.color_cameras[0].camera_to_world[:3, 3], [0.15, 1.5, 0.2])
-    assert rig.color_cameras[0].distortion == (0.1, 0, 0, 0, 0)
+    assert np.allclose(rig.cameras[0].view.pose.to_world[:3, 3], PLACE)
+    assert np.allclose(rig.color_cameras[0].view.pose.to_world[:3, 3], [0.15, 1.5, 0.2])
+    assert rig.color_cameras[0].view.distortion == (0.1, 0, 0, 0, 0)
     assert open_take(path).others == (
         "/chatter (String)",
         "/front/color/camera_info (CameraInfo)",
@@ -178,7 +178,7 @@ def test_a_bag_of_realsense_says_its_unit_and_where_colour_is(tmp_path, made):
             bag.image(f"{color}/image/data", shade(number), "rgb8", time)
     rig, _ = made(tmp_path / "scan.bag")
     assert same(rig) and rig.cameras[0].depth_unit == pytest.approx(0.0005)
-    assert rig.color_cameras[0].camera_to_world[0, 3] == pytest.approx(-0.015)
+    assert rig.color_cameras[0].view.pose.to_world[0, 3] == pytest.approx(-0.015)
 
 
 CALIBRATION = {"CalibrationInformation": {"Cameras": [
@@ -196,12 +196,12 @@ def test_an_azure_kinect_file_has_the_lens_of_its_mode(tmp_path, made):
     rig, remarks = made(files.mkv(tmp_path / "room.mkv", CALIBRATION))
     depth, color = rig.cameras[0], rig.color_cameras[0]
     assert remarks == [] and rig.frames == list(range(COUNT)) and (rig.depth(0, 2) == 1002).all()
-    assert np.allclose(depth.focal, (0.49 * 1024, 0.492 * 1024))
-    assert np.allclose(depth.center, (0.5 * 1024 - 192 - 0.5, 0.51 * 1024 - 180 - 0.5))
-    assert np.allclose(color.intrinsic[:2, 2], (0.5 * 1280 - 0.5, 0.51 * 960 - 120 - 0.5))
-    assert np.allclose(color.intrinsic[[0, 1], [0, 1]], (0.478 * 1280, 0.637 * 960))
-    assert color.distortion == (0.58, -2.49, 1e-4, 2e-4, 1.36, 0.5, -2.3, 1.3)
-    assert np.allclose(color.camera_to_world[:3, 3], (0.032, 0.002, -0.004))
+    assert np.allclose(depth.view.focal, (0.49 * 1024, 0.492 * 1024))
+    assert np.allclose(depth.view.center, (0.5 * 1024 - 192, 0.51 * 1024 - 180))
+    assert np.allclose(color.view.center, (0.5 * 1280, 0.51 * 960 - 120))
+    assert np.allclose(color.view.focal, (0.478 * 1280, 0.637 * 960))
+    assert color.view.distortion == (0.58, -2.49, 1e-4, 2e-4, 1.36, 0.5, -2.3, 1.3)
+    assert np.allclose(color.view.pose.to_world[:3, 3], (0.032, 0.002, -0.004))
     assert np.abs(color.picture(3).pixels.astype(int) - 100).max() <= NEAR
 
 
@@ -213,7 +213,7 @@ def test_bent_depth_is_straightened_without_new_depths(tmp_path, made):
     assert set(np.unique(depth)) <= {0, *np.unique(DEPTHS[0].astype(np.uint16) * 5)}
     x = (70 - 47.5) / 96
     assert depth[48, 70] == 5 * DEPTHS[0][48, round(47.5 + 96 * x * (1 + 0.2 * (x * x + (0.5 / 96) ** 2)))]
-    assert rig.color_cameras[0].distortion == (0.2, 0, 0, 0, 0)
+    assert rig.color_cameras[0].view.distortion == (0.2, 0, 0, 0, 0)
 
 
 def test_pictures_are_paired_within_half_a_frame_and_lost_ones_are_told(tmp_path, made):

@@ -13,7 +13,7 @@ import pytest
 import meshreel
 from meshreel.analysis.fit.frame import FrameSurface
 from meshreel.analysis.plan import Plan
-from meshreel.capture.procedural import SoftBodiesOptions, soft_bodies
+from meshreel.capture.simulated.procedural import SoftBodiesOptions, soft_bodies
 from meshreel.coding.group import continue_group
 from meshreel.encoder.group.forms import EncodedGroup
 from meshreel.encoder.group.interval import Interval

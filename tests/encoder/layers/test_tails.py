@@ -19,7 +19,7 @@ from meshreel.encoder.sequence import encode
 from meshreel.encoder.settings.options import EncoderOptions
 from meshreel.encoder.settings.presets import preset_options
 from meshreel.format.records import pack
-from meshreel.geometry.cameras import PinholeCamera
+from meshreel.geometry.cameras import Camera
 from meshreel.geometry.depth import DepthPicture, FreeSpace
 from meshreel.types import Mesh, MeshList, Placement
 from tests.coding.paper.test_laplacian import icosahedron
@@ -186,7 +186,7 @@ def test_tails_can_be_switched_off(sequence: MeshList, tmp_path) -> None:
 
 def test_surface_that_a_frame_lacks_stays_unless_a_camera_saw_through_it():
     more = both(BALL, knob())
-    camera = PinholeCamera(64, 64, np.array([[60.0, 0, 32], [0, 60.0, 32], [0, 0, 1]]), np.eye(4))
+    camera = Camera.of(64, 64, np.array([[60.0, 0, 32], [0, 60.0, 32], [0, 0, 1]]), np.eye(4))
     away = DepthPicture(camera, np.full((64, 64), 9.0, np.float32), 1.0, 10.0)  # nothing up to nine metres
     place = Placement(1.0, (0.0, 0.0, 3.0))
     frames, shown = [Mesh(BALL.vertices + NOISE[0], BALL.faces)] * 2, [more] * 2
@@ -199,7 +199,7 @@ def test_surface_that_a_frame_lacks_stays_unless_a_camera_saw_through_it():
 @pytest.mark.parametrize(("measured", "stays"), [(0, False), (2, True)])
 def test_surface_that_cameras_face_and_hardly_ever_measure_goes(measured: int, stays: bool) -> None:
     more, bare = both(BALL, knob()), Mesh(BALL.vertices + NOISE[0], BALL.faces)
-    camera = PinholeCamera(64, 64, np.array([[60.0, 0, 32], [0, 60.0, 32], [0, 0, 1]]), np.eye(4))
+    camera = Camera.of(64, 64, np.array([[60.0, 0, 32], [0, 60.0, 32], [0, 0, 1]]), np.eye(4))
     dark = DepthPicture(camera, np.zeros((64, 64), np.float32), 1.0, 10.0)
     free = [FreeSpace.of([dark], Placement(1.0, (0.0, 0.0, 3.0)))] * 4
     frames = [both(bare, knob())] * measured + [bare] * (4 - measured)

@@ -11,7 +11,7 @@ import sys
 
 import numpy as np
 
-from meshreel.capture.solid_colors import room_colors
+from meshreel.capture.simulated.solid_colors import room_colors
 from meshreel.coding.appearance.pictures import VideoEncoder, VideoOptions, to_i420
 from meshreel.format.layout import VideoCodec
 

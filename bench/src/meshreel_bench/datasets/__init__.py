@@ -16,10 +16,10 @@ from pathlib import Path
 import numpy as np
 
 from meshreel.analysis.scene.masks import VIEW_FILES, read_view_file
-from meshreel.capture.procedural import SoftBodiesOptions, soft_bodies
-from meshreel.capture.recording import open_recording
+from meshreel.capture.rig.recording import open_recording
+from meshreel.capture.simulated.procedural import SoftBodiesOptions, soft_bodies
 from meshreel.errors import InputError
-from meshreel.geometry.cameras import PinholeCamera
+from meshreel.geometry.cameras import Camera
 from meshreel.geometry.color_views import ColorFrames
 from meshreel.geometry.derived_sequences import Chosen
 from meshreel.geometry.topology import weld
@@ -72,7 +72,7 @@ class Dataset:
     """Sequence with its cameras and, where it is simulated, its scene."""
 
     sequence: MeshSequence
-    cameras: tuple[PinholeCamera, ...] = ()  # where it was seen from; none: look from around it
+    cameras: tuple[Camera, ...] = ()  # where it was seen from; none: look from around it
     scene: SceneData | None = None  # of a simulated scene
     pictures: ColorFrames | None = None  # of colour cameras: what decoded colours are compared with
     truth: Truth | None = None  # what simulated colour cameras without errors would see

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from meshreel.capture.recording import Recording
-from meshreel.geometry.cameras import PinholeCamera
+from meshreel.capture.rig.recording import Recording
+from meshreel.geometry.cameras import Camera
 from meshreel.geometry.color_views import ColorFrames
 from meshreel.geometry.depth import DepthFrames
 from meshreel.io.sequence import open_sequence
@@ -31,7 +31,7 @@ class Captured(Frames):
         return self._meshes[range(len(self))[index]]
 
     @property
-    def cameras(self) -> tuple[PinholeCamera, ...]:
+    def cameras(self) -> tuple[Camera, ...]:
         """Cameras of the capture."""
         return tuple(camera.view for camera in self._recording.rig.cameras)
 

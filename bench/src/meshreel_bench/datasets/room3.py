@@ -13,11 +13,11 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Bool, Float64, Int64
 
-from meshreel.capture.demo_room import Box, box
-from meshreel.capture.figure import Pose, figure, turn_about_y
-from meshreel.capture.implicit import polygonize
-from meshreel.capture.procedural import grid_of_frame
-from meshreel.capture.simulated_rig import TRUTH, SceneFrame, corner_cameras, simulate_rig
+from meshreel.capture.simulated.demo_room import Box, box
+from meshreel.capture.simulated.figure import Pose, figure, turn_about_y
+from meshreel.capture.simulated.implicit import polygonize
+from meshreel.capture.simulated.procedural import grid_of_frame
+from meshreel.capture.simulated.simulated_rig import TRUTH, SceneFrame, corner_cameras, simulate_rig
 from meshreel.geometry.topology import concatenate, subdivide_midpoint
 from meshreel.io.write import replacing
 from meshreel.types import Mesh
@@ -107,8 +107,8 @@ class Room3:
                 counts.append([len(part.faces) for part in parts])
                 yield SceneFrame(concatenate(parts), np.repeat(moving_parts(poses)[number], counts[-1]))
 
-        cameras = (camera.resized(width, round(0.9 * width)) for camera in corner_cameras(LOW, HIGH))
-        simulate_rig(folder, frames(), tuple(cameras), RATE)
+        cameras = corner_cameras(LOW, HIGH, width)
+        simulate_rig(folder, frames(), cameras, RATE)
         with replacing(folder / TRUTH / PARTS) as file:
             np.savez_compressed(file, allow_pickle=False, faces=np.array(counts), poses=poses)
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float64
 
-from meshreel.capture.simulated_rig import SceneFrame, SensorOptions, corner_cameras, simulate_rig
+from meshreel.capture.simulated.simulated_rig import SceneFrame, SensorOptions, corner_cameras, simulate_rig
 from meshreel.errors import InputError
 from meshreel.io.meshes import read_mesh
 from meshreel.types import Mesh
@@ -41,7 +41,7 @@ def simulate_room(
     """Writes the scene's rig and its truth into a folder; the number of frames. Some five minutes for 60 frames."""
     room = furnished(data)
     low, high = room.vertices.min(axis=0), room.vertices.max(axis=0)
-    cameras = corner_cameras(low + WALLS, high - np.array(WALLS), CAMERAS)
+    cameras = corner_cameras(low + WALLS, high - np.array(WALLS), count=CAMERAS)
     frames = scene(room, data, SPEEDS[options.name], options.frames)
     return simulate_rig(folder, frames, cameras, FRAME_RATE, options.sensor, progress)
 

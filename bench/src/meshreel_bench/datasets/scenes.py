@@ -20,12 +20,12 @@ from meshreel.analysis import scene as segmenter
 from meshreel.analysis.scene.background import BackgroundOptions
 from meshreel.analysis.scene.background_depth import Moment, fuse_still_depth
 from meshreel.analysis.scene.segmentation import SegmentOptions, segment
-from meshreel.capture import demo_room
-from meshreel.capture.fusion import FusionOptions
-from meshreel.capture.recording import open_recording
-from meshreel.capture.rig import RIG
-from meshreel.capture.simulated_rig import TRUTH
-from meshreel.capture.truth import Truth, read_truth
+from meshreel.capture.rig.fusion import FusionOptions
+from meshreel.capture.rig.recording import open_recording
+from meshreel.capture.rig.rig import RIG
+from meshreel.capture.simulated import demo_room
+from meshreel.capture.simulated.simulated_rig import TRUTH
+from meshreel.capture.simulated.truth import Truth, read_truth
 from meshreel.geometry.closest_points import Surface, carried_labels
 from meshreel.geometry.decimate import decimate_faces
 from meshreel.geometry.derived_sequences import Chosen

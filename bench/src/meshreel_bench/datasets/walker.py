@@ -9,15 +9,16 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Bool, Float64
 
-from meshreel.capture.figure import Pose, figure
-from meshreel.capture.implicit import polygonize
-from meshreel.capture.procedural import grid_of_frame
-from meshreel.capture.recording import open_recording
-from meshreel.capture.rig import RIG, DepthCamera
-from meshreel.capture.simulated_color import ColorSensorOptions, shade_of
-from meshreel.capture.simulated_rig import SceneFrame, SensorOptions, simulate_rig
-from meshreel.capture.solid_colors import WALKER, person_colors
-from meshreel.geometry.cameras import looking_at
+from meshreel.capture.rig.cameras import DepthCamera
+from meshreel.capture.rig.recording import open_recording
+from meshreel.capture.rig.rig import RIG
+from meshreel.capture.simulated.figure import Pose, figure
+from meshreel.capture.simulated.implicit import polygonize
+from meshreel.capture.simulated.procedural import grid_of_frame
+from meshreel.capture.simulated.simulated_color import ColorSensorOptions, shade_of
+from meshreel.capture.simulated.simulated_rig import SceneFrame, SensorOptions, simulate_rig
+from meshreel.capture.simulated.solid_colors import WALKER, person_colors
+from meshreel.geometry.cameras import Camera, CameraPose, looking_at
 from meshreel.geometry.closest_points import Surface
 from meshreel.geometry.color_views import ColorPicture, ColorViews
 from meshreel.geometry.topology import face_normals
@@ -65,7 +66,7 @@ class Truth:
         assert frame.paint is not None
         hits = Surface(frame.mesh).closest(points)
         faces, normals = hits.faces.astype(np.int64), face_normals(frame.mesh)[0][hits.faces]
-        black = [ColorPicture(c.view, np.zeros((c.height, c.width, 3), np.uint8)) for c in CAMERAS]
+        black = [ColorPicture(c.view, np.zeros((c.view.height, c.view.width, 3), np.uint8)) for c in CAMERAS]
         seen = ColorViews(black, frame.mesh).at(hits.points, normals)[1]
         along = np.cross(normals, [0.3, 0.5, 0.8])
         along /= np.linalg.norm(along, axis=1, keepdims=True)
@@ -92,7 +93,8 @@ def _camera(number: int, count: int) -> DepthCamera:
     pose = looking_at(eye, np.array([0.0, 0.9, 0.0]))
     width, height = 512, 640
     focal = 0.8 * height / 1.75 * 2.6  # the person fills four fifths of the height
-    return DepthCamera(f"c{number}", width, height, (focal, focal), ((width - 1) / 2, (height - 1) / 2), pose)
+    view = Camera(width, height, (focal, focal), (width / 2, height / 2), CameraPose.of_camera(pose))
+    return DepthCamera(f"c{number}", view)
 
 
 CAMERAS = tuple(_camera(number, 6) for number in range(6))

@@ -16,7 +16,7 @@ from pathlib import Path
 from PIL import Image
 
 import meshreel
-from meshreel.capture.rig import read_cameras
+from meshreel.capture.rig.rig import read_cameras
 
 from ..playing import WEB, playing
 

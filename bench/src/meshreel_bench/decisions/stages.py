@@ -13,7 +13,7 @@ from meshreel.analysis.reference.deform import bind, center_motions, move
 from meshreel.analysis.reference.extraction import Reference, extract_reference, predict
 from meshreel.analysis.reference.track import track_centers
 from meshreel.analysis.survey import survey
-from meshreel.capture.procedural import SoftBodiesOptions, soft_bodies
+from meshreel.capture.simulated.procedural import SoftBodiesOptions, soft_bodies
 from meshreel.coding import klt
 from meshreel.coding.group import decode_group, payload_bytes_by_purpose
 from meshreel.coding.paper.group import encode_laplacian

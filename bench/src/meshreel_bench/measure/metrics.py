@@ -23,7 +23,7 @@ from meshreel.metrics.comparison import ComparisonOptions, OriginalFrame, compar
 from meshreel.metrics.depth import DepthJudge, judge
 from meshreel.metrics.mpeg import MpegOptions
 from meshreel.metrics.scene_accuracy import Scene, people_flicker, scene_means, scene_row
-from meshreel.metrics.viewpoints import Box, Camera
+from meshreel.metrics.viewpoints import AnyCamera, Box
 from meshreel.types import UP_AXES, Frames, Mesh
 
 from ..datasets import Dataset
@@ -68,7 +68,7 @@ def _to_input(frames: Measured, metrics: Metrics) -> tuple[Values, PerFrame]:
     known = frames.known
     originals = Chosen(known.sequence, frames.numbers)
     prepared = None if known.scene is None else [_original(known.scene, number) for number in frames.numbers]
-    cameras: Sequence[Camera] | None = known.cameras or None
+    cameras: Sequence[AnyCamera] | None = known.cameras or None
     if cameras is None and metrics in ("parallel views", "colors"):
         cameras = parallel_views_around(Box.of(originals))
     mpeg = MpegOptions(PIXELS) if metrics == "mpeg" else None

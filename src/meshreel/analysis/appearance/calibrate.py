@@ -14,6 +14,7 @@ import numpy as np
 from jaxtyping import Float64, Int64
 
 from ...geometry import strict
+from ...geometry.cameras import CameraPose
 from ...geometry.color_views import ColorPicture, ColorViews, sampled
 from ...geometry.topology import face_normals, subdivide_midpoint
 from ...types import Mesh
@@ -194,7 +195,7 @@ def _moved(picture: ColorPicture, pose: Float64[np.ndarray, " 6"]) -> ColorPictu
     motion[:3, :3] = strict.rotations_of(np.concatenate([[1.0], pose[:3] / 2])[None])[0]
     motion[:3, 3] = pose[3:]
     camera = picture.camera
-    return replace(picture, camera=replace(camera, extrinsic=strict.products(motion, camera.extrinsic)))
+    return replace(picture, camera=replace(camera, pose=CameraPose.of_world(strict.products(motion, camera.extrinsic))))
 
 
 def _small(picture: ColorPicture, most_side: int) -> ColorPicture:
@@ -210,7 +211,8 @@ def halved(picture: ColorPicture) -> ColorPicture:
     width, height = camera.width // 2, camera.height // 2
     blocks = picture.pixels[: 2 * height, : 2 * width].reshape(height, 2, width, 2, 3)
     pixels = ((blocks.sum(axis=(1, 3), dtype=np.uint16) + 2) // 4).astype(np.uint8)
-    half = replace(camera, width=width, height=height, intrinsic=camera.intrinsic * [[0.5], [0.5], [1.0]])
+    focal, center = ((0.5 * x, 0.5 * y) for x, y in (camera.focal, camera.center))
+    half = replace(camera, width=width, height=height, focal=focal, center=center)
     return replace(picture, camera=half, pixels=pixels)
 
 

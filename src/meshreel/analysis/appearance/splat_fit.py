@@ -15,7 +15,7 @@ from jaxtyping import Float32, Float64, Int32
 
 from ...errors import InputError
 from ...geometry.atlas import finer_places
-from ...geometry.cameras import PinholeCamera
+from ...geometry.cameras import Camera
 from ...geometry.splats import Carrier, Splats, locate, pose
 from .splat_raster import LEAST, Drawing, Flat, camera_matrices, project
 
@@ -38,7 +38,7 @@ DEAD = 0.05  # of the mean of what splats add to pictures: less is as good as un
 class SplatView:
     """A camera, and its picture of the surface alone, on white."""
 
-    camera: PinholeCamera
+    camera: Camera
     pixels: Float32[np.ndarray, "H W 3"]  # sRGB, 0 to 1
 
 
@@ -172,7 +172,7 @@ class _Fit:
         kept = (opacities >= LEAST) & (self.added > 0)
         return splats.take(kept), self.added[kept]
 
-    def _drawn(self, carrier: Carrier, camera: PinholeCamera) -> tuple[Drawing, Any]:
+    def _drawn(self, carrier: Carrier, camera: Camera) -> tuple[Drawing, Any]:
         torch, own = self._torch, self._own
         weights = own["weights"]
         finer, now, along = locate(self._faces, weights.detach().numpy().astype(np.float64), carrier.levels)

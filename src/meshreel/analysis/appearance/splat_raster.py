@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float32, Float64, Int64
 
-from ...geometry.cameras import PinholeCamera
+from ...geometry.cameras import Camera
 from ...geometry.splats import Bound
 
 BLUR = 0.3  # pixels squared, added to the variances of what is drawn: no Gaussian falls between pixels
@@ -55,7 +55,7 @@ def project(xp: Any, means: Any, axes: Any, scales: Any, camera: tuple[Any, Any]
     return Flat(centers, conics, xp.stack([xx, yy], axis=1), depths)
 
 
-def camera_matrices(camera: PinholeCamera) -> tuple[Float64[np.ndarray, "3 4"], Float64[np.ndarray, "3 3"]]:
+def camera_matrices(camera: Camera) -> tuple[Float64[np.ndarray, "3 4"], Float64[np.ndarray, "3 3"]]:
     """Return what `project` takes."""
     return camera.extrinsic[:3], camera.intrinsic
 
@@ -160,7 +160,7 @@ def _stable_order(pixels: Int64[np.ndarray, " P"]) -> Int64[np.ndarray, " P"]:
     return order
 
 
-def draw(bound: Bound, camera: PinholeCamera) -> Float32[np.ndarray, "H W 3"]:
+def draw(bound: Bound, camera: Camera) -> Float32[np.ndarray, "H W 3"]:
     """Return the picture of Gaussians on white, sRGB, 0 to 1."""
     flat = project(np, bound.means, bound.axes, bound.scales, camera_matrices(camera))
     return Drawing(flat, bound.opacities, bound.colors, (camera.height, camera.width)).picture.astype(np.float32)

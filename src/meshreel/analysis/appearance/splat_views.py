@@ -8,13 +8,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from functools import partial
 
 import numpy as np
 from jaxtyping import Float64
 
-from ...geometry.cameras import PinholeCamera, looking_at
+from ...geometry.cameras import Camera, CameraPose, looking_at
 from ...geometry.color_views import ColorPicture, sampled
 from ...geometry.painted import Painted
 from ...geometry.raycast import Hit, Rays, pixels_near
@@ -30,22 +29,22 @@ HIDDEN = 0.01  # of the distance: what is nearer by that hides the mesh (guess)
 Colors = Callable[[Hit, Float64[np.ndarray, "N 3"]], Float64[np.ndarray, "N 3"]]  # of hits, and where they are
 
 
-def ring(mesh: Mesh, count: int, size: int, turn: float, up: Up = "y") -> list[PinholeCamera]:
+def ring(mesh: Mesh, count: int, size: int, turn: float, up: Up = "y") -> list[Camera]:
     """Return cameras around a mesh, which fills pictures of `size` pixels; `turn` is that of the first, in turns."""
-    extent, found = mesh.diagonal, list[PinholeCamera]()
+    extent, found = mesh.diagonal, list[Camera]()
     above = np.array(UP_AXES[up])
     axis = int(np.abs(above).argmax())
     along, aside = np.eye(3)[(axis + 1) % 3], np.eye(3)[(axis + 2) % 3]
     for number in range(count):
         angle, tilt = 2 * math.pi * (number / count + turn), TILTS[number % len(TILTS)]
         way = math.cos(tilt) * (math.cos(angle) * along + math.sin(angle) * aside) + math.sin(tilt) * above
-        pose = np.linalg.inv(looking_at(mesh.middle + AWAY * extent * way, mesh.middle, axis))
-        camera = PinholeCamera(size, size, np.diag([size, size, 1.0]), pose)
+        pose = CameraPose.of_camera(looking_at(mesh.middle + AWAY * extent * way, mesh.middle, axis))
+        camera = Camera(size, size, (float(size), float(size)), (0.0, 0.0), pose)
         found += [cut] if (cut := cut_to(camera, mesh, size)) else []
     return found
 
 
-def cut_to(camera: PinholeCamera, mesh: Mesh, size: int, most: float = math.inf) -> PinholeCamera | None:
+def cut_to(camera: Camera, mesh: Mesh, size: int, most: float = math.inf) -> Camera | None:
     """Return a camera at the same place whose picture is the mesh, its longer side `size` pixels; None: out of sight.
 
     Its pixels are at most `most` times as fine.
@@ -65,10 +64,10 @@ def cut_to(camera: PinholeCamera, mesh: Mesh, size: int, most: float = math.inf)
     scale = min((size - 2 * BORDER) / extent, most)
     width, height = (max(math.ceil(scale * side) + 2 * BORDER, 8) for side in (high - low))
     moved = np.array([[scale, 0, BORDER - scale * low[0]], [0, scale, BORDER - scale * low[1]], [0, 0, 1]])
-    return PinholeCamera(width, height, moved @ camera.intrinsic, camera.extrinsic)
+    return Camera.of(width, height, moved @ camera.intrinsic, camera.extrinsic)
 
 
-def rendered(mesh: Mesh, cameras: Sequence[PinholeCamera]) -> tuple[SplatView, ...]:
+def rendered(mesh: Mesh, cameras: Sequence[Camera]) -> tuple[SplatView, ...]:
     """Return pictures of a coloured mesh, without light."""
     rays, painted = Rays(mesh), Painted(mesh)
     return tuple(_view(mesh, rays, camera, lambda hit, _: painted.on(hit.faces, hit.barycentric)) for camera in cameras)
@@ -81,7 +80,7 @@ def taken(pictures: Sequence[ColorPicture], body: Mesh, whole: Mesh, size: int) 
     """
     rays, hides, found = Rays(body), Rays(whole), list[SplatView]()
     for picture in pictures:
-        camera = cut_to(picture.camera, body, size, most=1.0)
+        camera = cut_to(picture.camera.straight, body, size, most=1.0)
         if camera is not None:
             found.append(_view(body, rays, camera, partial(_pictured, picture, hides)))
     return tuple(found)
@@ -102,10 +101,9 @@ def _pictured(
     return colors
 
 
-def _view(mesh: Mesh, rays: Rays, camera: PinholeCamera, colors: Colors) -> SplatView:
+def _view(mesh: Mesh, rays: Rays, camera: Camera, colors: Colors) -> SplatView:
     """Cast rays through parts of pixels, and give these the mean of the colours that they find."""
-    fine = replace(camera, width=FINER * camera.width, height=FINER * camera.height)
-    fine = replace(fine, intrinsic=np.diag([FINER, FINER, 1.0]) @ camera.intrinsic)
+    fine = camera.resized(FINER * camera.width, FINER * camera.height)
     rows, columns = np.nonzero(pixels_near(fine, mesh))
     _, local = fine.rays(np.column_stack([columns, rows]) + 0.5)
     directions = local @ fine.extrinsic[:3, :3]

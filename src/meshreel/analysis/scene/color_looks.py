@@ -6,11 +6,10 @@ In: the colour pictures of a recording. Out: views of one size, and what they se
 from __future__ import annotations
 
 import numpy as np
-from jaxtyping import Float64, UInt8
+from jaxtyping import UInt8
 
-from ...geometry.cameras import PinholeCamera
-from ...geometry.color_views import ColorFrames, ColorPicture, bent, sampled
-from ...geometry.strict import inverse, products
+from ...geometry.cameras import Camera
+from ...geometry.color_views import ColorFrames, ColorPicture, sampled
 
 SIDE = 640  # pixels, most along the longer side of a view, for tools that make masks (guess)
 
@@ -26,15 +25,7 @@ class ColorLooks:
         width, height = next(((camera.width, camera.height) for camera in taken.values()), (1, 1))
         share = min(1.0, side / max(width, height))
         width, height = round(share * width), round(share * height)
-        self.views = tuple(
-            PinholeCamera(
-                width,
-                height,
-                np.diag([width / camera.width, height / camera.height, 1.0]) @ camera.intrinsic,
-                camera.extrinsic,
-            )
-            for camera in taken.values()
-        )
+        self.views = tuple(camera.straight.resized(width, height) for camera in taken.values())
 
     def at(self, frame: int, view: int) -> UInt8[np.ndarray, "H W 3"] | None:
         """Return the picture of a view; None where its camera lacks the frame."""
@@ -42,16 +33,7 @@ class ColorLooks:
         return None if found is None else _straight(found, self.views[view])
 
 
-def _straight(picture: ColorPicture, view: PinholeCamera) -> UInt8[np.ndarray, "H W 3"]:
+def _straight(picture: ColorPicture, view: Camera) -> UInt8[np.ndarray, "H W 3"]:
     """Return what a view from the place of a colour camera sees in its picture."""
-    ahead = ahead_of(view).reshape(-1, 3)
-    x, y = bent(ahead[:, 0], ahead[:, 1], picture.distortion)
-    places = products(np.stack([x, y, np.ones(len(x))], axis=1), picture.camera.intrinsic.T)[:, :2]
+    places = picture.camera.project(view.ahead.reshape(-1, 3))
     return np.rint(sampled(picture.pixels, places)).astype(np.uint8).reshape(view.height, view.width, 3)
-
-
-def ahead_of(view: PinholeCamera) -> Float64[np.ndarray, "H W 3"]:
-    """Return the point at depth 1 that each pixel sees, in the camera's axes."""
-    rows, columns = np.mgrid[: view.height, : view.width]
-    pixels = np.stack([columns + 0.5, rows + 0.5, np.ones(rows.shape)], axis=-1)
-    return np.einsum("hwd,ed->hwe", pixels, inverse(view.intrinsic))

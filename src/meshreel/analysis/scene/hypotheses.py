@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Int32
 
-from ...geometry.cameras import PinholeCamera
+from ...geometry.cameras import Camera
 from ...geometry.raycast import Seen
 from ...geometry.strict import inverse, products
 
@@ -95,7 +95,7 @@ def overlap(one: np.ndarray, other: np.ndarray) -> float:
     return int((one & other).sum()) / union if union else 1.0
 
 
-def tour(views: Sequence[PinholeCamera], start: int) -> list[int]:
+def tour(views: Sequence[Camera], start: int) -> list[int]:
     """Return the order of the views from `start` on, the most similar one next each time, so that they form a video.
 
     Views differ by the distance of their eyes and by the angle of their axes; opposite axes count as much as the

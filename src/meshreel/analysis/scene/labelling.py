@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Bool, Float64, Int64, UInt8
 from scipy.spatial import cKDTree
 
-from ...geometry.cameras import PinholeCamera
+from ...geometry.cameras import Camera
 from ...geometry.raycast import Rays, Seen
 from ...geometry.topology import connected_faces, face_normals, unique_edges
 from ...geometry.voxels import Lattice, spread
@@ -191,7 +191,7 @@ class ByMasks:
     """Segmentation by masks: each pixel that sees a face votes on its label (eqs. 1 to 4)."""
 
     masker: Masker
-    views: Sequence[PinholeCamera]
+    views: Sequence[Camera]
     cell: float  # m
     threshold: float  # share of the pixels that see a face
     island: float  # m^2
@@ -235,7 +235,7 @@ class ByMasks:
         return without_islands(mesh, moves, self.island)
 
 
-def looks(mesh: Mesh, views: Sequence[PinholeCamera]) -> list[Seen]:
+def looks(mesh: Mesh, views: Sequence[Camera]) -> list[Seen]:
     """Return what each view sees of a mesh."""
     rays = Rays(mesh)
     return [rays.look(view) for view in views]

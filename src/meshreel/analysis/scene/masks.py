@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Bool, UInt8
 
 from ...errors import InputError
-from ...geometry.cameras import PinholeCamera, unpack_cameras
+from ...geometry.cameras import Camera, unpack_cameras
 from ...geometry.raycast import Seen
 from ...io.file_names import last_number
 from ...io.mask_pictures import find_masks, read_mask
@@ -27,7 +27,7 @@ CAMERAS = "cameras.json"  # file name: Open3D's pinhole camera JSON, beside the 
 class Masker(Protocol):
     """Source of masks: for each pixel of each view, whether the surface that it sees moves. Inherit from it."""
 
-    views: tuple[PinholeCamera, ...] | None = None  # cameras of the masks; None: those that the scene is segmented with
+    views: tuple[Camera, ...] | None = None  # cameras of the masks; None: those that the scene is segmented with
     observes: bool = False  # whether `foresee` and `observe` must be called before the first masks
 
     def foresee(self, moments: Sequence[Sequence[Seen]], colors: ColorLooks | None = None) -> None:
@@ -37,11 +37,11 @@ class Masker(Protocol):
         """
         del moments, colors
 
-    def observe(self, frame: int, seen: Sequence[Seen], views: Sequence[PinholeCamera]) -> None:
+    def observe(self, frame: int, seen: Sequence[Seen], views: Sequence[Camera]) -> None:
         """Learn what the views see of a frame; called for every frame in order, before the first masks."""
         del frame, seen, views
 
-    def masks(self, frame: int, seen: Sequence[Seen], views: Sequence[PinholeCamera]) -> Bool[np.ndarray, "X H W"]:
+    def masks(self, frame: int, seen: Sequence[Seen], views: Sequence[Camera]) -> Bool[np.ndarray, "X H W"]:
         """Return the masks of one frame in the order of the views; True: moving."""
         ...
 
@@ -52,7 +52,7 @@ class ImageMasks(Masker):
     Pixels are object numbers; 0 means still.
     """
 
-    views: tuple[PinholeCamera, ...]
+    views: tuple[Camera, ...]
 
     def __init__(self, folder: Path, frames: int) -> None:
         """Read every file of `frames` frames. Raises InputError if one is missing, damaged or of another size."""
@@ -68,7 +68,7 @@ class ImageMasks(Masker):
         text = f"{folder}: has masks for {others} more frames than the {frames} of the sequence: the first are used"
         self.remarks = (f"{text}, beginning with frame 0",) if others > 0 else ()
 
-    def masks(self, frame: int, seen: Sequence[Seen], views: Sequence[PinholeCamera]) -> Bool[np.ndarray, "X H W"]:
+    def masks(self, frame: int, seen: Sequence[Seen], views: Sequence[Camera]) -> Bool[np.ndarray, "X H W"]:
         """Return the masks of one frame; `views` must be `self.views`."""
         assert len(seen) == len(views) == len(self.views), "masks belong to their own views"
         return self.objects(frame) > 0
@@ -78,7 +78,7 @@ class ImageMasks(Masker):
         return np.stack([read_mask(files[frame]) for files in self._files])
 
 
-def read_views(folder: Path) -> tuple[PinholeCamera, ...]:
+def read_views(folder: Path) -> tuple[Camera, ...]:
     """Read the views, all of one size, from a folder's `cameras.json`. Raises InputError if it is invalid."""
     return read_view_file(folder / CAMERAS, "the cameras of the masks, as Open3D pinhole camera JSON")
 
@@ -86,7 +86,7 @@ def read_views(folder: Path) -> tuple[PinholeCamera, ...]:
 VIEW_FILES = "view_*.json"  # as TSMC's authors release the cameras of a scene
 
 
-def read_view_file(path: Path, wanted: str = "Open3D pinhole camera JSON") -> tuple[PinholeCamera, ...]:
+def read_view_file(path: Path, wanted: str = "Open3D pinhole camera JSON") -> tuple[Camera, ...]:
     """Read views, all of one size, from a file, or from the files `view_00.json` and so on of a folder.
 
     Raises InputError, which says what is `wanted`, if they are invalid.
@@ -103,7 +103,7 @@ def read_view_file(path: Path, wanted: str = "Open3D pinhole camera JSON") -> tu
     return one_size(unpack_cameras(data, str(path)), str(path))
 
 
-def one_size(views: Sequence[PinholeCamera], name: str) -> tuple[PinholeCamera, ...]:
+def one_size(views: Sequence[Camera], name: str) -> tuple[Camera, ...]:
     """Return the views as a tuple after checking that there is at least one and that all have one picture size.
 
     Raises InputError, which calls them `name`.

@@ -12,21 +12,21 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float64, UInt8
 
-from ...geometry.cameras import PinholeCamera, pack_cameras
+from ...geometry.cameras import Camera, pack_cameras
 from ...geometry.raycast import Rays, Seen
 from ...io.write import frame_names, make_folder, replacing, write_picture
 from ...types import Frames
-from .color_looks import ColorLooks, ahead_of
+from .color_looks import ColorLooks
 from .masks import CAMERAS, one_size
 
 
-def normal_picture(seen: Seen, view: PinholeCamera) -> UInt8[np.ndarray, "H W 3"]:
+def normal_picture(seen: Seen, view: Camera) -> UInt8[np.ndarray, "H W 3"]:
     """Render normals n in world axes as colors (n + 1) / 2; white where nothing is seen.
 
     Normals are computed from the depths of neighbouring pixels, so they face the camera whatever the orientation of the
     faces.
     """
-    ahead = ahead_of(view)
+    ahead = view.ahead
     hit = np.isfinite(seen.depth)
     points = np.where(hit, seen.depth, np.nan)[..., None] * ahead
     normals = np.nan_to_num(np.cross(_step(points, 1), _step(points, 0)))
@@ -40,7 +40,7 @@ def normal_picture(seen: Seen, view: PinholeCamera) -> UInt8[np.ndarray, "H W 3"
 def write_views(
     folder: Path,
     frames: Frames,
-    views: Sequence[PinholeCamera],
+    views: Sequence[Camera],
     report: Callable[[int], None] = lambda _done: None,
     colors: ColorLooks | None = None,
 ) -> None:

@@ -18,7 +18,7 @@ import numpy as np
 from jaxtyping import Bool, Float32, Float64, Int32, Int64, UInt16
 from scipy.ndimage import minimum_filter
 
-from ...geometry.cameras import PinholeCamera
+from ...geometry.cameras import Camera
 from ...geometry.depth import DepthPicture
 from ...geometry.raycast import Rays
 from ...geometry.topology import face_normals
@@ -57,7 +57,7 @@ class Observations:
     """Frames, the views of them, and the depth pictures that cameras took of each frame, if there are any."""
 
     frames: Sequence[Mesh] | Frames
-    views: Sequence[PinholeCamera]
+    views: Sequence[Camera]
     pictures: Callable[[int], list[DepthPicture | None]] | None = None  # of a frame: one for each camera
     report: Report = silent  # called with the progress of `find_places`
 
@@ -131,7 +131,7 @@ class Tally:
 class Eye:
     """A depth camera that does not move, and the pixels in which it usually measures a depth."""
 
-    camera: PinholeCamera
+    camera: Camera
     sees: Bool[np.ndarray, "H W"]  # pixels with a depth in at least half of the frames
 
 
@@ -203,7 +203,7 @@ def states(
 
 
 def _states(
-    frames: Sequence[_Observation], places: Places, views: Sequence[PinholeCamera], options: PlacesOptions
+    frames: Sequence[_Observation], places: Places, views: Sequence[Camera], options: PlacesOptions
 ) -> Iterator[tuple[Bool[np.ndarray, " P"], Bool[np.ndarray, " P"]]]:
     """Yield the states of the places in frames whose observations are in memory; see `states`."""
     seen = np.zeros((len(frames), len(places.keys)), np.uint8)
@@ -249,7 +249,7 @@ class _Cameras:
 
     def __init__(self) -> None:
         self._frames = 0
-        self._counts: dict[int, tuple[PinholeCamera, Int32[np.ndarray, "H W"]]] = {}
+        self._counts: dict[int, tuple[Camera, Int32[np.ndarray, "H W"]]] = {}
 
     def add(self, pictures: Sequence[DepthPicture | None] | None) -> None:
         """Count the depths in the pictures of the next frame."""
@@ -301,7 +301,7 @@ def _cells(mesh: Mesh, lattice: Lattice) -> tuple[Int64[np.ndarray, " C"], Float
     return keys, np.stack(sums, axis=1).astype(np.float32)
 
 
-def _stored(rays: Rays, view: PinholeCamera, unit: float) -> UInt16[np.ndarray, "H W"]:
+def _stored(rays: Rays, view: Camera, unit: float) -> UInt16[np.ndarray, "H W"]:
     """Return a view's depths in multiples of `unit` (m); 0 where a ray hits nothing, or a face from behind."""
     seen = rays.look(view)
     depth = np.where(np.isfinite(seen.depth) & ~rays.backs(view, seen), seen.depth, 0.0)

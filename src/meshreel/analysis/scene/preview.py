@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Integer, UInt8
 
-from ...geometry.cameras import PinholeCamera
+from ...geometry.cameras import Camera
 from ...geometry.raycast import Rays, Seen
 from ...types import Mesh
 from .pictures import normal_picture
@@ -38,7 +38,7 @@ def label_colors(moving: Bool[np.ndarray, " F"], bodies: Integer[np.ndarray, " F
     return np.where(moving[:, None], known, np.array(_RESTS, np.uint8))
 
 
-def colored_picture(seen: Seen, view: PinholeCamera, colors: UInt8[np.ndarray, "F 3"]) -> UInt8[np.ndarray, "H W 3"]:
+def colored_picture(seen: Seen, view: Camera, colors: UInt8[np.ndarray, "F 3"]) -> UInt8[np.ndarray, "H W 3"]:
     """Render what a view sees in the faces' colors under one light; white where nothing is seen."""
     normals = normal_picture(seen, view).astype(np.float64) * (2 / 255) - 1
     light = _AMBIENT + (1 - _AMBIENT) * np.abs(normals @ _LIGHT)
@@ -49,7 +49,7 @@ def colored_picture(seen: Seen, view: PinholeCamera, colors: UInt8[np.ndarray, "
 
 
 def look_at_labels(
-    mesh: Mesh, moving: Bool[np.ndarray, " F"], bodies: Integer[np.ndarray, " F"], views: Sequence[PinholeCamera]
+    mesh: Mesh, moving: Bool[np.ndarray, " F"], bodies: Integer[np.ndarray, " F"], views: Sequence[Camera]
 ) -> tuple[list[UInt8[np.ndarray, "H W 3"]], list[int]]:
     """Return a picture for each view, and the number of moving faces that it sees."""
     rays, colors = Rays(mesh), label_colors(moving, bodies)

@@ -20,7 +20,7 @@ import numpy as np
 from jaxtyping import Bool, Float32, Int32, UInt8
 
 from ...errors import InputError
-from ...geometry.cameras import PinholeCamera
+from ...geometry.cameras import Camera
 from ...geometry.raycast import Seen
 from .color_looks import ColorLooks
 from .hypotheses import Hypotheses, HypothesisOptions, hypotheses, moving_in_views, reference_view, tour
@@ -77,7 +77,7 @@ class Sam3Masks(Masker):
         if self._chosen is None:
             self._chosen = reference_view(moments)
 
-    def observe(self, frame: int, seen: Sequence[Seen], views: Sequence[PinholeCamera]) -> None:
+    def observe(self, frame: int, seen: Sequence[Seen], views: Sequence[Camera]) -> None:
         """Keep the reference view's picture of a frame; frames must come in order from 0 on, before the first masks."""
         if self._moving is not None or frame < len(self._pictures):
             return
@@ -86,14 +86,14 @@ class Sam3Masks(Masker):
         self._pictures.append(self._picture(frame, number, seen, views))
         self._depths.append(thinned(seen[number].depth))
 
-    def masks(self, frame: int, seen: Sequence[Seen], views: Sequence[PinholeCamera]) -> Bool[np.ndarray, "X H W"]:
+    def masks(self, frame: int, seen: Sequence[Seen], views: Sequence[Camera]) -> Bool[np.ndarray, "X H W"]:
         """Return the masks of an observed frame; True: moving."""
         shape = (len(views), views[0].height, views[0].width)
         if frame not in self._known:
             self._known[frame] = np.packbits(self.objects(frame, seen, views) > 0)
         return np.unpackbits(self._known[frame], count=math.prod(shape)).astype(bool).reshape(shape)
 
-    def objects(self, frame: int, seen: Sequence[Seen], views: Sequence[PinholeCamera]) -> Int32[np.ndarray, "X H W"]:
+    def objects(self, frame: int, seen: Sequence[Seen], views: Sequence[Camera]) -> Int32[np.ndarray, "X H W"]:
         """Return the number, the same in all frames, of the moving object that each pixel sees; 0: none."""
         moving = self._hypotheses()
         if not moving.objects.any():
@@ -114,12 +114,12 @@ class Sam3Masks(Masker):
         return self._moving
 
     def _picture(
-        self, frame: int, number: int, seen: Sequence[Seen], views: Sequence[PinholeCamera]
+        self, frame: int, number: int, seen: Sequence[Seen], views: Sequence[Camera]
     ) -> UInt8[np.ndarray, "H W 3"]:
         taken = None if self._colors is None else self._colors.at(frame, number)
         return normal_picture(seen[number], views[number]) if taken is None else taken
 
-    def _reference(self, views: Sequence[PinholeCamera]) -> int:
+    def _reference(self, views: Sequence[Camera]) -> int:
         number = self.reference
         if not 0 <= number < len(views):
             raise InputError(f"reference view {number} of {len(views)}: give 0 to {len(views) - 1}")

@@ -16,7 +16,7 @@ import numpy as np
 from jaxtyping import Bool, Int64
 
 from ...errors import InputError
-from ...geometry.cameras import PinholeCamera
+from ...geometry.cameras import Camera
 from ...geometry.closest_points import Surface, distances
 from ...geometry.derived_sequences import CapturedSequence, Chosen, TurnedOver, captured
 from ...geometry.topology import edge_lengths, face_normals
@@ -48,7 +48,7 @@ class SegmentOptions:
     settle: SettleOptions = field(default_factory=SettleOptions)
     threshold: float = 0.3  # the paper's tau: a low one followed by clean-up misses less than a high one
     island: float = 0.01  # m^2: connected faces with less area take the label of the faces around them
-    cameras: tuple[PinholeCamera, ...] = ()  # views of one picture size; none: they are placed by `views`
+    cameras: tuple[Camera, ...] = ()  # views of one picture size; none: they are placed by `views`
 
 
 def segment(frames: MeshSequence, options: SegmentOptions = SegmentOptions(), report: Report = silent) -> ByPlace:
@@ -116,14 +116,14 @@ def segment_by(masker: Masker, frames: MeshSequence, options: SegmentOptions = S
     return ByMasks(masker, views, edge_length(frames, chosen), options.threshold, options.island)
 
 
-def scene_views(frames: MeshSequence, options: SegmentOptions = SegmentOptions()) -> tuple[PinholeCamera, ...]:
+def scene_views(frames: MeshSequence, options: SegmentOptions = SegmentOptions()) -> tuple[Camera, ...]:
     """Return the views of a scene: given cameras, or placed ones. Raises InputError if no frame has a surface."""
     return _views(frames, _to_see(frames), options)
 
 
 def mask_views(
     frames: MeshSequence, options: SegmentOptions = SegmentOptions()
-) -> tuple[tuple[PinholeCamera, ...], ColorLooks | None]:
+) -> tuple[tuple[Camera, ...], ColorLooks | None]:
     """Return views for masks: given cameras, or colour cameras with their pictures, or placed views."""
     chosen = _to_see(frames)
     colors = None if options.cameras else _color_looks(frames, chosen)
@@ -149,15 +149,15 @@ def _with_surface(frames: MeshSequence, numbers: Sequence[int]) -> list[int]:
     return [number for number in numbers if not frames[number].is_empty]
 
 
-def _views(frames: MeshSequence, chosen: Sequence[int], options: SegmentOptions) -> tuple[PinholeCamera, ...]:
+def _views(frames: MeshSequence, chosen: Sequence[int], options: SegmentOptions) -> tuple[Camera, ...]:
     """Return the cameras in the options, or views placed for a few of the chosen frames."""
     some = Chosen(frames, chosen[:: max(1, len(chosen) // _PROBES)])
     return _looking(options.cameras, frames, chosen) or place_views(some, options.views, some.up)
 
 
 def _looking(
-    views: tuple[PinholeCamera, ...] | None, frames: MeshSequence, chosen: Sequence[int]
-) -> tuple[PinholeCamera, ...] | None:
+    views: tuple[Camera, ...] | None, frames: MeshSequence, chosen: Sequence[int]
+) -> tuple[Camera, ...] | None:
     """Return `views` unchanged. Raises InputError if they see no face of any chosen frame."""
     if views and chosen and not any((s.faces >= 0).any() for k in chosen for s in looks(frames[k], views)):
         text = f"the {len(views)} given cameras see no face in any of {len(chosen)} frames (the first is {chosen[0]})"

@@ -18,7 +18,7 @@ import numpy as np
 from jaxtyping import Float32, Float64, Int64
 
 from ...errors import InputError
-from ...geometry.cameras import PinholeCamera
+from ...geometry.cameras import Camera, CameraPose
 from ...geometry.raycast import Rays
 from ...geometry.strict import dot, norm, products, rounded
 from ...geometry.topology import face_normals
@@ -46,7 +46,7 @@ class ViewsOptions:
 
 def place_views(
     meshes: Sequence[Mesh] | Frames, options: ViewsOptions = ViewsOptions(), up: Up = "y"
-) -> tuple[PinholeCamera, ...]:
+) -> tuple[Camera, ...]:
     """Place views that together see nearly all of the meshes; the same meshes always give the same views.
 
     Only `options.frames` of the meshes are read. Raises InputError if none of those has a surface. Takes some 4 s of
@@ -146,12 +146,10 @@ def _pixels(
     return np.concatenate(found, axis=1)
 
 
-def _greedy(
-    candidates: list[PinholeCamera], pixels: Float32[np.ndarray, "C N"], count: int
-) -> tuple[PinholeCamera, ...]:
+def _greedy(candidates: list[Camera], pixels: Float32[np.ndarray, "C N"], count: int) -> tuple[Camera, ...]:
     """Choose views one by one, each expected to see most of the samples that the earlier views do not see."""
     unseen = np.ones(pixels.shape[1], np.float32)  # probability that no pixel of the chosen views meets the face
-    chosen: list[PinholeCamera] = []
+    chosen: list[Camera] = []
     for _ in range(min(count, len(candidates))):
         best = int(np.argmax(np.einsum("cn,n->c", pixels, unseen)))
         chosen.append(candidates[best])
@@ -160,13 +158,13 @@ def _greedy(
     return tuple(chosen)
 
 
-def _looking(eye: Float64[np.ndarray, " 3"], turn: Float64[np.ndarray, "3 3"], options: ViewsOptions) -> PinholeCamera:
+def _looking(eye: Float64[np.ndarray, " 3"], turn: Float64[np.ndarray, "3 3"], options: ViewsOptions) -> Camera:
     """Return a camera at `eye` with the rotation `turn` from world to camera."""
     focal = options.width / 2 / rounded(math.tan(math.radians(options.fov) / 2))
-    intrinsic = np.array([[focal, 0, options.width / 2], [0, focal, options.height / 2], [0, 0, 1.0]])
     extrinsic = np.eye(4)
     extrinsic[:3, :3], extrinsic[:3, 3] = turn, -products(turn, eye[:, None])[:, 0]
-    return PinholeCamera(options.width, options.height, intrinsic, extrinsic)
+    center = (options.width / 2, options.height / 2)
+    return Camera(options.width, options.height, (focal, focal), center, CameraPose.of_world(extrinsic))
 
 
 @cache

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Protocol, runtime_checkable
 
 from ...errors import InputError
-from ..rig import RIG, SINGLE
+from ..rig.rig import RIG, SINGLE
 from .takes import Take, reading
 
 PLUGINS = "meshreel.recordings"

@@ -14,8 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from ..poses import pose_of
-from .takes import Lens, Pictures, Sensor, Stream, Take
+from ...geometry.cameras import Camera
+from ..calibration.poses import pose_of
+from .takes import Pictures, Sensor, Stream, Take, lens_of
 
 KIND = "an Azure Kinect or Femto recording (.mkv)"
 CALIBRATION = "calibration.json"
@@ -47,7 +48,8 @@ def read(path: Path) -> Take:
             size, told = (track.width, track.height), cameras.get(title)
             lens = None if told is None else _lens(told, title == "DEPTH", *size)
             pictures = partial(_pictures, path, video.streams.video.index(track), start, title == "DEPTH")
-            streams[title] = Stream(*size, count, seconds * (count - 1) / max(count, 1), lens, pictures)
+            reach = float((told or {}).get("MetricRadius") or np.inf)
+            streams[title] = Stream(*size, count, seconds * (count - 1) / max(count, 1), lens, pictures, reach)
         others = tuple(title for title in tracks if title not in streams)
     apart = None
     if "COLOR" in cameras:  # which has the way back, in metres
@@ -68,7 +70,7 @@ def _cameras(data: bytes | None) -> dict[str, dict[str, Any]]:
     return {names[one["Location"]]: one for one in cameras if one.get("Location") in names}
 
 
-def _lens(camera: dict[str, Any], deep: bool, width: int, height: int) -> Lens:
+def _lens(camera: dict[str, Any], deep: bool, width: int, height: int) -> Camera:
     """Return the lens of a mode from what is known of the whole sensor, whose first pixel begins at 0."""
     cx, cy, fx, fy, k1, k2, k3, k4, k5, k6, _, _, p2, p1 = map(float, camera["Intrinsics"]["ModelParameters"][:14])
     if deep:
@@ -81,8 +83,7 @@ def _lens(camera: dict[str, Any], deep: bool, width: int, height: int) -> Lens:
         if camera["SensorWidth"] * 9 == camera["SensorHeight"] * 16:
             cy, fy = (cy * 2304 + 384) / 3072, fy * 2304 / 3072
     center = (cx * wide - left - 0.5, cy * high - top - 0.5)
-    reach = float(camera.get("MetricRadius") or np.inf)
-    return Lens(width, height, (fx * wide, fy * high), center, (k1, k2, p1, p2, k3, k4, k5, k6), reach)
+    return lens_of(width, height, (fx * wide, fy * high), center, (k1, k2, p1, p2, k3, k4, k5, k6))
 
 
 def _pictures(path: Path, index: int, start: float, deep: bool) -> Pictures:

@@ -17,8 +17,8 @@ import numpy as np
 from ...errors import InputError
 from ...io.file_names import last_number
 from ...io.read import MOST_BYTES, read_file
-from ..poses import pose_of
-from .takes import Lens, Picture, Pictures, Sensor, Stream, Take, picture_size, reading
+from ..calibration.poses import pose_of
+from .takes import Picture, Pictures, Sensor, Stream, Take, lens_of, picture_size, reading
 
 KIND = "a Record3D recording (.r3d, or the folder of its export EXR + JPG)"
 EXPORT = "EXR_RGBD"
@@ -52,7 +52,7 @@ def read(path: Path) -> Take:
     times = {n: float(stamps[n]) if stamped else n / rate for n in {*deep, *color}}
     if "K" in about:
         k = np.array(about["K"], np.float64).reshape(3, 3).T
-        lens = Lens(*size, (k[0, 0], k[1, 1]), (k[0, 2], k[1, 2]))
+        lens = lens_of(*size, (k[0, 0], k[1, 1]), (k[0, 2], k[1, 2]))
     height, width = (about["dh"], about["dw"]) if "dh" in about else decode(next(iter(deep.values()))).shape
 
     def stream(names: dict[int, str], size: tuple[int, int], load: Callable[[str], Picture]) -> Stream:

@@ -18,9 +18,10 @@ from typing import Any
 import numpy as np
 
 from ...errors import InputError
+from ...geometry.cameras import Camera
 from ...io.depth_pictures import parse_depth
-from ..poses import Pose, pose_in_root, pose_of
-from .takes import Lens, Picture, Pictures, Sensor, Stream, Take, picture_size
+from ..calibration.poses import Pose, pose_in_root, pose_of
+from .takes import Picture, Pictures, Sensor, Stream, Take, lens_of, picture_size
 
 KIND = "a ROS 1 or RealSense .bag, a ROS 2 bag, an .mcap"
 DEEP = {"16UC1": ("<u2", 0.001), "mono16": ("<u2", 0.001), "32FC1": ("<f4", 1.0)}  # type, and its unit in ROS, m
@@ -216,7 +217,7 @@ def _stream(bag: _Bag, topic: _Topic) -> Stream:
     return Stream(topic.width, topic.height, topic.count, seconds, lens, pictures)
 
 
-def _lens(info: Any, straight: bool) -> Lens | None:
+def _lens(info: Any, straight: bool) -> Camera | None:
     """Return the lens that a CameraInfo tells, None where it has zeros; `straight`: of rectified pictures."""
     matrix, bends, projection = (
         np.asarray(getattr(info, name, getattr(info, name.upper(), None)), np.float64) for name in ("k", "d", "p")
@@ -229,7 +230,7 @@ def _lens(info: Any, straight: bool) -> Lens | None:
     elif info.distortion_model not in MODELS:
         raise ValueError(f"camera_info has the lens model {info.distortion_model}; rectify the pictures")
     (fx, _, cx), (_, fy, cy) = numbers[0, :3], numbers[1, :3]
-    return Lens(int(info.width), int(info.height), (fx, fy), (cx, cy), tuple(bends[:8].tolist()))
+    return lens_of(int(info.width), int(info.height), (fx, fy), (cx, cy), tuple(bends[:8].tolist()))
 
 
 def _pixels(message: Any) -> Picture:

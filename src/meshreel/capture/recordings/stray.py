@@ -16,8 +16,8 @@ from ...io.depth_pictures import read_depth
 from ...io.file_names import last_number
 from ...io.pictures import read_picture
 from ...io.read import read_file, read_input
-from ..poses import pose_of
-from .takes import Lens, Pictures, Sensor, Stream, Take, picture_size, reading
+from ..calibration.poses import pose_of
+from .takes import Pictures, Sensor, Stream, Take, lens_of, picture_size, reading
 
 KIND = "a Stray Scanner folder (depth/, rgb.mp4, odometry.csv)"
 MATRIX, VIDEO = "camera_matrix.csv", "rgb.mp4"
@@ -88,7 +88,7 @@ def _video(path: Path, start: float) -> Stream:
         with reading(path / MATRIX):
             text = read_file(path / MATRIX).decode()
             matrix = np.array([line.split(",") for line in text.splitlines() if line], np.float64).reshape(3, 3)
-        lens = Lens(width, height, (matrix[0, 0], matrix[1, 1]), (matrix[0, 2], matrix[1, 2]))
+        lens = lens_of(width, height, (matrix[0, 0], matrix[1, 1]), (matrix[0, 2], matrix[1, 2]))
 
     def pictures() -> Pictures:
         with av.open(path / VIDEO) as video:

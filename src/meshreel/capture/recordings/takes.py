@@ -7,44 +7,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float64
 
 from ...errors import InputError
-from ...geometry.cameras import scaled_lens
+from ...geometry.cameras import Camera
 from ...io.pictures import opened
 
 Picture = np.ndarray | bytes  # depths H x W in the sensor's unit, integers or floats; colours H x W x 3; a PNG or JPEG
 Pictures = Iterator[tuple[float, Picture]]  # each with its time on the take's clock, s
-
-
-@dataclass(frozen=True, slots=True)
-class Lens:
-    """Intrinsics of a camera in pixels, whose middles are whole numbers; it bends as OpenCV's coefficients say."""
-
-    width: int
-    height: int
-    focal: tuple[float, float]
-    center: tuple[float, float]
-    distortion: tuple[float, ...] = ()  # k1 k2 p1 p2 k3 k4 k5 k6, or fewer
-    reach: float = np.inf  # largest tangent of an angle to the optical axis for which the coefficients hold
-
-    def __post_init__(self) -> None:
-        if not (np.isfinite(self.distortion).all() and self.reach > 0):
-            raise ValueError(f"its lens bends by {self.distortion} up to a tangent of {self.reach:g}: not finite, or 0")
-
-    def check(self, width: int, height: int) -> None:
-        """Raise InputError for a picture of another size."""
-        if (width, height) != (self.width, self.height):
-            raise InputError(f"{width} x {height} pixels where its lens has {self.width} x {self.height}")
-
-    def resized(self, width: int, height: int) -> Lens:
-        """Return the lens for pictures of another size."""
-        focal, center = scaled_lens(self.focal, self.center, width / self.width, height / self.height)
-        return replace(self, width=width, height=height, focal=focal, center=center)
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,8 +29,13 @@ class Stream:
     height: int  # pixels
     count: int  # pictures; about as many, where the file does not say
     seconds: float  # from the first to the last
-    lens: Lens | None  # None where the take has no calibration of it
+    lens: Camera | None  # None where the take has no calibration of it; its pose counts for nothing
     pictures: Callable[[], Pictures]  # reads the take from its beginning
+    reach: float = np.inf  # largest tangent of an angle to the optical axis for which the lens's distortion holds
+
+    def __post_init__(self) -> None:
+        if not self.reach > 0:
+            raise ValueError(f"its lens bends up to a tangent of {self.reach:g}: give a number above 0")
 
     @property
     def rate(self) -> float:
@@ -85,6 +64,28 @@ class Take:
     sensors: tuple[Sensor, ...]
     calibrate: str  # what a user does where the calibration is missing
     others: tuple[str, ...] = ()  # streams that are not read
+
+
+def lens_of(
+    width: int,
+    height: int,
+    focal: tuple[float, float],
+    center: tuple[float, float],
+    distortion: tuple[float, ...] = (),
+) -> Camera:
+    """Return the lens of intrinsics that call the middles of pixels whole numbers, as most recorders do.
+
+    Raises ValueError where the distortion is not finite.
+    """
+    if not np.isfinite(distortion).all():
+        raise ValueError(f"its lens bends by {distortion}: not finite")
+    return Camera(width, height, focal, (center[0] + 0.5, center[1] + 0.5), distortion=distortion)
+
+
+def check_size(lens: Camera, width: int, height: int) -> None:
+    """Raise InputError for a picture of another size."""
+    if (width, height) != (lens.width, lens.height):
+        raise InputError(f"{width} x {height} pixels where its lens has {lens.width} x {lens.height}")
 
 
 @contextmanager

@@ -11,7 +11,7 @@ import re
 import shutil
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import chain, count
 from pathlib import Path
 from typing import Any
@@ -20,13 +20,13 @@ import numpy as np
 from jaxtyping import Bool, Float64, Int64
 
 from ...errors import InputError
-from ...geometry.color_views import bent
+from ...geometry.cameras import Camera
 from ...io.pictures import pack_picture
 from ...io.unfinished import cannot_be_written, part_of
 from ...io.write import make_folder
-from ..color_cameras import distortion_of
-from ..rig import DepthCamera, write_rig
-from .takes import Lens, Picture, Sensor, Stream, Take, picture_size, reading
+from ..rig.cameras import DepthCamera, distortion_of, placed
+from ..rig.rig import write_rig
+from .takes import Picture, Sensor, Stream, Take, check_size, picture_size, reading
 
 MILLIMETRE = 0.001  # m, the unit of depths that are recorded as floats
 MOVES, TURNS = 0.05, 3.0  # m, degrees: a phone that tracks itself, on a tripod, strays by less (guess)
@@ -149,17 +149,17 @@ class _Part:
             distortion_of(record)  # raises InputError for what no rig may have
         return record
 
-    def _as_camera(self, name: str, lens: Lens, pose: Float64[np.ndarray, "4 4"]) -> DepthCamera:
+    def _as_camera(self, name: str, lens: Camera, pose: Float64[np.ndarray, "4 4"]) -> DepthCamera:
         with reading(self.take.path):
-            return DepthCamera(name, lens.width, lens.height, lens.focal, lens.center, pose, self.unit)
+            return DepthCamera(name, replace(lens, pose=placed(name, pose)), self.unit)
 
     def read(self, folder: Path, report: Callable[[], None]) -> None:
         """Write all pictures to a folder."""
-        pixels = _straightened(self.lens)
+        pixels = _straightened(self.lens, self.sensor.depth.reach)
 
-        def straight(picture: Picture, lens: Lens) -> tuple[bytes, str]:
+        def straight(picture: Picture, lens: Camera) -> tuple[bytes, str]:
             assert isinstance(picture, np.ndarray)
-            lens.check(picture.shape[1], picture.shape[0])
+            check_size(lens, picture.shape[1], picture.shape[0])
             if picture.dtype.kind == "f":
                 depth, self.unit = picture * (self.sensor.unit / MILLIMETRE), MILLIMETRE
                 with np.errstate(invalid="ignore"):  # what is none, or too far, is 0
@@ -174,7 +174,7 @@ class _Part:
         self,
         stream: Stream,
         folder: Path,
-        pack: Callable[[Picture, Lens], tuple[bytes, str]],
+        pack: Callable[[Picture, Camera], tuple[bytes, str]],
         report: Callable[[], None],
     ) -> _Written:
         written, what = _Written(), f"{self.take.path}: {folder.name} of {self.sensor.name}"
@@ -262,34 +262,29 @@ def _still(take: Take, sensor: Sensor) -> Float64[np.ndarray, "4 4"]:
     return usual
 
 
-def _straightened(lens: Lens) -> tuple[tuple[np.ndarray, np.ndarray], Bool[np.ndarray, "H W"]] | None:
+def _straightened(lens: Camera, reach: float) -> tuple[tuple[np.ndarray, np.ndarray], Bool[np.ndarray, "H W"]] | None:
     """Return for each pixel of a lens that does not bend which one of a picture it is, and whether there is one.
 
     Depths are not blended: between two surfaces is none.
     """
     if not any(lens.distortion):
         return None
-    rows, columns = np.mgrid[: lens.height, : lens.width].astype(np.float64)
-    x, y = (columns - lens.center[0]) / lens.focal[0], (rows - lens.center[1]) / lens.focal[1]
-    bent_x, bent_y = bent(x, y, lens.distortion)
-    column, row = bent_x * lens.focal[0] + lens.center[0], bent_y * lens.focal[1] + lens.center[1]
-    inside = (np.hypot(x, y) <= lens.reach) & (column > -0.5) & (column < lens.width - 0.5)
-    inside &= (row > -0.5) & (row < lens.height - 0.5)
-    nearest = (
-        np.rint(np.where(inside, row, 0)).astype(np.int64),
-        np.rint(np.where(inside, column, 0)).astype(np.int64),
-    )
-    return nearest, inside
+    ahead = lens.ahead
+    x, y = np.moveaxis(lens.project(ahead.reshape(-1, 3)).reshape(lens.height, lens.width, 2), 2, 0)
+    inside = (x > 0) & (x < lens.width) & (y > 0) & (y < lens.height)
+    inside &= np.hypot(ahead[..., 0], ahead[..., 1]) <= reach
+    row, column = (np.where(inside, place, 0).astype(np.int64) for place in (y, x))
+    return (row, column), inside
 
 
-def _colored(picture: Picture, lens: Lens) -> tuple[bytes, str]:
+def _colored(picture: Picture, lens: Camera) -> tuple[bytes, str]:
     """Return the bytes of a picture's file, and its extension. Raises InputError where it does not fit the lens."""
     if isinstance(picture, bytes):
-        lens.check(*picture_size(picture, "colour"))
+        check_size(lens, *picture_size(picture, "colour"))
         return picture, ".jpg" if picture[:2] == b"\xff\xd8" else ".png"
     from PIL import Image
 
-    lens.check(picture.shape[1], picture.shape[0])
+    check_size(lens, picture.shape[1], picture.shape[0])
     packed = io.BytesIO()
     Image.fromarray(picture).save(packed, "JPEG", quality=QUALITY, subsampling=0)
     return packed.getvalue(), ".jpg"

@@ -17,8 +17,8 @@ from jaxtyping import Float64
 from ...errors import InputError
 from ...io.depth_pictures import read_depth
 from ...io.read import read_input
-from ..poses import pose_of
-from .takes import Lens, Picture, Pictures, Sensor, Stream, Take, picture_size, reading
+from ..calibration.poses import pose_of
+from .takes import Picture, Pictures, Sensor, Stream, Take, lens_of, picture_size, reading
 
 KIND = "a TUM RGB-D folder (depth.txt, rgb.txt)"
 UNIT = 1 / 5000  # m
@@ -98,7 +98,7 @@ def _stream(rows: list[tuple[float, Path]], given: list[float], deep: bool) -> S
     if not rows:
         raise ValueError("its list of pictures is empty")
     width, height = picture_size(read_input(rows[0][1]), str(rows[0][1]))
-    lens = Lens(width, height, (given[0], given[1]), (given[2], given[3]), tuple(given[4:9])) if given else None
+    lens = lens_of(width, height, (given[0], given[1]), (given[2], given[3]), tuple(given[4:9])) if given else None
 
     def pictures() -> Pictures:
         for time, file in rows:

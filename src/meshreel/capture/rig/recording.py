@@ -1,0 +1,189 @@
+"""A rig's recording as a sequence of meshes, each frame fused when it is read.
+
+A rig's folder -> a MeshSequence and warnings for the user. A camera that moved is detected in its own data: the pixels
+of a camera that stands still measure mostly the same depths in all frames.
+"""
+
+from __future__ import annotations
+
+import pickle
+import tempfile
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float64
+
+from ...errors import InputError
+from ...geometry.color_views import ColorPicture, ColorViews, spread_colors
+from ...geometry.depth import DepthPicture, apart
+from ...geometry.topology import vertex_normals
+from ...io.sequence import SequenceOptions
+from ...types import Mesh, MeshSequence, Up
+from .cameras import ColorCamera
+from .fusion import FusionOptions, fuse_depths
+from .rig import Rig, read_rig
+
+LOOKED_AT = 12  # frames examined for movement, spread over the recording (guess)
+MOVED = 0.5  # share of pixels that differ from their usual depth, in the median frame, of a camera that moves (guess)
+LEAST = 0.3  # share of pixels with a measurement below which a frame is ignored: it may show no background (guess)
+
+
+class Recording(MeshSequence):
+    """The frames of a rig as a MeshSequence, in world coordinates.
+
+    A frame is fused when it is first read, and kept in a temporary file as long as this object lives and the disk has
+    room (10 MB for half a million faces), since encoding a scene reads it several times. Pass `keep=False` to read each
+    frame once.
+    """
+
+    def __init__(
+        self, rig: Rig, options: FusionOptions = FusionOptions(), frames: str = ":", keep: bool = True
+    ) -> None:
+        numbers = rig.frames
+        chosen = SequenceOptions(frames=frames).chosen(len(numbers))
+        self.rig, self.options = rig, options
+        self.numbers = [numbers[index] for index in chosen]  # of the frames, in the files' names
+        self._kept = Kept() if keep else None
+
+    @property
+    def frame_rate(self) -> float:
+        return self.rig.frame_rate
+
+    def __len__(self) -> int:
+        return len(self.numbers)
+
+    def __getitem__(self, index: int) -> Mesh:
+        number = self.numbers[index]
+        if self._kept is not None and (kept := self._kept.get(number)) is not None:
+            return kept
+        depths = self.rig.depths(number)
+        try:
+            mesh = self._colored(fuse_depths(depths, self.options), number)
+        except InputError as error:
+            raise InputError(f"{self.rig.folder}: frame {number}: {error}") from None
+        if self._kept is not None:
+            self._kept.put(number, mesh)
+        return mesh
+
+    def _colored(self, mesh: Mesh, number: int) -> Mesh:
+        """Return a fused mesh with colours of its vertices, where the rig has colour cameras."""
+        found = [camera.picture(number) for camera in self.rig.color_cameras]
+        pictures = [picture for picture in found if picture is not None]
+        if not pictures or mesh.is_empty:
+            return mesh
+        colors, seen = ColorViews(pictures, mesh).at(mesh.vertices, vertex_normals(mesh))
+        return replace(mesh, colors=spread_colors(mesh, colors, seen))
+
+    @property
+    def up(self) -> Up:
+        """The axis that points up, as the rig is described."""
+        return self.rig.up
+
+    @property
+    def colors(self) -> RigColors | None:
+        """The colour pictures of the frames; None where the rig has no colour cameras."""
+        return RigColors(self.rig.color_cameras, tuple(self.numbers)) if self.rig.color_cameras else None
+
+    @property
+    def depth(self) -> RigDepth:
+        """The depth pictures that the frames are fused from."""
+        return RigDepth(self.rig, tuple(self.numbers))
+
+
+@dataclass(frozen=True, slots=True)
+class RigDepth:
+    """The depth pictures of some frames of a rig's recording (`geometry.depth.DepthFrames`)."""
+
+    rig: Rig
+    numbers: tuple[int, ...]  # of the frames, in the files' names
+
+    def __getitem__(self, index: int) -> list[DepthPicture | None]:
+        frame, files = self.numbers[index], self.rig.files
+        cameras = enumerate(self.rig.cameras)
+        return [camera.picture(self.rig.depth(k, frame)) if frame in files[k] else None for k, camera in cameras]
+
+
+@dataclass(frozen=True, slots=True)
+class RigColors:
+    """The colour pictures of some frames of a rig's recording (`geometry.color_views.ColorFrames`)."""
+
+    cameras: tuple[ColorCamera, ...]
+    numbers: tuple[int, ...]  # of the frames, in the files' names
+
+    def __getitem__(self, index: int) -> list[ColorPicture | None]:
+        return [camera.picture(self.numbers[index]) for camera in self.cameras]
+
+
+class Kept:
+    """Meshes by number in a temporary file without a name, which ends with this object or its process."""
+
+    def __init__(self) -> None:
+        self._file: Any = None  # io.FileIO
+        self._places: dict[int, tuple[int, int]] = {}  # offset in the file, and size, bytes
+
+    def get(self, number: int) -> Mesh | None:
+        """Return a kept mesh, or None."""
+        if number not in self._places:
+            return None
+        offset, size = self._places[number]
+        self._file.seek(offset)
+        return pickle.loads(self._file.read(size))
+
+    def put(self, number: int, mesh: Mesh) -> None:
+        """Keep a mesh, unless the disk has no room: it is fused again, then."""
+        with suppress(OSError):
+            if self._file is None:  # without a buffer: one that could not be written would fail again when it is read
+                self._file = tempfile.TemporaryFile(prefix="meshreel-", buffering=0)  # noqa: SIM115
+            offset, data = self._file.seek(0, 2), pickle.dumps(mesh)
+            if self._file.write(data) == len(data):
+                self._places[number] = (offset, len(data))
+
+
+def open_recording(
+    folder: Path, options: FusionOptions = FusionOptions(), frames: str = ":", keep: bool = True
+) -> tuple[Recording, list[str]]:
+    """Open the recording in a rig's folder; also return a warning for each problem that a user must know.
+
+    `frames` is a range A:B, with B excluded; `keep` is that of `Recording`. Raises InputError where the rig is wrong or
+    one of its cameras moves.
+    """
+    rig = read_rig(folder)
+    warnings = [*rig.remarks, *rig.missing()]
+    for number, camera in enumerate(rig.cameras):
+        seen = looked_at(rig, number)
+        blind = sum(not depth.any() for depth in seen)
+        if blind:
+            warnings.append(f"camera {camera.name} measures nothing in {blind} of {len(seen)} frames looked at")
+        if (share := moved_share(seen)) > MOVED:
+            raise InputError(
+                f"{folder}: camera {camera.name} seems to move: {100 * share:.0f} % of its pixels see something else "
+                "than usual; record with cameras that stand still, or cut the recording where it was moved"
+            )
+    return Recording(rig, options, frames, keep), warnings
+
+
+def moved_share(depths: list[Float64[np.ndarray, "H W"]]) -> float:
+    """Return the share of pixels whose depth (m) differs from their usual depth, in the median frame.
+
+    The usual depth is the median over frames; pixels without a measurement are ignored. Fewer than three usable frames
+    give 0.
+    """
+    seen = [depth for depth in depths if (depth > 0).mean() >= LEAST]
+    if len(seen) < 3:
+        return 0.0
+    stack = np.where(np.stack(seen) > 0, np.stack(seen), np.nan)
+    known = np.isfinite(stack).sum(axis=0) >= 3
+    usual = np.nanmedian(stack[:, known], axis=0)
+    other = np.abs(stack[:, known] - usual) > apart(usual)
+    valid = np.isfinite(stack[:, known])
+    return float(np.median((other & valid).sum(axis=1) / np.maximum(valid.sum(axis=1), 1)))
+
+
+def looked_at(rig: Rig, number: int) -> list[Float64[np.ndarray, "H W"]]:
+    """Return depths of a camera, m, from frames spread evenly over its recording; 0 is no measurement."""
+    frames = sorted(rig.files[number])
+    chosen = sorted({frames[int(k)] for k in np.linspace(0, len(frames) - 1, LOOKED_AT)})
+    return [rig.depth(number, frame) * rig.cameras[number].depth_unit for frame in chosen]

@@ -1,0 +1,229 @@
+"""A rig: depth cameras that stand still around a scene, and the depth pictures that they recorded.
+
+A folder with `rig.json` <-> cameras and their depths, frame by frame. A folder with `camera.json` and `depth/` is a rig
+of one camera. Pictures of different cameras belong to one frame if their file names have the same number.
+"""
+
+from __future__ import annotations
+
+import difflib
+import json
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import UInt16
+
+from ...errors import InputError
+from ...geometry.cameras import Camera, Matrix
+from ...io.depth_pictures import read_depth
+from ...io.read import read_json
+from ...io.write import replacing
+from ...types import UP_AXES, UPS, Up
+from .cameras import ColorCamera, DepthCamera, check_frames, check_size, distortion_of, pictures_in, placed
+
+RIG, SINGLE = "rig.json", "camera.json"
+RATES = (1e-9, 1e9)  # 1/s, the range of a sequence of meshes
+_TEXTS = ("name", "depth")
+_NUMBERS = ("width", "height", "fx", "fy", "cx", "cy", "depth_unit_m", "depth_min_m", "depth_max_m")
+_UPRIGHT = 0.5  # least cosine between an axis and the pictures' mean upward direction (guess)
+_SEE = "see `meshreel capture --help`"
+
+
+@dataclass(frozen=True, slots=True)
+class Rig:
+    """Cameras of a rig, with the depth pictures of each by frame number."""
+
+    folder: Path
+    cameras: tuple[DepthCamera, ...]
+    files: tuple[dict[int, Path], ...]  # of each camera
+    frame_rate: float  # 1/s
+    remarks: tuple[str, ...] = ()  # warnings about the description, for the user
+    color_cameras: tuple[ColorCamera, ...] = ()
+
+    @property
+    def up(self) -> Up:
+        """The axis nearest to upward in the cameras' pictures: y, z, -y or -z; y where none is near."""
+        mean = np.mean([-camera.view.pose.to_world[:3, 1] for camera in self.cameras], axis=0)
+        along = {axis: float(mean @ UP_AXES[axis]) for axis in UPS}
+        best = max(along, key=along.__getitem__)
+        return best if along[best] > _UPRIGHT else "y"
+
+    @property
+    def frames(self) -> list[int]:
+        """Sorted numbers of the frames that at least one camera has."""
+        return sorted(set().union(*self.files))
+
+    def depths(self, frame: int) -> list[tuple[DepthCamera, UInt16[np.ndarray, "H W"]]]:
+        """Read a frame's depths of all cameras that have it. Raises InputError where a picture has another size."""
+        there = [number for number, files in enumerate(self.files) if frame in files]
+        return [(self.cameras[number], self.depth(number, frame)) for number in there]
+
+    def depth(self, number: int, frame: int) -> UInt16[np.ndarray, "H W"]:
+        """Read the depths of one camera, by its number, in a frame that it has; depths out of its range are 0."""
+        camera, path = self.cameras[number], self.files[number][frame]
+        depth = read_depth(path)
+        check_size(path, depth, camera)
+        return camera.in_range(depth)
+
+    def missing(self) -> list[str]:
+        """Return a warning for each camera that lacks frames, and one for frames that no camera has."""
+        frames, warnings = set(self.frames), []
+        for camera, files in zip(self.cameras, self.files, strict=True):
+            lost = sorted(frames - set(files))
+            if lost:
+                text = f"camera {camera.name} lacks {len(lost)} of {len(frames)} frames, for example {lost[0]}"
+                warnings.append(f"{text}; they are fused without it")
+        return warnings + _gaps(self.frames)
+
+
+def read_rig(folder: Path) -> Rig:
+    """Read the rig in a folder. Raises InputError where its description or a camera's pictures are missing or wrong."""
+    entries, cameras, rate, alone = _described(folder)
+    folders = [folder / str(e.get("depth", f"{c.name}/depth")) for e, c in zip(entries, cameras, strict=True)]
+    files = tuple(pictures_in(place, camera.name, "depth") for place, camera in zip(folders, cameras, strict=True))
+    beside = [number for number, entry in enumerate(entries) if "color" in entry]
+    colors = [_color_camera(folder, entries[k]["color"], cameras[k].record(), k) for k in beside]
+    colors += [_color_camera(folder, entry, {"name": f"color{number}"}) for number, entry in enumerate(alone)]
+    rig = Rig(folder, cameras, files, rate, tuple(_unknown(folder, entries)), tuple(colors))
+    check_frames(folder, colors, rig.frames)
+    return rig
+
+
+def read_cameras(folder: Path) -> tuple[tuple[DepthCamera, ...], float]:
+    """Read the cameras that a folder describes, and their frame rate, 1/s; their pictures may be missing."""
+    _, cameras, rate, _ = _described(folder)
+    return cameras, rate
+
+
+def _described(folder: Path) -> tuple[list[Any], tuple[DepthCamera, ...], float, list[Any]]:
+    """Read a description: its entry per camera, the cameras, their frame rate, 1/s, and entries of further cameras."""
+    path, single = folder / RIG, folder / SINGLE
+    if path.exists():
+        record = read_json(path, "give JSON")
+        entries = record.get("cameras")
+        if not isinstance(entries, list) or not entries:
+            raise InputError(f"{path}: has no list `cameras`; describe one camera at least")
+    elif single.exists():
+        path = single
+        record = read_json(path, "give JSON")
+        color = {"color": "color"} if (folder / "color").is_dir() else {}
+        entries = [{"name": folder.resolve().name, "depth": "depth"} | color | record]
+    else:
+        if not folder.exists():
+            raise InputError(f"{folder}: no such file or folder; check the path")
+        text = f"{folder}: {'' if folder.is_dir() else 'is no folder and '}has neither {RIG} nor {SINGLE}"
+        raise InputError(f"{text}; describe its cameras in one, or make a rig of a recording with meshreel capture")
+    rate = record.get("frames_per_second")
+    if isinstance(rate, bool) or not isinstance(rate, (int, float)) or not RATES[0] <= rate <= RATES[1]:
+        raise InputError(f"{path}: frames_per_second is {rate!r:.40}; give a number from {RATES[0]:g} to {RATES[1]:g}")
+    cameras = tuple(_camera(path, number, entry) for number, entry in enumerate(entries))
+    names = [camera.name for camera in cameras]
+    if len(set(names)) < len(names):
+        raise InputError(f"{path}: two cameras have one name ({', '.join(names)}); name each differently")
+    alone = record.get("color_cameras", [])
+    if not isinstance(alone, list):
+        raise InputError(f"{path}: color_cameras is {alone!r:.40} and not a list; {_SEE}")
+    return entries, cameras, float(rate), alone
+
+
+def write_rig(
+    folder: Path, cameras: tuple[DepthCamera, ...], frame_rate: float, colors: Sequence[dict[str, Any] | None] = ()
+) -> None:
+    """Write `rig.json`; `colors` describe the colour cameras beside the first of the cameras, None where is none."""
+    entries = [camera.record() | {"depth": f"{camera.name}/depth"} for camera in cameras]
+    for entry, color in zip(entries, colors, strict=False):
+        entry |= {} if color is None else {"color": color}
+    with replacing(folder / RIG) as file:
+        file.write((json.dumps({"frames_per_second": frame_rate, "cameras": entries}, indent=1) + "\n").encode())
+
+
+def _camera(path: Path, number: int, entry: Any) -> DepthCamera:
+    try:
+        if not isinstance(entry, dict):
+            raise InputError(f"is {entry!r:.40} and not an object")
+        for key in _TEXTS:
+            if not isinstance(entry.get(key, ""), str):
+                raise InputError(f"{key} is {entry[key]!r:.40}; give text")
+        given = {"depth_unit_m": 0.001, "depth_min_m": 0.1, "depth_max_m": 10.0} | entry
+        width, height, fx, fy, cx, cy, unit, near, far = (_number(given, key) for key in _NUMBERS)
+        if not (width.is_integer() and height.is_integer()):
+            raise InputError(f"pictures of {width:g} x {height:g}; give whole numbers of pixels")
+        to_world = _matrix(given)
+    except InputError as error:
+        raise InputError(f"{path}: camera number {number} is not described: {error}; {_SEE}") from None
+    try:
+        name = entry.get("name", f"camera{number}")
+        center, pose = (cx + 0.5, cy + 0.5), placed(name, to_world)
+        return DepthCamera(name, Camera(int(width), int(height), (fx, fy), center, pose), unit, (near, far))
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+
+
+def _number(entry: dict[str, Any], key: str) -> float:
+    value = entry.get(key)
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        raise InputError(f"{key} is {value!r:.40} and not a number" if key in entry else f"it has no {key}")
+    try:
+        return float(value)
+    except OverflowError:  # whole numbers in JSON may have any size
+        return math.inf
+
+
+def _matrix(entry: dict[str, Any]) -> Matrix:
+    """Return the matrix of an entry; its shape is checked here, its numbers by `placed`."""
+    if "camera_to_world" not in entry:
+        raise InputError("it has no camera_to_world")
+    try:
+        pose = np.array(entry["camera_to_world"], dtype=np.float64)
+    except (TypeError, ValueError, OverflowError):
+        raise InputError("camera_to_world is not 4 rows of 4 numbers") from None
+    if pose.shape != (4, 4):
+        name = entry.get("name", "")
+        raise InputError(f"camera {name}: camera_to_world has the shape {pose.shape}; give 4 rows of 4 numbers")
+    return pose
+
+
+def _unknown(folder: Path, entries: list[Any]) -> Iterator[str]:
+    """Yield a warning about unknown keys of cameras: a misspelt key would silently leave a default in place."""
+    known = {*_TEXTS, *_NUMBERS, "camera_to_world", "frames_per_second", "color", "color_cameras"}
+    found = dict.fromkeys(key for entry in entries for key in entry if key not in known)
+    near = [(key, difflib.get_close_matches(key, known, 1)) for key in found]
+    if near:
+        keys = ", ".join(key + (f" (is {other[0]} meant?)" if other else "") for key, other in near)
+        yield f"{folder}: unknown keys describe cameras and are ignored: {keys}"
+
+
+def _gaps(frames: list[int]) -> list[str]:
+    """Return a warning if frame numbers are missing in an otherwise even row."""
+    pairs = list(pairwise(frames))
+    step = min((after - before for before, after in pairs), default=1)
+    lost = [(before + step, (after - before - 1) // step) for before, after in pairs if after - before > step]
+    if not lost:
+        return []
+    count = sum(many for _, many in lost)
+    text = f"no camera has {count} of the frames {frames[0]} to {frames[-1]}, for example {lost[0][0]}"
+    return [f"{text}; the frames after a gap are shown earlier"]
+
+
+def _color_camera(folder: Path, entry: Any, beside: dict[str, Any], number: int | None = None) -> ColorCamera:
+    """Return the colour camera of an entry, a folder or an object; what it does not say is as `beside` has it."""
+    path, given = folder / RIG, {"folder": entry} if isinstance(entry, str) else entry
+    if not isinstance(given, dict):
+        raise InputError(f"{path}: color of camera {beside['name']} is {entry!r:.40}; give a folder or an object")
+    one = beside | given
+    try:
+        camera = _camera(path, 0, {key: one[key] for key in one if key not in ("folder", "distortion")})
+        place, distortion = one.get("folder"), distortion_of(one)
+        if not isinstance(place, str):
+            raise InputError(f"color camera {camera.name} has no folder; name that of its pictures")
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+    files = pictures_in(folder / place, camera.name, "color")
+    found = ColorCamera(camera.name, replace(camera.view, distortion=distortion), files, number)
+    found.picture(min(files))  # an error of its size is told before anything else is done
+    return found
