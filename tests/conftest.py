@@ -1,5 +1,9 @@
-"""Checks every annotated array's shape and dtype while the tests run."""
+"""Settings of all tests: shapes and types of annotated arrays are checked.
 
+`MESHREEL_SHAPES=0` leaves the checks out: they cost each worker 8 s to load, and a tenth of what it runs.
+"""
+
+import os
 import sys
 
 import hypothesis
@@ -8,7 +12,10 @@ from jaxtyping import install_import_hook
 
 import tests.typecheck  # noqa: F401  (the hook finds it by name)
 
-sys.modules["meshreel.shapes"] = jaxtyping  # whose names check what ours only say
-install_import_hook("meshreel", "tests.typecheck.check")
+SHAPES = os.environ.get("MESHREEL_SHAPES") != "0"
+
+if SHAPES:
+    sys.modules["meshreel.shapes"] = jaxtyping  # whose names check what ours only say
+    install_import_hook("meshreel", "tests.typecheck.check")
 hypothesis.settings.register_profile("shared", deadline=None)  # a machine that does other work, too, misses any
 hypothesis.settings.load_profile("shared")

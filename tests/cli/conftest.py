@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,7 @@ from meshreel.geometry.raycast import Rays
 from meshreel.io.write import write_mesh, write_picture
 from tests.capture.depth_scenes import camera, record
 from tests.golden import GOLDEN
+from tests.kept import kept
 from tests.small_options import VIEWS, quick
 from tests.small_scene import ROOM_FACES, scene
 from tests.spheres import sliding_sphere
@@ -108,6 +110,16 @@ def rig(tmp_path) -> Path:
     near = {"focal": (150.0, 150.0)}
     cameras = [camera("front", **near), camera("left", 20, **near)]
     return record(tmp_path / "rig", cameras, [(x, 0, 0) for x in (-0.3, 0, 0.3)])
+
+
+def encode_once(run, source: Path, path: Path, *flags: str | Path) -> Path:
+    """Encode by a command, or copy what one with equal inputs and flags has written; return the path."""
+
+    def encode(made: Path) -> None:
+        assert run("encode", source, "-o", made, *flags).code == 0
+
+    made, _ = kept(encode, path.name, source, *flags)
+    return Path(shutil.copy(made, path))
 
 
 def failed(said: Said, *words: str) -> bool:

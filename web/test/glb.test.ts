@@ -74,5 +74,5 @@ describe(`compressed GLB${ready ? "" : " (skipped: no meshoptimizer in .venv)"}`
     } finally {
       rmSync(folder, { recursive: true, force: true });
     }
-  }, 60_000);
+  });
 });

@@ -28,6 +28,7 @@ from meshreel.io.sequence import open_sequence
 from meshreel.io.write import write_mesh
 from meshreel.metrics.color import color_errors
 from meshreel.types import Mesh, MeshList, Texture
+from tests.kept import kept
 from tests.small_bodies import body
 from tests.small_options import quick
 from tests.small_scene import scene
@@ -50,11 +51,14 @@ def textured(mesh: Mesh) -> Mesh:
     return replace(mesh, uv=flat[mesh.faces].astype(np.float32), texture=Texture.of(CHECKS))
 
 
-def written(meshes: list[Mesh], path: Path, color: str = "auto", compatible: bool = False, **others: object) -> bytes:
+def written(meshes: list[Mesh], color: str = "auto", compatible: bool = False, **others: object) -> bytes:
     appearance = appearance_options(50.0, color, compatible=compatible)
-    options = replace(quick(**others), appearance=appearance)  # type: ignore[arg-type]
-    Encoder(Welded(MeshList(tuple(meshes)))).encode(path, replace(options, scene=None))
-    return path.read_bytes()
+    options = replace(quick(**others), appearance=appearance, scene=None)  # type: ignore[arg-type]
+
+    def write(path: Path) -> None:
+        Encoder(Welded(MeshList(tuple(meshes)))).encode(path, options)
+
+    return kept(write, "a.reel", meshes, options)[0].read_bytes()
 
 
 def kinds(data: bytes) -> list[ChunkKind]:
@@ -62,13 +66,12 @@ def kinds(data: bytes) -> list[ChunkKind]:
 
 
 @pytest.fixture(scope="module")
-def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
-    folder = tmp_path_factory.mktemp("colors")
+def files() -> dict[str, bytes]:
     return {
-        "plain": written(BODY, folder / "plain.reel"),
-        "vertices": written(COLORED, folder / "vertices.reel", group_size=3),
-        "none": written(COLORED, folder / "none.reel", "none"),
-        "texture": written([textured(mesh) for mesh in BODY], folder / "texture.reel", group_size=3),
+        "plain": written(BODY),
+        "vertices": written(COLORED, group_size=3),
+        "none": written(COLORED, "none"),
+        "texture": written([textured(mesh) for mesh in BODY], group_size=3),
     }
 
 
@@ -89,21 +92,21 @@ def test_colors_of_vertices_are_near_those_of_the_frames(files: dict[str, bytes]
     np.testing.assert_array_equal(bare.vertices, video[0].vertices)
 
 
-def test_textures_may_have_another_size_in_each_frame(tmp_path: Path) -> None:
+def test_textures_may_have_another_size_in_each_frame() -> None:
     """What is painted is the same: a ramp over the frame, of 16 x 16 texels or of 96 x 40."""
     meshes = []
     for number, mesh in enumerate(textured(mesh) for mesh in BODY):
         rows, columns = (16, 16) if number % 2 else (40, 96)
         ramp = np.linspace(20, 220, columns)[None, :, None] * np.ones((rows, 1, 3))
         meshes.append(replace(mesh, texture=Texture.of(ramp.astype(np.uint8))))
-    video = meshreel.open(written(meshes, tmp_path / "a.reel"))
+    video = meshreel.open(written(meshes))
     for mesh, shown in zip(meshes, video, strict=True):
         assert shown.texture is not None and shown.texture.pixels.shape == video[0].texture.pixels.shape
         assert color_errors(mesh, shown).y > 28
 
 
 @pytest.mark.parametrize("colored", [True, False])
-def test_faces_without_places_are_encoded_beside_faces_with(tmp_path: Path, colored: bool) -> None:
+def test_faces_without_places_are_encoded_beside_faces_with(colored: bool) -> None:
     """The places of some are NaN, those of others are outside of 0 to 1, where the texture is repeated."""
     meshes = []
     for mesh, painted_mesh in zip(BODY[:2], COLORED, strict=False):
@@ -111,7 +114,7 @@ def test_faces_without_places_are_encoded_beside_faces_with(tmp_path: Path, colo
         uv[: len(uv) // 3] = np.nan
         flat = Texture.of(np.full((8, 8, 3), 90, np.uint8))
         meshes.append(replace(painted_mesh if colored else mesh, uv=uv, texture=flat))
-    for mesh, shown in zip(meshes, meshreel.open(written(meshes, tmp_path / "a.reel")), strict=True):
+    for mesh, shown in zip(meshes, meshreel.open(written(meshes)), strict=True):
         assert shown.texture is not None and color_errors(mesh, shown).y > 25
 
 
@@ -143,9 +146,9 @@ def test_fewer_layers_have_the_colors_of_their_vertices(files: dict[str, bytes])
 
 
 @pytest.mark.parametrize("preset", ["best", "paper"])
-def test_all_forms_have_colors(tmp_path: Path, preset: str) -> None:
+def test_all_forms_have_colors(preset: str) -> None:
     unlike = [painted(mesh, mesh) for mesh in (body(0, 1)[0], body(3, 1)[0], body(5, 1)[0], Mesh.empty())]
-    data = written([*COLORED[:2], *unlike], tmp_path / "all.reel", preset=preset)
+    data = written([*COLORED[:2], *unlike], preset=preset)
     video = meshreel.open(data)
     assert len({group.form for group in video.reader.groups}) > 1
     for number, mesh in enumerate([*COLORED[:2], *unlike[:3]]):
@@ -185,9 +188,9 @@ def without(data: bytes, kind: ChunkKind) -> bytes:
     return output.getvalue()
 
 
-def test_a_compatible_file_is_shown_with_either_video(files: dict[str, bytes], tmp_path: Path) -> None:
+def test_a_compatible_file_is_shown_with_either_video(files: dict[str, bytes]) -> None:
     meshes = [textured(mesh) for mesh in BODY]
-    both = written(meshes, tmp_path / "both.reel", compatible=True, group_size=3)
+    both = written(meshes, compatible=True, group_size=3)
     found = kinds(both)
     assert found.count(ChunkKind.COMPATIBLE) == found.count(ChunkKind.PICTURES) > 1
     assert without(both, ChunkKind.COMPATIBLE) == files["texture"]
@@ -195,12 +198,6 @@ def test_a_compatible_file_is_shown_with_either_video(files: dict[str, bytes], t
     for number in (4, 0, 5):
         one, two = video[number].texture.pixels, other[number].texture.pixels
         assert 0 < np.abs(one.astype(int) - two).mean() < 10
-
-
-def test_the_same_frames_give_the_same_bytes(files: dict[str, bytes], tmp_path: Path) -> None:
-    assert written(COLORED, tmp_path / "again.reel", group_size=3) == files["vertices"]
-    again = written([textured(mesh) for mesh in BODY], tmp_path / "texture.reel", group_size=3)
-    assert again == files["texture"]
 
 
 def damaged(data: bytes, kind: ChunkKind) -> bytes:
@@ -247,6 +244,7 @@ def lit(mesh: Mesh, light: float) -> Mesh:
     return replace(mesh, colors=(light * (120 + 100 * np.tanh(mesh.vertices))).astype(np.uint8))
 
 
+@pytest.mark.slow
 def test_light_that_moves_over_a_room_is_in_its_slow_video(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("meshreel.encoder.appearance.videos.LAYER_PICTURES", 2)
     monkeypatch.setattr("meshreel.decoder.pictures.LAYER_PICTURES", 2)
@@ -265,6 +263,7 @@ def test_light_that_moves_over_a_room_is_in_its_slow_video(tmp_path: Path, monke
         assert again == [means[9], means[1], means[5]]
 
 
+@pytest.mark.slow
 def test_parts_of_a_sequence_are_joined_with_their_colors(tmp_path: Path) -> None:
     for number, mesh in enumerate(COLORED):
         write_mesh(mesh, tmp_path / f"frame_{number}.ply")

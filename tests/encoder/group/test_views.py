@@ -35,6 +35,7 @@ def test_cameras_are_corrected_in_every_frame(wrong: Shown) -> None:
     assert Calibrated(MeshList((wrong[0],)), QUICK).colors is None
 
 
+@pytest.mark.slow
 def test_an_encode_calibrates_once_unless_told_not_to(
     wrong: Shown, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -314,7 +314,8 @@ def test_a_disk_that_is_full_at_any_byte_leaves_the_old_file_and_what_resume_nee
     assert path.read_bytes() == whole and len(sizes) > 5 and min(sizes) > 0
 
 
-@pytest.mark.parametrize("preset", ["paper", pytest.param("best", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("preset", ["paper", "best"])
 def test_a_stopped_scene_continues_to_the_same_bytes(tmp_path, preset, monkeypatch):
     encoder, options = Encoder(scene(4)), replace(quick(preset, group_size=1), key_interval=0.1)
     encoder.encode(tmp_path / "whole.reel", options)

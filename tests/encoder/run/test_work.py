@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from meshreel.encoder.sequence import encode
 from meshreel.encoder.settings.presets import preset_options
@@ -24,6 +25,7 @@ def ellipsoid(seed: int) -> Mesh:
     return Mesh.of(turned / np.linalg.norm(np.ptp(turned, axis=0)), BALL.faces)
 
 
+@pytest.mark.slow
 def test_what_cannot_be_followed_is_not_searched_frame_by_frame(tmp_path):
     summary = encode(
         MeshList(tuple(ellipsoid(k) for k in range(32))), tmp_path / "a.reel", options=quick(group_size=16)
@@ -45,6 +47,7 @@ def test_frames_of_a_room_are_read_once_and_tracked_and_fitted_once(tmp_path):
     assert work["frames read"] == 4 and work["frames fitted"] <= 4 and work["frames tracked"] <= 4
 
 
+@pytest.mark.slow
 def test_a_hard_body_is_fitted_at_most_two_and_a_half_times_a_frame(tmp_path):
     frames = open_sequence(performer("basketball_player"), SequenceOptions(scale=0.1))
     summary = encode(frames, tmp_path / "a.reel", options=preset_options())

@@ -121,6 +121,7 @@ def test_the_unit_is_the_size_of_what_moves(rolling):
     assert video.reader.header.scale == pytest.approx(2 * np.sqrt(3) * RADIUS, rel=0.1)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("plainly")
 def test_the_same_scene_gives_the_same_bytes_with_an_executor_too(tmp_path):
     stages: dict[str, list[int]] = {}
@@ -136,6 +137,7 @@ def test_the_same_scene_gives_the_same_bytes_with_an_executor_too(tmp_path):
         assert sorted(stages[stage]) == stages[stage] and len(set(stages[stage])) > 2
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("plainly")
 def test_a_scene_that_is_encoded_again_is_taken_apart_once(tmp_path, monkeypatch):
     count = []

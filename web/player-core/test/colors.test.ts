@@ -45,7 +45,7 @@ beforeAll(async () => {
     Omit<Painted, "data"> & { readonly file: string }
   >;
   painted = Object.fromEntries(Object.entries(made).map(([name, { file, ...others }]) => [name, { data: Uint8Array.from(Buffer.from(file, "base64")), ...others }]));
-}, 60_000);
+});
 
 const digest = (colors: Uint8Array | undefined): string => createHash("sha256").update(colors ?? new Uint8Array(0)).digest("hex");
 

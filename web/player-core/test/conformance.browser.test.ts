@@ -17,7 +17,7 @@ describeInBrowser("golden files in Chromium", () => {
   beforeAll(async () => {
     opened = await openPage(fileURLToPath(new URL("conformance_page.ts", import.meta.url)));
     await opened.page.waitForFunction("globalThis.decodeAll");
-  }, 120_000);
+  });
   afterAll(() => opened?.close());
 
   test.each(NAMES)("%s", async (name) => {

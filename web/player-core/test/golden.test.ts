@@ -53,7 +53,7 @@ function cornersOf({ faces, extraStarts, firstFrame }: PackedGroup, frame: numbe
 
 async function shownAt(frame: number, timeline: Head): Promise<Shown> {
   player.currentTime = timeline.timestamp(frame);
-  await expect.poll(() => !player.seeking && player.update(performance.now())?.frame, { interval: 2, timeout: 5000 }).toBe(frame);
+  await expect.poll(() => !player.seeking && player.update(performance.now())?.frame, { interval: 2 }).toBe(frame);
   return player.update(performance.now())!;
 }
 
@@ -72,7 +72,7 @@ describe.each(NAMES)("%s", (name) => {
       if (viewer.shown) seen.set(viewer.shown.frame, facesOf(viewer.shown));
     }, 2);
     await player.play();
-    await expect.poll(() => player.ended, { timeout: 10_000 }).toBe(true);
+    await expect.poll(() => player.ended).toBe(true);
     clearInterval(timer);
     expect(viewer.warnings).toEqual([]);
     expect(player.stats).toMatchObject({ stalls: 0, skippedGroups: 0 });
@@ -119,7 +119,7 @@ describe.each(NAMES)("%s", (name) => {
         player.currentTime = head.timestamp(frame);
         const wanted = head.tracks.map((_, track) => Math.min(layers, head.chunkOfFrame(frame, track).layers.length - 1));
         const layersShown = (): number[] => viewer.shown?.groups.map((group, track) => group?.layers ?? wanted[track]) ?? [];
-        await expect.poll(() => viewer.shown?.frame === frame && layersShown(), { interval: 2, timeout: 5000 }).toEqual(wanted);
+        await expect.poll(() => viewer.shown?.frame === frame && layersShown(), { interval: 2 }).toEqual(wanted);
       }
       expect(facesOf(viewer.shown!)).toBe(golden.frames[frame].faces);
     }

@@ -82,7 +82,7 @@ describe("throttled", () => {
   test("it shows the first frame before a tenth of the file has come", async () => {
     throttle(RATE);
     void player.load();
-    await expect.poll(() => viewer.shown?.frame, { timeout: 5000, interval: 10 }).toBe(0);
+    await expect.poll(() => viewer.shown?.frame, { interval: 10 }).toBe(0);
     expect(player.stats.fetchedBytes).toBeLessThan(FILE.length / 10);
   });
 
@@ -90,11 +90,11 @@ describe("throttled", () => {
     throttle(RATE);
     player.layers = 3;
     void player.load();
-    await expect.poll(() => viewer.shown?.frame, { timeout: 5000, interval: 10 }).toBe(0);
+    await expect.poll(() => viewer.shown?.frame, { interval: 10 }).toBe(0);
     await expect.poll(() => server.asked.length).toBeGreaterThan(1);
     const [before, requests] = [player.stats.fetchedBytes, server.asked.length];
     player.currentTime = 4.1;
-    await expect.poll(() => viewer.shown?.frame, { timeout: 5000, interval: 10 }).toBe(102);
+    await expect.poll(() => viewer.shown?.frame, { interval: 10 }).toBe(102);
     expect(server.cut).toBeGreaterThan(0);
     const group = Head.parse(FILE).chunks[10];
     expect(server.asked[requests].from).toBe(group.offset);
@@ -110,7 +110,7 @@ describe("a server", () => {
       await limit.send(response, FILE);
     };
     void player.load();
-    await expect.poll(() => viewer.shown?.frame, { timeout: 5000, interval: 10 }).toBe(0);
+    await expect.poll(() => viewer.shown?.frame, { interval: 10 }).toBe(0);
     expect(player.stats.fetchedBytes).toBeLessThan(FILE.length / 5);
     await ended();
     everyFrame();
@@ -158,7 +158,7 @@ describe("a server", () => {
       response.writeHead(206, { "Content-Range": `bytes ${asked.from}-${asked.to - 1}/${FILE.length}`, ETag: '"two"' });
       response.end(server.bytes.subarray(asked.from, asked.to));
     };
-    await expect.poll(() => seen.errors.length, { timeout: 8000 }).toBe(1);
+    await expect.poll(() => seen.errors.length).toBe(1);
     expect(seen.errors[0].message).toContain("changed on the server");
     seen.stop();
     small.dispose();

@@ -22,7 +22,7 @@ describeInBrowser("the player and a recording's own colours", () => {
     const script = new URL("../../player-core/test/colored.py", import.meta.url);
     files = JSON.parse(runPython(script, "--flat", ...NAMES.map((name) => join(ROOT, `conformance/v1/${name}.reel`))).toString()) as typeof files;
     for (const name of NAMES) site.write(`${name}-flat.reel`, Buffer.from(files[name].file, "base64"));
-  }, 120_000);
+  });
   afterAll(() => site.close());
 
   const open = async (file: string, controls = 0): Promise<{ page: Page; errors: string[] }> => {

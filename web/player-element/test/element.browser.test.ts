@@ -13,7 +13,7 @@ describeOnPage("<meshreel-player>", (on) => {
       await on.page.waitForTimeout(300);
       return (await count()).join() === before.join();
     };
-    await expect.poll(isStill, { timeout: 10_000 }).toBe(true);
+    await expect.poll(isStill).toBe(true);
     const before = await count();
     await on.get((player) => player.fit());
     await expect.poll(async () => (await count())[0]! - before[0]!).toBe(1);
@@ -89,7 +89,7 @@ describeOnPage("<meshreel-player>", (on) => {
       return on.page.evaluate("refs.filter((ref) => ref.deref()).length");
     };
     expect(players).toBe(5);
-    await expect.poll(alive, { timeout: 10_000 }).toBe(0);
+    await expect.poll(alive).toBe(0);
   });
 
   test("focus() gives it the keyboard", async () => {

@@ -106,7 +106,7 @@ describeInBrowser("the built player in a headset", () => {
     await page.waitForFunction((before) => document.querySelector("meshreel-player")!.statistics!.drawn > before, drawn); // by the page's own frames
     expect(errors).toEqual([]);
     await page.close();
-  }, 60_000);
+  });
 
   test("in the viewer's own room nothing but the recording and its shadow is drawn", async () => {
     const { page, errors } = await site.visit("player/index.html?src=/layers.reel&background=white", [{ path: IWER }, installHeadset]);
@@ -120,7 +120,7 @@ describeInBrowser("the built player in a headset", () => {
     await page.waitForFunction(() => !document.querySelector("meshreel-player")!.presenting);
     expect(errors).toEqual([]);
     await page.close();
-  }, 60_000);
+  });
 
   test("both eyes see splats, where nothing else is drawn", async () => {
     site.write("splats.reel", readFileSync(join(ROOT, "conformance/v1/splats/splats.reel")));
@@ -134,7 +134,7 @@ describeInBrowser("the built player in a headset", () => {
     expect(Math.abs(left - right)).toBeLessThan(0.2 * left);
     expect(errors).toEqual([]);
     await page.close();
-  }, 60_000);
+  });
 
   test("a bench during which the headset is entered measures the headset alone", async () => {
     const { page, errors } = await site.visit("player/index.html?src=/layers.reel&bench=2", [{ path: IWER }, installHeadset]);
@@ -145,5 +145,5 @@ describeInBrowser("the built player in a headset", () => {
     expect(JSON.parse((await text.jsonValue())!)).toMatchObject({ place: "VR", displayRate: 72 });
     expect(errors).toEqual([]);
     await page.close();
-  }, 60_000);
+  });
 });

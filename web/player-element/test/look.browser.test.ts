@@ -98,7 +98,7 @@ describeOnPage("look of <meshreel-player>", (on) => {
     await on.page.mouse.move(300, 100);
     await on.press("k");
     const opacity = () => on.page.locator(".bar").evaluate((bar) => Number(getComputedStyle(bar).opacity));
-    await expect.poll(opacity, { timeout: 5000 }).toBe(0);
+    await expect.poll(opacity).toBe(0);
     await on.page.mouse.move(310, 120);
     await expect.poll(opacity).toBe(1);
   });
@@ -116,7 +116,7 @@ describeOnPage("look of <meshreel-player>", (on) => {
     await on.shown("loop");
     await tap(".picture");
     await expect.poll(() => on.get((player) => player.paused)).toBe(false);
-    await expect.poll(opacity, { timeout: 5000 }).toBe(0);
+    await expect.poll(opacity).toBe(0);
     await tap(".picture");
     await on.page.waitForTimeout(1000); // longer than the bar takes to fade
     expect([await opacity(), await on.get((player) => player.paused)]).toEqual([1, false]);

@@ -1,6 +1,7 @@
 // The built player in a folder of a web server, as users have it.
 
-import { copyFileSync, cpSync, mkdirSync, mkdtempSync, rmSync, writeFileSync } from "node:fs";
+import { createHash } from "node:crypto";
+import { copyFileSync, cpSync, existsSync, mkdirSync, mkdtempSync, readdirSync, readFileSync, renameSync, rmSync, statSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { fileURLToPath } from "node:url";
@@ -10,13 +11,42 @@ import { launchBrowser, serveFolder, type Served } from "../../test/browser.ts";
 import { ENTRIES } from "../../vite.config.ts";
 
 const ROOT = fileURLToPath(new URL("../../../", import.meta.url));
+const WEB = join(ROOT, "web");
+const CORE = join(ROOT, "src/meshreel/player/core.wasm");
+const DAY = 86_400_000; // ms
 
 /** Builds the player into `folder`, with the core.wasm that is committed. */
 export async function buildPlayer(folder: string): Promise<void> {
   mkdirSync(folder, { recursive: true });
-  copyFileSync(join(ROOT, "src/meshreel/player/core.wasm"), join(folder, "core.wasm"));
+  copyFileSync(CORE, join(folder, "core.wasm"));
   process.env.MESHREEL_PLAYER = folder;
-  for (const mode of Object.keys(ENTRIES)) await build({ configFile: join(ROOT, "web/vite.config.ts"), mode, logLevel: "error" });
+  for (const mode of Object.keys(ENTRIES)) await build({ configFile: join(WEB, "vite.config.ts"), mode, logLevel: "error" });
+}
+
+/** The player of these sources, in a folder that is never changed: built once for all tests, and for later runs. */
+async function builtPlayer(): Promise<string> {
+  const digest = createHash("sha256");
+  for (const path of sources()) digest.update(path).update("\0").update(readFileSync(path)).update("\0");
+  const all = join(ROOT, "build/tests/player");
+  const kept = join(all, digest.digest("hex").slice(0, 16));
+  if (existsSync(kept)) return kept;
+  mkdirSync(all, { recursive: true });
+  for (const old of readdirSync(all).map((name) => join(all, name))) if (Date.now() - statSync(old).mtimeMs > DAY) rmSync(old, { recursive: true, force: true });
+  const made = mkdtempSync(`${kept}-`);
+  await buildPlayer(made);
+  try {
+    renameSync(made, kept);
+  } catch {
+    rmSync(made, { recursive: true }); // another worker was first
+  }
+  return kept;
+}
+
+/** What the player is built from. */
+function sources(): string[] {
+  const places = readdirSync(WEB).flatMap((name) => [join(WEB, name, "src"), join(WEB, name, "page")]).filter(existsSync);
+  const files = places.flatMap((place) => readdirSync(place, { recursive: true, encoding: "utf8" }).sort().map((name) => join(place, name)));
+  return [CORE, ...["package-lock.json", "vite.config.ts"].map((name) => join(WEB, name)), ...files.filter((path) => statSync(path).isFile())];
 }
 
 /** A site with `player/` and the conformance files; pages are added to it. */
@@ -27,7 +57,7 @@ export class Site {
   #others: Served[] = [];
 
   async open(): Promise<void> {
-    await buildPlayer(join(this.folder, "player"));
+    cpSync(await builtPlayer(), join(this.folder, "player"), { recursive: true });
     for (const name of ["scene", "layers", "mixed", "laplacian", "draco"]) {
       copyFileSync(join(ROOT, `conformance/v1/${name}.reel`), join(this.folder, `${name}.reel`));
     }

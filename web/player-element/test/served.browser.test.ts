@@ -41,5 +41,5 @@ describeInBrowser("the player of meshreel play", () => {
       await browser.close();
       server.kill();
     }
-  }, 120_000);
+  });
 });

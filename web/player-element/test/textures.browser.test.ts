@@ -126,7 +126,7 @@ describeInBrowser("the player and textures", () => {
     for (const frame of [0, 5, 2]) {
       await seek(frame);
       const wanted = light[frame] / light[ROOM_FRAMES - 1];
-      await expect.poll(async () => Math.abs((await brightness()) / last - wanted), { message: `frame ${frame}`, timeout: 5000 }).toBeLessThan(0.07 * wanted);
+      await expect.poll(async () => Math.abs((await brightness()) / last - wanted), { message: `frame ${frame}` }).toBeLessThan(0.07 * wanted);
     }
     expect(errors).toEqual([]);
     await page.close();

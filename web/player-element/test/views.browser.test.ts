@@ -55,14 +55,13 @@ describeInBrowser("the page of a recording", () => {
     const times = await page.evaluate(async () => {
       const player = document.querySelector("meshreel-player")!;
       const seen: number[] = [];
-      const started = performance.now();
-      while (performance.now() - started < 2500) {
+      for (let repeats = 0; repeats < 2; ) {
         await new Promise((done) => setTimeout(done, 15));
+        if (player.currentTime < (seen.at(-1) ?? 0)) repeats++;
         seen.push(player.currentTime);
       }
       return seen;
     });
-    expect(times.filter((time, k) => k > 0 && time < times[k - 1]!).length).toBeGreaterThanOrEqual(2);
     expect(Math.max(...times)).toBeLessThan(0.4);
     expect(await page.evaluate(() => document.querySelector("meshreel-player")!.paused)).toBe(false);
     expect((await page.locator(".section").boundingBox())!.width).toBeGreaterThan(10);

@@ -33,7 +33,7 @@ describeInBrowser("positions on the GPU and in Python", () => {
   let open: OpenPage;
   beforeAll(async () => {
     open = await openPage(fileURLToPath(new URL("pages/scene.ts", import.meta.url)));
-  }, 120_000);
+  });
   afterAll(async () => open?.close());
 
   test.skipIf(!hasPython).each(NAMES)("%s", async (name) => {

@@ -33,7 +33,7 @@ describeInBrowser("a scene in Chromium", () => {
   let open: OpenPage;
   beforeAll(async () => {
     open = await openPage(fileURLToPath(new URL("pages/scene.ts", import.meta.url)));
-  }, 120_000);
+  });
   afterAll(async () => open?.close());
   beforeEach(async () => {
     await open.page.evaluate(() => {

@@ -45,7 +45,7 @@ describeInBrowser("splats in Chromium", () => {
   let open: OpenPage;
   beforeAll(async () => {
     open = await openPage(fileURLToPath(new URL("pages/splats.ts", import.meta.url)));
-  }, 120_000);
+  });
   afterAll(async () => open?.close());
   afterEach(() => expect(open.errors).toEqual([]));
 

@@ -81,7 +81,7 @@ describeInBrowser("a session in a simulated Quest 3", () => {
       window.vr.drawOnPage();
     });
     before = await state();
-  }, 120_000);
+  });
   beforeEach(async () => {
     await open.page.evaluate(() => {
       window.vr.head(0, 1.6, 0);
