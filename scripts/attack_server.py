@@ -10,7 +10,6 @@ import asyncio
 import random
 import shutil
 import signal
-import subprocess
 import sys
 import tempfile
 import time
@@ -19,7 +18,6 @@ from pathlib import Path
 
 from scripts.reliability import add_row
 from scripts.server_attacks import (
-    BOMBS,
     SECRET,
     Served,
     answer,
@@ -29,14 +27,10 @@ from scripts.server_attacks import (
     connected,
     crowd,
     get,
-    hostile,
     make_big,
     nonsense,
     path,
     ranges,
-    silent,
-    slow,
-    stalled,
 )
 from tests.golden import GOLDEN
 
@@ -68,13 +62,12 @@ async def trials(served: Served, attack: Callable[[Served, int], Awaitable[str]]
 
 
 async def ended(folder: Path, number: int) -> list[str]:
-    """Send SIGTERM at a random moment to a server that is busy with everything; return what is left after 2 s."""
+    """Send SIGTERM at a random moment to a busy server; return a fault if its end takes more than 2 s."""
     served = begin(folder)
     make_big(folder / "big.reel")
-    kinds = [silent, slow, stalled, hostile, changed]
+    kinds = [nonsense, crowd, ranges, changed]
     tasks = [asyncio.create_task(kind(served, number * 100 + k)) for k in range(4) for kind in kinds]
     await asyncio.sleep(random.Random(number).uniform(0, 2))
-    painters = children(served.process.pid)
     began = time.monotonic()
     served.process.send_signal(signal.SIGTERM)
     while served.process.poll() is None and time.monotonic() - began < 20:
@@ -83,18 +76,7 @@ async def ended(folder: Path, number: int) -> list[str]:
     for task in tasks:
         task.cancel()
     await asyncio.gather(*tasks, return_exceptions=True)
-    left = [pid for pid in painters if runs(pid)]
-    return [f"took {took:.1f} s"] * (took > ENDED) + [f"{len(left)} processes are left"] * bool(left)
-
-
-def children(pid: int) -> list[int]:
-    """Return the processes that a process has started and that run."""
-    return [int(one) for one in subprocess.run(["pgrep", "-P", str(pid)], capture_output=True).stdout.split()]
-
-
-def runs(pid: int) -> bool:
-    state = subprocess.run(["ps", "-o", "stat=", "-p", str(pid)], capture_output=True).stdout.strip()
-    return state != b"" and not state.startswith(b"Z")
+    return [f"took {took:.1f} s"] * (took > ENDED)
 
 
 def make_folder(root: Path) -> Path:
@@ -131,22 +113,17 @@ async def attack(folder: Path, connections: int, report: Report) -> None:
     """Run all kinds of attacks on one server, then end it and others by signals."""
     served = begin(folder)
     try:
-        await hostile(served, 0)  # starts what draws posters
         async with connected(served) as (reader, writer):
             writer.write(get("/"))
             await answer(reader)
         await asyncio.sleep(1)
         before, total, start = served.count("files"), 0, time.monotonic()
         for kind, count, side in (
-            (silent, connections, connections),
-            (slow, connections, connections),
-            (stalled, connections, connections),
             (crowd, 2 * connections, 2 * connections),
             (nonsense, 10 * connections, 20),
             (path, 10 * connections, 20),
             (ranges, 10 * connections, 20),
             (changed, max(connections // 4, 3), 5),
-            (hostile, len(BOMBS), 8),
         ):
             began, tracebacks = time.monotonic(), len(told(served))
             faults = await trials(served, kind, count, side)
@@ -166,7 +143,7 @@ async def attack(folder: Path, connections: int, report: Report) -> None:
     began, count, faults = time.monotonic(), max(connections // 10, 2), []
     for number in range(count):
         faults += await ended(folder, number)
-    report.add("SIGTERM ends a busy server and what it started within 2 s.", (count, "signals"), faults, began, "")
+    report.add("SIGTERM ends a busy server within 2 s.", (count, "signals"), faults, began, "")
 
 
 def main(arguments: list[str]) -> int:

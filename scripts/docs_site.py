@@ -91,7 +91,7 @@ def make_samples(folder: Path) -> None:
     from meshreel.capture.rig.recording import open_recording
     from meshreel.capture.simulated.demo_room import VOXEL, RoomOptions, record_room
     from meshreel.capture.simulated.procedural import SoftBodiesOptions, soft_bodies
-    from meshreel.server.painter import poster
+    from meshreel.geometry.picture import picture
 
     folder.mkdir(parents=True, exist_ok=True)
     room, bodies = folder / "room.reel", folder / "bodies.reel"
@@ -102,7 +102,7 @@ def make_samples(folder: Path) -> None:
     if not bodies.exists():
         meshreel.encode(soft_bodies(SoftBodiesOptions(frames=FRAMES)), bodies)
     for path in (room, bodies):
-        path.with_suffix(".png").write_bytes(poster(path) or b"")
+        path.with_suffix(".png").write_bytes(picture(meshreel.open(path)[0]))
 
 
 if __name__ == "__main__":

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shutil
-import sys
 import threading
 
 import pytest
@@ -14,7 +13,6 @@ import uvicorn
 from starlette.testclient import TestClient
 
 from meshreel.server.app import make_app
-from meshreel.server.connections import Limits
 from meshreel.server.library import Library
 from meshreel.server.run import ServerOptions, run
 from tests.golden import GOLDEN
@@ -65,7 +63,7 @@ def live(monkeypatch):
         servers.append(self)
         made(self, *arguments)
 
-    def start(app, options=ServerOptions(), limits=Limits()):
+    def start(app, options=ServerOptions()):
         told: list[str] = []
         heard = threading.Event()
 
@@ -73,7 +71,7 @@ def live(monkeypatch):
             told.extend(found)
             heard.set()
 
-        threads.append(threading.Thread(target=run, args=(app, options, tell, limits)))
+        threads.append(threading.Thread(target=run, args=(app, options, tell)))
         threads[-1].start()
         assert heard.wait(60)
         return told[0]
@@ -86,15 +84,3 @@ def live(monkeypatch):
     for thread in threads:
         thread.join(60)
     assert not any(thread.is_alive() for thread in threads)
-
-
-@pytest.fixture
-def painter(monkeypatch):
-    """Replaces what draws posters: `poster(path)`, whose source is given, in a process as it is otherwise."""
-
-    def replace(source):
-        quick = "import sys\nsys.modules['meshreel.metrics.render'] = None\n"  # not needed here, and slow
-        program = f"{quick}from meshreel.server import painter\n{source}\npainter.poster = poster\npainter.main()\n"
-        monkeypatch.setattr("meshreel.server.posters.PAINTER", (sys.executable, "-P", "-c", program))
-
-    return replace

@@ -12,7 +12,7 @@ from meshreel.container.sources import FileSource
 from meshreel.errors import InputError
 from meshreel.server import library
 from meshreel.server.app import make_app
-from meshreel.server.library import Facts, Library
+from meshreel.server.library import Library
 from tests.server.conftest import ODD
 
 BYTES_AS_NAMES = sys.platform == "linux"
@@ -126,11 +126,10 @@ def opened(monkeypatch):
     return names
 
 
-def test_a_gallery_of_500_files_reads_the_heads_of_changed_files_alone(folder, opened, monkeypatch):
-    monkeypatch.setattr(library, "RECENT", -1.0)  # nothing counts as changed just now
+def test_a_gallery_of_500_files_reads_the_heads_of_changed_files_alone(folder, opened):
     for number in range(500):
         (folder / f"{number}.reel").write_bytes(b"none")
-    facts = Facts(Library(folder))
+    facts = Library(folder)
     first = facts.entries()
     assert len(opened) == len(first) == 504
     opened.clear()
@@ -143,8 +142,3 @@ def test_a_gallery_of_500_files_reads_the_heads_of_changed_files_alone(folder, o
     changed = {entry.name: entry for entry in facts.entries()}
     assert opened == ["7.reel", "renamed.reel"] and "truncated" in changed["7.reel"].error
     assert "8.reel" not in changed and len(changed) == 503
-
-
-def test_a_file_that_may_change_without_another_time_is_read_again(folder, opened):
-    facts = Facts(Library.of_file(folder / "walk.reel"))
-    assert facts.entries() == facts.entries() and opened == ["walk.reel", "walk.reel"]

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import re
 import socket
 import ssl
 import sys
+import time
 import urllib.request
 from datetime import timedelta
+from pathlib import Path
+from urllib.error import HTTPError
+from urllib.parse import urlsplit
 
 import pytest
 from cryptography import x509
@@ -16,7 +21,9 @@ from meshreel.cli import one_line
 from meshreel.errors import InputError
 from meshreel.server.app import make_app
 from meshreel.server.library import Library
-from meshreel.server.run import ServerOptions, addresses, run
+from meshreel.server.run import IDLE, MOST_CONNECTIONS, ServerOptions, addresses, run
+
+ROOT = Path(__file__).resolve().parents[2]
 
 
 def test_addresses_are_those_to_type():
@@ -75,3 +82,23 @@ def test_a_server_for_this_machine_answers_to_local_names_only(folder, player):
     for host, code in (("localhost", 200), ("127.0.0.1:80", 200), ("[::1]:80", 200), ("evil.example", 400), ("", 400)):
         assert client.get("/files/walk.reel", headers={"Host": host}).status_code == code
     assert ServerOptions(host="0.0.0.0").hosts == ServerOptions(host="192.168.0.7").hosts == ("*",)
+
+
+def test_requests_beyond_the_limit_are_refused_until_connections_end(folder, player, live, monkeypatch):
+    monkeypatch.setattr("meshreel.server.run.MOST_CONNECTIONS", 3)
+    place = urlsplit(live(make_app(Library(folder), player)))
+    lines = [socket.create_connection((place.hostname, place.port)) for _ in range(2)]
+    with pytest.raises(HTTPError, match="503"):
+        urllib.request.urlopen(place.geturl(), timeout=60)
+    for line in lines:
+        line.close()
+    time.sleep(0.3)
+    with urllib.request.urlopen(place.geturl(), timeout=60) as answer:
+        assert answer.status == 200
+
+
+def test_the_limits_are_those_that_the_documentation_states():
+    page = (ROOT / "docs/player.md").read_text(encoding="utf-8")
+    rows = [line for line in page[page.index("### Limits") :].splitlines() if line.startswith("| ")]
+    stated = [[int(number) for number in re.findall(r"\d+", row)] for row in rows[2:]]
+    assert stated == [[MOST_CONNECTIONS, 503], [IDLE], [2]]

@@ -2,32 +2,43 @@
 
 from __future__ import annotations
 
+import os
 import re
-from collections.abc import AsyncIterator, Sequence
-from contextlib import asynccontextmanager
+from collections.abc import Mapping, Sequence
+from hashlib import blake2b
 from pathlib import Path
 
 from starlette.applications import Starlette
 from starlette.concurrency import run_in_threadpool
-from starlette.datastructures import Headers
 from starlette.exceptions import HTTPException
 from starlette.middleware import Middleware
 from starlette.middleware.cors import CORSMiddleware
+from starlette.middleware.gzip import GZipMiddleware
 from starlette.middleware.trustedhost import TrustedHostMiddleware
 from starlette.requests import Request
-from starlette.responses import PlainTextResponse, Response
+from starlette.responses import FileResponse, HTMLResponse, PlainTextResponse, Response
 from starlette.routing import Route
-from starlette.staticfiles import NotModifiedResponse
+from starlette.staticfiles import NotModifiedResponse, StaticFiles
 
-from .. import __version__
 from ..errors import InputError
-from . import files
-from .assets import FRESH, PAGE, SAFE, Asset, Player, is_unchanged
-from .library import Facts, Library, as_text
-from .pages import PLAIN, gallery_page, player_page, policy
-from .posters import Posters
+from .library import Library, as_text
+from .pages import gallery_page, player_page, policy
 
 EXPOSED = ("Accept-Ranges", "Content-Length", "Content-Range", "ETag")
+# Not from the system, whose list may be wrong (on Windows, it is in the registry) or missing.
+TYPES = {
+    ".css": "text/css",
+    ".html": "text/html",
+    ".js": "text/javascript",
+    ".txt": "text/plain",
+    ".wasm": "application/wasm",
+}
+BYTES = "application/octet-stream"  # .reel files and unknown types
+SAFE = {"X-Content-Type-Options": "nosniff", "Referrer-Policy": "no-referrer"}
+FRESH = SAFE | {"Cache-Control": "no-cache"}  # browsers may keep it, but must revalidate it
+LASTING = SAFE | {"Cache-Control": "public, max-age=31536000, immutable"}  # for addresses that name their contents
+SUM = 12  # bytes of the sum in such an address
+_OWN = Path(__file__).parent
 _ORIGIN = re.compile(r"\*|https?://[^\s/?#@]+")
 
 
@@ -39,27 +50,17 @@ def make_app(
     "*" allows all of them. `/` plays the file of a library with `only` one, otherwise it is a gallery; `/watch/NAME`
     plays a file and `/files/NAME` sends it. Raises InputError for a malformed origin.
     """
-    built, posters = Player(player or Path(__file__).parents[1] / "player"), Posters()
-    style = Asset.of(Path(__file__).with_name("gallery.css").read_bytes(), "text/css")
-    pages = _Pages(library, built, posters)
+    pages = _Pages(library, player or _OWN.parent / "player")
+    packed = [Middleware(GZipMiddleware)]
     routes = [
-        Route("/", pages.home),
-        Route("/watch/{name:path}", pages.watch),
+        Route("/", pages.home, middleware=packed),
+        Route("/watch/{name:path}", pages.watch, middleware=packed),
         Route("/files/{name:path}", pages.file),
-        Route("/posters/{name:path}.png", pages.poster),
-        Route("/style.css", lambda request: style.answer(request.headers, FRESH)),
-        Route("/player/{path:path}", built.answer),
+        Route("/gallery.{kind}", pages.own),
+        Route("/player/{path:path}", pages.player, middleware=packed),
     ]
-
-    @asynccontextmanager
-    async def lifespan(_: Starlette) -> AsyncIterator[None]:
-        try:
-            yield
-        finally:
-            posters.close()
-
     middleware = [Middleware(TrustedHostMiddleware, allowed_hosts=hosts, www_redirect=False), *_cors(cors)]
-    return Starlette(routes=routes, middleware=middleware, exception_handlers={OSError: _gone}, lifespan=lifespan)
+    return Starlette(routes=routes, middleware=middleware, exception_handlers={OSError: _gone})
 
 
 def _cors(origins: Sequence[str]) -> list[Middleware]:
@@ -81,42 +82,55 @@ def _cors(origins: Sequence[str]) -> list[Middleware]:
 
 
 class _Pages:
-    def __init__(self, library: Library, player: Player, posters: Posters) -> None:
-        self._library, self._player, self._posters = library, player, posters
-        self._facts = Facts(library)
+    """Responses to all requests. The player's files are read once: after a build, start the server again."""
 
-    async def home(self, request: Request) -> Response:
+    def __init__(self, library: Library, player: Path) -> None:
+        self._library, self._player = library, player
+        built = {path.name: path.read_bytes() for path in sorted(player.glob("*")) if path.is_file()}
+        self._names = set(built)
+        self._edition = blake2b(b"".join(built.values()), digest_size=SUM).hexdigest()
+        self._styles = built.get("page.css", b"").decode()
+
+    async def home(self, _: Request) -> Response:
         """Return the player of the only file, or the gallery."""
         if self._library.only is not None:
-            return await run_in_threadpool(self._watch, request, self._library.only)
-        return await run_in_threadpool(self._gallery, request)
+            return self._watch(self._library.only)
+        title = as_text(self._library.folder.resolve().name) or "meshreel"
+        entries = await run_in_threadpool(self._library.entries)
+        return _page(gallery_page(title, entries, f"/player/{self._edition}"), policy())
 
     async def watch(self, request: Request) -> Response:
         """Return the page that plays one file."""
         name = request.path_params["name"]
         await self._path(name)
-        return await run_in_threadpool(self._watch, request, name)
+        return self._watch(name)
 
     async def file(self, request: Request) -> Response:
-        """Return a file, or ranges of it."""
-        path = await self._path(request.path_params["name"])
-        try:
-            opened = await run_in_threadpool(files.OpenFile.of, path)
-        except PermissionError as error:
-            raise HTTPException(403, f"cannot be read: {error.strerror}") from error
-        return files.answer(opened, request.headers, request.method == "HEAD")
+        """Return a .reel file, or ranges of it."""
+        return await _file(request, await self._path(request.path_params["name"]), BYTES, FRESH)
 
-    async def poster(self, request: Request) -> Response:
-        """Return the poster of a file, or a plain tile if it has none."""
-        path = await self._path(request.path_params["name"])
-        tag = await run_in_threadpool(files.tag_of, path)
-        if tag is None:
-            return _plain()
-        headers = FRESH | {"ETag": f'{tag[:-1]}-{__version__}"'}
-        if is_unchanged(request.headers, Headers(headers)):
-            return NotModifiedResponse(Headers(headers))
-        picture = await self._posters.of(path, tag)
-        return _plain() if picture is None else Response(picture, media_type="image/png", headers=headers)
+    async def own(self, request: Request) -> Response:
+        """Return the style or the script of the gallery."""
+        if (kind := f".{request.path_params['kind']}") not in (".css", ".js"):
+            raise HTTPException(404)
+        return await _file(request, _OWN / f"gallery{kind}", TYPES[kind], FRESH)
+
+    async def player(self, request: Request) -> Response:
+        """Return a file of the built player, in Brotli if the build brought it and the browser takes it.
+
+        An address that begins with the sum over all files is never used for other contents: browsers keep it.
+        """
+        path = request.path_params["path"]
+        name = path.removeprefix(f"{self._edition}/")
+        if name not in self._names or name.endswith(".br"):
+            raise HTTPException(404, "there is no such file")
+        headers, kind = LASTING if name != path else FRESH, TYPES.get(Path(name).suffix, BYTES)
+        headers |= {"Content-Security-Policy": policy()} if kind == "text/html" else {}
+        if f"{name}.br" in self._names:
+            headers |= {"Vary": "Accept-Encoding"}
+            if "br" in request.headers.get("accept-encoding", "").replace(" ", "").split(","):
+                return await _file(request, self._player / f"{name}.br", kind, headers | {"Content-Encoding": "br"})
+        return await _file(request, self._player / name, kind, headers)
 
     async def _path(self, name: str) -> Path:
         path = await run_in_threadpool(self._library.path_of, name)
@@ -124,22 +138,22 @@ class _Pages:
             raise HTTPException(404, f"there is no file {name}")
         return path
 
-    def _watch(self, request: Request, name: str) -> Response:
-        edition, files = self._player.load()
-        styles = files["page.css"].body.decode() if "page.css" in files else ""
-        page = player_page(name, f"/player/{edition}" if edition else "/player", styles)
-        headers = PAGE | {"Content-Security-Policy": policy(styles)}
-        return Asset.of(page.encode(), "text/html").answer(request.headers, headers)
-
-    def _gallery(self, request: Request) -> Response:
-        title = as_text(self._library.folder.resolve().name) or "meshreel"
-        page = gallery_page(title, self._facts.entries())
-        return Asset.of(page.encode(), "text/html").answer(request.headers, PAGE)
+    def _watch(self, name: str) -> Response:
+        return _page(player_page(name, f"/player/{self._edition}", self._styles), policy(self._styles))
 
 
-def _plain() -> Response:
-    """Return the plain tile, not to be cached: once the renderer is installed, there may be a poster."""
-    return Response(PLAIN, media_type="image/svg+xml", headers=SAFE | {"Cache-Control": "no-store"})
+def _page(text: str, rules: str) -> Response:
+    return HTMLResponse(text, headers=FRESH | {"Content-Security-Policy": rules})
+
+
+async def _file(request: Request, path: Path, kind: str, headers: Mapping[str, str]) -> Response:
+    """Return a file, or ranges of it. Raises OSError if it is not there any more."""
+    found = await run_in_threadpool(path.stat)
+    if not os.access(path, os.R_OK):
+        raise HTTPException(403, "cannot be read: Permission denied")
+    response = FileResponse(path, headers=headers, media_type=kind, stat_result=found)
+    is_known = StaticFiles().is_not_modified(response.headers, request.headers)
+    return NotModifiedResponse(response.headers) if is_known else response
 
 
 async def _gone(_: Request, error: Exception) -> Response:

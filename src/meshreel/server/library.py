@@ -8,19 +8,17 @@ In: a folder. Out: names with slashes, and for each file its length and rate, or
 from __future__ import annotations
 
 import os
-import time
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 
 from ..container.reader import ReelReader
 from ..container.sources import FileSource
-from ..errors import InputError, MeshreelError
+from ..errors import FormatError, InputError, MeshreelError
 from ..io.file_names import is_text
 
 SUFFIX = ".reel"
 HIDDEN = "."  # first character of hidden names
-RECENT = 3.0  # s; the coarsest times of file systems are 2 s apart (FAT)
-
 Version = tuple[int, int, int]  # size in bytes; mtime and ctime in ns
 
 
@@ -87,45 +85,37 @@ class Library:
         if path is None:
             return Entry(name, error="is not there any more")
         try:
-            with FileSource(path) as source:
-                reader = ReelReader(source)
+            return _facts(name, path, _version(path))
         except (MeshreelError, OSError) as error:
-            # Viewers need not know the folders of the server.
-            return Entry(name, error=str(error).removeprefix(f"{path}: "))
-        lost, whole = len(reader.missing), len(reader.chunks)
-        cut = f"{lost} of {whole} chunks are missing: the file is truncated" if lost else ""
-        return Entry(name, reader.size, reader.frame_count, reader.duration, cut)
-
-
-class Facts:
-    """Facts of all files of a library. A head is read again only when the version of its file is another."""
-
-    def __init__(self, library: Library) -> None:
-        self._library = library
-        self._known: dict[str, tuple[Version | None, Entry]] = {}
+            return Entry(name, error=_without_path(error, path))
 
     def entries(self) -> list[Entry]:
         """Return the facts of the files that exist now, in the order of their names."""
-        entries: dict[str, tuple[Version | None, Entry]] = {}
-        for name in self._library.names():
-            version = self._version(name)
-            known = self._known.get(name)
-            is_known = known is not None and version is not None and known[0] == version
-            entries[name] = known if known and is_known else (version, self._library.entry(name))
-        self._known = entries
-        return [entry for _, entry in entries.values()]
-
-    def _version(self, name: str) -> Version | None:
-        """Return the version of a file; None if it has changed just now, and may again without another time."""
-        try:
-            found = (self._library.folder / name).stat()
-        except OSError:
-            return None
-        return version_of(found) if time.time() - max(found.st_mtime, found.st_ctime) > RECENT else None
+        return [self.entry(name) for name in self.names()]
 
 
-def version_of(found: os.stat_result) -> Version:
+@lru_cache(maxsize=4096)
+def _facts(name: str, path: Path, _version: Version) -> Entry:
+    """Read the facts of a version of a file, once. Raises MeshreelError if it cannot be read now."""
+    try:
+        with FileSource(path) as source:
+            reader = ReelReader(source)
+    except FormatError as error:
+        return Entry(name, error=_without_path(error, path))
+    lost, whole = len(reader.missing), len(reader.chunks)
+    cut = f"{lost} of {whole} chunks are missing: the file is truncated" if lost else ""
+    return Entry(name, reader.size, reader.frame_count, reader.duration, cut)
+
+
+def _without_path(error: MeshreelError | OSError, path: Path) -> str:
+    """Return the text of an error without the path: viewers need not know the folders of the server."""
+    text = error.strerror if isinstance(error, OSError) else str(error)
+    return (text or type(error).__name__).removeprefix(f"{path}: ")
+
+
+def _version(path: Path) -> Version:
     """Return what changes with a file, without a look at its contents. (On Windows, ctime is when it was made.)"""
+    found = path.stat()
     return found.st_size, found.st_mtime_ns, found.st_ctime_ns
 
 

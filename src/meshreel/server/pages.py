@@ -27,8 +27,8 @@ _HEAD = """\
 # Until the script is there.
 _LOADING = '<svg class="loading" viewBox="0 0 48 48"><circle cx="24" cy="24" r="22"/></svg>'
 
-# A play mark, shown for files without a poster.
-PLAIN = (
+# A play mark, shown until a poster is drawn.
+_PLAIN = "data:image/svg+xml," + quote(
     '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 480 360"><path d="M210 140v80l70-40z" fill="#8a92a0"/></svg>'
 )
 
@@ -69,9 +69,11 @@ def player_page(name: str, player: str, styles: str) -> str:
     )
 
 
-def gallery_page(title: str, entries: Sequence[Entry]) -> str:
-    """Return the gallery, with a tile for each file."""
-    head = _HEAD.format(title=escape(f"{title} · meshreel")) + '<link rel="stylesheet" href="/style.css">\n'
+def gallery_page(title: str, entries: Sequence[Entry], player: str) -> str:
+    """Return the gallery, with a tile for each file, whose posters the player at the address `player` draws."""
+    head = _HEAD.format(title=escape(f"{title} · meshreel")) + '<link rel="stylesheet" href="/gallery.css">\n'
+    for script in (f"{player}/meshreel-player.js", "/gallery.js") if entries else ():
+        head += f'<script type="module" src="{script}"></script>\n'
     tiles = "".join(map(_tile, entries))
     body = f"<ul>\n{tiles}</ul>" if entries else "<p>This folder has no .reel files.</p>"
     return f"{head}</head>\n<body>\n<main>\n<h1>{escape(title)}</h1>\n{body}\n</main>\n</body>\n</html>\n"
@@ -84,8 +86,7 @@ def _tile(entry: Entry) -> str:
     facts = f"{entry.mbps:.3g} Mbps, {entry.duration:.1f} s, {entry.frames} frames, {size}"
     lines = f'<div class="facts">{facts}</div>' if entry.frames else ""
     lines += f'<div class="error">{escape(entry.error)}</div>' if entry.error else ""
-    poster = (
-        f'<img src="/posters/{address}.png" alt="" loading="lazy">' if entry.frames else '<div class="blank"></div>'
-    )
+    picture = f'<img src="{_PLAIN}" data-file="/files/{address}" alt="">'
+    poster = picture if entry.frames else '<div class="blank"></div>'
     inside = f'{poster}<div class="facts-box"><div class="name">{name}</div>{lines}</div>'
     return f'<li><a href="/watch/{address}">{inside}</a></li>\n' if entry.frames else f"<li>{inside}</li>\n"

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import asyncio
 import logging
-import math
 import socket
 import ssl
 from collections.abc import Callable, Iterator
@@ -12,16 +12,18 @@ from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from typing import Annotated
 
+import h11
 import uvicorn
 from cyclopts import Parameter
 from starlette.applications import Starlette
 
 from ..errors import InputError
-from .connections import Connection, Limits, Server, is_news, room_for_files
 
 LOCAL = ("localhost", "127.0.0.1", "::1")
 EVERYWHERE = ("0.0.0.0", "::")
 PATIENCE = 0  # s for responses in progress when the server stops, beyond the 0.1 s that uvicorn gives them
+MOST_CONNECTIONS = 256  # at once, those of 42 browsers, which open 6 each; further requests are answered 503
+IDLE = 10  # s until a connection is closed that asks for nothing more (guess)
 UNKNOWN = "meshreel, for one run of its server"  # organization that signs the certificate
 VALID = timedelta(days=365)  # validity of the certificate; Apple's systems refuse more than 825 days
 
@@ -50,32 +52,38 @@ class ServerOptions:
         return tuple(map(_bracketed, LOCAL)) if self.host in LOCAL else ("*",)
 
 
-def run(
-    app: Starlette, options: ServerOptions, announce: Callable[[list[str]], None], limits: Limits = Limits()
-) -> None:
+def run(app: Starlette, options: ServerOptions, announce: Callable[[list[str]], None]) -> None:
     """Serve until SIGINT, which is the regular end, or SIGTERM.
 
     `announce` gets the addresses as soon as the server listens.
     Raises InputError if the host is unknown or the port is taken.
     """
-    logging.getLogger("uvicorn.error").addFilter(is_news)
+    logging.getLogger("uvicorn.error").addFilter(_is_news)
     with _listening(options) as listener:
         encryption = _encryption(listener.getsockname()[0]) if options.https else None
         config = uvicorn.Config(
             app,
-            http=Connection,
-            lifespan="on",
+            http="h11",
+            lifespan="off",
             ws="none",
             log_level="error",
             access_log=False,
             server_header=False,
             timeout_graceful_shutdown=PATIENCE,
-            timeout_keep_alive=math.ceil(limits.request),
+            timeout_keep_alive=IDLE,
+            limit_concurrency=MOST_CONNECTIONS,
             ssl_context_factory=(lambda *_: encryption) if encryption else None,
         )
         with suppress(KeyboardInterrupt):
             announce(addresses(options, listener.getsockname()[1]))
-            Server(config, room_for_files(limits)).run(sockets=[listener])
+            uvicorn.Server(config).run(sockets=[listener])
+
+
+def _is_news(record: logging.LogRecord) -> bool:
+    """Tell log records worth reading from those of responses that the server's end or a client broke off."""
+    error = record.exc_info and record.exc_info[1]
+    is_broken_off = isinstance(error, asyncio.CancelledError | h11.LocalProtocolError)
+    return not is_broken_off and "timeout graceful shutdown exceeded" not in record.getMessage()
 
 
 def addresses(options: ServerOptions, port: int) -> list[str]:
