@@ -26,6 +26,7 @@ def get(path):
     return f"GET {path} HTTP/1.1\r\nHost: localhost\r\n\r\n".encode()
 
 
+@pytest.mark.clock
 @pytest.mark.skipif(sys.platform == "win32", reason="no signals for one process on Windows")
 @pytest.mark.parametrize("number, code", [(signal.SIGTERM, 143), (signal.SIGINT, 0)])
 def test_a_signal_ends_the_process_whatever_its_clients_do(folder, number, code):
