@@ -9,7 +9,7 @@ from functools import cache, partial
 
 import numpy as np
 
-from meshreel.analysis.appearance.calibrate import halved
+from meshreel.capture.calibration.colors import halved
 from meshreel.capture.rig.cameras import DepthCamera, posed
 from meshreel.capture.simulated.figure import Pose, figure
 from meshreel.capture.simulated.implicit import polygonize

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import meshreel
-from meshreel.capture.rig.recording import open_recording
+from meshreel.capture.recording import open_recording
 from meshreel.capture.simulated.demo_room import RoomOptions, record_room
 from meshreel.capture.simulated.truth import read_truth
 from meshreel.cli.console import called_as

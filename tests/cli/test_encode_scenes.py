@@ -10,7 +10,7 @@ import pytest
 from PIL import Image
 
 import meshreel
-from meshreel.capture.rig.recording import open_recording
+from meshreel.capture.recording import open_recording
 from meshreel.cli.encode import describe
 from meshreel.encoder.group.interval import Interval
 from meshreel.encoder.paper.recipe import PaperRecipe

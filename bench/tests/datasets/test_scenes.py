@@ -16,7 +16,7 @@ from meshreel_bench.measure.point import measure_point
 from meshreel_bench.report.values import value
 from meshreel_bench.rows import Point
 
-from meshreel.capture.rig.recording import open_recording
+from meshreel.capture.recording import open_recording
 from meshreel.capture.simulated.procedural import soft_bodies
 from meshreel.capture.simulated.simulated_rig import SceneFrame, SensorOptions, simulate_rig
 from meshreel.errors import InputError

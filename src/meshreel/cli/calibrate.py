@@ -16,7 +16,7 @@ from ..capture.calibration.calibrate import refine as refined
 from ..capture.calibration.calibration_sheet import write_calibration_sheet
 from ..capture.calibration.poses import read_poses
 from ..capture.calibration.rig_poses import described, posed_by, with_poses
-from ..capture.rig.recording import open_recording
+from ..capture.recording import open_recording
 from ..capture.rig.rig import RIG, SINGLE
 from ..errors import InputError
 from ..io.write import check_apart, replacing

@@ -11,11 +11,11 @@ from typing import Annotated, Any, Literal
 
 from cyclopts import Parameter
 
+from ..capture.recording import Recording, open_recording
 from ..capture.recordings import is_rig, open_take
 from ..capture.recordings.takes import Stream, Take
 from ..capture.rig.cameras import ColorCamera, DepthCamera
 from ..capture.rig.fusion import FusionOptions
-from ..capture.rig.recording import Recording, open_recording
 from ..capture.rig.rig import Rig, read_rig
 from ..errors import InputError
 from ..io.read import first_difference, read_json

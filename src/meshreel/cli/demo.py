@@ -10,8 +10,8 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from ..capture.recording import Recording, open_recording
 from ..capture.rig.fusion import FusionOptions
-from ..capture.rig.recording import Recording, open_recording
 from ..capture.rig.rig import RIG, read_cameras
 from ..capture.simulated.demo_room import VOXEL, WIDTH, RoomOptions, record_room, room_cameras
 from ..capture.simulated.simulated_rig import TRUTH

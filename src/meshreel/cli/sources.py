@@ -13,10 +13,10 @@ from cyclopts import Parameter
 from ..analysis.scene.masks import ImageMasks, Masker, read_view_file
 from ..analysis.scene.sam3 import PromptBy, Sam3Masks, Sam3Options
 from ..analysis.scene.segmentation import SegmentOptions
+from ..capture.recording import open_recording
 from ..capture.recordings import is_rig, is_take, open_take
 from ..capture.recordings.takes import Take
 from ..capture.recordings.to_rig import write_takes
-from ..capture.rig.recording import open_recording
 from ..errors import InputError
 from ..geometry.derived_sequences import Upright
 from ..io.remote import Remote, located

@@ -12,7 +12,7 @@ from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import Executor
 from dataclasses import replace
-from functools import cache, partial
+from functools import partial
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -43,7 +43,6 @@ from .file.summary import GroupSummary, SceneSummary, Summary
 from .group.digests import WriteLines
 from .group.interval import Interval
 from .group.progress import Progress, Stages
-from .group.views import Calibrated
 from .paper.recipe import FindGroups, find_groups
 from .run.excerpt import Excerpt, write_survey
 from .run.job import Job
@@ -128,7 +127,6 @@ class Encoder:
         self.find: FindGroups = find_groups
         self.audio = b""  # payload of `packed_audio` that files get
         self._scene: tuple[SegmentOptions, BackgroundOptions, Parts] | None = None
-        self._calibrated = cache(partial(Calibrated, self.sequence))
         self._stands: bool | None = masker is not None or None  # most stands still; None: unknown yet
 
     @property
@@ -186,10 +184,8 @@ class Encoder:
 
     def _job(self, options: EncoderOptions) -> Job:
         stages = Stages(self.progress, len(self.sequence) if self._excerpt is None else len(self._excerpt.frames))
-        how = None if options.appearance is None else options.appearance.calibration
-        sequence = self.sequence if how is None else self._calibrated(how)
         recipe = options.recipe(self.find)
-        job = Job(sequence, options, self._executor, stages, recipe, digests=self.digests)
+        job = Job(self.sequence, options, self._executor, stages, recipe, digests=self.digests)
         return replace(job, excerpt=self._excerpt)
 
     def _is_scene(self, options: EncoderOptions) -> bool:

@@ -41,7 +41,7 @@ def broken(matrix: Matrix) -> str:
         return "has a number that is not finite"
     turn, last = matrix[:3, :3], matrix[3].tolist()
     if not np.allclose(last, (0, 0, 0, 1)):
-        return f"has the last row {last} and not 0 0 0 1"
+        return f"is no pose: its last row is {last} and not 0 0 0 1"
     if np.abs(turn @ turn.T - np.eye(3)).max() > _RIGID or np.linalg.det(turn) < 0:
         return "is no rotation with a translation"
     return ""

@@ -10,8 +10,8 @@ import pytest
 from meshreel.capture.calibration.calibrate import refine, refine_views
 from meshreel.capture.calibration.calibration_sheet import write_calibration_sheet
 from meshreel.capture.calibration.still_view import still_view
+from meshreel.capture.recording import looked_at
 from meshreel.capture.rig.cameras import posed
-from meshreel.capture.rig.recording import looked_at
 from meshreel.capture.rig.rig import read_rig
 from meshreel.capture.simulated.demo_room import RoomOptions, furnished_room, room_cameras
 from meshreel.capture.simulated.simulated_rig import SensorOptions, simulate_rig

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from meshreel.capture.recording import open_recording
 from meshreel.capture.rig.cameras import posed
-from meshreel.capture.rig.recording import open_recording
 from meshreel.capture.rig.rig import read_rig
 from meshreel.errors import InputError
 from meshreel.geometry.raycast import Rays

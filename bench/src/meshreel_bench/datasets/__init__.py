@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from meshreel.analysis.scene.masks import VIEW_FILES, read_view_file
-from meshreel.capture.rig.recording import open_recording
+from meshreel.capture.recording import open_recording
 from meshreel.capture.simulated.procedural import SoftBodiesOptions, soft_bodies
 from meshreel.errors import InputError
 from meshreel.geometry.cameras import Camera

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from meshreel.capture.rig.recording import Recording
+from meshreel.capture.recording import Recording
 from meshreel.geometry.cameras import Camera
 from meshreel.geometry.color_views import ColorFrames
 from meshreel.geometry.depth import DepthFrames

@@ -9,6 +9,7 @@ from functools import cache
 from importlib.resources import files
 from pathlib import Path
 
+from meshreel.capture.calibration.remembered import REMEMBERED
 from meshreel.errors import InputError
 
 TABLE = "checksums.json"  # package data: by path below the benchmark data; `python -m` this with their folder writes it
@@ -41,7 +42,7 @@ def write_checksums(data: Path, table: Path) -> None:
 def checksum(path: Path) -> str:
     """Return the SHA-256 of a file, or of a folder's names and contents. InputError for unreadable ones."""
     try:
-        listed = sorted(p for p in path.rglob("*") if p.is_file()) if path.is_dir() else [path]
+        listed = sorted(p for p in path.rglob("*") if p.is_file() and p.name != REMEMBERED) if path.is_dir() else [path]
         stamps = [(file, file.stat()) for file in listed]
         return _checksum(path, tuple((file, stat.st_size, stat.st_mtime_ns) for file, stat in stamps))
     except OSError as error:

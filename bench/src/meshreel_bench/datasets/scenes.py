@@ -20,8 +20,8 @@ from meshreel.analysis import scene as segmenter
 from meshreel.analysis.scene.background import BackgroundOptions
 from meshreel.analysis.scene.background_depth import Moment, fuse_still_depth
 from meshreel.analysis.scene.segmentation import SegmentOptions, segment
+from meshreel.capture.recording import open_recording
 from meshreel.capture.rig.fusion import FusionOptions
-from meshreel.capture.rig.recording import open_recording
 from meshreel.capture.rig.rig import RIG
 from meshreel.capture.simulated import demo_room
 from meshreel.capture.simulated.simulated_rig import TRUTH

@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Bool, Float64
 
+from meshreel.capture.calibration.colors import Corrected, corrections_of
+from meshreel.capture.recording import open_recording
 from meshreel.capture.rig.cameras import DepthCamera
-from meshreel.capture.rig.recording import open_recording
 from meshreel.capture.rig.rig import RIG
 from meshreel.capture.simulated.figure import Pose, figure
 from meshreel.capture.simulated.implicit import polygonize
@@ -45,7 +46,8 @@ class Walker(Frames):
         if not (folder / RIG).exists():
             every = (_scene(number) for number in range(frames))
             simulate_rig(folder, every, CAMERAS, RATE, SensorOptions(noise=0.0), color=SENSOR)
-        self.colors = open_recording(folder, keep=False)[0].colors
+        pictures = open_recording(folder, keep=False)[0].pictures
+        self.colors = Corrected(pictures, lambda: corrections_of(self, pictures))  # on clean meshes
 
     def __len__(self) -> int:
         return self._count

@@ -9,8 +9,8 @@ import numpy as np
 from jaxtyping import Float64
 
 from meshreel.analysis.scene.segmentation import segment
+from meshreel.capture.recording import Recording, open_recording
 from meshreel.capture.rig.fusion import FusionOptions
-from meshreel.capture.rig.recording import Recording, open_recording
 from meshreel.capture.simulated.demo_room import RoomOptions, furnished_room, room_cameras
 from meshreel.capture.simulated.simulated_rig import SensorOptions, simulate_rig
 from meshreel.decoder.video import open as open_video

@@ -23,7 +23,6 @@ from ...errors import InputError
 from ...geometry import strict
 from ...geometry.depth import depth_noise
 from ..rig.cameras import DepthCamera, posed
-from ..rig.recording import looked_at
 from ..rig.rig import Rig
 from .still_view import StillView, still_view
 
@@ -71,7 +70,7 @@ def refine(rig: Rig, report: Report = lambda *_: None) -> Calibration:
     """Refine the poses of a rig's depth cameras. Raises InputError where it has one, or one sees nothing still."""
     if len(rig.cameras) < 2:
         raise InputError(f"{rig.folder}: has one camera; poses are calibrated between two at least")
-    views = tuple(still_view(camera, looked_at(rig, number)) for number, camera in enumerate(rig.cameras))
+    views = tuple(still_view(camera, rig.looked_at(number)) for number, camera in enumerate(rig.cameras))
     for view in views:
         if not view.known.any():
             text = f"camera {view.camera.name} sees no surface that stands still"

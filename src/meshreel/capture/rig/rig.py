@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jaxtyping import UInt16
+from jaxtyping import Float64, UInt16
 
 from ...errors import InputError
 from ...geometry.cameras import Camera, Matrix
@@ -27,6 +27,7 @@ from ...types import UP_AXES, UPS, Up
 from .cameras import ColorCamera, DepthCamera, check_frames, check_size, distortion_of, pictures_in, placed
 
 RIG, SINGLE = "rig.json", "camera.json"
+LOOKED_AT = 12  # frames examined for movement and for what stands still, spread over the recording (guess)
 RATES = (1e-9, 1e9)  # 1/s, the range of a sequence of meshes
 _TEXTS = ("name", "depth")
 _NUMBERS = ("width", "height", "fx", "fy", "cx", "cy", "depth_unit_m", "depth_min_m", "depth_max_m")
@@ -69,6 +70,12 @@ class Rig:
         depth = read_depth(path)
         check_size(path, depth, camera)
         return camera.in_range(depth)
+
+    def looked_at(self, number: int) -> list[Float64[np.ndarray, "H W"]]:
+        """Return depths of a camera, m, from frames spread evenly over its recording; 0 is no measurement."""
+        frames = sorted(self.files[number])
+        chosen = sorted({frames[int(k)] for k in np.linspace(0, len(frames) - 1, LOOKED_AT)})
+        return [self.depth(number, frame) * self.cameras[number].depth_unit for frame in chosen]
 
     def missing(self) -> list[str]:
         """Return a warning for each camera that lacks frames, and one for frames that no camera has."""

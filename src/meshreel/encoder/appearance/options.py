@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ...analysis.appearance.calibrate import CalibrationOptions
 from ...analysis.appearance.splat_fit import FitSplatsOptions
 from ...coding.appearance.colors import ColorCodingOptions
 from ...coding.appearance.pictures import VideoOptions
@@ -50,5 +49,4 @@ class AppearanceOptions:
 
     colors: ColorCodingOptions = ColorCodingOptions()  # of the vertices, which every coloured group has
     texture: TextureOptions | None = TextureOptions()  # None: no textures
-    calibration: CalibrationOptions | None = CalibrationOptions()  # of colour cameras; None: they are as they are said
     splats: SplatOptions | None = None  # None: no splats

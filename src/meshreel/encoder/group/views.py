@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 
-from ...analysis.appearance.calibrate import CalibrationOptions, Correction, calibrate
 from ...analysis.survey import Survey
 from ...geometry.color_views import MARGIN, ColorFrames, ColorPicture, ColorViews
 from ...geometry.depth import DepthFrames, FreeSpace
-from ...geometry.derived_sequences import CapturedSequence, DerivedSequence, only
-from ...types import Mesh, MeshSequence, Placement, evenly
+from ...geometry.derived_sequences import CapturedSequence, only
+from ...types import Mesh, MeshSequence, Placement
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,33 +63,3 @@ class Sight:
     def at(self, number: int) -> FreeSpace:
         """Return what the cameras saw through in a frame."""
         return FreeSpace.of(self.depth[number], self.place)
-
-
-class Calibrated(DerivedSequence):
-    """The same frames, whose colour cameras are corrected, once, so that they agree in what they see."""
-
-    def __init__(self, source: MeshSequence, options: CalibrationOptions) -> None:
-        super().__init__(source)
-        self.options = options
-
-    @cached_property
-    def colors(self) -> ColorFrames | None:
-        """The colour pictures of the frames, corrected; None where the source has none."""
-        known = super().colors
-        if known is None:
-            return None
-        some = evenly(len(self), self.options.frames)
-        found = calibrate(((self._source[number], known[number]) for number in some), self.options)
-        return known if found is None else _Corrected(known, tuple(found))
-
-
-@dataclass(frozen=True, slots=True)
-class _Corrected:
-    """The pictures of colour cameras, with a correction for each camera."""
-
-    colors: ColorFrames
-    corrections: tuple[Correction, ...]
-
-    def __getitem__(self, index: int) -> list[ColorPicture | None]:
-        pairs = zip(self.colors[index], self.corrections, strict=True)
-        return [None if picture is None else correction.of(picture) for picture, correction in pairs]

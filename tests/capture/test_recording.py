@@ -10,7 +10,7 @@ import tempfile
 import numpy as np
 import pytest
 
-from meshreel.capture.rig.recording import Kept, open_recording
+from meshreel.capture.recording import Kept, open_recording
 from meshreel.geometry.derived_sequences import Chosen, captured
 from meshreel.types import Mesh
 from tests.capture import depth_scenes
@@ -28,7 +28,7 @@ def recording(tmp_path):
 
 def test_a_frame_is_fused_once_and_is_the_same_again(recording, monkeypatch):
     first = recording[1]
-    monkeypatch.setattr("meshreel.capture.rig.recording.fuse_depths", None)
+    monkeypatch.setattr("meshreel.capture.recording.fuse_depths", None)
     again = recording[1]
     assert np.array_equal(first.vertices, again.vertices) and np.array_equal(first.faces, again.faces)
 
@@ -49,7 +49,7 @@ def test_on_a_full_disk_frames_are_fused_again(recording, monkeypatch):
     def full(*_, **__):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("meshreel.capture.rig.recording.tempfile.TemporaryFile", full)
+    monkeypatch.setattr("meshreel.capture.recording.tempfile.TemporaryFile", full)
     first, again = recording[0], recording[0]
     assert np.array_equal(first.vertices, again.vertices) and not recording._kept._places
 
@@ -73,7 +73,7 @@ def test_a_disk_that_fills_while_a_frame_is_kept_costs_no_kept_frame():
 
 def test_without_keep_no_frame_is_stored(tmp_path, monkeypatch):
     folder = depth_scenes.record(tmp_path / "rig", CAMERAS, [(0.0, 0.0, 0.0)])
-    monkeypatch.setattr("meshreel.capture.rig.recording.Kept", None)
+    monkeypatch.setattr("meshreel.capture.recording.Kept", None)
     assert not open_recording(folder, keep=False)[0][0].is_empty
 
 

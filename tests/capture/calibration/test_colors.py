@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from meshreel.analysis.appearance.calibrate import CalibrationOptions, Correction, Moment, calibrate, fit_gains
+from meshreel.capture.calibration.colors import CalibrationOptions, Correction, Moment, calibrate, fit_gains
 from meshreel.capture.simulated.simulated_color import shade_of
 from meshreel.geometry.color_views import ColorPicture, ColorViews
 from meshreel.geometry.topology import face_normals

@@ -7,17 +7,19 @@ a rigid motion with which the cameras agree best. The meshes stay where they are
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float64, Int64
 
 from ...geometry import strict
 from ...geometry.cameras import CameraPose
-from ...geometry.color_views import ColorPicture, ColorViews, sampled
+from ...geometry.color_views import ColorFrames, ColorPicture, ColorViews, sampled
 from ...geometry.topology import face_normals, subdivide_midpoint
-from ...types import Mesh
+from ...types import Frames, Mesh, evenly
 
 Moment = tuple[Mesh, Sequence[ColorPicture | None]]  # a frame's surface, and a picture for each camera that has one
 Colors = Float64[np.ndarray, "C N 3"]  # of places in the pictures of cameras; 0 where a camera does not see a place
@@ -57,6 +59,39 @@ class Correction:
         """Return a picture of the camera with this correction."""
         gains = strict.exp(self.gains * LN2)
         return replace(_moved(picture, self.pose), gains=(float(gains[0]), float(gains[1]), float(gains[2])))
+
+
+Corrections = tuple[Correction, ...]  # of each camera; none where they agree as they are
+
+
+class Corrected:
+    """Colour pictures of a recording, whose cameras are corrected; how is found when the first one is asked for."""
+
+    def __init__(self, colors: ColorFrames, find: Callable[[], Corrections]) -> None:
+        self._colors, self._find = colors, find
+
+    @cached_property
+    def corrections(self) -> Corrections:
+        """The correction of each camera; none where nothing is to be mended."""
+        return self._find()
+
+    def __getitem__(self, index: int) -> list[ColorPicture | None]:
+        pictures = self._colors[index]
+        if not self.corrections:
+            return pictures
+        pairs = zip(pictures, self.corrections, strict=True)
+        return [None if picture is None else correction.of(picture) for picture, correction in pairs]
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {"_colors": self._colors, "corrections": self.corrections}  # other processes need not find them again
+
+
+def corrections_of(
+    frames: Frames, colors: ColorFrames, options: CalibrationOptions = CalibrationOptions()
+) -> Corrections:
+    """Return corrections of the cameras of a recording, from frames spread evenly over it."""
+    moments = ((frames[number], colors[number]) for number in evenly(len(frames), options.frames))
+    return tuple(calibrate(moments, options) or ())
 
 
 def calibrate(frames: Iterable[Moment], options: CalibrationOptions) -> list[Correction] | None:

@@ -9,24 +9,26 @@ from __future__ import annotations
 import pickle
 import tempfile
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from jaxtyping import Float64
 
-from ...errors import InputError
-from ...geometry.color_views import ColorPicture, ColorViews, spread_colors
-from ...geometry.depth import DepthPicture, apart
-from ...geometry.topology import vertex_normals
-from ...io.sequence import SequenceOptions
-from ...types import Mesh, MeshSequence, Up
-from .cameras import ColorCamera
-from .fusion import FusionOptions, fuse_depths
-from .rig import Rig, read_rig
+from ..errors import InputError
+from ..geometry.color_views import ColorPicture, ColorViews, spread_colors
+from ..geometry.depth import DepthPicture, apart
+from ..geometry.topology import vertex_normals
+from ..io.sequence import SequenceOptions
+from ..types import Mesh, MeshSequence, Up, evenly
+from .calibration.colors import CalibrationOptions, Corrected, Corrections, corrections_of
+from .calibration.remembered import remembered
+from .rig.cameras import ColorCamera
+from .rig.fusion import FusionOptions, fuse_depths
+from .rig.rig import Rig, read_rig
 
-LOOKED_AT = 12  # frames examined for movement, spread over the recording (guess)
 MOVED = 0.5  # share of pixels that differ from their usual depth, in the median frame, of a camera that moves (guess)
 LEAST = 0.3  # share of pixels with a measurement below which a frame is ignored: it may show no background (guess)
 
@@ -83,9 +85,24 @@ class Recording(MeshSequence):
         return self.rig.up
 
     @property
-    def colors(self) -> RigColors | None:
-        """The colour pictures of the frames; None where the rig has no colour cameras."""
-        return RigColors(self.rig.color_cameras, tuple(self.numbers)) if self.rig.color_cameras else None
+    def pictures(self) -> RigColors:
+        """The colour pictures of the frames as they were recorded; vertices have their colours."""
+        return RigColors(self.rig.color_cameras, tuple(self.numbers))
+
+    @cached_property
+    def colors(self) -> Corrected | None:
+        """The colour pictures with cameras that agree; None where the rig has no colour cameras."""
+        return Corrected(self.pictures, self._corrections) if self.rig.color_cameras else None
+
+    def _corrections(self) -> Corrections:
+        """Return what all frames of the rig tell, whichever were chosen."""
+        if len(self.rig.color_cameras) < 2:
+            return ()
+        whole = self if self.numbers == self.rig.frames else Recording(self.rig, self.options, keep=False)
+        options = CalibrationOptions()
+        looked_at = [whole.numbers[index] for index in evenly(len(whole), options.frames)]
+        depends_on = {"fusion": asdict(self.options), "calibration": asdict(options)}
+        return remembered(self.rig, looked_at, depends_on, lambda: corrections_of(whole, whole.pictures, options))
 
     @property
     def depth(self) -> RigDepth:
@@ -153,7 +170,7 @@ def open_recording(
     rig = read_rig(folder)
     warnings = [*rig.remarks, *rig.missing()]
     for number, camera in enumerate(rig.cameras):
-        seen = looked_at(rig, number)
+        seen = rig.looked_at(number)
         blind = sum(not depth.any() for depth in seen)
         if blind:
             warnings.append(f"camera {camera.name} measures nothing in {blind} of {len(seen)} frames looked at")
@@ -180,10 +197,3 @@ def moved_share(depths: list[Float64[np.ndarray, "H W"]]) -> float:
     other = np.abs(stack[:, known] - usual) > apart(usual)
     valid = np.isfinite(stack[:, known])
     return float(np.median((other & valid).sum(axis=1) / np.maximum(valid.sum(axis=1), 1)))
-
-
-def looked_at(rig: Rig, number: int) -> list[Float64[np.ndarray, "H W"]]:
-    """Return depths of a camera, m, from frames spread evenly over its recording; 0 is no measurement."""
-    frames = sorted(rig.files[number])
-    chosen = sorted({frames[int(k)] for k in np.linspace(0, len(frames) - 1, LOOKED_AT)})
-    return [rig.depth(number, frame) * rig.cameras[number].depth_unit for frame in chosen]
