@@ -20,7 +20,7 @@ FORM = re.compile(r"([\w.-]+)(?:\[\w+\])?>=([\d.]+)")  # of a requirement that i
 
 
 def requirements() -> list[str]:
-    """Return what meshreel, its extras and the bench require, without each other."""
+    """Return the requirements of meshreel, its extras and the bench, without each other."""
     product, bench = settings("pyproject.toml")["project"], settings("bench/pyproject.toml")["project"]
     lists = [product["dependencies"], *(product["optional-dependencies"][extra] for extra in EXTRAS)]
     return [one for found in (*lists, bench["dependencies"]) for one in found if not one.startswith("meshreel")]

@@ -43,7 +43,7 @@ def parents(module: str) -> list[str]:
 
 
 def record(seconds: dict[tuple[str, str], float]) -> dict[str, dict[str, float]]:
-    """Return what durations.json holds: files, and tests that take long; files that are gone are left out."""
+    """Return the contents of durations.json: files, and long tests; without files that are gone."""
     files = defaultdict[str, float](float)
     for (file, _), taken in seconds.items():
         files[file] += taken

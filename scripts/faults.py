@@ -77,7 +77,7 @@ class Encode:
         return found
 
     def judged(self) -> Counter[str]:
-        """Return what is wrong after an encode that was stopped, and after the next run."""
+        """Return the faults after an encode that was stopped, and after the next run."""
         found = Counter[str]()
         found["output torn"] += self.output.read_bytes() not in (b"old", self.whole)  # complete: killed as it ended
         found["left for resume"] += (self.folder / "out.reel.part").exists()

@@ -85,7 +85,7 @@ def carries_copyleft(package: Distribution) -> bool:
 
 
 def verdict(package: Distribution, free: bool) -> tuple[str, bool]:
-    """Return what to print of a package's licence, and whether it is a fault; `free`: the extra may bring anything."""
+    """Return the line about a package's licence, and True if it is a fault; `free`: the extra may bring anything."""
     name, told = canonical(package.name), licence(package)
     if not told:
         return "not known: read its source", True

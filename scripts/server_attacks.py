@@ -84,7 +84,7 @@ def get(path: str, *headers: str) -> bytes:
 
 
 async def rest(reader: asyncio.StreamReader, seconds: float) -> bytes | None:
-    """Return what comes until the connection ends, None if it does not within some seconds."""
+    """Return the bytes received until the connection ends, None if it does not within some seconds."""
     received = bytearray()
     try:
         async with asyncio.timeout(seconds):

@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from scripts.plain_english import refused, vague
 from tests.run_page import blocks
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -58,6 +59,32 @@ def test_a_decision_says_whether_it_holds(page: Path) -> None:
     assert re.fullmatch(r"accepted|(accepted; in part )?superseded by \[\d+\]\(\S+\)", short)
     index = (ROOT / "docs" / "decisions" / "README.md").read_text(encoding="utf-8")
     assert re.search(rf"\({re.escape(page.name)}\) \| .* \| {re.escape(short)} \|$", index, re.MULTILINE)
+
+
+@pytest.mark.parametrize(
+    ("code", "line"),
+    [
+        ('"""What is to be encoded."""', 1),
+        ('class Job:\n    """Who is told of progress."""', 1),
+        ('x = 1\n\ndef find():\n    """Return what was found."""', 3),
+        ("def process_frames(): ...", 1),
+        ("class _Helper: ...", 1),
+        ('def find():\n    """Return whether a frame is empty. What it costs."""', None),
+        ("def handle_exit(): ...", None),
+        ("def unprocessed(): ...", None),
+    ],
+)
+def test_vague_openings_and_names_are_refused(code: str, line: int | None, tmp_path: Path) -> None:
+    path = tmp_path / "frames.py"
+    path.write_text(code, encoding="utf-8")
+    complaints = list(vague(path, refused(PAGE.read_text(encoding="utf-8"))))
+    assert [complaint.split(":")[0] for complaint in complaints] == ([] if line is None else [str(line)])
+
+
+def test_a_module_of_all_and_sundry_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "mesh_utils.py"
+    path.write_text("", encoding="utf-8")
+    assert len(list(vague(path, refused(PAGE.read_text(encoding="utf-8"))))) == 1
 
 
 def _contracts(kind: str) -> list[dict[str, Any]]:

@@ -40,7 +40,7 @@ __all__ = [
     "preset_options",
 ]
 
-# Imported on first use: decoding never imports the encoder, and the command line heeds Ctrl-C before NumPy is loaded.
+# Imported on first use: decoding never imports the encoder, and Ctrl-C ends the command line before NumPy is loaded.
 _LATER = {
     **dict.fromkeys(("Video", "open"), ".decoder.video"),
     **dict.fromkeys(("Mesh", "MeshList", "MeshSequence", "as_sequence"), ".types"),
@@ -64,5 +64,5 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    """List the promised names and what every module has; modules below may change without notice."""
+    """List the public names and every module's own; modules below may change without notice."""
     return sorted({*__all__, *(name for name in globals() if name.startswith("__"))})

@@ -1,7 +1,7 @@
 """Names for arrays in annotations: `Float64[np.ndarray, "V 3"]` says dtype and shape.
 
-To a reader and a type checker they are jaxtyping's, which takes as long to load as NumPy. At run time nothing asks for
-them, and they are what jaxtyping itself shows to type checkers; the tests put jaxtyping in the place of this module.
+For readers and type checkers they are jaxtyping's, which takes as long to load as NumPy. At run time nothing reads
+them, so they are the stand-ins that jaxtyping gives to type checkers; the tests replace this module by jaxtyping.
 """
 
 from typing import Annotated as Bool

@@ -32,10 +32,10 @@ GREY = 128  # red, green and blue of a surface without colours beside one with c
 
 @dataclass(frozen=True, slots=True)
 class Texture:
-    """A picture in sRGB that is decoded when its pixels are asked for; InputError where its file cannot be used."""
+    """A picture in sRGB, decoded when its pixels are read, which raises InputError if its file cannot be used."""
 
     read: Callable[[], UInt8[np.ndarray, "H W 3"]] = field(repr=False)
-    size: tuple[int, int] | None = None  # rows and columns, where they are known before the picture is decoded
+    size: tuple[int, int] | None = None  # rows and columns, if known before the picture is decoded
 
     @staticmethod
     def of(pixels: UInt8[np.ndarray, "H W 3"]) -> Texture:
@@ -52,17 +52,17 @@ class Texture:
 
     @property
     def pixels(self) -> UInt8[np.ndarray, "H W 3"]:
-        """The picture, its uppermost row first."""
+        """The picture, top row first."""
         return self.read()
 
 
 @dataclass(frozen=True, slots=True)
 class Audio:
-    """An audio file that belongs to frames, byte for byte as it was given."""
+    """An audio file that belongs to frames, unchanged."""
 
     data: bytes = field(repr=False)
     media_type: str  # as audio/ogg
-    start: float  # s after the first frame; below 0 where its beginning is not heard
+    start: float  # s after the first frame; below 0: its beginning is skipped
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -81,7 +81,7 @@ class Mesh:
 
     @staticmethod
     def of(vertices: object, faces: object) -> Mesh:
-        """Return a mesh of any array-likes, converted to contiguous arrays of the annotated dtypes."""
+        """Return a mesh of array-likes, converted to contiguous arrays of the annotated dtypes."""
         v = np.ascontiguousarray(np.asarray(vertices, dtype=np.float64).reshape(-1, 3))
         f = np.ascontiguousarray(np.asarray(faces, dtype=np.int32).reshape(-1, 3))
         return Mesh(v, f)
@@ -97,7 +97,7 @@ class Mesh:
         return self.colors is not None or (self.uv is not None and self.texture is not None)
 
     def at(self, vertices: Float64[np.ndarray, "V 3"]) -> Mesh:
-        """Return the same surface, colours and all, with its vertices in other places."""
+        """Return the same surface, colours included, with new positions of its vertices."""
         return replace(self, vertices=vertices)
 
     def left(
@@ -107,7 +107,7 @@ class Mesh:
         vertex_origins: Int32[np.ndarray, " W"],
         face_origins: Int32[np.ndarray, " G"],
     ) -> Mesh:
-        """Return what is left of the mesh, with its colours, by the number that each vertex and each face had."""
+        """Return a reduced mesh with this mesh's colours; `*_origins` are its vertices' and faces' numbers here."""
         colors = None if self.colors is None else self.colors[vertex_origins]
         uv = None if self.uv is None else self.uv[face_origins]
         return Mesh(vertices, faces, colors, uv, self.texture)
@@ -132,7 +132,7 @@ class Mesh:
     @property
     def box(self) -> tuple[Float64[np.ndarray, "3"], Float64[np.ndarray, "3"]]:
         """Lower and upper corner of the bounding box, m, of a mesh with vertices."""
-        axes = self.vertices.T  # one by one: NumPy takes ten times as long for rows of 3
+        axes = self.vertices.T  # axis by axis: NumPy takes ten times as long for rows of 3
         return np.array([axis.min() for axis in axes]), np.array([axis.max() for axis in axes])
 
     @property
@@ -144,7 +144,7 @@ class Mesh:
         return (low + high) / 2
 
     def copy(self) -> Mesh:
-        """Return the same mesh in new arrays, which may be written to."""
+        """Return the same mesh in new, writable arrays."""
         colors = None if self.colors is None else self.colors.copy()
         uv = None if self.uv is None else self.uv.copy()
         return Mesh(self.vertices.copy(), self.faces.copy(), colors, uv, self.texture)
@@ -182,10 +182,10 @@ class Mesh:
         except ImportError as error:
             raise ImportError("Mesh.to_pyvista needs the package pyvista: pip install pyvista") from error
         mesh = self.copy()
-        found = pyvista.PolyData.from_regular_faces(mesh.vertices, mesh.faces)
+        surface = pyvista.PolyData.from_regular_faces(mesh.vertices, mesh.faces)
         if mesh.colors is not None:
-            found.point_data["RGB"] = mesh.colors
-        return found
+            surface.point_data["RGB"] = mesh.colors
+        return surface
 
     def to_open3d(self) -> Any:
         """Return a copy as an `open3d.geometry.TriangleMesh`. Raises ImportError without Open3D."""
@@ -194,10 +194,12 @@ class Mesh:
         except ImportError as error:
             raise ImportError("Mesh.to_open3d needs the extra `open3d`: pip install 'meshreel[open3d]'") from error
         mesh, utility = self.copy(), open3d.utility  # it refuses read-only arrays
-        found = open3d.geometry.TriangleMesh(utility.Vector3dVector(mesh.vertices), utility.Vector3iVector(mesh.faces))
+        surface = open3d.geometry.TriangleMesh(
+            utility.Vector3dVector(mesh.vertices), utility.Vector3iVector(mesh.faces)
+        )
         if mesh.colors is not None:
-            found.vertex_colors = utility.Vector3dVector(mesh.colors / 255.0)
-        return found
+            surface.vertex_colors = utility.Vector3dVector(mesh.colors / 255.0)
+        return surface
 
 
 @dataclass(frozen=True, slots=True)
@@ -251,7 +253,7 @@ class MeshSequence(Frames, Protocol):
 
 @dataclass(frozen=True, slots=True, repr=False)
 class MeshList(MeshSequence):
-    """A MeshSequence of meshes that are in memory."""
+    """A MeshSequence of meshes in memory."""
 
     meshes: tuple[Mesh, ...]
     frame_rate: float = 30.0  # 1/s
@@ -268,8 +270,8 @@ def as_sequence(value: object, frame_rate: float | None = None) -> MeshSequence:
     """Return `value` if it is a MeshSequence, otherwise a MeshList of its items at `frame_rate` (1/s).
 
     An item is a Mesh, a mesh or scene of trimesh, a mesh of Open3D, a frame of Open4D, or a pair of arrays (vertices,
-    faces). Colours of vertices are kept. Without a frame rate it is the `fps` of `value`, as Open4D's sequences have
-    it, or 30. Raises InputError for any other value; the message names the frame.
+    faces). Colours of vertices are kept. The default of `frame_rate` is the attribute `fps` of `value`, which Open4D's
+    sequences have, or 30. Raises InputError for any other value; the message names the frame.
     """
     if isinstance(value, MeshSequence):
         return value
@@ -304,16 +306,16 @@ def _as_mesh(item: object, where: str) -> Mesh:
 def _colors_of(item: object, count: int, where: str) -> UInt8[np.ndarray, "V 3"] | None:
     """Return colours of vertices: those of trimesh are bytes, those of Open3D and Open4D fractions of 1."""
     visual = getattr(item, "visual", None)
-    given = getattr(item, "vertex_colors", getattr(item, "colors", ()))
-    found = np.asarray(given if visual is None else visual.vertex_colors if visual.kind == "vertex" else ())
-    if found.size == 0 or found.dtype == object:
+    attribute = getattr(item, "vertex_colors", getattr(item, "colors", ()))
+    colors = np.asarray(attribute if visual is None else visual.vertex_colors if visual.kind == "vertex" else ())
+    if colors.size == 0 or colors.dtype == object:
         return None
-    if found.ndim != 2 or found.shape[0] != count or found.shape[1] not in (3, 4):
-        raise InputError(f"{where}: colours of shape {found.shape}; give {count} x 3, one of each vertex")
-    found, most = found[:, :3], 1 if found.dtype.kind == "f" else 255
-    if not (known := (found >= -most) & (found <= 2 * most)).all():  # blended ones go a little beyond
-        raise InputError(f"{where}: a colour has the value {found[~known][0]:g}; give fractions of 1, or bytes")
-    return np.ascontiguousarray((np.clip(found, 0, most) * (255 / most)).round(), np.uint8)
+    if colors.ndim != 2 or colors.shape[0] != count or colors.shape[1] not in (3, 4):
+        raise InputError(f"{where}: colours of shape {colors.shape}; give {count} x 3, one of each vertex")
+    colors, most = colors[:, :3], 1 if colors.dtype.kind == "f" else 255
+    if not (valid := (colors >= -most) & (colors <= 2 * most)).all():  # blended colours exceed the range a little
+        raise InputError(f"{where}: a colour has the value {colors[~valid][0]:g}; give fractions of 1, or bytes")
+    return np.ascontiguousarray((np.clip(colors, 0, most) * (255 / most)).round(), np.uint8)
 
 
 def _rows_of_three(values: object, what: str) -> np.ndarray:
@@ -331,7 +333,7 @@ class Centers:
     """Tracked volume centers of a group of frames (paper, section 3.1)."""
 
     positions: Float64[np.ndarray, "T K 3"]  # in units of the sequence's bounding-box diagonal
-    bodies: Int32[np.ndarray, " K"]  # which connected body of the first frame each center belongs to
+    bodies: Int32[np.ndarray, " K"]  # number of each center's connected body in the first frame
 
     def __len__(self) -> int:
         return len(self.positions)
@@ -345,4 +347,4 @@ def check_up(axis: str) -> None:
 
 def known_up(axis: object) -> Up:
     """Return `axis` if it is in UP_AXES, otherwise y, the default of players and of glTF."""
-    return next((known for known in UPS if known == axis), "y")
+    return next((up for up in UPS if up == axis), "y")

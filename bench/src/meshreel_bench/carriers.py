@@ -1,4 +1,4 @@
-"""What carries splats in each frame of a stream: the meshes of chains of groups. Bytes of a .reel file -> chains."""
+"""Carriers of splats in each frame of a stream: the meshes of chains of groups. Bytes of a .reel file -> chains."""
 
 from __future__ import annotations
 
@@ -32,5 +32,5 @@ def chains_of(data: bytes) -> list[Chain]:
 
 
 def alone(mesh: Mesh) -> Carrier:
-    """Return what carries splats in a frame that shares no faces with others."""
+    """Return the carrier of splats in a frame that shares no faces with others."""
     return Carrier(mesh.vertices, mesh.faces, 0)

@@ -36,7 +36,7 @@ command = App(name="bench", help=HELP)  # of `meshreel bench`
 @Parameter(name="*")
 @dataclass(frozen=True, slots=True)
 class Running:
-    """How points are measured."""
+    """Settings of the measurement of points."""
 
     jobs: int = 1
     """Points to measure side by side, each in a process; the rows are the same but for times."""
@@ -56,7 +56,7 @@ class Running:
 @Parameter(name="*")
 @dataclass(frozen=True, slots=True)
 class Selection:
-    """Which points, of which data."""
+    """Selection of points, with the folder of their data."""
 
     data: Path = DATA
     """The folder of the benchmark's sequences, or of those that TSMC's authors release: then of these, where there are
@@ -244,7 +244,7 @@ def describe(row: Row) -> str:
 
 
 def _measured(row: Row) -> str:
-    """Return what was measured of a point, or why nothing was."""
+    """Return the measured values of a point in a line, or its failure."""
     if row.failed:
         return f"failed: {row.failed}"
     parts = [f"{row.mbps:.3f} Mbps"] if row.stream else []

@@ -38,7 +38,7 @@ _TITLES = {
 
 
 def title(name: str) -> str:
-    """Return what a legend calls a curve; what a variant changes stays behind the title of what it is a variant of."""
+    """Return the title of a curve in legends; that of a variant is its base's title and its change."""
     begin, end = f"{TUNED}, ", TSMC.removeprefix(TUNED)  # of a variant of which m is varied
     if name.startswith(begin) and name.endswith(end):
         return f"{_TITLES[TSMC]}, {name.removeprefix(begin).removesuffix(end)}"

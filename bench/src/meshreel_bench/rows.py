@@ -110,7 +110,7 @@ class Decoding(msgspec.Struct, frozen=True):
 
 
 class Row(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True, forbid_unknown_fields=True):
-    """What was measured of a point, or why nothing was."""
+    """Measured values of a point, or its failure."""
 
     point: Point
     name: str  # of the codec, as it calls itself: points of one name are a curve
@@ -166,7 +166,7 @@ def checked(row: Row) -> Row:
 
 
 def _is_cut(line: bytes) -> bool:
-    """Whether a last line is the beginning of a row."""
+    """Return whether a last line is the beginning of a row."""
     if not (line.startswith(BEGINNING) or BEGINNING.startswith(line)):
         return False
     try:

@@ -23,8 +23,8 @@ class GroupOptions:
 def cut_at(residuals: Float64[np.ndarray, " T"], options: GroupOptions) -> int | None:
     """Return the frame that should begin a second group, or None if one reference follows all frames.
 
-    Residuals are in units of the distance to reach. The cut is the one that leaves the residuals on each side most
-    alike (least squares on their logarithms), which separates frames that are followed well from those that are not.
+    Residuals are in units of the distance to reach. The cut leaves the residuals on each side most alike (least squares
+    on their logarithms), which separates frames that are followed well from those that are not.
     """
     limit = min(options.limit, max(1.0, options.tolerance * float(np.median(residuals))))
     if len(residuals) < 2 or residuals.max() <= limit:

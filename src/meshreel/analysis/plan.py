@@ -1,4 +1,4 @@
-"""Plan groups: cut the next frames where another template pays, and nowhere else (decision 24).
+"""Plan groups: cut frames only where another template saves more than it costs (decision 24).
 
 In -> out: the residuals that each template leaves on each frame -> groups of successive frames, each with its template
 or with none. Residuals are in units of the distance to reach; a cost is a sum of their squares.
@@ -15,25 +15,25 @@ from jaxtyping import Float64
 
 NOBODY = -1  # in place of a template: its frames are coded one by one
 CODED = 0.7  # squared targets that coding adds to a residual (measured on bodies at quality 50)
-USUAL = 2.0  # squared targets that a good template may leave, at most (guess)
-CLOSE = 2.0  # times dearer or cheaper that templates may be in a plan that is coded for comparison (guess)
+USUAL = 2.0  # squared targets, largest residual of a good template (guess)
+CLOSE = 2.0  # factor on the price of templates in the plan that is coded for comparison (guess)
 LOST = 1e6  # targets, in place of an infinite residual
-SMALL = 0.1  # squared targets that are no reason for another key (guess)
-REACHED = 1.0  # squared targets that a frame has that is coded alone
+SMALL = 0.1  # squared targets that do not justify another key (guess)
+REACHED = 1.0  # squared targets of a frame that is coded alone
 
 
 @dataclass(frozen=True, slots=True)
 class PlanOptions:
-    """Prices of a plan, and when another template is looked for."""
+    """Prices of a plan, and conditions for trying another template."""
 
     limit: float = 2.0  # a frame is lost if its residual is larger than this many times the target
     worth: float = 14.0  # price of a template: the sum of squared residuals that it must save (decision 24)
     alone: float = 1.2  # price of a frame without a template, in prices of a template (guess)
-    pop: float = 1.5  # dB that the quality may step at a cut without a price
-    keys: int = 5  # frames tried as keys for one plan, at most
+    pop: float = 1.5  # dB, largest step of the quality at a cut without a price
+    keys: int = 5  # largest number of frames tried as keys for one plan
     settled: float = 1.0  # excess beyond which another key is tried, in prices of a template
-    misses: int = 2  # keys in a row without gain after which no other is tried (guess)
-    gain: float = 0.25  # that a key must bring, in prices of a template (guess)
+    misses: int = 2  # successive keys without gain after which no other is tried (guess)
+    gain: float = 0.25  # smallest gain of a key, in prices of a template (guess)
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,21 +46,21 @@ class PlannedGroup:
 
     @property
     def is_alone(self) -> bool:
-        """True where its frames are coded one by one."""
+        """True if its frames are coded one by one."""
         return self.template == NOBODY
 
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """Groups that cover some frames, and what they cost."""
+    """Groups that cover some frames, with their cost."""
 
     groups: tuple[PlannedGroup, ...]
     cost: float
-    squares: Float64[np.ndarray, " T"]  # squared residual of each frame, or the price of one without a template
+    squares: Float64[np.ndarray, " T"]  # squared residual of each frame, or the price of a frame without a template
 
     @property
     def excess(self) -> Float64[np.ndarray, " T"]:
-        """Squared residuals beyond those of the better half of the frames, which any template would leave, too."""
+        """Squared residuals beyond those of the better half of the frames, which any template would leave."""
         usual = np.median(np.sort(self.squares)[: (len(self.squares) + 1) // 2])
         return np.maximum(self.squares - min(usual, USUAL), 0.0)
 
@@ -68,13 +68,14 @@ class Plan:
 def best_plan(residuals: Float64[np.ndarray, "C T"], onward: Sequence[bool], options: PlanOptions) -> Plan:
     """Return the plan of least cost (dynamic programming); residuals of frames that a template does not follow are inf.
 
-    The cost is the sum of the squared residuals, the price of each group's template, and that of steps of the quality
-    at cuts. A template that is `onward`, known from the frames before, costs nothing, but can only begin.
+    The cost is the sum of the squared residuals, the prices of the groups' templates, and the prices of steps of the
+    quality at cuts. A template that is `onward`, known from earlier frames, costs nothing, but only the first group can
+    have it.
     """
     (count, frames), price = residuals.shape, options.worth
     squares = np.vstack([residuals**2, np.full(frames, options.alone * price)])
-    starts = np.array([0.0 if known else price for known in onward] + [0.0])
-    changes = np.array([np.inf if known else price for known in onward] + [0.0])
+    starts = np.array([0.0 if is_onward else price for is_onward in onward] + [0.0])
+    changes = np.array([np.inf if is_onward else price for is_onward in onward] + [0.0])
     errors = 10 * np.log10(np.vstack([np.minimum(residuals, LOST) ** 2 + CODED, np.full(frames, REACHED)]))  # dB
     best, before = starts + squares[:, 0], np.zeros((frames, count + 1), int)
     for t in range(1, frames):
@@ -100,7 +101,7 @@ def best_plan(residuals: Float64[np.ndarray, "C T"], onward: Sequence[bool], opt
 def rival(
     plan: Plan, residuals: Float64[np.ndarray, "C T"], onward: Sequence[bool], options: PlanOptions
 ) -> Plan | None:
-    """Return another plan that would be the best were templates dearer or cheaper, None where there is none close."""
+    """Return a different plan that is best at a higher or lower price of templates; None if there is none."""
     for price in (options.worth * CLOSE, options.worth / CLOSE):
         other = best_plan(residuals, onward, replace(options, worth=price))
         if other.groups != plan.groups:
@@ -109,7 +110,7 @@ def rival(
 
 
 def next_key(plan: Plan, tried: Collection[int]) -> int | None:
-    """Return the frame to try as a key next: the middle of the run that costs most; None where all were tried."""
+    """Return the frame to try next as a key: the middle of the costliest run; None if all were tried."""
     excess = plan.excess
     bad = excess >= max(0.999 * float(excess.mean()), SMALL)
     runs, at = list[range](), 0
@@ -121,6 +122,6 @@ def next_key(plan: Plan, tried: Collection[int]) -> int | None:
     if not runs:
         return None
     worst = max(runs, key=lambda run: float(excess[run.start : run.stop].sum()))
-    middle, whole = (worst.start + worst.stop - 1) / 2, (len(excess) - 1) / 2
-    left = (frame for frame in worst if frame not in tried)
-    return min(left, key=lambda frame: (abs(frame - middle), abs(frame - whole), -frame))
+    middle, center = (worst.start + worst.stop - 1) / 2, (len(excess) - 1) / 2
+    untried = (frame for frame in worst if frame not in tried)
+    return min(untried, key=lambda frame: (abs(frame - middle), abs(frame - center), -frame))

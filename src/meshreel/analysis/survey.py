@@ -20,7 +20,7 @@ from .pieces import Piece, pieces_of
 
 UNLIKE = 30.0  # times the median size: a larger frame of a room must be in another unit; a guess
 LARGEST_RATIO = 10.0  # largest ratio of the diagonals of two frames in one interval: a guess
-Report = Callable[[str, int], object]  # takes a stage, and how many frames more have passed it
+Report = Callable[[str, int], object]  # takes a stage, and the number of further frames that have passed it
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,10 +30,10 @@ class Survey:
     low: Float64[np.ndarray, "3"]  # corner of the sequence's bounding box, m
     high: Float64[np.ndarray, "3"]  # the opposite corner, m
     diagonals: tuple[float, ...]  # of each frame's bounding box, m; 0 for a frame without surface
-    flattened: tuple[int, ...] = ()  # frames whose faces all have no area: they count as empty
+    flattened: tuple[int, ...] = ()  # frames whose faces all lack area: they count as empty
     scale: float | None = None  # m, unit of normalised coordinates; None: the bounding box's diagonal
-    dropped: int = 0  # faces, over all frames, without area or with the three vertices of another: they are dropped
-    pieces: tuple[tuple[Piece, ...], ...] = ()  # of each frame, none of one that is all one; () of a scene
+    dropped: int = 0  # faces, over all frames, that are dropped: without area, or with the vertices of another face
+    pieces: tuple[tuple[Piece, ...], ...] = ()  # of each frame, none of a single-piece frame; () for a scene
 
     @property
     def center(self) -> Float64[np.ndarray, "3"]:
@@ -47,15 +47,13 @@ class Survey:
 
     @property
     def unit(self) -> float:
-        """Unit of normalised coordinates, m."""
         return self.diagonal if self.scale is None else self.scale
 
     def is_bare(self, frame: int) -> bool:
-        """Return whether a frame has no surface."""
         return self.diagonals[frame] == 0
 
     def without_frames(self) -> Survey:
-        """Return what normalising needs: all but the facts about single frames, of any number of frames."""
+        """Return the survey without the facts about single frames, which normalising does not need."""
         return replace(self, diagonals=(), flattened=(), pieces=())
 
     def normalise(self, mesh: Mesh) -> Mesh:
@@ -64,7 +62,7 @@ class Survey:
         return mesh.at((mesh.vertices - self.center) / self.unit)
 
     def intervals(self, size: int) -> list[range]:
-        """Return intervals of at most `size` frames, of even lengths, each all empty or all of about one scale."""
+        """Return even intervals of at most `size` frames, each of empty frames or of frames of similar size."""
         intervals = []
         for start, stop in pairwise([0, *self._breaks(), len(self.diagonals)]):
             parts = -(-(stop - start) // size)
@@ -73,7 +71,7 @@ class Survey:
         return intervals
 
     def _breaks(self) -> Iterator[int]:
-        """Yield the frames that cannot share an interval with the previous ones: empty or not, or of another scale."""
+        """Yield the frames that cannot share an interval with the one before: only one is empty, or sizes differ."""
         least = most = self.diagonals[0]
         for number, diagonal in enumerate(self.diagonals):
             least, most = min(least, diagonal), max(most, diagonal)
@@ -85,14 +83,14 @@ class Survey:
 def survey(sequence: MeshSequence, report: Report = lambda *_: None, cleaned: bool = True) -> Survey:
     """Survey a sequence with one frame in memory at a time. Raises InputError if it is empty or a frame is invalid.
 
-    Unless `cleaned`, faces without area count like any others, and pieces are not looked for: scenes have too many
-    faces to search for them.
+    Unless `cleaned`, faces without area count like any others, and pieces are not searched: scenes have too many faces
+    for that.
     """
     return joined([survey_of(sequence, range(len(sequence)), report, cleaned)])
 
 
 def survey_of(sequence: MeshSequence, numbers: range, report: Report = lambda *_: None, cleaned: bool = True) -> Survey:
-    """Survey some frames of a sequence as `survey` does; `joined` makes one of the surveys of all its parts."""
+    """Survey the frames `numbers` of a sequence as `survey` does; `joined` combines such surveys."""
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
     diagonals, flattened, dropped, pieces = list[float](), list[int](), 0, list[tuple[Piece, ...]]()
     for number in numbers:
@@ -111,7 +109,7 @@ def survey_of(sequence: MeshSequence, numbers: range, report: Report = lambda *_
 
 
 def joined(parts: Sequence[Survey]) -> Survey:
-    """Return the survey of a sequence from those of its parts, in order. Raises InputError where there is no frame."""
+    """Return the survey of a sequence from those of its parts, in order. Raises InputError if there is no frame."""
     diagonals = tuple(diagonal for part in parts for diagonal in part.diagonals)
     if not diagonals:
         raise InputError("the sequence has no frames; give at least one mesh")
@@ -119,28 +117,27 @@ def joined(parts: Sequence[Survey]) -> Survey:
     if not np.isfinite(low).all():  # no frame has a surface
         low, high = np.zeros(3), np.zeros(3)
     flattened = tuple(number for part in parts for number in part.flattened)
-    pieces = tuple(some for part in parts for some in part.pieces)
+    pieces = tuple(frame_pieces for part in parts for frame_pieces in part.pieces)
     return Survey(low, high, diagonals, flattened, dropped=sum(part.dropped for part in parts), pieces=pieces)
 
 
-def check_one_unit(seen: Survey) -> None:
+def check_one_unit(survey: Survey) -> None:
     """Raise InputError if a frame of a scene is far larger than the others, as if its unit were another.
 
     Its segmentation would need more cells by the square of the ratio.
     """
-    sizes = [size for size in seen.diagonals if size > 0]
+    sizes = [size for size in survey.diagonals if size > 0]
     usual, largest = float(np.median(sizes or [0.0])), max(sizes, default=0.0)
     if largest > UNLIKE * usual:
-        text = (
-            f"frame {seen.diagonals.index(largest)} is {largest:.3g} m large, half of the frames at most {usual:.3g} m"
-        )
+        frame = survey.diagonals.index(largest)
+        text = f"frame {frame} is {largest:.3g} m large, half of the frames at most {usual:.3g} m"
         raise InputError(f"{text}; correct its unit, leave it out with --frames, or encode with --dynamic-only")
 
 
 def check(mesh: Mesh, where: str) -> None:
     """Raise InputError for vertices that are not finite and faces that refer to missing vertices.
 
-    `io` checks files for the same; this is for meshes made in memory.
+    `io` checks files likewise; this is for meshes made in memory.
     """
     if not np.isfinite(mesh.vertices).all():
         vertex = int(np.argmin(np.isfinite(mesh.vertices).all(axis=1)))

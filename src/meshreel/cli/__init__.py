@@ -1,8 +1,8 @@
 """The command line `meshreel COMMAND`, with the commands of `COMMANDS`, and those that other distributions add.
 
-Errors take one line on standard error and exit code 2; `--debug` shows the traceback. The module of a command is
+Errors are one line on standard error, with exit code 2; `--debug` shows the traceback. The module of a command is
 imported when the command is called, so that `decode` and `info` work without the extra `encode`. This module imports
-nothing heavy, so that Ctrl-C is heeded from the first moment.
+nothing heavy, so that Ctrl-C works from the first moment.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ if TYPE_CHECKING:
     from cyclopts import App, MissingArgumentError
 
 FAILED = 2
-INTERRUPTED = 130  # 128 + SIGINT, as shells have it
+INTERRUPTED = 130  # 128 + SIGINT, as shells report it
 TERMINATED = 143  # 128 + SIGTERM
 PIPE_CLOSED = 141  # 128 + SIGPIPE
-_STOPPED = {False: "interrupted", True: "terminated"}  # by whether it was SIGTERM
+_STOPPED = {False: "interrupted", True: "terminated"}  # True: by SIGTERM
 
 COMMANDS = {
     "capture": "Fuse the depth of a rig into one mesh per frame, or make a rig of recordings of other programs.",
@@ -40,7 +40,7 @@ COMMANDS = {
     "concat": "Join .reel files that are parts of one sequence, without encoding them again.",
     "retime": "Write a .reel file that plays at another frame rate or speed.",
     "transform": "Write a .reel file in another place, size or orientation.",
-    "tag": "Write a .reel file with other metadata, as a title.",
+    "tag": "Write a .reel file with other metadata, such as a title.",
     "decode": "Decode a .reel file into a directory of meshes.",
     "export": "Write a .reel file as one animated file, GLB or USD, that other programs play.",
     "info": "Show the rate by content, tracks over time, groups and forms, and what the encoder recorded.",
@@ -49,14 +49,14 @@ COMMANDS = {
     "serve": "Serve a folder of .reel files: a gallery, and a page that plays each.",
     "player": "Copy the player's files for a web server.",
     "demo": "Make a short capture of moving people, encode it, and measure the result.",
-    "doctor": "Tell what is installed, and what this machine can do with it.",
-    "completion": "Print the script by which a shell completes commands and flags.",
+    "doctor": "Report installed packages and extras, and what this machine can do with them.",
+    "completion": "Print a script that lets a shell complete commands and flags.",
 }
-EDITS = ("cut", "concat", "retime", "transform", "tag")  # which share a module
+EDITS = ("cut", "concat", "retime", "transform", "tag")  # commands that share a module
 BENCH = "Measure codecs against each other."
 
 
-EXTRAS = {  # of packages that are not in `encode`
+EXTRAS = {  # extras of packages that are not in `encode`
     **dict.fromkeys(("starlette", "uvicorn", "trustme"), "play"),
     **dict.fromkeys(("matplotlib", "skimage"), "demo"),
     **dict.fromkeys(("cyclopts", "rich"), "cli"),
@@ -67,11 +67,11 @@ class Terminated(BaseException):
     """Raised on SIGTERM, so that temporary files are removed on the way out."""
 
 
-PLUGINS = "meshreel.commands"  # entry points by which other distributions add commands: meshreel-bench adds `bench`
+PLUGINS = "meshreel.commands"  # entry points with which other distributions add commands: meshreel-bench adds `bench`
 
 
 def place_of(name: str) -> str:
-    """Return module and function of a command."""
+    """Return module and function of a command, as `module:function`."""
     return f"meshreel.cli.edits:{name}" if name in EDITS else f"meshreel.cli.{name}:command"
 
 
@@ -101,7 +101,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def run_app(make: Callable[[], App], arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code: 0, 2 after an error, or 128 plus the number of a signal.
 
-    Without `arguments` it takes those of the process and exits with the code.
+    Without `arguments`, parse those of the process and exit with the code.
     """
     tokens = list(sys.argv[1:] if arguments is None else arguments)
     signals = _Signals(raises=arguments is not None)
@@ -114,7 +114,7 @@ def run_app(make: Callable[[], App], arguments: Sequence[str] | None = None) -> 
 
 def _run(make: Callable[[], App], tokens: list[str], signals: _Signals) -> int:
     if isinstance(sys.stdout, io.TextIOWrapper):
-        sys.stdout.reconfigure(errors="backslashreplace")  # a file name that the terminal cannot show is no error
+        sys.stdout.reconfigure(errors="backslashreplace")  # for file names that the terminal cannot show
     try:
         app = make()
         if tokens and not tokens[0].startswith("-") and tokens[0] not in [*app]:  # the parser would import them all
@@ -126,7 +126,7 @@ def _run(make: Callable[[], App], tokens: list[str], signals: _Signals) -> int:
     except (KeyboardInterrupt, Terminated) as error:
         return _stopped(signal.SIGTERM if isinstance(error, Terminated) else signal.SIGINT, error)
     except BrokenPipeError:  # the reader of our output is gone
-        sys.stdout = open(os.devnull, "w")  # noqa: PTH123, SIM115  (or the interpreter complains at its end)
+        sys.stdout = open(os.devnull, "w")  # noqa: PTH123, SIM115  (else the interpreter complains when it exits)
         return PIPE_CLOSED
     except Exception as error:
         if signals.heard:  # a signal during the import of a compiled module becomes an ImportError
@@ -137,7 +137,7 @@ def _run(make: Callable[[], App], tokens: list[str], signals: _Signals) -> int:
 
 
 def one_line(error: Exception) -> str:
-    """Return what went wrong and what to do, without line breaks."""
+    """Return the message of an error, with its remedy, without line breaks."""
     return _noted(_text_of(error), error)
 
 
@@ -172,23 +172,23 @@ def _text_of(error: Exception) -> str:
 
 
 def _unknown(name: str, app: App) -> str:
-    """Name a command that does not exist, and those that it begins, or is like."""
-    program, names = app.name[0], [known for known in app if not known.startswith("-")]
+    """Return the message for an unknown command, with commands that it begins or resembles."""
+    program, names = app.name[0], [command for command in app if not command.startswith("-")]
     if (program, name) == ("meshreel", "bench"):
         return "the bench is a distribution of its own; install it with: pip install meshreel-bench"
-    near = [known for known in names if known.startswith(name)] or get_close_matches(name, names)
-    meant = f" Did you mean {' or '.join(near)}?" if near else ""
-    return f'Unknown command "{name}".{meant} Commands: {", ".join(names)} (see {program} --help)'
+    near = [command for command in names if command.startswith(name)] or get_close_matches(name, names)
+    suggestion = f" Did you mean {' or '.join(near)}?" if near else ""
+    return f'Unknown command "{name}".{suggestion} Commands: {", ".join(names)} (see {program} --help)'
 
 
 def _missing(error: MissingArgumentError, command: str) -> str:
-    """Name the missing argument of a command, with the first sentence of its help."""
+    """Return the message for a missing argument of a command, with the first sentence of its help."""
     assert error.argument is not None
     arguments = [] if error.app is None else error.app.assemble_argument_collection(parse_docstring=True)
     helps = {argument.name: argument.parameter.help or "" for argument in arguments}
     meaning = " ".join(helps.get(error.argument.name, "").split()).split(". ")[0].rstrip(".")
-    shown = f": {meaning}" if meaning else ""
-    return f"{command}: {error.keyword or error.argument.name} is missing{shown} (see {command} --help)"
+    sentence = f": {meaning}" if meaning else ""
+    return f"{command}: {error.keyword or error.argument.name} is missing{sentence} (see {command} --help)"
 
 
 def _report(text: str, code: int) -> int:
@@ -197,7 +197,7 @@ def _report(text: str, code: int) -> int:
 
 
 def program() -> str:
-    """Return the name that messages begin with: `meshreel`, or that of a program which begins so, as the bench's."""
+    """Return the program's name for messages: `meshreel`, or one that begins with `meshreel-`, as the bench's."""
     name = os.path.basename(sys.argv[0]).removesuffix(".exe") if sys.argv else ""  # noqa: PTH119  (see the module)
     return name if name.startswith("meshreel-") else "meshreel"
 
@@ -208,9 +208,9 @@ def _stopped(number: int, error: BaseException) -> int:
 
 
 class _Signals:
-    """SIGINT and SIGTERM: exceptions while a command runs; while modules are loaded, they end the process.
+    """Handlers of SIGINT and SIGTERM: they raise while a command runs, and end the process while modules are loaded.
 
-    In the middle of an import, an exception may be lost, or come out as another one with a traceback.
+    In the middle of an import, an exception may be lost, or turn into another with a traceback.
     """
 
     def __init__(self, raises: bool) -> None:
@@ -223,8 +223,9 @@ class _Signals:
         if threading.current_thread() is not threading.main_thread():
             yield  # only the main thread may set handlers
             return
-        heard = [number for number in (signal.SIGINT, signal.SIGTERM) if signal.getsignal(number) is not signal.SIG_IGN]
-        before = {number: signal.signal(number, self._stop) for number in heard}
+        both = (signal.SIGINT, signal.SIGTERM)
+        signals = [number for number in both if signal.getsignal(number) is not signal.SIG_IGN]
+        before = {number: signal.signal(number, self._stop) for number in signals}
         try:
             yield
         finally:

@@ -1,4 +1,4 @@
-"""`meshreel calibrate`: the poses of a rig's cameras, from other programs, a board, and what the cameras see."""
+"""`meshreel calibrate`: the poses of a rig's cameras, from other programs, a board, and the cameras' depth."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from ..errors import InputError
 from ..io.write import check_apart, replacing
 from .console import Common
 
-BEFORE = "rig.before.json"  # what --in-place replaced
+BEFORE = "rig.before.json"  # copy of the file that --in-place replaced
 
 
 def command(
@@ -38,10 +38,10 @@ def command(
     refine: bool = True,
     common: Common = Common(),
 ) -> None:
-    """Find the poses of a rig's cameras: coarse from a file or a board, fine from the depth of what stands still.
+    """Find the poses of a rig's cameras: coarse from a file or a board, fine from the depth of still surface.
 
-    Without --poses and --board it begins with the poses in rig.json, right to some degrees and centimetres. Beside its
-    output it draws a picture.
+    Without --poses and --board it begins with the poses in rig.json, which must be right to some degrees and
+    centimetres. It draws a picture beside its output.
 
     Parameters
     ----------
@@ -71,26 +71,26 @@ def command(
     if not refine and poses is None and board.kind is None:
         raise InputError("--no-refine leaves nothing to do without --poses or --board; give one, or leave it out")
     recording, warnings = open_recording(rig, keep=False)
-    found, calibration = recording.rig, None
+    posed, calibration = recording.rig, None
     if poses is not None:
         unit = np.array([[1, 1, 1, scale]] * 3 + [[1, 1, 1, 1]])
-        given = {name: pose * unit for name, pose in read_poses(poses).items()}
-        found, told = posed_by(found, given, poses_of, poses)
-        warnings += told
+        poses_in_m = {name: pose * unit for name, pose in read_poses(poses).items()}
+        posed, remarks = posed_by(posed, poses_in_m, poses_of, poses)
+        warnings += remarks
     if board.kind is not None:
-        if not found.color_cameras:
+        if not posed.color_cameras:
             raise InputError(f"{rig}: has no colour cameras, in whose pictures --board is found; give --poses instead")
-        seen, told = poses_by_board(found.color_cameras, board)
-        found, warnings = with_poses(found, {}, seen), warnings + told
+        by_board, remarks = poses_by_board(posed.color_cameras, board)
+        posed, warnings = with_poses(posed, {}, by_board), warnings + remarks
     if refine:
         with common.stages(0, "rounds") as progress:
-            calibration = refined(found, progress)
-        found = with_poses(found, {one.name: one.view.pose.to_world for one in calibration.cameras}, {})
+            calibration = refined(posed, progress)
+        posed = with_poses(posed, {camera.name: camera.view.pose.to_world for camera in calibration.cameras}, {})
         warnings += calibration.warnings
         write_calibration_sheet(
-            calibration, found.up, path.with_name("calibration.png") if in_place else path.with_suffix(".png")
+            calibration, posed.up, path.with_name("calibration.png") if in_place else path.with_suffix(".png")
         )
-    new = described(found)
+    new = described(posed)
     if in_place:
         with replacing(rig / BEFORE) as file:
             file.write((rig / RIG).read_bytes())
@@ -111,7 +111,7 @@ def _output(rig: Path, output: Path | None, in_place: bool) -> Path:
         raise InputError(f"{path}: the output must end in .json")
     if not in_place:
         check_apart(path, [rig / RIG])
-        if path.is_dir() or not path.parent.is_dir():  # told before anything is computed
+        if path.is_dir() or not path.parent.is_dir():  # an error before anything is computed
             text = "is a folder" if path.is_dir() else f"there is no folder {path.parent}"
             raise InputError(f"{path}: {text}; name a file in a folder that is there")
     return path
@@ -123,7 +123,7 @@ def _tell(path: Path, calibration: Calibration | None, warnings: list[str], comm
     for pair in calibration.pairs if calibration else ():
         before, after = (None if math.isnan(d) else 1000 * d for d in (pair.before, pair.after))
         pairs.append({"cameras": pair.cameras, "overlap": pair.overlap, "before_mm": before, "after_mm": after})
-        shown = "-" if before is None else f"{before:.1f}"
-        table.add_row(" - ".join(pair.cameras), f"{100 * pair.overlap:.0f} %", shown, f"{1000 * pair.after:.1f}")
+        before_mm = "-" if before is None else f"{before:.1f}"
+        table.add_row(" - ".join(pair.cameras), f"{100 * pair.overlap:.0f} %", before_mm, f"{1000 * pair.after:.1f}")
     row = {"output": str(path), "pairs": pairs, "warnings": warnings}
     common.result(row, *([table] if pairs else []), f"{path}: poses of {'refined' if calibration else 'given'} cameras")

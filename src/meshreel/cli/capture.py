@@ -70,10 +70,10 @@ def command(
         Show the streams of recordings or rigs, their sizes, rates and calibration, and write nothing.
     """
     options = FusionOptions(voxel, truncation, fragment)
-    if show:  # for which no picture is read
-        found = [read_rig(path) if is_rig(path) else open_take(path) for path in inputs]
-        lines = [line for one in found for line in (_rig_lines(one) if isinstance(one, Rig) else _lines(one))]
-        rows = [_rig_row(one) if isinstance(one, Rig) else _take_row(one) for one in found]
+    if show:  # reads no picture
+        recordings = [read_rig(path) if is_rig(path) else open_take(path) for path in inputs]
+        lines = [line for each in recordings for line in (_rig_lines(each) if isinstance(each, Rig) else _lines(each))]
+        rows = [_rig_row(each) if isinstance(each, Rig) else _take_row(each) for each in recordings]
         return common.result({"recordings": rows}, *lines)
     if output is None:
         raise InputError("--output is missing: a folder for meshes, or for the rig of recordings; or give --list")
@@ -86,9 +86,10 @@ def command(
 
 def _take_row(take: Take) -> dict[str, Any]:
     cameras = [
-        {"name": one.name, "depth": _row(one.depth), "color": None if one.color is None else _row(one.color)}
-        | {"poses": 0 if one.poses is None else len(one.poses)}
-        for one in take.sensors
+        {"name": sensor.name, "depth": _row(sensor.depth)}
+        | {"color": None if sensor.color is None else _row(sensor.color)}
+        | {"poses": 0 if sensor.poses is None else len(sensor.poses)}
+        for sensor in take.sensors
     ]
     return {"path": str(take.path), "kind": take.kind, "cameras": cameras, "others": list(take.others)}
 
@@ -101,11 +102,11 @@ def _row(stream: Stream) -> dict[str, Any]:
 def _lines(take: Take) -> Iterator[str]:
     yield f"{take.path}: {take.kind}"
     for sensor in take.sensors:
-        for what, one in (("depth", sensor.depth), ("color", sensor.color)):
-            if one is not None:
-                known = "calibrated" if one.lens is not None else f"NOT calibrated: {take.calibrate}"
-                times = f"{one.count} pictures in {one.seconds:.2f} s ({one.rate:.4g} a second)"
-                yield f"  {sensor.name}: {what} {one.width} x {one.height}, {times}, {known}"
+        for kind, stream in (("depth", sensor.depth), ("color", sensor.color)):
+            if stream is not None:
+                calibration = "calibrated" if stream.lens is not None else f"NOT calibrated: {take.calibrate}"
+                times = f"{stream.count} pictures in {stream.seconds:.2f} s ({stream.rate:.4g} a second)"
+                yield f"  {sensor.name}: {kind} {stream.width} x {stream.height}, {times}, {calibration}"
     if take.others:
         yield f"  not read: {', '.join(take.others)}"
 
@@ -125,12 +126,12 @@ def _rig_row(rig: Rig) -> dict[str, Any]:
 def _rig_lines(rig: Rig) -> Iterator[str]:
     row = _rig_row(rig)
     yield f"{rig.folder}: a rig, {row['frames']} frames, {rig.frame_rate:g} a second"
-    for one in row["cameras"]:
-        yield f"  {one['name']}: {one['kind']} {one['width']} x {one['height']}, {one['pictures']} pictures, calibrated"
+    for camera in row["cameras"]:
+        size = f"{camera['width']} x {camera['height']}, {camera['pictures']} pictures"
+        yield f"  {camera['name']}: {camera['kind']} {size}, calibrated"
 
 
 def _make_rig(inputs: list[Path], output: Path, common: Common) -> None:
-    """Write the rig of recordings."""
     warnings = make_rig([open_take(path) for path in inputs], output, common)
     rig = read_rig(output)
     common.warn([*warnings, *rig.missing()])
@@ -141,7 +142,6 @@ def _make_rig(inputs: list[Path], output: Path, common: Common) -> None:
 
 
 def _fuse(rig: Path, output: Path, options: FusionOptions, frames: str, format: str, common: Common) -> None:
-    """Write the meshes of a rig."""
     recording, warnings = open_recording(rig, options, frames, keep=False)
     common.warn(warnings)
     names = frame_names(len(recording), format)
@@ -157,13 +157,13 @@ def _fuse(rig: Path, output: Path, options: FusionOptions, frames: str, format: 
     if bare:
         common.warn([f"{output}: {len(bare)} of {len(missing)} fused frames have no surface, as {bare[0]}"])
     row = {"output": str(output), "frames": len(names), "fused": len(missing), "frame_rate": recording.frame_rate}
-    kept = "" if len(missing) == len(names) else f", {len(names) - len(missing)} of them from before"
-    text = f"{output}: {len(names)} {format} files{kept}, {recording.frame_rate:g} frames a second"
+    earlier = "" if len(missing) == len(names) else f", {len(names) - len(missing)} of them from before"
+    text = f"{output}: {len(names)} {format} files{earlier}, {recording.frame_rate:g} frames a second"
     common.result(row | {"format": format}, text)
 
 
 def _made(rig: Path, recording: Recording) -> dict[str, Any]:
-    """Return all that the frames depend on; pictures count by their sizes, which differ between recordings."""
+    """Return everything that the frames depend on; the files of pictures are told apart by their sizes."""
     cameras = [camera.record() for camera in recording.rig.cameras]
     sizes = [[_size(files[n]) if n in files else -1 for n in recording.numbers] for files in recording.rig.files]
     return {
@@ -189,7 +189,7 @@ def _started(output: Path, made: dict[str, Any], names: list[str]) -> set[str]:
     """Record the run in the folder; return the missing files. Raises InputError for a folder of another run."""
     path = output / CAPTURED
     make_folder(output)
-    there = {name for name in names if (output / name).exists()}
+    existing = {name for name in names if (output / name).exists()}
     if path.exists():
         before = read_json(path, "delete the folder, or choose another")
         if before != (now := json.loads(json.dumps(made))):
@@ -200,4 +200,4 @@ def _started(output: Path, made: dict[str, Any], names: list[str]) -> set[str]:
     else:
         with replacing(path) as file:
             file.write((json.dumps(made, indent=1) + "\n").encode())
-    return set(names) - there
+    return set(names) - existing

@@ -35,8 +35,8 @@ from .flags import Knowing, Looking, Reading
 from .sources import open_source
 from .splats import compare_splats
 
-ALIKE = 0.2  # share of what depth measured: a decoded scene that covers less is of another recording (guess)
-OF_BOTH = {"truth": "against the truth", "depth": "by the depth pictures"}  # parts of a row with numbers of both
+ALIKE = 0.2  # share of the measured depth: a decoded scene that covers less is of another recording (guess)
+OF_BOTH = {"truth": "against the truth", "depth": "by the depth pictures"}  # metrics of originals and decoded meshes
 
 
 def command(
@@ -77,7 +77,7 @@ def command(
     if sheet is not None and not sheet.parent.is_dir():
         raise InputError(f"{sheet}: there is no folder {sheet.parent}; make it or choose another")
     if sheet is not None:
-        import_module("matplotlib")  # where it is missing, that is said before minutes of measuring
+        import_module("matplotlib")  # if it is missing, fail before minutes of measuring
     source = open_source([originals], reading, common)
     sequence, stored = source.sequence, open_decoded(decoded, reading)
     same = len(stored) == len(sequence)
@@ -85,7 +85,7 @@ def command(
     other = stored if same else Chosen(stored, numbers)
     if len(sequence) != len(other):
         raise InputError(f"{originals} has {len(sequence)} frames and {decoded} {len(other)}; choose with --frames A:B")
-    shown = SheetOptions(sheet_frames, _sheet_cameras(looking, sequence), up=looking.up, first=numbers.start)
+    sheet_options = SheetOptions(sheet_frames, _sheet_cameras(looking, sequence), up=looking.up, first=numbers.start)
     if splats:
         if not isinstance(other, Video):
             raise InputError(f"{decoded}: --splats needs a .reel file with the frames of {originals}; see meshreel cut")
@@ -101,7 +101,7 @@ def command(
                     sequence, other, truth, range(0, len(sequence), knowing.truth_every), progress
                 )
         if sheet is not None:
-            write_sheet(sequence, other, sheet, shown)
+            write_sheet(sequence, other, sheet, sheet_options)
     except FormatError as error:  # names the chunk, but not the file
         raise FormatError(f"{decoded}: {error}; copy the file again, or compare frames before it") from None
     warnings = [*source.warnings, *(f"{decoded}: {w}" for w in getattr(stored, "warnings", ()))]
@@ -110,7 +110,7 @@ def command(
 
 
 def _other(row: dict[str, Any], originals: str, decoded: str) -> Iterator[str]:
-    """Yield a warning where the decoded surface is hardly anywhere that the depth pictures of a rig have surface."""
+    """Yield a warning if the decoded surface covers hardly any of the depth pictures of a rig."""
     own, share = (row["depth"][name]["all_covered"] for name in ("originals", "decoded")) if "depth" in row else (0, 0)
     if (share or 0.0) < ALIKE <= (own or 0.0):
         text = f"{decoded}: covers {100 * (share or 0.0):.0f} % of what the depth cameras of {originals} measured"
@@ -118,7 +118,6 @@ def _other(row: dict[str, Any], originals: str, decoded: str) -> Iterator[str]:
 
 
 def _tell(row: dict[str, Any], sheet: Path | None, common: Common) -> None:
-    """Print warnings and tables, or JSON."""
     common.warn(row["warnings"])
     texts: list[object] = [both_table(title, row[name]) for name, title in OF_BOTH.items() if name in row]
     texts += [f"picture: {sheet}"] if sheet is not None else []
@@ -134,7 +133,7 @@ def _measured(
 
 
 def _rate(decoded: str, other: MeshSequence) -> dict[str, Any]:
-    """Return the size of a .reel file and its rate; nothing of meshes."""
+    """Return the size and rate of a .reel file; nothing for meshes."""
     if not isinstance(other, Video):
         return {}
     described = describe_file(Path(decoded))
@@ -142,16 +141,15 @@ def _rate(decoded: str, other: MeshSequence) -> dict[str, Any]:
 
 
 def open_decoded(decoded: str, reading: Reading) -> MeshSequence:
-    """Open a .reel file, or decoded meshes."""
     if is_reel(decoded):
         return open_video(decoded)
     return open_sequence(decoded, SequenceOptions(reading.fps, weld=weld))
 
 
 def _options(looking: Looking, sequence: MeshSequence, decoded: MeshSequence) -> ComparisonOptions:
-    """Return the options that were asked for; key frames are those that a file names where none are given.
+    """Return the requested options, with the key frames that a file records unless others are given.
 
-    By default, no pictures are rendered of what is judged by its own depth pictures.
+    By default, SSIM is not computed for recordings with depth pictures, which judge the frames.
     """
     options = looking.options(captured(sequence).depth is None)
     if isinstance(decoded, Video) and not options.keys:
@@ -193,20 +191,20 @@ def against_truth(
 
 
 def by_depth(sequence: CapturedSequence, decoded: MeshSequence, progress: StageBars) -> dict[str, Any]:
-    """Judge decoded frames by the depth pictures of a recording, which it has, and beside them its own frames."""
+    """Judge a recording's own frames and the decoded ones by its depth pictures."""
     assert sequence.depth is not None
     judged = DepthJudge(sequence.depth, len(sequence), UP_AXES[sequence.up])
     chunks = decoded.reader.chunks if isinstance(decoded, Video) else ()
     refreshes = {chunk.first_frame for chunk in chunks if chunk.kind == ChunkKind.STATIC}
-    found = dict[str, Any]()
+    rows = dict[str, Any]()
     for name, frames, changed in (("originals", sequence, set[int]()), ("decoded", decoded, refreshes)):
         numbers = counted(range(len(sequence)), progress, f"depth of {name}")
-        found[name] = judge(judged, frames, numbers, changed)
-    return {"frames": list(range(len(sequence)))} | found
+        rows[name] = judge(judged, frames, numbers, changed)
+    return {"frames": list(range(len(sequence)))} | rows
 
 
 def both_table(title: str, row: dict[str, Any]) -> Table:
-    """Return a table of numbers of originals and of decoded meshes, a line each."""
+    """Return a table with a line for each metric: its values for originals and for decoded meshes."""
     beside, decoded = (row[name] for name in row if name not in ("frames", "per_frame"))
     table = Table(f"{title}, {len(row['frames'])} frames", "originals (noise floor)", "decoded")
     for name in decoded:
@@ -226,7 +224,7 @@ def is_reel(path: str) -> bool:
 
 
 def recorded_keys(metadata: dict[str, Any], count: int) -> tuple[int, ...]:
-    """Return the key frames below `count` recorded in a file; ignore other values, which a foreign file may have."""
+    """Return the key frames below `count` recorded in a file; ignore invalid values, which a foreign file may have."""
     recorded = metadata.get("key_frames")
     numbers = recorded if isinstance(recorded, list) else []
     return tuple(number for number in numbers if type(number) is int and 0 <= number < count)
@@ -235,7 +233,7 @@ def recorded_keys(metadata: dict[str, Any], count: int) -> tuple[int, ...]:
 def metric_table(row: dict[str, Any]) -> Table:
     """Return a table of metrics, one per line: mean over frames, worst frame, and mean without key frames.
 
-    What no frame has, and counts of no frames, are left out.
+    Metrics that no frame has, and counts of 0 frames, are left out.
     """
     columns = {"mean": "", "worst frame": "_worst"}
     if any(name.endswith("_without_keys") for name in row):
@@ -251,14 +249,14 @@ def metric_table(row: dict[str, Any]) -> Table:
 
 
 def counted(items: MeshSequence | range, progress: StageBars, stage: str = "compare") -> Iterator[Any]:
-    """Yield frames or their numbers and report each after its use."""
+    """Yield frames or their numbers, and report progress after each is used."""
     for i, item in enumerate(items):
         yield item
         progress(stage, i + 1, len(items))
 
 
 def _cameras(row: dict[str, Any]) -> list[str]:
-    """Return a line for each view of SSIM; the JSON has the complete cameras."""
+    """Return a line for each view used for SSIM; the JSON has the complete cameras."""
     lines = []
     for number, camera in enumerate(row["cameras"]):
         extrinsic = np.reshape(camera["extrinsic"], (4, 4)).T

@@ -1,4 +1,4 @@
-"""`meshreel completion`: the script by which a shell completes commands and flags."""
+"""`meshreel completion`: a script that lets a shell complete commands and flags."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from .console import Common
 
 
 def command(shell: Literal["bash", "zsh", "fish"], /, *, common: Common = Common()) -> None:
-    """Print the script by which a shell completes commands and flags.
+    """Print a script that lets a shell complete commands and flags.
 
-    Commands whose packages are not installed have no flags in it.
+    It lacks the flags of commands whose packages are not installed.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Terminal output: warnings, a progress bar for each stage or a line now and then, results as text or JSON."""
+"""Terminal output: warnings, progress as a bar for each stage or as lines, results as text or JSON."""
 
 from __future__ import annotations
 
@@ -64,12 +64,12 @@ class Common:
             console = Console(highlight=False, soft_wrap=True)
             for text in texts:
                 console.print(text, markup=False)
-        if sys.stdout is not None:  # it is closed where the caller has none
+        if sys.stdout is not None:  # None if the caller closed it
             sys.stdout.flush()  # a server prints its addresses and keeps running
 
     @contextmanager
     def stages(self, total: int, counted: str = "frames") -> Iterator[StageBars]:
-        """Show progress bars, one per stage, on standard error, or lines where that is no terminal; none if quiet."""
+        """Show progress on standard error: a bar per stage, or lines if it is no terminal; nothing if quiet."""
         console = Console(stderr=True)
         columns = (
             SpinnerColumn(),
@@ -81,21 +81,21 @@ class Common:
             TextColumn("left"),
             _LeftColumn(),
         )
-        shown = console.is_terminal and not self.quiet
-        bars = Progress(*columns, console=console, disable=not shown)
-        with bars, nullcontext() if shown or self.quiet else _lines(bars, counted):
+        visible = console.is_terminal and not self.quiet
+        bars = Progress(*columns, console=console, disable=not visible)
+        with bars, nullcontext() if visible or self.quiet else _lines(bars, counted):
             yield StageBars(bars, total)
 
 
 def called_as() -> str:
-    """Return how this program was called, for printed commands: by its name on PATH, by its path, or as a module."""
+    """Return the command that called this program, for printed examples: name on PATH, path, or module."""
     called = Path(sys.argv[0])
     if called.stem == "__main__":
         return f"{sys.executable} -m meshreel"
     if called.stem != "meshreel":
-        return "meshreel"  # from another program, which uses it as a library
-    found = shutil.which(called.name)
-    return "meshreel" if found is not None and Path(found).resolve() == called.resolve() else str(called)
+        return "meshreel"  # another program uses it as a library
+    on_path = shutil.which(called.name)
+    return "meshreel" if on_path is not None and Path(on_path).resolve() == called.resolve() else str(called)
 
 
 class StageBars:
@@ -117,18 +117,17 @@ class StageBars:
 
 
 def left(task: Task) -> float | None:
-    """Return the seconds that a stage still takes at the pace so far; None where none of its frames was seen pass."""
-    gained = task.completed - task.fields["first"]  # those of an earlier run took no time
+    """Return the seconds that a stage still takes at its pace so far; None before its first frame."""
+    gained = task.completed - task.fields["first"]  # frames of an earlier run took no time
     if gained <= 0 or task.elapsed is None or task.remaining is None:
         return None
     return task.elapsed * task.remaining / gained
 
 
 class _LeftColumn(ProgressColumn):
-    """The time left, from all frames so far: a frame's time varies too much for the last few to tell."""
+    """Column with the time left, from the mean time of all frames so far, because single frames vary."""
 
     def render(self, task: Task) -> Text:
-        """Return the text of a bar."""
         return Text(_clock(left(task)), style="progress.remaining")
 
 
@@ -153,7 +152,7 @@ def _lines(bars: Progress, counted: str) -> Iterator[None]:
 
 
 def line_of(tasks: Iterable[Task], counted: str = "frames") -> str:
-    """Return a line that tells how far the unfinished stages are, or the last one that is done; empty before any."""
+    """Return a line with the progress of the unfinished stages, or the last finished stage; empty before any."""
     if not (all_of_them := list(tasks)):
         return ""
     began = min(task.start_time or 0.0 for task in all_of_them)

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from cyclopts import Parameter
 
@@ -18,7 +18,7 @@ from ..errors import FormatError, InputError
 from ..export.frames import Part, check_part, write_frames
 from ..export.splats import check_splats, write_splats
 from ..geometry.topology import concatenate
-from ..io.write import check_apart, frame_names, left_over, make_folder, replacing
+from ..io.write import check_apart, frame_names, left_over, make_folder, replacing, write_mesh
 from ..types import Mesh, Texture
 from .console import Common
 
@@ -88,21 +88,13 @@ def command(
                 return replace(mesh, uv=None, texture=None)
             return replace(mesh, texture=Texture.of(mesh.texture.pixels))
         except FormatError as error:
-            mesh = concatenate(parts(bare, frame))  # whose error is one of the surface
+            mesh = concatenate(parts(bare, frame))  # raises if the surface is damaged
             pale.append(error)
             return mesh
 
-    make_folder(output)
     every_name = frame_names(len(video), format)
     names = [every_name[frame] for frame in written]
-    common.warn(left_over(output, names, f"frame_*.{format}"))
-    with common.stages(len(names)) as progress:
-        paths = [output / name for name in names]
-        failed = write_frames(lambda at: decode(written[at]), paths, lambda done: progress("decode", done, len(names)))
-    if failed:
-        raise FormatError(
-            f"{file}: {failed[0]}; {_lost(len(failed), len(names))}; copy the file again, or encode it anew"
-        )
+    _write(file, output, names, (lambda at: decode(written[at]), write_mesh), common)
     if pale:
         text = f"{file}: {pale[0]}; {len(pale)} of {len(names)} frames are written without their colours"
         raise FormatError(f"{text}; copy the file again")
@@ -113,53 +105,45 @@ def command(
 
 
 def _changes(reader: ReelReader, pictured: Callable[[int], Mesh | None]) -> Sequence[int]:
-    """Return the frames at which another background is shown, or the same one as another object of `pictured`."""
-    found, before, seen = list[int](), -1, None
+    """Return the frames at which the background or its picture, an object of `pictured`, changes."""
+    frames, before, mesh_before = list[int](), -1, None
     for frame in range(reader.frame_count):
         if (chunk := reader.static_of_frame(frame)) is None:
             continue
         try:
-            shown = pictured(frame)
+            mesh = pictured(frame)
         except FormatError:
-            shown = None  # which is told when it is written
-        if chunk.number != before or shown is not seen:
-            found.append(frame)
-        before, seen = chunk.number, shown
-    return found
+            mesh = None  # reported when it is written
+        if chunk.number != before or mesh is not mesh_before:
+            frames.append(frame)
+        before, mesh_before = chunk.number, mesh
+    return frames
 
 
 def _write_audio(file: Path, video: Video, output: Path, common: Common) -> None:
-    """Write the audio file, byte for byte. Raises InputError where there is none."""
-    found = video.audio
-    if found is None:
+    """Write the audio file, byte for byte. Raises InputError if there is none."""
+    clip = video.audio
+    if clip is None:
         raise InputError(f"{file}: has no audio; meshreel tag --audio adds one")
     check_apart(output, [file])
     with replacing(output) as sink:
-        sink.write(found.data)
-    row = {"output": str(output), "bytes": len(found.data), "type": found.media_type, "start_s": found.start}
-    common.result(row, f"{output}: {len(found.data)} bytes of {found.media_type}")
+        sink.write(clip.data)
+    row = {"output": str(output), "bytes": len(clip.data), "type": clip.media_type, "start_s": clip.start}
+    common.result(row, f"{output}: {len(clip.data)} bytes of {clip.media_type}")
 
 
 def _write_splats(file: Path, video: Video, output: Path, format: str, common: Common) -> None:
-    """Write the splats of all frames. Raises InputError where there are none, or for a format of meshes."""
+    """Write the splats of all frames. Raises InputError if there are none, or for a format of meshes."""
     if format not in ("ply", "spz"):
         raise InputError(f"--format {format}: splats are written as PLY or SPZ; give --format ply or spz")
     check_splats(video, str(file))
-    make_folder(output)
-    names = frame_names(len(video), format)
-    common.warn(left_over(output, names, f"frame_*.{format}"))
-    with common.stages(len(video)) as progress:
-        failed = _write_all(video, [output / name for name in names], progress)
-    if failed:
-        raise FormatError(
-            f"{file}: {failed[0]}; {_lost(len(failed), len(video))}; copy the file again, or encode it anew"
-        )
+    _write(file, output, frame_names(len(video), format), (video.splats, write_splats), common)
     row = {"output": str(output), "frames": len(video), "format": format, "frame_rate": video.frame_rate}
     common.result(row, f"{output}: splats of {len(video)} frames, {format} files")
 
 
 def _not_kept(reader: ReelReader, format: str) -> tuple[str, ...]:
-    """Return a warning of what files of a format do not keep of the colours of a video."""
+    """Return a warning if files of a format cannot keep a video's textures."""
     if not reader.has_textures:
         return ()
     if format == "ply":
@@ -169,18 +153,20 @@ def _not_kept(reader: ReelReader, format: str) -> tuple[str, ...]:
     return ("no textures, colours of vertices are kept: textures need the extra color: pip install 'meshreel[color]'",)
 
 
-def _write_all(video: Video, paths: Sequence[Path], progress: Callable[[str, int, int], object]) -> list[FormatError]:
-    """Write the splats of each frame; return the errors of damaged frames, whose files are removed."""
-    failed = list[FormatError]()
-    for number, path in enumerate(paths):
-        try:
-            write_splats(video.splats(number), path)
-        except FormatError as error:
-            failed.append(error)
-            path.unlink(missing_ok=True)
-        progress("decode", number + 1, len(paths))
-    return failed
-
-
-def _lost(failed: int, count: int) -> str:
-    return f"{failed} of {count} frames are lost, the others are written" if failed < count else "all frames are lost"
+def _write(
+    file: Path,
+    output: Path,
+    names: list[str],
+    how: tuple[Callable[[int], Any], Callable[[Any, Path], None]],
+    common: Common,
+) -> None:
+    """Decode and write frames by the functions `how`. Raises FormatError at the end if some are damaged."""
+    make_folder(output)
+    common.warn(left_over(output, names, f"frame_*{Path(names[0]).suffix}"))
+    with common.stages(len(names)) as progress:
+        paths, (decode, write) = [output / name for name in names], how
+        failed = write_frames(decode, paths, lambda done: progress("decode", done, len(names)), write)
+    if failed:
+        lost = f"{len(failed)} of {len(names)} frames are lost, the others are written"
+        lost = lost if len(failed) < len(names) else "all frames are lost"
+        raise FormatError(f"{file}: {failed[0]}; {lost}; copy the file again, or encode it again")

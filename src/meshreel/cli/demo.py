@@ -29,7 +29,7 @@ from .info import rate_table
 from .workers import workers
 
 _QUALITY = preset_options().quality
-_JUDGED = 4  # frames, at most, that are compared with the truth: each takes seconds (guess)
+_JUDGED = 4  # largest number of frames compared with the truth: each takes seconds (guess)
 
 
 def command(
@@ -43,7 +43,7 @@ def command(
 ) -> None:
     """Simulate depth cameras in a room where two people move, capture and encode it, and measure the result.
 
-    Captured and decoded meshes are compared with the truth, which a simulation knows; the captured ones are noisy.
+    Captured meshes, which are noisy, and decoded ones are compared with the truth, which a simulation knows.
 
     Parameters
     ----------
@@ -98,7 +98,7 @@ def _captured(folder: Path, room: RoomOptions, progress: StageBars) -> Recording
 
 
 def _forget(folder: Path, names: list[str]) -> None:
-    """Remove the frames of an earlier demo, so that rig and truth match. Raises InputError if the rig is no demo's."""
+    """Remove the frames of an earlier demo, so that rig and truth match. Raises InputError for other rigs."""
     if not (folder / RIG).exists():
         return
     if not (folder / TRUTH).is_dir() or [camera.name for camera in read_cameras(folder)[0]] != names:

@@ -1,4 +1,4 @@
-"""`meshreel doctor`: what is installed, and what this machine can do with it."""
+"""`meshreel doctor`: installed packages and extras, and what this machine can do with them."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ _CODECS = {"AV1 decoded": "libdav1d", "AV1 encoded": "libsvtav1", "H.264 encoded
 
 
 def command(*, common: Common = Common()) -> None:
-    """Tell what is installed, extra by extra, which video codecs there are, and whether a GPU and browser are found."""
+    """Report installed packages by extra, the video codecs, and if a GPU and a browser are found."""
     row: dict[str, Any] = {"meshreel": __version__, "python": platform.python_version(), "system": platform.platform()}
     row |= {"extras": _extras(), "codecs": _codecs(), "gpu": _gpu()}
     row["browser"] = _browser()
     row["player"] = (files("meshreel") / "player" / "meshreel-player.js").is_file()
     table = Table("extra", "installed", "missing")
     for extra, packages in row["extras"].items():
-        there = ", ".join(f"{name} {found}" for name, found in packages.items() if found)
-        table.add_row(extra, there, ", ".join(name for name, found in packages.items() if not found) or "nothing")
-    codecs = ", ".join(f"{name}: {'yes' if there else 'no'}" for name, there in row["codecs"].items())
+        present = ", ".join(f"{name} {release}" for name, release in packages.items() if release)
+        table.add_row(extra, present, ", ".join(name for name, release in packages.items() if not release) or "nothing")
+    codecs = ", ".join(f"{name}: {'yes' if present else 'no'}" for name, present in row["codecs"].items())
     common.result(
         row,
         f"meshreel {row['meshreel']}, Python {row['python']}, {row['system']}",
@@ -41,20 +41,20 @@ def command(*, common: Common = Common()) -> None:
 
 
 def _extras() -> dict[str, dict[str, str | None]]:
-    """Return the packages of each extra, and of none, with their versions; None for those that are missing."""
-    found: dict[str, dict[str, str | None]] = {}
+    """Return the packages of each extra, and those needed always, with versions; None for missing packages."""
+    extras: dict[str, dict[str, str | None]] = {}
     for line in requires("meshreel") or ():
         if (need := _NEEDS.match(line)) and need[1] != "meshreel":
-            packages = found.setdefault(need[2] or "(none)", {})
+            packages = extras.setdefault(need[2] or "(none)", {})
             try:
                 packages[need[1]] = version(need[1])
             except PackageNotFoundError:
                 packages[need[1]] = None
-    return found
+    return extras
 
 
 def _codecs() -> dict[str, bool]:
-    """Return which codecs of textures PyAV has; nothing without it."""
+    """Return the codecs of textures, True for those that PyAV has; nothing without PyAV."""
     try:
         from av import codecs_available
     except ImportError:
@@ -65,10 +65,10 @@ def _codecs() -> dict[str, bool]:
 def _browser() -> str | None:
     """Return the browser that `meshreel play` and `Video.show` open; None without one."""
     try:
-        found = webbrowser.get()
+        browser = webbrowser.get()
     except webbrowser.Error:
         return None
-    return str(getattr(found, "name", type(found).__name__))
+    return str(getattr(browser, "name", type(browser).__name__))
 
 
 def _gpu() -> str | None:

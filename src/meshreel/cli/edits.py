@@ -1,4 +1,4 @@
-"""`meshreel cut`, `concat`, `retime`, `transform` and `tag`: edits of .reel files that encode nothing again."""
+"""`meshreel cut`, `concat`, `retime`, `transform` and `tag`: edits of .reel files without encoding again."""
 
 from __future__ import annotations
 
@@ -35,9 +35,9 @@ def cut(
     Parameters
     ----------
     frames
-        Frames to keep, as A:B with B excluded. Those that they are coded with stay in the file, hidden.
+        Frames to keep, as A:B with B excluded. Other frames of their groups stay in the file, hidden.
     keys
-        Cut where frames decode alone, before A and behind B, so that nothing is hidden.
+        Cut only where frames decode alone, at or before A and at or behind B, so that no frame is hidden.
     """
     done = edit.cut(file, _checked(output), frames, keys)
     if done.hidden:
@@ -58,8 +58,8 @@ def concat(inputs: list[str], /, *, output: Output, common: Common = Common()) -
     place = _checked(output)
     joined = edit.concat(inputs, place)
     if joined.missing:
-        whole = joined.frames + joined.missing
-        common.warn((f"{place}: {joined.missing} of the sequence's {whole} frames are in none of the files",))
+        total = joined.frames + joined.missing
+        common.warn((f"{place}: {joined.missing} of the sequence's {total} frames are in none of the files",))
     row = {"output": str(place), "frames": joined.frames, "bytes": joined.size, "files": len(inputs)}
     common.result(row, f"{place}: {joined.frames} frames of {len(inputs)} files, {joined.size} bytes")
 
@@ -74,7 +74,7 @@ def retime(
     fps
         Frames per second, evenly.
     speed
-        How many times as fast it plays, as 0.5 for half the speed.
+        Factor of the speed: 0.5 plays half as fast.
     """
     done = edit.retime(file, _checked(output), fps, speed)
     if done.lost_audio:
@@ -109,10 +109,10 @@ def transform(
     """
     turn = np.eye(3)
     for axis, angle in enumerate(np.radians(rotate)):
-        one, other = (axis + 1) % 3, (axis + 2) % 3
+        first, second = (axis + 1) % 3, (axis + 2) % 3
         step = np.eye(3)
-        step[one, one] = step[other, other] = np.cos(angle)
-        step[one, other], step[other, one] = -np.sin(angle), np.sin(angle)
+        step[first, first] = step[second, second] = np.cos(angle)
+        step[first, second], step[second, first] = -np.sin(angle), np.sin(angle)
         turn = step @ turn
     done = edit.transform(file, _checked(output), scale, turn if any(rotate) else None, translate, up)
     _tell(_checked(output), done, common)
@@ -154,8 +154,8 @@ def tag(
             tags[name] = json.loads(text) if text else None
         except ValueError:
             tags[name] = text
-    heard = b"" if no_audio else audio
-    _tell(_checked(output), edit.tag(file, _checked(output), tags, audio=heard, audio_start=audio_start), common)
+    sound = b"" if no_audio else audio
+    _tell(_checked(output), edit.tag(file, _checked(output), tags, audio=sound, audio_start=audio_start), common)
 
 
 def _checked(output: str) -> Place:

@@ -153,11 +153,11 @@ class Part:
         surveyed, chosen = read_survey(located(self.survey)), SequenceOptions(frames=frames).chosen(len(sequence))
         if self.part is None:
             return Excerpt(surveyed, chosen)
-        found = _PART.fullmatch(self.part)
-        if found is None or len(chosen) < len(sequence):
+        numbers = _PART.fullmatch(self.part)
+        if numbers is None or len(chosen) < len(sequence):
             raise InputError(f"--part {self.part}: give K/N, as 3/100, and leave --frames out")
         intervals = surveyed.seen.intervals(options.recipe().longest(sequence.frame_rate))
-        return Excerpt(surveyed, part_of(intervals, int(found[1]), int(found[2])))
+        return Excerpt(surveyed, part_of(intervals, int(numbers[1]), int(numbers[2])))
 
     def check(self, coding: Coding, masking: Masking) -> None:
         """Raise InputError for flags that no part can have."""
@@ -217,7 +217,7 @@ def command(
     if debug_digests is not None and (resume or coding.goal() is not None):
         raise InputError("--debug-digests describes one whole encode: leave out --resume and targets")
     part.check(coding, masking)
-    heard = hearing.payload()
+    sound = hearing.payload()
     scene = parting.scene(preset_options().scene or SceneOptions(), masking)
 
     def options_at(quality: float) -> EncoderOptions:
@@ -229,16 +229,16 @@ def command(
     source = open_source(inputs, reading if part.survey is None else replace(reading, frames=":"), common)
     sequence, masker = masking.upright(source), masking.masker(len(source.sequence))
     excerpt = part.excerpt(sequence, reading.frames, options)
-    here = jobs == 1 and cluster is None  # where workers read, this process reads no frame
+    here = jobs == 1 and cluster is None  # with workers, this process reads no frame
     early = lacking if sequence.colors is not None or (lacking and here and is_colored(sequence)) else ()
-    common.warn(early)  # not after minutes
+    common.warn(early)  # now, not after minutes
     with (
         common.stages(len(sequence if excerpt is None else excerpt.frames)) as progress,
         workers(jobs, cluster) as executor,
         _lines(debug_digests, place, sequence.files) as digests,
     ):
         encoder = Encoder(sequence, executor, progress, masker, digests, excerpt)
-        encoder.audio = heard
+        encoder.audio = sound
         if goal is None:
             summary = encoder.encode(place, options, resume)
         else:
@@ -253,7 +253,7 @@ def command(
 
 @contextmanager
 def _lines(path: Path | None, output: Place, inputs: Iterable[Path]) -> Iterator[WriteLines | None]:
-    """Yield what writes lines to the file of digests, which appears when the encode is done; None without a path."""
+    """Yield a writer of lines for the file of digests, which appears after the encode; None without a path."""
     if path is None:
         yield None
         return
@@ -340,5 +340,5 @@ def _reached(row: dict[str, Any]) -> str:
     psnr = row["d2_psnr_paper"]
     if psnr is None:
         return f"quality {row['quality']:g}"
-    some = "" if row["scene"] is None else f" in {len(row['scene']['measured_frames'])} frames"
-    return f"quality {row['quality']:g}, D2-PSNR {psnr:.2f} dB{some}"
+    measured = "" if row["scene"] is None else f" in {len(row['scene']['measured_frames'])} frames"
+    return f"quality {row['quality']:g}, D2-PSNR {psnr:.2f} dB{measured}"

@@ -97,8 +97,8 @@ def _target(file: Path, output: Path | None, glb: bool, usd: bool) -> Path:
         if not (glb or usd):
             raise InputError("no format: give --glb, --usd, or a name with -o")
         return Path(file.stem + (".glb" if glb else ".usdc"))
-    known = (".glb",) if glb else EXTENSIONS if usd else (".glb", *EXTENSIONS)
-    if output.suffix.lower() not in known:
-        text = f"{output}: the output must end in {' or '.join(known)}"
+    extensions = (".glb",) if glb else EXTENSIONS if usd else (".glb", *EXTENSIONS)
+    if output.suffix.lower() not in extensions:
+        text = f"{output}: the output must end in {' or '.join(extensions)}"
         raise InputError(f"{text}; a mesh file for each frame is written by meshreel decode")
     return output

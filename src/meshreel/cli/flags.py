@@ -61,7 +61,7 @@ class Looking:
     per frame)."""
 
     def options(self, ssim: bool) -> ComparisonOptions:
-        """Return the options of `compare_sequences`, with SSIM as given where it is neither asked for nor excluded."""
+        """Return the options of `compare_sequences`; `ssim` decides if no flag requests or excludes SSIM."""
         ssim = (ssim or self.cameras is not None) if self.ssim is None else self.ssim
         views, mpeg = ViewOptions(self.width, self.height, up=self.up), MpegOptions() if self.mpeg else None
         return ComparisonOptions(self.cameras, views, ssim, self.keys, mpeg)
@@ -85,7 +85,7 @@ class Knowing:
 @Parameter(name="*")
 @dataclass(frozen=True, slots=True)
 class Hearing:
-    """Flags for what is heard with the frames."""
+    """Flags for the audio file of the frames."""
 
     audio: str | None = None
     """An audio file that players play with the frames: Opus (.opus, .webm), AAC (.m4a, .aac) or MP3, kept as it is."""
@@ -93,7 +93,7 @@ class Hearing:
     """Seconds from the first frame to the beginning of --audio; below 0, that much of it is left out."""
 
     def payload(self) -> bytes:
-        """Return the bytes of a chunk. Raises InputError for another file."""
+        """Return the payload of an audio chunk, empty without audio. Raises InputError for files of other types."""
         if self.audio is None and self.audio_start:
             raise InputError(f"--audio-start {self.audio_start:g}: needs --audio, the file that begins then")
         return b"" if self.audio is None else packed_audio(self.audio, self.audio_start)

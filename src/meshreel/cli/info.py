@@ -1,4 +1,4 @@
-"""`meshreel info`: the contents of a .reel file and the bytes that each takes."""
+"""`meshreel info`: the contents of a .reel file and their sizes in bytes."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from ..errors import FormatError
 from .console import Common
 
 MOST = 8  # rows of a table without --groups: all of them fit on a screen (guess)
-MOST_CONTENTS = 24  # rows of contents; where there are more, tracks are added up
-_LONGEST = 80  # characters of a value that the encoder recorded
+MOST_CONTENTS = 24  # largest number of rows of contents; above it, tracks are added up
+_LONGEST = 80  # largest number of shown characters of a recorded value
 
 
 def command(
@@ -46,21 +46,21 @@ def command(
     tables = [rate_table(row | _added_up(row) if is_long else row)]
     if row["background"] or len(row["tracks"]) > 1:
         tables += [_tracks(row, more), _states(row, more)]
-    told = f"recorded at encode: {recorded or 'nothing'}"
-    common.result(row, head, _looks(row), told, *tables, _groups(row, more))
+    recorded_line = f"recorded at encode: {recorded or 'nothing'}"
+    common.result(row, head, _looks(row), recorded_line, *tables, _groups(row, more))
     common.warn(f"background: {state['error']}" for state in row["background"] if "error" in state)
     common.warn([f"audio: {row['audio']['error']}"] if "error" in (row["audio"] or {}) else [])
     common.warn(f"group {i}: {group['error']}" for i, group in enumerate(row["groups"]) if "error" in group)
 
 
 def _decode_all(file: Path, row: dict[str, Any]) -> None:
-    """Decode each group and state of the background that is shown; one that does not decode gets an error."""
+    """Decode each shown group and state of the background; add an error to the row of one that does not decode."""
     with open_video(file) as video:
-        shown = [(state, state["ranges"][0][0], video.background) for state in row["background"] if state["ranges"]]
+        decodable = [(state, state["ranges"][0][0], video.background) for state in row["background"] if state["ranges"]]
         for group in row["groups"]:
             if group["frames"]:
-                shown.append((group, group["first_frame"], video.tracks[group["track"]].__getitem__))
-        for described, frame, decode in shown:
+                decodable.append((group, group["first_frame"], video.tracks[group["track"]].__getitem__))
+        for described, frame, decode in decodable:
             try:
                 decode(frame)
             except FormatError as error:
@@ -68,35 +68,34 @@ def _decode_all(file: Path, row: dict[str, Any]) -> None:
 
 
 def _looks(row: dict[str, Any]) -> str:
-    """Describe what is seen in a line: box, mesh, layers, colour."""
+    """Describe box, mesh, layers, colour and audio in a line."""
     low, high = row["box_m"]
     box = " x ".join(f"{end - begin:.3g}" for begin, end in zip(low, high, strict=True))
     mesh, hidden = row["first_surface"], row["frames_hidden"]
     what = f"frame {mesh['frame']}: {mesh['vertices']} vertices, {mesh['faces']} faces" if mesh else "no surface found"
     parts = [f"box {box} m, {row['up']} is up", what, f"{row['layers']} layers", f"colour: {row['color']}"]
-    if (heard := row["audio"]) is not None:
-        begin = f", from {heard['start_s']:g} s" if "start_s" in heard else ""
-        parts.append(f"audio: {heard.get('type', 'damaged')}, {heard['bytes']} bytes{begin}")
+    if (sound := row["audio"]) is not None:
+        begin = f", from {sound['start_s']:g} s" if "start_s" in sound else ""
+        parts.append(f"audio: {sound.get('type', 'damaged')}, {sound['bytes']} bytes{begin}")
     return "; ".join([*parts, *([f"{hidden} frames more are hidden"] if hidden else [])])
 
 
 def _printable(text: str) -> str:
-    """Return the text with control characters escaped: a file from an untrusted source must not steer the terminal."""
+    """Return the text with control characters escaped: an untrusted file must not control the terminal."""
     return "".join(letter if letter.isprintable() else repr(letter)[1:-1] for letter in text)
 
 
 def _added_up(row: dict[str, Any]) -> dict[str, Any]:
     """Return bytes and rates by content of all tracks together."""
-    found: dict[str, dict[str, Any]] = {name: {} for name in ("bytes_by_content", "mbps_by_content")}
-    for of, sums in found.items():
+    sums_by_row: dict[str, dict[str, Any]] = {name: {} for name in ("bytes_by_content", "mbps_by_content")}
+    for of, sums in sums_by_row.items():
         for name, size in row[of].items():
             what = name.partition(": ")[2] or name
             sums[what] = sums.get(what, 0) + size
-    return found
+    return sums_by_row
 
 
 def rate_table(row: dict[str, Any]) -> Table:
-    """Return a table of bytes and rate by content."""
     table = Table("content", "bytes", "Mbps", "share")
     for name, size in ((name, size) for name, size in row["bytes_by_content"].items() if size):
         table.add_row(name, str(size), f"{row['mbps_by_content'][name]:.4f}", f"{100 * size / row['bytes']:.1f} %")
@@ -115,8 +114,8 @@ def _states(row: dict[str, Any], most: int | None) -> Table:
     table = Table("background", "form", "changes", "shown in frames", "bytes")
     for state in row["background"][:most]:
         changes = "" if state["changes"] is None else f"chunk {state['changes']}"
-        shown = _listed(state["ranges"], most)
-        table.add_row(f"chunk {state['chunk']}", state["form"], changes, shown, str(state["bytes"]))
+        frames = _listed(state["ranges"], most)
+        table.add_row(f"chunk {state['chunk']}", state["form"], changes, frames, str(state["bytes"]))
     return _ended(table, len(row["background"]), most)
 
 
@@ -134,7 +133,7 @@ def _groups(row: dict[str, Any], most: int | None) -> Table:
 
 
 def _ended(table: Table, count: int, most: int | None) -> Table:
-    """Return a table that says how many rows it lacks."""
+    """Return the table with a caption that counts the rows it lacks."""
     if most is not None and count > most:
         table.caption = f"{count - most} more: --groups shows all"
     return table

@@ -36,10 +36,10 @@ def command(
     with open_video(file):  # a damaged file is an error before the server starts
         pass
 
-    def announce(found: list[str]) -> None:
-        common.result({"file": str(file), "addresses": found}, f"playing {file} at {' '.join(found)}  (Ctrl-C stops)")
+    def announce(urls: list[str]) -> None:
+        common.result({"file": str(file), "addresses": urls}, f"playing {file} at {' '.join(urls)}  (Ctrl-C stops)")
         if browser:  # in a thread: a text browser returns only when it is closed
-            threading.Thread(target=_open, args=(found[0], common), daemon=True).start()
+            threading.Thread(target=_open, args=(urls[0], common), daemon=True).start()
 
     run(make_app(Library.of_file(file), hosts=server.hosts), server, announce)
 

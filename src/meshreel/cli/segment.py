@@ -98,7 +98,7 @@ def _left_over(output: Path, count: int, views_only: bool, previews: int) -> tup
 
 @dataclass(frozen=True, slots=True)
 class _Labelling:
-    """A scene to label, and how."""
+    """A scene to label, with the source of masks and the options."""
 
     frames: MeshSequence
     masker: Masker | None
@@ -129,8 +129,8 @@ def _write_labels(scene: _Labelling, output: Path, previews: int, common: Common
                 mesh = frames[number]
                 colors = label_colors(labels.moving, labels.bodies)
                 write_colored(mesh, colors, output / COLORED / f"{names[number]}.ply")
-                pictures, shown = look_at_labels(mesh, labels.moving, labels.bodies, views)
-                rows.append((FrameViews(number, pictures), shown))
+                pictures, counts = look_at_labels(mesh, labels.moving, labels.bodies, views)
+                rows.append((FrameViews(number, pictures), counts))
             progress("label", number + 1, count)
     with replacing(output / CAMERAS) as file:
         file.write(pack_cameras(views))
@@ -147,7 +147,6 @@ class _Tally:
         self._bodies: dict[int, list[int]] = {}  # face counts of each body in the frames that have it
 
     def add(self, labels: FrameLabels) -> None:
-        """Count the faces of a frame."""
         self._faces.append(len(labels.moving))
         self._moving.append(int(labels.moving.sum()))
         for number, faces in enumerate(np.bincount(labels.bodies).tolist()):
@@ -155,7 +154,6 @@ class _Tally:
                 self._bodies.setdefault(number, []).append(faces)
 
     def row(self) -> dict[str, Any]:
-        """Return the counts, ready for JSON."""
         bodies = [
             {"body": number, "frames": len(faces), "faces": sum(faces) // len(faces)}
             for number, faces in sorted(self._bodies.items())
@@ -168,8 +166,8 @@ class _Tally:
 
 
 def _sheet(previews: list[tuple[FrameViews, list[int]]]) -> UInt8[np.ndarray, "Y X 3"]:
-    """Return a sheet with a row for each frame: of all views, those that show most moving faces, which are given."""
-    counts = np.sum([shown for _, shown in previews], axis=0)
+    """Return a sheet with a row per frame of the views that show most moving faces, whose counts are given."""
+    counts = np.sum([moving_faces for _, moving_faces in previews], axis=0)
     best = sorted(np.argsort(-counts, kind="stable")[:COLUMNS].tolist())
     return sheet([FrameViews(row.frame, [row.pictures[view] for view in best]) for row, _ in previews], best)
 
@@ -178,5 +176,5 @@ def _describe(row: dict[str, Any]) -> str:
     share = f"{100 * row['moving_share']:.1f} % of the faces move"
     spread = f"{100 * row['moving_share_least']:.1f} to {100 * row['moving_share_most']:.1f} % in a frame"
     bodies = [f"{body['body']} in {body['frames']} frames, {body['faces']} faces" for body in row["bodies"]]
-    found = f"{len(bodies)} bodies ({'; '.join(bodies)})" if bodies else "no bodies"
-    return f"{row['frames']} frames, {share} ({spread}), {found}"
+    body_list = f"{len(bodies)} bodies ({'; '.join(bodies)})" if bodies else "no bodies"
+    return f"{row['frames']} frames, {share} ({spread}), {body_list}"

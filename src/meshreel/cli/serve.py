@@ -34,8 +34,8 @@ def command(
     if not folder.is_dir():
         raise InputError(f"{folder}: no folder; give one with .reel files, or use meshreel play for one file")
 
-    def announce(found: list[str]) -> None:
-        text = f"serving {folder} at {' '.join(found)}  (Ctrl-C stops)"
-        common.result({"folder": str(folder), "addresses": found}, text)
+    def announce(urls: list[str]) -> None:
+        text = f"serving {folder} at {' '.join(urls)}  (Ctrl-C stops)"
+        common.result({"folder": str(folder), "addresses": urls}, text)
 
     run(make_app(Library(folder), cors=cors, hosts=server.hosts), server, announce)

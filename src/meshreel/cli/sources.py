@@ -1,4 +1,4 @@
-"""Inputs of commands that take scenes: mesh files, the folder of a rig or recordings, and flags for what moves."""
+"""Inputs of commands that take scenes: mesh files, the folder of a rig or recordings, and flags for masks."""
 
 from __future__ import annotations
 
@@ -34,18 +34,18 @@ class Source:
 
     sequence: MeshSequence
     remarks: tuple[str, ...] = ()
-    scratch: tempfile.TemporaryDirectory[str] | None = None  # with the rig of recordings; it ends with the source
+    scratch: tempfile.TemporaryDirectory[str] | None = None  # with the rig of recordings; deleted with the source
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """One line each; complete after the last frame was read."""
+        """Warnings, one line each; complete after the last frame was read."""
         return (*self.remarks, *getattr(self.sequence, "warnings", ()))
 
 
 def open_source(inputs: Sequence[str], reading: Reading, common: Common = Common(quiet=True)) -> Source:
     """Open mesh files, or the folder of a rig or recordings, whose frames are fused on access. Raises InputError.
 
-    `common` shows how far the reading of recordings is. The truth of a simulated rig has a description of cameras, too,
+    `common` shows the progress of reading recordings. The truth of a simulated rig has a description of cameras, too,
     but is opened as the mesh files that it holds.
     """
     folder = located(inputs[0])
@@ -64,7 +64,7 @@ def open_source(inputs: Sequence[str], reading: Reading, common: Common = Common
             options = replace(options, frame_rate=float(rate))
         sequence = open_sequence(inputs[0] if len(inputs) == 1 else list(inputs), options)
         return Source(sequence)
-    reading.options()  # raises InputError for values that no sequence can have
+    reading.options()  # raises InputError for invalid values
     if reading.scale != _READ.scale:
         raise InputError(f"--scale {reading.scale:g}: {folder} is a rig, whose poses are in metres; leave it out")
     recording, remarks = open_recording(folder, frames=reading.frames)
@@ -75,7 +75,7 @@ def open_source(inputs: Sequence[str], reading: Reading, common: Common = Common
 
 
 def make_rig(takes: Sequence[Take], folder: Path, common: Common) -> list[str]:
-    """Write the rig of recordings and show how far it is; return warnings for the user."""
+    """Write the rig of recordings and show progress; return warnings for the user."""
     streams = [one for take in takes for sensor in take.sensors for one in (sensor.depth, sensor.color) if one]
     total = sum(stream.count for stream in streams)
     with common.stages(total, "pictures") as progress:
@@ -85,7 +85,7 @@ def make_rig(takes: Sequence[Take], folder: Path, common: Common) -> list[str]:
 @Parameter(name="*")
 @dataclass(frozen=True, slots=True)
 class Masking:
-    """Flags for the source of masks of what moves; without them, geometric change over the sequence."""
+    """Flags for masks of moving surface; without them, geometric change over the sequence decides."""
 
     masks: Path | None = None
     """Masks of another tool: a folder with cameras.json, and view00/frame_00000.png ... of its cameras, 8-bit
@@ -96,7 +96,7 @@ class Masking:
     """Words for objects that SAM3 looks for, as --prompts person --prompts dog; only moving ones count. Common words
     if not given."""
     prompt_by: PromptBy = "words"
-    """How objects are shown to SAM3: by words, or by points on what is seen to move in one view (motion)."""
+    """Prompts of objects for SAM3: words, or points on surface that moves in one view (motion)."""
     device: str = "cpu"
     """Device of SAM3 in torch's notation: cpu, cuda, cuda:1."""
     views: Path | None = None
@@ -123,11 +123,11 @@ class Masking:
         return replace(self, up=None) != Masking()
 
     def upright(self, source: Source) -> Upright:
-        """Return the sequence with the axis that points up: the one that was asked for, else that of the cameras."""
+        """Return the sequence with its axis that points up: that of --up, else that of the cameras."""
         return Upright(source.sequence, self.up)
 
     def options(self, options: SegmentOptions) -> SegmentOptions:
-        """Return the options with the views that were asked for. Raises InputError where their file is wrong."""
+        """Return the options with the views of --views. Raises InputError if their file is wrong."""
         if self.views is None:
             return options
         return replace(options, cameras=read_view_file(self.views))

@@ -1,4 +1,4 @@
-"""How far pictures of splats are from pictures of the originals, for `meshreel compare`."""
+"""Comparison of pictures of splats with pictures of the originals, for `meshreel compare`."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from ..metrics.ssim import BORDER, ssim_map
 from ..types import MeshSequence, evenly
 
 FRAMES, VIEWS, SIZE = 8, 4, 256  # frames that are compared, cameras around each, and pixels of the longer side
-ASIDE = 0.11  # turns, from a camera that the encoder has fitted to
+ASIDE = 0.11  # turns, from a camera to which the encoder fitted splats
 
 
 def compare_splats(sequence: MeshSequence, video: Video, progress: Progress) -> dict[str, Any]:
-    """Return PSNR, dB, and SSIM of pictures of splats in some frames, cut to the bodies.
+    """Return PSNR, dB, and SSIM of pictures of splats in some frames, cropped to the bodies.
 
-    Of a rig they are compared with its pictures; of coloured meshes with renders from cameras that were not fitted to.
-    Raises InputError where there is neither.
+    They are compared with a rig's pictures, or with renders of coloured meshes from cameras that were not used to fit.
+    Raises InputError if there are neither.
     """
     numbers, squares, scores = evenly(len(sequence), FRAMES), list[float](), list[float]()
     for done, number in enumerate(numbers, 1):
@@ -42,7 +42,7 @@ def compare_splats(sequence: MeshSequence, video: Video, progress: Progress) -> 
 
 
 def held_out(sequence: MeshSequence, video: Video, number: int) -> tuple[SplatView, ...]:
-    """Return pictures of a frame: a rig's, or renders from where no encoder looked."""
+    """Return pictures of a frame: a rig's, or renders from cameras that were not used to fit."""
     if (colors := captured(sequence).colors) is not None:
         pictures = [picture for picture in colors[number] if picture is not None]
         return taken(pictures, video.moving(number), sequence[number], SIZE)
@@ -52,9 +52,9 @@ def held_out(sequence: MeshSequence, video: Video, number: int) -> tuple[SplatVi
 
 def errors(bound: Bound, view: SplatView) -> tuple[float, float]:
     """Return the mean squared error, of values 0 to 1, and SSIM of a picture of splats; unknown pixels are left out."""
-    found = np.clip(draw(bound, view.camera), 0, 1)
+    drawn = np.clip(draw(bound, view.camera), 0, 1)
     known = np.isfinite(view.pixels)
-    wanted = np.where(known, view.pixels, found).astype(np.float64)
+    target = np.where(known, view.pixels, drawn).astype(np.float64)
     inside = slice(BORDER, -BORDER)
-    square = float(np.square(found - wanted)[known].mean()) if known.any() else 0.0
-    return square, float(ssim_map(found.astype(np.float64), wanted)[inside, inside].mean())
+    square = float(np.square(drawn - target)[known].mean()) if known.any() else 0.0
+    return square, float(ssim_map(drawn.astype(np.float64), target)[inside, inside].mean())

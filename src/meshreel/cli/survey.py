@@ -28,7 +28,7 @@ def command(
     cluster: str | None = None,
     common: Common = Common(),
 ) -> None:
-    """Read all frames of a sequence once, and write what encodes of its parts have to know of the whole.
+    """Read all frames of a sequence once, and write the facts about the whole that encodes of its parts need.
 
     Parameters
     ----------
@@ -53,8 +53,8 @@ def command(
     sequence = Masking(up=up).upright(source)
     with uploaded(place) as path, common.stages(len(sequence)) as progress, workers(jobs, cluster) as executor:
         check_apart(path, sequence.files)
-        seen = Encoder(sequence, executor, progress).survey(path)
-    warnings = (*source.warnings, *warnings_of(seen))
+        survey = Encoder(sequence, executor, progress).survey(path)
+    warnings = (*source.warnings, *warnings_of(survey))
     common.warn(warnings)
     row = {"output": str(place), "frames": len(sequence), "warnings": warnings}
-    common.result(row, f"{place}: {len(sequence)} frames, {seen.diagonal:.3g} m large")
+    common.result(row, f"{place}: {len(sequence)} frames, {survey.diagonal:.3g} m large")

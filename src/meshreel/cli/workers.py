@@ -1,6 +1,6 @@
-"""Workers of commands: processes here, which Ctrl-C reaches only through the command itself, or those of a cluster.
+"""Executors for commands: local processes that ignore SIGINT, or a Dask cluster.
 
-Imports nothing heavy: each worker imports this module before it can heed its parent's end.
+Imports nothing heavy: each worker imports this module before it can react to its parent's end.
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ if TYPE_CHECKING:
     from distributed import Client
 
 _BLOCKS = hasattr(signal, "pthread_sigmask")
-CONNECTS = 10.0  # s, in which a scheduler answers (guess)
+CONNECTS = 10.0  # s, longest time until a scheduler answers (guess)
 
 
 @contextmanager
 def workers(jobs: int, cluster: str | None = None) -> Iterator[Executor | None]:
     """Start processes that encode `jobs` intervals at a time, none for one job; an interrupt ends them at once.
 
-    With the address of a Dask scheduler, its workers encode. Raises InputError where jobs are asked for, too.
+    With the address of a Dask scheduler, its workers encode. Raises InputError if several jobs are requested, too.
     """
     if jobs < 1:
         raise InputError(f"--jobs must be at least 1, got {jobs}")
@@ -59,7 +59,7 @@ def workers(jobs: int, cluster: str | None = None) -> Iterator[Executor | None]:
 
 @contextmanager
 def _cluster(address: str) -> Iterator[Executor]:
-    """Connect to a Dask scheduler; an interrupt cancels what its workers still have to do."""
+    """Connect to a Dask scheduler; an interrupt cancels the pending calls of its workers."""
     try:
         from distributed import Client
     except ModuleNotFoundError as error:
@@ -70,16 +70,16 @@ def _cluster(address: str) -> Iterator[Executor]:
         text = f"--cluster {address}: no scheduler answers ({error})"
         raise InputError(f"{text}; start one, or give its address, as tcp://10.0.0.7:8786") from error
     with connected as client:
-        own = installed()
-        for worker, theirs in client.run(installed).items():
-            if theirs != own:
-                text = f"{worker}: is not installed as this machine is: {first_difference(theirs, own)}"
+        local = installed()
+        for worker, remote in client.run(installed).items():
+            if remote != local:
+                text = f"{worker}: is not installed as this machine is: {first_difference(remote, local)}"
                 raise InputError(f"{text} here; bytes would depend on who encodes: install the same versions")
-        yield _ClusterWorkers(client)  # what is not done when the client leaves is cancelled
+        yield _ClusterWorkers(client)  # pending calls are cancelled when the client leaves
 
 
 def installed() -> dict[str, Any]:
-    """Return the versions on which bytes depend."""
+    """Return the versions of libraries on which the bytes of files depend."""
     from ..encoder.group.digests import versions
 
     return {"meshreel": __version__, "libraries": versions()}
@@ -88,23 +88,23 @@ def installed() -> dict[str, Any]:
 class _ClusterWorkers(Executor):
     """Workers of a Dask cluster.
 
-    Not the client's own executor: it takes a result for an error where the worker dies right after it has sent it.
+    Not the client's own executor: that one reports an error if a worker dies right after it has sent its result.
     """
 
     def __init__(self, client: Client) -> None:
         self._client = client
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
-        """Have a worker call a function; a worker that is lost has its call done by another one."""
+        """Let a worker call a function; if the worker is lost, another one repeats the call."""
         future = Future[Any]()
-        call = self._client.submit(fn, *args, pure=False, **kwargs)  # what is at a path may change
+        call = self._client.submit(fn, *args, pure=False, **kwargs)  # the file at a path may change
         future.add_done_callback(lambda done: call.cancel() if done.cancelled() else None)
         call.add_done_callback(partial(_hand_over, future))
         return future
 
 
 def _hand_over(future: Future[Any], call: Any) -> None:
-    """Give the future what the call returned or raised."""
+    """Pass the result or error of a call on to the future."""
     if not future.set_running_or_notify_cancel():
         return
     try:
@@ -114,7 +114,7 @@ def _hand_over(future: Future[Any], call: Any) -> None:
 
 
 class _Workers(ProcessPoolExecutor):
-    """Worker processes that tell how far they are."""
+    """Worker processes that report their progress."""
 
     def __init__(self, jobs: int) -> None:
         context = _Context()
@@ -122,16 +122,15 @@ class _Workers(ProcessPoolExecutor):
         super().__init__(jobs, mp_context=context, initializer=_begin, initargs=(self._queue,))
 
     def told(self) -> Iterator[Told]:
-        """Yield what the workers have told since the last call."""
+        """Yield the workers' reports since the last call."""
         while not self._queue.empty():
             yield self._queue.get()
 
 
-class _Process(SpawnProcess):
-    """A worker that is deaf to Ctrl-C from its first moment: it inherits that the signal is blocked."""
+class _DeafProcess(SpawnProcess):
+    """Worker process that ignores Ctrl-C from its first moment: it inherits a mask that blocks the signal."""
 
     def start(self) -> None:
-        """Start the process."""
         before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT}) if _BLOCKS else set()
         try:
             super().start()
@@ -141,13 +140,13 @@ class _Process(SpawnProcess):
 
 
 class _Context(SpawnContext):
-    """Spawned, not forked: the progress display and Open3D have threads, which a fork would lose."""
+    """Context that spawns processes: a fork would lose the threads of the progress display and of Open3D."""
 
-    Process = _Process
+    Process = _DeafProcess
 
 
 def _begin(queue: SimpleQueue[Told]) -> None:
-    """Let the parent heed Ctrl-C, and let SIGTERM and the parent's end end a worker without a message."""
+    """Leave Ctrl-C to the parent, and end the worker silently on SIGTERM or when the parent ends."""
     tell_to(queue.put)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)

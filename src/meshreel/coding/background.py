@@ -69,12 +69,12 @@ def decode_change(data: bytes, before: Mesh, place: Placement | None = None) -> 
 
 def changed(before: Mesh, dropped: Bool[np.ndarray, " F"], added: Mesh) -> Mesh:
     """Return a background without its dropped faces and the vertices that only they use, then the added mesh."""
-    kept = part_of(before, ~dropped) if dropped.any() else before
-    return concatenate([kept, added])
+    remaining = part_of(before, ~dropped) if dropped.any() else before
+    return concatenate([remaining, added])
 
 
 def _dropped(record: StaticPatch, faces: int) -> Bool[np.ndarray, " F"]:
-    """Decode which of `faces` faces are dropped."""
+    """Decode the mask of dropped faces, `faces` long."""
     if record.runs == 0 and not record.dropped:
         return np.zeros(faces, bool)
     if record.runs > faces + 1:

@@ -1,7 +1,7 @@
-"""Colours of the vertices of a group of any form, or of a background: the meshes that they are coded over.
+"""Colours of the vertices of a group of any form, or of a background, and the meshes over which they are coded.
 
-In: the payload of a group, and the state of the group that it is predicted from. Out: its meshes before they are
-subdivided, and for each frame the colours of its vertices.
+In: the payload of a group, and the state of the group that predicts it. Out: its meshes before subdivision, and the
+colours of each frame's vertices.
 """
 
 from __future__ import annotations
@@ -32,26 +32,26 @@ class Canvas:
     """The meshes of a group whose vertices have colours: one for all frames, or one for each."""
 
     meshes: tuple[ColoredMesh, ...]
-    patches: tuple[int, ...] = ()  # vertices of the patch of each frame, which the last of the meshes has together
+    patches: tuple[int, ...] = ()  # vertices of each frame's patch; the last mesh has the vertices of all patches
     is_layered: bool = False  # each level of the first mesh is a layer
     dropped: Bool[np.ndarray, "T F"] | None = None  # faces of the template that each frame lacks
     added: tuple[int, ...] = ()  # faces of the patch of each frame
-    empty: tuple[int, ...] = ()  # frames without surface, where each has a mesh of its own: they have none
+    empty: tuple[int, ...] = ()  # frames without surface, which have no mesh in groups with one mesh per frame
 
     def uv(self, layout: Layout) -> list[Float32[np.ndarray, "_ 3 2"]]:
-        """Return the places of the corners of each frame's faces in a texture; NaN for those of patches."""
+        """Return the texture coordinates of each frame's face corners; NaN for faces of patches."""
         template = self.meshes[0]
-        whole = layout.uv(template.levels)
+        template_uv = layout.uv(template.levels)
         if self.dropped is None:
-            return [whole] * template.frames
-        found = list[Float32[np.ndarray, "_ 3 2"]]()
-        for gone, added in zip(self.dropped, self.added, strict=True):
-            kept = whole[~gone] if gone.any() else whole
-            found.append(np.concatenate([kept, np.full((added, 3, 2), np.nan, np.float32)]) if added else kept)
-        return found
+            return [template_uv] * template.frames
+        by_frame = list[Float32[np.ndarray, "_ 3 2"]]()
+        for hidden, added in zip(self.dropped, self.added, strict=True):
+            shown = template_uv[~hidden] if hidden.any() else template_uv
+            by_frame.append(np.concatenate([shown, np.full((added, 3, 2), np.nan, np.float32)]) if added else shown)
+        return by_frame
 
     def carriers(self, frames: Sequence[Mesh], unit: float = 1.0) -> list[Carrier]:
-        """Return what carries splats in each frame: the template, where it is and what of it the frame lacks.
+        """Return the carrier of splats in each frame: the template's positions, and its faces that the frame lacks.
 
         `unit` is that of normalised coordinates in the frames.
         """
@@ -69,26 +69,26 @@ class Canvas:
         ]
 
     def by_frame(self, colors: Sequence[UInt8[np.ndarray, "_ _ 3"]]) -> list[UInt8[np.ndarray, "_ 3"]]:
-        """Return the colours of the vertices of each frame from those of the meshes."""
+        """Regroup colours of vertices from meshes to frames."""
         if not self.patches:
-            found = [frame for some in colors for frame in some]
+            by_frame = [frame for of_mesh in colors for frame in of_mesh]
             for number in self.empty:
-                found.insert(number, np.zeros((0, 3), np.uint8))
-            return found
+                by_frame.insert(number, np.zeros((0, 3), np.uint8))
+            return by_frame
         template, [added] = colors
         bounds = pairwise(np.cumsum([0, *self.patches]).tolist())
         return [np.concatenate([frame, added[a:b]]) for frame, (a, b) in zip(template, bounds, strict=True)]
 
     def by_mesh(self, colors: Sequence[UInt8[np.ndarray, "_ 3"]]) -> list[UInt8[np.ndarray, "_ _ 3"]]:
-        """Return the colours of the vertices of each mesh from those of the frames."""
+        """Regroup colours of vertices from frames to meshes."""
         if not self.patches:
-            found, rest = list[UInt8[np.ndarray, "_ _ 3"]](), list(colors)
+            by_mesh, remaining = list[UInt8[np.ndarray, "_ _ 3"]](), list(colors)
             for number in reversed(self.empty):
-                del rest[number]
+                del remaining[number]
             for mesh in self.meshes:
-                found.append(np.stack(rest[: mesh.frames]))
-                rest = rest[mesh.frames :]
-            return found
+                by_mesh.append(np.stack(remaining[: mesh.frames]))
+                remaining = remaining[mesh.frames :]
+            return by_mesh
         shared = self.meshes[0].vertices
         added = np.concatenate([frame[shared:] for frame in colors])
         return [np.stack([frame[:shared] for frame in colors]), added[None]]
@@ -97,7 +97,7 @@ class Canvas:
 def canvas_of(
     data: bytes, counts: Sequence[int], layers: int | None = None, previous: LayersState | None = None
 ) -> Canvas:
-    """Return the meshes of a payload, or of a prefix of its layers, whose frames have so many vertices.
+    """Return the meshes of a payload, or of a prefix of its layers; `counts` are the frames' numbers of vertices.
 
     Raises FormatError as `continue_group` does.
     """
@@ -105,16 +105,16 @@ def canvas_of(
     if form == Form.LAYERS:
         records = read_layers(data, layers)
         base, levels = base_of(records, previous), len(records.layers) - 1
-        found = patches_of(data, records, layers, 4**levels * len(base.faces))
-        if found is None:
+        patches = patches_of(data, records, layers, 4**levels * len(base.faces))
+        if patches is None:
             return Canvas((ColoredMesh(base, levels, len(counts), counts[0]),), is_layered=True)
-        added = tuple(len(mesh.vertices) for mesh in found.meshes)
+        added = tuple(len(mesh.vertices) for mesh in patches.meshes)
         template = ColoredMesh(base, levels, len(counts), counts[0] - added[0])
-        faces = tuple(len(mesh.faces) for mesh in found.meshes)
+        faces = tuple(len(mesh.faces) for mesh in patches.meshes)
         if not any(added):
-            return Canvas((template,), is_layered=True, dropped=found.dropped, added=faces)
-        patch = ColoredMesh(concatenate(found.meshes), 0, 1, sum(added))
-        return Canvas((template, patch), added, True, found.dropped, faces)
+            return Canvas((template,), is_layered=True, dropped=patches.dropped, added=faces)
+        patch = ColoredMesh(concatenate(patches.meshes), 0, 1, sum(added))
+        return Canvas((template, patch), added, True, patches.dropped, faces)
     if form == Form.LAPLACIAN:
         record = unpack_all(LaplacianGroup, data)
         reference = decode_mesh(record.reference, record.step)
@@ -122,7 +122,7 @@ def canvas_of(
     if form == Form.DRACO:
         group = unpack_all(DracoGroup, data)
         pairs = zip(group.meshes, counts, strict=True)
-        meshes = (ColoredMesh(decode_mesh(one, group.step), group.levels, 1, n) for one, n in pairs if n)
+        meshes = (ColoredMesh(decode_mesh(frame, group.step), group.levels, 1, n) for frame, n in pairs if n)
         return Canvas(tuple(meshes), empty=tuple(t for t, n in enumerate(counts) if not n))
     return Canvas((), empty=tuple(range(len(counts))))
 
@@ -133,7 +133,7 @@ def encode_group_colors(
     options: ColorCodingOptions,
     before: Float64[np.ndarray, "V 3"] | None,
 ) -> EncodedColors:
-    """Encode the colours of the vertices of each frame of a group; CostlyError where a reader would refuse them."""
+    """Encode the colours of the vertices of each frame of a group; CostlyError if a reader would refuse them."""
     encoded = encode_colors(canvas.meshes, canvas.by_mesh(colors), options, before, canvas.is_layered)
     _check_cost(canvas, len(encoded.payload))
     return encoded
@@ -142,45 +142,45 @@ def encode_group_colors(
 def decode_group_colors(
     data: bytes, canvas: Canvas, before: LayersState | None, after: LayersState | None
 ) -> tuple[list[UInt8[np.ndarray, "_ 3"]], LayersState | None]:
-    """Decode the colours of the vertices of each frame of a group, by the states of geometry before and after it.
+    """Decode the colours of the vertices of each frame of a group, given the geometry's states before and after it.
 
-    Return also the state after it with what the next colours are predicted from. Raises FormatError where the colours
-    are damaged, or need those of a group that are not at hand.
+    Also return the state after it with the colours that predict the next group's. Raises FormatError if the colours are
+    damaged, or predicted from missing ones.
     """
     _check_cost(canvas, len(data))
-    found, values = decode_colors(data, canvas.meshes, None if before is None else before.colors)
-    return canvas.by_frame(found), None if after is None else replace(after, colors=values)
+    colors, values = decode_colors(data, canvas.meshes, None if before is None else before.colors)
+    return canvas.by_frame(colors), None if after is None else replace(after, colors=values)
 
 
 def paint_background(mesh: Mesh, data: bytes, colors: bytes) -> Mesh:
-    """Return a decoded background with the colours of a payload; those of a change are of what it adds, at the end.
+    """Return a decoded background with the colours of a payload; a change colours only the vertices that it adds.
 
-    Raises FormatError where the colours are damaged.
+    Raises FormatError if the colours are damaged.
     """
     canvas = background_canvas(data)
     _check_cost(canvas, len(colors))
-    [[found]], _ = decode_colors(colors, canvas.meshes)
-    if data[0] != Form.PATCH and len(found) == len(mesh.vertices):
-        return replace(mesh, colors=found)
-    if mesh.colors is None or len(found) > len(mesh.vertices):
-        raise FormatError(f"colours of {len(found)} of {len(mesh.vertices)} vertices of a background")
-    kept = mesh.colors[: len(mesh.vertices) - len(found)]
-    return replace(mesh, colors=np.concatenate([kept, found]))
+    [[added]], _ = decode_colors(colors, canvas.meshes)
+    if data[0] != Form.PATCH and len(added) == len(mesh.vertices):
+        return replace(mesh, colors=added)
+    if mesh.colors is None or len(added) > len(mesh.vertices):
+        raise FormatError(f"colours of {len(added)} of {len(mesh.vertices)} vertices of a background")
+    remaining = mesh.colors[: len(mesh.vertices) - len(added)]
+    return replace(mesh, colors=np.concatenate([remaining, added]))
 
 
 def background_canvas(data: bytes) -> Canvas:
-    """Return the mesh of a background, or that which a change of it adds. Raises FormatError on damaged bytes."""
+    """Return the mesh of a background, or the mesh that a change adds. Raises FormatError on damaged bytes."""
     if data[:1] == bytes([Form.PATCH]):
         change = unpack_all(StaticPatch, data)
         added = decode_mesh(change.mesh, change.step)
         return Canvas((ColoredMesh(added, 0, 1, len(added.vertices)),))
     group = unpack_all(DracoGroup, data)
-    whole = decode_mesh(group.meshes[0], group.step) if group.meshes else Mesh.empty()
-    return Canvas((ColoredMesh(whole, 0, 1, len(whole.vertices)),))
+    background = decode_mesh(group.meshes[0], group.step) if group.meshes else Mesh.empty()
+    return Canvas((ColoredMesh(background, 0, 1, len(background.vertices)),))
 
 
 def atlas_base(data: bytes) -> Mesh:
-    """Return the mesh that an atlas or splats are of, from the first layer of their group, or from a background."""
+    """Return the base mesh of an atlas or splats, from the first layer of their group, or from a background."""
     if data[:1] == bytes([Form.LAYERS]):
         return base_of(read_layers(data, 0), None)
     if data[:1] == bytes([Form.LAPLACIAN]):

@@ -1,7 +1,7 @@
 """Decode a group of any form by its first byte.
 
-In: the payload of a group, and the state of the group that it is predicted from. Out: its frames. The form `laplacian`,
-which few files have, is imported where it is met.
+In: the payload of a group, and the state of the group that predicts it. Out: its frames. The rare form `laplacian` is
+imported on first use.
 """
 
 from __future__ import annotations
@@ -37,14 +37,14 @@ def continue_group(
     """Decode a group that may be predicted from the previous one; also return the state that predicts the next one.
 
     `previous` is the state returned for the previous group with the same `layers`; only the form `layers` has one. With
-    `place`, the frames are in metres, if the form allows without another pass over them. Errors as in `decode_group`.
+    `place`, the frames are in metres. Errors as in `decode_group`.
     """
     form = _form_of(data)
     if form == Form.LAYERS:
         meshes, state = _decode_layers(data, layers, previous, place)
     else:
         meshes, state = _decode_alone(data, form, frame_count, layers), None
-        if place is not None and form != Form.EMPTY:  # whose frames are one mesh
+        if place is not None and form != Form.EMPTY:  # empty frames are one mesh
             meshes = [place.of(mesh) for mesh in meshes]
     _check_count(len(meshes), frame_count)
     return meshes, state

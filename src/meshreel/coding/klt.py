@@ -27,7 +27,6 @@ class Basis:
     energies: Float64[np.ndarray, " M"]  # mean square of each weight, units of the field squared
 
     def only(self, kept: Bool[np.ndarray, " M"] | Int64[np.ndarray, " N"]) -> Basis:
-        """Return the basis of some of its vectors."""
         return Basis(self.mean, np.ascontiguousarray(self.vectors[:, kept]), self.energies[kept])
 
 
@@ -92,7 +91,7 @@ def quantize(basis: Basis, count: int, step: float) -> BasisSymbols:
 
 
 def _dual(vectors: Float64[np.ndarray, "C M"]) -> Float64[np.ndarray, "C M"]:
-    """Return the vectors whose scalar products with a point are the weights of the given ones nearest to it."""
+    """Return the dual vectors: their scalar products with a point are the least-squares weights of the given ones."""
     gram = strict.products(vectors.T, vectors)
     return strict.products(vectors, strict.inverse(gram))
 

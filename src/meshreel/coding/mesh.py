@@ -17,7 +17,7 @@ from ..types import Mesh
 
 MAX_BITS = 21  # bits per coordinate that Draco's float32 positions can hold
 COMPRESSION_LEVEL = 7  # from the paper
-PLAIN_LEVEL = 5  # the highest at which each face costs a bit, whatever the mesh is like
+PLAIN_LEVEL = 5  # the highest level at which each face costs a bit, whatever the mesh
 MAX_FACES = 64_000_000  # faces or vertices of a group: a limit of memory, a guess
 
 
@@ -30,10 +30,10 @@ def encode_mesh(mesh: Mesh, step: float) -> bytes:
 
 
 def encode_meshes(meshes: Sequence[Mesh], step: float) -> tuple[bytes, ...]:
-    """Encode meshes that are decoded together, as `encode_mesh`.
+    """Encode meshes that are decoded together, as `encode_mesh` does.
 
-    Large, flat, regular meshes take so few bytes that no reader would believe these (`check_claims`); they are coded
-    plainly. Raises InputError also where tens of thousands of faces meet at one vertex, with holes between them.
+    Large, flat, regular meshes take so few bytes that readers would refuse them (`check_claims`); they are coded
+    plainly. Also raises InputError if tens of thousands of faces meet at one vertex, with holes between them.
     """
     for level in (COMPRESSION_LEVEL, PLAIN_LEVEL):
         coded = tuple(_encode_draco(mesh, step, level) for mesh in meshes)
@@ -97,9 +97,9 @@ def decode_mesh(data: bytes, step: float) -> Mesh:
 
 
 def check_claims(meshes: Sequence[bytes]) -> None:
-    """Raise FormatError for Draco meshes of kinds that no encoder writes, or that claim more than their bytes may.
+    """Raise FormatError for Draco meshes of kinds that no encoder writes, or that claim more than their bytes allow.
 
-    Draco takes memory for what is claimed before it knows better. The rules are in FORMAT.md ("A mesh").
+    Draco allocates memory for claimed counts before it has checked them. The rules are in FORMAT.md ("A mesh").
     """
     try:
         _core.check_draco([bytes(mesh) for mesh in meshes])

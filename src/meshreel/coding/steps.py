@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 
-RUNGS = 200  # number of rungs; the step of the finest is 3e-8, below any use
+RUNGS = 200  # number of rungs; the finest step is 3e-8, below any use
 _EIGHTHS = (  # 2^(-j/8) rounded to 32 bits, so that no platform's pow decides
     4294967296,
     3938502376,
@@ -21,7 +21,6 @@ _EIGHTHS = (  # 2^(-j/8) rounded to 32 bits, so that no platform's pow decides
 
 
 def step_of(rung: int) -> float:
-    """Return the step of a rung."""
     return math.ldexp(_EIGHTHS[rung % 8], -32 - rung // 8)
 
 

@@ -1,4 +1,4 @@
-"""Sources behind URLs: a web server, by range requests, or a store that fsspec knows. In: a URL. Out: bytes."""
+"""Sources behind URLs: a web server with range requests, or a store supported by fsspec. In: a URL. Out: bytes."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class _UrlSource:
 
     def __init__(self, url: str) -> None:
         self._url, self.bytes_read = url, 0
-        self._begin, self._size = self._counted(0, FIRST_REQUEST)  # the bytes known from the beginning
+        self._begin, self._size = self._counted(0, FIRST_REQUEST)  # first bytes of the file
 
     @property
     def size(self) -> int:
@@ -39,9 +39,9 @@ class _UrlSource:
         """Do nothing: no connection stays open."""
 
     def _counted(self, offset: int, length: int) -> tuple[bytes, int]:
-        found = self._request(offset, length)
-        self.bytes_read += len(found[0])
-        return found
+        answer = self._request(offset, length)
+        self.bytes_read += len(answer[0])
+        return answer
 
     def _request(self, offset: int, length: int) -> tuple[bytes, int]:
         """Return the bytes of a range, or all bytes if the server has no ranges, and the size of the file."""
@@ -49,7 +49,7 @@ class _UrlSource:
 
 
 class StoreSource(_UrlSource):
-    """A file behind a URL of fsspec, as s3:// and gs:// (extra `remote`). Raises InputError if it cannot be read."""
+    """A file behind a URL of fsspec, such as s3:// (extra `remote`). Raises InputError if it cannot be read."""
 
     def _request(self, offset: int, length: int) -> tuple[bytes, int]:
         try:
@@ -79,13 +79,13 @@ class HttpSource(_UrlSource):
             request = Request(self._url, headers={"Range": f"bytes={offset}-{offset + length - 1}"})
             with urlopen(request, timeout=_TIMEOUT) as answer:
                 is_whole = answer.status == HTTPStatus.OK
-                data: bytes = answer.read(None if is_whole else length + 1)  # an answer by range may not end
-                found = _RANGE.fullmatch(answer.headers.get("Content-Range", ""))
+                data: bytes = answer.read(None if is_whole else length + 1)  # a server's answer may be endless
+                span = _RANGE.fullmatch(answer.headers.get("Content-Range", ""))
         except (URLError, HTTPException, OSError, ValueError) as error:
             reason = getattr(error, "reason", None) or error
             raise InputError(f"{self._url}: cannot be read ({reason}); check the address") from error
         if is_whole and offset == 0:
             return data, len(data)
-        if found is None or int(found[1]) != offset or len(data) > length:
+        if span is None or int(span[1]) != offset or len(data) > length:
             raise InputError(f"{self._url}: the server answered without bytes {offset} ...; open it again")
-        return data, int(found[2])
+        return data, int(span[2])

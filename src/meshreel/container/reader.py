@@ -1,6 +1,6 @@
-"""Reader of a .reel file: the head once, then any chunk by its byte range. A Source -> payloads checked by CRC.
+"""Reader of a .reel file: reads the head once, then any chunk by its byte range. A Source -> payloads checked by CRC.
 
-A damaged head makes the file unreadable (FormatError at once); damage behind it costs only the damaged chunks.
+A damaged head makes the file unreadable (FormatError at once); damage behind it affects only the damaged chunks.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ class Chunk:
 
     @property
     def form_name(self) -> str:
-        """Name of the form, in small letters; its number where this version does not know it."""
+        """Name of the form in lower case; its number if this version does not know it."""
         return next((form.name.lower() for form in Form if form == self.form), str(self.form))
 
     @property
@@ -86,7 +86,7 @@ class ReelReader:
         check_index(self.index)
         self.metadata = parse_metadata(self.header.metadata)
         groups = (entry for entry in self.index.chunks if entry.kind == ChunkKind.GROUP)
-        self.coded_count = sum(entry.frames for entry in groups if entry.track == 0)  # frames, the hidden ones too
+        self.coded_count = sum(entry.frames for entry in groups if entry.track == 0)  # frames, hidden ones included
         self.edit = parse_edit(self.metadata, flags, self.coded_count)
         self.chunks = _chunks(self.index, self.head_size, -self.edit.first)
         self.groups = tuple(chunk for chunk in self.chunks if chunk.kind == ChunkKind.GROUP)
@@ -99,7 +99,7 @@ class ReelReader:
             raise FormatError(f"{source.size - self.size} bytes behind the last chunk, copy the file again")
         self._companions = {(c.depends_on[0], c.kind): c for c in self.chunks if c.kind in COMPANIONS}
         self._first_frames = [[group.first_frame for group in groups] for groups in self.tracks]
-        self._shown_from = dict[int, int]()  # of each STATIC, the first frame of the first GROUP that names it
+        self._shown_from = dict[int, int]()  # first frame of the first GROUP that depends on each STATIC
         for group in self.groups:
             for number in group.depends_on:
                 self._shown_from.setdefault(number, group.first_frame)
@@ -107,14 +107,13 @@ class ReelReader:
 
     @property
     def source(self) -> Source:
-        """Where the bytes come from."""
         return self._source
 
     @property
     def bytes_read(self) -> int:
-        """Bytes that came over the network, the head's among them; of a file here, those of chunks that were read."""
-        found: int = getattr(self._source, "bytes_read", self._bytes_read)
-        return found
+        """Bytes received over the network, head included; for a local file, the bytes of the chunks that were read."""
+        count: int = getattr(self._source, "bytes_read", self._bytes_read)
+        return count
 
     @property
     def box(self) -> tuple[Float64[np.ndarray, "3"], Float64[np.ndarray, "3"]]:
@@ -141,31 +140,30 @@ class ReelReader:
 
     @property
     def missing(self) -> tuple[Chunk, ...]:
-        """The chunks that a truncated file has lost, whole or in part; none in a whole file."""
+        """The chunks that a truncated file has lost, entirely or in part; none in a complete file."""
         return tuple(chunk for chunk in self.chunks if chunk.end > self._source.size)
 
     @property
     def is_colored(self) -> bool:
-        """Whether the file has colours."""
+        """True if the file has colours."""
         return any(chunk.kind != ChunkKind.SPLATS for chunk in self._companions.values())
 
     @property
     def has_splats(self) -> bool:
-        """Whether the file has splats."""
         return any(chunk.kind == ChunkKind.SPLATS for chunk in self._companions.values())
 
     @property
     def has_textures(self) -> bool:
-        """Whether the file has pictures, in any coding."""
+        """True if the file has pictures, in any coding."""
         return any(chunk.form == Form.VIDEO for chunk in self._companions.values())
 
     @property
     def audio(self) -> Chunk | None:
-        """The chunk that has what is heard, if any."""
+        """The chunk of the audio file, if any."""
         return next((chunk for chunk in self.chunks if chunk.kind == ChunkKind.AUDIO), None)
 
     def read_audio(self) -> AudioFile | None:
-        """Read what is heard; None where there is nothing. A FormatError names the chunk."""
+        """Read the audio file; None if there is none. A FormatError names the chunk."""
         if (chunk := self.audio) is None:
             return None
         try:
@@ -179,12 +177,10 @@ class ReelReader:
 
     @property
     def has_background(self) -> bool:
-        """Whether some frame has a background."""
         return any(self._is_static(number) for group in self.groups for number in group.depends_on)
 
     @property
     def has_moving(self) -> bool:
-        """Whether some frame has a moving body."""
         return any(group.form != Form.EMPTY for group in self.groups)
 
     def timestamp(self, frame: int) -> float:
@@ -205,23 +201,23 @@ class ReelReader:
         return tuple(self.chunk_of_frame(frame, track) for track in range(len(self.tracks)))
 
     def static_of_frame(self, frame: int) -> Chunk | None:
-        """Return the STATIC chunk that a frame is shown with: the newest one that a group of the frame depends on."""
+        """Return the STATIC chunk shown with a frame: the newest that a group of the frame depends on."""
         named = [n for chunk in self.chunks_of_frame(frame) for n in chunk.depends_on if self._is_static(n)]
         return self.chunks[max(named)] if named else None
 
     def static_ranges(self, frames: range) -> dict[int, list[tuple[int, int]]]:
-        """Return by its number the ranges (end excluded) of some consecutive frames that show each STATIC chunk."""
+        """Return the ranges within `frames` (end excluded) that show each STATIC chunk, by its number."""
         ranges = dict[int, list[tuple[int, int]]]()
         starts = sorted({frames.start, *(group.first_frame for group in self.groups if group.first_frame in frames)})
-        for start, end in pairwise([*starts, frames.stop]):  # it changes only with a group
+        for start, end in pairwise([*starts, frames.stop]):  # the background changes only with a group
             if (chunk := self.static_of_frame(start)) is not None:
-                own = ranges.setdefault(chunk.number, [])
-                first = own.pop()[0] if own and own[-1][1] == start else start
-                own.append((first, end))
+                shown = ranges.setdefault(chunk.number, [])
+                first = shown.pop()[0] if shown and shown[-1][1] == start else start
+                shown.append((first, end))
         return ranges
 
     def shown_from(self, static: Chunk) -> int:
-        """Return the first frame that is shown with a STATIC chunk, from which its pictures are counted."""
+        """Return the first frame shown with a STATIC chunk, from which its pictures are counted."""
         return self._shown_from[static.number]
 
     def group_before(self, chunk: Chunk) -> Chunk | None:
@@ -242,15 +238,15 @@ class ReelReader:
         offset = chunk.offset + sum(before.size for before in chunk.layers[:layer])
         return self._read(chunk, offset, chunk.layers[layer : layer + 1])
 
-    def _read(self, chunk: Chunk, offset: int, wanted: tuple[Layer, ...]) -> bytes:
-        size = sum(layer.size for layer in wanted)
+    def _read(self, chunk: Chunk, offset: int, layers: tuple[Layer, ...]) -> bytes:
+        size = sum(layer.size for layer in layers)
         if offset + size > self._source.size:
             raise FormatError(f"{chunk}: truncated, the file ends at byte {self._source.size} of {self.size}")
         payload = self._source.get_bytes(offset, size)
         self._bytes_read += size
         if len(payload) != size:
             raise FormatError(f"{chunk}: truncated, {len(payload)} of {size} bytes")
-        _check_payload(chunk, payload, wanted)
+        _check_payload(chunk, payload, layers)
         return payload
 
 
@@ -277,7 +273,7 @@ def _read_head(source: Source) -> tuple[Header, Index, int, int]:
 
 
 def _chunks(index: Index, offset: int, first_frame: int) -> tuple[Chunk, ...]:
-    """Return the chunks behind each other from an offset on, and the frames of each track from the first on."""
+    """Return the chunks of an index, with positions from `offset` on and frames of each track from `first_frame` on."""
     chunks: list[Chunk] = []
     frames = [first_frame] * (
         1 + max((entry.track for entry in index.chunks if entry.kind == ChunkKind.GROUP), default=0)
@@ -290,7 +286,7 @@ def _chunks(index: Index, offset: int, first_frame: int) -> tuple[Chunk, ...]:
         chunk = Chunk(*place, entry.track, len(frames) == 1)
         chunks.append(chunk)
         offset = chunk.end
-        if is_group:  # only their tracks are checked: a kind to come may have any
+        if is_group:  # only groups have checked tracks: an unknown kind may have any
             frames[entry.track] += entry.frames
     return tuple(chunks)
 

@@ -1,4 +1,4 @@
-"""Sources: where the bytes of a file come from, as one function `get_bytes(offset, length)`."""
+"""Sources of a file's bytes, behind one function `get_bytes(offset, length)`."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class Stream(Protocol):
 
 
 class BytesSource:
-    """A file that is in memory."""
+    """A file in memory."""
 
     def __init__(self, data: bytes) -> None:
         self._data = data
@@ -56,7 +56,7 @@ class StreamSource:
     """A binary file object that can seek; threads may share it. Raises InputError if it cannot be read."""
 
     def __init__(self, file: Stream, name: str | None = None) -> None:
-        """Read from `file`; `name` is what error messages call it."""
+        """Read from `file`; `name` is its name in error messages."""
         self._file, self._lock = file, threading.Lock()
         self._name = type(file).__name__ if name is None else name
         if not file.seekable() or not isinstance(file.read(0), bytes):
@@ -73,7 +73,7 @@ class StreamSource:
                 self._file.seek(offset)
                 data: bytes = self._file.read(length)
                 return data
-        except (OSError, ValueError) as error:  # a ValueError where the file is closed
+        except (OSError, ValueError) as error:  # a ValueError if the file is closed
             raise _unreadable(self._name, offset, error) from error
 
     def close(self) -> None:
@@ -81,7 +81,7 @@ class StreamSource:
 
 
 def _open_at_once(path: str, flags: int) -> int:
-    """Open a file; a pipe without waiting for its writer, so that it is refused as one that cannot seek."""
+    """Open a file without waiting for the writer of a pipe, which is then refused because it cannot seek."""
     return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))
 
 
@@ -100,9 +100,9 @@ class FileSource(StreamSource):
     def get_bytes(self, offset: int, length: int) -> bytes:
         if not hasattr(os, "pread"):
             return super().get_bytes(offset, length)
-        try:  # a forked process has a file of its own, but the same position in it
+        try:  # not `seek`: forked processes share the position in an open file
             file = self._disk.fileno()
-            data = os.pread(file, length, offset)  # on Linux 2 GiB at the most
+            data = os.pread(file, length, offset)  # on Linux at most 2 GiB
             while len(data) < length and (more := os.pread(file, length - len(data), offset + len(data))):
                 data += more
             return data
@@ -117,7 +117,7 @@ class FileSource(StreamSource):
 
 
 def source_at(place: str | Path) -> FileSource | HttpSource | StoreSource:
-    """Open a file on disk, or the source of ranges behind a URL. Raises InputError if it cannot be read."""
+    """Open a file on disk or behind a URL. Raises InputError if it cannot be read."""
     if isinstance(place, str) and "://" in place:
         from .http import HttpSource, StoreSource
 

@@ -1,7 +1,7 @@
-"""Writer of a .reel file, which appears whole or not at all. A header and payloads -> a file, or its bytes.
+"""Writer of a .reel file, which appears complete or not at all. A header and payloads -> a file, or its bytes.
 
-The head names every chunk and comes first, so chunks wait: where they are stored already, or in a temporary file that
-ends with the process. Memory stays flat, and a process that is killed leaves nothing under the final name.
+The head names every chunk and comes first, so chunks wait in the file that stores them already, or in a temporary file
+that ends with the process. Memory is bounded, and a killed process leaves nothing under the final name.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class Sink(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Stored:
-    """A payload in an open file, which is read when it is needed."""
+    """A payload in an open file, read when it is needed."""
 
     file: Stream
     offset: int
@@ -60,7 +60,7 @@ class Stored:
         return self.size
 
     def read(self) -> bytes:
-        """Return the payload; fewer bytes where the file has lost some."""
+        """Return the payload; fewer bytes if the file has been truncated."""
         self.file.seek(self.offset)
         data: bytes = self.file.read(self.size)
         return data
@@ -68,34 +68,33 @@ class Stored:
 
 @dataclass(frozen=True, slots=True)
 class Companion:
-    """What belongs to a group or a background: its colours, an atlas, or pictures."""
+    """Companion of a group or a background: its colours, an atlas, pictures or splats."""
 
     kind: ChunkKind
     payload: bytes | Stored
-    layers: tuple[int, ...] = ()  # where each layer of the payload ends; none: it is one layer
+    layers: tuple[int, ...] = ()  # ends of the payload's layers, bytes; none: it is one layer
 
     def __len__(self) -> int:
         return len(self.payload)
 
     def read(self) -> bytes:
-        """Return the payload."""
         return self.payload if isinstance(self.payload, bytes) else self.payload.read()
 
 
 class ReelWriter:
     """Context manager that writes a file: chunks are added by `add_*`, and the file appears when the block succeeds.
 
-    The output is a path, or a Sink such as io.BytesIO. Raises InputError where the output cannot be written (no such
-    folder, disk full), where no frame was added, or where a value cannot be stored.
+    The output is a path, or a Sink such as io.BytesIO. Raises InputError if the output cannot be written (no such
+    folder, disk full), if no frame was added, or if a value cannot be stored.
     """
 
     def __init__(self, output: str | Path | Sink, header: Header, name: str = "the output", audio: bytes = b"") -> None:
-        """Write to `output`; `name` is what error messages call a Sink, `audio` a payload of form AUDIO_FILE."""
+        """Write to `output`; `name` is a Sink's name in error messages, `audio` a payload of form AUDIO_FILE."""
         self._output = Path(output) if isinstance(output, str | Path) else output
         self._name = str(self._output) if isinstance(self._output, Path) else name
         self.header = header  # may be replaced until the block ends, to store measured values as metadata
         self._audio = audio
-        self.size = 0  # bytes of the whole file, known when the block has ended
+        self.size = 0  # bytes of the whole file, set when the block has ended
         self._entries: list[IndexEntry] = []
         self._chunks: list[Stored] = []
         self._checks = IndexChecks()
@@ -106,17 +105,17 @@ class ReelWriter:
         return self.frames_of(0)
 
     def frames_of(self, track: int) -> int:
-        """Return the number of frames added to a track, which is where its next group begins."""
+        """Return the number of frames added to a track: the first frame of its next group."""
         return self._checks.frames[track] if track < len(self._checks.frames) else 0
 
     def last_of(self, track: int) -> int | None:
-        """Return the number of a track's newest chunk, from which its next may be predicted, or None."""
+        """Return the number of a track's newest chunk, from which the next may be predicted, or None."""
         return self._checks.groups[track] if track < len(self._checks.groups) else None
 
     def __enter__(self) -> ReelWriter:
         with _as_input_error(self._name):
             pack(self.header)
-            check_header(self.header, len(self.header.intervals) + 1)  # now, not when all is encoded
+            check_header(self.header, len(self.header.intervals) + 1)  # before encoding, not after it
             parse_metadata(self.header.metadata)
             self._spool = _open_spool(self._output)  # for chunks that are in memory
         return self
@@ -148,12 +147,12 @@ class ReelWriter:
         depends_on: Sequence[int] = (),
         track: int = 0,
     ) -> int:
-        """Add a group of frames, which follow those of the track's previous group, and return the number of its chunk.
+        """Add a group of frames, which follow the track's previous group, and return the number of its chunk.
 
         Add groups in the order of their first frame, then of their track. `layers` are the ends of the payload's
         layers, bytes, ascending to its length; without any it is one layer. `depends_on` are the numbers of the static
-        chunk that the frames are shown with and, for a predicted group, of the previous group of its track. A payload
-        that is stored must stay so until the block ends.
+        chunk that the frames are shown with and, for a predicted group, of the previous group of its track. A stored
+        payload must remain in its file until the block ends.
         """
         if track < 0 or first_frame != self.frames_of(track):
             raise InputError(
@@ -167,9 +166,9 @@ class ReelWriter:
         return self._add(entry, payload)
 
     def add_companion(self, companion: Companion, depends_on: Sequence[int]) -> int:
-        """Add what belongs to a chunk, and return the number of its own.
+        """Add a companion of a chunk, and return the number of its own chunk.
 
-        `depends_on` are the number of that chunk and those of what else it needs.
+        `depends_on` are the numbers of the chunk that it belongs to and of other chunks that it needs.
         """
         data, entry = companion.read(), self._entries[depends_on[0]]
         place = (entry.frames, entry.track, tuple(depends_on))
@@ -182,14 +181,14 @@ class ReelWriter:
 
     def atlas_of(self, number: int, before: int | None) -> int:
         """Return the number of the atlas of a group's pictures: its own, or that of the group before."""
-        own = self.companion_of(number, ChunkKind.ATLAS)
-        found = self._checks.atlas_of(before) if own is None and before is not None else own
-        if found is None:
+        own_atlas = self.companion_of(number, ChunkKind.ATLAS)
+        atlas = self._checks.atlas_of(before) if own_atlas is None and before is not None else own_atlas
+        if atlas is None:
             raise InputError(f"pictures of chunk {number}, which has no atlas; add one first")
-        return found
+        return atlas
 
     def _add(self, entry: IndexEntry, payload: bytes | Stored) -> int:
-        pack(entry)  # refuses what does not fit its field
+        pack(entry)  # refuses values that do not fit their fields
         try:
             number = self._checks.add(entry)
         except FormatError as error:
@@ -200,9 +199,9 @@ class ReelWriter:
         return number
 
     def _kept(self, payload: bytes) -> Stored:
-        kept = Stored(self._spool, self._spool.seek(0, os.SEEK_END), len(payload))
+        stored = Stored(self._spool, self._spool.seek(0, os.SEEK_END), len(payload))
         self._spool.write(payload)
-        return kept
+        return stored
 
     def _finish(self) -> None:
         self._checks.finish()
@@ -223,7 +222,7 @@ class ReelWriter:
         sync_folder(self._output.parent)
 
     def _copy(self, head: bytes, output: Sink) -> None:
-        """Write the head and the chunks, each of which must still be what was added."""
+        """Write the head and the chunks, each of which must still match its entry."""
         output.write(head)
         if len(self._chunks) != len(self._entries):
             raise InputError(f"{self._name}: a chunk could not be written, encode again")
@@ -237,9 +236,9 @@ class ReelWriter:
 
 
 def pack_head(header: Header, index: Index, flags: int = 0) -> bytes:
-    """Pack the head, which is everything before the chunks. Raises FormatError for one that no reader would read.
+    """Pack the head, which is everything before the chunks. Raises FormatError if readers would refuse it.
 
-    Of the `flags`, EDITED lets the item `edit` of the metadata count.
+    The flag EDITED makes the metadata's item `edit` valid.
     """
     body = pack(header) + pack(index)
     size = least_size(Preamble) + len(body) + least_size(Checksum)
@@ -249,9 +248,9 @@ def pack_head(header: Header, index: Index, flags: int = 0) -> bytes:
 
 
 def with_audio(index: Index, payload: bytes) -> tuple[Index, int]:
-    """Return an index with an AUDIO chunk more, and its number.
+    """Return an index with an additional AUDIO chunk, and its number.
 
-    It lies behind all that the first frame needs, and before the rest, so that a file can be heard while it arrives.
+    It lies behind all chunks that the first frame needs and before the others, so that a file plays while it arrives.
     """
     later, frames = len(index.chunks), dict[int, int]()
     for number, entry in enumerate(index.chunks):
@@ -298,7 +297,7 @@ def _layers(payload: bytes, ends: Sequence[int]) -> tuple[Layer, ...]:
 
 @contextmanager
 def _as_input_error(name: str) -> Iterator[None]:
-    """Turn errors inside the block, which the caller can mend, into an InputError that names the output."""
+    """Turn errors inside the block that the user can repair into an InputError that names the output."""
     try:
         yield
     except OSError as error:

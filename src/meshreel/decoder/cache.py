@@ -1,7 +1,7 @@
 """Cache of one track: the last group decoded, and the states from which the next groups of its chain continue.
 
-In: decoded meshes and states, and what was refused. Out: the same, within a bound on memory. Values are replaced as a
-whole and never changed, but for the refusals, which only grow; so threads can share a track without a lock.
+In: decoded meshes and states, and refused chunks. Out: the same, within a bound on memory. Values are replaced and
+never changed, except for the refusals, which only grow; so threads can share a track without a lock.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from ..container.reader import Chunk
 from ..errors import FormatError
 from ..types import Mesh
 
-# Bytes of states that the tracks of a video keep together (guess): a few bytes of a file can describe groups that
-# each take as much memory as a group may.
+# Bytes of states that all tracks of a video keep (guess): a few bytes of a file can describe groups that each take as
+# much memory as a group may.
 MOST_KEPT = 1 << 25
 
 
@@ -36,7 +36,7 @@ NO_GROUP = CachedGroup(-1, [], 0)
 
 @dataclass(frozen=True, slots=True)
 class CachedStates:
-    """States of the groups of one chain, by chunk number. All are kept while they fit: playing backwards needs each."""
+    """States of the groups of one chain, by chunk number; all are kept while they fit, for playing backwards."""
 
     known: dict[int, LayersState | None]
     nbytes: int = 0
@@ -48,7 +48,7 @@ class CachedStates:
     def add(self, number: int, state: LayersState | None, before: LayersState | None, most: int) -> CachedStates:
         """Return the cache with the state of a group, which was decoded from the state `before`.
 
-        If all states would take over `most` bytes, only the new one is kept.
+        If all states would take more than `most` bytes, only the new one is kept.
         """
         if number in self.known:
             return self
@@ -60,14 +60,14 @@ class CachedStates:
 
 
 class Refusals:
-    """Chunks whose bytes are damaged though their checksums match, so that no frame more decodes them again.
+    """Chunks that are damaged although their checksums match, remembered so that they are decoded only once.
 
-    What could not be read is not among them: a file may grow, and a network may come back. A refusal takes some hundred
-    bytes, and each chunk has 14 bytes of its file at least.
+    Chunks that could not be read are not remembered: a file may grow, and a network may come back. A refusal takes some
+    hundred bytes, and each chunk has at least 14 bytes of its file.
     """
 
     def __init__(self) -> None:
-        self._messages: dict[int, str] = {}  # by chunk; those that need a refused chunk have its message
+        self._messages: dict[int, str] = {}  # by chunk; chunks that need a refused chunk have its message
 
     @contextmanager
     def of(self, chunk: Chunk) -> Iterator[None]:
@@ -79,7 +79,7 @@ class Refusals:
             raise FormatError(message) from error
 
     def check(self, chunk: Chunk, dependents: Sequence[Chunk] = ()) -> None:
-        """Raise the FormatError of a refused chunk again, and remember it for those that need this chunk."""
+        """Raise the FormatError of a refused chunk again, and remember it for the `dependents` of this chunk."""
         message = self._messages.get(chunk.number)
         if message is None:
             return

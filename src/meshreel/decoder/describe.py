@@ -1,6 +1,6 @@
-"""Description of a .reel file: its frames, tracks, states and groups, and the bytes that each takes.
+"""Description of a .reel file: its frames, tracks, states and groups, and their sizes in bytes.
 
-In: a file. Out: a JSON object, which `meshreel info` shows. Nothing is decoded but the head of a first surface.
+In: a file. Out: a JSON object, which `meshreel info` shows. Only the first surface is decoded.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from ..errors import FormatError
 from ..format.layout import ChunkKind, Form
 from .video import Video
 
-LOOKED_AT = 8  # frames, at most, in which a first surface is looked for (guess)
+LOOKED_AT = 8  # largest number of frames in which the first surface is searched (guess)
 COMPANION_NAMES = {
     ChunkKind.COLORS: "vertex colors",
     ChunkKind.ATLAS: "atlas",
@@ -38,19 +38,19 @@ def describe_file(file: Path) -> dict[str, Any]:
             reader = ReelReader(source)
         except FormatError as error:
             raise FormatError(f"{file}: {error}") from error
-        there = source.size
-        groups = [_describe_group(reader, chunk, there) for chunk in reader.groups]
-        shown = reader.static_ranges(range(reader.frame_count))
+        length = source.size
+        groups = [_describe_group(reader, chunk, length) for chunk in reader.groups]
+        ranges = reader.static_ranges(range(reader.frame_count))
         static = [chunk for chunk in reader.chunks if chunk.kind == ChunkKind.STATIC]
         surface = _first_surface(reader)
-        audio = _describe_audio(reader, there)
-        states = [_describe_state(reader, chunk, there, shown.get(chunk.number, [])) for chunk in static]
+        audio = _describe_audio(reader, length)
+        states = [_describe_state(reader, chunk, length, ranges.get(chunk.number, [])) for chunk in static]
     tracks = [_describe_track(reader, number, groups) for number in range(len(reader.tracks))]
     several = len(tracks) > 1
     of_tracks = [_renamed(track, several) for track in tracks]
-    heard = [] if audio is None else [audio["bytes_by_content"]]
-    whole = {"header and index": reader.head_size}
-    sizes = _sum([whole, *(state["bytes_by_content"] for state in states), *of_tracks, *heard])
+    audio_sizes = [] if audio is None else [audio["bytes_by_content"]]
+    head = {"header and index": reader.head_size}
+    sizes = _sum([head, *(state["bytes_by_content"] for state in states), *of_tracks, *audio_sizes])
     return {
         "frames": reader.frame_count,
         "frame_rate": reader.frame_rate,
@@ -63,7 +63,7 @@ def describe_file(file: Path) -> dict[str, Any]:
         "audio": audio,
         "frames_hidden": reader.coded_count - reader.frame_count,
         "bytes": reader.size,
-        "bytes_missing": reader.size - there,
+        "bytes_missing": reader.size - length,
         "mbps": megabits(reader.size, reader),
         "bytes_by_content": sizes,
         "mbps_by_content": {name: megabits(size, reader) for name, size in sizes.items()},
@@ -75,7 +75,7 @@ def describe_file(file: Path) -> dict[str, Any]:
 
 
 def _first_surface(reader: ReelReader) -> dict[str, int] | None:
-    """Return number, vertices and faces of the first frame with a surface that is whole, among the first few."""
+    """Return number, vertices and faces of the first undamaged frame with a surface, among the first few."""
     video = Video(reader).at(colors=False)
     for frame in range(min(reader.frame_count, LOOKED_AT)):
         with suppress(FormatError):
@@ -94,14 +94,16 @@ def _color(reader: ReelReader) -> str:
     return ", ".join(name for kind, name in kinds.items() if any(c.kind == kind for c in reader.chunks)) or "none"
 
 
-def _describe_audio(reader: ReelReader, there: int) -> dict[str, Any] | None:
-    """Describe what is heard, and when it begins after the first frame; None where there is nothing."""
+def _describe_audio(reader: ReelReader, length: int) -> dict[str, Any] | None:
+    """Describe the audio file, and its start after the first frame; None if there is none."""
     if reader.audio is None:
         return None
-    row = {"bytes": reader.audio.size} | _contents(reader, reader.audio, there, lambda payload: {"audio": len(payload)})
+    row = {"bytes": reader.audio.size} | _contents(
+        reader, reader.audio, length, lambda payload: {"audio": len(payload)}
+    )
     with suppress(FormatError):
-        if (found := Video(reader).audio) is not None:
-            row |= {"type": found.media_type, "start_s": found.start}
+        if (clip := Video(reader).audio) is not None:
+            row |= {"type": clip.media_type, "start_s": clip.start}
     return row
 
 
@@ -110,69 +112,68 @@ def megabits(size: int, reader: ReelReader) -> float:
     return size * 8 * reader.frame_rate / reader.frame_count / 1e6
 
 
-def _describe_group(reader: ReelReader, chunk: Chunk, there: int) -> dict[str, Any]:
-    """Describe a group of a file of which the first `there` bytes exist."""
+def _describe_group(reader: ReelReader, chunk: Chunk, length: int) -> dict[str, Any]:
+    """Describe a group of a file of which the first `length` bytes exist."""
     row: dict[str, Any] = {"chunk": chunk.number, "track": chunk.track}
     first, end = _shown(reader, chunk)
     row |= {"first_frame": first, "frames": end - first}
     row |= {"form": chunk.form_name, "bytes": _size_of(reader, chunk), "layers": len(chunk.layers) - 1}
     row["predicted"] = reader.group_before(chunk) is not None
-    return row | _contents(reader, chunk, there, payload_bytes_by_purpose)
+    return row | _contents(reader, chunk, length, payload_bytes_by_purpose)
 
 
 def _shown(reader: ReelReader, chunk: Chunk) -> tuple[int, int]:
-    """Return the first frame of a group that is shown, and where those end."""
+    """Return the range of a group's shown frames, end excluded."""
     first = min(max(chunk.first_frame, 0), reader.frame_count)
     return first, max(min(chunk.first_frame + chunk.frame_count, reader.frame_count), first)
 
 
 def _size_of(reader: ReelReader, chunk: Chunk) -> int:
-    """Return the bytes of a chunk and of all that belongs to it."""
     return chunk.size + sum(other.size for _, other in _companions(reader, chunk))
 
 
 def _companions(reader: ReelReader, chunk: Chunk) -> Iterator[tuple[str, Chunk]]:
-    """Yield the chunks that belong to a chunk, with the names of what they have."""
+    """Yield the companions of a chunk, with the names of their contents."""
     for kind, name in COMPANION_NAMES.items():
         if (other := reader.companion_of(chunk, kind)) is not None:
             yield name if chunk.frame_count else f"background's {name}", other
 
 
-def _describe_state(reader: ReelReader, chunk: Chunk, there: int, shown: Iterable[tuple[int, int]]) -> dict[str, Any]:
+def _describe_state(reader: ReelReader, chunk: Chunk, length: int, shown: Iterable[tuple[int, int]]) -> dict[str, Any]:
     """Describe a state of the background: the state that it changes, if any, and the frames that show it."""
     row: dict[str, Any] = {"chunk": chunk.number, "form": chunk.form_name, "bytes": _size_of(reader, chunk)}
     row["changes"] = chunk.depends_on[0] if chunk.depends_on else None
     row["ranges"] = _merged(shown)
-    return row | _contents(reader, chunk, there, lambda payload: {"background": len(payload)})
+    return row | _contents(reader, chunk, length, lambda payload: {"background": len(payload)})
 
 
 def _describe_track(reader: ReelReader, number: int, groups: list[dict[str, Any]]) -> dict[str, Any]:
     """Describe a track: the frames in which its body appears, and the bytes of its contents."""
-    own = [group for group in groups if group["track"] == number]
-    there = [_shown(reader, group) for group in reader.tracks[number] if group.form != Form.EMPTY]
-    there = [span for span in there if span[0] < span[1]]
-    size = sum(group["bytes"] for group in own)
-    row: dict[str, Any] = {"track": number, "ranges": _merged(there), "groups": len(own), "bytes": size}
+    track_groups = [group for group in groups if group["track"] == number]
+    spans = [_shown(reader, group) for group in reader.tracks[number] if group.form != Form.EMPTY]
+    spans = [span for span in spans if span[0] < span[1]]
+    size = sum(group["bytes"] for group in track_groups)
+    row: dict[str, Any] = {"track": number, "ranges": _merged(spans), "groups": len(track_groups), "bytes": size}
     return row | {
         "mbps": megabits(size, reader),
-        "bytes_by_content": _sum([group["bytes_by_content"] for group in own]),
+        "bytes_by_content": _sum([group["bytes_by_content"] for group in track_groups]),
     }
 
 
 def _contents(
-    reader: ReelReader, chunk: Chunk, there: int, sizes_of: Callable[[bytes], dict[str, int]]
+    reader: ReelReader, chunk: Chunk, length: int, sizes_of: Callable[[bytes], dict[str, int]]
 ) -> dict[str, Any]:
-    """Return the bytes of a chunk by content; for a damaged chunk its error, and which of its bytes are missing."""
+    """Return the bytes of a chunk by content; for a damaged chunk its error, and the number of missing bytes."""
     sizes, errors = dict[str, int](), list[str]()
-    for name, one in [("", chunk), *_companions(reader, chunk)]:
+    for name, part in [("", chunk), *_companions(reader, chunk)]:
         try:
-            payload = reader.read_chunk(one.number)
-            found = {name: len(payload)} if name else sizes_of(payload)
+            payload = reader.read_chunk(part.number)
+            sizes_of_part = {name: len(payload)} if name else sizes_of(payload)
         except FormatError as error:
-            missing = min(max(one.end - there, 0), one.size)
-            found = {"damaged": one.size - missing, "missing": missing}
+            missing = min(max(part.end - length, 0), part.size)
+            sizes_of_part = {"damaged": part.size - missing, "missing": missing}
             errors.append(str(error))
-        sizes = _sum([sizes, {what: size for what, size in found.items() if size}])
+        sizes = _sum([sizes, {what: size for what, size in sizes_of_part.items() if size}])
     return {"bytes_by_content": sizes} | ({"error": errors[0]} if errors else {})
 
 
@@ -184,10 +185,10 @@ def _sum(rows: Iterable[dict[str, int]]) -> dict[str, int]:
 
 
 def _renamed(track: dict[str, Any], several: bool) -> dict[str, int]:
-    """Return the bytes of a track by content; names include the track if there are several, save for lost bytes."""
-    whole = ("damaged", "missing")
+    """Return the bytes of a track by content; names include the track if there are several, except for lost bytes."""
+    unnamed = ("damaged", "missing")
     prefix = f"track {track['track']}: " if several else ""
-    return {name if name in whole else prefix + name: size for name, size in track["bytes_by_content"].items()}
+    return {name if name in unnamed else prefix + name: size for name, size in track["bytes_by_content"].items()}
 
 
 def _merged(ranges: Iterable[tuple[int, int]]) -> list[list[int]]:

@@ -1,6 +1,6 @@
-"""Page that plays one recording by itself: the built player and the file's bytes in one HTML text, without a network.
+"""Self-contained page that plays one recording: the built player and the file's bytes in one HTML text.
 
-In: the bytes of a .reel file. Out: a page, and for notebooks a frame that holds it. Browsers unpack what is in it.
+In: the bytes of a .reel file. Out: a page, and for notebooks a frame that holds it. Browsers unpack its contents.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from importlib.resources import files
 
 _NAMES = ("meshreel-player.js", "three.js", "worker.js", "order.js", "core.wasm", "draco.wasm")
 
-# The element, its files from memory (`meshreelFiles`, which the player looks at), and the recording given to it.
+# The element, its files in memory (`meshreelFiles`, where the player looks them up), and the recording.
 _PAGE = """\
 <!doctype html>
 <html lang="en">
@@ -45,22 +45,22 @@ meshreel-player {{ width: 100%; height: 100%; aspect-ratio: auto }}
 
 
 def player_page(data: bytes, name: str) -> str:
-    """Return the page that plays a file, whose name it shows. Raises FileNotFoundError where no player is built."""
+    """Return the page that plays a file, entitled `name`. Raises FileNotFoundError if no player is built."""
     built = files("meshreel") / "player"
     packed = {file: _text(gzip.compress((built / file).read_bytes(), mtime=0)) for file in _NAMES}
-    shown = json.dumps(name).replace("<", "\\u003c")  # no name ends the script
-    return _PAGE.format(title=escape(name), name=shown, packed=json.dumps(packed), recording=_text(data))
+    text = json.dumps(name).replace("<", "\\u003c")  # no name ends the script
+    return _PAGE.format(title=escape(name), name=text, packed=json.dumps(packed), recording=_text(data))
 
 
 def in_frame(page: str, facts: Sequence[str]) -> str:
-    """Return what a notebook shows: facts, and the page in a frame of its own."""
+    """Return the HTML of a notebook's output: facts, and the page in a frame."""
     style = "width: 100%; height: 400px; border: 0"
     allow = 'allow="fullscreen; xr-spatial-tracking" allowfullscreen'
     return f'<p>{escape(", ".join(facts))}</p><iframe style="{style}" {allow} srcdoc="{escape(page)}"></iframe>'
 
 
 def table(facts: Iterable[tuple[str, str]], note: str) -> str:
-    """Return the facts of a file that is too large for a notebook, and how to play it."""
+    """Return the HTML for a file that is too large for a notebook: its facts, and a note on how to play it."""
     rows = "".join(f"<tr><th>{escape(name)}</th><td>{escape(value)}</td></tr>" for name, value in facts)
     return f"<table>{rows}</table><p>{escape(note)}</p>"
 

@@ -1,8 +1,8 @@
 """Pictures of a track or a background: the texture of each frame, decoded on access from the video of its chain.
 
-In: a reader, and the frames of a group. Out: the places of their faces in a texture, and the textures. Pictures are
-decoded in their order, from the chain's first where another one was asked for last. Each layer of the pictures of a
-background is a chain of its own.
+In: a reader, and the frames of a group. Out: texture coordinates of their faces, and the textures. Pictures are decoded
+in order, from the chain's first unless an earlier picture was decoded last. Each layer of a background's pictures is a
+separate chain.
 """
 
 from __future__ import annotations
@@ -30,37 +30,36 @@ CODECS = {ChunkKind.PICTURES: VideoCodec.AV1, ChunkKind.COMPATIBLE: VideoCodec.H
 
 @dataclass(frozen=True, slots=True)
 class _Place:
-    """Where the decoder of a chain stands."""
+    """Position of the decoder of a chain."""
 
     decoder: VideoDecoder
     texels: int  # of a picture
     size: int  # bytes of the chunk whose pictures were decoded last
-    after: tuple[int, int]  # this chunk, and the layer
-    count: int = 0  # of these pictures
-    planes: np.ndarray | None = None  # of the last of them
+    after: tuple[int, int]  # number of this chunk, and its layer
+    count: int = 0  # decoded pictures of this layer
+    planes: np.ndarray | None = None  # of the last of these pictures
 
 
 class Decoders:
-    """Decoders of the videos of a file, each at the picture that was asked for last, as many as memory has."""
+    """Decoders of the videos of a file, each at the picture that it decoded last, within a bound on memory."""
 
     def __init__(self) -> None:
         self.lock = threading.Lock()
-        self.refused = dict[tuple[int, int], tuple[int, str]]()  # by chunk and layer: whole pictures, and what follows
-        self._places = dict[tuple[int, int], _Place]()  # by those that a chain begins with; the last used is the last
+        self.refused = dict[tuple[int, int], tuple[int, str]]()  # valid pictures and error, by chunk and layer
+        self._places = dict[tuple[int, int], _Place]()  # by a chain's first chunk and layer, least recently used first
 
     def take(self, first: tuple[int, int], texels: int, size: int) -> _Place | None:
-        """Return the place of a chain, which is forgotten, for it may fail; and so are others, until it has room."""
+        """Remove and return the place of a chain, whose decoding may fail; drop others until there is room for it."""
         place = self._places.pop(first, None)
         while self._places and are_costly([(texels, size), *((one.texels, one.size) for one in self._places.values())]):
             del self._places[next(iter(self._places))]
         return place
 
     def keep(self, first: tuple[int, int], place: _Place) -> None:
-        """Keep the place of a chain."""
         self._places[first] = place
 
     def check(self, link: tuple[int, int], stop: int | None) -> None:
-        """Raise the FormatError of bytes that were refused, where the first `stop` pictures, or all, need them."""
+        """Raise the FormatError of refused bytes if the first `stop` pictures, or all, need them."""
         whole, message = self.refused.get(link, (0, ""))
         if message and (stop is None or stop > whole):
             raise FormatError(message)
@@ -68,7 +67,7 @@ class Decoders:
 
 @dataclass(frozen=True, slots=True)
 class _Shown:
-    """A picture, decoded when it is asked for; pickled as what it shows."""
+    """A picture, decoded when it is called; pickled as its pixels."""
 
     pictures: TrackPictures
     number: int
@@ -86,13 +85,13 @@ class TrackPictures:
 
     def __init__(self, reader: ReelReader, decoders: Decoders) -> None:
         self._reader, self._decoders = reader, decoders
-        self._layouts: tuple[int, Layout] | None = None  # of the atlas that was asked for last
-        self._sizes = dict[int, tuple[int, int]]()  # of the textures of all atlases that were asked for
-        self._layers = dict[tuple[int, int], tuple[int, int]]()  # what `_sizes_of` found, by chunk and layer
-        self._background: tuple[int, int, Mesh] | None = None  # the state and picture shown last, and their mesh
+        self._layouts: tuple[int, Layout] | None = None  # number and layout of the atlas used last
+        self._sizes = dict[int, tuple[int, int]]()  # width and height of textures, by atlas
+        self._layers = dict[tuple[int, int], tuple[int, int]]()  # results of `_sizes_of`, by chunk and layer
+        self._background: tuple[int, int, Mesh] | None = None  # state and picture shown last, and their mesh
 
     def textured(self, chunk: Chunk, meshes: list[Mesh], canvas: Canvas) -> list[Mesh]:
-        """Return the frames of a group with the textures that it has. FormatError where its atlas is damaged."""
+        """Return the frames of a group with its textures. Raises FormatError if its atlas is damaged."""
         pictures = self._pictures_of(chunk)
         if pictures is None:
             return meshes
@@ -107,7 +106,7 @@ class TrackPictures:
         return [replace(mesh, uv=uv, texture=self._texture(pictures, frame)) for frame, (mesh, uv) in pairs]
 
     def shown(self, static: Chunk, mesh: Mesh, frame: int) -> Mesh:
-        """Return the mesh of a background with the picture of a frame; the same mesh where it has it, or has none."""
+        """Return the mesh of a background with the picture of a frame, or as it is if it has no pictures."""
         pictures = self._pictures_of(static)
         if pictures is None or mesh.texture is None:
             return mesh
@@ -119,7 +118,7 @@ class TrackPictures:
     def planes(self, number: int, at: int) -> UInt8[np.ndarray, "R W"]:
         """Return the planes of picture `at` of chunk `number`.
 
-        Raises FormatError where it, or a picture before it in its chain, is damaged.
+        Raises FormatError if this picture, or one before it in its chain, is damaged.
         """
         with self._decoders.lock:
             return self._decoded(number, at)
@@ -140,7 +139,7 @@ class TrackPictures:
         )
 
     def _at(self, pictures: Chunk, frame: int) -> int:
-        """Return which of a background's pictures is shown in a frame, counted from the first that it is shown in."""
+        """Return the number of a background's picture in `frame`, counted from the first frame that shows it."""
         last = len(pictures.layers) - 1
         at = frame // self._sizes_of(pictures.number, 0)[0]
         if at < last * LAYER_PICTURES:
@@ -148,22 +147,22 @@ class TrackPictures:
         return min(at, last * LAYER_PICTURES + self._sizes_of(pictures.number, last)[1] - 1)
 
     def _sizes_of(self, number: int, layer: int) -> tuple[int, int]:
-        """Return of a layer of a background's pictures the frames that each is shown for, and how many they are."""
+        """Return the frames for which each picture of a background's layer is shown, and the number of pictures."""
         if (number, layer) not in self._layers:
             record = self._record((number, layer), self._reader.read_layer(number, layer))
             self._layers[number, layer] = record.interval, len(record.packets)
         return self._layers[number, layer]
 
     def _decoded(self, number: int, at: int) -> UInt8[np.ndarray, "R W"]:
-        chain, known = self._chain(number, at), self._decoders
+        chain, decoders = self._chain(number, at), self._decoders
         width, height = self._sizes[self._reader.chunks[number].depends_on[1]]
-        here = chain[-1], 1 + (at % LAYER_PICTURES if self._is_static(number) else at)
-        place = known.take(chain[0], width * height, self._reader.chunks[number].size)
-        if place is not None and (place.after, place.count) > here:
+        wanted = chain[-1], 1 + (at % LAYER_PICTURES if self._is_static(number) else at)
+        place = decoders.take(chain[0], width * height, self._reader.chunks[number].size)
+        if place is not None and (place.after, place.count) > wanted:
             place = None
-        if place is None or (place.after, place.count) < here:
-            place = self._advanced(place, chain, here[1], width, height)
-        known.keep(chain[0], place)
+        if place is None or (place.after, place.count) < wanted:
+            place = self._advanced(place, chain, wanted[1], width, height)
+        decoders.keep(chain[0], place)
         assert place.planes is not None
         return place.planes
 
@@ -193,14 +192,14 @@ class TrackPictures:
         chunk = self._reader.chunks[link[0]]
         width, height = self._sizes[chunk.depends_on[1]]
         record = decode_pictures(data, chunk.frame_count, width * height)
-        if record.codec != CODECS[ChunkKind(chunk.kind)]:  # a decoder would find in the packets what nobody counted
+        if record.codec != CODECS[ChunkKind(chunk.kind)]:  # another coding could take more memory than was checked
             raise FormatError(f"pictures of codec {int(record.codec)} in a chunk of kind {ChunkKind(chunk.kind).name}")
         if link[1] < len(chunk.layers) - 1 and len(record.packets) < LAYER_PICTURES:
             raise FormatError(f"{len(record.packets)} pictures in a layer that is not the last")
         return record
 
     def _chain(self, number: int, at: int) -> list[tuple[int, int]]:
-        """Return chunk and layer of all pictures that are decoded before one of them, and with it."""
+        """Return chunks and layers of the pictures that must be decoded for one picture, its own last."""
         if self._is_static(number):
             return [(number, at // LAYER_PICTURES)]
         chain = [number]

@@ -1,6 +1,6 @@
-"""Splats of a track: those of a chain of groups, decoded on access and bound to the mesh of each frame.
+"""Splats of a track: decoded on access for a chain of groups, and bound to the mesh of each frame.
 
-In: a reader, and the mesh of a frame with what led to it. Out: Gaussians in metres.
+In: a reader, and the mesh of a frame with the state before it. Out: Gaussians in metres.
 """
 
 from __future__ import annotations
@@ -21,22 +21,22 @@ class TrackSplats:
     def __init__(self, reader: ReelReader, layers: int | None) -> None:
         self._reader, self._layers = reader, layers
         self._refusals = Refusals()
-        self._splats: tuple[int, int, Splats] | None = None  # of the chunk asked for last, and faces of its mesh
-        self._carriers: tuple[int, list[Carrier]] | None = None  # of the frames of the group that was asked for last
+        self._splats: tuple[int, int, Splats] | None = None  # chunk used last, number of its mesh's faces, its splats
+        self._carriers: tuple[int, list[Carrier]] | None = None  # group used last, and carriers of its frames
 
     def of(self, chunk: Chunk) -> Chunk | None:
-        """Return the chunk of the splats that a group has: its own, or those of the group before it; None: none."""
-        at: Chunk | None = chunk if chunk.form in (Form.LAYERS, Form.LAPLACIAN) else None
-        while at is not None:
-            if (found := self._reader.companion_of(at, ChunkKind.SPLATS)) is not None:
-                return found
-            at = self._reader.group_before(at)
+        """Return the chunk of a group's splats: its own, or that of the group before it, and so on; None: no splats."""
+        group: Chunk | None = chunk if chunk.form in (Form.LAYERS, Form.LAPLACIAN) else None
+        while group is not None:
+            if (companion := self._reader.companion_of(group, ChunkKind.SPLATS)) is not None:
+                return companion
+            group = self._reader.group_before(group)
         return None
 
     def bound(
         self, of: Chunk, chunk: Chunk, payload: bytes, frames: list[Mesh], before: LayersState | None, index: int
     ) -> Bound | None:
-        """Return the splats of a frame of a group, whose frames are in metres; None where they are of another mesh.
+        """Return the splats of a frame of a group, whose frames are in metres; None if they are on another mesh.
 
         Raises FormatError on damaged bytes.
         """

@@ -30,7 +30,7 @@ MOST_TOGETHER = 8 * MOST_NUMBERS  # bytes: the groups of one frame take no more 
 
 
 class Track(Frames):
-    """One moving body over the whole file: a mesh for each frame, empty in frames without the body."""
+    """Moving body over the whole file: a mesh for each frame, empty in frames without the body."""
 
     def __init__(
         self,
@@ -42,7 +42,7 @@ class Track(Frames):
     ) -> None:
         """Decode track `number` from at most `layers` layers of each group beyond its first; None: from all.
 
-        Tracks that share `decoders` take no more memory for their textures than is good.
+        Pass one `decoders` to all tracks to share their memory limit.
         """
         self.reader = reader
         self._colored = colored and reader.is_colored
@@ -54,7 +54,7 @@ class Track(Frames):
         self._pictures = TrackPictures(reader, decoders or Decoders())
         self._splats = TrackSplats(reader, layers)
         self._refusals = Refusals()  # of frames
-        self._lost = Refusals()  # of states, which may be whole where frames of the same group are damaged
+        self._lost = Refusals()  # of states, which may be valid if frames of the same group are damaged
 
     def __len__(self) -> int:
         return self.reader.frame_count
@@ -70,7 +70,7 @@ class Track(Frames):
         return group.frames[index - chunk.first_frame], group.nbytes
 
     def splats(self, index: int) -> Bound | None:
-        """Return the splats of frame `index` in metres; None where its groups have none. Raises as indexing does."""
+        """Return the splats of frame `index` in metres; None if its groups have none. Raises as indexing does."""
         chunk = self.reader.chunk_of_frame(index, self.number)
         if (of := self._splats.of(chunk)) is None:
             return None
@@ -87,16 +87,16 @@ class Track(Frames):
         with self._refusals.of(chunk):
             meshes, after = continue_group(payload, chunk.frame_count, self.layers, state, self._place)
         meshes, after = self._painted(chunk, payload, meshes, state, after)
-        shown = {
+        views = {
             id(mesh): read_only(turned(mesh, self.reader)) for mesh in meshes
         }  # the frames of an empty group are one mesh
-        meshes = [shown[id(mesh)] for mesh in meshes]
+        meshes = [views[id(mesh)] for mesh in meshes]
         self._states = states.add(chunk.number, after, state, self._most)
         self._group = group = CachedGroup(chunk.number, meshes, memory_of(meshes))
         return group
 
     def _state_before(self, chunk: Chunk) -> tuple[LayersState | None, CachedStates]:
-        """Return the state that a group is predicted from, and a cache of it; the frames before are not decoded."""
+        """Return the state that a group is predicted from, and a cache with it; earlier frames are not decoded."""
         chain = [chunk]
         states = self._states
         self._refusals.check(chunk)
@@ -117,7 +117,7 @@ class Track(Frames):
     def _painted(
         self, chunk: Chunk, payload: bytes, meshes: list[Mesh], before: LayersState | None, after: LayersState | None
     ) -> tuple[list[Mesh], LayersState | None]:
-        """Return the frames of a group with its colours, and the state that predicts the next with theirs."""
+        """Return the frames of a group with its colours, and the state for the next group with its colours."""
         if not self._colored or self.reader.companion_of(chunk, ChunkKind.COLORS) is None:
             return meshes, after
         counts = [len(mesh.vertices) for mesh in meshes]
@@ -125,14 +125,14 @@ class Track(Frames):
             canvas = canvas_of(payload, counts, self.layers, before)
         layers = None if chunk.form != Form.LAYERS else self.layers
         colors, after = self._colors(chunk, canvas, layers, before, after)
-        meshes = [replace(mesh, colors=some) for mesh, some in zip(meshes, colors, strict=True)]
+        meshes = [replace(mesh, colors=own) for mesh, own in zip(meshes, colors, strict=True)]
         with self._refusals.of(chunk):
             return self._pictures.textured(chunk, meshes, canvas), after
 
     def _state_with_colors(
         self, chunk: Chunk, payload: bytes, before: LayersState | None, after: LayersState | None
     ) -> LayersState | None:
-        """Return a state with the colours that the next group may be predicted from; none is painted."""
+        """Return a state with the colours that the next group may be predicted from; no frame is painted."""
         if after is None or not self._colored or self.reader.companion_of(chunk, ChunkKind.COLORS) is None:
             return after
         levels = len(after.scalars)  # without the patches, from which nothing is predicted
@@ -151,7 +151,7 @@ class Track(Frames):
 
     @property
     def _most(self) -> int:
-        """Bytes of states to keep: all tracks together keep no more than a single one would."""
+        """Bytes of states to keep: all tracks together keep no more than a single track would."""
         return MOST_KEPT // len(self.reader.tracks)
 
     def _read(self, chunk: Chunk) -> bytes:
@@ -166,14 +166,14 @@ class Background:
         self._colored = colored
         self._pictures = TrackPictures(reader, decoders or Decoders())
         self._place = placement(reader)
-        # Number of a chunk, its mesh, what led to it, and what is shown; replaced as a whole, as other threads do.
+        # Number of a chunk, its mesh, the chain that led to it, and the shown mesh; replaced as one for other threads.
         self._last = (-1, Mesh.empty(), Chain(), Mesh.empty())
         self._refusals = Refusals()
 
     def of_frame(self, frame: int) -> Mesh | None:
         """Return the background of a frame in metres, None if the frame has none.
 
-        Raises IndexError out of range and FormatError if it, or a state that it was changed from, is damaged.
+        Raises IndexError out of range and FormatError if the state, or one that it changes, is damaged.
         """
         chunk = self.reader.static_of_frame(frame)
         if chunk is None:
@@ -184,7 +184,7 @@ class Background:
             raise FormatError(f"the background of frame {frame}: {error}") from error
 
     def _state(self, chunk: Chunk) -> Mesh:
-        """Decode a state, starting from the last one decoded if the state is that one or was changed from it."""
+        """Decode a state, starting from the last decoded one if it is that state or changes it."""
         known, mesh, led, shown = self._last
         chain = [chunk]
         self._refusals.check(chunk)
@@ -210,7 +210,7 @@ class Background:
             return self._painted(chunk, payload, decode_background(payload, self._place)), Chain(0, len(payload))
 
     def _painted(self, chunk: Chunk, payload: bytes, mesh: Mesh) -> Mesh:
-        """Return a state with its colours, where it has them: those of what a change adds come behind what is left."""
+        """Return a state with its colours, if any: those of added faces follow those of the remaining ones."""
         of = self.reader.companion_of(chunk, ChunkKind.COLORS) if self._colored else None
         if of is None:
             return mesh
@@ -226,7 +226,7 @@ def placement(reader: ReelReader) -> Placement:
 
 
 def turned(mesh: Mesh, reader: ReelReader) -> Mesh:
-    """Return a mesh of a file, in metres, as the file's edit turns it."""
+    """Return a mesh of a file, in metres, with the rotation of the file's edit."""
     if not reader.edit.rotation:
         return mesh
     turn, origin = np.array(reader.edit.rotation).reshape(3, 3), np.array(reader.header.origin)

@@ -26,13 +26,14 @@ from .pictures import Decoders
 from .tracks import Background, Track, moving_of_frame
 
 BACKGROUND = "background"  # its name among the parts of a frame
-INLINE = 8_000_000  # bytes of a file that a notebook's output may hold (guess): saved notebooks hold 4/3 of it
+INLINE = 8_000_000  # bytes, largest file in a notebook's output (guess): saved notebooks hold 4/3 of it
 
 
 def open(source: str | Path | bytes | Stream | Source) -> Video:
     """Open the video in a .reel file: a path, a URL, bytes, a binary file object, or a source of byte ranges.
 
-    A URL is http(s)://, or one of a store that fsspec knows, as s3:// (extra `remote`); what is decoded is fetched.
+    A URL is http(s)://, or of a store that fsspec supports, such as s3:// (extra `remote`); only chunks that are
+    decoded are fetched.
     Raises InputError if it cannot be read, and FormatError if the header or the index are damaged or of a version that
     this reader does not know.
     """
@@ -58,8 +59,8 @@ class Video(Sequence[Mesh]):
 
     A frame is its background, if it has one, and its moving bodies, one in each track; `parts` returns them separately.
     Random access decodes one group of each track, and the groups that it is predicted from. A file stays open until
-    `close`, or until the end of a `with` block. The arrays of a frame are the caller's own, who may change them; those
-    of `parts` and `background` are read-only, because the video keeps them: `mesh.copy()` gives arrays of one's own.
+    `close`, or until the end of a `with` block. The arrays of a frame belong to the caller, who may change them; those
+    of `parts` and `background` are read-only, because the video keeps them: `mesh.copy()` returns a writable copy.
     """
 
     def __init__(
@@ -71,7 +72,7 @@ class Video(Sequence[Mesh]):
         path: str | Path | None = None,
     ) -> None:
         self.reader = reader
-        self.path = path  # that it was opened by, or its URL; None for bytes and objects
+        self.path = path  # path or URL that was opened; None for bytes and objects
         self.layers = layers
         self._colored = colored
         decoders, numbers = Decoders(), range(len(reader.tracks))
@@ -92,7 +93,7 @@ class Video(Sequence[Mesh]):
         return Video(self.reader, layers, self._close, colors, self.path)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Pickle the path or the URL, by which another process opens the file again, or else the bytes."""
+        """Pickle the path or URL, with which another process opens the file again, or else the bytes."""
         source: str | Path | Source = self.reader.source
         if self.path is not None:
             source = Path(self.path).absolute() if isinstance(source, FileSource) else self.path
@@ -101,7 +102,7 @@ class Video(Sequence[Mesh]):
         return _reopened, (source, self.layers, self._colored)
 
     def close(self) -> None:
-        """Close the file. Afterwards only frames of the groups that were decoded last can be read."""
+        """Close the file. Afterwards only frames of the last decoded groups can be read."""
         if self._close is not None:
             self._close()
 
@@ -133,9 +134,9 @@ class Video(Sequence[Mesh]):
 
     @property
     def audio(self) -> Audio | None:
-        """The audio file that belongs to the frames, byte for byte; None where there is none.
+        """The audio file that belongs to the frames, byte for byte; None if there is none.
 
-        Raises FormatError where it is damaged.
+        Raises FormatError if it is damaged.
         """
         record, head = self.reader.read_audio(), self.reader.header
         if record is None:
@@ -149,7 +150,7 @@ class Video(Sequence[Mesh]):
 
     @property
     def bytes_read(self) -> int:
-        """Bytes read so far: from a URL all that came; from a file here those of the chunks that were decoded."""
+        """Bytes read so far: of a URL, all received bytes; of a local file, those of decoded chunks."""
         return self.reader.bytes_read
 
     @property
@@ -197,35 +198,35 @@ class Video(Sequence[Mesh]):
         return _joined(moving_of_frame(self.tracks, self._frame(index)))
 
     def splats(self, index: int) -> Bound | None:
-        """Return the splats of all moving bodies of frame `index` in metres; None where none has any.
+        """Return the splats of all moving bodies of frame `index` in metres; None if there are none.
 
-        They are to be drawn in place of the surface of these bodies. Raises as indexing does.
+        Draw them in place of the surface of these bodies. Raises as indexing does.
         """
         frame = self._frame(index)
-        found = [some for some in (track.splats(frame) for track in self.tracks) if some is not None]
-        return Bound.join(found) if found else None
+        bound = [splats for splats in (track.splats(frame) for track in self.tracks) if splats is not None]
+        return Bound.join(bound) if bound else None
 
     def vertices(self, first: int, last: int, out: np.ndarray | None = None) -> Float[np.ndarray, "T V 3"]:
-        """Return the vertices of frames `first` to `last` - 1 in metres, which all must have the same ones.
+        """Return the positions (m) of the vertices, which must be the same in frames `first` to `last` - 1.
 
-        They are written to `out` if it is given, an array of float64 or float32, for which the coordinates are rounded;
-        otherwise to a new array of float64. Raises InputError, which names the frame, where their number or what they
-        are changes, or does not fit the array; and otherwise as indexing does.
+        They are written to `out` if it is given, an array of float64 or float32, for which coordinates are rounded;
+        otherwise to a new array of float64. Raises InputError, which names the frame, if the vertices or their number
+        change or do not fit the array; and otherwise as indexing does.
         """
         if not 0 <= first < last <= len(self):
             raise IndexError(f"frames {first} to {last} of a video of {len(self)} frames")
         if out is not None and (out.ndim != 3 or len(out) != last - first or out.dtype.char not in "df"):
             text = f"an array of {out.dtype} {out.shape} for {last - first} frames"
             raise InputError(f"{text}: give one of float64 or float32, frames x vertices x 3")
-        shown, static = [*self.parts(first).values()], self.reader.static_of_frame(first)
+        first_parts, static = [*self.parts(first).values()], self.reader.static_of_frame(first)
         before = self.reader.chunks_of_frame(first)
         if out is None:
-            out = np.empty((last - first, sum(len(mesh.vertices) for mesh in shown), 3))
+            out = np.empty((last - first, sum(len(mesh.vertices) for mesh in first_parts), 3))
         for row, frame in zip(out, range(first, last), strict=True):
             parts, chunks = [*self.parts(frame).values()], self.reader.chunks_of_frame(frame)
             if (count := sum(len(mesh.vertices) for mesh in parts)) != len(row) or row.shape[1:] != (3,):
                 raise InputError(f"frame {frame} has {count} vertices: the array has room for {len(row)}")
-            is_same = self._follow(chunks, before) or _are_alike(parts, shown)
+            is_same = self._follow(chunks, before) or _are_alike(parts, first_parts)
             if self.reader.static_of_frame(frame) != static or not is_same:
                 raise InputError(f"frame {frame} has other vertices than frame {first}: ask for the frames before it")
             np.concatenate([mesh.vertices for mesh in parts], out=row, casting="same_kind")
@@ -233,17 +234,17 @@ class Video(Sequence[Mesh]):
         return out
 
     def _follow(self, chunks: tuple[Chunk, ...], before: tuple[Chunk, ...]) -> bool:
-        """Return whether groups go on with the vertices of those before, one after the other."""
+        """Return whether groups continue with the vertices of the groups before them."""
         return all(
-            chunk.form != Form.DRACO and (chunk == one or self.reader.group_before(chunk) == one)
-            for chunk, one in zip(chunks, before, strict=True)
+            chunk.form != Form.DRACO and (chunk == earlier or self.reader.group_before(chunk) == earlier)
+            for chunk, earlier in zip(chunks, before, strict=True)
         )
 
     def __repr__(self) -> str:
         return f"<meshreel.Video: {', '.join(self._facts().values())}>"
 
     def _repr_html_(self) -> str:
-        """Return for a notebook the player with the file in it, or a table where the file has more than `INLINE` bytes.
+        """Return for a notebook the player with the file in it, or a table if the file has more than `INLINE` bytes.
 
         The output needs no network; browsers of 2023 and later play it.
         """
@@ -262,7 +263,7 @@ class Video(Sequence[Mesh]):
     def show(self) -> None:
         """Play the video: in a notebook below the cell; elsewhere in the browser, as a page in a temporary folder.
 
-        The page has the whole file in it and needs no server; `meshreel play` streams a large one.
+        The page contains the whole file and needs no server; `meshreel play` streams a large file.
         """
         shell = sys.modules.get("IPython") and sys.modules["IPython"].get_ipython()
         if shell is not None and hasattr(shell, "kernel"):
@@ -317,14 +318,14 @@ def _counted(count: int, what: str) -> str:
 
 
 def _are_alike(parts: list[Mesh], others: list[Mesh]) -> bool:
-    """Return whether the parts of two frames, as many in each, have equally many vertices and the same faces."""
+    """Return whether corresponding parts of two frames have equally many vertices and the same faces."""
     return all(
-        len(one.vertices) == len(other.vertices) and np.array_equal(one.faces, other.faces)
-        for one, other in zip(parts, others, strict=True)
+        len(part.vertices) == len(other.vertices) and np.array_equal(part.faces, other.faces)
+        for part, other in zip(parts, others, strict=True)
     )
 
 
 def _joined(meshes: list[Mesh]) -> Mesh:
-    """Return all meshes as one, in arrays that belong to nobody else."""
+    """Return all meshes as one, in new arrays."""
     mesh = concatenate(meshes)
     return mesh.copy() if any(mesh is part for part in meshes) else mesh

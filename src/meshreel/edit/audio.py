@@ -71,7 +71,7 @@ class JoinedAudio:
 
 
 def audio_type(data: bytes, name: str) -> AudioType:
-    """Return what the bytes of an audio file are. Raises InputError, which begins with its name, for others."""
+    """Return the type of an audio file. Raises InputError, which begins with its name, for other bytes."""
     if not data:
         raise InputError(f"{name}: has no bytes; {_REMEDY}")
     if len(data) > LIMITS.audio - (1 << 10):
@@ -120,7 +120,7 @@ def _coded(data: bytes) -> AudioType | None:
 
 
 def _found(data: bytes) -> str:
-    """Say what bytes are."""
+    """Return a description of bytes of unknown type."""
     if data[:4] == b"OggS":
         return "an Ogg file without Opus"
     if data[:4] == b"\x1aE\xdf\xa3":

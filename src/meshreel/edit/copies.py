@@ -26,7 +26,7 @@ _MOST = 0xFFFF  # bytes of metadata (FORMAT.md)
 
 @dataclass(frozen=True, slots=True)
 class Edited:
-    """What became of the files."""
+    """Result of an edit."""
 
     frames: int  # shown
     size: int  # bytes

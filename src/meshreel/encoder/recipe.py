@@ -37,7 +37,7 @@ class Recipe(Protocol):
 
     @property
     def bodies_apart(self) -> bool:
-        """Whether bodies that never touch become tracks of their own."""
+        """True if bodies that never touch become separate tracks."""
         ...
 
     def longest(self, frame_rate: float) -> int:

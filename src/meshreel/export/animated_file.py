@@ -1,7 +1,7 @@
 """Export of a .reel file to one animated file that other programs play: GLB or USD.
 
-In: a reader and a path. Out: the file. Frames of a group that have the same vertices become one moving shape; every
-other frame becomes a shape that is shown for one frame. The states of a background are shapes that stand still.
+In: a reader and a path. Out: the file. Frames of a group with the same vertices become one moving shape; every other
+frame becomes a shape that is visible for one frame. The states of a background are still shapes.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ from .animated_usd import EXTENSIONS, animated_usd
 from .frames import Part
 from .shapes import Animation, AnimationWriter, Points, Shape, check_output
 
-MOST_FRAMES = 64  # of a shape, which are in memory together; viewers limit the morph targets of a mesh (guess)
-_FAR = 8.0  # diagonals; coordinates that far from the origin are stored relative to the center (guess)
+MOST_FRAMES = 64  # of a shape, all in memory together; viewers limit the morph targets of a mesh (guess)
+_FAR = 8.0  # diagonals; coordinates farther from the origin are stored relative to the center (guess)
 
 Progress = Callable[[str, int, int], None]  # stage, number of frames done, number of all frames
 
@@ -37,13 +37,11 @@ Progress = Callable[[str, int, int], None]  # stage, number of frames done, numb
 class ExportOptions:
     """Layers, parts and orientation of an export."""
 
-    layers: int | None = None  # at most, of each group beyond its first; None: all
+    layers: int | None = None  # largest number of layers of each group beyond its first; None: all
     only: Part = "all"
-    up: Up | None = (
-        None  # axis of the meshes that points up, None: as the .reel file names it; in the exported file it is +y
-    )
-    texture: bool = False  # of each frame in USD, of each shape's first in GLB: glTF cannot change a picture in time
-    compressed: bool = False  # GLB alone: EXT_meshopt_compression and KHR_mesh_quantization
+    up: Up | None = None  # axis of the meshes that becomes the file's +y; None: the axis that the .reel file names
+    texture: bool = False  # write textures: of each frame in USD, of each shape's first in GLB, which cannot change it
+    compressed: bool = False  # GLB only: EXT_meshopt_compression and KHR_mesh_quantization
 
     def __post_init__(self) -> None:
         if self.layers is not None and self.layers < 0:
@@ -70,8 +68,8 @@ def export(
 ) -> int:
     """Write consecutive frames, by default all, to a .glb, .usd, .usdc, .usda or .usdz file; return the shape count.
 
-    The file appears when it is complete. Two groups are in memory. Raises InputError if the format cannot hold the
-    frames or the file cannot be written, and FormatError if a chunk is damaged.
+    The file appears when it is complete. At most two groups are in memory. Raises InputError if the format cannot hold
+    the frames or the file cannot be written, and FormatError if a chunk is damaged.
     """
     frames = range(reader.frame_count) if frames is None else frames
     decoders, numbers = Decoders(), range(len(reader.tracks))
@@ -118,24 +116,25 @@ def _animation(reader: ReelReader, frames: range, up: Up) -> Animation:
 def _states(source: _Source) -> Iterator[Shape]:
     """Yield a shape for each state of the background, with the ranges of exported frames that show it."""
     frames = source.frames
-    for number, own in enumerate(source.reader.static_ranges(frames).values()):
-        mesh = source.background.of_frame(own[0][0])
+    for number, spans in enumerate(source.reader.static_ranges(frames).values()):
+        mesh = source.background.of_frame(spans[0][0])
         if mesh is not None and not mesh.is_empty:
-            shown = tuple((first - frames.start, end - frames.start) for first, end in own)
+            shown = tuple((first - frames.start, end - frames.start) for first, end in spans)
             points, uv = map(_points, [mesh]), _uv(source, mesh)
             yield Shape("background", f"state_{number}", mesh.faces, shown[0][0], 1, points, shown, uv)
 
 
 def _moving(source: _Source, progress: Progress | None) -> Iterator[Shape]:
-    """Yield the shapes of one track after the other."""
     frames = source.frames
     for number, groups in enumerate(source.reader.tracks):
         for group in groups:
-            own = range(max(group.first_frame, frames.start), min(group.first_frame + group.frame_count, frames.stop))
-            if own:
-                yield from _group_shapes(source, group, own)
+            exported = range(
+                max(group.first_frame, frames.start), min(group.first_frame + group.frame_count, frames.stop)
+            )
+            if exported:
+                yield from _group_shapes(source, group, exported)
                 if progress is not None:
-                    done = number * len(frames) + own.stop - frames.start
+                    done = number * len(frames) + exported.stop - frames.start
                     progress("export", done // len(source.tracks), len(frames))
 
 
@@ -183,7 +182,7 @@ def _ahead(source: _Source, group: Chunk, meshes: Sequence[Mesh], frame: int) ->
 
 
 def _is_moved(before: Mesh, after: Mesh) -> bool:
-    """Return whether two frames of a group have the same vertices, in other places.
+    """Return whether two frames of a group have the same vertices, in different places.
 
     Frames that are decoded from one template share its faces in memory. Equal faces prove nothing: faces of patches,
     or of frames coded one by one, may be equal by chance.

@@ -1,9 +1,9 @@
 """Writer of animated GLB (binary glTF 2.0): a node and a mesh for each shape, morph targets for its frames.
 
-In: shapes, one after the other. Out: a file whose binary chunk is never in memory as a whole. Core glTF, but for what
-`GlbFile` says of colours: a scale of 0 hides a node, as the specification ("Transformations") says, and weights are
+In: shapes, one after the other. Out: a file whose binary chunk is never in memory as a whole. Only core glTF, except
+for colours (see `GlbFile`): a scale of 0 hides a node, as the specification allows ("Transformations"), and weights are
 interpolated linearly between frames. A compressed file has streams of meshoptimizer (EXT_meshopt_compression), and
-places as 16-bit numbers on a lattice of each shape, which its node moves to where it is (KHR_mesh_quantization).
+positions as 16-bit numbers on a lattice of each shape, which its node scales and translates (KHR_mesh_quantization).
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ from ..io.meshopt import by_use, check_meshopt
 from ..io.write import replacing
 from .shapes import Animation, Points, Shape, changes, unit_normals
 
-BITS = 14  # of places along the longest side of a shape in a compressed file, as gltfpack has by default
-_ROUNDED = {"NORMAL": 6, COLORS: 10}  # bits behind the point, guesses: half a degree of normals, a 2048th of light
+BITS = 14  # of positions along the longest side of a shape in a compressed file, gltfpack's default
+_ROUNDED = {"NORMAL": 6, COLORS: 10}  # fractional bits, guesses: half a degree of normals, a 2048th of light
 _MATERIAL = {
     "name": "surface",
     "doubleSided": True,  # surfaces may be open
@@ -58,8 +58,8 @@ class GlbWriter:
         root = animation.root
         moved = {} if np.array_equal(root, np.eye(4)) else {"matrix": root.T.reshape(-1).tolist()}
         self._nodes: list[dict[str, Any]] = [{"name": "scene", **moved}]
-        self._parts: dict[str, int] = {}  # their nodes
-        self._materials: dict[bool, int] = {}  # of faces without a place in a picture, by whether they have colours
+        self._parts: dict[str, int] = {}  # node of each part
+        self._materials: dict[bool, int] = {}  # of faces without a texture; True: with colours
         self._channels: list[dict[str, Any]] = []
         self._samplers: list[dict[str, Any]] = []
 
@@ -87,7 +87,7 @@ class GlbWriter:
         self._file.finish(file, tree)
 
     def _primitives(self, shape: Shape) -> tuple[list[dict[str, Any]], _Lattice]:
-        """Write vertices and faces: what is seen of the first frame, and the difference of each other frame from it."""
+        """Write vertices and faces of the first frame, and the difference of each other frame from it."""
         file, points = self._file, iter(shape.frames)
         first = next(points)
         origins, corners, picture = np.arange(len(first.vertices)), shape.faces, None
@@ -99,9 +99,9 @@ class GlbWriter:
             origins, corners = by_use(shape.faces, len(first.vertices))
         rows, lattice = self._rows(shape, chain([first], points), origins), _Lattice(np.zeros(3), 1.0)
         if file.compressed:
-            kept = list(rows)
-            lattice = _Lattice.around([row["POSITION"] for row in kept])
-            rows = iter([row | {"POSITION": lattice.numbers(row["POSITION"])} for row in kept])
+            stored = list(rows)
+            lattice = _Lattice.around([row["POSITION"] for row in stored])
+            rows = iter([row | {"POSITION": lattice.numbers(row["POSITION"])} for row in stored])
         frames = self._put(_differences(rows), shape)
         frames[0] |= places
         material = None if shape.pictured.all() else self._material(first.colors is not None)
@@ -113,25 +113,25 @@ class GlbWriter:
             row = {"POSITION": self._animation.local(shape, frame.vertices), "NORMAL": unit_normals(frame)}
             row |= {} if frame.colors is None or shape.pictured.all() else {COLORS: light(frame.colors)}
             if self._file.compressed and frame.colors is not None:
-                del row["NORMAL"]  # colours show without light
+                del row["NORMAL"]  # colours are drawn unlit
             yield {name: values[origins] for name, values in row.items()}
 
     def _put(self, rows: Iterable[dict[str, np.ndarray]], shape: Shape) -> list[dict[str, int]]:
-        """Write frames, in one view, or compressed in one for each attribute; return their accessors."""
+        """Write frames in one buffer view, or compressed in one for each attribute; return their accessors."""
         if not self._file.compressed:
             self._file.open_vertices()
             put = partial(self._file.put, kind="VEC3", what=shape)
             return [{name: put(row, bounded=name == "POSITION") for name, row in each.items()} for each in rows]
-        kept = list(rows)
-        frames: list[dict[str, int]] = [{} for _ in kept]
-        for name in kept[0]:
+        stored = list(rows)
+        frames: list[dict[str, int]] = [{} for _ in stored]
+        for name in stored[0]:
             self._file.open_vertices(8 if name == "POSITION" else 12, _ROUNDED.get(name, 0))
-            for frame, row in zip(frames, kept, strict=True):
+            for frame, row in zip(frames, stored, strict=True):
                 frame[name] = self._file.put(row[name], "VEC3", shape, name == "POSITION")
         return frames
 
     def _material(self, colored: bool) -> int:
-        """Return the material of faces without a place in a picture."""
+        """Return the material of faces without a texture."""
         if colored not in self._materials:
             self._materials[colored] = self._file.put_unlit({}) if colored else self._file.add("materials", _MATERIAL)
         return self._materials[colored]
@@ -143,9 +143,9 @@ class GlbWriter:
             return
         put = partial(self._file.put, what=shape)
         self._file.open_view()
-        shown = list(changes(shape, count))
-        keys = self._times[[frame for frame, _ in shown] + [count]]  # with the end of the last frame
-        states = np.array([is_shown for _, is_shown in shown] + [shown[-1][1]], np.float32)
+        visible = list(changes(shape, count))
+        keys = self._times[[frame for frame, _ in visible] + [count]]  # with the end of the last frame
+        states = np.array([is_shown for _, is_shown in visible] + [visible[-1][1]], np.float32)
         values = np.repeat(np.float32(size) * states[:, None], 3, axis=1)
         times = put(keys, "SCALAR", bounded=True)
         self._channel(node, "scale", (times, put(values, "VEC3")), "STEP")
@@ -166,14 +166,14 @@ class GlbWriter:
 
 @dataclass(frozen=True, slots=True)
 class _Lattice:
-    """Places as whole numbers: low + step * number, m."""
+    """Lattice of positions: low + step * whole numbers, m."""
 
     low: np.ndarray
     step: float
 
     @classmethod
     def around(cls, frames: Sequence[np.ndarray]) -> _Lattice:
-        """Return one of BITS bits along the longest side."""
+        """Return the lattice of frames, with BITS bits along their longest side."""
         low = np.min([places.min(axis=0) for places in frames], axis=0).astype(np.float64)
         side = float((np.max([places.max(axis=0) for places in frames], axis=0) - low).max())
         return cls(low, float(np.float32((side or 1.0) / (2**BITS - 1))))
@@ -183,7 +183,7 @@ class _Lattice:
 
 
 def _differences(rows: Iterable[dict[str, np.ndarray]]) -> Iterator[dict[str, np.ndarray]]:
-    """Yield the first frame, and how each other one differs from it."""
+    """Yield the first frame, and the difference of each other frame from it."""
     base = dict[str, np.ndarray]()
     for row in rows:
         yield {name: values - base[name] if base else values for name, values in row.items()}
@@ -191,7 +191,7 @@ def _differences(rows: Iterable[dict[str, np.ndarray]]) -> Iterator[dict[str, np
 
 
 def _times(path: Path, animation: Animation) -> np.ndarray:
-    """Return the times at which frames begin, and the end of the last one, as float32."""
+    """Return the times at which frames begin, and the end of the last frame, as float32."""
     times = animation.ends.astype(np.float32)
     stuck = np.flatnonzero(np.diff(times) <= 0)
     if len(stuck):

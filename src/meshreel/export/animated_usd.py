@@ -1,4 +1,4 @@
-"""Writer of USD: a Mesh prim for each shape, its points as time samples, shown and hidden by its visibility.
+"""Writer of USD: a Mesh prim for each shape, with points as time samples, shown and hidden by its visibility.
 
 In: shapes, one after the other. Out: a .usd or .usdc file (crate), .usda (text) or .usdz (package). Needs the extra
 `usd`; the only module that imports `pxr`. The stage is saved whenever _MOST_UNSAVED bytes are pending, so that memory
@@ -53,12 +53,12 @@ def animated_usd(path: Path, animation: Animation) -> Iterator[UsdWriter]:
                 writer.save()
             finally:
                 writer.close()
-            whole = _converted(crate, path)
+            converted = _converted(crate, path)
             if textures.exists() and path.suffix.lower() != ".usdz":
                 (path.parent / textures.name).mkdir(exist_ok=True)
                 for picture in textures.iterdir():
                     picture.replace(path.parent / textures.name / picture.name)
-            whole.replace(path)
+            converted.replace(path)
     except (OSError, Tf.ErrorException) as error:
         remedy = "free space, or choose another folder"
         raise InputError(f"{path}: cannot be written ({_reason(error)}); {remedy}") from None
@@ -89,7 +89,6 @@ class UsdWriter:
         stage.SetDefaultPrim(scene.GetPrim())
 
     def add(self, shape: Shape) -> None:
-        """Write a shape."""
         from pxr import UsdGeom, Vt
 
         part = UsdGeom.Xform.Define(self._stage, f"/scene/{_identifier(shape.part)}")
@@ -118,12 +117,12 @@ class UsdWriter:
         from pxr import UsdGeom
 
         states = {True: UsdGeom.Tokens.inherited, False: UsdGeom.Tokens.invisible}
-        shown = list(changes(shape, len(self._codes)))
-        if shown == [(0, True)]:
+        visible = list(changes(shape, len(self._codes)))
+        if visible == [(0, True)]:
             return
         # As in the first frame, for viewers that do not animate.
-        visibility = mesh.CreateVisibilityAttr(states[shown[0][1]])
-        for frame, is_shown in shown:
+        visibility = mesh.CreateVisibilityAttr(states[visible[0][1]])
+        for frame, is_shown in visible:
             visibility.Set(states[is_shown], self._codes[frame])
 
     def _move(self, mesh: Any, shape: Shape) -> int:
@@ -132,7 +131,7 @@ class UsdWriter:
 
         size = 0
         points, normals, extent = mesh.CreatePointsAttr(), mesh.CreateNormalsAttr(), mesh.CreateExtentAttr()
-        shown = mesh.CreateDisplayColorPrimvar()
+        colors = mesh.CreateDisplayColorPrimvar()
         picture = None if shape.uv is None else self._picture(mesh, shape, shape.uv)
         for number, frame in enumerate(shape.frames):
             code = Usd.TimeCode.Default() if shape.count == 1 else Usd.TimeCode(self._codes[shape.first + number])
@@ -142,17 +141,17 @@ class UsdWriter:
             extent.Set(Vt.Vec3fArray.FromNumpy(np.stack([local.min(axis=0), local.max(axis=0)])), code)
             size += (2 if frame.colors is None else 3) * local.nbytes
             if frame.colors is not None:
-                shown.Set(Vt.Vec3fArray.FromNumpy(light(frame.colors)), code)
+                colors.Set(Vt.Vec3fArray.FromNumpy(light(frame.colors)), code)
             if picture is not None and frame.texture is not None and shape.first + number < shape.shown[0][1]:
                 picture.Set(self._put_picture(f"{shape.part}_{shape.first + number:05}", frame.texture.pixels), code)
         if frame.colors is None:
-            shown.Set([_GREY])
+            colors.Set([_GREY])
         else:
-            shown.SetInterpolation(UsdGeom.Tokens.vertex)
+            colors.SetInterpolation(UsdGeom.Tokens.vertex)
         return size
 
     def _picture(self, mesh: Any, shape: Shape, uv: Float32[np.ndarray, "F 3 2"]) -> Any:
-        """Give faces with a place in the textures a material; return the attribute for the file of its picture."""
+        """Give faces with a texture a material; return the attribute that names the texture's file."""
         from pxr import Sdf, UsdGeom, UsdShade, Vt
 
         types, path = Sdf.ValueTypeNames, mesh.GetPath().AppendChild("material")
@@ -179,7 +178,7 @@ class UsdWriter:
         return picture.CreateInput("file", types.Asset)
 
     def _put_picture(self, name: str, pixels: UInt8[np.ndarray, "H W 3"]) -> Any:
-        """Write a picture and return its place, relative to the stage."""
+        """Write a picture and return its path relative to the stage."""
         from pxr import Sdf
 
         self._textures.mkdir(exist_ok=True)
@@ -190,9 +189,9 @@ class UsdWriter:
 def _codes(animation: Animation) -> list[float]:
     """Return the times of frames in units of a frame: whole numbers if they follow the frame rate up to rounding."""
     exact = animation.times * animation.frame_rate
-    whole = np.round(exact)
+    rounded = np.round(exact)
     near: Float64[np.ndarray, " T"]
-    near = np.where(np.abs(exact - whole) <= _ROUNDED * animation.frame_rate, whole, exact)
+    near = np.where(np.abs(exact - rounded) <= _ROUNDED * animation.frame_rate, rounded, exact)
     codes: list[float] = (near if (np.diff(near) > 0).all() else exact).tolist()
     return codes
 
@@ -208,16 +207,16 @@ def _converted(crate: Path, path: Path) -> Path:
     extension = path.suffix.lower()
     target = crate.with_suffix(extension)
     if extension == ".usda":
-        whole = Sdf.Layer.FindOrOpen(str(crate)).Export(str(target))
+        complete = Sdf.Layer.FindOrOpen(str(crate)).Export(str(target))
     elif extension == ".usdz":
         if crate.stat().st_size > _MOST_PACKED:
             text = f"{path}: more than the {_MOST_PACKED} bytes that a .usdz file holds"
             raise InputError(f"{text}; export fewer frames or layers, or to .usdc")
-        whole = UsdUtils.CreateNewUsdzPackage(Sdf.AssetPath(str(crate)), str(target)) and _is_whole(target)
+        complete = UsdUtils.CreateNewUsdzPackage(Sdf.AssetPath(str(crate)), str(target)) and _is_whole(target)
     else:
         crate.replace(target)
-        whole = True
-    if not whole:
+        complete = True
+    if not complete:
         raise OSError(errno.EIO, f"the {extension} file is too large or not whole")
     return target
 

@@ -7,20 +7,22 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 from ..container.reader import ReelReader
 from ..errors import FormatError, InputError
 from ..io.write import write_mesh
-from ..types import Mesh
 
 Part = Literal["all", "background", "moving"]
 
 
 def write_frames(
-    decode: Callable[[int], Mesh], paths: Sequence[Path], progress: Callable[[int], None] = lambda _: None
+    decode: Callable[[int], Any],
+    paths: Sequence[Path],
+    progress: Callable[[int], None] = lambda _: None,
+    write: Callable[[Any, Path], None] = write_mesh,
 ) -> list[FormatError]:
-    """Write frame `i`, as `decode(i)` returns it, to `paths[i]`; return the errors of damaged frames.
+    """Decode each frame `i` and `write` it to `paths[i]`; return the errors of damaged frames.
 
     The file of a damaged frame is removed if an earlier run left one. `progress` gets the number of frames done. Raises
     InputError if a file cannot be written.
@@ -28,7 +30,7 @@ def write_frames(
     failed: list[FormatError] = []
     for number, path in enumerate(paths):
         try:
-            write_mesh(decode(number), path)  # which decodes the texture
+            write(decode(number), path)  # writing decodes the texture
         except FormatError as error:
             failed.append(error)
             path.unlink(missing_ok=True)
@@ -37,7 +39,6 @@ def write_frames(
 
 
 def check_part(file: Path, reader: ReelReader, part: Part) -> None:
-    """Raise InputError if no frame of a file has the part."""
     if part == "background" and not reader.has_background:
         raise InputError(f"{file}: has no background, leave out --only background")
     if part == "moving" and not reader.has_moving:

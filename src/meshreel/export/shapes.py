@@ -46,7 +46,7 @@ class Shape:
     count: int  # number of its frames, which are consecutive
     frames: Iterable[Points]  # `count` of them
     shown: tuple[tuple[int, int], ...]  # ranges of frames that show it: end excluded, in order, with gaps between
-    # Places of the faces' corners in the textures of the frames, as `Mesh.uv`: all of a face's are NaN, or none is.
+    # Texture coordinates of the faces' corners in all frames, as `Mesh.uv`: all of a face's are NaN, or none is.
     uv: Float32[np.ndarray, "F 3 2"] | None = None
 
     def __str__(self) -> str:
@@ -54,7 +54,7 @@ class Shape:
 
     @property
     def pictured(self) -> Bool[np.ndarray, " F"]:
-        """Which faces have a place in the textures."""
+        """Mask of the faces with a place in the textures."""
         return np.zeros(len(self.faces), bool) if self.uv is None else np.isfinite(self.uv[:, 0, 0])
 
 
@@ -97,7 +97,7 @@ class AnimationWriter(Protocol):
 
 
 def changes(shape: Shape, count: int) -> Iterator[tuple[int, bool]]:
-    """Yield frame numbers below `count` and whether the shape is shown from there on, beginning with frame 0."""
+    """Yield the frames below `count`, from 0 on, at which visibility changes, with True where the shape appears."""
     if shape.shown[0][0] > 0:
         yield 0, False
     for first, end in shape.shown:
@@ -114,7 +114,7 @@ def unit_normals(points: Points) -> Float32[np.ndarray, "V 3"]:
 
 
 def check_output(path: Path) -> None:
-    """Raise InputError if a file of this name cannot be written, before minutes are spent on it."""
+    """Raise InputError if a file of this name cannot be written, before minutes of work."""
     if path.is_dir():
         raise InputError(f"{path}: is a folder, name a file")
     if not path.parent.is_dir():

@@ -1,8 +1,8 @@
 """Export of the splats of a frame to files that viewers of 3D Gaussian splatting read: PLY (Kerbl et al. 2023) and SPZ.
 
-In: Gaussians in metres. Out: a file with their places, logarithms of scales, quaternions, opacities (in PLY their
-logits), and colours as harmonics of degree 0. Those that the frame does not show are left out. SPZ is Niantic's format
-in version 3: 20 bytes a splat, packed by gzip.
+In: Gaussians in metres. Out: a file with their positions, logarithms of scales, quaternions, opacities (in PLY their
+logits), and colours as harmonics of degree 0, without those that the frame hides. SPZ is Niantic's format in version 3:
+20 bytes a splat, packed by gzip.
 """
 
 from __future__ import annotations
@@ -27,7 +27,6 @@ NAMES = "x y z nx ny nz f_dc_0 f_dc_1 f_dc_2 opacity scale_0 scale_1 scale_2 rot
 
 
 def check_splats(video: Video, name: str) -> None:
-    """Raise InputError where a video has no splats."""
     if not video.reader.has_splats:
         raise InputError(f"{name}: has no splats; encode with --splats 8000")
 
@@ -47,7 +46,7 @@ def _ply(rows: Float64[np.ndarray, "N 17"]) -> bytes:
 
 
 def _spz(rows: Float64[np.ndarray, "N 17"]) -> bytes:
-    """Return an SPZ file: a head, then each attribute of all splats; numbers are those of its specification."""
+    """Return an SPZ file: a head, then each attribute of all splats; constants are those of its specification."""
     places, colors, logits, scales, turns = rows[:, :3], rows[:, 6:9], rows[:, 9], rows[:, 10:13], rows[:, 13:]
     most = float(np.abs(places).max(initial=1.0))
     fraction = min(max(22 - math.floor(math.log2(most)), 0), 16)  # bits of a place behind the point
@@ -64,15 +63,15 @@ def _spz(rows: Float64[np.ndarray, "N 17"]) -> bytes:
 
 
 def _smallest_three(turns: Float64[np.ndarray, "N 4"]) -> np.ndarray:
-    """Return quaternions x y z w in 32 bits each: which part is largest, then sign and size of the three others."""
+    """Return quaternions x y z w in 32 bits each: the index of the largest part, then sign and size of the others."""
     rows, largest = np.arange(len(turns)), np.abs(turns).argmax(axis=1)
     turns = turns * np.where(turns[rows, largest] < 0, -1.0, 1.0)[:, None]
-    found = largest.astype("<u4")
+    packed = largest.astype("<u4")
     for part in range(4):
-        own = turns[:, part]
-        size = np.round(511 * np.minimum(np.abs(own) * math.sqrt(2), 1)).astype("<u4")
-        found = np.where(largest == part, found, found << 10 | (own < 0).astype("<u4") << 9 | size)
-    return found.astype("<u4")
+        values = turns[:, part]
+        size = np.round(511 * np.minimum(np.abs(values) * math.sqrt(2), 1)).astype("<u4")
+        packed = np.where(largest == part, packed, packed << 10 | (values < 0).astype("<u4") << 9 | size)
+    return packed.astype("<u4")
 
 
 def _bytes(values: Float64[np.ndarray, "..."]) -> UInt8[np.ndarray, "..."]:
@@ -80,14 +79,14 @@ def _bytes(values: Float64[np.ndarray, "..."]) -> UInt8[np.ndarray, "..."]:
 
 
 def _rows(bound: Bound) -> Float64[np.ndarray, "N 17"]:
-    shown = bound.opacities > 0
-    opacities = np.minimum(bound.opacities[shown], MOST_OPACITY)
+    visible = bound.opacities > 0
+    opacities = np.minimum(bound.opacities[visible], MOST_OPACITY)
     columns = (
-        bound.means[shown],
-        bound.axes[shown, 2],
-        (bound.colors[shown] - 0.5) / HARMONIC,
+        bound.means[visible],
+        bound.axes[visible, 2],
+        (bound.colors[visible] - 0.5) / HARMONIC,
         np.log(opacities / (1 - opacities))[:, None],
-        np.log(bound.scales[shown]),
-        quaternions(np.swapaxes(bound.axes[shown], 1, 2)),
+        np.log(bound.scales[visible]),
+        quaternions(np.swapaxes(bound.axes[visible], 1, 2)),
     )
     return np.concatenate(columns, axis=1)

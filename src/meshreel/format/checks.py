@@ -1,4 +1,4 @@
-"""Laws that the records of a head obey beyond their layout; breaking one raises FormatError."""
+"""Rules that the records of a head obey beyond their layout; breaking one raises FormatError."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .records import unpack_all
 LARGEST = 1e15  # of the numbers in a header: keeps everything computed from them finite (guess)
 SMALLEST = 1e-15  # of a rate or scale (guess)
 MOST_TRACKS = 256  # a frame needs a group of each track (guess)
-# What belongs to a group or a background, and the form that it has.
+# Kinds of chunks that belong to a group or a background, with their forms.
 COMPANIONS = {
     ChunkKind.COLORS: Form.VERTEX_COLORS,
     ChunkKind.ATLAS: Form.PLACES,
@@ -45,25 +45,25 @@ def check_header(header: Header, frame_count: int) -> None:
 
 
 class IndexChecks:
-    """Laws of an index, checked entry by entry, so that the writer and the reader share them."""
+    """Rules of an index, checked entry by entry, so that the writer and the reader share them."""
 
     def __init__(self) -> None:
         self.frames: list[int] = []  # of each track so far
         self.groups: list[int] = []  # number of the newest group of each track
-        self._changes: dict[int, int] = {}  # for each STATIC chunk, how many patches lead to it
+        self._changes: dict[int, int] = {}  # number of patches that lead to each STATIC chunk
         self._place = (0, -1)  # first frame and track of the newest group
-        # Of each STATIC and GROUP: its frames, its track, and the group that it is predicted from.
+        # Frames and track of each STATIC and GROUP, and the group that it is predicted from.
         self._whole: dict[int, tuple[int, int, int | None]] = {}
         self._bases: set[int] = set()  # chunks that may have an atlas: those that begin with a base mesh
         self._bearers: set[int] = set()  # groups that may have splats: those that begin with a mesh of all frames
-        # By coded chunk and kind, the number of the chunk that has its colours, its atlas or its pictures.
+        # Number of the chunk with the colours, atlas or pictures of a chunk, by that chunk's number and the kind.
         self.companions: dict[tuple[int, int], int] = {}
         self._atlases: dict[int, int] = {}  # of each group with pictures, the number of its atlas
         self._has_audio = False
         self._count = 0
 
     def add(self, entry: IndexEntry) -> int:
-        """Add the next entry and return its number. Raises FormatError, and changes nothing, where it breaks a law."""
+        """Add the next entry and return its number. Raises FormatError, and changes nothing, if it breaks a rule."""
         number = self._count
         if entry.kind in (ChunkKind.STATIC, ChunkKind.GROUP):
             if (entry.kind == ChunkKind.STATIC) != (entry.frames == 0):
@@ -95,7 +95,7 @@ class IndexChecks:
         return number
 
     def atlas_of(self, group: int) -> int | None:
-        """Return the number of the atlas that a group's pictures are of."""
+        """Return the number of the atlas that a group's pictures use."""
         return self._atlases.get(group)
 
     def finish(self) -> None:
@@ -107,7 +107,7 @@ class IndexChecks:
                 raise FormatError(f"track {track} has {frames} frames, track 0 has {self.frames[0]}")
 
     def _changes_of(self, entry: IndexEntry) -> int:
-        """Return how many patches lead to a STATIC chunk: 0 for a mesh, 1 + those of its base for a patch."""
+        """Return the number of patches that lead to a STATIC chunk: 0 for a mesh, 1 + those of its base for a patch."""
         number = self._count
         if entry.form not in (Form.DRACO, Form.PATCH) or entry.track:
             raise FormatError(f"chunk {number}: a static chunk of form {Form(entry.form).name} and track {entry.track}")
@@ -125,7 +125,7 @@ class IndexChecks:
         return self._changes[before] + 1
 
     def _add_companion(self, entry: IndexEntry) -> None:
-        """Add what belongs to a chunk before it, which it names first; what else it needs follows from its kind."""
+        """Add a companion, whose first dependency is the chunk that it belongs to; its kind decides the others."""
         number, kind, of = self._count, ChunkKind(entry.kind), next(iter(entry.depends_on), -1)
         if of not in self._whole or (of, kind) in self.companions:
             raise FormatError(f"chunk {number}: {kind.name} of {of}, which is no chunk before it, or has others")
@@ -140,17 +140,17 @@ class IndexChecks:
             self._atlases[of] = entry.depends_on[1]
 
     def _needed(self, kind: ChunkKind, of: int, before: int | None) -> tuple[tuple[int, ...], ...]:
-        """Return what a companion may depend on, beside the chunk that it is of and which `before` predicts."""
+        """Return the allowed dependencies of a companion of chunk `of`, beside `of`; `before` predicts that chunk."""
         if kind == ChunkKind.COLORS:
-            known = None if before is None else self.companions.get((before, kind))
-            return ((),) if known is None else ((), (known,))
+            predicting = None if before is None else self.companions.get((before, kind))
+            return ((),) if predicting is None else ((), (predicting,))
         if kind == ChunkKind.ATLAS:
             return ((),) if of in self._bases else ()
         if kind == ChunkKind.SPLATS:
             return ((),) if of in self._bearers else ()
-        own = self.companions.get((of, ChunkKind.ATLAS))
-        if own is not None:
-            return ((own,),)
+        atlas = self.companions.get((of, ChunkKind.ATLAS))
+        if atlas is not None:
+            return ((atlas,),)
         last = None if before is None else self.companions.get((before, kind))
         return () if last is None or before is None else ((self._atlases[before], last),)
 
@@ -175,12 +175,12 @@ class IndexChecks:
                 f"chunk {number}: track {track} from frame {place[0]} behind track {self._place[1]} from frame "
                 f"{self._place[0]}; groups are in order of first frame and track"
             )
-        others = [other for other in entry.depends_on if other not in self._changes]
-        if others and (not begun or others != [self.groups[track]]):
+        groups = [other for other in entry.depends_on if other not in self._changes]
+        if groups and (not begun or groups != [self.groups[track]]):
             raise FormatError(
-                f"chunk {number}: depends on {others}, neither a static chunk before it nor the last group of its track"
+                f"chunk {number}: depends on {groups}, neither a static chunk before it nor the last group of its track"
             )
-        if len(entry.depends_on) - len(others) > 1:
+        if len(entry.depends_on) - len(groups) > 1:
             raise FormatError(f"chunk {number}: depends on {entry.depends_on}, on several static chunks")
         if not begun:
             self.frames.append(0)
@@ -191,7 +191,7 @@ class IndexChecks:
 
 
 def check_index(index: Index) -> None:
-    """Check a whole index; a FormatError names the chunk whose entry breaks a law of IndexChecks."""
+    """Check a whole index; a FormatError names the chunk whose entry breaks a rule of IndexChecks."""
     checks = IndexChecks()
     for entry in index.chunks:
         checks.add(entry)
@@ -199,7 +199,7 @@ def check_index(index: Index) -> None:
 
 
 def unpack_audio(payload: bytes) -> AudioFile:
-    """Unpack the payload of an AUDIO chunk. Raises FormatError for one without a file, or that begins nowhere near."""
+    """Unpack the payload of an AUDIO chunk. Raises FormatError if it has no file, or an absurd start."""
     record = unpack_all(AudioFile, payload)
     if record.form != Form.AUDIO_FILE or not record.data or abs(record.start) > LARGEST:
         raise FormatError(f"audio of {len(record.data)} bytes that begins at {record.start} microseconds")

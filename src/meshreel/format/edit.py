@@ -1,7 +1,7 @@
-"""Edits of a file: which of its coded frames are shown, and how they are turned.
+"""Edits of a file: the range of its coded frames that is shown, and their rotation.
 
-In: metadata, whose item `edit` counts where the preamble has the flag EDITED. Out: an Edit. Older readers refuse a file
-with the flag, rather than show hidden frames or another position.
+In: metadata, whose item `edit` is valid if the preamble has the flag EDITED. Out: an Edit. Older readers refuse a file
+with the flag, rather than show hidden frames or a wrong position.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from ..errors import FormatError
 from .layout import EDITED
 
 ITEM = "edit"  # of the metadata
-_CLOSE = 1e-6  # to a rotation: far above the rounding of products of rotations, far below what is seen
+_CLOSE = 1e-6  # largest error of a rotation: far above the rounding of products of rotations, far below visible
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,32 +27,32 @@ class Edit:
     rotation: tuple[float, ...] = ()  # nine numbers, row by row; none: not turned
 
     def item(self, frames: int) -> dict[str, Any]:
-        """Return the metadata of a file of `frames` coded frames: the item `edit`, or nothing where all is as coded."""
-        found: dict[str, Any] = {} if (self.first, self.end) == (0, frames) else {"frames": [self.first, self.end]}
-        found |= {"rotation": list(self.rotation)} if self.rotation else {}
-        return {ITEM: found} if found else {}
+        """Return the metadata of a file of `frames` coded frames: the item `edit`, or nothing if nothing is edited."""
+        edit: dict[str, Any] = {} if (self.first, self.end) == (0, frames) else {"frames": [self.first, self.end]}
+        edit |= {"rotation": list(self.rotation)} if self.rotation else {}
+        return {ITEM: edit} if edit else {}
 
 
 def parse_edit(metadata: dict[str, Any], flags: int, frames: int) -> Edit:
-    """Return the edit of a file of `frames` coded frames. Raises FormatError for one that cannot be followed."""
+    """Return the edit of a file of `frames` coded frames. Raises FormatError if it is invalid."""
     item = metadata.get(ITEM) if flags & EDITED else {}
     if not isinstance(item, dict) or item.keys() - {"frames", "rotation"}:
         raise FormatError(f"Header.metadata: edit {item!r:.80} is none that this reader knows, update meshreel")
-    shown, rotation = item.get("frames", [0, frames]), item.get("rotation", [])
-    if not isinstance(shown, list) or [type(number) for number in shown] != [int, int]:
-        raise FormatError(f"Header.metadata: edit.frames {shown!r:.80} are no two numbers of frames")
-    if not 0 <= shown[0] < shown[1] <= frames:
-        raise FormatError(f"Header.metadata: edit.frames {shown} of {frames} frames")
+    shown_frames, rotation = item.get("frames", [0, frames]), item.get("rotation", [])
+    if not isinstance(shown_frames, list) or [type(number) for number in shown_frames] != [int, int]:
+        raise FormatError(f"Header.metadata: edit.frames {shown_frames!r:.80} are no two numbers of frames")
+    if not 0 <= shown_frames[0] < shown_frames[1] <= frames:
+        raise FormatError(f"Header.metadata: edit.frames {shown_frames} of {frames} frames")
     if not isinstance(rotation, list) or not (rotation == [] or is_rotation(rotation)):
         raise FormatError(f"Header.metadata: edit.rotation {rotation!r:.80} is no rotation of nine numbers")
-    return Edit(shown[0], shown[1], tuple(map(float, rotation)))
+    return Edit(shown_frames[0], shown_frames[1], tuple(map(float, rotation)))
 
 
 def nearest_rotation(matrix: np.ndarray) -> np.ndarray:
-    """Return the rotation nearest to a matrix of 3 x 3 that is almost one, so that products do not drift from it."""
+    """Return the rotation nearest to a 3 x 3 matrix that is almost one, so that products of rotations do not drift."""
     left, _, right = np.linalg.svd(matrix)
-    found: np.ndarray = left @ right
-    return found
+    rotation: np.ndarray = left @ right
+    return rotation
 
 
 def is_rotation(numbers: list[Any]) -> bool:

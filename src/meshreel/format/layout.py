@@ -17,7 +17,7 @@ from .records import Nested
 MAGIC = b"REEL\r\n\x1a\n"  # the line ends reveal a transfer in text mode
 VERSION = 1
 EDITED = 1  # bit of Preamble.flags: the item `edit` of the metadata counts
-LAYER_PICTURES = 64  # of a background, in each layer but the last: 8 s of the 8 a second that an encoder makes (guess)
+LAYER_PICTURES = 64  # pictures of a background in each layer but the last: 8 s of an encoder's 8 a second (guess)
 
 
 class ChunkKind(IntEnum):
@@ -28,9 +28,9 @@ class ChunkKind(IntEnum):
     COLORS = 3  # the colours of the vertices of another chunk
     ATLAS = 4  # places of faces in a texture: of a group and those predicted from it, or of a background
     PICTURES = 5  # the textures of a group's frames, or of a background
-    COMPATIBLE = 6  # the same in a coding that more devices know
+    COMPATIBLE = 6  # the same textures in a coding that more devices support
     SPLATS = 7  # Gaussians on the faces of a group and of those predicted from it
-    AUDIO = 8  # what is heard with the frames
+    AUDIO = 8  # the audio file played with the frames
 
 
 class Form(IntEnum):
@@ -45,7 +45,7 @@ class Form(IntEnum):
     PLACES = 7  # places of corners in a texture
     VIDEO = 8  # pictures of a video: one a frame, of a background one each `interval` frames
     GAUSSIANS = 9  # splats, the most important first
-    AUDIO_FILE = 10  # an audio file as it was given
+    AUDIO_FILE = 10  # an audio file, unchanged
 
 
 class AnchorRule(IntEnum):
@@ -169,7 +169,7 @@ class DisplacementHead:
 
 
 class SharedMotion(IntEnum):
-    """What moves all vertices of a mesh alike."""
+    """Motion shared by all vertices of a mesh."""
 
     NONE = 0
     SHIFTS = 1

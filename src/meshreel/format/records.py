@@ -16,7 +16,7 @@ R = TypeVar("R")
 
 
 def pack(record: object) -> bytes:
-    """Pack a record into bytes. Raises InputError where a value does not fit its field."""
+    """Pack a record into bytes. Raises InputError if a value does not fit its field."""
     parts = []
     for field in record_fields(type(record)):
         value = getattr(record, field.name)
@@ -30,7 +30,7 @@ def pack(record: object) -> bytes:
 
 
 def unpack(record_type: type[R], data: bytes, offset: int = 0) -> tuple[R, int]:
-    """Unpack the record at `offset`; also return the offset behind it. Raises FormatError for other bytes."""
+    """Unpack the record at `offset`; also return the offset behind it. Raises FormatError for invalid bytes."""
     values = {}
     for field in record_fields(record_type):
         try:
@@ -41,7 +41,7 @@ def unpack(record_type: type[R], data: bytes, offset: int = 0) -> tuple[R, int]:
 
 
 def unpack_all(record_type: type[R], data: bytes) -> R:
-    """Unpack the record that fills `data` exactly. Raises FormatError where bytes are left over."""
+    """Unpack the record that fills `data` exactly. Raises FormatError if bytes are left over."""
     record, end = unpack(record_type, data)
     if end != len(data):
         raise FormatError(f"{record_type.__name__}: {len(data) - end} bytes too many")
@@ -50,7 +50,7 @@ def unpack_all(record_type: type[R], data: bytes) -> R:
 
 @cache
 def least_size(record_type: type) -> int:
-    """Return the fewest bytes that a record can take, which is its size if all fields are of fixed size."""
+    """Return the smallest size of a record in bytes: its size if all fields are of fixed size."""
     return sum(field.kind.least for field in record_fields(record_type))
 
 
@@ -64,18 +64,17 @@ class Field:
 
 
 def record_fields(record_type: type) -> tuple[Field, ...]:
-    """Return the fields of a record in the order of their bytes."""
     return _declared(record_type)
 
 
 @cache
 def _declared(record_type: type) -> tuple[Field, ...]:
     hints = get_type_hints(record_type, include_extras=True)
-    found = []
+    declared = []
     for field in fields(record_type):
         kind, meaning = hints[field.name].__metadata__
-        found.append(Field(field.name, kind, meaning))
-    return tuple(found)
+        declared.append(Field(field.name, kind, meaning))
+    return tuple(declared)
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,6 +1,6 @@
-"""The layout of a texture: where the corners of a mesh's faces are in it, also after midpoint subdivisions.
+"""The layout of a texture: the places of a mesh's face corners in it, also after midpoint subdivisions.
 
-Textures of several meshes become one, side by side, so that the meshes can be one mesh.
+Textures of several meshes are joined side by side, so that the meshes can become one mesh.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from ..types import GREY, Texture
 
 Places: TypeAlias = Float32[np.ndarray, "_ 3 2"]  # of the corners of some faces, as `Mesh.uv`
 
-MOST_SIDE = 2048  # texels, of a texture: pictures that a decoder keeps take 60 MB then
+MOST_SIDE = 2048  # texels, largest side of a texture: the pictures kept by its decoder take 60 MB
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,9 +36,9 @@ class Layout:
         """
         places = self.places.astype(np.float64)
         places[(self.places == self.places[:, :1]).all(axis=(1, 2))] = np.nan
-        found = finer_places(places, levels) / [self.width, self.height]
-        found[..., 1] = 1.0 - found[..., 1]
-        return found.astype(np.float32)
+        uv = finer_places(places, levels) / [self.width, self.height]
+        uv[..., 1] = 1.0 - uv[..., 1]
+        return uv.astype(np.float32)
 
 
 def finer_places(places: np.ndarray, levels: int) -> np.ndarray:
@@ -52,25 +52,25 @@ def finer_places(places: np.ndarray, levels: int) -> np.ndarray:
 
 
 def side_by_side(textures: Sequence[Texture], places: Sequence[tuple[int, Places]]) -> tuple[Texture, list[Places]]:
-    """Return one texture with all of these, from left to right at its top; and places in some of them, in it.
+    """Join textures from left to right, and convert places, each with its texture's number, to the joined one.
 
-    Where there is one texture, it is returned itself, and so are the places.
+    A single texture is returned unchanged, with its places.
     """
     if len(textures) == 1:
         return textures[0], [uv for _, uv in places]
     shapes = tuple(texture.shape for texture in textures)
     height, width = max(rows for rows, _ in shapes), sum(columns for _, columns in shapes)
-    lefts, found = [0, *accumulate(columns for _, columns in shapes)], list[Places]()
+    lefts, moved = [0, *accumulate(columns for _, columns in shapes)], list[Places]()
     for number, uv in places:
         rows, columns = shapes[number]
         scale, origin = np.array([columns / width, rows / height]), np.array([lefts[number] / width, 1 - rows / height])
-        found.append((origin + scale * uv).astype(np.float32))
-    return Texture(partial(_picture, tuple(textures), (height, width)), (height, width)), found
+        moved.append((origin + scale * uv).astype(np.float32))
+    return Texture(partial(_picture, tuple(textures), (height, width)), (height, width)), moved
 
 
 def _picture(textures: Sequence[Texture], size: tuple[int, int]) -> UInt8[np.ndarray, "H W 3"]:
     whole, left = np.full((*size, 3), GREY, np.uint8), 0
-    for pixels in (texture.pixels for texture in textures):
-        whole[: len(pixels), left : left + pixels.shape[1]] = pixels
-        left += pixels.shape[1]
+    for source in (texture.pixels for texture in textures):
+        whole[: len(source), left : left + source.shape[1]] = source
+        left += source.shape[1]
     return whole

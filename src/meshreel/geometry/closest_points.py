@@ -38,7 +38,6 @@ class Surface:
 
     @property
     def normals(self) -> Float64[np.ndarray, "F 3"]:
-        """Unit normals of the faces."""
         return self._oriented[0]
 
     @property
@@ -53,24 +52,23 @@ class Surface:
     def closest(self, queries: Float64[np.ndarray, "N 3"]) -> Hits:
         """Find the closest point of the surface to each query, with its face and barycentric weights.
 
-        Of equally close faces the one with the least number is taken.
+        Among equally close faces, the one with the lowest number is chosen.
         """
         work.count("closest points", len(queries))
         faces, barycentric = self.tree.closest(np.ascontiguousarray(queries), np.inf)
         return Hits(blend(self.mesh.vertices, self.mesh.faces[faces], barycentric), faces, barycentric)
 
     def distances(self, points: Float64[np.ndarray, "N 3"]) -> Float64[np.ndarray, " N"]:
-        """Return the distance of each point from the surface."""
         return np.linalg.norm(self.closest(points).points - points, axis=1)
 
     def move(self, vertices: Float64[np.ndarray, "V 3"]) -> None:
-        """Give the vertices other positions; the search structure is kept, which takes a tenth of a new one's time."""
+        """Move the vertices; updating the search structure takes a tenth of the time of building a new one."""
         self.mesh = Mesh(vertices, self.mesh.faces)
         self.tree.move(vertices)
         self.__dict__.pop("_oriented", None)
 
     def past_border(self, hits: Hits) -> Bool[np.ndarray, " N"]:
-        """Return which closest points are on the mesh's border: their queries lie beside the surface, not above it."""
+        """Return a mask of closest points on the mesh's border, whose queries lie beside the surface, not above it."""
         edges, corners = self._border
         on_edge = edges[hits.faces] & (hits.barycentric[:, [2, 0, 1]] < _AT_BORDER)  # opposite corners
         on_corner = corners[hits.faces] & (hits.barycentric > 1 - _AT_BORDER)
@@ -78,7 +76,7 @@ class Surface:
 
     @cached_property
     def _border(self) -> tuple[Bool[np.ndarray, "F 3"], Bool[np.ndarray, "F 3"]]:
-        """Edges (01, 12, 20) and corners of each face that are on the border."""
+        """Masks of the edges (01, 12, 20) and corners of each face that are on the border."""
         edges, face_edges = unique_edges(self.mesh.faces)
         border = border_mask(edges, face_edges)
         ends = np.zeros(len(self.mesh.vertices), bool)
@@ -93,17 +91,16 @@ def area_samples(mesh: Mesh, count: int) -> Int64[np.ndarray, " S"]:
     _, areas = face_normals(mesh)
     share = np.bincount(mesh.faces.reshape(-1), np.repeat(areas, 3), len(mesh.vertices))
     reached = np.cumsum(share)
-    at = (np.arange(count) + 0.5) * (reached[-1] / count)
-    return np.unique(np.minimum(np.searchsorted(reached, at), len(share) - 1))
+    steps = (np.arange(count) + 0.5) * (reached[-1] / count)
+    return np.unique(np.minimum(np.searchsorted(reached, steps), len(share) - 1))
 
 
 def distances(points: Float64[np.ndarray, "N 3"], mesh: Mesh) -> Float64[np.ndarray, " N"]:
-    """Return the distance of each point from a mesh that has faces."""
     return Surface(mesh).distances(points)
 
 
 def carried_labels(surface: Surface, labels: Bool[np.ndarray, " F"], mesh: Mesh) -> Bool[np.ndarray, " G"]:
-    """Carry face labels from a surface to another mesh: each face takes that of the face nearest to its middle."""
+    """Transfer face labels to another mesh: each face takes the label of the face nearest to its middle."""
     if mesh.is_empty:
         return np.zeros(0, bool)
     return labels[surface.closest(mesh.vertices[mesh.faces].mean(axis=1)).faces]

@@ -19,8 +19,8 @@ from .topology import border_edges, clean
 # reaches the target and loses nothing; at 1 and at 1000 it may not (guess).
 CLOSED_DIAGONAL = 10.0
 AGGRESSION = 4.0  # of fast-simplification; see CLOSED_DIAGONAL (guess)
-BOUNDARY_WEIGHT = 10.0  # of planes on open borders against planes of faces (guess)
-ROUGHLY = 5  # times the wanted vertices that a first, quick pass leaves: errors are those of one pass (decision 14)
+BOUNDARY_WEIGHT = 10.0  # of planes on open borders relative to planes of faces (guess)
+ROUGHLY = 5  # times the wanted vertices, left by a first, quick pass: errors are those of one pass (decision 14)
 ROUNDS = 3  # corrections of the number of faces: a collapse takes one face at a border and two elsewhere (guess)
 _ONE_AT_A_TIME = threading.Lock()  # fast-simplification keeps its mesh in static variables
 
@@ -75,7 +75,6 @@ def _roughly(mesh: Mesh, vertices: int) -> Mesh:
 
 
 def has_boundary(mesh: Mesh) -> bool:
-    """Return whether some edge belongs to one face only."""
     return len(border_edges(mesh)) > 0
 
 

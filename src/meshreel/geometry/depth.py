@@ -67,14 +67,14 @@ def inverse_depths(values: UInt16[np.ndarray, "H W"] | Float32[np.ndarray, "H W"
 
 @dataclass(frozen=True, slots=True)
 class FreeSpace:
-    """What the depth cameras saw through at one moment, asked in any coordinates."""
+    """Space that depth cameras saw through at one moment, queried in any coordinates."""
 
     pictures: tuple[DepthPicture, ...]  # each depth the least of nine pixels, 0 where one of them has none
     place: Placement = Placement(1.0, (0.0, 0.0, 0.0))  # of the coordinates, in the world
 
     @staticmethod
     def of(pictures: Sequence[DepthPicture | None], place: Placement | None = None) -> FreeSpace:
-        """Return what cameras saw through, in coordinates at a place in the world, or in those of the world."""
+        """Return the space that cameras saw through, in the coordinates of `place`, or of the world."""
         some = (replace(one, depth=minimum_filter(one.depth, 3)) for one in pictures if one is not None)
         return FreeSpace(tuple(some)) if place is None else FreeSpace(tuple(some), place)
 

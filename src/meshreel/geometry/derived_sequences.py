@@ -119,7 +119,7 @@ class DerivedSequence(MeshSequence):
 
     @property
     def is_stored(self) -> bool:
-        """Whether the frames are in files, which other processes can read."""
+        """True if the frames are in files, which other processes can read."""
         return getattr(self._source, "is_stored", False)
 
     def only(self, numbers: Sequence[int]) -> DerivedSequence:
@@ -130,7 +130,7 @@ class DerivedSequence(MeshSequence):
 
     @property
     def observed(self) -> Any:
-        """What the frames that were read have shown, for `learn` of the sequence that this one is a part of."""
+        """Observations from the frames that were read, for `learn` of the sequence that this one is a part of."""
         return getattr(self._source, "observed", None)
 
     def learn(self, observed: Any) -> None:

@@ -1,4 +1,4 @@
-"""Holes of a mesh: the loops of its border that are short enough to be closed. In: a mesh. Out: one with more faces."""
+"""Holes of a mesh: loops of its border that are short enough to close. In: a mesh. Out: one with additional faces."""
 
 from __future__ import annotations
 
@@ -19,30 +19,30 @@ def close_holes(
 ) -> Mesh:
     """Close the simple loops of the border of at most this perimeter, in the unit of the vertices, by least area.
 
-    Longer loops stay open: soles missing from a capture, sleeves, the rim of what a camera saw. So do loops that only
-    faces close with an edge that the mesh has already, or one with its middle where `stay_open` says so. No vertex is
-    added: cracks are zipped.
+    Longer loops stay open: soles missing from a capture, sleeves, the edge of a camera's view. So do loops whose faces
+    would repeat an edge of the mesh, or have a middle where `stay_open` returns True. No vertex is added: cracks are
+    zipped.
     """
     edges = unique_edges(mesh.faces)[0].astype(np.int64)
-    known, patches = edges[:, 0] * len(mesh.vertices) + edges[:, 1], list[Int64[np.ndarray, "n 3"]]()
+    edge_keys, patches = edges[:, 0] * len(mesh.vertices) + edges[:, 1], list[Int64[np.ndarray, "n 3"]]()
     for loop in _loops(mesh):
         rim = mesh.vertices[loop]
         if np.linalg.norm(rim - np.roll(rim, -1, axis=0), axis=1).sum() <= perimeter:
             pairs = np.sort(np.stack(np.broadcast_arrays(loop[:, None], loop[None])), axis=0)
             keys = pairs[0] * len(mesh.vertices) + pairs[1]
-            taken = known[np.minimum(np.searchsorted(known, keys), len(known) - 1)] == keys
-            patches.extend([loop[patch[:, ::-1]] for patch in [_least_area(rim, taken)] if len(patch)])
+            exists = edge_keys[np.minimum(np.searchsorted(edge_keys, keys), len(edge_keys) - 1)] == keys
+            patches.extend([loop[patch[:, ::-1]] for patch in [_least_area(rim, exists)] if len(patch)])
     if stay_open is not None and patches:
         middles = mesh.vertices[np.concatenate(patches)].mean(axis=1)
         free = np.split(stay_open(middles), np.cumsum([len(patch) for patch in patches])[:-1])
-        patches = [patch for patch, each in zip(patches, free, strict=True) if not each.any()]
+        patches = [patch for patch, is_open in zip(patches, free, strict=True) if not is_open.any()]
     return Mesh.of(mesh.vertices, np.concatenate([mesh.faces, *patches]))
 
 
 def _least_area(rim: Float64[np.ndarray, "n 3"], taken: Bool[np.ndarray, "n n"]) -> Int64[np.ndarray, "m 3"]:
-    """Return the faces with the least area that close a loop, wound as it (Barequet and Sharir 1995).
+    """Return the faces of least area that close a loop, with its orientation (Barequet and Sharir 1995).
 
-    None has a diagonal that is taken; there are no faces where no others close it.
+    No face has a diagonal that `exists` in the mesh; without such faces, return none.
     """
     count = len(rim)
     least, middle = np.zeros((count, count)), np.zeros((count, count), np.int64)
@@ -69,9 +69,9 @@ def _least_area(rim: Float64[np.ndarray, "n 3"], taken: Bool[np.ndarray, "n n"])
 
 
 def _loops(mesh: Mesh) -> Iterator[Int64[np.ndarray, " n"]]:
-    """Yield the half-edges without an opposite one as loops that meet no vertex twice, each by its vertices.
+    """Yield the half-edges without an opposite as loops that pass no vertex twice, each as its vertices.
 
-    Where several loops meet at a vertex, a walk along the border cuts off a loop whenever it comes back to itself.
+    If several loops meet at a vertex, a walk along the border cuts off a loop whenever it returns to itself.
     """
     f = mesh.faces.astype(np.int64)
     half = np.concatenate([f[:, [0, 1]], f[:, [1, 2]], f[:, [2, 0]]])

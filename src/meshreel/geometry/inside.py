@@ -17,8 +17,8 @@ from .closest_points import Surface
 from .strict import rounded
 from .topology import connected_faces, face_normals, weld
 
-BLOCK = 4  # grid points along a side of a block, which is classified at once where no surface crosses it (guess)
-MOST_BLOCKS = 1 << 19  # of the sampling grid; bounds memory when a few small bodies lie far apart (guess)
+BLOCK = 4  # grid points along a side of a block, which is classified at once if no surface crosses it (guess)
+MOST_BLOCKS = 1 << 19  # of the sampling grid; bounds memory if a few small bodies lie far apart (guess)
 SPECK = 0.002  # share of all samples below which a component is noise (guess)
 SHEET = 0.05  # interior samples per area h^2 below which a component is a sheet, h the samples' distance (guess)
 
@@ -68,7 +68,7 @@ def winding_numbers(mesh: Mesh, queries: Float64[np.ndarray, "N 3"]) -> Float64[
 
 
 def _spacing(mesh: Mesh, count: int, generator: np.random.Generator) -> float:
-    """Return the cell side at which about `count` cells fall inside; 0 where a pilot grid finds no interior."""
+    """Return the cell side at which about `count` cells fall inside; 0 if a pilot grid finds no interior."""
     low, size = mesh.vertices.min(axis=0), np.ptp(mesh.vertices, axis=0)
     for pilot in (16_384, 131_072):
         if size.min() <= 0:
@@ -108,7 +108,7 @@ def _inside_grid(mesh: Mesh, spacing: float, generator: np.random.Generator) -> 
 def _touched(
     mesh: Mesh, low: Float64[np.ndarray, " 3"], side: float, shape: Int64[np.ndarray, " 3"]
 ) -> Bool[np.ndarray, " B"]:
-    """Return which blocks the bounding box of some face meets."""
+    """Return a mask of the blocks that any face's bounding box meets."""
     corners = np.floor((mesh.vertices[mesh.faces] - low) / side).astype(np.int64)
     first, last = corners.min(axis=1), corners.max(axis=1)
     touched = np.zeros(tuple(shape), dtype=bool)
@@ -146,7 +146,7 @@ def _with_sheets(
     labels: Int64[np.ndarray, " N"],
     spacing: float,
 ) -> tuple[Float64[np.ndarray, "S 3"], Int64[np.ndarray, " S"]]:
-    """Add samples of the surface of parts that enclose next to nothing."""
+    """Add samples on the surface of parts that enclose almost no volume."""
     areas = np.bincount(parts, face_normals(mesh)[1])
     sheet = np.bincount(labels, minlength=len(areas)) < SHEET * areas / spacing**2
     weights = face_normals(mesh)[1] * sheet[parts]
@@ -178,7 +178,7 @@ def _without_specks(points: Float64[np.ndarray, "N 3"], labels: Int64[np.ndarray
     sizes = np.bincount(labels)
     order = np.argsort(-sizes, kind="stable")
     rank = np.full(len(sizes), -1)
-    kept = order[: max(1, int((sizes > SPECK * len(points)).sum()))]
-    rank[kept] = np.arange(len(kept))
+    large = order[: max(1, int((sizes > SPECK * len(points)).sum()))]
+    rank[large] = np.arange(len(large))
     bodies = rank[labels]
     return Samples(points[bodies >= 0], bodies[bodies >= 0])

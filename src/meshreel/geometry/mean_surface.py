@@ -1,6 +1,6 @@
-"""The mean surface of several: signed distances to each are averaged on a sparse grid, so that noise averages out.
+"""The mean of several surfaces: signed distances to each are averaged on a sparse grid, which reduces noise.
 
-In -> out: meshes -> the mesh of what enough of them have. Lasting borders stay; what some lack comes from others.
+In -> out: meshes -> the surface that enough of them have. Lasting borders stay; gaps are filled from other meshes.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from .voxels import Lattice, around, distinct, spread
 
 @dataclass(frozen=True, slots=True)
 class MeanOptions:
-    """Which distances count; lengths in voxels."""
+    """Limits of the distances that count, in voxels."""
 
     reach: float = 1.5  # distances are kept this far from a surface: enough for the cubes it crosses, and noise (guess)
     steady: float = math.inf  # where the standard deviation of the distances is larger, there is no surface
@@ -59,17 +59,17 @@ class MeanSurface:
         """Extract the zero of the mean distance, over voxels that at least `least` surfaces know and agree on."""
         means = self._sums / np.maximum(self._counts, 1)
         varies = np.sqrt(np.maximum(self._squares / np.maximum(self._counts, 1) - means**2, 0))
-        known = (self._counts >= least) & (varies <= self._options.steady * self._lattice.size)
-        if self._origin is None or not known.any():
+        agreed = (self._counts >= least) & (varies <= self._options.steady * self._lattice.size)
+        if self._origin is None or not agreed.any():
             return Mesh.empty()
-        cells = self._lattice.cells(self._keys[known])
+        cells = self._lattice.cells(self._keys[agreed])
         inside, shared = cells % SIDE, Lattice(np.zeros(3), 1.0)
         keys, which = np.unique(shared.keys(cells // SIDE + 0.5), return_inverse=True)
         blocks, which = shared.cells(keys), which.reshape(-1)
         distances = np.zeros((len(blocks), SIDE, SIDE, SIDE), np.float32)
         weights = np.zeros_like(distances)
         at = (which, inside[:, 2], inside[:, 1], inside[:, 0])
-        distances[at] = means[known] / (self._options.reach * self._lattice.size)
+        distances[at] = means[agreed] / (self._options.reach * self._lattice.size)
         weights[at] = 1.0
         mesh = extract(Grid.of(self._lattice.size, blocks.astype(np.int32), distances, weights), 0.5)
         return Mesh(mesh.vertices + self._origin, mesh.faces)
@@ -90,6 +90,6 @@ class MeanSurface:
         distance = np.linalg.norm(away, axis=1)
         beyond = surface.past_border(hits)
         aside = np.sqrt(np.maximum(distance**2 - along**2, 0))
-        known = (distance <= self._options.reach * size) & (~beyond | (aside <= self._options.past * size))
+        within = (distance <= self._options.reach * size) & (~beyond | (aside <= self._options.past * size))
         signed = np.where(beyond, along, np.where(along < 0, -distance, distance))
-        return keys[known], signed[known]
+        return keys[within], signed[within]

@@ -17,29 +17,29 @@ from .topology import blend
 
 @runtime_checkable
 class Paint(Protocol):
-    """What knows the colours of places on a surface."""
+    """Source of colours of points on a surface."""
 
     def at(
         self, points: Float64[np.ndarray, "N 3"], normals: Float64[np.ndarray, "N 3"]
     ) -> tuple[Float64[np.ndarray, "N 3"], Bool[np.ndarray, " N"]]:
-        """Return the colours of places with these normals, 0 to 255, and which of them it knows."""
+        """Return the colours of points with these normals, 0 to 255, and a mask of the known ones."""
 
     def pixels_on(self, mesh: Mesh) -> float:
-        """Return how many pixels of the pictures that it has show a mesh; infinite where it has none."""
+        """Return the number of pixels of its pictures that show a mesh; infinite without pictures."""
 
 
 class Painted:
     """A mesh with faces and colours, prepared for repeated queries."""
 
     def __init__(self, mesh: Mesh, far: float = np.inf) -> None:
-        """Take the mesh; of places farther from it than `far`, in the unit of its vertices, it knows nothing."""
+        """Take the mesh; colours of points farther from it than `far`, in the unit of its vertices, are unknown."""
         self._mesh, self._surface, self._far = mesh, Surface(mesh), far
         self._pixels = None if mesh.uv is None or mesh.texture is None else mesh.texture.pixels
 
     def at(
         self, points: Float64[np.ndarray, "N 3"], normals: Float64[np.ndarray, "N 3"]
     ) -> tuple[Float64[np.ndarray, "N 3"], Bool[np.ndarray, " N"]]:
-        """Return the colours at the closest points of the mesh, whatever their normals, and which are near enough."""
+        """Return the colours at the closest points of the mesh, whatever the normals, and a mask of near points."""
         del normals
         hits = self._surface.closest(points)
         if self._far == np.inf:
@@ -49,7 +49,7 @@ class Painted:
         return self.on(hits.faces, hits.barycentric), near
 
     def pixels_on(self, mesh: Mesh) -> float:
-        """Return how many texels of its texture the painted mesh has, whatever the mesh; infinite without a texture."""
+        """Return the number of texels of the painted mesh, whatever `mesh`; infinite without a texture."""
         del mesh
         if self._pixels is None or self._mesh.uv is None:
             return np.inf
@@ -61,20 +61,20 @@ class Painted:
         """Return the colours at places inside faces."""
         mesh = self._mesh
         if mesh.colors is None:
-            found = np.full((len(faces), 3), float(GREY))
+            colors = np.full((len(faces), 3), float(GREY))
         else:
-            found = blend(mesh.colors.astype(np.float64), mesh.faces[faces], barycentric)
+            colors = blend(mesh.colors.astype(np.float64), mesh.faces[faces], barycentric)
         if self._pixels is not None and mesh.uv is not None:
             places = np.einsum("nkc,nk->nc", mesh.uv[faces].astype(np.float64), barycentric)
-            known = np.isfinite(places).all(axis=1)
-            found[known] = bilinear(self._pixels, places[known])
-        return found
+            textured = np.isfinite(places).all(axis=1)
+            colors[textured] = bilinear(self._pixels, places[textured])
+        return colors
 
 
 def bilinear(
     pixels: UInt8[np.ndarray, "H W 3"], places: Float64[np.ndarray, "N 2"] | Float32[np.ndarray, "N 2"]
 ) -> Float64[np.ndarray, "N 3"]:
-    """Return the colours at places of a texture, as `Mesh.uv` has them; outside of 0 to 1 it is repeated."""
+    """Return the colours at places of a texture, as in `Mesh.uv`; outside of 0 to 1 the texture is repeated."""
     height, width = pixels.shape[:2]
     x, y = np.asarray(places, np.float64).T
     x, y = (x - np.floor(x)) * width - 0.5, (1.0 - (y - np.floor(y))) * height - 0.5

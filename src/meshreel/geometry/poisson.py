@@ -1,7 +1,7 @@
 """Poisson reconstruction by Open3D, as the paper has it (section 3.3.2). Needs the extra `open3d`.
 
-In: points with normals. Out: the surface through them. Poisson closes whatever is open: what lies far from all points
-is cut away.
+In: points with normals. Out: the surface through them. Poisson closes all openings: surface far from all points is cut
+away.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ _ONE_AT_A_TIME = threading.Lock()  # the library keeps state in static variables
 def poisson_surface(
     points: Float64[np.ndarray, "N 3"], normals: Float64[np.ndarray, "N 3"], depth: int, reach: float
 ) -> Mesh:
-    """Return the surface through points with outward normals, without what is farther than `reach` from all of them.
+    """Return the surface through points with outward normals, cut off farther than `reach` from all of them.
 
     `depth` is that of the octree. Runs in one thread, so that the same points give the same bits. Raises InputError
     without Open3D.

@@ -71,10 +71,10 @@ class Rays:
         return self._tree.cast(camera.eye[None], ways, False)[:2]
 
     def backs(self, camera: Camera, seen: Seen) -> Bool[np.ndarray, "H W"]:
-        """Return where a camera sees the back of a face; `seen` is the result of `look`."""
+        """Return a mask of the pixels that see the back of a face; `seen` is the result of `look`."""
         if self._mesh.is_empty:
             return np.zeros(seen.faces.shape, bool)
-        normals = self._normals[seen.faces]  # of some face where none is seen
+        normals = self._normals[seen.faces]  # arbitrary where no face is seen
         along = sum(normals[..., axis] * ways for axis, ways in enumerate(_ways(camera)))
         return (along > 0) & (seen.faces >= 0)
 
@@ -84,9 +84,9 @@ class Rays:
 
 
 def pixels_near(camera: Camera, mesh: Mesh) -> Bool[np.ndarray, "H W"]:
-    """Return the pixels in the boxes of the projected faces, a pixel wider: a camera sees the faces in no others.
+    """Return a mask of pixels that contains all that see faces: the boxes of projected faces, a pixel wider.
 
-    These are all pixels where the plane of the camera cuts a face.
+    If the camera's plane cuts a face, these are all pixels.
     """
     local = camera.local(mesh.vertices)
     ahead = (local[:, 2] > 0)[mesh.faces]

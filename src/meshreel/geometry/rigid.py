@@ -18,7 +18,7 @@ def fit_rigid(
 ) -> tuple[Float64[np.ndarray, "N 3 3"], Float64[np.ndarray, "N 3"]]:
     """Fit rotations R and translations t that minimise sum w |R source + t - target|^2 in each of N rows (Kabsch).
 
-    Points on a line, or a single point, leave part of the rotation open: the smallest rotation is then taken.
+    Points on a line, or a single point, leave part of the rotation open: the smallest rotation is chosen.
     """
     share = weights / np.maximum(weights.sum(axis=1, keepdims=True), np.finfo(float).tiny)
     middle_s = np.einsum("ni,nid->nd", share, source)

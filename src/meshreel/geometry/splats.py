@@ -1,4 +1,4 @@
-"""Splats on a mesh: flat Gaussians at places of a base mesh's faces, and where they are when the mesh has moved.
+"""Splats on a mesh: flat Gaussians at places of a base mesh's faces, which move with the mesh.
 
 In: splats, and the mesh of a frame after any number of subdivisions. Out: Gaussians in space. A place inside a face of
 the base mesh is found on each finer mesh, so that every layer of a group has the splats.
@@ -14,7 +14,7 @@ import numpy as np
 
 from ..shapes import Bool, Float64, Int32, Int64
 
-THIN = 0.1  # third scale, along the normal, of the shorter one (guess): surfaces are thin
+THIN = 0.1  # ratio of the third scale, along the normal, to the shorter one (guess): surfaces are thin
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +33,6 @@ class Splats:
         return len(self.faces)
 
     def take(self, chosen: Int64[np.ndarray, " M"] | Bool[np.ndarray, " N"]) -> Splats:
-        """Return some of the splats."""
         return Splats(*(getattr(self, name)[chosen] for name in self.__slots__))
 
 
@@ -49,7 +48,7 @@ class Bound:
 
     @staticmethod
     def join(parts: Sequence[Bound]) -> Bound:
-        """Return all Gaussians of at least one part, one behind the other."""
+        """Return the Gaussians of all parts, of which there is at least one."""
         return Bound(*(np.concatenate([getattr(part, name) for part in parts]) for name in Bound.__slots__))
 
 
@@ -61,26 +60,26 @@ class Carrier:
     faces: Int32[np.ndarray, "F 3"]
     levels: int  # midpoint subdivisions of the base mesh
     lacking: Bool[np.ndarray, " F"] | None = None  # faces that the frame lacks
-    unit: float = 1.0  # what lengths of splats count, in the unit of the vertices
+    unit: float = 1.0  # unit of splats' lengths, in the unit of the vertices
 
 
 def bind(splats: Splats, carrier: Carrier) -> Bound:
-    """Return the splats in a frame; one on a face that the frame lacks, or without area, is transparent."""
+    """Return the splats in a frame; a splat on a face that the frame lacks, or without area, is transparent."""
     finer, weights, along = locate(splats.faces, splats.weights, carrier.levels)
-    corners, own = carrier.vertices[carrier.faces[finer]], (splats.offsets, splats.turns, splats.scales, carrier.unit)
-    means, axes, scales = pose(np, corners, weights, along, own)
+    corners, shape = carrier.vertices[carrier.faces[finer]], (splats.offsets, splats.turns, splats.scales, carrier.unit)
+    means, axes, scales = pose(np, corners, weights, along, shape)
     is_there = axes.any(axis=2).all(axis=1)
     if carrier.lacking is not None:
         is_there &= ~carrier.lacking[finer]
     return Bound(means, axes, scales, np.where(is_there, splats.opacities, 0.0), splats.colors)
 
 
-def pose(xp: Any, corners: Any, weights: Any, along: Any, own: tuple[Any, Any, Any, float]) -> tuple[Any, Any, Any]:
+def pose(xp: Any, corners: Any, weights: Any, along: Any, shape: tuple[Any, Any, Any, float]) -> tuple[Any, Any, Any]:
     """Return means, axes and scales of splats, from the corners of their faces; `xp` is NumPy, or torch.
 
-    `own` are their offsets, turns and scales, and the unit of these. Axes on a face without area are 0.
+    `shape` are their offsets, turns and scales, and the unit of these. Axes on a face without area are 0.
     """
-    offsets, turns, scales, unit = own
+    offsets, turns, scales, unit = shape
     first = _unit(xp, (along[:, 0, :, None] * corners).sum(axis=1))
     normals = _unit(xp, _cross(xp, corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
     second = _cross(xp, normals, first)
@@ -93,22 +92,22 @@ def pose(xp: Any, corners: Any, weights: Any, along: Any, own: tuple[Any, Any, A
 def locate(
     faces: Int32[np.ndarray, " N"], weights: Float64[np.ndarray, "N 2"], levels: int
 ) -> tuple[Int64[np.ndarray, " N"], Float64[np.ndarray, "N 3"], Float64[np.ndarray, "N 2 3"]]:
-    """Return places on a base mesh as places on the mesh after so many subdivisions.
+    """Convert places on a base mesh to places on the mesh after `levels` subdivisions.
 
-    These are the faces, the weights of their corners, and how these weights change with the second and the third one.
+    Return the faces, the weights of their corners, and the derivatives of these by the second and third base weight.
     """
     finer, along = faces.astype(np.int64), np.tile(np.array([[-1.0, 1.0, 0.0], [-1.0, 0.0, 1.0]]), (len(faces), 1, 1))
-    own = np.column_stack([1 - weights.sum(axis=1), weights])
+    corner_weights = np.column_stack([1 - weights.sum(axis=1), weights])
     for _ in range(levels):
-        largest = own.argmax(axis=1)
-        is_inner = own.max(axis=1, initial=0) < 0.5
-        own, along = 2 * own, 2 * along
-        own[np.arange(len(own)), largest] -= 1  # faces (a, ab, ca), (ab, b, bc), (ca, bc, c)
-        own[is_inner, largest[is_inner]] += 1
-        own[is_inner] = 1 - own[is_inner][:, [2, 0, 1]]  # (ab, bc, ca)
+        largest = corner_weights.argmax(axis=1)
+        is_inner = corner_weights.max(axis=1, initial=0) < 0.5
+        corner_weights, along = 2 * corner_weights, 2 * along
+        corner_weights[np.arange(len(corner_weights)), largest] -= 1  # faces (a, ab, ca), (ab, b, bc), (ca, bc, c)
+        corner_weights[is_inner, largest[is_inner]] += 1
+        corner_weights[is_inner] = 1 - corner_weights[is_inner][:, [2, 0, 1]]  # (ab, bc, ca)
         along[is_inner] = -along[is_inner][:, :, [2, 0, 1]]
         finer = 4 * finer + np.where(is_inner, 3, largest)
-    return finer, own, along
+    return finer, corner_weights, along
 
 
 def _cross(xp: Any, a: Any, b: Any) -> Any:

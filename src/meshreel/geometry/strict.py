@@ -1,8 +1,8 @@
 """Algebra and elementary functions whose bits depend neither on the processor nor on the number of threads.
 
-BLAS and LAPACK sum in an order of their own for each processor and number of threads, and NumPy's exp, log2 and angles
-differ between processors. What an encode computes becomes bytes, so it is computed here, in core/. NumPy's `+ - * /`,
-`sqrt`, `sum` and `einsum` without `optimize` are the same everywhere.
+BLAS and LAPACK choose the order of sums by processor and number of threads, and NumPy's exp, log2 and angles differ
+between processors. Results of an encode become bytes, so they are computed by these functions, in core/. NumPy's
+`+ - * /`, `sqrt`, `sum` and `einsum` without `optimize` are the same everywhere.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ Array = Float[np.ndarray, "..."]  # of float32 or float64
 
 
 def products(a: Array, b: Array) -> Float64[np.ndarray, "..."]:
-    """Return `a @ b` of two matrices, or of two batches of as many matrices, summed in order."""
+    """Return `a @ b` of two matrices, or of two batches of equal length, summed in order."""
     if a.ndim == 2:
         return _core.products(_plain(a)[None], _plain(b)[None])[0]
     return _core.products(_plain(a), _plain(b))
@@ -35,17 +35,15 @@ def norm(a: Array) -> float:
 
 
 def inverses(matrices: Float64[np.ndarray, "N n n"]) -> Float64[np.ndarray, "N n n"]:
-    """Invert each matrix; one that has no inverse becomes numbers that are not finite."""
+    """Invert each matrix; the result of a singular matrix is not finite."""
     return _core.inverses(_plain(matrices))
 
 
 def inverse(matrix: Float64[np.ndarray, "n n"]) -> Float64[np.ndarray, "n n"]:
-    """Invert one matrix."""
     return inverses(matrix[None])[0]
 
 
 def determinants(matrices: Float64[np.ndarray, "N 3 3"]) -> Float64[np.ndarray, " N"]:
-    """Return the determinant of each matrix."""
     (a, b, c), (d, e, f), (g, h, i) = np.moveaxis(matrices, 0, 2)
     return a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)
 
@@ -65,7 +63,7 @@ def nearest_rotations(
     a matrix of zeros.
     """
     (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = np.moveaxis(matrices, 0, 2)
-    rows = [  # w last: of equal values the last one counts as the largest
+    rows = [  # w last: among equal values the last counts as the largest
         [xx - yy - zz, xy + yx, xz + zx, zy - yz],
         [xy + yx, yy - xx - zz, yz + zy, xz - zx],
         [xz + zx, yz + zy, zz - xx - yy, yx - xy],
@@ -88,7 +86,6 @@ def rotations_of(quaternions: Float64[np.ndarray, "N 4"]) -> Float64[np.ndarray,
 
 
 def exp(x: Array) -> Float64[np.ndarray, "..."]:
-    """Return e to the power of each number."""
     return _core.exp(_plain(x).reshape(-1)).reshape(x.shape)
 
 
@@ -98,7 +95,7 @@ def log2(x: Array) -> Float64[np.ndarray, "..."]:
 
 
 def rounded(value: float) -> float:
-    """Return a number to 12 significant digits: what libraries compute with `**` differs in the last bits."""
+    """Round a number to 12 significant digits: results of `**` differ between libraries in the last bits."""
     return float(f"{value:.12g}")
 
 

@@ -16,7 +16,7 @@ from ..shapes import Float, Float64, Int32
 from ..types import Mesh, Placement
 from .topology import vertex_normals
 
-LEAST_COSINE = 0.3  # between direction and surface normal; below it the tangent plane is of no use (guess)
+LEAST_COSINE = 0.3  # between direction and surface normal; below it the tangent plane is useless (guess)
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,14 +30,13 @@ class Level:
 
     @property
     def count(self) -> int:
-        """Number of vertices of the finer mesh."""
         return self.vertices + len(self.edges)
 
 
 def subdivide(faces: Int32[np.ndarray, "F 3"], vertices: int) -> Level:
     """Subdivide the connectivity once; vertices are in the order of `topology.subdivide_midpoint`.
 
-    Raises FormatError where a face names none of the vertices.
+    Raises FormatError if a face refers to a missing vertex.
     """
     try:
         edges, finer = _core.subdivide(faces, vertices)
@@ -60,8 +59,8 @@ def heights(
 ) -> Float64[np.ndarray, "T E"]:
     """Return the signed distance from each curved midpoint, along its direction, to the wanted surface.
 
-    `wanted` are positions of the finer level's vertices: the surface is the tangent plane at such a vertex or, where
-    the direction runs along that plane, the vertex itself. `known` are the coarser level's vertices as both encoder and
+    `wanted` are positions of the finer level's vertices: the surface is the tangent plane at such a vertex or, if the
+    direction runs along that plane, the vertex itself. `known` are the coarser level's vertices as both encoder and
     decoder have them. No distance exceeds the length of its edge.
     """
     scalars = np.empty((len(wanted), len(level.edges)))
@@ -80,19 +79,19 @@ def heights(
 
 
 def refine(
-    known: Float64[np.ndarray, "T V 3"], level: Level, scalars: Float64[np.ndarray, "T E"], curvature: int
+    coarse: Float64[np.ndarray, "T V 3"], level: Level, scalars: Float64[np.ndarray, "T E"], curvature: int
 ) -> Float64[np.ndarray, "T W 3"]:
     """Return the finer level's vertices: the coarser ones, then curved midpoint + scalar x direction for each edge.
 
     The direction is the unit sum of the normals at both ends. The curved midpoint lies `curvature` / 64 of the sagitta
     that these normals imply away from the middle of the edge.
     """
-    rows = np.ascontiguousarray(known.transpose(1, 2, 0))
+    rows = np.ascontiguousarray(coarse.transpose(1, 2, 0))
     return _core.refine(rows, level.coarse, level.edges, np.ascontiguousarray(scalars.T), curvature)
 
 
 def write_frames(
     rows: Float64[np.ndarray, "V 3 T"], place: Placement | None, frames: Float[np.ndarray, "T V 3"]
 ) -> None:
-    """Transpose rows, which hold all frames of a number, into `frames`. Raises FormatError if one is not finite."""
+    """Transpose rows, each of one coordinate in all frames, into `frames`. Raises FormatError if one is not finite."""
     _core.frames_of_rows(rows, None if place is None else place.numbers, frames)

@@ -1,7 +1,7 @@
 """Connectivity of triangle meshes: edges, components, welding, normals and midpoint subdivision.
 
-Pure functions of vertices (V x 3) and faces (F x 3), without heavy imports: the decoder uses this file. Those whose
-loops are in core/ raise ValueError for a face that refers to a missing vertex.
+Pure functions of vertices (V x 3) and faces (F x 3), without heavy imports: the decoder uses this file. Functions of
+the core raise ValueError for a face that refers to a missing vertex.
 """
 
 from __future__ import annotations
@@ -20,17 +20,17 @@ def unique_edges(faces: Int32[np.ndarray, "F 3"]) -> tuple[Int64[np.ndarray, "E 
     """Return the undirected edges (i < j, sorted) and, for each face, the numbers of its edges 01, 12 and 20."""
     count = int(faces.max(initial=-1)) + 1
     edges, finer = _core.subdivide(faces, count)
-    middles = finer[3::4]  # of the four faces that each is cut into, the one between the midpoints of its edges
+    middles = finer[3::4]  # of each four, the face between the midpoints
     return edges.astype(np.int64), middles.astype(np.int64) - count
 
 
 def border_mask(edges: Int64[np.ndarray, "E 2"], face_edges: Int64[np.ndarray, "F 3"]) -> Bool[np.ndarray, " E"]:
-    """Return which of the `unique_edges` belong to one face only."""
+    """Return a mask of the `unique_edges` that belong to a single face."""
     return np.bincount(face_edges.reshape(-1), minlength=len(edges)) == 1
 
 
 def border_edges(mesh: Mesh) -> Int64[np.ndarray, "B 2"]:
-    """Return the edges that belong to one face only; a closed mesh has none."""
+    """Return the edges that belong to a single face; a closed mesh has none."""
     edges, face_edges = unique_edges(mesh.faces)
     return edges[border_mask(edges, face_edges)]
 
@@ -67,10 +67,10 @@ def face_normals(mesh: Mesh) -> tuple[Float64[np.ndarray, "F 3"], Float64[np.nda
 def blend(
     values: Float64[np.ndarray, "V 3"], corners: Int32[np.ndarray, "N 3"], weights: Float64[np.ndarray, "N 3"]
 ) -> Float64[np.ndarray, "N 3"]:
-    """Values of vertices inside faces that are given by their three corners, by barycentric weights."""
+    """Interpolate values of vertices inside faces, given by their three corners, by barycentric weights."""
     a, b, c = (np.ascontiguousarray(corner) for corner in corners.T)
     u, v, w = (np.ascontiguousarray(weight) for weight in weights.T)
-    axes = (np.ascontiguousarray(axis) for axis in values.T)  # one by one: no N x 3 x 3 numbers in memory
+    axes = (np.ascontiguousarray(axis) for axis in values.T)  # axis by axis, to save memory
     return np.stack([u * axis[a] + v * axis[b] + w * axis[c] for axis in axes], axis=1)
 
 
@@ -119,7 +119,7 @@ def with_neighbours(faces: Int32[np.ndarray, "F 3"], chosen: Bool[np.ndarray, " 
 def concatenate(meshes: Sequence[Mesh]) -> Mesh:
     """Join meshes into one, vertices and faces in order; if only one has vertices, it is returned itself.
 
-    Where one has colours of its vertices, those of others are grey. Several textures are one, side by side.
+    If any has colours of its vertices, vertices of the others are grey. Several textures are joined side by side.
     """
     meshes = [mesh for mesh in meshes if len(mesh.vertices)] or list(meshes[:1])
     if len(meshes) <= 1:
@@ -157,7 +157,7 @@ def components(faces: Int32[np.ndarray, "F 3"], count: int) -> Int64[np.ndarray,
 
 
 def linked(pairs: Int64[np.ndarray, "L 2"], count: int) -> Int64[np.ndarray, " N"]:
-    """Label each of `count` things with what it is connected to by pairs of them, as `components` does."""
+    """Label each of `count` items with its component of the graph whose edges are `pairs`."""
     return components(pairs[:, [0, 1, 1]].astype(np.int32), count)
 
 

@@ -21,10 +21,10 @@ from .topology import clean, weld
 
 SIDE = 8  # voxels along a side of a block; the core's
 TRUNCATION = 3.0  # voxels before and behind a depth that it constrains (guess)
-GRAZING = 4.0  # the same where surface is seen at grazing angles (decision 28)
-ALONE = 8.0  # the same where one camera sees all: nothing is known behind a surface (decision 28)
+GRAZING = 4.0  # the same for surface seen at grazing angles (decision 28)
+ALONE = 8.0  # the same for a single camera: nothing is known behind a surface (decision 28)
 SEEN = 0.5  # weight above which a voxel is known: one measurement is enough (guess)
-FREE = 1.0  # the core's distance, in truncations, of what is farther before a surface
+FREE = 1.0  # the core's distance, in truncations, of voxels farther before a surface
 ALIKE = 2.0**-16  # voxels: vertices that are nearer to each other are one (guess)
 MOST_BLOCKS = 500_000  # bounds memory: 2 GB (guess)
 
@@ -59,12 +59,12 @@ def integrate(
 ) -> Grid:
     """Integrate depth pictures into a grid, within `truncation` voxels of their surfaces.
 
-    Every picture is integrated into the blocks of all pictures: where one camera sees through what another took for
-    surface (flying pixels, noise), it carves it away. Surface of `hidden` pictures is guessed, not measured: it counts
-    where no picture tells anything, and is no sign of free space. Raises InputError where the surface takes more than
+    Every picture is integrated into the blocks of all pictures: a camera that sees through false surface of another
+    one (flying pixels, noise) carves it away. Surface of `hidden` pictures is guessed, not measured: it counts only at
+    voxels without measurement, and is no evidence of free space. Raises InputError if the surface takes more than
     `MOST_BLOCKS` blocks.
     """
-    views, guessed = ([_view(picture) for picture in some] for some in (pictures, hidden))
+    views, guessed = ([_view(picture) for picture in group] for group in (pictures, hidden))
     reach = truncation * voxel
     blocks = [_core.touched_blocks(*view, voxel, reach) for view in (*views, *guessed)]
     union = np.unique(np.concatenate([np.zeros((0, 3), np.int32), *blocks]), axis=0)
@@ -78,13 +78,13 @@ def integrate(
         guesses, times = np.zeros((2, *distances.shape), np.float32)
         for view in guessed:
             _core.integrate(*view, voxel, reach, union, guesses, times)
-        told = (weights == 0) & (times > 0) & (guesses < FREE)
-        distances[told], weights[told] = guesses[told], times[told]
+        unknown = (weights == 0) & (times > 0) & (guesses < FREE)
+        distances[unknown], weights[unknown] = guesses[unknown], times[unknown]
     return Grid(voxel, union, distances, weights)
 
 
 def _view(picture: DepthPicture) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Return depths, m, the projection, the ways of pixels, and the eye, as the core takes them."""
+    """Return depths, m, the projection, ray directions of pixels, and the eye, as the core takes them."""
     camera, depth = picture.camera, picture.depth.astype(np.float32) * np.float32(picture.unit)
     ways = products(inverse(camera.extrinsic[:3, :3]), inverse(camera.intrinsic))
     return (
@@ -100,7 +100,7 @@ def extract(grid: Grid, least: float) -> Mesh:
     vertices, faces = _core.zero_level(grid.blocks, grid.distances, grid.weights, grid.voxel, least)
     if not len(faces):
         return Mesh.empty()
-    step = grid.voxel * ALIKE  # a level through a voxel is met from all its sides, but for rounding in one place
+    step = grid.voxel * ALIKE  # merges vertices at one voxel that differ by rounding
     return _ordered(clean(weld(Mesh(np.rint(vertices / step) * step, faces))))
 
 

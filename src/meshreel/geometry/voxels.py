@@ -1,6 +1,6 @@
 """A sparse lattice of cubic cells: the cell of a point, neighbouring cells, and points spread over faces.
 
-The points are so dense that a cell which a surface crosses is missed by little.
+The points are dense enough that hardly any cell crossed by a surface is missed.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from ..types import Mesh
 _SIDE = 1 << 20  # cells along an axis, half of them on either side of the origin: three axes fit into a 64-bit key
 _HALF = _SIDE // 2
 _STRIDES = np.array([_SIDE * _SIDE, _SIDE, 1])
-_STRIDE = 1 << 12  # cells between the origins that a lattice may have, so that float32 resolves a cell finely (guess)
+_STRIDE = 1 << 12  # cells between possible origins of a lattice, so that float32 resolves a cell finely (guess)
 _MOST_PARTS = 512  # of a face's side: bounds memory for one giant face (guess)
 _AROUND = np.array([d for d in itertools.product((-1, 0, 1), repeat=3) if any(d)])
 
@@ -31,7 +31,7 @@ class Lattice:
 
     @staticmethod
     def near(mesh: Mesh, size: float) -> Lattice:
-        """Return the lattice for a mesh and others of its scene: its origin is (0, 0, 0), unless that is far away."""
+        """Return the lattice of a mesh's scene: its origin is (0, 0, 0), unless that is far away."""
         if mesh.is_empty:
             return Lattice(np.zeros(3), size)
         place, stride = mesh.vertices[mesh.faces[0, 0]], _STRIDE * size
@@ -47,7 +47,6 @@ class Lattice:
         return np.stack([keys // (_SIDE * _SIDE), keys // _SIDE % _SIDE, keys % _SIDE], axis=1) - _HALF
 
     def centers(self, keys: Int64[np.ndarray, " P"]) -> Float64[np.ndarray, "P 3"]:
-        """Return the middles of cells."""
         return self.origin + (self.cells(keys) + 0.5) * self.size
 
 
@@ -75,15 +74,15 @@ def around(keys: Int64[np.ndarray, " P"]) -> Int64[np.ndarray, " Q"]:
 def neighbours(keys: Int64[np.ndarray, " P"]) -> Int32[np.ndarray, "P 26"]:
     """Return, for each of the sorted cells, the indices of its 26 neighbours; its own index where one is missing."""
     table = np.empty((len(keys), len(_AROUND)), np.int32)
-    own = np.arange(len(keys), dtype=np.int32)
+    numbers = np.arange(len(keys), dtype=np.int32)
     for column, offset in enumerate(_AROUND):
-        asked = moved(keys, offset)
-        at = np.minimum(np.searchsorted(keys, asked), max(len(keys) - 1, 0))
-        table[:, column] = np.where(keys[at] == asked, at, own) if len(keys) else own
+        wanted = moved(keys, offset)
+        at = np.minimum(np.searchsorted(keys, wanted), max(len(keys) - 1, 0))
+        table[:, column] = np.where(keys[at] == wanted, at, numbers) if len(keys) else numbers
     return table
 
 
 def spread(mesh: Mesh, spacing: float) -> tuple[Float64[np.ndarray, "N 3"], Int64[np.ndarray, " N"]]:
-    """Return points on a mesh about `spacing` apart at most, and the face of each, ascending; every face has one."""
+    """Return points on a mesh at most about `spacing` apart, and their faces, ascending; every face has a point."""
     points, faces = _core.spread(mesh.vertices, mesh.faces, spacing, _MOST_PARTS)
-    return points, faces.view(np.int64)  # of the same size, by its usual name
+    return points, faces.view(np.int64)  # NumPy has two types of this size

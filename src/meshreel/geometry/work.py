@@ -1,6 +1,6 @@
-"""Counts of the work that an encode does: what costs time on every machine, and depends on none.
+"""Counts of an encode's work: a measure of cost that does not depend on the machine.
 
-In: `count` where work is done. Out: what was counted since a moment, by kind.
+In: calls of `count` beside the work. Out: counts by kind since a moment.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ def count(kind: Kind, number: int = 1) -> None:
 
 @contextmanager
 def heard(hear: Callable[[Kind, int], object]) -> Iterator[None]:
-    """Tell `hear` of the work that this thread counts in the block."""
+    """Call `hear` with the work that this thread counts in the block."""
     before, _here.hear = getattr(_here, "hear", None), hear
     try:
         yield
@@ -43,12 +43,12 @@ def heard(hear: Callable[[Kind, int], object]) -> Iterator[None]:
 
 
 def so_far() -> Work:
-    """Return what this thread has done so far."""
+    """Return the work of this thread so far."""
     return dict(_counts())
 
 
 def since(before: Work) -> Work:
-    """Return what this thread has done since `so_far` returned `before`."""
+    """Return the work of this thread since `so_far` returned `before`."""
     return dict(sorted((_counts() - Counter(before)).items()))
 
 

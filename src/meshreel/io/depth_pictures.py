@@ -24,7 +24,7 @@ def read_depth(path: Path) -> UInt16[np.ndarray, "H W"]:
 
 
 def parse_depth(data: bytes, where: str) -> UInt16[np.ndarray, "H W"]:
-    """Return the depths in the bytes of a file; errors as `read_depth`, which begin with `where`."""
+    """Return the depths in the bytes of a file. Raises as `read_depth` does; messages begin with `where`."""
     wanted = "store depth as 16-bit grayscale PNG"
     with opened(data, where, wanted, _AGAIN) as image:
         if image.mode not in DEEP:
@@ -34,5 +34,4 @@ def parse_depth(data: bytes, where: str) -> UInt16[np.ndarray, "H W"]:
 
 
 def write_depth(depth: UInt16[np.ndarray, "H W"], path: Path) -> None:
-    """Write depths as a 16-bit grayscale PNG."""
     write_picture(depth, path)

@@ -1,4 +1,4 @@
-"""File names: the frame files of a sequence and their order, patterns, and names that are no text.
+"""File names: the frame files of a sequence and their order, patterns, and names that are not Unicode text.
 
 In: a folder, a glob pattern, a file or a list of files, or URLs of these. Out: the files in the order of their frame
 numbers, and warnings.
@@ -17,7 +17,7 @@ from ..errors import InputError
 from .meshes import EXTENSIONS
 from .remote import Place, Remote, located
 
-MESHES = "meshes"  # name of a folder of frames beside the cameras that look at them
+MESHES = "meshes"  # name of a folder of frames beside the files of their cameras
 _MAGIC = re.compile(r"[*?\[]")
 _LAST = re.compile(r"(\d+)(?!.*\d)")
 _P = TypeVar("_P", bound=PurePath)
@@ -33,14 +33,13 @@ def is_text(name: str) -> bool:
 
 
 def is_pattern(name: str) -> bool:
-    """Return whether a name contains wildcards."""
     return _MAGIC.search(name) is not None
 
 
 def find_frames(source: str | Path | Iterable[str | Path]) -> tuple[tuple[Place, ...], tuple[str, ...]]:
     """Return the frame files of a source and warnings about their order. A list keeps its order.
 
-    A folder without mesh files whose frames are in a folder `meshes`, as TSMC's authors release theirs, stands for it.
+    For a folder without mesh files, use its subfolder `meshes`, as in the releases of TSMC's authors.
     """
     if not isinstance(source, str | Path):
         return tuple(located(path) for path in source), ()
@@ -52,29 +51,29 @@ def find_frames(source: str | Path | Iterable[str | Path]) -> tuple[tuple[Place,
     except OSError as error:  # a name that is too long, or a folder without permission
         raise InputError(f"{source}: cannot be read ({error.strerror}); check the path and its rights") from None
     if is_folder:
-        folder, found = path, _listed(path)
-        if not found and (path / MESHES).is_dir():
-            folder, found = path / MESHES, _listed(path / MESHES)
-        _check_kind(folder, found)
-        return _ordered(folder, folder, found)
+        folder, meshes = path, _listed(path)
+        if not meshes and (path / MESHES).is_dir():
+            folder, meshes = path / MESHES, _listed(path / MESHES)
+        _check_kind(folder, meshes)
+        return _ordered(folder, folder, meshes)
     if path.exists():
         return (path,), ()
     if is_pattern(str(source)):
-        root, found = _globbed(path)
-        if not found:
+        root, meshes = _globbed(path)
+        if not meshes:
             raise InputError(f"{source}: no mesh file fits this pattern; check it, or name the folder")
-        return _ordered(root, root, found)
+        return _ordered(root, root, meshes)
     raise InputError(f"{source}: no such file or folder; check the path")
 
 
 def last_number(name: str) -> int | None:
-    """Return the last whole number in a name, None without one."""
-    found = _LAST.search(name)
-    return None if found is None else int(found[1])
+    """Return the last whole number in a name; None if it has no number."""
+    match = _LAST.search(name)
+    return None if match is None else int(match[1])
 
 
 def _find_remote(place: Remote) -> tuple[tuple[Remote, ...], tuple[str, ...]]:
-    """Return the frame files of a folder behind a URL, of a pattern, or the one."""
+    """Return the frame files of a folder behind a URL or of a pattern, or the single file."""
     wild = _MAGIC.search(place.url)
     if wild is None and place.suffix.lower() in EXTENSIONS:
         return (place,), ()
@@ -84,10 +83,10 @@ def _find_remote(place: Remote) -> tuple[tuple[Remote, ...], tuple[str, ...]]:
         names = folder.names(place.url[end + 1 :])
     except OSError as error:
         raise InputError(f"{place}: cannot be read ({error}); check the URL and your rights") from None
-    found = [path for path in map(PurePosixPath, names) if _has_mesh_name(path)]
-    if wild is None or not found:
-        _check_kind(place, found)
-    paths, remarks = _ordered(place, PurePosixPath(), found)
+    meshes = [path for path in map(PurePosixPath, names) if _has_mesh_name(path)]
+    if wild is None or not meshes:
+        _check_kind(place, meshes)
+    paths, remarks = _ordered(place, PurePosixPath(), meshes)
     return tuple(folder / str(path) for path in paths), remarks
 
 
@@ -95,10 +94,10 @@ def _globbed(pattern: Path) -> tuple[Path, list[Path]]:
     fixed = next(k for k, part in enumerate(pattern.parts) if _MAGIC.search(part))
     root = Path(*pattern.parts[:fixed])
     try:
-        found = [path for path in root.glob(str(Path(*pattern.parts[fixed:]))) if _is_mesh(path)]
+        meshes = [path for path in root.glob(str(Path(*pattern.parts[fixed:]))) if _is_mesh(path)]
     except ValueError as error:
         raise InputError(f"{pattern}: is no pattern ({error}); mend it, or name the folder") from None
-    return root, found
+    return root, meshes
 
 
 def _is_mesh(path: Path) -> bool:
@@ -110,17 +109,16 @@ def _has_mesh_name(path: PurePath) -> bool:
 
 
 def _listed(folder: Path) -> list[Path]:
-    """Return the mesh files of a folder."""
     try:
         return [path for path in folder.iterdir() if _is_mesh(path)]
     except OSError as error:
         raise InputError(f"{folder}: cannot be read ({error.strerror}); check its rights") from None
 
 
-def _check_kind(folder: Place, found: Sequence[PurePath]) -> None:
-    """Raise InputError where a folder has no mesh files, or several kinds."""
-    kinds = Counter(path.suffix.lower() for path in found)
-    if not found:
+def _check_kind(folder: Place, files: Sequence[PurePath]) -> None:
+    """Raise InputError if a folder has no mesh files, or several kinds."""
+    kinds = Counter(path.suffix.lower() for path in files)
+    if not files:
         raise InputError(f"{folder}: holds 0 mesh files; give a folder with {', '.join(EXTENSIONS)} files")
     if len(kinds) > 1:
         counts = ", ".join(f"{count} {kind}" for kind, count in sorted(kinds.items()))
@@ -156,11 +154,11 @@ def _ordered(source: Place, root: _P, paths: list[_P]) -> tuple[tuple[_P, ...], 
 
 
 def _gaps(source: Place, numbers: Sequence[int]) -> tuple[str, ...]:
-    """Return a warning of frame numbers that are left out, where most of them are one step apart."""
+    """Return a warning about missing frame numbers, if most numbers are one step apart."""
     steps = [after - before for before, after in pairwise(numbers)]
     usual, count = Counter(steps).most_common(1)[0]
     wide = [(before, step) for before, step in zip(numbers, steps, strict=False) if step >= 2 * usual]
-    if not wide or 2 * count <= len(steps):  # times in place of numbers have steps that differ a little
+    if not wide or 2 * count <= len(steps):  # timestamps in place of numbers have uneven steps
         return ()
     lost, (first, step) = sum(step // usual - 1 for _, step in wide), wide[0]
     text = f"{lost} frames are missing between the file names, the first between {first} and {first + step}"

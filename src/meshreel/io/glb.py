@@ -17,7 +17,7 @@ from .pictures import parse_picture
 from .polygons import Dropped, Polygons, Unreadable
 
 _DROPS = {"NORMAL": "normals", "JOINTS": "skinning"}
-# Of trimesh: what begins with _ it hands on as it is; colours of 16 bits it would read by their lower byte.
+# trimesh passes attributes that begin with _ on unchanged, but would read 16-bit colours by their lower byte.
 _COLORS, _HIDDEN = b'"COLOR_0"', b'"_OLOR_0"'
 _TRANSFORM, _FLOAT = "KHR_texture_transform", 5126
 _DRACO = "KHR_draco_mesh_compression"
@@ -25,7 +25,7 @@ _DENSEST = 64  # values per byte (guess): no mesh compression comes near
 
 
 def parse_glb(data: bytes) -> Polygons:
-    """Return the surface of a GLB scene at rest in world coordinates, without nodes that are hidden at rest."""
+    """Return the surface of a GLB scene at rest, in world coordinates, without hidden nodes."""
     tree = _json_chunk(data)
     if not tree.get("meshes"):
         return _joined([], _dropped(tree), None)
@@ -51,12 +51,12 @@ def parse_glb(data: bytes) -> Polygons:
 
 
 def _text_end(data: bytes) -> int:
-    """Return where the JSON chunk ends."""
+    """Return the offset of the JSON chunk's end."""
     return 20 + int.from_bytes(data[12:16], "little")
 
 
 def _json_chunk(data: bytes) -> dict[str, Any]:
-    """Return the scene description, after a check of the lengths that the container announces."""
+    """Return the scene description, after checking the lengths that the container announces."""
     head = np.frombuffer(data[:20].ljust(20, b"\0"), dtype="<u4")
     magic, version, total, length = data[:4], int(head[1]), int(head[2]), int(head[3])
     if magic != b"glTF" or version != 2:
@@ -90,8 +90,8 @@ def _dropped(tree: dict[str, Any]) -> Dropped:
 
 
 def _pictures(tree: dict[str, Any]) -> tuple[set[int], str]:
-    """Return the numbers of the images that are base colours of triangles, and what of these is not understood."""
-    found, unknown = set[int](), ""
+    """Return the numbers of the images that are base colours of triangles, and the name of any unsupported use."""
+    images, unknown = set[int](), ""
     for primitive in (one for mesh in tree["meshes"] for one in mesh.get("primitives", [])):
         material = tree["materials"][primitive["material"]] if "material" in primitive else {}
         shine = material.get("pbrMetallicRoughness", {})
@@ -107,12 +107,12 @@ def _pictures(tree: dict[str, Any]) -> tuple[set[int], str]:
         elif places is not None and tree["accessors"][places]["componentType"] != _FLOAT:
             unknown = "a texture (with places that are no floats)"
         else:
-            found.add(source)
-    return found, unknown
+            images.add(source)
+    return images, unknown
 
 
 def _picture(data: bytes, tree: dict[str, Any], image: int) -> Texture | None:
-    """Return the texture of an image that is in the file, None for one that is not."""
+    """Return the texture of an image in the file; None for an image elsewhere."""
     view, uri = tree["images"][image].get("bufferView"), tree["images"][image].get("uri", "")
     if uri.startswith("data:"):
         return Texture(partial(parse_picture, b64decode(uri.split(",", 1)[1]), "the texture of a GLB"))
@@ -134,14 +134,14 @@ def _joined(parts: list[tuple[np.ndarray, Any]], dropped: Dropped, texture: Text
         mirrored = np.linalg.det(matrix[:3, :3]) < 0
         faces.append((triangles[:, ::-1] if mirrored else triangles) + count)
         count += len(local)
-    corners, shown = np.concatenate(faces).reshape(-1), [part for _, part in parts]
+    corners, surfaces = np.concatenate(faces).reshape(-1), [part for _, part in parts]
     sizes = np.full(len(corners) // 3, 3, np.int64)
-    uv = None if texture is None else np.concatenate([_places(part) for part in shown])[corners]
-    return Polygons(np.concatenate(vertices), corners, sizes, dropped, _colors(shown), uv, texture)
+    uv = None if texture is None else np.concatenate([_places(part) for part in surfaces])[corners]
+    return Polygons(np.concatenate(vertices), corners, sizes, dropped, _colors(surfaces), uv, texture)
 
 
 def _places(part: Any) -> Float32[np.ndarray, "V 2"]:
-    """Return the places of a part's vertices in its texture, NaN where it has none."""
+    """Return the texture coordinates of a part's vertices; NaN if it has none."""
     uv = getattr(part.visual, "uv", None)
     if uv is None or len(uv) != len(part.vertices):
         return np.full((len(part.vertices), 2), np.nan, np.float32)
@@ -149,16 +149,16 @@ def _places(part: Any) -> Float32[np.ndarray, "V 2"]:
 
 
 def _colors(parts: list[Any]) -> UInt8[np.ndarray, "V 3"] | None:
-    """Return the colours of all vertices, grey for parts without; None where no part has any."""
+    """Return the colours of all vertices, grey for parts without; None if no part has any."""
     names = (_HIDDEN.decode().strip('"'), PASSED_OVER)
-    found = [next((part.vertex_attributes[n] for n in names if n in part.vertex_attributes), None) for part in parts]
-    if all(values is None for values in found):
+    given = [next((part.vertex_attributes[n] for n in names if n in part.vertex_attributes), None) for part in parts]
+    if all(values is None for values in given):
         return None
-    for part, values in zip(parts, found, strict=True):
+    for part, values in zip(parts, given, strict=True):
         if values is not None and (np.ndim(values) != 2 or len(values) != len(part.vertices) or values.shape[1] < 3):
             raise ValueError(f"COLOR_0 of shape {np.shape(values)} for {len(part.vertices)} vertices")
     colors = [
         np.full((len(part.vertices), 3), GREY, np.uint8) if values is None else from_linear(np.asarray(values)[:, :3])
-        for part, values in zip(parts, found, strict=True)
+        for part, values in zip(parts, given, strict=True)
     ]
     return np.concatenate(colors)

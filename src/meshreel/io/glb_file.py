@@ -1,8 +1,8 @@
 """Writer of GLB files (binary glTF 2.0): arrays and pictures one after the other, and the scene that refers to them.
 
 In: arrays. Out: numbers of accessors and materials, then the file, whose binary chunk is never in memory as a whole.
-A picture or colours of vertices show as they are, without light (KHR_materials_unlit); a face has the one or the other,
-for glTF multiplies them: what has a place in the picture keeps its colours under a name that viewers pass over.
+Textures and colours of vertices are drawn unlit (KHR_materials_unlit); a face has one or the other, because glTF
+multiplies them: textured vertices keep their colours under a name that viewers ignore.
 """
 
 from __future__ import annotations
@@ -29,12 +29,12 @@ _VERTICES, _INDICES = 34962, 34963  # targets of a buffer view (glTF 2.0)
 _RESTART = 65535  # largest value of 16 bits: restarts a primitive, so it is no index (glTF 2.0)
 _UNLIT = "KHR_materials_unlit"
 _MESHOPT = ["EXT_meshopt_compression", "KHR_mesh_quantization"]
-_MATT = {"metallicFactor": 0.0, "roughnessFactor": 0.9}  # for viewers without the extension
+_MATT = {"metallicFactor": 0.0, "roughnessFactor": 0.9}  # for viewers without KHR_materials_unlit
 
 
 @dataclass(frozen=True, slots=True)
 class Faces:
-    """Faces of a mesh, which of them have a place in a picture, and the materials of those and of the others."""
+    """Faces of a mesh, a mask of the textured ones, and the materials of these and of the others."""
 
     corners: Int32[np.ndarray, "F 3"]
     pictured: Bool[np.ndarray, " F"]
@@ -48,7 +48,7 @@ class GlbFile:
     def __init__(
         self, spool: IO[bytes] | BytesIO, name: str, remedy: str = "write fewer", compressed: bool = False
     ) -> None:
-        """Write arrays to an empty `spool` first; `name` begins error messages, `remedy` ends that of its length."""
+        """Write arrays to an empty `spool` first; `name` begins error messages, `remedy` ends that about its length."""
         self._spool, self._name, self._remedy = spool, name, remedy
         self._size = self._plain = 0  # bytes written, and those of the buffer that compressed views stand for
         self._tree: dict[str, list[Any]] = {"extensionsRequired": _MESHOPT.copy()} if compressed else {}
@@ -58,19 +58,19 @@ class GlbFile:
         self.compressed = compressed
 
     def add(self, kind: str, item: dict[str, Any]) -> int:
-        """Append an item to a list of the description, as "meshes", and return its number."""
+        """Append an item to a list of the description, such as "meshes", and return its number."""
         self._tree.setdefault(kind, []).append(item)
         return len(self._tree[kind]) - 1
 
     def open_vertices(self, stride: int = 12, bits: int = 0) -> None:
-        """Begin a buffer view of attributes of vertices, so many bytes for each; each `put` extends it.
+        """Begin a buffer view of vertex attributes of `stride` bytes each; each `put` extends it.
 
-        `bits`: where the file is compressed, floats are rounded to multiples of 2^-bits; 0 keeps them.
+        `bits`: in compressed files, floats are rounded to multiples of 2^-bits; 0 keeps them.
         """
         self.open_view((ATTRIBUTES, stride, bits), byteStride=stride, target=_VERTICES)
 
     def open_view(self, coding: tuple[str, int, int] | None = (ATTRIBUTES, 4, 0), **others: int) -> None:
-        """Begin a buffer view; `coding` says how it is compressed where the file is, and None that it never is."""
+        """Begin a buffer view; `coding` is its compression in compressed files, None for no compression."""
         self._close()
         self._coding = coding if self.compressed else None
         self.add("bufferViews", {"buffer": 0, "byteOffset": self._size, "byteLength": 0, **others})
@@ -94,12 +94,12 @@ class GlbFile:
         return self.add("accessors", accessor)
 
     def put_places(self, uv: Float32[np.ndarray, "V 2"], what: object = "its arrays") -> int:
-        """Append places in a texture, as `Mesh.uv` has them; glTF counts from the upper row, and has no NaN."""
+        """Append texture coordinates, as in `Mesh.uv`; glTF counts from the upper row, and has no NaN."""
         self.open_vertices(8)
         return self.put(np.nan_to_num(np.stack([uv[:, 0], 1 - uv[:, 1]], axis=1)), "VEC2", what)
 
     def put_picture(self, pixels: UInt8[np.ndarray, "H W 3"], what: object = "its picture") -> int:
-        """Append a picture and return the number of the material that shows it."""
+        """Append a picture and return the number of its material."""
         data = pack_picture(pixels)
         self.open_view(None)
         self._append(data, what)
@@ -108,19 +108,19 @@ class GlbFile:
         return self.put_unlit({"baseColorTexture": {"index": self.add("textures", {"source": image})}})
 
     def put_unlit(self, surface: dict[str, Any]) -> int:
-        """Add a material that shows colours as they are, and return its number."""
+        """Add an unlit material, and return its number."""
         self._used.add(_UNLIT)
         looks = {"pbrMetallicRoughness": surface | _MATT, "extensions": {_UNLIT: {}}}
         return self.add("materials", {"doubleSided": True} | looks)
 
     def put_faces(self, faces: Faces, frames: list[dict[str, int]], what: object = "its faces") -> list[dict[str, Any]]:
-        """Append faces and return their primitives: those with a place in a picture, and the others.
+        """Append faces and return their primitives: the textured ones, and the others.
 
-        `frames` are the accessors of the first frame, and of the differences of each other one from it.
+        `frames` are the accessors of the first frame, and of the differences of each other frame from it.
         """
-        found = []
-        shown = (faces.pictured, faces.picture, COLORS), (~faces.pictured, faces.material, PLACES)
-        for chosen, material, hidden in shown:
+        primitives = []
+        halves = (faces.pictured, faces.picture, COLORS), (~faces.pictured, faces.material, PLACES)
+        for chosen, material, hidden in halves:
             if not chosen.any():
                 continue
             first, *targets = [{name: at for name, at in frame.items() if name != hidden} for frame in frames]
@@ -128,8 +128,8 @@ class GlbFile:
                 first[PASSED_OVER] = frames[0][COLORS]
             primitive = {"attributes": first, "indices": self._put_corners(faces.corners[chosen], what), "mode": 4}
             primitive |= {} if material is None else {"material": material}
-            found.append(primitive | ({"targets": targets} if targets else {}))
-        return found
+            primitives.append(primitive | ({"targets": targets} if targets else {}))
+        return primitives
 
     def _put_corners(self, corners: Int32[np.ndarray, "F 3"], what: object) -> int:
         short = int(corners.max()) < _RESTART
@@ -155,7 +155,7 @@ class GlbFile:
             shutil.copyfileobj(self._spool, file, 1 << 20)
 
     def _close(self) -> None:
-        """Compress the newest view, which then stands in a buffer that no file has."""
+        """Compress the newest view, which then refers to a buffer that exists only uncompressed."""
         if self._coding is None or not self._loose:
             return
         view, (mode, stride, bits), data = self._tree["bufferViews"][-1], self._coding, bytes(self._loose)
@@ -177,7 +177,7 @@ class GlbFile:
             self._tree["bufferViews"][-1]["byteLength"] += len(data)
 
     def _write(self, data: bytes, what: object) -> int:
-        """Write to a place that is a multiple of 4, and return the number of bytes."""
+        """Write with padding to a multiple of 4 bytes, and return the number of bytes."""
         data += bytes(-len(data) % 4)
         self._check(self._size + len(data), what)
         self._spool.write(data)
@@ -193,7 +193,7 @@ class GlbFile:
 def distinct_places(
     uv: Float32[np.ndarray, "F 3 2"],
 ) -> tuple[Float32[np.ndarray, "P 2"], Int64[np.ndarray, "F 3"]]:
-    """Return the places in a texture without repetition, and the number of each corner's; NaN is a place, too."""
+    """Return the distinct places in a texture, and the number of each corner's place; NaN is a place, too."""
     pairs = np.ascontiguousarray(uv).reshape(-1, 2).view(np.int64)  # places with equal bits are equal
     places, numbers = np.unique(pairs, return_inverse=True)
     return places.view(np.float32).reshape(-1, 2), numbers.reshape(-1, 3).astype(np.int64)
@@ -202,9 +202,9 @@ def distinct_places(
 def cut_at_seams(
     faces: Int32[np.ndarray, "F 3"], uv: Float32[np.ndarray, "F 3 2"]
 ) -> tuple[Int64[np.ndarray, " W"], Int32[np.ndarray, "F 3"], Float32[np.ndarray, "W 2"]]:
-    """Return vertices by their numbers, faces, and places in the texture, one for each vertex, as GPUs need them.
+    """Return vertices' numbers, faces, and one texture coordinate for each vertex, as GPUs need them.
 
-    A vertex is repeated for each place that a corner of it has; one without a face is left out.
+    A vertex is repeated for each place of its corners; a vertex without a face is left out.
     """
     places, numbers = distinct_places(uv)
     codes, corners = np.unique(faces * np.int64(len(places)) + numbers, return_inverse=True)
@@ -213,16 +213,16 @@ def cut_at_seams(
 
 
 def to_linear(colors: UInt8[np.ndarray, "V 3"]) -> UInt16[np.ndarray, "V 3"]:
-    """Return sRGB as linear light, all of which is 65535 (IEC 61966-2-1)."""
+    """Convert sRGB to linear light, full scale 65535 (IEC 61966-2-1)."""
     s = np.arange(256) / 255
     light = np.where(s <= 0.04045, s / 12.92, ((s + 0.055) / 1.055) ** 2.4)
     return np.rint(65535 * light).astype(np.uint16)[colors]
 
 
 def from_linear(light: np.ndarray) -> UInt8[np.ndarray, "V 3"]:
-    """Return linear light, integers whose largest number is all of it or shares of 1, as sRGB.
+    """Convert linear light, full-scale integers or fractions of 1, to sRGB.
 
-    Raises Unreadable for what is no number, or far from these limits.
+    Raises Unreadable for values that are not finite, or far outside these limits.
     """
     most = np.iinfo(light.dtype).max if light.dtype.kind in "iu" else 1.0
     shares = shares_of(light, most)
@@ -231,7 +231,7 @@ def from_linear(light: np.ndarray) -> UInt8[np.ndarray, "V 3"]:
 
 
 def light(colors: UInt8[np.ndarray, "V 3"]) -> Float32[np.ndarray, "V 3"]:
-    """Return colours as shares of linear light, which glTF and USD have."""
+    """Convert sRGB to fractions of linear light, as in glTF and USD."""
     return (to_linear(colors) / np.float32(65535)).astype(np.float32)
 
 

@@ -1,7 +1,7 @@
-"""Mask pictures: 8-bit PNG of object numbers, one folder for each view; and the pictures that masks are made from.
+"""Mask pictures: 8-bit PNG of object numbers, one folder for each view.
 
-In -> out: a file <-> object numbers, 0 for what stands still (stored as gray or as palette indices, as DAVIS and most
-mask tools do); a folder -> its files by view and by frame.
+In -> out: a file <-> object numbers, 0 for still surface (stored as gray or palette indices, as by DAVIS and most mask
+tools); a folder -> its files by view and by frame.
 """
 
 from __future__ import annotations
@@ -40,12 +40,12 @@ def is_mask(path: Path) -> bool:
 
 
 def find_masks(folder: Path, views: int, frames: int) -> list[list[Path]]:
-    """Return the files of the masks by view and frame, whose numbers are the last ones in their names.
+    """Return the files of the masks by view and frame, whose numbers are the last numbers in their names.
 
     Raises InputError if a view or a frame has no mask, or two.
     """
     places = _numbered(folder, (path for path in _listed(folder) if path.is_dir()), "view")
-    found = []
+    masks = []
     for view in range(views):
         if view not in places:
             raise InputError(f"{folder}: has no folder of view {view} of {views}; {_LIKE}")
@@ -55,8 +55,8 @@ def find_masks(folder: Path, views: int, frames: int) -> list[list[Path]]:
         if lost:
             text = f"{places[view]}: has no mask of frame {lost[0]} ({len(lost)} of {frames} are missing)"
             raise InputError(f"{text}; {_LIKE}; where nothing moves, give a black one")
-        found.append([files[frame] for frame in range(frames)])
-    return found
+        masks.append([files[frame] for frame in range(frames)])
+    return masks
 
 
 def _listed(folder: Path) -> list[Path]:
@@ -67,13 +67,13 @@ def _listed(folder: Path) -> list[Path]:
 
 
 def _numbered(folder: Path, paths: Iterable[Path], what: str) -> dict[int, Path]:
-    found: dict[int, Path] = {}
+    numbered: dict[int, Path] = {}
     for path in paths:
         number = last_number(path.stem if path.suffix.lower() == ".png" else path.name)
         if number is None:
             continue
-        if number in found:
-            text = f"{found[number].name} and {path.name} are both {what} {number}"
+        if number in numbered:
+            text = f"{numbered[number].name} and {path.name} are both {what} {number}"
             raise InputError(f"{folder}: {text}; keep one of them")
-        found[number] = path
-    return found
+        numbered[number] = path
+    return numbered

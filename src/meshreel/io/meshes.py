@@ -66,7 +66,7 @@ def read_mesh(path: Place, where: str | None = None) -> Loaded:
 
 
 def checked(polygons: Polygons) -> Loaded:
-    """Return the mesh of polygons after checking every number. Raises Unreadable for the first illegal one."""
+    """Return the mesh of polygons after checking every number. Raises Unreadable for the first invalid one."""
     vertices, corners, sizes = polygons.vertices, polygons.corners, polygons.sizes
     near = np.abs(vertices) <= FARTHEST  # NaN is not <= anything
     if not near.all():

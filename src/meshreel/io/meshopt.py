@@ -1,6 +1,6 @@
-"""Encoder of meshoptimizer's streams, as glTF's EXT_meshopt_compression has them; the only module that imports it.
+"""Encoder of meshoptimizer's streams for glTF's EXT_meshopt_compression; the only module that imports it.
 
-In: bytes of vertices or of corners. Out: a stream, and the order of vertices and faces in which it is small.
+In: bytes of vertices or of corners. Out: a stream, and an order of vertices and faces that makes it small.
 """
 
 from __future__ import annotations
@@ -13,11 +13,11 @@ from jaxtyping import Float32, Int32, Int64, UInt32
 from ..errors import InputError
 
 MODES = ATTRIBUTES, TRIANGLES = "ATTRIBUTES", "TRIANGLES"
-_VERSIONS = {ATTRIBUTES: 0, TRIANGLES: 1}  # that the extension has
+_VERSIONS = {ATTRIBUTES: 0, TRIANGLES: 1}  # of streams in the extension
 
 
 def check_meshopt() -> Any:
-    """Return the package. Raises InputError where it is not installed."""
+    """Return the package. Raises InputError if it is not installed."""
     try:
         import meshoptimizer
     except ImportError:
@@ -26,7 +26,7 @@ def check_meshopt() -> Any:
 
 
 def pack_stream(data: bytes, mode: str, stride: int) -> bytes:
-    """Return vertices of `stride` bytes, a multiple of 4, or corners of triangles of 2 or 4 bytes, as a stream."""
+    """Encode vertices of `stride` bytes, a multiple of 4, or corners of triangles of 2 or 4 bytes, as a stream."""
     package, count = check_meshopt(), len(data) // stride
     if mode == TRIANGLES:
         package.encode_index_version(_VERSIONS[mode])
@@ -37,7 +37,7 @@ def pack_stream(data: bytes, mode: str, stride: int) -> bytes:
 
 
 def exponential(values: Float32[np.ndarray, " N"], bits: int) -> UInt32[np.ndarray, " N"]:
-    """Return multiples of 2^-bits as the filter EXPONENTIAL has them: a factor of 24 bits, and -bits above it."""
+    """Round to multiples of 2^-bits in the layout of filter EXPONENTIAL: a 24-bit factor, and -bits above it."""
     factors = np.rint(values.astype(np.float64) * 2**bits).astype(np.int64)
     return ((factors & 0xFFFFFF) | ((-bits & 0xFF) << 24)).astype(np.uint32)
 

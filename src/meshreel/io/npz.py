@@ -43,22 +43,22 @@ def _reading(where: str) -> Iterator[None]:
 
 
 class _Stream:
-    """An array in an archive with a row for each frame, or one row for all, which are read one after the other."""
+    """An array in an archive with a row for each frame, or one row for all, read forward row by row."""
 
     def __init__(self, path: Path, archive: zipfile.ZipFile, name: str, dimensions: int) -> None:
-        """Open the array `name`, whose rows have so many dimensions."""
+        """Open the array `name`, whose rows have this number of `dimensions`."""
         shape, self.dtype, self._begin = _head(archive, name)
         self._path, self._name, self._whole = path, name, shape
         self.rows = shape[0] if len(shape) > dimensions else None  # None: one for all frames
         self.shape = shape[-dimensions:] if len(shape) <= dimensions + 1 else ()
         self._stream: IO[bytes] | None = None
-        self._lock = threading.Lock()  # of the stream, which has one place
+        self._lock = threading.Lock()  # of the stream, which has one position
 
     def __str__(self) -> str:
         return f"'{self._name}' is {self.dtype} {self._whole}"
 
     def row(self, frame: int) -> np.ndarray:
-        """Read the row of a frame. Raises Unreadable where the file ends before."""
+        """Read the row of a frame. Raises Unreadable if the file ends before it."""
         size = int(np.prod(self.shape)) * self.dtype.itemsize
         with self._lock:
             if self._stream is None:  # while the sequence lives
@@ -102,12 +102,12 @@ class Archive:
         self._sizes: Int64[np.ndarray, " P"] = np.full(len(faces), faces.shape[1], dtype=np.int64)
 
     def __reduce__(self) -> tuple[Any, tuple[Path, int, int]]:
-        """Pickle the path: another process opens the file for itself, and keeps it open for what it reads next."""
+        """Pickle the path: another process opens the file itself, and keeps it open for later frames."""
         state = self.path.stat()
         return _opened, (self.path.absolute(), state.st_size, state.st_mtime_ns)
 
     def only(self, numbers: Sequence[int]) -> Archive:
-        """Return the archive: it is one file, whatever is read of it."""
+        """Return the archive: it is one file, whatever frames are read."""
         del numbers
         return self
 
@@ -115,16 +115,14 @@ class Archive:
         return self._vertices.rows or 0
 
     def name(self, index: int) -> str:
-        """Return the name of a frame in error messages."""
         return f"{self.path}[{index}]"
 
     def load(self, index: int, where: str) -> Loaded:
-        """Read and check one frame."""
         with _reading(where):
             return checked(self._polygons(index))
 
     def _check_colors(self) -> None:
-        """Raise InputError where colours or pictures are not those of the vertices and frames."""
+        """Raise InputError if colours or pictures do not match the vertices and frames."""
         colors, texture, rows = self._colors, self._texture, (None, self._vertices.rows)
         if colors is not None and (
             colors.shape != self._vertices.shape or colors.rows not in rows or colors.dtype.kind not in "fiu"
@@ -156,7 +154,7 @@ class Archive:
 
 @lru_cache(maxsize=4)  # archives at a time (guess)
 def _opened(path: Path, size: int, changed: int) -> Archive:
-    """Return the archive of a path, which is opened again where the file has changed since."""
+    """Return the archive of a path, opened again if the file has changed."""
     del size, changed
     return Archive(path)
 

@@ -22,7 +22,6 @@ _DROPS = {"vn": "normals", "l": "lines", "p": "points"}
 
 
 def parse_obj(data: bytes) -> Polygons:
-    """Return the surface of an OBJ file."""
     if b"\\" in data:
         data = re.sub(rb"\\\r?\n", b" ", data)
     lines = Lines.of(data)
@@ -43,7 +42,7 @@ def parse_obj(data: bytes) -> Polygons:
 def _vertices(
     lines: Lines, chosen: Int64[np.ndarray, " V"]
 ) -> tuple[Float64[np.ndarray, "V 3"], UInt8[np.ndarray, "V 3"] | None]:
-    """Return the places of vertices and, where all have them, their colours: three numbers behind the place."""
+    """Return positions of vertices and, if all have them, colours: three numbers behind the position."""
     values, counts = lines.values(chosen, skip=1)
     short = np.flatnonzero(counts < 3)
     if len(short):
@@ -78,23 +77,23 @@ def _faces(
 def _places(
     lines: Lines, chosen: Int64[np.ndarray, " W"], faces: Int64[np.ndarray, " P"], defined: Int64[np.ndarray, " C"]
 ) -> Float32[np.ndarray, "C 2"] | None:
-    """Return the place in the texture of each corner, NaN where it has none; `defined` places precede each corner."""
+    """Return each corner's texture coordinates, NaN if it has none; `defined` coordinates precede each corner."""
     if not len(chosen):
         return None
     values, counts = lines.values(chosen, skip=2)
-    begins, (wanted, _) = np.cumsum(counts) - counts, lines.values(faces, skip=1, stop="/", field=1)
+    begins, (named, _) = np.cumsum(counts) - counts, lines.values(faces, skip=1, stop="/", field=1)
     values = np.concatenate([values, [np.nan, np.nan]])  # behind a line without numbers
-    known = np.where((counts >= 2)[:, None], values[begins[:, None] + np.arange(2)], np.nan)
-    numbers = np.where(wanted > 0, wanted - 1, wanted + defined)
-    good = (numbers >= 0) & (numbers < len(known)) & (numbers == np.floor(numbers)) & (wanted != 0)
-    found = np.full((len(numbers), 2), np.nan, np.float32)
+    places = np.where((counts >= 2)[:, None], values[begins[:, None] + np.arange(2)], np.nan)
+    numbers = np.where(named > 0, named - 1, named + defined)
+    good = (numbers >= 0) & (numbers < len(places)) & (numbers == np.floor(numbers)) & (named != 0)
+    uv = np.full((len(numbers), 2), np.nan, np.float32)
     with np.errstate(over="ignore"):
-        found[good] = known[numbers[good].astype(np.int64)]
-    return found
+        uv[good] = places[numbers[good].astype(np.int64)]
+    return uv
 
 
 def _others(lines: Lines, chosen: Int64[np.ndarray, " N"]) -> tuple[Dropped, tuple[str, ...], tuple[str, ...]]:
-    """Return what is dropped of the other lines, the files of materials, and the materials that faces have."""
+    """Return the kinds of dropped data in the other lines, the material files, and the materials of faces."""
     text, starts = lines.text, lines.starts
     is_normal = (text[starts[chosen]] == ord("v")) & (text[np.minimum(starts[chosen] + 1, len(text) - 1)] == ord("n"))
     dropped, materials, used = {_DROPS["vn"]} if is_normal.any() else set(), list[str](), dict[str, None]()

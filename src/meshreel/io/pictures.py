@@ -1,6 +1,6 @@
 """Pictures of textures and of colour cameras: any file that Pillow reads, as 8-bit sRGB.
 
-In: a file, or the materials that an OBJ names. Out: an array H x W x 3, read when it is asked for; it is kept a while.
+In: a file, or the materials that an OBJ names. Out: an array H x W x 3, read on access and cached for a while.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ if TYPE_CHECKING:
 
 FORMATS = ("PNG", "JPEG", "WEBP", "AVIF", "BMP", "TIFF", "TGA", "GIF", "PPM")  # EPS would start another program
 MOST_PIXELS = 1 << 26  # of a picture: 8192 x 8192, 200 MB in memory (guess)
-DEEP = ("I;16", "I;16B", "I;16L", "I")  # modes in which versions of Pillow return 16 bits of grey
+DEEP = ("I;16", "I;16B", "I;16L", "I")  # modes of 16-bit grey pictures in versions of Pillow
 
 
 def read_picture(place: Place) -> UInt8[np.ndarray, "H W 3"]:
-    """Read a picture as sRGB, without transparency. Raises InputError where it cannot be read, or is too large."""
+    """Read a picture as sRGB, without transparency. Raises InputError if it cannot be read, or is too large."""
     return _read(place, place.stat().st_mtime_ns if isinstance(place, Path) and place.exists() else 0)
 
 
@@ -41,7 +41,7 @@ def _read(place: Place, changed: int) -> UInt8[np.ndarray, "H W 3"]:
 
 
 def parse_picture(data: bytes, where: str) -> UInt8[np.ndarray, "H W 3"]:
-    """Return the picture in the bytes of a file; errors as `read_picture`, which begin with `where`."""
+    """Return the picture in the bytes of a file. Raises as `read_picture` does; messages begin with `where`."""
     with opened(
         data, where, "give PNG or JPEG, or --color none", "write it again, or encode with --color none"
     ) as image:
@@ -58,8 +58,8 @@ def parse_picture(data: bytes, where: str) -> UInt8[np.ndarray, "H W 3"]:
 def opened(data: bytes, where: str, wanted: str, remedy: str) -> Iterator[Image.Image]:
     """Open the picture in the bytes of a file.
 
-    Raises InputError, also for damage that the block meets; it begins with `where`, and says what is `wanted` where
-    that is no picture, and the `remedy` for damage.
+    Raises InputError, also for damage found inside the block; its message begins with `where`, and ends with `wanted`
+    if the bytes are no picture, or with the `remedy` for damage.
     """
     from PIL import Image, UnidentifiedImageError
 
@@ -81,7 +81,7 @@ def opened(data: bytes, where: str, wanted: str, remedy: str) -> Iterator[Image.
 
 
 def pack_picture(pixels: UInt8[np.ndarray, "H W *C"] | UInt16[np.ndarray, "H W"]) -> bytes:
-    """Return the bytes of a PNG file, grey or in colour. Raises InputError where Pillow is missing."""
+    """Return the bytes of a PNG file, grey or in colour. Raises InputError if Pillow is missing."""
     try:
         from PIL import Image
     except ImportError:
@@ -92,16 +92,16 @@ def pack_picture(pixels: UInt8[np.ndarray, "H W *C"] | UInt16[np.ndarray, "H W"]
 
 
 def texture_of_materials(mesh: Place, files: tuple[str, ...], used: tuple[str, ...]) -> tuple[Texture | None, Dropped]:
-    """Return the texture that all faces of an OBJ have, and what of its materials is dropped."""
-    known, dropped = dict[str, str | None](), set[str]()
+    """Return the texture shared by all faces of an OBJ, and the kinds of dropped material data."""
+    picture_of, dropped = dict[str, str | None](), set[str]()
     for name in files:
         try:
             text = read_file(_beside(mesh, name)).decode("utf-8-sig", "replace")  # some editors begin with a mark
         except (OSError, ValueError):  # of a name with a null
             dropped.add(f"materials ({name} cannot be read)")
             continue
-        dropped |= _parse_materials(text, known)
-    pictures = {known.get(name) for name in used} if used else {*known.values()}
+        dropped |= _parse_materials(text, picture_of)
+    pictures = {picture_of.get(name) for name in used} if used else {*picture_of.values()}
     if len(pictures) > 1:
         return None, frozenset(dropped | {"several materials"})
     if not pictures or (picture := pictures.pop()) is None:
@@ -120,21 +120,21 @@ def _exists(place: Path) -> bool:
 
 
 def _beside(mesh: Place, name: str) -> Place:
-    """Return a file that a mesh names, which is beside it or in a folder there."""
+    """Return the path of a file that a mesh names, relative to the mesh."""
     name = name.replace("\\", "/")
     return (mesh.parent if isinstance(mesh, Path) else type(mesh)(str(mesh).rsplit("/", 1)[0])) / name
 
 
-def _parse_materials(text: str, known: dict[str, str | None]) -> Dropped:
-    """Add to `known` the picture of each material in a text, None for one without; return what is dropped."""
+def _parse_materials(text: str, picture_of: dict[str, str | None]) -> Dropped:
+    """Add to `picture_of` the picture of each material in a text, None for one without; return what is dropped."""
     name, dropped = "", set[str]()
     for words in (line.split(maxsplit=1) for line in text.splitlines()):
         keyword, rest = words[0].lower() if words else "", words[1].strip() if len(words) > 1 else ""
         if keyword == "newmtl":
             name = rest
-            known[name] = None
+            picture_of[name] = None
         elif keyword == "map_kd" and rest:
-            known[name] = rest.split()[-1] if rest.startswith("-") else rest  # behind options
+            picture_of[name] = rest.split()[-1] if rest.startswith("-") else rest  # behind options
         elif keyword == "map_d":
             dropped.add("transparency")
         elif keyword in ("norm", "bump", "map_bump", "map_kn"):

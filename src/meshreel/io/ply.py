@@ -50,12 +50,11 @@ class _Element:
 
 
 def parse_ply(data: bytes) -> Polygons:
-    """Return the surface of a PLY file."""
-    found = re.search(rb"end_header[ \t]*(\r\n|\n|\r)", data)
-    if not re.match(rb"ply\s", data) or found is None:
+    end = re.search(rb"end_header[ \t]*(\r\n|\n|\r)", data)
+    if not re.match(rb"ply\s", data) or end is None:
         raise Unreadable("PLY header does not run from 'ply' to 'end_header' (truncated?)")
-    encoding, elements = _header(data[: found.start()].decode("utf-8", "replace").splitlines()[1:])
-    body = _Text(data[found.end() :]) if encoding == "ascii" else _Binary(data[found.end() :])
+    encoding, elements = _header(data[: end.start()].decode("utf-8", "replace").splitlines()[1:])
+    body = _Text(data[end.end() :]) if encoding == "ascii" else _Binary(data[end.end() :])
     vertices, corners, sizes, colors = np.zeros((0, 3)), np.zeros(0, np.int64), np.zeros(0, np.int64), None
     for element in elements:
         if element.name == "vertex":
@@ -63,7 +62,7 @@ def parse_ply(data: bytes) -> Polygons:
             if not {"x", "y", "z"} <= columns.keys():
                 raise Unreadable("PLY vertices have no x, y, z")
             vertices = np.stack([columns[axis] for axis in "xyz"], axis=1).astype(np.float64)
-            names = next((some for some in _COLORS if {*some} <= columns.keys()), None)
+            names = next((group for group in _COLORS if {*group} <= columns.keys()), None)
             if names is not None:
                 colors = eight_bits(_of_kind(element, np.stack([columns[name] for name in names], axis=1), names[0]))
         elif element.name == "face":
@@ -118,7 +117,7 @@ def _dropped(elements: list[_Element]) -> Dropped:
     names = {p.name for e in elements if e.rows for p in e.properties}
     faces = {p.name for e in elements if e.rows and e.name == "face" for p in e.properties}
     others = {f"element {e.name!r}" for e in elements if e.rows and e.name not in ("vertex", "face")}
-    others |= {"colors of faces"} if faces & {name for some in _COLORS for name in some} else set()
+    others |= {"colors of faces"} if faces & {name for group in _COLORS for name in group} else set()
     return frozenset({words for words, fields in _DROPS.items() if fields & names} | others)
 
 
@@ -144,12 +143,12 @@ class _Text:
         for field in element.properties:
             if (place >= ends).any():
                 raise _short(element, int(np.argmax(place >= ends)))
-            here = padded[place]
+            value = padded[place]
             place = place + 1
             if field.count is None:
-                columns[field.name] = here
+                columns[field.name] = value
                 continue
-            length = whole(here, "PLY list length")
+            length = whole(value, "PLY list length")
             if ((length < 0) | (place + length > ends)).any():
                 raise _short(element, int(np.argmax((length < 0) | (place + length > ends))))
             if field.name == wanted:
@@ -165,7 +164,6 @@ class _Binary:
         self._data, self._at = data, 0
 
     def read(self, element: _Element, wanted: str | None) -> tuple[Columns, np.ndarray, np.ndarray]:
-        """Return the single values of an element by name, and the items (flat) and lengths of the list `wanted`."""
         if self._at + element.least_bytes > len(self._data):
             raise Unreadable(f"PLY announces {element.rows} {element.name} rows but the file is too short (truncated?)")
         if element.rows == 0 or not element.properties:

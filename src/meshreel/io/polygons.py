@@ -30,14 +30,14 @@ class Polygons:
     colors: UInt8[np.ndarray, "V 3"] | None = None  # of the vertices, sRGB
     uv: Float32[np.ndarray, "C 2"] | None = None  # of the corners, as `Mesh.uv`; NaN where a corner has none
     texture: Texture | None = None
-    materials: tuple[str, ...] = ()  # what OBJ says of its texture: names of files of materials,
-    used: tuple[str, ...] = ()  # and the materials in them that faces have
+    materials: tuple[str, ...] = ()  # names of an OBJ's material files
+    used: tuple[str, ...] = ()  # materials in these files that faces use
 
 
 def eight_bits(values: np.ndarray) -> UInt8[np.ndarray, "..."]:
-    """Return colours in 8 bits: of 16 bits without sign all are a 1, of fractions 1 is; others are 0 to 255.
+    """Convert colours to 8 bits: from unsigned 16-bit integers, from fractions of 1, or from 0 to 255.
 
-    Fractions beyond 2 are not such: some write 0 to 255 as text. Raises Unreadable as `shares_of` does.
+    Floats beyond 2 count as 0 to 255, which some programs write as text. Raises Unreadable as `shares_of` does.
     """
     if values.dtype.kind in "iu":
         most = 65535.0 if values.dtype.kind == "u" and values.dtype.itemsize == 2 else 255.0
@@ -48,9 +48,9 @@ def eight_bits(values: np.ndarray) -> UInt8[np.ndarray, "..."]:
 
 
 def shares_of(colors: np.ndarray, most: float) -> Float64[np.ndarray, "V 3"]:
-    """Return colours as shares, 0 to 1, of what is all of one; blended ones go a little beyond it.
+    """Return colours as shares, 0 to 1, of `most`; blended colours exceed the range a little.
 
-    Raises Unreadable for what is no number, or not nearly within these limits.
+    Raises Unreadable for values that are not finite, or far outside the range.
     """
     shares = colors.astype(np.float64) / most
     strange = np.flatnonzero(~((shares >= -1.0) & (shares <= 2.0)).all(axis=1))
@@ -104,7 +104,7 @@ def _folds(
     polygons: Int64[np.ndarray, "P N"],
     fans: Int64[np.ndarray, "P N-2 3"],
 ) -> np.ndarray:
-    """Return which polygons have a triangle of the fan that faces away from the polygon, bool P."""
+    """Return a mask of the polygons whose fan has a triangle that faces away from the polygon, bool P."""
     normals = _newell(vertices[polygons])
     a, b, c = (vertices[fans[:, :, k]] for k in range(3))
     return (np.einsum("pnd,pd->pn", np.cross(b - a, c - a), normals) < 0).any(axis=1)

@@ -16,7 +16,7 @@ _FLAGS = os.O_RDONLY | getattr(os, "O_BINARY", 0) | getattr(os, "O_NONBLOCK", 0)
 
 
 def read_file(path: Place) -> bytes:
-    """Return the bytes of a file. Raises OSError, whose text is for users, also for what is no regular file."""
+    """Return the bytes of a file. Raises OSError, whose text is for users, also if it is no regular file."""
     if isinstance(path, Remote):
         return path.read(MOST_BYTES)
     number = os.open(path, _FLAGS)
@@ -36,7 +36,7 @@ def read_file(path: Place) -> bytes:
 
 
 def read_input(path: Place, remedy: str = "check the path and its rights", where: str = "") -> bytes:
-    """Return the bytes of a file. Raises InputError, which begins with its name, or `where`, and says what to do."""
+    """Return the bytes of a file. Raises InputError; its message begins with the file's name, or `where`."""
     try:
         return read_file(path)
     except OSError as error:
@@ -44,11 +44,10 @@ def read_input(path: Place, remedy: str = "check the path and its rights", where
 
 
 def read_json(path: Place, remedy: str) -> dict[str, Any]:
-    """Return the object in a file of JSON. Raises InputError, which says what to do."""
+    """Return the object in a JSON file. Raises InputError with the `remedy`."""
     try:
-        record = json.loads(
-            read_input(path, "check it and its rights").decode("utf-8-sig")
-        )  # some editors begin with a mark
+        # Some editors write a byte order mark.
+        record = json.loads(read_input(path, "check it and its rights").decode("utf-8-sig"))
     except (ValueError, RecursionError) as error:
         raise InputError(f"{path}: cannot be read ({error}); {remedy}") from None
     if not isinstance(record, dict):

@@ -1,4 +1,4 @@
-"""Files behind URLs, through fsspec: s3://, gs://, https:// and what else it knows (extra `remote`).
+"""Files behind URLs, through fsspec: s3://, gs://, https:// and others that it supports (extra `remote`).
 
 In: a URL. Out: its bytes, the names in a folder, or a path to write to, whose file is uploaded when it is complete.
 """
@@ -23,7 +23,7 @@ _WEB = ("http://", "https://")
 
 @dataclass(frozen=True, slots=True)
 class Remote:
-    """A file or a folder behind a URL, with what readers use of a Path."""
+    """A file or a folder behind a URL, with the part of Path's interface that readers use."""
 
     url: str
 
@@ -35,12 +35,11 @@ class Remote:
 
     @property
     def path(self) -> PurePosixPath:
-        """Its path; in an address of the web, what follows `?` is none of it."""
+        """Its path; of a web address, without the query."""
         return PurePosixPath(urlsplit(self.url).path if self.url.startswith(_WEB) else self.url)
 
     @property
     def suffix(self) -> str:
-        """The extension of its name."""
         return self.path.suffix
 
     def absolute(self) -> Remote:
@@ -48,7 +47,7 @@ class Remote:
         return self
 
     def read(self, most: int) -> bytes:
-        """Return its bytes, which are one request. Raises OSError, also for more than `most`."""
+        """Return its bytes, by one request. Raises OSError, also if there are more than `most`."""
         with _as_os_error():
             system, path = _system(self.url)
             data: bytes = system.cat_file(path, start=0, end=most + 1)
@@ -57,18 +56,18 @@ class Remote:
         return data
 
     def names(self, pattern: str) -> list[str]:
-        """Return the names in this folder, or the paths from it that fit a pattern which is not "". Raises OSError."""
+        """Return the names in this folder, or relative paths that match a non-empty pattern. Raises OSError."""
         with _as_os_error():
             system, root = _system(self.url)
-            found = system.glob(f"{root.rstrip('/')}/{pattern}") if pattern else system.ls(root, detail=False)
-            return [name.removeprefix(root).lstrip("/") for name in found]
+            paths = system.glob(f"{root.rstrip('/')}/{pattern}") if pattern else system.ls(root, detail=False)
+            return [name.removeprefix(root).lstrip("/") for name in paths]
 
 
 Place = Path | Remote
 
 
 def located(name: str | Place) -> Place:
-    """Return where a name leads: to a path on this machine, or behind a URL."""
+    """Return the place that a name refers to: a path on this machine, or a URL."""
     if not isinstance(name, str):
         return name
     return Remote(name) if _URL.match(name) else Path(name)
@@ -76,9 +75,9 @@ def located(name: str | Place) -> Place:
 
 @contextmanager
 def uploaded(output: Place) -> Iterator[Path]:
-    """Yield the path to write an output to; for a URL, one in a temporary folder, uploaded at the end of the block.
+    """Yield a path for an output; for a URL, a path in a temporary folder, uploaded at the end of the block.
 
-    Raises InputError for a URL that takes no files, before the block or after it; after it, the file is kept.
+    Raises InputError if the URL takes no files, before or after the block; after it, the file is kept.
     """
     if isinstance(output, Path):
         yield output
@@ -93,18 +92,18 @@ def uploaded(output: Place) -> Iterator[Path]:
     with ExitStack() as stack:
         folder = tempfile.mkdtemp(prefix="meshreel-")
         stack.callback(shutil.rmtree, folder)
-        here = Path(folder, output.path.name)
-        yield here
+        local = Path(folder, output.path.name)
+        yield local
         try:
             with _as_os_error():
-                system.put_file(str(here), path)
+                system.put_file(str(local), path)
         except OSError as error:
             stack.pop_all()
-            raise InputError(f"{output}: cannot be written ({error}); {here} is complete: copy it there") from error
+            raise InputError(f"{output}: cannot be written ({error}); {local} is complete: copy it there") from error
 
 
 def _system(url: str) -> tuple[Any, str]:
-    """Return the file system of a URL, and its path there. Raises InputError where a package is missing."""
+    """Return the file system of a URL, and its path there. Raises InputError if a package is missing."""
     try:
         from fsspec.core import url_to_fs
 
@@ -117,7 +116,7 @@ def _system(url: str) -> tuple[Any, str]:
 
 @contextmanager
 def _as_os_error() -> Iterator[None]:
-    """Turn what file systems raise, each errors of its own, into OSErrors of one line."""
+    """Turn the various errors of file systems into OSErrors of one line."""
     try:
         yield
     except InputError:

@@ -24,9 +24,9 @@ from .npz import Archive
 from .read import read_file
 from .remote import Place, Remote, located
 
-CAPTURED = "capture.json"  # in a folder that `meshreel capture` wrote: how the frames were made
+CAPTURED = "capture.json"  # record of the capture, in a folder that `meshreel capture` wrote
 _FRAMES = re.compile(r"(-?\d{1,18})?:(-?\d{1,18})?")
-_SIZES = 0.02, 100.0  # m, diagonals of what is recorded; of others the unit is doubtful (guess)
+_SIZES = 0.02, 100.0  # m, usual diagonals of recordings; outside this range the unit is doubtful (guess)
 _SUSPICIOUS_RATIO = 20.0  # of two frames' diagonals; a person who crouches or enters changes it less (guess)
 
 
@@ -40,7 +40,6 @@ class SequenceOptions:
     weld: Callable[[Mesh], Mesh] | None = None  # merges equal positions (geometry.topology.weld); None: no welding
 
     def __post_init__(self) -> None:
-        """Raise InputError for values that no sequence can have."""
         for name, value in (("frame rate", self.frame_rate), ("scale", self.scale)):
             if not 1e-9 <= value <= 1e9:  # also refuses NaN
                 raise InputError(f"{name} {value} is not between 1e-9 and 1e9; give such a number, as 30 or 0.001")
@@ -50,10 +49,10 @@ class SequenceOptions:
     def chosen(self, count: int) -> range:
         """Return the numbers of the frames to use out of `count`. Raises InputError if there are none."""
         begin, end = (int(part) if part else None for part in self.frames.split(":"))
-        wanted = range(count)[begin:end]
-        if len(wanted) == 0:
+        numbers = range(count)[begin:end]
+        if len(numbers) == 0:
             raise InputError(f"frames {self.frames!r} of {count} frames leave 0; choose at least one")
-        return wanted
+        return numbers
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,21 +71,19 @@ class Files:
         return len(self.named)
 
     def only(self, numbers: Sequence[int]) -> Files:
-        """Return these files, wherever another process has its working directory."""
+        """Return these files by absolute paths, for another process with another working directory."""
         return Files({number: self.named[number].absolute() for number in numbers})
 
     def name(self, index: int) -> str:
-        """Return the name of a frame in error messages."""
         return str(self.named[index])
 
     def load(self, index: int, where: str) -> Loaded:
-        """Read and check one frame."""
         return read_mesh(self.named[index], where)
 
 
 @dataclass(slots=True)
 class _Seen:
-    """Counts for warnings, from the frames read so far; a frame that is read twice counts once."""
+    """Counts for warnings, from the frames read so far; a frame read twice counts once."""
 
     # By frame: merged vertices, all vertices, lost faces.
     merged: dict[int, tuple[int, int, int]] = field(default_factory=dict)
@@ -96,7 +93,7 @@ class _Seen:
     largest: tuple[float, int] | None = None
 
     def add(self, other: _Seen) -> None:
-        """Add the counts of other frames, or of the same."""
+        """Add the counts of other frames, or of the same frames."""
         self.merged |= other.merged
         self.empty |= other.empty
         for what, first in other.dropped.items():
@@ -119,7 +116,6 @@ class FileSequence(MeshSequence):
 
     @property
     def frame_rate(self) -> float:
-        """Frames per second, 1/s."""
         return self._options.frame_rate
 
     @property
@@ -129,24 +125,23 @@ class FileSequence(MeshSequence):
 
     @property
     def files(self) -> tuple[Path, ...]:
-        """The files that the frames are read from."""
         return self._frames.paths
 
     is_stored = True  # other processes can read the frames
 
     def only(self, numbers: Sequence[int]) -> FileSequence:
-        """Return the sequence with these of its frames, under the same numbers; to pickle it takes their names."""
+        """Return the sequence restricted to these frames, under the same numbers; it pickles as their file names."""
         part = copy.copy(self)
         part._frames, part._seen = self._frames.only([self._chosen[number] for number in numbers]), _Seen()
         return part
 
     @property
     def observed(self) -> _Seen:
-        """What `warnings` count, for `learn` of the sequence that this one is a part of."""
+        """Counts for `warnings`, to pass to `learn` of the sequence that this one is a part of."""
         return self._seen
 
     def learn(self, observed: _Seen) -> None:
-        """Take the counts of frames that another process read."""
+        """Add the counts of frames that another process read."""
         self._seen.add(observed)
 
     def __len__(self) -> int:
@@ -159,9 +154,9 @@ class FileSequence(MeshSequence):
         if self._options.scale != 1:
             mesh = mesh.at(mesh.vertices * self._options.scale)
         if self._options.weld is not None:
-            whole, mesh = mesh, self._options.weld(mesh)
-            merged = len(whole.vertices) - len(mesh.vertices)
-            self._seen.merged[number] = (merged, len(whole.vertices), len(whole.faces) - len(mesh.faces))
+            loaded_mesh, mesh = mesh, self._options.weld(mesh)
+            merged = len(loaded_mesh.vertices) - len(mesh.vertices)
+            self._seen.merged[number] = (merged, len(loaded_mesh.vertices), len(loaded_mesh.faces) - len(mesh.faces))
         sized = (mesh.diagonal, number) if mesh.diagonal > 0 else None
         empty = {number} if mesh.is_empty else set[int]()
         self._seen.add(_Seen({}, empty, dict.fromkeys(loaded.dropped, number), sized, sized))
@@ -176,7 +171,7 @@ class FileSequence(MeshSequence):
 def open_sequence(source: str | Path | Sequence[str | Path], options: SequenceOptions | None = None) -> FileSequence:
     """Return the frames of a folder, a glob pattern, a list of files, one file or an .npz; none is read yet.
 
-    All but an .npz may be URLs, as s3:// and https:// (extra `remote`).
+    All but an .npz may be URLs, such as s3:// and https:// (extra `remote`).
     The up axis is the one that `meshreel capture` recorded in the folder, otherwise y.
     """
     options = options or SequenceOptions()

@@ -1,7 +1,7 @@
 """Lines of numbers in text files, parsed by the core.
 
-In: the bytes of a file. Out: flat values and their count in each line. Raises Unreadable with the line number of a word
-that is no number.
+In: the bytes of a file. Out: flat values and their count in each line. Raises Unreadable, with the line's number, for a
+word that is no number.
 """
 
 from __future__ import annotations
@@ -39,24 +39,24 @@ class Lines:
 
     def line(self, number: int | np.integer) -> str:
         """Return one line, shortened for an error message."""
-        shown = self.whole(number)
-        return shown if len(shown) <= 60 else shown[:57] + "..."
+        text = self.whole(number)
+        return text if len(text) <= 60 else text[:57] + "..."
 
     def values(
         self, chosen: Int64[np.ndarray, " N"], skip: int = 0, stop: str = "", field: int = 0
     ) -> tuple[Float64[np.ndarray, " M"], Int64[np.ndarray, " N"]]:
         """Return all numbers of the chosen lines, without their first `skip` bytes, and the count in each line.
 
-        What follows the letter `stop` in a word is no part of the number. A `field` above 0 is what follows so many of
-        these letters, NaN where that is no number.
+        A number ends at the letter `stop` in a word. A `field` above 0 selects the text behind this many of these
+        letters, NaN if that is no number.
         """
         starts, ends = self.starts[chosen] + skip, self.ends[chosen]
         values, counts, bad = _core.read_numbers(self.text, starts, ends, stop or "\0", field)
         if bad >= 0:
             number = int(np.searchsorted(self.starts, bad, side="right")) - 1
             word = self.text[bad : self.ends[number]].tobytes().split()[0]
-            shown = (word.split(stop.encode())[0] if stop else word)[:20].decode("utf-8", "replace")
-            raise Unreadable(f"line {number + 1} ({self.line(number)!r}) has {shown!r} where a number must be")
+            start = (word.split(stop.encode())[0] if stop else word)[:20].decode("utf-8", "replace")
+            raise Unreadable(f"line {number + 1} ({self.line(number)!r}) has {start!r} where a number must be")
         return values, counts.astype(np.int64)
 
 

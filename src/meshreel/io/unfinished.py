@@ -1,7 +1,7 @@
-"""Unfinished files: an output in the making has a name of its own beside the final one, and a lock.
+"""Unfinished files: an output in the making has a temporary name beside the final one, and a lock.
 
-The lock ends with its process, however that ends, and the name is the same in every run: what a killed run left is
-taken over by the next run to the same output, and what a living run writes is left alone.
+The lock ends with its process, however that ends, and the name is the same in every run: the next run with the same
+output takes over the file of a killed run, and leaves that of a living run alone.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ from ..errors import InputError
 _LONGEST = 255  # bytes of a file's name, on the usual file systems
 _KEPT = 40  # characters of a name that is too long with its suffix: at most 160 bytes (guess)
 FULL = (errno.ENOSPC, errno.EFBIG, getattr(errno, "EDQUOT", errno.ENOSPC))  # of a disk or a quota
-_PAUSE = 0.02  # s, between two looks at a lock (guess)
+_PAUSE = 0.02  # s, between two attempts to lock (guess)
 _FLAGS = os.O_RDWR | os.O_CREAT | getattr(os, "O_BINARY", 0) | getattr(os, "O_NOFOLLOW", 0)
 
 
 def part_of(path: Path, hidden: bool = True) -> Path:
-    """Return the name that a file has while it is made: `.NAME.part`, or `NAME.part` where users should see it."""
+    """Return the name of a file in the making: `.NAME.part`, or `NAME.part` if users should see it."""
     name = f"{'.' if hidden else ''}{path.name}.part"
     if len(os.fsencode(name)) > _LONGEST:
         name = f"{name[:_KEPT]}.{zlib.crc32(os.fsencode(name)):08x}.part"
@@ -36,9 +36,9 @@ def part_of(path: Path, hidden: bool = True) -> Path:
 
 @contextmanager
 def unfinished(path: Path, wait: float = 0.0, durable: bool = True) -> Iterator[BinaryIO]:
-    """Open a file that takes the name `path` at the end of the block, and is removed where the block fails.
+    """Open a file that takes the name `path` at the end of the block, and is removed if the block fails.
 
-    A `durable` one is on the disk by then, whatever the power does. Raises InputError where it cannot be written.
+    A `durable` file is on the disk by then and survives a loss of power. Raises InputError if it cannot be written.
     """
     name = part_of(path)
     with cannot_be_written(path):
@@ -51,7 +51,7 @@ def unfinished(path: Path, wait: float = 0.0, durable: bool = True) -> Iterator[
             file.flush()
             if durable:
                 sync(file)
-            if os.name == "nt":  # which renames no open file
+            if os.name == "nt":  # Windows renames no open file
                 file.close()
             name.replace(path)
     except BaseException:
@@ -62,7 +62,7 @@ def unfinished(path: Path, wait: float = 0.0, durable: bool = True) -> Iterator[
 
 @contextmanager
 def cannot_be_written(path: Path) -> Iterator[None]:
-    """Turn an OSError inside the block into an InputError that names the output and what to do."""
+    """Turn an OSError inside the block into an InputError with the output's name and a remedy."""
     try:
         yield
     except OSError as error:
@@ -73,8 +73,8 @@ def cannot_be_written(path: Path) -> Iterator[None]:
 def claim(name: Path, output: Path, wait: float = 0.0) -> BinaryIO:
     """Open an unfinished file of an output, new or left by a dead process, and lock it.
 
-    Raises InputError where a living process has it for longer than `wait` seconds, or where the output is a pipe or a
-    device, which it would replace; OSError where it cannot be made.
+    Raises InputError if a living process holds it for longer than `wait` seconds, or if the output is a pipe or a
+    device, which it would replace; OSError if it cannot be made.
     """
     if output.exists() and not (output.is_file() or output.is_dir()):
         raise InputError(f"{output}: is a pipe or a device, which the file would replace; name a file")
@@ -99,10 +99,10 @@ def claim(name: Path, output: Path, wait: float = 0.0) -> BinaryIO:
 
 def discard(file: BinaryIO, name: Path) -> None:
     """Remove an unfinished file and close it."""
-    if os.name != "nt":  # before its lock ends; Windows removes no open file
+    if os.name != "nt":  # remove it before its lock ends; Windows removes no open file
         with suppress(OSError):
             name.unlink()
-    with suppress(OSError):  # bytes that are still to be written have no room, perhaps
+    with suppress(OSError):  # there may be no room for buffered bytes
         file.close()
     if os.name == "nt":
         with suppress(OSError):
@@ -110,13 +110,13 @@ def discard(file: BinaryIO, name: Path) -> None:
 
 
 def sync(file: BinaryIO) -> None:
-    """Return when what was written to a file is on the disk."""
+    """Flush a file to the disk."""
     file.flush()
     os.fsync(file.fileno())
 
 
 def sync_folder(folder: Path) -> None:
-    """Make a rename in a folder last through a loss of power, where the system can."""
+    """Make a rename in a folder survive a loss of power, if the system can."""
     if os.name == "nt":
         return
     with suppress(OSError):

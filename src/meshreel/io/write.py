@@ -22,16 +22,16 @@ from .pictures import pack_picture
 from .unfinished import cannot_be_written, unfinished
 
 _WAIT = 10.0  # s, for another process that writes the same file: a mesh takes less (guess)
-_MATERIAL = "surface"  # its name in the .mtl beside an .obj
+_MATERIAL = "surface"  # name of the material in the .mtl beside an .obj
 _TOLERANCE = 1e-6  # of the diagonal: largest rounding error of a float32 coordinate (guess)
 
 
 def left_over(folder: Path, names: Iterable[str], pattern: str = "frame_*") -> tuple[str, ...]:
-    """Return a warning if a folder, which need not exist, holds frame files other than `names`."""
-    others = {path.name for path in folder.glob(pattern)} - set(names)
-    if not others:
+    """Return a warning if a folder, which may not exist, holds frame files other than `names`."""
+    foreign = {path.name for path in folder.glob(pattern)} - set(names)
+    if not foreign:
         return ()
-    return (f"{folder} holds {len(others)} other frame files, as {min(others)}; they are of another run",)
+    return (f"{folder} holds {len(foreign)} other frame files, as {min(foreign)}; they are of another run",)
 
 
 def frame_names(count: int, extension: str) -> list[str]:
@@ -49,7 +49,7 @@ def make_folder(path: Path) -> None:
 
 
 def check_apart(output: Path, inputs: Iterable[Path]) -> None:
-    """Raise InputError where an output is one of the inputs: by the same name, another case of it, or a link."""
+    """Raise InputError if an output is one of the inputs: by the same name, another case of it, or a link."""
     for path in inputs if output.exists() else ():
         if path.exists() and path.samefile(output):
             raise InputError(f"{output}: is the input {path}, which the output would replace; choose another name")
@@ -58,7 +58,7 @@ def check_apart(output: Path, inputs: Iterable[Path]) -> None:
 def write_mesh(mesh: Mesh, path: Path) -> None:
     """Write a mesh to a .ply, .obj, .glb or .npz file, which appears when it is complete.
 
-    A .ply has no texture; that of an .obj is in a .mtl and a .png of its name.
+    A .ply has no texture; the texture of an .obj is in a .mtl and a .png of its name.
     """
     extension = path.suffix.lower()
     pack = _FORMATS.get(extension)
@@ -76,27 +76,26 @@ def write_mesh(mesh: Mesh, path: Path) -> None:
 def write_colored(mesh: Mesh, colors: UInt8[np.ndarray, "F 3"], path: Path) -> None:
     """Write a mesh to a .ply file with these colors (red, green, blue) of faces.
 
-    The file has colors of vertices, which most viewers show: a vertex between faces of several colors is duplicated.
+    The file has colors of vertices, which most viewers show: a vertex of faces with several colors is duplicated.
     """
     code = colors.astype(np.int64) @ (65536, 256, 1)
     corners = np.stack([mesh.faces.reshape(-1), np.repeat(code, 3)], axis=1)
     split, number = np.unique(corners, axis=0, return_inverse=True)
-    shown = np.stack([split[:, 1] >> 16, split[:, 1] >> 8 & 255, split[:, 1] & 255], axis=1).astype(np.uint8)
-    write_mesh(replace(Mesh.of(mesh.vertices[split[:, 0]], number.reshape(-1, 3)), colors=shown), path)
+    vertex_colors = np.stack([split[:, 1] >> 16, split[:, 1] >> 8 & 255, split[:, 1] & 255], axis=1).astype(np.uint8)
+    write_mesh(replace(Mesh.of(mesh.vertices[split[:, 0]], number.reshape(-1, 3)), colors=vertex_colors), path)
 
 
 @contextmanager
 def replacing(path: Path) -> Iterator[BinaryIO]:
     """Open a file that takes its final name at the end of the block; after a failure, nothing is left behind.
 
-    Where another process writes the same file, wait for its end; the later one stays.
+    If another process writes the same file, wait for its end; the later file stays.
     """
     with unfinished(path, _WAIT, durable=False) as file, cannot_be_written(path):
         yield file
 
 
 def write_picture(pixels: UInt8[np.ndarray, "H W *C"] | UInt16[np.ndarray, "H W"], path: Path) -> None:
-    """Write a picture as PNG, grey or in colour."""
     data = pack_picture(pixels)
     with replacing(path) as file:
         file.write(data)
@@ -113,9 +112,9 @@ def _pack_ply(mesh: Mesh, _: Path) -> bytes:
     )
     rows = np.empty(len(mesh.faces), dtype=[("size", "u1"), ("corners", "<i4", (3,))])
     rows["size"], rows["corners"] = 3, mesh.faces
-    shown = np.zeros((len(mesh.vertices), 0), np.uint8) if colors is None else colors
-    points = np.empty(len(mesh.vertices), dtype=[("place", dtype, (3,)), ("color", "u1", shown.shape[1:])])
-    points["place"], points["color"] = mesh.vertices, shown
+    color_rows = np.zeros((len(mesh.vertices), 0), np.uint8) if colors is None else colors
+    points = np.empty(len(mesh.vertices), dtype=[("place", dtype, (3,)), ("color", "u1", color_rows.shape[1:])])
+    points["place"], points["color"] = mesh.vertices, color_rows
     return header.encode() + points.tobytes() + rows.tobytes()
 
 
@@ -128,15 +127,15 @@ def _pack_obj(mesh: Mesh, path: Path) -> bytes:
         faces = "".join(f"f {a} {b} {c}\n" for a, b, c in (mesh.faces + 1).tolist())
     else:
         places, numbers = distinct_places(mesh.uv)
-        known = np.isfinite(places).all(axis=1)
-        rows = np.stack([mesh.faces + 1, np.cumsum(known)[numbers]], axis=2).reshape(-1, 6)
-        forms, has_place = ("f %d %d %d\n", "f %d/%d %d/%d %d/%d\n"), known[numbers].all(axis=1).tolist()
+        finite = np.isfinite(places).all(axis=1)
+        rows = np.stack([mesh.faces + 1, np.cumsum(finite)[numbers]], axis=2).reshape(-1, 6)
+        forms, has_place = ("f %d %d %d\n", "f %d/%d %d/%d %d/%d\n"), finite[numbers].all(axis=1).tolist()
         vertices += f"mtllib {path.stem}.mtl\nusemtl {_MATERIAL}\n"
-        vertices += "".join(f"vt {u:.9g} {v:.9g}\n" for u, v in places[known].tolist())
+        vertices += "".join(f"vt {u:.9g} {v:.9g}\n" for u, v in places[finite].tolist())
         faces = "".join(
             forms[has] % tuple(row if has else row[::2]) for has, row in zip(has_place, rows.tolist(), strict=True)
         )
-    return ("# meshreel\n" + vertices + faces).encode()  # a comment, because readers take an empty file for damage
+    return ("# meshreel\n" + vertices + faces).encode()  # not empty: readers report an empty file as damaged
 
 
 def _pack_npz(mesh: Mesh, _: Path) -> bytes:

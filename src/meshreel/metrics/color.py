@@ -17,9 +17,9 @@ from ..geometry.painted import Painted
 from ..types import LUMA, Mesh
 from .even_points import scatter
 
-POINTS = 60_000  # on each surface: those of a person's texture of 1024 texels are seven times as many (guess)
+POINTS = 60_000  # on each surface: a seventh of the texels of a person's texture of 1024 x 1024 (guess)
 PEAK = 255.0
-LEAST = 1e-12  # squared difference: below are roundings of equal colours
+LEAST = 1e-12  # squared difference; smaller ones are rounding of equal colours
 SHARES = np.array([6.0, 1.0, 1.0]) / 8  # of luma and of colour differences in one number, as MPEG weighs PSNRs
 TO_YUV = np.array([LUMA, (-LUMA[0] / 1.8556, -LUMA[1] / 1.8556, 0.5), (0.5, -LUMA[1] / 1.5748, -LUMA[2] / 1.5748)])
 
@@ -56,8 +56,8 @@ def psnr(square: float) -> float:
     return 10 * math.log10(PEAK**2 / square) if square > LEAST else math.inf
 
 
-def _squares(mesh: Mesh, here: Painted, there: Painted) -> Float64[np.ndarray, " 3"]:
+def _squares(mesh: Mesh, own: Painted, other: Painted) -> Float64[np.ndarray, " 3"]:
     """Return the mean squared differences of luma and colour differences at points of a mesh."""
-    some = scatter(mesh, np.ones(len(mesh.faces), bool), POINTS)
-    apart = here.on(some.faces.astype(np.int32), some.barycentric) - there.at(some.points, some.points)[0]
-    return np.square(apart @ TO_YUV.T).mean(axis=0)
+    sample = scatter(mesh, np.ones(len(mesh.faces), bool), POINTS)
+    errors = own.on(sample.faces.astype(np.int32), sample.barycentric) - other.at(sample.points, sample.points)[0]
+    return np.square(errors @ TO_YUV.T).mean(axis=0)

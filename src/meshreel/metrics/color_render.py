@@ -1,4 +1,4 @@
-"""Pictures of coloured surfaces by ray casting, unlit, on white, and how far those of two meshes are apart.
+"""Ray-cast pictures of coloured surfaces, unlit, on white, and the errors between those of two meshes.
 
 Two meshes and cameras -> RenderErrors. Luma is that of ITU-R BT.709, full range; SSIM is that of `metrics.ssim`.
 """
@@ -38,40 +38,38 @@ class ColorView:
 
     @property
     def covered(self) -> Bool[np.ndarray, "H W"]:
-        """Where the mesh is seen."""
         return self.faces >= 0
 
 
 class Colored:
-    """A mesh prepared for several views in its colours; one without is grey (`render.Visible`)."""
+    """A mesh prepared for several views in its colours; a mesh without colours is grey (`render.Visible`)."""
 
     def __init__(self, mesh: Mesh) -> None:
         self._surface = None if mesh.is_empty else (Rays(mesh), Painted(mesh))
 
     def look(self, pixels: Pixels) -> ColorView:
-        """Render the mesh in a crop of a camera's image."""
         shape, image = pixels.crop.shape, np.ones((*pixels.crop.shape, 3), np.float32)
         if self._surface is None or 0 in shape:
             return ColorView(image, np.full(shape, -1, np.int32))
         rays, painted = self._surface
         hit = rays.cast(*pixels.world_rays)
-        seen = hit.faces >= 0
-        colors = painted.on(hit.faces[seen], hit.barycentric[seen])
-        image.reshape(-1, 3)[seen] = np.clip(np.rint(colors), 0, 255) / 255
+        covered = hit.faces >= 0
+        colors = painted.on(hit.faces[covered], hit.barycentric[covered])
+        image.reshape(-1, 3)[covered] = np.clip(np.rint(colors), 0, 255) / 255
         return ColorView(image, hit.faces.reshape(shape))
 
 
 def render_errors(original: Mesh, decoded: Mesh, cameras: Sequence[AnyCamera]) -> RenderErrors:
-    """Compare pictures of two meshes in their colours; where no view sees any, they are equal."""
+    """Compare pictures of two meshes in their colours; meshes that no view sees are equal."""
     pair, scores = (Colored(original), Colored(decoded)), list[float]()
     squares, counts = np.zeros(2), np.zeros(2)
     for camera in cameras:
         pixels = Pixels(camera, crop_of([original, decoded], camera, MARGIN))
-        a, b = (one.look(pixels) for one in pair)
-        apart = np.square(PEAK * ((a.colors - b.colors).astype(np.float64) @ TO_YUV[0]))
-        for which, mask in enumerate((a.covered | b.covered, a.covered & b.covered)):
-            squares[which] += apart[mask].sum()
-            counts[which] += mask.sum()
+        a, b = (colored.look(pixels) for colored in pair)
+        squared_luma = np.square(PEAK * ((a.colors - b.colors).astype(np.float64) @ TO_YUV[0]))
+        for area, mask in enumerate((a.covered | b.covered, a.covered & b.covered)):
+            squares[area] += squared_luma[mask].sum()
+            counts[area] += mask.sum()
         masked = ssim_view(a, b, pixels)[1]
         scores += [] if masked is None else [masked]
     union, inside = (squares / np.maximum(counts, 1)).tolist()

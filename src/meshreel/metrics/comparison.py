@@ -78,7 +78,7 @@ class Comparison:
 
 
 class OriginalFrame:
-    """An original mesh that keeps its samples and pictures, for comparisons with what several codecs make of it."""
+    """An original mesh that keeps its samples and pictures, for comparisons with several decoded meshes."""
 
     def __init__(self, mesh: Mesh) -> None:
         self.mesh = mesh
@@ -101,7 +101,7 @@ def compare_sequences(
 ) -> Comparison:
     """Measure `decoded` against `originals`, frame by frame (two sequences of equal length).
 
-    What an `OriginalFrame` has prepared serves its later comparisons from the same cameras.
+    Samples and pictures that an `OriginalFrame` has prepared are reused in later comparisons from the same cameras.
     """
     options = options or ComparisonOptions()
     cameras = _cameras(originals, options) if options.ssim else ()
@@ -110,14 +110,14 @@ def compare_sequences(
     empty: list[bool] = []
     others = iter(decoded)
     for original in map(_prepared, originals):
-        other = next(others, None)
-        if other is None:
+        mesh = next(others, None)
+        if mesh is None:
             raise InputError(f"the decoded sequence ends after {len(rows)} frames and the original does not")
-        rows.append(frame_row(original, other, cameras))
+        rows.append(frame_row(original, mesh, cameras))
         if options.mpeg is not None:
-            found = mpeg_errors(original.mesh, other, box, options.mpeg)
-            rows[-1] |= dict(zip(_MPEG, (found.d1, found.d2, found.geometry, found.luma), strict=True))
-            if found.luma is None:
+            mpeg = mpeg_errors(original.mesh, mesh, box, options.mpeg)
+            rows[-1] |= dict(zip(_MPEG, (mpeg.d1, mpeg.d2, mpeg.geometry, mpeg.luma), strict=True))
+            if mpeg.luma is None:
                 rows[-1].pop(_MPEG[-1])
         # Vertices alone and faces without area are no surface.
         empty.append(bool(rows[-1]["diagonal_m"] == rows[-1]["rms_forward_m"] == 0))

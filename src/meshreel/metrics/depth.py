@@ -1,8 +1,8 @@
-"""A decoded scene judged by the depth pictures that it was made from: what it covers, invents and loses, and flickers.
+"""Measures of a decoded scene by the depth pictures it was made from: surface covered, invented and lost, and flicker.
 
 Depth pictures of still cameras and decoded meshes -> a row of numbers. No truth is needed, so recordings are judged as
-simulated rigs are. What a camera measures at a pixel is still where it is as far as usual, and of a body where it is
-nearer. Pixels beside a step in depth or a hole do not count: a sensor mixes both sides there.
+simulated rigs are. A pixel shows still surface where its depth is the usual one, and a body where it is nearer. Pixels
+beside a step in depth or a hole do not count: a sensor mixes both sides there.
 """
 
 from __future__ import annotations
@@ -24,26 +24,26 @@ from .render import Crop, Pixels, View, Visible
 
 ASIDE = 2  # pixels around a step or a hole that do not count (guess)
 NEAR = (0.03, 0.015)  # m, and share of the depth, within which surface covers a measurement
-LEAST_LOST = 0.01  # m^2, of a connected area that is not covered, from which on it is a lost run (guess)
-USUAL = 0.95  # quantile over time of a pixel's depth: how far it is where nobody stands (guess)
-SELDOM = 0.2  # share of all frames in which a pixel is as far as usual, below which this is a body as well (guess)
+LEAST_LOST = 0.01  # m^2, smallest connected area without coverage that counts as a lost run (guess)
+USUAL = 0.95  # quantile over time of a pixel's depth that is the depth of the still scene (guess)
+SELDOM = 0.2  # share of all frames: a usual depth that is measured less often is that of a body as well (guess)
 SPECK = 12  # pixels: smaller areas that are nearer than usual are noise (guess)
-LOOKED_AT = 60  # frames from which the usual depth is taken, at most (guess)
-FOOT = 0.3  # m around a body in which nothing is asked to stand still: a foot, which is not `apart` from the floor
-LIMB = 50  # pixels of a body's lower third from which on a frame shows it (guess)
-ENDS = (0.02, 0.98)  # quantiles of heights of measured points: where a body ends (guess)
+LOOKED_AT = 60  # largest number of frames from which the usual depth is taken (guess)
+FOOT = 0.3  # m around a body within which flicker is not measured: a foot is hardly nearer than the floor (guess)
+LIMB = 50  # pixels, fewest of a body's lower third in a frame that shows it (guess)
+ENDS = (0.02, 0.98)  # quantiles of the heights of measured points at which a body begins and ends (guess)
 LOWEST = 0.1  # quantile over frames of a body's lower end: the floor that it stands on (guess)
 PARTS = ("all", "still", "body")
 
 
-@dataclass(frozen=True)  # no slots: what is derived is computed once
+@dataclass(frozen=True)  # no slots: cached properties need a dict
 class Judged:
-    """One camera's picture of one frame beside what was decoded; masks of its pixels."""
+    """One camera's depth picture of one frame, the decoded surface seen from there, and masks of the pixels."""
 
     camera: Camera
     depth: Float64[np.ndarray, "H W"]  # m, measured
     view: View  # of the decoded surface
-    clear: Bool[np.ndarray, "H W"]  # those that count
+    clear: Bool[np.ndarray, "H W"]  # pixels that count
     body: Bool[np.ndarray, "H W"]  # measured nearer than usual
 
     def of(self, part: str) -> Bool[np.ndarray, "H W"]:
@@ -52,7 +52,7 @@ class Judged:
 
     @cached_property
     def off_body(self) -> Bool[np.ndarray, "H W"]:
-        """Pixels in which covered surface stands still for sure: farther than a foot's length from a body."""
+        """Pixels of covered still surface, farther than `FOOT` from a body."""
         still = self.of("still") & self.covered
         if not self.body.any():
             return still
@@ -103,39 +103,39 @@ class DepthJudge:
     """The depth pictures of a recording, prepared to judge decoded frames."""
 
     def __init__(self, frames: DepthFrames, count: int, up: Sequence[float]) -> None:
-        """Prepare the pictures of `count` frames, of which some are read; `up` is the direction that points up."""
+        """Read at most `LOOKED_AT` of `count` frames for the usual depth; `up` is the direction that points up."""
         self._frames, self._up = frames, np.asarray(up, np.float64)
-        looked_at = [frames[number] for number in evenly(count, LOOKED_AT)]
+        samples = [frames[number] for number in evenly(count, LOOKED_AT)]
         self._usual = dict[int, np.ndarray]()
-        for camera, pictures in enumerate(zip(*looked_at, strict=True)):
-            there = [picture.depth * picture.unit for picture in pictures if picture is not None]
-            if there:
-                self._usual[camera] = _usual(np.stack(there))
-        heights = [self._heights(pictures) for pictures in looked_at]
+        for camera, pictures in enumerate(zip(*samples, strict=True)):
+            depths = [picture.depth * picture.unit for picture in pictures if picture is not None]
+            if depths:
+                self._usual[camera] = _usual(np.stack(depths))
+        heights = [self._heights(pictures) for pictures in samples]
         lows = [np.quantile(each, ENDS[0]) for each in heights if len(each) >= LIMB]
         self._floor = float(np.quantile(lows, LOWEST)) if lows else 0.0
 
-    def of(self, number: int, decoded: Mesh) -> dict[int, Judged]:
-        """Return by camera what it measured in a frame, beside the decoded mesh; cameras without it are left out."""
-        visible, found = Visible(decoded), dict[int, Judged]()
-        for place, picture in enumerate(self._frames[number]):
+    def of(self, frame: int, decoded: Mesh) -> dict[int, Judged]:
+        """Return a frame's depth pictures by camera, compared with the decoded mesh; cameras without one are absent."""
+        visible, judged = Visible(decoded), dict[int, Judged]()
+        for number, picture in enumerate(self._frames[frame]):
             if picture is not None:
                 camera = picture.camera
                 view = visible.look(Pixels(camera, Crop(0, camera.height, 0, camera.width)))
                 depth, clear = picture.depth * picture.unit, clear_pixels(picture)
-                found[place] = Judged(camera, depth, view, clear, self._body(place, depth))
-        return found
+                judged[number] = Judged(camera, depth, view, clear, self._body(number, depth))
+        return judged
 
     def limb(self, judged: Iterable[Judged]) -> tuple[int, int]:
-        """Return how many pixels of a frame show the lower third of the body, and how many of these are covered."""
+        """Count a frame's pixels that show the lower third of the body, and the covered ones among them."""
         views = [(each, each.of("body")) for each in judged]
-        heights = [_points(each.camera, each.depth, body) @ self._up for each, body in views]
-        known = np.concatenate([*heights, np.zeros(0)])
-        if not len(known):
+        by_view = [_points(each.camera, each.depth, body) @ self._up for each, body in views]
+        heights = np.concatenate([*by_view, np.zeros(0)])
+        if not len(heights):
             return 0, 0
-        third = self._floor + (np.quantile(known, ENDS[1]) - self._floor) / 3
+        third = self._floor + (np.quantile(heights, ENDS[1]) - self._floor) / 3
         covered = np.concatenate([each.covered[body] for each, body in views])
-        return int((known < third).sum()), int(covered[known < third].sum())
+        return int((heights < third).sum()), int(covered[heights < third].sum())
 
     def _body(self, camera: int, depth: Float64[np.ndarray, "H W"]) -> Bool[np.ndarray, "H W"]:
         nearer = depth < self._usual.get(camera, 0.0) - apart(depth)
@@ -143,25 +143,25 @@ class DepthJudge:
 
     def _heights(self, pictures: Sequence[DepthPicture | None]) -> Float64[np.ndarray, " N"]:
         """Return the heights of a body's measured points in a frame, m."""
-        found = [np.zeros(0)]
+        heights = [np.zeros(0)]
         for number, picture in enumerate(pictures):
             if picture is not None:
                 depth = picture.depth * picture.unit
                 body = self._body(number, depth) & clear_pixels(picture)
-                found.append(_points(picture.camera, depth, body) @ self._up)
-        return np.concatenate(found)
+                heights.append(_points(picture.camera, depth, body) @ self._up)
+        return np.concatenate(heights)
 
 
 def judge(judged: DepthJudge, decoded: Frames, numbers: Iterable[int], refreshes: Collection[int] = ()) -> Row:
-    """Judge some decoded frames; return numbers over all of them, and under `per_frame` those of each.
+    """Judge decoded frames; return numbers over all of them, and under `per_frame` those of each.
 
     By part: the shares of pixels `covered` and `invented`, the number of `lost_runs` a frame and the area of the
-    largest. `cracks` is the share of all measured pixels, those beside steps, too, in slits of up to four pixels where
-    nothing was decoded: few, and seen first. `limbs_shown` counts the frames that show the lower third of a body,
-    `limbs_lost` those of them whose decoded mesh has not half of it. From a frame to the next: `still_flicker_m` is the
-    RMS change of decoded depth where both measured what stands still, `body_flicker_deg` that of normals on bodies,
-    motion taken out. `refreshes` are the frames in which another background begins: its change does not count. Shares
-    of nothing are None.
+    largest. `cracks` is the share of all measured pixels, those beside steps included, in slits of up to four pixels
+    without decoded surface; few pixels, but conspicuous. `limbs_shown` counts the frames that show the lower third of a
+    body, `limbs_lost` those of them whose decoded mesh covers less than half of it. Between successive frames:
+    `still_flicker_m` is the RMS change of decoded depth at pixels that measured still surface in both, and
+    `body_flicker_deg` that of normals on bodies, with their motion removed. `refreshes` are the frames in which another
+    background begins: its change does not count. Shares of nothing are None.
     """
     rows, before = list[Row](), dict[int, Judged]()
     for number in numbers:
@@ -174,8 +174,8 @@ def judge(judged: DepthJudge, decoded: Frames, numbers: Iterable[int], refreshes
         before = now
     sums = {name: sum(row[name] for row in rows) for name in (rows[0] if rows else ())}
     sums |= {name: max(row[name] for row in rows) for name in sums if name.endswith("largest_lost_m2")}
-    found = _rates(sums, len(rows)) if rows else {}
-    return {"frames_judged": len(rows)} | found | {"per_frame": [{"frame": r["frame"]} | _rates(r, 1) for r in rows]}
+    rates = _rates(sums, len(rows)) if rows else {}
+    return {"frames_judged": len(rows)} | rates | {"per_frame": [{"frame": r["frame"]} | _rates(r, 1) for r in rows]}
 
 
 def clear_pixels(picture: DepthPicture) -> Bool[np.ndarray, "H W"]:
@@ -186,15 +186,15 @@ def clear_pixels(picture: DepthPicture) -> Bool[np.ndarray, "H W"]:
 
 
 def _counts(views: Sequence[Judged]) -> Row:
-    """Return the pixels of a frame by part, and what was lost of it."""
+    """Return counts of a frame's pixels by part, and the number and largest area of its lost runs."""
     row: Row = {}
     for part in PARTS:
-        own = [(each.of(part), each.covered, each.invented) for each in views]
+        masks = [(each.of(part), each.covered, each.invented) for each in views]
         runs = np.concatenate([*(each.lost_runs(part) for each in views), np.zeros(0)])
         row |= {
-            f"{part}_pixels": sum(int(pixels.sum()) for pixels, *_ in own),
-            f"{part}_covered": sum(int((pixels & covered).sum()) for pixels, covered, _ in own),
-            f"{part}_invented": sum(int((pixels & invented).sum()) for pixels, _, invented in own),
+            f"{part}_pixels": sum(int(pixels.sum()) for pixels, *_ in masks),
+            f"{part}_covered": sum(int((pixels & covered).sum()) for pixels, covered, _ in masks),
+            f"{part}_invented": sum(int((pixels & invented).sum()) for pixels, _, invented in masks),
             f"{part}_lost_runs": len(runs),
             f"{part}_largest_lost_m2": float(runs.max(initial=0.0)),
         }
@@ -203,7 +203,7 @@ def _counts(views: Sequence[Judged]) -> Row:
 
 
 def _changes(before: Mapping[int, Judged], now: Mapping[int, Judged], refreshed: bool) -> Row:
-    """Return sums of squared changes from one frame to the next, and what they are of."""
+    """Return sums of squared changes from one frame to the next, and the numbers of summands."""
     pairs = [(before[camera], now[camera]) for camera in sorted(before.keys() & now.keys())]
     moved = [np.zeros(0)]
     for a, b in [] if refreshed else pairs:
@@ -211,14 +211,14 @@ def _changes(before: Mapping[int, Judged], now: Mapping[int, Judged], refreshed:
         moved.append(a.shown[both] - b.shown[both])
     steps, angles = np.concatenate(moved), np.zeros(0)
     if pairs:
-        first, other = (Patch.join(each.patch() for each in views) for views in zip(*pairs, strict=True))
-        angles = angles_after_motion(first, other, pairs[0][1].view.mesh)
+        first, second = (Patch.join(each.patch() for each in views) for views in zip(*pairs, strict=True))
+        angles = angles_after_motion(first, second, pairs[0][1].view.mesh)
     sums = {"still_changes": len(steps), "still_squares_m2": float(steps @ steps)}
     return sums | {"body_changes": len(angles), "body_squares_deg2": float(angles @ angles)}
 
 
 def _rates(sums: Row, frames: int) -> Row:
-    """Return shares and means of what was summed over some frames."""
+    """Return shares and means from sums over this number of frames."""
     row: Row = {}
     for part in PARTS:
         for name in (f"{part}_covered", f"{part}_invented"):
@@ -254,16 +254,16 @@ def _large(pixels: Bool[np.ndarray, "H W"], least: int) -> Bool[np.ndarray, "H W
 
 
 def _usual(stack: Float64[np.ndarray, "T H W"]) -> Float64[np.ndarray, "H W"]:
-    """Return how far each pixel is where nobody stands before it, m; 0 where nothing was measured.
+    """Return each pixel's depth of the still scene, m; 0 where nothing was measured.
 
-    Infinite where all that was measured moves: behind it is what is too far, or too dark.
+    Infinite where only moving surface was measured: the scene behind it is too far or too dark.
     """
     ordered = np.sort(np.where(stack > 0, stack, -1.0), axis=0)
-    none = (stack <= 0).sum(axis=0)
+    missing = (stack <= 0).sum(axis=0)
     last = len(stack) - 1
 
     def at(share: float) -> Float64[np.ndarray, "H W"]:
-        rank = none + np.floor(share * (last - none)).astype(np.int64)
+        rank = missing + np.floor(share * (last - missing)).astype(np.int64)
         return np.maximum(np.take_along_axis(ordered, np.clip(rank, 0, last)[None], 0)[0], 0)
 
     usual, near = at(USUAL), at(1 - USUAL)

@@ -121,8 +121,8 @@ def surface_errors(original: Mesh | Original, decoded: Mesh) -> SurfaceErrors:
     prepared = original if isinstance(original, Original) else Original(original)
     original, decoded = prepared.mesh, used_surface(decoded)
     if original.is_empty or decoded.is_empty:
-        both = _PERFECT if original.is_empty and decoded.is_empty else _WORST
-        return SurfaceErrors(original.diagonal, both, both)
+        errors = _PERFECT if original.is_empty and decoded.is_empty else _WORST
+        return SurfaceErrors(original.diagonal, errors, errors)
     a, b = prepared.samples, sample(decoded, original.middle)
     if (unit := _unit(a.mesh, b.mesh)) != 1:  # in metres, squares of the queries' float32 would be inf or 0
         smaller = surface_errors(_scaled(original, 1 / unit), _scaled(decoded, 1 / unit))
@@ -146,19 +146,19 @@ _PERFECT = OneWayErrors(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 _WORST = OneWayErrors(math.inf, math.inf, math.inf, math.inf, WORST_ANGLE, WORST_ANGLE)
 
 
-def _one_way(source: Samples, found: Matches) -> OneWayErrors:
+def _one_way(source: Samples, matches: Matches) -> OneWayErrors:
     vertices = len(source.mesh.vertices)
-    squared = found.distances**2
-    along = np.einsum("nd,nd->n", found.offsets, found.normals) ** 2
-    along = np.where(found.normals.any(axis=1), along, squared)  # without a normal the whole distance counts
-    turned = angles(source.normals, found.normals)
+    squared = matches.distances**2
+    along = np.einsum("nd,nd->n", matches.offsets, matches.normals) ** 2
+    along = np.where(matches.normals.any(axis=1), along, squared)  # without a normal the whole distance counts
+    normal_angles = angles(source.normals, matches.normals)
     return OneWayErrors(
         point_mse=float(squared[:vertices].mean()),
         plane_mse=float(along[:vertices].mean()),
         rms=float(np.sqrt(dot(source.weights, squared))),
-        hausdorff95=quantile(found.distances, source.weights, 0.95),
-        angle=dot(source.weights, turned),
-        vertex_angle=float(turned[:vertices].mean()),
+        hausdorff95=quantile(matches.distances, source.weights, 0.95),
+        angle=dot(source.weights, normal_angles),
+        vertex_angle=float(normal_angles[:vertices].mean()),
     )
 
 

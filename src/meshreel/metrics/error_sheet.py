@@ -38,11 +38,11 @@ class SheetOptions:
     """Frames, cameras and size of a sheet."""
 
     frames: tuple[int, ...] = ()  # their numbers; empty: first, middle and last
-    cameras: tuple[Camera, ...] = ()  # of one size; empty: one before all that is shown
+    cameras: tuple[Camera, ...] = ()  # of one size; empty: one from which all meshes are visible
     height: int = 480  # pixels of one picture
     unit: str = "percent"  # of the heat map: percent (of the diagonal) or mm
     up: str = "y"  # the axis that points up: y, z, -y or -z
-    first: int = 0  # number of the first frame, where the frames are some of a longer sequence
+    first: int = 0  # number of the sequences' first frame
 
     def __post_init__(self) -> None:
         if len({(camera.width, camera.height) for camera in self.cameras}) > 1:
@@ -51,12 +51,12 @@ class SheetOptions:
 
 @dataclass(frozen=True, slots=True)
 class SheetRow:
-    """One line of the sheet: a frame from one camera."""
+    """Row of the sheet: a frame from one camera."""
 
     label: str
     original: View
     decoded: View
-    pictures: tuple[np.ndarray, np.ndarray]  # of both, H x W x 3, 0 to 1
+    pictures: list[np.ndarray]  # of original and decoded mesh, H x W x 3, 0 to 1
     errors: Float64[np.ndarray, " N"]  # in the sheet's unit, one for each covered pixel of the original
 
 
@@ -91,24 +91,23 @@ def _rows(originals: Frames, decoded: Frames, options: SheetOptions) -> Iterator
         raise InputError(f"frames {frames}: the sequence has frames {first} to {first + count - 1}")
     pairs = [(frame, originals[frame - first], decoded[frame - first]) for frame in frames]
     cameras = _cameras([mesh for _, mesh, _ in pairs], options)
-    for frame, mesh, other in pairs:
-        measured = surface_errors(mesh, other)
-        factor = 1000.0 if options.unit == "mm" else 100 / (measured.diagonal or 1.0)
-        label = f"frame {frame}\nD2 {measured.d2_psnr_paper:.1f} dB\nnormals {measured.angle:.1f}°"
+    for frame, *meshes in pairs:
+        errors = surface_errors(*meshes)
+        factor = 1000.0 if options.unit == "mm" else 100 / (errors.diagonal or 1.0)
+        label = f"frame {frame}\nD2 {errors.d2_psnr_paper:.1f} dB\nnormals {errors.angle:.1f}°"
         for camera in cameras:
-            whole = Crop(0, camera.height, 0, camera.width)
-            seen, found = look(mesh, camera, whole), look(other, camera, whole)
-            yield SheetRow(
-                label, seen, found, _pictures(mesh, other, seen, found, camera), factor * error_at_pixels(seen, other)
-            )
+            crop = Crop(0, camera.height, 0, camera.width)
+            views = [look(mesh, camera, crop) for mesh in meshes]
+            pictures = _pictures(meshes, views, camera)
+            yield SheetRow(label, views[0], views[1], pictures, factor * error_at_pixels(views[0], meshes[1]))
 
 
-def _pictures(mesh: Mesh, other: Mesh, seen: View, found: View, camera: Camera) -> tuple[np.ndarray, np.ndarray]:
-    """Return pictures of both in their colours where both have some, else of their normals."""
-    if not (mesh.is_colored and other.is_colored):
-        return seen.colors, found.colors
-    pixels = Pixels(camera, seen.crop)
-    return Colored(mesh).look(pixels).colors, Colored(other).look(pixels).colors
+def _pictures(meshes: list[Mesh], views: list[View], camera: Camera) -> list[np.ndarray]:
+    """Return pictures of both meshes in their colours if both have some, else of their normals."""
+    if not all(mesh.is_colored for mesh in meshes):
+        return [view.colors for view in views]
+    pixels = Pixels(camera, views[0].crop)
+    return [Colored(mesh).look(pixels).colors for mesh in meshes]
 
 
 def _cameras(meshes: list[Mesh], options: SheetOptions) -> list[Camera]:
@@ -132,7 +131,7 @@ def _draw(rows: list[SheetRow], options: SheetOptions) -> Any:
     figure = Figure(figsize=tuple(size / _DPI), dpi=_DPI)
     FigureCanvasAgg(figure)
 
-    def axes_at(left: int, top: int, wide: int, high: int) -> Any:  # pixels, so that pictures keep theirs
+    def axes_at(left: int, top: int, wide: int, high: int) -> Any:  # pixels, so that pictures are not resampled
         return figure.add_axes((left / size[0], 1 - (top + high) / size[1], wide / size[0], high / size[1]))
 
     image: Any = None

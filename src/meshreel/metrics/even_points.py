@@ -41,6 +41,6 @@ def scatter(mesh: Mesh, chosen: Bool[np.ndarray, " F"], count: int) -> Scatter:
     at = np.searchsorted(ends, (steps + 0.5) * (area / count), side="right")
     faces = which[np.minimum(at, len(which) - 1)]
     square = (0.5 + _R2 * (steps[:, None] + 1)) % 1
-    folded = np.where(square.sum(axis=1, keepdims=True) > 1, 1 - square, square)  # its far half onto the near one
+    folded = np.where(square.sum(axis=1, keepdims=True) > 1, 1 - square, square)  # the square onto a triangle
     weights = np.column_stack([1 - folded.sum(axis=1), folded])
     return Scatter(blend(mesh.vertices, mesh.faces[faces], weights), faces, weights, area)

@@ -1,8 +1,8 @@
-"""Flicker: how much the normals of a moving surface change between two frames beyond its motion.
+"""Flicker: change of a moving surface's normals between two frames beyond its motion.
 
-Points and normals of a body in successive frames -> angles. Motion is taken out piece by piece: the points of a frame
-are laid on those of the next, first all together, then in blocks of half the size each time, point to plane. What a
-body of cloth really does within a block stays in: compare with the flicker of the input, not with 0.
+Points and normals of a body in successive frames -> angles. Motion is removed piece by piece: the points of a frame are
+registered to those of the next, first all together, then in blocks of half the size each time, point to plane. Real
+deformation within a block, as of cloth, remains: compare with the flicker of the input, not with 0.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ from ..types import Mesh
 from .normals import angles, interpolate, welded_normals
 
 SIZES = (4.8, 0.6, 0.3, 0.15)  # m, of the blocks, coarse to fine; the first is a whole body (guess)
-ROUNDS = 4  # of laying on, for each size (guess)
-REACH = 0.3  # of a block's size, at most 0.3 m: how far a point may be from its match meanwhile (guess)
-FARTHEST = 0.3  # m
+ROUNDS = 4  # of registration, for each size (guess)
+REACH = 0.3  # of a block's size, largest distance of a point from its match during registration (guess)
+FARTHEST = 0.3  # m, upper limit of this distance
 MATCHED = 0.02  # m: points that end farther from the next frame's surface are left out (guess)
-SAMPLES = 4000  # points of a body that are laid on the next frame, at most (guess)
-DAMPING = 1e-3  # share of a block's points: keeps it from sliding along a plane (guess)
+SAMPLES = 4000  # largest number of a body's points that are registered (guess)
+DAMPING = 1e-3  # share of a block's points, prevents sliding along a plane (guess)
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,20 +37,18 @@ class Patch:
 
     @staticmethod
     def join(patches: Iterable[Patch]) -> Patch:
-        """Return several as one."""
         points, normals = zip(*((each.points, each.normals) for each in patches), strict=True)
         return Patch(np.concatenate(points), np.concatenate(normals))
 
     def at(self, which: Bool[np.ndarray, " N"] | Int64[np.ndarray, " M"]) -> Patch:
-        """Return some of the points."""
         return Patch(self.points[which], self.normals[which])
 
 
 def angles_after_motion(before: Patch, after: Patch, surface: Mesh) -> Float64[np.ndarray, " M"]:
-    """Return the angles between the normals of points and those where motion brings them in the next frame, degrees.
+    """Return the angles between points' normals and the next frame's at their moved positions, degrees.
 
-    `surface` is all that the next frame shows, `after` the points of it that are of the body: points that none of these
-    is within `MATCHED` of are left out.
+    `surface` is the next frame's whole surface, `after` the body's points on it: points without one of these within
+    `MATCHED` are left out.
     """
     if not (len(before.points) and len(after.points)):
         return np.zeros(0)
@@ -72,7 +70,7 @@ def angles_after_motion(before: Patch, after: Patch, surface: Mesh) -> Float64[n
 def _laid(
     moved: Patch, onto: Patch, near: Bool[np.ndarray, " N"], blocks: Int64[np.ndarray, " N"], size: float
 ) -> Patch:
-    """Return each block moved rigidly so that its points near a match come into its plane: one linear step."""
+    """Move each block rigidly by one linear step that brings its points near a match into the match's plane."""
     count = blocks.max() + 1
     sizes = np.maximum(np.bincount(blocks, minlength=count), 1)
     middles = np.stack([np.bincount(blocks, axis, count) for axis in moved.points.T], axis=1) / sizes[:, None]

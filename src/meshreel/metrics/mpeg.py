@@ -1,9 +1,9 @@
 """MPEG's own measures of meshes, as its tool mmetric and the conditions of V-DMC define them: D1, D2 and IBSM.
 
 Two meshes and the box of all originals -> MpegErrors. Read from mmetric 1.1 (MPEGGroup/mpeg-pcc-mmetric) and the
-configurations of V-DMC's test model 4, for facts. D1 and D2 are of points on both surfaces where the lines of a grid
-meet them. IBSM is of pictures from sixteen sides. Both stop at 99.99 dB, which equal meshes have. Left out: the mean
-over points that are equally near, and that mmetric does not draw faces from behind, which closed meshes hide anyway.
+configurations of V-DMC's test model 4, for facts. D1 and D2 compare points where the lines of a grid meet each surface.
+IBSM compares pictures from sixteen sides. Both are limited to 99.99 dB, the value of equal meshes. Left out: the mean
+over points that are equally near, and mmetric's culling of back faces, which closed meshes hide anyway.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ class MpegErrors:
 
 
 def mpeg_errors(original: Mesh, decoded: Mesh, box: Box, options: MpegOptions = MpegOptions()) -> MpegErrors:
-    """Measure a decoded frame; `box` is that of all original frames. A frame that only one side has is 0 dB."""
+    """Measure a decoded frame; `box` is that of all original frames. If only one of the meshes is empty: 0 dB."""
     colored = original.is_colored and decoded.is_colored
     pair = original, decoded
     if any(used_surface(mesh).is_empty for mesh in pair):
@@ -80,9 +80,9 @@ class Cloud:
         step = float(box.size.max()) / (grid - 1) or 1.0
         normals, areas = face_normals(mesh)
         axes = np.where(areas > 0, np.abs(normals).argmax(axis=1), -1)
-        found = [_crossed(mesh, np.flatnonzero(axes == axis), axis, (box.low, step)) for axis in range(3)]
-        points, faces = (np.concatenate(parts) for parts in zip(*found, strict=True))
-        if not len(points):  # smaller than the grid: its vertices
+        crossings = [_crossed(mesh, np.flatnonzero(axes == axis), axis, (box.low, step)) for axis in range(3)]
+        points, faces = (np.concatenate(parts) for parts in zip(*crossings, strict=True))
+        if not len(points):  # a mesh smaller than the grid's spacing: its vertices
             points, faces = mesh.vertices[mesh.faces.reshape(-1)], np.repeat(np.arange(len(mesh.faces)), 3)
         places, at, counts = np.unique(points.astype(np.float32), axis=0, return_inverse=True, return_counts=True)
         sums = [np.bincount(at.reshape(-1), normals[faces, axis]) for axis in range(3)]
@@ -92,15 +92,15 @@ class Cloud:
         """Return the mean squared distances from these points to the nearest of the other's, and to its plane."""
         tree = cKDTree(other.points, balanced_tree=False, compact_nodes=False)  # medians of a grid are slow
         nearest = tree.query(self.points)[1]
-        apart = other.points[nearest] - self.points
-        along = np.einsum("nd,nd->n", apart, other.normals[nearest])
-        return np.array([np.einsum("nd,nd->n", apart, apart).mean(), np.square(along).mean()])
+        offsets = other.points[nearest] - self.points
+        along = np.einsum("nd,nd->n", offsets, other.normals[nearest])
+        return np.array([np.einsum("nd,nd->n", offsets, offsets).mean(), np.square(along).mean()])
 
 
 def _crossed(
     mesh: Mesh, faces: Int64[np.ndarray, " F"], axis: int, grid: tuple[Float64[np.ndarray, " 3"], float]
 ) -> tuple[Float64[np.ndarray, "N 3"], Int64[np.ndarray, " N"]]:
-    """Return where the lines of a grid (its corner and spacing) along an axis meet faces, and which these are."""
+    """Return the points where a grid's lines along an axis meet faces, and those faces; `grid`: corner and spacing."""
     low, step = grid
     corners = mesh.vertices[mesh.faces[faces]]
     across = [other for other in range(3) if other != axis]
@@ -108,20 +108,20 @@ def _crossed(
     first = np.ceil(flat.min(axis=1)).astype(np.int64)
     sizes = np.maximum(np.floor(flat.max(axis=1)).astype(np.int64) - first + 1, 0)
     counts = sizes.prod(axis=1)
-    which = np.repeat(np.arange(len(faces)), counts)
+    face_numbers = np.repeat(np.arange(len(faces)), counts)
     number = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
-    lines = first[which] + np.stack(np.divmod(number, np.maximum(sizes[which, 1], 1)), axis=1)
-    a, b, c = (flat[which, corner] for corner in range(3))
-    ways = [(b, c), (c, a), (a, b)]
-    shares = np.stack([_turn(end - start, lines - start) for start, end in ways], axis=1)
+    lines = first[face_numbers] + np.stack(np.divmod(number, np.maximum(sizes[face_numbers, 1], 1)), axis=1)
+    a, b, c = (flat[face_numbers, corner] for corner in range(3))
+    edges = [(b, c), (c, a), (a, b)]
+    barycentric = np.stack([_turn(end - start, lines - start) for start, end in edges], axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):  # no line is inside a face that is seen edge-on
-        shares /= _turn(b - a, c - a)[:, None]
-    inside = (shares >= 0).all(axis=1)
-    which, lines, shares = which[inside], lines[inside], shares[inside]
-    points = np.empty((len(which), 3))
+        barycentric /= _turn(b - a, c - a)[:, None]
+    inside = (barycentric >= 0).all(axis=1)
+    face_numbers, lines, barycentric = face_numbers[inside], lines[inside], barycentric[inside]
+    points = np.empty((len(face_numbers), 3))
     points[:, across] = low[across] + lines * step
-    points[:, axis] = np.einsum("nk,nk->n", shares, corners[which, :, axis])
-    return points, faces[which]
+    points[:, axis] = np.einsum("nk,nk->n", barycentric, corners[face_numbers, :, axis])
+    return points, faces[face_numbers]
 
 
 def _turn(a: Float64[np.ndarray, "N 2"], b: Float64[np.ndarray, "N 2"]) -> Float64[np.ndarray, " N"]:
@@ -129,7 +129,7 @@ def _turn(a: Float64[np.ndarray, "N 2"], b: Float64[np.ndarray, "N 2"]) -> Float
 
 
 def _picture_squares(original: Mesh, decoded: Mesh, pixels: int) -> tuple[float, float]:
-    """Return mean squared differences of depth, radii, and luma where both meshes are seen, over all views."""
+    """Return mean squared differences of depth (radii) and luma, over pixels of all views that see both meshes."""
     box = Box.of([original, decoded])
     radius = BORDER * float(np.linalg.norm(box.size)) / 2
     drawn, sums, count = [_Drawn(mesh) for mesh in (original, decoded)], np.zeros(2), 0
@@ -152,13 +152,13 @@ class _Drawn:
     def seen(
         self, starts: Float64[np.ndarray, "N 3"], way: Float64[np.ndarray, " 3"]
     ) -> tuple[Bool[np.ndarray, " N"], Float64[np.ndarray, " N"], Float64[np.ndarray, " N"]]:
-        """Return which rays meet the mesh, how far away, and the luma there."""
+        """Return a mask of the rays that meet the mesh, their lengths, and the luma there."""
         hit = self._rays.cast(starts, np.broadcast_to(way, starts.shape))
-        seen, luma = hit.faces >= 0, np.zeros(len(starts))
+        hits, luma = hit.faces >= 0, np.zeros(len(starts))
         if self._painted is not None:
-            colors = np.clip(np.rint(self._painted.on(hit.faces[seen], hit.barycentric[seen])), 0, PEAK)
-            luma[seen] = np.rint(colors @ TO_YUV[0])
-        return seen, np.where(seen, hit.distances, 0.0), luma
+            colors = np.clip(np.rint(self._painted.on(hit.faces[hits], hit.barycentric[hits])), 0, PEAK)
+            luma[hits] = np.rint(colors @ TO_YUV[0])
+        return hits, np.where(hits, hit.distances, 0.0), luma
 
 
 def directions() -> Iterator[Float64[np.ndarray, " 3"]]:
@@ -171,7 +171,7 @@ def directions() -> Iterator[Float64[np.ndarray, " 3"]]:
 def _rays(
     way: Float64[np.ndarray, " 3"], points: Float64[np.ndarray, "N 3"], radius: float, pixels: int
 ) -> Float64[np.ndarray, "P 3"]:
-    """Return where the rays of a picture cross its middle plane, about its middle, within the points' rectangle."""
+    """Return the points where a picture's rays cross the plane through its middle, within the points' rectangle."""
     up = np.array([0.0, 0.0, 1.0]) if abs(abs(way[1]) - 1) < 1e-6 else np.array([0.0, 1.0, 0.0])
     right = np.cross(up, way) / np.linalg.norm(np.cross(up, way))
     axes, pixel = np.stack([right, np.cross(way, right)]), 2 * radius / pixels

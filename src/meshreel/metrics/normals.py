@@ -44,10 +44,10 @@ def angles(a: Float64[np.ndarray, "N 3"], b: Float64[np.ndarray, "N 3"]) -> Floa
 
     The angle is 180 where either vector is zero: a surface without a normal matches none that has one.
     """
-    apart = np.linalg.norm(a - b, axis=1)
-    along = np.linalg.norm(a + b, axis=1)
+    differences = np.linalg.norm(a - b, axis=1)
+    sums = np.linalg.norm(a + b, axis=1)
     undefined = (~a.any(axis=1)) | (~b.any(axis=1))
-    return np.where(undefined, WORST_ANGLE, np.degrees(2 * angle(apart, along)))
+    return np.where(undefined, WORST_ANGLE, np.degrees(2 * angle(differences, sums)))
 
 
 def _first_at_position(vertices: Float64[np.ndarray, "V 3"]) -> Int64[np.ndarray, " V"] | None:

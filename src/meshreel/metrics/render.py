@@ -35,7 +35,6 @@ class Crop:
 
     @property
     def shape(self) -> tuple[int, int]:
-        """Height and width."""
         return self.bottom - self.top, self.right - self.left
 
 
@@ -79,17 +78,16 @@ def crop_of(meshes: list[Mesh], camera: AnyCamera, border: int = 8) -> Crop:
 
 
 def look(mesh: Mesh, camera: AnyCamera, crop: Crop) -> View:
-    """Return the camera's view of the mesh in the crop."""
     return Visible(mesh).look(Pixels(camera, crop))
 
 
 @runtime_checkable
 class Picture(Protocol):
-    """What a mesh looks like in a crop: `View`, or in its own colours."""
+    """Picture of a mesh in a crop: a `View`, or one in the mesh's own colours."""
 
     @property
     def covered(self) -> Bool[np.ndarray, "H W"]:
-        """Where a mesh is seen."""
+        """Pixels that see the mesh."""
 
     @property
     def colors(self) -> Float32[np.ndarray, "H W 3"]:
@@ -124,7 +122,6 @@ class Visible:
         self._normals, self._rays = welded_normals(self.mesh), Rays(self.mesh)
 
     def look(self, pixels: Pixels) -> View:
-        """Render the mesh in a crop of a camera's image."""
         mesh, crop = self.mesh, pixels.crop
         if mesh.is_empty or 0 in crop.shape:
             covered, nothing = np.zeros(crop.shape, dtype=bool), np.zeros((0, 3))
@@ -137,7 +134,6 @@ class Visible:
 
 
 def _to_camera(vertices: Float64[np.ndarray, "V 3"], camera: AnyCamera) -> Float64[np.ndarray, "V 3"]:
-    """Return camera coordinates."""
     rotation = camera.extrinsic[:3, :3]
     eye = -np.linalg.solve(rotation, camera.extrinsic[:3, 3])
     return (vertices - eye) @ rotation.T

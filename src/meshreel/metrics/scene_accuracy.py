@@ -11,7 +11,7 @@ simulated rigs. The noisy input may take the place of the truth.
 - The peak of both PSNRs is the diagonal of the whole reference scene, for its parts too. Forward is the paper's way
   and serves for the noisy input; against a truth it measures only the size of holes, so backward counts there.
 - SSIM of normal renders from these cameras, over pixels where either mesh shows the part (masked SSIM).
-- Flicker of people: how much more the normals in these renders change between successive frames than the truth's.
+- Flicker of people: change of the normals in these renders between successive frames, beyond the truth's.
 """
 
 from __future__ import annotations
@@ -47,8 +47,8 @@ class SightOptions:
     people: int = 20_000  # points on the moving faces of each mesh
     background: int = 60_000  # points on the still faces of each mesh
     near: float = 0.02  # m, distance up to which surface counts as covered
-    grazing: float = 65.0  # degrees between ray and normal past which depth is too coarse for surface to be expected
-    slack: float = 0.005  # m that a point may lie behind what the ray meets first
+    grazing: float = 65.0  # degrees, largest angle between ray and normal at which surface can be expected
+    slack: float = 0.005  # m that a visible point may lie behind the first surface on its ray
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,8 +56,8 @@ class Sight:
     """A camera that saw the scene, with the range of its depths."""
 
     camera: Camera
-    near: float = 0.0  # m along the optical axis: nothing nearer is measured
-    far: float = math.inf  # m: nor farther
+    near: float = 0.0  # m along the optical axis: least depth that is measured
+    far: float = math.inf  # m: largest depth that is measured
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,52 +96,48 @@ class Scene:
 
     @cached_property
     def surface(self) -> Surface:
-        """Surface for closest-point queries, about `origin`."""
         return Surface(self.mesh)
 
     @cached_property
     def normals(self) -> Float64[np.ndarray, "V 3"]:
-        """Unit vertex normals."""
         return welded_normals(self.mesh)
 
     @cached_property
     def points(self) -> dict[str, Scatter]:
         """Points on both parts, about `origin`; a complete scene has only points that a camera can see."""
         parts = (("people", self.dynamic, self.options.people), ("background", ~self.dynamic, self.options.background))
-        found = {name: scatter(self.mesh, chosen, count) for name, chosen, count in parts}
+        samples = {name: scatter(self.mesh, chosen, count) for name, chosen, count in parts}
         if self.complete:
-            found = {name: _only(points, visible(self, points)) for name, points in found.items()}
-        return found
+            samples = {name: _only(points, visible(self, points)) for name, points in samples.items()}
+        return samples
 
     @cached_property
     def pictures(self) -> tuple[Picture, ...]:
-        """Picture from each camera."""
         return tuple(_picture(self, sight.camera) for sight in self.sights)
 
     @cached_property
     def rays(self) -> Rays:
-        """Scene for ray casting, about `origin`."""
         return Rays(self.mesh)
 
 
 def visible(scene: Scene, points: Scatter) -> Bool[np.ndarray, " N"]:
-    """Return which points on a scene's surface at least one camera can measure."""
-    seen = np.zeros(len(points), bool)
+    """Return a mask of the points on a scene's surface that at least one camera can measure."""
+    measured = np.zeros(len(points), bool)
     normals = face_normals(scene.mesh)[0][points.faces]
     for sight in scene.sights:
         camera, options = sight.camera, scene.options
-        away = points.points + scene.origin - camera.eye
-        ahead = away @ camera.extrinsic[:3, :3].T
-        pixels = camera.project(ahead)
+        offsets = points.points + scene.origin - camera.eye
+        local = offsets @ camera.extrinsic[:3, :3].T
+        pixels = camera.project(local)
         inside = ((pixels >= 0) & (pixels < (camera.width, camera.height))).all(axis=1)  # not a number: behind the eye
-        inside &= (ahead[:, 2] >= sight.near) & (ahead[:, 2] <= sight.far)
-        lengths = np.linalg.norm(away, axis=1)
-        turned = np.abs(np.einsum("nd,nd->n", normals, away))
-        which = np.flatnonzero(inside & ~seen & (turned >= math.cos(math.radians(options.grazing)) * lengths))
-        eye = np.broadcast_to(camera.eye - scene.origin, (len(which), 3))
-        met = scene.rays.cast(eye, away[which]).distances
-        seen[which] = met * lengths[which] >= lengths[which] - options.slack
-    return seen
+        inside &= (local[:, 2] >= sight.near) & (local[:, 2] <= sight.far)
+        lengths = np.linalg.norm(offsets, axis=1)
+        facing = np.abs(np.einsum("nd,nd->n", normals, offsets))
+        candidates = np.flatnonzero(inside & ~measured & (facing >= math.cos(math.radians(options.grazing)) * lengths))
+        eye = np.broadcast_to(camera.eye - scene.origin, (len(candidates), 3))
+        hit_distances = scene.rays.cast(eye, offsets[candidates]).distances
+        measured[candidates] = hit_distances * lengths[candidates] >= lengths[candidates] - options.slack
+    return measured
 
 
 def scene_row(reference: Scene, decoded: Scene) -> Row:
@@ -151,10 +147,12 @@ def scene_row(reference: Scene, decoded: Scene) -> Row:
     180 degrees.
     """
     row: Row = {"diagonal_m": reference.mesh.diagonal}
-    there, back = _Matched.of(decoded, reference), _Matched.of(reference, decoded)
+    backward, forward = _Matched.of(decoded, reference), _Matched.of(reference, decoded)
     for part in PARTS:
-        found = _accuracy(there.part(part), back.part(part), reference) | _coverage(back.part(part), reference)
-        row |= {name if part == "all" else f"{part}_{name}": value for name, value in found.items()}
+        values = _accuracy(backward.part(part), forward.part(part), reference) | _coverage(
+            forward.part(part), reference
+        )
+        row |= {name if part == "all" else f"{part}_{name}": value for name, value in values.items()}
     return row | _ssim_row(reference.pictures, decoded.pictures)
 
 
@@ -206,18 +204,18 @@ def compare_with_truth(
     return {"frames": list(numbers)} | means | {"per_frame": rows}
 
 
-def people_flicker(truth: tuple[Scene, Scene], shown: tuple[Scene, Scene]) -> float | None:
+def people_flicker(truth: tuple[Scene, Scene], decoded: tuple[Scene, Scene]) -> float | None:
     """Return the RMS change of people's rendered normals from a frame to the next beyond that of the truth, degrees.
 
     That is the root of the difference of squares, 0 where the truth changes more, over pixels that show people in both
     frames of both; None where there are none.
     """
-    beyond = list[Float64[np.ndarray, " N"]]()
-    for pictures in zip(*(scene.pictures for scene in (*truth, *shown)), strict=True):
+    excess = list[Float64[np.ndarray, " N"]]()
+    for pictures in zip(*(scene.pictures for scene in (*truth, *decoded)), strict=True):
         people = np.logical_and.reduce([picture.dynamic for picture in pictures])
         normals = [2 * picture.colors[people].astype(np.float64) - 1 for picture in pictures]
-        beyond.append(angles(*normals[2:]) ** 2 - angles(*normals[:2]) ** 2)
-    squares = np.concatenate([*beyond, np.zeros(0)])
+        excess.append(angles(*normals[2:]) ** 2 - angles(*normals[:2]) ** 2)
+    squares = np.concatenate([*excess, np.zeros(0)])
     return math.sqrt(max(float(squares.mean()), 0.0)) if len(squares) else None
 
 
@@ -242,9 +240,9 @@ class _Matched:
         hits = target.surface.closest(points)
         distances = np.linalg.norm(hits.points - points, axis=1)
         corners = source.mesh.faces[np.concatenate([p.faces for p in parts.values()])]
-        own = interpolate(source.normals, corners, np.concatenate([p.barycentric for p in parts.values()]))
-        other = interpolate(target.normals, target.mesh.faces[hits.faces], hits.barycentric)
-        return _Matched(people, weights, distances, angles(own, other))
+        source_normals = interpolate(source.normals, corners, np.concatenate([p.barycentric for p in parts.values()]))
+        target_normals = interpolate(target.normals, target.mesh.faces[hits.faces], hits.barycentric)
+        return _Matched(people, weights, distances, angles(source_normals, target_normals))
 
     def part(self, name: str) -> _Matched:
         """Return the points of a part: all, people or background."""
@@ -259,22 +257,22 @@ class _Matched:
         return float(np.average(self.distances**2, weights=self.weights))
 
 
-def _accuracy(found: _Matched, wanted: _Matched, reference: Scene) -> Row:
+def _accuracy(backward: _Matched, forward: _Matched, reference: Scene) -> Row:
     names = ("median_m", "rms_backward_m", "normal_error_deg", "d2_psnr_backward")
-    if len(found.weights):
-        median, square = quantile(found.distances, found.weights, 0.5), found.mean_square
-        angle = float(np.average(found.turned, weights=found.weights))
+    if len(backward.weights):
+        median, square = quantile(backward.distances, backward.weights, 0.5), backward.mean_square
+        angle = float(np.average(backward.turned, weights=backward.weights))
         values: tuple[float | None, ...] = (median, math.sqrt(square), angle, psnr(square, reference.mesh.diagonal))
     else:
-        values = (math.inf, math.inf, WORST_ANGLE, 0.0) if len(wanted.weights) else (None,) * len(names)
+        values = (math.inf, math.inf, WORST_ANGLE, 0.0) if len(forward.weights) else (None,) * len(names)
     return dict(zip(names, values, strict=True))
 
 
-def _coverage(wanted: _Matched, reference: Scene) -> Row:
-    if len(wanted.weights) == 0:
+def _coverage(forward: _Matched, reference: Scene) -> Row:
+    if len(forward.weights) == 0:
         return {"coverage_rms_m": None, "covered": None, "d2_psnr_forward": None}
-    within = float(np.average(wanted.distances <= reference.options.near, weights=wanted.weights))
-    square = wanted.mean_square
+    within = float(np.average(forward.distances <= reference.options.near, weights=forward.weights))
+    square = forward.mean_square
     d2 = psnr(square, reference.mesh.diagonal)
     return {"coverage_rms_m": math.sqrt(square), "covered": within, "d2_psnr_forward": d2}
 

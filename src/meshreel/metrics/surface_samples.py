@@ -34,7 +34,6 @@ class Samples:
 
     @cached_property
     def surface(self) -> Surface:
-        """The mesh, prepared for closest-point queries."""
         return Surface(self.mesh)
 
 
@@ -48,7 +47,7 @@ class Matches:
 
 
 def sample(mesh: Mesh, center: Float64[np.ndarray, " 3"]) -> Samples:
-    """Sample a mesh, a result of `used_surface`, moved so that `center` is the origin."""
+    """Move a result of `used_surface` so that `center` is the origin, and sample it."""
     mesh = Mesh.of(mesh.vertices - center, mesh.faces)
     normals = welded_normals(mesh)
     levels = 0

@@ -84,12 +84,10 @@ class Box:
 
     @property
     def center(self) -> Float64[np.ndarray, " 3"]:
-        """Middle of the box, m."""
         return (self.low + self.high) / 2
 
     @property
     def size(self) -> Float64[np.ndarray, " 3"]:
-        """Side lengths, m."""
         return self.high - self.low
 
 

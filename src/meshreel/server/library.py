@@ -114,7 +114,7 @@ def _without_path(error: MeshreelError | OSError, path: Path) -> str:
 
 
 def _version(path: Path) -> Version:
-    """Return what changes with a file, without a look at its contents. (On Windows, ctime is when it was made.)"""
+    """Return a version of a file that changes with its contents, from its size and times."""
     found = path.stat()
     return found.st_size, found.st_mtime_ns, found.st_ctime_ns
 

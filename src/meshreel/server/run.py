@@ -80,7 +80,7 @@ def run(app: Starlette, options: ServerOptions, announce: Callable[[list[str]], 
 
 
 def _is_news(record: logging.LogRecord) -> bool:
-    """Tell log records worth reading from those of responses that the server's end or a client broke off."""
+    """Return whether a log record is worth reading: not of a response broken off by the server's end or a client."""
     error = record.exc_info and record.exc_info[1]
     is_broken_off = isinstance(error, asyncio.CancelledError | h11.LocalProtocolError)
     return not is_broken_off and "timeout graceful shutdown exceeded" not in record.getMessage()

@@ -16,7 +16,7 @@ export interface ReelOptions {
   readonly crossOrigin?: string;
 }
 
-const players = new Players(files); // whose workers are shared
+const players = new Players(files); // shares its workers
 
 /**
  * A recording in metres, upright, about the place that its file calls the origin. Call `update` once a picture. Its surfaces have shaders of their own: lights and fog
@@ -46,7 +46,7 @@ export class Reel extends Group {
     this.player.load().catch(() => undefined);
   }
 
-  /** How surfaces look; what the recording has not is shown as what comes nearest. */
+  /** Appearance of surfaces; if the recording lacks it, the nearest one that it has. */
   get mode(): Mode {
     return shownMode(this.#mode, this.player.info);
   }

@@ -21,7 +21,7 @@ export class Progress {
   #told = 0;
   #toldAt = 0; // ms
 
-  /** Whether some came since it was last asked; while more come, not oftener than every `everyMs`. */
+  /** True if events came since the last call; while more come, at most once every `everyMs`. */
   isNew(isFetching: boolean, everyMs: number): boolean {
     const now = performance.now();
     if (this.bytes === this.#told || (isFetching && now - this.#toldAt < everyMs)) return false;

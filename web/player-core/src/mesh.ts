@@ -13,7 +13,7 @@ const GREY = 128; // red, green and blue of vertices without colours beside some
 
 export const EMPTY: Mesh = { vertices: new Float64Array(0), faces: new Int32Array(0) };
 
-/** Where coordinates lie: each at origin + scale * coordinate. */
+/** Map from normalised coordinates to metres: origin + scale * coordinate. */
 export interface Placement {
   readonly scale: number; // m
   readonly origin: readonly number[]; // m, three

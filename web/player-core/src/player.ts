@@ -135,7 +135,7 @@ export class Player extends PlaybackTarget implements Playback {
     if (layers !== "auto" && !(layers >= 0)) throw new TypeError(`layers ${layers}: give "auto" or a number from 0`);
     if (layers === this.#layers) return;
     this.#layers = layers === "auto" ? layers : Math.floor(layers);
-    this.#session?.decoding.forgive(); // what is damaged may have whole layers before the damage
+    this.#session?.decoding.forgive(); // damaged chunks may have complete layers before the damage
     this.#wake();
   }
 

@@ -5,7 +5,7 @@ import { HttpSource } from "./net/http_source.ts";
 import { Player } from "./player.ts";
 import { WorkerPool, type WorkerLike } from "./time/pool.ts";
 
-/** Where the files of the workers lie. */
+/** Addresses of the workers' files. */
 export interface WorkerFiles {
   readonly worker: URL;
   readonly core: URL;
@@ -22,7 +22,7 @@ interface Shared {
 
 export class Players {
   readonly #files: WorkerFiles;
-  #shared: Shared | null = null; // what the next player gets
+  #shared: Shared | null = null; // for the next player
 
   constructor(files: WorkerFiles) {
     this.#files = files;

@@ -1,4 +1,4 @@
-// What passes between the player and its decoding workers.
+// Messages between the player and its decoding workers.
 
 import type { CompanionKind, Packed } from "./types.ts";
 
@@ -19,14 +19,14 @@ export interface DecodeJob {
   payload: Uint8Array; // its buffer is transferred
   ranges: { size: number; crc: number }[]; // of the layers in `payload`
   companions: Companion[]; // pictures are not among them: they are decoded elsewhere
-  textured: boolean; // whether pictures of it will be shown
+  textured: boolean; // true if pictures of it will be shown
   layers: number | null; // layers beyond the first; null: all
   previous: number | null; // chunk whose state it needs, decoded earlier in this worker; or the static chunk that a patch changes
   scale: number;
   stateOnly: boolean; // decode for the chain's sake, pack nothing
 }
 
-/** What a job's chunk is decoded with. */
+/** Companions with which a job's chunk is decoded. */
 export interface Companion {
   chunk: number;
   kind: CompanionKind;

@@ -25,13 +25,13 @@ export interface Limits {
   readonly memory: number; // bytes that decoded groups may take
 }
 
-/** Where the play head is and where it goes. */
+/** Position and direction of the play head. */
 export interface Aim {
   readonly time: number; // s
   readonly speed: number; // content seconds a second
   readonly loop: boolean;
   readonly layers: Layers;
-  readonly splats: boolean; // whether they are wanted
+  readonly splats: boolean; // true if they are wanted
   readonly isWaiting: boolean; // it should play and cannot
 }
 
@@ -142,7 +142,7 @@ export class Session {
     return Math.max(0, sum);
   }
 
-  /** Whether all that is wanted soon is decoded, whatever time that makes. */
+  /** True if everything that is wanted soon is decoded, however long that lasts. */
   get isSated(): boolean {
     return this.#firstAhead((step) => step.decode && !this.decoding.isSettled(step.chunk)) === Infinity;
   }
@@ -155,7 +155,7 @@ export class Session {
     return (this.decoding.msPerFrame * framesPerMs) / workers;
   }
 
-  /** What there is to tell at a time, s. */
+  /** Statistics at a time, s. */
   statsAt(time: number, loop: boolean): SessionStats {
     const { shown, wholeLayers } = this.picture;
     const layers = Math.max(0, ...(shown?.groups ?? []).map((group) => group?.layers ?? 0));

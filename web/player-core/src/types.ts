@@ -21,7 +21,7 @@ export interface PackedVertices {
   readonly places: PackedPlaces | null;
 }
 
-/** Where the corners of triangles are in a texture. */
+/** Places of triangles' corners in a texture. */
 export interface PackedPlaces {
   readonly width: number; // of the texture, texels
   readonly height: number;
@@ -88,7 +88,7 @@ export interface PackedStatic extends PackedVertices {
 export type Packed = PackedGroup | PackedStatic;
 
 /**
- * What to draw now: a frame, how far to blend towards the next, and what is at hand of it. The same object as long as that is the
+ * The picture to draw now: a frame, the blend towards the next, and the available part of it. The same object as long as that is the
  * same; one that was replaced stays as it is until the next is asked for, and may be used again then.
  */
 export interface Shown {
@@ -115,7 +115,7 @@ export interface TextureImage {
 }
 
 /**
- * Whether textures are shown, and if not, why: the file has none, they are switched off, the browser cannot decode them or not in time, they are
+ * State of the textures; if they are not shown, the reason: the file has none, they are switched off, the browser cannot decode them or not in time, they are
  * damaged, left out with layers, seen too small, or not decoded yet.
  */
 export type TextureState = "shown" | "none" | "off" | "unsupported" | "slow" | "damaged" | "left out" | "far" | "late";
@@ -124,16 +124,16 @@ export interface TextureStats {
   readonly textures: TextureState;
   readonly textureCodec: "AV1" | "H.264" | null; // that they are decoded from; null where they are not
   readonly textureReason: string; // why it is not AV1 or there are none, where browser or machine is the cause
-  readonly backgroundLate: boolean; // whether the background is shown in a picture of before, or without
+  readonly backgroundLate: boolean; // true if the background shows an earlier picture, or none
 }
 
-/** What a chunk may add to another one, which is shown without it where it is damaged. */
+/** Companion of a chunk, which is shown without it if the companion is damaged. */
 export type CompanionKind = "colors" | "atlas" | "splats" | Rendition;
 
-/** Which video textures are decoded from: AV1, or the same pictures in H.264. */
+/** Video from which textures are decoded: AV1, or the same pictures in H.264. */
 export type Rendition = "pictures" | "compatible";
 
-/** What is known from the head, before any chunk is there. */
+/** Facts from the head, known before any chunk is there. */
 export interface Info {
   readonly frameCount: number;
   readonly frameRate: number; // 1/s
@@ -144,17 +144,17 @@ export interface Info {
   readonly trackCount: number;
   readonly mostLayers: number; // layers beyond the first that the richest group has
   readonly size: number; // bytes
-  readonly hasColors: boolean; // whether some of it has colours of its own
-  readonly hasTextures: boolean; // whether some of these are in textures
-  readonly hasSplats: boolean; // whether some of it has splats
-  readonly hasAudio: boolean; // whether something is heard with it
+  readonly hasColors: boolean; // true if any of it has colours
+  readonly hasTextures: boolean; // true if any colours are in textures
+  readonly hasSplats: boolean; // true if any of it has splats
+  readonly hasAudio: boolean; // true if it has sound
   readonly metadata: Readonly<Record<string, unknown>>;
 }
 
 /** Layers beyond the first that are played; "auto": the most that network and workers can sustain. */
 export type Layers = number | "auto";
 
-/** What `Playback.playbackRate` may be. */
+/** Limits of `Playback.playbackRate`. */
 export const PLAYBACK_RATES = { least: 0.1, most: 4 } as const;
 
 /** Numbers for the overlay. */
@@ -194,7 +194,7 @@ export interface PlaybackEvents {
   error: CustomEvent<Error>; // nothing more can be played
 }
 
-/** What is heard with a recording, where it has something. */
+/** Sound of a recording, if it has any. */
 export interface Heard {
   muted: boolean; // set by itself, where the browser plays nothing aloud before the viewer has done something
   volume: number; // 0 to 1
@@ -216,8 +216,8 @@ export interface Playback extends EventTarget {
   playbackRate: number; // within PLAYBACK_RATES
   interpolate: boolean; // blend between frames of a group
   layers: Layers;
-  textures: boolean; // whether textures are fetched and shown
-  splats: boolean; // whether splats are fetched
+  textures: boolean; // true if textures are fetched and shown
+  splats: boolean; // true if splats are fetched
   play(): Promise<void>;
   pause(): void;
   /** Pauses and moves by a number of frames; a negative one goes back. */

@@ -1,4 +1,4 @@
-// What a `Worker` loads.
+// Entry point of a decoding `Worker`.
 
 import { serve } from "./decode/worker.ts";
 import type { Scope } from "./decode/worker.ts";

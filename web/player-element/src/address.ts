@@ -4,7 +4,7 @@ import type { MeshreelPlayer } from "./element.ts";
 
 const QUIET = 400; // ms without a change before the address follows: browsers bear no more than some a second
 
-/** What stands behind the # for what is seen now; "" for a recording as it opens. */
+/** Text behind the # of an address for the current view; "" for the view in which a recording opens. */
 export function stateOf(player: MeshreelPlayer): string {
   const state = new URLSearchParams();
   if (player.currentTime > 0) state.set("t", player.currentTime.toFixed(3));

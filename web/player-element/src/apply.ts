@@ -1,4 +1,4 @@
-// How a changed attribute reaches what plays and what draws.
+// Application of changed attributes to the playback and the stage.
 
 import type { Playback } from "@meshreel/player-core/types";
 import type { Reflected } from "./reflected.ts";

@@ -15,7 +15,7 @@ export const OBSERVED = [
   "autorotate", "fly", "section", "frames", "share", "muted", "volume", "playsinline", "crossorigin",
 ] as const;
 
-/** What a text says, "" taken for nothing; null where it says nothing that the attribute can be. */
+/** Value of an attribute's text, "" meaning none; null if the text is no valid value. */
 type Reader<T> = (text: string) => T | null;
 
 const words = <T extends string>(...known: readonly T[]): Reader<T> =>
@@ -31,7 +31,7 @@ const readTheme = words<Theme>("auto", "light", "dark");
 
 const readUp = words<Up>("y", "z", "-y", "-z");
 
-/** Where the camera is and what it looks at: x, y, z each, m. */
+/** Position and target of the camera: x, y, z each, m. */
 export const readCamera: Reader<readonly number[]> = (text) => {
   const values = text.split(",").map(readNumber);
   return values.length === 6 && values.every((value) => value !== null) ? values : null;
@@ -69,7 +69,7 @@ const RULES: Readonly<Record<string, { read: Reader<unknown>; wanted: string }>>
   volume: { read: readVolume, wanted: "a number from 0 to 1" },
 };
 
-/** What is wrong with an attribute's value, in a line; null where nothing is. */
+/** Message about an invalid value of an attribute, in a line; null for a valid one. */
 export function complaint(name: string, text: string): string | null {
   const rule = RULES[name];
   if (!rule || text.trim() === "" || rule.read(text) !== null) return null;
@@ -91,12 +91,12 @@ export function parseLayers(text: string | null): Layers {
   return readLayers(text ?? "") ?? "auto";
 }
 
-/** How surfaces look where the text is none: by splats, or in colours, or shaded, whichever of these comes first that the recording has. */
+/** Appearance of surfaces without an attribute: the first of splats, colours and shading that the recording has. */
 export function parseMode(text: string | null, has: Looks | null): Mode {
   return shownMode(readMode(text ?? "") ?? "splats", has);
 }
 
-/** Whether splats are wanted where there are some. */
+/** True if splats are wanted, should there be some. */
 export function wantsSplats(text: string | null): boolean {
   return (readMode(text ?? "") ?? "splats") === "splats";
 }

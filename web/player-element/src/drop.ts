@@ -1,7 +1,7 @@
 // Files that are dropped on the player.
 
 export interface DropActs {
-  welcome(): boolean; // whether files are taken at the moment
+  welcome(): boolean; // true if files are taken at the moment
   open(file: File): void;
   over(inside: boolean): void; // a file hangs over the player, or no longer
 }

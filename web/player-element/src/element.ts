@@ -21,7 +21,7 @@ declare global {
 
 export class MeshreelPlayer extends Viewed {
   static readonly observedAttributes = OBSERVED;
-  /** Where playbacks and stages come from; index.ts sets the real one before it defines the element. */
+  /** Factory of playbacks and stages; index.ts sets the real one before it defines the element. */
   static engine: Engine;
 
   #controls: Controls;
@@ -33,7 +33,7 @@ export class MeshreelPlayer extends Viewed {
   #playable = false;
   #wished = false; // it plays, or would if it could
   #startAt = 0; // s; where to begin once the head is there
-  #left: boolean | null = null; // whether it played when it was taken out of the document; null where it was not open
+  #left: boolean | null = null; // true if it played when it was taken out of the document; null if it was not open
   #queued = false;
   #early: Event[] = []; // that say there is a picture, and came before it could be drawn
 
@@ -145,7 +145,7 @@ export class MeshreelPlayer extends Viewed {
   get currentFrame(): number {
     return this.#playback?.currentFrame ?? 0;
   }
-  /** What plays the sound of the recording; null where there is none, or not yet. */
+  /** Player of the recording's sound; null if there is none, or not yet. */
   get audio(): Heard["voice"] {
     return this.#playback?.sound.voice ?? null;
   }
@@ -312,7 +312,7 @@ export class MeshreelPlayer extends Viewed {
     const info = this.#playback?.info;
     if (!info || !this.view) return;
     this.view.stage.begin(info);
-    applyToStage("mode", this, this.view.stage); // where none is set, the recording decides
+    applyToStage("mode", this, this.view.stage); // if none is set, the recording decides
     if (this.getAttribute("camera")) applyToStage("camera", this, this.view.stage);
   }
 

@@ -6,7 +6,7 @@ import { GraphicsError } from "./stage.ts";
 import type { Engine, Settings, Stage } from "./stage.ts";
 import type { ThreeStage } from "./stage_three.ts";
 
-/** Where the built player's other files lie. */
+/** Address of the built player's other files. */
 export interface Files extends WorkerFiles {
   readonly order: URL; // the worker that orders splats
   readonly three: URL; // stage_three.ts and three.js: the largest part, which a player needs only with its first picture

@@ -34,7 +34,7 @@ export class Fly {
 
   begin(canvas: HTMLCanvasElement): void {
     const { signal } = (this.#stop = new AbortController());
-    const keys = canvas.parentElement ?? canvas; // which has the focus
+    const keys = canvas.parentElement ?? canvas; // this element has the focus
     keys.addEventListener("keydown", (event) => this.#key(event, true), { signal });
     keys.addEventListener("keyup", (event) => this.#key(event, false), { signal });
     keys.addEventListener("blur", () => this.#held.clear(), { signal });
@@ -92,7 +92,7 @@ export class Fly {
   #turn(x: number, y: number): void {
     const turn = new Euler().setFromQuaternion(this.#eye.quaternion, "YXZ");
     const field = MathUtils.degToRad(this.#eye.fov);
-    turn.y += x * field; // what is seen follows the finger
+    turn.y += x * field; // the view follows the finger
     turn.x = MathUtils.clamp(turn.x + y * field, -STEEPEST, STEEPEST);
     this.#eye.quaternion.setFromEuler(turn);
     this.#moved();

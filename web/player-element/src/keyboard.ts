@@ -5,7 +5,7 @@ export type Action =
   | "mode" | "loop" | "fit" | "help" | "close" | "turnLeft" | "turnRight" | "turnUp" | "turnDown" | "closer" | "farther"
   | "mute" | "louder" | "quieter" | "sectionFrom" | "sectionTo" | "sectionOff" | "autoRotate" | "fly" | "frames";
 
-/** What `actionOf` looks at of a KeyboardEvent. */
+/** The part of a KeyboardEvent that `actionOf` reads. */
 export interface Key {
   readonly key: string;
   readonly ctrlKey?: boolean;
@@ -51,7 +51,7 @@ export function actionOf(event: Key): Action | null {
   return ACTIONS.get(event.shiftKey ? `Shift+${event.key}` : event.key) ?? null;
 }
 
-/** Whether an action is for recordings that have sound: of others, its key is left to the page. */
+/** True if an action is for recordings with sound; for others, its key is left to the page. */
 export function isOfSound(action: Action): boolean {
   return ["mute", "louder", "quieter"].includes(action);
 }
@@ -61,7 +61,7 @@ export function seekStep(duration: number): number {
   return Math.min(5, duration / 10);
 }
 
-/** What `takesKey` looks at of an element. */
+/** The part of an element that `takesKey` reads. */
 export interface Target {
   readonly localName?: string;
   readonly type?: string;

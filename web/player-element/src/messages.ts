@@ -7,7 +7,7 @@ export interface Message {
   readonly title: string;
   readonly advice: string;
   readonly detail: string; // the error's own words
-  readonly retry: boolean; // whether trying again can help
+  readonly retry: boolean; // true if trying again can help
 }
 
 type Words = Omit<Message, "detail" | "retry">;

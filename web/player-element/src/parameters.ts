@@ -1,4 +1,4 @@
-// What an address asks of the page: ?src, ?t, ?autoplay, ?loop, ?stats, ?mode, ?layers, ?camera, ?speed, ?theme, ?up, ?background,
+// Parameters of the page's address: ?src, ?t, ?autoplay, ?loop, ?stats, ?mode, ?layers, ?camera, ?speed, ?theme, ?up, ?background,
 // ?poster, ?interpolate, ?textures, ?ground, ?section, ?controls, ?autorotate, ?fly, ?frames, ?muted, ?volume, ?bench. All but t and bench are attributes of the element.
 
 export interface Parameters {

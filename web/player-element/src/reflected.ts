@@ -20,7 +20,7 @@ export class Reflected extends Element {
     }
   }
 
-  /** What is known of the recording; null before its head is there. */
+  /** Facts about the recording; null before its head is there. */
   get info(): Info | null {
     return null;
   }
@@ -84,7 +84,7 @@ export class Reflected extends Element {
     this.toggleAttribute("loop", value);
   }
 
-  /** Whether the statistics are shown. */
+  /** True while the statistics are shown. */
   get stats(): boolean {
     return parse.parseFlag(this.getAttribute("stats"));
   }
@@ -108,7 +108,7 @@ export class Reflected extends Element {
     this.setAttribute("speed", String(value));
   }
 
-  /** Whether motion is blended between frames. */
+  /** True if motion is blended between frames. */
   get interpolate(): boolean {
     return parse.parseSwitch(this.getAttribute("interpolate"));
   }
@@ -116,7 +116,7 @@ export class Reflected extends Element {
     this.setAttribute("interpolate", value ? "on" : "off");
   }
 
-  /** Whether textures are fetched and shown; without them surfaces have the colours of their vertices. */
+  /** True if textures are fetched and shown; without them surfaces have the colours of their vertices. */
   get textures(): boolean {
     return parse.parseSwitch(this.getAttribute("textures"));
   }
@@ -124,7 +124,7 @@ export class Reflected extends Element {
     this.setAttribute("textures", value ? "on" : "off");
   }
 
-  /** Whether what stands nowhere has a ground, with its shadow. */
+  /** True if a recording without a floor gets a ground, with its shadow. */
   get ground(): boolean {
     return parse.parseSwitch(this.getAttribute("ground"));
   }
@@ -132,7 +132,7 @@ export class Reflected extends Element {
     this.setAttribute("ground", value ? "on" : "off");
   }
 
-  /** Whether the camera goes around by itself; not for viewers who prefer reduced motion. */
+  /** True if the camera orbits by itself; not for viewers who prefer reduced motion. */
   get autoRotate(): boolean {
     return parse.parseFlag(this.getAttribute("autorotate"));
   }
@@ -140,7 +140,7 @@ export class Reflected extends Element {
     this.toggleAttribute("autorotate", value);
   }
 
-  /** Whether the camera flies instead of going around something: for rooms. */
+  /** True if the camera flies instead of orbiting: for rooms. */
   get fly(): boolean {
     return parse.parseFlag(this.getAttribute("fly"));
   }
@@ -157,7 +157,7 @@ export class Reflected extends Element {
     else this.setAttribute("section", value.map((time) => Number(time.toFixed(3))).join(","));
   }
 
-  /** Whether the bar counts frames instead of seconds. */
+  /** True if the bar counts frames instead of seconds. */
   get frames(): boolean {
     return parse.parseFlag(this.getAttribute("frames"));
   }
@@ -165,7 +165,7 @@ export class Reflected extends Element {
     this.toggleAttribute("frames", value);
   }
 
-  /** Whether the settings offer a link to what is seen: for pages whose address says it, as player/index.html. */
+  /** True if the settings offer a link to the current view: for pages that read it from their address, as player/index.html. */
   get share(): boolean {
     return parse.parseFlag(this.getAttribute("share"));
   }
@@ -173,7 +173,7 @@ export class Reflected extends Element {
     this.toggleAttribute("share", value);
   }
 
-  /** Whether nothing is heard, and nothing of it fetched; set by itself where the browser allows no sound before the viewer did something. */
+  /** True if the sound is off and not fetched; set automatically if the browser allows no sound before the viewer acts. */
   get muted(): boolean {
     return parse.parseFlag(this.getAttribute("muted"));
   }
@@ -181,7 +181,7 @@ export class Reflected extends Element {
     this.toggleAttribute("muted", value);
   }
 
-  /** How loud it is, 0 to 1. */
+  /** Volume, 0 to 1. */
   get volume(): number {
     return parse.parseVolume(this.getAttribute("volume"));
   }
@@ -207,7 +207,7 @@ export class Reflected extends Element {
     else this.setAttribute("crossorigin", value);
   }
 
-  /** How surfaces look: where none is set, or one that the recording has not, `splats`, `color` or `shaded`, the first of these that it has. */
+  /** Appearance of surfaces; if none is set, or one that the recording lacks, the first of `splats`, `color` and `shaded` that it has. */
   get mode(): Mode {
     return parse.parseMode(this.getAttribute("mode"), this.info);
   }
@@ -215,7 +215,7 @@ export class Reflected extends Element {
     this.setAttribute("mode", value);
   }
 
-  /** Whether splats are fetched, where the recording has some: `mode` says so. */
+  /** True if the recording's splats are fetched: `mode` decides. */
   get splats(): boolean {
     return parse.wantsSplats(this.getAttribute("mode"));
   }

@@ -1,6 +1,6 @@
 // Playing one part over and over.
 
-/** What it needs of a player. */
+/** The part of a player that it needs. */
 export interface Sectioned {
   readonly section: readonly [number, number] | null;
   readonly duration: number;

@@ -1,4 +1,4 @@
-// What the element needs of something that draws, and of something that opens files. The element knows no WebGL.
+// Interfaces of the stage, which draws, and of the playback, which opens files, for the element, which knows no WebGL.
 
 import type { Info, Layers, Packed, Playback, Shown } from "@meshreel/player-core/types";
 import type { Mode } from "@meshreel/player-three/modes";
@@ -29,7 +29,7 @@ export interface Stage extends EventTarget {
   autoRotate: boolean;
   fly: boolean; // the camera moves through the scene, instead of around what it looks at
   readonly isFit: boolean; // the view was not changed since it fitted
-  ground: boolean; // whether there is one, where the recording has none of its own
+  ground: boolean; // true for a ground, if the recording has none
   camera: string; // as the attribute has it; "" fits the view
   up: Up | null; // the recording's axis that points up; null: as it says itself. A change fits the view.
   /** A new recording: forgets the last one's groups, fits the view. */
@@ -68,7 +68,7 @@ export class GraphicsError extends Error {
   override name = "GraphicsError";
 }
 
-/** Where playbacks and stages come from; tests put others in. */
+/** Factory of playbacks and stages; tests replace it. */
 export interface Engine {
   open(source: string | Blob, settings: Settings): Playback;
   /** Fetches what stages are made with; null where that is there. Rejects where it cannot be fetched. */

@@ -14,7 +14,7 @@ import type { Up } from "@meshreel/player-three/upright";
 
 const FOV = 45; // degrees, of the picture's height
 const TANGENT = Math.tan((FOV * Math.PI) / 360); // of half of that
-const FROM = new Vector3(0.25, 0.25, 1).normalize(); // where a view that fits looks from
+const FROM = new Vector3(0.25, 0.25, 1).normalize(); // direction from which a fitting view looks
 const MARGIN = 1.05; // of the distance at which everything just fits
 const STEEPEST = 0.01; // radians from straight above or below
 const CLOSEST = 1e-3; // of the recording's size: how near the camera comes
@@ -26,13 +26,13 @@ export class ThreeStage extends EventTarget implements Stage {
   readonly canvas: HTMLCanvasElement;
   readonly #renderer: WebGLRenderer;
   readonly #scene = new Scene();
-  readonly #content = new Group(); // what a headset moves
+  readonly #content = new Group(); // moved by a headset
   readonly #eye = new PerspectiveCamera(FOV, 1, 0.01, 1000);
   readonly #orbit: OrbitControls;
   readonly #stop = new AbortController();
   readonly #sorter: Sorter;
   readonly #floor = new Ground();
-  #shaded: Shown | null = null; // whose shadow lies on it
+  #shaded: Shown | null = null; // the mesh of the shadow on it
   ground = true;
   #reel: ReelScene;
   #box: Box | null = null; // of the recording, as it stands
@@ -262,7 +262,7 @@ export class ThreeStage extends EventTarget implements Stage {
     this.#orbit.enableDamping = glides();
   }
 
-  /** What the camera looks at keeps before it: to go around that when flying ends. */
+  /** Keep the target in front of the camera, to orbit around it when flying ends. */
   #flown(): void {
     this.isFit = false;
     this.#orbit.target.set(0, 0, -this.#fly.size / 4).applyQuaternion(this.#eye.quaternion).add(this.#eye.position);
@@ -297,7 +297,7 @@ export class ThreeStage extends EventTarget implements Stage {
   }
 }
 
-/** How far from a box's middle, in the direction FROM, all its corners are seen; tangents of half the angles of view are given. */
+/** Distance from a box's middle, in the direction FROM, at which all its corners are visible, given the tangents of half the angles of view. */
 function distanceOf({ size }: Box, wide: number, high: number): number {
   const right = new Vector3(0, 1, 0).cross(FROM).normalize();
   const up = FROM.clone().cross(right);
@@ -310,7 +310,7 @@ function distanceOf({ size }: Box, wide: number, high: number): number {
   return distance;
 }
 
-/** Whether the camera comes to rest softly. */
+/** True if the camera comes to rest softly. */
 function glides(): boolean {
   return !matchMedia("(prefers-reduced-motion: reduce)").matches;
 }

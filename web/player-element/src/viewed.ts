@@ -1,4 +1,4 @@
-// What an element offers of its picture: camera, headset, screenshots.
+// Properties of an element's picture: camera, headset, screenshots.
 
 import { arSupported, vrSupported } from "@meshreel/xr/supported";
 import { Reflected } from "./reflected.ts";
@@ -8,14 +8,14 @@ export class Viewed extends Reflected {
   /** The picture; null before there is one. */
   protected view: View | null = null;
 
-  /** Where the camera is, as text that the attribute `camera` takes. */
+  /** Position and target of the camera, as text for the attribute `camera`. */
   get camera(): string {
     return this.view?.stage.camera ?? this.getAttribute("camera") ?? "";
   }
   set camera(value: string) {
     this.setAttribute("camera", value);
   }
-  /** Whether the view was changed since it fitted. */
+  /** True if the view was changed since it fitted. */
   get cameraMoved(): boolean {
     return this.view !== null && !this.view.stage.isFit;
   }

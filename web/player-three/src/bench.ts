@@ -1,4 +1,4 @@
-// What a viewer's device does with a recording, as numbers that they can send.
+// Measurements of a viewer's device, as numbers that they can send.
 
 /** The median, and what 95 % of the values do not exceed; null where there are none. */
 export interface Spread {
@@ -6,12 +6,12 @@ export interface Spread {
   readonly most95: number | null;
 }
 
-/** What the collector cannot know itself. */
+/** Facts that the collector cannot know itself. */
 export interface BenchExtra {
   readonly gpuBytes: number; // of the recording's buffers and textures
   readonly triangles: number; // of a picture
   readonly userAgent: string;
-  readonly place?: string; // where it was drawn, such as "page, 1280 x 720" or "VR"
+  readonly place?: string; // place of drawing, such as "page, 1280 x 720" or "VR"
   /** Hz, where it is known. Else it follows from the shortest intervals: a display that is always too fast goes unnoticed. */
   readonly displayRate?: number;
   readonly gpu?: string;

@@ -14,7 +14,7 @@ export interface Look {
   readonly mode: IUniform<number>;
   readonly flatNormals: IUniform<boolean>;
   readonly up: IUniform<Vector>;
-  readonly ground: IUniform<readonly [number, number]>; // where it is along `up`, and 1 / the height of what stands on it
+  readonly ground: IUniform<readonly [number, number]>; // its position along `up`, and 1 / the height of the recording
 }
 
 export function makeLook(): Look {
@@ -59,7 +59,7 @@ export interface Paint {
   readonly color: Vector;
 }
 
-/** What is drawn beside the surface; the first two need the feed `corner`. */
+/** Extras drawn beside the surface; the first two need the feed `corner`. */
 export interface Extras {
   readonly edges: boolean;
   readonly places: boolean; // of corners, in a texture

@@ -1,4 +1,4 @@
-// How surfaces may look.
+// Appearances of surfaces.
 
 import type { Info } from "@meshreel/player-core/types";
 
@@ -9,7 +9,7 @@ import type { Info } from "@meshreel/player-core/types";
 export const MODES = ["splats", "color", "shaded", "normal", "wireframe", "tracks"] as const;
 export type Mode = (typeof MODES)[number];
 
-/** What a recording may look like. */
+/** Appearance of a recording. */
 export type Looks = Pick<Info, "hasColors" | "hasSplats">;
 
 /** Modes that a recording can be shown in. */

@@ -1,4 +1,4 @@
-// What a `Worker` loads that orders splats: keeps the splats of each who asks.
+// Entry point of the `Worker` that orders splats: keeps the splats of each client.
 
 import { orderSplats } from "./order.ts";
 import type { OrderJob, Ordered } from "./order.ts";

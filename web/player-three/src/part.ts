@@ -44,14 +44,14 @@ export class Part extends Group {
     return this.#upload;
   }
 
-  /** Whether the edges of triangles are drawn, from the next `show` on. */
+  /** True if the edges of triangles are drawn, from the next `show` on. */
   set edges(edges: boolean) {
     if (edges === this.#edges) return;
     this.hide();
     this.#edges = edges;
   }
 
-  /** Whether splats are drawn where there are some, from the next `show` on. */
+  /** True if splats are drawn, should there be some, from the next `show` on. */
   set withSplats(withSplats: boolean) {
     if (withSplats === this.#withSplats) return;
     this.hide();
@@ -116,7 +116,7 @@ export class Part extends Group {
   }
 }
 
-/** What is the same in all frames. To be called after the upload's geometry was asked for, which may make the textures. */
+/** Set what is equal in all frames. Call it after access to the upload's geometry, which may make the textures. */
 export function setUpload(uniforms: PartUniforms, upload: Upload): void {
   uniforms.boxMinimum.value = upload.packed.box.minimum;
   uniforms.boxSize.value = upload.packed.box.size;

@@ -1,4 +1,4 @@
-// What of a packed value is drawn in which frame.
+// Ranges of a packed value that each frame draws.
 
 import type { Packed, PackedGroup } from "@meshreel/player-core/types";
 
@@ -7,7 +7,7 @@ export function localFrame(group: PackedGroup, frame: number): number {
   return Math.min(Math.max(frame - group.firstFrame, 0), group.frameCount - 1);
 }
 
-/** How many triangles a frame shows. */
+/** Number of triangles that a frame shows. */
 export function triangleCount(packed: Packed, frame: number): number {
   const always = packed.faces.length;
   if (packed.kind === "static") return always / 3;
@@ -15,7 +15,7 @@ export function triangleCount(packed: Packed, frame: number): number {
   return (always + packed.extraStarts[t + 1] - packed.extraStarts[t]) / 3;
 }
 
-/** How many numbers vertices of the value can have, padding included. */
+/** Largest number of the value's vertices, padding included. */
 export function vertexRoom(packed: Packed): number {
   if (packed.kind === "static") return packed.vertexCount;
   return packed.textureWidth * packed.textureHeight - (packed.frameCount - 1) * packed.vertexCount;

@@ -56,7 +56,7 @@ export class ReelScene extends Group {
     return this.#tracks.map(({ splatCount }) => splatCount);
   }
 
-  /** How surfaces look. To be seen from the next `show` on. */
+  /** Appearance of surfaces, from the next `show` on. */
   get mode(): Mode {
     return this.#mode;
   }
@@ -85,7 +85,7 @@ export class ReelScene extends Group {
   stand(turned: Matrix4, bottom: number, height: number): void {
     this.quaternion.setFromRotationMatrix(turned);
     const row = turned.elements;
-    this.#look.up.value = [row[1], row[5], row[9]]; // what points up in the recording's own axes
+    this.#look.up.value = [row[1], row[5], row[9]]; // up in the recording's axes
     this.#look.ground.value = [bottom, 1 / (height || 1)];
   }
 

@@ -1,6 +1,6 @@
 // GLSL ES 3.00. A vertex is four uint16, as `PackedVertices` in player-core/src/types.ts has them.
 
-/** Where a vertex comes from: an attribute; the texture at gl_VertexID; the texture at an attribute, corner by corner. */
+/** Source of a vertex: an attribute; the texture at gl_VertexID; the texture at an attribute, corner by corner. */
 export type Feed = "attribute" | "texture" | "corner";
 
 export const PRECISION = /* glsl */ `

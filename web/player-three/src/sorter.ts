@@ -5,7 +5,7 @@ import type { Vector } from "./colors.ts";
 import { orderSplats } from "./order.ts";
 import type { OrderJob, Ordered } from "./order.ts";
 
-/** What it needs of a Worker. */
+/** The part of a Worker that it needs. */
 export interface OrderWorker {
   postMessage(message: OrderJob, transfer: Transferable[]): void;
   terminate(): void;
@@ -13,7 +13,7 @@ export interface OrderWorker {
   onerror: ((event: never) => void) | null;
 }
 
-/** What is to be ordered; `texels` are copied. */
+/** Set the splats to order; `texels` are copied. */
 export interface Question {
   readonly splats: PackedSplats;
   readonly texels: Uint16Array;

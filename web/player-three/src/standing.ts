@@ -1,4 +1,4 @@
-// How a recording stands in a scene.
+// Orientation of a recording in a scene.
 
 import { Matrix4 } from "three";
 import type { Box, Info } from "@meshreel/player-core/types";

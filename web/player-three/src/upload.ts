@@ -1,4 +1,4 @@
-// What the GPU holds of one packed value. Everything lies over the value's own arrays: nothing is copied, and a lost context can
+// GPU buffers and textures of one packed value. Everything lies over the value's own arrays: nothing is copied, and a lost context can
 // be filled again from them.
 
 import { BufferAttribute, BufferGeometry, DataTexture, IntType, RGBAFormat, RGBAIntegerFormat, Sphere, UnsignedByteType, UnsignedIntType, UnsignedShortType, Vector3 } from "three";
@@ -57,7 +57,7 @@ export class Upload {
     return attributes + textures + corners * (this.#hasCorners ? 2 : 1);
   }
 
-  /** Whether it has places in a texture: then each corner is drawn for itself, with edges or without. */
+  /** True if it has places in a texture: then each corner is drawn separately, with edges or without. */
   get isTextured(): boolean {
     return this.packed.places !== null;
   }

@@ -36,7 +36,7 @@ export class Warmer {
     const patches = mode === "splats" && upload.splats !== null;
     this.#mesh.material = this.#materials[upload.packed.kind].of({ edges, places: upload.isTextured, patches });
     const geometries = [upload.faces(edges), upload.extra(edges)].filter((geometry) => geometry !== null);
-    this.#uniforms.vertices.value = upload.texture; // which the geometries may have made, as the other one
+    this.#uniforms.vertices.value = upload.texture; // the geometries may have made it, as the other one
     this.#uniforms.colors.value = upload.colors;
     if (patches) {
       renderer.initTexture(upload.splats!);

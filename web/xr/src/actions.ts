@@ -1,4 +1,4 @@
-// What a viewer in a headset asks for. By itself, so that a page knows it without three.js.
+// Wishes of a viewer in a headset. A separate module, so that a page can import it without three.js.
 
 export interface VrActions {
   /** Plays, or pauses. */

@@ -58,11 +58,11 @@ export class Grab {
     const y = position.y - this.#takenMiddle.y;
     const z = position.z - this.#takenMiddle.z;
     this.#middle.addVectors(left, right).multiplyScalar(0.5);
-    // What was between the hands stays there.
+    // The point between the hands stays there.
     pose.position.set(cos * x + sin * z, y, cos * z - sin * x).multiplyScalar(factor).add(this.#middle);
   }
 
-  /** How far the line from hand to hand turned, as seen from above. */
+  /** Turn of the line from hand to hand, seen from above. */
   #turnOf(left: Vector3, right: Vector3): number {
     const x0 = this.#takenRight.x - this.#takenLeft.x;
     const z0 = this.#takenRight.z - this.#takenLeft.z;

@@ -43,7 +43,7 @@ export class Hand {
     this.#pointing.addEventListener("squeezeend", this.#letGo);
   }
 
-  /** Where it holds the recording, in the room's space; null where it does not, or is not seen. */
+  /** Point at which it holds the recording, in the room's space; null if it does not, or is not tracked. */
   get holds(): Vector3 | null {
     return this.#squeezes && this.#grip.visible ? this.#grip.position : null;
   }

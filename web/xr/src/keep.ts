@@ -1,4 +1,4 @@
-// What a session changes of the page's own objects, to be put back.
+// Properties of the page's objects that a session changes, to be restored.
 
 import type { Object3D, PerspectiveCamera, WebGLRenderer } from "three";
 import { Vector2 } from "three";

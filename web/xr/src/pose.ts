@@ -1,4 +1,4 @@
-// Where the recording stands in the room. Room: metres, y up, y = 0 on the floor, as WebXR's local-floor has it.
+// Pose of the recording in the room. Room: metres, y up, y = 0 on the floor, as WebXR's local-floor has it.
 
 import { Quaternion, Vector3 } from "three";
 import type { Object3D } from "three";
@@ -55,7 +55,7 @@ export function place(box: Box, viewer: Viewer, pose: Pose, passthrough = false)
   pose.position.set(viewer.x - distance * sin - scale * (cos * x + sin * z), -scale * box.minimum[1], viewer.z - distance * cos - scale * (cos * z - sin * x));
 }
 
-/** Where a head is, and which way it looks, seen from above. */
+/** Position and direction of a head, seen from above. */
 export function setViewer(viewer: Viewer, position: DOMPointReadOnly, orientation: DOMPointReadOnly): void {
   const rotation = new Quaternion(orientation.x, orientation.y, orientation.z, orientation.w);
   const forward = new Vector3(0, 0, -1).applyQuaternion(rotation);

@@ -34,7 +34,7 @@ ON_THE_WAY = 3  # vertices after the first step, in those that are wanted
 
 
 class Point(NamedTuple):
-    """How a single frame is coded."""
+    """Settings of the coding of single frames."""
 
     qp: int  # bits along the longest side of the frame
     levels: int = 0  # midpoint subdivisions in the decoder

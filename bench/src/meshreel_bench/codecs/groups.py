@@ -34,7 +34,7 @@ class GroupStore:
             self._known[key] = tuple((len(group.frames), group.fitted) for group in found)
 
     def find(self, interval: Interval, options: PaperOptions, stages: Stages | None = None) -> list[FoundGroup]:
-        """Return what `paper.find_groups` returns, from the store where the interval is kept."""
+        """Return the result of `paper.find_groups`, from the store if the interval is kept."""
         if (known := self._known.get(_key(interval, options))) is None:
             return find_groups(interval, options, stages)
         frames, groups, first = list(interval.frames), list[FoundGroup](), 0

@@ -80,7 +80,7 @@ class Dataset:
 
 @dataclass(frozen=True, slots=True)
 class Store:
-    """Where sequences are found, and where those that take long to make are kept."""
+    """Folders of sequences, and of those that take long to make."""
 
     data: Path  # the folder of the benchmark data
     cache: Path | None = None  # scenes, recordings and remeshed bodies are kept here; scenes and recordings need it
@@ -204,10 +204,10 @@ def _places(name: str, data: Path) -> Sequence[Path]:
 
 
 def _is_path(name: str) -> bool:
-    """Whether somebody means a path, and no name that they know."""
+    """Return whether a name is meant as a path."""
     return name.startswith(".") or any(sign in name for sign in {"/", os.sep})
 
 
 def _is_known(path: Path, data: Path) -> bool:
-    """Whether a path is of the benchmark data, which have checksums."""
+    """Return whether a path belongs to the benchmark data, which have checksums."""
     return path.is_relative_to(data) and path.relative_to(data).as_posix() in known_checksums()

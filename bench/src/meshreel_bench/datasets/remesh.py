@@ -28,7 +28,7 @@ Place = tuple[float, float, float] | Float64[np.ndarray, "T 3"]
 
 @dataclass(frozen=True, slots=True)
 class RemeshOptions:
-    """How a frame gets connectivity of its own."""
+    """Settings that give each frame its own connectivity."""
 
     vertices: int = 10_000  # about this number is kept
     levels: int = 1  # midpoint subdivisions before the jitter

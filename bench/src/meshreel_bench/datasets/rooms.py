@@ -25,7 +25,7 @@ WALLS = (0.35, 0.0, 0.35)  # m from the walls to the cameras
 
 @dataclass(frozen=True, slots=True)
 class RoomOptions:
-    """Which scene, and how well it is measured."""
+    """Choice of a scene, and precision of its measurement."""
 
     name: str = "room2"
     frames: int = FRAMES

@@ -72,7 +72,7 @@ class SceneData:
         return self.labels(number, source)[_kept_array(path, lambda: _nearest_labels(clean, counts[parts], mesh))]
 
     def labels(self, number: int, source: str = TRUE) -> Bool[np.ndarray, " F"]:
-        """Which faces of a frame move: those nearest to clean ones that do (`TRUE`), or what the encoder finds."""
+        """Return a mask of a frame's moving faces: by the nearest clean face (`TRUE`), or as the encoder finds them."""
         if source == TRUE:
             path = self.folder / "labels" / f"{TRUE}-{number:05}.npy"
             clean = self.truth[number]

@@ -58,7 +58,7 @@ class Walker(Frames):
 
 @dataclass(frozen=True, slots=True)
 class Truth:
-    """What the person looks like to cameras without errors."""
+    """Appearance of the person in cameras without errors."""
 
     def luma(
         self, number: int, points: Float64[np.ndarray, "N 3"]

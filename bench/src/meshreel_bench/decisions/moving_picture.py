@@ -49,7 +49,7 @@ def main(folder: Path = Path("docs/pictures"), demo: Path | None = None) -> None
 
 
 def played(file: Path, frames: range, folder: Path) -> list[Image.Image]:
-    """Return what the player shows of some frames."""
+    """Return pictures of some frames in the player."""
     query = f"?autoplay=0&controls=0&layers={ALL}&interpolate=off&background=white&camera={CAMERA}"
     with playing(file) as address:
         values = [address + query, folder, *SIZE, *frames]

@@ -118,7 +118,7 @@ def reference(stages: Stages, path: Path) -> None:
 
 
 def fit(stages: Stages, path: Path) -> None:
-    """How far the reference is from a frame: deformed only, then fitted."""
+    """Draw the distance of the reference from a frame: only deformed, then fitted."""
     sheet = Sheet(4, 260, bar=True)
     last = len(stages.frames) - 1
     frame, faces = stages.frames[last], stages.coded.base.faces
@@ -155,7 +155,7 @@ def components(stages: Stages, path: Path) -> None:
 
 
 def decoded(stages: Stages, path: Path) -> None:
-    """What `meshreel compare --sheet` draws: original, decoded, error."""
+    """Draw the sheet of `meshreel compare --sheet`: original, decoded, error."""
     last = len(stages.frames) - 1
     pictures = MeshList(stages.frames), MeshList(stages.decoded)
     write_sheet(*pictures, path, SheetOptions(frames=(0, last), height=340))
@@ -191,7 +191,7 @@ PICTURES: dict[str, Picture] = {
 
 
 def _around_hands(stages: Stages, t: int) -> Mesh:
-    """What lies in the middle between the two, a tenth of the diagonal around."""
+    """Return the points in the middle between the two people, within a tenth of the diagonal."""
     box = Box.of(stages.frames)
     middle = box.center + [0, 0.14 * box.size[1], 0]
     frame = stages.frames[t]

@@ -79,7 +79,7 @@ class StageTimer:
 
 
 def cost_of(timers: Sequence[StageTimer], frames: int) -> Encoding:
-    """Return what was spent on a frame while these timers ran, and this process's peak memory."""
+    """Return the time per frame while these timers ran, and this process's peak memory."""
 
     def a_frame(totals: Sequence[Mapping[str, float]]) -> dict[str, float]:
         names = dict.fromkeys(name for total in totals for name in total)

@@ -31,7 +31,7 @@ Values = dict[str, float | None]
 
 
 def headset_values(data: bytes, level: int, throttle: float, rate: float) -> Values:
-    """Return what playing levels up to one takes, the better of two tries where the first loses pictures.
+    """Return the cost of playing levels up to `level`, the better of two tries if the first loses pictures.
 
     InputError without the checkout, Node or Chromium.
     """

@@ -18,7 +18,7 @@ _DIGITS = 12  # of a commit
 
 @cache
 def maker() -> Maker:
-    """Return what makes rows here."""
+    """Return the machine and versions that make rows here."""
     machine = (platform.platform(), platform.python_version(), processor(), os.cpu_count())
     return Maker(__version__, _commit(), *machine)
 

@@ -101,7 +101,7 @@ def _colors(frames: Measured) -> dict[str, float]:
 
 
 def _depth(frames: Measured) -> Values:
-    """Return what the depth pictures of a recording say of all its frames, and of bodies in the input beside it."""
+    """Return metrics of all frames by a recording's depth pictures, and of bodies in the input beside them."""
     source = captured(frames.known.sequence)
     if source.depth is None:
         raise InputError("only recordings have depth pictures; measure others without them")

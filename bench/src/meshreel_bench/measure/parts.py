@@ -1,4 +1,4 @@
-"""What a file does with the parts of a scene: bytes of each, when a thing at rest becomes room, people that it misses.
+"""Measures of a file's parts of a scene: bytes of each, time until an object at rest becomes room, missed people.
 
 In: a decoded video, and the truth by part. Which part a decoded face is of follows from the nearest clean face.
 """

@@ -25,7 +25,7 @@ Report = Callable[[Row, bool], None]  # of a row, and whether it is new
 
 @dataclass(frozen=True, slots=True)
 class Measuring:
-    """How points are measured."""
+    """Settings of the measurement of points."""
 
     store: Store
     limit_s: float | None = None  # wall time of a point
@@ -63,7 +63,7 @@ def run_points(
 
 
 def _is_valid(row: Row, how: Measuring) -> bool:
-    """Whether a row stands for its point as it would be measured now."""
+    """Return whether a row is still valid for its point."""
     if row.failed and how.retry:
         return False
     return row.source == how.store.digest(row.point.sequence) and row.codec_version == codec_version(row.point.codec)
@@ -78,7 +78,7 @@ def runs_of(points: Sequence[Point]) -> list[list[Point]]:
 
 
 def _shared(point: Point) -> object:
-    """Return what is equal for points that share an analysis, or the file that is played."""
+    """Return a key that is equal for points that share an analysis, or the played file."""
     if point.codec == HEADSET:
         return point.sequence, point.codec
     try:

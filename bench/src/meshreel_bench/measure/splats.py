@@ -40,7 +40,7 @@ FLOATS = 14  # numbers of a splat with harmonics of degree 0: place 3, scale 3, 
 
 @dataclass(slots=True)
 class _Found:
-    """What pictures of splats are apart from those of the originals, and what sets of splats take."""
+    """Errors of pictures of splats against those of the originals, and sizes and times of sets of splats."""
 
     squares: dict[str, list[float]]
     scores: list[float]
@@ -52,7 +52,7 @@ class _Found:
 def splat_values(
     known: Dataset, painted: Callable[[int], Mesh], decoded: Sequence[Mesh], numbers: Sequence[int], data: bytes
 ) -> dict[str, float]:
-    """Return what splats on the decoded frames reach; `painted` has the frames in colour."""
+    """Return the metrics of splats on the decoded frames; `painted` has the frames in colour."""
     count, unit = len(known.sequence), known.sequence[0].diagonal  # splats are in units of it, as in a file
     chains = (
         chains_of(data)

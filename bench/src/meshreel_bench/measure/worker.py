@@ -28,7 +28,7 @@ class WorkerError(Exception):
 
 
 def in_fresh_process(task: Callable[..., Iterator[Any]], *about: object, limit_s: float | None = None) -> Iterator[Any]:
-    """Yield what `task(*about)` yields in a fresh process, by pickle. WorkerError after `limit_s`, an error, an end."""
+    """Run `task(*about)` in a fresh process, and yield its items. WorkerError after `limit_s`, an error, an end."""
     os.environ.update(_ONE_THREAD)  # of processes that start from now on: libraries here have read theirs
     here, there = _SPAWN.Pipe(duplex=False)
     process = _SPAWN.Process(target=_answer, args=(there, task, about))

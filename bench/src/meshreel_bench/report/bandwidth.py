@@ -23,7 +23,7 @@ SYSTEMS = (TSMC, TVMC, DRACO, KLT, NECGS, BEST)
 
 
 def headline_table(rows: Sequence[Row]) -> Iterator[str]:
-    """Yield what each system needs for an SSIM of .9, of whole pictures and of covered pixels, on every sequence."""
+    """Yield each system's rate for an SSIM of .9, of whole pictures and of covered pixels, on every sequence."""
     names = sequences(rows)
     yield f"| | {' | '.join(names)} |"
     yield "|" + "---|" * (len(names) + 1)

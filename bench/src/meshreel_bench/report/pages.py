@@ -50,7 +50,7 @@ class Part:
 
     @property
     def is_drawn(self) -> bool:
-        """Whether it has a plot."""
+        """True if it has a plot."""
         return drawable(self.rows, self.study.measures[:2])
 
     @property
@@ -132,7 +132,7 @@ def _plot_name(part: Part, sequence: str) -> str:
 
 
 def _first_page(parts: Sequence[Part]) -> list[str]:
-    """Return what to believe, three plots and one table."""
+    """Return the lines of the first page: verdicts, three plots and one table."""
     paper = reproducing_page({part.name: part.rows for part in parts if part.name == OPEN})
     made = {
         "{verdicts}": [*_kept_promises(parts), *_doubts(parts)],
@@ -152,7 +152,7 @@ def _first_page(parts: Sequence[Part]) -> list[str]:
 
 
 def _doubts(parts: Sequence[Part]) -> list[str]:
-    """Return what cannot be compared: points whose bytes differ by experiment, codecs that were given other data."""
+    """Return notes on rows that cannot be compared: of points whose bytes differ by experiment, or of other data."""
     names = {id(row): part.name for part in reversed(parts) for row in part.rows}
     rows = [row for part in parts for row in part.rows]
     points = [

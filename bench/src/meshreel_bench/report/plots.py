@@ -51,7 +51,7 @@ def plot_curves(
 
 
 def drawable(rows: Sequence[Row], measures: Sequence[Measure]) -> bool:
-    """Whether rows have anything that `plot_curves` draws."""
+    """Return whether rows have anything that `plot_curves` draws."""
     return any(value(row, measure.key) is not None for row in rated(rows) for measure in measures)
 
 

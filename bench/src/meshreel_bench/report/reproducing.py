@@ -168,7 +168,7 @@ def _shown(row: Row | None) -> str:
 
 
 def _setting(row: Row) -> str:
-    """Return what TSMC is set to: several of its options choose a rate."""
+    """Return the settings of TSMC: several of its options choose a rate."""
     name = curve_of(row)
     if name in (TSMC, *WRITTEN):
         finest = f", {row.options['centers']} centers, {row.options['variant']}" if name == LITERAL_FINEST else ""

@@ -26,7 +26,7 @@ VARIATION, DRAWS = 0.35, 20  # of an interval's time: its deviation over its mea
 
 
 def value(row: Row, key: str) -> float | None:
-    """Return what a row knows by a name: a metric, or one of `DERIVED`; None where it was not measured."""
+    """Return a row's value by name: a metric, or one of `DERIVED`; None if it was not measured."""
     for prefix, found in (("encode_s.", row.encoding.stages_s), ("work.", row.encoding.work)) if row.encoding else ():
         if key.startswith(prefix):
             return found.get(key.removeprefix(prefix))
@@ -105,7 +105,7 @@ def _at_rest(seconds: float | None, reference_s: float | None) -> float | None:
 
 
 def _efficiency(row: Row, workers: int, interval: int) -> float | None:
-    """Return what share of their time workers are busy with an hour of frames, by a row's times and without parent."""
+    """Return the busy share of workers' time in an hour of frames, by a row's times and without the parent."""
     stages = row.encoding.stages_s if row.encoding else {}
     if "survey" not in stages:
         return None
@@ -230,7 +230,7 @@ def hull_of(rows: Sequence[Row], names: Sequence[str], measure: Measure) -> Curv
 
 
 def floors(rows: Iterable[Row]) -> dict[str, float]:
-    """Return what the truth itself reaches by metric; against the input what the input reaches against the truth."""
+    """Return the values of the truth itself by metric; against the input, those of the input against the truth."""
     found = [row for row in rows if row.point.codec == FLOOR and not row.failed]
     known: dict[str, Any] = dict(found[0].metrics) if found else {}
     if found and found[0].point.metrics == "regions":

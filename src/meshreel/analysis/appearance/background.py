@@ -1,6 +1,6 @@
-"""Colours of a background: what its places show in most frames, so that nobody who passes leaves a ghost.
+"""Colours of a background: the medians over frames, so that people who pass by leave no ghosts.
 
-In: places with normals, and what knows their colours in some frames. Out: the median of the colours of each place.
+In: points with normals, and sources of their colours in some frames. Out: the median colour of each point.
 """
 
 from __future__ import annotations
@@ -19,19 +19,19 @@ BLOCK = 1 << 16  # places whose medians are taken at a time: 16 frames of them t
 def median_colors(
     points: Float64[np.ndarray, "N 3"], normals: Float64[np.ndarray, "N 3"], paints: Iterable[Paint]
 ) -> tuple[UInt8[np.ndarray, "N 3"], Bool[np.ndarray, " N"]]:
-    """Return the medians over frames of the colours of places, and which places some frame knows; others are grey."""
-    stack, known = list[np.ndarray](), list[np.ndarray]()
+    """Return the medians over frames of the points' colours, and a mask of known colours; others are grey."""
+    stack, masks = list[np.ndarray](), list[np.ndarray]()
     for paint in paints:
-        colors, seen = paint.at(points, normals)
+        colors, mask = paint.at(points, normals)
         stack.append(np.clip(np.rint(colors), 0, 255).astype(np.uint8))
-        known.append(seen)
-    found = np.full(points.shape, GREY, np.uint8)
+        masks.append(mask)
+    medians_or_grey = np.full(points.shape, GREY, np.uint8)
     if not stack:
-        return found, np.zeros(len(points), bool)
-    seen = np.any(known, axis=0)
+        return medians_or_grey, np.zeros(len(points), bool)
+    mask = np.any(masks, axis=0)
     for start in range(0, len(points), BLOCK):
-        some = slice(start, start + BLOCK)
-        hidden = np.repeat(~np.stack([one[some] for one in known])[..., None], 3, axis=2)
-        medians = np.ma.median(np.ma.masked_array(np.stack([one[some] for one in stack]), hidden), axis=0)
-        found[some] = np.rint(np.ma.filled(medians, float(GREY))).astype(np.uint8)
-    return found, seen
+        block = slice(start, start + BLOCK)
+        hidden = np.repeat(~np.stack([array[block] for array in masks])[..., None], 3, axis=2)
+        medians = np.ma.median(np.ma.masked_array(np.stack([array[block] for array in stack]), hidden), axis=0)
+        medians_or_grey[block] = np.rint(np.ma.filled(medians, float(GREY))).astype(np.uint8)
+    return medians_or_grey, mask

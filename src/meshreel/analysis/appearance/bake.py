@@ -1,7 +1,7 @@
-"""Bake pictures: the colours that a painted surface has at the texels of an atlas, and colours between its charts.
+"""Bake pictures: sample a painted surface at the texels of an atlas, and fill the gaps between its charts.
 
-In: an atlas, the mesh that it is of in a frame, and a painted surface. Out: a picture without empty texels, so that a
-video of such pictures has no edges that the surface has not.
+In: an atlas, its mesh in a frame, and a painted surface. Out: a picture without empty texels, so that a video of such
+pictures has no edges that the surface lacks.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from ...types import GREY, Mesh
 
 @dataclass(frozen=True, slots=True)
 class Texels:
-    """The texels of an atlas whose middles are on the mesh, and where they are on it."""
+    """The texels of an atlas whose middles are on the mesh, with their places on it."""
 
     height: int
     width: int
@@ -28,7 +28,7 @@ class Texels:
     barycentric: Float64[np.ndarray, "N 3"]  # weights of the face's three corners
 
     def places(self, mesh: Mesh) -> Float64[np.ndarray, "N 3"]:
-        """Return where the texels are in space on a mesh with these faces."""
+        """Return the positions of the texels on a mesh with these faces."""
         return blend(mesh.vertices, mesh.faces[self.faces], self.barycentric)
 
 
@@ -49,16 +49,16 @@ def texels_of(layout: Layout, levels: int) -> Texels:
         pixels.append((y[inside].astype(np.int64)) * layout.width + x[inside].astype(np.int64))
         faces.append(np.full(int(inside.sum()), face))
         weights.append(np.stack([1 - v[inside] - w[inside], v[inside], w[inside]], axis=1))
-    known, first = np.unique(np.concatenate([np.zeros(0, np.int64), *pixels]), return_index=True)
-    found = np.concatenate([np.zeros(0, np.int64), *faces])[first]
-    finer, barycentric = _finer(found, np.concatenate([np.zeros((0, 3)), *weights])[first], levels)
-    return Texels(layout.height, layout.width, known, finer.astype(np.int32), barycentric)
+    numbers, first = np.unique(np.concatenate([np.zeros(0, np.int64), *pixels]), return_index=True)
+    base_faces = np.concatenate([np.zeros(0, np.int64), *faces])[first]
+    finer, barycentric = _finer(base_faces, np.concatenate([np.zeros((0, 3)), *weights])[first], levels)
+    return Texels(layout.height, layout.width, numbers, finer.astype(np.int32), barycentric)
 
 
 def _finer(
     faces: Int64[np.ndarray, " N"], weights: Float64[np.ndarray, "N 3"], levels: int
 ) -> tuple[Int64[np.ndarray, " N"], Float64[np.ndarray, "N 3"]]:
-    """Return places on faces as places on those that `levels` midpoint subdivisions make of them."""
+    """Convert places on faces to places on the faces after `levels` midpoint subdivisions."""
     for _ in range(levels):
         largest = weights.argmax(axis=1)
         at_corner = weights[np.arange(len(weights)), largest] >= 0.5
@@ -73,15 +73,15 @@ def _finer(
 
 
 def bake(paint: Paint, mesh: Mesh, texels: Texels) -> tuple[UInt8[np.ndarray, "N 3"], Bool[np.ndarray, " N"]]:
-    """Return the colours of the texels of a mesh, and which of them are known."""
-    colors, seen = paint.at(texels.places(mesh), face_normals(mesh)[0][texels.faces])
-    return np.clip(np.rint(colors), 0, 255).astype(np.uint8), seen
+    """Return the colours of the texels of a mesh, and a mask of the known ones."""
+    colors, known = paint.at(texels.places(mesh), face_normals(mesh)[0][texels.faces])
+    return np.clip(np.rint(colors), 0, 255).astype(np.uint8), known
 
 
 def picture(
     texels: Texels, colors: UInt8[np.ndarray, "N 3"], seen: Bool[np.ndarray, " N"]
 ) -> UInt8[np.ndarray, "H W 3"]:
-    """Return a picture with these colours of its texels, and elsewhere colours that lead from one to the other."""
+    """Return a picture with these colours of its texels, interpolated elsewhere."""
     values = np.full((texels.height * texels.width, 3), float(GREY))
     values[texels.pixels] = colors
     known = np.zeros(len(values), bool)
@@ -92,7 +92,7 @@ def picture(
 
 
 def _filled(values: Float64[np.ndarray, "H W 3"], known: Bool[np.ndarray, "H W"]) -> Float64[np.ndarray, "H W 3"]:
-    """Give unknown pixels the means of known ones nearby: from pictures of half the size, and of half that size ..."""
+    """Fill unknown pixels with means of known ones nearby, from recursively halved pictures."""
     if known.all() or not known.any() or min(known.shape) < 2:
         mean = values[known].mean(axis=0) if known.any() else np.full(3, float(GREY))
         return np.where(known[..., None], values, mean)

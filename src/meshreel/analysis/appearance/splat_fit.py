@@ -1,7 +1,7 @@
 """Fit splats to pictures of a moving mesh: all frames share the splats, and the mesh moves them.
 
-In: the mesh in some frames, and in each cameras with their pictures on white -> splats, and how important each is. Adam
-on one picture after another; splats that nobody sees move to where errors are. Needs the extra `splats` (torch).
+In: the mesh in some frames, with cameras and their pictures on white -> splats, and the importance of each. Adam takes
+one picture after another; splats that no camera sees move to where errors are. Needs the extra `splats` (torch).
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ from ...geometry.cameras import Camera
 from ...geometry.splats import Carrier, Splats, locate, pose
 from .splat_raster import LEAST, Drawing, Flat, camera_matrices, project
 
-COVER = 0.45  # standard deviation of a splat in the beginning, in the root of its share of the surface (guess)
-RATES = {  # of Adam, in the units of `Splats`; logarithms of scales, and logits of opacities (guess)
+COVER = 0.45  # initial standard deviation of a splat, in the root of its share of the surface (guess)
+RATES = {  # learning rates of Adam, in the units of `Splats`; logarithms of scales, and logits of opacities (guess)
     "weights": 5e-3,
     "offsets": 3e-4,
     "turns": 5e-2,
@@ -28,10 +28,10 @@ RATES = {  # of Adam, in the units of `Splats`; logarithms of scales, and logits
     "opacities": 1e-1,
     "colors": 2e-2,
 }
-LARGER, LONGER = 1.0, 0.7  # of logarithms: scales from those in the beginning, and from their mean (guess)
-LAST = 0.1  # share of the rates at the end (guess)
-FIRST_OPACITY = 0.9  # (guess)
-DEAD = 0.05  # of the mean of what splats add to pictures: less is as good as unseen (guess)
+LARGER, LONGER = 1.0, 0.7  # largest differences of log scales: from the initial one, and from their mean (guess)
+LAST = 0.1  # share of the learning rates that remains at the end (guess)
+FIRST_OPACITY = 0.9  # initial opacity (guess)
+DEAD = 0.05  # of the mean contribution of splats to pictures: a splat with less counts as unseen (guess)
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +44,7 @@ class SplatView:
 
 @dataclass(frozen=True, slots=True)
 class SplatFrame:
-    """The mesh of a frame, and what cameras see of it."""
+    """The mesh of a frame, and pictures of it."""
 
     carrier: Carrier
     views: tuple[SplatView, ...]
@@ -55,8 +55,8 @@ class FitSplatsOptions:
     """Options of the fit of splats."""
 
     count: int = 8000
-    steps: int = 900  # pictures that are looked at, one after the other
-    moves: int = 5  # times that unseen splats move to where errors are
+    steps: int = 900  # steps of Adam, each on one picture
+    moves: int = 5  # number of times that unseen splats move to where errors are
     seed: int = 0
 
     def __post_init__(self) -> None:
@@ -69,9 +69,9 @@ def fit_splats(
     options: FitSplatsOptions = FitSplatsOptions(),
     progress: Callable[[int], None] | None = None,
 ) -> tuple[Splats, Float64[np.ndarray, " N"]]:
-    """Return splats that look like the pictures of all frames, and what each adds to these.
+    """Return splats fitted to the pictures of all frames, and the contribution of each to them.
 
-    Raises InputError where no camera sees the surface, and without torch.
+    Raises InputError if no camera sees the surface, and without torch.
     """
     pictures = [(frame.carrier, view) for frame in frames for view in frame.views]
     if not any((view.pixels < 1).any() for _, view in pictures):
@@ -97,13 +97,13 @@ def fit_splats(
 
 
 class _Fit:
-    """Splats that are being fitted, as tensors of torch."""
+    """State of a fit: splats as tensors of torch."""
 
     def __init__(self, torch: Any, frames: Sequence[SplatFrame], options: FitSplatsOptions) -> None:
         self._torch, carrier = torch, frames[0].carrier
         self._faces, weights, area = _spread(carrier, options.count)
         count = len(self._faces)
-        self._first = float(np.log(COVER * np.sqrt(area / count)))  # logarithm of scales in the beginning
+        self._first = float(np.log(COVER * np.sqrt(area / count)))  # initial logarithm of scales
         first = {
             "weights": weights,
             "offsets": np.zeros(count),
@@ -124,8 +124,8 @@ class _Fit:
         """Improve the splats by one picture; `done` is the share of the steps."""
         torch = self._torch
         drawing, picture = self._drawn(carrier, view.camera)
-        wanted = torch.from_numpy(view.pixels)
-        error = torch.where(wanted.isnan(), 0.0, picture - wanted)  # NaN: unknown
+        target = torch.from_numpy(view.pixels)
+        error = torch.where(target.isnan(), 0.0, picture - target)  # NaN: unknown
         self._adam.zero_grad()
         (error.abs().mean() + (error * error).mean()).backward()
         for group, rate in zip(self._adam.param_groups, RATES.values(), strict=True):
@@ -142,7 +142,7 @@ class _Fit:
         self._errors += drawing.shares(error.detach().abs().mean(dim=2).numpy().astype(np.float64))
 
     def move(self, random: np.random.Generator) -> None:
-        """Move splats that add nothing to pictures to where those are that err most, which become smaller."""
+        """Move splats that add nothing to pictures to those with the largest errors, which become smaller."""
         torch, count = self._torch, len(self._faces)
         dead = np.flatnonzero(self.added < DEAD * self.added.mean())
         if len(dead):
@@ -161,45 +161,45 @@ class _Fit:
         self.added[:], self._errors[:] = 0, 0
 
     def result(self) -> tuple[Splats, Float64[np.ndarray, " N"]]:
-        """Return the splats, and what each added to the pictures since the last move."""
-        own = {name: values.detach().numpy().astype(np.float64) for name, values in self._own.items()}
-        scales, turns = np.exp(own["scales"]), own["turns"]
+        """Return the splats, and the contribution of each to the pictures since the last move."""
+        arrays = {name: values.detach().numpy().astype(np.float64) for name, values in self._own.items()}
+        scales, turns = np.exp(arrays["scales"]), arrays["turns"]
         is_swapped = scales[:, 0] < scales[:, 1]
         scales[is_swapped] = scales[is_swapped][:, ::-1]
         turns = np.mod(turns + np.where(is_swapped, np.pi / 2, 0), np.pi)
-        opacities, colors = 1 / (1 + np.exp(-own["opacities"])), np.clip(own["colors"], 0, 1)
-        splats = Splats(self._faces.copy(), own["weights"], own["offsets"], turns, scales, opacities, colors)
-        kept = (opacities >= LEAST) & (self.added > 0)
-        return splats.take(kept), self.added[kept]
+        opacities, colors = 1 / (1 + np.exp(-arrays["opacities"])), np.clip(arrays["colors"], 0, 1)
+        splats = Splats(self._faces.copy(), arrays["weights"], arrays["offsets"], turns, scales, opacities, colors)
+        visible = (opacities >= LEAST) & (self.added > 0)
+        return splats.take(visible), self.added[visible]
 
     def _drawn(self, carrier: Carrier, camera: Camera) -> tuple[Drawing, Any]:
-        torch, own = self._torch, self._own
-        weights = own["weights"]
+        torch, parameters = self._torch, self._own
+        weights = parameters["weights"]
         finer, now, along = locate(self._faces, weights.detach().numpy().astype(np.float64), carrier.levels)
         moved = (weights - weights.detach())[:, :, None] * _tensor(torch, along)
         corners = _tensor(torch, carrier.vertices[carrier.faces[finer]])
-        lengths = own["offsets"], own["turns"], own["scales"].exp(), 1.0
+        lengths = parameters["offsets"], parameters["turns"], parameters["scales"].exp(), 1.0
         means, axes, scales = pose(
             torch, corners, _tensor(torch, now) + moved.sum(dim=1), _tensor(torch, along), lengths
         )
         matrices = [_tensor(torch, matrix) for matrix in camera_matrices(camera)]
         flat = project(torch, means, axes, scales, (matrices[0], matrices[1]))
-        opacities = torch.sigmoid(own["opacities"])
+        opacities = torch.sigmoid(parameters["opacities"])
         if carrier.lacking is not None:
             opacities = opacities * torch.from_numpy(~carrier.lacking[finer])
         size, drawn = (camera.height, camera.width), list[Drawing]()
-        picture = self._composite.apply(*flat.tensors, opacities, own["colors"], size, drawn)
+        picture = self._composite.apply(*flat.tensors, opacities, parameters["colors"], size, drawn)
         return drawn[0], picture
 
     def _paint(self, frames: Sequence[SplatFrame]) -> None:
-        """Give each splat the mean of what pictures of some frames show where it is."""
+        """Give each splat the mean colour of the pixels that it covers in pictures of some frames."""
         sums, total = np.zeros((len(self._faces), 3)), np.full(len(self._faces), 1e-9)
         for frame in frames[:: max(len(frames) // 2, 1)]:
             for view in frame.views:
                 drawing, _ = self._drawn(frame.carrier, view.camera)
                 known = np.isfinite(view.pixels[..., 0])
-                shown = np.where(known[..., None], view.pixels, 0).astype(np.float64)
-                sums += np.stack([drawing.shares(shown[..., k]) for k in range(3)], axis=1)
+                pixels = np.where(known[..., None], view.pixels, 0).astype(np.float64)
+                sums += np.stack([drawing.shares(pixels[..., k]) for k in range(3)], axis=1)
                 total += drawing.shares(known.astype(np.float64))
         with self._torch.no_grad():
             self._own["colors"][:] = _tensor(self._torch, sums / total[:, None])
@@ -218,16 +218,16 @@ def _composite_function(torch: Any) -> Any:
             return _tensor(torch, context.drawing.picture)
 
         @staticmethod
-        def backward(context: Any, *given: Any) -> Any:
-            centers, conics, opacities, colors = context.drawing.gradients(given[0].numpy().astype(np.float64))
-            found = [_tensor(torch, values) for values in (centers, conics, opacities, colors)]
-            return found[0], found[1], None, None, found[2], found[3], None, None
+        def backward(context: Any, *gradient: Any) -> Any:
+            centers, conics, opacities, colors = context.drawing.gradients(gradient[0].numpy().astype(np.float64))
+            gradients = [_tensor(torch, values) for values in (centers, conics, opacities, colors)]
+            return gradients[0], gradients[1], None, None, gradients[2], gradients[3], None, None
 
     return Composite
 
 
 def _spread(carrier: Carrier, count: int) -> tuple[Int32[np.ndarray, " N"], Float64[np.ndarray, "N 2"], float]:
-    """Return faces of the base mesh and places on them, evenly over the surface, and its area."""
+    """Return base faces and places on them, evenly spread over the surface, and its area."""
     a, b, c = np.moveaxis(carrier.vertices[carrier.faces], 1, 0)
     areas = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
     ends = np.cumsum(areas)

@@ -15,12 +15,12 @@ from jaxtyping import Float32, Float64, Int64
 from ...geometry.cameras import Camera
 from ...geometry.splats import Bound
 
-BLUR = 0.3  # pixels squared, added to the variances of what is drawn: no Gaussian falls between pixels
-LEAST = 1 / 255  # opacity that is drawn: less changes no picture of 8 bits
-MOST = 0.999  # opacity, so that what is behind has a gradient (guess)
-SPENT = 1e-4  # share of the light, below which what is behind is not drawn
-NEAR = 1e-6  # lengths before the camera, within which nothing is drawn
-WHITE = 1.0  # the background, as of `metrics.color_render`
+BLUR = 0.3  # pixels squared, added to projected variances so that no Gaussian falls between pixels
+LEAST = 1 / 255  # smallest opacity that is drawn: less changes no 8-bit picture
+MOST = 0.999  # largest opacity, so that Gaussians behind it have a gradient (guess)
+SPENT = 1e-4  # share of the remaining light below which Gaussians behind are not drawn
+NEAR = 1e-6  # depth up to which nothing is drawn
+WHITE = 1.0  # the background, as in `metrics.color_render`
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +34,6 @@ class Flat:
 
     @property
     def tensors(self) -> tuple[Any, Any, Any, Any]:
-        """All four."""
         return self.centers, self.conics, self.spreads, self.depths
 
 
@@ -56,12 +55,11 @@ def project(xp: Any, means: Any, axes: Any, scales: Any, camera: tuple[Any, Any]
 
 
 def camera_matrices(camera: Camera) -> tuple[Float64[np.ndarray, "3 4"], Float64[np.ndarray, "3 3"]]:
-    """Return what `project` takes."""
     return camera.extrinsic[:3], camera.intrinsic
 
 
 class Drawing:
-    """A picture of Gaussians, with what its gradients need."""
+    """A picture of Gaussians, with the values that its gradients need."""
 
     def __init__(
         self,
@@ -80,26 +78,26 @@ class Drawing:
         a, b, c = (flat.conics[:, k].astype(np.float32)[index] for k in range(3))
         power = -0.5 * (a * self._dx**2 + c * self._dy**2) - b * self._dx * self._dy
         alphas = opacities.astype(np.float32)[index] * np.exp(power)
-        kept = np.flatnonzero(alphas >= LEAST)
-        pixels = (y * size[1] + x)[kept]
-        kept = kept[_stable_order(pixels)]
-        self._index, self._pixels, alphas = index[kept], (y * size[1] + x)[kept], alphas[kept]
-        self._dx, self._dy = self._dx[kept], self._dy[kept]
-        self._is_free = alphas < MOST  # of the upper limit
+        drawn = np.flatnonzero(alphas >= LEAST)
+        pixels = (y * size[1] + x)[drawn]
+        drawn = drawn[_stable_order(pixels)]
+        self._index, self._pixels, alphas = index[drawn], (y * size[1] + x)[drawn], alphas[drawn]
+        self._dx, self._dy = self._dx[drawn], self._dy[drawn]
+        self._is_free = alphas < MOST  # not clipped
         self._alphas = np.minimum(alphas, np.float32(MOST))
         self._composite()
 
     def _composite(self) -> None:
-        """Compute how much light each pair has left, what it adds, and the picture."""
+        """Compute the light that reaches each pair, the weight of its colour, and the picture."""
         count = self.size[0] * self.size[1]
         logs = np.log1p(-self._alphas.astype(np.float64))
         self._starts = np.searchsorted(self._pixels, np.arange(count + 1))
         sums = np.concatenate([[0.0], np.cumsum(logs)])
-        left = np.exp(sums[:-1] - sums[self._starts[self._pixels]])
-        seen = np.flatnonzero(left > SPENT)
-        self._left, self._index, self._pixels = left[seen], self._index[seen], self._pixels[seen]
-        self._alphas, self._is_free = self._alphas[seen].astype(np.float64), self._is_free[seen]
-        self._dx, self._dy = self._dx[seen], self._dy[seen]
+        light = np.exp(sums[:-1] - sums[self._starts[self._pixels]])
+        lit = np.flatnonzero(light > SPENT)
+        self._left, self._index, self._pixels = light[lit], self._index[lit], self._pixels[lit]
+        self._alphas, self._is_free = self._alphas[lit].astype(np.float64), self._is_free[lit]
+        self._dx, self._dy = self._dx[lit], self._dy[lit]
         self._starts = np.searchsorted(self._pixels, np.arange(count + 1))
         self.weights = self._alphas * self._left
         self._rest = 1 - np.bincount(self._pixels, self.weights, count)
@@ -108,19 +106,19 @@ class Drawing:
         self.picture: Float64[np.ndarray, "H W 3"] = np.stack(channels, axis=1).reshape(*self.size, 3)
 
     def shares(self, values: Float64[np.ndarray, "H W"] | None = None) -> Float64[np.ndarray, " N"]:
-        """Return the sum, over all pixels, of what each Gaussian adds to a pixel, times a value of the pixel."""
+        """Return the sum over all pixels of each Gaussian's weight times the pixel's value."""
         weights = self.weights if values is None else self.weights * values.reshape(-1)[self._pixels]
         return np.bincount(self._index, weights, len(self._opacities))
 
     def gradients(self, of_picture: Float64[np.ndarray, "H W 3"]) -> tuple[np.ndarray, ...]:
         """Return the gradients of centers, conics, opacities and colours from that of the picture."""
         n, index, flat = len(self._opacities), self._index, self._flat
-        given = of_picture.reshape(-1, 3)
-        here = given[self._pixels]
-        gains = (here * self._colors[index]).sum(axis=1)
+        pixels = of_picture.reshape(-1, 3)
+        of_pairs = pixels[self._pixels]
+        gains = (of_pairs * self._colors[index]).sum(axis=1)
         added = np.concatenate([[0.0], np.cumsum(self.weights * gains)])
         behind = (
-            added[self._starts[self._pixels + 1]] - added[1:] + (WHITE * self._rest * given.sum(axis=1))[self._pixels]
+            added[self._starts[self._pixels + 1]] - added[1:] + (WHITE * self._rest * pixels.sum(axis=1))[self._pixels]
         )
         alphas = (self._left * gains - behind / (1 - self._alphas)) * self._is_free
         powers = alphas * self._alphas
@@ -129,14 +127,14 @@ class Drawing:
         columns = (a * dx + b * dy, b * dx + c * dy, -0.5 * dx * dx, -dx * dy, -0.5 * dy * dy)
         sums = [np.bincount(index, powers * column, n) for column in columns]
         opacities = np.bincount(index, powers, n) / np.maximum(self._opacities, LEAST)
-        colors = [np.bincount(index, self.weights * here[:, k], n) for k in range(3)]
+        colors = [np.bincount(index, self.weights * of_pairs[:, k], n) for k in range(3)]
         return np.stack(sums[:2], axis=1), np.stack(sums[2:], axis=1), opacities, np.stack(colors, axis=1)
 
 
 def _pairs(
     flat: Flat, opacities: Float64[np.ndarray, " N"], size: tuple[int, int]
 ) -> tuple[Int64[np.ndarray, " P"], Int64[np.ndarray, " P"], Int64[np.ndarray, " P"]]:
-    """Return the Gaussian, column and row of each pixel of the boxes that Gaussians reach, from the nearest on."""
+    """Return Gaussian, column and row of each pixel in the boxes that Gaussians reach, the nearest Gaussian first."""
     reach = np.sqrt(2 * np.log(np.maximum(opacities / LEAST, 1))[:, None] * flat.spreads)
     limits = np.array([size[1], size[0]])
     low = np.clip(np.ceil(flat.centers - reach - 0.5), 0, limits).astype(np.int64)
@@ -153,7 +151,7 @@ def _pairs(
 
 
 def _stable_order(pixels: Int64[np.ndarray, " P"]) -> Int64[np.ndarray, " P"]:
-    """Return a stable order by pixel: by radix, which NumPy has for 16 bits."""
+    """Return a stable order by pixel, by NumPy's radix sort, which exists for 16 bits."""
     order = np.argsort((pixels & 0xFFFF).astype(np.uint16), kind="stable")
     if pixels.max(initial=0) > 0xFFFF:
         order = order[np.argsort((pixels >> 16).astype(np.uint16)[order], kind="stable")]

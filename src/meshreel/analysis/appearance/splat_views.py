@@ -1,7 +1,7 @@
-"""Pictures that splats are fitted to: of a coloured mesh from around it, or what colour cameras saw of a body.
+"""Pictures to which splats are fitted: renders of a coloured mesh from around it, or a body in colour cameras.
 
-In: a mesh, and what knows its colours -> cameras with pictures of the mesh alone, on white. Cameras look at the mesh
-only: their pictures are cut to it, so that few pixels are empty.
+In: a mesh, and the source of its colours -> cameras with pictures of the mesh alone, on white. Pictures are cropped to
+the mesh, so that few pixels are empty.
 """
 
 from __future__ import annotations
@@ -20,18 +20,18 @@ from ...geometry.raycast import Hit, Rays, pixels_near
 from ...types import UP_AXES, Mesh, Up
 from .splat_fit import SplatView
 
-GOLDEN = (math.sqrt(5) - 1) / 2  # of a turn, from a frame's cameras to the next one's: no two frames have the same
-TILTS = (0.1, 0.4)  # rad, above the horizon, of cameras in turn (guess)
-AWAY = 1.6  # sizes of the mesh, between its middle and a camera (guess)
+GOLDEN = (math.sqrt(5) - 1) / 2  # turns from a frame's cameras to the next frame's, so that no two frames agree
+TILTS = (0.1, 0.4)  # rad above the horizon, of alternate cameras (guess)
+AWAY = 1.6  # sizes of the mesh between its middle and a camera (guess)
 BORDER = 3  # pixels beside the mesh
 FINER = 2  # rays a pixel, along both sides
-HIDDEN = 0.01  # of the distance: what is nearer by that hides the mesh (guess)
-Colors = Callable[[Hit, Float64[np.ndarray, "N 3"]], Float64[np.ndarray, "N 3"]]  # of hits, and where they are
+HIDDEN = 0.01  # of the distance: surface that is nearer by more hides the mesh (guess)
+Colors = Callable[[Hit, Float64[np.ndarray, "N 3"]], Float64[np.ndarray, "N 3"]]  # of hits at positions
 
 
 def ring(mesh: Mesh, count: int, size: int, turn: float, up: Up = "y") -> list[Camera]:
-    """Return cameras around a mesh, which fills pictures of `size` pixels; `turn` is that of the first, in turns."""
-    extent, found = mesh.diagonal, list[Camera]()
+    """Return cameras around a mesh, which fills pictures of `size` pixels; `turn`: the first one's angle, turns."""
+    extent, cameras = mesh.diagonal, list[Camera]()
     above = np.array(UP_AXES[up])
     axis = int(np.abs(above).argmax())
     along, aside = np.eye(3)[(axis + 1) % 3], np.eye(3)[(axis + 2) % 3]
@@ -40,14 +40,14 @@ def ring(mesh: Mesh, count: int, size: int, turn: float, up: Up = "y") -> list[C
         way = math.cos(tilt) * (math.cos(angle) * along + math.sin(angle) * aside) + math.sin(tilt) * above
         pose = CameraPose.of_camera(looking_at(mesh.middle + AWAY * extent * way, mesh.middle, axis))
         camera = Camera(size, size, (float(size), float(size)), (0.0, 0.0), pose)
-        found += [cut] if (cut := cut_to(camera, mesh, size)) else []
-    return found
+        cameras += [cut] if (cut := cut_to(camera, mesh, size)) else []
+    return cameras
 
 
 def cut_to(camera: Camera, mesh: Mesh, size: int, most: float = math.inf) -> Camera | None:
-    """Return a camera at the same place whose picture is the mesh, its longer side `size` pixels; None: out of sight.
+    """Crop a camera's picture to the mesh, and scale its longer side to `size` pixels; None: out of sight.
 
-    Its pixels are at most `most` times as fine.
+    Its pixels become at most `most` times as fine.
     """
     if mesh.is_empty:
         return None
@@ -56,7 +56,7 @@ def cut_to(camera: Camera, mesh: Mesh, size: int, most: float = math.inf) -> Cam
         return None
     places = camera.project(local)
     low, high = places.min(axis=0), places.max(axis=0)
-    if most < math.inf:  # of a real picture, nothing is known beyond its border
+    if most < math.inf:  # a real picture ends at its border
         low, high = np.maximum(low, 0), np.minimum(high, [camera.width, camera.height])
     extent = float((high - low).max())
     if (high - low).min() < 1:
@@ -68,22 +68,22 @@ def cut_to(camera: Camera, mesh: Mesh, size: int, most: float = math.inf) -> Cam
 
 
 def rendered(mesh: Mesh, cameras: Sequence[Camera]) -> tuple[SplatView, ...]:
-    """Return pictures of a coloured mesh, without light."""
+    """Return unlit pictures of a coloured mesh."""
     rays, painted = Rays(mesh), Painted(mesh)
     return tuple(_view(mesh, rays, camera, lambda hit, _: painted.on(hit.faces, hit.barycentric)) for camera in cameras)
 
 
 def taken(pictures: Sequence[ColorPicture], body: Mesh, whole: Mesh, size: int) -> tuple[SplatView, ...]:
-    """Return what colour cameras saw of a body, on white; NaN where something else hides it, and beyond the picture.
+    """Return a body in colour cameras' pictures, on white; NaN where it is hidden, and beyond the picture.
 
     `whole` is all surface of the frame.
     """
-    rays, hides, found = Rays(body), Rays(whole), list[SplatView]()
+    rays, hides, views = Rays(body), Rays(whole), list[SplatView]()
     for picture in pictures:
         camera = cut_to(picture.camera.straight, body, size, most=1.0)
         if camera is not None:
-            found.append(_view(body, rays, camera, partial(_pictured, picture, hides)))
-    return tuple(found)
+            views.append(_view(body, rays, camera, partial(_pictured, picture, hides)))
+    return tuple(views)
 
 
 def _pictured(
@@ -102,7 +102,7 @@ def _pictured(
 
 
 def _view(mesh: Mesh, rays: Rays, camera: Camera, colors: Colors) -> SplatView:
-    """Cast rays through parts of pixels, and give these the mean of the colours that they find."""
+    """Render a view with `FINER` x `FINER` rays per pixel, whose colours are averaged."""
     fine = camera.resized(FINER * camera.width, FINER * camera.height)
     rows, columns = np.nonzero(pixels_near(fine, mesh))
     _, local = fine.rays(np.column_stack([columns, rows]) + 0.5)

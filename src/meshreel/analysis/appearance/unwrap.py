@@ -1,6 +1,6 @@
-"""Unwrap a mesh onto a texture: by xatlas (extra `color`), whose charts have room around each, or as cameras see it.
+"""Unwrap a mesh onto a texture: by xatlas (extra `color`), with room around each chart, or by projection to cameras.
 
-In: a mesh as decoded, and the size of the texture or the cameras. Out: the places of its faces' corners, in texels.
+In: a decoded mesh, and the size of the texture or the cameras. Out: texture coordinates of its faces' corners, texels.
 """
 
 from __future__ import annotations
@@ -14,17 +14,17 @@ from ...geometry.topology import face_normals
 from ...types import Mesh
 
 GUTTERS = 128  # in the width of a texture; 8 texels of 1024 keep charts apart in three mip levels
-ROUNDS = 8  # of packing, with the texels of a metre corrected after each (guess)
-MARGIN = 0.995  # of the size that would just fit: packing is not quite in proportion (guess)
-ENLARGED = 3.0  # texels along a pixel, at most: 39 dB of living_room in place of 36 (with 2: 38) at about the same rate
-USUAL_SIDE = 1024  # texels up to which small pictures are enlarged (guess)
+ROUNDS = 8  # of packing, with texels per metre corrected after each (guess)
+MARGIN = 0.995  # of the size that would just fit: packing is not quite proportional (guess)
+ENLARGED = 3.0  # largest number of texels along a pixel: 39 dB of living_room; with 2: 38, with 1: 36, at similar rates
+USUAL_SIDE = 1024  # texels, side up to which small pictures are enlarged (guess)
 BLOCK = 16  # texels: the height of the texture is a multiple, as video has blocks
 
 
 def unwrap(base: Mesh, size: int) -> Layout:
-    """Return places for all corners of a base mesh in a texture `size` texels wide and at most so high.
+    """Return places of all corners of a base mesh in a texture `size` texels wide and at most as high.
 
-    Raises InputError where xatlas is missing, or finds no places.
+    Raises InputError if xatlas is missing, or cannot fit the mesh.
     """
     try:
         import xatlas
@@ -54,26 +54,26 @@ def unwrap(base: Mesh, size: int) -> Layout:
 
 
 def projected(mesh: Mesh, views: ColorViews) -> tuple[Layout, float]:
-    """Return places where the cameras of some views see the faces, their pictures side by side; texels along a pixel.
+    """Return the faces' places in the cameras' pictures, laid side by side, and the texels along a pixel.
 
-    A face is in the picture that sees it most squarely; one that none sees whole has no place. Small pictures are
-    enlarged, as corners are on whole texels, and large ones made to fit a texture.
+    A face is in the picture that sees it most frontally; a face that no picture has entirely has no place. Small
+    pictures are enlarged, because corners are on whole texels, and large ones are reduced to fit a texture.
     """
     normals, middles = face_normals(mesh)[0], mesh.vertices[mesh.faces].mean(axis=1)
     best, weight = np.full(len(mesh.faces), -1), np.zeros(len(mesh.faces))
     places, left, height = np.zeros((len(mesh.faces), 3, 2)), 0, 0
     for number, view in enumerate(views.views):
-        seen, camera = view.weights(middles, normals, at_step=0.1), view.picture.camera
+        weights, camera = view.weights(middles, normals, at_step=0.1), view.picture.camera
         corners = view.picture.project(mesh.vertices)[0][mesh.faces]
         size = [camera.width, camera.height]
         with np.errstate(invalid="ignore"):
             whole = ((corners >= 0) & (corners <= size)).all(axis=(1, 2))
-        better = whole & (seen > weight)
-        best[better], weight[better] = number, seen[better]
+        better = whole & (weights > weight)
+        best[better], weight[better] = number, weights[better]
         places[better] = corners[better] + [left, 0]
         left, height = left + camera.width, max(height, camera.height)
     side = max(left, height)
     scale = min(ENLARGED, max(1.0, USUAL_SIDE / side), MOST_SIDE / side)
-    found = np.where(best[:, None, None] < 0, 0.0, places * scale)
+    scaled = np.where(best[:, None, None] < 0, 0.0, places * scale)
     sides = [max(2, -(-round(side * scale) // BLOCK) * BLOCK) for side in (left, height)]
-    return Layout(sides[0], sides[1], np.ascontiguousarray(np.rint(found).astype(np.int32))), scale
+    return Layout(sides[0], sides[1], np.ascontiguousarray(np.rint(scaled).astype(np.int32))), scale

@@ -1,8 +1,8 @@
-"""Samples along the open borders of a mesh, to which a fit pulls those of a template that run beside them.
+"""Samples along the open borders of a mesh, to which a fit pulls the template's borders.
 
-In: a mesh. Out: Border. Point-to-plane rows leave the position across a border free: without these, a
-template that is too small or too large at a rim (soles cut off at the floor, sleeves, the edge of a camera's view)
-stays so, and those few vertices carry most of the error: 3.5 dB on a captured dancer.
+In: a mesh. Out: Border. Point-to-plane rows leave the position across a border free: without these samples, a template
+that is too small or too large at a rim (soles cut off at the floor, sleeves, the edge of a camera's view) stays so, and
+those few vertices carry most of the error: 3.5 dB on a captured dancer.
 """
 
 from __future__ import annotations
@@ -30,8 +30,8 @@ class Border:
 def border_sides(faces: Int32[np.ndarray, "F 3"]) -> tuple[Int64[np.ndarray, " E"], Int64[np.ndarray, " E"]]:
     """Find the half-edges that no second face shares: the face of each, and the corner where it starts."""
     edges, of_faces = unique_edges(faces)
-    found, sides = np.nonzero(border_mask(edges, of_faces)[of_faces])
-    return found, sides
+    face_numbers, sides = np.nonzero(border_mask(edges, of_faces)[of_faces])
+    return face_numbers, sides
 
 
 def sample_border(mesh: Mesh) -> Border:

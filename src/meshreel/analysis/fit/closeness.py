@@ -1,8 +1,8 @@
-"""How near a fitted template lies to a frame, by samples of both surfaces: keys and cuts are decided by it.
+"""Distance between a fitted template and a frame, by samples of both surfaces, which decides keys and cuts.
 
 In: a template; its positions on a frame. Out: the RMS distance, the larger of both directions, since either alone
-misses surface that the other lacks; infinite where a template is wrong: where more surface of a clean frame than usual
-has no counterpart, or one that faces away (folds, shards turned inside out).
+misses surface that the other lacks; infinite if a template is wrong: if more surface of a clean frame than usual has no
+counterpart, or one that faces away (folds, shards turned inside out).
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from ...types import Mesh
 from .frame import ON_BORDER, FrameSurface
 
 SAMPLES = 4000  # of each surface: as many as tracking matches
-STRAY = 6.0  # RMS distances of the noise: what is farther off is surface that the other one lacks: a guess
+STRAY = 6.0  # RMS distances of the noise: samples farther off are surface that the other side lacks: a guess
 SHARED = 0.4  # least share of the samples of each surface that noisy frames have in common (guess)
-FAR = 0.006  # diagonals: samples farther than that have no counterpart (1 cm on a body; decision 24), or than
+FAR = 0.006  # diagonals: samples farther off have no counterpart (1 cm on a body; decision 24), unless within
 FAR_OFF = 4.0  # distances to reach (guess)
-WRONG = 0.03  # share of samples beyond the usual one, a sum of folds that show; good fits have up to .012 (decision 24)
+WRONG = 0.03  # share of samples beyond the usual share: visible folds; good fits have up to .012 (decision 24)
 
 
 def shared_distance(
@@ -31,17 +31,17 @@ def shared_distance(
     """Return the RMS distance, the larger of both directions, of the surface that two noisy surfaces have in common.
 
     `squares` are squared distances of samples of each from the other; `over` is True where a sample lies over the
-    other surface, not past its border. What one of both lacks says nothing about the motion of the rest: infinite only
-    where little is left.
+    other surface, not past its border. Surface that one side lacks says nothing about the motion of the rest; infinite
+    only if too little is shared.
     """
-    shared = [each[there & (each <= (STRAY * noise) ** 2)] for each, there in zip(squares, over, strict=True)]
-    if any(len(some) < SHARED * there.sum() or not len(some) for some, there in zip(shared, over, strict=True)):
+    shared = [each[inside & (each <= (STRAY * noise) ** 2)] for each, inside in zip(squares, over, strict=True)]
+    if any(len(part) < max(SHARED * inside.sum(), 1) for part, inside in zip(shared, over, strict=True)):
         return np.inf
-    return float(np.sqrt(max(some.mean() for some in shared)))
+    return float(np.sqrt(max(part.mean() for part in shared)))
 
 
 class Closeness:
-    """A template prepared for measuring how near its positions are to frames."""
+    """A template prepared for measuring its distance from frames."""
 
     def __init__(
         self, faces: Int32[np.ndarray, "F 3"], rest: Float64[np.ndarray, "V 3"], target: float, noise: float = 0.0
@@ -53,22 +53,22 @@ class Closeness:
         mesh = Mesh(rest, faces)
         self._surface, self._samples, self._noise = Surface(mesh), area_samples(mesh, SAMPLES), noise
         self._far = max(FAR, FAR_OFF * target)
-        self._usual = 1.0  # share without counterpart where it fits best: wheels in mesh face each other
+        self._usual = 1.0  # share without counterpart in the best fit: gear wheels in mesh face each other
 
     def of(self, positions: Float64[np.ndarray, "V 3"], frame: FrameSurface) -> float:
         """Return the RMS distance between the template at these positions and a frame; infinite where it is wrong."""
         self._surface.move(positions)
         chosen = frame.samples(SAMPLES)
-        own, theirs = positions[self._samples], frame.mesh.vertices[chosen]
-        to_frame, to_fit = frame.surface.closest(own), self._surface.closest(theirs)
+        template, frame_points = positions[self._samples], frame.mesh.vertices[chosen]
+        to_frame, to_fit = frame.surface.closest(template), self._surface.closest(frame_points)
         normals = vertex_normals(self._surface.mesh)[self._samples]
-        here, there = self._surface.normals[to_fit.faces], frame.surface.normals[to_frame.faces]
-        back, ahead = ((to_frame.points - own) ** 2).sum(axis=1), ((to_fit.points - theirs) ** 2).sum(axis=1)
-        if self._noise > 0:  # holes of noisy frames are no reason for another template
-            both = frame.inside_at(to_frame) > ON_BORDER, ~self._surface.past_border(to_fit)
-            return shared_distance((back, ahead), both, self._noise)
-        wrong = (np.einsum("nd,nd->n", normals, there) < 0) | (back > self._far**2)
-        lacking = (np.einsum("nd,nd->n", frame.normals[chosen], here) < 0) | (ahead > self._far**2)
+        fit_normals, frame_normals = self._surface.normals[to_fit.faces], frame.surface.normals[to_frame.faces]
+        back, ahead = ((to_frame.points - template) ** 2).sum(axis=1), ((to_fit.points - frame_points) ** 2).sum(axis=1)
+        if self._noise > 0:  # holes of noisy frames do not call for another template
+            inside = frame.inside_at(to_frame) > ON_BORDER, ~self._surface.past_border(to_fit)
+            return shared_distance((back, ahead), inside, self._noise)
+        wrong = (np.einsum("nd,nd->n", normals, frame_normals) < 0) | (back > self._far**2)
+        lacking = (np.einsum("nd,nd->n", frame.normals[chosen], fit_normals) < 0) | (ahead > self._far**2)
         share = float(max(wrong.mean(), lacking.mean()))
         self._usual = min(self._usual, share)
         if share > self._usual + WRONG:

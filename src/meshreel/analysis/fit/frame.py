@@ -24,7 +24,7 @@ class FrameSurface:
     """A frame prepared for matching: search structure, vertex normals, and which vertices are on no open border."""
 
     def __init__(self, mesh: Mesh, free: FreeSpace | None = None) -> None:
-        """`free` is what cameras saw through in the frame, where that is known."""
+        """`free`: the space that cameras saw through in the frame, if known."""
         self.mesh, self.free = mesh, free
         self.surface = Surface(mesh)
         self.normals = vertex_normals(mesh)
@@ -45,16 +45,15 @@ class FrameSurface:
     def sampled(self, count: int) -> _core.DeformTarget:
         """Return the frame with about `count` samples, as the core's embedded deformation takes it."""
         if count not in self._sampled:
-            some, spacing = self.samples(count), float(np.sqrt(self.surface.areas.sum() / count))
-            some = some[self.inside[some]]
-            points, normals = self.mesh.vertices[some], self.normals[some]
+            samples, spacing = self.samples(count), float(np.sqrt(self.surface.areas.sum() / count))
+            samples = samples[self.inside[samples]]
+            points, normals = self.mesh.vertices[samples], self.normals[samples]
             whole = (self.surface.tree, self.mesh.vertices, self.mesh.faces, self.normals, self.inside.view(np.uint8))
             self._sampled[count] = _core.DeformTarget(*whole, points, normals, spacing)
         return self._sampled[count]
 
     @cached_property
     def target(self) -> _core.FitTarget:
-        """The frame as the core's fit takes it."""
         rim = sample_border(self.mesh)
         whole = (self.surface.tree, self.mesh.vertices, self.mesh.faces, self.normals, self.inside.view(np.uint8))
         return _core.FitTarget(*whole, rim.points, rim.normals, rim.outward)

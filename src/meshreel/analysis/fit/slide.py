@@ -1,8 +1,8 @@
-"""Slide a fitted template along the surface until it shows at each place what it showed there in its key frame.
+"""Slide a fitted template along the surface until its colours agree with those of its key frame.
 
-In: positions of a template on a frame, what knows the frame's colours, the luma that its places had in the key frame.
-Out: positions whose offsets are tangential, of a fraction of an edge in each round. Shape alone does not tell where a
-flat or round surface has slid; texture does. Where there is none, vertices follow their neighbours, or stay.
+In: positions of a template on a frame, the source of the frame's colours, the template's luma in the key frame. Out:
+positions with tangential offsets of a fraction of an edge in each round. Shape alone does not determine how a flat or
+round surface slid; texture does. Without texture, vertices follow their neighbours, or stay.
 
 Optical flow by B. K. P. Horn and B. G. Schunck, *Determining Optical Flow* (1981), on a mesh in place of a picture: the
 colours are compared at the vertices of a finer mesh, whose offsets are those of the template between its vertices.
@@ -30,14 +30,14 @@ LIGHT = 40  # blurs whose result is light, not texture; with 15 or 120, .3 dB wo
 class SlideOptions:
     """Options of the slide; the values are guesses, tried on basketball_player."""
 
-    levels: int = 2  # of midpoint subdivision, to the vertices at which colours are compared
-    blurs: tuple[int, ...] = (12, 4, 1, 1)  # of the luma over neighbours there, in each round
-    contrast: float = 12.0  # luma an edge there, 0 to 255: less than this is followed less
-    most: float = 0.7  # edges of the template, that a vertex moves in a round
+    levels: int = 2  # midpoint subdivisions to the mesh at whose vertices colours are compared
+    blurs: tuple[int, ...] = (12, 4, 1, 1)  # blurs of the luma over that mesh, in each round
+    contrast: float = 12.0  # luma per edge of that mesh, 0 to 255: weaker slopes count less
+    most: float = 0.7  # edges of the template, largest motion of a vertex in a round
 
 
 class Slide:
-    """A template of constant connectivity, with the luma that each of its places shows in the key frame."""
+    """A template of constant connectivity, with its luma in the key frame."""
 
     def __init__(
         self,
@@ -46,38 +46,38 @@ class Slide:
         paint: Paint,
         options: SlideOptions = SlideOptions(),
     ) -> None:
-        """Take the template as it lies on the key frame, and what knows the colours of that."""
+        """Take the template's positions on the key frame, and the source of that frame's colours."""
         from scipy.sparse import eye_array, kron
 
         self._faces, self._options = faces, options
         self._around = kron(_means_over(faces, len(key)), eye_array(3), format="csr")  # of offsets
-        self._finer, self._finer_faces = _finer(faces, len(key), options.levels)  # a matrix: values between vertices
-        self._vectors = kron(self._finer, eye_array(3), format="csr")  # the same of vectors
+        self._finer, self._finer_faces = _finer(faces, len(key), options.levels)  # interpolates vertices
+        self._vectors = kron(self._finer, eye_array(3), format="csr")  # the same for vectors
         self._gather = self._finer.T.tocsr()
         self._shares = self._gather @ np.ones(self._finer.shape[0])
         self._blur = _means_over(self._finer_faces, self._finer.shape[0])
         self._luma, self._known = self._texture(self._sampled(key), paint)
 
     def to(self, positions: Float64[np.ndarray, "V 3"], paint: Paint) -> Float64[np.ndarray, "V 3"]:
-        """Return the positions on a frame, slid to where its colours are those of the key frame."""
-        found = positions
+        """Return the positions on a frame, slid so that its colours agree with the key frame's."""
+        slid = positions
         for blurs in self._options.blurs:
-            mesh = self._sampled(found)
-            found = found + self._flow(found, mesh, *self._texture(mesh, paint), blurs)
-        return found
+            mesh = self._sampled(slid)
+            slid = slid + self._flow(slid, mesh, *self._texture(mesh, paint), blurs)
+        return slid
 
     def _sampled(self, positions: Float64[np.ndarray, "V 3"]) -> Mesh:
-        """Return the finer mesh of the places at which colours are compared."""
+        """Return the finer mesh at whose vertices colours are compared."""
         return Mesh(self._finer @ positions, self._finer_faces)
 
     def _texture(self, mesh: Mesh, paint: Paint) -> tuple[Float64[np.ndarray, " N"], Bool[np.ndarray, " N"]]:
-        """Return the luma at the finer mesh's vertices without that of the light, and where it is known."""
+        """Return the luma at the finer mesh's vertices without lighting, and a mask of known values."""
         colors, seen = paint.at(mesh.vertices, vertex_normals(mesh))
-        found = np.where(seen, (colors * np.array(LUMA)).sum(axis=1), 0.0)
-        light, around = found, seen.astype(np.float64)
+        luma = np.where(seen, (colors * np.array(LUMA)).sum(axis=1), 0.0)
+        light, around = luma, seen.astype(np.float64)
         for _ in range(LIGHT):
             light, around = self._blur @ light, self._blur @ around
-        return np.where(seen, found - light / np.maximum(around, 1e-9), 0.0), seen
+        return np.where(seen, luma - light / np.maximum(around, 1e-9), 0.0), seen
 
     def _flow(
         self,
@@ -89,15 +89,15 @@ class Slide:
     ) -> Float64[np.ndarray, "V 3"]:
         """Return tangential offsets of the template that bring the luma of the frame nearer to that of the key frame.
 
-        They have the least sum of squared differences of luma and of differences from the neighbours' offsets: found by
-        Jacobi iterations with a bound of the normal equations that is a 3 x 3 block a vertex.
+        They minimise squared differences of luma and from the neighbours' offsets, by Jacobi iterations whose bound on
+        the normal equations is a 3 x 3 block per vertex.
         """
-        both = (known & self._known).astype(np.float64)
-        wanted, there = self._luma, luma
+        shared = (known & self._known).astype(np.float64)
+        key_luma, frame_luma = self._luma, luma
         for _ in range(blurs):
-            wanted, there = self._blur @ wanted, self._blur @ there
-        edge, gaps, stiff = _edge(mesh), (there - wanted) * both, self._options.contrast**2
-        slopes = _tangential(_slopes(mesh, there), vertex_normals(mesh)) * both[:, None] * edge
+            key_luma, frame_luma = self._blur @ key_luma, self._blur @ frame_luma
+        edge, gaps, stiff = _edge(mesh), (frame_luma - key_luma) * shared, self._options.contrast**2
+        slopes = _tangential(_slopes(mesh, frame_luma), vertex_normals(mesh)) * shared[:, None] * edge
         blocks = self._mean((slopes[:, :, None] * slopes[:, None]).reshape(-1, 9)).reshape(-1, 3, 3)
         solve = _blocks(inverses(blocks + stiff * np.eye(3)))
         step = (solve @ (_blocks(blocks) + stiff * self._around - self._normal(slopes))).tocsr()
@@ -115,8 +115,8 @@ class Slide:
 
         rows = np.arange(len(slopes)).repeat(3)
         along = csr_array((slopes.reshape(-1), (rows, np.arange(slopes.size))), shape=(len(slopes), slopes.size))
-        there = along @ self._vectors
-        return diags_array(1 / self._shares.repeat(3)) @ (there.T @ there)
+        at_template = along @ self._vectors
+        return diags_array(1 / self._shares.repeat(3)) @ (at_template.T @ at_template)
 
     def _mean(self, values: Float64[np.ndarray, "N C"]) -> Float64[np.ndarray, "V C"]:
         """Return the means of values at the finer mesh's vertices around each vertex of the template."""
@@ -140,15 +140,15 @@ def _edge(mesh: Mesh) -> float:
 
 
 def _slopes(mesh: Mesh, values: Float64[np.ndarray, " V"]) -> Float64[np.ndarray, "V 3"]:
-    """Return the gradient of values of the vertices along the surface, the mean over the faces at each vertex."""
+    """Return the gradient of vertices' values along the surface, the mean over the faces at each vertex."""
     normals, areas = face_normals(mesh)
     a, b, c = np.moveaxis(mesh.vertices[mesh.faces], 1, 0)
     va, vb, vc = values[mesh.faces].T[..., None]
     turned = np.cross(normals, va * (c - b) + vb * (a - c) + vc * (b - a)) / 2  # area times the gradient
     corners, count = mesh.faces.reshape(-1), len(mesh.vertices)
     sums = np.stack([np.bincount(corners, turned[:, k].repeat(3), count) for k in range(3)], axis=1)
-    whole = np.bincount(corners, areas.repeat(3), count)
-    return sums / np.maximum(whole, 1e-30)[:, None]
+    total_area = np.bincount(corners, areas.repeat(3), count)
+    return sums / np.maximum(total_area, 1e-30)[:, None]
 
 
 def _means_over(faces: Int32[np.ndarray, "F 3"], count: int) -> Any:
@@ -163,13 +163,13 @@ def _means_over(faces: Int32[np.ndarray, "F 3"], count: int) -> Any:
 
 
 def _finer(faces: Int32[np.ndarray, "F 3"], count: int, levels: int) -> tuple[Any, Int32[np.ndarray, "G 3"]]:
-    """Return the sparse matrix that takes values at vertices to those after midpoint subdivisions, and finer faces."""
+    """Return the sparse matrix of midpoint subdivisions of values at vertices, and the finer faces."""
     from scipy.sparse import csr_array, eye_array, vstack
 
-    found = eye_array(count, format="csr")
+    matrix = eye_array(count, format="csr")
     for _ in range(levels):
-        level = subdivide(faces, found.shape[0])
-        rows, shape = np.arange(len(level.edges)).repeat(2), (len(level.edges), found.shape[0])
+        level = subdivide(faces, matrix.shape[0])
+        rows, shape = np.arange(len(level.edges)).repeat(2), (len(level.edges), matrix.shape[0])
         middles = csr_array((np.full(len(rows), 0.5), (rows, level.edges.reshape(-1))), shape=shape)
-        found, faces = vstack([found, middles @ found], format="csr"), level.faces
-    return found, faces
+        matrix, faces = vstack([matrix, middles @ matrix], format="csr"), level.faces
+    return matrix, faces

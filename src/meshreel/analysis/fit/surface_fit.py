@@ -1,9 +1,9 @@
 """Fit one template of constant connectivity to the surface of each frame (displacement fields; paper, section 3.3.2).
 
 In: the decoded, subdivided reference deformed to each frame; the frames. Out: its positions on every frame, and their
-residuals, in bounding-box diagonals. A shape prior, the key frame's fit rotated as the body turns, keeps detail and
+residuals, in bounding-box diagonals. A shape prior, the key frame's fit rotated with the body, keeps detail and
 sliding along the surface constant over time, so that they cost no rate. A second fit is pulled to positions that the
-coder represents cheaply: the first fit's strongest components (decision 10), or coherent positions that a caller makes.
+coder represents cheaply: the first fit's strongest components (decision 10), or coherent positions from the caller.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from .frame import FrameSurface
 FOLLOWED = 6e-4  # RMS noise from which the second fit trusts the coherent positions more than the frames (decision 16)
 NOISY_ROUNDS = slice(1, 3)  # of the first fit: motion is smooth under noise, and tighter rounds fit it (decision 16)
 GATE = 6.0  # RMS distances of the noise that a pair may be apart at least: three standard deviations (guess)
-MANY = 5000  # vertices of a template from which strides count: fewer cost little and tell less (guess)
+MANY = 5000  # smallest number of a template's vertices for which strides apply (guess)
 Coherence = Callable[[Float64[np.ndarray, "T V 3"]], Float64[np.ndarray, "T V 3"]]
 
 
@@ -40,7 +40,7 @@ class FitOptions:
 
     gates: tuple[float, ...] = (0.024, 0.018, 0.012, 0.012)  # largest distances of pairs, in diagonals
     smoothing: tuple[float, ...] = (4.0, 2.0, 0.7, 0.4)  # row weights of the difference from the rotated Laplacian
-    strides: tuple[int, ...] | None = None  # of n points one is matched, in a round of a clean fit; None: all
+    strides: tuple[int, ...] | None = None  # one of this many points is matched, per round of a clean fit; None: all
     agreement: float = 0.3  # smallest cosine between the normals of a pair
     anchor: float = 0.02  # row weight of the offset from the prediction
     components: int = 15  # of the trajectories, in the second fit (decision 10); 0: no second fit
@@ -72,8 +72,8 @@ class Rounds:
     gates: tuple[float, ...]
     smoothing: tuple[float, ...]
     strides: tuple[int, ...]
-    anchor: float  # row weight of the offset from the place
-    turn: bool  # whether the shape turns with each vertex's neighbourhood
+    anchor: float  # row weight of the offset from the prediction
+    turn: bool  # True: the shape turns with each vertex's neighbourhood
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,12 +136,12 @@ def snap_to_vertices(
 
 
 def _residual(fitted: Mesh, frame: FrameSurface | None) -> float:
-    """Return the RMS distance of the vertices of one from the other: the larger, as one may lack what the other has."""
+    """Return the RMS distance of vertices from the other surface, the larger of both directions."""
     if frame is None:
         return np.inf
-    own, theirs = fitted.vertices, frame.mesh.vertices
-    to_fit = np.linalg.norm(Surface(fitted).closest(theirs).points - theirs, axis=1)
-    to_frame = np.linalg.norm(frame.surface.closest(own).points - own, axis=1)
+    template, frame_points = fitted.vertices, frame.mesh.vertices
+    to_fit = np.linalg.norm(Surface(fitted).closest(frame_points).points - frame_points, axis=1)
+    to_frame = np.linalg.norm(frame.surface.closest(template).points - template, axis=1)
     return float(np.sqrt(max(np.mean(to_fit**2), np.mean(to_frame**2))))
 
 
@@ -156,20 +156,20 @@ def fit_surfaces(
     positions = predictions.copy()
     fitting = Fitting(faces, predictions.shape[1], options, guides.noise)
     middle = len(surfaces) // 2 if guides.key is None else guides.key
-    there = [t for t, surface in enumerate(surfaces) if surface is not None]
-    key = min(there, key=lambda t: (abs(t - middle), t), default=middle)  # the nearest to the middle
-    for at in [key] + [t for t in range(len(surfaces)) if t != key]:
-        own = predictions if at == key else positions  # until the key is fitted, its prediction
-        rest = own[key] if guides.rest is None else guides.rest
-        positions[at] = fitting.first(surfaces[at], rest, predictions[at])
+    present = [t for t, surface in enumerate(surfaces) if surface is not None]
+    key = min(present, key=lambda t: (abs(t - middle), t), default=middle)  # the nearest to the middle
+    for number in [key] + [t for t in range(len(surfaces)) if t != key]:
+        shapes = predictions if number == key else positions  # until the key is fitted, its prediction
+        rest = shapes[key] if guides.rest is None else guides.rest
+        positions[number] = fitting.first(surfaces[number], rest, predictions[number])
     if options.components and len(surfaces) > 1:
         if guides.coherence is None:
             coherent = strongest_components(positions, key, options.components)
         else:
             coherent = guides.coherence(positions)
-        for at in range(len(surfaces)):
-            if not (at == key and options.restart):
-                positions[at] = fitting.second(surfaces[at], coherent[at], positions[at])
+        for number in range(len(surfaces)):
+            if not (number == key and options.restart):
+                positions[number] = fitting.second(surfaces[number], coherent[number], positions[number])
     return positions
 
 
@@ -181,8 +181,8 @@ def strongest_components(positions: Float64[np.ndarray, "T V 3"], key: int, coun
     centered = field - mean
     _, vectors = eigen(products(centered.T, centered))
     basis = vectors[:, ::-1][:, :count]
-    kept = products(products(centered, basis), basis.T) + mean
-    return positions[key] + kept.reshape(vertices, frames, 3).transpose(1, 0, 2)
+    rebuilt = products(products(centered, basis), basis.T) + mean
+    return positions[key] + rebuilt.reshape(vertices, frames, 3).transpose(1, 0, 2)
 
 
 class Fitting:
@@ -191,7 +191,7 @@ class Fitting:
     def __init__(self, faces: Int32[np.ndarray, "F 3"], vertices: int, options: FitOptions, noise: float = 0.0) -> None:
         """`noise` is the RMS distance of the frames from the truth; 0: a clean capture."""
         self._template, self._options = _core.FitTemplate(faces, vertices), options
-        chosen = options if vertices >= MANY else replace(options, strides=None)  # all points of few are matched
+        chosen = options if vertices >= MANY else replace(options, strides=None)  # few: match all
         self._first, self._second = chosen.rounds(noise)
 
     def first(
@@ -200,7 +200,7 @@ class Fitting:
         rest: Float64[np.ndarray, "V 3"],
         prediction: Float64[np.ndarray, "V 3"],
     ) -> Float64[np.ndarray, "V 3"]:
-        """Fit a frame from its prediction, keeping the shape of the `rest` where nothing is near."""
+        """Fit a frame from its prediction, keeping the shape `rest` where the frame has no surface nearby."""
         work.count("frames fitted")
         return self._fitted(surface, rest, prediction, prediction, self._first)
 
@@ -222,7 +222,7 @@ class Fitting:
         start: Float64[np.ndarray, "V 3"],
         rounds: Rounds,
     ) -> Float64[np.ndarray, "V 3"]:
-        """Fit a frame in the core; an empty one keeps where it starts."""
+        """Fit a frame in the core; an empty frame keeps its start."""
         o = self._options
         if surface is None:
             return start

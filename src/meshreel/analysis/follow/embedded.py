@@ -33,10 +33,10 @@ from .embedded_pose import Pose, moved, rotation, turned, unmoved
 from .rigid import RigidBody, RigidMotion
 
 NORMAL_REACH = 0.01  # diagonals, weight of a difference of unit normals in a search: a guess
-LOST = 3.0  # RMS distances of the noise that a residual may have in addition: legs come and go (decision 16)
+LOST = 3.0  # RMS distances of the noise that a residual may have in addition: legs appear and vanish (decision 16)
 BACK_ROUNDS = 2  # rounds of the inverse, the first of which only estimates the nodes that move a point: a guess
-Painter = Callable[[], Paint | None]  # finds what knows the colours of a frame, if anything does
-CLEARLY = 0.8  # times the residual that a start by colour must fall below: it is rougher where shape suffices (guess)
+Painter = Callable[[], Paint | None]  # opens the colour source of a frame, if it has one
+CLEARLY = 0.8  # share of the best residual that a start by colour must reach: it is rougher than one by shape (guess)
 UNUSUAL = 1.25  # a frame is retried if its residual exceeds this many times the median so far (decision 15)
 
 
@@ -81,7 +81,7 @@ class Tracker:
         noise: float = 0.0,
         paint: Painter | None = None,
     ) -> None:
-        """Take the key's mesh; `paint` is asked for what knows its colours if shape alone leads astray."""
+        """Take the key's mesh; `paint` opens its colour source, used only if shape alone misleads."""
         self.options, self.key = options or EmbeddedOptions(), key
         self.limits, self._noise = self.options.limits(noise), noise
         self.mesh = clean(key_mesh)
@@ -101,14 +101,14 @@ class Tracker:
         self._residuals = {key: 0.0}
         self._paint = paint
         self._colored: ColoredPlaces | None = None
-        self._body = RigidBody(self.mesh, noise) if noise > 0 else None  # what bends costs clean bodies nothing
+        self._body = RigidBody(self.mesh, noise) if noise > 0 else None  # bending costs clean bodies nothing
         self._rigid = {} if self._body is None else {key: RigidMotion.none()}
 
     def step(self, frame: int, mesh: Mesh | FrameSurface, paint: Painter | None = None) -> float:
         """Register a frame, starting from the nearest registered frame between it and the key; return its residual.
 
-        An empty frame gets its neighbour's pose and an infinite residual. A frame may be registered again. `paint` is
-        asked for what knows the frame's colours.
+        An empty frame gets its neighbour's pose and an infinite residual. A frame may be registered again. `paint`
+        opens the frame's colour source.
         """
         if frame == self.key:
             raise InputError(f"frame {frame} is the key: it needs no registration; step to another")
@@ -128,9 +128,9 @@ class Tracker:
         return residual
 
     def rigid(self, frames: Iterable[int]) -> list[RigidMotion] | None:
-        """Return the rigid motions from the key to registered frames; None where the body has moved otherwise."""
-        found = [self._rigid.get(frame) for frame in frames]
-        return None if None in found else [motion for motion in found if motion is not None]
+        """Return the rigid motions from the key to registered frames; None if the body's motion is not rigid."""
+        motions = [self._rigid.get(frame) for frame in frames]
+        return None if None in motions else [motion for motion in motions if motion is not None]
 
     def residual(self, frame: int) -> float | None:
         """Return the RMS distance of the moved key mesh and a frame, the larger of both directions; None if unknown."""
@@ -149,7 +149,7 @@ class Tracker:
         poses = [self._poses[frame] for frame in frames]
         if (rigid := self.rigid(frames)) is not None:
             count = len(self._graph.nodes)
-            poses = [Pose(np.tile(one.turn, (count, 1, 1)), one.of(self._graph.nodes)) for one in rigid]
+            poses = [Pose(np.tile(step.turn, (count, 1, 1)), step.of(self._graph.nodes)) for step in rigid]
         rotations = np.stack([pose.rotations for pose in poses])
         positions = np.stack([pose.positions for pose in poses])
         residuals = np.array([self._residuals[frame] for frame in frames])
@@ -172,31 +172,31 @@ class Tracker:
     def _follow(self, frame: int, surface: FrameSurface, paint: Painter | None) -> tuple[Pose, float]:
         """Register a frame from several starts until one is good enough; return the best pose and its residual."""
         o, last = self.options, self._known(frame)
-        there = surface.sampled(o.samples)
-        usual = np.median([r for r in self._residuals.values() if 0 < r < np.inf] or [0.0])  # noise is not failure
-        starts = self._starts(frame, there)
+        target = surface.sampled(o.samples)
+        usual = np.median([r for r in self._residuals.values() if 0 < r < np.inf] or [0.0])  # includes noise
+        starts = self._starts(frame, target)
         best = self._poses[last], np.inf
         enough = max(self.limits.doubt, UNUSUAL * float(usual))
         tries = [(starts[0], o.torn[0]), (starts[0], o.torn[1]), *((start, o.torn[0]) for start in starts[1:])]
         for start, torn in tries:
-            found = self._from(start, there, torn, surface)
-            best = found if found[1] < best[1] else best
-            if found[1] < enough:
+            result = self._from(start, target, torn, surface)
+            best = result if result[1] < best[1] else best
+            if result[1] < enough:
                 return best
         for start in self._by_color(starts[0], surface, paint):
-            found = self._from(start, there, o.torn[0], surface)
-            if found[1] < CLEARLY * best[1] or found[1] <= self.limits.lost < best[1]:
-                best = found
+            result = self._from(start, target, o.torn[0], surface)
+            if result[1] < CLEARLY * best[1] or result[1] <= self.limits.lost < best[1]:
+                best = result
         stay = self._poses[last], self._measure(self._poses[last], surface)
         return best if best[1] < stay[1] else stay
 
-    def _from(self, start: Pose, there: _core.DeformTarget, torn: float, surface: FrameSurface) -> tuple[Pose, float]:
-        """Return the pose that is found from a start, and its residual."""
-        pose = self._rounds(self._fine, self._carried(start, there, torn), there, self.options.fine, torn)
+    def _from(self, start: Pose, target: _core.DeformTarget, torn: float, surface: FrameSurface) -> tuple[Pose, float]:
+        """Return the pose registered from a start, and its residual."""
+        pose = self._rounds(self._fine, self._carried(start, target, torn), target, self.options.fine, torn)
         return pose, self._measure(pose, surface)
 
     def _starts(self, frame: int, surface: _core.DeformTarget) -> list[Pose]:
-        """Return the neighbour's pose and its extrapolation, the one that matches the frame better first."""
+        """Return the neighbour's pose and its extrapolation, the better match of the frame first."""
         last = self._known(frame)
         side = 1 if frame > last else -1
         before = [f for f in self._followed() if (last - f) * side > 0]
@@ -212,28 +212,28 @@ class Tracker:
         return poses if weights[0] >= weights[1] else poses[::-1]
 
     def _by_color(self, pose: Pose, surface: FrameSurface, paint: Painter | None) -> Iterator[Pose]:
-        """Yield the pose shifted to where the frame has the colours of the key, if both are known."""
-        theirs = paint() if paint is not None else None
-        if theirs is None:
+        """Yield the pose shifted to places of the key's colours in the frame, if both have colours."""
+        frame_paint = paint() if paint is not None else None
+        if frame_paint is None:
             return
-        if self._paint is not None and (own := self._paint()) is not None:
-            self._colored = ColoredPlaces(self.mesh, self._samples, own)
+        if self._paint is not None and (key_paint := self._paint()) is not None:
+            self._colored = ColoredPlaces(self.mesh, self._samples, key_paint)
         self._paint = None
         if self._colored is not None:
             points = moved(self._fine.points, self._fine.nodes, self._fine.binding, pose)
-            offsets = self._colored.offsets(pose.positions, points, surface, self.options.samples, theirs)
+            offsets = self._colored.offsets(pose.positions, points, surface, self.options.samples, frame_paint)
             if offsets is not None:
                 yield Pose(pose.rotations, pose.positions + offsets)
 
     def _carried(self, pose: Pose, surface: _core.DeformTarget, torn: float) -> Pose:
-        """Move a pose by a coarse graph whose rest is that pose, so that its detail stays."""
+        """Move a pose by a coarse graph at rest in that pose, which keeps its detail."""
         few, fine = self._few, self._fine
-        here = Pose(pose.rotations[: len(few.nodes)], pose.positions[: len(few.nodes)])
+        coarse = Pose(pose.rotations[: len(few.nodes)], pose.positions[: len(few.nodes)])
         points, normals = moved(fine.points, fine.nodes, fine.binding, pose), turned(fine.normals, fine.binding, pose)
-        held = few.core.holds(here.rotations, here.positions, torn)
-        rest = _Rest(here.positions, few.edges, points, normals, few.binding, held)
-        carried = self._rounds(rest, Pose.at(here.positions), surface, self.options.coarse, torn)
-        positions = moved(pose.positions, here.positions, self._nodes_by_few, carried)
+        held = few.core.holds(coarse.rotations, coarse.positions, torn)
+        rest = _Rest(coarse.positions, few.edges, points, normals, few.binding, held)
+        carried = self._rounds(rest, Pose.at(coarse.positions), surface, self.options.coarse, torn)
+        positions = moved(pose.positions, coarse.positions, self._nodes_by_few, carried)
         return Pose(products(rotation(self._nodes_by_few, carried), pose.rotations), positions)
 
     def _rounds(self, rest: _Rest, pose: Pose, surface: _core.DeformTarget, stage: Stage, torn: float) -> Pose:
@@ -246,13 +246,13 @@ class Tracker:
         """Return the RMS distance over samples of both surfaces; the larger of both directions."""
         vertices = moved(self.mesh.vertices, self._graph.nodes, self._all, pose)
         self._moved.move(vertices)
-        theirs = surface.mesh.vertices[surface.samples(self.options.samples)]
-        own, back = vertices[self._samples], self._moved.closest(theirs)
-        ahead = surface.surface.closest(own)
-        squares = ((ahead.points - own) ** 2).sum(axis=1), ((back.points - theirs) ** 2).sum(axis=1)
-        if self._noise > 0:  # what one of both lacks says nothing of the motion of what both have
-            both = surface.inside_at(ahead) > ON_BORDER, ~self._moved.past_border(back)
-            return shared_distance(squares, both, self._noise)
+        frame_points = surface.mesh.vertices[surface.samples(self.options.samples)]
+        key_points, back = vertices[self._samples], self._moved.closest(frame_points)
+        ahead = surface.surface.closest(key_points)
+        squares = ((ahead.points - key_points) ** 2).sum(axis=1), ((back.points - frame_points) ** 2).sum(axis=1)
+        if self._noise > 0:  # compare only surface that both have
+            inside = surface.inside_at(ahead) > ON_BORDER, ~self._moved.past_border(back)
+            return shared_distance(squares, inside, self._noise)
         return float(np.sqrt(max(each.mean() for each in squares)))
 
 
@@ -269,7 +269,6 @@ class _Rest:
 
     @property
     def core(self) -> _core.Deformation:
-        """The graph as the core takes it."""
         edges, bound = self.edges.astype(np.int32), self.binding.indices.astype(np.int32)
         weights = self.binding.weights
         return _core.Deformation(self.nodes, edges, self.held, self.points, self.normals, bound, weights)
@@ -289,11 +288,11 @@ class Motion:
     def bound(self, points: Float64[np.ndarray, "P 3"], normals: Float64[np.ndarray, "P 3"] | None = None) -> Binding:
         """Bind points on or near the key mesh to the nodes of the nearest vertices.
 
-        Normals keep them off a near sheet that faces away.
+        Normals prevent binding to a near sheet that faces away.
         """
-        own = np.concatenate([self.mesh.vertices, NORMAL_REACH * vertex_normals(self.mesh)], axis=1)
-        asked = points if normals is None else np.concatenate([points, NORMAL_REACH * normals], axis=1)
-        vertices = cKDTree(own[:, : asked.shape[1]]).query(asked)[1].reshape(-1)
+        key_vertices = np.concatenate([self.mesh.vertices, NORMAL_REACH * vertex_normals(self.mesh)], axis=1)
+        queries = points if normals is None else np.concatenate([points, NORMAL_REACH * normals], axis=1)
+        vertices = cKDTree(key_vertices[:, : queries.shape[1]]).query(queries)[1].reshape(-1)
         return self.graph.bind(points, self.graph.cells[vertices], self.neighbours)
 
     def back(self, frame: int, mesh: Mesh) -> Mesh:
@@ -302,17 +301,17 @@ class Motion:
         Faces with a vertex at which the motion has no inverse are left out.
         """
         pose = Pose(self.rotations[frame], self.positions[frame])
-        own = self.graph.bind(self.mesh.vertices, self.graph.cells, self.neighbours)
-        there = moved(self.mesh.vertices, self.graph.nodes, own, pose)
-        facing = turned(vertex_normals(self.mesh), own, pose)
-        asked = np.concatenate([mesh.vertices, NORMAL_REACH * vertex_normals(mesh)], axis=1)
-        near = cKDTree(np.concatenate([there, NORMAL_REACH * facing], axis=1)).query(asked)[1].reshape(-1)
+        binding = self.graph.bind(self.mesh.vertices, self.graph.cells, self.neighbours)
+        vertices = moved(self.mesh.vertices, self.graph.nodes, binding, pose)
+        facing = turned(vertex_normals(self.mesh), binding, pose)
+        queries = np.concatenate([mesh.vertices, NORMAL_REACH * vertex_normals(mesh)], axis=1)
+        near = cKDTree(np.concatenate([vertices, NORMAL_REACH * facing], axis=1)).query(queries)[1].reshape(-1)
         points, cells = self.mesh.vertices[near], self.graph.cells[near]
         for _ in range(BACK_ROUNDS):
-            points, known = unmoved(
+            points, invertible = unmoved(
                 mesh.vertices, self.graph.nodes, self.graph.bind(points, cells, self.neighbours), pose
             )
-        return clean(Mesh(points, mesh.faces[known[mesh.faces].all(axis=1)]))
+        return clean(Mesh(points, mesh.faces[invertible[mesh.faces].all(axis=1)]))
 
 
 def _extrapolated(first: Pose, last: Pose, ratio: float) -> Pose:

@@ -18,7 +18,7 @@ from ...geometry.topology import components, unique_edges, vertex_normals
 from ...types import Mesh
 
 TURN = 0.01  # diagonals, weight of a difference of unit normals, so that both sides of a thin part get nodes: a guess
-SEEDED = 0.25  # largest share of the nodes that are the first of their component: a guess
+SEEDED = 0.25  # largest share of nodes that begin a component: a guess
 TOGETHER = 2048  # points that are bound together: bounds memory (guess)
 
 
@@ -41,9 +41,9 @@ class DeformationGraph:
 
     def bind(self, points: Float64[np.ndarray, "P 3"], cells: Int64[np.ndarray, " P"], count: int) -> Binding:
         """Bind each point to the `count` nearest nodes of its cell's hood; weights fall to 0 at the next nearest."""
-        some = (slice(at, at + TOGETHER) for at in range(0, max(len(points), 1), TOGETHER))
-        found = [self._bound(points[rows], cells[rows], count) for rows in some]
-        return Binding(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
+        blocks = (slice(at, at + TOGETHER) for at in range(0, max(len(points), 1), TOGETHER))
+        bound = [self._bound(points[rows], cells[rows], count) for rows in blocks]
+        return Binding(*(np.concatenate(parts) for parts in zip(*bound, strict=True)))
 
     def _bound(
         self, points: Float64[np.ndarray, "P 3"], cells: Int64[np.ndarray, " P"], count: int
@@ -52,8 +52,8 @@ class DeformationGraph:
         away = np.linalg.norm(self.nodes[hood] - points[:, None], axis=2)
         away[hood < 0] = np.inf
         count = min(count, hood.shape[1])
-        some = np.argsort(away, axis=1, kind="stable")[:, : count + 1]
-        away, indices = np.take_along_axis(away, some, axis=1), np.take_along_axis(hood, some, axis=1)
+        nearest = np.argsort(away, axis=1, kind="stable")[:, : count + 1]
+        away, indices = np.take_along_axis(away, nearest, axis=1), np.take_along_axis(hood, nearest, axis=1)
         finite = np.where(np.isfinite(away), away, 0.0)
         reach = np.where(np.isfinite(away[:, -1]), away[:, -1], 1.5 * finite.max(axis=1))
         reach = np.maximum(reach, np.finfo(float).tiny)
@@ -93,7 +93,7 @@ def build_graph(mesh: Mesh, nodes: Int64[np.ndarray, " N"]) -> DeformationGraph:
 
 
 def _cells(mesh: Mesh, edges: Int64[np.ndarray, "E 2"], nodes: Int64[np.ndarray, " N"]) -> Int64[np.ndarray, " V"]:
-    """Return the node nearest to each vertex along the edges; the nearest in space where no path leads to one."""
+    """Return the node nearest to each vertex along the edges; the nearest in space if no path leads to a node."""
     size = len(mesh.vertices)
     lengths = np.linalg.norm(mesh.vertices[edges[:, 0]] - mesh.vertices[edges[:, 1]], axis=1)
     roads = sparse.csr_array((np.maximum(lengths, 1e-12), (edges[:, 0], edges[:, 1])), shape=(size, size))
@@ -108,9 +108,9 @@ def _cells(mesh: Mesh, edges: Int64[np.ndarray, "E 2"], nodes: Int64[np.ndarray,
 
 
 def _hoods(pairs: Int64[np.ndarray, "E 2"], count: int) -> Int64[np.ndarray, "N h"]:
-    one = sparse.csr_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
-    one = sparse.csr_array(one + sparse.eye_array(count))
-    two = sparse.csr_array(one @ one)
+    adjacent = sparse.csr_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
+    adjacent = sparse.csr_array(adjacent + sparse.eye_array(count))
+    two = sparse.csr_array(adjacent @ adjacent)
     two.sort_indices()
     sizes = np.diff(two.indptr)
     hood = np.full((count, int(sizes.max())), -1, np.int64)

@@ -44,9 +44,9 @@ def unmoved(
     """Move bound points from a pose back to rest; also return False for points whose motion has no inverse."""
     blended = _affine(nodes, binding, pose)
     linear, offsets = blended[:, :, :3].copy(), points - blended[:, :, 3]
-    known = np.abs(determinants(linear)) > FLATTEST
-    linear[~known] = np.eye(3)
-    return products(inverses(linear), offsets[:, :, None])[:, :, 0], known
+    invertible = np.abs(determinants(linear)) > FLATTEST
+    linear[~invertible] = np.eye(3)
+    return products(inverses(linear), offsets[:, :, None])[:, :, 0], invertible
 
 
 def _affine(nodes: Float64[np.ndarray, "N 3"], binding: Binding, pose: Pose) -> Float64[np.ndarray, "P 3 4"]:

@@ -1,10 +1,10 @@
 """Fuse one template from all frames through which a key frame is tracked (paper, section 3.3.2; decision 16).
 
 In: the motion of the key frame's mesh, and the frames. Out: a mesh in the key's pose of the surface that enough frames
-have: noise averages out, temporary holes are closed, and lasting borders stay where they usually are. Every frame is
-moved back to the key by the inverse of the blended motion; the signed distances to all are averaged.
+have: averaging reduces noise, temporary holes are closed, and lasting borders stay in their usual places. Every frame
+is moved back to the key by the inverse of the blended motion; the signed distances to all are averaged.
 
-Differs from the paper: no Poisson reconstruction, which invents surface that agreement then has to take away.
+Differs from the paper: no Poisson reconstruction, which invents surface that must then be removed.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""Rigid motion of a whole body, as of a door, a crate or a chair: one pose for each frame.
+"""Rigid motion of a whole body, such as a door, a crate or a chair: one pose for each frame.
 
-In: the key frame's surface, another frame, a motion to start from. Out: the rigid motion that brings both together, by
-point-to-plane steps in both directions, and how far they are apart where it is worst.
+In: the key frame's surface, another frame, an initial motion. Out: the rigid motion that aligns both, by point-to-plane
+steps in both directions, and the distance of the worst part.
 """
 
 from __future__ import annotations
@@ -20,17 +20,17 @@ from ..fit.closeness import STRAY, shared_distance
 from ..fit.frame import ON_BORDER, FrameSurface
 from .embedded_graph import farthest_first
 
-ROUNDS = 20  # of point-to-plane steps, at most (guess)
-SETTLED = 1e-5  # a step that moves no point by more, in diagonals, is the last (guess)
-GATE, SHRINKS = 0.03, 0.75  # diagonals: pairs farther apart are none in the first round, and of that in each (guess)
-NEAREST = 4.0  # RMS noise that pairs may be apart at least (guess)
+ROUNDS = 20  # largest number of point-to-plane steps (guess)
+SETTLED = 1e-5  # diagonals; a step that moves no point by more is the last (guess)
+GATE, SHRINKS = 0.03, 0.75  # diagonals, largest distance of a pair in the first round; factor for each round (guess)
+NEAREST = 4.0  # RMS noise, smallest such limit (guess)
 ALIKE = 0.5  # least cosine between the normals of a pair (guess)
-ALONG = 0.1  # weight of the distance of frame surface past the body's border: it tells how far the body slid (guess)
-WHOLE, WORST = 1.6, 3.25  # RMS noise that the whole body, and its worst part, may be off (doors of room3: decision 28)
+ALONG = 0.1  # weight of frame surface past the body's border, which reveals sliding (guess)
+WHOLE, WORST = 1.6, 3.25  # RMS noise, largest residual of the body and of its worst part (doors of room3: decision 28)
 BENDS = 1.75  # times the residual of a motion that bends (people: 2.5 and more; decision 28)
 EXACT = 1e-4  # diagonals, in place of the noise of clean frames (guess)
 SAMPLES = 1500  # of each surface (guess)
-BLOCKS = 24  # parts of a surface that are judged one by one: an arm that moves is not lost in a mean (guess)
+BLOCKS = 24  # parts of a surface that are judged separately, so that a moving arm is not lost in a mean (guess)
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,17 +42,17 @@ class RigidMotion:
 
     @staticmethod
     def none() -> RigidMotion:
-        """Return the motion that leaves all points where they are."""
+        """Return the identity."""
         return RigidMotion(np.eye(3), np.zeros(3))
 
     @staticmethod
     def between(source: Float64[np.ndarray, "N 3"], target: Float64[np.ndarray, "N 3"]) -> RigidMotion:
-        """Return the rigid motion that is nearest to that of some points (Kabsch)."""
+        """Return the rigid motion nearest to that of the points (Kabsch)."""
         turns, shifts = fit_rigid(source[None], target[None], np.ones((1, len(source))))
         return RigidMotion(turns[0], shifts[0])
 
     def of(self, points: Float64[np.ndarray, "N 3"]) -> Float64[np.ndarray, "N 3"]:
-        """Return where points go."""
+        """Return the moved points."""
         return products(points, self.turn.T) + self.shift
 
     def after(self, angles: Float64[np.ndarray, "3"], step: Float64[np.ndarray, "3"]) -> RigidMotion:
@@ -62,7 +62,7 @@ class RigidMotion:
 
 
 class RigidBody:
-    """A key frame's surface, prepared to be brought to other frames as it is."""
+    """A key frame's surface, prepared for rigid alignment with other frames."""
 
     def __init__(self, mesh: Mesh, noise: float) -> None:
         """`noise` is the RMS distance of the frames from the truth."""
@@ -74,7 +74,7 @@ class RigidBody:
         self._block = away.argmin(axis=1)
 
     def brought(self, frame: FrameSurface, motion: RigidMotion) -> RigidMotion:
-        """Return the motion that brings the body onto a frame, from one that is near it."""
+        """Return the motion that aligns the body with a frame, starting from a motion near it."""
         gate, least = GATE, NEAREST * self._noise
         for _ in range(ROUNDS):
             rows, gaps = self._pairs(frame, motion, max(gate, least))
@@ -88,16 +88,16 @@ class RigidBody:
         return motion
 
     def holds(self, frame: FrameSurface, motion: RigidMotion, free: float) -> bool:
-        """Return whether a motion explains a frame about as well as one that bends, which left the residual `free`."""
-        whole, worst = self.residual(frame, motion)
+        """Return whether a rigid motion fits a frame about as well as a bending one, whose residual is `free`."""
+        overall, worst = self.residual(frame, motion)
         noise = max(self._noise, EXACT, free)  # a body may be noisier than the rest
-        return whole <= min(WHOLE * noise, BENDS * max(free, EXACT)) and worst <= WORST * noise
+        return overall <= min(WHOLE * noise, BENDS * max(free, EXACT)) and worst <= WORST * noise
 
     def residual(self, frame: FrameSurface, motion: RigidMotion) -> tuple[float, float]:
-        """Return the RMS distance from a frame, and that of the part of the body that is farthest from it."""
-        own, theirs = self._moved(motion), frame.mesh.vertices[frame.samples(SAMPLES)]
-        ahead, back = frame.surface.closest(own), self._surface.closest(theirs)
-        squares = ((ahead.points - own) ** 2).sum(axis=1), ((back.points - theirs) ** 2).sum(axis=1)
+        """Return the body's RMS distance from a frame, and that of its worst part."""
+        body, frame_points = self._moved(motion), frame.mesh.vertices[frame.samples(SAMPLES)]
+        ahead, back = frame.surface.closest(body), self._surface.closest(frame_points)
+        squares = ((ahead.points - body) ** 2).sum(axis=1), ((back.points - frame_points) ** 2).sum(axis=1)
         over = frame.inside_at(ahead) > ON_BORDER, ~self._surface.past_border(back)
         noise = max(self._noise, EXACT)
         usable = over[0] & (squares[0] <= (STRAY * noise) ** 2)
@@ -114,22 +114,22 @@ class RigidBody:
     def _pairs(
         self, frame: FrameSurface, motion: RigidMotion, gate: float
     ) -> tuple[Float64[np.ndarray, "R 6"], Float64[np.ndarray, " R"]]:
-        """Return the rows of a small turn and step for pairs in both directions, and the gaps that they shall close."""
-        own, theirs = self._moved(motion), frame.mesh.vertices[frame.samples(SAMPLES)]
-        ahead, back = frame.surface.closest(own), self._surface.closest(theirs)
+        """Return the rows of a small turn and step for pairs in both directions, and the gaps to close."""
+        source, target = self._moved(motion), frame.mesh.vertices[frame.samples(SAMPLES)]
+        ahead, back = frame.surface.closest(source), self._surface.closest(target)
         inside, past = frame.inside_at(ahead) > ON_BORDER, self._surface.past_border(back)
         facing = frame.surface.normals[ahead.faces], self._surface.normals[back.faces]
         own_ways, their_ways = products(self._normals, motion.turn.T), frame.normals[frame.samples(SAMPLES)]
         inside &= (facing[0] * own_ways).sum(axis=1) > ALIKE
-        over = ~past & ((facing[1] * their_ways).sum(axis=1) > ALIKE)
-        found = list[tuple[np.ndarray, np.ndarray, np.ndarray]]()  # places on the body, directions, gaps along them
+        within = ~past & ((facing[1] * their_ways).sum(axis=1) > ALIKE)
+        rows = list[tuple[np.ndarray, np.ndarray, np.ndarray]]()  # places on the body, directions, gaps along them
         for places, aims, ways, good in (
-            (own, ahead.points, facing[0], inside),
-            (back.points, theirs, facing[1], over),
-            *((back.points, theirs, ALONG * np.broadcast_to(axis, theirs.shape), past) for axis in np.eye(3)),
+            (source, ahead.points, facing[0], inside),
+            (back.points, target, facing[1], within),
+            *((back.points, target, np.broadcast_to(axis, target.shape), past) for axis in ALONG * np.eye(3)),
         ):
             gaps = aims - places
             near = good & ((gaps**2).sum(axis=1) <= gate**2)
-            found.append((places[near], ways[near], (gaps * ways).sum(axis=1)[near]))
-        places, ways, gaps = (np.concatenate(each) for each in zip(*found, strict=True))
+            rows.append((places[near], ways[near], (gaps * ways).sum(axis=1)[near]))
+        places, ways, gaps = (np.concatenate(each) for each in zip(*rows, strict=True))
         return np.concatenate([np.cross(places, ways), ways], axis=1), gaps

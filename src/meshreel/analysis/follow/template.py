@@ -1,4 +1,4 @@
-"""Make the template of a group in form `layers`: a coarse base mesh of its key frame, and detail that all frames share.
+"""Make the template of a group of form LAYERS: a coarse base mesh of its key frame, and detail shared by all frames.
 
 In: a key frame; fitted positions of the subdivided base. Out: the base; positions whose detail is constant
 (docs/decisions/0014-template.md).
@@ -24,7 +24,7 @@ NOISY_BORDER = 100.0  # weight of open borders under noise: a coarse base cuts t
 FEWEST = 40  # smallest number of vertices of a base mesh, enough for a body's limbs: a guess
 DECAY = 1.2  # the error of quadric decimation falls with this power of the number of vertices (measured on bodies)
 CURVATURE = 52  # 64ths, lift of midpoints, between the coder's 48 and 58 (decision 14)
-NEAR, FAR = 0.05, 0.25  # logarithms of errors that are no reason to go on, in the first rounds and after: guesses
+NEAR, FAR = 0.05, 0.25  # logarithms of errors at which the search stops, in the first rounds and after: guesses
 ROUNDS, MOST_ROUNDS = 3, 8  # first rounds of the search for the number of vertices, and all of them: guesses
 
 
@@ -47,16 +47,16 @@ def base_mesh(key: Mesh, options: TemplateOptions, noise: float = 0.0) -> Mesh:
         base = decimate(key, max(count, 4), border)
         error = _rms(key, base)
         if error == 0.0 and not noise:
-            return base  # of a clean frame nothing is better than itself
+            return base  # exact
         tried[count] = math.log(error / aim) if error else -math.inf, base
         if abs(tried[count][0]) < (NEAR if len(tried) < ROUNDS else FAR):
             break
-        # Where a limb is lost the law does not hold: what is between too few and too many is tried.
+        # If a limb is lost the law does not hold: try a number between too few and too many.
         few = max((each for each, (off, _) in tried.items() if off > 0), default=FEWEST)
         many = min((each for each, (off, _) in tried.items() if off <= 0 and each > few), default=most)
-        wanted = round(len(base.vertices) * (error / aim) ** (1 / DECAY))
-        is_known = few in tried and many in tried and not few < wanted < many
-        count = round(math.sqrt(few * many)) if is_known else min(max(wanted, FEWEST), most)
+        estimate = round(len(base.vertices) * (error / aim) ** (1 / DECAY))
+        is_known = few in tried and many in tried and not few < estimate < many
+        count = round(math.sqrt(few * many)) if is_known else min(max(estimate, FEWEST), most)
     return min(tried.values(), key=lambda one: abs(one[0]))[1]
 
 
@@ -70,11 +70,11 @@ def shared_detail(
     hierarchy = levels_of(faces, count, levels)
 
     def coherent(positions: Float64[np.ndarray, "T V 3"]) -> Float64[np.ndarray, "T V 3"]:
-        known = np.ascontiguousarray(positions[:, :count])
+        vertices = np.ascontiguousarray(positions[:, :count])
         for level in hierarchy:
             scalars = heights(positions[:, : level.count], positions[:, : level.vertices], level, CURVATURE)
-            known = refine(known, level, np.tile(np.median(scalars, axis=0), (len(known), 1)), CURVATURE)
-        return known
+            vertices = refine(vertices, level, np.tile(np.median(scalars, axis=0), (len(vertices), 1)), CURVATURE)
+        return vertices
 
     return coherent
 

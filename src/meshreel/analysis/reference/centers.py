@@ -57,7 +57,7 @@ def reference_centers(
     distances: Float32[np.ndarray, "K K"], pose: Float64[np.ndarray, "K 3"], options: ReferenceCenterOptions
 ) -> ReferenceCenters:
     """Find the pose of least stress (eq. 5), rotated, shifted and mirrored to agree best with a frame's `pose`."""
-    if len(distances) < 4 or not distances.any():  # up to three points, or all in one place: there is nothing to find
+    if len(distances) < 4 or not distances.any():  # up to three points, or all in one place
         return ReferenceCenters(pose.copy(), _stress(distances, pose), 0)
     positions, rounds = _smacof(distances, _classical(distances, options), options)
     positions = _orient(positions, pose, distances)
@@ -101,9 +101,9 @@ def _strongest(
         image = products(matrix, basis[step][:, None])[:, 0]
         inside[step, : step + 1] = inside[: step + 1, step] = products(basis[: step + 1], image[:, None])[:, 0]
         vector = image
-        for _ in range(2):  # twice, so that rounding leaves nothing of the vectors so far
-            known = products(basis[: step + 1], vector[:, None])
-            vector = vector - products(basis[: step + 1].T, known)[:, 0]
+        for _ in range(2):  # twice, because of rounding
+            projections = products(basis[: step + 1], vector[:, None])
+            vector = vector - products(basis[: step + 1].T, projections)[:, 0]
     values, vectors = eigen(inside)
     return values[-3:], products(basis.T, vectors[:, -3:])
 
@@ -151,7 +151,7 @@ def _orient(
 ) -> Float64[np.ndarray, "K 3"]:
     """Align positions to a real pose, mirrored if most small neighbourhoods are inside out.
 
-    A limb may be elsewhere than in the frame, so a global fit may prefer the mirror image; neighbourhoods do not.
+    A limb may not be in the frame's place, so a global fit may prefer the mirror image; neighbourhoods do not.
     """
     count = min(12, len(pose))
     near = np.argsort(distances, axis=1, kind="stable")[:, :count]

@@ -138,9 +138,9 @@ def _guard(
     for choice in range(near.shape[1]):
         values = neighbours.affinity[near[to, choice], nearest[other]].astype(np.float64)
         kin[:, choice] = np.bincount(to, values, len(near))
-    own = np.bincount(to, neighbours.affinity[nearest[to], nearest[other]].astype(np.float64), len(near))
+    affinities = np.bincount(to, neighbours.affinity[nearest[to], nearest[other]].astype(np.float64), len(near))
     best = np.argmax(kin >= 0.8 * kin.max(axis=1, keepdims=True), axis=1)  # the nearest of the good ones
-    stranger = own < 0.5 * kin.max(axis=1)
+    stranger = affinities < 0.5 * kin.max(axis=1)
     return np.where(stranger, near[np.arange(len(near)), best], nearest)
 
 

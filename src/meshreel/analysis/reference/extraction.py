@@ -140,14 +140,14 @@ def _trial(group: Group, surfaces: list[FrameSurface], attempt: _Attempt, option
     if mesh.is_empty:
         return Trial(frame, key, np.inf, np.inf)
     tried = sorted({key, *np.linspace(0, len(surfaces) - 1, options.trial_frames).round().astype(int).tolist()})
-    some = [surfaces[t] for t in tried]
-    fitted = fit_surfaces(mesh.faces, group.sent(mesh, pose)[tried], some, TRIAL_FIT, Guides(key=tried.index(key)))
+    frames = [surfaces[t] for t in tried]
+    fitted = fit_surfaces(mesh.faces, group.sent(mesh, pose)[tried], frames, TRIAL_FIT, Guides(key=tried.index(key)))
     rms = []
-    for frame_surface, moved in zip(some, fitted, strict=True):
+    for frame_surface, moved in zip(frames, fitted, strict=True):
         original = frame_surface.mesh.vertices
-        there = Surface(Mesh(moved, mesh.faces)).distances(original[:: max(1, len(original) // PROBES)])
-        back = _outside(frame_surface.surface, moved, group.edge)
-        rms.append(max(np.sqrt(np.mean(there**2)), np.sqrt(np.mean(back**2))))
+        to_fit = Surface(Mesh(moved, mesh.faces)).distances(original[:: max(1, len(original) // PROBES)])
+        to_frame = _outside(frame_surface.surface, moved, group.edge)
+        rms.append(max(np.sqrt(np.mean(to_fit**2)), np.sqrt(np.mean(to_frame**2))))
     return Trial(frame, key, float(np.mean(rms)), float(np.max(rms)))
 
 

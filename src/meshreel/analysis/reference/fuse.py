@@ -4,7 +4,7 @@ In: frames, centers, a pose, a key frame. Out: the surfaces of the frames deform
 
 Differs from the paper: the key frame's surface comes first, and other frames add what it lacks; faces that tear in the
 deformation, or join parts that are separate in some frame, are cut; surfaces are joined by the mean of their signed
-distances, not by Poisson reconstruction, so that none is made far from all. `FuseOptions.poisson` has the paper's way.
+distances, not by Poisson reconstruction, which makes surface far from all frames (`FuseOptions.poisson` does so).
 """
 
 from __future__ import annotations
@@ -81,19 +81,19 @@ class Group:
         return moved_to(mesh, pose, self.positions, self.kin, self.deform)
 
     def pieces(self, pose: Float64[np.ndarray, "K 3"], key: int) -> list[Mesh]:
-        """Return the surface in a pose in pieces: the key frame's, then what it lacks, from the frames next to it.
+        """Return the surface in a pose in pieces: the key frame's, then pieces that it lacks from frames next to it.
 
-        Where tracking drifts, frames disagree by more than their detail: the mean of all would be blurred.
+        If tracking drifts, frames disagree by more than their detail, and the mean of all would be blurred.
         """
-        covered, found = np.zeros(len(pose)), list[Mesh]()
+        covered, pieces = np.zeros(len(pose)), list[Mesh]()
         for t in sorted(range(len(self.frames)), key=lambda t: (abs(t - key), t)):
             moved, faces = self._moved(t, pose)
             nearest = self.bindings[t].nearest
             area = np.bincount(nearest, vertex_areas(Mesh(self.frames[t].vertices, faces)), len(pose))
-            wanted = self._around(covered) < self.fuse.cover * self._around(area)
-            covered += np.where(wanted, area, 0)
-            found.append(drop_unreferenced(Mesh(moved, faces[wanted[nearest][faces].any(axis=1)])))
-        return found
+            lacking = self._around(covered) < self.fuse.cover * self._around(area)
+            covered += np.where(lacking, area, 0)
+            pieces.append(drop_unreferenced(Mesh(moved, faces[lacking[nearest][faces].any(axis=1)])))
+        return pieces
 
     def fused(self, pose: Float64[np.ndarray, "K 3"], key: int, voxel: float, vertices: int) -> Mesh:
         """Make one mesh in a pose with about `vertices` vertices, no surface far from the frames', no face that tears.
@@ -107,11 +107,10 @@ class Group:
         bad = self._parting(edges, bind(mesh, pose, self.kin, self.deform), pose)
         for moved in self.sent(mesh, pose):
             bad |= self._torn(mesh.vertices, moved, edges)
-        whole = drop_small(clean(Mesh.of(mesh.vertices, mesh.faces[~bad])), self.fuse.smallest)
-        return close_holes(whole, self.fuse.hole * mesh.diagonal)
+        intact = drop_small(clean(Mesh.of(mesh.vertices, mesh.faces[~bad])), self.fuse.smallest)
+        return close_holes(intact, self.fuse.hole * mesh.diagonal)
 
     def _joined(self, pieces: Sequence[Mesh], voxel: float) -> Mesh:
-        """Return one surface of several."""
         if self.fuse.poisson is not None:
             pieces = [subdivide_midpoint(piece) for piece in pieces]
             points, normals = (
@@ -144,11 +143,11 @@ class Group:
         return (self.distances[i, j] > self.fuse.torn * now + self.spacing / 2)[edges[1]].any(axis=1)
 
     def _torn(
-        self, here: Float64[np.ndarray, "V 3"], there: Float64[np.ndarray, "V 3"], edges: Edges
+        self, source: Float64[np.ndarray, "V 3"], target: Float64[np.ndarray, "V 3"], edges: Edges
     ) -> Bool[np.ndarray, " F"]:
         """Return the faces with an edge that is much longer in one pose than in the other."""
-        one, two = _lengths(here, edges[0]), _lengths(there, edges[0])
-        far = np.maximum(one, two) > self.fuse.torn * np.minimum(one, two) + self.spacing / 2
+        before, after = _lengths(source, edges[0]), _lengths(target, edges[0])
+        far = np.maximum(before, after) > self.fuse.torn * np.minimum(before, after) + self.spacing / 2
         return far[edges[1]].any(axis=1)
 
     def _around(self, amounts: Float64[np.ndarray, " K"]) -> Float64[np.ndarray, " K"]:

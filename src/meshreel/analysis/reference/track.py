@@ -129,9 +129,9 @@ class _Affinities:
         for body in range(int(bodies.max()) + 1):
             mine = np.flatnonzero(bodies == body)
             nearest = min(2 * options.neighbours + 1, len(mine))
-            _, found = cKDTree(centers[mine]).query(centers[mine], k=np.arange(1, nearest + 1))
+            _, neighbours = cKDTree(centers[mine]).query(centers[mine], k=np.arange(1, nearest + 1))
             rows.append(np.repeat(mine, nearest))
-            columns.append(mine[found].reshape(-1))
+            columns.append(mine[neighbours].reshape(-1))
         i, j = np.concatenate(rows), np.concatenate(columns)
         self._i, self._j = i[i != j], j[i != j].astype(np.int32)
         self._offsets = _offsets(self._i, len(centers))
@@ -166,8 +166,8 @@ class _Affinities:
         order = np.lexsort((halvings, self._i))
         rank = np.empty(len(order), np.int64)
         rank[order] = np.arange(len(order)) - self._offsets[self._i[order]]
-        kept = (rank < FEWEST_NEIGHBOURS) | ((rank < o.neighbours) & (affinity >= LEAST_AFFINITY))
-        return _offsets(self._i[kept], len(self._offsets) - 1), self._j[kept], affinity[kept]
+        listed = (rank < FEWEST_NEIGHBOURS) | ((rank < o.neighbours) & (affinity >= LEAST_AFFINITY))
+        return _offsets(self._i[listed], len(self._offsets) - 1), self._j[listed], affinity[listed]
 
 
 def _offsets(rows: Int64[np.ndarray, " P"], count: int) -> Int32[np.ndarray, " K1"]:

@@ -1,7 +1,7 @@
 """Fuse the still surface of many frames into one background mesh (paper, section 3.2; decision 19).
 
-In: the still faces of some frames. Out: one mesh. Signed distances to the surfaces of the frames are averaged, so noise
-averages out, and surface that people hide in one frame comes from others.
+In: the still faces of some frames. Out: one mesh. Signed distances to the surfaces of the frames are averaged, which
+reduces noise, and surface that people hide in one frame comes from others.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ class BackgroundOptions:
     refresh: float | None = None  # s between two copies of the background in the file; None: one copy
 
     def least(self, count: int) -> int:
-        """Return how many of `count` frames must have surface at a voxel."""
+        """Return the smallest number of `count` frames that must have surface at a voxel."""
         return max(1, math.ceil(self.seen * count))
 
 

@@ -1,8 +1,8 @@
 """Fuse the usual depth of every pixel over time into one background mesh (docs/decisions/0019-background.md).
 
-In: the depth pictures of frames, their meshes, and the still faces of these. Out: one mesh. The median over time avoids
-depths between two surfaces and removes noise before fusion, so voxels may be finer than those of the frames. Cameras
-must not move; a sequence that offers depth pictures has checked that.
+In: depth pictures, meshes and still faces of frames. Out: one mesh. The median over time avoids depths between two
+surfaces and removes noise before fusion, so voxels may be finer than those of the frames. Cameras must not move; a
+sequence that offers depth pictures has checked that.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from ...types import Mesh
 from .background import BackgroundOptions
 
 RIM = 3  # pixels around moving surface that are ignored: a guess
-HIDDEN = np.float32(-1)  # in place of a depth: what stands still is not seen there
+HIDDEN = np.float32(-1)  # in place of a depth: moving surface hides the still surface there
 OPEN = 0.3  # least share of the moments in which a pixel is not hidden that must have a depth there (guess)
 SMOOTH, SPREAD, ROUNDS = 2, 1.5, 2  # pixels around, standard deviation in pixels, and rounds of smoothing (decision 28)
 SIMILAR = 4.0  # times the noise, standard deviation of the inverse depths that are averaged (decision 28)
@@ -33,7 +33,7 @@ FINER = 3  # times the rows and columns of the pictures, interpolated, that are 
 
 @dataclass(frozen=True, slots=True)
 class Moment:
-    """One frame of a scene: its depth pictures, its mesh, and the still faces of the mesh."""
+    """Depth pictures and mesh of one frame of a scene, and the still faces of the mesh."""
 
     pictures: list[DepthPicture | None]  # one for each camera
     mesh: Mesh
@@ -46,7 +46,8 @@ def fuse_still_depth(moments: Iterable[Moment], voxel: float, options: Backgroun
     if not usual:
         return Mesh.empty()
     usual = [_smooth(picture) for picture in usual]
-    fine, past = ([one.finer(FINER) for one in some] for some in (usual, [_continued(one) for one in usual]))
+    fine = [picture.finer(FINER) for picture in usual]
+    past = [_continued(picture).finer(FINER) for picture in usual]
     mesh = extract(integrate(fine, options.finer * voxel, GRAZING if len(usual) > 1 else ALONE, past), SEEN)
     whole = without_fragments(_facing(mesh, usual, options.facing), options.fragment)
     return close_holes(whole, options.hole, FreeSpace.of(usual).at)
@@ -62,26 +63,26 @@ def usual_pictures(moments: Iterable[Moment], options: BackgroundOptions = Backg
             if picture is not None:
                 cameras[number] = picture
                 stacks.setdefault(number, []).append(_still(picture, rays, moment))
-    found = list[DepthPicture]()
+    usual = list[DepthPicture]()
     for number, stack in sorted(stacks.items()):
         depth = _medians(np.stack(stack), options)
         if depth.any():
-            found.append(DepthPicture(cameras[number].camera, depth, cameras[number].unit, cameras[number].far))
-    return found
+            usual.append(DepthPicture(cameras[number].camera, depth, cameras[number].unit, cameras[number].far))
+    return usual
 
 
 def _still(picture: DepthPicture, rays: Rays, moment: Moment) -> np.ndarray:
-    """Return the depths of a picture, `HIDDEN` for pixels that see moving faces or lie within `RIM` of some."""
+    """Return the depths of a picture; `HIDDEN` at pixels that see moving faces, and within `RIM` of them."""
     moves = pixels_near(picture.camera, Mesh(moment.mesh.vertices, moment.mesh.faces[~moment.still]))
-    faces = rays.faces_in(picture.camera, moves)  # of the whole mesh: what stands still may hide what moves
+    faces = rays.faces_in(picture.camera, moves)  # of the whole mesh: still faces may hide moving ones
     moves[moves] = (faces >= 0) & ~np.append(moment.still, True)[faces]
     return np.where(binary_dilation(moves, iterations=RIM), HIDDEN, picture.depth.astype(np.float32))
 
 
 def _medians(stack: Float32[np.ndarray, "T H W"], options: BackgroundOptions) -> Float32[np.ndarray, "H W"]:
-    """Return for each pixel the median of its depths above 0; 0 where too few are.
+    """Return for each pixel the median of its depths above 0; 0 where there are too few.
 
-    A door that opens soon is measured a few times, and what is behind it perhaps never.
+    A door that soon opens is measured a few times only, and the surface behind it perhaps never.
     """
     depths = np.sort(np.where(stack > 0, stack, np.inf), axis=0)
     count = np.isfinite(depths).sum(axis=0)
@@ -91,9 +92,9 @@ def _medians(stack: Float32[np.ndarray, "T H W"], options: BackgroundOptions) ->
 
 
 def _smooth(picture: DepthPicture) -> DepthPicture:
-    """Smooth a depth picture along surfaces: sensors round depth to steps, which noise does not even out.
+    """Smooth a depth picture along surfaces: sensors round depth to steps, which averaging over time does not remove.
 
-    Inverse depths are averaged, so that planes stay planes, with those around that are about as far.
+    Inverse depths are averaged, so that planes stay planes, with neighbours at a similar depth.
     """
     inverse = inverse_depths(picture.depth)
     (height, width), similar = inverse.shape, np.float32(max(SIMILAR * _noise(inverse), 1e-6))
@@ -103,34 +104,35 @@ def _smooth(picture: DepthPicture) -> DepthPicture:
         sums, weights = np.zeros_like(inverse), np.zeros_like(inverse)
         for down in places:
             for right in places:
-                there = padded[SMOOTH + down : SMOOTH + down + height, SMOOTH + right : SMOOTH + right + width]
-                near = (there - inverse) / (similar * around)
-                weight = np.exp(-(near**2) / 2 - np.float32((down**2 + right**2) / (2 * SPREAD**2))) * (there > 0)
-                sums += weight * there
+                shifted = padded[SMOOTH + down : SMOOTH + down + height, SMOOTH + right : SMOOTH + right + width]
+                offset = (shifted - inverse) / (similar * around)
+                weight = np.exp(-(offset**2) / 2 - np.float32((down**2 + right**2) / (2 * SPREAD**2))) * (shifted > 0)
+                sums += weight * shifted
                 weights += weight
         inverse = np.where(inverse > 0, sums / np.maximum(weights, np.float32(1e-9)), 0)
     return replace(picture, depth=inverse_depths(inverse))
 
 
 def _continued(picture: DepthPicture) -> DepthPicture:
-    """Return the surfaces of a depth picture a pixel past their borders, where a nearer one or nothing is measured.
+    """Return a depth picture's surfaces continued a pixel past their borders, behind nearer surface or a hole.
 
-    On a grid each surface ends a voxel before what hides it; between the two, one would see through the room.
+    On a grid each surface ends a voxel before the one that hides it, which would leave a gap in the room.
     """
-    inverse, found = np.pad(inverse_depths(picture.depth), 1), np.zeros((1, 1), np.float32)
+    inverse, farthest = np.pad(inverse_depths(picture.depth), 1), np.zeros((1, 1), np.float32)
     for axis, way in ((0, 1), (0, -1), (1, 1), (1, -1)):
-        here, before = np.roll(inverse, way, axis), np.roll(inverse, 2 * way, axis)
-        guess = np.where(np.abs(here - before) <= STEP * here, 2 * here - before, here)
-        hidden = (here > 0) & ((inverse == 0) | (guess < (1 - STEP) * inverse))
-        found = np.maximum(found, np.where(hidden, guess, 0))  # the nearest of several
-    return replace(picture, depth=inverse_depths(found[1:-1, 1:-1]))
+        depth, before = np.roll(inverse, way, axis), np.roll(inverse, 2 * way, axis)
+        guess = np.where(np.abs(depth - before) <= STEP * depth, 2 * depth - before, depth)
+        hidden = (depth > 0) & ((inverse == 0) | (guess < (1 - STEP) * inverse))
+        farthest = np.maximum(farthest, np.where(hidden, guess, 0))  # the nearest of several
+    return replace(picture, depth=inverse_depths(farthest[1:-1, 1:-1]))
 
 
 def _noise(inverse: Float32[np.ndarray, "H W"]) -> float:
-    """Return the usual noise of inverse depths, as a share of them: by second differences, which planes have not."""
+    """Return the typical noise of inverse depths, as a share of them, from second differences: 0 on planes."""
     differences = np.abs(inverse[:, :-2] - 2 * inverse[:, 1:-1] + inverse[:, 2:])
-    known = (inverse[:, :-2] > 0) & (inverse[:, 1:-1] > 0) & (inverse[:, 2:] > 0)
-    return float(np.median(differences[known] / inverse[:, 1:-1][known])) / SECOND_MEDIAN if known.any() else 0.0
+    measured = (inverse[:, :-2] > 0) & (inverse[:, 1:-1] > 0) & (inverse[:, 2:] > 0)
+    shares = differences[measured] / inverse[:, 1:-1][measured]
+    return float(np.median(shares)) / SECOND_MEDIAN if len(shares) else 0.0
 
 
 def _facing(mesh: Mesh, pictures: list[DepthPicture], least: float) -> Mesh:

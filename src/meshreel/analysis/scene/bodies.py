@@ -28,8 +28,8 @@ from ...geometry.voxels import Lattice, around, distinct, spread
 from ...types import Mesh
 
 MOST_RINGS = 4  # largest number of rings added around moving faces where the background has a gap: a guess
-AROUND = 0.9  # m around moving surface where what the room lacks is taken for moving, too: a guess
-SPECK = 0.002  # m^2: smaller pieces that the room lacks are noise: a guess
+AROUND = 0.9  # m around moving surface within which surface that the room lacks counts as moving: a guess
+SPECK = 0.002  # m^2: smaller pieces of surface that the room lacks are noise: a guess
 RING = 2.0  # cells, the longest edge of a face in a ring, so that large faces of a wall stay out of it: a guess
 
 
@@ -41,8 +41,8 @@ class BodyOptions:
     least: float = 0.1  # m^2: pieces that never reach this area are bits
     lasts: int = 5  # frames: bits that are present in at least this many are a body of their own
     large: float = 0.02  # m^2, of such a body in a frame at least, on average
-    beside: float = 0.9  # m: other bits at most this far from a body join it, as feet below legs that no camera sees
-    touches: float = 2.0  # cells of the scene: the same for a bit that is there in one frame only
+    beside: float = 0.9  # m: other bits at most this far from a body join it, such as feet below legs no camera sees
+    touches: float = 2.0  # cells of the scene: the same for a bit that is present in one frame only
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,14 +64,14 @@ class _Piece:
 
 
 def ring(mesh: Mesh, moves: Bool[np.ndarray, " F"], cell: float) -> Bool[np.ndarray, " F"]:
-    """Return True for the small faces next to moving ones, which go with the body; `cell` is in m.
+    """Return True for the small faces next to moving ones, which belong to the body; `cell` is in m.
 
-    Where a foot stands, fused surface runs from the floor up to it, a cell wide: it rests as long as the foot does, but
-    other frames have only the floor there. Without these faces bodies would hover by a cell.
+    Around a standing foot, fused surface runs from the floor up to it, a cell wide: it rests as long as the foot does,
+    but other frames have only the floor there. Without these faces bodies would hover by a cell.
     """
-    found = with_neighbours(mesh.faces, moves) & ~moves
-    found[found] = longest_edges(mesh.vertices, mesh.faces[found]) <= RING * cell
-    return found
+    added = with_neighbours(mesh.faces, moves) & ~moves
+    added[added] = longest_edges(mesh.vertices, mesh.faces[added]) <= RING * cell
+    return added
 
 
 def with_ring(mesh: Mesh, moves: Bool[np.ndarray, " F"], cell: float, background: Surface | None = None) -> Mesh:
@@ -80,23 +80,23 @@ def with_ring(mesh: Mesh, moves: Bool[np.ndarray, " F"], cell: float, background
     Where the background has a gap there, more rings are added: a background fused from depth pictures lacks some pixels
     around moving surface, and pixels of coarse pictures are wide.
     """
-    found = moves | ring(mesh, moves, cell)
+    cut = moves | ring(mesh, moves, cell)
     if background is None or not moves.any():
-        return part_of(mesh, found)
+        return part_of(mesh, cut)
     for _ in range(MOST_RINGS - 1):
-        more = np.flatnonzero(ring(mesh, found, cell))
+        more = np.flatnonzero(ring(mesh, cut, cell))
         more = more[background.past_border(background.closest(mesh.vertices[mesh.faces[more]].mean(axis=1)))]
         if not len(more):
             break
-        found[more] = True
-    return part_of(mesh, found)
+        cut[more] = True
+    return part_of(mesh, cut)
 
 
 def beyond(mesh: Mesh, moves: Bool[np.ndarray, " F"], room: Surface, far: float) -> Bool[np.ndarray, " F"]:
-    """Return the moving faces, and others near them that are farther than `far` (m) from the room.
+    """Return the moving faces, and those near them that are farther than `far` (m) from the room.
 
-    A foot that rests on the floor is there for so long, and so near to it, that it seems to stand still; the floor has
-    no such surface.
+    A foot stands so long and so near to the floor that it seems to belong to the room, but the floor has no such
+    surface.
     """
     if not moves.any():
         return moves
@@ -104,12 +104,12 @@ def beyond(mesh: Mesh, moves: Bool[np.ndarray, " F"], room: Surface, far: float)
     low, high = corners.min(axis=0) - AROUND, corners.max(axis=0) + AROUND
     near = ((mesh.vertices >= low) & (mesh.vertices <= high)).all(axis=1)[mesh.faces].all(axis=1) & ~moves
     off = np.zeros(len(mesh.vertices), bool)
-    asked = np.unique(mesh.faces[near])
-    off[asked] = room.distances(mesh.vertices[asked]) > far
-    found = moves | (near & off[mesh.faces].all(axis=1))
-    pieces = connected_faces(mesh.faces[found], len(mesh.vertices))
-    found[found] = (np.bincount(pieces, face_normals(part_of(mesh, found))[1]) >= SPECK)[pieces]
-    return found | moves
+    vertices = np.unique(mesh.faces[near])
+    off[vertices] = room.distances(mesh.vertices[vertices]) > far
+    body = moves | (near & off[mesh.faces].all(axis=1))
+    pieces = connected_faces(mesh.faces[body], len(mesh.vertices))
+    body[body] = (np.bincount(pieces, face_normals(part_of(mesh, body))[1]) >= SPECK)[pieces]
+    return body | moves
 
 
 def find_bodies(moving: Sequence[Mesh], size: float, options: BodyOptions = BodyOptions()) -> Bodies:
@@ -150,12 +150,12 @@ def same_bodies(before: Sequence[Mesh], now: Sequence[Mesh], size: float, option
     lattice = _lattice([*before, *now], options.cell * size)
     cells = [[around(_cells(mesh, lattice)) for mesh in meshes] for meshes in (before, now)]
     shared = np.array([[len(np.intersect1d(a, b, assume_unique=True)) for a in cells[0]] for b in cells[1]])
-    found = [-1] * len(now)
+    matches = [-1] * len(now)
     while shared.size and shared.max() > 0:
         new, old = np.unravel_index(int(shared.argmax()), shared.shape)
-        found[int(new)] = int(old)
+        matches[int(new)] = int(old)
         shared[new, :] = shared[:, old] = 0
-    return found
+    return matches
 
 
 def _lattice(meshes: Sequence[Mesh], size: float) -> Lattice:
@@ -167,11 +167,11 @@ def _pieces(frame: int, mesh: Mesh, lattice: Lattice) -> list[_Piece]:
         return []
     label = connected_faces(mesh.faces, len(mesh.vertices))
     areas = np.bincount(label, face_normals(mesh)[1])
-    found = []
+    pieces = []
     for number in np.flatnonzero(np.bincount(label)):
         part = part_of(mesh, label == number)
-        found.append(_Piece(frame, part, float(areas[number]), _cells(part, lattice)))
-    return found
+        pieces.append(_Piece(frame, part, float(areas[number]), _cells(part, lattice)))
+    return pieces
 
 
 def _cells(mesh: Mesh, lattice: Lattice) -> Int64[np.ndarray, " C"]:
@@ -183,24 +183,24 @@ def _linked(pieces: list[_Piece]) -> Int64[np.ndarray, " N"]:
     links, start = list[tuple[int, int]](), 0
     while start < len(pieces):
         frame = pieces[start].frame
-        here = [k for k in range(start, len(pieces)) if pieces[k].frame == frame]
+        current = [k for k in range(start, len(pieces)) if pieces[k].frame == frame]
         later = [k for k in range(start, len(pieces)) if pieces[k].frame == frame + 1]
         keys = np.concatenate([pieces[k].cells for k in later] or [np.zeros(0, np.int64)])
         owner = np.repeat(later, [len(pieces[k].cells) for k in later])
-        for k in here:
+        for k in current:
             near = np.isin(keys, around(pieces[k].cells))
             links += [(k, int(other)) for other in np.unique(owner[near])]
-        start = here[-1] + 1
+        start = current[-1] + 1
     return linked(np.array(links, np.int64).reshape(-1, 2), len(pieces))
 
 
 def _given(bodies: list[list[list[Mesh]]], bits: list[_Piece], frames: int, size: float, options: BodyOptions) -> int:
     """Make lasting bits a body, else add each to the nearest body of its frame; return the number of dropped faces.
 
-    A bit that is there in one frame only is noise, unless it touches a body.
+    A bit that is present in one frame only is noise, unless it touches a body.
     """
-    there = len({bit.frame for bit in bits})
-    if there >= options.lasts and sum(bit.area for bit in bits) >= options.large * there:
+    present = len({bit.frame for bit in bits})
+    if present >= options.lasts and sum(bit.area for bit in bits) >= options.large * present:
         body: list[list[Mesh]] = [[] for _ in range(frames)]
         for bit in bits:
             body[bit.frame].append(bit.mesh)
@@ -210,14 +210,14 @@ def _given(bodies: list[list[list[Mesh]]], bits: list[_Piece], frames: int, size
     for bit in bits:
         near = [(_gap(bit.mesh, body[bit.frame]), number) for number, body in enumerate(bodies) if body[bit.frame]]
         gap, number = min(near, default=(np.inf, -1))
-        if gap <= (options.beside if there > 1 else options.touches * size):
+        if gap <= (options.beside if present > 1 else options.touches * size):
             bodies[number][bit.frame].append(bit.mesh)
         else:
             dropped += len(bit.mesh.faces)
     return dropped
 
 
-def _gap(mesh: Mesh, others: list[Mesh]) -> float:
-    """Return the smallest distance between a vertex of `mesh` and one of `others`, m."""
-    points: Float64[np.ndarray, "N 3"] = np.concatenate([other.vertices for other in others])
+def _gap(mesh: Mesh, body: list[Mesh]) -> float:
+    """Return the smallest distance between a vertex of `mesh` and one of `body`, m."""
+    points: Float64[np.ndarray, "N 3"] = np.concatenate([part.vertices for part in body])
     return float(cKDTree(points).query(mesh.vertices)[0].min())

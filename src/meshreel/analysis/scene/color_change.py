@@ -1,7 +1,7 @@
-"""Faces in front of the room by less than the noise of places shows, found by their colour: feet on a floor.
+"""Find faces too close to the room to be told from it by depth, such as feet on a floor, by their colour.
 
-In: the pictures of colour cameras and the meshes of some frames. Out: faces that are nearer than the room usually is
-there and have another hue. Shadows change the brightness and hardly the hue, and are no nearer.
+In: the pictures of colour cameras and the meshes of some frames. Out: faces a little nearer than the room usually is
+there and of another hue. Shadows change the brightness and hardly the hue, and are no nearer.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from ...geometry.raycast import Rays
 from ...types import Frames, Mesh
 from .color_looks import ColorLooks
 
-SIDE = 320  # pixels, most along the longer side of a view (guess)
-MOMENTS = 24  # frames that tell what is usual (guess)
-_FAR = 0.75  # quantile over them of the depth that is that of the room (guess)
+SIDE = 320  # pixels, largest length of a view's longer side (guess)
+MOMENTS = 24  # frames from which the usual depth and hue are taken (guess)
+_FAR = 0.75  # quantile of depth over these frames that is the room's (guess)
 _ROOM = 3.0  # of `nearer`: within this distance of that depth a pixel shows the room (guess)
 _HUE = 0.015  # least change of a colour's share of the sum of channels (measured on a real room: .01 to .03 do)
 _NOISE = 4.0  # least change in standard deviations of a pixel (guess)
@@ -28,7 +28,7 @@ _DARK = 30  # added to the sum of channels: the hue of dark pixels is noise (gue
 
 @dataclass(frozen=True, slots=True)
 class ColorChange:
-    """What colour cameras usually see, to compare frames with it."""
+    """Usual depth and hue in each view of a colour camera, for comparison with single frames."""
 
     looks: ColorLooks
     nearer: float  # m, by which a pixel must be nearer than usual
@@ -38,7 +38,7 @@ class ColorChange:
 
     @staticmethod
     def of(frames: Frames, looks: ColorLooks, numbers: Sequence[int], nearer: float) -> ColorChange:
-        """Find what is usual in some frames."""
+        """Find the usual depth and hue over the frames `numbers`."""
         depths, hues = [], []
         for number in numbers:
             rays = Rays(frames[number])
@@ -52,8 +52,8 @@ class ColorChange:
         return ColorChange(looks, nearer, far, hue, np.maximum(_HUE, _NOISE * noise))
 
     def faces(self, frame: int, mesh: Mesh) -> Bool[np.ndarray, " F"]:
-        """Return the faces of a frame of which most pixels see another hue nearer than usual."""
-        rays, found, seen = Rays(mesh), np.zeros(len(mesh.faces)), np.zeros(len(mesh.faces))
+        """Return the faces of a frame whose pixels mostly see another hue, nearer than usual."""
+        rays, changed, visible = Rays(mesh), np.zeros(len(mesh.faces)), np.zeros(len(mesh.faces))
         for number, view in enumerate(self.looks.views):
             sight = rays.look(view)
             change = np.nan_to_num(np.abs(_hue(self.looks, frame, number) - self.hue[number]).max(axis=-1))
@@ -61,9 +61,9 @@ class ColorChange:
             unlike = (uniform_filter(change, 3) > self.limit[number]) & (uniform_filter(before, 3) > self.nearer)
             unlike = binary_opening(unlike, np.ones((2, 2)))
             hit = sight.faces >= 0
-            found += np.bincount(sight.faces[hit & unlike], minlength=len(found))
-            seen += np.bincount(sight.faces[hit], minlength=len(found))
-        return (found > 0) & (2 * found >= seen)
+            changed += np.bincount(sight.faces[hit & unlike], minlength=len(changed))
+            visible += np.bincount(sight.faces[hit], minlength=len(changed))
+        return (changed > 0) & (2 * changed >= visible)
 
 
 def _hue(looks: ColorLooks, frame: int, view: int) -> Float32[np.ndarray, "H W 2"]:
@@ -76,7 +76,7 @@ def _hue(looks: ColorLooks, frame: int, view: int) -> Float32[np.ndarray, "H W 2
 
 
 def _quantile(stack: Float32[np.ndarray, "T ..."], share: float) -> Float32[np.ndarray, "..."]:
-    """Return a quantile over the first axis of what is no NaN; NumPy's own takes a minute for four cameras."""
-    ordered, known = np.sort(stack, axis=0), (~np.isnan(stack)).sum(axis=0)  # NaN last
-    at = np.rint(share * np.maximum(known - 1, 0)).astype(np.int64)
+    """Return a quantile over the first axis without NaN; NumPy's own takes a minute for four cameras."""
+    ordered, counts = np.sort(stack, axis=0), (~np.isnan(stack)).sum(axis=0)  # NaN last
+    at = np.rint(share * np.maximum(counts - 1, 0)).astype(np.int64)
     return np.take_along_axis(ordered, at[None], axis=0)[0]

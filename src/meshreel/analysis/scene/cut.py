@@ -1,9 +1,9 @@
 """Separate moving places from resting ones by a minimum cut (docs/decisions/0018-places.md).
 
-In: the counts of what was observed at each place. Out: the moving places. A place that is sometimes seen free is left
-or entered by something that moves. One that never is may be part of it, too (the trunk of a standing person), so the
-border runs where it is short and where surfaces meet at a concave edge: under a foot, not through a leg. A body that
-leaves all its places has no part that never moves, so growth from such places is expensive.
+In: the counts of observations at each place. Out: the moving places. A place that is sometimes seen free is left or
+entered by something that moves. A place that is never seen free may be part of it, too (the trunk of a standing
+person), so the border runs where it is short and where surfaces meet at a concave edge: under a foot, not through a
+leg. A body that leaves all its places has no part that never moves, so growth from such places is expensive.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ from .places import Places
 
 _UNIT = 20  # integer capacity of a link of weight 1: a guess
 _EDGE = 5  # cells by which the cut may miss an edge: a guess
-_MOSTLY = 0.5  # share of the frames in which what continues a plane has surface: a guess
-_OFF = 0.5  # cells that a place of a plane may be off it: a guess
+_MOSTLY = 0.5  # share of the frames in which a place that continues a plane must have surface: a guess
+_OFF = 0.5  # cells, largest distance of a place from the plane that it belongs to: a guess
 _FULL = 0.8  # share of the frames until it vanished in which a place had surface: a guess
 _ALIKE = 0.95  # least cosine between the normals of places of a plane: a guess
-_FLAT = 0.99  # the same of a plane that goes on: on a ball at rest, neighbours have .97
+_FLAT = 0.99  # the same where a plane is continued: neighbours on a ball at rest have .97
 _AROUND = 64  # nearest places seen free whose mean share describes a neighbourhood: a guess
 
 
@@ -68,44 +68,45 @@ def moving_places(places: Places, options: CutOptions = CutOptions()) -> Bool[np
 
 
 def _continued(places: Places, moving: Bool[np.ndarray, " P"]) -> Bool[np.ndarray, " P"]:
-    """Return the moving places, mostly there and never seen free, that continue a still plane: walls beside hinges.
+    """Return the moving places that continue a still plane, such as a wall beside a hinge.
 
-    Normals of places are means of all surface there, so the cut may miss an edge by a few cells.
+    They are mostly occupied and never seen free. The normal of a place is the mean of all surface there, so the cut may
+    miss an edge by a few cells.
     """
-    tally, found = places.tally, np.zeros(len(moving), bool)
+    tally, continued = places.tally, np.zeros(len(moving), bool)
     never = moving & (tally.free == 0) & (tally.occupied >= _MOSTLY * tally.frames)
     for _ in range(_EDGE):
-        own = np.flatnonzero(never & ~found)
+        own = np.flatnonzero(never & ~continued)
         beside = places.beside[own]
-        found[own] = (_level(places, own[:, None], beside, _FLAT) & (~moving | found)[beside]).any(axis=1)
-    return found
+        continued[own] = (_level(places, own[:, None], beside, _FLAT) & (~moving | continued)[beside]).any(axis=1)
+    return continued
 
 
 def _left_together(places: Places, moving: Bool[np.ndarray, " P"]) -> Bool[np.ndarray, " P"]:
     """Return the places never seen free whose surface vanished together with moving surface in one plane.
 
-    An open door may hide where a part of it was.
+    An open door may hide places where a part of it was.
     """
     tally = places.tally
     last, count = tally.early.first, tally.early.count
     gone = (last >= 0) & (last < tally.frames - 1) & (count >= _FULL * (last + 1))
     left, hidden = gone & moving & (tally.free > 0), gone & ~moving & (tally.free == 0)
-    own = np.flatnonzero(left | hidden)
+    both = np.flatnonzero(left | hidden)
 
     def alike(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-        return (last[own[a]] == last[own[b]]) & _level(places, own[a], own[b])
+        return (last[both[a]] == last[both[b]]) & _level(places, both[a], both[b])
 
-    label = connected(places, own, alike)
-    found = np.zeros(len(moving), bool)
-    found[own] = hidden[own] & (np.bincount(label, left[own], len(own)) > 0)[label]
-    return found
+    label = connected(places, both, alike)
+    together = np.zeros(len(moving), bool)
+    together[both] = hidden[both] & (np.bincount(label, left[both], len(both)) > 0)[label]
+    return together
 
 
-def _level(places: Places, one: np.ndarray, other: np.ndarray, cosine: float = _ALIKE) -> np.ndarray:
-    """Return whether pairs of places are of one plane."""
-    apart = (places.middles[other] - places.middles[one]) * places.normals[other]
-    alike = (places.normals[other] * places.normals[one]).sum(axis=-1) >= cosine
-    return alike & (np.abs(apart.sum(axis=-1)) <= _OFF * places.lattice.size)
+def _level(places: Places, first: np.ndarray, second: np.ndarray, cosine: float = _ALIKE) -> np.ndarray:
+    """Return a mask of the pairs of places that lie in one plane."""
+    offsets = (places.middles[second] - places.middles[first]) * places.normals[second]
+    parallel = (places.normals[second] * places.normals[first]).sum(axis=-1) >= cosine
+    return parallel & (np.abs(offsets.sum(axis=-1)) <= _OFF * places.lattice.size)
 
 
 def connected(
@@ -117,18 +118,18 @@ def connected(
     """
     first, second = _links(places, chosen)
     if alike is not None:
-        kept = alike(first, second)
-        first, second = first[kept], second[kept]
+        joined = alike(first, second)
+        first, second = first[joined], second[joined]
     return linked(np.stack([first, second], axis=1), len(chosen))
 
 
 def _large(places: Places, chosen: Bool[np.ndarray, " P"], fewest: int) -> Bool[np.ndarray, " P"]:
     """Return the chosen places whose connected component has at least `fewest` places."""
-    own = np.flatnonzero(chosen)
-    label = connected(places, own)
-    kept = np.zeros(len(chosen), bool)
-    kept[own] = np.bincount(label)[label] >= fewest if len(own) else False
-    return kept
+    numbers = np.flatnonzero(chosen)
+    label = connected(places, numbers)
+    large = np.zeros(len(chosen), bool)
+    large[numbers] = np.bincount(label)[label] >= fewest if len(numbers) else False
+    return large
 
 
 def _links(places: Places, chosen: Int64[np.ndarray, " C"]) -> tuple[Int64[np.ndarray, " L"], Int64[np.ndarray, " L"]]:
@@ -147,8 +148,8 @@ def _around(
     """Return the mean share of the seeds nearest to each point."""
     thin = slice(None, None, max(1, len(seeds) // 20_000))
     count = min(_AROUND, len(seeds[thin]))
-    found = cKDTree(seeds[thin]).query(points, k=np.arange(1, count + 1))[1]
-    return share[thin][found].mean(axis=1)
+    nearest = cKDTree(seeds[thin]).query(points, k=np.arange(1, count + 1))[1]
+    return share[thin][nearest].mean(axis=1)
 
 
 def _hollow(
@@ -157,10 +158,10 @@ def _hollow(
     first: Int64[np.ndarray, " L"],
     second: Int64[np.ndarray, " L"],
 ) -> Float64[np.ndarray, " L"]:
-    """Return how much the normals of two neighbours turn towards each other, 0 to 2; 0 where the surface is convex."""
-    apart = middles[second] - middles[first]
-    apart /= np.linalg.norm(apart, axis=1)[:, None]
-    return np.maximum(((normals[first] - normals[second]) * apart).sum(axis=1), 0.0)
+    """Return the turn of two neighbours' normals towards each other, 0 to 2; 0 where the surface is convex."""
+    directions = middles[second] - middles[first]
+    directions /= np.linalg.norm(directions, axis=1)[:, None]
+    return np.maximum(((normals[first] - normals[second]) * directions).sum(axis=1), 0.0)
 
 
 def _cut(
@@ -171,23 +172,23 @@ def _cut(
 ) -> Bool[np.ndarray, " C"]:
     """Return the source's side of a minimum cut.
 
-    `moves` and `rests` are the capacities between each place and the source, and the sink; `weights` those of links.
+    `moves` and `rests` are the capacities between each place and the source or the sink; `weights` those of links.
     """
     count = len(moves)
-    source, sink, own = count, count + 1, np.arange(count)
+    source, sink, nodes = count, count + 1, np.arange(count)
     common = np.minimum(moves, rests)  # this flow passes in any case, so it is left out
     to, back = (_whole(side - common) for side in (moves, rests))
     link = np.maximum(_whole(weights), 1)
-    rows = np.concatenate([links[0], links[1], np.full(count, source), own])
-    columns = np.concatenate([links[1], links[0], own, np.full(count, sink)])
+    rows = np.concatenate([links[0], links[1], np.full(count, source), nodes])
+    columns = np.concatenate([links[1], links[0], nodes, np.full(count, sink)])
     capacity = np.concatenate([link, link, to, back])
     used = capacity > 0
     graph = csr_array((capacity[used], (rows[used], columns[used])), shape=(count + 2, count + 2))
-    left = graph - maximum_flow(graph, source, sink).flow
-    left.data = np.maximum(left.data, 0)
-    left.eliminate_zeros()
+    residual = graph - maximum_flow(graph, source, sink).flow
+    residual.data = np.maximum(residual.data, 0)
+    residual.eliminate_zeros()
     reached = np.zeros(count + 2, bool)
-    reached[breadth_first_order(left, source, return_predecessors=False)] = True
+    reached[breadth_first_order(residual, source, return_predecessors=False)] = True
     return reached[:count]
 
 

@@ -16,7 +16,7 @@ from ...geometry.cameras import Camera
 from ...geometry.raycast import Seen
 from ...geometry.strict import inverse, products
 
-APART = (0.06, 0.02)  # m, and share of the depth: a pixel whose depth varies by more sees a change; guesses
+APART = (0.06, 0.02)  # m, and share of the depth: a pixel whose depth varies by more sees motion; guesses
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,12 +53,12 @@ def hypotheses(tracked: Tracked, options: HypothesisOptions = HypothesisOptions(
     moving = {number for number in tracked.kinds if variation(tracked.objects, number) >= options.variation}
     still = {tracked.kinds[number] for number in tracked.kinds if number not in moving}
     kinds = frozenset(tracked.kinds[number] for number in moving) - still
-    kept = np.where(np.isin(tracked.objects, sorted(moving)), tracked.objects, 0)
-    return Hypotheses(kept.astype(np.int32), kinds)
+    objects = np.where(np.isin(tracked.objects, sorted(moving)), tracked.objects, 0)
+    return Hypotheses(objects.astype(np.int32), kinds)
 
 
 def variation(objects: Int32[np.ndarray, "T H W"], number: int) -> float:
-    """Return how much an object's mask varies, 0 to 1: 1 minus its mean overlap with its usual mask.
+    """Return the variation of an object's mask over time, 0 to 1: 1 minus its mean overlap with its usual mask.
 
     The usual mask has the pixels covered in at least half of the frames in which the object is seen; other frames do
     not count. 0 for an object that is never seen.
@@ -89,14 +89,14 @@ def moving_in_views(
     return numbers[tracked.objects]
 
 
-def overlap(one: np.ndarray, other: np.ndarray) -> float:
+def overlap(first: np.ndarray, second: np.ndarray) -> float:
     """Return the intersection over union of two masks; 1 if both are empty."""
-    union = int((one | other).sum())
-    return int((one & other).sum()) / union if union else 1.0
+    union = int((first | second).sum())
+    return int((first & second).sum()) / union if union else 1.0
 
 
 def tour(views: Sequence[Camera], start: int) -> list[int]:
-    """Return the order of the views from `start` on, the most similar one next each time, so that they form a video.
+    """Return the views in an order that makes a video: from `start` on, the most similar remaining view is next.
 
     Views differ by the distance of their eyes and by the angle of their axes; opposite axes count as much as the
     largest distance between two eyes.
@@ -115,8 +115,8 @@ def tour(views: Sequence[Camera], start: int) -> list[int]:
 def reference_view(moments: Sequence[Sequence[Seen]]) -> int:
     """Return the number of the view in which depth changes in most pixels between a few moments."""
     changes = []
-    for seen in zip(*moments, strict=True):
-        depths = np.stack([one.depth for one in seen])
+    for looks in zip(*moments, strict=True):
+        depths = np.stack([look.depth for look in looks])
         nearest, farthest = depths.min(axis=0), depths.max(axis=0)
         with np.errstate(invalid="ignore"):  # nothing is seen at any moment
             changes.append(int((farthest - nearest > np.maximum(APART[0], APART[1] * nearest)).sum()))

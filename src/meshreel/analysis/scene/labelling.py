@@ -1,6 +1,6 @@
 """Labels of moving faces, from moving places or from masks, behind one protocol (paper, section 3.2).
 
-In: the number and the mesh of a frame. Out: a label for each face; and the faces that a change of the room concerns.
+In: the number and the mesh of a frame. Out: a label for each face, and the faces that a change of the room affects.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from .settle import NEAR_CHANGE, NEVER, Rest
 from .votes import Votes
 
 _REMEMBERED = 600  # frames whose labels are kept, some 50 kB each: a guess, enough for seconds of a scene
-_FLICKER_AREA = 0.2  # m^2: less surface that moves by itself, beside what has come to rest, flickers (decision 28)
+_FLICKER_AREA = 0.2  # m^2: smaller separate moving surface beside an object at rest is flicker (decision 28)
 _ELSEWHERE = 2.0  # cells: surface farther from the middle of every known place is at no place (decision 18)
 
 
@@ -40,7 +40,7 @@ class Segmentation(Protocol):
 
     @property
     def noise(self) -> float:
-        """Scale of the frames' noise, m, at least one cell: surface farther off than a few of these is not noise."""
+        """Scale of the frames' noise, m, at least one cell: a distance of several times this is not noise."""
         ...
 
     @property
@@ -57,11 +57,11 @@ class Segmentation(Protocol):
         ...
 
     def came(self, change: int, mesh: Mesh) -> Bool[np.ndarray, " F"]:
-        """Return True for each face of `mesh`, any frame, where surface has become part of the room at `change`."""
+        """Return True for each face of `mesh`, any frame, at surface that has become part of the room at `change`."""
         ...
 
     def gone(self, change: int, mesh: Mesh) -> Bool[np.ndarray, " F"]:
-        """Return True for each face of `mesh`, any mesh of the room, where surface has left the room at `change`."""
+        """Return True for each face of `mesh`, any mesh of the room, at surface that has left the room at `change`."""
         ...
 
 
@@ -86,7 +86,7 @@ class _LabelCache:
 class ByPlace:
     """Segmentation by place: surface at a moving place moves, and so does surface far from every known place.
 
-    With `colors`, so does surface beside it that is a little nearer than the room and of another hue.
+    With `colors`, adjacent surface that is a little nearer than the room and of another hue moves, too.
     """
 
     cell: float  # m
@@ -100,12 +100,11 @@ class ByPlace:
 
     @property
     def noise(self) -> float:
-        """Width of the lattice's cells, m, chosen so that noise moves no surface by two of them."""
+        """Width of the lattice's cells, m, chosen so that noise displaces no surface by two cells."""
         return self.lattice.size
 
     @property
     def changes(self) -> list[int]:
-        """Numbers of the first frames after each change of the room, ascending."""
         return self.rest.changes
 
     def moving(self, frame: int, mesh: Mesh) -> Bool[np.ndarray, " F"]:
@@ -121,20 +120,19 @@ class ByPlace:
         return without_islands(mesh, self._without_flicker(frame, mesh, moving), self.island)
 
     def _without_flicker(self, frame: int, mesh: Mesh, moving: Bool[np.ndarray, " F"]) -> Bool[np.ndarray, " F"]:
-        """Return the moving faces without bits of what has come to rest: its edges are measured now and then."""
+        """Return the moving faces without bits of objects at rest, whose edges are measured in some frames only."""
         since, until = self._beside
         beside = (frame >= since) | (frame < until)
         if not (moving.any() and beside.any()):
             return moving
         area, label = _areas(mesh, moving)
         near = self.faces_at(mesh, beside)[moving]
-        apart = np.bincount(label, np.where(near, -1.0, 1.0), len(mesh.vertices)) > 0  # most faces are not beside it
+        elsewhere = np.bincount(label, np.where(near, -1.0, 1.0), len(mesh.vertices)) > 0  # most faces
         kept = moving.copy()
-        kept[moving] = (area >= _FLICKER_AREA) | apart[label]
+        kept[moving] = (area >= _FLICKER_AREA) | elsewhere[label]
         return kept
 
     def still_at_first(self, frame: int, mesh: Mesh) -> Bool[np.ndarray, " F"]:
-        """Return True for each face of frame `frame` that belongs to the room as it is in the first frame."""
         still = self.faces_at(mesh, ~self.chosen | (self.rest.until > frame))
         return still if self.colors is None else still & ~self.moving(frame, mesh)
 
@@ -155,34 +153,34 @@ class ByPlace:
         if mesh.is_empty or not (chosen.any() or (elsewhere and len(self.keys))):
             return np.zeros(len(mesh.faces), bool)
         points, faces = spread(mesh, 1.5 * self.lattice.size)
-        there = np.bincount(faces, np.append(chosen, elsewhere)[self._place(points)], len(mesh.faces))
-        return there >= 0.5 * np.bincount(faces, minlength=len(mesh.faces))
+        inside = np.bincount(faces, np.append(chosen, elsewhere)[self._place(points)], len(mesh.faces))
+        return inside >= 0.5 * np.bincount(faces, minlength=len(mesh.faces))
 
     def _place(self, points: Float64[np.ndarray, "N 3"]) -> Int64[np.ndarray, " N"]:
         """Return the number of the place of each point, or of the nearest place; P if none is near."""
-        asked = self.lattice.keys(points)
-        number = np.searchsorted(self.keys, asked)
-        unknown = np.flatnonzero(np.append(self.keys, -1)[number] != asked)
-        if len(unknown):
+        keys = self.lattice.keys(points)
+        number = np.searchsorted(self.keys, keys)
+        missing = np.flatnonzero(np.append(self.keys, -1)[number] != keys)
+        if len(missing):
             reach = _ELSEWHERE * self.lattice.size
-            number[unknown] = self._tree.query(points[unknown], distance_upper_bound=reach)[1]
+            number[missing] = self._tree.query(points[missing], distance_upper_bound=reach)[1]
         return number
 
     @cached_property
     def _beside(self) -> tuple[Int64[np.ndarray, " P"], Int64[np.ndarray, " P"]]:
-        """For each place, when the nearest resting place within `NEAR_CHANGE` joins the room, and when one leaves."""
-        found = list[Int64[np.ndarray, " P"]]()
+        """Frames in which the nearest resting place within `NEAR_CHANGE` of each place joins and leaves the room."""
+        nearby = list[Int64[np.ndarray, " P"]]()
         for times, never in ((self.rest.since, NEVER), (self.rest.until, 0)):
-            own, middles = np.flatnonzero(times != never), self.lattice.centers(self.keys)
-            nearest = np.full(len(times), len(own))
-            if len(own):
-                nearest = cKDTree(middles[own]).query(middles, distance_upper_bound=NEAR_CHANGE)[1]
-            found.append(np.append(times[own], never)[nearest])
-        return found[0], found[1]
+            changing, middles = np.flatnonzero(times != never), self.lattice.centers(self.keys)
+            nearest = np.full(len(times), len(changing))
+            if len(changing):
+                nearest = cKDTree(middles[changing]).query(middles, distance_upper_bound=NEAR_CHANGE)[1]
+            nearby.append(np.append(times[changing], never)[nearest])
+        return nearby[0], nearby[1]
 
     @cached_property
     def _tree(self) -> Any:
-        """The middles of the places as a tree, which takes a tenth of a second to make."""
+        """Search tree of the places' middles; building it takes a tenth of a second."""
         return cKDTree(self.lattice.centers(self.keys))
 
 
@@ -208,7 +206,6 @@ class ByMasks:
         return []
 
     def still_at_first(self, frame: int, mesh: Mesh) -> Bool[np.ndarray, " F"]:
-        """Return True for each face of frame `frame` that does not move."""
         return ~self.moving(frame, mesh)
 
     def came(self, change: int, mesh: Mesh) -> Bool[np.ndarray, " F"]:
@@ -218,7 +215,7 @@ class ByMasks:
     gone = came  # nor does anything leave the room
 
     def moving(self, frame: int, mesh: Mesh) -> Bool[np.ndarray, " F"]:
-        """Return True for each face that the votes of the pixels call moving; the masks of a frame are made once.
+        """Return True for each face that pixels vote to be moving; a frame's masks are made once.
 
         Faces that no view sees take the label of their neighbours.
         """
@@ -227,16 +224,16 @@ class ByMasks:
     def _voted(self, frame: int, mesh: Mesh) -> Bool[np.ndarray, " F"]:
         if mesh.is_empty:
             return np.zeros(0, bool)
-        seen = looks(mesh, self.views)
-        masks = self.masker.masks(frame, seen, self.views)
-        votes = Votes.of(np.stack([s.faces for s in seen]), masks, len(mesh.faces))
+        sights = looks(mesh, self.views)
+        masks = self.masker.masks(frame, sights, self.views)
+        votes = Votes.of(np.stack([s.faces for s in sights]), masks, len(mesh.faces))
         moves = votes.score >= self.threshold
         moves = _filled(mesh, moves, votes.seen > 0)
         return without_islands(mesh, moves, self.island)
 
 
 def looks(mesh: Mesh, views: Sequence[Camera]) -> list[Seen]:
-    """Return what each view sees of a mesh."""
+    """Render a mesh in each view."""
     rays = Rays(mesh)
     return [rays.look(view) for view in views]
 
@@ -271,20 +268,20 @@ def _reached(mesh: Mesh, moving: Bool[np.ndarray, " F"], more: Bool[np.ndarray, 
 
 def _areas(mesh: Mesh, chosen: Bool[np.ndarray, " F"]) -> tuple[Float64[np.ndarray, " C"], Int64[np.ndarray, " C"]]:
     """Return for each chosen face the area of its connected component of chosen faces, and its label (0 to V - 1)."""
-    some = Mesh(mesh.vertices, mesh.faces[chosen])
-    label = connected_faces(some.faces, len(some.vertices))
-    return np.bincount(label, face_normals(some)[1], len(some.vertices))[label].astype(np.float64), label
+    part = Mesh(mesh.vertices, mesh.faces[chosen])
+    label = connected_faces(part.faces, len(part.vertices))
+    return np.bincount(label, face_normals(part)[1], len(part.vertices))[label].astype(np.float64), label
 
 
-def _filled(mesh: Mesh, moves: Bool[np.ndarray, " F"], known: Bool[np.ndarray, " F"]) -> Bool[np.ndarray, " F"]:
+def _filled(mesh: Mesh, moves: Bool[np.ndarray, " F"], labelled: Bool[np.ndarray, " F"]) -> Bool[np.ndarray, " F"]:
     """Carry labels from the faces that are seen to neighbours that are not, ring by ring, by majority."""
     edges, face_edges = unique_edges(mesh.faces)
-    moves, known = moves & known, known.copy()
+    moves, labelled = moves & labelled, labelled.copy()
     while True:
-        weight = np.bincount(face_edges[known].reshape(-1), minlength=len(edges))
-        votes = np.bincount(face_edges[known & moves].reshape(-1), minlength=len(edges))
-        reached = ~known & (weight[face_edges].sum(axis=1) > 0)
+        weight = np.bincount(face_edges[labelled].reshape(-1), minlength=len(edges))
+        votes = np.bincount(face_edges[labelled & moves].reshape(-1), minlength=len(edges))
+        reached = ~labelled & (weight[face_edges].sum(axis=1) > 0)
         if not reached.any():
             return moves
         moves[reached] = 2 * votes[face_edges[reached]].sum(axis=1) > weight[face_edges[reached]].sum(axis=1)
-        known |= reached
+        labelled |= reached

@@ -1,6 +1,6 @@
 """Masks of moving pixels from image files or from a tracker, behind one protocol (paper, section 3.2).
 
-In: what the views see of a frame. Out: one mask per view, True where the visible surface moves.
+In: the faces and depths that the views see in a frame. Out: one mask per view, True at moving surface.
 """
 
 from __future__ import annotations
@@ -25,20 +25,20 @@ CAMERAS = "cameras.json"  # file name: Open3D's pinhole camera JSON, beside the 
 
 @runtime_checkable
 class Masker(Protocol):
-    """Source of masks: for each pixel of each view, whether the surface that it sees moves. Inherit from it."""
+    """Base class of sources of masks, which mark the pixels of each view that see moving surface."""
 
     views: tuple[Camera, ...] | None = None  # cameras of the masks; None: those that the scene is segmented with
     observes: bool = False  # whether `foresee` and `observe` must be called before the first masks
 
     def foresee(self, moments: Sequence[Sequence[Seen]], colors: ColorLooks | None = None) -> None:
-        """Learn what all views see at a few moments, to choose a reference view; called once, before `observe`.
+        """Receive all views of a few moments, to choose a reference view; called once, before `observe`.
 
         `colors` are the pictures of the views if these are colour cameras.
         """
         del moments, colors
 
     def observe(self, frame: int, seen: Sequence[Seen], views: Sequence[Camera]) -> None:
-        """Learn what the views see of a frame; called for every frame in order, before the first masks."""
+        """Receive the views of a frame; called for every frame in order, before the first masks."""
         del frame, seen, views
 
     def masks(self, frame: int, seen: Sequence[Seen], views: Sequence[Camera]) -> Bool[np.ndarray, "X H W"]:
@@ -64,9 +64,9 @@ class ImageMasks(Masker):
                 if (width, height) != (view.width, view.height):
                     text = f"{width} x {height} pixels where its camera has {view.width} x {view.height}"
                     raise InputError(f"{path} (frame {frame}): {text}; make masks of the camera's size")
-        others = len([path for path in self._files[0][0].parent.iterdir() if path.suffix.lower() == ".png"]) - frames
-        text = f"{folder}: has masks for {others} more frames than the {frames} of the sequence: the first are used"
-        self.remarks = (f"{text}, beginning with frame 0",) if others > 0 else ()
+        surplus = len([path for path in self._files[0][0].parent.iterdir() if path.suffix.lower() == ".png"]) - frames
+        text = f"{folder}: has masks for {surplus} more frames than the {frames} of the sequence: the first are used"
+        self.remarks = (f"{text}, beginning with frame 0",) if surplus > 0 else ()
 
     def masks(self, frame: int, seen: Sequence[Seen], views: Sequence[Camera]) -> Bool[np.ndarray, "X H W"]:
         """Return the masks of one frame; `views` must be `self.views`."""

@@ -1,11 +1,11 @@
-"""Point prompts on what moves in a view over time, an alternative to words for SAM3 (paper, section 3.2).
+"""Point prompts on moving objects in a view over time, an alternative to words for SAM3 (paper, section 3.2).
 
-In: the depths that one view sees in all frames. Out: for each moving thing, points on it and beside it, in the frame
+In: the depths that one view sees in all frames. Out: for each moving object, points on it and beside it, in the frame
 that shows most of it.
 
 Differs from the paper's release: there, differences of the grey values of successive pictures give the prompts of one
-object; here, depth that is less than the far depth of its pixel, so that somebody who stands for a while, and every
-object, has prompts, and no shadow has.
+object; here, depth less than the far depth of the pixel does, so that every object has prompts, a person who stands for
+a while too, and shadows have none.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _WIDER = 0.15  # of the size of an object's box: how far beside it points are; a
 
 @dataclass(frozen=True, slots=True)
 class Prompt:
-    """Points that tell an object from what is around it."""
+    """Points on an object and on its surroundings."""
 
     frame: int
     points: Float64[np.ndarray, "N 2"]  # x and y, as shares of the picture's width and height
@@ -42,11 +42,11 @@ def thinned(depth: Float32[np.ndarray, "H W"]) -> Float32[np.ndarray, "h w"]:
 
 
 def motion_prompts(depths: Sequence[Float32[np.ndarray, "h w"]]) -> list[Prompt]:
-    """Return prompts for each thing that moves, given the depths (m, infinite: none) of all frames."""
+    """Return prompts for each moving object, given the depths (m, infinite: none) of all frames."""
     moving = _moving(np.stack(depths))
     least = max(1.0, _LEAST * moving[0].size)
     things, count = label(moving, np.ones((3, 3, 3)))  # linked over time: each is shown once
-    areas = np.stack([np.bincount(one.reshape(-1), minlength=count + 1) for one in things])
+    areas = np.stack([np.bincount(frame.reshape(-1), minlength=count + 1) for frame in things])
     prompts = []
     for thing, frame in enumerate(areas[:, 1:].argmax(axis=0).tolist(), 1):
         pieces, number = label(things[frame] == thing, np.ones((3, 3)))
@@ -56,10 +56,10 @@ def motion_prompts(depths: Sequence[Float32[np.ndarray, "h w"]]) -> list[Prompt]
 
 
 def _moving(depths: Float32[np.ndarray, "T h w"]) -> Bool[np.ndarray, "T h w"]:
-    """Return where surface is nearer than the background, without specks."""
-    seen = np.isfinite(depths).any(axis=0)
-    known = np.where(np.isfinite(depths) | ~seen, depths, np.nan)
-    far = np.nanquantile(np.where(seen, known, 0), _FAR, axis=0)
+    """Return the pixels of each frame that see surface nearer than the background, without specks."""
+    covered = np.isfinite(depths).any(axis=0)
+    depths_or_nan = np.where(np.isfinite(depths) | ~covered, depths, np.nan)
+    far = np.nanquantile(np.where(covered, depths_or_nan, 0), _FAR, axis=0)
     nearer = np.where(np.isfinite(depths), far - depths, 0)
     return np.asarray(binary_opening(nearer > np.maximum(APART[0], APART[1] * far), np.ones((1, 3, 3))))
 

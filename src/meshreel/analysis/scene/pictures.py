@@ -1,7 +1,7 @@
 """Render the views as pictures for people and for tools that make masks (paper, section 3.2).
 
-In: what a view sees, and the pictures of colour cameras where there are any. Out: those, without the bends of lenses,
-or normals as colors; and folders of such pictures in the layout of the mask folders that `ImageMasks` reads.
+In: views of frames, and the pictures of colour cameras if there are any. Out: these without lens distortion, or normals
+as colors; and folders of such pictures in the layout of the mask folders that `ImageMasks` reads.
 """
 
 from __future__ import annotations
@@ -46,8 +46,9 @@ def write_views(
 ) -> None:
     """Write pictures of each frame from each view: view00/frame_00000.png ..., and `cameras.json` last.
 
-    They are those in `colors`, whose views these are, or normals. A tool that makes masks from them keeps names and
-    sizes, and puts the same `cameras.json` beside its masks. `report` is called with the number of finished frames.
+    The pictures are those in `colors`, if given, whose views these are; else normals. A tool that makes masks from them
+    keeps names and sizes, and puts the same `cameras.json` beside its masks. `report` is called with the number of
+    finished frames.
     """
     views = one_size(views, "views")
     places = [folder / f"view{number:02}" for number in range(len(views))]
@@ -56,8 +57,8 @@ def write_views(
     for number, name in enumerate(frame_names(len(frames), "png")):
         rays = Rays(frames[number])
         for view, place in enumerate(places):
-            taken = None if colors is None else colors.at(number, view)
-            picture = normal_picture(rays.look(views[view]), views[view]) if taken is None else taken
+            photo = None if colors is None else colors.at(number, view)
+            picture = normal_picture(rays.look(views[view]), views[view]) if photo is None else photo
             write_picture(picture, place / name)
         report(number + 1)
     with replacing(folder / CAMERAS) as file:
@@ -67,7 +68,7 @@ def write_views(
 def _step(points: Float64[np.ndarray, "H W 3"], axis: int) -> Float64[np.ndarray, "H W 3"]:
     """Return the vector to the next point along an axis: ahead or behind, whichever differs less in depth.
 
-    Edges stay sharp that way.
+    This keeps edges sharp.
     """
     ahead = np.diff(points, axis=axis)
     none = np.full_like(np.take(points, [0], axis=axis), np.nan)

@@ -3,9 +3,9 @@
 In: some frames, spread over the sequence, and views of them. Out: for every cell that has surface in any of the frames,
 counts of the frames in which it is occupied (surface in it or beside it) and of those in which views see past it.
 
-Noise moves surface by a cell, and rays graze it, so a cell beside surface is never seen free. Views look through holes
-that camera shadows leave, so where cameras usually measure, one of them must have measured past a cell, too; and that
-suffices if it did so in all nine pixels around. Memory does not grow with the number of frames.
+Noise moves surface by a cell, and rays graze it, so a cell beside surface is never seen free. Views see through holes
+in the cameras' shadows, so where cameras usually measure, one of them must have measured past a cell, too; a camera
+that did so in all nine pixels around suffices. Memory does not grow with the number of frames.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from ...types import Frames, Mesh, evenly
 
 _DEEPEST = 65_535  # largest stored depth (uint16), in units of a cell / _FINENESS; 0: nothing seen
 _FINENESS = 16  # units of a stored depth in a cell: a guess
-_TOGETHER = 32  # frames whose pictures are in memory together, so that places are projected once for all: a guess
+_TOGETHER = 32  # frames whose pictures are in memory together, so that places are projected once for them: a guess
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +48,6 @@ Report = Callable[[float], None]  # receives the share of the work that is done,
 
 
 def silent(share: float) -> None:
-    """Discard a report of progress."""
     del share
 
 
@@ -62,12 +61,11 @@ class Observations:
     report: Report = silent  # called with the progress of `find_places`
 
     def observe(self, number: int, lattice: Lattice) -> _Observation:
-        """Read one frame and return what is observed in it."""
         points, _ = spread(mesh := self.frames[number], 1.5 * lattice.size)
         return self.of_mesh(number, mesh, distinct(lattice.keys(points)), lattice)
 
     def of_mesh(self, number: int, mesh: Mesh, cells: Int64[np.ndarray, " C"], lattice: Lattice) -> _Observation:
-        """Return what is observed in a frame whose mesh and occupied cells are known."""
+        """Return the observations of a frame, given its mesh and occupied cells."""
         rays = Rays(mesh)
         depths = [_stored(rays, view, lattice.size / _FINENESS) for view in self.views]
         return _Observation(cells, depths, None if self.pictures is None else self.pictures(number))
@@ -91,13 +89,9 @@ class Tally:
         self.frames = 0
         self.occupied, self.free = np.zeros(places, np.int32), np.zeros(places, np.int32)  # frames
         none = np.full(places, -1, np.int32)
-        self._after, self._before = (
-            Stay(none, np.zeros(places, np.int32)),
-            Stay(none.copy(), np.zeros(places, np.int32)),
-        )
+        self._after, self._before = (Stay(none.copy(), np.zeros(places, np.int32)) for _ in range(2))
 
     def add(self, occupied: Bool[np.ndarray, " P"], free: Bool[np.ndarray, " P"]) -> None:
-        """Count the next frame."""
         early = occupied & (self.free == 0)
         self._before.first[early] = self.frames
         self._before.count[early] += 1
@@ -137,7 +131,7 @@ class Eye:
 
 @dataclass(frozen=True, slots=True)
 class Places:
-    """Cells of a scene that have surface in some inspected frame, and the counts of what was observed there."""
+    """Cells of a scene that have surface in any inspected frame, and the counts of observations there."""
 
     lattice: Lattice
     keys: Int64[np.ndarray, " P"]  # sorted
@@ -167,26 +161,26 @@ class _Observation:
 
 
 def find_places(observed: Observations, lattice: Lattice, options: PlacesOptions = PlacesOptions()) -> Places:
-    """Find the places of a scene and count what is observed there; frames after the first 32 are read twice.
+    """Find the places of a scene and count observations there; frames after the first 32 are read twice.
 
     Meshes are in memory one at a time. Takes about 1 s of CPU for a frame of 500,000 faces.
     """
     passes = len(observed.frames) + max(0, len(observed.frames) - _TOGETHER)
-    first, known, cameras = list[_Observation](), _Known(), _Cameras()
+    observations, cells, cameras = list[_Observation](), _Known(), _Cameras()
     for number in range(len(observed.frames)):
-        own, normals = _cells(mesh := observed.frames[number], lattice)
-        known.add(own, normals)
+        occupied_cells, normals = _cells(mesh := observed.frames[number], lattice)
+        cells.add(occupied_cells, normals)
         if number < _TOGETHER:
-            first.append(observed.of_mesh(number, mesh, own, lattice))
-            cameras.add(first[-1].measured)
+            observations.append(observed.of_mesh(number, mesh, occupied_cells, lattice))
+            cameras.add(observations[-1].measured)
         elif observed.pictures is not None:
             cameras.add(observed.pictures(number))
         observed.report((number + 1) / passes)
-    keys, normals = known.places()
+    keys, normals = cells.places()
     places = Places(lattice, keys, neighbours(keys), normals, Tally(len(keys)), cameras.eyes())
-    for occupied, free in _states(first, places, observed.views, options):
+    for occupied, free in _states(observations, places, observed.views, options):
         places.tally.add(occupied, free)
-    first.clear()
+    observations.clear()
     for occupied, free in states(observed, range(_TOGETHER, len(observed.frames)), places, options):
         places.tally.add(occupied, free)
         observed.report((len(observed.frames) - _TOGETHER + places.tally.frames) / passes)
@@ -196,7 +190,7 @@ def find_places(observed: Observations, lattice: Lattice, options: PlacesOptions
 def states(
     observed: Observations, numbers: range, places: Places, options: PlacesOptions = PlacesOptions()
 ) -> Iterator[tuple[Bool[np.ndarray, " P"], Bool[np.ndarray, " P"]]]:
-    """Yield for each frame in `numbers` which places are occupied, and which are not and are seen free."""
+    """Yield for each frame in `numbers` two masks of places: occupied ones, and others that are seen free."""
     for start in range(0, len(numbers), _TOGETHER):
         together = (observed.observe(number, places.lattice) for number in numbers[start : start + _TOGETHER])
         yield from _states(list(together), places, observed.views, options)
@@ -206,38 +200,38 @@ def _states(
     frames: Sequence[_Observation], places: Places, views: Sequence[Camera], options: PlacesOptions
 ) -> Iterator[tuple[Bool[np.ndarray, " P"], Bool[np.ndarray, " P"]]]:
     """Yield the states of the places in frames whose observations are in memory; see `states`."""
-    seen = np.zeros((len(frames), len(places.keys)), np.uint8)
+    seen_past = np.zeros((len(frames), len(places.keys)), np.uint8)
     middles, size = places.middles, places.lattice.size
     for number, view in enumerate(views):
         pixels, inside, depth = view.seen(middles)
         limit = (depth + options.past * size) / (size / _FINENESS)
-        for row, one in zip(seen, frames, strict=True):
-            row[inside[one.depths[number].reshape(-1)[pixels] > limit]] += 1
+        for counts, frame in zip(seen_past, frames, strict=True):
+            counts[inside[frame.depths[number].reshape(-1)[pixels] > limit]] += 1
     sensed = _sensed(frames, places, options.past * size)
-    for row, one, (doubtful, clear) in zip(seen, frames, sensed, strict=True):
-        occupied = _near(places.keys, places.beside, one.cells)
-        yield occupied, ((row >= options.views) & ~doubtful | clear) & ~occupied
+    for counts, frame, (doubtful, clear) in zip(seen_past, frames, sensed, strict=True):
+        occupied = _near(places.keys, places.beside, frame.cells)
+        yield occupied, ((counts >= options.views) & ~doubtful | clear) & ~occupied
 
 
 def _sensed(
     frames: Sequence[_Observation], places: Places, reach: float
 ) -> Iterator[tuple[Bool[np.ndarray, " P"], Bool[np.ndarray, " P"]]]:
-    """Yield for each frame which places are doubtful and which are clear, by the depths that cameras measured.
+    """Yield masks of the doubtful and of the clear places in each frame, by the depths that cameras measured.
 
     Doubtful: a camera that usually measures there measured nothing more than `reach` (m) past the place. Clear: a
     camera measured more than that in all nine pixels around the place.
     """
     middles = places.middles
     at = {number: eye.camera.seen(middles) for number, eye in places.eyes.items()}
-    for one in frames:
+    for frame in frames:
         expected, past, clear = np.zeros((3, len(middles)), bool)
         for number, eye in places.eyes.items():
             pixels, inside, depth = at[number]
             expected[inside[eye.sees.reshape(-1)[pixels]]] = True
-            if one.measured and (picture := one.measured[number]) is not None:
-                found = picture.depth.reshape(-1)[pixels] * picture.unit
-                expected[inside[found > 0]] = True
-                past[inside[found > depth + reach]] = True
+            if frame.measured and (picture := frame.measured[number]) is not None:
+                depths = picture.depth.reshape(-1)[pixels] * picture.unit
+                expected[inside[depths > 0]] = True
+                past[inside[depths > depth + reach]] = True
                 around = minimum_filter(picture.depth, 3)  # 0 where one of the nine pixels measured nothing
                 least = around.reshape(-1)[pixels] * picture.unit
                 clear[inside[least > depth + reach]] = True
@@ -252,7 +246,6 @@ class _Cameras:
         self._counts: dict[int, tuple[Camera, Int32[np.ndarray, "H W"]]] = {}
 
     def add(self, pictures: Sequence[DepthPicture | None] | None) -> None:
-        """Count the depths in the pictures of the next frame."""
         self._frames += 1
         for number, picture in enumerate(pictures or ()):
             if picture is not None:
@@ -303,8 +296,8 @@ def _cells(mesh: Mesh, lattice: Lattice) -> tuple[Int64[np.ndarray, " C"], Float
 
 def _stored(rays: Rays, view: Camera, unit: float) -> UInt16[np.ndarray, "H W"]:
     """Return a view's depths in multiples of `unit` (m); 0 where a ray hits nothing, or a face from behind."""
-    seen = rays.look(view)
-    depth = np.where(np.isfinite(seen.depth) & ~rays.backs(view, seen), seen.depth, 0.0)
+    sight = rays.look(view)
+    depth = np.where(np.isfinite(sight.depth) & ~rays.backs(view, sight), sight.depth, 0.0)
     return np.clip(np.rint(depth / unit), 0, _DEEPEST).astype(np.uint16)
 
 
@@ -312,8 +305,8 @@ def _near(
     keys: Int64[np.ndarray, " P"], beside: Int32[np.ndarray, "P 26"], own: Int64[np.ndarray, " C"]
 ) -> Bool[np.ndarray, " P"]:
     """Return True for each place that has surface of a frame (its cells are `own`) in it or in a neighbouring place."""
-    there = np.zeros(len(keys), bool)
-    there[np.searchsorted(keys, own)] = True
-    near = there.copy()
-    near[beside[there].reshape(-1)] = True
+    occupied = np.zeros(len(keys), bool)
+    occupied[np.searchsorted(keys, own)] = True
+    near = occupied.copy()
+    near[beside[occupied].reshape(-1)] = True
     return near

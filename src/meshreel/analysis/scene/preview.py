@@ -26,20 +26,20 @@ _BODIES = (
     (23, 190, 207),
 )
 _LIGHT = np.array([0.36, 0.80, 0.48])
-_AMBIENT = 0.45  # share of the color that unlit surface keeps: a choice of looks
+_AMBIENT = 0.45  # share of the color that unlit surface keeps: chosen by eye
 _GAP, _LEFT, _TOP, _TEXT = 4, 64, 24, 14  # pixels: between pictures, left of them, above and below them, of text
 _LEGEND = "light gray: still; colors: moving, one color per body (six in turn); dark gray: moving, part of no body"
 
 
 def label_colors(moving: Bool[np.ndarray, " F"], bodies: Integer[np.ndarray, " F"]) -> UInt8[np.ndarray, "F 3"]:
     """Return a color for each face: light gray if still, one of six by the body's number, dark gray if of no body."""
-    own = np.array(_BODIES, np.uint8)[(bodies.astype(np.int64) - 1) % len(_BODIES)]
-    known = np.where((bodies > 0)[:, None], own, np.array(_NO_BODY, np.uint8))
-    return np.where(moving[:, None], known, np.array(_RESTS, np.uint8))
+    by_body = np.array(_BODIES, np.uint8)[(bodies.astype(np.int64) - 1) % len(_BODIES)]
+    colors = np.where((bodies > 0)[:, None], by_body, np.array(_NO_BODY, np.uint8))
+    return np.where(moving[:, None], colors, np.array(_RESTS, np.uint8))
 
 
 def colored_picture(seen: Seen, view: Camera, colors: UInt8[np.ndarray, "F 3"]) -> UInt8[np.ndarray, "H W 3"]:
-    """Render what a view sees in the faces' colors under one light; white where nothing is seen."""
+    """Render a view in the faces' colors under one light; white where nothing is seen."""
     normals = normal_picture(seen, view).astype(np.float64) * (2 / 255) - 1
     light = _AMBIENT + (1 - _AMBIENT) * np.abs(normals @ _LIGHT)
     hit = seen.faces >= 0
@@ -51,7 +51,7 @@ def colored_picture(seen: Seen, view: Camera, colors: UInt8[np.ndarray, "F 3"]) 
 def look_at_labels(
     mesh: Mesh, moving: Bool[np.ndarray, " F"], bodies: Integer[np.ndarray, " F"], views: Sequence[Camera]
 ) -> tuple[list[UInt8[np.ndarray, "H W 3"]], list[int]]:
-    """Return a picture for each view, and the number of moving faces that it sees."""
+    """Return each view's picture, and the number of moving faces that it sees."""
     rays, colors = Rays(mesh), label_colors(moving, bodies)
     looks = [rays.look(view) for view in views]
     pictures = [colored_picture(seen, view, colors) for seen, view in zip(looks, views, strict=True)]
@@ -72,14 +72,14 @@ def sheet(rows: Sequence[FrameViews], views: Sequence[int]) -> UInt8[np.ndarray,
 
     height, width, _ = rows[0].pictures[0].shape
     size = (_LEFT + len(views) * (width + _GAP), _TOP + len(rows) * (height + _GAP) + _TOP)
-    whole = Image.new("RGB", size, "white")
-    draw, font = ImageDraw.Draw(whole), ImageFont.load_default(_TEXT)
+    image = Image.new("RGB", size, "white")
+    draw, font = ImageDraw.Draw(image), ImageFont.load_default(_TEXT)
     for k, view in enumerate(views):
         draw.text((_LEFT + k * (width + _GAP), _GAP), f"view {view}", "black", font)
     for i, row in enumerate(rows):
         top = _TOP + i * (height + _GAP)
         draw.text((_GAP, top), f"frame\n{row.frame}", "black", font)
         for k, picture in enumerate(row.pictures):
-            whole.paste(Image.fromarray(picture), (_LEFT + k * (width + _GAP), top))
+            image.paste(Image.fromarray(picture), (_LEFT + k * (width + _GAP), top))
     draw.text((_LEFT, size[1] - _TOP + _GAP), _LEGEND, "black", font)
-    return np.asarray(whole)
+    return np.asarray(image)

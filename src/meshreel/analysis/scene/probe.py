@@ -1,7 +1,7 @@
 """Detect scenes: sequences of open surface most of which is in the same place in all frames.
 
-In: a sequence. Out: whether to separate it into a background and bodies. A lone body moves or is closed; separating one
-that stands as still as a room would gain nothing.
+In: a sequence. Out: True if it should be separated into a background and bodies. A lone body moves or is closed;
+separating one that stands as still as a room would gain nothing.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ PROBES = 4  # frames inspected, spread over the sequence (guess)
 SHARE = 0.6  # smallest share of a frame's surface that stands still in a scene (guess)
 CELLS = 200  # cells along a frame's diagonal: 4 cm in a room (guess)
 BORDER = 1.0  # diagonals, least length of the borders of an open surface; holes of a captured body have less (guess)
-UNLIKE = 30.0  # largest ratio of the sizes of two frames that can show one room (guess)
+UNLIKE = 30.0  # largest ratio between the sizes of frames of one room (guess)
 COARSEST = 32  # smallest number of median edge lengths along the diagonal of a captured room (guess)
 
 
@@ -39,8 +39,8 @@ def is_scene(frames: Frames) -> bool:
         return False
     lattice = Lattice.near(meshes[0], meshes[0].diagonal / CELLS)
     cells = [distinct(lattice.keys(spread(mesh, lattice.size)[0])) for mesh in meshes]
-    wide = [around(own) for own in cells]
-    still = [np.mean([np.isin(own, other).mean() for other in wide]) for own in cells]
+    wide = [around(occupied) for occupied in cells]
+    still = [np.mean([np.isin(occupied, other).mean() for other in wide]) for occupied in cells]
     return float(np.median(still)) >= SHARE
 
 

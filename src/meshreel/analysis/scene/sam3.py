@@ -1,8 +1,8 @@
 """Masks by SAM3 in the paper's two stages (section 3.2): one view over time, then all views of each frame.
 
-In: pictures of the views: those of colour cameras, or normals. Out: masks, and the object that each pixel sees. Stage 1
+In: pictures of the views, from colour cameras or of normals. Out: masks, and the object that each pixel sees. Stage 1
 tracks the prompted objects through a reference view and keeps those that move; stage 2 tracks them through the views of
-a frame, taken as a video, and keeps those found in stage 1. Needs the extra `sam3`; the user supplies the weights.
+a frame as if these were a video, and keeps those found in stage 1. Needs the extra `sam3`; the user supplies weights.
 
 Differs from the paper: it does not state its prompts; ours are words, by default `AUTOMATIC`, or motion as in its
 release.
@@ -29,7 +29,7 @@ from .motion import thinned
 from .pictures import normal_picture
 from .sam3_trackers import PointTracker, WordTracker
 
-AUTOMATIC = ("person", "animal", "vehicle", "object")  # default prompts, whatever may move: a guess
+AUTOMATIC = ("person", "animal", "vehicle", "object")  # default prompts: things that may move; a guess
 PromptBy = Literal["words", "motion"]
 
 
@@ -38,7 +38,7 @@ class Sam3Options:
     """Options of masks by SAM3."""
 
     reference: int | None = None  # number of the view that is tracked over time; None: the one with most changes
-    prompt_by: PromptBy = "words"  # what shows objects to SAM3: words, or points where the reference view sees motion
+    prompt_by: PromptBy = "words"  # prompts of objects: words, or points at which the reference view sees motion
     device: str = "cpu"  # torch's name of a device: cpu, cuda, cuda:1 ...
     hypotheses: HypothesisOptions = field(default_factory=HypothesisOptions)
 
@@ -72,7 +72,7 @@ class Sam3Masks(Masker):
         return self._chosen or 0
 
     def foresee(self, moments: Sequence[Sequence[Seen]], colors: ColorLooks | None = None) -> None:
-        """Choose the reference view by what all views see at a few moments; without this call it is the first view."""
+        """Choose the reference view by the motion between a few moments; without this call it is the first view."""
         self._colors = colors
         if self._chosen is None:
             self._chosen = reference_view(moments)
@@ -101,8 +101,8 @@ class Sam3Masks(Masker):
         order = tour(views, self._reference(views))
         pictures = [self._picture(frame, number, seen, views) for number in order]
         tracked = self._tracker.through_views(pictures, moving.objects[frame])
-        found = moving_in_views(tracked, moving, frame, self._options.hypotheses)
-        return found[np.argsort(order)]
+        objects = moving_in_views(tracked, moving, frame, self._options.hypotheses)
+        return objects[np.argsort(order)]
 
     def _hypotheses(self) -> Hypotheses:
         """Run stage 1 at the first call and return its moving objects."""
@@ -116,8 +116,8 @@ class Sam3Masks(Masker):
     def _picture(
         self, frame: int, number: int, seen: Sequence[Seen], views: Sequence[Camera]
     ) -> UInt8[np.ndarray, "H W 3"]:
-        taken = None if self._colors is None else self._colors.at(frame, number)
-        return normal_picture(seen[number], views[number]) if taken is None else taken
+        photo = None if self._colors is None else self._colors.at(frame, number)
+        return normal_picture(seen[number], views[number]) if photo is None else photo
 
     def _reference(self, views: Sequence[Camera]) -> int:
         number = self.reference

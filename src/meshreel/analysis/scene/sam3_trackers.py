@@ -1,4 +1,4 @@
-"""SAM3's models as trackers of objects through a video: found by words, or shown by points and masks.
+"""SAM3's models as trackers of objects through a video, prompted by words, or by points and masks.
 
 In: a folder of weights, and pictures. Out: the object at each pixel. The one module that imports torch and
 transformers, of the extra `sam3`. Pictures are prepared here, since SAM3's own processor needs torchvision.
@@ -41,7 +41,7 @@ class WordTracker:
     def through_views(self, pictures: Pictures, first: Int32[np.ndarray, "H W"]) -> Tracked:
         """Track objects through the pictures of all views at one moment.
 
-        Most views do not see a given object. In a video SAM3 would discard it as a false detection; not here.
+        Most views do not see a given object. In a video SAM3 would discard it as a false detection; here it is kept.
         """
         del first
         return self._follow(pictures, 0)
@@ -71,34 +71,34 @@ class WordTracker:
 
 
 class PointTracker:
-    """SAM3's tracker of shown objects: shown by points where motion is, and in other views by masks."""
+    """SAM3's tracker, prompted by points where there is motion, and in other views by masks."""
 
     def __init__(self, path: Path, device: str) -> None:
         self._model = _Model(path, "Sam3TrackerVideoModel", device)
 
     def over_time(self, pictures: Pictures, depths: Sequence[Float32[np.ndarray, "h w"]]) -> Tracked:
-        """Track what moves through the pictures of one view at consecutive moments."""
-        shown = motion_prompts(depths)
-        return self._follow(pictures, {number: (prompt.frame, prompt) for number, prompt in enumerate(shown, 1)})
+        """Track moving objects through the pictures of one view at consecutive moments."""
+        prompts = motion_prompts(depths)
+        return self._follow(pictures, {number: (prompt.frame, prompt) for number, prompt in enumerate(prompts, 1)})
 
     def through_views(self, pictures: Pictures, first: Int32[np.ndarray, "H W"]) -> Tracked:
         """Track the objects of the first picture through the pictures of all views at one moment."""
         return self._follow(pictures, {number: (0, first == number) for number in np.unique(first[first > 0]).tolist()})
 
-    def _follow(self, pictures: Pictures, shown: dict[int, tuple[int, Any]]) -> Tracked:
-        """Track objects through a video; each is shown in one picture by a prompt of points or by a mask."""
+    def _follow(self, pictures: Pictures, prompts: dict[int, tuple[int, Any]]) -> Tracked:
+        """Track objects through a video, each prompted in one picture by points or by a mask."""
         from transformers.models.sam3_tracker_video.modeling_sam3_tracker_video import Sam3TrackerVideoInferenceSession
 
         objects = np.zeros((len(pictures), *pictures[0].shape[:2]), np.int32)
-        if not shown:
+        if not prompts:
             return Tracked(objects, {})
         session = self._model.session(Sam3TrackerVideoInferenceSession, pictures)
-        for number, (frame, how) in sorted(shown.items(), key=lambda item: item[1][0]):
+        for number, (frame, prompt) in sorted(prompts.items(), key=lambda item: item[1][0]):
             index = session.obj_id_to_idx(number - 1)
-            if isinstance(how, Prompt):
-                session.add_point_inputs(index, frame, self._model.points(how))
+            if isinstance(prompt, Prompt):
+                session.add_point_inputs(index, frame, self._model.points(prompt))
             else:
-                session.add_mask_inputs(index, frame, self._model.mask(how))
+                session.add_mask_inputs(index, frame, self._model.mask(prompt))
             session.obj_with_new_inputs = [number - 1]
             self._model.run(session, frame)  # with its input first, so that it is tracked before that picture, too
         for frame in range(len(pictures)):
@@ -109,7 +109,7 @@ class PointTracker:
 
 
 class _Model:
-    """A model of transformers on a device, with the conversions of what goes in and comes out."""
+    """A model of transformers on a device, with conversions of its inputs and outputs."""
 
     def __init__(self, path: Path, name: str, device: str) -> None:
         _check_files(path)
@@ -124,13 +124,12 @@ class _Model:
         except Exception as error:  # the library raises exceptions of many types for invalid files
             raise InputError(f"{path}: SAM3 cannot be loaded ({error}); the folder must hold {_NEEDED}") from error
         if loaded["missing_keys"]:
-            some = sorted(loaded["missing_keys"])[0]
-            text = f"{path}: the weights lack {len(loaded['missing_keys'])} of SAM3's tensors, as {some}"
+            first = sorted(loaded["missing_keys"])[0]
+            text = f"{path}: the weights lack {len(loaded['missing_keys'])} of SAM3's tensors, as {first}"
             raise InputError(f"{text}; the folder must hold {_NEEDED}")
         self._torch, self._size = torch, int(self.network.config.image_size)
 
     def session(self, kind: Any, pictures: Pictures) -> Any:
-        """Return a session of the model for a video."""
         height, width, _ = pictures[0].shape
         places = dict.fromkeys(("inference_device", "inference_state_device", "video_storage_device"), self._device)
         session = kind(video_height=height, video_width=width, dtype=self._torch.float32, **places)
@@ -138,12 +137,10 @@ class _Model:
         return session
 
     def run(self, session: Any, frame: int) -> Any:
-        """Run the model on one picture of a session."""
         with self._torch.inference_mode():
             return self.network(session, frame_idx=frame)
 
     def tokens(self, words: str) -> Any:
-        """Return the tokens of a prompt."""
         text = self._tokenizer(words, return_tensors="pt", padding="max_length", max_length=_WORDS, truncation=True)
         return text.to(self._device)
 
@@ -155,18 +152,18 @@ class _Model:
 
     def mask(self, mask: np.ndarray) -> Any:
         """Return a mask as the model's input, of its square picture."""
-        whole = self._torch.from_numpy(mask.astype(np.float32))[None, None]
-        return self._torch.nn.functional.interpolate(whole, size=(self._size, self._size), mode="nearest")
+        picture = self._torch.from_numpy(mask.astype(np.float32))[None, None]
+        return self._torch.nn.functional.interpolate(picture, size=(self._size, self._size), mode="nearest")
 
-    def paint(self, objects: Int32[np.ndarray, "H W"], found: Iterable[tuple[float, int, Any]]) -> None:
+    def paint(self, objects: Int32[np.ndarray, "H W"], scored: Iterable[tuple[float, int, Any]]) -> None:
         """Write objects, each with score, number and logits, into a picture: number + 1 where logits are positive.
 
         The surest object is written last and keeps its pixels.
         """
-        for _, number, logits in sorted(found, key=lambda one: one[0]):
+        for _, number, logits in sorted(scored, key=lambda item: item[0]):
             logits = logits.float().reshape(1, 1, *logits.shape[-2:])
-            whole = self._torch.nn.functional.interpolate(logits, size=objects.shape, mode="bilinear")
-            objects[np.asarray((whole[0, 0] > 0).cpu())] = number + 1
+            scaled = self._torch.nn.functional.interpolate(logits, size=objects.shape, mode="bilinear")
+            objects[np.asarray((scaled[0, 0] > 0).cpu())] = number + 1
 
 
 class _Video:
@@ -188,21 +185,21 @@ class _Video:
 
 
 class CleanUp:
-    """Suppression of doubles, and areas of connected pixels, which SAM3 uses to clean its masks.
+    """Suppression of duplicate masks, and areas of connected pixels, with which SAM3 cleans its masks.
 
-    transformers takes both from a package that it downloads when it runs and that is for CUDA alone; without it, it
+    transformers takes both from a package that it downloads at run time and that needs CUDA; without that package it
     skips them with a warning.
     """
 
     @staticmethod
     def generic_nms(overlaps: Any, scores: Any, most: float, use_iou_matrix: bool = True) -> Any:
-        """Return the numbers of the masks that overlap no surer kept one by more than `most`, the surest first."""
+        """Return the masks, surest first, that overlap none of the surer returned ones by more than `most`."""
         del use_iou_matrix
-        doubles, kept = (overlaps > most).cpu().numpy(), list[int]()
+        doubles, surest = (overlaps > most).cpu().numpy(), list[int]()
         for number in np.argsort(-scores.float().cpu().numpy(), kind="stable").tolist():
-            if not doubles[number, kept].any():
-                kept.append(number)
-        return scores.new_tensor(kept).long()
+            if not doubles[number, surest].any():
+                surest.append(number)
+        return scores.new_tensor(surest).long()
 
     @staticmethod
     def cc_2d(masks: Any, get_counts: bool = True) -> tuple[Any, Any]:
@@ -231,8 +228,8 @@ def _libraries() -> tuple[Any, Any]:
 
 
 def _check_files(path: Path) -> None:
-    there = {child.name for child in path.iterdir()} if path.is_dir() else set()
-    weights = any(name.endswith(".safetensors") for name in there)
-    words = "tokenizer.json" in there or {"vocab.json", "merges.txt"} <= there
-    if not ("config.json" in there and weights and words):
+    names = {child.name for child in path.iterdir()} if path.is_dir() else set()
+    weights = any(name.endswith(".safetensors") for name in names)
+    words = "tokenizer.json" in names or {"vocab.json", "merges.txt"} <= names
+    if not ("config.json" in names and weights and words):
         raise InputError(f"{path}: holds no weights of SAM3; the folder must hold {_NEEDED}")

@@ -34,7 +34,7 @@ from .views import ViewsOptions, place_views
 _PROBES = 3  # frames used to place the views: a guess
 _WIDTH = 4.75  # smallest width of a cell, in median distances between two frames: decision 18
 _WIDEST = 4.0  # largest width of a cell, in edge lengths: decision 18
-_LOOKS = 5  # frames that are compared to see whether something stands still: a guess
+_LOOKS = 5  # frames that are compared to decide if surface stands still: a guess
 _THINNED = 7  # one vertex in this many is measured when two frames are compared: a guess, for speed
 
 
@@ -46,7 +46,7 @@ class SegmentOptions:
     places: PlacesOptions = field(default_factory=PlacesOptions)
     cut: CutOptions = field(default_factory=CutOptions)
     settle: SettleOptions = field(default_factory=SettleOptions)
-    threshold: float = 0.3  # the paper's tau: a low one followed by clean-up misses less than a high one
+    threshold: float = 0.3  # the paper's tau: a low value, followed by clean-up, misses less than a high one
     island: float = 0.01  # m^2: connected faces with less area take the label of the faces around them
     cameras: tuple[Camera, ...] = ()  # views of one picture size; none: they are placed by `views`
 
@@ -54,31 +54,31 @@ class SegmentOptions:
 def segment(frames: MeshSequence, options: SegmentOptions = SegmentOptions(), report: Report = silent) -> ByPlace:
     """Segment a scene by geometric change over the whole sequence; `options.places` selects the inspected frames.
 
-    If nothing is found to move and the faces show their backs to the inside of the scene, it is segmented again with
-    all faces reversed.
+    If nothing moves and the faces turn their backs to the inside of the scene, it is segmented again with all faces
+    reversed.
     """
     frames = captured(frames)
     chosen = _with_surface(frames, options.places.chosen(len(frames), frames.frame_rate))
     if not chosen:
         nothing = np.zeros(0, np.int64), np.zeros(0, bool), Rest.none(0)
         return ByPlace(1.0, Lattice(np.zeros(3), 1.0), *nothing, options.island)
-    found = _by_place(frames, chosen, options, report)
-    if not found.chosen.any() and _faces_away(frames[chosen[0]]):
-        turned = _by_place(TurnedOver(frames), chosen, options, silent)
-        found = turned if turned.chosen.any() else found
-    return found
+    places = _by_place(frames, chosen, options, report)
+    if not places.chosen.any() and _faces_away(frames[chosen[0]]):
+        reversed_places = _by_place(TurnedOver(frames), chosen, options, silent)
+        places = reversed_places if reversed_places.chosen.any() else places
+    return places
 
 
 def _by_place(frames: CapturedSequence, chosen: Sequence[int], options: SegmentOptions, report: Report) -> ByPlace:
     cell, views = edge_length(frames, chosen), _views(frames, chosen, options)
     noise = _apart(frames[chosen[0]], frames[chosen[len(chosen) // 2]])
     lattice = Lattice.near(frames[chosen[0]], max(cell, min(_WIDTH * noise, _WIDEST * cell)))
-    some = Chosen(frames, chosen)
-    pictures = None if some.depth is None else some.depth.__getitem__
-    places = find_places(Observations(some, views, pictures, report), lattice, options.places)
+    inspected = Chosen(frames, chosen)
+    pictures = None if inspected.depth is None else inspected.depth.__getitem__
+    places = find_places(Observations(inspected, views, pictures, report), lattice, options.places)
     moving = moving_places(places, options.cut)
 
-    @lru_cache(maxsize=1)  # places beside a change are asked for step by step, all in the same frames
+    @lru_cache(maxsize=1)  # successive queries about places beside a change concern the same frames
     def looked_at(numbers: tuple[int, ...]) -> tuple[list[Surface], list[Int64[np.ndarray, " V"]]]:
         surfaces = [Surface(frames[numbers[k]]) for k in evenly(len(numbers), _LOOKS)]
         return surfaces, [lattice.keys(surface.mesh.vertices) for surface in surfaces]
@@ -95,7 +95,7 @@ def _by_place(frames: CapturedSequence, chosen: Sequence[int], options: SegmentO
 
 
 def _faces_away(mesh: Mesh) -> bool:
-    """Return whether most of the surface faces away from the middle of the mesh; the faces of a room look into it."""
+    """Return whether most of the surface faces away from the middle of the mesh; a room's faces look inwards."""
     normals, areas = face_normals(mesh)
     middles = mesh.vertices[mesh.faces].mean(axis=1)
     away = middles - mesh.middle
@@ -103,14 +103,14 @@ def _faces_away(mesh: Mesh) -> bool:
 
 
 def segment_by(masker: Masker, frames: MeshSequence, options: SegmentOptions = SegmentOptions()) -> ByMasks:
-    """Segment a scene by the masks of `masker`, which sees every frame before its first mask where it `observes`."""
+    """Segment a scene by the masks of `masker`; if it `observes`, it receives every frame before the first mask."""
     chosen = _to_see(frames)
     colors = None if masker.views or options.cameras else _color_looks(frames, chosen)
-    given = masker.views if colors is None else colors.views
-    views = _looking(given, frames, chosen) or _views(frames, chosen, options)
+    cameras = masker.views if colors is None else colors.views
+    views = _looking(cameras, frames, chosen) or _views(frames, chosen, options)
     if masker.observes:
-        some = chosen[:: max(1, len(chosen) // _PROBES)]
-        masker.foresee([looks(frames[number], views) for number in some], colors)
+        few = chosen[:: max(1, len(chosen) // _PROBES)]
+        masker.foresee([looks(frames[number], views) for number in few], colors)
         for number in range(len(frames)):
             masker.observe(number, looks(frames[number], views), views)
     return ByMasks(masker, views, edge_length(frames, chosen), options.threshold, options.island)
@@ -145,14 +145,14 @@ def _to_see(frames: MeshSequence) -> list[int]:
 
 
 def _with_surface(frames: MeshSequence, numbers: Sequence[int]) -> list[int]:
-    """Return those of `numbers` whose frames have a surface."""
+    """Return the `numbers` of frames with a surface."""
     return [number for number in numbers if not frames[number].is_empty]
 
 
 def _views(frames: MeshSequence, chosen: Sequence[int], options: SegmentOptions) -> tuple[Camera, ...]:
     """Return the cameras in the options, or views placed for a few of the chosen frames."""
-    some = Chosen(frames, chosen[:: max(1, len(chosen) // _PROBES)])
-    return _looking(options.cameras, frames, chosen) or place_views(some, options.views, some.up)
+    few = Chosen(frames, chosen[:: max(1, len(chosen) // _PROBES)])
+    return _looking(options.cameras, frames, chosen) or place_views(few, options.views, few.up)
 
 
 def _looking(
@@ -165,33 +165,34 @@ def _looking(
     return views
 
 
-def _stands(probes: Sequence[Surface], there: Sequence[Bool[np.ndarray, " V"]], reach: float, limit: float) -> bool:
-    """Return whether chosen surface of the frame with most of it is in the same place, m, in all frames that have it.
+def _stands(probes: Sequence[Surface], masks: Sequence[Bool[np.ndarray, " V"]], reach: float, limit: float) -> bool:
+    """Return whether chosen surface is in the same place, up to `limit` (m), in all frames that show it.
 
-    A frame has it if it has surface within `reach` of at least half of it: people in front hide things at times.
+    The surface is that of the frame with most of it. A frame shows it if it has surface within `reach` (m) of at least
+    half of it: people in front hide things at times.
     """
-    counts = [np.count_nonzero(chosen) for chosen in there]
+    counts = [np.count_nonzero(chosen) for chosen in masks]
     most = int(np.argmax(counts))
-    points, seen = probes[most].mesh.vertices[there[most]], 1
+    points, visible = probes[most].mesh.vertices[masks[most]], 1
     for number, probe in enumerate(probes):
         if number == most or counts[most] == 0:
             continue
         gaps = probe.distances(points)
         near = gaps[gaps <= reach]
         if len(near) >= len(gaps) / 2:
-            seen += 1
+            visible += 1
             if np.median(near) > limit:
                 return False
-    return seen >= len(probes) / 2
+    return visible >= len(probes) / 2
 
 
-def _apart(one: Mesh, other: Mesh) -> float:
+def _apart(first: Mesh, second: Mesh) -> float:
     """Return the median distance from vertices of one frame to another frame, m.
 
-    Of whole frames this is noise: more than half of a scene stands still. Infinite where there is no surface.
+    For whole frames this is the noise: more than half of a scene stands still. Infinite without surface.
     """
-    points = one.vertices[::_THINNED]
-    return float(np.median(distances(points, other))) if len(points) and not other.is_empty else np.inf
+    points = first.vertices[::_THINNED]
+    return float(np.median(distances(points, second))) if len(points) and not second.is_empty else np.inf
 
 
 def edge_length(frames: MeshSequence, chosen: Sequence[int]) -> float:

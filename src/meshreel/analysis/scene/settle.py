@@ -1,7 +1,7 @@
-"""Find lasting changes of the room, as a chair that is carried away or put down (paper, section 3.2; decision 18).
+"""Find lasting changes of the room, such as a chair carried away or put down (paper, section 3.2; decision 18).
 
-In: the counts of what was observed at each place, and the moving places. Out: the frames from which on, or until which,
-surface at a moving place belongs to the room.
+In: the counts of observations at each place, and the moving places. Out: the frames from which, or until which, surface
+at a moving place belongs to the room.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from .places import Places, Stay
 
 NEVER = np.iinfo(np.int32).max  # frame number that means "at no time"
 _FEWEST = 3  # smallest number of inspected frames with surface in a time of rest: a guess
-NEAR_CHANGE = 0.1  # m from a change to what is looked at as a part of it, step by step: a guess
-_SMALLEST = 10  # places: fewer stay as they are, for speed: a guess
+NEAR_CHANGE = 0.1  # m, largest step from a change to a place that may be part of it: a guess
+_SMALLEST = 10  # places: smaller sets stay as they are, for speed: a guess
 _STILL = 1.5  # times the noise: surface that is farther off from one frame to another has moved (decision 28)
 _STILL_BESIDE = 2.0  # the same beside a change, where cameras often see at grazing angles: a guess
 _ALIKE = 1  # largest difference, in inspected frames, between neighbours that change together: a guess
@@ -33,7 +33,7 @@ class SettleOptions:
     """Conditions for a change of the room (decision 18)."""
 
     rest: float = 10.0  # s of uninterrupted rest before or after the change: people do not stand still for as long
-    still: float = 0.8  # s of the same where surface does not move by more than noise, as a crate's (decision 28)
+    still: float = 0.8  # s of rest that suffice for surface that moves no more than noise, as a crate's (decision 28)
     share: float = 0.8  # smallest share of the inspected frames in that time that have surface at the place
     least: float = 0.15  # m^2, smallest area that changes together
 
@@ -64,10 +64,10 @@ def find_rest(
     options: SettleOptions = SettleOptions(),
     holds: Holds = lambda groups, _numbers, _times: [False] * len(groups),
 ) -> Rest:
-    """Find when moving places rest; `numbers` are the numbers of the inspected frames.
+    """Find the frames in which moving places rest; `numbers` are those of the inspected frames.
 
-    `holds` tells for sets of places whether surface there is where it was in all of some frames, but for some times the
-    noise: nobody stands so still.
+    `holds(sets of places, frame numbers, factor)` returns for each set whether surface there stays in place in these
+    frames, up to `factor` times the noise: nobody stands so still.
     """
     rest = Rest.none(len(places.keys))
     frames, tally = np.asarray(numbers, np.int32), places.tally
@@ -79,7 +79,7 @@ def find_rest(
         at = _settled(stay, len(order), options.share)
         lasts = abs(order[-1] - order[at]) >= min(options.rest, options.still) * frame_rate
         for group in _together(places, moving & (at >= 0) & lasts, at, least):
-            # When the last of these places has come to rest; what slows down is in its last place before it stands.
+            # Rest begins with the last place to come to rest: a slowing object reaches its last place before it stands.
             last = min(int(at[group].max()) + 1, len(order) - 1)
             long = abs(int(order[-1] - order[last])) >= options.rest * frame_rate
             if long or holds([group], order[last:].tolist(), _STILL)[0]:
@@ -96,21 +96,21 @@ def _join(
     never: int,
     holds: Holds,
 ) -> None:
-    """Let what rests beside a changed part of the room change with it, however small, late and seldom seen.
+    """Let places that rest beside a changed part of the room change with it, however few and seldom seen.
 
-    Somebody who pushes a crate hides a side of it; the edge of a door that is ajar is seen by one camera at times.
+    A person who pushes a crate hides a side of it; a single camera sees the edge of an open door at times.
     """
     waiting = resting & (out == never)
     while (out != never).any():
-        changed, own = np.flatnonzero(out != never), np.flatnonzero(waiting)
-        gaps, nearest = cKDTree(places.middles[changed]).query(places.middles[own], distance_upper_bound=NEAR_CHANGE)
-        own, times = own[gaps < np.inf], out[changed[nearest[gaps < np.inf]]]
-        if not len(own):
+        changed, beside = np.flatnonzero(out != never), np.flatnonzero(waiting)
+        gaps, nearest = cKDTree(places.middles[changed]).query(places.middles[beside], distance_upper_bound=NEAR_CHANGE)
+        beside, times = beside[gaps < np.inf], out[changed[nearest[gaps < np.inf]]]
+        if not len(beside):
             return
-        waiting[own] = False
+        waiting[beside] = False
         for time in np.unique(times):
             reached = np.zeros_like(waiting)
-            reached[own[times == time]] = True
+            reached[beside[times == time]] = True
             groups = _together(places, reached, np.zeros(len(reached), np.int64), _SMALLEST)
             after = order[order >= time] if never else order[order < time]
             for group, stands in zip(groups, holds(groups, after.tolist(), _STILL_BESIDE), strict=True):
@@ -118,19 +118,19 @@ def _join(
 
 
 def _with_unknown(places: Places, moving: Bool[np.ndarray, " P"], rest: Rest) -> Rest:
-    """Give moving places that are never seen free, as under a chair's legs, the rest of the nearest one that is."""
+    """Give moving places never seen free, as under a chair's legs, the rest of the nearest place that is seen free."""
     free = places.tally.free > 0
-    known, unknown = np.flatnonzero(moving & free), np.flatnonzero(moving & ~free)
-    if not rest.changes or not len(unknown):
+    seen_free, never_free = np.flatnonzero(moving & free), np.flatnonzero(moving & ~free)
+    if not rest.changes or not len(never_free):
         return rest
-    nearest = known[cKDTree(places.middles[known]).query(places.middles[unknown])[1]]
+    nearest = seen_free[cKDTree(places.middles[seen_free]).query(places.middles[never_free])[1]]
     until, since = rest.until.copy(), rest.since.copy()
-    until[unknown], since[unknown] = until[nearest], since[nearest]
+    until[never_free], since[never_free] = until[nearest], since[nearest]
     return Rest(until, since)
 
 
 def _settled(stay: Stay, frames: int, least: float) -> Int64[np.ndarray, " P"]:
-    """Return the index of the first inspected frame of each place's rest; -1 if surface is there in too few."""
+    """Return the index of the first inspected frame of each place's rest; -1 if too few have surface there."""
     full = (stay.count >= least * (frames - stay.first)) & (stay.count >= _FEWEST)
     return np.where((stay.first >= 0) & full, stay.first, -1).astype(np.int64)
 
@@ -139,7 +139,7 @@ def _together(
     places: Places, chosen: Bool[np.ndarray, " P"], at: Int64[np.ndarray, " P"], least: int
 ) -> list[Int64[np.ndarray, " C"]]:
     """Return the sets of at least `least` connected places that change at about the same time."""
-    own = np.flatnonzero(chosen)
-    label = connected(places, own, lambda a, b: np.abs(at[own[a]] - at[own[b]]) <= _ALIKE)
+    numbers = np.flatnonzero(chosen)
+    label = connected(places, numbers, lambda a, b: np.abs(at[numbers[a]] - at[numbers[b]]) <= _ALIKE)
     size = np.bincount(label, minlength=1)
-    return [own[label == number] for number in np.flatnonzero(size >= max(least, 1))]
+    return [numbers[label == number] for number in np.flatnonzero(size >= max(least, 1))]

@@ -1,7 +1,7 @@
 """Placement of views that all frames share and that together see nearly every face (paper, section 3.2).
 
 In: a few frames of a scene. Out: cameras. Candidates stand on a grid in the scene's box and look in 26 directions. They
-are taken greedily: next comes the candidate expected to see most of the surface that the earlier ones do not see.
+are chosen greedily: the next is the candidate expected to see most of the surface that the earlier ones do not see.
 
 Differs from the paper: it does not state its viewpoints, so this placement is ours (docs/decisions/0017-views.md).
 """
@@ -90,7 +90,7 @@ class _Samples:
         return _Samples(mesh, Rays(mesh), points, faces, normals[faces], areas[faces])
 
     def seen_from(self, eye: Float64[np.ndarray, " 3"]) -> tuple[np.ndarray, np.ndarray]:
-        """Return for each sample whether it is visible from `eye`; and whether it is visible from behind."""
+        """Return masks of the samples that are visible from `eye`, and of those visible from behind."""
         ahead = self.points - eye
         hit = self.rays.cast(np.broadcast_to(eye, ahead.shape), ahead)
         free = (hit.faces == self.faces) | (hit.distances > 1 - _TOUCHES)
@@ -133,17 +133,17 @@ def _pixels(
     across = rounded(math.tan(math.radians(options.fov) / 2))
     high = across * options.height / options.width
     focal = options.width / 2 / across
-    found = []
+    sizes = []
     for part, free in zip(samples, sees, strict=True):
         ahead = part.points[free] - eye
         distance = np.maximum(np.linalg.norm(ahead, axis=1), 1e-12)
         facing = np.abs((part.normals[free] * ahead).sum(axis=1)) / distance
-        whole = (focal**2 * facing * part.areas[free] / distance**2).astype(np.float32)  # on the axis
+        on_axis = (focal**2 * facing * part.areas[free] / distance**2).astype(np.float32)  # on the axis
         x, y, z = np.moveaxis(np.einsum("nd,wed->wne", ahead / distance[:, None], turns), 2, 0)
         within = (np.abs(x) < across * z) & (np.abs(y) < high * z)
-        found.append(np.zeros((len(turns), len(free)), np.float32))
-        found[-1][:, free] = np.where(within, np.minimum(whole / np.maximum(z, 1e-3) ** 3, 1), 0)
-    return np.concatenate(found, axis=1)
+        sizes.append(np.zeros((len(turns), len(free)), np.float32))
+        sizes[-1][:, free] = np.where(within, np.minimum(on_axis / np.maximum(z, 1e-3) ** 3, 1), 0)
+    return np.concatenate(sizes, axis=1)
 
 
 def _greedy(candidates: list[Camera], pixels: Float32[np.ndarray, "C N"], count: int) -> tuple[Camera, ...]:

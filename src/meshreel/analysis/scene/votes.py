@@ -20,7 +20,7 @@ class Votes:
 
     @staticmethod
     def of(ids: Int32[np.ndarray, "X H W"], masks: Bool[np.ndarray, "X H W"], faces: int) -> Votes:
-        """Count the votes on `faces` faces; `ids` are those that pixels see, -1: none; `masks`: what moves."""
+        """Count the votes on `faces` faces; `ids`: the face that each pixel sees, -1: none; `masks`: moving pixels."""
         assert ids.shape == masks.shape, "one mask per view"
         hit = ids >= 0
         return Votes(

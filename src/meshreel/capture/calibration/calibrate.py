@@ -48,7 +48,7 @@ Directions = Float64[np.ndarray, "m k"]  # k such motions
 
 @dataclass(frozen=True, slots=True)
 class PairDistance:
-    """How far apart two cameras see the same surface."""
+    """Distance between the surfaces that two cameras see."""
 
     cameras: tuple[str, str]  # names
     overlap: float  # share of the points of a camera that lie on what the other sees, the larger one of both
@@ -107,7 +107,7 @@ class _Match:
 
 
 class _Scene:
-    """What cameras see, and how well it agrees.
+    """Views of all cameras, and their agreement.
 
     The motion of a camera is six numbers in m: a turn about the middle of all points, times their mean distance from
     there, and a shift.

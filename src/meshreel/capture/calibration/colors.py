@@ -50,7 +50,7 @@ class CalibrationOptions:
 
 @dataclass(frozen=True, slots=True)
 class Correction:
-    """What is to be mended in the pictures of a camera."""
+    """Correction of the pictures of a camera."""
 
     gains: Float64[np.ndarray, " 3"]  # log2, by which its channels are too bright
     pose: Float64[np.ndarray, " 6"]  # its turn as a vector and its way, rad and m, in the camera's frame

@@ -1,4 +1,4 @@
-"""What a camera of a rig sees of the surface that stands still: a small plane at each pixel.
+"""Still surface in the view of a rig's camera: a small plane at each pixel.
 
 Depths of one camera in several frames -> their median, and planes fitted to it. Only the plane of a pixel whose window
 is flat up to the noise counts: edges, borders and what moves have none.

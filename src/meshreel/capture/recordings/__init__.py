@@ -29,7 +29,7 @@ class Reader(Protocol):
 
     @staticmethod
     def read(path: Path) -> Take:
-        """Return what it holds; no picture is read before its stream is asked. May raise anything for damage."""
+        """Return its contents; pictures are read on access to their stream. May raise any exception for damage."""
 
 
 @cache
@@ -55,7 +55,7 @@ def is_take(path: Path) -> bool:
 
 
 def open_take(path: Path) -> Take:
-    """Return what a recording holds. Raises InputError where no reader knows it, or where it cannot be read."""
+    """Return the contents of a recording. Raises InputError if no reader supports it, or if it cannot be read."""
     if not path.exists():
         raise InputError(f"{path}: no such file or folder; check the path")
     if is_rig(path):

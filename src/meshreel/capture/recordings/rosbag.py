@@ -81,7 +81,7 @@ class _Topic:
 
     @property
     def sdk(self) -> str:
-        """What the names of a stream begin with in RealSense's own files."""
+        """Prefixes of a stream's names in RealSense's own files."""
         return self.name.removesuffix("/image/data")
 
 

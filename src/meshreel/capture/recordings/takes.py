@@ -57,7 +57,7 @@ class Sensor:
 
 @dataclass(frozen=True, slots=True)
 class Take:
-    """What a file or folder holds."""
+    """Contents of a file or folder."""
 
     path: Path
     kind: str  # of recording

@@ -69,7 +69,7 @@ class SimulatedColor:
     def picture(
         self, mesh: Mesh, paint: Painter, frame: int, random: np.random.Generator
     ) -> UInt8[np.ndarray, "H W 3"]:
-        """Return what the camera sees of a mesh in a frame; black where it sees nothing."""
+        """Render a mesh in a frame as the camera sees it, on black."""
         from scipy.ndimage import gaussian_filter
 
         camera = self.camera.view

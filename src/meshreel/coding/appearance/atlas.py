@@ -1,6 +1,6 @@
-"""Encode an atlas: where the corners of a base mesh's faces are in a texture, in whole texels.
+"""Encode an atlas: the places of a base mesh's face corners in a texture, in whole texels.
 
-In -> out: a base mesh as decoded and the places of its corners <-> bytes. Subdivisions halve the sides of faces in the
+In -> out: a decoded base mesh and the places of its corners <-> bytes. Subdivisions halve the sides of faces in the
 texture as they do in space.
 """
 
@@ -16,7 +16,7 @@ from ..entropy import decode_integers, encode_integers
 
 
 def encode_atlas(base: Mesh, layout: Layout) -> bytes:
-    """Encode the places of a base mesh's corners. Raises InputError for a texture that no reader would take."""
+    """Encode the places of a base mesh's corners. Raises InputError for a texture that readers would refuse."""
     if not _is_size(layout.width, layout.height):
         raise InputError(f"a texture of {layout.width} x {layout.height}: give even sides of at most {MOST_SIDE}")
     joins, starts, rests = _core.encode_places(base.vertices, base.faces, layout.places)

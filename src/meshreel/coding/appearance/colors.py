@@ -1,8 +1,8 @@
-"""Encode the colours of vertices: fields of luma and colour differences over the connectivity that places have.
+"""Encode the colours of vertices: fields of luma and colour differences over the connectivity of positions.
 
-In: meshes that are subdivided, and the colours of their vertices in every frame. Out: the payload of a COLORS chunk,
-and the colours as they decode. Base vertices are predicted in their hierarchy, those of a level from the ends of their
-edges; all of a group's frames are one field, in a basis of their own, so that colours that stand still cost nothing.
+In: subdivided meshes, and the colours of their vertices in every frame. Out: the payload of a COLORS chunk, and the
+decoded colours. Base vertices are predicted in their hierarchy, those of a level from the ends of their edges; all of a
+group's frames are one field, in a separate basis, so that constant colours cost nothing.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from ..layers.graph import connectivity, hierarchy
 from ..steps import rung_of
 
 SIBLINGS = 24  # weight of the siblings' mean, 64ths: with 8 or 40, 1 to 3 % more bytes on basketball_player
-CHROMA = 64  # what colour differences are multiplied by, 64ths (guess)
+CHROMA = 64  # factor of colour differences, 64ths (guess)
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +48,7 @@ class ColorCodingOptions:
 
 @dataclass(frozen=True, slots=True)
 class EncodedColors:
-    """Payload of colours, and what it decodes to."""
+    """Payload of colours, and the decoded colours."""
 
     payload: bytes
     layers: tuple[int, ...]  # offset at which each layer ends
@@ -63,52 +63,52 @@ def encode_colors(
     before: Float64[np.ndarray, "V 3"] | None = None,
     layered: bool = False,
 ) -> EncodedColors:
-    """Encode the colours of the vertices of meshes, the first of them predicted from `before` where it is given.
+    """Encode the colours of the vertices of meshes, the first of them predicted from `before` if given.
 
-    With `layered`, each level of the first mesh is a layer of its own, and so are the other meshes together.
+    With `layered`, each level of the first mesh is a separate layer, and the other meshes together are one.
     """
     head = VertexColors(Form.VERTEX_COLORS, Origin.ALONE if before is None else Origin.PREVIOUS, CHROMA)
-    parts, found, state = [pack(head)], list[UInt8[np.ndarray, "_ _ 3"]](), None
-    for number, (mesh, wanted) in enumerate(zip(meshes, colors, strict=True)):
-        records = _encode_mesh(mesh, wanted, options, None if number else before)
+    parts, decoded_colors, state = [pack(head)], list[UInt8[np.ndarray, "_ _ 3"]](), None
+    for number, (mesh, target) in enumerate(zip(meshes, colors, strict=True)):
+        records = _encode_mesh(mesh, target, options, None if number else before)
         decoded, last = _decode_mesh(b"".join(records), mesh, head, None if number else before)
         state = last if number == 0 else state
-        found.append(decoded)
+        decoded_colors.append(decoded)
         if number == 0 and layered:
             parts = [parts[0] + records[0], *records[1:]]
         elif number <= 1 and layered:
             parts.append(b"".join(records))
         else:
             parts[-1] += b"".join(records)
-    return EncodedColors(b"".join(parts), tuple(accumulate(map(len, parts))), tuple(found), state)
+    return EncodedColors(b"".join(parts), tuple(accumulate(map(len, parts))), tuple(decoded_colors), state)
 
 
 def decode_colors(
     data: bytes, meshes: Sequence[ColoredMesh], before: Float64[np.ndarray, "V 3"] | None = None
 ) -> tuple[list[UInt8[np.ndarray, "_ _ 3"]], Float64[np.ndarray, "V 3"] | None]:
-    """Decode the colours of the vertices of meshes, and the state that the next group may be predicted from.
+    """Decode the colours of the vertices of meshes, and the state from which the next group may be predicted.
 
-    `data` ends with the records of these meshes; the first may have fewer levels than were coded, the others be left
-    out. Raises FormatError where it is damaged, or needs a group that is not at hand.
+    `data` ends with the records of these meshes; the first may have fewer levels than were coded, others may be left
+    out. Raises FormatError if it is damaged, or predicted from a missing group.
     """
     head, offset = unpack(VertexColors, data)
     if head.form != Form.VERTEX_COLORS or head.chroma == 0:
         raise FormatError(f"colours of form {head.form} and chroma {head.chroma}")
     if head.origin == Origin.PREVIOUS and before is None:
         raise FormatError("colours that are predicted from those of a group which is not at hand")
-    found, state = list[UInt8[np.ndarray, "_ _ 3"]](), None
+    decoded, state = list[UInt8[np.ndarray, "_ _ 3"]](), None
     for number, mesh in enumerate(meshes):
         start = offset
         _, offset = unpack(CodedField, data, offset)
         for _ in range(mesh.levels):
             _, offset = unpack(ColorsLevel, data, offset)
-        known = before if number == 0 and head.origin == Origin.PREVIOUS else None
-        colors, last = _decode_mesh(data[start:offset], mesh, head, known)
+        predicting = before if number == 0 and head.origin == Origin.PREVIOUS else None
+        colors, last = _decode_mesh(data[start:offset], mesh, head, predicting)
         state = last if number == 0 else state
-        found.append(colors)
+        decoded.append(colors)
     if offset != len(data):
         raise FormatError(f"colours: {len(data) - offset} bytes too many")
-    return found, state
+    return decoded, state
 
 
 def _encode_mesh(
@@ -117,26 +117,26 @@ def _encode_mesh(
     options: ColorCodingOptions,
     before: Float64[np.ndarray, "V 3"] | None,
 ) -> list[bytes]:
-    """Return the records of a mesh: that of its base, and that of each level."""
+    """Return the records of a mesh: one for its base, and one for each level."""
     frames, count, faces = mesh.frames, len(mesh.base.vertices), mesh.base.faces
     values = _core.color_values(np.ascontiguousarray(colors.reshape(-1, 3)), CHROMA / 64)
     rows = np.moveaxis(values.reshape(frames, -1, 3), 0, 2).reshape(mesh.vertices, 3 * frames)
-    known_before = np.zeros((mesh.vertices, 3)) if before is None else before
-    start = np.repeat(known_before, frames, axis=1)  # luma of all frames, then one difference, then the other
+    prediction = np.zeros((mesh.vertices, 3)) if before is None else before
+    start = np.repeat(prediction, frames, axis=1)  # luma of all frames, then one difference, then the other
     places, base = hierarchy(mesh.base), Rate(rung_of(options.step * options.finer), options.price)
     field = encode_field((rows[:count] - start[:count])[places.order], places.graph, base)
-    known = np.empty((count, 3 * frames))
-    known[places.order] = field.decoded
-    known += start[:count]
+    decoded = np.empty((count, 3 * frames))
+    decoded[places.order] = field.decoded
+    decoded += start[:count]
     records = [pack(field.record)]
     for _ in range(mesh.levels):
         near = connectivity(faces, count)
         more = slice(count, count + len(near.level.edges))
-        middles = (known[near.level.edges[:, 0]] + known[near.level.edges[:, 1]]) / 2
+        middles = (decoded[near.level.edges[:, 0]] + decoded[near.level.edges[:, 1]]) / 2
         rate = Rate(rung_of(options.step), options.price)
         field = encode_field(rows[more] - middles - start[more], near.siblings.graph(SIBLINGS), rate)
         records.append(pack(ColorsLevel(SIBLINGS, field.record)))
-        known = np.concatenate([known, middles + (field.decoded + start[more])])
+        decoded = np.concatenate([decoded, middles + (field.decoded + start[more])])
         count, faces = near.level.count, near.level.faces
     return records
 

@@ -1,8 +1,8 @@
 """Encode pictures that change little from frame to frame: as AV1 by SVT, or H.264 by x264 (PyAV, extra `color`).
 
-In -> out: pictures in sRGB <-> packets, one for each picture, in their order. Both sides know I420 planes of limited
-range (ITU-R BT.709), which decoders agree on to the bit; their colours are a matter of who shows them. What a packet
-asks of its decoder is seen without decoding it: a few bytes can ask for thousands of pictures.
+In -> out: pictures in sRGB <-> packets, one for each picture, in order. Both sides use I420 planes of limited range
+(ITU-R BT.709), on which decoders agree to the bit; the conversion to sRGB is up to the viewer. The cost of a packet is
+determined without decoding it: a few bytes can demand thousands of pictures.
 """
 
 from __future__ import annotations
@@ -36,16 +36,16 @@ X264 = (  # no picture waits for another; one key picture; BT.709, limited range
     "threads=1:cpu-independent=1:keyint=infinite:scenecut=0:bframes=0:rc-lookahead=0:sync-lookahead=0:repeat-headers=1:annexb=1"
     ":colorprim=bt709:transfer=bt709:colormatrix=bt709:fullrange=off"
 )
-H264_SCALE, H264_OFFSET = 0.375, 7.75  # from SVT's rate factor to that of x264 with about the same PSNR; measured
+H264_SCALE, H264_OFFSET = 0.375, 7.75  # from SVT's rate factor to x264's of about the same PSNR; measured
 COMMENT = 6  # type of a NAL unit: supplemental enhancement information
-H264_BORDER = 128  # pixels that FFmpeg's decoder counts beside a picture, at most
+H264_BORDER = 128  # pixels, largest border that FFmpeg's decoder adds to a picture
 LOW_DELAY = 0x80000  # FFmpeg's flag AV_CODEC_FLAG_LOW_DELAY: a picture is shown when its packet is decoded
 BAND = 64  # rows that become sRGB together: their floats take some MiB
-MOST_CODED = 8  # pictures in a packet: AV1 keeps as many for later ones
+MOST_CODED = 8  # largest number of pictures in a packet: AV1's number of reference frames
 SEQUENCE, FRAME = 1, 6  # types of an OBU (AV1, 6.2.2), and those with the header of a picture
 HEADERS = (3, FRAME, 7)
 SLICES = (1, 2, 5)  # types of a NAL unit (H.264, table 7-1) with a first slice
-BLUE, RED = 1.8556, 1.5748  # what a full colour difference is of blue and of red
+BLUE, RED = 1.8556, 1.5748  # blue and red of a full colour difference (ITU-R BT.709)
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,10 +61,10 @@ class VideoOptions:
 
 
 class VideoEncoder:
-    """Encoder of the pictures of one chain: the first is a key picture, no other is."""
+    """Encoder of the pictures of one chain, of which only the first is a key picture."""
 
     def __init__(self, width: int, height: int, options: VideoOptions, codec: VideoCodec = VideoCodec.AV1) -> None:
-        """Open the encoder. Raises InputError where PyAV or its encoder is missing."""
+        """Open the encoder. Raises InputError if PyAV or its encoder is missing."""
         self._context = context = _context(ENCODERS[codec], "w")
         context.width, context.height, context.pix_fmt = width, height, "yuv420p"
         context.time_base, context.framerate = Fraction(1, 30), Fraction(30)
@@ -78,7 +78,7 @@ class VideoEncoder:
         self._codec, self._count = codec, 0
 
     def add(self, planes: UInt8[np.ndarray, "R W"]) -> list[bytes]:
-        """Encode a picture, as `to_i420` makes it; return the packets that are done."""
+        """Encode a picture, a result of `to_i420`; return the completed packets."""
         import av
 
         frame = av.VideoFrame.from_ndarray(planes, "yuv420p")
@@ -87,21 +87,20 @@ class VideoEncoder:
         return self._packets(frame)
 
     def finish(self) -> list[bytes]:
-        """Return the packets that were not done."""
         return self._packets(None)
 
     def _packets(self, frame: Any) -> list[bytes]:
-        found = [bytes(packet) for packet in self._context.encode(frame)]
-        return found if self._codec == VideoCodec.AV1 else [_without_comments(packet) for packet in found]
+        packets = [bytes(packet) for packet in self._context.encode(frame)]
+        return packets if self._codec == VideoCodec.AV1 else [_without_comments(packet) for packet in packets]
 
 
 class VideoDecoder:
     """Decoder of the pictures of one chain, from its first on."""
 
     def __init__(self, width: int, height: int, codec: VideoCodec = VideoCodec.AV1) -> None:
-        """Open the decoder of pictures of this size. Raises InputError where PyAV is missing."""
+        """Open the decoder of pictures of this size. Raises InputError if PyAV is missing."""
         self._context = _context(DECODERS[codec], "r")
-        # `max_pixels`: what a decoder takes memory for before it shows anything.
+        # `max_pixels` limits the memory that a decoder allocates before the first picture.
         if codec == VideoCodec.AV1:
             self._context.options = {"max_pixels": str(width * height), "max_frame_delay": "1"}
         else:
@@ -112,31 +111,31 @@ class VideoDecoder:
         self._size = width, height
 
     def decode(self, packet: bytes) -> UInt8[np.ndarray, "R W"]:
-        """Return the planes of the next picture. Raises FormatError where the packet is damaged or has another size."""
+        """Return the planes of the next picture. Raises FormatError if the packet is damaged or has another size."""
         import av
 
         try:
-            found = self._context.decode(av.Packet(packet))
+            frames = self._context.decode(av.Packet(packet))
         except (av.error.FFmpegError, ValueError) as error:
             raise FormatError(f"a damaged picture ({len(packet)} bytes): {error}") from error
-        if len(found) != 1:
-            raise FormatError(f"a packet of {len(packet)} bytes with {len(found)} pictures")
-        [frame] = found
+        if len(frames) != 1:
+            raise FormatError(f"a packet of {len(packet)} bytes with {len(frames)} pictures")
+        [frame] = frames
         if (frame.width, frame.height) != self._size or frame.format.name != "yuv420p":
             raise FormatError(f"a picture of {frame.width} x {frame.height}, {frame.format.name}: not the atlas' size")
         return np.asarray(frame.to_ndarray())
 
 
 def encode_pictures(packets: Sequence[bytes], codec: VideoCodec = VideoCodec.AV1, interval: int = 1) -> bytes:
-    """Pack the packets of a group's pictures, or a layer of those of a background, each shown for `interval` frames."""
+    """Pack the packets of a group's pictures, or of a layer of a background's, each shown for `interval` frames."""
     return pack(Pictures(Form.VIDEO, codec, interval, tuple(packets)))
 
 
 def decode_pictures(data: bytes, frames: int, texels: int) -> Pictures:
-    """Return the packets of a group's pictures, or of a layer of those of a background, which has 0 frames.
+    """Return the packets of a group's pictures, or of a layer of a background's, which has 0 frames.
 
-    Raises FormatError where a group has not one for each frame, or the layer none, or more than it may; and CostlyError
-    where pictures of so many texels cost more than the bytes may.
+    Raises FormatError if a group does not have one picture per frame, or a layer none or too many; and CostlyError if
+    pictures of this many texels cost more than the bytes allow.
     """
     record = unpack_all(Pictures, data)
     count, interval = len(record.packets), record.interval
@@ -148,9 +147,9 @@ def decode_pictures(data: bytes, frames: int, texels: int) -> Pictures:
 
 
 def coded_pictures(packet: bytes, codec: VideoCodec) -> int:
-    """Return how many pictures a packet decodes, to show one.
+    """Return the number of pictures that a packet decodes in order to show one.
 
-    Raises FormatError where it shows none or several, decodes more than 8, or is AV1 of another profile than Main.
+    Raises FormatError if it shows none or several, decodes more than 8, or is AV1 of another profile than Main.
     """
     coded, shown = _of_av1(packet) if codec == VideoCodec.AV1 else _of_h264(packet)
     if shown != 1 or coded > MOST_CODED:
@@ -225,17 +224,17 @@ def _halved(plane: np.ndarray) -> np.ndarray:
 
 @contextmanager
 def _as_urgent_as_before() -> Iterator[None]:
-    """Give this thread and those that the block starts the scheduling that this one has had.
+    """Restore the scheduling of this thread after the block, and apply it to threads that the block started.
 
-    Where it runs as root, SVT makes its caller and its own threads the most urgent of the machine (`SCHED_FIFO`, 99):
-    they would not share a processor with anything else, and all that the process starts afterwards would be like them.
+    As root, SVT gives its caller and its own threads the highest priority of the machine (`SCHED_FIFO`, 99): they would
+    not share a processor with anything else, and threads started afterwards would inherit it.
     """
-    before, others = _scheduling(), _threads()
+    before, earlier_threads = _scheduling(), _threads()
     try:
         yield
     finally:
         if before is not None and _scheduling() != before:
-            for thread in (_threads() - others) | {get_native_id()}:
+            for thread in (_threads() - earlier_threads) | {get_native_id()}:
                 with suppress(ProcessLookupError):  # it has ended
                     os.sched_setscheduler(thread, *before)
 
@@ -254,7 +253,7 @@ def _threads() -> set[int]:
 
 
 def _context(codec: str, mode: Literal["r", "w"]) -> Any:
-    os.environ.setdefault("SVT_LOG", "1")  # errors only: it would tell of each encoder on the standard error
+    os.environ.setdefault("SVT_LOG", "1")  # errors only: SVT would report each encoder on standard error
     try:
         import av
     except ImportError:

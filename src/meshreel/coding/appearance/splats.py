@@ -22,7 +22,7 @@ from ...shapes import Float64, Int64
 from ..entropy import decode_integers, encode_integers
 from ..steps import RUNGS, rung_of, step_of
 
-ROUND = 1.1  # ratio of scales up to which a splat counts as round, whose angle is 0 (guess): nobody sees it
+ROUND = 1.1  # largest ratio of scales of a splat that counts as round, with angle 0 (guess): invisible
 MOST_BITS = 14  # of a number of a splat
 
 
@@ -35,7 +35,7 @@ class SplatCodingOptions:
     opacity_bits: int = 6
     color_bits: int = 7
     offset_step: float = 1e-4  # normalised: .2 mm on a person
-    layers: tuple[float, ...] = (0.125, 0.5, 1.0)  # share of the splats that the first k layers have
+    layers: tuple[float, ...] = (0.125, 0.5, 1.0)  # shares of the splats in the first k layers
 
     def __post_init__(self) -> None:
         bits = (self.place_bits, self.turn_bits, self.opacity_bits, self.color_bits)
@@ -48,7 +48,7 @@ class SplatCodingOptions:
 def encode_splats(
     splats: Splats, importance: Float64[np.ndarray, " N"], options: SplatCodingOptions = SplatCodingOptions()
 ) -> tuple[bytes, tuple[int, ...]]:
-    """Encode splats; return the payload and where its layers end. Raises InputError for values that have no code."""
+    """Encode splats; return the payload and the ends of its layers. Raises InputError for values without a code."""
     _check_input(splats, importance)
     o, rungs = options, _rungs(splats.scales)
     middle = int(np.median(rungs[:, 0]))
@@ -62,24 +62,24 @@ def encode_splats(
 
 
 def decode_splats(data: bytes, faces: int) -> Splats:
-    """Decode the splats of a payload, or of its first layers, on a base mesh of so many faces.
+    """Decode the splats of a payload, or of its first layers, on a base mesh of `faces` faces.
 
-    The fewer they are, the larger they become. Raises FormatError where the bytes are damaged, and CostlyError where
-    they have more splats than they may.
+    The fewer splats, the larger they become. Raises FormatError if the bytes are damaged, and CostlyError if they have
+    too many splats.
     """
     head, offset = unpack(Gaussians, data)
     bits = (head.place_bits, head.turn_bits, head.opacity_bits, head.color_bits)
-    if head.form != Form.GAUSSIANS or not all(1 <= some <= MOST_BITS for some in bits) or head.offset_level >= RUNGS:
+    if head.form != Form.GAUSSIANS or not all(1 <= part <= MOST_BITS for part in bits) or head.offset_level >= RUNGS:
         raise FormatError(f"splats of form {head.form}, bits {bits} and offset level {head.offset_level}")
-    found, total = list[Splats](), 0
-    while offset < len(data) or not found:
+    layers, total = list[Splats](), 0
+    while offset < len(data) or not layers:
         record, offset = unpack(GaussiansLayer, data, offset)
         total += record.count
         check_cost(splats_cost(total), len(data), "splats")
-        found.append(_decode_layer(record, head, faces))
+        layers.append(_decode_layer(record, head, faces))
     if total > head.count:
         raise FormatError(f"{total} splats of {head.count}")
-    splats = Splats(*(np.concatenate([getattr(some, name) for some in found]) for name in Splats.__slots__))
+    splats = Splats(*(np.concatenate([getattr(part, name) for part in layers]) for name in Splats.__slots__))
     return replace(splats, scales=splats.scales * math.sqrt(math.sqrt(head.count / total)))
 
 
@@ -93,7 +93,7 @@ def _encode_layer(splats: Splats, head: Gaussians) -> GaussiansLayer:
     red, green, blue = splats.colors.T
     differences = red - blue, green - (red + blue) / 2
     colors = np.rint(
-        np.stack([(red + blue) / 4 + green / 2, *(some / 2 for some in differences)]) * 2.0**head.color_bits
+        np.stack([(red + blue) / 4 + green / 2, *(difference / 2 for difference in differences)]) * 2.0**head.color_bits
     )
     return GaussiansLayer(
         len(splats),
@@ -155,13 +155,13 @@ def _unpacked(data: bytes, count: int, rows: int = 1) -> Int64[np.ndarray, "R N"
 
 
 def _rungs(scales: Float64[np.ndarray, "N 2"]) -> Int64[np.ndarray, "N 2"]:
-    """Return the levels of scales, which must not be 0; that of the shorter is not less."""
+    """Return the levels of scales above 0; the level of the shorter is not less."""
     rungs = np.clip(np.rint(-8 * np.log2(scales)), 0, RUNGS - 1).astype(np.int64)
     return np.maximum.accumulate(rungs, axis=1)
 
 
 def _on_lattice(weights: Float64[np.ndarray, "N 2"], size: int) -> Int64[np.ndarray, "N 2"]:
-    """Return weights as integers that are 0 to `size`, and whose sum is."""
+    """Round weights to integers of 0 to `size`, with a sum of 0 to `size`."""
     places = np.clip(np.rint(weights * size), 0, size).astype(np.int64)
     places[:, 1] = np.minimum(places[:, 1], size - places[:, 0])
     return places
@@ -172,14 +172,14 @@ def _layers(
 ) -> list[Int64[np.ndarray, " _"]]:
     """Return the splats of each layer, in the order of their places.
 
-    Layers are spread evenly over the surface: of splats that are neighbours in that order, the most important is first.
+    Layers are spread evenly over the surface: among neighbours in that order, the most important come first.
     """
     order = _by_place(splats)
     n, rank = len(order), np.empty(len(order))
     run = max(round(shares[-1] / shares[0]), 1)  # neighbours of which one is in the first layer
     for start in range(0, n, run):
-        some = importance[order[start : start + run]]
-        rank[start : start + len(some)][np.argsort(-some, kind="stable")] = np.arange(len(some))
+        values = importance[order[start : start + run]]
+        rank[start : start + len(values)][np.argsort(-values, kind="stable")] = np.arange(len(values))
     by_rank = np.argsort(rank, kind="stable")
     bounds = [0, *(max(round(share * n), 1) for share in shares)]
     parts = (np.sort(by_rank[a:b]) for a, b in pairwise(bounds) if b > a)
@@ -187,7 +187,7 @@ def _layers(
 
 
 def _by_place(splats: Splats) -> Int64[np.ndarray, " N"]:
-    """Return the order of splats by face, and in a face by the face that they have after four subdivisions."""
+    """Return the order of splats by face, and inside a face by their face after four subdivisions."""
     return np.argsort(locate(splats.faces, splats.weights, 4)[0], kind="stable")
 
 

@@ -30,8 +30,8 @@ from .graph import Connectivity, connectivity
 from .patches import Patches, decode_patches
 from .trajectories import decode_last_places, decode_trajectories, encode_trajectories
 
-NOISY_STEP = 0.8  # RMS distances of the noise that a step is wide in addition (decision 16)
-NOISY_DETAIL = 1.25  # RMS distances of the noise that a column of detail must have: noise has one (decision 28)
+NOISY_STEP = 0.8  # RMS distances of the noise by which a step is widened (decision 16)
+NOISY_DETAIL = 1.25  # RMS distances of the noise, least RMS of a column of detail: noise has 1 (decision 28)
 MOST_FRAMES = 255  # of a group: a byte in the head
 MOST_NUMBERS = 1 << 29  # of decoded places: 4 GiB
 
@@ -68,9 +68,7 @@ class LayersState:
     base: Float64[np.ndarray, "V 3"]  # the base's vertices in the last frame
     scalars: tuple[Float64[np.ndarray, " _"], ...]  # of the last frame, for each decoded level
     finer: tuple[Connectivity, ...] = ()  # of the decoded levels, kept because it follows from the faces alone
-    colors: Float64[np.ndarray, "W 3"] | None = (
-        None  # values of the colours of all decoded vertices (appearance.colors)
-    )
+    colors: Float64[np.ndarray, "W 3"] | None = None  # of all decoded vertices (appearance.colors)
 
     @property
     def count(self) -> int:
@@ -80,9 +78,9 @@ class LayersState:
     def nbytes_beyond(self, previous: LayersState | None) -> int:
         """Return the memory, bytes, that this state does not share with the state from which it was predicted."""
         shared = () if previous is None else previous.finer
-        own = [near.nbytes for near in self.finer if not any(near is other for other in shared)]
+        sizes = [near.nbytes for near in self.finer if not any(near is other for other in shared)]
         colors = 0 if self.colors is None else self.colors.nbytes
-        return self.faces.nbytes + self.base.nbytes + sum(level.nbytes for level in self.scalars) + sum(own) + colors
+        return self.faces.nbytes + self.base.nbytes + sum(level.nbytes for level in self.scalars) + sum(sizes) + colors
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,7 +104,7 @@ def encode_layers(
 
     With `previous`, the base mesh is that of its last frame, and only the number of levels of `reference` is used: give
     the reference of the group whose base mesh was coded. Raises InputError for positions that cannot be coded, and
-    CostlyError where they take so few bytes that readers would refuse these.
+    CostlyError if they take so few bytes that readers would refuse them.
     """
     frames, levels = len(positions), reference.levels
     base = reference.mesh if previous is None else Mesh(previous.base, previous.faces)
@@ -118,25 +116,25 @@ def encode_layers(
     data = reference.data if previous is None else b""
     head = LayersGroup(Form.LAYERS, origin, frames, levels, reference.step, data, shared, motion)
     layers = [pack(head)]
-    known = np.ascontiguousarray(np.moveaxis(decode_trajectories(layers[0], base, frames), 2, 0))
+    decoded = np.ascontiguousarray(np.moveaxis(decode_trajectories(layers[0], base, frames), 2, 0))
     scalars: list[Float64[np.ndarray, "T _"]] = []
     faces = base.faces
     for number in range(1, levels + 1):
-        level = subdivide(faces, known.shape[1])
+        level = subdivide(faces, decoded.shape[1])
         if positions.shape[1] < level.count:
             raise InputError(f"{positions.shape[1]} vertices where level {number} has {level.count}")
         curvature = options.curvature(number)
-        aim = heights(positions[:, : level.count], known, level, curvature)
+        aim = heights(positions[:, : level.count], decoded, level, curvature)
         coded = encode_level(aim, level, options.rate(number, noise), curvature, _before(previous, number))
         layers.append(pack(coded.record))
         scalars.append(coded.scalars)
-        known, faces = refine(known, level, coded.scalars, curvature), level.faces
+        decoded, faces = refine(decoded, level, coded.scalars, curvature), level.faces
     ends = tuple(accumulate(map(len, layers)))
     for count, end in enumerate(ends):
         check_cost(layers_cost(Size.of(base, count), frames), end, "layers")
-    last = known[-1, : len(base.vertices)].copy()
+    last = decoded[-1, : len(base.vertices)].copy()
     state = LayersState(base.faces, last, tuple(level[-1].copy() for level in scalars))
-    return EncodedLayers(b"".join(layers), ends, known, state)
+    return EncodedLayers(b"".join(layers), ends, decoded, state)
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,39 +170,39 @@ def place_layers(
 ) -> DecodedLayers:
     """Decode records; with `place`, the positions are placed by it, but never the state.
 
-    With `spare`, the block of memory also has room for the faces of each frame: the next group gets one block again
-    without the page faults that would take as long as decoding.
+    With `spare`, the block of memory also has room for the faces of each frame: a single block avoids page faults,
+    which would take as long as decoding.
     """
     head = records.head
     base, previous = _start(records, previous)
-    known = decode_trajectories(records.layers[0], base, head.frames)
-    last = np.ascontiguousarray(known[:, :, -1])
+    rows = decode_trajectories(records.layers[0], base, head.frames)
+    last = np.ascontiguousarray(rows[:, :, -1])
     faces, finest = base.faces, len(records.layers) - 1
-    room = None if finest else _Room.of(head.frames, len(known), 0)
+    room = None if finest else _Room.of(head.frames, len(rows), 0)
     scalars: list[Float64[np.ndarray, " _"]] = []
     finer: list[Connectivity] = []
     for number, record in enumerate(records.layers[1:], 1):
-        near = _level(previous, number, faces, len(known), head.frames)
+        near = _level(previous, number, faces, len(rows), head.frames)
         before = _before(previous, number)
         if number < finest:
-            known, offsets = decode_level(record, near, known, before)
+            rows, offsets = decode_level(record, near, rows, before)
         else:
             room = _Room.of(head.frames, near.level.count, len(near.level.faces) * spare)
-            offsets = decode_last(record, near, known, before, Shown(room.positions, place))
+            offsets = decode_last(record, near, rows, before, Shown(room.positions, place))
         faces = near.level.faces
         finer.append(near)
         scalars.append(offsets)
     assert room is not None
     if not finer:
-        write_frames(known, place, room.positions)
+        write_frames(rows, place, room.positions)
     state = LayersState(base.faces, last, tuple(scalars), tuple(finer))
     return DecodedLayers(faces, room.positions, state, room.faces)
 
 
 def state_after(records: LayersRecords, previous: LayersState | None) -> LayersState:
-    """Decode the state that predicts the next group, and no frame: a fraction of the work of `place_layers`.
+    """Decode only the state that predicts the next group: a fraction of the work of `place_layers`.
 
-    Raises FormatError as that does, but not for places of other frames than the last one, nor for those of levels.
+    Raises FormatError as that does, but checks only the last frame's base.
     """
     frames = records.head.frames
     base, previous = _start(records, previous)
@@ -222,7 +220,7 @@ def state_after(records: LayersRecords, previous: LayersState | None) -> LayersS
 
 @dataclass(frozen=True, slots=True)
 class _Room:
-    """One block of memory for the positions of a group and for faces."""
+    """Block of memory for the positions of a group and for faces."""
 
     positions: Float64[np.ndarray, "T V 3"]
     faces: Int32[np.ndarray, "N 3"]
@@ -256,12 +254,12 @@ def base_of(records: LayersRecords, previous: LayersState | None) -> Mesh:
 
 
 def has_patches(data: bytes, records: LayersRecords, levels: int | None) -> bool:
-    """Return whether a payload has patches that are decoded, of which `records` are the records before them."""
+    """Return whether patches follow `records` in a payload, and are decoded at this number of levels."""
     return records.end < len(data) and (levels is None or levels > records.head.levels)
 
 
 def patches_of(data: bytes, records: LayersRecords, levels: int | None, faces: int) -> Patches | None:
-    """Decode the patches of a payload whose finest level has `faces` faces; None where it has none, or not these."""
+    """Decode the patches of a payload whose finest level has `faces` faces; None if it has none, or they are off."""
     if not has_patches(data, records, levels):
         return None
     return decode_patches(unpack_all(LayersPatches, data[records.end :]), records.head.frames, faces)

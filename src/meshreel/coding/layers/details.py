@@ -63,7 +63,7 @@ def decode_level(
 ) -> tuple[Float64[np.ndarray, "W 3 T"], Float64[np.ndarray, " E"]]:
     """Decode the rows of a level's vertices from those of the coarser level; also return the last frame's scalars.
 
-    `record` is a packed LayersLevel. Raises FormatError where it is damaged, or needs a group that is not there.
+    `record` is a packed LayersLevel. Raises FormatError if it is damaged, or predicted from a missing group.
     """
     return _core.decode_level(record, near.core, known, previous)
 
@@ -77,7 +77,7 @@ def decode_last(
 ) -> Float64[np.ndarray, " E"]:
     """Decode the last level into `shown.positions`, placed by `shown.place`; return the last frame's scalars.
 
-    Raises FormatError as `decode_level` does, and where a position is not finite.
+    Raises FormatError as `decode_level` does, and if a position is not finite.
     """
     place = None if shown.place is None else shown.place.numbers
     return _core.decode_last_level(record, near.core, known, previous, place, shown.positions)

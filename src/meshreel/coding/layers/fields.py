@@ -1,7 +1,7 @@
 """Encode fields of trajectories: KLT over time, closed-loop prediction over a causal graph, one entropy stream.
 
 In: V trajectories of C numbers, a graph of their V vertices. Out: a CodedField, and the trajectories as it decodes to.
-The basis as decoded is orthonormal, so all columns share one step. A column is kept where it pays.
+The decoded basis is orthonormal, so all columns share one step. A column is kept if it pays.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class Rate:
 
     rung: int  # of the ladder of quantiser steps
     price: float  # of a bit, in squared steps
-    least: float = 0.0  # RMS weight that a column must have, in the field's unit, but the strongest: the rest is noise
+    least: float = 0.0  # least RMS weight of a column, except the strongest, in the field's unit: weaker ones are noise
 
     @property
     def step(self) -> float:
@@ -54,7 +54,7 @@ class SurfaceWeight:
 
 @dataclass(frozen=True)
 class EncodedField:
-    """Record of a field over a graph, and what follows from it."""
+    """Record of a field over a graph, with derived values."""
 
     record: CodedField
     graph: Graph
@@ -63,12 +63,12 @@ class EncodedField:
 
     @cached_property
     def decoded(self) -> Float64[np.ndarray, "V C"]:
-        """The trajectories as the record decodes to, made when they are asked for."""
+        """The decoded trajectories, computed on first use."""
         return decode_field(self.record, self.graph, self.width, self.head)
 
     @property
     def basis_bits(self) -> int:
-        """Bits of the basis and of what lies before it."""
+        """Bits of the head and the basis."""
         return 8 * len(self.record.basis)
 
     @property
@@ -91,18 +91,18 @@ def encode_field(
     width = trajectories.shape[1]
     basis = klt.fit_about(np.zeros(width), trajectories)
     least = np.full(len(basis.energies), max(LEAST_RMS * rate.step, rate.least))
-    least[:1] = LEAST_RMS * rate.step  # what stands still on a body is no noise, however small
-    kept = np.flatnonzero(basis.energies > least**2)
-    coded = _Columns(trajectories, basis.only(kept), graph, rate, surface)
+    least[:1] = LEAST_RMS * rate.step  # the strongest column is never noise
+    chosen = np.flatnonzero(basis.energies > least**2)
+    coded = _Columns(trajectories, basis.only(chosen), graph, rate, surface)
     while not (pays := coded.pays()).all():
-        kept = kept[pays]
-        coded = _Columns(trajectories, basis.only(kept), graph, rate, surface)
+        chosen = chosen[pays]
+        coded = _Columns(trajectories, basis.only(chosen), graph, rate, surface)
     packed = entropy.encode_integers(np.concatenate([head, coded.basis]))
-    return EncodedField(CodedField(len(kept), rate.rung, packed, coded.stream), graph, width, len(head))
+    return EncodedField(CodedField(len(chosen), rate.rung, packed, coded.stream), graph, width, len(head))
 
 
 def decode_field(record: CodedField, graph: Graph, width: int, head: int = 0) -> Float64[np.ndarray, "V C"]:
-    """Decode the trajectories of a record with a head of so many integers.
+    """Decode the trajectories of a record whose head has `head` integers.
 
     Raises FormatError if it is damaged or has another width or head.
     """
@@ -142,7 +142,7 @@ class _Columns:
         return _core.predict_surface(self.weights, graph.core, metric, step, price)
 
     def pays(self) -> Bool[np.ndarray, " M"]:
-        """Return True for the columns whose absence would cost more than they do."""
+        """Return a mask of the columns whose absence would cost more than their bits."""
         count, width = self.vectors.shape
         basis_bits = strict.log2(2.0 * np.abs(self.basis) + 1)
         rows = np.repeat(np.arange(count), width - np.arange(count))

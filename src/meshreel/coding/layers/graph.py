@@ -27,7 +27,7 @@ class Graph:
 
     @property
     def core(self) -> _core.Graph:
-        """The graph for calls of the core, which looks at these arrays."""
+        """The graph for calls of the core, which refers to these arrays."""
         return _core.Graph(self.starts, self.near, self.weights)
 
 
@@ -61,7 +61,7 @@ class Connectivity:
 
     @property
     def core(self) -> _core.Level:
-        """The level for calls of the core, which looks at these arrays."""
+        """The level for calls of the core, which refers to these arrays."""
         return _core.Level(self.level.coarse, self.level.edges, self.siblings.starts, self.siblings.near)
 
     @property
@@ -88,6 +88,5 @@ def hierarchy(base: Mesh) -> Hierarchy:
 
 
 def siblings(level: Level) -> Siblings:
-    """Find the siblings of a level's new vertices."""
     starts, near = _core.siblings(level.faces, level.vertices, len(level.edges))
     return Siblings(starts.view(np.int64), near)

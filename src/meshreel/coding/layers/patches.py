@@ -53,19 +53,19 @@ class Patches:
         self, faces: Int32[np.ndarray, "F 3"], spare: Int32[np.ndarray, "N 3"] | None
     ) -> list[Int32[np.ndarray, "_ 3"]]:
         """Return the remaining faces of each frame."""
-        shown = [faces] * len(self.dropped)
+        faces_of = [faces] * len(self.dropped)
         changed = np.flatnonzero(self.dropped.any(axis=1))
         room = np.empty((len(changed) * len(faces), 3), np.int32) if spare is None or not len(spare) else spare
         used = 0
         for t in changed:
             count = _core.keep_faces(faces, self.dropped[t].view(np.uint8), room[used : used + len(faces)])
-            shown[t] = room[used : used + count]
+            faces_of[t] = room[used : used + count]
             used += count
-        return shown
+        return faces_of
 
 
 def reach(rung: int, frames: int) -> tuple[float, float]:
-    """Return how far from 0 the meshes of `frames` frames may reach: along x, where they lie in a row; and in y, z."""
+    """Return the largest coordinates of meshes of `frames` frames: along x, where they lie in a row, and in y and z."""
     step = step_of(rung)
     return (MOST_CELLS // frames // 2 - 0.75) * step, (MOST_CELLS // 2 - 0.75) * step
 
@@ -102,8 +102,8 @@ def encode_runs(dropped: Bool[np.ndarray, "T F"]) -> Int32[np.ndarray, " N"]:
     if not dropped.any():
         return np.zeros(0, np.int32)
     ever = dropped.any(axis=0)
-    known = dropped[:, ever]
-    turned = known ^ np.concatenate([np.zeros((1, known.shape[1]), bool), known[:-1]])
+    changing = dropped[:, ever]
+    turned = changing ^ np.concatenate([np.zeros((1, changing.shape[1]), bool), changing[:-1]])
     return np.concatenate([run_lengths(np.asarray(ever)), run_lengths(turned.reshape(-1))])
 
 
@@ -141,7 +141,7 @@ def fill_runs(runs: Int32[np.ndarray, " N"], count: int) -> tuple[Bool[np.ndarra
 
 
 def _set_out(meshes: Sequence[Mesh], step: float) -> tuple[int, Mesh]:
-    """Return the cells of a frame along x, and all meshes as one, in which that of frame t is shifted by t frames."""
+    """Return the cells of a frame along x, and the meshes joined, with that of frame t shifted by t frames."""
     cells = [np.rint(mesh.vertices / step).astype(np.int64) for mesh in meshes]
     width = 2 * max((int(np.abs(points[:, 0]).max(initial=0)) for points in cells), default=0) + 2
     if width * len(meshes) > MOST_CELLS:
@@ -176,13 +176,13 @@ def _parted(
     """Separate a mesh into frames, keeping the order of faces and vertices; one pass for any number of frames."""
     used = np.zeros(len(mesh.vertices), bool)
     used[mesh.faces.reshape(-1)] = True
-    kept = np.flatnonzero(used)
-    kept = kept[np.argsort(of_vertices[kept], kind="stable")]
+    numbers = np.flatnonzero(used)
+    numbers = numbers[np.argsort(of_vertices[numbers], kind="stable")]
     place = np.zeros(len(used), np.int64)
-    place[kept] = np.arange(len(kept))
+    place[numbers] = np.arange(len(numbers))
     order = np.argsort(of_faces, kind="stable")
-    points, faces = mesh.vertices[kept], place[mesh.faces[order]]
-    starts = np.searchsorted(of_vertices[kept], np.arange(frames + 1)).tolist()
+    points, faces = mesh.vertices[numbers], place[mesh.faces[order]]
+    starts = np.searchsorted(of_vertices[numbers], np.arange(frames + 1)).tolist()
     ends = np.searchsorted(of_faces[order], np.arange(frames + 1)).tolist()
     spans = zip(pairwise(starts), pairwise(ends), strict=True)
     return tuple(Mesh.of(points[a:b].copy(), faces[c:d] - a) for (a, b), (c, d) in spans)

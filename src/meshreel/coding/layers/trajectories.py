@@ -1,8 +1,8 @@
 """Encode the motion of the base mesh: the first layer of the form `layers`.
 
-In: the places of the base mesh's vertices in every frame. Out: what moves all of them alike, a mean shift or a pose for
-each frame, and their displacements from it, predicted in a hierarchy that both sides build from the base as decoded
-(decisions 12 and 34).
+In: the positions of the base mesh's vertices in every frame. Out: their shared motion, a mean shift or a pose for each
+frame, and their displacements from it, predicted in a hierarchy that both sides build from the decoded base (decisions
+12 and 34).
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ from .fields import NOTHING, Rate, SurfaceWeight, encode_field
 from .graph import hierarchy
 
 MOST_BITS = 30  # fraction bits of shared motion, so that a shift by a diagonal fits 32 bits
-_RIGID = 0.25  # largest share of the energy of motion without its mean that poses leave where they are tried (guess)
-_MOST_TURN = 2.0  # largest twice the tangent of half a turn from a frame to the next, 90 degrees (guess)
+_RIGID = 0.25  # largest share of the energy of motion without its mean that poses may leave (guess)
+_MOST_TURN = 2.0  # largest turn between frames, as twice the tangent of its half: 90 degrees (guess)
 
 
 @dataclass(frozen=True, slots=True)
 class _Alike:
-    """What moves all vertices alike: its integers (FORMAT.md, "Fields"), and where it brings them."""
+    """Motion shared by all vertices: its integers (FORMAT.md, "Fields"), and the positions that it gives them."""
 
     kind: SharedMotion
     head: Int32[np.ndarray, " N"]
@@ -39,9 +39,9 @@ class _Alike:
 def encode_trajectories(
     positions: Float64[np.ndarray, "T V 3"], base: Mesh, rate: Rate, tangential: float
 ) -> tuple[SharedMotion, CodedField]:
-    """Encode the motion of the base's vertices, with a pose for each frame where that takes fewer bytes.
+    """Encode the motion of the base's vertices, with a pose for each frame if that takes fewer bytes.
 
-    `tangential` is the weight of a squared error along the surface: where on it a vertex lies hardly shows.
+    `tangential` is the weight of a squared error along the surface, where sliding hardly shows.
     """
     places = hierarchy(base)
     frames = [vertex_normals(Mesh(np.ascontiguousarray(frame), base.faces)) for frame in positions]
@@ -51,7 +51,7 @@ def encode_trajectories(
         if alike is not None:
             offsets = np.moveaxis(positions - alike.places, 0, 1)[places.order].reshape(normals.shape)
             coded.append((alike.kind, encode_field(offsets, places.graph, rate, surface, alike.head).record))
-    return min(coded, key=lambda one: len(one[1].basis) + len(one[1].symbols))
+    return min(coded, key=lambda pair: len(pair[1].basis) + len(pair[1].symbols))
 
 
 def decode_trajectories(record: bytes, base: Mesh, frames: int) -> Float64[np.ndarray, "V 3 T"]:
@@ -73,7 +73,7 @@ def _bits(rate: Rate) -> int:
 
 
 def _shifts(positions: Float64[np.ndarray, "T V 3"], base: Mesh, rate: Rate) -> _Alike:
-    """Return the mean shift of each frame; no motion where it does not pay."""
+    """Return the mean shift of each frame; no motion if it does not pay."""
     offsets, bits = positions - base.vertices, _bits(rate)
     mean = np.rint(np.ldexp(offsets.mean(axis=1), bits))
     worth = rate.price * rate.step**2 * strict.log2(2 * np.abs(mean) + 1).sum()
@@ -84,19 +84,19 @@ def _shifts(positions: Float64[np.ndarray, "T V 3"], base: Mesh, rate: Rate) -> 
 
 
 def _poses(positions: Float64[np.ndarray, "T V 3"], base: Mesh, rate: Rate) -> _Alike | None:
-    """Return a pose for each frame; None where one turns too far, or where poses explain little of the motion."""
+    """Return a pose for each frame; None if one turns too far, or if poses explain little of the motion."""
     rest, bits = np.broadcast_to(base.vertices, positions.shape), _bits(rate)
     turned = quaternions(fit_rigid(rest, positions, np.ones(positions.shape[:2]))[0])
     shifts = np.rint(np.ldexp((positions - rest).mean(axis=1), bits))
-    turns, known = np.zeros((len(positions), 3)), np.array([[1.0, 0.0, 0.0, 0.0]])
+    turns, decoded_turn = np.zeros((len(positions), 3)), np.array([[1.0, 0.0, 0.0, 0.0]])
     for t in range(len(positions)):
-        left = multiply(turned[t : t + 1], known * [1, -1, -1, -1])[0]
-        if 2 * strict.norm(left[1:]) > _MOST_TURN * abs(left[0]):
+        remaining = multiply(turned[t : t + 1], decoded_turn * [1, -1, -1, -1])[0]
+        if 2 * strict.norm(remaining[1:]) > _MOST_TURN * abs(remaining[0]):
             return None
-        turns[t] = np.rint(np.ldexp(2 * left[1:] / left[0], bits))
-        known = multiply(np.append(1.0, np.ldexp(turns[t], -bits - 1))[None], known)
-        known /= strict.norm(known)
-        turned[t] = known[0]
+        turns[t] = np.rint(np.ldexp(2 * remaining[1:] / remaining[0], bits))
+        decoded_turn = multiply(np.append(1.0, np.ldexp(turns[t], -bits - 1))[None], decoded_turn)
+        decoded_turn /= strict.norm(decoded_turn)
+        turned[t] = decoded_turn[0]
     middle = base.vertices.mean(axis=0)
     arms = np.broadcast_to(base.vertices - middle, positions.shape)
     away = strict.products(arms, np.swapaxes(rotations_of(turned), 1, 2))

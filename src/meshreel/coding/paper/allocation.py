@@ -2,7 +2,7 @@
 
 In: a field, its base's Laplacian system. Out: the basis as transmitted and each component's step, such that
 distortion + price * rate is least: the distortion is the squared error after the least-squares inverse (the basis is
-orthonormal but for its rounding, so components add), the rate is what the entropy coder really spends.
+orthonormal up to rounding, so components add), the rate is the entropy coder's actual output.
 """
 
 from __future__ import annotations
@@ -79,24 +79,24 @@ def allocate(
     """Choose the components and steps that minimise distortion + price * rate."""
     basis = klt.fit(field)
     if options.basis_size is not None:
-        kept = np.arange(len(basis.energies)) < options.basis_size
+        chosen = np.arange(len(basis.energies)) < options.basis_size
     else:
-        kept = basis.energies > (0.4 * options.step) ** 2  # weaker components are not tried (guess)
-    coded = _Components(field, basis.only(kept), system, options)
+        chosen = basis.energies > (0.4 * options.step) ** 2  # weaker components are not tried (guess)
+    coded = _Components(field, basis.only(chosen), system, options)
     ladder = [np.full(coded.count, rung_of(options.step) + offset) for offset in options.offsets]
     values = np.array([coded.value(coded.rounded(rungs), rungs, neighbours) for rungs in ladder])
     rungs = np.choose(values.argmin(axis=0), ladder) if coded.count else ladder[0]
     pays = values.min(axis=0) < coded.dropped() if options.basis_size is None else np.ones(coded.count, dtype=bool)
     if not pays.all():
-        kept[kept] = pays
-        coded, rungs = _Components(field, basis.only(kept), system, options), rungs[pays]
+        chosen[chosen] = pays
+        coded, rungs = _Components(field, basis.only(chosen), system, options), rungs[pays]
     return Allocation(coded.basis, rungs)
 
 
 def round_deltas(
     deltas: Float64[np.ndarray, "R M"], rungs: Int64[np.ndarray, " M"], system: System, options: DisplacementOptions
 ) -> Int32[np.ndarray, "R M"]:
-    """Round deltas to symbols; a symbol's price comes from how large its column's symbols are."""
+    """Round deltas to symbols; a symbol's price depends on the mean magnitude in its column."""
     steps, vertices = steps_of(rungs), system.vertices
     if options.dead_zone is not None:
         return quantize.forward(deltas, steps, options.dead_zone)
@@ -126,7 +126,7 @@ class _Components:
     def value(
         self, symbols: Int32[np.ndarray, "R M"], rungs: Int64[np.ndarray, " M"], neighbours: entropy.Neighbours
     ) -> Float64[np.ndarray, " M"]:
-        """Distortion + price * rate of each component: the basis is orthonormal, so they add."""
+        """Return distortion + price * rate of each component, which add because the basis is orthonormal."""
         error = self.system.inverse(symbols * steps_of(rungs)) - self.weights
         bits = entropy.weights_cost(symbols[: self.vertices], neighbours)
         bits += log2(2.0 * np.abs(symbols[self.vertices :]) + 1).sum(axis=0)
@@ -139,7 +139,6 @@ class _Components:
 
 
 def steps_of(rungs: Int64[np.ndarray, " M"]) -> Float64[np.ndarray, " M"]:
-    """Return the quantiser step of each rung."""
     return np.array([step_of(rung) for rung in rungs.tolist()], dtype=np.float64)
 
 

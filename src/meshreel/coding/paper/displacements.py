@@ -77,7 +77,7 @@ def layer_sizes(data: bytes) -> list[int]:
 def _encode(field: Float64[np.ndarray, "V T 3"], base: Mesh, options: DisplacementOptions) -> tuple[bytes, float]:
     """Return the payload for one number of anchors, and its squared error.
 
-    What chooses components and steps stands before the chain; `decode_displacements` undoes the chain line by line.
+    Components and steps are chosen before the chain, which `decode_displacements` undoes line by line.
     """
     vertices = len(field)
     anchors = laplacian.anchors(options.anchor_rule, options.anchor_count or 0, base.faces, vertices)

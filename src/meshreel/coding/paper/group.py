@@ -26,7 +26,7 @@ def encode_laplacian(
 ) -> tuple[bytes, tuple[int, ...]]:
     """Encode a `laplacian` group; return its payload and its layer ends: k + 1 layers decode with k components.
 
-    Raises CostlyError where readers would refuse so few bytes for it.
+    Raises CostlyError if it takes so few bytes that readers would refuse them.
     """
     displacements = encode_displacements(field, reference.base, options)
     record = LaplacianGroup(Form.LAPLACIAN, reference.levels, reference.step, reference.data, displacements)

@@ -19,8 +19,8 @@ def forward(
 ) -> Int32[np.ndarray, "N M"]:
     """Round values to multiples of the steps, halves away from zero.
 
-    A magnitude is rounded up only from `dead_zone`, in [0.5, 1), of a step on (0.5: nearest); larger is cheaper and
-    less accurate.
+    A magnitude is rounded up if its fraction of a step is at least `dead_zone`, in [0.5, 1) (0.5: nearest); larger
+    values are cheaper and less accurate.
     """
     if not 0.5 <= dead_zone < 1:
         raise InputError(f"dead zone {dead_zone}: give a fraction of a step in [0.5, 1)")

@@ -58,7 +58,7 @@ class ChainSplats:
         return (Companion(ChunkKind.SPLATS, payload, layers),)
 
     def _views(self, number: int) -> tuple[SplatView, ...]:
-        """Return what a frame looks like: in colour cameras, or from around it."""
+        """Return pictures of a frame: of colour cameras, or rendered from around it."""
         interval, o = self._interval, self._options
         mesh, views = interval.frames[number], interval.views
         if views is not None:

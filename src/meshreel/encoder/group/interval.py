@@ -54,18 +54,18 @@ class Interval:
         return replace(self, frames=frames, views=views)
 
     def paint(self, number: int, mesh: Mesh) -> Paint | None:
-        """Return what knows the colours of a frame, counted from the first, whose mesh this is; None: nothing does."""
+        """Return the colour source of frame `number`, counted from the first, with this mesh; None: no colours."""
         if mesh.is_empty or not (mesh.is_colored or self.views is not None):
             return None
         return Painted(mesh) if self.views is None else self.views.at(self.first_frame + number)
 
     def free(self, number: int) -> FreeSpace | None:
-        """Return what was seen through in a frame, counted from the first; None where nobody knows."""
+        """Return the space that cameras saw through in frame `number`, counted from the first; None if unknown."""
         return None if self.sight is None else self.sight.at(self.first_frame + number)
 
     @property
     def observed(self) -> Any:
-        """What reading the frames has shown, for `learn` of the interval that was sent."""
+        """Observations from reading the frames, for `learn` of the interval that was sent."""
         return self.frames.observed if isinstance(self.frames, NormalisedFrames) else None
 
     def learn(self, observed: Any) -> None:
@@ -94,7 +94,7 @@ class NormalisedFrames(Frames):
 
     @property
     def observed(self) -> Any:
-        """What the sequence observed."""
+        """Observations of the sequence."""
         return self._sequence.observed
 
     def learn(self, observed: Any) -> None:

@@ -31,7 +31,7 @@ class Views:
         return replace(self, sequence=only(self.sequence, numbers))
 
     def at(self, number: int, clear: bool = False, hides: Mesh | None = None) -> ColorViews:
-        """Return what the cameras saw in a frame; if `clear`, only away from steps in depth.
+        """Return the cameras' views of a frame; if `clear`, only away from steps in depth.
 
         What hides a place is the surface of the frame, or another one in normalised coordinates.
         """
@@ -61,5 +61,5 @@ class Sight:
         return None if sequence.depth is None else Sight(sequence.depth, Placement(seen.unit, tuple(seen.center)))
 
     def at(self, number: int) -> FreeSpace:
-        """Return what the cameras saw through in a frame."""
+        """Return the space that cameras saw through in a frame."""
         return FreeSpace.of(self.depth[number], self.place)

@@ -60,7 +60,7 @@ class Ahead:
         return self.surfaces[number - self.first]
 
     def painter(self, number: int) -> Painter:
-        """Return what finds who knows the colours of the frame with a number."""
+        """Return a callable that opens the colour source of frame `number`."""
         return partial(self.paint, number, self.at(number).mesh)
 
 

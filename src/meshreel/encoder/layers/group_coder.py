@@ -30,7 +30,7 @@ MOST_FOR_EDGES = 4  # times the bytes that frames with their edges may cost (gue
 
 @dataclass(frozen=True, slots=True)
 class GroupCoder:
-    """What the coding of a group depends on, beside its template."""
+    """Inputs of the coding of a group, beside its template."""
 
     surfaces: Sequence[FrameSurface]
     target: Fidelity  # that the frames should reach, normalised

@@ -54,6 +54,6 @@ class PaperOptions:
 
     @property
     def is_literal(self) -> bool:
-        """Whether all is done as the paper's words say."""
+        """True if every step follows the paper's words."""
         chosen = (self.pose, self.fit, self.rounding, self.steps, self.cuts)
         return chosen == ("mds", "nearest", "plain", "uniform", False)

@@ -141,7 +141,7 @@ def _fit(
 
 @dataclass(frozen=True, slots=True)
 class _Cutting:
-    """How an interval is cut into groups."""
+    """Division of an interval into groups."""
 
     options: PaperOptions
     noise: float

@@ -71,7 +71,7 @@ def part_of(intervals: list[range], number: int, count: int) -> range:
 
 
 def about(sequence: Unchanging) -> dict[str, Any]:
-    """Return what a survey has to agree in with the sequence that it is used for."""
+    """Return the facts in which a survey must agree with the sequence that it is used for."""
     return {"frames": len(sequence), "frame_rate": sequence.frame_rate, "up": sequence.up}
 
 

@@ -24,7 +24,7 @@ def tell_to(listener: Callable[[Told], object]) -> None:
 
 
 def tell(number: int, stage: str, done: int, total: int) -> None:
-    """Tell the parent, where it listens, how many frames of a call have passed a stage."""
+    """Report to the parent, if it listens, the number of a call's frames that have passed a stage."""
     del total
     if _listener is not None:
         _listener((number, stage, done))

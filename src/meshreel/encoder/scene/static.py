@@ -213,7 +213,7 @@ def _pictured(
 
 
 class _Looks:
-    """What the frames of a scene show of its still surface, in normalised coordinates."""
+    """Evidence of a scene's still surface from its frames, in normalised coordinates."""
 
     def __init__(self, sequence: CapturedSequence, parts: Parts) -> None:
         self._sequence, self._parts, self._views = sequence, parts, Views.of(sequence, parts.seen)

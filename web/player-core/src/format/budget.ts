@@ -1,4 +1,4 @@
-// What a chunk may cost to decode: bytes of memory, by the bytes that the chunk has. Beside format/budget.py.
+// Limits on the memory that decoding may take, in proportion to the bytes of a chunk. Beside format/budget.py.
 
 import { FormatError } from "../errors.ts";
 import { LIMITS } from "./layout.gen.ts";
@@ -9,7 +9,7 @@ export function elementsOf({ faces, vertices }: Mesh, levels = 0): number {
   return ((faces.length + vertices.length) / 3) * 4 ** levels;
 }
 
-/** What a chunk of `size` bytes may cost. */
+/** Cost allowed to a chunk of `size` bytes. */
 export function allowance(size: number): number {
   return LIMITS.free + LIMITS.perByte * size;
 }

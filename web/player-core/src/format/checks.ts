@@ -1,4 +1,4 @@
-// What the records of a head must satisfy beyond their bytes; FormatError where they do not. Beside format/checks.py.
+// Rules that the records of a head obey beyond their layout; breaking one throws FormatError. Beside format/checks.py.
 
 import { FormatError } from "../errors.ts";
 import { ChunkKind, Form, LIMITS } from "./layout.gen.ts";
@@ -8,7 +8,7 @@ const LARGEST = 1e15;
 const SMALLEST = 1e-15;
 const MOST_TRACKS = 256;
 const MOST_CHANGES = 255;
-/** What belongs to a group or a background, and the form that it has. */
+/** Kinds of chunks that belong to a group or a background, with their forms. */
 const COMPANIONS: ReadonlyMap<number, number> = new Map([
   [ChunkKind.COLORS, Form.VERTEX_COLORS],
   [ChunkKind.ATLAS, Form.PLACES],
@@ -48,8 +48,8 @@ export function checkIndex(index: Index): void {
 interface Whole {
   readonly entry: IndexEntry;
   readonly before: number | undefined; // the group that it is predicted from
-  readonly isBase: boolean; // whether it begins with a base mesh, and may have an atlas
-  readonly isBearer: boolean; // whether it begins with a mesh of all its frames, and may have splats
+  readonly isBase: boolean; // begins with a base mesh, and may have an atlas
+  readonly isBearer: boolean; // begins with a mesh of all its frames, and may have splats
 }
 
 class IndexChecks {
@@ -86,7 +86,7 @@ class IndexChecks {
     });
   }
 
-  /** How many patches lead to a STATIC chunk: none to a mesh, and to a patch one more than to the chunk that it changes. */
+  /** Number of patches that lead to a STATIC chunk: 0 for a mesh, 1 + those of its base for a patch. */
   private changesOf(entry: IndexEntry, name: string): number {
     const isPatch = entry.form === Form.PATCH;
     require((isPatch || entry.form === Form.DRACO) && entry.track === 0, `${name}: a static chunk of form ${entry.form}, track ${entry.track}`);
@@ -105,7 +105,7 @@ class IndexChecks {
     return { entry, before, isBase, isBearer: isBase || entry.form === Form.LAPLACIAN };
   }
 
-  /** What belongs to a chunk before it, which it names first; what else it needs follows from its kind. */
+  /** Check a companion, whose first dependency is the chunk that it belongs to; its kind decides the others. */
   private addCompanion({ kind, form, frames, track, dependsOn }: IndexEntry, name: string): void {
     const [of, ...others] = dependsOn;
     const whole = this.whole.get(of);
@@ -118,7 +118,7 @@ class IndexChecks {
     if (form === Form.VIDEO) this.atlases.set(of, others[0]);
   }
 
-  /** What a companion may depend on, beside the chunk that it is of. */
+  /** Allowed dependencies of a companion, beside the chunk that it belongs to. */
   private needed(kind: number, of: number, { before, isBase, isBearer }: Whole): readonly (readonly number[])[] {
     const last = before === undefined ? undefined : this.companion(before, kind);
     if (kind === ChunkKind.COLORS) return last === undefined ? [[]] : [[], [last]];

@@ -1,4 +1,4 @@
-// Which chunk needs which: the chains that groups and states of the background are predicted in.
+// Dependencies of chunks: the chains in which groups and states of the background are predicted.
 
 import { Form } from "./layout.gen.ts";
 import { isCompanion, isVideo } from "./reader.ts";
@@ -59,20 +59,20 @@ export function sizeOfLayers(chunk: Chunk, layers: number): number {
   return size;
 }
 
-/** How many layers of a companion are wanted with the first `layers` of its chunk: textures are what goes first, where the first layer alone is. */
+/** Number of a companion's layers that are wanted with the first `layers` of its chunk; with the first layer alone, textures are dropped. */
 export function companionLayers(chunk: Chunk, companion: Chunk, layers: number): number {
   const isScaled = chunk.form === Form.LAYERS && layers < chunk.layers.length;
   if (isScaled && layers === 1 && (companion.kind === "atlas" || isVideo(companion))) return 0;
   return isScaled ? Math.min(layers, companion.layers.length) : companion.layers.length;
 }
 
-/** What a viewer wants of companions, beside colours. */
+/** Companions that a viewer wants, beside colours. */
 export interface Wanted {
   readonly textures: Rendition | null; // of this rendition
   readonly splats: boolean;
 }
 
-/** What is wanted with a chunk. */
+/** Companions that are wanted with a chunk. */
 export function companionsWith(head: Head, chunk: Chunk, { textures, splats }: Wanted): readonly CompanionChunk[] {
   const isWanted = ({ kind }: CompanionChunk): boolean => {
     if (kind === "colors") return true;

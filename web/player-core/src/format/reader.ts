@@ -17,7 +17,7 @@ const PREAMBLE_SIZE = Preamble.least;
 /** Videos of textures, the one that is wanted first before the other. */
 export const RENDITIONS: readonly Rendition[] = ["pictures", "compatible"];
 
-/** Where a chunk lies and what it holds. */
+/** Position and contents of a chunk. */
 export interface Chunk {
   readonly number: number;
   /** Companions come with a chunk of frames or of the background, and add to it; "unknown": what this player does not decode, and never fetches. */
@@ -38,9 +38,9 @@ export type CompanionChunk = Chunk & { readonly kind: CompanionKind };
 export class Head {
   readonly info: Info;
   readonly tracks: readonly (readonly Chunk[])[]; // the groups of each
-  /** What is fetched as one, in the order of the file: a chunk, or a layer of a background's pictures, which is a video of its own. */
+  /** Unit of fetching, in the order of the file: a chunk, or a layer of a background's pictures, which is a separate video. */
   readonly pieces: readonly Chunk[];
-  readonly audio: Chunk | null; // what is heard
+  readonly audio: Chunk | null; // the audio file
   private readonly companions = new Map<number, readonly CompanionChunk[]>(); // by the chunk that they add to
   private readonly shown = new Map<number, number>(); // of each static chunk, the first frame of the first group that names it
   private readonly times: Float64Array; // s from the first frame; empty where they follow from the rate
@@ -177,7 +177,7 @@ export class Head {
   }
 }
 
-/** Whether a chunk adds to another one. */
+/** True if a chunk is a companion of another one. */
 export function isCompanion(chunk: Chunk): chunk is CompanionChunk {
   return isCompanionKind(chunk.kind);
 }
@@ -186,7 +186,7 @@ function isCompanionKind(kind: Chunk["kind"]): kind is CompanionKind {
   return ["colors", "atlas", "splats", ...RENDITIONS].includes(kind);
 }
 
-/** Whether a chunk has textures. */
+/** True if a chunk has textures. */
 export function isVideo(chunk: Chunk): chunk is Chunk & { readonly kind: Rendition } {
   return RENDITIONS.includes(chunk.kind as Rendition);
 }

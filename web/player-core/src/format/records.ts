@@ -3,14 +3,14 @@
 
 import { FormatError } from "../errors.ts";
 
-/** Where in some bytes a reader is. */
+/** Position of a reader in bytes. */
 export interface Cursor {
   readonly data: Uint8Array;
   readonly view: DataView;
   offset: number;
 }
 
-/** How one kind of value is read; `least` is the fewest bytes that it takes. */
+/** Reader of one kind of value; `least` is its smallest size in bytes. */
 export interface Kind<T> {
   readonly least: number;
   read(cursor: Cursor): T;

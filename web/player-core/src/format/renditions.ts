@@ -21,7 +21,7 @@ export async function decodable(): Promise<readonly Rendition[] | null> {
   return RENDITIONS.filter((_, k) => answers[k]);
 }
 
-/** How a decoder is set up for the video that begins with a packet. */
+/** Configuration of a decoder for the video that begins with a packet. */
 export function configFor(kind: Rendition, packet: Uint8Array): VideoDecoderConfig {
   const [header] = headersOf(kind, packet);
   return configOf(kind, header?.codec ?? LARGEST[kind]);

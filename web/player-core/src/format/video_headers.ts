@@ -1,4 +1,4 @@
-// What the packets of a video say of it: its codec and size, known before a decoder takes memory for it.
+// Headers in a video's packets: its codec and size, read before a decoder allocates memory.
 
 import { FormatError } from "../errors.ts";
 import type { Rendition } from "../types.ts";

@@ -1,4 +1,4 @@
-// How fast bytes come, measured while some are on their way, and how long a server takes to answer.
+// Bandwidth, measured while bytes are on their way, and the server's response time.
 
 const SAMPLE_MS = 50; // of bytes coming, at least
 const LEAST_MS = 20; // that bytes which come at once are taken to have been under way: a busy page finds whole answers waiting (guess)
@@ -19,7 +19,7 @@ export interface Transfer {
  * many small requests would make the line look slow.
  */
 export class Bandwidth {
-  /** How long the server takes to answer, ms: the least of late. 0 before the first answer. */
+  /** Response time of the server, ms: the least of recent ones. 0 before the first answer. */
   latency = 0;
   #coming = 0; // answers
   #since = 0; // when time was last counted, while one is coming

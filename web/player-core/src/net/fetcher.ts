@@ -13,7 +13,7 @@ export interface Wish {
   readonly when: When;
 }
 
-/** How soon bytes are wanted: for the frame at the play head, before long, or some time, when a request is worth while. */
+/** Urgency of bytes: for the frame at the play head, soon, or later, when a request is worthwhile. */
 export type When = "now" | "soon" | "later";
 
 export interface FetcherEvents {
@@ -77,7 +77,7 @@ export class Fetcher {
     return this.#requests.length > 0;
   }
 
-  /** How many whole layers of a chunk are at hand. */
+  /** Number of a chunk's complete layers that are at hand. */
   layersOf(chunk: Chunk): number {
     let rest = this.#held.get(chunk.offset)?.length ?? 0;
     let layers = 0;
@@ -225,7 +225,7 @@ export class Fetcher {
   }
 }
 
-/** Whether to ask now: what is wanted some time only is collected first. */
+/** True if a request should start now: ranges that are wanted later are collected first. */
 function isWorthwhile(ranges: readonly Range[]): boolean {
   return ranges.some(({ when }) => when !== "later") || ranges.reduce((sum, { from, to }) => sum + to - from, 0) >= BATCH[0];
 }

@@ -1,4 +1,4 @@
-// What a web server may answer, and what is wrong with it.
+// Checks of a web server's answers.
 
 import { SourceError } from "../errors.ts";
 
@@ -15,7 +15,7 @@ export class Lost extends Error {
   }
 }
 
-/** What is known of the file from the answers so far. */
+/** Facts about the file from the answers so far. */
 export interface Known {
   readonly url: string;
   size: number | null;
@@ -45,7 +45,7 @@ export function checkIdentity(response: Response, known: Known): void {
   known.etag ??= etag;
 }
 
-/** Where the part that a 206 holds ends, of the range asked for; it must start where that does. Sets `known.size`. */
+/** End of the part that a 206 holds of the requested range; both must start at the same byte. Sets `known.size`. */
 export function checkRange(response: Response, from: number, end: number, known: Known): number {
   const { url } = known;
   const encoding = response.headers.get("Content-Encoding");

@@ -1,4 +1,4 @@
-// Where bytes come from: ranges of a file that can be cancelled.
+// Sources of bytes: ranges of a file, which can be cancelled.
 
 import { joined } from "../bytes.ts";
 import { SourceError } from "../errors.ts";
@@ -16,7 +16,7 @@ export interface SourceWatch {
 export interface Source {
   /** Bytes of the whole file; null while that is not known. */
   readonly size: number | null;
-  /** Whether bytes that are not asked for are not sent: where they are sent all the same, fewer layers save no time. */
+  /** True if the server sends requested bytes only; if it sends all, fewer layers save no time. */
   readonly isSelective: boolean;
   /** Bits a second as measured lately; 0 where nothing was measured or there is no network. */
   readonly bandwidth: number;
@@ -37,7 +37,7 @@ export async function readBytes(source: Source, offset: number, length: number, 
   return joined(pieces);
 }
 
-/** What sources on this machine have in common. */
+/** Common part of sources on this machine. */
 abstract class LocalSource implements Source {
   readonly isSelective = true;
   readonly bandwidth = 0;

@@ -1,4 +1,4 @@
-// How many layers are played follows the network and the processor: layers are dropped before frames are.
+// Adaptation of the number of layers to the network and the processor: layers are dropped before frames are.
 
 import type { Timeline } from "./clock.ts";
 import { mostLayers, sizeWithCompanions } from "../format/links.ts";
@@ -6,7 +6,7 @@ import type { Wanted } from "../format/links.ts";
 import type { Head } from "../format/reader.ts";
 import { groupsBetween } from "./scheduler.ts";
 
-/** How playback goes. Seconds are of display time. */
+/** State of playback. Seconds are of display time. */
 export interface Conditions {
   readonly now: number; // ms
   readonly time: number; // s of content
@@ -34,7 +34,7 @@ export class Adaptive {
   readonly #timeline: Timeline;
   #rates: readonly number[] = [];
   #ratesAt = NaN; // s
-  #wanted: Wanted; // whose bytes count
+  #wanted: Wanted; // their bytes count
   readonly #loads: number[] = []; // of each level at normal speed, as measured last
   #changed = -Infinity; // ms
   #probed = Infinity; // level that was tried

@@ -30,7 +30,7 @@ export class Timeline {
     return low;
   }
 
-  /** How far a time is from a frame's start to its end, 0 to 1. */
+  /** Position of a time between a frame's start and its end, 0 to 1. */
   blendAt(time: number, frame: number): number {
     const start = this.startOf(frame);
     return Math.min(1, Math.max(0, (time - start) / (this.startOf(frame + 1) - start)));
@@ -42,9 +42,9 @@ export class Timeline {
   }
 }
 
-/** What may lead a clock. */
+/** A leader that a clock may follow. */
 export interface Lead {
-  /** Where it is, s, as the clock runs and is at `time`; NaN while the clock is to wait; null where it leads nowhere. */
+  /** Its position, s, when the running clock is at `time`; NaN while the clock must wait; null if it does not lead. */
   at(time: number, rate: number): number | null;
   /** The clock stands, or jumps. */
   rest(): void;

@@ -22,7 +22,7 @@ export interface DecodingEvents {
 }
 
 interface With {
-  readonly textured: boolean; // what textures of its chain need
+  readonly textured: boolean; // needed by textures of its chain
   readonly splatted: boolean; // the splats of its chain
 }
 
@@ -68,7 +68,7 @@ export class Decoding implements Holdings {
     return this.#decoded.get(chunk.number)?.packed ?? null;
   }
 
-  /** Whether all that can be shown of a chunk is at hand. */
+  /** True if everything that can be shown of a chunk is at hand. */
   isSettled(chunk: Chunk): boolean {
     return this.#decoded.has(chunk.number) || chunk.form === Form.EMPTY || this.#failed.has(chunk.number);
   }
@@ -91,7 +91,7 @@ export class Decoding implements Holdings {
     return this.#failed.has(chunk.number);
   }
 
-  /** What a chunk is decoded with, but for what can never be. */
+  /** Companions with which a chunk is decoded, without those that can never be decoded. */
   companionsOf(chunk: Chunk): readonly CompanionChunk[] {
     return companionsWith(this.#head, chunk, this.wanted).filter((companion) => !this.isFailed(companion));
   }
@@ -114,7 +114,7 @@ export class Decoding implements Holdings {
     this.#events.changed();
   }
 
-  /** Whether the bytes of a step are at hand. */
+  /** True if the bytes of a step are at hand. */
   hasBytes({ chunk, layers }: Step): boolean {
     const has = (other: Chunk, count: number): boolean => this.#fetcher.layersOf(other) >= count;
     return has(chunk, layers + 1) && this.companionsOf(chunk).every((companion) => isVideo(companion) || has(companion, companionLayers(chunk, companion, layers + 1)));
@@ -210,12 +210,12 @@ export class Decoding implements Holdings {
     this.#events.warn(new FormatError(`${text}; it is skipped${more}`));
   }
 
-  /** Whether the chain of a chunk has splats that are wanted and can be decoded. */
+  /** True if the chain of a chunk has splats that are wanted and can be decoded. */
   #hasSplats(chunk: Chunk): boolean {
     return this.companionsOf(this.#head.chunks[this.#links.rootOf(chunk)]).some(({ kind }) => kind === "splats");
   }
 
-  /** Whether a chunk was decoded without what it is wanted with now. */
+  /** True if a chunk was decoded without companions that are wanted now. */
   #lacks(chunk: Chunk, layers: number, { textured, splatted }: With): boolean {
     return (!textured && this.picturesOf(chunk, layers) !== null) || (!splatted && this.#hasSplats(chunk));
   }
@@ -278,7 +278,7 @@ export class Decoding implements Holdings {
       if (crowd !== null) this.#fail(chunk, crowd);
       else if (packed !== null && this.#keep.has(chunk.number)) this.#add(chunk, packed, layers, made);
     } else {
-      this.#share.clear(); // what follows in the chain would fail, too: it is planned again
+      this.#share.clear(); // later chunks of the chain would fail, too: plan again
       this.#submitted.clear();
       this.#states.delete(chunk.number);
       if (outcome.missingState && this.#countTry(chunk) < TRIES) this.#forgetChain(chunk);

@@ -1,4 +1,4 @@
-// What is to be shown, in two objects that are used in turn: `update` allocates nothing.
+// The pictures to show, in two objects that are used in turn, so that `update` allocates nothing.
 
 import type { Decoding } from "./decoding.ts";
 import { mostLayers } from "../format/links.ts";
@@ -44,7 +44,7 @@ export class Picture {
     return this.#shown.groups.reduce((most, group) => (group === null ? most : Math.max(most, mostLayers(chunks[group.chunk]))), 0);
   }
 
-  /** Whether all that a frame shows is at hand, but for what can never be; of textures, their bytes. */
+  /** True if everything that a frame shows is at hand, except for chunks that can never be; of textures, their bytes. */
   isReady(frame: number): boolean {
     const { tracks } = this.#head;
     for (let track = 0; track < tracks.length; track++) {
@@ -54,7 +54,7 @@ export class Picture {
     return background === null || this.#isAtHand(background);
   }
 
-  /** Whether a frame is ready, and its textures are decoded, but for the background's: that waits for no picture. */
+  /** True if a frame is ready and its textures are decoded; the background's textures are not waited for. */
   canShow(frame: number): boolean {
     return this.isReady(frame) && this.#textures.isReady(frame);
   }
@@ -89,7 +89,7 @@ export class Picture {
     return this.#decoding.version + this.#textures.version;
   }
 
-  /** Whether a picture is shown, or was the last before. */
+  /** True if a picture is shown, or was shown last. */
   #isInUse = (image: TextureImage): boolean => {
     for (const { images, backgroundImage } of [this.#shown, this.#spare]) if (image === backgroundImage || images.includes(image)) return true;
     return false;
@@ -141,7 +141,7 @@ export class Picture {
     this.#version = this.#currentVersion;
   }
 
-  /** What is shown in place of a damaged chunk: what was shown before, with the layers that it has now. */
+  /** Replacement for a damaged chunk: the chunk shown before, with the layers that it has now. */
   #held(chunk: Chunk, before: Packed | null): Packed | null {
     return before !== null && this.#decoding.isFailed(chunk) ? this.#decoding.packedOf(this.#head.chunks[before.chunk]) : null;
   }
@@ -155,9 +155,9 @@ export class Picture {
     return false;
   }
 
-  /** Whether a group that is shown has the next frame, too. */
+  /** True if a shown group has the next frame, too. */
   #goesOn({ frame, frames, groups }: Mutable): boolean {
-    if (frame + 1 >= this.#head.frameCount) return false; // what follows is hidden
+    if (frame + 1 >= this.#head.frameCount) return false; // later frames are hidden
     for (let track = 0; track < groups.length; track++) {
       const group = groups[track];
       if (group !== null && frames[track] === frame && frame + 1 < group.firstFrame + group.frameCount) return true;

@@ -3,7 +3,7 @@
 import type { Damage, DecodeJob, FromWorker, ToWorker } from "../protocol.ts";
 import type { Packed } from "../types.ts";
 
-/** What the pool needs of a Worker; one of Node's `worker_threads` needs a wrapper. */
+/** The part of a Worker that the pool needs; a worker of Node's `worker_threads` needs a wrapper. */
 export interface WorkerLike {
   postMessage(message: ToWorker, transfer: Transferable[]): void;
   terminate(): void;
@@ -15,7 +15,7 @@ export interface WorkerLike {
 /** Bytes, or their URL. */
 type Wasm = ArrayBuffer | string;
 
-/** How workers are made: for example `create: () => new Worker(new URL("../decode/worker.ts", import.meta.url), { type: "module" })`. */
+/** Options of the workers, for example `create: () => new Worker(new URL("../decode/worker.ts", import.meta.url), { type: "module" })`. */
 export interface WorkerSetup {
   readonly create: () => WorkerLike;
   readonly core: Wasm | Promise<Wasm>;
@@ -62,7 +62,7 @@ export class Share {
     this.queue.length = 0;
   }
 
-  /** Whether the worker that did a job is still the one that its lane uses. */
+  /** True if the worker that did a job is still the one that its lane uses. */
   isAt(lane: number, worker: number): boolean {
     return this.#pool.slotOf(this, lane)?.serial === worker;
   }

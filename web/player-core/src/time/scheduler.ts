@@ -1,4 +1,4 @@
-// What to fetch and decode next, from where the play head is. Plans only: nothing here fetches or decodes.
+// Plan of the next fetches and decodes, from the play head's position. Nothing here fetches or decodes.
 
 import type { Timeline } from "./clock.ts";
 import { Form } from "../format/layout.gen.ts";
@@ -6,19 +6,19 @@ import { mostLayers } from "../format/links.ts";
 import type { Links } from "../format/links.ts";
 import type { Chunk, Head } from "../format/reader.ts";
 
-/** What a plan builds on. Layers are counted beyond the first; -1: not at hand. */
+/** State on which a plan is based. Layers are counted beyond the first; -1: not at hand. */
 export interface Holdings {
   /** Of a chunk that is decoded and packed. */
   decodedAt(chunk: Chunk): number;
   /** Of the state of a chunk in a worker, or soon in one. */
   stateAt(chunk: Chunk): number;
-  /** Whether it can never be decoded. */
+  /** True if it can never be decoded. */
   isFailed(chunk: Chunk): boolean;
   /** Bytes that it takes when it is decoded, measured or estimated. */
   bytesOf(chunk: Chunk): number;
 }
 
-/** Where the play head is, and how much around it is wanted. */
+/** Position of the play head, and the extent that is wanted around it. */
 export interface Outlook {
   readonly time: number; // s
   readonly loop: boolean;
@@ -27,7 +27,7 @@ export interface Outlook {
   readonly behindSeconds: number; // of content: what is decoded behind the play head is kept
   readonly memory: number; // bytes that decoded groups may take
   readonly layers: number;
-  /** Whether groups decoded with other layers are decoded again, with the chains they are predicted from. */
+  /** True if groups decoded with other layers are decoded again, with the chains that predict them. */
   readonly exact: boolean;
 }
 

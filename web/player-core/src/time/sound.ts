@@ -1,4 +1,4 @@
-// What is heard: the audio file of a recording in an audio element, which leads the clock while it plays.
+// Sound: the audio file of a recording in an audio element, which leads the clock while it plays.
 // In: the bytes of a chunk. Out: the time that the picture should have. Nothing is fetched while it is muted.
 
 import { FormatError, SourceError } from "../errors.ts";
@@ -10,7 +10,7 @@ import { unpackAll } from "../format/records.ts";
 import { readBytes } from "../net/source.ts";
 import type { Source } from "../net/source.ts";
 
-/** What is used of an HTMLAudioElement. */
+/** The part of an HTMLAudioElement that is used. */
 export type Voice = Pick<
   HTMLAudioElement,
   "currentTime" | "duration" | "paused" | "playbackRate" | "volume" | "src" | "error" | "play" | "pause" | "addEventListener" | "removeAttribute"
@@ -90,7 +90,7 @@ export class Sound {
     this.#fetch();
   }
 
-  /** Whether playing need not wait for it. */
+  /** True if playback need not wait for it. */
   get isReady(): boolean {
     if (this.#muted || !this.#isPending) return true;
     if (Number.isNaN(this.#since)) this.#since = performance.now();

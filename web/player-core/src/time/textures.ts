@@ -15,7 +15,7 @@ import { SlowVideo } from "./slow_video.ts";
 import { VideoLane, countOf } from "./video_lane.ts";
 import type { LaneHost, Place } from "./video_lane.ts";
 
-/** What a viewer and a browser have to say of textures. */
+/** Wishes of the viewer and abilities of the browser concerning textures. */
 export interface TextureSettings {
   readonly on: boolean;
   readonly decodable: readonly Rendition[] | null; // as `decodable` says
@@ -50,7 +50,7 @@ export class Textures implements LaneHost {
   readonly #early = new Set<number>(); // tracks that are shown without until their first picture is there
   #on: boolean;
   #choices: readonly Rendition[]; // that the file has and the browser decodes, the best first
-  #choice = 0; // which of them; behind the last where none is in time
+  #choice = 0; // index of the choice; behind the last if none is in time
   #reason = ""; // why it is not the best that there could be
   #retryAt = Infinity; // ms
   #retryIn: number = RETRY_MS[0];
@@ -91,7 +91,7 @@ export class Textures implements LaneHost {
     }
   }
 
-  /** Whether the pictures of a chunk are left out, as its track is far. */
+  /** True if the pictures of a chunk are left out because its track is far. */
   isFar({ kind, track }: Chunk): boolean {
     return kind === "group" && this.#far.has(track);
   }
@@ -122,7 +122,7 @@ export class Textures implements LaneHost {
     if (places.length > 0 || this.#lanes.has(-1)) this.#lane(-1).want(places, isShown);
   }
 
-  /** Whether all pictures of the bodies in a frame whose groups are at hand are there, but for what can never be. */
+  /** True if the bodies' pictures of a frame whose groups are at hand are there, except for those that can never be. */
   isReady(frame: number): boolean {
     for (let track = 0; track < this.#head.tracks.length; track++) {
       const place = this.#placeOf(frame, track);
@@ -152,7 +152,7 @@ export class Textures implements LaneHost {
     return [...new Set([from, Math.max(from, last)].map((frame) => slow.placeOf(frame).pictures))];
   }
 
-  /** Whether the bytes of a chunk's pictures are at hand, where it waits for them. */
+  /** True if the bytes of a chunk's pictures are at hand, or it does not wait for them. */
   hasBytes(chunk: Chunk): boolean {
     if (chunk.kind === "static" || this.#early.has(chunk.track)) return true;
     const pictures = this.#picturesOf(chunk);
@@ -242,7 +242,7 @@ export class Textures implements LaneHost {
     this.#slow.set(chunk.number, new SlowVideo(this.#head.piecesOf(chunk), first, Math.max(1, end - first)));
   }
 
-  /** What is shown in place of textures, or that they are. */
+  /** Appearance shown in place of textures, or that textures are shown. */
   #stateOf(shown: Shown | null): TextureState {
     if (!this.#head.info.hasTextures) return "none";
     if (!this.#on) return "off";

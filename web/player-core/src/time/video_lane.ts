@@ -11,7 +11,7 @@ export interface Place {
   readonly index: number;
 }
 
-/** Where packets come from, and who hears what becomes of them. */
+/** Source of packets, and receiver of the results. */
 export interface LaneHost {
   /** The chunks of one video, from its key picture on. */
   chainOf(pictures: CompanionChunk): readonly CompanionChunk[];
@@ -192,7 +192,7 @@ export class VideoLane {
   }
 }
 
-/** How many pictures a chunk has, or a layer of a background's at most. */
+/** Number of pictures of a chunk, or the largest number in a layer of a background's. */
 export function countOf(pictures: CompanionChunk): number {
   return pictures.frameCount || LAYER_PICTURES;
 }

@@ -1,4 +1,4 @@
-// What Draco meshes claim, counted before Draco sees them. Declared in core/include/meshreel/draco.h.
+// Counts that Draco meshes claim, checked before Draco decodes them. Declared in core/include/meshreel/draco.h.
 
 import { joined } from "../bytes.ts";
 import type { Core } from "./memory.ts";

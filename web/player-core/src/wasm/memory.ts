@@ -7,7 +7,7 @@ type Call = (...values: (number | bigint)[]) => number | bigint | undefined;
 
 const NO_MEMORY = 4; // mr_status, core/include/meshreel/status.h
 
-/** What C++ takes for one argument or one field of a struct. */
+/** Representation of one argument or field of a struct in C++. */
 type Scalar = readonly ["u32" | "i32" | "f64", number];
 export type Bytes = Uint8Array | Int32Array | Float64Array | BigInt64Array;
 

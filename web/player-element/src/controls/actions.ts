@@ -1,4 +1,4 @@
-// What keys and buttons do.
+// Actions of keys and buttons.
 
 import type { MeshreelPlayer } from "../element.ts";
 import { recordingName } from "../format.ts";
@@ -7,7 +7,7 @@ import { linkOf } from "../address.ts";
 import { cut } from "../section.ts";
 import { modeName, nextMode } from "./choices.ts";
 
-/** What an action can ask of the controls. */
+/** Interface of the controls for actions. */
 export interface Surface {
   /** Says in a few words what was done. */
   tell(text: string): void;

@@ -10,7 +10,7 @@ import { Button, type Look, make, Menu, setText } from "./dom.ts";
 import { SeekBar } from "./seek.ts";
 import { Volume } from "./volume.ts";
 
-/** What the bar asks of the controls around it. */
+/** Interface of the surrounding controls for the bar. */
 export interface BarActs {
   act(action: Action): void;
   screenshot(): void;
@@ -23,7 +23,7 @@ export class Bar {
   readonly element: HTMLElement;
   readonly settings: HTMLElement;
   readonly seek: SeekBar;
-  /** Whether this browser has a headset; found out when the player enters a document. */
+  /** True if this browser has a headset; determined when the player enters a document. */
   headset = false;
   passthrough = false; // and whether it shows the viewer's own room
   #player: MeshreelPlayer;

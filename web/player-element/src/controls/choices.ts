@@ -1,4 +1,4 @@
-// What the menus offer.
+// Choices of the menus.
 
 import type { Layers } from "@meshreel/player-core/types";
 import { modesOf, type Looks, type Mode } from "@meshreel/player-three/modes";

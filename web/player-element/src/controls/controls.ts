@@ -56,7 +56,7 @@ export class Controls implements Surface {
     this.#file.addEventListener("change", () => this.#chosen());
   }
 
-  /** What lies over the lower end of the picture. */
+  /** Controls over the lower end of the picture. */
   get cover(): HTMLElement {
     return this.#bar.element;
   }

@@ -17,7 +17,7 @@ export function setText(node: Node, text: string): void {
   if (node.textContent !== text) node.textContent = text;
 }
 
-/** What a button shows and is called at the moment. */
+/** Icon and name of a button at the moment. */
 export interface Look {
   readonly icon: IconName;
   readonly label: string;

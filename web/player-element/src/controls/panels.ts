@@ -1,4 +1,4 @@
-// What lies over the picture: statistics, help, errors, warnings, and what is there before a file is open.
+// Panels over the picture: statistics, help, errors, warnings, and the welcome before a file is open.
 
 import type { MeshreelPlayer } from "../element.ts";
 import { KEYS } from "../keyboard.ts";
@@ -119,7 +119,7 @@ export class Toasts {
     this.#show("warning", WARNING_TIME, icon("warning"), make("span", {}, text), ...others);
   }
 
-  /** What was just done. */
+  /** Notice of the last action. */
   tell(text: string): void {
     this.#show("told", TELLING_TIME, make("span", {}, text));
   }
@@ -136,7 +136,7 @@ export class Toasts {
   }
 }
 
-/** What an empty player says. */
+/** Welcome of an empty player. */
 export function emptyPanel(open: () => void): HTMLElement {
   const button = make("button", { type: "button", class: "text primary", part: "button open" }, "Open a file");
   button.addEventListener("click", open);

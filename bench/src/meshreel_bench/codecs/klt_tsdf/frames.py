@@ -69,7 +69,7 @@ def decode_frame(group: Group, number: int, model: Model) -> Mesh:
 
 
 def _encode_omitted(mesh: Mesh, field: Field) -> bytes:
-    """Which blocks leave surface out, and which of their cells; nothing where none does."""
+    """Encode the blocks that omit surface, and their omitting cells; no bytes if there are none."""
     cells = _wrong(mesh, *polygonize(field))
     if len(cells) == 0:
         return b""

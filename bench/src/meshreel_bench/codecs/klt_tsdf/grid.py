@@ -96,7 +96,7 @@ def signed_distances(
 
 
 def _is_nearly_closed(mesh: Mesh, points: Float64[np.ndarray, "N 3"], values: Float64[np.ndarray, " N"]) -> bool:
-    """Whether winding numbers tell inside from outside as the signs near the surface do."""
+    """Return whether winding numbers agree with the signs near the surface on inside and outside."""
     near = np.flatnonzero(np.abs(values) < 1)
     some = near[:: max(len(near) // _ASKED, 1)]
     alike = winding_inside(mesh, points[some]) == (values[some] < 0)

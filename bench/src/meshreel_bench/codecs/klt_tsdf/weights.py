@@ -25,14 +25,14 @@ LARGEST = 1 << 20  # of a weight in units of 1 / STEP_ONE: sums stay exact
 
 @dataclass(frozen=True, slots=True)
 class Model:
-    """What encoder and decoder share."""
+    """Values shared by encoder and decoder."""
 
     basis: Basis
     step: int  # of the weights, in units of 1 / STEP_ONE voxels
 
 
 def trust(blocks: Blocks) -> Float64[np.ndarray, "B N"]:
-    """What each voxel counts in the fit."""
+    """Return the weight of each voxel in the fit."""
     return np.where(blocks.near, 1.0, np.where(blocks.known, _FAR, 0.0))
 
 

@@ -1,4 +1,4 @@
-"""What a fit or a training has reached, kept in the folder that MESHREEL_NECGS_KEEP names: an encode that was killed
+"""Progress of a fit or a training, kept in the folder that MESHREEL_NECGS_KEEP names: an encode that was killed
 goes on from there, to the same bytes; its time is that of what was left. Without such a folder nothing is kept.
 """
 
@@ -22,7 +22,7 @@ def key_of(parts: Iterable[Any]) -> str:
 
 
 def recall(key: str) -> Any:
-    """Return what was kept by this name; None where nothing was."""
+    """Return the state kept under this name, or None."""
     import torch
 
     path = _path(key)
