@@ -58,9 +58,17 @@ def __getattr__(name: str) -> Any:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     try:
         module = import_module(_LATER[name], __name__)
+        import_module(".types", __name__).Mesh._repr_png_ = _picture
         return module if _LATER[name].endswith(f".{name}") else getattr(module, name)
     except ModuleNotFoundError as error:
         raise ImportError(f"meshreel.{name} needs the extra `encode`: pip install 'meshreel[encode]'") from error
+
+
+def _picture(mesh: Mesh) -> bytes | None:
+    """Return the picture of a mesh for notebooks, None for one without faces."""
+    from .geometry.picture import picture
+
+    return None if mesh.is_empty else picture(mesh)
 
 
 def __dir__() -> list[str]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import TYPE_CHECKING, Any, Literal, Protocol, get_args, runtime_checkable
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, Protocol, get_args, runtime_checkable
 
 import numpy as np
 
@@ -78,6 +78,8 @@ class Mesh:
     # Places of the faces' corners in the texture, whose lower left corner is (0, 0) and upper right one (1, 1).
     uv: Float32[np.ndarray, "F 3 2"] | None = None
     texture: Texture | None = None
+
+    _repr_png_: ClassVar[Callable[[Mesh], bytes | None]]  # for notebooks; the package sets it
 
     @staticmethod
     def of(vertices: object, faces: object) -> Mesh:
@@ -168,12 +170,6 @@ class Mesh:
             raise ImportError("Mesh.to_trimesh needs the extra `encode`: pip install 'meshreel[encode]'") from error
         mesh = self.copy()
         return trimesh.Trimesh(mesh.vertices, mesh.faces, vertex_colors=mesh.colors, process=False)
-
-    def _repr_png_(self) -> bytes | None:
-        """Return a picture for notebooks, None for a mesh without faces."""
-        from .geometry.picture import picture
-
-        return None if self.is_empty else picture(self)
 
     def to_pyvista(self) -> Any:
         """Return a copy as a `pyvista.PolyData`, its colours as the point data `RGB`. Raises ImportError without it."""

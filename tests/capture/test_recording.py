@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from meshreel.capture.recording import Kept, open_recording
-from meshreel.geometry.derived_sequences import Chosen, captured
+from meshreel.geometry.derived_sequences import captured, picked
 from meshreel.types import Mesh
 from tests.capture import depth_scenes
 from tests.capture.depth_scenes import camera
@@ -81,7 +81,7 @@ def test_depth_pictures_are_given_per_camera_and_none_for_a_missing_one(tmp_path
     folder = depth_scenes.record(tmp_path / "rig", CAMERAS, [(0.0, 0.0, 0.0), (0.1, 0.0, 0.0)])
     (folder / "right" / "depth" / "depth_00001.png").unlink()
     found, _ = open_recording(folder)
-    assert captured(found) is found and Chosen(found, [1]).depth is not None
+    assert captured(found) is found and picked(found, [1]).depth is not None
     both, one = found.depth[0], found.depth[1]
     assert [picture is not None for picture in both] == [True, True]
     assert one[0] is not None and one[1] is None

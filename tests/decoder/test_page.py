@@ -24,7 +24,6 @@ from meshreel.decoder import video as module
 from meshreel.decoder.page import player_page
 from meshreel.errors import FormatError, InputError
 from meshreel.geometry.picture import HEIGHT, WIDTH, picture
-from meshreel.types import Mesh
 from tests.container.test_http import LARGE
 from tests.golden import GOLDEN, frame_record
 from tests.metrics.shapes import sphere
@@ -96,9 +95,9 @@ def test_the_picture_of_a_ball_is_a_disk_without_holes_brightest_in_its_middle()
 def test_the_picture_of_a_mesh_has_its_colors_and_an_empty_one_has_none():
     ball = sphere(0.5, 3)
     red = replace(ball, colors=np.tile(np.array([255, 0, 0], np.uint8), (len(ball.vertices), 1)))
-    seen = pixels_of(red._repr_png_() or b"")
+    seen = pixels_of(meshreel.Mesh._repr_png_(red) or b"")
     assert seen[..., 0].max() > 200 and seen[..., 1:3].max() == 0
-    assert Mesh.empty()._repr_png_() is None
+    assert meshreel.Mesh.empty()._repr_png_() is None
 
 
 def last_frame(video: meshreel.Video) -> object:

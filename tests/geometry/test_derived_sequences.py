@@ -11,24 +11,24 @@ from hypothesis import strategies as st
 
 from meshreel.errors import InputError
 from meshreel.geometry import derived_sequences
-from meshreel.geometry.derived_sequences import Chosen, Recent, Unchanging, Upright, captured
+from meshreel.geometry.derived_sequences import DerivedSequence, Memory, captured, picked, unchanging
 from meshreel.types import Mesh, MeshList
 from tests.spheres import sliding_sphere
 
 
 def test_chosen_frames_are_those_of_the_source():
     source = sliding_sphere(5, levels=1)
-    some = Chosen(source, (4, 0))
+    some = picked(source, (4, 0))
     assert len(some) == 2 and some.frame_rate == source.frame_rate
     assert [mesh.vertices[0, 0] for mesh in some] == [source[4].vertices[0, 0], source[0].vertices[0, 0]]
 
 
 def test_a_sequence_that_names_no_up_axis_is_refused():
-    class Sideways(Upright):
+    class Sideways(DerivedSequence):
         up = "x"
 
     with pytest.raises(InputError, match="up axis 'x'"):
-        captured(Sideways(sliding_sphere(2, levels=1), None))
+        captured(Sideways(sliding_sphere(2, levels=1)))
 
 
 def triangles(count: int) -> Mesh:
@@ -37,7 +37,7 @@ def triangles(count: int) -> Mesh:
 
 @given(st.integers(0, 100), st.lists(st.integers(0, 9), max_size=40))
 def test_the_frames_used_last_are_kept_as_far_as_they_fit(most: int, numbers: list[int]):
-    recent, used = Recent(most), list[int]()
+    recent, used = Memory(most), list[int]()
     for number in numbers:
         fitting = [k for at, k in enumerate(used) if sum(12 * other for other in used[: at + 1]) <= most]
         found = recent.get(number)
@@ -63,7 +63,7 @@ class Counted(MeshList):
 def test_each_frame_is_read_once_while_all_fit(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(Counted, "reads", {})
     source = sliding_sphere(3, levels=1)
-    frames = Unchanging(Counted(tuple(source)))
+    frames = unchanging(Counted(tuple(source)))
     for _ in range(4):
         for index, mesh in enumerate(frames):
             np.testing.assert_array_equal(mesh.vertices, source[index].vertices)
@@ -74,7 +74,7 @@ def test_a_frame_that_changed_before_it_is_read_again_is_refused(monkeypatch: py
     monkeypatch.setattr(Counted, "reads", {})
     source = sliding_sphere(3, levels=1)
     monkeypatch.setattr(derived_sequences, "MOST_KEPT", source[0].vertices.nbytes + source[0].faces.nbytes)
-    frames = Unchanging(Counted(tuple(source)))  # it keeps one
+    frames = unchanging(Counted(tuple(source)))  # it keeps one
     for _ in range(2):
         assert len(list(frames)) == 3
     assert frames[2] is frames[2] and Counted.reads == {0: 2, 1: 2, 2: 2}

@@ -21,7 +21,7 @@ from ..errors import FormatError, InputError
 from ..export.splats import check_splats
 from ..format.layout import MAGIC, ChunkKind
 from ..geometry.cameras import Camera
-from ..geometry.derived_sequences import CapturedSequence, Chosen, captured
+from ..geometry.derived_sequences import CapturedSequence, captured, picked
 from ..geometry.topology import weld
 from ..io.sequence import SequenceOptions, open_sequence
 from ..metrics.comparison import ComparisonOptions, compare_sequences
@@ -82,7 +82,7 @@ def command(
     sequence, stored = source.sequence, open_decoded(decoded, reading)
     same = len(stored) == len(sequence)
     numbers = range(len(stored)) if same else reading.options().chosen(len(stored))  # of the frames in `decoded`
-    other = stored if same else Chosen(stored, numbers)
+    other = stored if same else picked(stored, numbers)
     if len(sequence) != len(other):
         raise InputError(f"{originals} has {len(sequence)} frames and {decoded} {len(other)}; choose with --frames A:B")
     sheet_options = SheetOptions(sheet_frames, _sheet_cameras(looking, sequence), up=looking.up, first=numbers.start)

@@ -18,7 +18,7 @@ from ..capture.recordings import is_rig, is_take, open_take
 from ..capture.recordings.takes import Take
 from ..capture.recordings.to_rig import write_takes
 from ..errors import InputError
-from ..geometry.derived_sequences import Upright
+from ..geometry.derived_sequences import DerivedSequence, upright
 from ..io.remote import Remote, located
 from ..io.sequence import capture_record, open_sequence
 from ..types import MeshSequence, Up
@@ -122,9 +122,9 @@ class Masking:
         """True if any flag except --up is given."""
         return replace(self, up=None) != Masking()
 
-    def upright(self, source: Source) -> Upright:
+    def upright(self, source: Source) -> DerivedSequence:
         """Return the sequence with its axis that points up: that of --up, else that of the cameras."""
-        return Upright(source.sequence, self.up)
+        return upright(source.sequence, self.up)
 
     def options(self, options: SegmentOptions) -> SegmentOptions:
         """Return the options with the views of --views. Raises InputError if their file is wrong."""

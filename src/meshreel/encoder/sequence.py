@@ -32,7 +32,7 @@ from ..edit.metadata import rounded, upright
 from ..errors import InputError
 from ..format.layout import ChunkKind, Form, Header
 from ..geometry.closest_points import distances
-from ..geometry.derived_sequences import Unchanging, Welded, captured
+from ..geometry.derived_sequences import captured, unchanging, welded
 from ..geometry.topology import drop_unreferenced
 from ..geometry.work import since, so_far
 from ..io.remote import Place
@@ -97,7 +97,7 @@ def encode(
         text = f"options and quality {quality:g}, preset {preset!r}, effort {effort!r}, color {color!r}"
         raise InputError(f"{text}: options already have them; leave these out, or give preset_options(...) as options")
     heard = b"" if audio is None else packed_audio(audio, audio_start)
-    encoder = Encoder(Welded(as_sequence(sequence)), executor, progress)
+    encoder = Encoder(welded(as_sequence(sequence)), executor, progress)
     encoder.audio = heard
     summary = encoder.encode(path, options, resume)
     for text in summary.warnings:
@@ -122,7 +122,7 @@ class Encoder:
         `digests` takes lines of JSON, one for each stage. Of an `excerpt`, only its frames are encoded. The attributes
         `progress`, `audio` and `find`, which finds the groups of the paper's recipe, may be replaced between encodes.
         """
-        self.sequence, self._executor, self._masker = Unchanging(captured(sequence)), executor, masker
+        self.sequence, self._executor, self._masker = unchanging(captured(sequence)), executor, masker
         self.progress, self.digests, self._excerpt = progress, digests, excerpt
         self.find: FindGroups = find_groups
         self.audio = b""  # payload of `packed_audio` that files get

@@ -1,13 +1,14 @@
 """Sequences derived from another one, frame by frame on access, and the capabilities that a sequence may have.
 
-A sequence may know which axis points up, and the depth and colour pictures behind its meshes. Every wrapper keeps them;
-`captured` is the one adapter for sequences that lack these attributes.
+A sequence may know which axis points up, and the depth and colour pictures behind its meshes. All that is derived from
+it is one record, which keeps them; `captured` is the one adapter for sequences that lack these attributes.
 """
 
 from __future__ import annotations
 
 import copy
 import hashlib
+import operator
 from collections import OrderedDict
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -87,73 +88,11 @@ class Held(MeshSequence):
         return self.meshes[index]
 
 
-class DerivedSequence(MeshSequence):
-    """Base class of sequences derived frame by frame; by itself, the source with all capabilities."""
-
-    def __init__(self, source: MeshSequence) -> None:
-        self._source = source
-
-    @property
-    def frame_rate(self) -> float:
-        return self._source.frame_rate
-
-    @property
-    def up(self) -> Up:
-        """The axis that points up; y where the source does not know it."""
-        return getattr(self._source, "up", "y")
-
-    @property
-    def depth(self) -> DepthFrames | None:
-        """The depth pictures of the frames; None where the source knows none."""
-        return getattr(self._source, "depth", None)
-
-    @property
-    def colors(self) -> ColorFrames | None:
-        """The pictures of colour cameras; None where the source has none."""
-        return getattr(self._source, "colors", None)
-
-    @property
-    def files(self) -> tuple[Path, ...]:
-        """The files that the frames are read from; none where the source names none."""
-        return getattr(self._source, "files", ())
-
-    @property
-    def is_stored(self) -> bool:
-        """True if the frames are in files, which other processes can read."""
-        return getattr(self._source, "is_stored", False)
-
-    def only(self, numbers: Sequence[int]) -> DerivedSequence:
-        """Return the sequence with these of its frames, as the function `only` does."""
-        part = copy.copy(self)
-        part._source = only(self._source, numbers)
-        return part
-
-    @property
-    def observed(self) -> Any:
-        """Observations from the frames that were read, for `learn` of the sequence that this one is a part of."""
-        return getattr(self._source, "observed", None)
-
-    def learn(self, observed: Any) -> None:
-        """Take what another process observed when it read frames of this sequence."""
-        if observed is not None and (learn := getattr(self._source, "learn", None)) is not None:
-            learn(observed)
-
-    def name(self, index: int) -> str:
-        """Return the name of a frame in error messages."""
-        named = getattr(self._source, "name", None)
-        return f"frame {index}" if named is None else named(index)
-
-    def __len__(self) -> int:
-        return len(self._source)
-
-    def __getitem__(self, index: int) -> Mesh:
-        return self._source[index]
-
-
-class Recent:
-    """Frames that were used last, by number, as many as fit into `most` bytes."""
+class Memory:
+    """Digests of the frames that were read, and those used last, as many as fit into `most` bytes."""
 
     def __init__(self, most: int) -> None:
+        self.digests: dict[int, str] = {}
         self._meshes, self._free = OrderedDict[int, Mesh](), most
 
     def get(self, number: int) -> Mesh | None:
@@ -169,57 +108,152 @@ class Recent:
         while self._free < 0:
             self._free += _nbytes(self._meshes.popitem(last=False)[1])
 
+    def check(self, number: int, now: str, name: str) -> None:
+        """Raise InputError if a frame is not what it was when it was read first."""
+        if self.digests.setdefault(number, now) != now:
+            text = f"{name}: has changed while it was encoded, or since its survey"
+            raise InputError(f"{text}; encode again when nothing writes to it any more, with the survey's flags")
+
 
 def _nbytes(mesh: Mesh) -> int:
     arrays = (mesh.vertices, mesh.faces, mesh.colors, mesh.uv)
     return sum(array.nbytes for array in arrays if array is not None)
 
 
-class Unchanging(DerivedSequence):
-    """The same frames, of which the `Recent` ones are not read again.
+@dataclass(eq=False, repr=False)
+class DerivedSequence(MeshSequence):
+    """Frames derived from those of a source on access, with its capabilities; by itself, the source with all of them.
 
-    Raises InputError for a frame that is read again and is not what it was when it was read first.
+    Goes to other processes where its source and `frame` do.
     """
 
-    def __init__(self, source: MeshSequence) -> None:
-        super().__init__(source)
-        self._digests: dict[int, str] = {}
-        self._recent = Recent(MOST_KEPT)
-
-    def __getitem__(self, index: int) -> Mesh:
-        mesh = self._recent.get(index)
-        if mesh is None:
-            work.count("frames read")
-            mesh = super().__getitem__(index)
-            self._check(index, digest([mesh]))
-            self._recent.keep(index, mesh)
-        return mesh
-
-    def only(self, numbers: Sequence[int]) -> Unchanging:
-        """Return the sequence with these of its frames, of which none has been read."""
-        return Unchanging(only(self._source, numbers))
+    source: MeshSequence
+    frame: Callable[[MeshSequence, int], Mesh] = operator.getitem  # of the source and the number of a frame in it
+    numbers: tuple[int, ...] | None = None  # of its frames in the source; None: all
+    axis: Up | None = None  # that points up; None: the source's
+    memory: Memory | None = None  # for frames that must not change
 
     @property
-    def observed(self) -> tuple[dict[int, str], Any]:
-        """The digests of the frames that were read, and what the source observed."""
-        return self._digests, super().observed
+    def frame_rate(self) -> float:
+        return self.source.frame_rate
 
-    def learn(self, observed: tuple[dict[int, str], Any]) -> None:
+    @property
+    def up(self) -> Up:
+        """The axis that points up; y where the source does not know it."""
+        known: Up = getattr(self.source, "up", "y")
+        return self.axis or known
+
+    @property
+    def depth(self) -> DepthFrames | None:
+        """The depth pictures of the frames; None where the source knows none."""
+        return self._of_frames(getattr(self.source, "depth", None))
+
+    @property
+    def colors(self) -> ColorFrames | None:
+        """The pictures of colour cameras; None where the source has none."""
+        return self._of_frames(getattr(self.source, "colors", None))
+
+    def _of_frames(self, pictures: Any) -> Any:
+        return pictures if pictures is None or self.numbers is None else _ChosenPictures(pictures, self.numbers)
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """The files that the frames are read from; none where the source names none."""
+        return getattr(self.source, "files", ())
+
+    @property
+    def is_stored(self) -> bool:
+        """True if the frames are in files, which other processes can read."""
+        return self.numbers is None and getattr(self.source, "is_stored", False)
+
+    def only(self, numbers: Sequence[int]) -> DerivedSequence:
+        """Return the sequence with these of its frames, as the function `only` does; picked ones are read now."""
+        if self.numbers is not None:  # what chooses among faces cannot always be sent
+            return DerivedSequence(Held.of(self, numbers))
+        part = copy.copy(self)
+        part.source, part.memory = only(self.source, numbers), self.memory and Memory(MOST_KEPT)
+        return part
+
+    @property
+    def observed(self) -> Any:
+        """Observations from the frames that were read, for `learn` of the sequence that this one is a part of."""
+        of_source = getattr(self.source, "observed", None)
+        return of_source if self.memory is None else (self.memory.digests, of_source)
+
+    def learn(self, observed: Any) -> None:
         """Take what another process observed; raises InputError for a frame that was another when it was read first."""
-        digests, of_source = observed
-        for index, now in digests.items():
-            self._check(index, now)
-        super().learn(of_source)
-
-    def _check(self, index: int, now: str) -> None:
-        if self._digests.setdefault(index, now) != now:
-            text = f"{self.name(index)}: has changed while it was encoded, or since its survey"
-            raise InputError(f"{text}; encode again when nothing writes to it any more, with the survey's flags")
+        if self.memory is not None:
+            digests, observed = observed
+            for number, now in digests.items():
+                self.memory.check(number, now, self.name(number))
+        if observed is not None and (learn := getattr(self.source, "learn", None)) is not None:
+            learn(observed)
 
     @property
     def digests(self) -> list[str]:
-        """The digest of each frame that has been read."""
-        return [self._digests[index] for index in sorted(self._digests)]
+        """The digest of each frame that has been read, of a sequence with a memory."""
+        assert self.memory is not None
+        return [self.memory.digests[number] for number in sorted(self.memory.digests)]
+
+    def name(self, index: int) -> str:
+        """Return the name of a frame in error messages."""
+        named, number = getattr(self.source, "name", None), self._number(index)
+        return f"frame {number}" if named is None else named(number)
+
+    def _number(self, index: int) -> int:
+        return index if self.numbers is None else self.numbers[index]
+
+    def __len__(self) -> int:
+        return len(self.source) if self.numbers is None else len(self.numbers)
+
+    def __getitem__(self, index: int) -> Mesh:
+        number, memory = self._number(index), self.memory
+        if memory is None:
+            return self.frame(self.source, number)
+        if (mesh := memory.get(number)) is None:
+            work.count("frames read")
+            mesh = self.frame(self.source, number)
+            memory.check(number, digest([mesh]), self.name(number))
+            memory.keep(number, mesh)
+        return mesh
+
+
+def unchanging(source: MeshSequence) -> DerivedSequence:
+    """Return the same frames, of which those used last are not read again.
+
+    It raises InputError for a frame that is read again and is not what it was when it was read first.
+    """
+    return DerivedSequence(source, memory=Memory(MOST_KEPT))
+
+
+def upright(source: MeshSequence, up: Up | None) -> DerivedSequence:
+    """Return the same frames with a given axis that points up; None keeps the source's."""
+    return DerivedSequence(source, axis=up)
+
+
+def welded(source: MeshSequence) -> DerivedSequence:
+    """Return the same frames with vertices at equal positions merged: UV seams would pass for open borders."""
+    return DerivedSequence(source, _welded)
+
+
+def turned_over(source: MeshSequence) -> DerivedSequence:
+    """Return the same frames with the fronts of all faces where their backs were."""
+    return DerivedSequence(source, _turned_over)
+
+
+def picked(
+    source: MeshSequence,
+    numbers: Sequence[int],
+    choose: Callable[[int, Mesh], Bool[np.ndarray, " F"]] | None = None,
+) -> DerivedSequence:
+    """Return some frames, by their numbers, or faces of them that `choose` selects by a frame's number and mesh."""
+    if choose is None:
+        return DerivedSequence(source, numbers=tuple(numbers))
+
+    def part(frames: MeshSequence, number: int) -> Mesh:
+        return part_of(mesh := frames[number], choose(number, mesh))
+
+    return DerivedSequence(source, part, tuple(numbers))
 
 
 def digest(meshes: Iterable[Mesh]) -> str:
@@ -235,87 +269,18 @@ def digest(meshes: Iterable[Mesh]) -> str:
     return found.hexdigest()[:16]
 
 
-class Upright(DerivedSequence):
-    """The same frames with a given axis that points up; None keeps the source's."""
-
-    def __init__(self, source: MeshSequence, up: Up | None) -> None:
-        super().__init__(source)
-        self._up = up
-
-    @property
-    def up(self) -> Up:
-        """The axis that points up."""
-        return self._up or super().up
+def _welded(source: MeshSequence, number: int) -> Mesh:
+    mesh = source[number]
+    faces = mesh.faces
+    if faces.size and (faces.min() < 0 or faces.max() >= len(mesh.vertices)):
+        return mesh  # the survey refuses it with the number of its frame
+    return weld(mesh)
 
 
-class Welded(DerivedSequence):
-    """The same frames with vertices at equal positions merged: UV seams would pass for open borders."""
-
-    def __getitem__(self, index: int) -> Mesh:
-        mesh = self._source[index]
-        faces = mesh.faces
-        if faces.size and (faces.min() < 0 or faces.max() >= len(mesh.vertices)):
-            return mesh  # the survey refuses it with the number of its frame
-        return weld(mesh)
-
-
-class TurnedOver(DerivedSequence):
-    """The same frames with the fronts of all faces where their backs were."""
-
-    def __getitem__(self, index: int) -> Mesh:
-        mesh = self._source[index]
-        uv = None if mesh.uv is None else np.ascontiguousarray(mesh.uv[:, ::-1])
-        return replace(mesh, faces=np.ascontiguousarray(mesh.faces[:, ::-1]), uv=uv)
-
-
-class Chosen(DerivedSequence):
-    """Some frames of a sequence, by their numbers."""
-
-    def __init__(self, source: MeshSequence, numbers: Sequence[int]) -> None:
-        super().__init__(source)
-        self._numbers = tuple(numbers)
-
-    is_stored = False  # it is what it chooses from that may be
-
-    @property
-    def depth(self) -> DepthFrames | None:
-        """The depth pictures of the chosen frames; None where the source knows none."""
-        known = super().depth
-        return None if known is None else _ChosenPictures(known, self._numbers)
-
-    @property
-    def colors(self) -> ColorFrames | None:
-        """The colour pictures of the chosen frames; None where the source has none."""
-        known = super().colors
-        return None if known is None else _ChosenPictures(known, self._numbers)
-
-    def only(self, numbers: Sequence[int]) -> DerivedSequence:
-        """Return these of the chosen frames, which are read now: what chooses among faces cannot always be sent."""
-        return DerivedSequence(Held.of(self, numbers))
-
-    def name(self, index: int) -> str:
-        """Return the name of a frame in error messages."""
-        return super().name(self._numbers[index])
-
-    def __len__(self) -> int:
-        return len(self._numbers)
-
-    def __getitem__(self, index: int) -> Mesh:
-        return self._source[self._numbers[index]]
-
-
-class ChosenParts(Chosen):
-    """Chosen faces of some frames; `choose` selects them by a frame's number in the source and its mesh."""
-
-    def __init__(
-        self, source: MeshSequence, numbers: Sequence[int], choose: Callable[[int, Mesh], Bool[np.ndarray, " F"]]
-    ) -> None:
-        super().__init__(source, numbers)
-        self._choose = choose
-
-    def __getitem__(self, index: int) -> Mesh:
-        mesh = super().__getitem__(index)
-        return part_of(mesh, self._choose(self._numbers[index], mesh))
+def _turned_over(source: MeshSequence, number: int) -> Mesh:
+    mesh = source[number]
+    uv = None if mesh.uv is None else np.ascontiguousarray(mesh.uv[:, ::-1])
+    return replace(mesh, faces=np.ascontiguousarray(mesh.faces[:, ::-1]), uv=uv)
 
 
 @dataclass(frozen=True, slots=True)

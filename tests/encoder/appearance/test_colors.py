@@ -23,7 +23,7 @@ from meshreel.encoder.settings.presets import appearance_options, preset_options
 from meshreel.errors import FormatError, InputError
 from meshreel.format import budget
 from meshreel.format.layout import ChunkKind
-from meshreel.geometry.derived_sequences import Welded
+from meshreel.geometry.derived_sequences import welded
 from meshreel.io.sequence import open_sequence
 from meshreel.io.write import write_mesh
 from meshreel.metrics.color import color_errors
@@ -56,7 +56,7 @@ def written(meshes: list[Mesh], color: str = "auto", compatible: bool = False, *
     options = replace(quick(**others), appearance=appearance, scene=None)  # type: ignore[arg-type]
 
     def write(path: Path) -> None:
-        Encoder(Welded(MeshList(tuple(meshes)))).encode(path, options)
+        Encoder(welded(MeshList(tuple(meshes)))).encode(path, options)
 
     return kept(write, "a.reel", meshes, options)[0].read_bytes()
 
@@ -220,7 +220,7 @@ def test_damaged_colors_cost_colors_only(files: dict[str, bytes]) -> None:
 def test_a_scene_has_colors_of_its_room_and_its_bodies(tmp_path: Path) -> None:
     frames = scene(6, moving=True)
     colors = [replace(mesh, colors=(120 + 100 * np.tanh(mesh.vertices)).astype(np.uint8)) for mesh in frames]
-    Encoder(Welded(MeshList(tuple(colors), 10.0))).encode(tmp_path / "scene.reel", quick())
+    Encoder(welded(MeshList(tuple(colors), 10.0))).encode(tmp_path / "scene.reel", quick())
     with meshreel.open(tmp_path / "scene.reel") as video:
         assert video.reader.has_background
         for number in (0, 5):
@@ -234,10 +234,10 @@ def test_colors_that_readers_would_refuse_are_left_out_and_the_summary_tells_of_
     monkeypatch.setattr(budget, "LIMITS", replace(budget.LIMITS, colors=0, per_byte=1))
     body, room = COLORED[:2], [replace(mesh, colors=np.full(mesh.vertices.shape, 9, np.uint8)) for mesh in scene(2)]
     for meshes, lost in ((body, "2 frames"), (room, "the background")):
-        summary = Encoder(Welded(MeshList(tuple(meshes), 10.0))).encode(tmp_path / "bare.reel", quick())
+        summary = Encoder(welded(MeshList(tuple(meshes), 10.0))).encode(tmp_path / "bare.reel", quick())
         assert f"no colours of {lost}: they would cost a reader too much" in summary.warnings
         assert ChunkKind.COLORS not in kinds((tmp_path / "bare.reel").read_bytes())
-    assert not Encoder(Welded(MeshList(tuple(BODY[:2]), 10.0))).encode(tmp_path / "plain.reel", quick()).warnings
+    assert not Encoder(welded(MeshList(tuple(BODY[:2]), 10.0))).encode(tmp_path / "plain.reel", quick()).warnings
 
 
 def lit(mesh: Mesh, light: float) -> Mesh:
@@ -251,7 +251,7 @@ def test_light_that_moves_over_a_room_is_in_its_slow_video(tmp_path: Path, monke
     lights = np.linspace(0.6, 1, 10)
     frames = [lit(mesh, light) for mesh, light in zip(scene(10, moving=True), lights, strict=True)]
     options = replace(quick(), appearance=appearance_options(50.0, "texture", 128))
-    Encoder(Welded(MeshList(tuple(frames), 16.0))).encode(tmp_path / "scene.reel", options)
+    Encoder(welded(MeshList(tuple(frames), 16.0))).encode(tmp_path / "scene.reel", options)
     with meshreel.open(tmp_path / "scene.reel") as video:
         [pictures] = [c for c in video.reader.chunks if c.kind == ChunkKind.PICTURES and c.frame_count == 0]
         assert len(pictures.layers) == 3  # of 5 pictures, one for two frames
@@ -268,13 +268,13 @@ def test_parts_of_a_sequence_are_joined_with_their_colors(tmp_path: Path) -> Non
     for number, mesh in enumerate(COLORED):
         write_mesh(mesh, tmp_path / f"frame_{number}.ply")
     options = replace(quick(key_interval=0.1), appearance=appearance_options(), scene=None)
-    encoder = Encoder(Welded(open_sequence(tmp_path)))
+    encoder = Encoder(welded(open_sequence(tmp_path)))
     encoder.encode(tmp_path / "whole.reel", options)
     encoder.survey(tmp_path / "survey.json")
     surveyed = read_survey(tmp_path / "survey.json")
     parts = [tmp_path / "a.reel", tmp_path / "b.reel"]
     for path, frames in zip(parts, (range(3), range(3, FRAMES)), strict=True):
-        Encoder(Welded(open_sequence(tmp_path)), excerpt=Excerpt(surveyed, frames)).encode(path, options)
+        Encoder(welded(open_sequence(tmp_path)), excerpt=Excerpt(surveyed, frames)).encode(path, options)
     concat(parts, tmp_path / "joined.reel")
     with meshreel.open(tmp_path / "joined.reel") as joined, meshreel.open(tmp_path / "whole.reel") as whole:
         for one, other in zip(joined, whole, strict=True):

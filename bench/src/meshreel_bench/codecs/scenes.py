@@ -40,7 +40,7 @@ class SceneDracoCodec(Options):
     def encode(self, sequence: MeshSequence, progress: Progress | None = None) -> bytes:
         """Return a .reel file of single frames."""
         frames = _scene_frames(sequence)
-        meshes = [frames.scene.decimated(number, self.share) for number in frames.numbers]
+        meshes = [frames.scene.decimated(number, self.share) for number in frames.in_scene]
         return _written(frames.frame_rate, meshes, [Point(self.qp, self.levels)] * len(meshes), progress)
 
 
@@ -73,7 +73,7 @@ class BackgroundDracoCodec(Options):
         """Return a .reel file whose first frame is the background."""
         frames = _scene_frames(sequence)
         meshes = [_with_share(frames.scene.background(self.labels), self.background_share)]
-        for number in frames.numbers:
+        for number in frames.in_scene:
             mesh = frames.scene.meshes[number]
             moving = drop_unreferenced(Mesh.of(mesh.vertices, mesh.faces[frames.scene.labels(number, self.labels)]))
             meshes.append(_with_share(moving, self.share))

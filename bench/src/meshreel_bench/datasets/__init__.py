@@ -21,7 +21,7 @@ from meshreel.capture.simulated.procedural import SoftBodiesOptions, soft_bodies
 from meshreel.errors import InputError
 from meshreel.geometry.cameras import Camera
 from meshreel.geometry.color_views import ColorFrames
-from meshreel.geometry.derived_sequences import Chosen
+from meshreel.geometry.derived_sequences import DerivedSequence, picked
 from meshreel.geometry.topology import weld
 from meshreel.io.file_names import MESHES, is_pattern
 from meshreel.io.sequence import FileSequence, SequenceOptions, open_sequence
@@ -62,7 +62,7 @@ FAR, NEAR = 2.2, 0.5  # m, of the second body's way: surfaces are 1.2 m apart fi
 NAMES = (DEMO, *SHAPES, SYNTHETIC, LONG, *SCENES, ROOM3, PROCEDURAL, WALKER, *RECORDINGS, *REMESHED)
 # Endings of names: the same sequence in another order, of the wanted length.
 PLAYED: dict[str, Callable[[MeshSequence, int], MeshSequence]] = {
-    "-backwards": lambda sequence, count: Chosen(sequence, range(len(sequence))[::-1][:count]),
+    "-backwards": lambda sequence, count: picked(sequence, range(len(sequence))[::-1][:count]),
     "-forth-and-back": lambda sequence, count: forth_and_back(sequence, count),
 }
 
@@ -144,10 +144,10 @@ def views_missing(data: Path, names: Iterable[str]) -> tuple[str, ...]:
     return tuple(f"{data / name}: no {VIEW_FILES}; pictures are seen from views around the meshes" for name in lacking)
 
 
-def forth_and_back(source: MeshSequence, count: int) -> Chosen:
+def forth_and_back(source: MeshSequence, count: int) -> DerivedSequence:
     """Return `count` frames of a sequence that is played forth and back, over and over; ends are not repeated."""
     once = [*range(len(source)), *range(len(source) - 2, 0, -1)]
-    return Chosen(source, [once[number % len(once)] for number in range(count)])
+    return picked(source, [once[number % len(once)] for number in range(count)])
 
 
 def _scene(name: str, data: Path, frames: int | None, cache: Path | None) -> Dataset:

@@ -47,11 +47,11 @@ class RemeshedSequence(DerivedSequence):
     def __getitem__(self, index: int) -> Mesh:
         number = range(len(self))[operator.index(index)]
         if self._folder is None:
-            return remesh(self._source[number], number, self._options)
+            return remesh(self.source[number], number, self._options)
         o = self._options
         path = self._folder / f"{o.vertices}-{o.levels}-{o.jitter:g}-{number:05}.ply"
         if not path.exists():
-            write_mesh(remesh(self._source[number], number, o), path)
+            write_mesh(remesh(self.source[number], number, o), path)
         return read_mesh(path, str(path)).mesh
 
 

@@ -28,7 +28,7 @@ from meshreel.capture.simulated.simulated_rig import TRUTH
 from meshreel.capture.simulated.truth import Truth, read_truth
 from meshreel.geometry.closest_points import Surface, carried_labels
 from meshreel.geometry.decimate import decimate_faces
-from meshreel.geometry.derived_sequences import Chosen
+from meshreel.geometry.derived_sequences import DerivedSequence
 from meshreel.io.meshes import read_mesh
 from meshreel.io.write import make_folder, replacing, write_mesh
 from meshreel.metrics.scene_accuracy import Scene, Sight
@@ -102,12 +102,12 @@ class SceneData:
         return fuse_still_depth(moments, FusionOptions().voxel, options)
 
 
-class SceneFrames(Chosen):
+class SceneFrames(DerivedSequence):
     """Some frames of a captured scene, which anchors may ask for its labels."""
 
     def __init__(self, scene: SceneData, numbers: Sequence[int]) -> None:
-        super().__init__(scene.meshes, numbers)
-        self.scene, self.numbers = scene, tuple(numbers)
+        super().__init__(scene.meshes, numbers=tuple(numbers))
+        self.scene, self.in_scene = scene, tuple(numbers)
 
 
 def open_scene(name: str, data: Path, cache: Path, frames: int | None = None) -> SceneData:

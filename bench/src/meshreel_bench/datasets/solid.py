@@ -45,7 +45,7 @@ class InColours(DerivedSequence):
     def __getitem__(self, index: int) -> Mesh:
         number = range(len(self))[index]
         if number not in self._known:
-            mesh = self._source[number]
+            mesh = self.source[number]
             is_bare = not (mesh.is_colored or mesh.is_empty)
             self._known[number] = textured(mesh, Painted(self._painted(number))) if is_bare else mesh
         return self._known[number]

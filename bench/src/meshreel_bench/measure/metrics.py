@@ -17,7 +17,7 @@ from meshreel.decoder.video import open as open_video
 from meshreel.errors import InputError
 from meshreel.format.layout import MAGIC, ChunkKind
 from meshreel.geometry.closest_points import Surface
-from meshreel.geometry.derived_sequences import Chosen, captured
+from meshreel.geometry.derived_sequences import captured, picked
 from meshreel.geometry.topology import components, drop_unreferenced, face_normals, weld
 from meshreel.metrics.comparison import ComparisonOptions, OriginalFrame, compare_sequences, finite
 from meshreel.metrics.depth import DepthJudge, judge
@@ -66,7 +66,7 @@ def measure_frames(frames: Measured, metrics: Metrics) -> tuple[Values, PerFrame
 
 def _to_input(frames: Measured, metrics: Metrics) -> tuple[Values, PerFrame]:
     known = frames.known
-    originals = Chosen(known.sequence, frames.numbers)
+    originals = picked(known.sequence, frames.numbers)
     prepared = None if known.scene is None else [_original(known.scene, number) for number in frames.numbers]
     cameras: Sequence[AnyCamera] | None = known.cameras or None
     if cameras is None and metrics in ("parallel views", "colors"):

@@ -21,7 +21,7 @@ from meshreel.container.reader import ReelReader
 from meshreel.container.sources import BytesSource
 from meshreel.errors import InputError
 from meshreel.format.layout import MAGIC, ChunkKind
-from meshreel.geometry.derived_sequences import Chosen
+from meshreel.geometry.derived_sequences import picked
 from meshreel.types import Mesh, MeshSequence, evenly
 
 from ..codec import BackgroundCodec, Codec, ColorCodec, TwoStepCodec
@@ -195,7 +195,7 @@ def _file(name: str, frames: int | None, store: Store) -> bytes:
 
 
 def _sampled(known: Dataset, numbers: Sequence[int]) -> MeshSequence:
-    return Chosen(known.sequence, numbers) if known.scene is None else SceneFrames(known.scene, numbers)
+    return picked(known.sequence, numbers) if known.scene is None else SceneFrames(known.scene, numbers)
 
 
 @dataclass(slots=True)

@@ -18,7 +18,7 @@ from jaxtyping import Bool, Int64
 from ...errors import InputError
 from ...geometry.cameras import Camera
 from ...geometry.closest_points import Surface, distances
-from ...geometry.derived_sequences import CapturedSequence, Chosen, TurnedOver, captured
+from ...geometry.derived_sequences import CapturedSequence, captured, picked, turned_over
 from ...geometry.topology import edge_lengths, face_normals
 from ...geometry.voxels import Lattice
 from ...types import Mesh, MeshSequence, evenly
@@ -64,7 +64,7 @@ def segment(frames: MeshSequence, options: SegmentOptions = SegmentOptions(), re
         return ByPlace(1.0, Lattice(np.zeros(3), 1.0), *nothing, options.island)
     places = _by_place(frames, chosen, options, report)
     if not places.chosen.any() and _faces_away(frames[chosen[0]]):
-        reversed_places = _by_place(TurnedOver(frames), chosen, options, silent)
+        reversed_places = _by_place(turned_over(frames), chosen, options, silent)
         places = reversed_places if reversed_places.chosen.any() else places
     return places
 
@@ -73,7 +73,7 @@ def _by_place(frames: CapturedSequence, chosen: Sequence[int], options: SegmentO
     cell, views = edge_length(frames, chosen), _views(frames, chosen, options)
     noise = _apart(frames[chosen[0]], frames[chosen[len(chosen) // 2]])
     lattice = Lattice.near(frames[chosen[0]], max(cell, min(_WIDTH * noise, _WIDEST * cell)))
-    inspected = Chosen(frames, chosen)
+    inspected = picked(frames, chosen)
     pictures = None if inspected.depth is None else inspected.depth.__getitem__
     places = find_places(Observations(inspected, views, pictures, report), lattice, options.places)
     moving = moving_places(places, options.cut)
@@ -151,7 +151,7 @@ def _with_surface(frames: MeshSequence, numbers: Sequence[int]) -> list[int]:
 
 def _views(frames: MeshSequence, chosen: Sequence[int], options: SegmentOptions) -> tuple[Camera, ...]:
     """Return the cameras in the options, or views placed for a few of the chosen frames."""
-    few = Chosen(frames, chosen[:: max(1, len(chosen) // _PROBES)])
+    few = picked(frames, chosen[:: max(1, len(chosen) // _PROBES)])
     return _looking(options.cameras, frames, chosen) or place_views(few, options.views, few.up)
 
 

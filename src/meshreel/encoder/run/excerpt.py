@@ -17,7 +17,7 @@ from ...analysis.pieces import Piece
 from ...analysis.survey import Survey
 from ...errors import InputError
 from ...format.checks import LARGEST
-from ...geometry.derived_sequences import Unchanging
+from ...geometry.derived_sequences import DerivedSequence
 from ...io.read import read_input
 from ...io.remote import Place
 from ...io.write import replacing
@@ -34,7 +34,7 @@ class Surveyed:
     about: dict[str, Any]  # number of frames, frame rate, up axis
     digests: list[str]
 
-    def check(self, sequence: Unchanging) -> None:
+    def check(self, sequence: DerivedSequence) -> None:
         """Let a sequence refuse frames that are not the surveyed ones. Raises InputError for another sequence."""
         for name, value in about(sequence).items():
             if self.about[name] != value:
@@ -70,12 +70,12 @@ def part_of(intervals: list[range], number: int, count: int) -> range:
     return range(intervals[ends[0]].start, intervals[ends[1] - 1].stop)
 
 
-def about(sequence: Unchanging) -> dict[str, Any]:
+def about(sequence: DerivedSequence) -> dict[str, Any]:
     """Return the facts in which a survey must agree with the sequence that it is used for."""
     return {"frames": len(sequence), "frame_rate": sequence.frame_rate, "up": sequence.up}
 
 
-def write_survey(seen: Survey, sequence: Unchanging, path: Path) -> None:
+def write_survey(seen: Survey, sequence: DerivedSequence, path: Path) -> None:
     """Write the survey of a sequence, each frame of which has been read, to a file of JSON."""
     facts = asdict(seen) | {"low": seen.low.tolist(), "high": seen.high.tolist()}
     record = {"kind": KIND, **about(sequence), **facts, "digests": sequence.digests}

@@ -23,7 +23,7 @@ from ... import __version__
 from ...container.writer import Companion, Stored
 from ...errors import InputError
 from ...format.layout import ChunkKind, Form
-from ...geometry.derived_sequences import Unchanging
+from ...geometry.derived_sequences import DerivedSequence
 from ...io.read import first_difference
 from ...io.remote import Place, located, uploaded
 from ...io.unfinished import cannot_be_written, claim, discard, part_of, sync, sync_folder, unfinished
@@ -233,7 +233,7 @@ def opened(
             yield file, journal
 
 
-def made_of(sequence: Unchanging, options: EncoderOptions, masker: object) -> dict[str, Any]:
+def made_of(sequence: DerivedSequence, options: EncoderOptions, masker: object) -> dict[str, Any]:
     """Return all that the bytes of an encode depend on, for a sequence of which each frame has been read."""
     return {
         "meshreel": __version__,

@@ -23,7 +23,7 @@ from ...analysis.survey import Survey, check_one_unit
 from ...errors import InputError
 from ...geometry.closest_points import Surface
 from ...geometry.depth import DepthPicture, FreeSpace
-from ...geometry.derived_sequences import CapturedSequence, ChosenParts
+from ...geometry.derived_sequences import CapturedSequence, picked
 from ...geometry.topology import components, concatenate, face_normals, part_of
 from ...types import Mesh, MeshSequence, evenly
 from ..group.progress import Stages
@@ -155,7 +155,7 @@ def _background(
         still = stands(number, mesh)
         return still & ~ring(mesh, ~still, cell)
 
-    return fuse_background(ChosenParts(sequence, numbers, clear), cell, options)
+    return fuse_background(picked(sequence, numbers, clear), cell, options)
 
 
 def _fused(
@@ -177,7 +177,7 @@ def _change(sequence: CapturedSequence, segmentation: Segmentation, frame: int, 
     if options.depth and sequence.depth is not None:
         room = _fused(sequence, numbers, lambda k, mesh: ~segmentation.moving(k, mesh), segmentation.cell, options)
         return Change(frame, part_of(room, segmentation.came(frame, room)))
-    later = ChosenParts(sequence, numbers, lambda _, mesh: segmentation.came(frame, mesh))
+    later = picked(sequence, numbers, lambda _, mesh: segmentation.came(frame, mesh))
     return Change(frame, fuse_background(later, segmentation.cell, options))
 
 
