@@ -28,6 +28,7 @@ def test_the_python_of_the_readme_runs(tmp_path: Path) -> None:
     _run_page(RUN[0], tmp_path, "small")
 
 
+@pytest.mark.slow
 def test_the_tutorial_runs_as_it_stands_and_shows_layers(tmp_path: Path) -> None:
     printed = _run_page(RUN[1], tmp_path)
     with meshreel.open(tmp_path / "scan.reel") as video:

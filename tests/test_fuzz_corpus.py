@@ -18,6 +18,7 @@ FILES = {path.name: path for path in verdict.corpus()}
 GOLDEN_FILES = sorted(GOLDEN.rglob("*.reel"))
 
 
+@pytest.mark.slow
 def test_the_verdicts_on_the_corpus_are_those_that_are_committed():
     """If a change is meant: `.venv/bin/python core/fuzz/verdict.py` writes them anew."""
     assert verdict.verdicts() == json.loads(verdict.VERDICTS.read_text())
@@ -37,6 +38,7 @@ def test_a_file_that_is_taken_apart_and_put_together_is_the_same(path):
     assert assemble(*parse(data)) == data
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", GOLDEN_FILES, ids=lambda path: path.stem)
 def test_most_mutants_have_right_sums_and_all_are_decoded_or_refused(path):
     data, wrong_sums = path.read_bytes(), 0

@@ -65,10 +65,9 @@ LARGE = {
     "empty": partial(worst.empty, 30_000),
     "container": partial(worst.headed, 60_000),
 }
-CASES = [
-    *(pytest.param(make, id=f"{name}, small") for name, make in SMALL.items()),
-    *(pytest.param(make, id=f"{name}, large", marks=pytest.mark.slow) for name, make in LARGE.items()),
-]
+QUICK = [f"{name}, small" for name in ("layers", "patches of a background", "tracks")]
+NAMED = {f"{name}, small": make for name, make in SMALL.items()} | {f"{name}, large": LARGE[name] for name in LARGE}
+CASES = [pytest.param(make, id=n, marks=() if n in QUICK else pytest.mark.slow) for n, make in NAMED.items()]
 
 
 def promised(data: bytes) -> int:

@@ -9,7 +9,7 @@ import meshreel
 from meshreel.format.layout import ChunkKind
 from meshreel.io.sequence import open_sequence
 from tests.cli.conftest import FILE, SCENE, failed
-from tests.encoder.appearance.test_colors import BODY, textured, written
+from tests.colored_body import BODY, textured, written
 from tests.golden import GOLDEN
 
 
@@ -133,14 +133,12 @@ def test_a_missing_file_and_a_folder_that_cannot_be_are_reported(run, tmp_path):
     assert failed(run("decode", FILE, "-o", tmp_path, "--format", "fbx"), "fbx")
 
 
-@pytest.fixture(scope="module")
-def colored(tmp_path_factory):
+@pytest.fixture
+def colored():
     """A file whose frames have textures."""
     for name in ("av", "xatlas"):
         pytest.importorskip(name)
-    path = tmp_path_factory.mktemp("textures") / "a.reel"
-    written([textured(mesh) for mesh in BODY[:2]], path)
-    return path
+    return written([textured(mesh) for mesh in BODY[:2]])
 
 
 def test_textures_are_kept_or_named_in_one_line(run, tmp_path, monkeypatch, colored):

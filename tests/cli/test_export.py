@@ -12,7 +12,7 @@ import pytest
 import meshreel
 from meshreel.cli import main
 from tests.cli.conftest import FILE, SCENE, failed
-from tests.encoder.appearance.test_colors import BODY, textured, written
+from tests.colored_body import BODY, textured, written
 from tests.golden import GOLDEN
 from tests.play_glb import PlayedGlb
 
@@ -157,10 +157,10 @@ def test_without_usd_the_extra_is_named(run, tmp_path, monkeypatch):
 def test_a_texture_is_exported_where_it_is_asked_for(run, tmp_path):
     for name in ("av", "xatlas"):
         pytest.importorskip(name)
-    written([textured(mesh) for mesh in BODY[:2]], tmp_path / "a.reel")
+    file = written([textured(mesh) for mesh in BODY[:2]])
     for kind in ("glb", "usdc"):
         for flags in ([], ["--texture"]):
-            said = run("export", tmp_path / "a.reel", "-o", tmp_path / f"a.{kind}", *flags)
+            said = run("export", file, "-o", tmp_path / f"a.{kind}", *flags)
             assert said.code == 0 and ("the texture of its first frame" in said.err) == (kind == "glb" and bool(flags))
             assert (tmp_path / "a_textures").exists() == (kind == "usdc" and bool(flags))
             if kind == "glb":

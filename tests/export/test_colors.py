@@ -21,7 +21,7 @@ from meshreel.geometry.painted import Painted
 from meshreel.geometry.topology import concatenate
 from meshreel.io.sequence import open_sequence
 from meshreel.types import GREY, Mesh, Texture
-from tests.encoder.appearance.test_colors import BODY, CHECKS, COLORED, textured, written
+from tests.colored_body import BODY, CHECKS, COLORED, textured, written
 from tests.export.test_animated_file import play, seen, times
 from tests.gltf_validator import validate
 from tests.metrics.shapes import sphere
@@ -35,15 +35,9 @@ BALL = sphere(levels=1)
 
 
 @pytest.fixture(scope="module")
-def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    folder = tmp_path_factory.mktemp("colors")
-    made = {
-        "vertices": (BRIGHTER, 6),
-        "texture": ([textured(mesh) for mesh in BODY], 3),
-    }
-    for name, (meshes, size) in made.items():
-        written(meshes, folder / f"{name}.reel", group_size=size)
-    return {name: folder / f"{name}.reel" for name in made}
+def files() -> dict[str, Path]:
+    textures = written([textured(mesh) for mesh in BODY], group_size=3)
+    return {"vertices": written(BRIGHTER, group_size=6), "texture": textures}
 
 
 @pytest.mark.parametrize("extension", EXTENSIONS)

@@ -76,6 +76,7 @@ def test_a_body_comes_back_to_a_fraction_of_a_voxel(body, stream):
     assert len(stream) < 3500
 
 
+@pytest.mark.slow
 def test_quality_rises_with_the_rate(body):
     points = [(56, 16, 0.08), (80, 24, 0.05), (112, 32, 0.03)]
     coded = [KltTsdfCodec(cells=cells, basis=basis, step=step) for cells, basis, step in points]
@@ -87,6 +88,7 @@ def test_quality_rises_with_the_rate(body):
     assert quality[2] > quality[0] + 6
 
 
+@pytest.mark.slow
 def test_each_option_alone_buys_quality(body):
     def measured(**changes):
         data = replace(SMALL, **changes).encode(MeshList(body.meshes[:1]))
@@ -99,6 +101,7 @@ def test_each_option_alone_buys_quality(body):
         assert better > quality
 
 
+@pytest.mark.slow
 def test_spheres_that_move_and_stretch_stay_closed_in_one_piece():
     coarse = replace(SMALL, cells=48)
     for sequence in (sliding_sphere(3, step=0.3), deforming_sphere(3)):
@@ -129,6 +132,7 @@ def test_frames_may_be_empty_and_differ_in_everything(body):
         SMALL.encode(MeshList(()))
 
 
+@pytest.mark.slow
 def test_an_open_surface_stays_open_and_ends_where_it_did():
     sheet = open_sheet()
     for mesh in (sheet, Mesh.of(sheet.vertices, sheet.faces[:, ::-1])):
@@ -145,6 +149,7 @@ def test_faces_look_outwards_as_they_did(stream):
     assert np.einsum("nd,nd->", a, np.cross(b, c)) > 0
 
 
+@pytest.mark.slow
 def test_a_body_with_a_hole_has_its_inside_where_it_was(body):
     mesh = body[0]
     top = mesh.vertices[mesh.faces].mean(axis=1)[:, 1]
@@ -165,6 +170,7 @@ def test_a_closed_box_is_signed_by_its_pseudonormals():
     assert np.array_equal(found.values < 0, inside[index])
 
 
+@pytest.mark.slow
 def test_places_and_metres_do_not_matter(body):
     mesh = body[0]
     far = Mesh.of(1000 * mesh.vertices + [5e4, -2e5, 3e4], mesh.faces)

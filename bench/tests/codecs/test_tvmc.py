@@ -91,6 +91,7 @@ def test_a_moving_body_comes_back(stream):
     assert np.array_equal(video[-1].vertices, list(video)[3].vertices) and len(video[1:3]) == 2
 
 
+@pytest.mark.slow
 def test_quality_rises_with_the_rate(tracking):
     found = []
     for qp in (3, 5, 7, 9):
@@ -132,6 +133,7 @@ def test_no_frames_are_refused():
         SMALL.encode(MeshList(()))
 
 
+@pytest.mark.slow
 def test_what_no_reference_follows_is_cut_or_coded_frame_by_frame(monkeypatch):
     other = Mesh.of(BALL.vertices * [1, 0.2, 3] + [0, 4, 0], BALL.faces)
     frames = MeshList((BALL, BALL, other))
@@ -148,6 +150,7 @@ def test_what_no_reference_follows_is_cut_or_coded_frame_by_frame(monkeypatch):
         assert max(percent(a, b) for a, b in zip(frames, SMALL.decode(data), strict=True)) < 1
 
 
+@pytest.mark.slow
 def test_coordinates_around_a_million_keep_their_millimetres():
     far, balls = np.array([4.5e6, 1.2e2, 5.1e6]), sliding_sphere(2, levels=2)
     video = SMALL.decode(SMALL.encode(MeshList(tuple(Mesh.of(b.vertices + far, b.faces) for b in balls))))
@@ -193,6 +196,7 @@ def rolling():
     return tracked(MeshList((Mesh.empty(), *ROLLING)), replace(SMALL, group_size=4), quick_scene)
 
 
+@pytest.mark.slow
 def test_a_scene_has_its_background_once_and_its_body_tracked(rolling):
     data = SMALL.pack(rolling)
     stream = unpack_stream(data)

@@ -28,37 +28,10 @@ from meshreel.io.sequence import open_sequence
 from meshreel.io.write import write_mesh
 from meshreel.metrics.color import color_errors
 from meshreel.types import Mesh, MeshList, Texture
-from tests.kept import kept
+from tests.colored_body import BODY, COLORED, FRAMES, painted, textured, written
 from tests.small_bodies import body
 from tests.small_options import quick
 from tests.small_scene import scene
-
-FRAMES = 6
-
-
-def painted(mesh: Mesh, rest: Mesh) -> Mesh:
-    """A mesh with colours that its vertices have wherever they go."""
-    return replace(mesh, colors=(128 + 90 * np.sin(3 * rest.vertices + [0, 1, 2])).astype(np.uint8))
-
-
-BODY = body(1, FRAMES)
-COLORED = [painted(mesh, BODY[0]) for mesh in BODY]
-CHECKS = ((np.indices((64, 64)) // 8).sum(axis=0) % 2 * 200).astype(np.uint8)[..., None].repeat(3, axis=2)
-
-
-def textured(mesh: Mesh) -> Mesh:
-    flat = BODY[0].vertices[:, :2] / np.abs(BODY[0].vertices).max() / 2 + 0.5
-    return replace(mesh, uv=flat[mesh.faces].astype(np.float32), texture=Texture.of(CHECKS))
-
-
-def written(meshes: list[Mesh], color: str = "auto", compatible: bool = False, **others: object) -> bytes:
-    appearance = appearance_options(50.0, color, compatible=compatible)
-    options = replace(quick(**others), appearance=appearance, scene=None)  # type: ignore[arg-type]
-
-    def write(path: Path) -> None:
-        Encoder(welded(MeshList(tuple(meshes)))).encode(path, options)
-
-    return kept(write, "a.reel", meshes, options)[0].read_bytes()
 
 
 def kinds(data: bytes) -> list[ChunkKind]:
@@ -68,10 +41,10 @@ def kinds(data: bytes) -> list[ChunkKind]:
 @pytest.fixture(scope="module")
 def files() -> dict[str, bytes]:
     return {
-        "plain": written(BODY),
-        "vertices": written(COLORED, group_size=3),
-        "none": written(COLORED, "none"),
-        "texture": written([textured(mesh) for mesh in BODY], group_size=3),
+        "plain": written(BODY).read_bytes(),
+        "vertices": written(COLORED, group_size=3).read_bytes(),
+        "none": written(COLORED, "none").read_bytes(),
+        "texture": written([textured(mesh) for mesh in BODY], group_size=3).read_bytes(),
     }
 
 
@@ -148,8 +121,8 @@ def test_fewer_layers_have_the_colors_of_their_vertices(files: dict[str, bytes])
 @pytest.mark.parametrize("preset", ["best", "paper"])
 def test_all_forms_have_colors(preset: str) -> None:
     unlike = [painted(mesh, mesh) for mesh in (body(0, 1)[0], body(3, 1)[0], body(5, 1)[0], Mesh.empty())]
-    data = written([*COLORED[:2], *unlike], preset=preset)
-    video = meshreel.open(data)
+    path = written([*COLORED[:2], *unlike], preset=preset)
+    video = meshreel.open(path)
     assert len({group.form for group in video.reader.groups}) > 1
     for number, mesh in enumerate([*COLORED[:2], *unlike[:3]]):
         assert color_errors(mesh, video[number]).y > 22, number
@@ -190,7 +163,7 @@ def without(data: bytes, kind: ChunkKind) -> bytes:
 
 def test_a_compatible_file_is_shown_with_either_video(files: dict[str, bytes]) -> None:
     meshes = [textured(mesh) for mesh in BODY]
-    both = written(meshes, compatible=True, group_size=3)
+    both = written(meshes, compatible=True, group_size=3).read_bytes()
     found = kinds(both)
     assert found.count(ChunkKind.COMPATIBLE) == found.count(ChunkKind.PICTURES) > 1
     assert without(both, ChunkKind.COMPATIBLE) == files["texture"]

@@ -3,6 +3,7 @@
 import { describe, expect, test, vi } from "vitest";
 
 import { hasPython, runPython } from "../../test/python.ts";
+import { ALL } from "../../test/slow.ts";
 import { Video } from "../src/decode/decoder.ts";
 import { FormatError } from "../src/errors.ts";
 import { allowance, changeCost, checkCost, checkFrames, checkPictures, dracoCost, led, together } from "../src/format/budget.ts";
@@ -17,7 +18,7 @@ import { nodeTools } from "./tools.ts";
 const NAMES = ["draco", "frames of draco", "layers", "predicted layers", "laplacian", "laplacian of many frames", "laplacian of a fan", "patches of a background"];
 const SCRIPT = new URL("./worst_file.py", import.meta.url);
 
-test.skipIf(!hasPython).each(NAMES)("the worst legal file of %s is decoded, within the memory that FORMAT.md allows", { timeout: 60_000 }, async (name) => {
+test.runIf(ALL && hasPython).each(NAMES)("the worst legal file of %s is decoded, within the memory that FORMAT.md allows", async (name) => {
   const tools = await nodeTools();
   const data = new Uint8Array(runPython(SCRIPT, name));
   const video = new Video(tools, data);

@@ -5,6 +5,7 @@ import { readFileSync } from "node:fs";
 
 import { beforeAll, expect, test } from "vitest";
 
+import { slowTest } from "../../test/slow.ts";
 import { Video } from "../src/decode/decoder.ts";
 import type { Tools } from "../src/decode/group.ts";
 import { FormatError } from "../src/errors.ts";
@@ -57,7 +58,7 @@ function frameOf(video: Video, frame: number): Mesh | null {
   }
 }
 
-test.each(Object.entries(VERDICTS))("%s", async (name, wanted) => {
+slowTest.each(Object.entries(VERDICTS))("%s", async (name, wanted) => {
   const data = new Uint8Array(readFileSync(`${FOLDER}/${name}`));
   expect([await verdict(data, null), await verdict(data, 1)]).toEqual(wanted);
 });
