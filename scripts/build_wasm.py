@@ -13,11 +13,12 @@ SKIPPED = {  # an encoder's
     *("integration.cpp", "lists.cpp", "ray_cast.cpp", "surface_tree.cpp", "template.cpp", "text.cpp", "topology.cpp"),
     *("tracking.cpp", "zero.cpp"),
 }
-# Strict arithmetic, as in CMakeLists.txt. Exceptions are off: a want of memory stops the instance.
+# Strict arithmetic, as in CMakeLists.txt. Exceptions are those of the engine, with core/wasm/exceptions.cpp below them.
 FLAGS = (
     *("-target", "wasm32-wasi", "-mexec-model=reactor", "-std=c++17", "-O3", "-msimd128", "-s"),
     *("-ffp-contract=off", "-fno-fast-math", "-fno-math-errno", "-fno-trapping-math"),
-    *("-fno-exceptions", "-fno-rtti", "-DEIGEN_DONT_VECTORIZE", "-DEIGEN_MPL2_ONLY", "-DNDEBUG"),
+    *("-fwasm-exceptions", "-mexception-handling", "-fno-rtti"),
+    *("-DEIGEN_DONT_VECTORIZE", "-DEIGEN_MPL2_ONLY", "-DNDEBUG"),
     *("-Wl,--gc-sections", "-Wl,-z,stack-size=1048576"),
 )
 
@@ -37,7 +38,7 @@ def main(arguments: list[str]) -> int:
         print("usage: build_wasm.py OUT.wasm", file=sys.stderr)
         return 2
     sources = sorted(path for path in (ROOT / "core/src").glob("*.cpp") if path.name not in SKIPPED)
-    sources += sorted((ROOT / "core/wasm").glob("*.cpp"))
+    sources += [path for folder in ("core/decoder", "core/wasm") for path in sorted((ROOT / folder).glob("*.cpp"))]
     names = (ROOT / "core/wasm/exports.txt").read_text(encoding="utf-8").split()
     includes = [f"-I{ROOT / 'core/include'}", "-isystem", str(eigen())]
     out = Path(arguments[0])

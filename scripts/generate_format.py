@@ -1,5 +1,6 @@
 """Makes the generated files anew, or with --check changes nothing and fails where one is stale: FORMAT.md's tables and
-the player's reader of records from meshreel.format.layout, the table of docs/reliability.md from its rows.
+the records of the player and of the C++ decoder from meshreel.format.layout, the table of docs/reliability.md from its
+rows.
 """
 
 from __future__ import annotations
@@ -7,6 +8,7 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
+import format_cpp
 import format_tables
 import format_typescript
 import reliability
@@ -16,6 +18,7 @@ from meshreel.format.layout import PAYLOADS, RECORDS
 ROOT = Path(__file__).resolve().parents[1]
 DOCUMENT = ROOT / "FORMAT.md"
 MODULE = ROOT / "web/player-core/src/format/layout.gen.ts"
+HEADER = ROOT / "core/src/layout.gen.h"
 
 
 def made() -> dict[Path, str]:
@@ -23,6 +26,7 @@ def made() -> dict[Path, str]:
     return {
         DOCUMENT: format_tables.fill_tables(DOCUMENT.read_text(encoding="utf-8"), RECORDS + PAYLOADS),
         MODULE: format_typescript.typescript(RECORDS + PAYLOADS),
+        HEADER: format_cpp.cpp(RECORDS + PAYLOADS),
         reliability.PAGE: reliability.filled(),
     }
 

@@ -120,7 +120,6 @@ def test_an_installed_wheel_plays_a_file_with_the_player_that_it_brings(python, 
             "worker.js",
             "order.js",
             "core.wasm",
-            "draco.wasm",
             "page.js",
         } <= names
         assert "LICENSES.txt" in names

@@ -11,7 +11,7 @@ import { build } from "vite";
 const WEB = fileURLToPath(new URL(".", import.meta.url));
 const ROOT = dirname(resolve(WEB));
 const PLAYER = join(ROOT, "src/meshreel/player");
-const BUILT = ["meshreel-player.js", "three.js", "worker.js", "order.js", "core.wasm", "draco.wasm", "LICENSES.txt"];
+const BUILT = ["meshreel-player.js", "three.js", "worker.js", "order.js", "core.wasm", "LICENSES.txt"];
 const out = resolve(process.argv[2] ?? "");
 if (process.argv.length !== 3) throw new Error("usage: node npm.mjs FOLDER");
 

@@ -1,8 +1,8 @@
 // Builds the player into src/meshreel/player/, or into the folder MESHREEL_PLAYER: meshreel-player.js, which defines the element, three.js, which
-// draws, the page that `meshreel play` opens, the decoding worker, Draco, the worker that orders splats, the licences of what is in them, and each in
+// draws, the page that `meshreel play` opens, the decoding worker, the worker that orders splats, the licences of what is in them, and each in
 // Brotli. core.wasm is put there before by scripts/build_wasm.py. Two builds give the same bytes.
 
-import { copyFileSync, mkdirSync, readdirSync, readFileSync, rmSync, writeFileSync } from "node:fs";
+import { mkdirSync, readdirSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { extname, join, resolve } from "node:path";
 import { fileURLToPath } from "node:url";
 import { brotliCompressSync, constants } from "node:zlib";
@@ -31,7 +31,6 @@ function rest(): Plugin {
       for (const name of readdirSync(out)) if (!KEPT.has(name)) rmSync(join(out, name), { recursive: true });
     },
     writeBundle() {
-      copyFileSync(join(here, "node_modules/draco3d/draco_decoder.wasm"), join(out, "draco.wasm"));
       const [page, styles] = ["index.html", "page.css"].map((name) => readFileSync(join(here, "player-element/page", name), "utf8"));
       writeFileSync(join(out, "index.html"), inlined(page!, styles!.trim()));
       writeFileSync(join(out, "page.css"), styles!);
@@ -87,16 +86,6 @@ function withoutShaders(): Plugin {
   };
 }
 
-/** Draco asks for Node's modules where it runs in Node; here it never does. */
-function withoutNode(): Plugin {
-  return {
-    name: "meshreel-without-node",
-    enforce: "pre",
-    resolveId: (source, importer) => (["fs", "path"].includes(source) && importer?.includes("draco3d") ? "\0none" : null),
-    load: (id) => (id === "\0none" ? "export default {}" : null),
-  };
-}
-
 function licences(): string {
   const text = (path: string): string => readFileSync(join(here, path), "utf8").replaceAll("\r\n", "\n").trim();
   const version = (name: string): string => (JSON.parse(text(`node_modules/${name}/package.json`)) as { version: string }).version;
@@ -104,8 +93,6 @@ function licences(): string {
   return [
     "The player of meshreel. Apache License 2.0, at the end of this file. It contains:",
     `three.js ${version("three")} (in three.js), https://threejs.org\n\n${text("node_modules/three/LICENSE")}`,
-    `draco3d ${version("draco3d")} (in worker.js; draco.wasm), https://github.com/google/draco\n\n` +
-      "Copyright The Draco Authors. Apache License 2.0, at the end of this file.",
     "Eigen (in core.wasm), https://eigen.tuxfamily.org\n\nMozilla Public License 2.0, https://mozilla.org/MPL/2.0/; its source is unchanged.",
     text("../LICENSE"),
   ].join(rule) + "\n";
@@ -117,7 +104,7 @@ export default defineConfig(({ mode }) => {
     root: here,
     base: "./",
     publicDir: false,
-    plugins: name === "meshreel-player" ? [rest()] : name === "three" ? [withoutShaders()] : name === "page" ? [beside(), compressed()] : [withoutNode()],
+    plugins: name === "meshreel-player" ? [rest()] : name === "three" ? [withoutShaders()] : name === "page" ? [beside(), compressed()] : [],
     build: {
       outDir: out,
       emptyOutDir: false,

@@ -1,27 +1,16 @@
 // What a chunk may cost to decode, by the bytes that it has (FORMAT.md, "What a file may cost"): beside
-// src/meshreel/format/budget.py, whose numbers these are. Costs are in bytes, as doubles, which do not overflow.
+// src/meshreel/format/budget.py, whose numbers are in layout.gen.h. Costs are in bytes, as doubles, which do not
+// overflow.
 #pragma once
 
 #include <algorithm>
 #include <cmath>
 
-#include "format_error.h"
+#include "../src/format_error.h"
+#include "../src/layout.gen.h"
 #include "mesh.h"
 
 namespace meshreel {
-namespace limits {
-
-constexpr double kFree = 192 << 20, kPerByte = 8192, kTogether = 96 << 20, kChain = 8;
-constexpr double kFrames = 65'535, kFramesPerByte = 64, kFrame = 1024;
-constexpr double kElement = 160, kShown = 30, kMoving = 30, kSolved = 1600, kColumn = 20, kPair = 100, kNumber = 40;
-constexpr double kColors = 96 << 20, kPainted = 32, kPainting = 256;
-constexpr double kMostFaces = 64'000'000;     // faces or vertices of a group
-constexpr double kMostNumbers = 536'870'912;  // of a group's places: 4 GiB
-constexpr uint32_t kMostHead = 64 << 20;      // bytes
-constexpr uint64_t kMostAudio = 256 << 20;    // bytes of a chunk of audio
-
-}  // namespace limits
-
 inline double count_of(size_t number) { return static_cast<double>(number); }
 
 // Faces and vertices of a mesh, at most, after its midpoint subdivisions.
@@ -37,7 +26,7 @@ inline void check_cost(double cost, size_t size) {
 
 inline void check_growth(const Mesh& mesh, unsigned levels, size_t frames = 1) {
     const double faces = std::ldexp(count_of(mesh.face_count()), 2 * static_cast<int>(levels));
-    require(count_of(frames) * std::max(faces, count_of(mesh.vertex_count())) <= limits::kMostFaces,
+    require(count_of(frames) * std::max(faces, count_of(mesh.vertex_count())) <= limits::kFaces,
             "over 64 million faces or vertices");
 }
 

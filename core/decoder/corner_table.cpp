@@ -2,7 +2,7 @@
 
 #include <unordered_map>
 
-#include "format_error.h"
+#include "../src/format_error.h"
 
 namespace meshreel {
 namespace {

@@ -2,14 +2,16 @@
 
 #include <algorithm>
 
+#include "../src/records.h"
 #include "budget.h"
 #include "draco_mesh.h"
-#include "head.h"
 #include "meshreel/draco.h"
-#include "records.h"
 
 namespace meshreel {
 namespace {
+
+// 0 for no bytes, which is no form.
+Form form_of(const mr_bytes& data) { return static_cast<Form>(data.size > 0 ? data.data[0] : 0); }
 
 struct IntraMesh {
     Mesh base, mesh;  // before and after its subdivisions
@@ -17,21 +19,16 @@ struct IntraMesh {
 };
 
 std::vector<IntraMesh> decode_intra(const mr_bytes& data) {
-    Records in(data);
-    require(in.u8() == kDraco, "a payload of another form than DRACO");
-    const unsigned levels = in.u8();
-    const double step = in.f64();
-    const size_t count = in.u16();
-    require(4 * count <= in.left(), "DracoGroup: more meshes than there are bytes");
-    std::vector<mr_bytes> coded;
-    for (size_t k = 0; k < count; ++k) coded.push_back(in.blob(in.u32()));
-    in.finish("DracoGroup");
-    check_step(step);
+    const DracoGroup record = read_all<DracoGroup>(data, "DracoGroup");
+    const unsigned levels = record.levels;
+    const std::vector<mr_bytes>& coded = record.meshes;
+    const size_t count = coded.size();
+    check_step(record.step);
     check(mr_check_draco(coded.data(), count), "damaged Draco data: ");  // of all together
     std::vector<IntraMesh> found(count);
     double shown = 0, largest = 0;
     for (size_t k = 0; k < count; ++k) {
-        found[k].base = decode_draco(coded[k], step), found[k].levels = levels;
+        found[k].base = decode_draco(coded[k], record.step), found[k].levels = levels;
         check_growth(found[k].base, levels, count);
         const double elements = elements_of(found[k].base, levels);
         shown += elements, largest = std::max(largest, elements);
@@ -39,6 +36,10 @@ std::vector<IntraMesh> decode_intra(const mr_bytes& data) {
     check_cost(limits::kFrame * count_of(count) + limits::kShown * shown + limits::kElement * largest, data.size);
     for (IntraMesh& one : found) one.mesh = subdivide_midpoint(one.base, levels);
     return found;
+}
+
+void need_one(size_t meshes) {
+    if (meshes != 1) throw FormatError("background: " + std::to_string(meshes) + " meshes, a state has one");
 }
 
 Continued decode_frames(const mr_bytes& data, const Context& context) {
@@ -50,7 +51,7 @@ Continued decode_frames(const mr_bytes& data, const Context& context) {
         if (vertices > 0) made.canvas.push_back({std::move(one.base), one.levels, 1, vertices});
     }
     made.group.frames = made.group.added.size();
-    require(made.group.frames == context.frames, "a group of other frames than the index says");
+    check_frames(made.group.frames, context);
     return made;
 }
 
@@ -62,24 +63,21 @@ Continued decode_empty(const mr_bytes& data, const Context& context) {
 }
 
 Background decode_change(const mr_bytes& data, const Mesh& before, const mr_placement& place) {
-    Records in(data);
-    in.u8();  // the form
-    const double step = in.f64();
-    const uint64_t runs = in.varint();
-    const mr_bytes coded = in.blob(in.varint()), mesh = in.blob(in.varint());
-    in.finish("StaticPatch");
-    check_step(step);
+    const StaticPatch record = read_all<StaticPatch>(data, "StaticPatch");
+    const uint64_t runs = record.runs;
+    check_step(record.step);
     Background made;
-    if (runs > 0 || coded.size > 0) {
+    if (runs > 0 || record.dropped.size > 0) {
         require(runs <= before.face_count() + 1, "background: more runs than faces");
         size_t used = 0;
-        const std::vector<uint8_t> dropped = fill_runs(decode_integers(coded, runs), before.face_count(), used);
+        const std::vector<uint8_t> dropped =
+            fill_runs(decode_integers(record.dropped, runs), before.face_count(), used);
         require(used == runs && runs > 1, "background: runs of which none drops a face, or too many");
         made.mesh = without(before, dropped);
     } else {
         made.mesh = before;
     }
-    Mesh added = decode_draco(mesh, step);
+    Mesh added = decode_draco(record.mesh, record.step);
     check_growth(added, 0);
     check_cost(change_cost(before, added), data.size);
     made.added = {added, 0, 1, added.vertex_count()};
@@ -90,6 +88,12 @@ Background decode_change(const mr_bytes& data, const Mesh& before, const mr_plac
 }
 
 }  // namespace
+
+void check_frames(size_t frames, const Context& context) {
+    if (frames != context.frames)
+        throw FormatError("a group of " + std::to_string(frames) + " frames where the index says " +
+                          std::to_string(context.frames));
+}
 
 double State::memory() const {
     size_t numbers = base.size() + colors.size();
@@ -108,11 +112,10 @@ double Group::memory() const {
 Mesh Group::frame(size_t t) const {
     Mesh mesh;
     const size_t size = 3 * vertices, corners = faces->size(), count = corners / 3;
-    mesh.vertices.assign(positions.begin() + t * size, positions.begin() + (t + 1) * size);
+    mesh.vertices.assign(positions.data() + t * size, positions.data() + (t + 1) * size);
     if (!colors.empty()) mesh.colors.assign(colors.begin() + t * size, colors.begin() + (t + 1) * size);
     mesh.faces = faces, mesh.places = places;
-    if (!dropped.empty()) {
-        const uint8_t* gone = dropped.data() + t * count;
+    if (const uint8_t* gone = dropped_in(t)) {
         std::vector<int32_t> kept(corners);
         kept.resize(3 * mr_keep_faces(faces->data(), gone, count, kept.data()));
         mesh.faces = std::make_shared<const std::vector<int32_t>>(std::move(kept));
@@ -125,30 +128,30 @@ Mesh Group::frame(size_t t) const {
 }
 
 Continued continue_group(const mr_bytes& data, const Context& context) {
-    switch (data.data[0]) {
-        case kLayers: return decode_layers(data, context);
-        case kLaplacian: return decode_laplacian(data, context);
-        case kDraco: return decode_frames(data, context);
-        case kEmpty: return decode_empty(data, context);
+    switch (form_of(data)) {
+        case Form::LAYERS: return decode_layers(data, context);
+        case Form::LAPLACIAN: return decode_laplacian(data, context);
+        case Form::DRACO: return decode_frames(data, context);
+        case Form::EMPTY: return decode_empty(data, context);
         default: throw FormatError("a group of a form that is not known");
     }
 }
 
 Mesh base_mesh(const mr_bytes& data) {
-    if (data.data[0] == kLayers) return layers_base(data);
-    if (data.data[0] == kLaplacian) return laplacian_base(data);
+    if (form_of(data) == Form::LAYERS) return layers_base(data);
+    if (form_of(data) == Form::LAPLACIAN) return laplacian_base(data);
     const std::vector<IntraMesh> meshes = decode_intra(data);
-    require(meshes.size() == 1, "background: not one mesh");
+    need_one(meshes.size());
     return meshes[0].base;
 }
 
 Background decode_background(const mr_bytes& data, const Mesh* before, const mr_placement& place) {
-    if (data.data[0] == kPatch) {
+    if (form_of(data) == Form::PATCH) {
         require(before, "background: a patch of a state that is not at hand");
         return decode_change(data, *before, place);
     }
     std::vector<IntraMesh> meshes = decode_intra(data);
-    require(meshes.size() == 1, "background: not one mesh");
+    need_one(meshes.size());
     Background made;
     made.mesh = std::move(meshes[0].mesh);
     place_all(place, made.mesh.vertices);

@@ -5,11 +5,35 @@
 #include <memory>
 #include <vector>
 
-#include "head.h"
+#include "../src/layout.gen.h"
+#include "../src/scratch.h"
 #include "mesh.h"
 #include "meshreel/status.h"
 
 namespace meshreel {
+
+constexpr int64_t kAllLayers = -1;  // as a number of layers
+
+// Numbers in one block of memory, which are not set to anything at first, and which a host may take over.
+template <class T>
+class Block {
+public:
+    Block() = default;
+    explicit Block(size_t count) : numbers_(scratch<T>(count)), count_(count) {}
+
+    size_t size() const { return count_; }
+    bool empty() const { return count_ == 0; }
+    T* data() { return numbers_.get(); }
+    const T* data() const { return numbers_.get(); }
+    T* begin() { return data(); }
+    T* end() { return data() + count_; }
+    // The block, to be given back by give_block.
+    T* release() { return count_ = 0, numbers_.release(); }
+
+private:
+    Scratch<T> numbers_;
+    size_t count_ = 0;
+};
 
 // What the next group of a track may be predicted from.
 struct State {
@@ -32,8 +56,8 @@ struct ColoredMesh {
 // Frames: vertices and faces that all of them share, and a mesh that is added to each.
 struct Group {
     size_t frames = 0, vertices = 0;
-    unsigned levels = 0;            // subdivisions that the shared mesh has of its base
-    std::vector<double> positions;  // frames x vertices x 3, m
+    unsigned levels = 0;      // subdivisions that the shared mesh has of its base
+    Block<double> positions;  // frames x vertices x 3, m
     Faces faces = no_faces();
     std::vector<uint8_t> dropped;  // frames x faces, 1 where a frame lacks one; or empty
     std::vector<Mesh> added;       // one a frame, or empty
@@ -41,6 +65,8 @@ struct Group {
     std::vector<float> places;     // two of each corner of the shared faces, in a texture; or empty
 
     Mesh frame(size_t t) const;
+    // Which of the shared faces a frame lacks; null where it has all.
+    const uint8_t* dropped_in(size_t t) const { return dropped.empty() ? nullptr : &dropped[t * (faces->size() / 3)]; }
     double memory() const;  // bytes
 };
 
@@ -57,6 +83,9 @@ struct Context {
     mr_placement place;
     bool is_shown = true;  // else only the state is decoded, and the first mesh of the canvas
 };
+
+// Throws FormatError where a group has other frames than the index says.
+void check_frames(size_t frames, const Context& context);
 
 // From a whole payload, or from as many layers. Throws FormatError.
 Continued continue_group(const mr_bytes& data, const Context& context);
@@ -89,13 +118,15 @@ Mesh layers_base(const mr_bytes& data);
 Mesh laplacian_base(const mr_bytes& data);
 
 // Where the corners of a base mesh's faces are in a texture.
-struct Atlas {
+struct Layout {
     uint16_t width, height;                              // texels
     std::shared_ptr<const std::vector<int32_t>> places;  // two of each corner, from the upper left
 };
 
-Atlas decode_atlas(const mr_bytes& data, const Mesh& base);
-// Places of the corners of the faces after subdivisions, 0 to 1 from the lower left; NaN for faces that have none.
-std::vector<float> places_of(const Atlas& atlas, unsigned levels);
+Layout decode_atlas(const mr_bytes& data, const Mesh& base);
+// Places of the corners of the faces after subdivisions, in texels; NaN for faces that have none. Halves are exact.
+std::vector<float> texels_of(const Layout& atlas, unsigned levels);
+// The same from 0 to 1 from the lower left.
+std::vector<float> places_of(const Layout& atlas, unsigned levels);
 
 }  // namespace meshreel

@@ -5,54 +5,28 @@
 #include <cmath>
 #include <numeric>
 
+#include "../src/records.h"
 #include "budget.h"
 #include "draco_mesh.h"
 #include "group.h"
-#include "head.h"
 #include "meshreel/entropy.h"
-#include "records.h"
 
 namespace meshreel {
 namespace {
 
 constexpr int kMostBits = 30;  // fraction bits of the mean and of a direction
-constexpr uint8_t kSpread = 1, kFarthest = 2;
-
-struct Component {
-    uint8_t bits, step_level;
-    uint64_t anchors_size, deltas_size;
-};
-
-struct DisplacementHead {
-    size_t frames;
-    uint8_t anchor_rule, anchor_weight, mean_bits;
-    uint64_t anchor_count;
-    std::vector<Component> components;
-    mr_bytes basis;
-    size_t end;
-};
-
-DisplacementHead read_head(const mr_bytes& data) {
-    DisplacementHead head;
+// The head, checked, and the offset of the first stream.
+std::pair<DisplacementHead, size_t> read_head(const mr_bytes& data) {
     Records in(data);
-    head.frames = in.u16();
-    head.anchor_rule = in.choice(kSpread, kFarthest);
-    head.anchor_count = in.varint();
-    head.anchor_weight = in.u8(), head.mean_bits = in.u8();
-    const size_t count = in.u16();
-    require(4 * count <= in.left() && count <= 3 * head.frames, "displacements: more components than there can be");
-    for (size_t k = 0; k < count; ++k) {
-        Component part;
-        part.bits = in.u8(), part.step_level = in.u8(), part.anchors_size = in.varint(), part.deltas_size = in.varint();
-        require(part.bits <= kMostBits, "displacements: too many bits");
+    const DisplacementHead head = DisplacementHead::read(in);
+    require(head.frames > 0 && head.components.size() <= 3 * size_t{head.frames},
+            "displacements: more components than there can be");
+    require(head.anchor_weight > 0 && head.mean_bits <= kMostBits, "displacements: a head that is damaged");
+    for (const Component& part : head.components) {
+        require(part.basis_bits <= kMostBits, "displacements: too many bits");
         step_of(part.step_level);
-        head.components.push_back(part);
     }
-    head.basis = in.blob(in.varint());
-    require(head.frames > 0 && head.anchor_weight > 0 && head.mean_bits <= kMostBits,
-            "displacements: a head that is damaged");
-    head.end = in.offset();
-    return head;
+    return {head, in.offset()};
 }
 
 // For each vertex the first one of its connected component.
@@ -90,7 +64,7 @@ std::vector<int32_t> spread_anchors(const Mesh& base, uint64_t count) {
 }
 
 std::vector<int32_t> anchors_of(const DisplacementHead& head, const Mesh& base) {
-    if (head.anchor_rule == kSpread) return spread_anchors(base, head.anchor_count);
+    if (head.anchor_rule == AnchorRule::SPREAD) return spread_anchors(base, head.anchor_count);
     std::vector<int32_t> anchors(base.vertex_count());
     const int64_t vertices = static_cast<int64_t>(base.vertex_count()), faces = static_cast<int64_t>(base.face_count());
     const int64_t wanted = static_cast<int64_t>(head.anchor_count);
@@ -144,32 +118,22 @@ std::vector<double> decode_deltas(const DisplacementHead& head, size_t columns, 
     return deltas;
 }
 
-struct LaplacianGroup {
-    unsigned levels;
-    Mesh reference;
-    mr_bytes displacements;
-};
-
-LaplacianGroup read_group(const mr_bytes& data) {
-    Records in(data);
-    require(in.u8() == kLaplacian, "a group of another form than LAPLACIAN");
-    const unsigned levels = in.u8();
-    const double step = in.f64();
-    const mr_bytes coded = in.blob(in.u32());
-    check_step(step);
-    return {levels, decode_draco(coded, step), in.rest()};
+Mesh reference_of(const LaplacianGroup& record) {
+    require(record.form == Form::LAPLACIAN, "a group of another form than LAPLACIAN");
+    check_step(record.step);
+    return decode_draco(record.reference, record.step);
 }
 
 // vertices x frames x 3 numbers, from at most so many components.
 std::vector<double> decode_displacements(const mr_bytes& data, const Mesh& base, int64_t most) {
-    const DisplacementHead head = read_head(data);
-    const size_t all = head.components.size(), vertices = base.vertex_count(), width = 3 * head.frames;
+    const auto [head, end] = read_head(data);
+    const size_t all = head.components.size(), vertices = base.vertex_count(), width = 3 * size_t{head.frames};
     const size_t count =
         most == kAllLayers ? all : static_cast<size_t>(std::min<uint64_t>(static_cast<uint64_t>(most), all));
     require(head.anchor_count <= vertices, "displacements: more anchors than vertices");
-    require(count_of(width) * count_of(vertices) <= limits::kMostNumbers, "displacements: too many numbers");
+    require(count_of(width) * count_of(vertices) <= limits::kNumbers, "displacements: too many numbers");
     const std::vector<int32_t> anchors = anchors_of(head, base);
-    Records in({data.data + head.end, data.size - head.end});
+    Records in({data.data + end, data.size - end});
     const std::vector<double> deltas = decode_deltas(head, count, in, base, anchors.size());
     if (most == kAllLayers) in.finish("displacements");
     const mr_mesh view = base.view();
@@ -181,7 +145,7 @@ std::vector<double> decode_displacements(const mr_bytes& data, const Mesh& base,
     std::vector<double> mean(width), vectors(width * count), field(vertices * width);
     for (size_t k = 0; k < width; ++k) mean[k] = std::ldexp(static_cast<double>(numbers[k]), -head.mean_bits);
     for (size_t k = 0; k < vectors.size(); ++k)
-        vectors[k] = std::ldexp(static_cast<double>(numbers[width + k]), -head.components[k / width].bits);
+        vectors[k] = std::ldexp(static_cast<double>(numbers[width + k]), -head.components[k / width].basis_bits);
     mr_klt_inverse(weights.data(), static_cast<int64_t>(vertices), static_cast<int64_t>(count), vectors.data(),
                    mean.data(), static_cast<int64_t>(width), field.data());
     return field;
@@ -189,28 +153,29 @@ std::vector<double> decode_displacements(const mr_bytes& data, const Mesh& base,
 
 }  // namespace
 
-Mesh laplacian_base(const mr_bytes& data) { return read_group(data).reference; }
+Mesh laplacian_base(const mr_bytes& data) { return reference_of(read_all<LaplacianGroup>(data, "LaplacianGroup")); }
 
 Continued decode_laplacian(const mr_bytes& data, const Context& context) {
-    const LaplacianGroup record = read_group(data);
-    const auto& [levels, reference, displacements] = record;
-    const DisplacementHead head = read_head(displacements);
-    require(head.frames == context.frames, "a group of other frames than the index says");
+    const LaplacianGroup record = read_all<LaplacianGroup>(data, "LaplacianGroup");
+    const Mesh reference = reference_of(record);
+    const unsigned levels = record.levels;
+    const DisplacementHead head = read_head(record.displacements).first;
+    check_frames(head.frames, context);
     check_growth(reference, levels, head.frames);
     check_cost(laplacian_cost(reference, levels, count_of(head.frames), count_of(head.components.size())), data.size);
     const Mesh base = subdivide_midpoint(reference, levels);
-    const std::vector<double> field = decode_displacements(displacements, base, context.layers);
+    const std::vector<double> field = decode_displacements(record.displacements, base, context.layers);
     Continued made;
     Group& group = made.group;
     const size_t frames = group.frames = head.frames, vertices = group.vertices = base.vertex_count();
     group.faces = base.faces, group.levels = levels;
-    group.positions.resize(field.size());
+    group.positions = Block<double>(field.size());
+    double* positions = group.positions.data();
     for (size_t v = 0; v < vertices; ++v)
         for (size_t t = 0; t < frames; ++t)
             for (size_t k = 0; k < 3; ++k)
-                group.positions[3 * (t * vertices + v) + k] =
-                    base.vertices[3 * v + k] + field[3 * (v * frames + t) + k];
-    place_all(context.place, group.positions);
+                positions[3 * (t * vertices + v) + k] = base.vertices[3 * v + k] + field[3 * (v * frames + t) + k];
+    place_all(context.place, positions, group.positions.size());
     made.canvas.push_back({reference, levels, frames, vertices});
     return made;
 }

@@ -2,44 +2,33 @@
 // src/meshreel/coding/layers/coder.py.
 #include <algorithm>
 
+#include "../src/records.h"
 #include "budget.h"
 #include "draco_mesh.h"
 #include "group.h"
-#include "head.h"
-#include "records.h"
 
 namespace meshreel {
 namespace {
 
 // The records of a payload, or of its first layers.
 struct LayersRecords {
-    bool is_alone;
-    size_t frames;
-    unsigned levels;  // of all, in the file
-    double step;
-    mr_bytes base;
+    LayersGroup head;
     std::vector<mr_bytes> layers;  // the LayersGroup, then a LayersLevel for each level
     mr_bytes rest;
     size_t end;
+
+    bool is_alone() const { return head.origin == Origin::ALONE; }
 };
 
 LayersRecords read(const mr_bytes& data, int64_t most) {
     LayersRecords found;
     Records in(data);
-    require(in.u8() == kLayers, "a group of another form than LAYERS");
-    found.is_alone = in.choice(0, 1) == 0;
-    found.frames = in.u8(), found.levels = in.u8(), found.step = in.f64();
-    found.base = in.blob(in.varint());
-    in.choice(0, 2);  // shared
-    in.skip_field();
+    found.head = LayersGroup::read(in);
     found.layers.push_back(in.since(0));
-    const unsigned levels =
-        most == kAllLayers ? found.levels : static_cast<unsigned>(std::min<int64_t>(most, found.levels));
-    for (unsigned level = 0; level < levels; ++level) {
+    const int64_t levels = most == kAllLayers ? found.head.levels : std::min<int64_t>(most, found.head.levels);
+    for (int64_t level = 0; level < levels; ++level) {
         const size_t start = in.offset();
-        in.choice(0, 1);  // origin
-        in.u8(), in.u8();
-        in.skip_field();
+        LayersLevel::read(in);
         found.layers.push_back(in.since(start));
     }
     found.end = in.offset();
@@ -48,19 +37,19 @@ LayersRecords read(const mr_bytes& data, int64_t most) {
 }
 
 Mesh base_of(const LayersRecords& records, const State* previous) {
-    check_step(records.step);
-    require(records.frames > 0, "layers: a group of 0 frames");
+    check_step(records.head.step);
+    require(records.head.frames > 0, "layers: a group of 0 frames");
     Mesh base;
-    if (records.is_alone) {
-        base = decode_draco(records.base, records.step);
+    if (records.is_alone()) {
+        base = decode_draco(records.head.base, records.head.step);
     } else {
         require(previous, "layers: a group that is predicted from one which is not at hand");
-        require(records.base.size == 0, "layers: a base mesh in a group that has another's");
+        require(records.head.base.size == 0, "layers: a base mesh in a group that has another's");
         base.vertices = previous->base, base.faces = previous->faces;
     }
-    check_growth(base, records.levels, records.frames);
+    check_growth(base, records.head.levels, records.head.frames);
     const unsigned levels = static_cast<unsigned>(records.layers.size() - 1);
-    check_cost(layers_cost(base, levels, count_of(records.frames)), records.end);
+    check_cost(layers_cost(base, levels, count_of(records.head.frames)), records.end);
     return base;
 }
 
@@ -68,7 +57,10 @@ Mesh base_of(const LayersRecords& records, const State* previous) {
 class Refinement {
 public:
     Refinement(const LayersRecords& records, const State* previous, const Mesh& base, const mr_placement& place)
-        : frames_(records.frames), records_(records), previous_(records.is_alone ? nullptr : previous), place_(place) {
+        : frames_(records.head.frames),
+          records_(records),
+          previous_(records.is_alone() ? nullptr : previous),
+          place_(place) {
         faces = base.faces, vertices = base.vertex_count();
         state->faces = base.faces;
     }
@@ -76,29 +68,30 @@ public:
     // Positions of the finest level, and the state.
     void decode(const Mesh& base) {
         const mr_mesh view = base.view();
-        rows_.resize(3 * frames_ * vertices);
-        check(mr_decode_motion(&records_.layers[0], &view, frames_, rows_.data()));
+        Block<double> rows(3 * frames_ * vertices);
+        check(mr_decode_motion(&records_.layers[0], &view, frames_, rows.data()));
         state->base.resize(3 * vertices);
-        for (size_t k = 0; k < state->base.size(); ++k) state->base[k] = rows_[k * frames_ + frames_ - 1];
+        for (size_t k = 0; k < state->base.size(); ++k) state->base[k] = rows.data()[k * frames_ + frames_ - 1];
         for (size_t number = 1; number < records_.layers.size(); ++number) {
             const Connectivity& near = next(number);
             const mr_level level = level_of(near, number);
             std::vector<double>& last = state->scalars.back();
-            rows_.reserve(3 * frames_ * near.count());
+            Block<double> finer(3 * frames_ * near.count());
             if (number + 1 < records_.layers.size()) {
-                rows_.resize(3 * frames_ * near.count());
-                check(mr_decode_level(&records_.layers[number], &level, rows_.data(), last.data()));
+                std::copy(rows.begin(), rows.end(), finer.begin());
+                check(mr_decode_level(&records_.layers[number], &level, finer.data(), last.data()));
+                rows = std::move(finer);
             } else {
-                positions.resize(3 * frames_ * near.count());
+                positions = std::move(finer);
                 const mr_frames shown{positions.data(), &place_, nullptr};
-                check(mr_decode_last_level(&records_.layers[number], &level, rows_.data(), last.data(), &shown));
+                check(mr_decode_last_level(&records_.layers[number], &level, rows.data(), last.data(), &shown));
             }
             faces = near.faces, vertices = near.count();
         }
         if (records_.layers.size() > 1) return;
-        positions.resize(rows_.size());
+        positions = Block<double>(rows.size());
         const mr_frames shown{positions.data(), &place_, nullptr};
-        check(mr_frames_of_rows(rows_.data(), frames_, vertices, &shown));
+        check(mr_frames_of_rows(rows.data(), frames_, vertices, &shown));
     }
 
     // The state alone: a fraction of the work.
@@ -116,7 +109,7 @@ public:
 
     Faces faces;      // of the finest level
     size_t vertices;  // of it
-    std::vector<double> positions;
+    Block<double> positions;
     std::shared_ptr<State> state = std::make_shared<State>();
 
 private:
@@ -126,7 +119,7 @@ private:
         state->finer.push_back(is_known ? previous_->finer[number - 1]
                                         : std::make_shared<const Connectivity>(subdivide(faces, vertices, true)));
         const Connectivity& near = *state->finer.back();
-        require(3 * count_of(frames_) * count_of(near.count()) <= limits::kMostNumbers, "frames of too many numbers");
+        require(3 * count_of(frames_) * count_of(near.count()) <= limits::kNumbers, "frames of too many numbers");
         state->scalars.emplace_back(near.edge_count());
         return near;
     }
@@ -148,7 +141,6 @@ private:
     const LayersRecords& records_;
     const State* previous_;
     const mr_placement& place_;
-    std::vector<double> rows_;
 };
 
 }  // namespace
@@ -157,7 +149,7 @@ Mesh layers_base(const mr_bytes& data) { return base_of(read(data, 0), nullptr);
 
 Continued decode_layers(const mr_bytes& data, const Context& context) {
     const LayersRecords records = read(data, context.layers);
-    require(records.frames == context.frames, "a group of other frames than the index says");
+    check_frames(records.head.frames, context);
     Continued made;
     const Mesh base = base_of(records, context.previous);
     Refinement refinement(records, context.previous, base, context.place);
@@ -165,12 +157,12 @@ Continued decode_layers(const mr_bytes& data, const Context& context) {
     if (context.is_shown) refinement.decode(base);
     else refinement.skip(base);
     made.state = refinement.state;
-    made.canvas.push_back({base, levels, records.frames, refinement.vertices});
+    made.canvas.push_back({base, levels, records.head.frames, refinement.vertices});
     if (!context.is_shown) return made;
     Group& group = made.group;
-    group.frames = records.frames, group.vertices = refinement.vertices, group.levels = levels;
+    group.frames = records.head.frames, group.vertices = refinement.vertices, group.levels = levels;
     group.positions = std::move(refinement.positions), group.faces = refinement.faces;
-    if (records.rest.size == 0 || (context.layers != kAllLayers && context.layers <= records.levels)) return made;
+    if (records.rest.size == 0 || (context.layers != kAllLayers && context.layers <= records.head.levels)) return made;
     decode_patches(records.rest, group);
     Mesh together;
     for (const Mesh& mesh : group.added) append(together, mesh);

@@ -2,7 +2,7 @@
 
 #include <limits>
 
-#include "format_error.h"
+#include "../src/format_error.h"
 
 namespace meshreel {
 namespace {
@@ -50,13 +50,13 @@ Mesh subdivide_midpoint(const Mesh& mesh, unsigned levels) {
     return finer;
 }
 
-void place_all(const mr_placement& placement, std::vector<double>& vertices) {
-    for (size_t k = 0; k < vertices.size(); ++k) vertices[k] = placement.origin[k % 3] + placement.scale * vertices[k];
+void place_all(const mr_placement& placement, double* vertices, size_t numbers) {
+    for (size_t k = 0; k < numbers; ++k) vertices[k] = placement.origin[k % 3] + placement.scale * vertices[k];
 }
 
-void turn_all(const double (&rotation)[9], const double (&origin)[3], std::vector<double>& vertices) {
-    for (size_t v = 0; v < vertices.size(); v += 3) {
-        double* at = vertices.data() + v;
+void turn_all(const double (&rotation)[9], const double* origin, double* vertices, size_t numbers) {
+    for (size_t v = 0; v < numbers; v += 3) {
+        double* at = vertices + v;
         const double x = at[0] - origin[0], y = at[1] - origin[1], z = at[2] - origin[2];
         for (size_t k = 0; k < 3; ++k) {
             const double* row = rotation + 3 * k;

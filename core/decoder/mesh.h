@@ -45,10 +45,13 @@ Connectivity subdivide(const Faces& faces, size_t vertices, bool with_siblings);
 Mesh subdivide_midpoint(const Mesh& mesh, unsigned levels);
 
 // Moves each coordinate to origin + scale * coordinate.
-void place_all(const mr_placement& placement, std::vector<double>& vertices);
+void place_all(const mr_placement& placement, double* vertices, size_t numbers);
+inline void place_all(const mr_placement& placement, std::vector<double>& vertices) {
+    place_all(placement, vertices.data(), vertices.size());
+}
 
 // Turns vertices about an origin by a rotation matrix, row by row.
-void turn_all(const double (&rotation)[9], const double (&origin)[3], std::vector<double>& vertices);
+void turn_all(const double (&rotation)[9], const double* origin, double* vertices, size_t numbers);
 
 // Drops the faces of which `dropped` is 1, and the vertices that no other face names.
 Mesh without(const Mesh& mesh, const std::vector<uint8_t>& dropped);

@@ -1,11 +1,10 @@
 // Colours of the vertices of a group or of a background. Beside src/meshreel/coding/{colored,appearance/colors}.py.
 #include <algorithm>
 
+#include "../src/records.h"
 #include "budget.h"
 #include "group.h"
-#include "head.h"
 #include "meshreel/colors.h"
-#include "records.h"
 
 namespace meshreel {
 namespace {
@@ -29,24 +28,28 @@ void check_colors_cost(const std::vector<ColoredMesh>& canvas, size_t size) {
 Painted decode_colors(const mr_bytes& data, const std::vector<ColoredMesh>& canvas, const std::vector<double>& before) {
     check_colors_cost(canvas, data.size);
     Records in(data);
-    require(in.u8() == kVertexColors, "colours of another form");
-    const bool is_predicted = in.choice(0, 1) == 1;
-    const uint8_t chroma = in.u8();
-    require(chroma > 0, "colours whose differences were multiplied by 0");
+    const VertexColors head = VertexColors::read(in);
+    const bool is_predicted = head.origin == Origin::PREVIOUS;
+    require(head.form == Form::VERTEX_COLORS, "colours of another form");
+    require(head.chroma > 0, "colours whose differences were multiplied by 0");
     require(!is_predicted || !before.empty(), "colours that are predicted from those of a group which is not at hand");
     Painted painted;
     for (size_t number = 0; number < canvas.size(); ++number) {
         const ColoredMesh& mesh = canvas[number];
         const size_t start = in.offset();
-        in.skip_field();
-        for (unsigned level = 0; level < mesh.levels; ++level) in.skip_colors_level();
+        CodedField::read(in);
+        for (unsigned level = 0; level < mesh.levels; ++level) ColorsLevel::read(in);
         const mr_bytes records = in.since(start);
         const bool is_known = number == 0 && is_predicted;
         require(!is_known || before.size() == 3 * mesh.vertices,
                 "colours that are predicted from those of other vertices");
         const mr_mesh base = mesh.base.view();
-        const mr_colored colored{&base,         static_cast<int>(mesh.levels),     mesh.vertices, mesh.frames,
-                                 chroma / 64.0, is_known ? before.data() : nullptr};
+        const mr_colored colored{&base,
+                                 static_cast<int>(mesh.levels),
+                                 mesh.vertices,
+                                 mesh.frames,
+                                 head.chroma / 64.0,
+                                 is_known ? before.data() : nullptr};
         const size_t first = painted.colors.size();
         painted.colors.resize(first + 3 * mesh.frames * mesh.vertices);
         std::vector<double> last(3 * mesh.vertices);

@@ -2,10 +2,10 @@
 // src/meshreel/coding/layers/patches.py.
 #include <cmath>
 
+#include "../src/records.h"
 #include "budget.h"
 #include "draco_mesh.h"
 #include "group.h"
-#include "records.h"
 
 namespace meshreel {
 namespace {
@@ -78,21 +78,16 @@ std::vector<Mesh> part(const Mesh& mesh, double width, double step, size_t frame
 }  // namespace
 
 void decode_patches(const mr_bytes& data, Group& group) {
-    Records in(data);
-    const uint64_t count = in.varint();
-    const mr_bytes dropped = in.blob(in.varint());
-    const double step = step_of(in.u8());
-    const uint64_t width = in.varint();
-    const mr_bytes mesh = in.blob(in.varint());
-    in.finish("LayersPatches");
+    const LayersPatches record = read_all<LayersPatches>(data, "LayersPatches");
+    const double step = step_of(record.step_level);
     const size_t faces = group.faces->size() / 3;
-    require(count <= 2 * faces + group.frames * (faces + 1) + 2, "patches: more runs than there are faces");
-    group.dropped = decode_dropped(decode_integers(dropped, count), group.frames, faces);
-    const Mesh whole = decode_draco(mesh, step);
+    require(record.runs <= 2 * faces + group.frames * (faces + 1) + 2, "patches: more runs than there are faces");
+    group.dropped = decode_dropped(decode_integers(record.dropped, record.runs), group.frames, faces);
+    const Mesh whole = decode_draco(record.mesh, step);
     group.added.resize(group.frames);
     if (whole.face_count() == 0) return;
     check_growth(whole, 0);
-    group.added = part(whole, static_cast<double>(width), step, group.frames);
+    group.added = part(whole, static_cast<double>(record.width), step, group.frames);
 }
 
 }  // namespace meshreel

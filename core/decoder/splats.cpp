@@ -1,37 +1,24 @@
-
 #include <algorithm>
 #include <cmath>
 
+#include "../src/records.h"
 #include "../src/rigid3.h"
 #include "budget.h"
-#include "records.h"
-#include "video.h"
+#include "splats.h"
 
 namespace meshreel {
 namespace {
 
 constexpr uint8_t kMostBits = 14;
 constexpr int32_t kRungs = 200;  // of the ladder of steps
-constexpr double kSplat = 1024;  // cost of one
 constexpr double kThin = 0.1;    // third scale, along the normal, of the shorter one
 constexpr double kPi = 3.14159265358979323846;
 
-struct SplatsHead {
-    uint8_t bits[4];  // of places, turns, opacities, colours
-    uint8_t offset_level, scale_level;
-    uint64_t count;
-};
-
-SplatsHead read_head(Records& in) {
-    require(in.u8() == kGaussians, "splats of another form");
-    SplatsHead head;
-    for (uint8_t& bits : head.bits) {
-        bits = in.u8();
+void check_head(const Gaussians& head) {
+    require(head.form == Form::GAUSSIANS, "splats of another form");
+    for (const uint8_t bits : {head.place_bits, head.turn_bits, head.opacity_bits, head.color_bits})
         require(bits >= 1 && bits <= kMostBits, "splats: numbers of too many bits");
-    }
-    head.offset_level = in.u8(), head.scale_level = in.u8(), head.count = in.varint();
     step_of(head.offset_level);
-    return head;
 }
 
 int64_t in_range(int64_t value, int64_t most) {
@@ -39,13 +26,16 @@ int64_t in_range(int64_t value, int64_t most) {
     return value;
 }
 
-void read_layer(Records& in, const SplatsHead& head, size_t n, size_t faces, std::vector<Splat>& out) {
-    const auto get = [&](size_t rows) { return decode_integers(in.blob(in.varint()), rows * n); };
-    const std::vector<int32_t> skips = get(1), places = get(2), offsets = get(1), turns = get(1), scales = get(2),
-                               opacities = get(1), colors = get(3);
-    const int64_t whole = int64_t{1} << head.bits[0], turn = int64_t{1} << head.bits[1],
-                  full = int64_t{1} << head.bits[2];
-    const double fine = std::ldexp(1.0, head.bits[3]);
+void read_layer(const GaussiansLayer& layer, const Gaussians& head, size_t faces, std::vector<Splat>& out) {
+    const size_t n = static_cast<size_t>(layer.count);
+    const auto get = [&](const mr_bytes& stream, size_t rows) { return decode_integers(stream, rows * n); };
+    const std::vector<int32_t> skips = get(layer.faces, 1), places = get(layer.places, 2),
+                               offsets = get(layer.offsets, 1), turns = get(layer.turns, 1),
+                               scales = get(layer.scales, 2), opacities = get(layer.opacities, 1),
+                               colors = get(layer.colors, 3);
+    const int64_t whole = int64_t{1} << head.place_bits, turn = int64_t{1} << head.turn_bits,
+                  full = int64_t{1} << head.opacity_bits;
+    const double fine = std::ldexp(1.0, head.color_bits);
     int64_t face = 0, luma = 0, orange = 0, green = 0;
     for (size_t k = 0; k < n; ++k) {
         Splat splat;
@@ -59,6 +49,7 @@ void read_layer(Records& in, const SplatsHead& head, size_t n, size_t faces, std
         splat.turn = static_cast<double>(in_range(turns[k], turn - 1)) * (kPi / static_cast<double>(turn));
         const int64_t longer = in_range(int64_t{head.scale_level} + scales[k], kRungs - 1);
         const int64_t shorter = in_range(longer + in_range(scales[n + k], kRungs - 1), kRungs - 1);
+        splat.rungs[0] = static_cast<uint8_t>(longer), splat.rungs[1] = static_cast<uint8_t>(shorter);
         splat.scales[0] = step_of(static_cast<unsigned>(longer)),
         splat.scales[1] = step_of(static_cast<unsigned>(shorter));
         splat.opacity = static_cast<double>(in_range(opacities[k], full)) / static_cast<double>(full);
@@ -69,11 +60,14 @@ void read_layer(Records& in, const SplatsHead& head, size_t n, size_t faces, std
     }
 }
 
-// Where a splat is after subdivisions: a face, the weights of its corners, and the first edge of the base's face there.
-struct Located {
-    size_t face;
-    double weights[3], along[3];
-};
+Vec unit_of(Vec v) {
+    const double length = std::sqrt(dot(v, v));
+    return length > 0 ? (1 / length) * v : v;
+}
+
+void push(std::vector<double>& out, Vec v) { out.insert(out.end(), {v.x, v.y, v.z}); }
+
+}  // namespace
 
 Located locate(const Splat& splat, unsigned levels) {
     size_t face = static_cast<size_t>(splat.face);
@@ -93,28 +87,23 @@ Located locate(const Splat& splat, unsigned levels) {
     return {face, {w[0], w[1], w[2]}, {along[0], along[1], along[2]}};
 }
 
-Vec unit_of(Vec v) {
-    const double length = std::sqrt(dot(v, v));
-    return length > 0 ? (1 / length) * v : v;
-}
-
-void push(std::vector<double>& out, Vec v) { out.insert(out.end(), {v.x, v.y, v.z}); }
-
-}  // namespace
-
-std::vector<Splat> decode_splats(const mr_bytes& data, size_t faces) {
+Splats decode_splats(const mr_bytes& data, size_t faces) {
     Records in(data);
-    const SplatsHead head = read_head(in);
-    std::vector<Splat> splats;
+    const Gaussians head = Gaussians::read(in);
+    check_head(head);
+    Splats found;
+    std::vector<Splat>& splats = found.all;
     do {
-        const uint64_t n = in.varint();
+        const GaussiansLayer layer = GaussiansLayer::read(in);
+        const uint64_t n = layer.count;
         require(n > 0 && n <= head.count && splats.size() <= head.count - n, "splats: more or fewer than there are");
-        check_cost(kSplat * count_of(splats.size() + static_cast<size_t>(n)), data.size);
-        read_layer(in, head, static_cast<size_t>(n), faces, splats);
+        check_cost(limits::kSplat * (count_of(splats.size()) + static_cast<double>(n)), data.size);
+        read_layer(layer, head, faces, splats);
     } while (in.left() > 0);
-    const double growth = std::sqrt(std::sqrt(static_cast<double>(head.count) / count_of(splats.size())));
+    const double growth = found.growth =
+        std::sqrt(std::sqrt(static_cast<double>(head.count) / count_of(splats.size())));
     for (Splat& splat : splats) splat.scales[0] *= growth, splat.scales[1] *= growth;
-    return splats;
+    return found;
 }
 
 Bound bind_splats(const std::vector<Splat>& splats, const Group& group, size_t t, double unit) {
@@ -140,37 +129,6 @@ Bound bind_splats(const std::vector<Splat>& splats, const Group& group, size_t t
         bound.colors.insert(bound.colors.end(), splat.color, splat.color + 3);
     }
     return bound;
-}
-
-// The chunk of the splats that a group has: its own, or those of a group before it.
-uint32_t Video::splats_of(uint32_t chunk) const {
-    for (; chunk != kNoChunk; chunk = head.group_before(chunk)) {
-        const uint8_t form = head.chunks[chunk].form;
-        if (form != kLayers && form != kLaplacian) return kNoChunk;
-        const uint32_t found = head.companion_of(chunk, kSplatsOf);
-        if (found != kNoChunk) return found;
-    }
-    return kNoChunk;
-}
-
-Bound Video::splats(uint64_t frame, size_t track) {
-    lacking.clear();
-    const uint32_t chunk = head.chunk_of_frame(frame, track), of = splats_of(chunk);
-    if (of == kNoChunk) return Bound();
-    const Group& group = group_of(frame, track);
-    if (splats_.chunk != of) {
-        refused_.check(of);
-        const uint32_t owner = static_cast<uint32_t>(head.chunks[of].depends_on[0]);
-        const std::vector<uint8_t> first = read(owner, 0), data = read(of, layers_);
-        splats_ = {};
-        splats_.faces = refused_.of(head, of, [&] { return base_mesh(view(first)).face_count(); });
-        splats_.all = refused_.of(head, of, [&] { return decode_splats(view(data), splats_.faces); });
-        splats_.chunk = of;
-    }
-    const double corners = 3 * std::ldexp(count_of(splats_.faces), 2 * static_cast<int>(group.levels));
-    if (count_of(group.faces->size()) != corners) return Bound();  // they are of another mesh
-    const size_t t = static_cast<size_t>(frame - head.chunks[chunk].first_frame);
-    return bind_splats(splats_.all, group, t, head.header.scale);
 }
 
 }  // namespace meshreel

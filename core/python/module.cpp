@@ -3,6 +3,7 @@
 
 namespace meshreel {
 
+void bind_decoder(nanobind::module_&);
 void bind_draco(nanobind::module_&);
 void bind_deform(nanobind::module_&);
 void bind_dense(nanobind::module_&);
@@ -19,6 +20,7 @@ void bind_voxels(nanobind::module_&);
 
 NB_MODULE(_core, m) {
     m.doc() = "The arithmetic that must be fast, and equal to the bit in every build.";
+    meshreel::bind_decoder(m);
     meshreel::bind_draco(m);
     meshreel::bind_deform(m);
     meshreel::bind_dense(m);

@@ -3,6 +3,7 @@
 
 #include "draco_head.h"
 #include "guarded.h"
+#include "layout.gen.h"
 #include "meshreel/draco.h"
 
 // Facts about the bytes: Draco's bitstream specification, version 2.2.
@@ -14,12 +15,12 @@ namespace {
 // some 60 bytes of memory. Captured surfaces have at most 6 faces a byte, and those of the standard traversal 8,
 // whatever they are.
 constexpr uint64_t kFree = 1 << 17, kPerByte = 16;
-constexpr uint64_t kMost = 64'000'000;  // MAX_FACES of coding/mesh.py
+constexpr uint64_t kMost = static_cast<uint64_t>(limits::kFaces);
 // Corners that it may rename to put these together, at some 13 ns each. Captured surfaces have less than one a face,
 // grids full of holes two.
 constexpr uint64_t kFreeSteps = 1 << 24, kStepsPerFace = 64;
 
-constexpr uint8_t kBegin[] = {'D', 'R', 'A', 'C', 'O'}, kVersion[] = {2, 2};
+constexpr uint8_t kBegin[] = {'D', 'R', 'A', 'C', 'O'}, kDracoVersion[] = {2, 2};
 constexpr uint8_t kMesh = 1, kEdgebreaker = 1;
 constexpr uint8_t kPositions = 0, kFloat32 = 9, kQuantised = 2;
 constexpr int kMostBits = 30;  // of a coordinate
@@ -29,9 +30,9 @@ uint64_t most_of(uint64_t bytes) { return bytes < kMost ? std::min(kFree + kPerB
 int check_kind(DracoReader& in) {
     const uint8_t* begin = in.take(sizeof kBegin);
     if (!begin || std::memcmp(begin, kBegin, sizeof kBegin) != 0) return MR_NOT_DRACO;
-    const uint8_t* version = in.take(sizeof kVersion);
+    const uint8_t* version = in.take(sizeof kDracoVersion);
     if (in.byte() != kMesh) return MR_DRACO_CLOUD;
-    if (!in.good() || std::memcmp(version, kVersion, sizeof kVersion) != 0) return MR_NOT_DRACO;
+    if (!in.good() || std::memcmp(version, kDracoVersion, sizeof kDracoVersion) != 0) return MR_NOT_DRACO;
     if (in.byte() != kEdgebreaker) return MR_DRACO_SEQUENTIAL;
     const uint8_t low = in.byte(), high = in.byte();
     return (low | high) != 0 ? MR_DRACO_METADATA : MR_OK;
@@ -63,6 +64,19 @@ int check_attributes(DracoReader& in) {
 bool is_finite(const uint8_t* number) {  // a 32-bit float
     return (number[3] & 0x7f) != 0x7f || (number[2] & 0x80) == 0;
 }
+
+// Claims of meshes that are decoded together.
+struct Tally {
+    explicit Tally(uint64_t bytes) : most(most_of(bytes)) {}
+
+    bool add(const DracoClaims& claims) {
+        faces += claims.faces, points += claims.points + claims.splits, steps += claims.steps;
+        return faces <= most && points <= most;
+    }
+    int finish() const { return steps > kFreeSteps + kStepsPerFace * faces ? MR_DRACO_STEPS : MR_OK; }
+
+    uint64_t most, faces = 0, points = 0, steps = 0;
+};
 
 // Where the parts of the positions are.
 struct Places {
@@ -131,24 +145,25 @@ int read_draco(const mr_bytes& mesh, DracoParts& parts) {
     found.most = static_cast<int32_t>(number_of(places.bounds + 4));
     for (int k = 0; k < 3; ++k) found.corner[k] = float_of(places.numbers + 4 * k);
     found.width = float_of(places.numbers + 12), found.bits = places.bits;
-    return places.symbols.good() ? MR_OK : MR_BAD_DRACO;
+    if (!places.symbols.good()) return MR_BAD_DRACO;
+    Tally tally(mesh.size);
+    return tally.add(parts.claims) ? tally.finish() : MR_DRACO_CLAIMS;
 }
 
 }  // namespace meshreel
 
 int mr_check_draco(const mr_bytes* meshes, size_t count) {
     using namespace meshreel;
-    uint64_t bytes = 0, faces = 0, points = 0, steps = 0;
+    uint64_t bytes = 0;
     for (size_t k = 0; k < count; ++k) bytes += meshes[k].size;
-    const uint64_t most = most_of(bytes);
+    Tally tally(bytes);
     for (size_t k = 0; k < count; ++k) {
         if (meshes[k].size == 0) continue;  // the empty mesh
         DracoClaims claims{};
-        const int status = guarded(MR_NO_MEMORY, MR_BAD_DRACO, [&] { return check_mesh(meshes[k], claims, most); });
+        const int status =
+            guarded(MR_NO_MEMORY, MR_BAD_DRACO, [&] { return check_mesh(meshes[k], claims, tally.most); });
         if (status != MR_OK) return status;
-        faces += claims.faces, points += claims.points + claims.splits, steps += claims.steps;
-        if (faces > most || points > most) return MR_DRACO_CLAIMS;
+        if (!tally.add(claims)) return MR_DRACO_CLAIMS;
     }
-    if (steps > kFreeSteps + kStepsPerFace * faces) return MR_DRACO_STEPS;
-    return MR_OK;
+    return tally.finish();
 }

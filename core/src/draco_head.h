@@ -23,7 +23,7 @@ struct DracoParts {
     DracoPositions positions;
 };
 
-// Returns a status. Checks what mr_check_draco does of a single mesh, but for its steps. May throw std::bad_alloc.
+// Returns a status. Checks what mr_check_draco does of a single mesh. May throw std::bad_alloc.
 int read_draco(const mr_bytes& mesh, DracoParts& parts);
 
 }  // namespace meshreel

@@ -6,42 +6,22 @@
 #include <vector>
 
 #include "field_rows.h"
+#include "layout.gen.h"
 #include "meshreel/layers.h"
 #include "scratch.h"
 
 namespace meshreel {
 
-struct CodedField {
-    uint64_t columns;
-    uint8_t step_level;
-    mr_bytes basis, symbols;
-};
-
-// SharedMotion of src/meshreel/format/layout.py: what moves all vertices alike, coded before the basis.
-enum class Shared : uint8_t { kNone, kShifts, kPoses };
-
-struct LayersGroup {
-    uint8_t frames;
-    Shared shared;
-    CodedField motion;
-};
-
-struct LayersLevel {
-    bool follows;  // its scalars are counted from the last frame of the group before
-    int curvature, sibling_weight;
-    CodedField scalars;
-};
-
-// Colours of the vertices that a subdivision adds.
-struct ColorsLevel {
-    int sibling_weight;
-    CodedField values;
-};
-
 // False where the bytes are not exactly one such record.
-bool parse(const mr_bytes& bytes, CodedField& record);
-bool parse(const mr_bytes& bytes, LayersGroup& record);
-bool parse(const mr_bytes& bytes, LayersLevel& record);
+template <class Record>
+bool parse(const mr_bytes& bytes, Record& record) {
+    try {
+        record = read_all<Record>(bytes, "record");
+        return true;
+    } catch (...) {  // FormatError
+        return false;
+    }
+}
 // The same of a CodedField and a ColorsLevel for each of `levels`.
 bool parse(const mr_bytes& bytes, CodedField& base, std::vector<ColorsLevel>& levels);
 

@@ -5,7 +5,7 @@
 
 namespace meshreel {
 
-#if defined(__cpp_exceptions)
+#if defined(__cpp_exceptions) && !defined(__wasm__)
 
 // What `body` gives, `no_memory` where there was none for it, and `failed` where it threw anything else.
 template <class Body>
@@ -21,7 +21,7 @@ int guarded(int no_memory, int failed, Body body) {
 
 #else
 
-// A build without exceptions (wasm) stops where there is no memory: its host starts another instance.
+// In wasm nothing can look at what was thrown: all of it goes on to the host's call.
 template <class Body>
 int guarded(int, int, Body body) {
     return body();

@@ -76,7 +76,8 @@ int decode_motion(const LayersGroup& record, const mr_mesh& base, size_t first, 
     const mr_graph graph = mr_hierarchy_graph(made);
     FieldStreams streams;
     const size_t width = size_t{3} * record.frames;
-    const size_t head = record.shared == Shared::kNone ? 0 : 1 + (record.shared == Shared::kPoses ? 2 : 1) * width;
+    const size_t head =
+        record.shared == SharedMotion::NONE ? 0 : 1 + (record.shared == SharedMotion::POSES ? 2 : 1) * width;
     status = decode_streams(record.motion, graph, width, head, streams);
     if (status != MR_OK) return status;
     const int bits = head > 0 ? streams.head[0] : 0;
@@ -84,8 +85,8 @@ int decode_motion(const LayersGroup& record, const mr_mesh& base, size_t first, 
     std::vector<double> shared;
     for (size_t k = 1; k < head; ++k) shared.push_back(std::ldexp(static_cast<double>(streams.head[k]), -bits));
     std::vector<Pose> poses;
-    if (record.shared == Shared::kPoses) poses = poses_of(shared);
-    if (record.shared == Shared::kShifts) streams.means = shared;
+    if (record.shared == SharedMotion::POSES) poses = poses_of(shared);
+    if (record.shared == SharedMotion::SHIFTS) streams.means = shared;
     FieldRows field(streams.over(graph, 3 * first));
     const Pose* own = poses.empty() ? nullptr : poses.data() + first;
     return place_rows(field, mr_hierarchy_order(made), base, record.frames - first, own, rows) ? MR_OK : MR_NOT_FINITE;

@@ -186,9 +186,9 @@ public:
         const mr_graph graph{level.edge_count, level.starts, level.near, weights_.data()};
         const int status = decode_streams(record.scalars, graph, level.frames, 0, streams_);
         if (status != MR_OK) return status;
-        if (record.follows && !level.previous) return MR_NO_PREVIOUS;
+        if (record.origin == Origin::PREVIOUS && !level.previous) return MR_NO_PREVIOUS;
         field_ = streams_.over(graph, first);
-        field_.before = record.follows ? level.previous : nullptr;
+        field_.before = record.origin == Origin::PREVIOUS ? level.previous : nullptr;
         return MR_OK;
     }
 

@@ -1,9 +1,71 @@
 """Types of the compiled core (core/python/bind_*.cpp)."""
 
+from collections.abc import Sequence
 from typing import TypeAlias
 
 import numpy as np
 from jaxtyping import Float, Float32, Float64, Int32, Int64, UInt8
+
+# bind_decoder.cpp
+
+Arrays: TypeAlias = tuple[
+    Float64[np.ndarray, "V 3"],
+    Int32[np.ndarray, "F 3"],
+    UInt8[np.ndarray, "V 3"] | None,
+    Float32[np.ndarray, "F 3 2"] | None,
+]  # vertices, faces, colours and places of a mesh, read-only
+Place: TypeAlias = tuple[float, tuple[float, float, float]]  # scale and origin
+
+class GroupState:
+    @property
+    def levels(self) -> int: ...
+    def nbytes_beyond(self, before: GroupState | None) -> int: ...
+
+class AtlasLayout:
+    width: int
+    height: int
+
+class Group:
+    def __init__(
+        self,
+        data: bytes,
+        frames: int,
+        layers: int | None,
+        previous: GroupState | None,
+        place: Place,
+        shown: bool = True,
+    ) -> None: ...
+    @property
+    def state(self) -> GroupState | None: ...
+    @property
+    def nbytes(self) -> int: ...
+    def paint(self, data: bytes) -> None: ...
+    def place(self, layout: AtlasLayout) -> None: ...
+    def turn(self, rotation: Sequence[float], origin: Sequence[float]) -> None: ...
+    def frames(self) -> list[Arrays]: ...
+
+class Background:
+    def __init__(self, data: bytes, before: Background | None, place: Place) -> None: ...
+    def paint(self, data: bytes) -> None: ...
+    def place(self, layout: AtlasLayout) -> None: ...
+    def arrays(self) -> Arrays: ...
+
+class Splats:
+    def bind(
+        self, group: Group, frame: int, unit: float
+    ) -> (
+        tuple[
+            Float64[np.ndarray, "N 3"],
+            Float64[np.ndarray, "N 3 3"],
+            Float64[np.ndarray, "N 3"],
+            Float64[np.ndarray, " N"],
+            Float64[np.ndarray, "N 3"],
+        ]
+        | None
+    ): ...
+
+def read_atlas(data: bytes, owner: bytes) -> AtlasLayout: ...
+def read_splats(data: bytes, owner: bytes) -> Splats: ...
 
 # bind_draco.cpp
 

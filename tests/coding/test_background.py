@@ -15,6 +15,7 @@ from meshreel.coding.entropy import encode_integers
 from meshreel.coding.intra import encode_empty, encode_intra
 from meshreel.coding.mesh import encode_mesh
 from meshreel.errors import FormatError, InputError
+from meshreel.format.budget import LIMITS
 from meshreel.format.layout import Form, StaticPatch
 from meshreel.format.records import pack, unpack_all
 from meshreel.types import Mesh, Placement
@@ -165,10 +166,10 @@ def test_runs_that_say_nothing_or_something_else_are_refused(runs: list[int]) ->
 def test_a_background_that_grows_beyond_all_bounds_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     data = encode_change(BEFORE, np.zeros(len(BEFORE.faces), bool), KNOB, STEP)
     together = len(BEFORE.faces) + len(KNOB.faces)
-    monkeypatch.setattr("meshreel.coding.mesh.MAX_FACES", together)
+    monkeypatch.setattr("meshreel.coding.mesh.LIMITS", replace(LIMITS, faces=together))
     assert len(decode_change(data, BEFORE).faces) == together
     for most in (together - 1, len(KNOB.faces) - 1):
-        monkeypatch.setattr("meshreel.coding.mesh.MAX_FACES", most)
+        monkeypatch.setattr("meshreel.coding.mesh.LIMITS", replace(LIMITS, faces=most))
         with pytest.raises(FormatError, match=f"over {most}"):
             decode_change(data, BEFORE)
 

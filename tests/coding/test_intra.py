@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from meshreel.coding.intra import decode_empty, decode_intra, encode_empty, encode_intra
-from meshreel.coding.mesh import MAX_FACES, encode_mesh
+from meshreel.coding.mesh import encode_mesh
 from meshreel.coding.reference_mesh import code_on_lattice
 from meshreel.errors import FormatError, InputError
+from meshreel.format.budget import LIMITS
 from meshreel.format.layout import DracoGroup, Form
 from meshreel.format.records import pack
 from meshreel.types import Mesh
@@ -38,7 +39,7 @@ def test_subdivision_is_free_and_keeps_the_vertices() -> None:
 
 
 def test_subdivision_to_an_absurd_size_is_refused_before_memory_is_taken() -> None:
-    levels = next(k for k in range(20) if len(BALL.faces) * 4**k > MAX_FACES)
+    levels = next(k for k in range(20) if len(BALL.faces) * 4**k > LIMITS.faces)
     with pytest.raises(FormatError, match=f"subdivided {levels} times"):
         decode_intra(encode_intra([BALL], 1e-3, levels))
 

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 import meshreel
-from meshreel.coding import group as forms
+from meshreel import _core
 from meshreel.coding.intra import encode_empty
-from meshreel.coding.layers.coder import LayersRecords, encode_layers
+from meshreel.coding.layers.coder import encode_layers
 from meshreel.container.reader import ReelReader
 from meshreel.container.sources import BytesSource
 from meshreel.container.writer import ReelWriter
@@ -92,13 +92,13 @@ def test_a_frame_costs_its_chain_and_the_next_group_only_itself():
 
 
 def test_a_frame_asked_for_first_places_the_frames_of_its_own_group_alone(monkeypatch: pytest.MonkeyPatch):
-    placed, place = list[int](), forms.place_layers
+    placed, decode = list[int](), _core.Group
 
-    def count(records: LayersRecords, *arguments: object, **named: object) -> object:
-        placed.append(records.head.frames)
-        return place(records, *arguments, **named)
+    def count(data: bytes, frames: int, *arguments: object, shown: bool = True) -> object:
+        placed.extend([frames] * shown)
+        return decode(data, frames, *arguments, shown=shown)
 
-    monkeypatch.setattr(forms, "place_layers", count)
+    monkeypatch.setattr(_core, "Group", count)
     assert frame_record(meshreel.open(DATA)[8]) == WHOLE[8]
     assert placed == [LENGTHS[2]]
 

@@ -9,11 +9,12 @@ from collections.abc import Callable
 import pytest
 
 import meshreel
+from meshreel import _core
 from meshreel.coding.intra import encode_empty
 from meshreel.container.reader import ReelReader
 from meshreel.container.sources import BytesSource
 from meshreel.container.writer import ReelWriter
-from meshreel.decoder import cache, tracks
+from meshreel.decoder import cache
 from meshreel.errors import FormatError, InputError
 from tests.container.files import HEADER
 from tests.decoder.test_chains import COUNT, DATA, WHOLE
@@ -42,13 +43,13 @@ def shortened(payload: bytes) -> bytes:
 def decoded(monkeypatch: pytest.MonkeyPatch) -> Counter[int]:
     """How often each payload was decoded, by its length and the background's by their form."""
     counts: Counter[int] = Counter()
-    for name in ("continue_group", "skip_group", "decode_background", "decode_change"):
+    for name in ("Group", "Background"):
 
-        def count(data: bytes, *arguments: object, of=getattr(tracks, name)) -> object:
+        def count(data: bytes, *arguments: object, of=getattr(_core, name), **named: object) -> object:
             counts[data[0], len(data)] += 1
-            return of(data, *arguments)
+            return of(data, *arguments, **named)
 
-        monkeypatch.setattr(tracks, name, count)
+        monkeypatch.setattr(_core, name, count)
     return counts
 
 

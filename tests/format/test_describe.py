@@ -26,15 +26,17 @@ def test_format_md_is_not_stale():
 def test_generate_check_passes_and_fails_on_a_stale_document(tmp_path):
     copied = tmp_path / "scripts"
     copied.mkdir()
-    for name in ("generate", "generate_format.py", "format_tables.py", "format_typescript.py", "reliability.py"):
+    makers = ("cpp", "tables", "typescript")
+    for name in ("generate", "generate_format.py", *(f"format_{maker}.py" for maker in makers), "reliability.py"):
         (copied / name).write_bytes((ROOT / "scripts" / name).read_bytes())
     shutil.copytree(ROOT / "docs", tmp_path / "docs", ignore=shutil.ignore_patterns("pictures"))
     (tmp_path / "src").symlink_to(ROOT / "src")
     text = (ROOT / "FORMAT.md").read_text(encoding="utf-8")
     (tmp_path / "FORMAT.md").write_text(text, encoding="utf-8")
-    module = tmp_path / "web/player-core/src/format/layout.gen.ts"
-    module.parent.mkdir(parents=True)
-    module.write_bytes((ROOT / module.relative_to(tmp_path)).read_bytes())
+    generated = ("web/player-core/src/format/layout.gen.ts", "core/src/layout.gen.h")
+    for module in (tmp_path / name for name in generated):
+        module.parent.mkdir(parents=True)
+        module.write_bytes((ROOT / module.relative_to(tmp_path)).read_bytes())
     command = ["bash", str(copied / "generate"), "--check"]
     environment = os.environ | {"PYTHON": sys.executable}
     assert subprocess.run(command, env=environment).returncode == 0
@@ -42,9 +44,13 @@ def test_generate_check_passes_and_fails_on_a_stale_document(tmp_path):
     assert subprocess.run(command, env=environment, capture_output=True).returncode == 1
     assert subprocess.run(command[:-1], env=environment).returncode == 0
     assert (tmp_path / "FORMAT.md").read_text(encoding="utf-8") == text
-    module.write_text(module.read_text(encoding="utf-8").replace("VERSION = 1", "VERSION = 2"), encoding="utf-8")
-    assert subprocess.run(command, env=environment, capture_output=True).returncode == 1
-    assert subprocess.run(command[:-1], env=environment).returncode == 0
+    for module in (tmp_path / name for name in generated):
+        stale = (
+            module.read_text(encoding="utf-8").replace("RSION = 1", "RSION = 2").replace("kVersion = 1", "kVersion = 2")
+        )
+        module.write_text(stale, encoding="utf-8")
+        assert subprocess.run(command, env=environment, capture_output=True).returncode == 1
+        assert subprocess.run(command[:-1], env=environment).returncode == 0
     assert subprocess.run(command, env=environment).returncode == 0
 
 

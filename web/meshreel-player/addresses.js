@@ -5,7 +5,6 @@ import { files } from "./files.js";
 globalThis.meshreelFiles ??= {
   "worker.js": files.worker.href,
   "core.wasm": files.core.href,
-  "draco.wasm": files.draco.href,
   "order.js": files.order.href,
   "three.js": new URL("./three.js", import.meta.url).href,
 };

@@ -1,2 +1,2 @@
 /** Addresses of the workers' files, after whatever a bundler did with them. */
-export declare const files: { readonly worker: URL; readonly core: URL; readonly draco: URL; readonly order: URL };
+export declare const files: { readonly worker: URL; readonly core: URL; readonly order: URL };

@@ -3,6 +3,5 @@
 export const files = {
   worker: new URL("./worker.js", import.meta.url),
   core: new URL("./core.wasm", import.meta.url),
-  draco: new URL("./draco.wasm", import.meta.url),
   order: new URL("./order.js", import.meta.url),
 };

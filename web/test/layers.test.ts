@@ -9,7 +9,7 @@ const WEB = fileURLToPath(new URL("../", import.meta.url));
 
 /** What each package may import besides its own files. */
 const ALLOWED: Readonly<Record<string, readonly RegExp[]>> = {
-  "player-core": [/^draco3d(\/|$)/],
+  "player-core": [],
   "player-three": [/^three$/, /^@meshreel\/player-core\/types$/],
   xr: [/^three$/, /^@meshreel\/player-core\/types$/],
   "player-element": [/^three(\/|$)/, /^@meshreel\/(player-core|player-three|xr)(\/|$)/],
@@ -23,13 +23,13 @@ const ROOMS: Readonly<Record<string, readonly string[]>> = {
   time: ["net", "format", "ground"], // which chunk is needed when, and what is shown
   net: ["format", "ground"], // ranges of a file
   decode: ["wasm", "format", "ground"], // chunks to meshes: the workers' half
-  wasm: ["ground"], // calls of the compiled core
+  wasm: ["format", "ground"], // calls of the compiled core
   format: ["ground"], // the records of a file
   ground: [],
 };
 const LOOSE: Readonly<Record<string, string>> = {
   index: "door", worker_entry: "door", player: "player", players: "player", session: "player",
-  events: "ground", protocol: "ground", mesh: "ground", bytes: "ground", errors: "ground", types: "ground",
+  events: "ground", protocol: "ground", bytes: "ground", errors: "ground", types: "ground",
 };
 
 const PAGE = /\b(document|window|HTMLElement|customElements|requestAnimationFrame|localStorage|WebGL2?RenderingContext)\b/;

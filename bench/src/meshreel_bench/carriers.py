@@ -9,7 +9,7 @@ from meshreel.container.sources import BytesSource
 from meshreel.decoder.tracks import placement
 from meshreel.format.layout import Form
 from meshreel.geometry.splats import Carrier
-from meshreel.types import Mesh
+from meshreel.types import Mesh, Placement
 
 Chain = list[tuple[int, Carrier]]  # numbers of frames, and what carries splats there
 
@@ -20,7 +20,7 @@ def chains_of(data: bytes) -> list[Chain]:
     for chunk in reader.tracks[0]:
         before = state if reader.group_before(chunk) is not None else None
         payload = reader.read_chunk(chunk.number)
-        meshes, state = continue_group(payload, chunk.frame_count, None, before, placement(reader))
+        meshes, state = continue_group(payload, chunk.frame_count, None, before, Placement(*placement(reader)))
         numbers = range(chunk.first_frame, chunk.first_frame + chunk.frame_count)
         if chunk.form not in (Form.LAYERS, Form.LAPLACIAN):
             chains += [[(k, alone(mesh))] for k, mesh in zip(numbers, meshes, strict=True)]

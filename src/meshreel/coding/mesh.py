@@ -13,12 +13,12 @@ import numpy as np
 
 from .. import _core
 from ..errors import FormatError, InputError
+from ..format.budget import LIMITS
 from ..types import Mesh
 
 MAX_BITS = 21  # bits per coordinate that Draco's float32 positions can hold
 COMPRESSION_LEVEL = 7  # from the paper
-PLAIN_LEVEL = 5  # the highest level at which each face costs a bit, whatever the mesh
-MAX_FACES = 64_000_000  # faces or vertices of a group: a limit of memory, a guess
+PLAIN_LEVEL = 5  # the highest at which each face costs a bit, whatever the mesh is like
 
 
 def encode_mesh(mesh: Mesh, step: float) -> bytes:
@@ -109,10 +109,10 @@ def check_claims(meshes: Sequence[bytes]) -> None:
 
 def check_growth(mesh: Mesh, levels: int, frames: int = 1) -> None:
     """Raise FormatError if subdivision in all frames would make over 64 million faces or vertices."""
-    if frames * max(len(mesh.faces) * 4**levels, len(mesh.vertices)) > MAX_FACES:
+    if frames * max(len(mesh.faces) * 4**levels, len(mesh.vertices)) > LIMITS.faces:
         raise FormatError(
             f"{len(mesh.faces)} faces of {len(mesh.vertices)} vertices, subdivided {levels} times, "
-            f"in {frames} frames: over {MAX_FACES}"
+            f"in {frames} frames: over {LIMITS.faces}"
         )
 
 

@@ -10,9 +10,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 
-import numpy as np
-
-from ..coding.layers.coder import LayersState
+from .. import _core
 from ..container.reader import Chunk
 from ..errors import FormatError
 from ..types import Mesh
@@ -29,23 +27,26 @@ class CachedGroup:
     number: int  # of its chunk; -1 before any group is decoded
     frames: list[Mesh]
     nbytes: int  # memory of all frames
+    core: _core.Group | None  # None before any group is decoded
 
 
-NO_GROUP = CachedGroup(-1, [], 0)
+NO_GROUP = CachedGroup(-1, [], 0, None)
 
 
 @dataclass(frozen=True, slots=True)
 class CachedStates:
     """States of the groups of one chain, by chunk number; all are kept while they fit, for playing backwards."""
 
-    known: dict[int, LayersState | None]
+    known: dict[int, _core.GroupState | None]
     nbytes: int = 0
 
     def copy(self) -> CachedStates:
         """Return a cache that can grow while other threads read this one."""
         return CachedStates(dict(self.known), self.nbytes)
 
-    def add(self, number: int, state: LayersState | None, before: LayersState | None, most: int) -> CachedStates:
+    def add(
+        self, number: int, state: _core.GroupState | None, before: _core.GroupState | None, most: int
+    ) -> CachedStates:
         """Return the cache with the state of a group, which was decoded from the state `before`.
 
         If all states would take more than `most` bytes, only the new one is kept.
@@ -88,15 +89,8 @@ class Refusals:
         raise FormatError(message)
 
 
-def memory_of(meshes: Sequence[Mesh]) -> int:
-    """Return the memory of meshes in bytes; arrays that are views of one array count once."""
-    arrays = [array for mesh in meshes for array in (mesh.vertices, mesh.faces, mesh.colors) if array is not None]
-    owners = [array.base if isinstance(array.base, np.ndarray) else array for array in arrays]
-    return sum({id(owner): owner.nbytes for owner in owners}.values())
-
-
 def read_only(mesh: Mesh) -> Mesh:
-    """Return read-only views of a mesh that is cached and shares its faces with other frames and groups."""
+    """Return read-only views of a mesh that is cached."""
     vertices, faces = mesh.vertices.view(), mesh.faces.view()
     colors, uv = (None if array is None else array.view() for array in (mesh.colors, mesh.uv))
     for array in (vertices, faces, colors, uv):

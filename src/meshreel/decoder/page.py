@@ -12,7 +12,7 @@ from collections.abc import Iterable, Sequence
 from html import escape
 from importlib.resources import files
 
-_NAMES = ("meshreel-player.js", "three.js", "worker.js", "order.js", "core.wasm", "draco.wasm")
+_NAMES = ("meshreel-player.js", "three.js", "worker.js", "order.js", "core.wasm")
 
 # The element, its files in memory (`meshreelFiles`, where the player looks them up), and the recording.
 _PAGE = """\

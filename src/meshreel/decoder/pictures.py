@@ -8,20 +8,19 @@ separate chain.
 from __future__ import annotations
 
 import threading
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
 import numpy as np
 
-from ..coding.appearance.atlas import decode_atlas
+from .. import _core
 from ..coding.appearance.pictures import VideoDecoder, decode_pictures, from_i420
-from ..coding.colored import Canvas, atlas_base
 from ..container.reader import Chunk, ReelReader
 from ..errors import FormatError
 from ..format.budget import are_costly
 from ..format.layout import LAYER_PICTURES, ChunkKind, Pictures, VideoCodec
-from ..geometry.atlas import Layout
 from ..shapes import UInt8
 from ..types import Mesh, Texture
 
@@ -85,25 +84,27 @@ class TrackPictures:
 
     def __init__(self, reader: ReelReader, decoders: Decoders) -> None:
         self._reader, self._decoders = reader, decoders
-        self._layouts: tuple[int, Layout] | None = None  # number and layout of the atlas used last
-        self._sizes = dict[int, tuple[int, int]]()  # width and height of textures, by atlas
-        self._layers = dict[tuple[int, int], tuple[int, int]]()  # results of `_sizes_of`, by chunk and layer
-        self._background: tuple[int, int, Mesh] | None = None  # state and picture shown last, and their mesh
+        self._layouts: tuple[int, _core.AtlasLayout] | None = None  # of the atlas that was asked for last
+        self._sizes = dict[int, tuple[int, int]]()  # of the textures of all atlases that were asked for
+        self._layers = dict[tuple[int, int], tuple[int, int]]()  # what `_sizes_of` found, by chunk and layer
+        self._background: tuple[int, int, Mesh] | None = None  # the state and picture shown last, and their mesh
 
-    def textured(self, chunk: Chunk, meshes: list[Mesh], canvas: Canvas) -> list[Mesh]:
-        """Return the frames of a group with its textures. Raises FormatError if its atlas is damaged."""
+    def place(self, chunk: Chunk, decoded: _core.Group | _core.Background) -> Callable[[int], Texture] | None:
+        """Give a group or a background its places in the texture that it has; return that of each frame, or None.
+
+        Raises FormatError where its atlas is damaged.
+        """
         pictures = self._pictures_of(chunk)
         if pictures is None:
-            return meshes
+            return None
         atlas = self._reader.chunks[pictures.depends_on[1]]
         if self._layouts is None or self._layouts[0] != atlas.number:
             whole = None if chunk.frame_count == 0 else 1
-            base = atlas_base(self._reader.read_chunk(atlas.depends_on[0], whole))
-            layout = decode_atlas(self._reader.read_chunk(atlas.number), base)
+            owner = self._reader.read_chunk(atlas.depends_on[0], whole)
+            layout = _core.read_atlas(self._reader.read_chunk(atlas.number), owner)
             self._layouts, self._sizes[atlas.number] = (atlas.number, layout), (layout.width, layout.height)
-        places = canvas.uv(self._layouts[1])
-        pairs = enumerate(zip(meshes, places, strict=True))
-        return [replace(mesh, uv=uv, texture=self._texture(pictures, frame)) for frame, (mesh, uv) in pairs]
+        decoded.place(self._layouts[1])
+        return partial(self._texture, pictures)
 
     def shown(self, static: Chunk, mesh: Mesh, frame: int) -> Mesh:
         """Return the mesh of a background with the picture of a frame, or as it is if it has no pictures."""

@@ -1,17 +1,14 @@
 """Splats of a track: decoded on access for a chain of groups, and bound to the mesh of each frame.
 
-In: a reader, and the mesh of a frame with the state before it. Out: Gaussians in metres.
+In: a reader, and a decoded group. Out: Gaussians in metres.
 """
 
 from __future__ import annotations
 
-from ..coding.appearance.splats import decode_splats
-from ..coding.colored import atlas_base, canvas_of
-from ..coding.layers.coder import LayersState
+from .. import _core
 from ..container.reader import Chunk, ReelReader
 from ..format.layout import ChunkKind, Form
-from ..geometry.splats import Bound, Carrier, Splats, bind
-from ..types import Mesh
+from ..geometry.splats import Bound
 from .cache import Refusals
 
 
@@ -21,8 +18,7 @@ class TrackSplats:
     def __init__(self, reader: ReelReader, layers: int | None) -> None:
         self._reader, self._layers = reader, layers
         self._refusals = Refusals()
-        self._splats: tuple[int, int, Splats] | None = None  # chunk used last, number of its mesh's faces, its splats
-        self._carriers: tuple[int, list[Carrier]] | None = None  # group used last, and carriers of its frames
+        self._splats: tuple[int, _core.Splats] | None = None  # of the chunk that was asked for last
 
     def of(self, chunk: Chunk) -> Chunk | None:
         """Return the chunk of a group's splats: its own, or that of the group before it, and so on; None: no splats."""
@@ -33,23 +29,18 @@ class TrackSplats:
             group = self._reader.group_before(group)
         return None
 
-    def bound(
-        self, of: Chunk, chunk: Chunk, payload: bytes, frames: list[Mesh], before: LayersState | None, index: int
-    ) -> Bound | None:
-        """Return the splats of a frame of a group, whose frames are in metres; None if they are on another mesh.
+    def bound(self, of: Chunk, group: _core.Group | None, index: int) -> Bound | None:
+        """Return the splats of a frame of a group in metres; None where they are of another mesh.
 
         Raises FormatError on damaged bytes.
         """
-        if self._carriers is None or self._carriers[0] != chunk.number:
-            layers = None if chunk.form != Form.LAYERS else self._layers
-            canvas = canvas_of(payload, [len(mesh.vertices) for mesh in frames], layers, before)
-            self._carriers = chunk.number, canvas.carriers(frames, self._reader.header.scale)
         if self._splats is None or self._splats[0] != of.number:
             whole = None if self._layers is None else self._layers + 1
-            count = len(atlas_base(self._reader.read_chunk(of.depends_on[0], 1)).faces)
+            owner = self._reader.read_chunk(of.depends_on[0], 1)
             data = self._reader.read_chunk(of.number, whole)
             self._refusals.check(of)
             with self._refusals.of(of):
-                self._splats = of.number, count, decode_splats(data, count)
-        carrier, (_, count, splats) = self._carriers[1][index], self._splats
-        return bind(splats, carrier) if len(carrier.faces) == count * 4**carrier.levels else None
+                self._splats = of.number, _core.read_splats(data, owner)
+        assert group is not None
+        bound = self._splats[1].bind(group, index, self._reader.header.scale)
+        return None if bound is None else Bound(*bound)

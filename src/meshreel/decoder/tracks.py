@@ -6,27 +6,23 @@ background is decoded once and kept until another state of it is shown.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
-from ..coding.background import decode_background, decode_change
-from ..coding.colored import Canvas, background_canvas, canvas_of, decode_group_colors, paint_background
-from ..coding.group import continue_group, skip_group
-from ..coding.layers.coder import MOST_NUMBERS, LayersState
+from .. import _core
 from ..container.reader import Chunk, ReelReader
 from ..errors import FormatError
-from ..format.budget import Chain, together
+from ..format.budget import LIMITS, Chain, together
 from ..format.layout import ChunkKind, Form
 from ..geometry.splats import Bound
-from ..shapes import UInt8
-from ..types import Frames, Mesh, Placement
-from .cache import MOST_KEPT, NO_GROUP, CachedGroup, CachedStates, Refusals, memory_of, read_only
+from ..types import Frames, Mesh, Texture
+from .cache import MOST_KEPT, NO_GROUP, CachedGroup, CachedStates, Refusals, read_only
 from .pictures import Decoders, TrackPictures
 from .splats import TrackSplats
 
-MOST_TOGETHER = 8 * MOST_NUMBERS  # bytes: the groups of one frame take no more memory than the largest legal group
+MOST_TOGETHER = 8 * LIMITS.numbers  # bytes: the groups of one frame take no more memory than the largest legal group
 
 
 class Track(Frames):
@@ -74,8 +70,7 @@ class Track(Frames):
         chunk = self.reader.chunk_of_frame(index, self.number)
         if (of := self._splats.of(chunk)) is None:
             return None
-        frames, (before, _) = self._decoded(chunk).frames, self._state_before(chunk)
-        return self._splats.bound(of, chunk, self._read(chunk), frames, before, index - chunk.first_frame)
+        return self._splats.bound(of, self._decoded(chunk).core, index - chunk.first_frame)
 
     def _decoded(self, chunk: Chunk) -> CachedGroup:
         """Return a group, from the cache if it was the last one decoded."""
@@ -85,18 +80,19 @@ class Track(Frames):
         state, states = self._state_before(chunk)
         payload = self._read(chunk)
         with self._refusals.of(chunk):
-            meshes, after = continue_group(payload, chunk.frame_count, self.layers, state, self._place)
-        meshes, after = self._painted(chunk, payload, meshes, state, after)
-        views = {
-            id(mesh): read_only(turned(mesh, self.reader)) for mesh in meshes
-        }  # the frames of an empty group are one mesh
-        meshes = [views[id(mesh)] for mesh in meshes]
-        self._states = states.add(chunk.number, after, state, self._most)
-        self._group = group = CachedGroup(chunk.number, meshes, memory_of(meshes))
+            decoded = _core.Group(payload, chunk.frame_count, self.layers, state, self._place)
+        self._paint(chunk, decoded, None if chunk.form != Form.LAYERS else self.layers)
+        with self._refusals.of(chunk):
+            texture = self._pictures.place(chunk, decoded) if self._is_colored(chunk) else None
+        if self.reader.edit.rotation:
+            decoded.turn(self.reader.edit.rotation, self.reader.header.origin)
+        meshes = _meshes(decoded.frames(), texture)
+        self._states = states.add(chunk.number, decoded.state, state, self._most)
+        self._group = group = CachedGroup(chunk.number, meshes, decoded.nbytes, decoded)
         return group
 
-    def _state_before(self, chunk: Chunk) -> tuple[LayersState | None, CachedStates]:
-        """Return the state that a group is predicted from, and a cache with it; earlier frames are not decoded."""
+    def _state_before(self, chunk: Chunk) -> tuple[_core.GroupState | None, CachedStates]:
+        """Return the state that a group is predicted from, and a cache of it; the frames before are not decoded."""
         chain = [chunk]
         states = self._states
         self._refusals.check(chunk)
@@ -107,47 +103,26 @@ class Track(Frames):
         states = CachedStates({}) if before is None else states.copy()
         for link in reversed(chain[1:]):
             payload = self._read(link)
-            with self._lost.of(link):
-                after = skip_group(payload, link.frame_count, self.layers, state)
-            after = self._state_with_colors(link, payload, state, after)
+            after = None
+            if link.form == Form.LAYERS:
+                with self._lost.of(link):
+                    skipped = _core.Group(payload, link.frame_count, self.layers, state, self._place, shown=False)
+                if (after := skipped.state) is not None:
+                    self._paint(link, skipped, after.levels)  # the levels that the next colours are predicted from
             states = states.add(link.number, after, state, self._most)
             state = after
         return state, states
 
-    def _painted(
-        self, chunk: Chunk, payload: bytes, meshes: list[Mesh], before: LayersState | None, after: LayersState | None
-    ) -> tuple[list[Mesh], LayersState | None]:
-        """Return the frames of a group with its colours, and the state for the next group with its colours."""
-        if not self._colored or self.reader.companion_of(chunk, ChunkKind.COLORS) is None:
-            return meshes, after
-        counts = [len(mesh.vertices) for mesh in meshes]
-        with self._refusals.of(chunk):
-            canvas = canvas_of(payload, counts, self.layers, before)
-        layers = None if chunk.form != Form.LAYERS else self.layers
-        colors, after = self._colors(chunk, canvas, layers, before, after)
-        meshes = [replace(mesh, colors=own) for mesh, own in zip(meshes, colors, strict=True)]
-        with self._refusals.of(chunk):
-            return self._pictures.textured(chunk, meshes, canvas), after
+    def _is_colored(self, chunk: Chunk) -> bool:
+        return self._colored and self.reader.companion_of(chunk, ChunkKind.COLORS) is not None
 
-    def _state_with_colors(
-        self, chunk: Chunk, payload: bytes, before: LayersState | None, after: LayersState | None
-    ) -> LayersState | None:
-        """Return a state with the colours that the next group may be predicted from; no frame is painted."""
-        if after is None or not self._colored or self.reader.companion_of(chunk, ChunkKind.COLORS) is None:
-            return after
-        levels = len(after.scalars)  # without the patches, from which nothing is predicted
-        canvas = canvas_of(payload, [after.count] * chunk.frame_count, levels, before)
-        return self._colors(chunk, canvas, levels, before, after)[1]
-
-    def _colors(
-        self, chunk: Chunk, canvas: Canvas, layers: int | None, before: LayersState | None, after: LayersState | None
-    ) -> tuple[list[UInt8[np.ndarray, "_ 3"]], LayersState | None]:
-        """Decode the colours of a group that has some, from at most `layers` layers beyond its first; None: all."""
-        of = self.reader.companion_of(chunk, ChunkKind.COLORS)
-        assert of is not None
+    def _paint(self, chunk: Chunk, group: _core.Group, layers: int | None) -> None:
+        """Decode the colours of a group, if it has some, from at most `layers` layers beyond its first; None: all."""
+        of = self.reader.companion_of(chunk, ChunkKind.COLORS) if self._colored else None
+        if of is None:
+            return
         with self._refusals.of(of):
-            data = self.reader.read_chunk(of.number, None if layers is None else layers + 1)
-            return decode_group_colors(data, canvas, before, after)
+            group.paint(self.reader.read_chunk(of.number, None if layers is None else layers + 1))
 
     @property
     def _most(self) -> int:
@@ -158,6 +133,15 @@ class Track(Frames):
         return self.reader.read_chunk(chunk.number, None if self.layers is None else self.layers + 1)
 
 
+@dataclass(frozen=True, slots=True)
+class _State:
+    """State of the background, from which the next may be changed."""
+
+    core: _core.Background
+    mesh: Mesh  # as it is before the file's edit turns it
+    led: Chain
+
+
 class Background:
     """The background of each frame. It has no layers: all of it is read, whatever the layers of the tracks."""
 
@@ -166,8 +150,8 @@ class Background:
         self._colored = colored
         self._pictures = TrackPictures(reader, decoders or Decoders())
         self._place = placement(reader)
-        # Number of a chunk, its mesh, the chain that led to it, and the shown mesh; replaced as one for other threads.
-        self._last = (-1, Mesh.empty(), Chain(), Mesh.empty())
+        # Number of a chunk, its state, and what is shown; replaced as a whole, as other threads do.
+        self._last: tuple[int, _State | None, Mesh] = (-1, None, Mesh.empty())
         self._refusals = Refusals()
 
     def of_frame(self, frame: int) -> Mesh | None:
@@ -184,8 +168,8 @@ class Background:
             raise FormatError(f"the background of frame {frame}: {error}") from error
 
     def _state(self, chunk: Chunk) -> Mesh:
-        """Decode a state, starting from the last decoded one if it is that state or changes it."""
-        known, mesh, led, shown = self._last
+        """Decode a state, starting from the last one decoded if the state is that one or was changed from it."""
+        known, state, shown = self._last
         chain = [chunk]
         self._refusals.check(chunk)
         while chain[-1].number != known and chain[-1].depends_on:
@@ -195,34 +179,51 @@ class Background:
         if chain[-1].number == known:
             chain.pop()
         for link in reversed(chain):
-            mesh, led = self._decode(link, mesh, led)
+            state = self._decode(link, state)
         if chain:
-            shown = read_only(turned(mesh, self.reader))
-            self._last = (chunk.number, mesh, led, shown)
+            assert state is not None
+            shown = read_only(turned(state.mesh, self.reader))
+            self._last = (chunk.number, state, shown)
         return shown
 
-    def _decode(self, chunk: Chunk, before: Mesh, led: Chain) -> tuple[Mesh, Chain]:
+    def _decode(self, chunk: Chunk, before: _State | None) -> _State:
         payload = self.reader.read_chunk(chunk.number)
+        before = before if chunk.form == Form.PATCH else None
         with self._refusals.of(chunk):
-            if chunk.form == Form.PATCH:
-                after = decode_change(payload, before, self._place)
-                return self._painted(chunk, payload, after), led.then(before, after, len(payload))
-            return self._painted(chunk, payload, decode_background(payload, self._place)), Chain(0, len(payload))
+            core = _core.Background(payload, None if before is None else before.core, self._place)
+        texture = self._dress(chunk, core)
+        mesh = Mesh(*core.arrays(), before.mesh.texture if before is not None and texture is None else texture)
+        with self._refusals.of(chunk):
+            led = Chain(0, len(payload)) if before is None else before.led.then(before.mesh, mesh, len(payload))
+        return _State(core, mesh, led)
 
-    def _painted(self, chunk: Chunk, payload: bytes, mesh: Mesh) -> Mesh:
-        """Return a state with its colours, if any: those of added faces follow those of the remaining ones."""
+    def _dress(self, chunk: Chunk, state: _core.Background) -> Texture | None:
+        """Decode the colours of a state, where it has them, and its places in a texture; return its first picture.
+
+        The colours of what a change adds come behind those of what is left.
+        """
         of = self.reader.companion_of(chunk, ChunkKind.COLORS) if self._colored else None
         if of is None:
-            return mesh
+            return None
         with self._refusals.of(of):
-            mesh = paint_background(mesh, payload, self.reader.read_chunk(of.number))
+            state.paint(self.reader.read_chunk(of.number))
         with self._refusals.of(chunk):
-            return self._pictures.textured(chunk, [mesh], background_canvas(payload))[0]
+            texture = self._pictures.place(chunk, state)
+        return None if texture is None else texture(0)
 
 
-def placement(reader: ReelReader) -> Placement:
-    """Return the map from the normalised coordinates of a file to metres."""
-    return Placement(reader.header.scale, reader.header.origin)
+def placement(reader: ReelReader) -> tuple[float, tuple[float, float, float]]:
+    """Return the map from the normalised coordinates of a file to metres: their scale and origin."""
+    x, y, z = reader.header.origin
+    return reader.header.scale, (x, y, z)
+
+
+def _meshes(frames: Sequence[_core.Arrays], texture: Callable[[int], Texture] | None) -> list[Mesh]:
+    """Return the decoded arrays of frames as meshes; frames that share all arrays are one mesh."""
+    if texture is not None:
+        return [Mesh(*arrays, texture(frame)) for frame, arrays in enumerate(frames)]
+    made: dict[int, Mesh] = {}
+    return [made.setdefault(id(arrays), Mesh(*arrays)) for arrays in frames]
 
 
 def turned(mesh: Mesh, reader: ReelReader) -> Mesh:

@@ -1,7 +1,7 @@
 """Videos: the frames of a .reel file as meshes, decoded from the bytes of the file and nothing else.
 
-In: a path, a URL, bytes or a file object. Out: a Video, a sequence of meshes in metres. Imports NumPy, DracoPy and the
-compiled core, and PyAV when a picture is asked for.
+In: a path, a URL, bytes or a file object. Out: a Video, a sequence of meshes in metres. Imports NumPy and the compiled
+core, and PyAV when a picture is asked for.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 A file is `Preamble | Header | Index | Checksum | chunks`; everything before the chunks is the head. Chunks follow one
 another in the order of the index, so their offsets and frame numbers are sums and cannot contradict each other
-(decision 3). scripts/generate makes FORMAT.md's tables and the player's layout.gen.ts from this module.
+(decision 3). scripts/generate makes FORMAT.md's tables, layout.gen.ts and layout.gen.h from this module.
 """
 
 from __future__ import annotations

@@ -1428,7 +1428,7 @@ in vec3 barycentric;
 out vec4 fragment;
 
 // A matte surface in a soft room: a large lamp beside the viewer, a bright ceiling, a warm floor. What looks down close to the floor is in the
-// dark, which stands in for what surfaces hide from each other. Python's posters have the same sums (server/painter.py).
+// dark, which stands in for what surfaces hide from each other.
 vec3 shaded(vec3 n, vec3 own) {
   vec3 eye = normalize(toEye);
   vec3 lamp = normalize(eye + 0.7 * up + 0.5 * normalize(cross(up, eye) + 1e-6));

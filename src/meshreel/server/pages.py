@@ -57,7 +57,7 @@ def player_page(name: str, player: str, styles: str) -> str:
         f'<link {how} href="{player}/{file}">\n'
         for how, files in (
             ('rel="modulepreload"', ("meshreel-player.js", "three.js")),
-            ('rel="preload" as="fetch" crossorigin', ("core.wasm", "draco.wasm")),
+            ('rel="preload" as="fetch" crossorigin', ("core.wasm",)),
         )
         for file in files
     )

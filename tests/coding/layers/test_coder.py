@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from meshreel.coding.layers import coder
 from meshreel.coding.layers.coder import EncodedLayers, LayerCodingOptions, encode_layers
 from meshreel.coding.reference_mesh import CodedReference, code_reference
 from meshreel.errors import FormatError, InputError
+from meshreel.format.budget import LIMITS
 from meshreel.format.layout import LayersGroup, LayersLevel, Origin
 from meshreel.format.records import pack, unpack
 from meshreel.geometry.subdivision import heights, refine, subdivide
@@ -187,7 +189,7 @@ def test_absurd_heads_are_refused(change: dict[str, object]) -> None:
 
 
 def test_frames_of_absurd_size_are_refused_before_memory_is_taken(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(coder, "MOST_NUMBERS", WANTED.size - 1)
+    monkeypatch.setattr(coder, "LIMITS", replace(LIMITS, numbers=WANTED.size - 1))
     with pytest.raises(FormatError, match="exceed"):
         decode_layers(CODED.payload)
 

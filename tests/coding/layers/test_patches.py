@@ -21,6 +21,7 @@ from meshreel.coding.layers.patches import (
     encode_runs,
 )
 from meshreel.errors import FormatError, InputError
+from meshreel.format.budget import LIMITS
 from meshreel.format.layout import LayersPatches
 from meshreel.format.records import pack
 from meshreel.geometry.topology import drop_unreferenced
@@ -227,6 +228,6 @@ def test_each_frame_gets_its_faces_and_the_vertices_they_use_in_their_order() ->
 
 
 def test_patches_of_absurd_size_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("meshreel.coding.mesh.MAX_FACES", 100)
+    monkeypatch.setattr("meshreel.coding.mesh.LIMITS", replace(LIMITS, faces=100))
     with pytest.raises(FormatError, match="over 100"):
         decode_patches(RECORD, FRAMES, FACES)

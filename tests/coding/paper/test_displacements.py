@@ -3,6 +3,7 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from meshreel.coding.paper.displacements import decode_displacements, encode_dis
 from meshreel.coding.steps import RUNGS, rung_of, step_of
 from meshreel.errors import FormatError, InputError
 from meshreel.format import records
+from meshreel.format.budget import LIMITS
 from meshreel.format.layout import AnchorRule, Component, DisplacementHead
 from meshreel.types import Mesh
 
@@ -195,7 +197,7 @@ def test_parts_that_only_a_collapsed_face_ties_are_refused() -> None:
 def test_a_field_of_absurd_size_is_refused_before_memory_is_taken(monkeypatch: pytest.MonkeyPatch) -> None:
     data = still_payload(BASE, 4, 1)
     assert decode_displacements(data, BASE).shape == (len(BASE.vertices), 4, 3)
-    monkeypatch.setattr(displacements, "MOST_NUMBERS", 3 * 4 * len(BASE.vertices) - 1)
+    monkeypatch.setattr(displacements, "LIMITS", replace(LIMITS, numbers=3 * 4 * len(BASE.vertices) - 1))
     with pytest.raises(FormatError, match="4 frames"):
         decode_displacements(data, BASE)
 

@@ -9,7 +9,6 @@ import { WorkerPool, type WorkerLike } from "./time/pool.ts";
 export interface WorkerFiles {
   readonly worker: URL;
   readonly core: URL;
-  readonly draco: URL;
 }
 
 const POOL_KEPT = 1000; // ms that workers are kept after the last player is closed: a change of the source needs them again
@@ -30,9 +29,9 @@ export class Players {
 
   /** A player of an address or a file; `crossOrigin` as a video has it. */
   open(source: string | Blob, crossOrigin: string | null): Player {
-    const { worker, core, draco } = this.#files;
+    const { worker, core } = this.#files;
     const create = (): WorkerLike => openWorker(worker) as WorkerLike;
-    const shared = (this.#shared ??= { workers: new WorkerPool({ create, core: bytesAt(core), draco: bytesAt(draco) }), users: 0 });
+    const shared = (this.#shared ??= { workers: new WorkerPool({ create, core: bytesAt(core) }), users: 0 });
     shared.users++;
     const player = new PooledPlayer({
       source: typeof source === "string" ? new HttpSource(source, { credentials: crossOrigin === "use-credentials" ? "include" : "same-origin" }) : new BlobSource(source),

@@ -3,7 +3,7 @@
 import type { CompanionKind, Packed } from "./types.ts";
 
 export type ToWorker =
-  | { type: "start"; core: ArrayBuffer | string; draco: ArrayBuffer | string } // wasm bytes, or their URLs
+  | { type: "start"; core: ArrayBuffer | string } // wasm bytes, or their URL
   | { type: "decode"; id: number; job: DecodeJob }
   | { type: "forget"; file: number };
 

@@ -1,14 +1,9 @@
 // Textures as Python writes them: places of corners in an atlas, and what packets say of their video.
 
-import { createHash } from "node:crypto";
-
 import { describe, expect, test, vi } from "vitest";
 
 import { hasPython, runPython } from "../../test/python.ts";
-import { decodeAtlas, finerPlaces } from "../src/decode/atlas.ts";
 import { ChunkDecoder } from "../src/decode/chunk_decoder.ts";
-import { readLayers } from "../src/decode/layers.ts";
-import { decodeMesh } from "../src/decode/mesh.ts";
 import { texelsOf } from "../src/format/renditions.ts";
 import { headersOf } from "../src/format/video_headers.ts";
 import { FormatError } from "../src/errors.ts";
@@ -21,7 +16,8 @@ import { FakeDecoder, useFakeDecoder, video } from "./fake_decoder.ts";
 import { jobOf, noDamage } from "./jobs.ts";
 import { colors, group, makeReel } from "./reel.ts";
 import { pass, useRig } from "./rig.ts";
-import { nodeTools } from "./tools.ts";
+import { nodeCore } from "./tools.ts";
+import type { Handle } from "../src/wasm/core.ts";
 
 interface Made {
   readonly file: string;
@@ -34,23 +30,19 @@ const made = hasPython ? (JSON.parse(runPython(new URL("textured.py", import.met
 const bytesIn = (text: string): Uint8Array => Uint8Array.from(Buffer.from(text, "base64"));
 
 describe.skipIf(!hasPython)("an atlas", async () => {
-  const tools = await nodeTools();
+  const core = await nodeCore();
   const data = bytesIn(made?.file ?? "");
   const head = Head.parse(data);
   const atlas = head.chunks.find(({ kind }) => kind === "atlas")!;
   const bytesOf = ({ offset, size }: { offset: number; size: number }): Uint8Array => data.slice(offset, offset + size);
-  const { head: first } = readLayers(bytesOf(head.chunks[atlas.dependsOn[0]]), 0);
-  const base = decodeMesh(tools.core, tools.draco, first.base, first.step);
-
-  test.each([[1, "oneLayer"], [first.levels, "all"]] as const)("has the places that Python decodes, on level %i", (levels, name) => {
-    const layout = decodeAtlas(tools.core, bytesOf(atlas), base);
-    const uv = finerPlaces(layout, levels).map((place, k) => (k % 2 === 0 ? place / layout.width : 1 - place / layout.height));
-    expect(createHash("sha256").update(new Uint8Array(uv.buffer)).digest("hex")).toBe(made![name][0]);
-  });
+  const { width, height } = unpackAll(Atlas, bytesOf(atlas));
+  const open = (layers: number | null): Handle => {
+    const chunk = head.chunks[atlas.dependsOn[0]];
+    return core.open({ payload: bytesOf(chunk), frames: chunk.frameCount, layers, previous: null, isShown: true, scale: 1, origin: [0, 0, 0] });
+  };
 
   test("is packed with its group and those predicted from it, and only where pictures are shown", () => {
-    const decoder = new ChunkDecoder(tools);
-    const { width, height, places } = decodeAtlas(tools.core, bytesOf(atlas), base);
+    const decoder = new ChunkDecoder(core);
     for (const chunk of head.tracks[0]) {
       const job = jobOf(head, chunk, data);
       expect((decoder.decode({ ...job, textured: false, payload: job.payload.slice() }, noDamage) as PackedGroup).places).toBeNull();
@@ -60,23 +52,21 @@ describe.skipIf(!hasPython)("an atlas", async () => {
       expect(packed.places!.extra.length).toBe(2 * packed.extra.length);
       expect(packed.places!.faces.every((place) => place <= PLACE_SCALE || place === NO_PLACE)).toBe(true);
     }
-    expect(places.length).toBe(2 * base.faces.length);
   });
 
   test("that is damaged or of another mesh is refused, never more", () => {
-    const payload = bytesOf(atlas);
+    const [payload, chunk] = [bytesOf(atlas), open(null)];
     for (let at = 0; at < payload.length; at++) {
       const copy = payload.slice();
       copy[at] ^= 1 << at % 8;
       try {
-        const { width, height, places } = decodeAtlas(tools.core, copy, base);
-        expect(places.every((place, k) => place >= 0 && place <= (k % 2 === 0 ? width : height))).toBe(true);
+        core.dress(chunk, "atlas", copy);
+        expect(core.pack(chunk, true).places.every((place) => place <= PLACE_SCALE || place === NO_PLACE)).toBe(true);
       } catch (error) {
         expect(error).toBeInstanceOf(FormatError);
       }
     }
-    expect(() => decodeAtlas(tools.core, payload, { ...base, faces: base.faces.slice(3) })).toThrow(FormatError);
-    expect(() => decodeAtlas(tools.core, Uint8Array.of(Form.PLACES, 1, 0, 2, 0, 0, 0, 0, 0, 0, 0), base)).toThrow(/1 x 2 texels/);
+    expect(() => core.dress(chunk, "atlas", Uint8Array.of(Form.PLACES, 1, 0, 2, 0, 0, 0, 0, 0, 0, 0))).toThrow(/side is odd/);
   });
 });
 

@@ -7,9 +7,8 @@ import { beforeAll, describe, expect, test, vi } from "vitest";
 
 import { hasPython, runPython } from "../../test/python.ts";
 import { ChunkDecoder, buffersOf } from "../src/decode/chunk_decoder.ts";
-import { decodeColors } from "../src/decode/colors.ts";
-import { Video } from "../src/decode/decoder.ts";
-import type { Tools } from "../src/decode/group.ts";
+import { Video } from "./whole_video.ts";
+import type { Core } from "../src/wasm/core.ts";
 import { serve } from "../src/decode/worker.ts";
 import type { Scope } from "../src/decode/worker.ts";
 import { FormatError } from "../src/errors.ts";
@@ -19,10 +18,10 @@ import { Head } from "../src/format/reader.ts";
 import type { Chunk } from "../src/format/reader.ts";
 import type { Damage, DecodeJob, FromWorker, ToWorker } from "../src/protocol.ts";
 import type { Packed, PackedGroup } from "../src/types.ts";
-import { CoreStopped } from "../src/wasm/memory.ts";
+import { CoreStopped } from "../src/wasm/core.ts";
 import { jobOf, noDamage } from "./jobs.ts";
 import { noise } from "./server.ts";
-import { ROOT, coreWasm, dracoWasm, nodeTools } from "./tools.ts";
+import { ROOT, coreWasm, nodeCore } from "./tools.ts";
 
 const FOLDER = `${ROOT}/conformance/v1`;
 const NAMES = readdirSync(FOLDER).filter((name) => name.endsWith(".reel") && name !== "cut.reel").map((name) => name.slice(0, -5)); // an edit has chunks of another file
@@ -35,10 +34,10 @@ interface Painted {
   readonly framesOfOneLayer: readonly string[];
 }
 
-let tools: Tools;
+let core: Core;
 let painted: Record<string, Painted>;
 beforeAll(async () => {
-  tools = await nodeTools();
+  core = await nodeCore();
   if (!hasPython) return;
   const made = JSON.parse(runPython(new URL("colored.py", import.meta.url), ...NAMES.map((name) => `${FOLDER}/${name}.reel`)).toString()) as Record<
     string,
@@ -63,18 +62,18 @@ const decodedChunks = (head: Head): Chunk[] => head.chunks.filter(({ kind }) => 
 describe.skipIf(!hasPython).each(NAMES)("%s", (name) => {
   test("has the colours that Python decodes, played to and fro", () => {
     const { data, frames, framesOfOneLayer } = painted[name];
-    const [all, one] = [new Video(tools, data), new Video(tools, data, 1)];
+    const [all, one] = [new Video(core, data), new Video(core, data, 1)];
     expect(frames.map((_, frame) => digest(all.frame(frame).colors))).toEqual(frames);
     expect(framesOfOneLayer.map((_, frame) => digest(one.frame(frame).colors))).toEqual(framesOfOneLayer);
-    const again = new Video(tools, data);
+    const again = new Video(core, data);
     for (let frame = frames.length - 1; frame >= 0; frame--) expect(digest(again.frame(frame).colors)).toBe(frames[frame]);
     expect(all.head.info.hasColors).toBe(name !== "empty");
   });
 
   test("is packed with its colours in the order of its vertices, and they are handed over", () => {
     const { data } = painted[name];
-    const video = new Video(tools, data);
-    const decoder = new ChunkDecoder(tools);
+    const video = new Video(core, data);
+    const decoder = new ChunkDecoder(core);
     for (const chunk of decodedChunks(video.head)) {
       const packed = decoder.decode(jobOf(video.head, chunk, data), noDamage)!;
       if (packed.colors === null) {
@@ -90,8 +89,8 @@ describe.skipIf(!hasPython).each(NAMES)("%s", (name) => {
 
   test("with colours that are changed is refused in words or decoded, its geometry all the same", () => {
     const { data } = painted[name];
-    const { head } = new Video(tools, data);
-    const decoder = new ChunkDecoder(tools);
+    const { head } = new Video(core, data);
+    const decoder = new ChunkDecoder(core);
     for (const chunk of decodedChunks(head)) {
       const job = jobOf(head, chunk, data);
       if (job.companions.length === 0) continue;
@@ -148,8 +147,8 @@ function spoiled(payload: Uint8Array, seed: number): Uint8Array {
 describe.skipIf(!hasPython)("a group with fewer layers", () => {
   test("has the colours of its own vertices, also where the one before has more", () => {
     const { data } = painted["layers"];
-    const { head } = new Video(tools, data);
-    const decoder = new ChunkDecoder(tools);
+    const { head } = new Video(core, data);
+    const decoder = new ChunkDecoder(core);
     const fewer = (chunk: Chunk, layers: number): DecodeJob => {
       const job = jobOf(head, chunk, data);
       const cut = <T extends Pick<DecodeJob, "payload" | "ranges">>(part: T): T => {
@@ -159,7 +158,7 @@ describe.skipIf(!hasPython)("a group with fewer layers", () => {
       return { ...cut(job), companions: job.companions.map(cut), layers };
     };
     const [first, second] = decodedChunks(head);
-    const one = new Video(tools, data, 1);
+    const one = new Video(core, data, 1);
     const ofOne = [...one.frame(second.firstFrame).colors!];
     for (const before of [fewer(first, 1), jobOf(head, first, data)]) {
       decoder.decode(before, noDamage);
@@ -168,38 +167,26 @@ describe.skipIf(!hasPython)("a group with fewer layers", () => {
       expect(shown).toEqual(ofOne);
     }
   });
-
-  test("cannot have those of a finer one predicted from it", () => {
-    const { data } = painted["layers"];
-    const { head } = new Video(tools, data);
-    const [first, second] = decodedChunks(head);
-    const coarse = new Video(tools, data, 0);
-    coarse.frame(0);
-    const canvas = [{ base: coarse.frame(0), levels: 0, frames: second.frameCount, vertices: coarse.frame(0).vertices.length / 3 }];
-    const [own] = head.companionsOf(second);
-    const payload = data.slice(own.offset, own.offset + own.size);
-    expect(() => decodeColors(tools.core, payload, canvas, new Float64Array(3))).toThrow(/colours of \d+ vertices, predicted from those of 1$/);
-    expect(() => decodeColors(tools.core, payload, canvas, null)).toThrow(/predicted from those of a group which is not at hand/);
-    expect(first.dependsOn).toEqual([]);
-  });
 });
 
 describe.skipIf(!hasPython)("colours", () => {
-  test("that cost more than their bytes may are refused before memory is taken", () => {
-    const canvas = [{ base: { vertices: new Float64Array(0), faces: new Int32Array(0) }, levels: 0, frames: 1000, vertices: 10_000 }];
-    expect(() => decodeColors(tools.core, new Uint8Array(10), canvas, null)).toThrow(/^colours: 10 bytes that cost 322560000 to decode$/);
-  });
-
   test("of another form or without chroma are refused", () => {
-    expect(() => decodeColors(tools.core, Uint8Array.of(6, 0, 0), [], null)).toThrow(/chroma 0/);
-    expect(() => decodeColors(tools.core, Uint8Array.of(2, 0, 64), [], null)).toThrow(/form 2/);
-    expect(() => decodeColors(tools.core, Uint8Array.of(6, 0, 64, 9, 9), [], null)).toThrow(/^colours: 2 bytes too many$/);
-    expect(() => decodeColors(tools.core, Uint8Array.of(6), [], null)).toThrow(FormatError);
+    const { data } = painted["draco"];
+    const [chunk] = Head.parse(data).chunks;
+    const payload = data.slice(chunk.offset, chunk.offset + chunk.size);
+    const group = core.open({ payload, frames: chunk.frameCount, layers: null, previous: null, isShown: true, scale: 1, origin: [0, 0, 0] });
+    const colored = (...bytes: number[]) => (): void => core.dress(group, "colors", Uint8Array.from(bytes));
+    expect(colored(6, 0, 0)).toThrow(/multiplied by 0/);
+    expect(colored(2, 0, 64)).toThrow(/another form/);
+    expect(colored(6, 1, 64)).toThrow(/predicted from those of a group which is not at hand/);
+    expect(colored(6)).toThrow(FormatError);
+    expect(core.show(group, 0).colors).toHaveLength(0);
+    core.close(group);
   });
 
   test("that stop the core are told as damaged, and the chunk may come again", async () => {
     const { data } = painted["layers"];
-    const { head } = new Video(tools, data);
+    const { head } = new Video(core, data);
     const told: FromWorker[] = [];
     const scope: Scope = { onmessage: null, postMessage: (message) => told.push(message) };
     serve(scope);
@@ -208,7 +195,7 @@ describe.skipIf(!hasPython)("colours", () => {
       damage({ chunk: 1, message: "no memory" });
       throw new CoreStopped("no memory");
     });
-    send({ type: "start", core: coreWasm(), draco: dracoWasm() });
+    send({ type: "start", core: coreWasm() });
     const job = jobOf(head, head.chunks[0], data);
     send({ type: "decode", id: 1, job });
     send({ type: "decode", id: 2, job: { ...job, companions: [] } });

@@ -7,7 +7,7 @@ import { afterAll, beforeAll, expect, test } from "vitest";
 
 import { describeInBrowser, openPage } from "../../test/browser.ts";
 import type { OpenPage } from "../../test/browser.ts";
-import { ROOT, coreWasm, dracoWasm } from "./tools.ts";
+import { ROOT, coreWasm } from "./tools.ts";
 
 const FOLDER = `${ROOT}/conformance/v1`;
 const NAMES = readdirSync(FOLDER).filter((name) => name.endsWith(".json")).map((name) => name.slice(0, -5));
@@ -23,7 +23,7 @@ describeInBrowser("golden files in Chromium", () => {
   test.each(NAMES)("%s", async (name) => {
     const golden = JSON.parse(readFileSync(`${FOLDER}/${name}.json`, "utf8"));
     const file = [...readFileSync(`${FOLDER}/${name}.reel`)];
-    const wasm = [[...new Uint8Array(coreWasm())], [...new Uint8Array(dracoWasm())]];
+    const wasm = [[...new Uint8Array(coreWasm())]];
     for (const [layers, key] of [[null, "frames"], [1, "frames_with_one_component"]] as const) {
       if (golden[key] === undefined) continue;
       const call = `decodeAll(${[...wasm, file, layers].map((value) => JSON.stringify(value)).join(", ")})`;

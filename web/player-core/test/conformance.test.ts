@@ -5,13 +5,13 @@ import { readFileSync, readdirSync } from "node:fs";
 
 import { beforeAll, describe, expect, test } from "vitest";
 
-import type { Tools } from "../src/decode/group.ts";
-import { Video } from "../src/decode/decoder.ts";
+import type { Core } from "../src/wasm/core.ts";
+import { Video } from "./whole_video.ts";
 import { AudioFile, AudioType } from "../src/format/layout.gen.ts";
 import { Head } from "../src/format/reader.ts";
 import { unpackAll } from "../src/format/records.ts";
-import type { Mesh } from "../src/mesh.ts";
-import { ROOT, nodeTools } from "./tools.ts";
+import type { Mesh } from "./whole_video.ts";
+import { ROOT, nodeCore } from "./tools.ts";
 
 const FOLDER = `${ROOT}/conformance/v1`;
 const NAMES = readdirSync(FOLDER).filter((name) => name.endsWith(".json")).map((name) => name.slice(0, -5));
@@ -42,9 +42,9 @@ function recordOf(mesh: Mesh): FrameRecord {
   };
 }
 
-let tools: Tools;
+let core: Core;
 beforeAll(async () => {
-  tools = await nodeTools();
+  core = await nodeCore();
 });
 
 test("the audio of a golden file is what Python wrote", () => {
@@ -65,7 +65,7 @@ describe.each(NAMES)("%s", (name) => {
   const golden = JSON.parse(readFileSync(`${FOLDER}/${name}.json`, "utf8")) as Golden;
 
   test("frames have the bits that Python gives", () => {
-    const video = new Video(tools, data);
+    const video = new Video(core, data);
     expect(video.head.info.frameCount).toBe(golden.frames.length);
     expect(video.head.info.frameRate).toBe(golden.frame_rate);
     golden.frames.forEach(({ vertices, faces, vertices_sha256, faces_sha256 }, frame) => {
@@ -74,19 +74,19 @@ describe.each(NAMES)("%s", (name) => {
   });
 
   test("frames are shown at the times that Python says", () => {
-    const { head } = new Video(tools, data);
+    const { head } = new Video(core, data);
     golden.timestamps.forEach((time, frame) => expect(head.timestamp(frame)).toBeCloseTo(time - golden.timestamps[0], 9));
   });
 
   test.runIf(golden.frames_with_one_component)("a prefix of layers has the bits that Python gives", () => {
-    const video = new Video(tools, data, 1);
+    const video = new Video(core, data, 1);
     golden.frames_with_one_component!.forEach(({ vertices, faces, vertices_sha256, faces_sha256 }, frame) => {
       expect(recordOf(video.frame(frame))).toEqual({ vertices, faces, vertices_sha256, faces_sha256 });
     });
   });
 
   test("played backwards the same", () => {
-    const video = new Video(tools, data);
+    const video = new Video(core, data);
     for (let frame = golden.frames.length - 1; frame >= 0; frame--) {
       expect(recordOf(video.frame(frame)).vertices_sha256).toBe(golden.frames[frame].vertices_sha256);
     }

@@ -1,8 +1,8 @@
 // The page of conformance.browser.test.ts: decodes a file that it is given, in Chromium.
 
-import { Video } from "../src/decode/decoder.ts";
-import type { Mesh } from "../src/mesh.ts";
-import { makeTools } from "../src/decode/tools.ts";
+import { Video } from "./whole_video.ts";
+import type { Mesh } from "./whole_video.ts";
+import { Core } from "../src/wasm/core.ts";
 
 async function digest(values: Float64Array | Int32Array): Promise<string> {
   const bytes = new Uint8Array(values.buffer, values.byteOffset, values.byteLength).slice();
@@ -16,9 +16,8 @@ async function recordOf(mesh: Mesh): Promise<object> {
 }
 
 /** The records of all frames of a file. */
-async function decodeAll(core: number[], draco: number[], file: number[], layers: number | null): Promise<object[]> {
-  const tools = await makeTools(await WebAssembly.compile(Uint8Array.from(core)), Uint8Array.from(draco).buffer);
-  const video = new Video(tools, Uint8Array.from(file), layers);
+async function decodeAll(core: number[], file: number[], layers: number | null): Promise<object[]> {
+  const video = new Video(await Core.create(await WebAssembly.compile(Uint8Array.from(core))), Uint8Array.from(file), layers);
   return Promise.all(Array.from({ length: video.head.frameCount }, (_, frame) => recordOf(video.frame(frame))));
 }
 

@@ -6,23 +6,23 @@ import { readFileSync } from "node:fs";
 import { beforeAll, expect, test } from "vitest";
 
 import { slowTest } from "../../test/slow.ts";
-import { Video } from "../src/decode/decoder.ts";
-import type { Tools } from "../src/decode/group.ts";
+import { Video } from "./whole_video.ts";
+import type { Core } from "../src/wasm/core.ts";
 import { FormatError } from "../src/errors.ts";
 import { Head } from "../src/format/reader.ts";
-import type { Mesh } from "../src/mesh.ts";
+import type { Mesh } from "./whole_video.ts";
 import { open } from "../src/net/opening.ts";
 import { BytesSource } from "../src/net/source.ts";
 import { group, makeReel } from "./reel.ts";
-import { ROOT, nodeTools } from "./tools.ts";
+import { ROOT, nodeCore } from "./tools.ts";
 
 const FOLDER = `${ROOT}/core/fuzz/corpus`;
 const MOST_FRAMES = 24; // as in core/fuzz/verdict.py
 const VERDICTS = JSON.parse(readFileSync(`${FOLDER}/verdicts.json`, "utf8")) as Record<string, [string, string]>;
 
-let tools: Tools;
+let core: Core;
 beforeAll(async () => {
-  tools = await nodeTools();
+  core = await nodeCore();
 });
 
 /** Null where the bytes are refused. */
@@ -35,7 +35,7 @@ function refused(error: unknown): null {
 async function verdict(data: Uint8Array, layers: number | null): Promise<string> {
   const opened = await open(new BytesSource(data), new AbortController().signal).catch(refused);
   if (opened === null) return "refused";
-  const video = new Video(tools, data, layers);
+  const video = new Video(core, data, layers);
   const total = createHash("sha256");
   let shown = 0;
   for (let frame = 0; frame < Math.min(video.head.info.frameCount, MOST_FRAMES); frame++) {

@@ -27,7 +27,7 @@ export class FakeWorkers {
   bytesPerFrame = 800;
 
   setup(count = 1, silenceMs?: number): WorkerSetup {
-    const setup = { create: () => this.#create(), core: new ArrayBuffer(8), draco: "draco.wasm", count };
+    const setup = { create: () => this.#create(), core: new ArrayBuffer(8), count };
     return silenceMs === undefined ? setup : { ...setup, silenceMs };
   }
 

@@ -5,25 +5,24 @@ import { readFileSync, readdirSync } from "node:fs";
 import { beforeAll, describe, expect, test } from "vitest";
 
 import { ChunkDecoder, MissingState, buffersOf } from "../src/decode/chunk_decoder.ts";
-import type { Tools } from "../src/decode/group.ts";
-import { Video } from "../src/decode/decoder.ts";
+import type { Core } from "../src/wasm/core.ts";
+import { Video } from "./whole_video.ts";
 import { FormatError } from "../src/errors.ts";
-import type { Mesh } from "../src/mesh.ts";
-import { packStatic } from "../src/decode/pack.ts";
+import type { Mesh } from "./whole_video.ts";
 import type { FromWorker, ToWorker } from "../src/protocol.ts";
 import type { PackedGroup, PackedStatic } from "../src/types.ts";
 import { serve } from "../src/decode/worker.ts";
 import type { Scope } from "../src/decode/worker.ts";
-import { decodeNormal, encodeNormal } from "../../test/octahedral.ts";
+import { decodeNormal } from "../../test/octahedral.ts";
 import { jobOf, noDamage } from "./jobs.ts";
-import { ROOT, coreWasm, dracoWasm, nodeTools } from "./tools.ts";
+import { ROOT, coreWasm, nodeCore } from "./tools.ts";
 
 const FOLDER = `${ROOT}/conformance/v1`;
 const NAMES = readdirSync(FOLDER).filter((name) => name.endsWith(".reel"));
 
-let tools: Tools;
+let core: Core;
 beforeAll(async () => {
-  tools = await nodeTools();
+  core = await nodeCore();
 });
 
 function load(name: string): Uint8Array {
@@ -58,9 +57,9 @@ function worst(found: number[][], wanted: number[][]): number {
 describe.each(NAMES)("%s", (name) => {
   test("a frame's triangles are those of the decoder within half a step of the box", () => {
     const data = load(name);
-    const video = new Video(tools, data);
+    const video = new Video(core, data);
     const { head } = video;
-    const decoder = new ChunkDecoder(tools);
+    const decoder = new ChunkDecoder(core);
     const packed = head.chunks.map((chunk) => decoder.decode(jobOf(head, chunk, data), noDamage)!);
     for (const frame of new Set([0, head.frameCount >> 1, head.frameCount - 1])) {
       const state = head.staticOfFrame(frame);
@@ -93,9 +92,9 @@ function normalsOf(mesh: Mesh): (number[] | null)[] {
 
 test("normals are those of the frame's own faces, to a degree", () => {
   const data = load("layers_patched.reel");
-  const video = new Video(tools, data);
+  const video = new Video(core, data);
   const chunk = video.head.chunks[0];
-  const packed = new ChunkDecoder(tools).decode(jobOf(video.head, chunk, data), noDamage) as PackedGroup;
+  const packed = new ChunkDecoder(core).decode(jobOf(video.head, chunk, data), noDamage) as PackedGroup;
   let alone = packed.frameCount * packed.vertexCount;
   for (let t = 0; t < packed.frameCount; t++) {
     normalsOf(video.frame(t)).forEach((normal, v) => {
@@ -107,23 +106,17 @@ test("normals are those of the frame's own faces, to a degree", () => {
   }
 });
 
-test("a vertex that no face uses has the normal +z, and its code is that of the tests", () => {
-  const mesh = { vertices: Float64Array.of(0, 0, 0, 1, 0, 0, 0, 0, 1, 5, 5, 5), faces: Int32Array.of(0, 1, 2) };
-  const codes = [...packStatic(tools.core, mesh, null).texels].filter((_, k) => k % 4 === 3);
-  expect(codes).toEqual([...Array.from({ length: 3 }, () => encodeNormal([0, -1, 0])), encodeNormal([0, 0, 1])]);
-});
-
 test("a chunk whose predecessor is not at hand asks for the chain", () => {
   const data = load("layers.reel");
-  const { head } = new Video(tools, data);
+  const { head } = new Video(core, data);
   const chunk = head.chunks.find((candidate) => head.groupBefore(candidate) !== null)!;
-  expect(() => new ChunkDecoder(tools).decode(jobOf(head, chunk, data), noDamage)).toThrow(MissingState);
+  expect(() => new ChunkDecoder(core).decode(jobOf(head, chunk, data), noDamage)).toThrow(MissingState);
 });
 
 test("a damaged payload is told with chunk and frames, and costs nothing else", () => {
   const data = load("layers.reel");
-  const { head } = new Video(tools, data);
-  const decoder = new ChunkDecoder(tools);
+  const { head } = new Video(core, data);
+  const decoder = new ChunkDecoder(core);
   const job = jobOf(head, head.chunks[0], data);
   job.payload[job.payload.length - 1] ^= 1;
   expect(() => decoder.decode(job, noDamage)).toThrow(/chunk 0 \(track 0, frames 0 to \d+\): layer \d+ is damaged/);
@@ -133,13 +126,13 @@ test("a damaged payload is told with chunk and frames, and costs nothing else", 
 test("payloads with any byte changed and their checksums made to fit are refused or decoded, never worse", () => {
   for (const name of NAMES) {
     const data = load(name);
-    const { head } = new Video(tools, data);
+    const { head } = new Video(core, data);
     for (const chunk of head.chunks.filter((candidate) => candidate.dependsOn.length === 0)) {
       for (let at = 1; at < chunk.size; at += 7) {
         const job = jobOf(head, chunk, data);
         job.payload[at] ^= 0x55;
         try {
-          new ChunkDecoder({ core: tools.core, draco: tools.draco }).decode({ ...job, ranges: [] }, noDamage);
+          new ChunkDecoder(core).decode({ ...job, ranges: [] }, noDamage);
         } catch (error) {
           expect(error, `${name} chunk ${chunk.number} byte ${at}: ${error}`).toBeInstanceOf(FormatError);
         }
@@ -150,7 +143,7 @@ test("payloads with any byte changed and their checksums made to fit are refused
 
 test("a worker starts, decodes, tells of errors and hands its buffers over", async () => {
   const data = load("layers.reel");
-  const { head } = new Video(tools, data);
+  const { head } = new Video(core, data);
   const told: FromWorker[] = [];
   const handed: Transferable[][] = [];
   const scope: Scope = {
@@ -162,7 +155,7 @@ test("a worker starts, decodes, tells of errors and hands its buffers over", asy
   };
   serve(scope);
   const send = (message: ToWorker): void => scope.onmessage!({ data: message } as MessageEvent<ToWorker>);
-  send({ type: "start", core: coreWasm(), draco: dracoWasm() });
+  send({ type: "start", core: coreWasm() });
   send({ type: "decode", id: 7, job: jobOf(head, head.chunks[0], data) });
   send({ type: "decode", id: 8, job: { ...jobOf(head, head.chunks[0], data), stateOnly: true } });
   send({ type: "decode", id: 9, job: { ...jobOf(head, head.chunks[0], data), form: 3 } });

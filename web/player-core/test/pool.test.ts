@@ -236,8 +236,8 @@ test("a share that has left hears nothing of what was being done for it", async 
 test("a pool has one worker at least, four at most, and one core left if it may choose", () => {
   for (const [cores, size] of [[1, 1], [2, 1], [3, 2], [5, 4], [64, 4]]) {
     vi.stubGlobal("navigator", { hardwareConcurrency: cores });
-    const { create, core, draco } = workers.setup();
-    pool = new WorkerPool({ create, core, draco });
+    const { create, core } = workers.setup();
+    pool = new WorkerPool({ create, core });
     expect(pool.size).toBe(size);
     vi.unstubAllGlobals();
     pool.dispose();

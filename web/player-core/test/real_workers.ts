@@ -4,10 +4,10 @@ import type { WorkerLike, WorkerSetup } from "../src/time/pool.ts";
 import type { FromWorker, ToWorker } from "../src/protocol.ts";
 import { serve } from "../src/decode/worker.ts";
 import type { Scope } from "../src/decode/worker.ts";
-import { coreWasm, dracoWasm } from "./tools.ts";
+import { coreWasm } from "./tools.ts";
 
 export function realWorkers(count: number): WorkerSetup {
-  return { create: () => new RealWorker(), core: coreWasm(), draco: dracoWasm(), count };
+  return { create: () => new RealWorker(), core: coreWasm(), count };
 }
 
 class RealWorker implements WorkerLike {

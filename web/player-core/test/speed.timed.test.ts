@@ -5,18 +5,18 @@ import { beforeAll, expect, test } from "vitest";
 import { hasPython, runPython } from "../../test/python.ts";
 import { ALL } from "../../test/slow.ts";
 import { ChunkDecoder } from "../src/decode/chunk_decoder.ts";
-import type { Tools } from "../src/decode/group.ts";
+import type { Core } from "../src/wasm/core.ts";
 import { Head } from "../src/format/reader.ts";
 import type { PackedGroup } from "../src/types.ts";
 import { jobOf, noDamage } from "./jobs.ts";
-import { nodeTools } from "./tools.ts";
+import { nodeCore } from "./tools.ts";
 
 const SHARE = 0.5; // of a group's own duration, at most
 const PASSES = 5;
 
-let tools: Tools;
+let core: Core;
 beforeAll(async () => {
-  tools = await nodeTools();
+  core = await nodeCore();
 });
 
 test.runIf(ALL && hasPython)("a group of 10 frames of 20k vertices takes at most half of its duration, alone or predicted", () => {
@@ -24,7 +24,7 @@ test.runIf(ALL && hasPython)("a group of 10 frames of 20k vertices takes at most
   const head = Head.parse(data);
   const times: number[][] = head.chunks.map(() => []);
   for (let pass = 0; pass < PASSES; pass++) {
-    const decoder = new ChunkDecoder(tools);
+    const decoder = new ChunkDecoder(core);
     head.chunks.forEach((chunk, k) => {
       const { vertexCount, frameCount, decodeMs } = decoder.decode(jobOf(head, chunk, data), noDamage) as PackedGroup;
       expect(frameCount).toBe(10);

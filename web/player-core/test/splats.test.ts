@@ -5,19 +5,16 @@ import { readFileSync } from "node:fs";
 import { beforeAll, expect, test } from "vitest";
 
 import { ChunkDecoder } from "../src/decode/chunk_decoder.ts";
-import { Video } from "../src/decode/decoder.ts";
-import type { Tools } from "../src/decode/group.ts";
-import { checkShowable } from "../src/decode/pack_splats.ts";
-import type { Bound, Splats } from "../src/decode/splats.ts";
-import { decodeSplats } from "../src/decode/splats.ts";
+import { Video } from "./whole_video.ts";
+import type { Core, Handle } from "../src/wasm/core.ts";
+import type { Bound } from "./whole_video.ts";
 import { FormatError } from "../src/errors.ts";
-import { LIMITS } from "../src/format/layout.gen.ts";
 import { Head } from "../src/format/reader.ts";
 import type { PackedGroup } from "../src/types.ts";
 import { SPLAT_WEIGHT, SPLAT_WORDS } from "../src/types.ts";
 import { jobOf, noDamage } from "./jobs.ts";
 import { noise } from "./server.ts";
-import { ROOT, nodeTools } from "./tools.ts";
+import { ROOT, nodeCore } from "./tools.ts";
 
 const FILE = new Uint8Array(readFileSync(`${ROOT}/conformance/v1/splats/splats.reel`));
 const GOLDEN = JSON.parse(readFileSync(`${ROOT}/conformance/v1/splats/splats.json`, "utf8")) as Record<string, (Bound[] | null)[]>;
@@ -25,9 +22,9 @@ const EVERY = 50; // splats, of which the golden file tells one
 const HEAD = Head.parse(FILE);
 const COUNT = 7; // offset of the number of all splats
 
-let tools: Tools;
+let core: Core;
 beforeAll(async () => {
-  tools = await nodeTools();
+  core = await nodeCore();
 });
 
 /** All numbers, in the order of their names. */
@@ -39,7 +36,7 @@ test.each([
   ["frames", null],
   ["frames_of_first_layers", 0],
 ] as const)("%s have their splats where Python has them", (name, layers) => {
-  const video = new Video(tools, FILE, layers);
+  const video = new Video(core, FILE, layers);
   const { origin } = video.head.header;
   const hidden = GOLDEN[name].map((wanted, frame) => {
     const found = video.splats(frame);
@@ -56,12 +53,12 @@ test.each([
 
 /** Groups of the file as a worker packs them. */
 function packed(data: Uint8Array): PackedGroup[] {
-  const decoder = new ChunkDecoder(tools);
+  const decoder = new ChunkDecoder(core);
   return HEAD.tracks[0].map((chunk) => decoder.decode(jobOf(HEAD, chunk, data), noDamage) as PackedGroup);
 }
 
 test("groups carry the splats of their chain, with their numbers and the frames that lack them", () => {
-  const video = new Video(tools, FILE);
+  const video = new Video(core, FILE);
   const groups = packed(FILE);
   expect(groups.map(({ splats }) => splats?.count ?? null)).toEqual([300, 300, 300, null]);
   for (const { splats, firstFrame, frameCount, vertexCount } of groups) {
@@ -83,19 +80,26 @@ test("groups carry the splats of their chain, with their numbers and the frames 
   }
 });
 
+/** The group that the splats are on. */
+function carriers(): Handle {
+  const [chunk] = HEAD.chunks;
+  const payload = FILE.slice(chunk.offset, chunk.offset + chunk.size);
+  return core.open({ payload, frames: chunk.frameCount, layers: null, previous: null, isShown: true, scale: 1, origin: [0, 0, 0] });
+}
+
 test("what is changed in their bytes is refused in words, or decoded; what is cut off always but between layers", () => {
   const [chunk] = HEAD.chunks.filter(({ kind }) => kind === "splats");
   const data = FILE.slice(chunk.offset, chunk.offset + chunk.size);
-  const faces = 80;
-  const whole = decodeSplats(tools.core, data, faces);
+  const [carrier, whole] = [carriers(), 300];
   let refused = 0;
   for (let seed = 0; seed < 400; seed++) {
     const copy = data.slice();
     const [where, high, value] = noise(3, 77 + seed);
     copy[(where * 256 + high) % (seed % 2 === 0 ? 40 : copy.length)] = value;
     try {
-      const { colors, weights } = decodeSplats(tools.core, copy, faces);
-      expect([...colors, ...weights].every((x) => x >= 0 && x <= 1)).toBe(true);
+      core.dress(carrier, "splats", copy);
+      const [, , , opacities, colors] = core.show(carrier, 0).splats;
+      expect([...opacities, ...colors].every((x) => x >= 0 && x <= 1)).toBe(true);
     } catch (error) {
       expect(error).toBeInstanceOf(FormatError);
       refused++;
@@ -104,19 +108,20 @@ test("what is changed in their bytes is refused in words, or decoded; what is cu
   expect(refused).toBeGreaterThan(200);
   const ends = new Set([0, 1, 2].map((k) => chunk.layers.slice(0, k + 1).reduce((sum, { size }) => sum + size, 0)));
   for (let end = 0; end < data.length; end += ends.has(end + 1) ? 1 : 7) {
-    if (ends.has(end)) expect(decodeSplats(tools.core, data.subarray(0, end), faces).faces.length).toBeLessThan(whole.faces.length);
-    else expect(() => decodeSplats(tools.core, data.subarray(0, end), faces)).toThrow(FormatError);
+    const cut = (): void => core.dress(carrier, "splats", data.subarray(0, end));
+    if (!ends.has(end)) expect(cut).toThrow(FormatError);
+    else {
+      cut();
+      expect(core.show(carrier, 0).splats[3].length).toBeLessThan(whole);
+    }
   }
-  expect(() => decodeSplats(tools.core, data, Math.max(...whole.faces))).toThrow(/^splat \d+: /);
 });
 
-test("more splats than can be shown are refused, and their group is shown without", () => {
-  const many = { faces: { length: (1 << 22) + 1 } } as unknown as Splats;
-  expect(() => checkShowable(many)).toThrow("4194305 splats: over 4194304");
+test("splats that are damaged are left out, and their group is shown without", () => {
   const job = jobOf(HEAD, HEAD.chunks[0], FILE);
   job.companions[0].payload[job.companions[0].payload.length - 1] ^= 1;
   const damage: string[] = [];
-  const shown = new ChunkDecoder(tools).decode(job, ({ message }) => damage.push(message)) as PackedGroup;
+  const shown = new ChunkDecoder(core).decode(job, ({ message }) => damage.push(message)) as PackedGroup;
   expect(damage).toEqual([expect.stringContaining("layer 2 is damaged")]);
   expect([shown.splats, shown.faces.length > 0]).toEqual([null, true]);
 });
@@ -127,8 +132,8 @@ test("a count that their bytes have no right to is refused before memory is take
   const many = [0x80, 0x80, 0x80, 0x80, 0x04]; // 2^30
   const second = COUNT + 2; // of the first layer: behind the two bytes of 300
   const claimed = Uint8Array.from([...data.slice(0, second), ...many, ...data.slice(second + 1)]);
-  expect(() => decodeSplats(tools.core, claimed, 80)).toThrow(`cost ${LIMITS.splat * 2 ** 30} to decode`);
+  expect(() => core.dress(carriers(), "splats", claimed)).toThrow(FormatError);
   const fewer = Uint8Array.from(data);
   fewer[COUNT] -= 1;
-  expect(() => decodeSplats(tools.core, fewer, 80)).toThrow("300 splats of 299");
+  expect(() => core.dress(carriers(), "splats", fewer)).toThrow(/more or fewer/);
 });

@@ -1,11 +1,9 @@
-// The decoder's tools for tests in Node.
+// The compiled decoder for tests in Node.
 
 import { readFileSync } from "node:fs";
-import { createRequire } from "node:module";
 import { fileURLToPath } from "node:url";
 
-import type { Tools } from "../src/decode/group.ts";
-import { makeTools } from "../src/decode/tools.ts";
+import { Core } from "../src/wasm/core.ts";
 
 export const ROOT = fileURLToPath(new URL("../../..", import.meta.url));
 
@@ -15,8 +13,7 @@ export function buffer(path: string): ArrayBuffer {
 }
 
 export const coreWasm = (): ArrayBuffer => buffer(`${ROOT}/src/meshreel/player/core.wasm`);
-export const dracoWasm = (): ArrayBuffer => buffer(createRequire(import.meta.url).resolve("draco3d/draco_decoder.wasm"));
 
-export async function nodeTools(): Promise<Tools> {
-  return makeTools(await WebAssembly.compile(coreWasm()), dracoWasm());
+export async function nodeCore(): Promise<Core> {
+  return Core.create(await WebAssembly.compile(coreWasm()));
 }

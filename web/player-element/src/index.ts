@@ -12,7 +12,7 @@ const beside = (name: string): URL => new URL(elsewhere?.[name] ?? name, import.
 
 if (globalThis.customElements && !customElements.get("meshreel-player")) {
   MeshreelPlayer.engine = new RealEngine({
-    worker: beside("worker.js"), core: beside("core.wasm"), draco: beside("draco.wasm"), order: beside("order.js"), three: beside("three.js"),
+    worker: beside("worker.js"), core: beside("core.wasm"), order: beside("order.js"), three: beside("three.js"),
   });
   customElements.define("meshreel-player", MeshreelPlayer);
 }

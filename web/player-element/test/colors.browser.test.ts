@@ -5,10 +5,10 @@ import { join } from "node:path";
 import type { Page } from "playwright-core";
 import { afterAll, beforeAll, expect, test } from "vitest";
 
-import { Video } from "@meshreel/player-core/decode/decoder";
+import { Video } from "../../player-core/test/whole_video.ts";
 import { describeInBrowser } from "../../test/browser.ts";
 import { hasPython, ROOT, runPython } from "../../test/python.ts";
-import { nodeTools } from "../../player-core/test/tools.ts";
+import { nodeCore } from "../../player-core/test/tools.ts";
 import { Site } from "./product.ts";
 
 const NAMES = ["scene", "layers", "draco"];
@@ -60,7 +60,7 @@ describeInBrowser("the player and a recording's own colours", () => {
   });
 
   test.skipIf(!hasPython).each(NAMES)("%s.reel is shown in them, to the byte", async (name) => {
-    const video = new Video(await nodeTools(), Uint8Array.from(Buffer.from(files[name].file, "base64")));
+    const video = new Video(await nodeCore(), Uint8Array.from(Buffer.from(files[name].file, "base64")));
     const wanted = [...video.frame(0).colors!.subarray(0, 3)].join(",");
     const { page, errors } = await open(`${name}-flat`);
     expect(await page.evaluate(() => [document.querySelector("meshreel-player")!.mode, document.querySelector("meshreel-player")!.info!.hasColors])).toEqual(["color", true]);

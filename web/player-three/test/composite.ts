@@ -1,6 +1,6 @@
 // Splats drawn on white without a GPU, as analysis/appearance/splat_raster.py: what their shaders must come near to.
 
-import type { Bound } from "@meshreel/player-core/decode/splats";
+import type { Bound } from "../../player-core/test/whole_video.ts";
 import type { Vector } from "../src/colors.ts";
 
 const [BLUR, MOST, LEAST] = [0.3, 0.999, 1 / 255];

@@ -8,7 +8,7 @@ import { ChunkDecoder } from "@meshreel/player-core/decode/chunk_decoder";
 import { Head } from "@meshreel/player-core/format/reader";
 import type { Box, Packed } from "@meshreel/player-core/types";
 import { jobOf, noDamage } from "../../player-core/test/jobs.ts";
-import { nodeTools } from "../../player-core/test/tools.ts";
+import { nodeCore } from "../../player-core/test/tools.ts";
 import { describeInBrowser, openPage } from "../../test/browser.ts";
 import type { OpenPage } from "../../test/browser.ts";
 import { hasPython, ROOT, runPython } from "../../test/python.ts";
@@ -39,7 +39,7 @@ describeInBrowser("positions on the GPU and in Python", () => {
   test.skipIf(!hasPython).each(NAMES)("%s", async (name) => {
     const data = new Uint8Array(readFileSync(join(FOLDER, name)));
     const head = Head.parse(data);
-    const decoder = new ChunkDecoder(await nodeTools());
+    const decoder = new ChunkDecoder(await nodeCore());
     const packed = head.chunks.map((chunk) => decoder.decode(jobOf(head, chunk, data), noDamage)!);
     for (const frame of new Set([0, head.frameCount >> 1, head.frameCount - 1])) {
       const background = head.staticOfFrame(frame);

@@ -5,12 +5,12 @@ import { join } from "node:path";
 import { fileURLToPath } from "node:url";
 import { afterAll, afterEach, beforeAll, expect, test } from "vitest";
 import { ChunkDecoder } from "@meshreel/player-core/decode/chunk_decoder";
-import { Video } from "@meshreel/player-core/decode/decoder";
+import { Video } from "../../player-core/test/whole_video.ts";
 import { Head } from "@meshreel/player-core/format/reader";
 import { SPLATS_WIDTH, SPLAT_WEIGHT, SPLAT_WORDS } from "@meshreel/player-core/types";
 import type { Packed, PackedGroup } from "@meshreel/player-core/types";
 import { jobOf, noDamage } from "../../player-core/test/jobs.ts";
-import { nodeTools } from "../../player-core/test/tools.ts";
+import { nodeCore } from "../../player-core/test/tools.ts";
 import { describeInBrowser, openPage } from "../../test/browser.ts";
 import type { OpenPage } from "../../test/browser.ts";
 import { ROOT } from "../../test/python.ts";
@@ -58,8 +58,8 @@ describeInBrowser("splats in Chromium", () => {
 
   test("are those that are composited without a GPU, in the frames of each group, but for rounding", async () => {
     const data = new Uint8Array(readFileSync(join(ROOT, "conformance/v1/splats/splats.reel")));
-    const [head, tools] = [Head.parse(data), await nodeTools()];
-    const [decoder, video] = [new ChunkDecoder(tools), new Video(tools, data)];
+    const [head, core] = [Head.parse(data), await nodeCore()];
+    const [decoder, video] = [new ChunkDecoder(core), new Video(core, data)];
     const groups = head.tracks[0].map((chunk) => decoder.decode(jobOf(head, chunk, data), noDamage) as PackedGroup);
     const { origin } = head.header;
     const [from, width, height] = [[0.7, 0.4, 1.1] as const, 120, 90];

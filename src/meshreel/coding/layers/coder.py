@@ -15,7 +15,7 @@ import numpy as np
 
 from ... import _core
 from ...errors import FormatError, InputError
-from ...format.budget import Size, check_cost, layers_cost
+from ...format.budget import LIMITS, Size, check_cost, layers_cost
 from ...format.layout import Form, LayersGroup, LayersLevel, LayersPatches, Origin
 from ...format.records import pack, unpack, unpack_all
 from ...geometry.subdivision import heights, refine, subdivide, write_frames
@@ -33,7 +33,6 @@ from .trajectories import decode_last_places, decode_trajectories, encode_trajec
 NOISY_STEP = 0.8  # RMS distances of the noise by which a step is widened (decision 16)
 NOISY_DETAIL = 1.25  # RMS distances of the noise, least RMS of a column of detail: noise has 1 (decision 28)
 MOST_FRAMES = 255  # of a group: a byte in the head
-MOST_NUMBERS = 1 << 29  # of decoded places: 4 GiB
 
 
 @dataclass(frozen=True, slots=True)
@@ -315,6 +314,6 @@ def _level(
         near = previous.finer[number - 1]
     else:
         near = connectivity(faces, vertices)
-    if 3 * frames * near.level.count > MOST_NUMBERS:
-        raise FormatError(f"{frames} frames of {len(near.level.faces)} faces exceed {MOST_NUMBERS} numbers")
+    if 3 * frames * near.level.count > LIMITS.numbers:
+        raise FormatError(f"{frames} frames of {len(near.level.faces)} faces exceed {LIMITS.numbers} numbers")
     return near

@@ -11,6 +11,7 @@ import numpy as np
 
 from ...errors import FormatError, InputError
 from ...format import records
+from ...format.budget import LIMITS
 from ...format.layout import Component, DisplacementHead
 from ...shapes import Float64
 from ...types import Mesh
@@ -21,7 +22,6 @@ from .allocation import Allocation, DisplacementOptions, allocate, alternatives,
 
 MOST_FRAMES = 65_535  # of a group: a uint16 in the head
 MOST_BITS = 30  # fraction bits of the mean and of a basis vector, so that values fit int32
-MOST_NUMBERS = 1 << 29  # of a decoded field: 4 GiB
 
 
 def encode_displacements(field: Float64[np.ndarray, "V T 3"], base: Mesh, options: DisplacementOptions) -> bytes:
@@ -44,8 +44,8 @@ def decode_displacements(data: bytes, base: Mesh, components: int | None = None)
     vertices = len(base.vertices)
     if head.anchor_count > vertices or not np.isfinite(base.vertices).all():
         raise FormatError(f"displacements: {head.anchor_count} anchors among {vertices} vertices, or a base not finite")
-    if 3 * head.frames * vertices > MOST_NUMBERS:
-        raise FormatError(f"displacements: {head.frames} frames of {vertices} vertices exceed {MOST_NUMBERS} numbers")
+    if 3 * head.frames * vertices > LIMITS.numbers:
+        raise FormatError(f"displacements: {head.frames} frames of {vertices} vertices exceed {LIMITS.numbers} numbers")
     neighbours = entropy.causal_neighbours(base.faces, vertices)
     anchors = laplacian.anchors(head.anchor_rule, head.anchor_count, base.faces, vertices)
     streams = _streams(data, offset, head.components[:count])

@@ -1,65 +1,64 @@
 // The inside of a decoding worker: jobs in, packed groups out. Keeps what groups that follow are predicted from.
 
-import { decodeAtlas, finerPlaces } from "./atlas.ts";
 import { arraysOf } from "../bytes.ts";
-import type { Layout } from "./atlas.ts";
-import { paintStatic } from "./colors.ts";
-import type { Tools } from "./group.ts";
-import { colorGroup, continueGroup, decodeStatic } from "./group.ts";
-import type { LayersState } from "./layers.ts";
-import { faceCount } from "../mesh.ts";
-import type { Placement } from "../mesh.ts";
 import { FormatError } from "../errors.ts";
-import { led } from "../format/budget.ts";
-import type { Led } from "../format/budget.ts";
 import { checkPayload } from "../format/payload.ts";
-import { packGroup, packStatic } from "./pack.ts";
-import { checkShowable, packSplats } from "./pack_splats.ts";
-import type { FineAtlas } from "./pack.ts";
-import type { Damage, DecodeJob } from "../protocol.ts";
 import { describe } from "../format/reader.ts";
-import { decodeSplats, inherited } from "./splats.ts";
-import type { ColoredMesh } from "../wasm/colors.ts";
-import type { CompanionKind, Packed } from "../types.ts";
+import type { Damage, DecodeJob } from "../protocol.ts";
+import type { Box, Packed, PackedVertices } from "../types.ts";
+import type { Core, Handle, PackedArrays } from "../wasm/core.ts";
 
 const MOST_STATES = 64; // of groups, of all tracks and files; the oldest goes first
 const MOST_STATICS = 4;
+const TEXTURE_WIDTH = 2048; // that every WebGL 2 has
+const ORIGIN = [0, 0, 0]; // of what is packed: the header's, from which positions are counted
 
 /** A job whose predecessor this worker has not, or no longer: the chain is to be sent again. */
 export class MissingState extends Error {
   override name = "MissingState";
 }
 
-/** Values by file and chunk, up to a number of them. */
-class Kept<T> {
-  private readonly values = new Map<string, T>();
+/** Opened chunks by file and number, up to a number of them. */
+class Kept {
+  private readonly chunks = new Map<string, Handle>();
 
-  constructor(private readonly most: number) {}
+  constructor(
+    private readonly core: Core,
+    private readonly most: number,
+  ) {}
 
-  get(file: number, chunk: number): T | undefined {
-    return this.values.get(`${file}/${chunk}`);
+  get(file: number, chunk: number): Handle | undefined {
+    return this.chunks.get(`${file}/${chunk}`);
   }
 
-  set(file: number, chunk: number, value: T): void {
+  set(file: number, chunk: number, value: Handle): void {
     const key = `${file}/${chunk}`;
-    this.values.delete(key); // so that it counts as the newest
-    this.values.set(key, value);
-    for (const oldest of this.values.keys()) {
-      if (this.values.size <= this.most) break;
-      this.values.delete(oldest);
+    this.close(key); // so that it counts as the newest
+    this.chunks.set(key, value);
+    for (const oldest of this.chunks.keys()) {
+      if (this.chunks.size <= this.most) break;
+      this.close(oldest);
     }
   }
 
   forget(file: number): void {
-    for (const key of [...this.values.keys()]) if (key.startsWith(`${file}/`)) this.values.delete(key);
+    for (const key of [...this.chunks.keys()]) if (key.startsWith(`${file}/`)) this.close(key);
+  }
+
+  private close(key: string): void {
+    const chunk = this.chunks.get(key);
+    if (chunk !== undefined) this.core.close(chunk);
+    this.chunks.delete(key);
   }
 }
 
 export class ChunkDecoder {
-  private readonly states = new Kept<LayersState>(MOST_STATES);
-  private readonly statics = new Kept<Led>(MOST_STATICS);
+  private readonly groups: Kept;
+  private readonly statics: Kept;
 
-  constructor(private readonly tools: Tools) {}
+  constructor(private readonly core: Core) {
+    [this.groups, this.statics] = [new Kept(core, MOST_STATES), new Kept(core, MOST_STATICS)];
+  }
 
   /**
    * What the job's chunk is, in metres from the header's origin; null where only its state is wanted. A companion that cannot be decoded is
@@ -68,79 +67,68 @@ export class ChunkDecoder {
   decode(job: DecodeJob, damage: (damage: Damage) => void): Packed | null {
     const start = performance.now();
     checkPayload(describe({ ...job, number: job.chunk }), job.form, job.payload, job.ranges);
-    const place = { scale: job.scale, origin: [0, 0, 0] };
-    const made = job.kind === "static" ? this.background(job, place, damage) : this.group(job, place, damage);
-    return made && { ...made, decodeMs: performance.now() - start };
+    const isGroup = job.kind === "group";
+    const kept = isGroup ? this.groups : this.statics;
+    const { payload, layers, scale } = job;
+    const frames = isGroup ? job.frameCount : null;
+    const chunk = this.core.open({ payload, frames, layers, previous: previousOf(kept, job), isShown: !job.stateOnly, scale, origin: ORIGIN });
+    let packed: Packed | null = null;
+    try {
+      this.dress(chunk, job, damage);
+      if (!job.stateOnly) packed = packedOf(this.core.pack(chunk, job.textured), job, start);
+      this.core.trim(chunk);
+    } catch (error) {
+      if (error instanceof FormatError) this.core.close(chunk);
+      throw error;
+    }
+    kept.set(job.file, job.chunk, chunk);
+    return packed;
   }
 
   /** Frees what is kept of a file. */
   forget(file: number): void {
-    this.states.forget(file);
+    this.groups.forget(file);
     this.statics.forget(file);
   }
 
-  private group(job: DecodeJob, place: Placement, damage: (damage: Damage) => void): Packed | null {
-    const { file, chunk, track, firstFrame, layers, payload } = job;
-    const { core } = this.tools;
-    const previous = this.needed(this.states, job);
-    const made = continueGroup(this.tools, payload, { frameCount: job.frameCount, layers, previous, place });
-    const colored = companion(job, "colors", damage, (data) => colorGroup(core, made, data, { layers, previous }));
-    const [colors, state] = colored ?? [null, made.state];
-    const template = made.canvas[0];
-    const layout = companion(job, "atlas", damage, (data) => decodeAtlas(core, data, template.base)) ?? previous?.layout ?? null;
-    const own = companion(job, "splats", damage, (data) => checkShowable(decodeSplats(core, data, faceCount(template.base))));
-    const carried = own ?? inherited(previous, template);
-    if (state !== null) this.states.set(file, chunk, { ...state, layout, splats: carried });
-    if (job.stateOnly) return null;
-    const shape = packGroup(core, made.group, colors, job.textured ? fineAtlas(layout, template) : null);
-    const splats = carried && packSplats(carried, made.group, template.levels, job.scale);
-    return { kind: "group", chunk, track, firstFrame, ...shape, splats, layers: Math.max(0, job.ranges.length - 1), bytes: bytesOf(job), decodeMs: 0 };
-  }
-
-  private background(job: DecodeJob, place: Placement, damage: (damage: Damage) => void): Packed | null {
-    const { core } = this.tools;
-    const before = this.needed(this.statics, job);
-    const made = decodeStatic(this.tools, job.payload, before && before.mesh, place);
-    const mesh = companion(job, "colors", damage, (data) => paintStatic(core, made, data)) ?? made.mesh;
-    this.statics.set(job.file, job.chunk, led(before, mesh, job.payload.length));
-    if (job.stateOnly) return null;
-    const layout = companion(job, "atlas", damage, (data) => decodeAtlas(core, data, made.added.base));
-    const atlas = job.textured ? fineAtlas(layout, made.added, mesh) : null;
-    return { kind: "static", chunk: job.chunk, ...packStatic(core, mesh, atlas), bytes: bytesOf(job), decodeMs: 0 };
-  }
-
-  private needed<T>(kept: Kept<T>, job: DecodeJob): T | null {
-    if (job.previous === null) return null;
-    const value = kept.get(job.file, job.previous);
-    if (value === undefined) throw new MissingState(`chunk ${job.chunk} needs chunk ${job.previous}, which is not at hand`);
-    return value;
+  /** Decodes the companions of a job's chunk. Throws what stops the core, damage or not. */
+  private dress(chunk: Handle, job: DecodeJob, damage: (damage: Damage) => void): void {
+    for (const { chunk: number, kind, form, payload, ranges } of job.companions) {
+      if (kind === "pictures" || kind === "compatible") continue;
+      try {
+        checkPayload(describe({ ...job, number, kind }), form, payload, ranges);
+        this.core.dress(chunk, kind, payload);
+      } catch (error) {
+        damage({ chunk: number, message: error instanceof Error ? error.message : String(error) });
+        if (!(error instanceof FormatError)) throw error;
+      }
+    }
   }
 }
 
-/** What a companion of a job's chunk decodes to; null where it has none, or a damaged one. Throws what stops the core, damage or not. */
-function companion<T>(job: DecodeJob, kind: CompanionKind, damage: (damage: Damage) => void, decode: (payload: Uint8Array) => T): T | null {
-  const found = job.companions.find((other) => other.kind === kind);
-  if (found === undefined) return null;
-  const { chunk, form, payload, ranges } = found;
-  try {
-    checkPayload(describe({ ...job, number: chunk, kind }), form, payload, ranges);
-    return decode(payload);
-  } catch (error) {
-    damage({ chunk, message: error instanceof Error ? error.message : String(error) });
-    if (error instanceof FormatError) return null;
-    throw error;
-  }
+function previousOf(kept: Kept, job: DecodeJob): Handle | null {
+  if (job.previous === null) return null;
+  const chunk = kept.get(job.file, job.previous);
+  if (chunk === undefined) throw new MissingState(`chunk ${job.chunk} needs chunk ${job.previous}, which is not at hand`);
+  return chunk;
 }
 
-/** The places of the finest faces of a mesh; null where it has no textures, or where they are those of another mesh. */
-function fineAtlas(layout: Layout | null, { base, levels }: ColoredMesh, shown = base): FineAtlas | null {
-  if (layout === null || layout.places.length !== 2 * base.faces.length || shown.faces.length !== base.faces.length) return null;
-  return { ...layout, places: finerPlaces(layout, levels) };
+function packedOf(arrays: PackedArrays, job: DecodeJob, start: number): Packed {
+  const { vertexCount, faces, extra, extraStarts, splatCount, words, unit } = arrays;
+  const bytes = job.companions.reduce((sum, other) => sum + other.payload.length, job.payload.length); // that it was decoded from
+  const common = { chunk: job.chunk, ...verticesOf(arrays), vertexCount, faces, bytes, decodeMs: performance.now() - start };
+  if (job.kind === "static") return { kind: "static", ...common };
+  const { track, firstFrame, frameCount } = job;
+  const splats = splatCount === 0 ? null : { count: splatCount, words, unit };
+  const shape = { textureWidth: TEXTURE_WIDTH, textureHeight: arrays.rows, extra, extraStarts, splats, layers: Math.max(0, job.ranges.length - 1) };
+  return { kind: "group", track, firstFrame, frameCount, ...shape, ...common };
 }
 
-/** Bytes that a job's chunk is decoded from. */
-function bytesOf({ payload, companions }: DecodeJob): number {
-  return companions.reduce((sum, other) => sum + other.payload.length, payload.length);
+function verticesOf({ bounds, texels, colors, width, height, places, extraPlaces }: PackedArrays): PackedVertices {
+  const minimum = [...bounds.subarray(0, 3)] as unknown as Box["minimum"];
+  const size = minimum.map((low, k) => bounds[3 + k] - low) as unknown as Box["size"];
+  const placed = width === 0 ? null : { width, height, faces: places, extra: extraPlaces };
+  return { texels, colors: colors.length === 0 ? null : colors, box: { minimum, size }, places: placed };
 }
 
 /** The buffers of a packed value, to be handed over with it. */

@@ -3,8 +3,7 @@
 
 import { ChunkDecoder, MissingState, buffersOf } from "./chunk_decoder.ts";
 import type { Damage, DecodeJob, FromWorker, ToWorker } from "../protocol.ts";
-import { makeTools } from "./tools.ts";
-import { CoreStopped } from "../wasm/memory.ts";
+import { Core, CoreStopped } from "../wasm/core.ts";
 
 /** What a worker's global scope is here, and what a test's stand-in has. */
 export interface Scope {
@@ -26,13 +25,12 @@ export function serve(scope: Scope): void {
 class Served {
   private decoder: ChunkDecoder | null = null;
   private core: WebAssembly.Module | null = null;
-  private draco: ArrayBuffer | null = null;
 
   constructor(private readonly scope: Scope) {}
 
   async answer(message: ToWorker): Promise<void> {
     if (message.type === "start") {
-      [this.core, this.draco] = await Promise.all([bytesOf(message.core).then((bytes) => WebAssembly.compile(bytes)), bytesOf(message.draco)]);
+      this.core = await WebAssembly.compile(await bytesOf(message.core));
       await this.restart();
       this.scope.postMessage({ type: "started" }, []);
     } else if (message.type === "forget") this.decoder?.forget(message.file);
@@ -55,9 +53,9 @@ class Served {
     }
   }
 
-  /** New instances; what was kept is gone with the old ones. */
+  /** A new instance; what was kept is gone with the old one. */
   private async restart(): Promise<void> {
-    if (this.core !== null && this.draco !== null) this.decoder = new ChunkDecoder(await makeTools(this.core, this.draco));
+    if (this.core !== null) this.decoder = new ChunkDecoder(await Core.create(this.core));
   }
 }
 

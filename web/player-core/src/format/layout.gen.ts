@@ -34,6 +34,8 @@ export const LIMITS = {
   videos: 184549376,
   splat: 1024,
   audio: 268435456,
+  faces: 64000000,
+  numbers: 536870912,
   held: 44,
 } as const;
 

@@ -19,7 +19,6 @@ type Wasm = ArrayBuffer | string;
 export interface WorkerSetup {
   readonly create: () => WorkerLike;
   readonly core: Wasm | Promise<Wasm>;
-  readonly draco: Wasm | Promise<Wasm>;
   readonly count?: number; // workers; cores - 1 if not given, from 1 to 4
   readonly silenceMs?: number; // without an answer before a worker counts as dead; 30 000 if not given
 }
@@ -176,10 +175,10 @@ export class WorkerPool {
     worker.onmessage = ({ data }) => this.#hear(slot, data);
     worker.onerror = (event) => this.#replace(slot, event.message || "it ended");
     worker.onmessageerror = () => this.#replace(slot, "its answer cannot be read");
-    void Promise.all([this.#setup.core, this.#setup.draco]).then(([core, draco]) => {
+    void Promise.resolve(this.#setup.core).then((core) => {
       if (!this.#slots.includes(slot)) return;
       this.#watch(slot); // from now on: bytes may take long to come
-      worker.postMessage({ type: "start", core, draco }, []);
+      worker.postMessage({ type: "start", core }, []);
     });
   }
 

@@ -4,7 +4,7 @@
 #include <locale>
 #include <sstream>
 
-#include "format_error.h"
+#include "../../src/format_error.h"
 #include "head.h"
 
 namespace meshreel {

@@ -6,10 +6,10 @@
 #include <string>
 #include <vector>
 
-#include "format_error.h"
-#include "group.h"
+#include "../../src/format_error.h"
+#include "../group.h"
+#include "../splats.h"
 #include "source.h"
-#include "splats.h"
 
 namespace meshreel {
 
@@ -49,7 +49,7 @@ public:
     Mesh whole(uint64_t frame);
     Bound splats(uint64_t frame, size_t track);
     // The coded picture of a group or a background in a frame, in the coding of a kind of chunks.
-    Picture picture(uint64_t frame, uint32_t chunk, Kind kind);
+    Picture picture(uint64_t frame, uint32_t chunk, ChunkKind kind);
 
     // What was left out of the last mesh, in words.
     std::string lacking;
@@ -71,11 +71,11 @@ private:
     template <class Paint>
     std::string paint_with(uint32_t chunk, int64_t layers, Paint paint);
     std::string paint(uint32_t chunk, const Context& context, int64_t layers, Continued& made);
-    void turn(std::vector<double>& vertices) const;
+    void turn(double* vertices, size_t numbers) const;
     std::string put_on_texture(uint32_t chunk, unsigned levels, const Faces& faces, std::vector<float>& places);
     const Mesh& state_of(uint32_t chunk);
     Mesh decode_state(uint32_t chunk);
-    const Atlas& atlas(uint32_t chunk);
+    const Layout& atlas(uint32_t chunk);
     uint32_t pictures_of(uint32_t chunk) const;
     uint32_t splats_of(uint32_t chunk) const;
     std::vector<uint8_t> read(uint32_t chunk, int64_t layers) const;
@@ -97,11 +97,11 @@ private:
         std::string lacking;
     } background_;
     uint32_t atlas_chunk_ = kNoChunk;
-    Atlas atlas_{};
+    Layout atlas_{};
     struct {
         uint32_t chunk = kNoChunk;
         size_t faces = 0;  // of the base mesh
-        std::vector<Splat> all;
+        Splats found;
     } splats_;  // those that were decoded last
 };
 

@@ -5,7 +5,7 @@
 #include <memory>
 #include <new>
 
-#include "format_error.h"
+#include "../../src/format_error.h"
 #include "meshreel/decoder.h"
 #include "video.h"
 
@@ -85,12 +85,12 @@ int32_t up_of(const std::string& metadata) {
 void count_chunks(const Head& head, meshreel_info& info) {
     for (const Chunk& chunk : head.chunks) {
         const uint32_t beyond = static_cast<uint32_t>(chunk.layers.size()) - 1;
-        if (chunk.kind == kGroup) info.layers = std::max(info.layers, beyond);
-        if (chunk.kind == kGroup)
+        if (chunk.kind == ChunkKind::GROUP) info.layers = std::max(info.layers, beyond);
+        if (chunk.kind == ChunkKind::GROUP)
             for (const uint64_t number : chunk.depends_on) info.has_background |= head.is_static(number);
-        info.has_textures |= chunk.kind == kPicturesOf || chunk.kind == kCompatibleOf;
-        info.has_splats |= chunk.kind == kSplatsOf;
-        info.has_colors |= chunk.kind == kColorsOf;
+        info.has_textures |= chunk.kind == ChunkKind::PICTURES || chunk.kind == ChunkKind::COMPATIBLE;
+        info.has_splats |= chunk.kind == ChunkKind::SPLATS;
+        info.has_colors |= chunk.kind == ChunkKind::COLORS;
     }
 }
 
@@ -216,7 +216,8 @@ int32_t meshreel_picture(meshreel_video* video, uint64_t frame, int32_t part, in
         const uint64_t coded = head.coded(frame);
         const uint32_t chunk = part == MESHREEL_BACKGROUND ? head.static_of_frame(coded)
                                                            : head.chunk_of_frame(coded, static_cast<size_t>(part));
-        video->picture = opened.picture(coded, chunk, codec == MESHREEL_AV1 ? kPicturesOf : kCompatibleOf);
+        video->picture =
+            opened.picture(coded, chunk, codec == MESHREEL_AV1 ? ChunkKind::PICTURES : ChunkKind::COMPATIBLE);
         const Picture& found = video->picture;
         if (found.packet.empty()) return MESHREEL_OK;
         *packet = {found.packet.data(), found.packet.size(), found.stream, found.number, found.width, found.height};

@@ -7,33 +7,13 @@
 #include <utility>
 #include <vector>
 
-#include "records.h"
+#include "../../src/format_error.h"
+#include "../../src/layout.gen.h"
+#include "../group.h"
 
 namespace meshreel {
 
-enum Kind : uint8_t { kStatic = 1, kGroup, kColorsOf, kAtlasOf, kPicturesOf, kCompatibleOf, kSplatsOf, kAudio };
-enum Form : uint8_t {
-    kLaplacian = 1,
-    kLayers,
-    kDraco,
-    kEmpty,
-    kPatch,
-    kVertexColors,
-    kPlaces,
-    kVideo,
-    kGaussians,
-    kAudioFile
-};
-
 constexpr uint32_t kNoChunk = ~0u;
-constexpr int64_t kAllLayers = -1;  // as a number of layers
-
-struct Header {
-    double frame_rate, origin[3], scale, minimum[3], maximum[3];
-    std::string metadata;
-    int64_t first_time;
-    std::vector<uint64_t> intervals;
-};
 
 // What of the coded frames is shown, and how it is turned.
 struct Edit {
@@ -42,20 +22,10 @@ struct Edit {
     double rotation[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};  // about the origin, row by row
 };
 
-struct Layer {
-    uint64_t size;
-    uint32_t crc;
-};
-
-struct Chunk {
-    uint8_t kind, form;
-    uint16_t frames;
-    uint64_t track;
-    std::vector<uint64_t> depends_on;
-    std::vector<Layer> layers;
+struct Chunk : IndexEntry {
     uint64_t offset = 0, first_frame = 0;
 
-    bool is_companion() const { return kind >= kColorsOf && kind <= kSplatsOf; }
+    bool is_companion() const { return kind >= ChunkKind::COLORS && kind <= ChunkKind::SPLATS; }
     uint64_t size() const;
 };
 
@@ -63,22 +33,22 @@ struct Head {
     Header header;
     Edit edit;
     std::vector<Chunk> chunks;
-    std::vector<std::vector<uint32_t>> tracks;                    // numbers of the groups of each
-    std::map<std::pair<uint32_t, uint8_t>, uint32_t> companions;  // by coded chunk and kind
-    std::map<uint32_t, uint64_t> shown_from;                      // of each static chunk, the first frame that names it
-    std::vector<int64_t> times;                                   // of all frames shown, microseconds; or empty
-    uint64_t frames = 0;                                          // shown
-    uint64_t size = 0;                                            // bytes of the whole file
+    std::vector<std::vector<uint32_t>> tracks;                      // numbers of the groups of each
+    std::map<std::pair<uint32_t, ChunkKind>, uint32_t> companions;  // by coded chunk and kind
+    std::map<uint32_t, uint64_t> shown_from;  // of each static chunk, the first frame that names it
+    std::vector<int64_t> times;               // of all frames shown, microseconds; or empty
+    uint64_t frames = 0;                      // shown
+    uint64_t size = 0;                        // bytes of the whole file
 
     // The number that a frame shown has among the coded ones, by which chunks are found.
     uint64_t coded(uint64_t frame) const { return edit.first + frame; }
-    uint32_t companion_of(uint32_t chunk, uint8_t kind) const;
+    uint32_t companion_of(uint32_t chunk, ChunkKind kind) const;
     uint32_t chunk_of_frame(uint64_t frame, size_t track) const;
     // The newest static chunk that a group of the frame names, or kNoChunk.
     uint32_t static_of_frame(uint64_t frame) const;
     uint32_t group_before(uint32_t chunk) const;
     double time_of(uint64_t frame) const;  // s, of a frame shown
-    bool is_static(uint64_t chunk) const { return chunks[chunk].kind == kStatic; }
+    bool is_static(uint64_t chunk) const { return chunks[chunk].kind == ChunkKind::STATIC; }
 };
 
 // Bytes that the first request is for.

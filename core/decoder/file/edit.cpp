@@ -2,7 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "format_error.h"
+#include "../../src/format_error.h"
 #include "head.h"
 
 namespace meshreel {

@@ -11,7 +11,6 @@ namespace meshreel {
 namespace {
 
 constexpr uint64_t kSymbolsPerByte = 22'800;  // no stream says more (src/meshreel/coding/entropy.py)
-constexpr unsigned kRungs = 200;              // of the ladder of steps (src/meshreel/coding/steps.py)
 
 std::array<uint32_t, 256> crc_table() {
     std::array<uint32_t, 256> table{};
@@ -25,8 +24,12 @@ std::array<uint32_t, 256> crc_table() {
 
 }  // namespace
 
+void Records::refuse(const std::string& what) const { throw FormatError(field_ + (": " + what)); }
+
 const uint8_t* Records::take(uint64_t size) {
-    require(size <= left_, "a record is truncated or damaged");
+    if (size > left_)
+        refuse(std::to_string(size) + " bytes needed at byte " + std::to_string(offset()) + ", " +
+               std::to_string(left_) + " left");
     const uint8_t* from = at_;
     at_ += size, left_ -= static_cast<size_t>(size);
     return from;
@@ -43,11 +46,23 @@ uint64_t Records::number(int bytes) {
     return value;
 }
 
+size_t Records::count(uint64_t number, size_t least) const {
+    if (number > left_ / least)
+        refuse(std::to_string(number) + " values of at least " + std::to_string(least) + " bytes, " +
+               std::to_string(left_) + " bytes left");
+    return static_cast<size_t>(number);
+}
+
+std::string Records::text(uint64_t size) {
+    const mr_bytes bytes = blob(size);
+    return std::string(bytes.data, bytes.data + bytes.size);
+}
+
 double Records::f32() {
     const uint32_t bits = u32();
     float value;
     std::memcpy(&value, &bits, sizeof value);
-    require(std::isfinite(value), "a number that is not finite");
+    if (!std::isfinite(value)) refuse("a number that is not finite");
     return static_cast<double>(value);
 }
 
@@ -55,7 +70,7 @@ double Records::f64() {
     const uint64_t bits = number(8);
     double value;
     std::memcpy(&value, &bits, sizeof value);
-    require(std::isfinite(value), "a number that is not finite");
+    if (!std::isfinite(value)) refuse("a number that is not finite");
     return value;
 }
 
@@ -63,31 +78,13 @@ uint64_t Records::varint() {
     uint64_t value = 0;
     for (int shift = 0; shift < 70; shift += 7) {
         const uint8_t byte = u8();
-        require(shift < 63 || byte <= 1, "a varint beyond 64 bits");
+        if (shift == 63 && byte > 1) refuse("a varint beyond 64 bits or longer than it needs to be");
         value |= static_cast<uint64_t>(byte & 0x7F) << shift;
         if (byte & 0x80) continue;
-        require(shift == 0 || byte != 0, "a varint longer than it needs to be");
+        if (shift > 0 && byte == 0) refuse("a varint beyond 64 bits or longer than it needs to be");
         break;
     }
     return value;
-}
-
-uint8_t Records::choice(uint8_t first, uint8_t last) {
-    const uint8_t value = u8();
-    require(value >= first && value <= last, "a value that is none of those known");
-    return value;
-}
-
-void Records::skip_field() {
-    varint();  // columns
-    u8();      // step
-    blob(varint());
-    blob(varint());
-}
-
-void Records::skip_colors_level() {
-    u8();
-    skip_field();
 }
 
 std::vector<int32_t> decode_integers(const mr_bytes& data, uint64_t count) {

@@ -4,54 +4,22 @@
 #include <cmath>
 #include <cstring>
 
-#include "budget.h"
+#include "../budget.h"
 
 namespace meshreel {
 namespace {
 
-constexpr uint8_t kMagic[8] = {0x52, 0x45, 0x45, 0x4c, 0x0d, 0x0a, 0x1a, 0x0a};
-constexpr int kVersion = 1;
-constexpr size_t kFlagsAt = 9;
-constexpr uint8_t kEdited = 1;  // the only flag
-constexpr size_t kPreamble = 14, kChecksum = 4;
+constexpr size_t kFlagsAt = 9, kChecksum = 4;
 constexpr double kLargest = 1e15, kSmallest = 1e-15;  // of the numbers in a header
 
-void read_triple(Records& in, double (&out)[3], bool is_single) {
-    for (double& value : out) {
-        value = is_single ? in.f32() : in.f64();
-        require(std::fabs(value) <= kLargest, "Header: a number that is too large");
-    }
-}
-
 Header read_header(Records& in) {
-    Header header;
-    header.frame_rate = in.f64();
-    read_triple(in, header.origin, false);
-    header.scale = in.f64();
-    read_triple(in, header.minimum, true);
-    read_triple(in, header.maximum, true);
-    const mr_bytes text = in.blob(in.u16());
-    header.metadata.assign(text.data, text.data + text.size);
-    header.first_time = in.i64();
-    const uint64_t count = in.varint();
-    require(count <= in.left(), "Header.intervals: more than there are bytes");
-    for (uint64_t k = 0; k < count; ++k) header.intervals.push_back(in.varint());
+    Header header = Header::read(in);
+    for (const std::array<double, 3>& triple : {header.origin, header.minimum, header.maximum})
+        for (const double value : triple) require(std::fabs(value) <= kLargest, "Header: a number that is too large");
     for (const double value : {header.frame_rate, header.scale})
         require(value >= kSmallest && value <= kLargest, "Header: a rate or a scale that is out of range");
     for (int k = 0; k < 3; ++k) require(header.minimum[k] <= header.maximum[k], "Header: a minimum above its maximum");
     return header;
-}
-
-Chunk read_entry(Records& in) {
-    Chunk chunk;
-    chunk.kind = in.u8(), chunk.form = in.u8(), chunk.frames = in.u16(), chunk.track = in.varint();
-    chunk.depends_on.resize(in.u8());
-    for (uint64_t& number : chunk.depends_on) number = in.varint();
-    const size_t count = in.u16();
-    require(5 * count <= in.left(), "Index: more layers than there are bytes");
-    chunk.layers.resize(count);
-    for (Layer& layer : chunk.layers) layer.size = in.varint(), layer.crc = in.u32();
-    return chunk;
 }
 
 void read_times(Head& head) {
@@ -77,17 +45,17 @@ uint64_t Chunk::size() const {
 }
 
 uint32_t head_size(const std::vector<uint8_t>& start, uint64_t file_size) {
-    require(start.size() >= kPreamble && std::memcmp(start.data(), kMagic, sizeof kMagic) == 0,
+    require(start.size() >= kPreambleSize && std::memcmp(start.data(), kMagic, sizeof kMagic) == 0,
             "not a .reel file: the signature is missing");
-    Records in({start.data() + sizeof kMagic, kPreamble - sizeof kMagic});
+    Records in({start.data() + sizeof kMagic, kPreambleSize - sizeof kMagic});
     const int version = in.u8();
     if (version != kVersion)
         throw FormatError("format version " + std::to_string(version) + ": this reader knows version " +
                           std::to_string(kVersion) + ", update meshreel");
     require((in.u8() & ~kEdited) == 0, "flags that this reader does not know, update meshreel");
     const uint32_t size = in.u32();
-    require(size >= kPreamble + kChecksum && size <= file_size, "the head is truncated or damaged");
-    require(size <= limits::kMostHead, "a head of more bytes than it may have");
+    require(size >= kPreambleSize + kChecksum && size <= file_size, "the head is truncated or damaged");
+    require(size <= limits::kHead, "a head of more bytes than it may have");
     return size;
 }
 
@@ -96,15 +64,16 @@ Head parse_head(const std::vector<uint8_t>& data, uint64_t file_size) {
     Records checksum({data.data() + end, kChecksum});
     const bool is_right = checksum.u32() == crc32(data.data(), end);
     require(is_right || kIgnoresChecksums, "the head is damaged: its checksum does not match");
-    Records in({data.data() + kPreamble, end - kPreamble});
+    Records in({data.data() + kPreambleSize, end - kPreambleSize});
     Head head;
     head.header = read_header(in);
-    const uint32_t count = in.u32();
-    require(count <= in.left() / 8, "Index: more chunks than there are bytes");
+    in.begin("Index.chunks");
+    const size_t count = in.count(in.u32(), 8);
     uint64_t offset = data.size();
-    for (uint32_t number = 0; number < count; ++number) {
-        head.chunks.push_back(read_entry(in));
+    for (size_t number = 0; number < count; ++number) {
+        head.chunks.emplace_back();
         Chunk& chunk = head.chunks.back();
+        static_cast<IndexEntry&>(chunk) = IndexEntry::read(in);
         chunk.offset = offset;
         for (const Layer& layer : chunk.layers) {
             require(layer.size <= INT64_MAX - offset, "Index: chunks beyond all files");
@@ -120,14 +89,14 @@ Head parse_head(const std::vector<uint8_t>& data, uint64_t file_size) {
     head.frames = head.edit.end - head.edit.first;
     read_times(head);
     double frames = 0;
-    for (const Chunk& chunk : head.chunks) frames += chunk.kind == kGroup ? chunk.frames : 0;
+    for (const Chunk& chunk : head.chunks) frames += chunk.kind == ChunkKind::GROUP ? chunk.frames : 0;
     require(frames <= limits::kFrames + limits::kFramesPerByte * static_cast<double>(head.size),
             "more frames than so many bytes may have");
     require(file_size <= head.size, "bytes behind the last chunk, copy the file again");
     return head;
 }
 
-uint32_t Head::companion_of(uint32_t chunk, uint8_t kind) const {
+uint32_t Head::companion_of(uint32_t chunk, ChunkKind kind) const {
     const auto found = companions.find({chunk, kind});
     return found == companions.end() ? kNoChunk : found->second;
 }

@@ -1,31 +1,18 @@
 // Coded pictures, handed out as they are. Beside src/meshreel/coding/appearance/pictures.py.
 #include <algorithm>
 
-#include "format_error.h"
+#include "../../src/format_error.h"
 #include "video.h"
 
 namespace meshreel {
 namespace {
 
-constexpr uint64_t kLayerPictures = 64;  // of a background, in each layer but the last
-
-struct Pictures {
-    uint64_t interval;
-    std::vector<mr_bytes> packets;
-};
-
-Pictures read_pictures(const std::vector<uint8_t>& data, uint8_t codec, size_t frames) {
-    Records in(view(data));
-    require(in.u8() == kVideo && in.u8() == codec, "pictures of another form or coding");
-    Pictures pictures;
-    pictures.interval = in.varint();
-    const size_t count = in.u16();
-    require(count <= in.left(), "pictures: more packets than there are bytes");
-    for (size_t k = 0; k < count; ++k) {
-        pictures.packets.push_back(in.blob(in.varint()));
-        require(pictures.packets.back().size > 0, "pictures: a packet without bytes");
-    }
-    in.finish("pictures");
+// The packets lie in `data`.
+Pictures read_pictures(const std::vector<uint8_t>& data, VideoCodec codec, size_t frames) {
+    Pictures pictures = read_all<Pictures>(view(data), "Pictures");
+    const size_t count = pictures.packets.size();
+    require(pictures.form == Form::VIDEO && pictures.codec == codec, "pictures of another form or coding");
+    for (const mr_bytes& packet : pictures.packets) require(packet.size > 0, "pictures: a packet without bytes");
     const bool is_right = frames > 0 ? count == frames && pictures.interval == 1
                                      : pictures.interval > 0 && count > 0 && count <= kLayerPictures;
     require(is_right, "pictures: not one for each frame, or more than a layer may have");
@@ -34,17 +21,18 @@ Pictures read_pictures(const std::vector<uint8_t>& data, uint8_t codec, size_t f
 
 }  // namespace
 
-Picture Video::picture(uint64_t frame, uint32_t chunk, Kind kind) {
+Picture Video::picture(uint64_t frame, uint32_t chunk, ChunkKind kind) {
     lacking.clear();
-    while (chunk != kNoChunk && head.chunks[chunk].form == kPatch)  // what is left of a background keeps its pictures
+    while (chunk != kNoChunk &&
+           head.chunks[chunk].form == Form::PATCH)  // what is left of a background keeps its pictures
         chunk = static_cast<uint32_t>(head.chunks[chunk].depends_on[0]);
     const uint32_t of = chunk == kNoChunk ? kNoChunk : head.companion_of(chunk, kind);
     if (of == kNoChunk) return Picture{};
     const Chunk& coded = head.chunks[of];
-    const uint8_t codec = kind == kPicturesOf ? MESHREEL_AV1 : MESHREEL_H264;
+    const VideoCodec codec = kind == ChunkKind::PICTURES ? VideoCodec::AV1 : VideoCodec::H264;
     const uint32_t number = static_cast<uint32_t>(coded.depends_on[1]);
-    const Atlas& own = atlas(number);
-    Picture found{{}, uint64_t{number} << 24 | uint64_t{kind} << 16, 0, own.width, own.height};
+    const Layout& own = atlas(number);
+    Picture found{{}, uint64_t{number} << 24 | static_cast<uint64_t>(kind) << 16, 0, own.width, own.height};
     size_t at, layer = 0;
     if (coded.frames > 0) {
         at = static_cast<size_t>(frame - coded.first_frame);
@@ -52,8 +40,8 @@ Picture Video::picture(uint64_t frame, uint32_t chunk, Kind kind) {
     } else {
         const auto shown_from = head.shown_from.find(chunk);
         if (shown_from == head.shown_from.end() || frame < shown_from->second) return Picture{};  // not shown yet
-        const Pictures first = read_pictures(source_.layer(head, of, 0), codec, 0);
-        const uint64_t picture = (frame - shown_from->second) / first.interval;
+        const std::vector<uint8_t> first = source_.layer(head, of, 0);
+        const uint64_t picture = (frame - shown_from->second) / read_pictures(first, codec, 0).interval;
         layer = static_cast<size_t>(std::min<uint64_t>(picture / kLayerPictures, coded.layers.size() - 1));
         at = static_cast<size_t>(std::min(picture - layer * kLayerPictures, kLayerPictures - 1));
     }

@@ -1,15 +1,17 @@
 // The laws of an index. Beside src/meshreel/format/checks.py.
 #include <algorithm>
 
-#include "budget.h"
+#include "../budget.h"
 #include "head.h"
 
 namespace meshreel {
 namespace {
 
 constexpr size_t kMostTracks = 256;
-constexpr int kMostChanges = 255;  // patches on one background
-constexpr uint8_t kCompanionForms[] = {kVertexColors, kPlaces, kVideo, kVideo, kGaussians};  // from kColorsOf on
+constexpr int kMostChanges = 255;                                       // patches on one background
+constexpr uint64_t kMostAudio = static_cast<uint64_t>(limits::kAudio);  // bytes of a chunk
+constexpr Form kCompanionForms[] = {Form::VERTEX_COLORS, Form::PLACES, Form::VIDEO, Form::VIDEO,
+                                    Form::GAUSSIANS};  // from COLORS on
 
 class IndexChecks {
 public:
@@ -23,14 +25,15 @@ public:
         std::vector<uint64_t> sorted = entry.depends_on;
         std::sort(sorted.begin(), sorted.end());
         need(std::adjacent_find(sorted.begin(), sorted.end()) == sorted.end(), "depends on a chunk twice");
-        if (entry.kind == kStatic || entry.kind == kGroup) {
-            need((entry.kind == kStatic) == (entry.frames == 0), "a number of frames that its kind cannot have");
-            need(entry.form >= kLaplacian && entry.form <= kPatch, "a form that its kind cannot have");
+        if (entry.kind == ChunkKind::STATIC || entry.kind == ChunkKind::GROUP) {
+            need((entry.kind == ChunkKind::STATIC) == (entry.frames == 0),
+                 "a number of frames that its kind cannot have");
+            need(entry.form >= Form::LAPLACIAN && entry.form <= Form::PATCH, "a form that its kind cannot have");
         }
-        if (entry.kind == kStatic) add_static(entry);
-        else if (entry.kind == kGroup) add_group(entry);
+        if (entry.kind == ChunkKind::STATIC) add_static(entry);
+        else if (entry.kind == ChunkKind::GROUP) add_group(entry);
         else if (entry.is_companion()) add_companion(entry);
-        else if (entry.kind == kAudio) add_audio(entry);
+        else if (entry.kind == ChunkKind::AUDIO) add_audio(entry);
     }
 
     void finish() {
@@ -65,21 +68,21 @@ private:
     }
 
     void add_static(const Chunk& entry) {
-        need((entry.form == kDraco || entry.form == kPatch) && entry.track == 0,
+        need((entry.form == Form::DRACO || entry.form == Form::PATCH) && entry.track == 0,
              "a background of another form, or with a track");
-        need(entry.depends_on.size() == (entry.form == kPatch ? 1u : 0u),
+        need(entry.depends_on.size() == (entry.form == Form::PATCH ? 1u : 0u),
              "a background that depends on too much or too little");
         int changes = 0;
-        if (entry.form == kPatch) {
+        if (entry.form == Form::PATCH) {
             need(is_static(entry.depends_on[0]), "a patch of what is no background before it");
             changes = whole(entry.depends_on[0])->changes + 1;
             need(changes <= kMostChanges, "a patch too many of one background");
         }
-        wholes_[number_] = {kNoChunk, entry.form == kDraco, false, changes, 0};
+        wholes_[number_] = {kNoChunk, entry.form == Form::DRACO, false, changes, 0};
     }
 
     void add_group(Chunk& entry) {
-        need(entry.form != kPatch, "a group of form PATCH");
+        need(entry.form != Form::PATCH, "a group of form PATCH");
         need(entry.track <= frames_.size() && entry.track < kMostTracks,
              "a track whose number leaves a gap, or one too many");
         const size_t track = static_cast<size_t>(entry.track);
@@ -104,17 +107,17 @@ private:
         frames_[track] += entry.frames;
         head_.tracks[track].push_back(number_);
         place_ = place;
-        const bool is_base = entry.form == kLayers && before == kNoChunk;
-        wholes_[number_] = {before, is_base, is_base || entry.form == kLaplacian, -1, 0};
+        const bool is_base = entry.form == Form::LAYERS && before == kNoChunk;
+        wholes_[number_] = {before, is_base, is_base || entry.form == Form::LAPLACIAN, -1, 0};
     }
 
     // What is heard is not this library's: it only keeps the laws.
     void add_audio(const Chunk& entry) {
         uint64_t size = 0;
         for (const Layer& layer : entry.layers)
-            size = std::min(size + std::min(layer.size, limits::kMostAudio + 1), limits::kMostAudio + 1);
-        need(!has_audio_ && entry.form == kAudioFile && !entry.frames && !entry.track && entry.depends_on.empty() &&
-                 size <= limits::kMostAudio,
+            size = std::min(size + std::min(layer.size, kMostAudio + 1), kMostAudio + 1);
+        need(!has_audio_ && entry.form == Form::AUDIO_FILE && !entry.frames && !entry.track &&
+                 entry.depends_on.empty() && size <= kMostAudio,
              "audio besides other audio, not on its own, or too much");
         has_audio_ = true;
     }
@@ -124,23 +127,24 @@ private:
         need(whole(of) && head_.companion_of(static_cast<uint32_t>(of), entry.kind) == kNoChunk,
              "belongs to no chunk before it, or to one that has others");
         const Chunk& owner = head_.chunks[of];
-        need(entry.form == kCompanionForms[entry.kind - kColorsOf] && entry.frames == owner.frames &&
-                 entry.track == owner.track,
+        need(entry.form == kCompanionForms[static_cast<size_t>(entry.kind) - static_cast<size_t>(ChunkKind::COLORS)] &&
+                 entry.frames == owner.frames && entry.track == owner.track,
              "its form, frames or track are not those of the chunk that it belongs to");
         const std::vector<uint64_t> others(entry.depends_on.begin() + 1, entry.depends_on.end());
         need(is_right(entry.kind, static_cast<uint32_t>(of), others), "depends on what its kind does not");
         entry.first_frame = owner.first_frame;
         head_.companions[{static_cast<uint32_t>(of), entry.kind}] = number_;
-        if (entry.form == kVideo) wholes_[of].atlas = others[0];
+        if (entry.form == Form::VIDEO) wholes_[of].atlas = others[0];
     }
 
-    bool is_right(uint8_t kind, uint32_t of, const std::vector<uint64_t>& others) const {
+    bool is_right(ChunkKind kind, uint32_t of, const std::vector<uint64_t>& others) const {
         const Whole& known = *whole(of);
         const uint32_t last = known.before == kNoChunk ? kNoChunk : head_.companion_of(known.before, kind);
-        if (kind == kColorsOf) return others.empty() || (last != kNoChunk && others == std::vector<uint64_t>{last});
-        if (kind == kAtlasOf) return known.is_base && others.empty();
-        if (kind == kSplatsOf) return known.is_bearer && others.empty();
-        const uint32_t own = head_.companion_of(of, kAtlasOf);
+        if (kind == ChunkKind::COLORS)
+            return others.empty() || (last != kNoChunk && others == std::vector<uint64_t>{last});
+        if (kind == ChunkKind::ATLAS) return known.is_base && others.empty();
+        if (kind == ChunkKind::SPLATS) return known.is_bearer && others.empty();
+        const uint32_t own = head_.companion_of(of, ChunkKind::ATLAS);
         if (own != kNoChunk) return others == std::vector<uint64_t>{own};
         return last != kNoChunk && others == std::vector<uint64_t>{whole(known.before)->atlas, last};
     }

@@ -2,14 +2,14 @@
 
 #include <algorithm>
 
-#include "budget.h"
+#include "../budget.h"
 
 namespace meshreel {
 namespace {
 
 // Bytes of states that all tracks keep together, as in src/meshreel/decoder/cache.py.
 constexpr double kMostKept = 1 << 25;
-constexpr double kMostTogether = 8 * limits::kMostNumbers;
+constexpr double kMostTogether = 8 * limits::kNumbers;
 
 }  // namespace
 
@@ -81,7 +81,7 @@ const Group& Video::group_of(uint64_t frame, size_t track) {
 }
 
 Context Video::context_of(uint32_t chunk, const State* previous) const {
-    const double* origin = head.header.origin;
+    const std::array<double, 3>& origin = head.header.origin;
     return {head.chunks[chunk].frames, layers_, previous, {head.header.scale, {origin[0], origin[1], origin[2]}}};
 }
 
@@ -91,20 +91,20 @@ void Video::decode(uint32_t chunk, Cached& cached) {
     cached.chunk = kNoChunk, cached.group = Group();
     const Context context = context_of(chunk, before.get());
     Continued made = refused_.of(head, chunk, [&] { return continue_group(view(payload), context); });
-    const int64_t layers = head.chunks[chunk].form == kLayers ? layers_ : kAllLayers;
+    const int64_t layers = head.chunks[chunk].form == Form::LAYERS ? layers_ : kAllLayers;
     cached.lacking = paint(chunk, context, layers, made);
     const unsigned levels = made.canvas.empty() ? 0 : made.canvas[0].levels;
     const std::string more = put_on_texture(chunk, levels, made.group.faces, made.group.places);
     if (cached.lacking.empty()) cached.lacking = more;
     keep(chunk, made.state, cached);
-    turn(made.group.positions);
-    for (Mesh& mesh : made.group.added) turn(mesh.vertices);
+    turn(made.group.positions.data(), made.group.positions.size());
+    for (Mesh& mesh : made.group.added) turn(mesh.vertices.data(), mesh.vertices.size());
     cached.group = std::move(made.group);
     cached.chunk = chunk;
 }
 
-void Video::turn(std::vector<double>& vertices) const {
-    if (head.edit.is_turned) turn_all(head.edit.rotation, head.header.origin, vertices);
+void Video::turn(double* vertices, size_t numbers) const {
+    if (head.edit.is_turned) turn_all(head.edit.rotation, head.header.origin.data(), vertices, numbers);
 }
 
 std::shared_ptr<State> Video::state_before(uint32_t chunk, Cached& cached) {
@@ -120,7 +120,7 @@ std::shared_ptr<State> Video::state_before(uint32_t chunk, Cached& cached) {
     for (size_t link = chain.size() - 1; link > 0; --link) {
         const uint32_t number = chain[link];
         std::shared_ptr<State> after;
-        if (head.chunks[number].form == kLayers) {
+        if (head.chunks[number].form == Form::LAYERS) {
             const std::vector<uint8_t> payload = read(number, layers_);
             Context context = context_of(number, state.get());
             context.is_shown = false;
@@ -145,7 +145,7 @@ void Video::keep(uint32_t chunk, const std::shared_ptr<State>& state, Cached& ca
 // Returns why there are no colours, where they are damaged: the surface is shown without them.
 template <class Paint>
 std::string Video::paint_with(uint32_t chunk, int64_t layers, Paint paint) {
-    const uint32_t of = head.companion_of(chunk, kColorsOf);
+    const uint32_t of = head.companion_of(chunk, ChunkKind::COLORS);
     if (of == kNoChunk) return "";
     try {
         refused_.check(of);
@@ -162,8 +162,8 @@ std::string Video::paint(uint32_t chunk, const Context& context, int64_t layers,
 }
 
 uint32_t Video::pictures_of(uint32_t chunk) const {
-    const uint32_t pictures = head.companion_of(chunk, kPicturesOf);
-    return pictures == kNoChunk ? head.companion_of(chunk, kCompatibleOf) : pictures;
+    const uint32_t pictures = head.companion_of(chunk, ChunkKind::PICTURES);
+    return pictures == kNoChunk ? head.companion_of(chunk, ChunkKind::COMPATIBLE) : pictures;
 }
 
 // Returns why there are no places, where they are damaged.
@@ -172,7 +172,7 @@ std::string Video::put_on_texture(uint32_t chunk, unsigned levels, const Faces& 
     if (pictures == kNoChunk) return "";
     try {
         const uint32_t number = static_cast<uint32_t>(head.chunks[pictures].depends_on[1]);
-        const Atlas& found = atlas(number);
+        const Layout& found = atlas(number);
         require(count_of(found.places->size()) * std::pow(4.0, levels) == 2 * count_of(faces->size()),
                 "an atlas of another mesh");
         places = places_of(found, levels);
@@ -182,7 +182,7 @@ std::string Video::put_on_texture(uint32_t chunk, unsigned levels, const Faces& 
     return "";
 }
 
-const Atlas& Video::atlas(uint32_t chunk) {
+const Layout& Video::atlas(uint32_t chunk) {
     if (atlas_chunk_ == chunk) return atlas_;
     refused_.check(chunk);
     const std::vector<uint8_t> data = read(chunk, kAllLayers);
@@ -197,7 +197,7 @@ Mesh Video::background(uint64_t frame) {
     lacking.clear();
     if (chunk == kNoChunk) return Mesh();
     Mesh mesh = state_of(chunk);
-    turn(mesh.vertices);  // not the state, to which changes are made
+    turn(mesh.vertices.data(), mesh.vertices.size());  // not the state, to which changes are made
     lacking = background_.lacking;
     return mesh;
 }
@@ -227,7 +227,7 @@ const Mesh& Video::state_of(uint32_t chunk) {
 
 Mesh Video::decode_state(uint32_t chunk) {
     const std::vector<uint8_t> payload = read(chunk, kAllLayers);
-    const bool is_change = head.chunks[chunk].form == kPatch;
+    const bool is_change = head.chunks[chunk].form == Form::PATCH;
     const Mesh* before = is_change ? &background_.mesh : nullptr;
     const mr_placement place = context_of(chunk, nullptr).place;
     Background made = refused_.of(head, chunk, [&] {
@@ -246,6 +246,37 @@ Mesh Video::decode_state(uint32_t chunk) {
     const std::string more = put_on_texture(chunk, 0, made.mesh.faces, made.mesh.places);
     if (lacks.empty()) lacks = more;
     return std::move(made.mesh);
+}
+
+// The chunk of the splats that a group has: its own, or those of a group before it.
+uint32_t Video::splats_of(uint32_t chunk) const {
+    for (; chunk != kNoChunk; chunk = head.group_before(chunk)) {
+        const Form form = head.chunks[chunk].form;
+        if (form != Form::LAYERS && form != Form::LAPLACIAN) return kNoChunk;
+        const uint32_t found = head.companion_of(chunk, ChunkKind::SPLATS);
+        if (found != kNoChunk) return found;
+    }
+    return kNoChunk;
+}
+
+Bound Video::splats(uint64_t frame, size_t track) {
+    lacking.clear();
+    const uint32_t chunk = head.chunk_of_frame(frame, track), of = splats_of(chunk);
+    if (of == kNoChunk) return Bound();
+    const Group& group = group_of(frame, track);
+    if (splats_.chunk != of) {
+        refused_.check(of);
+        const uint32_t owner = static_cast<uint32_t>(head.chunks[of].depends_on[0]);
+        const std::vector<uint8_t> first = read(owner, 0), data = read(of, layers_);
+        splats_ = {};
+        splats_.faces = refused_.of(head, of, [&] { return base_mesh(view(first)).face_count(); });
+        splats_.found = refused_.of(head, of, [&] { return decode_splats(view(data), splats_.faces); });
+        splats_.chunk = of;
+    }
+    const double corners = 3 * std::ldexp(count_of(splats_.faces), 2 * static_cast<int>(group.levels));
+    if (count_of(group.faces->size()) != corners) return Bound();  // they are of another mesh
+    const size_t t = static_cast<size_t>(frame - head.chunks[chunk].first_frame);
+    return bind_splats(splats_.found.all, group, t, head.header.scale);
 }
 
 }  // namespace meshreel

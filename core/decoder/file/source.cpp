@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "format_error.h"
+#include "../../src/format_error.h"
 
 namespace meshreel {
 namespace {
@@ -15,7 +15,7 @@ void check_layer(const Head& head, uint32_t number, size_t layer, const uint8_t*
 }
 
 void check_form(const Head& head, uint32_t number, uint8_t form) {
-    require(form == head.chunks[number].form, "its form is not the one that the index says");
+    require(static_cast<Form>(form) == head.chunks[number].form, "its form is not the one that the index says");
 }
 
 }  // namespace
