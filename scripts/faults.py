@@ -173,8 +173,7 @@ def make_inputs(folder: Path) -> None:
     (folder / "meshes").mkdir()
     for number, mesh in enumerate(sliding_sphere(8, levels=2)):
         write_mesh(mesh, folder / "meshes" / f"frame_{number}.ply")
-    near = {"focal": (150.0, 150.0)}
-    cameras = [camera("front", **near), camera("left", 20, **near)]
+    cameras = [camera("front"), camera("left", 20)]
     record(folder / "rig", cameras, [(0.1 * k, 0, 0) for k in range(4)])
 
 

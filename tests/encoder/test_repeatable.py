@@ -18,7 +18,7 @@ import pytest
 from threadpoolctl import threadpool_info
 
 import meshreel
-from meshreel.encoder.group.digests import Digests, line_of, note
+from meshreel.encoder.group.digests import line_of, listener, note, noted
 from meshreel.encoder.sequence import Encoder
 from meshreel.encoder.settings.presets import appearance_options
 from meshreel.format.layout import ChunkKind
@@ -142,7 +142,18 @@ def test_a_digest_tells_values_shapes_and_types_apart():
     zeros = np.zeros((2, 3))
     kinds = [zeros, zeros.T, zeros.astype(np.float32), zeros + 1, b"\0" * 48, 0.0, None, "0.0"]
     assert len({line_of("stage", kind) for kind in kinds}) == len(kinds)
-    digests = Digests(1, 20)
-    note(digests, "stage", zeros)
-    assert [json.loads(line)["frame"] for line in digests.take()] == [20]
-    assert digests.take() == ()
+
+
+def test_stages_tell_who_listens_in_this_context_and_no_other_one():
+    outer, inner = list[str](), list[str]()
+    note("nobody listens", 1)
+    with noted(outer.append):
+        with noted(inner.append, track=1, frame=20), ThreadPoolExecutor(1) as executor:
+            note("stage", 2)
+            assert executor.submit(listener).result() is None
+        with noted(None):
+            note("nobody listens", 3)
+        note("later", 4)
+    rows = [[json.loads(line) for line in lines] for lines in (outer, inner)]
+    assert [[(row["stage"], row.get("frame")) for row in some] for some in rows] == [[("later", None)], [("stage", 20)]]
+    assert listener() is None

@@ -13,7 +13,7 @@ import meshreel
 from meshreel.analysis.scene.masks import read_views
 from meshreel.capture.rig.rig import read_rig
 from meshreel.capture.simulated.truth import _labels
-from meshreel.encoder.run.journal import Journal
+from meshreel.encoder.run.interval_files import IntervalFiles
 from meshreel.errors import InputError
 from meshreel.io import read
 from meshreel.io.depth_pictures import read_depth
@@ -96,7 +96,7 @@ def test_a_pipe_in_place_of_a_video_ends_at_once(tmp_path):
 
 
 @posix
-@pytest.mark.parametrize("opened", [Journal, replacing])
+@pytest.mark.parametrize("opened", [IntervalFiles, replacing])
 def test_a_pipe_in_place_of_the_output_is_not_replaced(tmp_path, opened):
     os.mkfifo(tmp_path / "a.reel")
     with pytest.raises(InputError, match=r"a.reel: is a pipe or a device"), opened(tmp_path / "a.reel"):

@@ -27,7 +27,7 @@ from .calibration.colors import CalibrationOptions, Corrected, Corrections, corr
 from .calibration.remembered import remembered
 from .rig.cameras import ColorCamera
 from .rig.fusion import FusionOptions, fuse_depths
-from .rig.rig import Rig, read_rig
+from .rig.rig import RIG, SINGLE, Rig, read_rig
 
 MOVED = 0.5  # share of pixels that differ from their usual depth, in the median frame, of a camera that moves (guess)
 LEAST = 0.3  # share of pixels with a measurement below which a frame is ignored: it may show no background (guess)
@@ -78,6 +78,13 @@ class Recording(MeshSequence):
             return mesh
         colors, seen = ColorViews(pictures, mesh).at(mesh.vertices, vertex_normals(mesh))
         return replace(mesh, colors=spread_colors(mesh, colors, seen))
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """The files that the frames are made of: the description of the rig, and its pictures."""
+        described = [path for path in (self.rig.folder / RIG, self.rig.folder / SINGLE) if path.exists()]
+        pictures = (*self.rig.files, *(camera.files for camera in self.rig.color_cameras))
+        return (*described, *(of[number] for number in self.numbers for of in pictures if number in of))
 
     @property
     def up(self) -> Up:

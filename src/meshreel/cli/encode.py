@@ -15,7 +15,7 @@ from cyclopts import Parameter
 from ..encoder.file.summary import SceneSummary, Summary
 from ..encoder.group.digests import WriteLines, machine_line
 from ..encoder.rate_control import Goal, encode_to
-from ..encoder.run.excerpt import Excerpt, part_of, read_survey
+from ..encoder.run.surveying import Excerpt, read_survey
 from ..encoder.scene.static import is_colored
 from ..encoder.sequence import Encoder
 from ..encoder.settings.options import EncoderOptions, SceneOptions, as_installed
@@ -156,8 +156,7 @@ class Part:
         numbers = _PART.fullmatch(self.part)
         if numbers is None or len(chosen) < len(sequence):
             raise InputError(f"--part {self.part}: give K/N, as 3/100, and leave --frames out")
-        intervals = surveyed.seen.intervals(options.recipe().longest(sequence.frame_rate))
-        return Excerpt(surveyed, part_of(intervals, int(numbers[1]), int(numbers[2])))
+        return surveyed.part(int(numbers[1]), int(numbers[2]), options.recipe().longest(sequence.frame_rate))
 
     def check(self, coding: Coding, masking: Masking) -> None:
         """Raise InputError for flags that no part can have."""

@@ -10,7 +10,7 @@ import os
 import tempfile
 import zlib
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass, replace
 from itertools import accumulate
 from pathlib import Path
@@ -36,6 +36,7 @@ from ..format.records import least_size, pack
 from ..io.unfinished import FULL, sync_folder, unfinished
 from .sources import Stream
 
+SKIPPED = 255  # the kind of a chunk that no reader knows, now or later (FORMAT.md: a byte)
 AUDIO_PIECE = 1 << 16  # bytes of an audio chunk's layers: 8 s of 64 kbit/s (guess)
 
 
@@ -50,9 +51,9 @@ class Sink(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Stored:
-    """A payload in an open file, read when it is needed."""
+    """A payload in a file, read when it is needed; given by its path, so that few files are open."""
 
-    file: Stream
+    file: Stream | Path
     offset: int
     size: int
 
@@ -61,9 +62,10 @@ class Stored:
 
     def read(self) -> bytes:
         """Return the payload; fewer bytes if the file has been truncated."""
-        self.file.seek(self.offset)
-        data: bytes = self.file.read(self.size)
-        return data
+        with self.file.open("rb") if isinstance(self.file, Path) else nullcontext(self.file) as file:
+            file.seek(self.offset)
+            data: bytes = file.read(self.size)
+            return data
 
 
 @dataclass(frozen=True, slots=True)
@@ -174,6 +176,10 @@ class ReelWriter:
         place = (entry.frames, entry.track, tuple(depends_on))
         layers = _layers(data, companion.layers)
         return self._add(IndexEntry(companion.kind, _form(data), *place, layers), companion.payload)
+
+    def add_skipped(self, payload: bytes) -> int:
+        """Add bytes for the writer's own use, of a kind that readers skip, and return the number of their chunk."""
+        return self._add(IndexEntry(SKIPPED, _form(payload), 0, 0, (), _layers(payload, ())), payload)
 
     def companion_of(self, number: int | None, kind: ChunkKind) -> int | None:
         """Return the number of the chunk of a kind that belongs to a chunk, or None."""

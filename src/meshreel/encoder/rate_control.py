@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from ..errors import InputError
 from ..io.remote import Place, located
 from .file.summary import Summary
-from .run.journal import opened
+from .run.interval_files import opened
 from .sequence import Encoder
 from .settings.options import EncoderOptions
 
@@ -90,15 +90,15 @@ def encode_to(
     if resume:
         text = f"{path}: a search for a target begins again, it cannot continue"
         raise InputError(f"{text}; leave --resume (resume=True) out, or give the quality in place of the target")
-    with opened(path, encoder.sequence.files, resume, lasting=False) as (file, journal):
+    with opened(path, encoder.sequence.files, resume, lasting=False) as (file, files):
         for _ in range(TRIALS):
             quality = search.next()
             if quality is None:
                 break
-            journal.restart()
+            files.restart()
             file.seek(0)
             file.truncate()
-            summary = encoder.encode_into(file, options_at(quality), journal)
+            summary = encoder.encode_into(file, options_at(quality), files)
             value = goal.measured(summary, encoder.frame_rate)
             if abs(value - goal.wanted) <= goal.tolerance:
                 return summary, quality

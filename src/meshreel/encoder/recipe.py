@@ -58,5 +58,5 @@ def encode_interval(
     splats = appearance is not None and appearance.splats is not None
     interval = replace(interval, pictured=splats or has_pictures(interval, sample, appearance))
     for group in colored_groups(recipe.encode(interval, stages), interval, appearance, stages):
-        note(interval.digests, "payload", group.form.name, group.payload, *(one.read() for one in group.companions))
-        yield group if interval.digests is None else replace(group, digests=interval.digests.take())
+        note("payload", group.form.name, group.payload, *(one.read() for one in group.companions))
+        yield group

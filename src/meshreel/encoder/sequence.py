@@ -25,12 +25,12 @@ from ..analysis.scene.probe import is_scene
 from ..analysis.scene.segmentation import SegmentOptions
 from ..analysis.survey import Survey
 from ..coding.background import decode_background
-from ..container.writer import Companion, ReelWriter
+from ..container.writer import ReelWriter
 from ..decoder.video import open as open_video
 from ..edit.audio import Given, packed_audio
 from ..edit.metadata import rounded, upright
 from ..errors import InputError
-from ..format.layout import ChunkKind, Form, Header
+from ..format.layout import Form, Header
 from ..geometry.closest_points import distances
 from ..geometry.derived_sequences import captured, unchanging, welded
 from ..geometry.topology import drop_unreferenced
@@ -40,14 +40,14 @@ from ..metrics.distance import PSNR_CEILING, psnr
 from ..types import MeshSequence, as_sequence, evenly
 from .file.metadata import chosen_options, metadata_of
 from .file.summary import GroupSummary, SceneSummary, Summary
-from .group.digests import WriteLines
+from .group.digests import WriteLines, note, noted
 from .group.interval import Interval
 from .group.progress import Progress, Stages
 from .paper.recipe import FindGroups, find_groups
-from .run.excerpt import Excerpt, write_survey
+from .run.interval_files import IntervalFiles, made_of, opened, write_companions, write_group
 from .run.job import Job
-from .run.journal import Journal, made_of, opened
-from .run.surveying import surveyed
+from .run.surveying import Excerpt, facts_of, known_survey, surveyed, write_survey
+from .scene.kept import pack_parts, unpack_parts
 from .scene.parts import Parts, take_apart
 from .scene.scene import Tracks, encode_bodies, scene_intervals
 from .scene.static import Static, colored_states, is_colored
@@ -148,12 +148,12 @@ class Encoder:
 
     def encode(self, path: str | Place, options: EncoderOptions, resume: bool | None = None) -> Summary:
         """Encode the sequence as the function `encode` does, with the same errors."""
-        with opened(path, self.sequence.files, resume) as (file, journal):
-            return self.encode_into(file, options, journal)
+        with opened(path, self.sequence.files, resume) as (file, files):
+            return self.encode_into(file, options, files)
 
     @threadpool_limits.wrap(limits=1)  # idle threads of BLAS would take a third of the processor's time
-    def encode_into(self, file: BinaryIO, options: EncoderOptions, journal: Journal) -> Summary:
-        """Encode the sequence into an open, empty file; its groups wait in the journal."""
+    def encode_into(self, file: BinaryIO, options: EncoderOptions, files: IntervalFiles) -> Summary:
+        """Encode the sequence into an open, empty file; its groups wait in the files of their intervals."""
         if options.scene is None and self._masker is not None:
             raise InputError("masks for a sequence that is not taken apart (scene=None): give one of both")
         before, excerpt = so_far(), self._excerpt
@@ -166,15 +166,20 @@ class Encoder:
             if self._is_scene(options):
                 text = "a scene has one background for all frames, and is not encoded in parts"
                 raise InputError(f"{text}; encode it in one run, with --cluster perhaps, or with --dynamic-only")
-        job, parts = replace(self._job(options), journal=journal), self.parts(options)
-        seen = parts.seen if parts is not None else surveyed(job) if excerpt is None else excerpt.surveyed.seen
-        made = made_of(self.sequence, options, self._masker)
-        journal.begin(made if excerpt is None else made | {"part": str(excerpt.frames)})
-        name = str(journal.output)
+        job, made = self._job(options), made_of(self.sequence, options, self._masker)
+        files.check(made)
+        seen, parts = self._whole(job, files)
+        made |= {"surfaces": self.sequence.digests} | ({} if excerpt is None else {"part": str(excerpt.frames)})
+        lasts = files.lasting and excerpt is None
+        scene = pack_parts(parts) if lasts and parts is not None and files.scene is None else None
+        encode = files.begin(made, facts_of(self.sequence, seen) if lasts else {}, scene)
+        job = replace(job, files=files, head=make_header(self.sequence.frame_rate, seen, {"encode": encode}))
+        name = str(files.output)
         encoded = partial(_encode_tracked, seen=seen) if parts is None else partial(_encode_scene, parts=parts)
-        summary = encoded(job, file, name, audio=self.audio)
+        with noted(self.digests):
+            summary = encoded(job, file, name, audio=self.audio)
         texts = summary.warnings + (lacking if any(group.colors for group in summary.groups) else ())
-        return replace(summary, work=since(before), warnings=texts, continued=journal.continued)
+        return replace(summary, work=since(before), warnings=texts, continued=files.continued)
 
     def survey(self, path: Path) -> Survey:
         """Survey the sequence, and write a file of it for encodes of its parts."""
@@ -184,9 +189,8 @@ class Encoder:
 
     def _job(self, options: EncoderOptions) -> Job:
         stages = Stages(self.progress, len(self.sequence) if self._excerpt is None else len(self._excerpt.frames))
-        recipe = options.recipe(self.find)
-        job = Job(self.sequence, options, self._executor, stages, recipe, digests=self.digests)
-        return replace(job, excerpt=self._excerpt)
+        job = Job(self.sequence, options, self._executor, stages, options.recipe(self.find))
+        return replace(job, chosen=None if self._excerpt is None else self._excerpt.frames)
 
     def _is_scene(self, options: EncoderOptions) -> bool:
         if options.scene is None or not len(self.sequence):
@@ -195,12 +199,30 @@ class Encoder:
             self._stands = is_scene(self.sequence)
         return self._stands
 
-    def _parts(self, job: Job) -> Parts:
-        """Return the parts of the scene; they are found again where the options of the scene changed."""
+    def _whole(self, job: Job, files: IntervalFiles) -> tuple[Survey, Parts | None]:
+        """Return the survey, and the parts of a scene: those that an earlier run wrote, where its frames are these.
+
+        Raises InputError where it had others.
+        """
+        if self._excerpt is not None:
+            return self._excerpt.surveyed.seen, None
+        is_scene = self._is_scene(job.options)
+        seen = None if files.whole is None else known_survey(self.sequence, files.whole)
+        if is_scene:
+            parts = self._parts(job, files, seen)
+            return parts.seen, parts
+        return surveyed(job) if seen is None else seen, None
+
+    def _parts(self, job: Job, files: IntervalFiles | None = None, seen: Survey | None = None) -> Parts:
+        """Return the parts of the scene: those that an earlier encode of it had, here or in files, where it had any."""
         how = (job.scene.segment, job.scene.background)
         if self._scene is None or self._scene[:2] != how:
-            seen = surveyed(job, cleaned=False)
-            self._scene = (*how, take_apart(job.sequence, seen, job.scene, job.stages, self._masker))
+            seen = surveyed(job, cleaned=False) if seen is None else seen
+            parts = None
+            if files is not None:
+                files.check({"surfaces": self.sequence.digests})
+                parts = None if files.scene is None else unpack_parts(files.scene, job.sequence, seen)
+            self._scene = (*how, parts or take_apart(job.sequence, seen, job.scene, job.stages, self._masker))
         return self._scene[2]
 
 
@@ -208,27 +230,26 @@ def _encode_tracked(job: Job, file: BinaryIO, name: str, seen: Survey, audio: by
     """Encode a sequence in which everything may move; errors call the output `name`."""
     sequence, options = job.sequence, job.options
     groups: list[GroupSummary] = []
-    job.note("survey", seen.low, seen.high, seen.diagonals, seen.dropped, seen.pieces)
+    note("survey", seen.low, seen.high, seen.diagonals, seen.dropped, seen.pieces)
     with ReelWriter(file, make_header(sequence.frame_rate, seen, {}), name, audio) as writer:
         for encoded in encode_tracked(job, seen):
             groups += [_added(writer, each, [], seen.diagonal) for each in encoded]
-        excerpt = job.excerpt
-        part = None if excerpt is None else (excerpt.frames.start, len(excerpt.surveyed.digests))
+        part = None if job.chosen is None else (job.chosen.start, len(sequence))
         metadata = metadata_of(options, groups, sequence.up, part)
         writer.header = make_header(sequence.frame_rate, seen, metadata)
-    texts = warnings_of(seen) if job.excerpt is None else ()  # the survey told of them
+    texts = warnings_of(seen) if job.chosen is None else ()  # the survey told of them
     return Summary(writer.size, tuple(groups), (*texts, *_bare(groups)), audio=len(audio))
 
 
 def _encode_scene(job: Job, file: BinaryIO, name: str, parts: Parts, audio: bytes) -> Summary:
     """Encode a scene with a background; errors call the output `name`."""
     sequence, options, seen = job.sequence, job.options, parts.seen
-    job.note("survey", seen.low, seen.high, seen.diagonals, seen.unit)
-    job.note("background and noise", parts.background.vertices, parts.background.faces, parts.noise, parts.deviation)
+    note("survey", seen.low, seen.high, seen.diagonals, seen.unit)
+    note("background and noise", parts.background.vertices, parts.background.faces, parts.noise, parts.deviation)
     job.stages.add("room", 0)
     states = colored_states(sequence, parts, job.scene.background, options.appearance)
     job.stages.reach("room", 1.0)
-    job.note("background, coded", *(state.payload for state in states))
+    note("background, coded", *(state.payload for state in states))
     with ReelWriter(file, make_header(sequence.frame_rate, seen, {}), name, audio) as writer:
         coded = encode_bodies(job, parts)
         groups = _added_in_order(writer, coded.groups, states, seen)
@@ -253,7 +274,7 @@ def _added_in_order(
         while waiting and waiting[0].frame <= each.first_frame:
             state = waiting.popleft()
             static = [writer.add_static(state.payload, depends_on=static if state.is_patch else ())]
-            _add_companions(writer, static[0], state.companions, None)
+            write_companions(writer, static[0], state.companions, None)
         with_static = each.track == 0 and not seen.is_bare(each.first_frame)
         groups.append(_added(writer, each, static if with_static else [], seen.unit))
     return groups
@@ -261,24 +282,13 @@ def _added_in_order(
 
 def _added(writer: ReelWriter, each: TrackGroup, static: list[int], unit: float) -> GroupSummary:
     """Write a group of a track, with the chunk of the background that its frames are shown with."""
-    group, track, last = each.group, each.track, writer.last_of(each.track)
-    before, payload = [last] if group.predicted and last is not None else [], group.stored or group.payload
-    number = writer.add_group(each.first_frame, group.frame_count, payload, group.layers, (*static, *before), track)
-    _add_companions(writer, number, group.companions, before[0] if before else None)
+    group = each.group
+    write_group(writer, each.first_frame, group, each.track, static)
     key = None if group.key is None else each.first_frame + group.key
     fidelity = group.fidelity.scaled(unit)
     colors = sum(map(len, group.companions))
-    facts = (group.form, group.frame_count, len(payload), fidelity, group.predicted)
-    return GroupSummary(*facts, key, track, each.share, colors, group.lost_colors, group.canonical)
-
-
-def _add_companions(writer: ReelWriter, of: int, companions: Sequence[Companion], before: int | None) -> None:
-    """Write what belongs to a chunk, which may be predicted from what belongs to the group before."""
-    for companion in companions:
-        depends_on, last = [of], writer.companion_of(before, companion.kind)
-        if companion.kind in (ChunkKind.PICTURES, ChunkKind.COMPATIBLE):
-            depends_on.append(writer.atlas_of(of, before))
-        writer.add_companion(companion, depends_on if last is None else [*depends_on, last])
+    facts = (group.form, group.frame_count, len(group.stored or group.payload), fidelity, group.predicted)
+    return GroupSummary(*facts, key, each.track, each.share, colors, group.lost_colors, group.canonical)
 
 
 def _measured(sequence: MeshSequence, file: BinaryIO, diagonal: float, numbers: Sequence[int]) -> float:

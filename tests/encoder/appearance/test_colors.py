@@ -16,7 +16,7 @@ from meshreel.container.sources import BytesSource
 from meshreel.container.writer import Companion, ReelWriter
 from meshreel.edit.edits import concat
 from meshreel.encoder.appearance import colors as appearance
-from meshreel.encoder.run.excerpt import Excerpt, read_survey
+from meshreel.encoder.run.surveying import Excerpt, read_survey
 from meshreel.encoder.sequence import Encoder
 from meshreel.encoder.settings.options import as_installed
 from meshreel.encoder.settings.presets import appearance_options, preset_options

@@ -14,7 +14,7 @@ import pytest
 from meshreel.encoder.group.forms import EncodedGroup
 from meshreel.encoder.group.target import Fidelity
 from meshreel.encoder.run import schedule as recipe
-from meshreel.encoder.run.side_by_side import AHEAD, as_done, workers_of
+from meshreel.encoder.run.schedule import AHEAD, as_done, workers_of
 from meshreel.encoder.sequence import Encoder
 from meshreel.errors import InputError
 from meshreel.format.layout import Form
@@ -168,7 +168,7 @@ def test_a_file_that_changes_between_two_readings_is_refused(folder, tmp_path, m
 
 @pytest.mark.usefixtures("plainly")
 def test_intervals_that_were_done_out_of_order_are_not_done_again(folder, tmp_path, monkeypatch):
-    """The first interval fails when later ones are in the journal."""
+    """The first interval fails when later ones are done."""
     Encoder(opened(folder)).encode(tmp_path / "whole.reel", EACH_ALONE)
     plain, calls = recipe.encode_interval, list[int]()
 

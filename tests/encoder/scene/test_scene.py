@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
@@ -20,12 +22,14 @@ from meshreel.coding.intra import decode_intra, encode_empty, encode_intra
 from meshreel.encoder.group.forms import EncodedGroup
 from meshreel.encoder.group.progress import Stages
 from meshreel.encoder.group.target import NO_ERROR, target_of
+from meshreel.encoder.run.interval_files import IntervalFiles
 from meshreel.encoder.run.job import Job
 from meshreel.encoder.scene.parts import Parts, take_apart
-from meshreel.encoder.scene.scene import encode_bodies
+from meshreel.encoder.scene.scene import CodedBodies, encode_bodies
 from meshreel.encoder.scene.static import encode_static
 from meshreel.encoder.scene.tracks import TrackGroup
 from meshreel.encoder.sequence import Encoder, encode
+from meshreel.encoder.settings.options import EncoderOptions
 from meshreel.errors import InputError
 from meshreel.format.checks import MOST_TRACKS
 from meshreel.format.layout import Form
@@ -289,11 +293,22 @@ def tracks(frames: list[Mesh], interval: int = 2) -> list[str]:
     seen = replace(survey(sequence), scale=1.0)
     parts = Parts(seen, ALL, NONE, [], 0.0, 0.0)
     options = replace(OPTIONS, key_interval=float(interval))
-    coded = encode_bodies(Job(captured(sequence), options, None, Stages(None, len(frames))), parts)
+    coded = bodies_of(sequence, options, parts)
     assert coded.dropped == 0
     assert coded.groups == sorted(coded.groups, key=lambda each: (each.first_frame, each.track))
     count = max(each.track for each in coded.groups) + 1
     return [shown(coded.groups, track, len(frames)) for track in range(count)]
+
+
+def bodies_of(sequence: MeshList, options: EncoderOptions, parts: Parts) -> CodedBodies:
+    """Return the bodies of a scene as encoded, with their payloads in memory."""
+    stages, recipe = Stages(None, len(sequence)), options.recipe()
+    with TemporaryDirectory() as folder, IntervalFiles(Path(folder, "a.reel")) as files:
+        coded = encode_bodies(Job(captured(sequence), options, None, stages, recipe, files), parts)
+        loaded = [
+            (each, each.group.stored.read() if each.group.stored else each.group.payload) for each in coded.groups
+        ]
+        return replace(coded, groups=[replace(e, group=replace(e.group, payload=data)) for e, data in loaded])
 
 
 def shown(groups: list[TrackGroup], track: int, frames: int) -> str:
@@ -365,9 +380,7 @@ def test_more_bodies_than_a_file_has_tracks_share_some():
     many = concatenate([moved(plate, (k % 17, k // 17, 0)) for k in range(MOST_TRACKS + 20)])
     sequence = MeshList((many, many), 1.0)
     seen = replace(survey(sequence), scale=1.0)
-    coded = encode_bodies(
-        Job(captured(sequence), OPTIONS, None, Stages(None, 2)), Parts(seen, ALL, NONE, [], CELL, 0.0, 0.0)
-    )
+    coded = bodies_of(sequence, OPTIONS, Parts(seen, ALL, NONE, [], CELL, 0.0, 0.0))
     assert {each.track for each in coded.groups} == set(range(MOST_TRACKS)) and coded.dropped == 0
     faces = [len(decode_intra(each.group.payload)[0].faces) for each in coded.groups if each.first_frame == 0]
     assert sum(faces) == len(many.faces)

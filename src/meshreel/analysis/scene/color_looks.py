@@ -19,7 +19,7 @@ class ColorLooks:
 
     def __init__(self, colors: ColorFrames, frame: int, side: int = SIDE) -> None:
         """Take the cameras that have a picture of `frame`; the views have the shape of the first one's."""
-        self._colors = colors
+        self._colors, self.frame = colors, frame
         cameras = {number: picture.camera for number, picture in enumerate(colors[frame]) if picture is not None}
         self._numbers = list(cameras)
         width, height = next(((camera.width, camera.height) for camera in cameras.values()), (1, 1))

@@ -10,7 +10,9 @@ import hashlib
 import json
 import os
 import platform
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -23,22 +25,30 @@ WriteLines = Callable[[str], object]  # takes whole lines of JSON
 LIBRARIES = ("numpy", "scipy", "libigl", "fast-simplification", "DracoPy", "trimesh")
 
 
-class Digests:
-    """Collects the lines of an interval, which may be encoded in another process."""
-
-    def __init__(self, track: int, frame: int) -> None:
-        self.where, self.lines = {"track": track, "frame": frame}, list[str]()
-
-    def take(self) -> tuple[str, ...]:
-        """Return the lines since the last call."""
-        lines, self.lines = tuple(self.lines), []
-        return lines
+_listener = ContextVar[tuple[WriteLines, dict[str, int]] | None]("listener to digests", default=None)
 
 
-def note(digests: Digests | None, stage: str, *values: object) -> None:
-    """Add the line of a stage where digests are wanted."""
-    if digests is not None:
-        digests.lines.append(line_of(stage, *values, **digests.where))
+@contextmanager
+def noted(write: WriteLines | None, **where: int) -> Iterator[None]:
+    """Pass the line of each stage in the block to `write`, with the place that it is of; None: no digests are made."""
+    token = _listener.set(None if write is None else (write, where))
+    try:
+        yield
+    finally:
+        _listener.reset(token)
+
+
+def listener() -> WriteLines | None:
+    """Return the function that takes lines here, or None where no digests are wanted."""
+    listening = _listener.get()
+    return None if listening is None else listening[0]
+
+
+def note(stage: str, *values: object) -> None:
+    """Write the line of a stage where digests are wanted."""
+    if (listening := _listener.get()) is not None:
+        write, where = listening
+        write(line_of(stage, *values, **where))
 
 
 def line_of(stage: str, *values: object, **where: int) -> str:

@@ -15,7 +15,6 @@ from ...container.writer import Companion, Stored
 from ...errors import InputError
 from ...format.budget import CostlyError
 from ...format.layout import Form
-from ...geometry.work import Work
 from ...types import Mesh
 from .draco import IntraOptions, cheapest_intra, finest_intra
 from .target import NO_ERROR, Fidelity
@@ -39,9 +38,7 @@ class EncodedGroup:
     canonical: bool = field(default=False, kw_only=True)  # its reference lies in the pose of eq. 5
     companions: tuple[Companion, ...] = field(default=(), kw_only=True)  # its colours, an atlas, pictures
     lost_colors: bool = field(default=False, kw_only=True)  # its frames have colours that a reader would refuse
-    digests: tuple[str, ...] = field(default=(), kw_only=True)  # lines of `--debug-digests`
-    stored: Stored | None = None  # where the payload is, in place of `payload`, of a group that a journal has
-    work: Work = field(default_factory=dict, kw_only=True)  # that another process did until this group was done
+    stored: Stored | None = None  # where the payload is, in place of `payload`, of a group whose interval has a file
 
 
 def most_for(group: EncodedGroup) -> float:

@@ -17,7 +17,6 @@ from ...geometry.derived_sequences import DerivedSequence
 from ...geometry.painted import Paint, Painted
 from ...geometry.topology import clean, part_of
 from ...types import Frames, Mesh, Up
-from .digests import Digests
 from .views import Sight, Views
 
 MOST_FRAMES = 64  # in a group: the tracker's distances and the basis grow with it (guess)
@@ -32,7 +31,6 @@ class Interval:
     frame_rate: float = field(default=30.0, kw_only=True)  # 1/s
     first_frame: int = 0  # its number in the sequence
     track: int = 0
-    digests: Digests | None = field(default=None, kw_only=True)  # of what its stages compute; None: nobody asks
     # Digest of the frames; empty where they are frames of the sequence, or pieces of them: it has their digests.
     surface: str = ""
     up: Up = field(default="y", kw_only=True)  # the axis that points up

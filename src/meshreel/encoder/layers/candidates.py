@@ -25,7 +25,7 @@ from ...coding.layers.coder import LayersState
 from ...coding.reference_mesh import CodedReference, code_on_lattice
 from ...geometry.painted import Paint
 from ...types import Mesh
-from ..group.digests import Digests, note
+from ..group.digests import note
 from ..group.target import Fidelity
 from .options import LayersOptions
 
@@ -43,7 +43,6 @@ class Ahead:
     surfaces: list[FrameSurface]
     noise: float  # RMS distance of the frames from the truth, normalised
     target: Fidelity  # that the frames should reach, normalised
-    digests: Digests | None = None
     paint: Callable[[int, Mesh], Paint | None] = lambda *_: None  # as `Interval.paint`
     frame_rate: float = 30.0  # 1/s
 
@@ -235,7 +234,7 @@ class Candidate:
         o = self._options
         lattice = o.layers.step_above(self._tolerated) * (LATTICE if len(ahead) > 1 else LATTICE_ALONE)
         reference = code_on_lattice(base_mesh(surface, o.template, self._tolerated), lattice, o.template.levels)
-        note(ahead.digests, "template, coded", reference.base.vertices, reference.base.faces)
+        note("template, coded", reference.base.vertices, reference.base.faces)
         return None if reference.mesh.is_empty else reference
 
     def _take(
@@ -251,4 +250,4 @@ class Candidate:
         prediction = self._tracker.placed(number, self._points, self._binding)
         positions = self._fitting.first(ahead.at(number), self._rest, prediction)
         self._fits[number], self._residuals[number] = positions, self._closeness.of(positions, ahead.at(number))
-        note(ahead.digests, "first fit", self.key, number, positions)
+        note("first fit", self.key, number, positions)

@@ -6,7 +6,7 @@ In: frames, the positions of a template on them. Out: an EncodedGroup with its f
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float64, Int32
@@ -18,7 +18,7 @@ from ...format.budget import CostlyError
 from ...format.layout import Form
 from ...format.records import pack
 from ...types import Mesh
-from ..group.digests import Digests, note
+from ..group.digests import note
 from ..group.draco import cheapest_intra
 from ..group.forms import EncodedGroup, cheaper, intra_only, most_for
 from ..group.target import Fidelity, measure
@@ -38,7 +38,6 @@ class GroupCoder:
     options: LayersOptions
     floor: bool = True  # Draco is tried in place of every group, not only where nothing else holds
     dearer: float = 0.0  # bytes a frame, for which Draco was tried and was no bargain
-    digests: Digests | None = field(default=None, kw_only=True)
 
     @property
     def frames(self) -> list[Mesh]:
@@ -65,14 +64,14 @@ class GroupCoder:
                 return self.alone(), None
             half = len(self.surfaces) // 2
             return replace(self, surfaces=self.surfaces[:half]).layers(reference, positions[:half], previous)
-        note(self.digests, "fields and symbols", encoded.payload)
+        note("fields and symbols", encoded.payload)
         shown = self._with_tails(encoded, reference.base.faces)
-        note(self.digests, "patches", shown.payload[len(encoded.payload) :])
+        note("patches", shown.payload[len(encoded.payload) :])
         count = len(self.surfaces)
         most = min(self.options.measured or count, count)
         some = [(2 * k + 1) * count // (2 * most) for k in range(most)]
         fidelity = measure([self.surfaces[k].mesh for k in some], [shown.frames[k] for k in some])
-        note(self.digests, "fidelity", fidelity)
+        note("fidelity", fidelity)
         is_predicted = previous is not None
         chosen = EncodedGroup(Form.LAYERS, len(self.surfaces), shown.payload, shown.layers, fidelity, is_predicted)
         if not np.isfinite(chosen.fidelity.distance) or any(mesh.is_empty for mesh in shown.frames):

@@ -95,15 +95,13 @@ class _Planner:
     def _next_frames(self) -> Ahead:
         """Return the next frames."""
         numbers = range(self._at, min(self._at + self._options.group_size, len(self._interval.frames)))
-        known, digests, noise = self._surfaces, self._interval.digests, self._interval.noise
+        known, noise = self._surfaces, self._interval.noise
         frames, free = self._interval.frames, self._interval.free if self._options.tails else lambda _: None
         self._surfaces = {at: known.get(at) or FrameSurface(frames[at], free(at)) for at in numbers}
         meshes = [surface.mesh for surface in self._surfaces.values()]
-        note(digests, "frames", *(array for mesh in meshes for array in (mesh.vertices, mesh.faces)))
+        note("frames", *(array for mesh in meshes for array in (mesh.vertices, mesh.faces)))
         target = target_of(meshes, self._target, noise)
-        ahead = Ahead(
-            self._at, list(self._surfaces.values()), noise, target, digests, frame_rate=self._interval.frame_rate
-        )
+        ahead = Ahead(self._at, list(self._surfaces.values()), noise, target, frame_rate=self._interval.frame_rate)
         return replace(ahead, paint=self._interval.paint) if self._options.slide and self._colored else ahead
 
     def _standing(self, ahead: Ahead) -> list[Coded]:
@@ -126,7 +124,7 @@ class _Planner:
         plan, candidates = self._planned(ahead)
         is_last, done = ahead.numbers.stop == len(self._interval.frames), dict[PlannedGroup, Coded]()
         other = rival(plan, *_known(ahead, candidates), self._options.plan_for(ahead.noise))
-        note(ahead.digests, "plans", plan.groups, other and other.groups)
+        note("plans", plan.groups, other and other.groups)
         if other is not None:
             tried = [(self._all(ahead, one.groups, candidates, done), one) for one in (plan, other)]
             noisy = ahead.noise > 0
@@ -191,7 +189,7 @@ class _Planner:
     def _with(self, ahead: Ahead, numbers: range, coder: GroupCoder, candidate: Candidate) -> Coded:
         """Code successive frames with a template."""
         positions = candidate.fit(ahead, numbers)
-        note(ahead.digests, "fit", positions)
+        note("fit", positions)
         previous = candidate.before.state if candidate.before else None
         group, state = coder.layers(candidate.reference, positions, previous)
         if state is None:
@@ -201,8 +199,7 @@ class _Planner:
         return replace(group, key=key), candidate.followed(ahead, state, positions[len(numbers) - 1], numbers)
 
     def _coder(self, ahead: Ahead, some: slice) -> GroupCoder:
-        chosen, digests = ahead.surfaces[some], ahead.digests
-        return GroupCoder(chosen, ahead.target, ahead.noise, self._options, self._floor, self._dearer, digests=digests)
+        return GroupCoder(ahead.surfaces[some], ahead.target, ahead.noise, self._options, self._floor, self._dearer)
 
 
 def _is_patched(group: EncodedGroup) -> bool:

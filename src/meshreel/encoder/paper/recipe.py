@@ -28,7 +28,7 @@ from ...errors import NoReferenceError
 from ...format.budget import CostlyError
 from ...format.layout import Form
 from ...types import Centers, Mesh
-from ..group.digests import Digests, note
+from ..group.digests import note
 from ..group.forms import EncodedGroup, cheaper, empty_groups, intra_only
 from ..group.interval import Interval
 from ..group.progress import Stages
@@ -66,9 +66,9 @@ def find_groups(interval: Interval, options: PaperOptions, stages: Stages | None
     if len(frames) == 1:
         return [FoundGroup(frames, None)]
     centers = track_centers(frames, options.track)
-    note(interval.digests, "centers", centers.positions)
+    note("centers", centers.positions)
     stages.add("track", len(frames))
-    return _Cutting(options, interval.noise, interval.digests).groups(frames, centers, options.groups.depth, stages)
+    return _Cutting(options, interval.noise).groups(frames, centers, options.groups.depth, stages)
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,7 +145,6 @@ class _Cutting:
 
     options: PaperOptions
     noise: float
-    digests: Digests | None = None
 
     def groups(self, frames: Sequence[Mesh], centers: Centers, depth: int, stages: Stages) -> list[FoundGroup]:
         """Cut frames as `find_groups` does, from tracked centers; `depth` times at most."""
@@ -156,8 +155,8 @@ class _Cutting:
             fitted, residuals = analyze(frames, centers, options, stages)
         except NoReferenceError:
             return [FoundGroup(frames, None)]
-        note(self.digests, "reference, coded", fitted.reference.base.vertices, fitted.reference.base.faces)
-        note(self.digests, "fit", fitted.positions)
+        note("reference, coded", fitted.reference.base.vertices, fitted.reference.base.faces)
+        note("fit", fitted.positions)
         cut = cut_at(residuals / target_of(frames, options.target, self.noise).distance, options.groups)
         if cut is None or not options.cuts:
             return [FoundGroup(frames, fitted)]

@@ -5,13 +5,14 @@ from __future__ import annotations
 from concurrent.futures import Executor
 from dataclasses import dataclass
 
+from ...format.layout import Header
 from ...geometry.derived_sequences import DerivedSequence
-from ..group.digests import WriteLines, line_of
 from ..group.progress import Stages
 from ..recipe import Recipe
 from ..settings.options import EncoderOptions, SceneOptions
-from .excerpt import Excerpt
-from .journal import Journal
+from .interval_files import IntervalFiles
+
+NEUTRAL = Header(1.0, (0.0, 0.0, 0.0), 1.0, (-1.0, -1.0, -1.0), (1.0, 1.0, 1.0), '{"encode":""}')  # in normalised units
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,14 +24,9 @@ class Job:
     executor: Executor | None
     stages: Stages
     recipe: Recipe
-    journal: Journal | None = None  # of the output; None where groups are not kept
-    digests: WriteLines | None = None  # of what the stages compute; None where nobody asks
-    excerpt: Excerpt | None = None  # the frames that are encoded; None: all
-
-    def note(self, stage: str, *values: object) -> None:
-        """Write the line of a stage where digests are wanted."""
-        if self.digests is not None:
-            self.digests(line_of(stage, *values))
+    files: IntervalFiles | None = None  # of the output, which the encoding of intervals needs
+    head: Header = NEUTRAL  # of the files of intervals
+    chosen: range | None = None  # the frames that are encoded; None: all
 
     @property
     def scene(self) -> SceneOptions:

@@ -1,126 +1,180 @@
 """Encoding of the intervals of a job, here or side by side in workers, in any order.
 
-In -> out: a job, its intervals -> their groups, in order; those that an earlier run had done come from its journal.
+In -> out: a job, its intervals -> their groups, in order; those that an earlier run had done come from their files.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
+from dataclasses import dataclass
 from functools import partial
+from itertools import islice
 from typing import Any
 
 from threadpoolctl import threadpool_limits
 
-from ...geometry.work import add, heard, since, so_far
+from ...format.layout import Header
+from ...geometry.work import Work, add, heard, since, so_far
 from ..appearance.options import AppearanceOptions
-from ..group.digests import Digests
+from ..group.digests import listener, noted
 from ..group.forms import EncodedGroup
 from ..group.interval import Interval
 from ..group.progress import IntervalStages, Stages
 from ..recipe import Recipe, encode_interval
+from .interval_files import IntervalFiles, pack_interval
 from .job import Job
-from .side_by_side import Call, as_done
 from .worker import end_with_parent, tell
+
+AHEAD = 2  # calls for each worker, so that none waits for its next (guess)
+UNKNOWN = 8  # workers of an executor that does not say how many it has (guess)
+_LOOK = 0.5  # s, between two looks at what workers tell of calls that are not done (guess)
+
+Call = tuple[int, Callable[..., Any], tuple[Any, ...]]  # number, function, arguments
+_Done = tuple[list[EncodedGroup], str]  # and lines of digests
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """An interval to encode, here or in a worker process."""
+
+    interval: Interval
+    recipe: Recipe
+    appearance: AppearanceOptions | None
+    head: Header  # of its file
+    noting: bool  # digests are wanted
+
+    def done(self, stages: IntervalStages) -> tuple[bytes, str]:
+        """Encode the interval; return its file and its lines of digests."""
+        interval, lines = self.interval, list[str]()
+        noting = noted(lines.append if self.noting else None, track=interval.track, frame=interval.first_frame)
+        with heard(stages.hear), noting:
+            groups = list(encode_interval(interval, self.recipe, self.appearance, stages))
+        return pack_interval(interval, groups, self.head), "".join(lines)
 
 
 def encode_intervals(job: Job, intervals: Iterable[Interval]) -> Iterator[list[EncodedGroup]]:
     """Yield the groups of each interval, in order; with an executor, its workers encode them in any order.
 
-    Where the job has a journal, the groups are those that it has, or are stored in it as soon as they are there: what
-    waits here for an earlier interval has no payloads.
+    An interval that has a file is not encoded again, and others get one as soon as they are done: what waits here for
+    an earlier interval has no payloads.
     """
+    assert job.files is not None
     job.stages.add("code", 0)  # the time that a frame takes is counted from here
-    for groups, lines in _one_by_one(job, intervals) if job.executor is None else _side_by_side(job, intervals):
-        if job.digests is not None:
-            job.digests(lines)
+    encode = _one_by_one if job.executor is None else _side_by_side
+    for groups, lines in encode(job, job.files, intervals):
+        if lines and (write := listener()) is not None:
+            write(lines)
         yield groups
 
 
-_Done = tuple[list[EncodedGroup], str]  # and lines of digests
-
-
-def _one_by_one(job: Job, intervals: Iterable[Interval]) -> Iterator[_Done]:
+def _one_by_one(job: Job, files: IntervalFiles, intervals: Iterable[Interval]) -> Iterator[_Done]:
     """Encode intervals here, each when it is asked for."""
-    for interval in map(partial(_noting, job), intervals):
+    for interval in intervals:
         stages = _stages_of(job, interval)
-        if (known := _known(job, interval, stages)) is not None:
+        if (known := _known(job, files, interval, stages)) is not None:
             yield known, ""
             continue
-        with heard(stages.hear):
-            groups = list(encode_interval(interval, job.recipe, job.options.appearance, stages))
-        yield _kept(job, interval, groups)
+        data, lines = _task(job, interval).done(stages)
+        yield files.keep(interval, data), lines
 
 
-def _side_by_side(job: Job, intervals: Iterable[Interval]) -> Iterator[_Done]:
+def _side_by_side(job: Job, files: IntervalFiles, intervals: Iterable[Interval]) -> Iterator[_Done]:
     """Encode intervals in workers: which read their frames themselves, where frames are in files."""
     assert job.executor is not None
     ready, sent, next_one = dict[int, _Done](), dict[int, tuple[Interval, IntervalStages]](), 0
     told = getattr(job.executor, "told", None)  # workers of the command line tell of each frame
 
     def calls() -> Iterator[Call]:
-        for number, interval in enumerate(map(partial(_noting, job), intervals)):
+        for number, interval in enumerate(intervals):
             stages = _stages_of(job, interval)
-            if (known := _known(job, interval, stages)) is not None:
+            if (known := _known(job, files, interval, stages)) is not None:
                 ready[number] = known, ""
                 continue
             sent[number] = interval, stages
-            yield number, encode_sent, (interval.to_send(), job.recipe, job.options.appearance, number)
+            yield number, encode_sent, (_task(job, interval.to_send()), number)
 
     def look() -> None:
         for number, stage, done in told() if told is not None else ():
             if number in sent:
                 sent[number][1].reach_frame(stage, done)
 
-    for number, (groups, observed) in as_done(job.executor, calls(), None if told is None else look):
+    for number, (data, lines, observed, work) in as_done(job.executor, calls(), None if told is None else look):
         interval, stages = sent.pop(number)
         interval.learn(observed)
         stages.reach("code", 1.0)
-        for group in groups:
-            add(group.work)
-        ready[number] = _kept(job, interval, groups)
+        add(work)
+        ready[number] = files.keep(interval, data), lines
         while next_one in ready:
             yield ready.pop(next_one)
             next_one += 1
     yield from (ready[number] for number in sorted(ready))
 
 
-def _noting(job: Job, interval: Interval) -> Interval:
-    """Return the interval with what collects its digests, where they are wanted."""
-    if job.digests is None:
-        return interval
-    return replace(interval, digests=Digests(interval.track, interval.first_frame))
+def _task(job: Job, interval: Interval) -> Task:
+    return Task(interval, job.recipe, job.options.appearance, job.head, listener() is not None)
 
 
 def _stages_of(job: Job, interval: Interval) -> IntervalStages:
     return IntervalStages(job.stages, len(interval.frames), job.recipe.group_size, interval.weight)
 
 
-def _known(job: Job, interval: Interval, stages: IntervalStages) -> list[EncodedGroup] | None:
-    """Return the groups of an interval from the journal of an earlier run, None where it has them not."""
-    known = None if job.journal is None else job.journal.take(interval)
+def _known(job: Job, files: IntervalFiles, interval: Interval, stages: IntervalStages) -> list[EncodedGroup] | None:
+    """Return the groups of an interval that an earlier run encoded, or None."""
+    known = files.take(interval, job.head)
     if known is not None:
         stages.reach("code", 1.0)
     return known
 
 
-def _kept(job: Job, interval: Interval, groups: list[EncodedGroup]) -> _Done:
-    """Store the groups of an interval where there is a journal; return them and their lines of digests."""
-    lines = "".join(line for group in groups for line in group.digests)
-    return groups if job.journal is None else job.journal.keep(interval, groups), lines
+def encode_sent(task: Task, number: int) -> tuple[bytes, str, Any, Work]:
+    """Do a task in a worker process, which ends with its parent.
 
-
-def encode_sent(
-    interval: Interval, recipe: Recipe, appearance: AppearanceOptions | None, number: int
-) -> tuple[list[EncodedGroup], Any]:
-    """Encode an interval in a worker process, which ends with its parent; the result can be pickled.
-
-    Return the groups, and what reading the frames has shown.
+    Return what the task returns, what reading the frames has shown, and the work.
     """
     end_with_parent()
-    count = len(interval.frames)
-    stages = IntervalStages(Stages(partial(tell, number), count), count, recipe.group_size)
-    with threadpool_limits(1), heard(stages.hear):
+    count = len(task.interval.frames)
+    stages = IntervalStages(Stages(partial(tell, number), count), count, task.recipe.group_size)
+    with threadpool_limits(1):
         before = so_far()
-        *others, last = encode_interval(interval, recipe, appearance, stages)
-        return [*others, replace(last, work=since(before))], interval.observed
+        data, lines = task.done(stages)
+        return data, lines, task.interval.observed, since(before)
+
+
+def as_done(
+    executor: Executor, calls: Iterable[Call], look: Callable[[], object] | None = None
+) -> Iterator[tuple[int, Any]]:
+    """Yield number and result of each call as it is done; calls are asked for when a worker is about to be free.
+
+    Where calls fail, raises what the first of them raised, in the order of their numbers. `look` is called now and then
+    while there is nothing to yield.
+    """
+    waiting, running = iter(calls), dict[Future[Any], int]()
+    try:
+        while True:
+            for number, function, arguments in islice(waiting, max(AHEAD * workers_of(executor) - len(running), 0)):
+                running[executor.submit(function, *arguments)] = number
+            if not running:
+                return
+            done = wait(running, None if look is None else _LOOK, FIRST_COMPLETED).done
+            if look is not None:
+                look()
+            failed = [running[future] for future in done if future.exception() is not None]
+            for future in done:  # first what can be kept
+                if future.exception() is None:
+                    yield running.pop(future), future.result()
+            if failed:  # all calls before one that failed have been submitted
+                for future in sorted(running, key=running.__getitem__):
+                    if running[future] <= min(failed):
+                        future.result()
+    finally:
+        for future in running:
+            future.cancel()
+
+
+def workers_of(executor: Executor) -> int:
+    """Return how many calls an executor can do at a time."""
+    count: int | None = getattr(executor, "_max_workers", None)
+    if count is None and (client := getattr(executor, "_client", None)) is not None:
+        count = sum(client.nthreads().values())  # of a Dask cluster, which may grow
+    return count or UNKNOWN

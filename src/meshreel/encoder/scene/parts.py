@@ -122,9 +122,14 @@ def take_apart(
     found = _measured(sequence, segmentation, background, changes, stages)
     unit = float(np.median(found.sizes)) if found.sizes else 0.0
     seen = replace(seen, scale=unit or seen.diagonal)
+    facts = (found.noise, found.deviation, found.astray)
+    return Parts(seen, segmentation, background, changes, *facts, free_space(sequence))
+
+
+def free_space(sequence: CapturedSequence) -> tuple[FreeSpace, ...]:
+    """Return the space that depth cameras saw through in some frames; none if no depth is known."""
     depth, some = sequence.depth, evenly(len(sequence), PROBES)
-    free = () if depth is None else tuple(FreeSpace.of(depth[number]) for number in some)
-    return Parts(seen, segmentation, background, changes, found.noise, found.deviation, found.astray, free)
+    return () if depth is None else tuple(FreeSpace.of(depth[number]) for number in some)
 
 
 def _check_nothing_lost(sequence: MeshSequence, segmentation: Segmentation, options: BackgroundOptions) -> None:

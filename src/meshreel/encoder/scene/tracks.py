@@ -52,13 +52,13 @@ class TrackedBodies:
     """The key intervals of a sequence, each with its bodies."""
 
     intervals: list[tuple[range, list[Body]]]
-    count: int  # of the whole sequence, also where the intervals are those of an excerpt
+    count: int  # of the whole sequence, also where the intervals are those of some of its frames
 
 
 def tracked_bodies(job: Job, seen: Survey) -> TrackedBodies:
     """Return the key intervals and their bodies: one, in track 0, where the recipe codes none apart.
 
-    Of an excerpt, these are the key intervals of the whole sequence as far as its frames go.
+    Where some frames are chosen, these are the key intervals of the whole sequence as far as those frames go.
     """
     numbered = seen.intervals(job.recipe.longest(job.sequence.frame_rate))
     if job.recipe.bodies_apart:
@@ -66,11 +66,12 @@ def tracked_bodies(job: Job, seen: Survey) -> TrackedBodies:
     else:
         whole = [(frames, [Body(0)]) for frames in numbered]
     tracks = 1 + max(body.track for _, bodies in whole for body in bodies)
-    if job.excerpt is None:
+    if (chosen := job.chosen) is None:
         return TrackedBodies(whole, tracks)
     cut = list[tuple[range, list[Body]]]()
     for frames, bodies in whole:
-        for some in job.excerpt.of([frames]):
+        some = range(max(frames.start, chosen.start), min(frames.stop, chosen.stop))
+        if len(some):
             at = slice(some.start - frames.start, some.stop - frames.start)
             cut.append((some, [replace(b, bodies=b.bodies[at], diagonals=b.diagonals[at]) for b in bodies]))
     return TrackedBodies(cut, tracks)
