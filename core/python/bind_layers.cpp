@@ -203,7 +203,7 @@ nb::tuple edge_frames(In<double, 2> positions, In<int32_t, 2> faces, In<int32_t,
 
 using Place = std::optional<std::tuple<double, std::tuple<double, double, double>>>;  // scale and origin
 
-// Where frames are written to, and how they are placed.
+// Destination of frames, and their placement.
 class Target {
 public:
     Target(double* positions, const Place& place) : Target(positions, nullptr, place) {}

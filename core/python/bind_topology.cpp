@@ -5,7 +5,7 @@
 namespace meshreel {
 namespace {
 
-// What is left of a mesh.
+// Remainder of a mesh.
 struct Rest {
     const mr_mesh mesh;
     Buffer<double> positions;

@@ -8,7 +8,7 @@
 
 namespace meshreel {
 
-// What a Draco mesh says of itself before its faces.
+// Head of a Draco mesh, before its faces.
 struct DracoClaims {
     uint64_t faces, points;
     uint64_t symbols;  // of the traversal; each has a face
@@ -30,7 +30,7 @@ struct DracoHandle {
     bool is_right;
 };
 
-// What the faces are made from.
+// Symbols from which the faces are made.
 struct DracoFaces {
     std::vector<uint8_t> symbols;  // in the order of decoding
     std::vector<DracoHandle> handles;

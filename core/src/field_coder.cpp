@@ -132,7 +132,7 @@ int64_t code_nonzero(Coder& coder, FieldModels& models, int context, int64_t val
     return negative ? -static_cast<int64_t>(read) : static_cast<int64_t>(read);
 }
 
-// Where the encoder's symbols come from.
+// Source of the encoder's symbols.
 struct Given {
     const int32_t* symbols;
     size_t count;
@@ -140,7 +140,7 @@ struct Given {
     void set(size_t, size_t, int64_t) const {}
 };
 
-// Where the decoder's go.
+// Destination of the decoder's.
 struct Found {
     FieldTable table;
     double step;

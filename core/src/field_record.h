@@ -25,7 +25,7 @@ bool parse(const mr_bytes& bytes, Record& record) {
 // The same of a CodedField and a ColorsLevel for each of `levels`.
 bool parse(const mr_bytes& bytes, CodedField& base, std::vector<ColorsLevel>& levels);
 
-// What the streams of a CodedField hold.
+// Contents of the streams of a CodedField.
 struct FieldStreams {
     std::vector<int32_t> head;           // integers before those of the basis
     std::vector<double> vectors, means;  // means: zeros

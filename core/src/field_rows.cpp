@@ -61,7 +61,7 @@ void transform(const double* row, const Field& field, double* out) {
     }
 }
 
-// What predicts a row, added to it. A sum of none or one needs no beginning at zero: no number of `row` is -0.
+// Prediction of a row, added to it. A sum of none or one needs no beginning at zero: no number of `row` is -0.
 void add_prediction(const mr_graph& graph, size_t v, size_t stride, const double* rows, double* __restrict sums,
                     double* __restrict row) {
     const int64_t begin = graph.starts[v], count = graph.starts[v + 1] - begin;

@@ -7,7 +7,7 @@ namespace meshreel {
 
 #if defined(__cpp_exceptions) && !defined(__wasm__)
 
-// What `body` gives, `no_memory` where there was none for it, and `failed` where it threw anything else.
+// Result of `body`, `no_memory` if it ran out of memory, and `failed` if it threw anything else.
 template <class Body>
 int guarded(int no_memory, int failed, Body body) {
     try {

@@ -116,7 +116,7 @@ std::vector<double> transposed(const mr_laplacian& system, const double* deltas,
     return product;
 }
 
-// What a solver leaves of `right` for want of digits, solved for and added.
+// Residual of a solver's rounding, solved for and added.
 void refine(const mr_laplacian& system, const std::vector<double>& right, int64_t columns, double* weights) {
     std::vector<double> fitted((system.vertices + system.anchors.size()) * columns);
     mr_laplacian_forward(&system, weights, columns, fitted.data());

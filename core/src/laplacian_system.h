@@ -1,4 +1,4 @@
-// What a Laplacian system holds, and the two sparse factors it may need.
+// A Laplacian system, and the two sparse factors that it may need.
 #pragma once
 
 #include <cstdint>

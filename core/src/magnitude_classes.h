@@ -11,7 +11,7 @@ constexpr int kClasses = 15;
 constexpr int kClamp = 255;                 // larger magnitudes count as this one
 constexpr uint64_t kFirstRatio = 1u << 11;  // a column about as large as the one before
 
-// Where a class begins, in sixteenths of a step.
+// Lower end of a class, in sixteenths of a step.
 constexpr uint32_t kBegin[kClasses - 1] = {1, 5, 9, 14, 20, 28, 40, 64, 100, 160, 300, 600, 1200, 2400};
 
 // The class of `parts` times an expected magnitude, for one that is known as a fraction of `parts` need not be divided.

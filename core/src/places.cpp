@@ -115,7 +115,7 @@ private:
         return symbols_.rest(places_[3 * f + c], predicted(g, k, f, c));
     }
 
-    // Where the third corner of f is if f has the shape on the texture that it has in space.
+    // Place of the third corner of f if f has the same shape on the texture as in space.
     Place predicted(size_t g, size_t k, size_t f, size_t c) const {
         const Place p = places_[3 * g + k], q = places_[3 * g + (k + 1) % 3], r = places_[3 * g + (k + 2) % 3];
         const double *a = at(vertex(g, k)), *b = at(vertex(g, (k + 1) % 3)), *d = at(vertex(f, c));

@@ -1,4 +1,4 @@
-// What both closed-loop quantisers share: prediction in a causal graph, and what a magnitude costs (an encoder's
+// Common part of both closed-loop quantisers: prediction in a causal graph, and the cost of a magnitude (an encoder's
 // estimate).
 #pragma once
 

@@ -155,7 +155,7 @@ void SurfaceTree::cast(const Rays& rays, int32_t* faces, double* distances, doub
     }
 }
 
-// Where a ray meets the plane of a face, in double precision; infinite where there is no face.
+// Distance at which a ray meets a face's plane, in double precision; infinite without a face.
 double SurfaceTree::met(int32_t face, Vec origin, Vec way, double* weights) const {
     weights[0] = 1.0, weights[1] = weights[2] = 0.0;
     if (face < 0) return std::numeric_limits<double>::infinity();

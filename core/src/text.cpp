@@ -29,7 +29,7 @@ public:
 
     const char* behind() const { return at_; }
 
-    // Whether a word that is a number begins here; it becomes *value.
+    // True if a number begins here; it becomes *value.
     bool read(mr_nearest nearest, double* value) {
         const bool negative = at_ != end_ && *at_ == '-';
         if (negative || (at_ != end_ && *at_ == '+')) ++at_;
@@ -103,7 +103,7 @@ private:
     bool is_exact_ = false;
 };
 
-// What follows `count` stops in a word; the end of the word where it has fewer.
+// Text behind `count` stops in a word; the end of the word if it has fewer.
 const char* behind_stops(const char* at, const char* end, char stop, size_t count) {
     for (; at != end && !is_blank(*at) && count > 0; ++at) count -= *at == stop;
     return at;

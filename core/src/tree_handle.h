@@ -1,4 +1,4 @@
-// What is behind the handle of a tree in the C ABI.
+// The object behind the handle of a tree in the C ABI.
 #pragma once
 
 #include "meshreel/tree.h"

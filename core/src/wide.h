@@ -1,4 +1,4 @@
-// What makes loops fast on some machines and changes no result: wide registers, and memory asked for in time.
+// Speed without change of results: wide registers, and memory prefetched in time.
 #pragma once
 
 namespace meshreel {
@@ -19,7 +19,7 @@ __attribute__((target("avx2"), flatten)) auto in_wide_registers(Body& body) {
     return body();
 }
 
-// What `body` gives, in registers as wide as the machine has: the compiler makes it twice. Each number comes about by
+// Result of `body`, in registers as wide as the machine has: the compiler makes it twice. Each number comes about by
 // the same operations in the same order, only more of them side by side, and none is fused: no bit depends on the
 // machine.
 template <class Body>

@@ -131,7 +131,7 @@ private:
         return found;
     }
 
-    // Which voxels of a block and the first ones of those around are known, and which of these are inside.
+    // Masks of the known and inside voxels of a block and of the first ones around it.
     void gather(const Around& blocks) {
         for (int z = 0; z < kWide; ++z)
             for (int y = 0; y < kWide; ++y)

@@ -29,7 +29,7 @@ extern "C" {
 #define MESHREEL_ABI_VERSION 1
 MESHREEL_API uint32_t meshreel_abi_version(void);
 
-// What calls return; meshreel_last_error has it in words.
+// Status of a call; meshreel_last_error has it in words.
 enum {
     MESHREEL_OK = 0,
     MESHREEL_BAD_ARGUMENT = 1,  // a null pointer, or a frame or a part that is not there
@@ -74,7 +74,7 @@ typedef struct meshreel_info {
 MESHREEL_API int32_t meshreel_get_info(meshreel_video* video, meshreel_info* info);
 // The time at which a frame is shown, s.
 MESHREEL_API int32_t meshreel_time(meshreel_video* video, uint64_t frame, double* seconds);
-// What the encoder recorded, a JSON object in UTF-8, ended by 0. Valid until the file is closed.
+// The encoder's metadata, a JSON object in UTF-8, ended by 0. Valid until the file is closed.
 MESHREEL_API const char* meshreel_metadata(const meshreel_video* video);
 
 // Decodes from at most so many layers of each group beyond its first, so that fewer bytes are read and meshes are

@@ -1,4 +1,4 @@
-// What calls of the C ABI return, and the arguments that several of them take.
+// Statuses of calls of the C ABI, and arguments that several of them take.
 #pragma once
 
 #include <stddef.h>

@@ -12,7 +12,7 @@
 extern "C" {
 #endif
 
-// What is left of a mesh: vertices and faces in their order. There is room for all of them; the counts are set.
+// Remainder of a mesh: vertices and faces in their order. There is room for all of them; the counts are set.
 struct mr_rest {
     double* positions;
     size_t vertices;

@@ -76,7 +76,7 @@ def open_source(inputs: Sequence[str], reading: Reading, common: Common = Common
 
 def make_rig(takes: Sequence[Take], folder: Path, common: Common) -> list[str]:
     """Write the rig of recordings and show progress; return warnings for the user."""
-    streams = [one for take in takes for sensor in take.sensors for one in (sensor.depth, sensor.color) if one]
+    streams = [each for take in takes for sensor in take.sensors for each in (sensor.depth, sensor.color) if each]
     total = sum(stream.count for stream in streams)
     with common.stages(total, "pictures") as progress:
         return write_takes(takes, folder, lambda done: progress("read", done, total))

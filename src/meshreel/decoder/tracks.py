@@ -169,14 +169,14 @@ class Background:
 
     def _state(self, chunk: Chunk) -> Mesh:
         """Decode a state, starting from the last one decoded if the state is that one or was changed from it."""
-        known, state, shown = self._last
+        last, state, shown = self._last
         chain = [chunk]
         self._refusals.check(chunk)
-        while chain[-1].number != known and chain[-1].depends_on:
+        while chain[-1].number != last and chain[-1].depends_on:
             before = self.reader.chunks[chain[-1].depends_on[0]]
             self._refusals.check(before, chain)
             chain.append(before)
-        if chain[-1].number == known:
+        if chain[-1].number == last:
             chain.pop()
         for link in reversed(chain):
             state = self._decode(link, state)

@@ -1,4 +1,4 @@
-"""Audio of a file. In: an audio file, or those of files that are joined. Out: the bytes of a chunk.
+"""Audio of a file. In: an audio file, or the audio of files that are joined. Out: the bytes of a chunk.
 
 Opus in Ogg or WebM, AAC in MP4 or ADTS, and MP3 are told by their first bytes and their lists of tracks, never by their
 names: what can be played is for a player to say.
@@ -17,8 +17,8 @@ from ..format.records import pack
 from ..io.read import read_input
 from ..io.remote import Place, located
 
-_START = 1 << 16  # bytes in which Ogg and WebM name their tracks (guess)
-_PICTURES = re.compile(rb"hdlr.{8}vide|V_(VP[89]|AV1|MPEG)", re.DOTALL)  # a track of them in MP4, in WebM
+_START = 1 << 16  # bytes at the start within which Ogg and WebM name their tracks (guess)
+_PICTURES = re.compile(rb"hdlr.{8}vide|V_(VP[89]|AV1|MPEG)", re.DOTALL)  # marks of a video track in MP4 and in WebM
 _KNOWN = {
     b"RIFF": "a WAV file",
     b"fLaC": "a FLAC file",
@@ -28,7 +28,7 @@ _KNOWN = {
 }
 _REMEDY = "give Opus (.opus, .ogg, .webm), AAC (.m4a, .aac) or MP3, as ffmpeg -i IN -vn -c:a libopus OUT.opus makes it"
 Given = str | Place | bytes  # a path, a URL (extra `remote`), or the bytes of an audio file
-_MOST = 1e8  # s, three years: what is further off from the frames was meant in another unit (guess)
+_MOST = 1e8  # s, three years: a larger offset was meant in another unit (guess)
 _CLOSE = 1000  # microseconds within which joined files have the same audio at the same time: times are rounded
 
 
@@ -46,7 +46,7 @@ def packed_audio(audio: Given, start: float, first_time: int = 0) -> bytes:
 
 @dataclass(slots=True)
 class JoinedAudio:
-    """The audio of files that are joined, of which all that have some must have the same."""
+    """The audio of files that are joined: all files with audio must have the same."""
 
     record: AudioFile | None = None
 
@@ -66,12 +66,12 @@ class JoinedAudio:
 
     @property
     def payload(self) -> bytes:
-        """The payload of the joined file; no bytes where nothing is heard."""
+        """The payload of the joined file; no bytes if there is no audio."""
         return b"" if self.record is None else pack(self.record)
 
 
 def audio_type(data: bytes, name: str) -> AudioType:
-    """Return the type of an audio file. Raises InputError, which begins with its name, for other bytes."""
+    """Return the type of an audio file. Raises InputError, which begins with the file's name, for other bytes."""
     if not data:
         raise InputError(f"{name}: has no bytes; {_REMEDY}")
     if len(data) > LIMITS.audio - (1 << 10):
@@ -90,7 +90,7 @@ def audio_type(data: bytes, name: str) -> AudioType:
 
 
 def _boxes(data: bytes) -> Iterator[tuple[bytes, bytes]]:
-    """Yield name and contents of the boxes of an MP4 file, as far as they are whole."""
+    """Yield name and contents of the complete boxes of an MP4 file."""
     at = 0
     while at + 8 <= len(data):
         size, head = int.from_bytes(data[at : at + 4], "big"), 8
@@ -104,7 +104,7 @@ def _boxes(data: bytes) -> Iterator[tuple[bytes, bytes]]:
 
 
 def _coded(data: bytes) -> AudioType | None:
-    """Return ADTS or MPEG for frames of these, behind a tag perhaps."""
+    """Return the name of ADTS or MPEG for frames of these formats, which a tag may precede."""
     at = 0
     if data[:3] == b"ID3" and len(data) > 10:
         at = 10 + sum((byte & 0x7F) << (21 - 7 * k) for k, byte in enumerate(data[6:10]))

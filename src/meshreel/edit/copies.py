@@ -30,9 +30,9 @@ class Edited:
 
     frames: int  # shown
     size: int  # bytes
-    hidden: int = 0  # frames that are in the file and not shown: those that the first or last shown ones are coded with
-    missing: int = 0  # frames of the sequence that no file has, where the files say of what they are parts
-    lost_audio: bool = False  # the file had audio, which would be out of step
+    hidden: int = 0  # frames of the file that are not shown: the first or last shown ones are predicted from them
+    missing: int = 0  # frames of the sequence that no file has, if the files are parts of one
+    lost_audio: bool = False  # the audio was removed: it would be out of step
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +46,7 @@ class Piece:
 
 @contextmanager
 def opened(path: Place) -> Iterator[tuple[Place, ReelReader]]:
-    """Open a file for the block; of one behind a URL, the head and the chunks that are copied are fetched."""
+    """Open a file for the block; from a URL, only the head and the chunks that are copied are fetched."""
     source = source_at(path if isinstance(path, Path) else path.url)
     try:
         reader = ReelReader(source)
@@ -64,7 +64,7 @@ def check_known(path: Place, chunks: Iterable[Chunk]) -> None:
 
 
 def piece_of(path: Place, reader: ReelReader, numbers: Iterable[int], first: int = 0) -> Piece:
-    """Return chunks of a file, which get numbers one after the other."""
+    """Return chunks of a file, renumbered without gaps."""
     numbers = tuple(numbers)
     places = {number: place for place, number in enumerate(numbers, first)}
     entries = tuple(
@@ -75,7 +75,7 @@ def piece_of(path: Place, reader: ReelReader, numbers: Iterable[int], first: int
 
 
 def silent(reader: ReelReader) -> list[int]:
-    """Return the numbers of all chunks but that of audio."""
+    """Return the numbers of all chunks but the audio's."""
     return [chunk.number for chunk in reader.chunks if chunk.kind != ChunkKind.AUDIO]
 
 

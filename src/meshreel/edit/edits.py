@@ -28,7 +28,13 @@ from .metadata import HISTORY, MEANS, PART, joined_metadata, of_all_parts, place
 Name = str | Place
 Numbers = Sequence[Any] | np.ndarray
 Part = tuple[dict[str, Any], int]  # the metadata of a file, and its number of frames
-_OWN = ("key_frames", PART, HISTORY, ITEM, "up")  # metadata that `tag` leaves alone: others are computed from them
+_OWN = (
+    "key_frames",
+    PART,
+    HISTORY,
+    ITEM,
+    "up",
+)  # metadata that `tag` does not change: others depend on them
 
 
 def cut(source: Name, output: Name, frames: str, at_keys: bool = False) -> Edited:
@@ -50,7 +56,7 @@ def cut(source: Name, output: Name, frames: str, at_keys: bool = False) -> Edite
         edit = Edit(shown.start - whole.start, shown.stop - whole.start, reader.edit.rotation)
         intervals = reader.header.intervals[shown.start : shown.stop - 1]
         header = replace(reader.header, first_time=round(1e6 * reader.timestamp(shown.start)), intervals=intervals)
-        lost = (ITEM, PART) if len(shown) == count else (ITEM, PART, *MEANS)  # means are those of all frames
+        lost = (ITEM, PART) if len(shown) == count else (ITEM, PART, *MEANS)  # means are over all frames
         metadata = {name: value for name, value in reader.metadata.items() if name not in lost}
         keys = metadata.get("key_frames")
         if isinstance(keys, list):
@@ -87,14 +93,14 @@ def concat(sources: Sequence[Name], output: Name) -> Edited:
     edit = Edit(hidden[0], hidden[0] + frames, heads[0].edit.rotation)
     metadata = joined_metadata(parts) | edit.item(frames + sum(hidden))
     if place is None and len(sources) > 1:
-        before = [told for of, _ in parts for told in _history(of)[HISTORY]]
+        before = [entry for of, _ in parts for entry in _history(of)[HISTORY]]
         metadata |= _history({HISTORY: [*dict.fromkeys(before)]}, f"concat of {len(sources)} files")
     done = written(located(output), with_metadata(header, metadata), pieces, audio.payload)
     return replace(done, missing=max(place[1] - frames, 0) if place else 0)
 
 
 def retime(source: Name, output: Name, frame_rate: float | None = None, speed: float | None = None) -> Edited:
-    """Write a file that plays at another frame rate (1/s, and evenly), or `speed` times as fast, without its audio."""
+    """Write a file that plays at another frame rate (1/s, in equal steps) or `speed` times as fast, without audio."""
     if (frame_rate is None) == (speed is None):
         raise InputError("give a frame rate or a speed, and not both")
     factor = frame_rate if speed is None else speed
@@ -103,12 +109,12 @@ def retime(source: Name, output: Name, frame_rate: float | None = None, speed: f
     with opened(located(source)) as (path, reader):
         head = reader.header
         if speed is None:
-            header, told = replace(head, frame_rate=factor, first_time=0, intervals=()), f"retime to {factor:g}/s"
+            header, entry = replace(head, frame_rate=factor, first_time=0, intervals=()), f"retime to {factor:g}/s"
         else:
             intervals = tuple(max(round(interval / speed), 1) for interval in head.intervals)
             header = replace(head, frame_rate=head.frame_rate * speed, intervals=intervals)
-            told = f"retime by {speed:g}"
-        silent, metadata = None if reader.audio is None else b"", reader.metadata | _history(reader.metadata, told)
+            entry = f"retime by {speed:g}"
+        silent, metadata = None if reader.audio is None else b"", reader.metadata | _history(reader.metadata, entry)
         done = _relabelled(path, reader, output, header, metadata, audio=silent)
         return replace(done, lost_audio=silent is not None)
 
@@ -147,9 +153,9 @@ def transform(
             raise _unknown(path, error) from None
         if up is not None:
             metadata = {name: value for name, value in metadata.items() if name != "up"} | upright(up)
-        told = f"transform by {scale:g}, {np.round(turn, 6).tolist()}, {move.tolist()}"
+        entry = f"transform by {scale:g}, {np.round(turn, 6).tolist()}, {move.tolist()}"
         edit = replace(reader.edit, rotation=rotated)
-        return _relabelled(path, reader, output, header, metadata | _history(metadata, told), edit)
+        return _relabelled(path, reader, output, header, metadata | _history(metadata, entry), edit)
 
 
 def tag(
@@ -182,7 +188,7 @@ def tag(
 
 
 def _check_alike(path: Place, reader: ReelReader, other: ReelReader, first: Place, parts: Sequence[Part]) -> None:
-    """Raise InputError where a file, the last of the parts, is not of the sequence of the first, or not the next."""
+    """Raise InputError if the last of the parts is of another sequence than the first, or not the next part."""
     if len(reader.tracks) != len(other.tracks):
         text = f"{path}: {len(reader.tracks)} tracks, and {first} has {len(other.tracks)}"
         raise InputError(f"{text}; encode both with --survey FILE, which meshreel survey writes")
@@ -214,7 +220,7 @@ def _unknown(path: Place, error: Exception) -> InputError:
 
 
 def _numbers(name: str, given: Numbers, shape: tuple[int, ...]) -> np.ndarray:
-    """Return numbers as an array. Raises InputError where they are not finite, or not of the shape."""
+    """Return numbers as an array. Raises InputError if they are not finite, or not of the shape."""
     try:
         array = np.asarray(given, np.float64)
     except (TypeError, ValueError):
@@ -226,7 +232,7 @@ def _numbers(name: str, given: Numbers, shape: tuple[int, ...]) -> np.ndarray:
 
 
 def _timed(readers: Sequence[ReelReader]) -> Header:
-    """Return the header of files one after the other, with the times that their frames have in them."""
+    """Return the header of files one after the other, with the times of their frames."""
     first = readers[0].header
     if not any(reader.header.intervals for reader in readers):
         return first
@@ -237,14 +243,14 @@ def _timed(readers: Sequence[ReelReader]) -> Header:
     return replace(first, intervals=tuple(steps[:-1]))
 
 
-def _history(metadata: dict[str, Any], *told: str) -> dict[str, Any]:
-    """Return the metadata that tell of more edits."""
+def _history(metadata: dict[str, Any], *edits: str) -> dict[str, Any]:
+    """Return the history of a file as metadata, with these edits added."""
     before = metadata.get(HISTORY)
-    return {HISTORY: [*map(str, before if isinstance(before, list) else ()), *told]}
+    return {HISTORY: [*map(str, before if isinstance(before, list) else ()), *edits]}
 
 
 def _begin_of_last(readers: Sequence[ReelReader]) -> int:
-    """Return when the frames of the last of files begin that lie one after the other, microseconds."""
+    """Return the time of the first frame of the last of joined files, microseconds."""
     header, frames = _timed(readers), sum(reader.frame_count for reader in readers[:-1])
     before = sum(header.intervals[:frames]) if header.intervals else round(1e6 * frames / header.frame_rate)
     return header.first_time + before
@@ -259,11 +265,11 @@ def _relabelled(
     edit: Edit | None = None,
     audio: bytes | None = None,
 ) -> Edited:
-    """Write a file with all its chunks, of unknown kinds, too, under another header, with its own edit or another.
+    """Write a file with all its chunks, unknown kinds included, under another header, with its own edit or another.
 
     Without `audio` it keeps its own; with a payload, or with no bytes, unknown kinds are refused.
     """
-    metadata = {name: value for name, value in metadata.items() if name != ITEM}  # without the flag, it is none
+    metadata = {name: value for name, value in metadata.items() if name != ITEM}  # not an edit if the flag is missing
     metadata |= (edit or reader.edit).item(reader.coded_count)
     piece = Piece(path, tuple(range(len(reader.chunks))), reader.index.chunks)
     if audio is not None:

@@ -1,4 +1,4 @@
-"""Intervals of a file, which can stand alone: whole groups of all tracks, and all that these are predicted from.
+"""Intervals of a file that decode alone: whole groups of all tracks, and all chunks that these are predicted from.
 
 In: a reader and frames. Out: the frames from which to which the file has to be kept, and the chunks of these.
 """
@@ -11,7 +11,7 @@ from ..format.layout import ChunkKind
 
 
 def interval_of(reader: ReelReader, frames: range) -> range:
-    """Return the shortest interval that has some frames, and begins and ends with groups of all tracks.
+    """Return the shortest interval that contains given frames, and begins and ends with groups of all tracks.
 
     It begins with groups that name no group before. Pictures of a background are counted from the first frame that it
     is shown in, which an interval then begins with. Hidden frames have numbers below 0, or from `frame_count` on.
@@ -44,7 +44,7 @@ def _group_at(groups: tuple[Chunk, ...], frame: int) -> Chunk:
 
 
 def _stands_alone(reader: ReelReader, group: Chunk) -> Chunk:
-    """Return the group that a group's chain begins with."""
+    """Return the first group of a group's chain of predictions."""
     while (before := reader.group_before(group)) is not None:
         group = before
     return group

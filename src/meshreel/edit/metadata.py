@@ -15,8 +15,8 @@ from typing import Any
 from ..format.edit import ITEM
 from ..types import Up
 
-HISTORY = "history"  # of a file that was edited: what was done, in words
-PART = "part"  # of a file that is a part: its place, its exact totals, and a digest of its options
+HISTORY = "history"  # of an edited file: its edits, in words
+PART = "part"  # of a part: its place in the sequence, its exact totals, and a digest of its options
 KEYS = "key_frames"
 CANONICAL = "canonical_references"
 MEANS = ("rms_m", "worst_rms_m", "d2_psnr_paper", "normal_error_deg")
@@ -41,7 +41,7 @@ class Totals:
 
     @staticmethod
     def from_metadata(metadata: dict[str, Any], frames: int) -> Totals:
-        """Return the totals of a file of `frames` frames; where it is no part, from its rounded means.
+        """Return the totals of a file of `frames` frames; if it is no part, from its rounded means.
 
         Raises KeyError, TypeError or ValueError for metadata that have none, or that no encoder wrote.
         """
@@ -52,7 +52,7 @@ class Totals:
 
     @property
     def exact(self) -> list[float | None]:
-        """The sums without rounding, for JSON."""
+        """The exact sums, for JSON."""
         return [value if math.isfinite(value) else None for value in astuple(self)[1:]]
 
     @property
@@ -73,7 +73,7 @@ def joined_metadata(parts: Sequence[tuple[dict[str, Any], int]]) -> dict[str, An
     found = {name: value for name, value in parts[0][0].items() if name not in dropped}
     if KEYS in found:
         firsts = accumulate((frames for _, frames in parts), initial=0)
-        pairs = zip(firsts, parts, strict=False)  # the last of the firsts is the number of all frames
+        pairs = zip(firsts, parts, strict=False)  # the last of `firsts` is the number of all frames
         found[KEYS] = [first + key for first, (metadata, _) in pairs for key in metadata[KEYS]]
     if CANONICAL in found:
         found[CANONICAL] = sum(metadata[CANONICAL] for metadata, _ in parts)
@@ -96,7 +96,7 @@ def scaled_metadata(metadata: dict[str, Any], scale: float) -> dict[str, Any]:
 
 
 def of_all_parts(metadata: dict[str, Any]) -> dict[str, Any]:
-    """Return the metadata that all parts of a sequence have in common, the digest of their options among them.
+    """Return the metadata that all parts of a sequence share, the digest of their options among them.
 
     Raises KeyError or TypeError for metadata that no encoder wrote.
     """
@@ -119,7 +119,7 @@ def upright(up: Up) -> dict[str, Any]:
 
 
 def rounded(value: float) -> float | None:
-    """Round to four significant digits; None where JSON has no number."""
+    """Round to four significant digits; None if JSON has no such number."""
     return float(f"{value:.4g}") if math.isfinite(value) else None
 
 

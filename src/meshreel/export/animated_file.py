@@ -119,9 +119,9 @@ def _states(source: _Source) -> Iterator[Shape]:
     for number, spans in enumerate(source.reader.static_ranges(frames).values()):
         mesh = source.background.of_frame(spans[0][0])
         if mesh is not None and not mesh.is_empty:
-            shown = tuple((first - frames.start, end - frames.start) for first, end in spans)
+            visible = tuple((first - frames.start, end - frames.start) for first, end in spans)
             points, uv = map(_points, [mesh]), _uv(source, mesh)
-            yield Shape("background", f"state_{number}", mesh.faces, shown[0][0], 1, points, shown, uv)
+            yield Shape("background", f"state_{number}", mesh.faces, visible[0][0], 1, points, visible, uv)
 
 
 def _moving(source: _Source, progress: Progress | None) -> Iterator[Shape]:

@@ -36,7 +36,7 @@ def looking_at(eye: Float64[np.ndarray, "3"], target: Float64[np.ndarray, "3"], 
 
 
 def broken(matrix: Matrix) -> str:
-    """Return why a matrix is no rotation with a translation, as a clause that follows its name; empty where it is."""
+    """Return why a matrix is no rotation with a translation, as a clause that follows its name; empty if it is one."""
     if not np.isfinite(matrix).all():
         return "has a number that is not finite"
     turn, last = matrix[:3, :3], matrix[3].tolist()
@@ -49,7 +49,7 @@ def broken(matrix: Matrix) -> str:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CameraPose:
-    """Place of a camera in the world: both matrices are kept, so that the one that was given keeps its bits."""
+    """Place of a camera in the world: both matrices are stored, so that the given one keeps its bits."""
 
     to_world: Matrix  # camera to world
     from_world: Matrix  # world to camera
@@ -73,7 +73,7 @@ class CameraPose:
 
 @dataclass(frozen=True, slots=True)
 class Camera:
-    """Pinhole camera whose lens bends as OpenCV's `k1 k2 p1 p2 k3 k4 k5 k6` say; equal numbers make equal cameras.
+    """Pinhole camera whose lens distorts by OpenCV's `k1 k2 p1 p2 k3 k4 k5 k6`; equal numbers make equal cameras.
 
     Rays and what is computed from them (`seen`, `raycast`) leave the bends out.
     """
@@ -108,11 +108,11 @@ class Camera:
 
     @property
     def straight(self) -> Camera:
-        """The camera without the bends of its lens."""
+        """The camera without the distortion of its lens."""
         return replace(self, distortion=())
 
     def resized(self, width: int, height: int) -> Camera:
-        """Return the camera with pictures of another size that show the same."""
+        """Return the camera with the same view in pictures of another size."""
         x, y = width / self.width, height / self.height
         focal, center = (self.focal[0] * x, self.focal[1] * y), (self.center[0] * x, self.center[1] * y)
         return replace(self, width=width, height=height, focal=focal, center=center)
@@ -199,16 +199,16 @@ def pack_cameras(cameras: Sequence[Camera]) -> bytes:
 
 def unpack_cameras(data: bytes, name: str) -> list[Camera]:
     """Unpack an Open3D PinholeCameraParameters or PinholeCameraTrajectory; errors name the data `name`."""
-    found: list[Camera] = []
+    cameras: list[Camera] = []
     try:
         record = json.loads(data)
         for entry in record.get("parameters", [record]):
-            found.append(_camera(entry))
-        return found
+            cameras.append(_camera(entry))
+        return cameras
     except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
         raise InputError(f"{name}: cannot read cameras ({error}); give Open3D pinhole camera JSON") from error
     except (KeyError, TypeError, ValueError, AttributeError, OverflowError, np.linalg.LinAlgError) as error:
-        text = f"{name}: not Open3D pinhole camera JSON (camera number {len(found)}: {error!r})"
+        text = f"{name}: not Open3D pinhole camera JSON (camera number {len(cameras)}: {error!r})"
         raise InputError(f"{text}; mend it or leave it out") from error
 
 

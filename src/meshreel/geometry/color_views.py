@@ -1,4 +1,4 @@
-"""Colours that cameras saw of places on a surface: projected, checked for what hides them, and blended.
+"""Colours of places on a surface in camera pictures: projected, tested for occlusion, and blended.
 
 In: pictures with their cameras, and a mesh that may hide places from them. Out: a colour for each place that some
 camera saw, from those that looked at it most squarely.
@@ -19,8 +19,8 @@ from .raycast import Rays
 from .strict import products
 from .topology import face_normals
 
-MOST_SIDE = 512  # pixels, of the pictures of what hides a place: a third of the time of whole ones (guess)
-MARGIN = 0.01  # of the depth, and at least as many metres: how far a place may lie behind what is seen (guess)
+MOST_SIDE = 512  # pixels, of the depth pictures that test occlusion: a third of the time of whole ones (guess)
+MARGIN = 0.01  # of the depth, and at least as many metres: how far a place may lie behind the visible surface (guess)
 FEATHER = 4.0  # pixels from a step in depth within which a colour counts less, and none at it: both sides mix (guess)
 NOISE = 5  # pixels across, of the median that a depth picture is smoothed by (guess)
 STEP = 0.03  # of the depth between neighbours: a step (guess)
@@ -32,7 +32,7 @@ class ColorPicture:
 
     camera: Camera
     pixels: UInt8[np.ndarray, "H W 3"]
-    gains: tuple[float, float, float] = (1.0, 1.0, 1.0)  # by which its channels are too bright
+    gains: tuple[float, float, float] = (1.0, 1.0, 1.0)  # factors by which its channels are too bright
 
     def project(
         self, points: Float64[np.ndarray, "N 3"]
@@ -62,9 +62,9 @@ class ColorViews:
     def __init__(
         self, pictures: Sequence[ColorPicture], hides: Mesh, margin: float = MARGIN, clear: bool = False
     ) -> None:
-        """Take pictures, and all surface that may hide a place; `margin` is in the unit of its vertices.
+        """Take pictures, and all surface that may occlude a place; `margin` is in the unit of its vertices.
 
-        If `clear`, a place near a step in depth is not seen, as pictures mix both sides there.
+        If `clear`, a place near a step in depth counts as hidden, as pictures mix both sides there.
         """
         rays = Rays(hides)
         self.views = [View(picture, rays, margin, clear) for picture in pictures]
@@ -72,19 +72,19 @@ class ColorViews:
     def at(
         self, points: Float64[np.ndarray, "N 3"], normals: Float64[np.ndarray, "N 3"]
     ) -> tuple[Float64[np.ndarray, "N 3"], Bool[np.ndarray, " N"]]:
-        """Return the colours of places with these normals, 0 to 255, and which of them some camera saw."""
+        """Return the colours of places with these normals, 0 to 255, and a mask of those that some camera saw."""
         sums, weights = np.zeros((len(points), 3)), np.zeros(len(points))
         for view in self.views:
             weight = view.weights(points, normals)
             colors = view.colors(points, weight > 0)
             sums += colors * weight[:, None]
             weights += weight
-        seen = weights > 0
-        sums[seen] /= weights[seen, None]
-        return sums, seen
+        known = weights > 0
+        sums[known] /= weights[known, None]
+        return sums, known
 
     def pixels_on(self, mesh: Mesh) -> float:
-        """Return how many pixels of the pictures show a mesh: each face counts in the one that sees it finest."""
+        """Return how many pixels of the pictures show a mesh: each face counts in the picture that resolves it best."""
         normals, areas = face_normals(mesh)
         middles, most = mesh.vertices[mesh.faces].mean(axis=1), np.zeros(len(mesh.faces))
         for view in self.views:
@@ -96,7 +96,7 @@ class ColorViews:
 
 
 class View:
-    """A picture, and the depth that it sees at each of its pixels, coarser where it is large."""
+    """A picture, and the depth of the surface at each of its pixels; a large picture's depths are coarser."""
 
     def __init__(self, picture: ColorPicture, rays: Rays, margin: float, clear: bool = False) -> None:
         from scipy.ndimage import distance_transform_edt
@@ -112,9 +112,9 @@ class View:
     def weights(
         self, points: Float64[np.ndarray, "N 3"], normals: Float64[np.ndarray, "N 3"], at_step: float = 0.0
     ) -> Float64[np.ndarray, " N"]:
-        """Return how well the picture shows places: the cube of the cosine of the view, less near steps; 0: not.
+        """Return how well the picture shows places: the cube of the cosine of the view, less near steps; 0 if hidden.
 
-        `at_step` is the share of the weight that is left at a step.
+        `at_step` is the share of the weight that remains at a step.
         """
         positions, depth = self.picture.project(points)
         to_eye = self.picture.camera.eye - points
@@ -135,15 +135,15 @@ class View:
 
     def colors(self, points: Float64[np.ndarray, "N 3"], chosen: Bool[np.ndarray, " N"]) -> Float64[np.ndarray, "N 3"]:
         """Return the colours of the chosen places in the picture; 0 of others."""
-        found = np.zeros((len(points), 3))
-        found[chosen] = sampled(self.picture.pixels, self.picture.project(points[chosen])[0]) / self.picture.gains
-        return found
+        colors = np.zeros((len(points), 3))
+        colors[chosen] = sampled(self.picture.pixels, self.picture.project(points[chosen])[0]) / self.picture.gains
+        return colors
 
 
 def _smooth(depth: Float32[np.ndarray, "H W"]) -> Float32[np.ndarray, "H W"]:
     """Return a depth picture without holes and noise, so that steps are those of the surface.
 
-    A hole has the depth of what is nearest to it in the picture: between near and far surface its middle is a step.
+    A hole takes the depth of the nearest pixel: between near and far surface its middle is a step.
     """
     from scipy.ndimage import distance_transform_edt, median_filter
 
@@ -153,16 +153,16 @@ def _smooth(depth: Float32[np.ndarray, "H W"]) -> Float32[np.ndarray, "H W"]:
 
 def _steps(depth: Float32[np.ndarray, "H W"]) -> Bool[np.ndarray, "H W"]:
     """Return the pixels beside a step in depth."""
-    found = np.zeros(depth.shape, bool)
+    steps = np.zeros(depth.shape, bool)
     for axis in (0, 1):
-        one, two = np.moveaxis(depth, axis, 0)[:-1], np.moveaxis(depth, axis, 0)[1:]
+        before, after = np.moveaxis(depth, axis, 0)[:-1], np.moveaxis(depth, axis, 0)[1:]
         with np.errstate(invalid="ignore"):
-            apart = ~(np.abs(one - two) <= STEP * np.minimum(one, two))  # also where one of both sees nothing
-        apart &= np.isfinite(one) | np.isfinite(two)
-        edge = np.moveaxis(found, axis, 0)
-        edge[:-1] |= apart
-        edge[1:] |= apart
-    return found
+            differ = ~(np.abs(before - after) <= STEP * np.minimum(before, after))  # also if one is a hole
+        differ &= np.isfinite(before) | np.isfinite(after)
+        edge = np.moveaxis(steps, axis, 0)
+        edge[:-1] |= differ
+        edge[1:] |= differ
+    return steps
 
 
 def sampled(pixels: UInt8[np.ndarray, "H W 3"], positions: Float64[np.ndarray, "N 2"]) -> Float64[np.ndarray, "N 3"]:
@@ -183,13 +183,13 @@ def spread_colors(
     """Return colours of all vertices of a mesh: those that no camera saw have the means of neighbours, ring by ring."""
     ends = np.concatenate([mesh.faces, mesh.faces[:, [1, 2, 0]]]).reshape(-1)
     others = np.concatenate([mesh.faces[:, [1, 2, 0]], mesh.faces]).reshape(-1)
-    found, known = np.where(seen[:, None], colors, float(GREY)), seen.copy()
+    values, reached_vertices = np.where(seen[:, None], colors, float(GREY)), seen.copy()
     while True:
-        reached = known[others] & ~known[ends]
+        reached = reached_vertices[others] & ~reached_vertices[ends]
         if not reached.any():
-            return np.clip(np.rint(found), 0, 255).astype(np.uint8)
-        at, counts = ends[reached], np.bincount(ends[reached], minlength=len(known))
-        sums = np.stack([np.bincount(at, found[others[reached], k], len(known)) for k in range(3)], axis=1)
+            return np.clip(np.rint(values), 0, 255).astype(np.uint8)
+        at, counts = ends[reached], np.bincount(ends[reached], minlength=len(reached_vertices))
+        sums = np.stack([np.bincount(at, values[others[reached], k], len(reached_vertices)) for k in range(3)], axis=1)
         new = counts > 0
-        found[new] = sums[new] / counts[new, None]
-        known |= new
+        values[new] = sums[new] / counts[new, None]
+        reached_vertices |= new

@@ -13,10 +13,13 @@ from scipy.ndimage import minimum_filter
 from ..types import Placement
 from .cameras import Camera
 
-FACING = 0.3  # cosine between a surface and the way to a camera from which on the camera measures it (guess)
-THROUGH = (0.03, 0.015)  # m, and share of the depth, by which a camera must see past a place to know it is free (guess)
+FACING = 0.3  # least cosine between a surface's normal and the direction to a camera that measures it (guess)
+THROUGH = (
+    0.03,
+    0.015,
+)  # m, and share of the depth: a measurement so far behind a place proves it free (guess)
 APART = (0.06, 0.02)  # m, and share of the depth: measurements farther apart are of different surfaces (guess)
-STEP = 0.03  # of the depth between neighbours: what is farther apart is two surfaces (guess)
+STEP = 0.03  # of the depth, between neighbours: pixels that differ by more are of two surfaces (guess)
 
 
 def apart(depth: Float64[np.ndarray, "..."]) -> Float64[np.ndarray, "..."]:
@@ -25,7 +28,7 @@ def apart(depth: Float64[np.ndarray, "..."]) -> Float64[np.ndarray, "..."]:
 
 
 def depth_noise(depth: Float64[np.ndarray, "..."]) -> Float64[np.ndarray, "..."]:
-    """Return the usual noise of a depth camera, m, which grows: 15 mm at 2 m, 20 mm at 3 m (paper, section 4.1)."""
+    """Return the usual noise of a depth camera, m, growing with depth: 15 mm at 2 m, 20 mm at 3 m (paper, 4.1)."""
     return 0.005 + 0.005 * depth
 
 
@@ -36,14 +39,14 @@ class DepthPicture:
     camera: Camera
     depth: UInt16[np.ndarray, "H W"] | Float32[np.ndarray, "H W"]
     unit: float  # m, of a depth of 1
-    far: float  # m, beyond which no depth counts
+    far: float  # m, the largest depth that counts
 
     def finer(self, factor: int) -> DepthPicture:
         """Return the picture with `factor` times as many rows and columns, interpolated along surfaces.
 
-        A plane stays a plane, for the inverse of its depth is linear in the picture. Where surface is seen at a grazing
-        angle, neighbouring rows are far apart in depth: on a grid of distances it would be stairs, and have cracks. No
-        depth between two surfaces comes up: pixels farther apart than `STEP` are not mixed.
+        A plane stays a plane, for the inverse of its depth is linear in the picture. At a grazing angle,
+        neighbouring rows are far apart in depth: on a grid of distances the surface would be stairs with cracks. No
+        depth between two surfaces results: pixels farther apart than `STEP` are not mixed.
         """
         inverse = inverse_depths(self.depth)
         rows, columns = (_between(count, factor) for count in inverse.shape)
@@ -60,47 +63,47 @@ class DepthPicture:
 
 
 def inverse_depths(values: UInt16[np.ndarray, "H W"] | Float32[np.ndarray, "H W"]) -> Float[np.ndarray, "H W"]:
-    """Return inverse depths of depths, or depths of inverse ones; 0 stays 0."""
-    known = values > 0
-    return np.where(known, 1.0 / np.where(known, values, 1), 0.0)
+    """Return the reciprocals of depths or inverse depths; 0 stays 0."""
+    measured = values > 0
+    return np.where(measured, 1.0 / np.where(measured, values, 1), 0.0)
 
 
 @dataclass(frozen=True, slots=True)
 class FreeSpace:
     """Space that depth cameras saw through at one moment, queried in any coordinates."""
 
-    pictures: tuple[DepthPicture, ...]  # each depth the least of nine pixels, 0 where one of them has none
+    pictures: tuple[DepthPicture, ...]  # each depth the least of nine pixels, 0 if one of them has none
     place: Placement = Placement(1.0, (0.0, 0.0, 0.0))  # of the coordinates, in the world
 
     @staticmethod
     def of(pictures: Sequence[DepthPicture | None], place: Placement | None = None) -> FreeSpace:
         """Return the space that cameras saw through, in the coordinates of `place`, or of the world."""
-        some = (replace(one, depth=minimum_filter(one.depth, 3)) for one in pictures if one is not None)
-        return FreeSpace(tuple(some)) if place is None else FreeSpace(tuple(some), place)
+        eroded = (replace(each, depth=minimum_filter(each.depth, 3)) for each in pictures if each is not None)
+        return FreeSpace(tuple(eroded)) if place is None else FreeSpace(tuple(eroded), place)
 
     def at(self, points: Float64[np.ndarray, "N 3"]) -> Bool[np.ndarray, " N"]:
-        """Return the points that some camera saw past: in all nine pixels around, it measured something farther off."""
-        found = np.zeros(len(points), bool)
+        """Return the points that some camera saw past: it measured a larger depth in all nine pixels around."""
+        free = np.zeros(len(points), bool)
         for _, inside, depth, ahead, past in self._measured(self._world(points)):
-            found[inside[depth > ahead + past]] = True
-        return found
+            free[inside[depth > ahead + past]] = True
+        return free
 
     def faced(self, points: Float64[np.ndarray, "N 3"], normals: Float64[np.ndarray, "N 3"]) -> Bool[np.ndarray, " N"]:
-        """Return the points with these normals that face some camera which measured nothing before them."""
-        world, found = self._world(points), np.zeros(len(points), bool)
+        """Return the points with these normals that face some camera which measured nothing in front of them."""
+        world, facing_points = self._world(points), np.zeros(len(points), bool)
         for camera, inside, depth, ahead, past in self._measured(world):
             way = camera.eye - world[inside]
             facing = np.einsum("nd,nd->n", way, normals[inside]) > FACING * np.linalg.norm(way, axis=1)
             hidden = (depth > 0) & (depth < ahead - past)
-            found[inside[facing & ~hidden]] = True
-        return found
+            facing_points[inside[facing & ~hidden]] = True
+        return facing_points
 
     def _world(self, points: Float64[np.ndarray, "N 3"]) -> Float64[np.ndarray, "N 3"]:
         return np.asarray(self.place.origin) + self.place.scale * points
 
     def _measured(self, world: Float64[np.ndarray, "N 3"]) -> Iterator[tuple[Camera, Any, Any, Any, Any]]:
-        """Yield each camera, the numbers of the places in its picture, what it measured there, how far they are, and by
-        how much more or less it must have measured to tell, m.
+        """Yield each camera, the numbers of the places in its picture, their measured and their own depths, and the
+        difference of both that is significant, m.
         """
         for picture in self.pictures:
             pixels, inside, ahead = picture.camera.seen(world)

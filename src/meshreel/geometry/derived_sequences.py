@@ -39,31 +39,31 @@ class CapturedSequence(MeshSequence, Protocol):
 
     @property
     def depth(self) -> DepthFrames | None:
-        """The depth pictures from which the meshes were made; None where they are not known."""
+        """The depth pictures from which the meshes were made; None if they are unknown."""
 
     @property
     def colors(self) -> ColorFrames | None:
-        """The pictures of colour cameras; None where there are none."""
+        """The pictures of colour cameras; None if there are none."""
 
 
 def captured(sequence: MeshSequence) -> CapturedSequence:
     """Return the sequence with its capabilities; without them, y points up and no depth is known.
 
-    Raises InputError where the sequence names an up axis that there is not.
+    Raises InputError if the sequence names an up axis that does not exist.
     """
-    known = sequence if isinstance(sequence, CapturedSequence) else DerivedSequence(sequence)
-    check_up(known.up)
-    return known
+    capable = sequence if isinstance(sequence, CapturedSequence) else DerivedSequence(sequence)
+    check_up(capable.up)
+    return capable
 
 
 def only(sequence: MeshSequence, numbers: Sequence[int]) -> MeshSequence:
     """Return the sequence with these of its frames and no others, under the same numbers, to send to another process.
 
-    Frames that are in files stay there, and what is sent is their names; others are read now.
+    Of frames in files, only the names are sent; others are read now.
     """
     cut = getattr(sequence, "only", None)
-    found: MeshSequence = Held.of(sequence, numbers) if cut is None else cut(numbers)
-    return found
+    part: MeshSequence = Held.of(sequence, numbers) if cut is None else cut(numbers)
+    return part
 
 
 @dataclass(frozen=True, slots=True)
@@ -257,16 +257,16 @@ def picked(
 
 
 def digest(meshes: Iterable[Mesh]) -> str:
-    """Return a text of 16 characters that differs where meshes do."""
-    found = hashlib.sha256()
+    """Return a digest of a mesh, 16 characters."""
+    hashed = hashlib.sha256()
     for mesh in meshes:
         for array in (mesh.vertices, mesh.faces, mesh.colors, mesh.uv):
             if array is not None:
-                found.update(f"{array.shape}".encode())
-                found.update(np.ascontiguousarray(array).data)
+                hashed.update(f"{array.shape}".encode())
+                hashed.update(np.ascontiguousarray(array).data)
         if mesh.texture is not None:
-            found.update(mesh.texture.pixels.data)
-    return found.hexdigest()[:16]
+            hashed.update(mesh.texture.pixels.data)
+    return hashed.hexdigest()[:16]
 
 
 def _welded(source: MeshSequence, number: int) -> Mesh:

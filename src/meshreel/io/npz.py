@@ -79,8 +79,8 @@ class Archive:
         with _reading(str(path)), zipfile.ZipFile(path) as archive:
             names = {name.removesuffix(".npy") for name in archive.namelist()}
             if not {"vertices", "faces"} <= names:
-                found = ", ".join(sorted(names)) or "nothing"
-                raise InputError(f"{path}: has {found}; save it as 'vertices' and 'faces'")
+                given = ", ".join(sorted(names)) or "nothing"
+                raise InputError(f"{path}: has {given}; save it as 'vertices' and 'faces'")
             self._vertices = _Stream(path, archive, "vertices", 2)
             self._colors = _Stream(path, archive, "colors", 2) if "colors" in names else None
             self._texture = _Stream(path, archive, "texture", 3) if "texture" in names else None

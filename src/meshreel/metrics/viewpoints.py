@@ -101,9 +101,9 @@ def views_around(box: Box, options: ViewOptions = ViewOptions()) -> list[Camera]
     tangent = math.tan(math.radians(options.fov) / 2)
     distance = across / 2 + MARGIN * max(height, across * options.height / options.width) / 2 / tangent
     focal = options.height / 2 / tangent
-    one = Camera(options.width, options.height, (focal, focal), (options.width / 2, options.height / 2))
+    option = Camera(options.width, options.height, (focal, focal), (options.width / 2, options.height / 2))
     poses = [CameraPose.of_world(looking(box.center, axes, distance)) for axes in sides(options.up)]
-    return [replace(one, pose=pose) for pose in poses]
+    return [replace(option, pose=pose) for pose in poses]
 
 
 def read_cameras(path: Path) -> list[Camera]:

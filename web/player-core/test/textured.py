@@ -28,7 +28,7 @@ from meshreel.encoder.settings.options import EncoderOptions
 from meshreel.encoder.settings.presets import appearance_options
 from meshreel.format.layout import VideoCodec
 from meshreel.geometry.atlas import MOST_SIDE
-from meshreel.geometry.derived_sequences import Welded
+from meshreel.geometry.derived_sequences import welded
 from meshreel.types import Mesh, MeshList, MeshSequence, Texture
 from tests.small_bodies import body
 from tests.small_options import quick
@@ -49,7 +49,7 @@ def textured(mesh: Mesh, rest: Mesh, t: int, frames: int) -> Mesh:
 def written(frames: int, group_size: int) -> bytes:
     """The file."""
     meshes = body(1, frames)
-    sequence = Welded(MeshList(tuple(textured(mesh, meshes[0], t, frames) for t, mesh in enumerate(meshes))))
+    sequence = welded(MeshList(tuple(textured(mesh, meshes[0], t, frames) for t, mesh in enumerate(meshes))))
     appearance = appearance_options(50.0, "auto", compatible=True)
     return encoded(sequence, replace(quick(group_size=group_size), appearance=appearance, scene=None))
 
@@ -61,7 +61,7 @@ def room(frames: int) -> bytes:
     pairs = zip(scene(frames, moving=True), colors, lights, strict=True)
     meshes = tuple(replace(mesh, colors=(light * color).astype(np.uint8)) for mesh, color, light in pairs)
     options = replace(quick(), appearance=appearance_options(50.0, "texture", 128))
-    return encoded(Welded(MeshList(meshes, 16.0)), options)
+    return encoded(welded(MeshList(meshes, 16.0)), options)
 
 
 def encoded(sequence: MeshSequence, options: EncoderOptions) -> bytes:

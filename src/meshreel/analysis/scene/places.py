@@ -106,8 +106,8 @@ class Tally:
     @property
     def after(self) -> Stay:
         """Stays since each place was last seen free."""
-        seen = self.free > 0
-        return Stay(np.where(seen, self._after.first, -1).astype(np.int32), self._after.count)
+        left = self.free > 0
+        return Stay(np.where(left, self._after.first, -1).astype(np.int32), self._after.count)
 
     @property
     def early(self) -> Stay:
@@ -117,8 +117,8 @@ class Tally:
     @property
     def before(self) -> Stay:
         """Stays until each place was first seen free; frames are numbered backwards from the last one."""
-        known = (self.free > 0) & (self._before.first >= 0)
-        return Stay(np.where(known, self.frames - 1 - self._before.first, -1).astype(np.int32), self._before.count)
+        entered = (self.free > 0) & (self._before.first >= 0)
+        return Stay(np.where(entered, self.frames - 1 - self._before.first, -1).astype(np.int32), self._before.count)
 
 
 @dataclass(frozen=True, slots=True)

@@ -95,22 +95,26 @@ def corrections_of(
 
 
 def calibrate(frames: Iterable[Moment], options: CalibrationOptions) -> list[Correction] | None:
-    """Return a correction for each camera; None where none makes the cameras agree better on moments held out."""
-    moments = [(mesh, [one and _small(one, options.most_side) for one in pictures]) for mesh, pictures in frames]
+    """Return a correction for each camera; None if none makes the cameras agree better on moments held out."""
+    side = options.most_side
+    moments = [(mesh, [picture and _small(picture, side) for picture in pictures]) for mesh, pictures in frames]
     if not moments or (cameras := len(moments[0][1])) < 2:
         return None
     fitted, judged = moments[::2], moments[1::2] or moments[::2]
-    poses, found = np.zeros((cameras, 6)), [(np.zeros((cameras, 3)), np.zeros((cameras, 6)))]
+    poses, candidates = np.zeros((cameras, 6)), [(np.zeros((cameras, 3)), np.zeros((cameras, 6)))]
     for halvings in options.halvings:
         looks = [_Look.at(moment, poses, halvings, options.places) for moment in fitted]
         gains = fit_gains(*_joined(looks, poses))
-        found = found if len(found) > 1 else [*found, (gains, poses)]  # poses may be as they should, and gains not
+        if len(candidates) == 1:
+            candidates.append((gains, poses))  # poses may be right, and gains not
         for _ in range(options.rounds):
             poses = fit_poses(looks, gains, poses)
-    found.append((fit_gains(*_joined(looks, poses)), poses))
-    errors = [disagreement([_Look.at(one, each[1], 0, options.places) for one in judged], *each) for each in found]
+    candidates.append((fit_gains(*_joined(looks, poses)), poses))
+    errors = [
+        disagreement([_Look.at(moment, each[1], 0, options.places) for moment in judged], *each) for each in candidates
+    ]
     best = min(range(3), key=lambda number: errors[number])
-    return [Correction(*each) for each in zip(*found[best], strict=True)] if best else None
+    return [Correction(*each) for each in zip(*candidates[best], strict=True)] if best else None
 
 
 def fit_gains(colors: Colors, trust: Trust) -> Gains:
@@ -118,23 +122,23 @@ def fit_gains(colors: Colors, trust: Trust) -> Gains:
 
     Of a camera that shares no place with another it is 0.
     """
-    logs, found = strict.log2(np.maximum(colors, DARK)), np.zeros((len(colors), 3))
+    logs, gains = strict.log2(np.maximum(colors, DARK)), np.zeros((len(colors), 3))
     trust = np.where(((colors > DARK) & (colors < BRIGHT)).all(axis=2), trust, 0.0)
     slopes = np.full((*trust.shape, 1, 1), -1.0)
     for _ in range(GAIN_ROUNDS):
-        apart, weights = _compared(logs - found[:, None], trust, LEAST_GAIN)
+        residuals, weights = _compared(logs - gains[:, None], trust, LEAST_GAIN)
         for k in range(3):
-            normal, slope = _equations(slopes, apart[..., k : k + 1], weights)
-            found[:, k] -= _solved(normal, slope, found[:, k : k + 1], GAIN_ERROR)[:, 0]
-    return found
+            normal, slope = _equations(slopes, residuals[..., k : k + 1], weights)
+            gains[:, k] -= _solved(normal, slope, gains[:, k : k + 1], GAIN_ERROR)[:, 0]
+    return gains
 
 
 def fit_poses(looks: Sequence[_Look], gains: Gains, poses: Poses) -> Poses:
     """Return the poses of cameras after a step of Gauss-Newton towards those with which colours of places agree."""
     factors, sums = strict.exp(-gains * LN2), (np.zeros((poses.size, poses.size)), np.zeros(poses.shape))
     for look in looks:
-        apart, weights = _compared(look.colors(poses) * factors[:, None], look.trust, LEAST_COLOR)
-        for total, more in zip(sums, _equations(look.slopes(poses, factors), apart, weights), strict=True):
+        residuals, weights = _compared(look.colors(poses) * factors[:, None], look.trust, LEAST_COLOR)
+        for total, more in zip(sums, _equations(look.slopes(poses, factors), residuals, weights), strict=True):
             total += more
     return poses - _solved(*sums, poses, POSE_ERROR)
 
@@ -143,8 +147,8 @@ def disagreement(looks: Sequence[_Look], gains: Gains, poses: Poses) -> float:
     """Return by how many levels cameras differ from the mean of what all see of a place, in the mean."""
     colors, trust = _joined(looks, poses)
     shared = _shared(trust)
-    apart = _apart(colors * strict.exp(-gains * LN2)[:, None], shared)
-    return float((np.abs(apart).mean(axis=2) * shared).sum() / max(shared.sum(), SMALL))
+    residuals = _apart(colors * strict.exp(-gains * LN2)[:, None], shared)
+    return float((np.abs(residuals).mean(axis=2) * shared).sum() / max(shared.sum(), SMALL))
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,28 +169,28 @@ class _Look:
             pictures = [one and halved(one) for one in pictures]
         points, normals = _places(mesh, places)
         empty = [np.zeros((len(pictures), len(points), *more)) for more in ((), (2, 2), (2, 6))]
-        found, along = _Look(pictures, points, *empty), np.cross(normals, np.eye(3)[np.abs(normals).argmin(axis=1)])
+        look, along = _Look(pictures, points, *empty), np.cross(normals, np.eye(3)[np.abs(normals).argmin(axis=1)])
         moved = [one and _moved(one, pose) for one, pose in zip(pictures, poses, strict=True)]
         views = iter(ColorViews([one for one in moved if one is not None], mesh).views)
         for k, (given, picture) in enumerate(zip(pictures, moved, strict=True)):
             if given is None or picture is None:
                 continue
-            found.trust[k] = next(views).weights(points, normals)
-            rows = np.flatnonzero(found.trust[k])
+            look.trust[k] = next(views).weights(points, normals)
+            rows = np.flatnonzero(look.trust[k])
             there, at = points[rows], picture.project(points[rows])[0]
             tangents = (STEP * way[rows] for way in (along, np.cross(normals, along)))
-            found.scales[k, rows] = np.stack([picture.project(there + way)[0] - at for way in tangents], 2) / STEP
+            look.scales[k, rows] = np.stack([picture.project(there + way)[0] - at for way in tangents], 2) / STEP
             turned = (_moved(given, poses[k] + step) for step in STEP * np.eye(6))
             changes = np.stack([one.project(there)[0] - at for one in turned], 2) / STEP
-            found.ways[k, rows] = strict.products(strict.inverses(found.scales[k, rows]), changes)
-        return found
+            look.ways[k, rows] = strict.products(strict.inverses(look.scales[k, rows]), changes)
+        return look
 
     def colors(self, poses: Poses) -> Colors:
         """Return the colours of the places in pictures taken from these poses."""
-        found = np.zeros((*self.trust.shape, 3))
+        colors = np.zeros((*self.trust.shape, 3))
         for k, picture, rows, at in self._seen(poses):
-            found[k, rows] = sampled(picture.pixels, at)
-        return found
+            colors[k, rows] = sampled(picture.pixels, at)
+        return colors
 
     def slopes(self, poses: Poses, factors: Float64[np.ndarray, "C 3"]) -> Float64[np.ndarray, "C N 3 6"]:
         """Return how the colours of the places change with the poses, by the mean slope of what all cameras see.
@@ -265,15 +269,15 @@ def _shared(trust: Trust) -> Trust:
 def _compared(values: Colors, trust: Trust, least: float) -> tuple[Colors, Trust]:
     """Return how far values are from the means of their places, and trust over variance, less in outliers (Cauchy)."""
     shared = _shared(trust)
-    apart = _apart(values, shared)
-    far = np.sqrt((apart**2).mean(axis=2))
+    residuals = _apart(values, shared)
+    far = np.sqrt((residuals**2).mean(axis=2))
     scale = max(least, float(np.median(far[shared > 0])) if shared.any() else least)
     weights = shared / (1 + (far / (2 * scale)) ** 2)
     return _apart(values, weights), weights / scale**2
 
 
 def _equations(
-    slopes: Float64[np.ndarray, "C N k D"], apart: Float64[np.ndarray, "C N k"], weights: Trust
+    slopes: Float64[np.ndarray, "C N k D"], residuals: Float64[np.ndarray, "C N k"], weights: Trust
 ) -> tuple[Float64[np.ndarray, "CD CD"], Float64[np.ndarray, "C D"]]:
     """Return the normal equations of the least weighted sum of squares of values about the means of their places."""
     cameras, _, _, count = slopes.shape
@@ -284,13 +288,13 @@ def _equations(
     for k in range(cameras):
         rows = slice(k * count, (k + 1) * count)
         normal[rows, rows] += strict.products(weighted[k].reshape(-1, count).T, slopes[k].reshape(-1, count))
-    return normal, np.einsum("cnki,cnk->ci", weighted, apart)
+    return normal, np.einsum("cnki,cnk->ci", weighted, residuals)
 
 
 def _solved(
-    normal: Float64[np.ndarray, "CD CD"], slope: Float64[np.ndarray, "C D"], known: np.ndarray, usual: float
+    normal: Float64[np.ndarray, "CD CD"], slope: Float64[np.ndarray, "C D"], estimate: np.ndarray, deviation: float
 ) -> Float64[np.ndarray, "C D"]:
-    """Return the step to subtract from what is known, which is expected to be as large as `usual`."""
-    right = slope + known / usual**2
-    step = strict.products(strict.inverse(normal + np.eye(slope.size) / usual**2), right.reshape(-1, 1))
+    """Return the step to subtract from what is known, which is expected to be as large as `deviation`."""
+    right = slope + estimate / deviation**2
+    step = strict.products(strict.inverse(normal + np.eye(slope.size) / deviation**2), right.reshape(-1, 1))
     return step.reshape(slope.shape)
