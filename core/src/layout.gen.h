@@ -60,7 +60,7 @@ enum class AnchorRule : uint8_t { SPREAD = 1, FARTHEST = 2 };
 // Prediction of a coded field.
 enum class Origin : uint8_t { ALONE = 0, PREVIOUS = 1 };
 
-// What moves all vertices of a mesh alike.
+// Motion shared by all vertices of a mesh.
 enum class SharedMotion : uint8_t { NONE = 0, SHIFTS = 1, POSES = 2 };
 
 // Coding of pictures.

@@ -6,7 +6,6 @@ from meshreel.coding.colored import canvas_of
 from meshreel.coding.group import continue_group
 from meshreel.container.reader import ReelReader
 from meshreel.container.sources import BytesSource
-from meshreel.decoder.tracks import placement
 from meshreel.format.layout import Form
 from meshreel.geometry.splats import Carrier
 from meshreel.types import Mesh, Placement
@@ -17,10 +16,11 @@ Chain = list[tuple[int, Carrier]]  # numbers of frames, and what carries splats 
 def chains_of(data: bytes) -> list[Chain]:
     """Return the chains of groups of one track, frames of other forms than one mesh alone."""
     reader, state, chains = ReelReader(BytesSource(data)), None, list[Chain]()
+    place = Placement(reader.header.scale, reader.header.origin)
     for chunk in reader.tracks[0]:
         before = state if reader.group_before(chunk) is not None else None
         payload = reader.read_chunk(chunk.number)
-        meshes, state = continue_group(payload, chunk.frame_count, None, before, Placement(*placement(reader)))
+        meshes, state = continue_group(payload, chunk.frame_count, None, before, place)
         numbers = range(chunk.first_frame, chunk.first_frame + chunk.frame_count)
         if chunk.form not in (Form.LAYERS, Form.LAPLACIAN):
             chains += [[(k, alone(mesh))] for k, mesh in zip(numbers, meshes, strict=True)]

@@ -18,7 +18,7 @@ from ..types import Mesh
 
 MAX_BITS = 21  # bits per coordinate that Draco's float32 positions can hold
 COMPRESSION_LEVEL = 7  # from the paper
-PLAIN_LEVEL = 5  # the highest at which each face costs a bit, whatever the mesh is like
+PLAIN_LEVEL = 5  # the highest level at which each face costs a bit, whatever the mesh
 
 
 def encode_mesh(mesh: Mesh, step: float) -> bytes:

@@ -84,15 +84,15 @@ class TrackPictures:
 
     def __init__(self, reader: ReelReader, decoders: Decoders) -> None:
         self._reader, self._decoders = reader, decoders
-        self._layouts: tuple[int, _core.AtlasLayout] | None = None  # of the atlas that was asked for last
-        self._sizes = dict[int, tuple[int, int]]()  # of the textures of all atlases that were asked for
-        self._layers = dict[tuple[int, int], tuple[int, int]]()  # what `_sizes_of` found, by chunk and layer
-        self._background: tuple[int, int, Mesh] | None = None  # the state and picture shown last, and their mesh
+        self._layouts: tuple[int, _core.AtlasLayout] | None = None  # number and layout of the atlas used last
+        self._sizes = dict[int, tuple[int, int]]()  # width and height of textures, by atlas
+        self._layers = dict[tuple[int, int], tuple[int, int]]()  # results of `_sizes_of`, by chunk and layer
+        self._background: tuple[int, int, Mesh] | None = None  # state and picture shown last, and their mesh
 
     def place(self, chunk: Chunk, decoded: _core.Group | _core.Background) -> Callable[[int], Texture] | None:
-        """Give a group or a background its places in the texture that it has; return that of each frame, or None.
+        """Place a group or a background in its texture; return the texture of each frame, or None if it has none.
 
-        Raises FormatError where its atlas is damaged.
+        Raises FormatError if its atlas is damaged.
         """
         pictures = self._pictures_of(chunk)
         if pictures is None:

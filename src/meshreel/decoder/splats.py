@@ -18,7 +18,7 @@ class TrackSplats:
     def __init__(self, reader: ReelReader, layers: int | None) -> None:
         self._reader, self._layers = reader, layers
         self._refusals = Refusals()
-        self._splats: tuple[int, _core.Splats] | None = None  # of the chunk that was asked for last
+        self._splats: tuple[int, _core.Splats] | None = None  # of the chunk used last
 
     def of(self, chunk: Chunk) -> Chunk | None:
         """Return the chunk of a group's splats: its own, or that of the group before it, and so on; None: no splats."""
@@ -30,7 +30,7 @@ class TrackSplats:
         return None
 
     def bound(self, of: Chunk, group: _core.Group | None, index: int) -> Bound | None:
-        """Return the splats of a frame of a group in metres; None where they are of another mesh.
+        """Return the splats of a frame of a group in metres; None if they are on another mesh.
 
         Raises FormatError on damaged bytes.
         """

@@ -92,7 +92,7 @@ class Track(Frames):
         return group
 
     def _state_before(self, chunk: Chunk) -> tuple[_core.GroupState | None, CachedStates]:
-        """Return the state that a group is predicted from, and a cache of it; the frames before are not decoded."""
+        """Return the state that a group is predicted from, and a cache with it; earlier frames are not decoded."""
         chain = [chunk]
         states = self._states
         self._refusals.check(chunk)
@@ -150,7 +150,7 @@ class Background:
         self._colored = colored
         self._pictures = TrackPictures(reader, decoders or Decoders())
         self._place = placement(reader)
-        # Number of a chunk, its state, and what is shown; replaced as a whole, as other threads do.
+        # Number of a chunk, its state, and the shown mesh; replaced as one for other threads.
         self._last: tuple[int, _State | None, Mesh] = (-1, None, Mesh.empty())
         self._refusals = Refusals()
 
@@ -168,7 +168,7 @@ class Background:
             raise FormatError(f"the background of frame {frame}: {error}") from error
 
     def _state(self, chunk: Chunk) -> Mesh:
-        """Decode a state, starting from the last one decoded if the state is that one or was changed from it."""
+        """Decode a state, starting from the last decoded one if it is that state or changes it."""
         last, state, shown = self._last
         chain = [chunk]
         self._refusals.check(chunk)
@@ -198,9 +198,9 @@ class Background:
         return _State(core, mesh, led)
 
     def _dress(self, chunk: Chunk, state: _core.Background) -> Texture | None:
-        """Decode the colours of a state, where it has them, and its places in a texture; return its first picture.
+        """Decode the colours of a state, if any, and its places in a texture; return its first picture.
 
-        The colours of what a change adds come behind those of what is left.
+        Colours of added faces follow those of the remaining ones.
         """
         of = self.reader.companion_of(chunk, ChunkKind.COLORS) if self._colored else None
         if of is None:

@@ -1,7 +1,7 @@
 """Limits on the memory that decoding may take, in proportion to the bytes of a chunk.
 
-Pure arithmetic on numbers that a reader knows before it takes memory; FORMAT.md ("What a file may cost") has it in
-words. A cost is an upper bound of the memory and, at some 2 ns for each byte of it, of the time. The decoder in
+Pure arithmetic on numbers that a reader knows before it allocates; FORMAT.md ("What a file may cost") states the rules.
+A cost is an upper bound of the memory and, at some 2 ns for each byte of it, of the time. The decoder in
 C++ has the same functions in core/decoder/budget.h, with the numbers of `LIMITS`.
 """
 
@@ -41,7 +41,7 @@ class Limits:
     texel: int = 2  # of a decoded picture
     videos: int = 176 << 20  # memory allowed to the decoders of all videos, plus per_byte: one video of 2048 x 2048
     splat: int = 1024  # of a splat, bound in a frame
-    audio: int = 256 << 20  # bytes of a chunk of audio, which is held whole: hours (guess)
+    audio: int = 256 << 20  # bytes of a chunk of audio, which is in memory as a whole: hours (guess)
     faces: int = 64_000_000  # faces or vertices of a group, or places of them in all frames (guess): memory
     numbers: int = 1 << 29  # of the decoded places of a group: 4 GiB
     held: int = 44  # of a texel of a video, whose decoder keeps up to 16 pictures (H.264; measured: 42)

@@ -340,7 +340,7 @@ describeInBrowser("the built player", () => {
     }
     const licences = readFileSync(join(site.folder, "player/LICENSES.txt"), "utf8");
     for (const text of ["three.js", "The MIT License", "Apache License", "Eigen"]) expect(licences).toContain(text);
-  }, 60_000);
+  });
 
   test("the player is small enough for a page", () => {
     const size = (name: string) => gzipSync(readFileSync(join(site.folder, "player", name))).length;
