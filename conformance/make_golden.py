@@ -18,8 +18,6 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from meshreel.coding.appearance.atlas import encode_atlas
-from meshreel.coding.appearance.colors import ColorCodingOptions
-from meshreel.coding.appearance.pictures import VideoOptions
 from meshreel.coding.appearance.splats import encode_splats
 from meshreel.coding.background import decode_background, decode_change, encode_background, encode_change
 from meshreel.coding.colored import atlas_base, background_canvas, canvas_of, encode_group_colors
@@ -47,8 +45,8 @@ from tests.splats import some_splats
 from tests.tones import tone
 
 FRAMES = 4
-COLORS = ColorCodingOptions(step=1 / 24)
-TEXTURES = TextureOptions(video=VideoOptions(crf=50), compatible=True)
+COLORS = 1 / 24
+TEXTURES = TextureOptions(crf=50, compatible=True)
 Group = tuple[int, bytes, tuple[int, ...], bool]  # frames, payload, layer ends, whether predicted from the last
 
 

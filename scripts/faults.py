@@ -89,11 +89,10 @@ class Encode:
 
 def meshreel() -> None:
     """Be the command line with options that suit small bodies, so that loading it is not all that is interrupted."""
-    import meshreel.cli.encode as command
     from meshreel.cli import main as program
-    from tests.small_options import quick
+    from tests.small_options import resolve_small
 
-    command.preset_options = quick
+    resolve_small()
     program()
 
 

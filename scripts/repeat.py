@@ -103,9 +103,9 @@ def encode_all(work: list[tuple[str, str, float]], out: Path, jobs: int) -> dict
     """Encode all work in this process; return the digest of each file."""
     from meshreel.cli.encode import workers
     from meshreel.encoder.sequence import Encoder
-    from meshreel.encoder.settings.presets import preset_options
+    from meshreel.encoder.settings.settings import Settings
     from meshreel.types import Mesh, MeshList
-    from tests.small_options import quick
+    from tests.small_options import small
 
     out.mkdir()
     found = {}
@@ -115,8 +115,9 @@ def encode_all(work: list[tuple[str, str, float]], out: Path, jobs: int) -> dict
             name = f"{Path(path).name} {preset} {quality:g}"
             with (out / f"{name}.jsonl").open("w", encoding="utf-8") as lines:
                 encoder = Encoder(MeshList(frames, FRAME_RATE), executor, digests=lines.write)
-                find = quick if name.startswith("small") else preset_options
-                options = find(preset, quality, group_size=2, key_interval=0.4 if preset == "best" else None)
+                interval = 0.4 if preset == "best" else None
+                options = Settings(preset, quality, group_size=2, key_interval=interval).resolved()
+                options = small(options) if name.startswith("small") else options
                 encoder.encode(out / f"{name}.reel", options)
             found[name] = hashlib.sha256((out / f"{name}.reel").read_bytes()).hexdigest()
     return found

@@ -27,33 +27,29 @@ def main(page: Path, given: bool) -> None:
 
 def give() -> None:
     """Makes a folder `scan`, and the presets small."""
-    import meshreel
     from meshreel.capture.simulated.procedural import SoftBodiesOptions, soft_bodies
+    from meshreel.encoder.settings.settings import Settings
     from meshreel.io.write import write_mesh
 
-    meshreel.preset_options = small(meshreel.preset_options)  # type: ignore[assignment]
+    resolved = Settings.resolved
+    Settings.resolved = lambda settings: small(resolved(settings))  # type: ignore[method-assign]
     Path("scan").mkdir()
     for number, mesh in enumerate(soft_bodies(SoftBodiesOptions(frames=4, people=1, spacing=0.06))):
         write_mesh(mesh, Path("scan") / f"frame_{number:05}.ply")
 
 
-def small(preset_options: Any) -> Any:
-    """A preset's options with little of everything, so that a page runs in seconds."""
+def small(made: Any) -> Any:
+    """Options with little of everything, so that a page runs in seconds."""
     from meshreel.analysis.reference.extraction import ReferenceOptions
     from meshreel.analysis.reference.track import TrackOptions
     from meshreel.encoder.group.draco import IntraOptions
     from meshreel.encoder.paper.options import PaperOptions
 
-    def options(*arguments: Any, **named: Any) -> Any:
-        reference = ReferenceOptions(vertices=300, keys=1, trial_vertices=300)
-        reference = replace(reference, fuse=replace(reference.fuse, voxel=1.0))
-        intra = IntraOptions(fractions=(0.5, 1.0), steps=(1.0,), levels=(0,))
-        track = TrackOptions(centers=100, samples=5000)
-        made = preset_options(*arguments, **named)
-        paper = {"track": track, "reference": reference} if isinstance(made.method, PaperOptions) else {}
-        return replace(made, method=replace(made.method, intra=intra, **paper))
-
-    return options
+    intra = IntraOptions(fractions=(0.5, 1.0), steps=(1.0,))
+    paper = {"track": TrackOptions(100, 5000), "reference": ReferenceOptions(300)}
+    return replace(
+        made, method=replace(made.method, intra=intra, **(paper if isinstance(made.method, PaperOptions) else {}))
+    )
 
 
 if __name__ == "__main__":

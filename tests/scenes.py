@@ -3,30 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 from skimage.measure import marching_cubes
 
-from meshreel.analysis.scene.background import BackgroundOptions
-from meshreel.analysis.scene.places import PlacesOptions
-from meshreel.analysis.scene.segmentation import SegmentOptions
-from meshreel.analysis.scene.views import ViewsOptions
-from meshreel.encoder.settings.options import EncoderOptions, SceneOptions
 from meshreel.geometry.topology import concatenate, weld
 from meshreel.types import Mesh
 
 from .metrics.shapes import moved, noisy, plane, sphere
-from .small_options import quick
 
 SIDE = 2.4  # m, of the floor and the walls
 PARTS = 40  # of a side
 CELL = SIDE / PARTS
 NOISE = 0.1 * CELL  # m, of a coordinate
 RADIUS = 0.3  # m, of the ball
-SEGMENT = SegmentOptions(
-    views=ViewsOptions(count=8, width=96, height=72, places=4, frames=2, samples=256), places=PlacesOptions(frames=6)
-)
 
 
 def room() -> Mesh:
@@ -72,11 +62,6 @@ def of_body(frame: Mesh) -> np.ndarray:
 def overlap(found: np.ndarray, wanted: np.ndarray) -> float:
     """Intersection over union."""
     return float((found & wanted).sum() / max((found | wanted).sum(), 1))
-
-
-def quick_scene(preset: str = "best", **options: float) -> EncoderOptions:
-    """Options that are quick on these scenes."""
-    return replace(quick(preset, **options), scene=SceneOptions(SEGMENT, BackgroundOptions(frames=4)))
 
 
 def _capsule(points: np.ndarray, start: np.ndarray, end: np.ndarray, radius: float) -> np.ndarray:

@@ -2,48 +2,53 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 from meshreel.analysis.follow.embedded import EmbeddedOptions, Stage
-from meshreel.analysis.scene.segmentation import SegmentOptions
-from meshreel.analysis.scene.views import ViewsOptions
+from meshreel.analysis.scene import places, segmentation, views
 from meshreel.encoder.group.draco import IntraOptions
 from meshreel.encoder.group.target import Fidelity
 from meshreel.encoder.layers.options import LayersOptions
 from meshreel.encoder.paper.options import PaperOptions
-from meshreel.encoder.settings.options import EncoderOptions, SceneOptions
-from meshreel.encoder.settings.presets import preset_options
+from meshreel.encoder.scene import parts
+from meshreel.encoder.settings.options import EncoderOptions
+from meshreel.encoder.settings.settings import Settings
 
-VIEWS = ViewsOptions(count=6, width=120, height=90, places=4, samples=500)
-TRIALS = IntraOptions(fractions=(1.0,), steps=(1.4, 0.7), levels=(0,))
+VIEWS = (8, 96, 72)  # number and size of views, pixels
+TRIALS = IntraOptions(fractions=(1.0,), steps=(1.4, 0.7))
 
 
-def quick(
-    preset: str = "best",
-    quality: float = 50.0,
-    basis_size: int | None = None,
-    group_size: int | None = None,
-    centers: int | None = None,
-    key_interval: float | None = None,
-    effort: str = "normal",
-    color: str = "auto",
-    color_quality: float | None = None,
-    texture: int | None = None,
-    compatible: bool = False,
-    splats: int | None = None,
-) -> EncoderOptions:
-    """The preset's options made small; takes what `preset_options` takes."""
-    colors = {
-        "color": color,
-        "color_quality": color_quality,
-        "texture": texture,
-        "compatible": compatible,
-        "splats": splats,
-    }
-    options = preset_options(preset, quality, basis_size, group_size, centers, key_interval, effort, **colors)  # type: ignore[arg-type]
+def quick(*chosen: Any, **named: Any) -> EncoderOptions:
+    """The options of `Settings(*chosen, **named)` made small."""
+    return small(Settings(*chosen, **named).resolved())
+
+
+def small(options: EncoderOptions) -> EncoderOptions:
+    """The same options for small bodies."""
     method = options.method
     method = _quick_layers(method) if isinstance(method, LayersOptions) else _quick_paper(method)
-    return replace(options, method=method, scene=SceneOptions(SegmentOptions(views=VIEWS)))
+    return replace(options, method=method)
+
+
+def resolve_small(patch: Callable[[Any, str, Any], None] = setattr) -> None:
+    """Let all settings resolve to small options."""
+    resolved = Settings.resolved
+    patch(Settings, "resolved", lambda settings: small(resolved(settings)))
+
+
+def look_quickly(patch: Callable[[Any, str, Any], None] = setattr) -> None:
+    """Let scenes be looked at in few frames, by few, small views, which few samples place."""
+    for module, name, value in (
+        (views, "_PLACES", 4),
+        (views, "_FRAMES", 2),
+        (views, "_SAMPLES", 256),
+        (places, "_FRAMES", 6),
+        (parts, "FRAMES", 4),
+        (segmentation, "place_views", lambda meshes, up: views.place_views(meshes, up, *VIEWS)),
+    ):
+        patch(module, name, value)
 
 
 def with_method(options: EncoderOptions, **changes: object) -> EncoderOptions:
@@ -59,11 +64,10 @@ def _quick_layers(options: LayersOptions) -> LayersOptions:
 
 
 def _quick_paper(options: PaperOptions) -> PaperOptions:
-    fuse = replace(options.reference.fuse, voxel=1.0)
     return replace(
         options,
         intra=TRIALS,
         target=Fidelity(distance=0.003, angle=15.0, worst=0.006),
         track=replace(options.track, centers=min(options.track.centers, 150), samples=3000),
-        reference=replace(options.reference, vertices=150, keys=1, trial_vertices=150, fuse=fuse),
+        reference=replace(options.reference, vertices=150),
     )

@@ -88,13 +88,13 @@ def test_the_promised_names_are_these():
         "MeshSequence",
         "MeshreelError",
         "SequenceOptions",
+        "Settings",
         "Video",
         "as_sequence",
         "edit",
         "encode",
         "open",
         "open_sequence",
-        "preset_options",
     ]
     assert 12 <= len(meshreel.__all__) <= 16
     assert all(getattr(meshreel, name) is not None for name in meshreel.__all__)

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from .decoder.video import Video, open
     from .encoder.sequence import encode
     from .encoder.settings.options import EncoderOptions
-    from .encoder.settings.presets import preset_options
+    from .encoder.settings.settings import Settings
     from .io.sequence import SequenceOptions, open_sequence
     from .types import Mesh, MeshList, MeshSequence, as_sequence
 
@@ -31,13 +31,13 @@ __all__ = [
     "MeshSequence",
     "MeshreelError",
     "SequenceOptions",
+    "Settings",
     "Video",
     "as_sequence",
     "edit",
     "encode",
     "open",
     "open_sequence",
-    "preset_options",
 ]
 
 # Imported on first use: decoding never imports the encoder, and Ctrl-C ends the command line before NumPy is loaded.
@@ -46,10 +46,10 @@ _LATER = {
     **dict.fromkeys(("Mesh", "MeshList", "MeshSequence", "as_sequence"), ".types"),
     "EncoderOptions": ".encoder.settings.options",
     "SequenceOptions": ".io.sequence",
+    "Settings": ".encoder.settings.settings",
     "edit": ".edit",
     "encode": ".encoder.sequence",
     "open_sequence": ".io.sequence",
-    "preset_options": ".encoder.settings.presets",
 }
 
 

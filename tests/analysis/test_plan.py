@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from meshreel.analysis.plan import CODED, NOBODY, REACHED, PlanOptions, best_plan, next_key, rival
+from meshreel.analysis.plan import CODED, NOBODY, POP, REACHED, PlanOptions, best_plan, next_key, rival
 
 OPTIONS = PlanOptions()
 GOOD, BAD = 0.6, 1.9
@@ -34,11 +34,12 @@ def test_a_good_key_beats_every_cut():
     assert groups(*thirds) == [(2, 0, 10)]
 
 
-def test_a_cut_must_be_worth_a_template_more():
+def test_a_cut_must_be_worth_a_template_more(monkeypatch):
     rows = [GOOD] * 8 + [BAD] * 8, [BAD] * 8 + [GOOD] * 8
     saved = 8 * (BAD**2 - GOOD**2)
-    assert len(groups(*rows, worth=0.9 * saved, pop=100.0)) == 2
-    assert len(groups(*rows, worth=1.1 * saved, pop=100.0)) == 1
+    monkeypatch.setattr("meshreel.analysis.plan.POP", 100.0)
+    assert len(groups(*rows, worth=0.9 * saved)) == 2
+    assert len(groups(*rows, worth=1.1 * saved)) == 1
 
 
 def test_frames_that_no_template_follows_are_coded_one_by_one():
@@ -51,11 +52,13 @@ def test_the_template_of_the_group_before_costs_nothing_but_can_only_begin():
     assert groups([np.inf] + [0.9] * 9, [GOOD] * 10, onward=(0,)) == [(1, 0, 10)]
 
 
-def test_a_step_of_the_quality_at_a_cut_has_a_price():
+def test_a_step_of_the_quality_at_a_cut_has_a_price(monkeypatch):
     early, late = [GOOD] * 5 + [1.8] * 3 + [np.inf] * 2, [np.inf] * 2 + [1.7] * 5 + [GOOD] * 3
-    [first, _] = groups(early, late, pop=100.0)
+    monkeypatch.setattr("meshreel.analysis.plan.POP", 100.0)
+    [first, _] = groups(early, late)
     assert first == (0, 0, 5)  # where the sum is least: from .6 to 1.7
-    [first, _] = groups(early, late, pop=0.5)
+    monkeypatch.setattr("meshreel.analysis.plan.POP", 0.5)
+    [first, _] = groups(early, late)
     assert first[2] in (6, 7)  # from 1.8 to 1.7
 
 
@@ -83,7 +86,7 @@ def cost_of(path: tuple[int, ...], residuals: np.ndarray, onward: list[bool]) ->
             return np.inf
         errors = [squares[t] + CODED if template != NOBODY else REACHED for t in (at, stop - 1)]
         if error is not None and np.isfinite(errors[0]) and np.isfinite(error):
-            total += OPTIONS.worth * max(abs(10 * np.log10(errors[0] / error)) / OPTIONS.pop - 1, 0)
+            total += OPTIONS.worth * max(abs(10 * np.log10(errors[0] / error)) / POP - 1, 0)
         at, error = stop, errors[1]
     return total
 
@@ -100,6 +103,6 @@ def test_plans_are_coded_for_comparison_only_where_they_are_close():
     rows = np.array([[GOOD] * 8 + [BAD] * 8, [BAD] * 8 + [GOOD] * 8])
     saved = 8 * (BAD**2 - GOOD**2)
     for worth, is_close in ((0.95 * saved, True), (0.1 * saved, False)):
-        options = PlanOptions(worth=worth, pop=100.0)
+        options = PlanOptions(worth=worth)
         other = rival(best_plan(rows, [False] * 2, options), rows, [False] * 2, options)
         assert (other is not None) == is_close

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from meshreel.analysis.groups import GroupOptions, cut_at
+from meshreel.analysis.groups import cut_at
 from meshreel.analysis.survey import survey
 from meshreel.types import Mesh, MeshList
 
@@ -44,13 +44,13 @@ def test_faces_that_are_not_kept_are_counted():
 
 
 def test_frames_that_are_followed_are_not_cut():
-    assert cut_at(np.full(10, 0.9), GroupOptions()) is None
-    assert cut_at(np.array([5.0]), GroupOptions()) is None
+    assert cut_at(np.full(10, 0.9)) is None
+    assert cut_at(np.array([5.0])) is None
 
 
 def test_a_group_is_cut_where_its_frames_stop_being_followed():
-    assert cut_at(np.array([0.5, 0.6, 0.5, 0.5, 4.0, 5.0, 4.5]), GroupOptions()) == 4
+    assert cut_at(np.array([0.5, 0.6, 0.5, 0.5, 4.0, 5.0, 4.5])) == 4
 
 
 def test_small_residuals_never_cut_however_uneven():
-    assert cut_at(np.array([0.01, 0.01, 0.9]), GroupOptions()) is None
+    assert cut_at(np.array([0.01, 0.01, 0.9])) is None

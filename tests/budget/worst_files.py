@@ -12,7 +12,7 @@ import numpy as np
 from meshreel import _core
 from meshreel.coding import entropy
 from meshreel.coding.appearance.atlas import encode_atlas
-from meshreel.coding.appearance.pictures import VideoEncoder, VideoOptions, encode_pictures
+from meshreel.coding.appearance.pictures import VideoEncoder, encode_pictures
 from meshreel.coding.background import encode_background
 from meshreel.coding.intra import encode_empty
 from meshreel.coding.layers import orthonormal
@@ -240,7 +240,7 @@ def painted(size: int, frames: int = 16, levels: int = 2, side: int = 0) -> byte
     if side:
         places = np.rint(base.vertices[base.faces][..., :2] / STEP).astype(np.int32) % side
         colors.append(Companion(ChunkKind.ATLAS, encode_atlas(base, Layout(side, side, places))))
-        encoder = VideoEncoder(side, side, VideoOptions(preset=13))
+        encoder = VideoEncoder(side, side)
         for frame in range(frames):
             pictures += encoder.add(np.full((side * 3 // 2, side), 16 + frame, np.uint8))
         colors.append(Companion(ChunkKind.PICTURES, encode_pictures(pictures + encoder.finish())))

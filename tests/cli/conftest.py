@@ -19,7 +19,7 @@ from meshreel.io.write import write_mesh, write_picture
 from tests.capture.depth_scenes import camera, record
 from tests.golden import GOLDEN
 from tests.kept import kept
-from tests.small_options import VIEWS, quick
+from tests.small_options import VIEWS, look_quickly, resolve_small
 from tests.small_scene import ROOM_FACES, scene
 from tests.spheres import sliding_sphere
 
@@ -58,9 +58,8 @@ def run(capsys):
 @pytest.fixture
 def quick_presets(monkeypatch):
     """`encode` and `demo` with options that suit tests."""
-    monkeypatch.setattr("meshreel.cli.encode.preset_options", quick)
-    monkeypatch.setattr("meshreel.cli.demo.preset_options", quick)
-    monkeypatch.setattr("meshreel.cli.segment.preset_options", quick)
+    resolve_small(monkeypatch.setattr)
+    look_quickly(monkeypatch.setattr)
 
 
 @pytest.fixture(scope="session")
@@ -94,7 +93,7 @@ def scan(tmp_path_factory) -> Path:
 def painted(tmp_path_factory) -> Path:
     """Masks of these frames, and the cameras they are for: white where a ball is seen."""
     folder, frames = tmp_path_factory.mktemp("painted"), scene(4)
-    views = place_views(frames, VIEWS)
+    views = place_views(frames, "y", *VIEWS)
     write_views(folder, frames, views)
     for number, mesh in enumerate(frames):
         rays = Rays(mesh)

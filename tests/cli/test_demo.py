@@ -15,13 +15,14 @@ from meshreel.capture.simulated.truth import read_truth
 from meshreel.cli.console import called_as
 from tests.capture.depth_scenes import camera, record
 from tests.cli.conftest import failed
-from tests.small_options import quick
+from tests.small_options import look_quickly, resolve_small
 
 
 @pytest.fixture
 def coarse(monkeypatch):
     """A demo that takes seconds: quick options, large pixels, large voxels."""
-    monkeypatch.setattr("meshreel.cli.demo.preset_options", quick)
+    resolve_small(monkeypatch.setattr)
+    look_quickly(monkeypatch.setattr)
     monkeypatch.setattr("meshreel.cli.demo.WIDTH", 128)
     monkeypatch.setattr("meshreel.cli.demo.VOXEL", 0.06)
 
@@ -46,7 +47,8 @@ def test_the_demo_leaves_a_rig_a_file_and_a_picture_and_shows_its_numbers(run, t
 
 @pytest.mark.slow
 def test_at_the_demos_own_resolution_two_people_are_two_tracks(run, tmp_path, monkeypatch):
-    monkeypatch.setattr("meshreel.cli.demo.preset_options", quick)
+    resolve_small(monkeypatch.setattr)
+    look_quickly(monkeypatch.setattr)
     monkeypatch.setattr("meshreel.cli.demo.RoomOptions", partial(RoomOptions, frame_rate=10.0))  # time to move in
     row = run("demo", "-o", tmp_path, "--frames", "7", "--json").row
     assert row["scene"]["tracks"] == 2

@@ -5,13 +5,13 @@ from __future__ import annotations
 import inspect
 import json
 import shutil
-from dataclasses import asdict, replace
+from dataclasses import replace
 
 import pytest
 
 import meshreel
 from meshreel.cli.encode import command
-from meshreel.encoder.settings.presets import preset_options
+from meshreel.encoder.settings.options import EncoderOptions
 from meshreel.errors import InputError
 from meshreel.io.sequence import SequenceOptions
 from tests.cli.conftest import Said, failed
@@ -146,13 +146,8 @@ def test_digests_that_cannot_be_written_are_an_error(run, balls, tmp_path):
 
 def test_flags_default_to_the_defaults_of_the_options():
     defaults = {name: parameter.default for name, parameter in inspect.signature(command).parameters.items()}
-    code = preset_options()
     assert replace(defaults["reading"].options(), weld=None) == SequenceOptions()
-    coding = asdict(defaults["coding"])
-    assert coding.pop("preset") == code.preset == "best" and coding.pop("effort") == "normal"
-    assert coding.pop("color") == "auto" and coding.pop("compatible") is False
-    assert set(coding.values()) == {None}  # chosen by the preset
-    assert defaults["coding"].options(code.quality) == code
+    assert defaults["settings"].resolved() == EncoderOptions()
 
 
 @pytest.mark.usefixtures("quick_presets")

@@ -19,7 +19,7 @@ SCRIPT = """
 import sys, time
 import meshreel.cli.encode as command
 from meshreel.cli import main
-from tests.small_options import quick
+from tests.small_options import resolve_small
 
 real = command.Encoder
 
@@ -30,7 +30,7 @@ def slow(sequence, executor, progress, *rest):
             time.sleep(120)
     return real(sequence, executor, wait, *rest)
 
-command.preset_options = quick
+resolve_small()
 if sys.argv.pop(1) == "wait":
     command.Encoder = slow
 if __name__ == "__main__":

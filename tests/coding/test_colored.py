@@ -5,14 +5,13 @@ from itertools import accumulate
 import numpy as np
 
 import meshreel
-from meshreel.coding.appearance.colors import ColorCodingOptions
 from meshreel.coding.colored import canvas_of, decode_group_colors, encode_group_colors
 from meshreel.coding.group import continue_group
 from meshreel.container.writer import Companion, ReelWriter
 from meshreel.format.layout import ChunkKind
 from tests.golden import GOLDEN
 
-OPTIONS = ColorCodingOptions(step=1 / 64)
+OPTIONS = 1 / 64
 
 
 def waves(vertices: np.ndarray) -> np.ndarray:

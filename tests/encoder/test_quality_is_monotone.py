@@ -13,7 +13,7 @@ from meshreel.encoder.group.draco import IntraOptions
 from meshreel.encoder.paper.options import PaperOptions
 from meshreel.encoder.sequence import encode
 from meshreel.encoder.settings.options import EncoderOptions
-from meshreel.encoder.settings.presets import preset_options
+from meshreel.encoder.settings.settings import Settings
 from meshreel.geometry.decimate import decimate
 from meshreel.geometry.topology import weld
 from meshreel.io.sequence import SequenceOptions, open_sequence
@@ -29,12 +29,10 @@ LOOK = ComparisonOptions(views=ViewOptions(512, 512))  # of 128 x 128 pixels, SS
 
 
 def quicker(options: EncoderOptions) -> EncoderOptions:
-    """Few centers, one key frame and few trials of the per-frame form; nothing that follows the quality is changed."""
+    """Few centers and few trials of the per-frame form; nothing that follows the quality is changed."""
     method = replace(options.method, intra=IntraOptions(fractions=(0.5, 1.0)))
     if isinstance(method, PaperOptions):
-        fuse = replace(method.reference.fuse, voxel=1.0)
-        reference = replace(method.reference, keys=1, canonical_keys=1, trial_vertices=150, fuse=fuse)
-        method = replace(method, reference=reference, track=replace(method.track, centers=150, samples=3000))
+        method = replace(method, track=replace(method.track, centers=150, samples=3000))
     return replace(options, method=method)
 
 
@@ -54,7 +52,7 @@ def test_quality_is_monotone(preset, make, tmp_path):
     body, rows = make(), []
     for quality in QUALITIES:
         path = tmp_path / f"{quality}.reel"
-        size = encode(body, path, options=quicker(preset_options(preset, quality))).size
+        size = encode(body, path, options=quicker(Settings(preset, quality).resolved())).size
         rows.append({"bytes": size} | compare_sequences(body, open_video(path), LOOK).to_row())
     for (a, low), (b, high) in pairwise(zip(QUALITIES, rows, strict=True)):
         between = f"from quality {a} to {b}"

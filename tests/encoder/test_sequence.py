@@ -107,7 +107,7 @@ def test_every_stage_reports_every_frame(tmp_path):
 
 def test_draco_takes_a_group_that_costs_less_that_way(tmp_path):
     coarse = sliding_sphere(2, levels=1)  # 18 vertices: any reference costs more
-    options = with_method(paper(), intra=IntraOptions((1.0,), (2.0, 1.0, 0.7, 0.5), (0,)))
+    options = with_method(paper(), intra=IntraOptions((1.0,), (2.0, 1.0, 0.7, 0.5)))
     video, summary = decoded(coarse, tmp_path / "a.reel", options)
     assert {group.form for group in summary.groups} == {Form.DRACO}
     assert len(video[0].faces) == len(coarse[0].faces)
@@ -256,7 +256,7 @@ def test_absurd_options_are_refused():
         with pytest.raises(InputError, match=str(size)):
             with_method(paper(), group_size=size)
     with pytest.raises(InputError, match="unknown"):
-        meshreel.preset_options("unknown")
+        meshreel.Settings("unknown")
 
 
 def test_a_deforming_ball_keeps_its_frame_rate(tmp_path):

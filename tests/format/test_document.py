@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from meshreel.coding import entropy
 from meshreel.coding.appearance.atlas import decode_atlas, encode_atlas
-from meshreel.coding.appearance.colors import ColorCodingOptions, ColoredMesh, decode_colors, encode_colors
+from meshreel.coding.appearance.colors import ColoredMesh, decode_colors, encode_colors
 from meshreel.coding.appearance.splats import decode_splats, encode_splats
 from meshreel.coding.background import decode_background, decode_change, encode_background, encode_change
 from meshreel.coding.layers.coder import LayerCodingOptions, LayersState, encode_layers
@@ -85,8 +85,11 @@ def field(vertices: int, frames: int) -> np.ndarray:
 
 
 @pytest.mark.parametrize("rule", AnchorRule)
-def test_the_document_decodes_displacements(decoder: dict[str, Any], rule: AnchorRule) -> None:
-    base, options = body(), DisplacementOptions(step=3e-3, anchor_rule=rule, anchor_count=7, anchor_weight=3)
+def test_the_document_decodes_displacements(
+    decoder: dict[str, Any], rule: AnchorRule, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("meshreel.coding.paper.displacements.ANCHORS", rule)
+    base, options = body(), DisplacementOptions(step=3e-3, anchor_count=7, anchor_weight=3)
     data = encode_displacements(field(len(base.vertices), 3), base, options)
     head, offset = records.unpack(DisplacementHead, data)
     assert len(head.components) >= 4
@@ -204,7 +207,7 @@ def test_the_document_decodes_colors_to_the_bit(decoder: dict[str, Any]) -> None
     for round_number in range(2):
         wanted = generator.integers(0, 256, (1, count, 3)) + 9 * np.arange(frames)[:, None, None] + 20 * round_number
         colors = np.clip(wanted, 0, 255).astype(np.uint8)
-        data = encode_colors([shape], [colors], ColorCodingOptions(1 / 8), state).payload
+        data = encode_colors([shape], [colors], 1 / 8, state).payload
         [found], state = decode_colors(data, [shape], state)
         head, offset = records.unpack(VertexColors, data)
         assert (head.origin == Origin.PREVIOUS) == (round_number > 0)
@@ -226,7 +229,7 @@ def test_colors_take_at_most_a_tenth_more_than_the_entropy_of_their_contexts(
     noise = np.random.default_rng(10).normal(0, 12, (frames, *points.shape))
     shape = ColoredMesh(mesh, 3, frames, len(points))
     colors = np.clip(128 + 90 * waves + noise, 0, 255).astype(np.uint8)
-    data = encode_colors([shape], [colors], ColorCodingOptions(1 / 16)).payload
+    data = encode_colors([shape], [colors], 1 / 16).payload
     kind, raw = decoder["Decoder"], [0]
 
     def bit(self: Any, model: Any, code: Any = kind.bit) -> int:

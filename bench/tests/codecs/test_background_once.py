@@ -2,31 +2,24 @@
 
 from __future__ import annotations
 
-from functools import partial
-
 import numpy as np
 import pytest
 from meshreel_bench.codecs import make_codec
 from meshreel_bench.codecs.background_once import BackgroundOnceDracoCodec
 from meshreel_bench.codecs.draco import DecimatedDracoCodec
 
-from meshreel.analysis.scene.segmentation import SegmentOptions
 from meshreel.decoder.video import open as open_video
-from meshreel.encoder.settings.options import SceneOptions
 from meshreel.errors import FormatError, InputError
 from meshreel.format.layout import ChunkKind
 from meshreel.geometry.closest_points import Surface, distances
 from meshreel.types import Mesh, MeshList
-from tests.small_options import VIEWS
 from tests.small_scene import balls, scene
 from tests.spheres import sliding_sphere
 
 SCENE = scene()
 
 
-def test_the_background_is_sent_once_and_what_moves_in_every_frame(monkeypatch):
-    quick_scenes = partial(SceneOptions, SegmentOptions(views=VIEWS))
-    monkeypatch.setattr("meshreel_bench.codecs.background_once.SceneOptions", quick_scenes)
+def test_the_background_is_sent_once_and_what_moves_in_every_frame():
     codec = BackgroundOnceDracoCodec(0.5, 11)
     data = codec.encode(SCENE)
     video = open_video(data)

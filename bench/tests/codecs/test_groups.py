@@ -16,7 +16,7 @@ from meshreel.encoder.paper.recipe import find_groups
 from meshreel.encoder.sequence import Encoder, encode
 from meshreel.encoder.settings.options import EncoderOptions
 from meshreel.types import Mesh, MeshList
-from tests.scenes import ball, quick_scene, with_room
+from tests.scenes import ball, with_room
 from tests.small_options import quick, with_method
 from tests.spheres import deforming_sphere
 
@@ -65,7 +65,7 @@ def test_bodies_of_a_noisy_scene_are_analysed_once_with_their_noise(codec, monke
     monkeypatch.setattr(
         stored, "find_groups", lambda interval, *rest: noises.append(interval.noise) or find_groups(interval, *rest)
     )
-    options, rolling = quick_scene("paper", group_size=2), with_room([ball(0.5 + 0.35 * t) for t in range(4)])
+    options, rolling = quick(preset="paper", group_size=2), with_room([ball(0.5 + 0.35 * t) for t in range(4)])
     prepared = Encoder(MeshList(tuple(rolling)))
     prepare(prepared, options)
     analysed = len(noises)
@@ -80,8 +80,7 @@ def test_bodies_of_a_noisy_scene_are_analysed_once_with_their_noise(codec, monke
 
 def test_kept_groups_are_those_that_find_groups_returns():
     store, ball = GroupStore(), list(deforming_sphere(3, levels=2))
-    groups = replace(PAPER.method.groups, depth=1)
-    options = replace(PAPER.method, target=Fidelity(1e-7, 1.0, 1e-7), groups=groups)  # never reached
+    options = replace(PAPER.method, target=Fidelity(1e-7, 1.0, 1e-7))  # never reached
     store.keep(Interval(ball), options)
     kept, found = store.find(Interval(ball), options), find_groups(Interval(ball), options)
     assert [len(group.frames) for group in kept] == [len(group.frames) for group in found] and len(kept) > 1
@@ -97,6 +96,5 @@ def test_options_that_affect_the_rate_alone_are_not_shared(preset, coding):
     rates = with_method(replace(options, quality=3.0), **finer)
     assert shared_options(rates) == shared_options(options)
     assert shared_options(replace(options, scene=None)) != shared_options(options)
-    name = "fit" if preset == "best" else "surface_fit"
-    fit = with_method(options, **{name: replace(getattr(options.method, name), anchor=0.5)})
-    assert (shared_options(fit) == shared_options(options)) == (preset == "best")
+    finer = with_method(options, group_size=5)
+    assert (shared_options(finer) == shared_options(options)) == (preset == "best")

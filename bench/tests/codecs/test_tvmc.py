@@ -23,11 +23,10 @@ from meshreel.geometry.closest_points import distances
 from meshreel.geometry.topology import concatenate
 from meshreel.metrics.distance import surface_errors
 from meshreel.types import Mesh, MeshList
-from tests.scenes import CELL, NOISE, ball, of_body, quick_scene, room, with_room
-from tests.small_options import quick
+from tests.scenes import CELL, NOISE, ball, of_body, room, with_room
+from tests.small_options import resolve_small
 from tests.spheres import deforming_sphere, sliding_sphere
 
-CODEC = "meshreel_bench.codecs.tvmc.codec"
 SMALL = TvmcCodec(qp=8, vertices=150, group_size=3, centers=150)
 BALL = sliding_sphere(1, levels=2)[0]
 BODY = MeshList(tuple(soft_bodies(SoftBodiesOptions(frames=4, people=1, spacing=0.04))))
@@ -35,7 +34,7 @@ BODY = MeshList(tuple(soft_bodies(SoftBodiesOptions(frames=4, people=1, spacing=
 
 @pytest.fixture(autouse=True)
 def quick_analysis(monkeypatch):
-    monkeypatch.setattr(f"{CODEC}.preset_options", quick)
+    resolve_small(monkeypatch.setattr)
 
 
 @pytest.fixture(scope="module")
@@ -49,9 +48,9 @@ def stream(tracking):
     return SMALL.pack(tracking)
 
 
-def tracked(sequence, codec=SMALL, make=quick):
+def tracked(sequence, codec=SMALL):
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(f"{CODEC}.preset_options", make)
+        resolve_small(patch.setattr)
         return track_sequence(Encoder(sequence), codec.encoder_options)
 
 
@@ -168,10 +167,7 @@ def test_coordinates_around_a_million_keep_their_millimetres():
         ({"bits": 8}, "bits"),
     ],
 )
-def test_options_out_of_range_are_refused(options, words, monkeypatch):
-    from meshreel.encoder.settings.presets import preset_options
-
-    monkeypatch.setattr(f"{CODEC}.preset_options", preset_options)
+def test_options_out_of_range_are_refused(options, words):
     with pytest.raises(InputError, match=words):
         make_codec("tvmc", options)
 
@@ -193,7 +189,7 @@ ROLLING = with_room([ball(0.5 + 0.35 * t) for t in range(4)])
 
 @pytest.fixture(scope="module")
 def rolling():
-    return tracked(MeshList((Mesh.empty(), *ROLLING)), replace(SMALL, group_size=4), quick_scene)
+    return tracked(MeshList((Mesh.empty(), *ROLLING)), replace(SMALL, group_size=4))
 
 
 @pytest.mark.slow

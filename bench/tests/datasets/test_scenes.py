@@ -72,8 +72,7 @@ def test_labels_that_another_encoder_has_found_are_not_taken_for_this_ones(scene
     monkeypatch.setattr(module, "segment", lambda meshes: calls.append(len(meshes)) or Found())
     module._kept_as.cache_clear()
     assert not scene.labels(0, "found").any() and not scene.labels(1, "found").any() and calls == [4]
-    real = module.SegmentOptions
-    monkeypatch.setattr(module, "SegmentOptions", lambda: real(island=0.5))
+    monkeypatch.setattr(module, "segmenter", module.geometry)  # a segmenter of other code
     module._kept_as.cache_clear()
     assert scene.labels(0, "found").all() and calls == [4, 4]
     monkeypatch.undo()

@@ -5,28 +5,20 @@ In -> out: the symmetric residual of each frame's fit -> the frame before which 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from jaxtyping import Float64
 
-
-@dataclass(frozen=True, slots=True)
-class GroupOptions:
-    """Conditions under which a group of the paper's recipe is cut in two; the defaults are guesses."""
-
-    limit: float = 2.0  # a frame is lost if its residual is larger than this many times the target
-    tolerance: float = 2.0  # or larger than the target and than this many times the group's median
-    depth: int = 1  # largest number of nested cuts; frames that are lost after them are coded one by one
+LIMIT = 2.0  # a frame is lost if its residual is larger than this many times the target (guess)
+TOLERANCE = 2.0  # or larger than the target and than this many times the group's median (guess)
 
 
-def cut_at(residuals: Float64[np.ndarray, " T"], options: GroupOptions) -> int | None:
+def cut_at(residuals: Float64[np.ndarray, " T"]) -> int | None:
     """Return the frame that should begin a second group, or None if one reference follows all frames.
 
     Residuals are in units of the distance to reach. The cut leaves the residuals on each side most alike (least squares
     on their logarithms), which separates frames that are followed well from those that are not.
     """
-    limit = min(options.limit, max(1.0, options.tolerance * float(np.median(residuals))))
+    limit = min(LIMIT, max(1.0, TOLERANCE * float(np.median(residuals))))
     if len(residuals) < 2 or residuals.max() <= limit:
         return None
     logs = np.log(np.clip(residuals, 1e-6, 1e6))

@@ -20,6 +20,7 @@ CLOSE = 2.0  # factor on the price of templates in the plan that is coded for co
 LOST = 1e6  # targets, in place of an infinite residual
 SMALL = 0.1  # squared targets that do not justify another key (guess)
 REACHED = 1.0  # squared targets of a frame that is coded alone
+POP = 1.5  # dB, largest step of the quality at a cut without a price (guess)
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,7 +30,6 @@ class PlanOptions:
     limit: float = 2.0  # a frame is lost if its residual is larger than this many times the target
     worth: float = 14.0  # price of a template: the sum of squared residuals that it must save (decision 24)
     alone: float = 1.2  # price of a frame without a template, in prices of a template (guess)
-    pop: float = 1.5  # dB, largest step of the quality at a cut without a price
     keys: int = 5  # largest number of frames tried as keys for one plan
     settled: float = 1.0  # excess beyond which another key is tried, in prices of a template
     misses: int = 2  # successive keys without gain after which no other is tried (guess)
@@ -80,7 +80,7 @@ def best_plan(residuals: Float64[np.ndarray, "C T"], onward: Sequence[bool], opt
     best, before = starts + squares[:, 0], np.zeros((frames, count + 1), int)
     for t in range(1, frames):
         steps = np.abs(errors[:, t][None] - errors[:, t - 1][:, None])
-        pops = price * np.maximum(steps / options.pop - 1, 0.0)
+        pops = price * np.maximum(steps / POP - 1, 0.0)
         ways = best[:, None] + changes[None] + pops
         np.fill_diagonal(ways, best)
         before[t] = np.argmin(ways, axis=0)

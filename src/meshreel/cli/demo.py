@@ -19,7 +19,7 @@ from ..capture.simulated.truth import read_truth
 from ..decoder.describe import describe_file
 from ..decoder.video import open as open_video
 from ..encoder.sequence import encode
-from ..encoder.settings.presets import preset_options
+from ..encoder.settings.settings import QUALITY, Settings
 from ..errors import InputError
 from ..metrics.error_sheet import SheetOptions, write_sheet
 from .compare import OF_BOTH, against_truth, both_table
@@ -28,7 +28,6 @@ from .encode import describe, summary_row
 from .info import rate_table
 from .workers import workers
 
-_QUALITY = preset_options().quality
 _JUDGED = 4  # largest number of frames compared with the truth: each takes seconds (guess)
 
 
@@ -36,7 +35,7 @@ def command(
     *,
     output: Annotated[Path, Parameter(name=["--output", "-o"])] = Path("demo"),
     frames: int = RoomOptions().frames,
-    quality: float = _QUALITY,
+    quality: float = QUALITY,
     seed: int = 0,
     jobs: int = 1,
     common: Common = Common(),
@@ -62,7 +61,10 @@ def command(
         raise InputError(f"--jobs must be at least 1, got {jobs}")
     if seed < 0:
         raise InputError(f"--seed must not be negative, got {seed}")
-    options, room = preset_options(quality=quality), RoomOptions(frames=frames, seed=seed)  # errors before work begins
+    options, room = (
+        Settings(quality=quality).resolved(),
+        RoomOptions(frames=frames, seed=seed),
+    )  # errors before work begins
     file, picture = output / "demo.reel", output / "demo.png"
     with common.stages(frames) as progress, workers(jobs) as executor:
         capture = _captured(output / "rig", room, progress)

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 from cyclopts import Parameter
 
@@ -18,8 +18,8 @@ from ..encoder.rate_control import Goal, encode_to
 from ..encoder.run.surveying import Excerpt, read_survey
 from ..encoder.scene.static import is_colored
 from ..encoder.sequence import Encoder
-from ..encoder.settings.options import EncoderOptions, SceneOptions, as_installed
-from ..encoder.settings.presets import preset_options
+from ..encoder.settings.options import EncoderOptions, as_installed
+from ..encoder.settings.settings import QUALITY, Settings
 from ..errors import InputError
 from ..io.remote import Place, located
 from ..io.sequence import SequenceOptions
@@ -30,104 +30,28 @@ from .flags import Hearing, Reading
 from .sources import Masking, open_source
 from .workers import workers
 
-DEFAULT_QUALITY = preset_options().quality
-
 
 @Parameter(name="*")
 @dataclass(frozen=True, slots=True)
-class Coding:
-    """Flags for the arguments of `preset_options`, and for targets."""
+class Aiming:
+    """Flags for targets, which choose the quality."""
 
-    preset: Literal["best", "paper", "paper-literal"] = "best"
-    """`best` needs the fewest bits for its quality; `paper` is section 3 of the TSMC paper."""
-    effort: Literal["fast", "normal", "thorough"] = "normal"
-    """`fast` encodes in half the time, at a rate within a few per cent; `thorough` tries more templates, for the
-    least rate at equal errors. Preset `best` only."""
-    quality: float | None = None
-    """0 (small) to 100 (fine); 50 if neither it nor a target is given."""
     target_psnr: float | None = None
     """Instead of a quality: the D2-PSNR (one way, mean over the frames, as `compare` prints it) to meet within 0.3 dB.
     Takes up to 8 encodes."""
     target_mbps: float | None = None
     """Instead of a quality: the rate of the file to meet within 5 %, Mbit/s. Takes up to 8 encodes. The size of a
     scene's background does not depend on the quality."""
-    basis_size: int | None = None
-    """Number of KLT components per group, which also excludes per-frame Draco; chosen by rate and distortion if not
-    given. Preset `paper` only."""
-    centers: int | None = None
-    """Number of volume centers to track, the paper's K (2000). Preset `paper` only."""
-    group_size: int | None = None
-    """Largest number of frames in a group, the paper's GoF (16; `paper`: 10)."""
-    key_interval: float | None = None
-    """Longest time between frames that decode without earlier ones, s (4). Preset `best` only."""
 
-    color: Literal["auto", "texture", "vertices", "none"] = "auto"
-    """`auto` codes colours of vertices, and textures where frames have textures or colour cameras; `texture` makes
-    textures of colours of vertices, too; `vertices` and `none` leave textures, or all colours, out."""
-    color_quality: float | None = None
-    """Quality of colours, 0 to 100; the quality of the geometry if not given."""
-    texture: Literal[128, 256, 512, 1024, 2048] | None = None
-    """Width of a body's texture, texels; as the pictures have detail, at most 1024, if not given."""
-    compatible: Annotated[bool, Parameter(negative="")] = False
-    """Store textures also as H.264, for devices that cannot play AV1; it takes 1.3 to 2 times AV1's bytes."""
-    splats: int | None = None
-    """Number of Gaussian splats on each moving body, as 8000: they move with it, and take some 7 bytes each in every
-    key interval. Fitted to colour cameras or coloured meshes (extra `splats`: torch)."""
-
-    def goal(self) -> Goal | None:
+    def goal(self, settings: Settings) -> Goal | None:
         """Return the target, None without one. Raises InputError for a target with a quality, or out of range."""
         if self.target_psnr is None and self.target_mbps is None:
             return None
         goal = Goal(self.target_psnr, self.target_mbps)
-        if self.quality is not None:
-            text = f"--quality {self.quality:g} and a target: the target chooses the quality"
+        if settings.quality is not None:
+            text = f"--quality {settings.quality:g} and a target: the target chooses the quality"
             raise InputError(f"{text}, give one of both")
         return goal
-
-    def options(self, quality: float) -> EncoderOptions:
-        """Return the options at a quality. Raises InputError if a value is out of range or not of the preset."""
-        return preset_options(
-            self.preset,
-            quality,
-            self.basis_size,
-            self.group_size,
-            self.centers,
-            key_interval=self.key_interval,
-            effort=self.effort,
-            color=self.color,
-            color_quality=self.color_quality,
-            texture=self.texture,
-            compatible=self.compatible,
-            splats=self.splats,
-        )
-
-
-@Parameter(name="*")
-@dataclass(frozen=True, slots=True)
-class Parting:
-    """Flags for the split of a scene into background and moving bodies."""
-
-    dynamic_only: Annotated[bool, Parameter(negative="")] = False
-    """Look for no background: everything may move and is coded in every frame."""
-    background_refresh: float | None = None
-    """Seconds between copies of a scene's background in the file, for viewers who join late. One copy for all frames if
-    not given."""
-
-    def __post_init__(self) -> None:
-        if self.background_refresh is not None and not 0 < self.background_refresh < math.inf:
-            raise InputError(f"--background-refresh {self.background_refresh:g}: give seconds above 0")
-
-    def check(self, masking: Masking) -> None:
-        """Raise InputError if one flag excludes another."""
-        if self.dynamic_only and (self.background_refresh is not None or masking.wanted):
-            raise InputError("--dynamic-only looks for no background: leave out --background-refresh, masks and views")
-
-    def scene(self, options: SceneOptions, masking: Masking) -> SceneOptions | None:
-        """Return the options of the scene; None for --dynamic-only. Raises InputError for a wrong file of views."""
-        if self.dynamic_only:
-            return None
-        background = replace(options.background, refresh=self.background_refresh)
-        return replace(options, segment=masking.options(options.segment), background=background)
 
 
 @Parameter(name="*")
@@ -158,9 +82,9 @@ class Part:
             raise InputError(f"--part {self.part}: give K/N, as 3/100, and leave --frames out")
         return surveyed.part(int(numbers[1]), int(numbers[2]), options.recipe().longest(sequence.frame_rate))
 
-    def check(self, coding: Coding, masking: Masking) -> None:
+    def check(self, goal: Goal | None, masking: Masking) -> None:
         """Raise InputError for flags that no part can have."""
-        if self.survey is not None and (coding.goal() is not None or masking.wanted):
+        if self.survey is not None and (goal is not None or masking.wanted):
             raise InputError("--survey is for a part: give --quality in place of a target, and no masks or views")
 
 
@@ -172,9 +96,9 @@ def command(
     /,
     *,
     output: Annotated[str, Parameter(name=["--output", "-o"])],
-    coding: Coding = Coding(),
+    settings: Annotated[Settings, Parameter(name="*", negative="")] = Settings(),
+    aiming: Aiming = Aiming(),
     reading: Reading = Reading(),
-    parting: Parting = Parting(),
     masking: Masking = Masking(),
     part: Part = Part(),
     hearing: Hearing = Hearing(),
@@ -212,17 +136,19 @@ def command(
     place = located(output)
     if place.suffix != ".reel":
         raise InputError(f"{output}: the output must end in .reel")
-    parting.check(masking)
-    if debug_digests is not None and (resume or coding.goal() is not None):
+    if settings.dynamic_only and masking.wanted:
+        raise InputError("--dynamic-only looks for no background: leave masks and views out")
+    goal, quality = aiming.goal(settings), QUALITY if settings.quality is None else settings.quality
+    if debug_digests is not None and (resume or goal is not None):
         raise InputError("--debug-digests describes one whole encode: leave out --resume and targets")
-    part.check(coding, masking)
+    part.check(goal, masking)
     sound = hearing.payload()
-    scene = parting.scene(preset_options().scene or SceneOptions(), masking)
+    cameras = masking.cameras
 
     def options_at(quality: float) -> EncoderOptions:
-        return replace(coding.options(quality), scene=scene)
+        options = replace(settings, quality=quality).resolved()
+        return options if options.scene is None else replace(options, scene=replace(options.scene, cameras=cameras))
 
-    goal, quality = coding.goal(), DEFAULT_QUALITY if coding.quality is None else coding.quality
     options = options_at(quality)
     lacking = as_installed(options)[1]  # raises InputError before recordings are read
     source = open_source(inputs, reading if part.survey is None else replace(reading, frames=":"), common)
@@ -243,7 +169,7 @@ def command(
         else:
             summary, quality = encode_to(encoder, place, goal, options_at, resume)
     warnings = (*source.warnings, *getattr(masker, "remarks", ()), *summary.warnings)
-    if summary.scene is None and parting.background_refresh is not None:
+    if summary.scene is None and settings.background_refresh is not None:
         warnings += ("no background was found that could be sent again: --background-refresh does nothing",)
     common.warn(text for text in warnings if text not in early)
     row = summary_row(summary, sequence.frame_rate) | {"quality": quality}

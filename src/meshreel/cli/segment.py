@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -10,14 +10,13 @@ import numpy as np
 from cyclopts import Parameter
 from jaxtyping import UInt8
 
+from ..analysis.scene.camerasation import mask_views, scene_views, segment, segment_by
 from ..analysis.scene.labelling import Segmentation
 from ..analysis.scene.masks import CAMERAS, Masker
 from ..analysis.scene.pictures import write_views
 from ..analysis.scene.preview import FrameViews, label_colors, look_at_labels, sheet
-from ..analysis.scene.segmentation import mask_views, scene_views, segment, segment_by
 from ..encoder.scene.labels import FrameLabels, label_frames
 from ..encoder.settings.options import EncoderOptions, SceneOptions
-from ..encoder.settings.presets import preset_options
 from ..errors import InputError
 from ..geometry.cameras import pack_cameras
 from ..io.mask_pictures import is_mask
@@ -65,12 +64,11 @@ def command(
     if views_only and (masking.masks or masking.sam3):
         raise InputError("--views-only needs no masks; leave out --masks and --sam3")
     source = open_source(inputs, reading, common)
-    scene, sequence = preset_options().scene or SceneOptions(), masking.upright(source)
-    scene = replace(scene, segment=masking.options(scene.segment))
+    scene, sequence = SceneOptions(masking.cameras), masking.upright(source)
     masker = masking.masker(len(source.sequence))
     left = _left_over(output, len(source.sequence), views_only, previews)
     if views_only:
-        views, colors = mask_views(sequence, scene.segment)
+        views, colors = mask_views(sequence, scene.cameras)
         with common.stages(len(sequence)) as progress:
             write_views(output, sequence, views, lambda done: progress("look", done, len(sequence)), colors)
         row = {"frames": len(sequence), "views": len(views)}
@@ -113,10 +111,10 @@ def _write_labels(scene: _Labelling, output: Path, previews: int, common: Common
     with common.stages(count) as progress:
         by: Segmentation
         if scene.masker is None:
-            views = scene_views(frames, options.segment)
-            by = segment(frames, options.segment, lambda share: progress("segment", round(share * count), count))
+            views = scene_views(frames, options.cameras)
+            by = segment(frames, options.cameras, lambda share: progress("segment", round(share * count), count))
         else:
-            masks = segment_by(scene.masker, frames, options.segment)
+            masks = segment_by(scene.masker, frames, options.cameras)
             views, by = tuple(masks.views), masks
         progress("segment", count, count)
         for folder in (LABELS, *([COLORED] if chosen else [])):

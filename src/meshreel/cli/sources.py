@@ -12,7 +12,7 @@ from cyclopts import Parameter
 
 from ..analysis.scene.masks import ImageMasks, Masker, read_view_file
 from ..analysis.scene.sam3 import PromptBy, Sam3Masks, Sam3Options
-from ..analysis.scene.segmentation import SegmentOptions
+from ..analysis.scene.segmentation import Cameras
 from ..capture.recording import open_recording
 from ..capture.recordings import is_rig, is_take, open_take
 from ..capture.recordings.takes import Take
@@ -126,11 +126,10 @@ class Masking:
         """Return the sequence with its axis that points up: that of --up, else that of the cameras."""
         return upright(source.sequence, self.up)
 
-    def options(self, options: SegmentOptions) -> SegmentOptions:
-        """Return the options with the views of --views. Raises InputError if their file is wrong."""
-        if self.views is None:
-            return options
-        return replace(options, cameras=read_view_file(self.views))
+    @property
+    def cameras(self) -> Cameras:
+        """Cameras of --views, or none. Raises InputError if their file is wrong."""
+        return () if self.views is None else read_view_file(self.views)
 
     def masker(self, frames: int) -> Masker | None:
         """Return the source of masks of `frames` frames, None for geometric change. Raises InputError."""

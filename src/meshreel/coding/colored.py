@@ -22,7 +22,7 @@ from ..geometry.subdivision import levels_of
 from ..geometry.topology import concatenate
 from ..shapes import Bool, Float32, Float64, Int32, UInt8
 from ..types import Mesh
-from .appearance.colors import ColorCodingOptions, ColoredMesh, EncodedColors, decode_colors, encode_colors
+from .appearance.colors import ColoredMesh, EncodedColors, decode_colors, encode_colors
 from .layers.coder import LayersState, base_of, patches_of, read_layers
 from .mesh import decode_mesh
 
@@ -130,11 +130,11 @@ def canvas_of(
 def encode_group_colors(
     canvas: Canvas,
     colors: Sequence[UInt8[np.ndarray, "_ 3"]],
-    options: ColorCodingOptions,
+    step: float,
     before: Float64[np.ndarray, "V 3"] | None,
 ) -> EncodedColors:
     """Encode the colours of the vertices of each frame of a group; CostlyError if a reader would refuse them."""
-    encoded = encode_colors(canvas.meshes, canvas.by_mesh(colors), options, before, canvas.is_layered)
+    encoded = encode_colors(canvas.meshes, canvas.by_mesh(colors), step, before, canvas.is_layered)
     _check_cost(canvas, len(encoded.payload))
     return encoded
 

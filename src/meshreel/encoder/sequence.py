@@ -19,10 +19,9 @@ from typing import Any, BinaryIO
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from ..analysis.scene.background import BackgroundOptions
 from ..analysis.scene.masks import Masker
 from ..analysis.scene.probe import is_scene
-from ..analysis.scene.segmentation import SegmentOptions
+from ..analysis.scene.segmentation import Cameras
 from ..analysis.survey import Survey
 from ..coding.background import decode_background
 from ..container.writer import ReelWriter
@@ -53,9 +52,8 @@ from .scene.scene import Tracks, encode_bodies, scene_intervals
 from .scene.static import Static, colored_states, is_colored
 from .scene.tracks import TrackGroup, encode_tracked, intervals_of, tracked_bodies
 from .settings.options import EncoderOptions, as_installed
-from .settings.presets import preset_options
+from .settings.settings import Color, Effort, Preset, Settings, TextureSize
 
-QUALITY, PRESET, EFFORT, COLOR = 50.0, "best", "normal", "auto"  # the default operating point (decision 9)
 MEASURED = 4  # frames of a scene that are compared with the decoded ones (guess)
 ASTRAY = 0.005  # of the surface: noise, and what a border of the background lacks, is less (guess)
 
@@ -63,11 +61,21 @@ ASTRAY = 0.005  # of the surface: noise, and what a border of the background lac
 def encode(
     sequence: MeshSequence | Iterable[object],
     path: str | Path,
-    quality: float = QUALITY,
-    preset: str = PRESET,
+    quality: float | None = None,
+    preset: Preset = "best",
     *,
-    effort: str = EFFORT,
-    color: str = COLOR,
+    effort: Effort = "normal",
+    basis_size: int | None = None,
+    centers: int | None = None,
+    group_size: int | None = None,
+    key_interval: float | None = None,
+    color: Color = "auto",
+    color_quality: float | None = None,
+    texture: TextureSize | None = None,
+    compatible: bool = False,
+    splats: int | None = None,
+    dynamic_only: bool = False,
+    background_refresh: float | None = None,
     options: EncoderOptions | None = None,
     executor: Executor | None = None,
     progress: Progress | None = None,
@@ -78,11 +86,11 @@ def encode(
     """Encode meshes as a .reel file at `path`, also a URL (extra `remote`); it appears only when it is complete.
 
     `sequence` is a MeshSequence or an iterable of meshes (`types.as_sequence`, which also takes a frame rate); vertices
-    at equal positions are welded. `effort` is `fast`, `normal` or `thorough`. `color` is `auto`, `texture`,
-    `vertices` or `none`, as `preset_options` says. `options` replace quality, preset, effort and color; make them with
-    `preset_options`. Most of a scene stands still: it becomes a background and bodies. Bodies
-    that never touch are coded apart in any sequence. With an executor, intervals are encoded side by side, to the same
-    bytes; memory then holds an interval for each worker and one more. Warns of surface that the file lacks.
+    at equal positions are welded. The keywords from `quality` to `background_refresh` are the fields of `Settings`,
+    which say when to touch them; `options` replace them all. Most of a scene stands still: it becomes a background and
+    bodies. Bodies that never touch are coded apart in any sequence. With an executor, intervals are encoded side by
+    side, to the same bytes; memory then holds an interval for each worker and one more. Warns of surface that the file
+    lacks.
     `audio` is a path, a URL or the bytes of an audio file (Opus, AAC, MP3), kept as it is, which begins `audio_start`
     seconds after the first frame. Raises InputError for frames or audio that cannot be used, before anything is
     encoded.
@@ -91,15 +99,28 @@ def encode(
     stopped, `resume=True` continues with the next interval, to the same bytes; False starts over; None raises
     InputError where there is something to continue.
     """
-    if options is None:
-        options = preset_options(preset, quality, effort=effort, color=color)
-    elif (quality, preset, effort, color) != (QUALITY, PRESET, EFFORT, COLOR):
-        text = f"options and quality {quality:g}, preset {preset!r}, effort {effort!r}, color {color!r}"
-        raise InputError(f"{text}: options already have them; leave these out, or give preset_options(...) as options")
+    settings = Settings(
+        preset,
+        quality,
+        effort,
+        basis_size,
+        centers,
+        group_size,
+        key_interval,
+        color,
+        color_quality,
+        texture,
+        compatible,
+        splats,
+        dynamic_only,
+        background_refresh,
+    )
+    if options is not None and settings != Settings():
+        raise InputError("options and settings: leave the settings out, or give Settings(...).resolved() as options")
     heard = b"" if audio is None else packed_audio(audio, audio_start)
     encoder = Encoder(welded(as_sequence(sequence)), executor, progress)
     encoder.audio = heard
-    summary = encoder.encode(path, options, resume)
+    summary = encoder.encode(path, options or settings.resolved(), resume)
     for text in summary.warnings:
         warnings.warn(text, stacklevel=2)
     return summary
@@ -126,7 +147,7 @@ class Encoder:
         self.progress, self.digests, self._excerpt = progress, digests, excerpt
         self.find: FindGroups = find_groups
         self.audio = b""  # payload of `packed_audio` that files get
-        self._scene: tuple[SegmentOptions, BackgroundOptions, Parts] | None = None
+        self._scene: tuple[Cameras, bool, Parts] | None = None
         self._stands: bool | None = masker is not None or None  # most stands still; None: unknown yet
 
     @property
@@ -140,7 +161,7 @@ class Encoder:
         if parts is None:
             seen = surveyed(job)
             return intervals_of(job, seen, tracked_bodies(job, seen))
-        return scene_intervals(job, parts, Tracks(parts.segmentation.cell, job.scene.bodies))
+        return scene_intervals(job, parts, Tracks(parts.segmentation.cell, job.scene.near))
 
     def parts(self, options: EncoderOptions) -> Parts | None:
         """Return the parts of the scene; None where the sequence is no scene, or `options.scene` is None."""
@@ -215,7 +236,7 @@ class Encoder:
 
     def _parts(self, job: Job, files: IntervalFiles | None = None, seen: Survey | None = None) -> Parts:
         """Return the parts of the scene: those that an earlier encode of it had, here or in files, where it had any."""
-        how = (job.scene.segment, job.scene.background)
+        how = (job.scene.cameras, job.scene.from_depth)
         if self._scene is None or self._scene[:2] != how:
             seen = surveyed(job, cleaned=False) if seen is None else seen
             parts = None
@@ -247,7 +268,7 @@ def _encode_scene(job: Job, file: BinaryIO, name: str, parts: Parts, audio: byte
     note("survey", seen.low, seen.high, seen.diagonals, seen.unit)
     note("background and noise", parts.background.vertices, parts.background.faces, parts.noise, parts.deviation)
     job.stages.add("room", 0)
-    states = colored_states(sequence, parts, job.scene.background, options.appearance)
+    states = colored_states(sequence, parts, job.scene, options.appearance)
     job.stages.reach("room", 1.0)
     note("background, coded", *(state.payload for state in states))
     with ReelWriter(file, make_header(sequence.frame_rate, seen, {}), name, audio) as writer:

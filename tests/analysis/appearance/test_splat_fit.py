@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from meshreel.analysis.appearance.splat_fit import FitSplatsOptions, SplatFrame, SplatView, fit_splats
+from meshreel.analysis.appearance.splat_fit import SplatFrame, SplatView, fit_splats
 from meshreel.analysis.appearance.splat_raster import Drawing, Flat, camera_matrices, draw, project
 from meshreel.analysis.appearance.splat_views import rendered, ring, taken
 from meshreel.errors import InputError
@@ -84,7 +84,7 @@ def test_what_is_near_hides_what_is_far() -> None:
 
 def test_a_fit_shows_other_views_and_other_frames() -> None:
     pytest.importorskip("torch")
-    splats, importance = fit_splats([frame(0.0), frame(0.4)], FitSplatsOptions(400, 120))
+    splats, importance = fit_splats([frame(0.0), frame(0.4)], 400, 120)
     assert len(splats) == len(importance) <= 400
     for by in (0.0, 0.2, 0.4):
         unseen = frame(by, 2, 0.13)
@@ -96,18 +96,22 @@ def test_equal_input_gives_equal_splats() -> None:
     threads, found = torch.get_num_threads(), list[np.ndarray]()
     for some in (1, 2):
         torch.set_num_threads(some)
-        found.append(fit_splats([frame(0.0)], FitSplatsOptions(100, 20))[0].colors)
+        found.append(fit_splats([frame(0.0)], 100, 20)[0].colors)
         assert torch.get_num_threads() == some
     torch.set_num_threads(threads)
     np.testing.assert_array_equal(*found)
 
 
-def test_splats_that_nobody_sees_move_to_where_errors_are() -> None:
+def test_splats_that_nobody_sees_move_to_where_errors_are(monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("torch")
     whole = frame(0.0)
     lacking = np.arange(len(FINE.faces)) < len(FINE.faces) // 2  # transparent there
     half = replace(whole, carrier=replace(whole.carrier, lacking=lacking))
-    still, moved = (fit_splats([half], FitSplatsOptions(300, 40, moves=moves))[0] for moves in (0, 2))
+    found = []
+    for moves in (0, 2):
+        monkeypatch.setattr("meshreel.analysis.appearance.splat_fit.MOVES", moves)
+        found.append(fit_splats([half], 300, 40)[0])
+    still, moved = found
     assert len(moved) == 300 > 1.5 * len(still)  # what adds nothing is left out
     assert moved.faces.min() >= len(BALL.faces) // 2
 
@@ -116,15 +120,13 @@ def test_pictures_that_show_nothing_are_refused() -> None:
     blank = replace(frame(0.0), views=tuple(replace(v, pixels=np.ones_like(v.pixels)) for v in frame(0.0).views))
     for empty in (blank, replace(blank, views=())):
         with pytest.raises(InputError, match=r"none of \d pictures shows the surface; check the cameras"):
-            fit_splats([empty], FitSplatsOptions(10, 1))
-    with pytest.raises(InputError, match="give 1 to"):
-        FitSplatsOptions(0)
+            fit_splats([empty], 10, 1)
 
 
 def test_without_torch_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(__import__("sys").modules, "torch", None)
     with pytest.raises(InputError, match=r"meshreel\[splats\]"):
-        fit_splats([frame(0.0)], FitSplatsOptions(10, 1))
+        fit_splats([frame(0.0)], 10, 1)
 
 
 def test_a_picture_fills_its_longer_side() -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from meshreel.analysis.follow import template
-from meshreel.analysis.follow.template import CURVATURE, FEWEST, NOISY_ERROR, TemplateOptions, base_mesh, shared_detail
+from meshreel.analysis.follow.template import CURVATURE, FEWEST, NOISY_ERROR, base_mesh, shared_detail
 from meshreel.geometry.closest_points import Surface
 from meshreel.geometry.subdivision import heights, levels_of, refine
 from meshreel.types import Mesh
@@ -26,11 +26,11 @@ def rms(mesh: Mesh, base: Mesh) -> float:
 @pytest.mark.parametrize("body", [BALL, ROUGH], ids=["ball", "rough"])
 @pytest.mark.parametrize("error", [2e-3, 1e-3, 5e-4])
 def test_the_base_mesh_has_about_the_requested_error(body: Mesh, error: float) -> None:
-    assert error / 1.4 < rms(body, base_mesh(body, TemplateOptions(error=error))) < 1.4 * error
+    assert error / 1.4 < rms(body, base_mesh(body, error)) < 1.4 * error
 
 
 def test_a_smaller_error_takes_more_vertices() -> None:
-    counts = [len(base_mesh(ROUGH, TemplateOptions(error=error)).vertices) for error in (2e-3, 1e-3, 5e-4, 2e-4)]
+    counts = [len(base_mesh(ROUGH, error).vertices) for error in (2e-3, 1e-3, 5e-4, 2e-4)]
     assert counts == sorted(counts) and len(set(counts)) == 4
 
 
@@ -42,18 +42,18 @@ def test_a_limb_that_coarse_meshes_lose_breaks_no_search() -> None:
     body = Mesh.of(np.concatenate([part.vertices for part in parts]), faces)
     for error, noise in ((7e-4, 0.0), (4e-4, 6e-4)):
         aim = math.hypot(error, NOISY_ERROR * noise)
-        assert aim / 1.4 < rms(body, base_mesh(body, TemplateOptions(error=error), noise)) < 1.4 * aim
+        assert aim / 1.4 < rms(body, base_mesh(body, error, noise)) < 1.4 * aim
 
 
 def test_a_base_mesh_has_neither_fewer_vertices_than_a_body_needs_nor_more_than_the_frame_has() -> None:
-    assert len(base_mesh(BALL, TemplateOptions(error=1.0)).vertices) >= 0.8 * FEWEST
-    assert len(base_mesh(ROUGH, TemplateOptions(error=1e-12)).vertices) <= len(ROUGH.vertices)
+    assert len(base_mesh(BALL, 1.0).vertices) >= 0.8 * FEWEST
+    assert len(base_mesh(ROUGH, 1e-12).vertices) <= len(ROUGH.vertices)
 
 
 @pytest.mark.parametrize("error", [1e-6, 1.0])
 def test_a_mesh_of_one_face_is_its_own_base(error: float) -> None:
     triangle = Mesh.of([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
-    base = base_mesh(triangle, TemplateOptions(error=error))
+    base = base_mesh(triangle, error)
     np.testing.assert_allclose(np.sort(base.vertices, axis=0), np.sort(triangle.vertices, axis=0), atol=1e-9)
 
 
@@ -115,5 +115,5 @@ def test_the_search_for_the_number_of_vertices_ends(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(
         template, "decimate", lambda mesh, count, border: (asked.append(count), real(mesh, count, border))[1]
     )
-    base_mesh(ROUGH, TemplateOptions(error=1e-5))
+    base_mesh(ROUGH, 1e-5)
     assert len(asked) <= template.MOST_ROUNDS

@@ -8,15 +8,12 @@ import numpy as np
 import pytest
 
 from meshreel.analysis.reference.centers import (
-    ReferenceCenterOptions,
     affinity,
     center_spacing,
     largest_distances,
     reference_centers,
 )
 from meshreel.types import Centers
-
-OPTIONS = ReferenceCenterOptions()
 
 
 def turned(points: np.ndarray, angle: float) -> np.ndarray:
@@ -40,7 +37,7 @@ def test_the_largest_distance_is_the_largest_of_all_frames() -> None:
 
 def test_rigid_frames_give_back_the_pose_itself_with_no_stress() -> None:
     pose = cloud()
-    found = reference_centers(largest_distances(centers(pose, turned(pose, 1.0))), pose, OPTIONS)
+    found = reference_centers(largest_distances(centers(pose, turned(pose, 1.0))), pose)
     assert found.stress < 1e-4
     np.testing.assert_allclose(found.positions, pose, atol=1e-4)
 
@@ -48,7 +45,7 @@ def test_rigid_frames_give_back_the_pose_itself_with_no_stress() -> None:
 def test_the_mirror_image_that_distances_allow_is_not_taken() -> None:
     for seed in range(5):  # the eigenvectors' signs are arbitrary: some of these start mirrored
         pose = cloud(seed=seed)
-        found = reference_centers(largest_distances(centers(pose)), pose, OPTIONS)
+        found = reference_centers(largest_distances(centers(pose)), pose)
         np.testing.assert_allclose(found.positions, pose, atol=1e-4)
 
 
@@ -57,47 +54,48 @@ def test_two_bodies_that_touch_in_one_frame_are_separate_in_the_reference() -> N
     apart = np.array([0.5, 0, 0])
     touching = np.concatenate([one, one + np.array([0.3, 0, 0])])
     parted = np.concatenate([one, one + apart])
-    found = reference_centers(largest_distances(centers(touching, parted)), touching, OPTIONS)
+    found = reference_centers(largest_distances(centers(touching, parted)), touching)
     gap = found.positions[300:].mean(axis=0) - found.positions[:300].mean(axis=0)
     assert np.linalg.norm(gap) == pytest.approx(0.5, abs=0.02)
     assert found.stress < 0.02
 
 
-def test_more_rounds_never_raise_the_stress() -> None:
+def test_more_rounds_never_raise_the_stress(monkeypatch: pytest.MonkeyPatch) -> None:
     rng = np.random.default_rng(1)
     distances = largest_distances(centers(cloud(), cloud() + rng.normal(0, 0.05, (300, 3))))
-    stress = [
-        reference_centers(distances, cloud(), ReferenceCenterOptions(max_rounds=n, tolerance=0.0)).stress
-        for n in (0, 2, 5, 20)
-    ]
+    monkeypatch.setattr("meshreel.analysis.reference.centers.TOLERANCE", 0.0)
+    stress = []
+    for rounds in (0, 2, 5, 20):
+        monkeypatch.setattr("meshreel.analysis.reference.centers.MAX_ROUNDS", rounds)
+        stress.append(reference_centers(distances, cloud()).stress)
     assert all(b <= a * (1 + 1e-5) for a, b in pairwise(stress))
 
 
 def test_the_same_distances_give_the_same_bits() -> None:
     distances = largest_distances(centers(cloud(seed=3)))
-    a, b = (reference_centers(distances, cloud(seed=3), OPTIONS).positions for _ in range(2))
+    a, b = (reference_centers(distances, cloud(seed=3)).positions for _ in range(2))
     assert np.array_equal(a, b)
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 4, 5, 9])
 def test_a_handful_of_centers_is_enough(count: int) -> None:
     pose = cloud(count)
-    found = reference_centers(largest_distances(centers(pose)), pose, OPTIONS)
+    found = reference_centers(largest_distances(centers(pose)), pose)
     assert found.stress < 1e-3
 
 
 def test_centers_at_one_place_stay_finite() -> None:
     pose = np.zeros((20, 3))
-    found = reference_centers(largest_distances(centers(pose)), pose, OPTIONS)
+    found = reference_centers(largest_distances(centers(pose)), pose)
     assert np.isfinite(found.positions).all()
-    assert np.isfinite(affinity(largest_distances(centers(pose)), OPTIONS)).all()
+    assert np.isfinite(affinity(largest_distances(centers(pose)))).all()
 
 
 def test_affinity_is_one_for_a_center_itself_half_at_its_reach_and_knows_no_unit() -> None:
     pose = np.arange(10.0)[:, None] * np.array([1.0, 0, 0])
     distances = largest_distances(centers(pose))
-    a = affinity(distances, OPTIONS)
+    a = affinity(distances)
     np.testing.assert_array_equal(np.diag(a), 1)
     assert center_spacing(distances) == 1
     assert a[0, 2] == pytest.approx(0.5)
-    np.testing.assert_allclose(affinity(1000 * distances, OPTIONS), a, rtol=1e-5)
+    np.testing.assert_allclose(affinity(1000 * distances), a, rtol=1e-5)

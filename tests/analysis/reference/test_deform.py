@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from meshreel.analysis.reference.centers import ReferenceCenterOptions, affinity, largest_distances
+from meshreel.analysis.reference.centers import affinity, largest_distances
 from meshreel.analysis.reference.deform import (
-    DeformOptions,
     Neighbours,
     bind,
     blended,
@@ -19,11 +18,9 @@ from meshreel.geometry.rigid import rotate
 from meshreel.geometry.topology import subdivide_midpoint, vertex_normals
 from meshreel.types import Centers, Mesh
 
-OPTIONS = DeformOptions()
 
-
-def deform(mesh: Mesh, source: np.ndarray, target: np.ndarray, near: Neighbours, options: DeformOptions) -> np.ndarray:
-    binding = bind(mesh, source, near, options)
+def deform(mesh: Mesh, source: np.ndarray, target: np.ndarray, near: Neighbours) -> np.ndarray:
+    binding = bind(mesh, source, near)
     return move(mesh.vertices, binding, center_motions(source, target, near), near)
 
 
@@ -58,7 +55,7 @@ def both(a: Mesh, b: Mesh) -> Mesh:
 
 def kin(*poses: np.ndarray):  # type: ignore[no-untyped-def]
     distances = largest_distances(Centers(np.stack(poses), np.zeros(len(poses[0]), np.int32)))
-    return neighbours(affinity(distances, ReferenceCenterOptions()), OPTIONS)
+    return neighbours(affinity(distances))
 
 
 @pytest.mark.parametrize("angle", [0.0, 0.3, 2.0, np.pi, 4.5])
@@ -67,9 +64,9 @@ def test_a_rigid_motion_deforms_exactly(angle: float) -> None:
     target = source @ rotation(angle).T + np.array([0.2, -0.1, 0.05])
     near = kin(source, target)
     expected = mesh.vertices @ rotation(angle).T + np.array([0.2, -0.1, 0.05])
-    moved = deform(mesh, source, target, near, OPTIONS)
+    moved = deform(mesh, source, target, near)
     np.testing.assert_allclose(moved, expected, atol=1e-9)
-    back = deform(Mesh(moved, mesh.faces), target, source, near, OPTIONS)
+    back = deform(Mesh(moved, mesh.faces), target, source, near)
     np.testing.assert_allclose(back, mesh.vertices, atol=1e-9)
 
 
@@ -77,7 +74,7 @@ def test_normals_turn_with_their_points() -> None:
     mesh, source = ball((0, 0, 0)), inside((0, 0, 0))
     near = kin(source)
     motions = center_motions(source, source @ rotation(1.0).T, near)
-    turned = rotate(blended(bind(mesh, source, near, OPTIONS), motions, near), vertex_normals(mesh))
+    turned = rotate(blended(bind(mesh, source, near), motions, near), vertex_normals(mesh))
     np.testing.assert_allclose(turned, vertex_normals(mesh) @ rotation(1.0).T, atol=1e-9)
 
 
@@ -87,13 +84,13 @@ def test_two_balls_that_touch_separate_without_damage() -> None:
     touching = np.concatenate([inside(left), inside(right, seed=1)])
     shift = np.array([0.3, 0, 0])
     parted = touching + shift * (np.arange(300) >= 150)[:, None]
-    moved = deform(mesh, touching, parted, kin(touching, parted), OPTIONS)
+    moved = deform(mesh, touching, parted, kin(touching, parted))
     half = len(mesh.vertices) // 2
     np.testing.assert_allclose(moved[:half], mesh.vertices[:half], atol=1e-9)
     np.testing.assert_allclose(moved[half:], mesh.vertices[half:] + shift, atol=1e-9)
 
 
-def test_a_vertex_nearest_to_a_center_of_the_other_body_stays_with_its_body() -> None:
+def test_a_vertex_nearest_to_a_center_of_the_other_body_stays_with_its_body(monkeypatch: pytest.MonkeyPatch) -> None:
     left, right = (-0.1, 0, 0), (0.1, 0, 0)
     mesh = both(ball(left), ball(right))
     own = inside(left)
@@ -102,8 +99,9 @@ def test_a_vertex_nearest_to_a_center_of_the_other_body_stays_with_its_body() ->
     parted = touching + np.array([0.3, 0, 0]) * (np.arange(len(touching)) >= len(own))[:, None]
     near = kin(touching, parted)
     half = len(mesh.vertices) // 2
-    guarded = deform(mesh, touching, parted, near, OPTIONS)
-    alone = deform(mesh, touching, parted, near, DeformOptions(guard_choices=1))
+    guarded = deform(mesh, touching, parted, near)
+    monkeypatch.setattr("meshreel.analysis.reference.deform.GUARD_CHOICES", 1)
+    alone = deform(mesh, touching, parted, near)
     lost = [int((np.abs(v[:half] - mesh.vertices[:half]).max(axis=1) > 1e-3).sum()) for v in (guarded, alone)]
     assert lost[1] > 0
     assert lost[0] < lost[1]
@@ -117,12 +115,12 @@ def test_a_center_is_its_own_first_neighbour_even_beside_its_twin() -> None:
 @pytest.mark.parametrize("count", [1, 2, 3])
 def test_a_handful_of_centers_still_shifts_a_mesh(count: int) -> None:
     mesh, source = ball((0, 0, 0)), inside((0, 0, 0), count)
-    moved = deform(mesh, source, source + 0.25, kin(source), OPTIONS)
+    moved = deform(mesh, source, source + 0.25, kin(source))
     np.testing.assert_allclose(moved, mesh.vertices + 0.25, atol=1e-9)
 
 
 def test_a_mesh_without_faces_or_vertices_deforms_to_itself() -> None:
     source = inside((0, 0, 0))
-    assert deform(Mesh.empty(), source, source, kin(source), OPTIONS).shape == (0, 3)
+    assert deform(Mesh.empty(), source, source, kin(source)).shape == (0, 3)
     points = Mesh.of(source + 0.01, np.zeros((0, 3)))
-    np.testing.assert_allclose(deform(points, source, source, kin(source), OPTIONS), points.vertices, atol=1e-12)
+    np.testing.assert_allclose(deform(points, source, source, kin(source)), points.vertices, atol=1e-12)

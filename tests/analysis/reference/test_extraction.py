@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
-from meshreel.analysis.reference.deform import DeformOptions
 from meshreel.analysis.reference.extraction import MDS, Reference, ReferenceOptions, extract_reference, predict
 from meshreel.geometry.closest_points import Surface
 from meshreel.geometry.decimate import has_boundary
@@ -13,7 +13,7 @@ from meshreel.types import Centers, Mesh
 
 from .test_deform import ball, inside, rotation
 
-QUICK = ReferenceOptions(vertices=500, keys=2)
+QUICK = ReferenceOptions(vertices=500)
 RADIUS = 0.1
 
 
@@ -63,7 +63,7 @@ def test_the_pose_of_mds_is_taken_where_it_is_asked_for() -> None:
 def test_no_triangle_bridges_the_parts_in_any_frame_even_where_the_pose_has_them_touch() -> None:
     frames, centers = two_balls((0.2, 0.26, 0.32))
     reference = extract_reference(frames, centers, QUICK)
-    moved = predict(reference, reference.mesh, centers, DeformOptions())
+    moved = predict(reference, reference.mesh, centers)
     for vertices in moved:
         edges = np.linalg.norm(vertices[reference.mesh.faces] - vertices[np.roll(reference.mesh.faces, 1, 1)], axis=2)
         assert edges.max() < 0.08
@@ -76,21 +76,21 @@ def test_the_reference_sent_back_lies_on_each_frame() -> None:
     first = inside((0.1, 0, 0))
     centers = Centers(np.stack([first, first @ turn.T]), np.zeros(len(first), np.int32))
     reference = extract_reference(frames, centers, QUICK)
-    for frame, vertices in zip(frames, predict(reference, reference.mesh, centers, DeformOptions()), strict=True):
+    for frame, vertices in zip(frames, predict(reference, reference.mesh, centers), strict=True):
         assert rms_gap(frame, Mesh(vertices, reference.mesh.faces)) < 0.003
     outward, _ = face_normals(reference.mesh)
     middle = reference.mesh.vertices[reference.mesh.faces].mean(axis=1) - reference.mesh.vertices.mean(axis=0)
     assert (np.sum(outward * middle, axis=1) > 0).mean() > 0.99
 
 
-def test_surface_that_the_key_frame_lacks_comes_from_other_frames() -> None:
+def test_surface_that_the_key_frame_lacks_comes_from_other_frames(monkeypatch: pytest.MonkeyPatch) -> None:
     whole = ball((0, 0, 0))
     hole = whole.faces[whole.vertices[whole.faces].mean(axis=1)[:, 2] < 0.06]
     frames = [whole, Mesh(whole.vertices, hole), whole]
     first = inside((0, 0, 0))
     centers = Centers(np.stack([first] * 3), np.zeros(len(first), np.int32))
-    one_key = ReferenceOptions(vertices=500, keys=1)
-    reference = extract_reference(frames, centers, one_key)
+    monkeypatch.setattr("meshreel.analysis.reference.extraction.KEYS", 1)
+    reference = extract_reference(frames, centers, QUICK)
     assert reference.key == 1
     assert reference.mesh.vertices[:, 2].max() > 0.095
     assert rms_gap(whole, reference.mesh) < 0.004
@@ -134,6 +134,6 @@ def test_any_mesh_in_the_reference_pose_can_be_sent_back() -> None:
     frames, centers = two_balls((0.2, 0.3))
     reference: Reference = extract_reference(frames, centers, QUICK)
     dense = subdivide_midpoint(reference.mesh, 1)
-    few, many = (predict(reference, mesh, centers, DeformOptions()) for mesh in (reference.mesh, dense))
+    few, many = (predict(reference, mesh, centers) for mesh in (reference.mesh, dense))
     assert many.shape == (2, len(dense.vertices), 3)
     assert np.abs(many[:, : few.shape[1]] - few).mean() < 1e-3

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from meshreel.analysis.scene.background import BackgroundOptions, fuse_background
+from meshreel.analysis.scene.background import FRAGMENT, fuse_background
 from meshreel.geometry.closest_points import distances
 from meshreel.geometry.topology import concatenate, face_normals
 from meshreel.types import Mesh
@@ -62,17 +62,19 @@ def test_surface_hidden_in_one_frame_comes_from_others():
 
 def test_surface_that_few_frames_have_is_left_out():
     table = moved(plane(0.8, 16), (0.4, 0.4, 0.7))
-    frames = [concatenate([FLOOR, table]), *[FLOOR] * 9]
-    assert fuse_background(frames, VOXEL, BackgroundOptions(seen=0.1)).vertices[:, 2].max() > 0.6
-    least = fuse_background(frames, VOXEL, BackgroundOptions(seen=0.25))
+    with_table = concatenate([FLOOR, table])
+    assert fuse_background([*[with_table] * 2, *[FLOOR] * 8], VOXEL).vertices[:, 2].max() > 0.6
+    least = fuse_background([with_table, *[FLOOR] * 9], VOXEL)
     assert least.vertices[:, 2].max() < 0.1 and not least.is_empty
 
 
 def test_small_pieces_are_dropped():
-    both = concatenate([FLOOR, moved(sphere(0.1, 3), (0.8, 0.8, 0.6))])  # 0.13 m^2
-    assert fuse_background([both], VOXEL, BackgroundOptions(fragment=0.2)).vertices[:, 2].max() < 0.1
-    assert fuse_background([both], VOXEL, BackgroundOptions(fragment=0.05)).vertices[:, 2].max() > 0.6
-    assert fuse_background([both], VOXEL, BackgroundOptions(fragment=50.0)).is_empty
+    for radius, height in ((0.035, 0.1), (0.1, 0.7)):
+        ball = moved(sphere(radius, 3), (0.8, 0.8, 0.6))
+        assert (4 * math.pi * radius**2 > FRAGMENT) == (radius == 0.1)
+        found = fuse_background([concatenate([FLOOR, ball])], VOXEL / 4).vertices[:, 2].max()
+        assert height - 0.1 < found < height
+    assert fuse_background([moved(plane(0.1, 4), (0.4, 0.4, 0.7))], VOXEL / 4).is_empty
 
 
 def test_the_order_of_frames_does_not_matter_and_the_same_frames_give_the_same_mesh():
@@ -100,9 +102,10 @@ def test_of_nothing_there_is_nothing():
     assert fuse_background([Mesh.of(np.ones((3, 3)), [[0, 1, 2]])], VOXEL).is_empty
 
 
-def test_surface_that_moves_from_frame_to_frame_is_left_out():
+def test_surface_that_moves_from_frame_to_frame_is_left_out(monkeypatch):
     ribbons = [moved(plane(0.8, 16), (0.4, 0.4, 0.7 + 0.06 * math.sin(2.4 * k))) for k in range(10)]
     frames = [concatenate([floor, ribbon]) for floor, ribbon in zip(floors(10), ribbons, strict=True)]
-    assert fuse_background(frames, VOXEL, BackgroundOptions(steady=9.0)).vertices[:, 2].max() > 0.6
     mesh = fuse_background(frames, VOXEL)
     assert mesh.vertices[:, 2].max() < 0.1 and height_error(mesh) < SIGMA
+    monkeypatch.setattr("meshreel.analysis.scene.background.STEADY", 9.0)
+    assert fuse_background(frames, VOXEL).vertices[:, 2].max() > 0.6

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from scipy.ndimage import binary_erosion
 
-from meshreel.analysis.scene.background import BackgroundOptions
 from meshreel.analysis.scene.background_depth import Moment, fuse_still_depth, usual_pictures
 from meshreel.capture.rig.fusion import FusionOptions, fuse_depths
 from meshreel.geometry.closest_points import distances
@@ -62,21 +61,23 @@ def test_a_body_that_never_leaves_casts_a_shadow():
     assert np.linalg.norm(mesh.vertices[:, :2], axis=1).min() > RADIUS
 
 
-def test_the_usual_depth_is_the_median_of_enough_measured_depths():
+def test_the_usual_depth_is_the_median_of_enough_measured_depths(monkeypatch):
     depth = np.full((AHEAD.height, AHEAD.width), 1000, np.uint16)
     others = [depth, np.where(np.arange(AHEAD.width) < 8, 0, depth + 4), depth + 400]
     nothing = Mesh.empty(), np.zeros(0, bool)
     pictures = [Moment([AHEAD.picture(one.astype(np.uint16))], *nothing) for one in others]
-    usual = usual_pictures(pictures, BackgroundOptions(seen=0.9))[0].depth
+    usual = usual_pictures(pictures)[0].depth
+    assert (usual[:, 8:] == 1004).all() and (usual[:, :8] == 1200).all()  # the mean of the middle two
+    monkeypatch.setattr("meshreel.analysis.scene.background.SEEN", 0.9)
+    usual = usual_pictures(pictures)[0].depth
     assert (usual[:, :8] == 0).all() and (usual[:, 8:] == 1004).all()
-    usual = usual_pictures(pictures, BackgroundOptions(seen=0.1))[0].depth
-    assert (usual[:, :8] == 1200).all()  # the mean of the middle two
 
 
-def test_faces_that_no_camera_sees_from_the_front_are_dropped():
+def test_faces_that_no_camera_sees_from_the_front_are_dropped(monkeypatch):
     depth = measured(AHEAD)
-    all_of_it = fuse_still_depth(moments([depth]), VOXEL, BackgroundOptions(facing=0.0))
-    front = fuse_still_depth(moments([depth]), VOXEL, BackgroundOptions(facing=0.5))
+    front = fuse_still_depth(moments([depth]), VOXEL)
+    monkeypatch.setattr("meshreel.analysis.scene.background_depth.FACING", 0.0)
+    all_of_it = fuse_still_depth(moments([depth]), VOXEL)
     assert len(front.faces) < len(all_of_it.faces)
     assert distances(front.vertices, all_of_it).max() < 1e-6
 

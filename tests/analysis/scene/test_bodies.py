@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from meshreel.analysis.scene.bodies import BodyOptions, at_most, find_bodies, ring, same_bodies, with_ring
+from meshreel.analysis.scene.bodies import at_most, find_bodies, ring, same_bodies, with_ring
 from meshreel.geometry.closest_points import Surface
 from meshreel.geometry.topology import concatenate, part_of
 from meshreel.types import Mesh
@@ -80,7 +80,7 @@ def test_bits_that_last_are_a_body_of_their_own():
     frames = [concatenate([at(0), at(4 + 0.01 * t, mesh=BIT)]) for t in range(5)]
     found = find_bodies(frames, CELL)
     assert len(found.meshes) == 2 and found.dropped == 0
-    assert len(find_bodies(frames, CELL, BodyOptions(lasts=6)).meshes) == 1
+    assert len(find_bodies(frames[:4], CELL).meshes) == 1
 
 
 def test_bits_alone_without_any_body_are_kept_where_they_last():
@@ -123,17 +123,17 @@ def test_bodies_far_from_the_origin_are_separated_too():
     bodies = find_bodies(frames, CELL).meshes
     assert len(bodies) == 2
     last, now = [body[-1] for body in bodies], [bodies[1][-1], bodies[0][-1]]
-    assert same_bodies(last, now, CELL, BodyOptions()) == [1, 0]
+    assert same_bodies(last, now, CELL) == [1, 0]
 
 
 def test_a_body_is_continued_by_that_which_shares_most_with_it():
     before = [at(0), NONE, at(3)]
-    assert same_bodies(before, [at(3.1), at(0.05), at(8)], CELL, BodyOptions()) == [2, 0, -1]
+    assert same_bodies(before, [at(3.1), at(0.05), at(8)], CELL) == [2, 0, -1]
     both = [at(0.2), at(0.05)]
-    assert same_bodies([at(0)], both, CELL, BodyOptions()) == [-1, 0]
-    assert same_bodies([], [at(0)], CELL, BodyOptions()) == [-1]
-    assert same_bodies([at(0)], [], CELL, BodyOptions()) == []
-    assert same_bodies([NONE], [NONE], CELL, BodyOptions()) == [-1]
+    assert same_bodies([at(0)], both, CELL) == [-1, 0]
+    assert same_bodies([], [at(0)], CELL) == [-1]
+    assert same_bodies([at(0)], [], CELL) == []
+    assert same_bodies([NONE], [NONE], CELL) == [-1]
 
 
 def test_a_ring_surrounds_moving_faces_without_large_ones():

@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from meshreel.analysis.scene.cut import _UNIT, CutOptions, _continued, _cut, _hollow, _left_together, moving_places
+from meshreel.analysis.scene import cut
+from meshreel.analysis.scene.cut import _UNIT, _continued, _cut, _hollow, _left_together, moving_places
 from meshreel.analysis.scene.places import Places, Tally
 from meshreel.geometry.voxels import Lattice, neighbours
 
@@ -49,7 +50,13 @@ def test_an_edge_is_hollow_where_normals_turn_towards_each_other():
 
 
 SIZE = 0.1
-FLAT = CutOptions(fewest=9, least=0.2, reach=0.45, still=(3.0, 0.0))  # a place has 8 neighbours, 3 across a border
+
+
+@pytest.fixture(autouse=True)
+def flat(monkeypatch):
+    """Costs for a flat sheet of few places: a place has 8 neighbours, 3 across a border."""
+    for name, value in {"_FEWEST": 9, "_LEAST": 0.2, "_REACH": 0.45, "_STILL": (3.0, 0.0)}.items():
+        monkeypatch.setattr(cut, name, value)
 
 
 def sheet(free: np.ndarray, normals=(0.0, 0.0, 1.0)) -> Places:
@@ -72,38 +79,43 @@ def square(start: int, stop: int, count: int = 9) -> np.ndarray:
 
 
 def test_places_that_are_always_occupied_rest():
-    assert not moving_places(sheet(np.zeros((20, 20), int)), FLAT).any()
+    assert not moving_places(sheet(np.zeros((20, 20), int))).any()
 
 
 def test_places_seen_free_move_and_those_around_them_do_not():
     free = square(5, 12)
-    assert np.array_equal(moving_places(sheet(free), FLAT).reshape(20, 20), free > 0)
+    assert np.array_equal(moving_places(sheet(free)).reshape(20, 20), free > 0)
 
 
 def test_a_part_that_is_never_seen_free_but_enclosed_moves_as_well():
     free = square(5, 12)
     free[7:10, 7:10] = 0
-    assert np.array_equal(moving_places(sheet(free), FLAT).reshape(20, 20), square(5, 12) > 0)
+    assert np.array_equal(moving_places(sheet(free)).reshape(20, 20), square(5, 12) > 0)
 
 
-def test_no_place_moves_beyond_reach_of_places_seen_free():
-    free, near = square(2, 18), CutOptions(fewest=9, least=0.2, reach=0.15, still=(0.0, 0.0))
+def test_no_place_moves_beyond_reach_of_places_seen_free(monkeypatch):
+    monkeypatch.setattr(cut, "_REACH", 0.15)
+    monkeypatch.setattr(cut, "_STILL", (0.0, 0.0))
+    free = square(2, 18)
     free[5:15, 5:15] = 0
-    found = moving_places(sheet(free), near).reshape(20, 20)
+    found = moving_places(sheet(free)).reshape(20, 20)
     assert not found[7:13, 7:13].any() and found[2, 2]
 
 
 def test_few_places_seen_free_are_noise_and_small_ones_flicker():
-    assert not moving_places(sheet(square(5, 7)), FLAT).any()  # 4 places
-    assert not moving_places(sheet(square(5, 9)), FLAT).any()  # 16 places, 0.16 m^2
-    assert moving_places(sheet(square(5, 10)), FLAT).sum() == 25
+    assert not moving_places(sheet(square(5, 7))).any()  # 4 places
+    assert not moving_places(sheet(square(5, 9))).any()  # 16 places, 0.16 m^2
+    assert moving_places(sheet(square(5, 10))).sum() == 25
     scattered = np.zeros((20, 20), int)
     scattered[::3, ::3] = 9
-    assert not moving_places(sheet(scattered), FLAT).any()
+    assert not moving_places(sheet(scattered)).any()
 
 
-def test_a_place_seen_free_too_seldom_is_no_evidence():
-    assert not moving_places(sheet(square(5, 12, 1)), CutOptions(fewest=9, share=0.15)).any()
+def test_a_place_seen_free_too_seldom_is_no_evidence(monkeypatch):
+    monkeypatch.setattr(cut, "_STILL", (0.2, 0.3))
+    assert moving_places(sheet(square(5, 12, 1))).any()
+    monkeypatch.setattr(cut, "_SHARE", 0.15)
+    assert not moving_places(sheet(square(5, 12, 1))).any()
 
 
 def test_a_still_plane_goes_on_where_it_was_never_seen_free():

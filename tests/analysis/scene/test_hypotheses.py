@@ -15,7 +15,7 @@ from meshreel.analysis.scene.hypotheses import (
     tour,
     variation,
 )
-from meshreel.analysis.scene.views import ViewsOptions, place_views
+from meshreel.analysis.scene.views import place_views
 from meshreel.geometry.raycast import Rays
 from tests.analysis.scene.test_views import ROOM, box, together
 from tests.metrics.shapes import moved, sphere
@@ -75,7 +75,7 @@ def test_overlap_is_symmetric_and_one_only_for_equal_masks(a, b):
 
 
 def test_a_tour_visits_every_view_once_and_turns_gently():
-    views = place_views([ROOM], ViewsOptions(width=80, height=60))
+    views = place_views([ROOM], width=80, height=60)
     order = tour(views, 5)
     assert order[0] == 5 and sorted(order) == list(range(len(views)))
     axes = np.array([views[k].extrinsic[2, :3] for k in order])
@@ -86,7 +86,7 @@ def test_a_tour_visits_every_view_once_and_turns_gently():
 
 
 def test_the_reference_view_is_the_one_that_sees_the_change():
-    views = place_views([ROOM], ViewsOptions(count=6, width=80, height=60))
+    views = place_views([ROOM], "y", 6, 80, 60)
     walls = box((0, 0, 0), (5, 2.5, 4), inwards=True)
     meshes = [together(walls, moved(sphere(0.4), (x, 1.2, 2))) for x in (1.5, 2.5, 3.5)]
     moments = [[Rays(mesh).look(view) for view in views] for mesh in meshes]

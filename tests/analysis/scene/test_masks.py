@@ -10,8 +10,8 @@ import pytest
 
 from meshreel.analysis.scene.masks import CAMERAS, ImageMasks, Masker, one_size, read_view_file, read_views
 from meshreel.analysis.scene.pictures import write_views
-from meshreel.analysis.scene.segmentation import SegmentOptions, scene_views, segment_by
-from meshreel.analysis.scene.views import ViewsOptions, place_views
+from meshreel.analysis.scene.segmentation import scene_views, segment_by
+from meshreel.analysis.scene.views import place_views
 from meshreel.analysis.scene.votes import Votes
 from meshreel.errors import InputError
 from meshreel.geometry.cameras import pack_cameras
@@ -22,7 +22,7 @@ from tests.analysis.scene.test_views import ROOM
 from tests.metrics.shapes import sphere
 
 BALL = len(sphere().faces)  # the last faces of the room are the ball's
-VIEWS = place_views([ROOM], ViewsOptions(count=3, width=80, height=60))
+VIEWS = place_views([ROOM], "y", 3, 80, 60)
 SEEN = [Rays(ROOM).look(view) for view in VIEWS]
 
 
@@ -88,7 +88,7 @@ def test_cameras_that_see_nothing_of_the_scene_are_refused(masks: Path):
     with pytest.raises(InputError, match=r"the 3 given cameras see no face in any of 1 frames \(the first is 1\)"):
         segment_by(ImageMasks(masks, 2), frames)
     with pytest.raises(InputError, match="the 3 given cameras see no face"):
-        scene_views(frames, SegmentOptions(cameras=away))
+        scene_views(frames, away)
 
 
 def test_a_folder_without_cameras_or_with_cameras_of_two_sizes_is_refused(masks: Path):
@@ -111,7 +111,7 @@ def test_a_frame_is_asked_for_its_masks_once_and_an_empty_one_never(masks: Path)
             return super().masks(frame, seen, views)
 
     frames = MeshList((ROOM, ROOM, Mesh.empty()))
-    by = segment_by(Counted(masks, 2), frames, SegmentOptions(island=0))
+    by = segment_by(Counted(masks, 2), frames)
     found = [by.moving(frame, frames[frame]) for frame in (0, 1, 0, 2)]
     assert asked == [0, 1] and np.array_equal(found[0], found[2]) and found[0].any() and len(found[3]) == 0
     assert 0 < by.cell < ROOM.diagonal
@@ -119,11 +119,10 @@ def test_a_frame_is_asked_for_its_masks_once_and_an_empty_one_never(masks: Path)
 
 def test_views_are_placed_by_frames_that_have_a_surface_and_given_ones_are_taken():
     frames = MeshList((Mesh.empty(), ROOM, *[Mesh.empty()] * 5))
-    options = SegmentOptions(views=ViewsOptions(count=2, width=80, height=60))
-    assert len(scene_views(frames, options)) == 2
-    assert scene_views(frames, replace(options, cameras=VIEWS)) == VIEWS
+    assert len(scene_views(frames)) == 14
+    assert scene_views(frames, VIEWS) == VIEWS
     with pytest.raises(InputError, match="has a surface"):
-        scene_views(MeshList((Mesh.empty(),) * 2), options)
+        scene_views(MeshList((Mesh.empty(),) * 2))
 
 
 def test_a_folder_of_cameras_one_a_file_is_read_in_the_order_of_their_numbers(tmp_path: Path):

@@ -10,14 +10,15 @@ import pytest
 
 from meshreel.analysis.scene import places as module
 from meshreel.analysis.scene.cut import moving_places
-from meshreel.analysis.scene.places import Observations, Places, PlacesOptions, find_places, states
+from meshreel.analysis.scene.places import Observations, Places, find_places, inspected, states
 from meshreel.analysis.scene.views import place_views
 from meshreel.geometry.depth import DepthPicture
 from meshreel.geometry.raycast import Rays
 from meshreel.geometry.voxels import Lattice
 from meshreel.types import Frames, Mesh
 from tests.metrics.shapes import moved, plane
-from tests.scenes import CELL, RADIUS, SEGMENT, ball, room, with_room
+from tests.scenes import CELL, RADIUS, ball, room, with_room
+from tests.small_options import VIEWS
 
 LATTICE = Lattice(np.zeros(3), CELL)
 FROM, TO = 0.6, 1.6  # m, where the ball lies in the first half of the frames and in the second
@@ -26,7 +27,7 @@ FRAMES = with_room([ball(FROM)] * 2 + [ball(TO)] * 2)
 
 @pytest.fixture(scope="module")
 def views():
-    return place_views(FRAMES, SEGMENT.views)
+    return place_views(FRAMES, "y", *VIEWS)
 
 
 @dataclass(frozen=True)
@@ -37,9 +38,9 @@ class Seen:
     free: np.ndarray
 
 
-def each_frame(frames, views, options: PlacesOptions = PlacesOptions()) -> Seen:
-    found = find_places(Observations(frames, views), LATTICE, options)
-    occupied, free = zip(*states(Observations(frames, views), range(len(frames)), found, options), strict=True)
+def each_frame(frames, views) -> Seen:
+    found = find_places(Observations(frames, views), LATTICE)
+    occupied, free = zip(*states(Observations(frames, views), range(len(frames)), found), strict=True)
     return Seen(np.stack(occupied), np.stack(free))
 
 
@@ -156,7 +157,7 @@ class Again(Frames):
     ("count", "rate", "least"), [(20, 30.0, 16), (60, 30.0, 16), (240, 30.0, 32), (900, 30.0, 120), (5, 0.1, 5)]
 )
 def test_some_frames_of_each_second_are_looked_at_however_long_a_recording_is(count, rate, least):
-    numbers = PlacesOptions().chosen(count, rate)
+    numbers = inspected(count, rate)
     assert least <= len(numbers) <= least + 2 and numbers[0] == 0 and numbers[-1] == count - 1
     assert max(np.diff(numbers)) <= max(1, 0.25 * rate + 1)
 
@@ -165,7 +166,7 @@ def test_no_place_is_seen_free_through_the_back_of_a_face():
     """Whoever looks through an open side into a wall's back is inside of something that was not scanned."""
     wall = Mesh.of(room().vertices, room().faces[:, ::-1])
     frames = [wall, moved(wall, (0, 0, 0.3))]
-    there = place_views([room()], SEGMENT.views)
+    there = place_views([room()], "y", *VIEWS)
     assert not find_places(Observations(frames, there), LATTICE).tally.free.any()
 
 

@@ -12,16 +12,16 @@ from hypothesis import strategies as st
 from meshreel.analysis.scene import labelling
 from meshreel.analysis.scene.labelling import ByPlace, without_islands
 from meshreel.analysis.scene.masks import Masker
-from meshreel.analysis.scene.places import PlacesOptions
 from meshreel.analysis.scene.segmentation import segment, segment_by
 from meshreel.analysis.scene.settle import Rest
 from meshreel.geometry.topology import components, concatenate, face_normals
 from meshreel.geometry.voxels import Lattice
 from meshreel.types import Mesh, MeshList
 from tests.metrics.shapes import moved, plane
-from tests.scenes import CELL, SEGMENT, ball, figure, of_body, overlap, room, with_room
+from tests.scenes import CELL, ball, figure, of_body, overlap, room, with_room
 
 NONE = Mesh.empty()
+pytestmark = pytest.mark.usefixtures("small_views")
 ROLLING = with_room([ball(0.5 + 0.25 * t) for t in range(6)])
 
 
@@ -31,7 +31,7 @@ def overlaps(frames: list[Mesh], found: ByPlace) -> list[float]:
 
 @pytest.fixture(scope="module")
 def rolling() -> ByPlace:
-    return segment(MeshList(tuple(ROLLING)), SEGMENT)
+    return segment(MeshList(tuple(ROLLING)))
 
 
 def test_a_ball_that_rolls_is_found_and_the_room_rests(rolling):
@@ -43,21 +43,23 @@ def test_a_ball_that_rolls_is_found_and_the_room_rests(rolling):
 
 def test_a_scene_whose_faces_are_inside_out_is_segmented_too(rolling):
     inside_out = [Mesh(mesh.vertices, np.ascontiguousarray(mesh.faces[:, ::-1])) for mesh in ROLLING]
-    found = segment(MeshList(tuple(inside_out)), SEGMENT)
+    found = segment(MeshList(tuple(inside_out)))
     assert min(overlaps(inside_out, found)) > 0.9
     assert np.array_equal(found.chosen, rolling.chosen)
 
 
-def test_frames_that_were_not_looked_at_are_labelled_as_well():
-    few = segment(MeshList(tuple(ROLLING)), replace(SEGMENT, places=PlacesOptions(frames=3)))
+def test_frames_that_were_not_looked_at_are_labelled_as_well(monkeypatch):
+    monkeypatch.setattr("meshreel.analysis.scene.places._FRAMES", 3)
+    few = segment(MeshList(tuple(ROLLING)))
     assert overlaps(ROLLING, few)[2] > 0.9  # where it was looked at; between, it is where nobody has looked
     assert min(overlaps(ROLLING, few)) > 0.3
 
 
-def test_a_body_present_only_between_inspected_frames_moves():
+def test_a_body_present_only_between_inspected_frames_moves(monkeypatch):
     """A ball that comes after a look and is gone before the next; but for its foot, two cells above the floor."""
     frames = with_room([NONE] * 4 + [ball(1.2)] * 2 + [NONE])
-    found = segment(MeshList(tuple(frames)), replace(SEGMENT, places=PlacesOptions(frames=3)))
+    monkeypatch.setattr("meshreel.analysis.scene.places._FRAMES", 3)
+    found = segment(MeshList(tuple(frames)))
     assert not found.chosen.any()  # nothing is known of it
     for number in (4, 5):
         moves = found.moving(number, frames[number])
@@ -69,7 +71,7 @@ def test_a_body_present_only_between_inspected_frames_moves():
 @pytest.mark.parametrize("body", [NONE, ball(1.2)], ids=["alone", "with a ball that lies"])
 def test_a_still_room_with_noise_has_no_moving_places(body):
     frames = with_room([body] * 6)
-    found = segment(MeshList(tuple(frames)), SEGMENT)
+    found = segment(MeshList(tuple(frames)))
     assert not found.chosen.any() and not found.moving(0, frames[0]).any()
 
 
@@ -85,7 +87,7 @@ def waving(mesh: Mesh, seed: int, height: float) -> Mesh:
 def test_noise_as_high_as_cells_does_not_make_a_room_move(height, least):
     """Cells are as wide as noise: with those of the edges' length 3 % and 91 % of the room would move here."""
     frames = [waving(mesh, seed, height * CELL) for seed, mesh in enumerate(ROLLING)]
-    found = segment(MeshList(tuple(frames)), SEGMENT)
+    found = segment(MeshList(tuple(frames)))
     assert found.cell < 1.3 * CELL and found.noise > 2 * CELL
     assert min(overlaps(frames, found)) >= least
     for number, mesh in enumerate(frames):
@@ -94,50 +96,50 @@ def test_noise_as_high_as_cells_does_not_make_a_room_move(height, least):
 
 def test_a_standing_person_who_swings_the_arms_is_found_whole():
     frames = with_room([figure(0.5 * t) for t in range(6)])
-    assert min(overlaps(frames, segment(MeshList(tuple(frames)), SEGMENT))) > 0.9
+    assert min(overlaps(frames, segment(MeshList(tuple(frames))))) > 0.9
 
 
 def test_moving_surface_below_the_least_area_is_not_found():
     frames = with_room([ball(0.5 + 0.25 * t, radius=0.06) for t in range(6)])
-    assert not segment(MeshList(tuple(frames)), SEGMENT).chosen.any()
+    assert not segment(MeshList(tuple(frames))).chosen.any()
 
 
 def test_a_ball_that_rests_for_half_of_the_time_is_found_there_too():
     frames = with_room([ball(0.5)] * 3 + [ball(0.5 + 0.3 * t) for t in range(1, 4)])
-    assert min(overlaps(frames, segment(MeshList(tuple(frames)), SEGMENT))) > 0.9
+    assert min(overlaps(frames, segment(MeshList(tuple(frames))))) > 0.9
 
 
 def test_the_order_of_time_does_not_matter(rolling):
-    back = segment(MeshList(tuple(ROLLING[::-1])), SEGMENT)  # other views, for other frames are first
+    back = segment(MeshList(tuple(ROLLING[::-1])))  # other views, for other frames are first
     for number, mesh in enumerate(ROLLING):
         assert overlap(back.moving(number, mesh), rolling.moving(number, mesh)) > 0.9
 
 
 def test_the_same_frames_give_the_same_segmentation(rolling):
-    again = segment(MeshList(tuple(ROLLING)), SEGMENT)
+    again = segment(MeshList(tuple(ROLLING)))
     assert again.keys.tobytes() == rolling.keys.tobytes() and again.chosen.tobytes() == rolling.chosen.tobytes()
 
 
 def test_scenes_far_from_the_origin_are_segmented_too():
     far = [moved(mesh, (1e6, -1e6, 2e6)) for mesh in ROLLING]
-    assert min(overlaps(far, segment(MeshList(tuple(far)), SEGMENT))) > 0.9
+    assert min(overlaps(far, segment(MeshList(tuple(far))))) > 0.9
 
 
 def test_empty_frames_are_passed_over_and_nothing_moves_where_there_is_nothing():
     frames = [ROLLING[0], NONE, *ROLLING[1:]]
-    found = segment(MeshList(tuple(frames)), SEGMENT)
+    found = segment(MeshList(tuple(frames)))
     assert overlap(found.moving(0, ROLLING[0]), of_body(ROLLING[0])) > 0.9
     assert found.moving(1, NONE).shape == (0,)
     for empty in ([NONE], [NONE] * 3):
-        assert not segment(MeshList(tuple(empty)), SEGMENT).moving(0, ROLLING[0]).any()
-    assert not segment(MeshList((ROLLING[0],)), SEGMENT).chosen.any()  # one frame: nothing can be said to move
+        assert not segment(MeshList(tuple(empty))).moving(0, ROLLING[0]).any()
+    assert not segment(MeshList((ROLLING[0],))).chosen.any()  # one frame: nothing can be said to move
 
 
 def test_edges_without_length_do_not_say_how_large_cells_are():
     flat = Mesh.of(np.zeros((3, 3)), [[0, 1, 2]])
     many = concatenate([*[flat] * 8000, room()])
-    assert 0.05 < segment(MeshList((many,) * 3), SEGMENT).lattice.size < 0.1
-    assert not segment(MeshList((flat,) * 3), SEGMENT).chosen.any()
+    assert 0.05 < segment(MeshList((many,) * 3)).lattice.size < 0.1
+    assert not segment(MeshList((flat,) * 3)).chosen.any()
 
 
 # a square of 8 x 8 cells of 1 cm, as two faces each
@@ -220,7 +222,7 @@ class Right(Masker):
 
 def test_masks_become_labels_and_unseen_faces_take_those_of_their_neighbours():
     masker = Right()
-    found = segment_by(masker, MeshList(tuple(ROLLING[:2])), SEGMENT)
+    found = segment_by(masker, MeshList(tuple(ROLLING[:2])))
     assert masker.observed == [0, 1]
     wanted = ROLLING[1].vertices[ROLLING[1].faces].mean(axis=1)[:, 0] > 1.2
     assert (found.moving(1, ROLLING[1]) == wanted).mean() > 0.97

@@ -1,18 +1,18 @@
 """Changes of a room: a box carried across it is background before, a body on the way, and background after."""
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from jaxtyping import Int64
 
-from meshreel.analysis.scene.background import BackgroundOptions
-from meshreel.analysis.scene.cut import CutOptions
+from meshreel.analysis.scene import cut, settle
 from meshreel.analysis.scene.labelling import ByPlace
-from meshreel.analysis.scene.places import Places, PlacesOptions, Tally
-from meshreel.analysis.scene.segmentation import SegmentOptions, segment
-from meshreel.analysis.scene.settle import NEVER, Rest, SettleOptions, find_rest
-from meshreel.analysis.scene.views import ViewsOptions
+from meshreel.analysis.scene.places import Places, Tally
+from meshreel.analysis.scene.segmentation import segment
+from meshreel.analysis.scene.settle import NEVER, Rest, find_rest
+from meshreel.analysis.scene.views import place_views
 from meshreel.analysis.survey import survey
 from meshreel.coding.background import decode_background, decode_change
 from meshreel.encoder.group.progress import Stages
@@ -27,12 +27,6 @@ from meshreel.geometry.voxels import Lattice, neighbours, spread
 from meshreel.types import Mesh, MeshList, Placement
 
 FRAMES, LIFTED, PUT = 28, 9, 18  # at 4 frames a second
-OPTIONS = SegmentOptions(
-    views=ViewsOptions(count=8, width=160, height=120),
-    places=PlacesOptions(frames=28),
-    cut=CutOptions(least=0.1),
-    settle=SettleOptions(rest=1.5, least=0.1),
-)
 
 
 def sheet(corner: tuple[float, ...], along: tuple[float, ...], across: tuple[float, ...], levels: int) -> Mesh:
@@ -64,6 +58,21 @@ def frame(number: int) -> Mesh:
     return concatenate([floor, wall, box((0.5 + 1.3 * share, 0.2 + lifted, 1.0))])
 
 
+CAMERAS = place_views([frame(0), frame(FRAMES // 2), frame(FRAMES - 1)], "y", 8, 160, 120)
+OPTIONS = SceneOptions(CAMERAS)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def of_seconds() -> Iterator[None]:
+    """Small areas count, and all frames are looked at: the scene has few."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("meshreel.analysis.scene.places._FRAMES", FRAMES)
+        patch.setattr(cut, "_LEAST", 0.1)
+        patch.setattr(settle, "_LEAST", 0.1)
+        patch.setattr(settle, "_REST", 1.5)
+        yield
+
+
 @pytest.fixture(scope="module")
 def scene() -> MeshList:
     return MeshList(tuple(frame(number) for number in range(FRAMES)), 4.0)
@@ -71,7 +80,7 @@ def scene() -> MeshList:
 
 @pytest.fixture(scope="module")
 def found(scene: MeshList) -> ByPlace:
-    return segment(scene, OPTIONS)
+    return segment(scene, CAMERAS)
 
 
 ROOM = 2 * 8192  # faces of floor and wall, which come first
@@ -84,15 +93,17 @@ def test_a_box_moves_only_while_it_is_carried(scene: MeshList, found: ByPlace) -
     assert all(found.moving(number, scene[number])[:ROOM].mean() < 0.05 for number in range(0, FRAMES, 5))
 
 
-def test_without_enough_rest_it_moves_always(scene: MeshList) -> None:
-    options = replace(OPTIONS, settle=SettleOptions(rest=20.0, still=20.0))
-    found = segment(scene, options)
+def test_without_enough_rest_it_moves_always(scene: MeshList, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(settle, "_REST", 20.0)
+    monkeypatch.setattr(settle, "_SHORT_REST", 20.0)
+    found = segment(scene, CAMERAS)
     assert found.rest.changes == []
     assert found.moving(0, scene[0])[ROOM:].mean() > 0.9
 
 
-def test_what_stands_still_as_a_thing_does_needs_no_long_rest(scene: MeshList) -> None:
-    found = segment(scene, replace(OPTIONS, settle=SettleOptions(rest=20.0, still=1.0)))
+def test_what_stands_still_as_a_thing_does_needs_no_long_rest(scene: MeshList, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(settle, "_REST", 20.0)
+    found = segment(scene, CAMERAS)
     assert len(found.rest.changes) == 2
 
 
@@ -104,9 +115,8 @@ def test_changes_are_two_of_the_frames(found: ByPlace) -> None:
 
 
 def test_the_background_has_a_patch_for_each_change(scene: MeshList) -> None:
-    options = SceneOptions(OPTIONS)
-    parts = take_apart(captured(scene), survey(scene), options, Stages(None, FRAMES))
-    states = encode_static(parts, FRAMES, 4.0, options.background)
+    parts = take_apart(captured(scene), survey(scene), OPTIONS, Stages(None, FRAMES))
+    states = encode_static(parts, FRAMES, 4.0, OPTIONS)
     assert [state.is_patch for state in states] == [False, True, True]
     place, rooms = Placement(parts.seen.unit, tuple(parts.seen.center)), [decode_background(states[0].payload)]
     for state in states[1:]:
@@ -124,9 +134,8 @@ def test_a_change_that_costs_more_than_its_bytes_may_is_a_whole_background(scene
         raise CostlyError(f"{len(payload)} bytes for {len(before.faces)} faces")
 
     monkeypatch.setattr("meshreel.encoder.scene.static.decode_change", costly)
-    options = SceneOptions(OPTIONS)
-    parts = take_apart(captured(scene), survey(scene), options, Stages(None, FRAMES))
-    states = encode_static(parts, FRAMES, 4.0, options.background)
+    parts = take_apart(captured(scene), survey(scene), OPTIONS, Stages(None, FRAMES))
+    states = encode_static(parts, FRAMES, 4.0, OPTIONS)
     assert [state.is_patch for state in states] == [False, False, False]
     place = Placement(parts.seen.unit, tuple(parts.seen.center))
     here, there = (np.array([x, 0.4, 1.0]) for x in (0.5, 1.8))
@@ -138,9 +147,8 @@ def test_a_change_that_costs_more_than_its_bytes_may_is_a_whole_background(scene
 def test_a_background_repeated_at_a_change_is_complete(scene: MeshList, found: ByPlace) -> None:
     """A viewer who joins in between waits for the next whole background; patches after it refer to its faces."""
     gone, came = found.rest.changes
-    room = BackgroundOptions(refresh=gone / 4.0)
-    parts = take_apart(captured(scene), survey(scene), SceneOptions(OPTIONS), Stages(None, FRAMES))
-    states = encode_static(parts, FRAMES, 4.0, room)
+    parts = take_apart(captured(scene), survey(scene), OPTIONS, Stages(None, FRAMES))
+    states = encode_static(parts, FRAMES, 4.0, replace(OPTIONS, refresh=gone / 4.0))
     whole = {frame: frame % gone == 0 for frame in sorted({*range(0, FRAMES, gone), came})}
     assert {state.frame: not state.is_patch for state in states} == whole
     place, mesh = Placement(parts.seen.unit, tuple(parts.seen.center)), Mesh.empty()
@@ -153,9 +161,8 @@ def test_a_background_repeated_at_a_change_is_complete(scene: MeshList, found: B
 
 
 def test_surface_that_settles_without_a_background_is_a_whole_background(scene: MeshList) -> None:
-    options = SceneOptions(OPTIONS)
-    parts = take_apart(captured(scene), survey(scene), options, Stages(None, FRAMES))
-    states = encode_static(replace(parts, background=Mesh.empty()), FRAMES, 4.0, options.background)
+    parts = take_apart(captured(scene), survey(scene), OPTIONS, Stages(None, FRAMES))
+    states = encode_static(replace(parts, background=Mesh.empty()), FRAMES, 4.0, OPTIONS)
     came = parts.changes[-1].frame
     assert [(state.frame, state.is_patch) for state in states] == [(came, False)]
     assert not decode_background(states[0].payload).is_empty
@@ -182,12 +189,12 @@ def stand(frames: int, seen_from: int, patch: slice) -> Places:
 
 
 def rests(places: Places, holds: bool) -> list[int]:
-    every, options = np.ones(len(places.keys), bool), SettleOptions(rest=10.0, still=2.0)
+    every = np.ones(len(places.keys), bool)
 
     def stands(groups: list[Int64[np.ndarray, " C"]], _numbers: list[int], _times: float) -> list[bool]:
         return [holds or len(group) > 200 for group in groups]
 
-    rest = find_rest(places, every, range(16), 4.0, options, stands)
+    rest = find_rest(places, every, range(16), 4.0, stands)
     return np.bincount(np.minimum(rest.since, 99), minlength=100)[[7, 99]].tolist()
 
 

@@ -7,9 +7,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from meshreel.analysis.scene.views import ViewsOptions, place_views
+from meshreel.analysis.scene.views import place_views
 from meshreel.analysis.scene.votes import Votes
 from meshreel.geometry.raycast import Rays
+from meshreel.types import Mesh
 from tests.metrics.shapes import sphere
 
 FACES = 7
@@ -45,7 +46,7 @@ def test_the_order_of_the_views_does_not_matter(ids, masks):
 
 def test_a_mask_of_one_half_of_a_ball_finds_that_half():
     ball = sphere(levels=4)
-    views = place_views([ball], ViewsOptions(count=12, width=160, height=120, reach=3.0))
+    views = place_views([ball, Mesh(3 * ball.vertices, ball.faces[:, ::-1])], "y", 12, 160, 120)
     rays = Rays(ball)
     ids = np.stack([rays.look(view).faces for view in views])
     assert ids.shape == (12, 120, 160) and ids.dtype == np.int32

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from meshreel.coding.appearance.pictures import MOST_CODED, VideoEncoder, VideoOptions, coded_pictures, to_i420
+from meshreel.coding.appearance.pictures import MOST_CODED, VideoEncoder, coded_pictures, to_i420
 from meshreel.errors import FormatError
 from meshreel.format.layout import VideoCodec
 
@@ -49,7 +49,7 @@ def test_access_units_have_one_picture(packet: bytes):
 @pytest.mark.parametrize("codec", VideoCodec)
 def test_what_the_encoders_make_is_legal(codec: VideoCodec):
     pytest.importorskip("av")
-    encoder, found = VideoEncoder(64, 32, VideoOptions(), codec), list[bytes]()
+    encoder, found = VideoEncoder(64, 32, codec=codec), list[bytes]()
     noise = np.random.default_rng(0)
     for _ in range(40):
         found += encoder.add(to_i420(noise.integers(0, 256, (32, 64, 3)).astype(np.uint8)))

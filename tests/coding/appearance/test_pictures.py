@@ -14,7 +14,6 @@ from meshreel.coding.appearance.pictures import (
     BAND,
     VideoDecoder,
     VideoEncoder,
-    VideoOptions,
     decode_pictures,
     encode_pictures,
     from_i420,
@@ -34,7 +33,7 @@ PICTURES = [
 
 
 def packets(crf: int = 20, codec: VideoCodec = VideoCodec.AV1) -> list[bytes]:
-    encoder, found = VideoEncoder(96, 64, VideoOptions(crf), codec), list[bytes]()
+    encoder, found = VideoEncoder(96, 64, crf, codec), list[bytes]()
     for one in PICTURES:
         found += encoder.add(to_i420(one))
     return found + encoder.finish()
@@ -44,7 +43,7 @@ def packets(crf: int = 20, codec: VideoCodec = VideoCodec.AV1) -> list[bytes]:
     not hasattr(os, "sched_getscheduler") or os.geteuid() != 0, reason="SVT makes threads urgent on Linux, as root"
 )
 def test_encoding_leaves_no_thread_more_urgent_than_it_was() -> None:
-    encoder, before = VideoEncoder(96, 64, VideoOptions()), os.sched_getscheduler(0)
+    encoder, before = VideoEncoder(96, 64), os.sched_getscheduler(0)
     encoder.add(to_i420(PICTURES[0]))
     threads = [int(task.name) for task in Path("/proc/self/task").iterdir()]
     assert len(threads) > 3  # SVT's own
@@ -153,9 +152,9 @@ def test_a_layer_of_a_background_has_at_most_64_pictures() -> None:
 def test_without_pyav_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "av", None)
     with pytest.raises(InputError, match=r"meshreel\[color\]"):
-        VideoEncoder(96, 64, VideoOptions())
+        VideoEncoder(96, 64)
 
 
 def test_options_out_of_range_are_refused() -> None:
     with pytest.raises(InputError, match="crf 64"):
-        VideoOptions(crf=64)
+        VideoEncoder(96, 64, 64)

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from meshreel.coding.appearance.splats import SplatCodingOptions, decode_splats, encode_splats
+from meshreel.coding.appearance.splats import decode_splats, encode_splats
 from meshreel.coding.entropy import encode_integers
 from meshreel.coding.steps import RUNGS
 from meshreel.errors import FormatError, InputError
@@ -21,7 +21,11 @@ FACES, COUNT = 500, 1000
 WANTED = some_splats(COUNT, FACES)
 IMPORTANCE = np.random.default_rng(1).uniform(0, 1, COUNT)
 DATA, ENDS = encode_splats(WANTED, IMPORTANCE)
-ONE_LAYER = SplatCodingOptions(layers=(1.0,))
+
+
+@pytest.fixture
+def one_layer(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("meshreel.coding.appearance.splats.LAYERS", (1.0,))
 
 
 def matched(found: Splats) -> np.ndarray:
@@ -44,9 +48,10 @@ def test_splats_come_back_within_half_a_step() -> None:
     assert apart[is_long].max() <= np.pi / 128 + 1e-9 and not found.turns[~is_long].any()
 
 
+@pytest.mark.usefixtures("one_layer")
 def test_what_was_decoded_loses_nothing_more() -> None:
-    once = decode_splats(encode_splats(WANTED, IMPORTANCE, ONE_LAYER)[0], FACES)
-    again = decode_splats(encode_splats(once, np.ones(COUNT), ONE_LAYER)[0], FACES)
+    once = decode_splats(encode_splats(WANTED, IMPORTANCE)[0], FACES)
+    again = decode_splats(encode_splats(once, np.ones(COUNT))[0], FACES)
     for name in ("faces", "offsets", "scales", "opacities"):
         np.testing.assert_allclose(np.sort(getattr(again, name), axis=0), np.sort(getattr(once, name), axis=0))
 
@@ -79,16 +84,14 @@ def test_values_without_a_code_are_refused(changed: dict[str, np.ndarray], named
         encode_splats(replace(WANTED, **changed), IMPORTANCE)
 
 
-def test_no_splats_and_wrong_options_are_refused() -> None:
+def test_no_splats_are_refused() -> None:
     with pytest.raises(InputError, match="no splats"):
         encode_splats(WANTED.take(np.zeros(0, np.int64)), IMPORTANCE[:0])
-    for wrong in ({"place_bits": 15}, {"offset_step": 0.0}, {"layers": (0.5,)}, {"layers": (0.5, 0.5, 1.0)}):
-        with pytest.raises(InputError, match="give"):
-            SplatCodingOptions(**wrong)
 
 
+@pytest.mark.usefixtures("one_layer")
 def test_damaged_splats_are_refused() -> None:
-    data, _ = encode_splats(WANTED, IMPORTANCE, ONE_LAYER)
+    data, _ = encode_splats(WANTED, IMPORTANCE)
     head, offset = unpack(Gaussians, data)
     layer, _ = unpack(GaussiansLayer, data, offset)
 

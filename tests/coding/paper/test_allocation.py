@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from meshreel.coding import entropy, klt
 from meshreel.coding.paper import laplacian
@@ -50,12 +51,15 @@ def test_the_chosen_number_of_components_is_no_worse_than_any_fixed_one() -> Non
     assert cost(None) <= 1.03 * best
 
 
-def test_a_price_on_bits_saves_more_bytes_than_a_coarser_step_of_equal_error() -> None:
+def test_a_price_on_bits_saves_more_bytes_than_a_coarser_step_of_equal_error(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     base = icosahedron(4)
     field = moving(base)
 
     def coded(step: float, price: float) -> tuple[int, float]:
-        data = encode_displacements(field, base, DisplacementOptions(step=step, price=price, anchor_count=6))
+        monkeypatch.setattr("meshreel.coding.paper.allocation.PRICE", price)
+        data = encode_displacements(field, base, DisplacementOptions(step=step, anchor_count=6))
         return len(data), rms(decode_displacements(data, base) - field)
 
     size, error = coded(5e-4, 0.5)

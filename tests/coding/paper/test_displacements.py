@@ -54,8 +54,10 @@ def test_the_error_stays_in_proportion_to_the_step(base: Mesh, step: float) -> N
 
 @pytest.mark.parametrize("rule", list(AnchorRule))
 @pytest.mark.parametrize("count", [0, 3, 100, 10_000])
-def test_any_anchors_decode(rule: AnchorRule, count: int) -> None:
-    options = DisplacementOptions(anchor_rule=rule, anchor_count=count, anchor_weight=3, price=0.0)
+def test_any_anchors_decode(rule: AnchorRule, count: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("meshreel.coding.paper.displacements.ANCHORS", rule)
+    monkeypatch.setattr("meshreel.coding.paper.allocation.PRICE", 0.0)
+    options = DisplacementOptions(anchor_count=count, anchor_weight=3)
     decoded = decode_displacements(encode_displacements(FIELD, BASE, options), BASE)
     assert rms(decoded - FIELD) < 20e-3
 

@@ -19,7 +19,8 @@ from meshreel.encoder.appearance import colors as appearance
 from meshreel.encoder.run.surveying import Excerpt, read_survey
 from meshreel.encoder.sequence import Encoder
 from meshreel.encoder.settings.options import as_installed
-from meshreel.encoder.settings.presets import appearance_options, preset_options
+from meshreel.encoder.settings.presets import appearance_options
+from meshreel.encoder.settings.settings import Settings
 from meshreel.errors import FormatError, InputError
 from meshreel.format import budget
 from meshreel.format.layout import ChunkKind
@@ -256,17 +257,17 @@ def test_parts_of_a_sequence_are_joined_with_their_colors(tmp_path: Path) -> Non
 
 def test_missing_packages_leave_colors_of_vertices(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(appearance, "find_spec", lambda name: None if name == "av" else name)
-    options, warnings = as_installed(preset_options())
+    options, warnings = as_installed(Settings().resolved())
     assert options.appearance.texture is None and "meshreel[color]" in warnings[0]
     with pytest.raises(InputError, match=r"av missing; pip install"):
-        as_installed(preset_options(color="texture"))
-    assert as_installed(preset_options(color="none"))[1] == ()
+        as_installed(Settings(color="texture").resolved())
+    assert as_installed(Settings(color="none").resolved())[1] == ()
 
 
 def test_ways_of_colors_out_of_range_are_refused() -> None:
     none = {"color": "none", "texture": 512}, {"color": "none", "compatible": True}
     for wrong in ({"color": "red"}, {"color_quality": 101.0}, {"texture": 300}, *none):
         with pytest.raises(InputError):
-            preset_options(**wrong)  # type: ignore[arg-type]
-    assert preset_options(color="none").appearance is None
-    assert preset_options(color="vertices").appearance.texture is None
+            Settings(**wrong).resolved()  # type: ignore[arg-type]
+    assert Settings(color="none").resolved().appearance is None
+    assert Settings(color="vertices").resolved().appearance.texture is None

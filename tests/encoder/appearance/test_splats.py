@@ -5,14 +5,16 @@ from __future__ import annotations
 import gzip
 import io
 import struct
+from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 from itertools import accumulate
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from meshreel.analysis.appearance.splat_fit import FitSplatsOptions
+from meshreel.analysis.appearance.splat_fit import fit_splats
 from meshreel.cli.decode import command as decode
 from meshreel.cli.splats import compare_splats
 from meshreel.coding.intra import encode_intra
@@ -21,10 +23,9 @@ from meshreel.container.sources import BytesSource
 from meshreel.container.writer import Companion, ReelWriter
 from meshreel.decoder.video import Video
 from meshreel.decoder.video import open as open_video
-from meshreel.encoder.appearance.options import SplatOptions
 from meshreel.encoder.sequence import encode
 from meshreel.encoder.settings.options import EncoderOptions, as_installed
-from meshreel.encoder.settings.presets import preset_options
+from meshreel.encoder.settings.settings import Settings
 from meshreel.errors import FormatError, InputError
 from meshreel.export.splats import write_splats
 from meshreel.format.layout import ChunkKind
@@ -46,12 +47,21 @@ def ball(frames: int = FRAMES) -> MeshList:
 def options(preset: str = "best", group_size: int = 3) -> EncoderOptions:
     centers = 60 if preset == "paper" else None
     basis = 2 if preset == "paper" else None
-    found = preset_options(
+    found = Settings(
         preset, basis_size=basis, group_size=group_size, centers=centers, color="vertices", splats=200
-    )
-    assert found.appearance is not None
-    drawn = SplatOptions(FitSplatsOptions(200, 60), frames=3, views=4, size=64)
-    return replace(found, scene=None, appearance=replace(found.appearance, splats=drawn))
+    ).resolved()
+    return replace(found, scene=None)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def small_splats() -> Iterator[None]:
+    """Few pictures, and small ones."""
+    module = "meshreel.encoder.appearance.splats"
+    with pytest.MonkeyPatch.context() as patch:
+        for name, value in (("FRAMES", 3), ("VIEWS", 4), ("SIZE", 64)):
+            patch.setattr(f"{module}.{name}", value)
+        patch.setattr(f"{module}.fit_splats", partial(fit_splats, steps=60))
+        yield
 
 
 @pytest.fixture(scope="module")
@@ -104,7 +114,7 @@ def test_a_sequence_without_colours_is_refused(tmp_path) -> None:
         encode(plain, tmp_path / "x.reel", options=options())
     assert not list(tmp_path.glob("*.reel"))
     with pytest.raises(InputError, match="splats are fitted to colours"):
-        preset_options(color="none", splats=100)
+        Settings(color="none", splats=100).resolved()
 
 
 def test_without_torch_nothing_is_encoded_and_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:

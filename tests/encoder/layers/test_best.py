@@ -15,7 +15,7 @@ from meshreel.format.layout import Form
 from meshreel.metrics.comparison import ComparisonOptions, compare_sequences
 from meshreel.metrics.distance import surface_errors
 from meshreel.types import Mesh, MeshList
-from tests.small_options import quick, with_method
+from tests.small_options import quick, resolve_small, with_method
 from tests.spheres import sliding_sphere
 
 OPTIONS = quick(group_size=2, key_interval=0.2)
@@ -110,7 +110,7 @@ def test_the_summary_agrees_with_measurements_of_the_file(written):
 
 
 def test_without_options_preset_best_is_taken(tmp_path, monkeypatch):
-    monkeypatch.setattr("meshreel.encoder.sequence.preset_options", quick)
+    resolve_small(monkeypatch.setattr)
     encode(MeshList((BALLS[0],)), tmp_path / "a.reel")
     with meshreel.open(tmp_path / "a.reel") as video:
         assert (video.reader.metadata["preset"], video.reader.metadata["quality"]) == ("best", 50)

@@ -19,7 +19,7 @@ from meshreel.types import Mesh
 from tests.small_options import quick
 from tests.spheres import sliding_sphere
 
-OPTIONS = replace(quick(group_size=4).method, tails=None)
+OPTIONS = replace(quick(group_size=4).method, tails=False)
 BALL = Mesh.of(sliding_sphere(1)[0].vertices / 12**0.5, sliding_sphere(1)[0].faces)
 FRAMES = [Mesh.of(BALL.vertices + [0.01 * t, 0, 0], BALL.faces) for t in range(3)]
 

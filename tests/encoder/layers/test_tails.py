@@ -9,15 +9,14 @@ import pytest
 
 import meshreel
 from meshreel.analysis.fit import closeness
-from meshreel.analysis.follow.embedded import EmbeddedOptions
 from meshreel.coding.group import payload_bytes_by_purpose
 from meshreel.coding.layers.patches import decode_patches
 from meshreel.encoder.group.target import Fidelity, measure
 from meshreel.encoder.layers import tails
-from meshreel.encoder.layers.tails import TailOptions, find_tails
+from meshreel.encoder.layers.tails import find_tails
 from meshreel.encoder.sequence import encode
 from meshreel.encoder.settings.options import EncoderOptions
-from meshreel.encoder.settings.presets import preset_options
+from meshreel.encoder.settings.settings import Settings
 from meshreel.format.records import pack
 from meshreel.geometry.cameras import Camera
 from meshreel.geometry.depth import DepthPicture, FreeSpace
@@ -76,14 +75,16 @@ def test_surface_that_is_new_is_added() -> None:
     assert measure(frames, found.frames).distance < 0.3 * measure(frames, plain).distance
 
 
-def test_without_shares_nothing_is_added() -> None:
+def test_without_shares_nothing_is_added(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("meshreel.encoder.layers.tails.SHARES", ())
     frames = [BALL] * 5 + [both(BALL, knob())]
-    assert find_tails(frames, meshes(noisy(BALL), BALL.faces), SIZE, TailOptions(shares=()), noise=0.0) is None
+    assert find_tails(frames, meshes(noisy(BALL), BALL.faces), SIZE, noise=0.0) is None
 
 
-def test_where_bytes_are_dear_nothing_is_sent() -> None:
+def test_where_bytes_are_dear_nothing_is_sent(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("meshreel.encoder.layers.tails.EXCHANGE", 1e9)
     frames = [BALL] * 5 + [both(BALL, knob(0.004, 0.32))]
-    assert find_tails(frames, meshes(noisy(BALL), BALL.faces), SIZE, TailOptions(exchange=1e9), noise=0.0) is None
+    assert find_tails(frames, meshes(noisy(BALL), BALL.faces), SIZE, noise=0.0) is None
 
 
 def sheet(step: float = 0.05) -> Mesh:
@@ -153,7 +154,7 @@ def meshes(positions: np.ndarray, faces: np.ndarray) -> list[Mesh]:
 
 def options(**changes: object) -> EncoderOptions:
     """`best`, all frames in one group."""
-    best = preset_options("best", 40.0, group_size=4)
+    best = Settings("best", 40.0, group_size=4).resolved()
     plan = replace(best.method.plan, limit=1e6, worth=1e6)
     return with_method(best, plan=plan, target=Fidelity(0.01, 90.0, 0.01), **changes)
 
@@ -166,9 +167,9 @@ def sequence() -> MeshList:
 
 
 def test_a_file_has_the_layer_where_it_pays_and_plays_without_it(sequence: MeshList, tmp_path, monkeypatch) -> None:
-    patient = EmbeddedOptions(lost=1.0)  # else the frame with the knob is a group of its own
+    monkeypatch.setattr("meshreel.analysis.follow.embedded.LOST", 1.0)  # else the frame with the knob is alone
     monkeypatch.setattr(closeness, "WRONG", 1.0)
-    encode(sequence, tmp_path / "with.reel", options=options(embedded=patient))
+    encode(sequence, tmp_path / "with.reel", options=options())
     patched = meshreel.open(tmp_path / "with.reel")
     assert payload_bytes_by_purpose(patched.reader.read_chunk(0))["patches"] > 0
     levels = len(patched.reader.chunks[0].layers) - 2
@@ -180,7 +181,7 @@ def test_a_file_has_the_layer_where_it_pays_and_plays_without_it(sequence: MeshL
 
 
 def test_tails_can_be_switched_off(sequence: MeshList, tmp_path) -> None:
-    encode(sequence, tmp_path / "without.reel", options=options(tails=None))
+    encode(sequence, tmp_path / "without.reel", options=options(tails=False))
     assert "patches" not in payload_bytes_by_purpose(meshreel.open(tmp_path / "without.reel").reader.read_chunk(0))
 
 

@@ -14,7 +14,7 @@ from meshreel.format.layout import Form
 from tests.spheres import sliding_sphere
 
 BALLS = list(sliding_sphere(2, levels=1))
-OPTIONS = IntraOptions(fractions=(1.0,), steps=(0.7,), levels=(0,))
+OPTIONS = IntraOptions(fractions=(1.0,), steps=(0.7,))
 ASKED = Fidelity(distance=0.002, angle=30.0, worst=0.004)
 
 

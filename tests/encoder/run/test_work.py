@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from meshreel.encoder.sequence import encode
-from meshreel.encoder.settings.presets import preset_options
+from meshreel.encoder.settings.settings import Settings
 from meshreel.format.layout import Form
 from meshreel.io.sequence import SequenceOptions, open_sequence
 from meshreel.types import Mesh, MeshList
-from tests.scenes import ball, quick_scene, with_room
+from tests.scenes import ball, with_room
 from tests.shared_data import performer
 from tests.small_options import quick
 from tests.spheres import sliding_sphere
@@ -43,13 +43,13 @@ def test_a_body_that_is_followed_is_tracked_and_fitted_once(tmp_path):
 
 def test_frames_of_a_room_are_read_once_and_tracked_and_fitted_once(tmp_path):
     frames = with_room([ball(0.5 + 0.35 * t) for t in range(4)])
-    work = encode(MeshList(tuple(frames)), tmp_path / "a.reel", options=quick_scene(group_size=4)).work
+    work = encode(MeshList(tuple(frames)), tmp_path / "a.reel", options=quick(group_size=4)).work
     assert work["frames read"] == 4 and work["frames fitted"] <= 4 and work["frames tracked"] <= 4
 
 
 @pytest.mark.slow
 def test_a_hard_body_is_fitted_at_most_two_and_a_half_times_a_frame(tmp_path):
     frames = open_sequence(performer("basketball_player"), SequenceOptions(scale=0.1))
-    summary = encode(frames, tmp_path / "a.reel", options=preset_options())
+    summary = encode(frames, tmp_path / "a.reel", options=Settings().resolved())
     assert summary.work["frames fitted"] <= 2.5 * 10 and summary.work["frames tracked"] <= 2.5 * 10
     assert summary.work["frames read"] == 10 and summary.work.get("surfaces fused", 0) == 0

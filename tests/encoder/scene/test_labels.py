@@ -9,9 +9,9 @@ from meshreel.geometry.topology import concatenate
 from meshreel.types import Mesh, MeshList
 from tests.encoder.scene.test_scene import ALL, NONE, SMALL, at
 from tests.metrics.shapes import moved, sphere
-from tests.scenes import quick_scene
+from tests.small_options import quick
 
-OPTIONS = quick_scene(key_interval=2.0)
+OPTIONS = quick(key_interval=2.0)
 COUNT = len(SMALL.faces)
 
 

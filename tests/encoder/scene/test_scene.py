@@ -12,7 +12,6 @@ import pytest
 
 import meshreel
 import meshreel.encoder.scene.scene as scene
-from meshreel.analysis.scene.background import BackgroundOptions
 from meshreel.analysis.scene.labelling import ByPlace
 from meshreel.analysis.scene.segmentation import scene_views
 from meshreel.analysis.scene.settle import Rest
@@ -29,7 +28,7 @@ from meshreel.encoder.scene.scene import CodedBodies, encode_bodies
 from meshreel.encoder.scene.static import encode_static
 from meshreel.encoder.scene.tracks import TrackGroup
 from meshreel.encoder.sequence import Encoder, encode
-from meshreel.encoder.settings.options import EncoderOptions
+from meshreel.encoder.settings.options import EncoderOptions, SceneOptions
 from meshreel.errors import InputError
 from meshreel.format.checks import MOST_TRACKS
 from meshreel.format.layout import Form
@@ -40,12 +39,13 @@ from meshreel.geometry.voxels import Lattice
 from meshreel.types import Mesh, MeshList, Placement
 from tests import small_scene
 from tests.metrics.shapes import moved, plane, sphere
-from tests.scenes import CELL, NOISE, RADIUS, SIDE, ball, of_body, quick_scene, room, with_room
+from tests.scenes import CELL, NOISE, RADIUS, SIDE, ball, of_body, room, with_room
+from tests.small_options import quick
 
 NONE = Mesh.empty()
 BODIES = [ball(0.5 + 0.35 * t) for t in range(4)]
 ROLLING = with_room(BODIES)
-OPTIONS = quick_scene(group_size=3)
+OPTIONS = quick(group_size=3)
 FAR = np.array([1e6, -1e6, 2e6])
 
 
@@ -148,22 +148,22 @@ def test_a_scene_that_is_encoded_again_is_taken_apart_once(tmp_path, monkeypatch
     monkeypatch.setattr("meshreel.encoder.sequence.take_apart", lambda *args: count.append(1) or take_apart(*args))
     encoder = Encoder(MeshList(tuple(ROLLING), 4.0))
     for quality in (30, 60):
-        encoder.encode(tmp_path / f"{quality}.reel", quick_scene(quality=quality))
+        encoder.encode(tmp_path / f"{quality}.reel", quick(quality=quality))
     assert len(count) == 1
-    encoded(ROLLING, tmp_path / "alone.reel", quick_scene(quality=60), rate=4.0)
+    encoded(ROLLING, tmp_path / "alone.reel", quick(quality=60), rate=4.0)
     assert (tmp_path / "alone.reel").read_bytes() == (tmp_path / "60.reel").read_bytes()
-    other = quick_scene(quality=60)
-    encoder.encode(tmp_path / "other.reel", in_scene(other, threshold=0.4))
+    other = quick(quality=60)
+    encoder.encode(tmp_path / "other.reel", in_scene(other, from_depth=False))
     assert len(count) == 3
     for _ in range(2):  # cameras of the same numbers, made anew
-        views = scene_views(MeshList(tuple(ROLLING), 4.0), other.scene.segment)
+        views = scene_views(MeshList(tuple(ROLLING), 4.0))
         cameras = tuple(replace(view, extrinsic=view.extrinsic.copy()) for view in views)
         encoder.encode(tmp_path / "given.reel", in_scene(other, cameras=cameras))
     assert len(count) == 4
 
 
 def test_preset_paper_has_scenes_too(tmp_path):
-    options = quick_scene("paper", group_size=1)
+    options = quick(preset="paper", group_size=1)
     video, summary = encoded(ROLLING, tmp_path / "a.reel", options)
     assert summary.scene is not None and len(statics(video)) == 1
     assert_rolls(video)
@@ -177,9 +177,9 @@ def test_bodies_need_not_be_nearer_to_noisy_frames_than_the_truth_is(preset, mon
         "encode_intervals",
         lambda job, some: coded(job, (noises.append(i.noise) or i for i in some)),
     )
-    video, _ = encoded(ROLLING, tmp_path / "a.reel", quick_scene(preset, group_size=1))
+    video, _ = encoded(ROLLING, tmp_path / "a.reel", quick(preset=preset, group_size=1))
     assert noises
-    target = quick_scene(preset).method.target
+    target = quick(preset=preset).method.target
     for noise in noises:
         assert 0.5 * NOISE < noise * video.reader.header.scale < 3 * NOISE
         clean = target_of(ROLLING, target, 0.0).distance
@@ -189,7 +189,7 @@ def test_bodies_need_not_be_nearer_to_noisy_frames_than_the_truth_is(preset, mon
 def test_where_everything_may_move_no_background_is_looked_for(tmp_path, monkeypatch):
     monkeypatch.setattr("meshreel.encoder.sequence.is_scene", None)
     small = [Mesh.of(plane(1.0, 6).vertices, plane(1.0, 6).faces)] * 2
-    options = replace(quick_scene("paper", group_size=1), scene=None)
+    options = replace(quick(preset="paper", group_size=1), scene=None)
     video, summary = encoded(small, tmp_path / "a.reel", options)
     assert summary.scene is None and not statics(video) and rms(small[1].vertices, video[1]) < 0.01
 
@@ -204,7 +204,7 @@ def test_where_nothing_moves_the_file_is_a_background(tmp_path):
 
 def test_where_all_moves_there_is_no_scene(tmp_path):
     frames = [moved(plane(1.0, 6), (0.4 * t, 0.3 * t, 0.5 * t)) for t in range(2)]
-    video, summary = encoded(frames, tmp_path / "a.reel", quick_scene("paper", group_size=1))
+    video, summary = encoded(frames, tmp_path / "a.reel", quick(preset="paper", group_size=1))
     assert summary.scene is None and rms(frames[1].vertices, video[1]) < 0.01
 
 
@@ -254,7 +254,7 @@ def test_a_vertex_that_no_face_has_does_not_make_the_scene_larger(tmp_path):
 
 @pytest.mark.usefixtures("plainly")
 def test_the_background_may_be_sent_again(tmp_path):
-    options = replace(OPTIONS, scene=replace(OPTIONS.scene, background=BackgroundOptions(frames=4, refresh=0.2)))
+    options = in_scene(OPTIONS, refresh=0.2)
     video, summary = encoded(ROLLING, tmp_path / "a.reel", options, rate=10.0)
     assert len(statics(video)) == 2
     assert_rolls(video)
@@ -391,10 +391,7 @@ def test_a_background_is_no_finer_than_its_noise_asks_for():
     seen = replace(survey(MeshList((room(),))), scale=1.0)
     sizes = []
     for noise in (0.0, 0.002, 0.01):
-        parts, options = (
-            Parts(seen, ALL, with_room([NONE], sigma=0.002)[0], [], CELL, noise, noise),
-            BackgroundOptions(),
-        )
+        parts, options = Parts(seen, ALL, with_room([NONE], sigma=0.002)[0], [], CELL, noise, noise), SceneOptions()
         payload = encode_static(parts, 1, 30.0, options)[0].payload
         place = Placement(1.0, tuple(seen.center))
         away = rms(parts.background.vertices, decode_background(payload, place))
@@ -436,7 +433,7 @@ def test_still_surface_that_is_in_no_part_of_the_file_gives_a_warning(tmp_path):
 def test_a_scene_that_is_not_in_metres_is_refused_with_its_size(tmp_path):
     small = MeshList(tuple(Mesh(mesh.vertices * 1e-3, mesh.faces) for mesh in small_scene.scene(4)), 10.0)
     with pytest.raises(InputError, match=r"frame 0: \d+ of \d+ faces stand still.*is 0\.00\d+ m large.*--scale"):
-        encode(small, tmp_path / "a.reel", options=quick_scene())
+        encode(small, tmp_path / "a.reel", options=quick())
     assert list(tmp_path.iterdir()) == []
 
 
@@ -446,5 +443,5 @@ def test_a_frame_in_another_unit_is_refused_by_its_number(tmp_path):
     with pytest.raises(
         InputError, match=r"frame 2 is 3\.\d+e\+03 m large, half of the frames at most 3\.\d+ m; correct its unit"
     ):
-        encode(MeshList(tuple(frames), 10.0), tmp_path / "a.reel", options=quick_scene())
+        encode(MeshList(tuple(frames), 10.0), tmp_path / "a.reel", options=quick())
     assert list(tmp_path.iterdir()) == []

@@ -1,27 +1,54 @@
-"""Presets: one name and one quality set every option."""
+"""Settings and presets: what a user chooses sets every option, and is said once."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+import inspect
+from dataclasses import fields, replace
 from itertools import pairwise
 
 import pytest
 
 from meshreel.encoder.layers.options import LayersOptions
 from meshreel.encoder.paper.options import PaperOptions
+from meshreel.encoder.sequence import encode
 from meshreel.encoder.settings.options import EncoderOptions
-from meshreel.encoder.settings.presets import EFFORTS, PRESETS, displacement_step, preset_options, reference_vertices
+from meshreel.encoder.settings.presets import displacement_step, reference_vertices
+from meshreel.encoder.settings.settings import EFFORTS, PRESETS, Settings
 from meshreel.errors import InputError
 
 
 def test_the_default_options_are_those_that_encode_takes_by_default():
-    assert EncoderOptions() == preset_options() == preset_options("best", 50.0)
-    assert preset_options("paper").method == PaperOptions()
+    assert EncoderOptions() == Settings().resolved() == Settings("best", 50.0).resolved()
+    assert Settings("paper").resolved().method == PaperOptions()
+
+
+def test_encode_takes_the_settings_as_keywords_with_the_same_defaults_and_types():
+    keywords = inspect.signature(encode).parameters
+    for field in fields(Settings):
+        assert (keywords[field.name].default, keywords[field.name].annotation) == (field.default, field.type)
+
+
+def test_every_setting_reaches_its_option():
+    assert Settings(dynamic_only=True).resolved().scene is None
+    assert Settings(background_refresh=2.0).resolved().scene.refresh == 2.0
+    assert Settings(group_size=7).resolved().method.group_size == 7
+    assert Settings(key_interval=1.5).resolved().key_interval == 1.5
+    assert Settings("paper", basis_size=3, centers=80).resolved().method.displacements.basis_size == 3
+    textures = Settings(color="texture", texture=256, compatible=True, splats=9).resolved().appearance
+    assert textures.texture.always and textures.texture.compatible
+    assert (textures.texture.size, textures.splats) == (256, 9)
+    assert Settings(color_quality=80).resolved().appearance.color_step < Settings().resolved().appearance.color_step
+
+
+@pytest.mark.parametrize("wrong", [{"background_refresh": 0.0}, {"background_refresh": 1.0, "dynamic_only": True}])
+def test_refreshes_that_make_no_sense_are_refused(wrong):
+    with pytest.raises(InputError, match="background refresh"):
+        Settings(**wrong)
 
 
 def test_the_laplacian_form_follows_the_quality():
     for quality in (0, 25, 50, 100):
-        steps = {preset_options(preset, quality).method.displacements.step for preset in PRESETS[1:]}
+        steps = {Settings(preset, quality).resolved().method.displacements.step for preset in PRESETS[1:]}
         assert steps == {displacement_step(quality)}
 
 
@@ -31,17 +58,17 @@ def test_more_quality_means_finer_steps_and_more_vertices():
     vertices = [reference_vertices(q) for q in qualities]
     assert steps == sorted(steps, reverse=True) and vertices == sorted(vertices)
     assert len(set(steps)) == len(set(vertices)) == len(qualities)
-    best = [preset_options("best", q).method for q in qualities]
-    assert all(a.layers.step > b.layers.step and a.template.error > b.template.error for a, b in pairwise(best))
+    best = [Settings("best", q).resolved().method for q in qualities]
+    assert all(a.layers.step > b.layers.step and a.template_error > b.template_error for a, b in pairwise(best))
     assert all(a.target.distance > b.target.distance for a, b in pairwise(best))
 
 
 def test_above_the_knee_steps_fall_faster_and_at_the_top_the_target_must_be_reached():
-    low, knee, high, top = (preset_options("best", quality).method for quality in (60, 85, 97, 100))
+    low, knee, high, top = (Settings("best", quality).resolved().method for quality in (60, 85, 97, 100))
     assert low.layers.step == pytest.approx(2 * knee.layers.step) and knee.flat == high.flat == low.flat
     assert high.layers.step < knee.layers.step / 2 and high.target.angle == low.target.angle
     assert top.flat == 1.0 and top.target.angle < 2.5 and top.target.distance < 1e-4  # 80 dB of the diagonal
-    first = preset_options("best", 99).method  # the first that may give way to Draco: less fine
+    first = Settings("best", 99).resolved().method  # the first that may give way to Draco: less fine
     assert first.target.distance > top.target.distance and 2.0 > first.target.angle > top.target.angle
     assert set(top.intra.fractions) > set(high.intra.fractions) - {0.25, 0.5}
 
@@ -49,28 +76,28 @@ def test_above_the_knee_steps_fall_faster_and_at_the_top_the_target_must_be_reac
 @pytest.mark.parametrize("quality", [-1, 100.5, float("nan")])
 def test_a_quality_out_of_range_is_refused_with_its_value(quality):
     with pytest.raises(InputError, match="0 to 100"):
-        preset_options(quality=quality)
+        Settings(quality=quality).resolved()
 
 
 def test_an_unknown_preset_is_refused_by_name():
     with pytest.raises(InputError, match="'worst'; known: best, paper, paper-literal"):
-        preset_options("worst")
+        Settings("worst").resolved()
 
 
 def test_options_of_the_other_preset_are_refused_with_the_remedy():
     with pytest.raises(InputError, match=r"basis size 4: .*use preset `paper`"):
-        preset_options(basis_size=4)
+        Settings(basis_size=4).resolved()
     with pytest.raises(InputError, match=r"centers 300: .*use preset `paper`"):
-        preset_options(centers=300)
+        Settings(centers=300).resolved()
     with pytest.raises(InputError, match=r"key interval 2: .*`paper`"):
-        preset_options("paper", key_interval=2.0)
+        Settings("paper", key_interval=2.0).resolved()
 
 
 def test_the_literal_preset_differs_from_the_paper_in_every_choice_and_is_recorded():
-    ours, words = (preset_options(name).method for name in ("paper", "paper-literal"))
-    assert all(getattr(ours, name) != getattr(words, name) for name in ("pose", "fit", "rounding", "steps", "cuts"))
-    assert ours.coded == ours.displacements
-    assert (words.coded.dead_zone, words.coded.offsets) == (0.5, (0,))
+    ours, words = (Settings(name).resolved().method for name in ("paper", "paper-literal"))
+    assert all(getattr(ours, name) != getattr(words, name) for name in ("pose", "fit", "cuts"))
+    assert ours.displacements.dead_zone is None and len(ours.displacements.offsets) > 1
+    assert (words.displacements.dead_zone, words.displacements.offsets) == (0.5, (0,))
     assert EncoderOptions(method=words).preset == "paper-literal"
     assert EncoderOptions(method=replace(words, fit="surface")).preset == "paper"
 
@@ -78,13 +105,13 @@ def test_the_literal_preset_differs_from_the_paper_in_every_choice_and_is_record
 @pytest.mark.parametrize("seconds", [0.0, -1.0, 600.1, 1e308, float("inf"), float("nan")])
 def test_a_key_interval_out_of_range_is_refused(seconds):
     with pytest.raises(InputError, match=r"key interval .*at most 600"):
-        preset_options(key_interval=seconds)
+        Settings(key_interval=seconds).resolved()
 
 
 @pytest.mark.parametrize(("name", "value"), [("basis_size", -1), ("centers", 0)])
 def test_counts_of_the_paper_out_of_range_are_refused(name, value):
     with pytest.raises(InputError, match=rf"{name.replace('_', ' ')}.*{value}"):
-        preset_options("paper", **{name: value})
+        Settings("paper", **{name: value}).resolved()
 
 
 @pytest.mark.parametrize("wrong", [{"measured": 0}, {"measured": -1}, {"errors": (0.0,)}, {"errors": (0.8, -1.0)}])
@@ -94,21 +121,21 @@ def test_searches_that_make_no_sense_are_refused(wrong):
 
 
 def test_less_effort_tries_fewer_keys_with_fewer_samples_and_the_default_is_normal():
-    fast, normal, thorough = (preset_options(effort=effort).method for effort in EFFORTS)
+    fast, normal, thorough = (Settings(effort=effort).resolved().method for effort in EFFORTS)
     assert fast.plan.keys < normal.plan.keys < thorough.plan.keys
-    assert fast.embedded.samples < normal.embedded.samples and fast.tails is None
-    assert preset_options().method == normal and fast.layers == normal.layers == thorough.layers
+    assert fast.embedded.samples < normal.embedded.samples and not fast.tails
+    assert Settings().resolved().method == normal and fast.layers == normal.layers == thorough.layers
 
 
 def test_an_effort_that_is_unknown_or_not_of_the_preset_is_refused():
     with pytest.raises(InputError, match="no effort is called 'lazy'; known: fast, normal, thorough"):
-        preset_options(effort="lazy")
+        Settings(effort="lazy").resolved()
     with pytest.raises(InputError, match="effort fast: preset `paper` has one effort"):
-        preset_options("paper", effort="fast")
+        Settings("paper", effort="fast").resolved()
 
 
 def test_many_centers_bring_the_samples_they_need():
-    assert preset_options("paper", centers=20_000).method.track.samples >= 80_000
+    assert Settings("paper", centers=20_000).resolved().method.track.samples >= 80_000
 
 
 def test_the_recipe_names_the_preset_that_a_file_records() -> None:

@@ -19,7 +19,7 @@ from pathlib import Path
 
 import numpy as np
 
-from meshreel.coding.appearance.colors import ColorCodingOptions, EncodedColors
+from meshreel.coding.appearance.colors import EncodedColors
 from meshreel.coding.background import decode_background, decode_change
 from meshreel.coding.colored import background_canvas, canvas_of, encode_group_colors
 from meshreel.coding.group import continue_group
@@ -31,7 +31,7 @@ from meshreel.decoder.video import open as open_video
 from meshreel.format.layout import ChunkKind
 from meshreel.types import Mesh
 
-OPTIONS = ColorCodingOptions(step=1 / 64)
+OPTIONS = 1 / 64
 Colors = Callable[[np.ndarray, int], np.ndarray]  # of vertices in a frame
 
 

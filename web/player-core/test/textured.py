@@ -20,7 +20,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[3]))
 
-from meshreel.coding.appearance.pictures import VideoEncoder, VideoOptions, to_i420
+from meshreel.coding.appearance.pictures import VideoEncoder, to_i420
 from meshreel.decoder.video import Video
 from meshreel.decoder.video import open as open_video
 from meshreel.encoder.sequence import Encoder
@@ -79,7 +79,7 @@ def places(video: Video) -> list[str]:
 def too_large(codec: VideoCodec) -> str:
     """The packet of a picture that is larger than a texture may be."""
     width, height = MOST_SIDE + 16, 64
-    encoder = VideoEncoder(width, height, VideoOptions(), codec)
+    encoder = VideoEncoder(width, height, codec=codec)
     [packet] = encoder.add(to_i420(np.zeros((height, width, 3), np.uint8))) + encoder.finish()
     return base64.b64encode(packet).decode()
 

@@ -12,7 +12,7 @@ import sys
 import numpy as np
 
 from meshreel.capture.simulated.solid_colors import room_colors
-from meshreel.coding.appearance.pictures import VideoEncoder, VideoOptions, to_i420
+from meshreel.coding.appearance.pictures import VideoEncoder, to_i420
 from meshreel.format.layout import VideoCodec
 
 WIDTH = 2.0  # m, of what the texture shows: texels of 2 mm where there are 1024
@@ -24,7 +24,7 @@ def main(frames: int, side: int) -> None:
     right, up = (axis.ravel() * WIDTH / side for axis in np.meshgrid(np.arange(side), np.arange(side)))
     colors = room_colors(np.column_stack([right, up, np.zeros(side * side)]))
     codecs = {"pictures": VideoCodec.AV1, "compatible": VideoCodec.H264}
-    encoders = {name: VideoEncoder(side, side, VideoOptions(), codec) for name, codec in codecs.items()}
+    encoders = {name: VideoEncoder(side, side, codec=codec) for name, codec in codecs.items()}
     packets = {name: list[bytes]() for name in codecs}
     for t in range(frames):
         light = 0.75 + 0.25 * np.tanh((right - WIDTH * t / frames) / SOFT)

@@ -53,7 +53,7 @@ class BackgroundOnceDracoCodec(TwoSteps):
             seen = survey(sequence, stages.add)
             return Still((), Frames(sequence.frame_rate, seen, [seen.normalise(mesh) for mesh in sequence]))
         parts = take_apart(captured(sequence), survey(sequence, stages.add, cleaned=False), options, stages)
-        states = encode_static(parts, len(sequence), sequence.frame_rate, options.background)
+        states = encode_static(parts, len(sequence), sequence.frame_rate, options)
         moving = list[Mesh]()
         for number, mesh in enumerate(sequence):
             moving.append(parts.seen.normalise(part_of(mesh, parts.segmentation.moving(number, mesh))))

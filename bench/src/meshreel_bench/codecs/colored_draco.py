@@ -14,7 +14,7 @@ from jaxtyping import UInt8
 from PIL import Image
 
 from meshreel.analysis.appearance.vertices import vertex_colors
-from meshreel.coding.appearance.pictures import VideoDecoder, VideoEncoder, VideoOptions, from_i420, to_i420
+from meshreel.coding.appearance.pictures import VideoDecoder, VideoEncoder, from_i420, to_i420
 from meshreel.coding.mesh import COMPRESSION_LEVEL
 from meshreel.errors import InputError
 from meshreel.geometry.painted import Painted
@@ -106,7 +106,7 @@ class ColoredDracoCodec(Options):
 
     def _pictures(self, pictures: Sequence[np.ndarray]) -> list[bytes]:
         if self.color == "av1":
-            encoder = VideoEncoder(self.size, self.size, VideoOptions(self.quality))
+            encoder = VideoEncoder(self.size, self.size, self.quality)
             return [*(packet for pixels in pictures for packet in encoder.add(to_i420(pixels))), *encoder.finish()]
         found = [io.BytesIO() for _ in pictures]
         for pixels, file in zip(pictures, found, strict=True):

@@ -71,8 +71,7 @@ def shared_options(options: EncoderOptions) -> EncoderOptions:
 
 
 def _shared(options: PaperOptions) -> PaperOptions:
-    usual = PaperOptions()
-    return replace(options, displacements=usual.displacements, rounding=usual.rounding, steps=usual.steps)
+    return replace(options, displacements=PaperOptions().displacements)
 
 
 def _key(interval: Interval, options: PaperOptions) -> bytes:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from meshreel.encoder.sequence import Encoder
 from meshreel.encoder.settings.options import EncoderOptions
-from meshreel.encoder.settings.presets import preset_options
+from meshreel.encoder.settings.settings import Settings
 from meshreel.types import MeshSequence
 
 from ..codec import Progress
@@ -72,7 +72,7 @@ class MeshreelCodec(Prepared):
     def encoder_options(self) -> EncoderOptions:
         """Options of the encoder."""
         chosen = {name: value for name, value in asdict(self).items() if value is not None and name != "variant"}
-        return find_variant(self.variant)(preset_options(**chosen))
+        return find_variant(self.variant)(Settings(**chosen).resolved())
 
     def code(self, analysis: Encoder, progress: Progress | None = None) -> bytes:
         """Return the .reel file."""

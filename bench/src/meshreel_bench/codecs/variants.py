@@ -9,7 +9,8 @@ from typing import TypeVar
 from meshreel.encoder.layers.options import LayersOptions
 from meshreel.encoder.paper.options import PaperOptions
 from meshreel.encoder.settings.options import EncoderOptions, SceneOptions
-from meshreel.encoder.settings.presets import LITERAL_ANCHORS, preset_options
+from meshreel.encoder.settings.presets import plain_displacements
+from meshreel.encoder.settings.settings import Settings
 from meshreel.errors import InputError
 
 UNIFORM, IN_MDS_POSE, BOTH = "one step, plain rounding", "MDS pose, no cuts", "MDS pose, no cuts, one step"
@@ -41,8 +42,7 @@ def _paper(change: Callable[[PaperOptions], PaperOptions]) -> Change:
 
 def _plain(options: PaperOptions) -> PaperOptions:
     """One step, plain rounding, and as many anchors as `paper-literal` has."""
-    anchored = replace(options.displacements, anchor_count=LITERAL_ANCHORS)
-    return replace(options, rounding="plain", steps="uniform", displacements=anchored)
+    return replace(options, displacements=plain_displacements(options.displacements))
 
 
 def _scene(change: Callable[[SceneOptions], SceneOptions]) -> Change:
@@ -50,21 +50,21 @@ def _scene(change: Callable[[SceneOptions], SceneOptions]) -> Change:
 
 
 VARIANTS: dict[str, Change] = {
-    "fast": lambda options: preset_options(options.preset, options.quality, effort="fast"),
+    "fast": lambda options: Settings(options.preset, options.quality, "fast").resolved(),  # type: ignore[arg-type]
     "no shared detail": _layers(lambda o: replace(o, fit=replace(o.fit, components=0))),
     "middle key, no cuts": _layers(lambda o: replace(o, plan=replace(o.plan, keys=1, limit=1e9, worth=1e9))),
     "flat midpoints": _layers(lambda o: replace(o, layers=replace(o.layers, curvatures=(0,)))),
     "plain rounding": _layers(lambda o: replace(o, layers=replace(o.layers, price=0.0))),
     "errors along the surface count": _layers(lambda o: replace(o, layers=replace(o.layers, tangential=1.0))),
     "groups alone": _layers(lambda o: replace(o, predict=False)),
-    "no tails": _layers(lambda o: replace(o, tails=None)),
+    "no tails": _layers(lambda o: replace(o, tails=False)),
     UNIFORM: _paper(_plain),
     IN_MDS_POSE: _paper(lambda o: replace(o, pose="mds", cuts=False)),
     BOTH: _paper(lambda o: replace(_plain(o), pose="mds", cuts=False)),
     RELEASED: _paper(lambda o: replace(o, displacements=replace(o.displacements, step=RELEASED_STEP))),
     LARGER: _paper(lambda o: replace(o, reference=replace(o.reference, vertices=5000))),
-    FROM_MESHES: _scene(lambda o: replace(o, background=replace(o.background, depth=False))),
-    TOGETHER: _scene(lambda o: replace(o, bodies=replace(o.bodies, cell=1e4))),  # all pieces are near each other
+    FROM_MESHES: _scene(lambda o: replace(o, from_depth=False)),
+    TOGETHER: _scene(lambda o: replace(o, near=1e4)),  # all pieces are near each other
 }
 
 

@@ -17,9 +17,9 @@ from jaxtyping import Bool
 
 from meshreel import geometry
 from meshreel.analysis import scene as segmenter
-from meshreel.analysis.scene.background import BackgroundOptions
+from meshreel.analysis.scene.background import FRAMES
 from meshreel.analysis.scene.background_depth import Moment, fuse_still_depth
-from meshreel.analysis.scene.segmentation import SegmentOptions, segment
+from meshreel.analysis.scene.segmentation import segment
 from meshreel.capture.recording import open_recording
 from meshreel.capture.rig.fusion import FusionOptions
 from meshreel.capture.rig.rig import RIG
@@ -96,10 +96,9 @@ class SceneData:
         return _kept_mesh(path, lambda: decimate_faces(mesh, round(share * len(mesh.faces))))
 
     def _fused(self, source: str) -> Mesh:
-        options = BackgroundOptions()
-        meshes = ((number, self.meshes[number]) for number in evenly(len(self.meshes), options.frames))
+        meshes = ((number, self.meshes[number]) for number in evenly(len(self.meshes), FRAMES))
         moments = (Moment(self.meshes.depth[k], mesh, ~self.labels(k, source)) for k, mesh in meshes)
-        return fuse_still_depth(moments, FusionOptions().voxel, options)
+        return fuse_still_depth(moments, FusionOptions().voxel)
 
 
 class SceneFrames(DerivedSequence):
@@ -137,7 +136,7 @@ def _kept_as(source: str) -> str:
     """Cache name of the labels; for those that the encoder finds, it depends on the code of the segmentation."""
     if source != FOUND:
         return source
-    digest = hashlib.sha256(repr(SegmentOptions()).encode())
+    digest = hashlib.sha256()
     for package in (segmenter, geometry):
         for path in sorted(path for folder in package.__path__ for path in Path(folder).glob("*.py")):
             digest.update(path.read_bytes())

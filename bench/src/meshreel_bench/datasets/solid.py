@@ -17,7 +17,7 @@ import numpy as np
 from jaxtyping import Float64, UInt8
 
 from meshreel.encoder.sequence import Encoder
-from meshreel.encoder.settings.presets import preset_options
+from meshreel.encoder.settings.settings import Settings
 from meshreel.errors import InputError
 from meshreel.geometry.closest_points import Surface
 from meshreel.geometry.derived_sequences import DerivedSequence
@@ -102,8 +102,10 @@ def _tracked(sequence: MeshSequence) -> list[Mesh]:
     """Return a template in all frames: that of the first chain of groups, which must be the only one."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "template.reel")
-        options = preset_options(quality=TRACKED, color="none", group_size=min(len(sequence), 64))
-        Encoder(sequence).encode(path, replace(options, scene=None))
+        options = Settings(
+            quality=TRACKED, color="none", group_size=min(len(sequence), 64), dynamic_only=True
+        ).resolved()
+        Encoder(sequence).encode(path, options)
         chains = chains_of(path.read_bytes())
     if len(chains) > 1:
         raise InputError(f"a template cannot be tracked: {len(chains)} chains; give fewer frames")

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float64
 
-from meshreel.analysis.fit.surface_fit import Fit, Guides, fit_frames
+from meshreel.analysis.fit.surface_fit import Fit, FitOptions, Guides, fit_frames
 from meshreel.analysis.reference.centers import largest_distances, reference_centers
 from meshreel.analysis.reference.deform import bind, center_motions, move
 from meshreel.analysis.reference.extraction import Reference, extract_reference, predict
@@ -19,6 +19,7 @@ from meshreel.coding.group import decode_group, payload_bytes_by_purpose
 from meshreel.coding.paper.group import encode_laplacian
 from meshreel.coding.reference_mesh import CodedReference, code_reference
 from meshreel.encoder.paper.options import PaperOptions
+from meshreel.encoder.paper.recipe import LEVELS, REFERENCE_BITS
 from meshreel.geometry.topology import vertex_normals
 from meshreel.types import Centers, Mesh, MeshList
 
@@ -70,16 +71,15 @@ def compute(sequence: MeshList, options: PaperOptions) -> Stages:
     frames = tuple(seen.normalise(mesh) for mesh in sequence)
     centers = track_centers(frames, options.track)
     middle = centers.positions[len(frames) // 2]
-    spread = reference_centers(largest_distances(centers), middle, options.reference.centers)
+    spread = reference_centers(largest_distances(centers), middle)
     reference = extract_reference(frames, centers, options.reference)
-    coded = code_reference(reference.mesh, options.reference_bits, options.levels)
-    predictions = predict(reference, coded.base, centers, options.reference.deform)
-    fit = fit_frames(coded.base.faces, predictions, frames, options.surface_fit, Guides(key=reference.key))
+    coded = code_reference(reference.mesh, REFERENCE_BITS, LEVELS)
+    predictions = predict(reference, coded.base, centers)
+    fit = fit_frames(coded.base.faces, predictions, frames, FitOptions(), Guides(key=reference.key))
     field = np.moveaxis(fit.positions, 0, 1) - coded.base.vertices[:, None]
     payload, layers = encode_laplacian(coded, field, options.displacements)
     moved = tuple(
-        _moved(frame, own, spread.positions, reference, options)
-        for frame, own in zip(frames, centers.positions, strict=True)
+        _moved(frame, own, spread.positions, reference) for frame, own in zip(frames, centers.positions, strict=True)
     )
     return Stages(
         frames=frames,
@@ -103,9 +103,8 @@ def _moved(
     own: Float64[np.ndarray, "K 3"],
     pose: Float64[np.ndarray, "K 3"],
     reference: Reference,
-    options: PaperOptions,
 ) -> Moved:
-    binding = bind(frame, own, reference.neighbours, options.reference.deform)
+    binding = bind(frame, own, reference.neighbours)
     motions = center_motions(own, pose, reference.neighbours)
     vertices = move(frame.vertices, binding, motions, reference.neighbours)
     return Moved(Mesh(vertices, frame.faces), (vertex_normals(frame) + 1) / 2)

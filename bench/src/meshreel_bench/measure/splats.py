@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from meshreel.analysis.appearance.splat_fit import FitSplatsOptions, SplatFrame, SplatView, fit_splats
+from meshreel.analysis.appearance.splat_fit import SplatFrame, SplatView, fit_splats
 from meshreel.analysis.appearance.splat_views import GOLDEN, rendered, ring
 from meshreel.cli.splats import ASIDE, errors
 from meshreel.coding.appearance.splats import decode_splats, encode_splats
@@ -82,7 +82,7 @@ def _judge(chain: Chain, wanted: Sequence[int], painted: Callable[[int], Mesh], 
     views, steps = (VIEWS, STEPS) if len(chosen) > 1 else (VIEWS_ALONE, STEPS_ALONE)
     frames = [SplatFrame(carrier, _rendered(painted(k), views, GOLDEN * k)) for k, carrier in chosen]
     start = time.process_time()
-    splats, importance = fit_splats(frames, FitSplatsOptions(COUNT, steps))
+    splats, importance = fit_splats(frames, COUNT, steps)
     found.seconds.append(time.process_time() - start)
     payload, _ = encode_splats(splats, importance)
     coded, carriers, last = decode_splats(payload, 1 + int(splats.faces.max())), dict(chain), None

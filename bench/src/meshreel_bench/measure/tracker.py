@@ -13,7 +13,15 @@ import numpy as np
 from jaxtyping import Float64
 from scipy.spatial import cKDTree
 
-from meshreel.analysis.reference.track import LEAST_AFFINITY, TrackOptions, track_centers
+from meshreel.analysis.reference.track import (
+    AGREEMENT,
+    LEAST_AFFINITY,
+    REACH,
+    ROUNDS,
+    SEED,
+    TrackOptions,
+    track_centers,
+)
 from meshreel.analysis.survey import survey
 from meshreel.errors import InputError
 from meshreel.geometry.inside import interior_samples
@@ -71,16 +79,16 @@ def carried(frames: Sequence[Mesh], centers: Float64[np.ndarray, "K 3"], count: 
 
 def published_track(frames: Sequence[Mesh], first: Float64[np.ndarray, "K 3"], options: TrackOptions) -> Track:
     """Return centers that balance an even spread and rigidity, round by round, by affinities of all pairs so far."""
-    draw = lambda t: interior_samples(frames[t], options.samples, np.random.default_rng((options.seed, t))).points  # noqa: E731
+    draw = lambda t: interior_samples(frames[t], options.samples, np.random.default_rng((SEED, t))).points  # noqa: E731
     track, points = [first], draw(0)
     distance, difference = _squared(first), np.zeros((len(first), len(first)))
     for t in range(1, len(frames)):
         before, following = track[-1], draw(t)
-        affinity = np.exp2(-distance / options.reach**2 - difference / options.agreement**2)
+        affinity = np.exp2(-distance / REACH**2 - difference / AGREEMENT**2)
         affinity[affinity < LEAST_AFFINITY] = 0
         np.fill_diagonal(affinity, 0)
         now = 2 * before - track[-2] if len(track) > 1 else before.copy()
-        for _ in range(options.rounds):
+        for _ in range(ROUNDS):
             even, is_owner = _owned_means(following, now)
             turns, shifts = _rigid(affinity, before, now)
             rigid = np.einsum("kab,kb->ka", turns, before) + shifts

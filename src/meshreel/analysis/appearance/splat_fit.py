@@ -31,6 +31,9 @@ RATES = {  # learning rates of Adam, in the units of `Splats`; logarithms of sca
 LARGER, LONGER = 1.0, 0.7  # largest differences of log scales: from the initial one, and from their mean (guess)
 LAST = 0.1  # share of the learning rates that remains at the end (guess)
 FIRST_OPACITY = 0.9  # initial opacity (guess)
+STEPS = 900  # steps of Adam, each on one picture (guess)
+MOVES = 5  # number of times that unseen splats move to where errors are (guess)
+SEED = 0  # of the order of the pictures
 DEAD = 0.05  # of the mean contribution of splats to pictures: a splat with less counts as unseen (guess)
 
 
@@ -50,26 +53,15 @@ class SplatFrame:
     views: tuple[SplatView, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class FitSplatsOptions:
-    """Options of the fit of splats."""
-
-    count: int = 8000
-    steps: int = 900  # steps of Adam, each on one picture
-    moves: int = 5  # number of times that unseen splats move to where errors are
-    seed: int = 0
-
-    def __post_init__(self) -> None:
-        if not 1 <= self.count <= 1 << 20 or self.steps < 1 or self.moves < 0:
-            raise InputError(f"{self.count} splats, {self.steps} steps: give 1 to {1 << 20} and at least 1")
-
-
 def fit_splats(
     frames: Sequence[SplatFrame],
-    options: FitSplatsOptions = FitSplatsOptions(),
+    count: int,
+    steps: int = STEPS,
     progress: Callable[[int], None] | None = None,
 ) -> tuple[Splats, Float64[np.ndarray, " N"]]:
-    """Return splats fitted to the pictures of all frames, and the contribution of each to them.
+    """Return `count` splats fitted to the pictures of all frames, and the contribution of each to them.
+
+    The fit takes `steps` steps, each on one picture.
 
     Raises InputError if no camera sees the surface, and without torch.
     """
@@ -80,14 +72,14 @@ def fit_splats(
     threads = torch.get_num_threads()
     torch.set_num_threads(1)  # sums have an order
     try:
-        fit = _Fit(torch, frames, options)
-        random = np.random.default_rng(options.seed)
-        every = max(options.steps * 6 // 10 // (options.moves + 1), 1)
+        fit = _Fit(torch, frames, count)
+        random = np.random.default_rng(SEED)
+        every = max(steps * 6 // 10 // (MOVES + 1), 1)
         queue = list[int]()
-        for step in range(options.steps):
+        for step in range(steps):
             queue = queue or random.permutation(len(pictures)).tolist()
-            fit.step(*pictures[queue.pop()], step / options.steps)
-            if (step + 1) % every == 0 and (step + 1) // every <= options.moves:
+            fit.step(*pictures[queue.pop()], step / steps)
+            if (step + 1) % every == 0 and (step + 1) // every <= MOVES:
                 fit.move(random)
             if progress is not None:
                 progress(step + 1)
@@ -99,9 +91,9 @@ def fit_splats(
 class _Fit:
     """State of a fit: splats as tensors of torch."""
 
-    def __init__(self, torch: Any, frames: Sequence[SplatFrame], options: FitSplatsOptions) -> None:
+    def __init__(self, torch: Any, frames: Sequence[SplatFrame], count: int) -> None:
         self._torch, carrier = torch, frames[0].carrier
-        self._faces, weights, area = _spread(carrier, options.count)
+        self._faces, weights, area = _spread(carrier, count)
         count = len(self._faces)
         self._first = float(np.log(COVER * np.sqrt(area / count)))  # initial logarithm of scales
         first = {

@@ -10,7 +10,6 @@ colours are compared at the vertices of a finer mesh, whose offsets are those of
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -24,16 +23,10 @@ from ...types import LUMA, Mesh
 
 ITERATIONS = 160  # of the flow in each round: 160 edges of the template far; with 80, .3 dB worse at quality 80
 LIGHT = 40  # blurs whose result is light, not texture; with 15 or 120, .3 dB worse on basketball_player
-
-
-@dataclass(frozen=True, slots=True)
-class SlideOptions:
-    """Options of the slide; the values are guesses, tried on basketball_player."""
-
-    levels: int = 2  # midpoint subdivisions to the mesh at whose vertices colours are compared
-    blurs: tuple[int, ...] = (12, 4, 1, 1)  # blurs of the luma over that mesh, in each round
-    contrast: float = 12.0  # luma per edge of that mesh, 0 to 255: weaker slopes count less
-    most: float = 0.7  # edges of the template, largest motion of a vertex in a round
+LEVELS = 2  # midpoint subdivisions to the mesh at whose vertices colours are compared (guess)
+BLURS = (12, 4, 1, 1)  # blurs of the luma over that mesh, in each round (guess)
+CONTRAST = 12.0  # luma per edge of that mesh, 0 to 255: weaker slopes count less (guess)
+MOST = 0.7  # edges of the template, largest motion of a vertex in a round (guess)
 
 
 class Slide:
@@ -44,14 +37,13 @@ class Slide:
         faces: Int32[np.ndarray, "F 3"],
         key: Float64[np.ndarray, "V 3"],
         paint: Paint,
-        options: SlideOptions = SlideOptions(),
     ) -> None:
         """Take the template's positions on the key frame, and the source of that frame's colours."""
         from scipy.sparse import eye_array, kron
 
-        self._faces, self._options = faces, options
+        self._faces = faces
         self._around = kron(_means_over(faces, len(key)), eye_array(3), format="csr")  # of offsets
-        self._finer, self._finer_faces = _finer(faces, len(key), options.levels)  # interpolates vertices
+        self._finer, self._finer_faces = _finer(faces, len(key), LEVELS)  # interpolates vertices
         self._vectors = kron(self._finer, eye_array(3), format="csr")  # the same for vectors
         self._gather = self._finer.T.tocsr()
         self._shares = self._gather @ np.ones(self._finer.shape[0])
@@ -61,7 +53,7 @@ class Slide:
     def to(self, positions: Float64[np.ndarray, "V 3"], paint: Paint) -> Float64[np.ndarray, "V 3"]:
         """Return the positions on a frame, slid so that its colours agree with the key frame's."""
         slid = positions
-        for blurs in self._options.blurs:
+        for blurs in BLURS:
             mesh = self._sampled(slid)
             slid = slid + self._flow(slid, mesh, *self._texture(mesh, paint), blurs)
         return slid
@@ -96,7 +88,7 @@ class Slide:
         key_luma, frame_luma = self._luma, luma
         for _ in range(blurs):
             key_luma, frame_luma = self._blur @ key_luma, self._blur @ frame_luma
-        edge, gaps, stiff = _edge(mesh), (frame_luma - key_luma) * shared, self._options.contrast**2
+        edge, gaps, stiff = _edge(mesh), (frame_luma - key_luma) * shared, CONTRAST**2
         slopes = _tangential(_slopes(mesh, frame_luma), vertex_normals(mesh)) * shared[:, None] * edge
         blocks = self._mean((slopes[:, :, None] * slopes[:, None]).reshape(-1, 9)).reshape(-1, 3, 3)
         solve = _blocks(inverses(blocks + stiff * np.eye(3)))
@@ -106,7 +98,7 @@ class Slide:
         for _ in range(ITERATIONS):
             flow = step @ flow - start
         flow = _tangential(flow.reshape(-1, 3), vertex_normals(Mesh(positions, self._faces)))
-        length, most = np.sqrt((flow**2).sum(axis=1, keepdims=True)), self._options.most * 2**self._options.levels
+        length, most = np.sqrt((flow**2).sum(axis=1, keepdims=True)), MOST * 2**LEVELS
         return flow * np.minimum(1.0, most / np.maximum(length, 1e-12)) * edge
 
     def _normal(self, slopes: Float64[np.ndarray, "N 3"]) -> Any:

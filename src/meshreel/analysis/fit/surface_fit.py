@@ -29,6 +29,8 @@ NOISY_ROUNDS = slice(1, 3)  # of the first fit: motion is smooth under noise, an
 GATE = 6.0  # RMS distances of the noise that a pair may be apart at least: three standard deviations (guess)
 MANY = 5000  # smallest number of a template's vertices for which strides apply (guess)
 Coherence = Callable[[Float64[np.ndarray, "T V 3"]], Float64[np.ndarray, "T V 3"]]
+AGREEMENT = 0.3  # smallest cosine between the normals of a pair (guess)
+ANCHOR = 0.02  # row weight of the offset from the prediction (guess)
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,8 +43,6 @@ class FitOptions:
     gates: tuple[float, ...] = (0.024, 0.018, 0.012, 0.012)  # largest distances of pairs, in diagonals
     smoothing: tuple[float, ...] = (4.0, 2.0, 0.7, 0.4)  # row weights of the difference from the rotated Laplacian
     strides: tuple[int, ...] | None = None  # one of this many points is matched, per round of a clean fit; None: all
-    agreement: float = 0.3  # smallest cosine between the normals of a pair
-    anchor: float = 0.02  # row weight of the offset from the prediction
     components: int = 15  # of the trajectories, in the second fit (decision 10); 0: no second fit
     pull: float = 0.1  # row weight of the offset from the coherent positions in the second fit
     restart: bool = True  # the second fit starts from the coherent positions, and the key keeps its first fit
@@ -60,7 +60,7 @@ class FitOptions:
             strides, stiffer = (1,) * len(gates), math.hypot(1.0, noise / FOLLOWED)
         again = (stiffer * last,) * len(gates[-2:])
         return (
-            Rounds(gates, smoothing, strides, self.anchor, turn=True),
+            Rounds(gates, smoothing, strides, ANCHOR, turn=True),
             Rounds(gates[-2:], again, strides[-2:], stiffer * self.pull, turn=False),
         )
 
@@ -223,7 +223,6 @@ class Fitting:
         rounds: Rounds,
     ) -> Float64[np.ndarray, "V 3"]:
         """Fit a frame in the core; an empty frame keeps its start."""
-        o = self._options
         if surface is None:
             return start
         return self._template.fit(
@@ -234,9 +233,9 @@ class Fitting:
             np.array(rounds.gates),
             np.array(rounds.smoothing),
             np.array(rounds.strides, np.int32),
-            o.agreement,
+            AGREEMENT,
             rounds.anchor,
-            o.tolerance,
-            o.iterations,
+            self._options.tolerance,
+            self._options.iterations,
             rounds.turn,
         )

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float64, Int64
@@ -33,11 +33,21 @@ from .embedded_pose import Pose, moved, rotation, turned, unmoved
 from .rigid import RigidBody, RigidMotion
 
 NORMAL_REACH = 0.01  # diagonals, weight of a difference of unit normals in a search: a guess
-LOST = 3.0  # RMS distances of the noise that a residual may have in addition: legs appear and vanish (decision 16)
+NOISY_LOST = (
+    3.0  # RMS distances of the noise that a residual may have in addition: legs appear and vanish (decision 16)
+)
 BACK_ROUNDS = 2  # rounds of the inverse, the first of which only estimates the nodes that move a point: a guess
 Painter = Callable[[], Paint | None]  # opens the colour source of a frame, if it has one
 CLEARLY = 0.8  # share of the best residual that a start by colour must reach: it is rougher than one by shape (guess)
 UNUSUAL = 1.25  # a frame is retried if its residual exceeds this many times the median so far (decision 15)
+NEIGHBOURS = 4  # nodes that move a point (guess)
+AGREEMENT = 0.3  # smallest cosine between the normals of a pair (guess)
+TORN = (0.5, 0.15)  # an edge off by this share of its length counts a quarter; try, retry (decision 15)
+DOUBT = 0.0005  # diagonals: a frame with a larger, unusual residual is tried again from elsewhere (decision 15)
+LOST = 0.004  # diagonals: a frame with a larger residual is lost: no surface fit would recover it (decision 15)
+DAMPING = 0.01  # squared row weight of a node's step relative to its data (guess)
+ITERATIONS = 60  # largest number of conjugate-gradient iterations per round (guess)
+TOLERANCE = 1e-2  # relative residual at which they stop (guess)
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,18 +66,6 @@ class EmbeddedOptions:
     coarse: Stage = Stage(200, (0.1, 0.08, 0.06, 0.06, 0.045, 0.03, 0.024), (10.0, 3.0, 3.0, 1.0, 0.5, 0.2, 0.1))
     fine: Stage = Stage(900, (0.024, 0.018, 0.012, 0.012), (0.3, 0.1, 0.1, 0.05))
     samples: int = 4000  # points of the key mesh, and of a frame, that are matched
-    neighbours: int = 4  # nodes that move a point
-    agreement: float = 0.3  # smallest cosine between the normals of a pair
-    torn: tuple[float, float] = (0.5, 0.15)  # an edge off by this share of its length counts a quarter; try, retry
-    doubt: float = 0.0005  # a frame with a larger, unusual residual is retried: other starts, edges that tear sooner
-    lost: float = 0.004  # a frame with a larger residual is lost: no surface fit would recover it
-    damping: float = 0.01  # squared row weight of a node's step relative to its data
-    iterations: int = 60  # largest number of conjugate-gradient iterations per round
-    tolerance: float = 1e-2  # relative residual at which they stop
-
-    def limits(self, noise: float) -> EmbeddedOptions:
-        """Return options with the limits for frames at this RMS distance from the truth."""
-        return replace(self, doubt=math.hypot(self.doubt, noise), lost=math.hypot(self.lost, LOST * noise))
 
 
 class Tracker:
@@ -83,7 +81,7 @@ class Tracker:
     ) -> None:
         """Take the key's mesh; `paint` opens its colour source, used only if shape alone misleads."""
         self.options, self.key = options or EmbeddedOptions(), key
-        self.limits, self._noise = self.options.limits(noise), noise
+        self._noise, self._doubt, self.lost = noise, math.hypot(DOUBT, noise), math.hypot(LOST, NOISY_LOST * noise)
         self.mesh = clean(key_mesh)
         if self.mesh.is_empty:
             raise InputError(f"the key frame {key} is empty; choose one that has a surface")
@@ -95,8 +93,8 @@ class Tracker:
         nodes = farthest_first(self.mesh, self._samples, o.fine.nodes)
         self._graph, coarse = build_graph(self.mesh, nodes), build_graph(self.mesh, nodes[: o.coarse.nodes])
         self._fine, self._few = self._rest(self._graph), self._rest(coarse)
-        self._nodes_by_few = coarse.bind(self._graph.nodes, coarse.cells[nodes], o.neighbours)
-        self._all = self._graph.bind(self.mesh.vertices, self._graph.cells, o.neighbours)
+        self._nodes_by_few = coarse.bind(self._graph.nodes, coarse.cells[nodes], NEIGHBOURS)
+        self._all = self._graph.bind(self.mesh.vertices, self._graph.cells, NEIGHBOURS)
         self._poses = {key: Pose.at(self._graph.nodes)}
         self._residuals = {key: 0.0}
         self._paint = paint
@@ -153,11 +151,11 @@ class Tracker:
         rotations = np.stack([pose.rotations for pose in poses])
         positions = np.stack([pose.positions for pose in poses])
         residuals = np.array([self._residuals[frame] for frame in frames])
-        return Motion(self.mesh, self._graph, rotations, positions, residuals, self.options.neighbours)
+        return Motion(self.mesh, self._graph, rotations, positions, residuals)
 
     def _rest(self, graph: DeformationGraph) -> _Rest:
         points, normals = self.mesh.vertices[self._samples], vertex_normals(self.mesh)[self._samples]
-        binding = graph.bind(points, graph.cells[self._samples], self.options.neighbours)
+        binding = graph.bind(points, graph.cells[self._samples], NEIGHBOURS)
         return _Rest(graph.nodes, graph.edges, points, normals, binding, np.ones(len(graph.edges)))
 
     def _known(self, frame: int) -> int:
@@ -176,16 +174,16 @@ class Tracker:
         usual = np.median([r for r in self._residuals.values() if 0 < r < np.inf] or [0.0])  # includes noise
         starts = self._starts(frame, target)
         best = self._poses[last], np.inf
-        enough = max(self.limits.doubt, UNUSUAL * float(usual))
-        tries = [(starts[0], o.torn[0]), (starts[0], o.torn[1]), *((start, o.torn[0]) for start in starts[1:])]
+        enough = max(self._doubt, UNUSUAL * float(usual))
+        tries = [(starts[0], TORN[0]), (starts[0], TORN[1]), *((start, TORN[0]) for start in starts[1:])]
         for start, torn in tries:
             result = self._from(start, target, torn, surface)
             best = result if result[1] < best[1] else best
             if result[1] < enough:
                 return best
         for start in self._by_color(starts[0], surface, paint):
-            result = self._from(start, target, o.torn[0], surface)
-            if result[1] < CLEARLY * best[1] or result[1] <= self.limits.lost < best[1]:
+            result = self._from(start, target, TORN[0], surface)
+            if result[1] < CLEARLY * best[1] or result[1] <= self.lost < best[1]:
                 best = result
         stay = self._poses[last], self._measure(self._poses[last], surface)
         return best if best[1] < stay[1] else stay
@@ -205,10 +203,7 @@ class Tracker:
         first = max(before, key=lambda f: f * side)
         ahead = _extrapolated(self._poses[first], self._poses[last], (frame - last) / (last - first))
         gate, poses = self.options.coarse.gates[-1], [ahead, self._poses[last]]
-        weights = [
-            self._fine.core.matched(surface, pose.rotations, pose.positions, gate, self.options.agreement)
-            for pose in poses
-        ]
+        weights = [self._fine.core.matched(surface, pose.rotations, pose.positions, gate, AGREEMENT) for pose in poses]
         return poses if weights[0] >= weights[1] else poses[::-1]
 
     def _by_color(self, pose: Pose, surface: FrameSurface, paint: Painter | None) -> Iterator[Pose]:
@@ -237,9 +232,8 @@ class Tracker:
         return Pose(products(rotation(self._nodes_by_few, carried), pose.rotations), positions)
 
     def _rounds(self, rest: _Rest, pose: Pose, surface: _core.DeformTarget, stage: Stage, torn: float) -> Pose:
-        o = self.options
         gates, rigidity = np.array(stage.gates), np.array(stage.rigidity)
-        rounds = (gates, rigidity, torn, o.damping, o.agreement, o.tolerance, o.iterations)
+        rounds = (gates, rigidity, torn, DAMPING, AGREEMENT, TOLERANCE, ITERATIONS)
         return Pose(*rest.core.deform(surface, pose.rotations, pose.positions, *rounds))
 
     def _measure(self, pose: Pose, surface: FrameSurface) -> float:
@@ -283,7 +277,6 @@ class Motion:
     rotations: Float64[np.ndarray, "T N 3 3"]
     positions: Float64[np.ndarray, "T N 3"]
     residuals: Float64[np.ndarray, " T"]  # symmetric RMS; 0 at the key, infinite at an empty frame
-    neighbours: int = 4
 
     def bound(self, points: Float64[np.ndarray, "P 3"], normals: Float64[np.ndarray, "P 3"] | None = None) -> Binding:
         """Bind points on or near the key mesh to the nodes of the nearest vertices.
@@ -293,7 +286,7 @@ class Motion:
         key_vertices = np.concatenate([self.mesh.vertices, NORMAL_REACH * vertex_normals(self.mesh)], axis=1)
         queries = points if normals is None else np.concatenate([points, NORMAL_REACH * normals], axis=1)
         vertices = cKDTree(key_vertices[:, : queries.shape[1]]).query(queries)[1].reshape(-1)
-        return self.graph.bind(points, self.graph.cells[vertices], self.neighbours)
+        return self.graph.bind(points, self.graph.cells[vertices], NEIGHBOURS)
 
     def back(self, frame: int, mesh: Mesh) -> Mesh:
         """Move a mesh on or near a frame to the pose of the key frame, by the inverse of `moved`.
@@ -301,7 +294,7 @@ class Motion:
         Faces with a vertex at which the motion has no inverse are left out.
         """
         pose = Pose(self.rotations[frame], self.positions[frame])
-        binding = self.graph.bind(self.mesh.vertices, self.graph.cells, self.neighbours)
+        binding = self.graph.bind(self.mesh.vertices, self.graph.cells, NEIGHBOURS)
         vertices = moved(self.mesh.vertices, self.graph.nodes, binding, pose)
         facing = turned(vertex_normals(self.mesh), binding, pose)
         queries = np.concatenate([mesh.vertices, NORMAL_REACH * vertex_normals(mesh)], axis=1)
@@ -309,7 +302,7 @@ class Motion:
         points, cells = self.mesh.vertices[near], self.graph.cells[near]
         for _ in range(BACK_ROUNDS):
             points, invertible = unmoved(
-                mesh.vertices, self.graph.nodes, self.graph.bind(points, cells, self.neighbours), pose
+                mesh.vertices, self.graph.nodes, self.graph.bind(points, cells, NEIGHBOURS), pose
             )
         return clean(Mesh(points, mesh.faces[invertible[mesh.faces].all(axis=1)]))
 

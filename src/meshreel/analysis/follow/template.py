@@ -8,14 +8,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float64, Int32
 
 from ...geometry.closest_points import Surface
 from ...geometry.decimate import BOUNDARY_WEIGHT, decimate
-from ...geometry.strict import rounded
 from ...geometry.subdivision import heights, levels_of, refine
 from ...types import Mesh
 
@@ -26,35 +24,26 @@ DECAY = 1.2  # the error of quadric decimation falls with this power of the numb
 CURVATURE = 52  # 64ths, lift of midpoints, between the coder's 48 and 58 (decision 14)
 NEAR, FAR = 0.05, 0.25  # logarithms of errors at which the search stops, in the first rounds and after: guesses
 ROUNDS, MOST_ROUNDS = 3, 8  # first rounds of the search for the number of vertices, and all of them: guesses
+LEVELS = 2  # midpoint subdivisions of the base (decision 14)
 
 
-@dataclass(frozen=True, slots=True)
-class TemplateOptions:
-    """Options of the template of a group (decision 14)."""
-
-    # Desired RMS distance of the key frame's vertices to the base mesh, in diagonals; `presets` at quality 50.
-    error: float = rounded(0.00088 * (0.0018 / 0.0012) ** 0.55)
-    levels: int = 2  # midpoint subdivisions of the base
-    border: float = BOUNDARY_WEIGHT  # weight of open borders in the decimation
-
-
-def base_mesh(key: Mesh, options: TemplateOptions, noise: float = 0.0) -> Mesh:
-    """Decimate the key frame until its error is about `options.error`."""
-    most, aim = len(key.vertices), math.hypot(options.error, NOISY_ERROR * noise)
-    border = NOISY_BORDER if noise else options.border
+def base_mesh(key: Mesh, error: float, noise: float = 0.0) -> Mesh:
+    """Decimate the key frame until the RMS distance of its vertices from the base is about `error`."""
+    most, aim = len(key.vertices), math.hypot(error, NOISY_ERROR * noise)
+    border = NOISY_BORDER if noise else BOUNDARY_WEIGHT
     count, tried = min(max(most // 20, FEWEST), most), dict[int, tuple[float, Mesh]]()
     while len(tried) < MOST_ROUNDS and count not in tried:
         base = decimate(key, max(count, 4), border)
-        error = _rms(key, base)
-        if error == 0.0 and not noise:
+        missed = _rms(key, base)
+        if missed == 0.0 and not noise:
             return base  # exact
-        tried[count] = math.log(error / aim) if error else -math.inf, base
+        tried[count] = math.log(missed / aim) if missed else -math.inf, base
         if abs(tried[count][0]) < (NEAR if len(tried) < ROUNDS else FAR):
             break
         # If a limb is lost the law does not hold: try a number between too few and too many.
         few = max((each for each, (off, _) in tried.items() if off > 0), default=FEWEST)
         many = min((each for each, (off, _) in tried.items() if off <= 0 and each > few), default=most)
-        estimate = round(len(base.vertices) * (error / aim) ** (1 / DECAY))
+        estimate = round(len(base.vertices) * (missed / aim) ** (1 / DECAY))
         is_known = few in tried and many in tried and not few < estimate < many
         count = round(math.sqrt(few * many)) if is_known else min(max(estimate, FEWEST), most)
     return min(tried.values(), key=lambda one: abs(one[0]))[1]

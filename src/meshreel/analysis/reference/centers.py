@@ -19,16 +19,10 @@ from ...geometry.strict import determinants, eigen, exp, norm, products
 from ...types import Centers
 
 LANCZOS = 30  # steps towards three eigenvectors, from which SMACOF starts: a guess
-
-
-@dataclass(frozen=True, slots=True)
-class ReferenceCenterOptions:
-    """Options of the solution of eqs. 5 and 6; the values are guesses."""
-
-    max_rounds: int = 80  # largest number of SMACOF rounds
-    tolerance: float = 2e-4  # stop when a round lowers the stress by less than this share
-    reach: float = 2.0  # affinity is 1/2 at this many median distances to the nearest center (eq. 6's sigma)
-    seed: int = 0  # seed of the eigenvector iteration's start
+MAX_ROUNDS = 80  # largest number of SMACOF rounds (guess)
+TOLERANCE = 2e-4  # stop when a round lowers the stress by less than this share (guess)
+REACH = 2.0  # affinity is 1/2 at this many median distances to the nearest center (eq. 6's sigma; guess)
+SEED = 0  # seed of the eigenvector iteration's start
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,23 +47,21 @@ def largest_distances(centers: Centers) -> Float32[np.ndarray, "K K"]:
     return largest
 
 
-def reference_centers(
-    distances: Float32[np.ndarray, "K K"], pose: Float64[np.ndarray, "K 3"], options: ReferenceCenterOptions
-) -> ReferenceCenters:
+def reference_centers(distances: Float32[np.ndarray, "K K"], pose: Float64[np.ndarray, "K 3"]) -> ReferenceCenters:
     """Find the pose of least stress (eq. 5), rotated, shifted and mirrored to agree best with a frame's `pose`."""
     if len(distances) < 4 or not distances.any():  # up to three points, or all in one place
         return ReferenceCenters(pose.copy(), _stress(distances, pose), 0)
-    positions, rounds = _smacof(distances, _classical(distances, options), options)
+    positions, rounds = _smacof(distances, _classical(distances))
     positions = _orient(positions, pose, distances)
     return ReferenceCenters(positions, _stress(distances, positions), rounds)
 
 
-def affinity(distances: Float32[np.ndarray, "K K"], options: ReferenceCenterOptions) -> Float32[np.ndarray, "K K"]:
+def affinity(distances: Float32[np.ndarray, "K K"]) -> Float32[np.ndarray, "K K"]:
     """Return the affinity of each pair of centers, 1 for a center with itself (eq. 6).
 
     Sigma follows from the spacing of the centers, so that it depends neither on the unit nor on the number of bodies.
     """
-    sigma = math.sqrt(math.log(2)) / max(options.reach * center_spacing(distances), float(np.finfo(np.float32).tiny))
+    sigma = math.sqrt(math.log(2)) / max(REACH * center_spacing(distances), float(np.finfo(np.float32).tiny))
     return exp(-np.square(np.float32(sigma) * distances)).astype(np.float32)  # eq. 6
 
 
@@ -80,12 +72,12 @@ def center_spacing(distances: Float32[np.ndarray, "K K"]) -> float:
     return float(np.median(np.partition(distances, 1, axis=1)[:, 1]))
 
 
-def _classical(distances: Float32[np.ndarray, "K K"], options: ReferenceCenterOptions) -> Float64[np.ndarray, "K 3"]:
+def _classical(distances: Float32[np.ndarray, "K K"]) -> Float64[np.ndarray, "K 3"]:
     """Scale classically (Torgerson): project on the three strongest axes of the doubly centered squared distances."""
     gram = -0.5 * np.square(distances.astype(np.float64))
     gram -= gram.mean(axis=0, keepdims=True)
     gram -= gram.mean(axis=1, keepdims=True)
-    start = np.random.default_rng(options.seed).standard_normal(len(gram))
+    start = np.random.default_rng(SEED).standard_normal(len(gram))
     values, vectors = _strongest(gram, start, min(LANCZOS, len(gram)))
     return vectors * np.sqrt(np.maximum(values, 0))
 
@@ -109,7 +101,7 @@ def _strongest(
 
 
 def _smacof(
-    distances: Float32[np.ndarray, "K K"], start: Float64[np.ndarray, "K 3"], options: ReferenceCenterOptions
+    distances: Float32[np.ndarray, "K K"], start: Float64[np.ndarray, "K 3"]
 ) -> tuple[Float64[np.ndarray, "K 3"], int]:
     """Minimise stress by majorisation with doubled steps; return the positions and the number of rounds.
 
@@ -119,14 +111,14 @@ def _smacof(
     x = (start - start.mean(axis=0)).astype(np.float32)
     guttman, stress = _guttman(distances, x)
     rounds = 0
-    while rounds < options.max_rounds:
+    while rounds < MAX_ROUNDS:
         rounds += 1
         bold = 2 * guttman - x
         bold_guttman, bold_stress = _guttman(distances, bold)
         if bold_stress > stress:  # the plain step never raises the stress
             bold = guttman
             bold_guttman, bold_stress = _guttman(distances, bold)
-        done = bold_stress > stress * (1 - options.tolerance)
+        done = bold_stress > stress * (1 - TOLERANCE)
         x, guttman, stress = bold, bold_guttman, bold_stress
         if done:
             break

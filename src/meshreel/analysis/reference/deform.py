@@ -21,16 +21,10 @@ from ...geometry.topology import unique_edges, vertex_normals
 from ...types import Mesh
 
 FRONT = 4.0  # factor on the distance by which a center lies in front of the surface: a guess
-
-
-@dataclass(frozen=True, slots=True)
-class DeformOptions:
-    """Options of the choice of the centers that move a point, and of their weights; guesses except `neighbours`."""
-
-    neighbours: int = 8  # centers per neighbourhood (the paper's K_nbr), including the center itself
-    falloff: float = 1.0  # a weight falls to 1/e at this many center spacings beyond the point's nearest center
-    guard_choices: int = 6  # nearest centers that a vertex may take in place of an unrelated one; 1: the paper's rule
-    guard_rounds: int = 2  # passes over the mesh that replace unrelated centers
+NEIGHBOURS = 8  # centers per neighbourhood (the paper's K_nbr), including the center itself
+FALLOFF = 1.0  # a weight falls to 1/e at this many center spacings beyond the point's nearest center (guess)
+GUARD_CHOICES = 6  # nearest centers that a vertex may take in place of an unrelated one; 1: the paper's rule (guess)
+GUARD_ROUNDS = 2  # passes over the mesh that replace unrelated centers (guess)
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,9 +44,9 @@ class Binding:
     weights: Float64[np.ndarray, "V n"]  # of the neighbours of k1; rows sum to 1
 
 
-def neighbours(affinity: Float32[np.ndarray, "K K"], options: DeformOptions) -> Neighbours:
+def neighbours(affinity: Float32[np.ndarray, "K K"]) -> Neighbours:
     """Return the K_nbr centers with the largest affinity to each center, itself first, then in decreasing order."""
-    count = min(options.neighbours, len(affinity))
+    count = min(NEIGHBOURS, len(affinity))
     distance = 1 - affinity
     np.fill_diagonal(distance, -1)  # a center comes first even if another one is at the same place
     indices = np.argsort(distance, axis=1, kind="stable")[:, :count].astype(np.int64)
@@ -67,18 +61,18 @@ def center_motions(
     return from_rigid(rotations, translations)
 
 
-def bind(mesh: Mesh, source: Float64[np.ndarray, "K 3"], neighbours: Neighbours, options: DeformOptions) -> Binding:
+def bind(mesh: Mesh, source: Float64[np.ndarray, "K 3"], neighbours: Neighbours) -> Binding:
     """Choose the centers that move each vertex of a mesh in the source pose, with their weights."""
-    choices = min(options.guard_choices, len(source))
+    choices = min(GUARD_CHOICES, len(source))
     reach, near = cKDTree(source).query(mesh.vertices, k=choices)
     reach, near = reach.reshape(-1, choices), near.reshape(-1, choices).astype(np.int64)
     if choices > 1 and not mesh.is_empty:
         near = _behind_first(mesh, near, reach, source)
     nearest = near[:, 0]  # eq. 7
     if choices > 1 and not mesh.is_empty:
-        for _ in range(options.guard_rounds):
+        for _ in range(GUARD_ROUNDS):
             nearest = _guard(mesh, near, nearest, neighbours)
-    return Binding(nearest, _weights(mesh.vertices, nearest, source, neighbours, options))
+    return Binding(nearest, _weights(mesh.vertices, nearest, source, neighbours))
 
 
 def move(
@@ -96,10 +90,9 @@ def moved_to(
     pose: Float64[np.ndarray, "K 3"],
     targets: Float64[np.ndarray, "T K 3"],
     neighbours: Neighbours,
-    options: DeformOptions,
 ) -> Float64[np.ndarray, "T V 3"]:
     """Move the vertices of a mesh in a pose of the centers to each of some others (eq. 7)."""
-    binding = bind(mesh, pose, neighbours, options)
+    binding = bind(mesh, pose, neighbours)
     motions = (center_motions(pose, target, neighbours) for target in targets)
     return np.stack([move(mesh.vertices, binding, each, neighbours) for each in motions])
 
@@ -149,13 +142,12 @@ def _weights(
     nearest: Int64[np.ndarray, " V"],
     source: Float64[np.ndarray, "K 3"],
     neighbours: Neighbours,
-    options: DeformOptions,
 ) -> Float64[np.ndarray, "V n"]:
     """Return weights that fall off with the distance to the point (in this pose) and with the affinity to k1."""
     rows = neighbours.indices[nearest]
     square = np.sum(np.square(points[:, None] - source[rows]), axis=2)
     square -= square.min(axis=1, keepdims=True)  # keeps weights from vanishing far from all centers
-    width = options.falloff * _spacing(source, neighbours)
+    width = FALLOFF * _spacing(source, neighbours)
     weights = neighbours.affinities[nearest] * exp(-square / max(width**2, np.finfo(float).tiny))
     return weights / weights.sum(axis=1, keepdims=True)
 

@@ -4,7 +4,7 @@ In: frames, centers, a pose, a key frame. Out: the surfaces of the frames deform
 
 Differs from the paper: the key frame's surface comes first, and other frames add what it lacks; faces that tear in the
 deformation, or join parts that are separate in some frame, are cut; surfaces are joined by the mean of their signed
-distances, not by Poisson reconstruction, which makes surface far from all frames (`FuseOptions.poisson` does so).
+distances, not by Poisson reconstruction, which makes surface far from all frames (`poisson` does so).
 """
 
 from __future__ import annotations
@@ -32,23 +32,16 @@ from ...geometry.topology import (
 )
 from ...types import Mesh
 from .centers import center_spacing
-from .deform import Binding, DeformOptions, Neighbours, bind, blended, center_motions, moved_to
+from .deform import Binding, Neighbours, bind, blended, center_motions, moved_to
 
 Edges = tuple[Int64[np.ndarray, "E 2"], Int64[np.ndarray, "F 3"]]  # result of geometry.topology.unique_edges
-
-
-@dataclass(frozen=True, slots=True)
-class FuseOptions:
-    """Options of the fusion of the frames; lengths in mean edges of the frames' meshes; guesses."""
-
-    poisson: int | None = None  # depth of the paper's reconstruction, which then joins surfaces (paper: 9)
-    voxel: float = 0.5  # of the grid on which surfaces are joined otherwise
-    cover: float = 0.3  # a frame adds surface where earlier ones have less than this share of its own
-    reach: float = 2.0  # voxels: surfaces closer than this are joined to their mean
-    past: float = 1.5  # voxels by which pieces are continued past their borders, so that they meet
-    torn: float = 3.0  # an edge that grows to more than this factor, plus half a center spacing, tears
-    smallest: float = 0.01  # connected bits with less than this share of the largest one's faces are dropped
-    hole: float = 0.08  # holes with a shorter perimeter, which cuts leave, are closed; share of the mesh's diagonal
+VOXEL = 0.5  # mean edges of the frames' meshes, of the grid on which surfaces are joined (guess)
+COVER = 0.3  # a frame adds surface where earlier ones have less than this share of its own (guess)
+REACH = 2.0  # voxels: surfaces closer than this are joined to their mean (guess)
+PAST = 1.5  # voxels by which pieces are continued past their borders, so that they meet (guess)
+TORN = 3.0  # an edge that grows to more than this factor, plus half a center spacing, tears (guess)
+SMALLEST = 0.01  # connected bits with less than this share of the largest one's faces are dropped (guess)
+HOLE = 0.08  # holes with a shorter perimeter, which cuts leave, are closed; share of the mesh's diagonal (guess)
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,22 +56,22 @@ class GroupCenters:
 class Group:
     """Frames with data that hold in every pose: neighbourhoods of centers, bindings, faces that join separate parts."""
 
-    def __init__(self, frames: Sequence[Mesh], centers: GroupCenters, deform: DeformOptions, fuse: FuseOptions) -> None:
-        """Bind non-empty frames to their centers."""
+    def __init__(self, frames: Sequence[Mesh], centers: GroupCenters, poisson: int | None = None) -> None:
+        """Bind non-empty frames to their centers; `poisson` is the depth of the paper's reconstruction, if it joins."""
         positions, kin = centers.positions, centers.kin
         self.frames, self.positions, self.kin = frames, positions, kin
-        self.deform, self.fuse = deform, fuse
+        self.poisson = poisson
         self.distances, self.spacing = centers.distances, center_spacing(centers.distances)
         self.edges = [unique_edges(frame.faces) for frame in frames]
         self.edge = float(
             np.mean([_lengths(f.vertices, e).mean() for f, (e, _) in zip(frames, self.edges, strict=True)])
         )
-        self.bindings = [bind(frame, pose, kin, self.deform) for frame, pose in zip(frames, positions, strict=True)]
+        self.bindings = [bind(frame, pose, kin) for frame, pose in zip(frames, positions, strict=True)]
         self.parting = [self._parting(*each) for each in zip(self.edges, self.bindings, positions, strict=True)]
 
     def sent(self, mesh: Mesh, pose: Float64[np.ndarray, "K 3"]) -> Float64[np.ndarray, "T V 3"]:
         """Deform the vertices of a mesh in this pose to each frame."""
-        return moved_to(mesh, pose, self.positions, self.kin, self.deform)
+        return moved_to(mesh, pose, self.positions, self.kin)
 
     def pieces(self, pose: Float64[np.ndarray, "K 3"], key: int) -> list[Mesh]:
         """Return the surface in a pose in pieces: the key frame's, then pieces that it lacks from frames next to it.
@@ -90,7 +83,7 @@ class Group:
             moved, faces = self._moved(t, pose)
             nearest = self.bindings[t].nearest
             area = np.bincount(nearest, vertex_areas(Mesh(self.frames[t].vertices, faces)), len(pose))
-            lacking = self._around(covered) < self.fuse.cover * self._around(area)
+            lacking = self._around(covered) < COVER * self._around(area)
             covered += np.where(lacking, area, 0)
             pieces.append(drop_unreferenced(Mesh(moved, faces[lacking[nearest][faces].any(axis=1)])))
         return pieces
@@ -100,25 +93,25 @@ class Group:
 
         `voxel` is in mean edges of the frames' meshes.
         """
-        mesh = decimate(drop_small(self._joined(self.pieces(pose, key), voxel), self.fuse.smallest), vertices)
+        mesh = decimate(drop_small(self._joined(self.pieces(pose, key), voxel), SMALLEST), vertices)
         if mesh.is_empty:
             return mesh
         edges = unique_edges(mesh.faces)
-        bad = self._parting(edges, bind(mesh, pose, self.kin, self.deform), pose)
+        bad = self._parting(edges, bind(mesh, pose, self.kin), pose)
         for moved in self.sent(mesh, pose):
             bad |= self._torn(mesh.vertices, moved, edges)
-        intact = drop_small(clean(Mesh.of(mesh.vertices, mesh.faces[~bad])), self.fuse.smallest)
-        return close_holes(intact, self.fuse.hole * mesh.diagonal)
+        intact = drop_small(clean(Mesh.of(mesh.vertices, mesh.faces[~bad])), SMALLEST)
+        return close_holes(intact, HOLE * mesh.diagonal)
 
     def _joined(self, pieces: Sequence[Mesh], voxel: float) -> Mesh:
-        if self.fuse.poisson is not None:
+        if self.poisson is not None:
             pieces = [subdivide_midpoint(piece) for piece in pieces]
             points, normals = (
                 np.concatenate(several)
                 for several in ([p.vertices for p in pieces], [vertex_normals(p) for p in pieces])
             )
-            return poisson_surface(points, normals, self.fuse.poisson, self.edge)
-        mean = MeanSurface(voxel * self.edge, MeanOptions(reach=self.fuse.reach, past=self.fuse.past))
+            return poisson_surface(points, normals, self.poisson, self.edge)
+        mean = MeanSurface(voxel * self.edge, MeanOptions(reach=REACH, past=PAST))
         for piece in pieces:
             mean.add(piece)
         return mean.surface(1)
@@ -133,21 +126,21 @@ class Group:
         spoiled = np.zeros(len(points), bool)
         spoiled[frame.faces[self.parting[t] | self._torn(frame.vertices, points, self.edges[t])]] = True
         faces = frame.faces[~spoiled[frame.faces].any(axis=1)]
-        faces = faces[large_pieces(faces, len(points), self.fuse.smallest)]  # else: bound to the wrong body's centers
+        faces = faces[large_pieces(faces, len(points), SMALLEST)]  # else: bound to the wrong body's centers
         return points, faces
 
     def _parting(self, edges: Edges, binding: Binding, pose: Float64[np.ndarray, "K 3"]) -> Bool[np.ndarray, " F"]:
         """Return the faces that join centers which are much farther from each other in some frame than in this pose."""
         i, j = binding.nearest[edges[0]].T
         now = np.linalg.norm(pose[i] - pose[j], axis=1)
-        return (self.distances[i, j] > self.fuse.torn * now + self.spacing / 2)[edges[1]].any(axis=1)
+        return (self.distances[i, j] > TORN * now + self.spacing / 2)[edges[1]].any(axis=1)
 
     def _torn(
         self, source: Float64[np.ndarray, "V 3"], target: Float64[np.ndarray, "V 3"], edges: Edges
     ) -> Bool[np.ndarray, " F"]:
         """Return the faces with an edge that is much longer in one pose than in the other."""
         before, after = _lengths(source, edges[0]), _lengths(target, edges[0])
-        far = np.maximum(before, after) > self.fuse.torn * np.minimum(before, after) + self.spacing / 2
+        far = np.maximum(before, after) > TORN * np.minimum(before, after) + self.spacing / 2
         return far[edges[1]].any(axis=1)
 
     def _around(self, amounts: Float64[np.ndarray, " K"]) -> Float64[np.ndarray, " K"]:

@@ -25,22 +25,22 @@ from ...types import Centers, Mesh
 LEAST_AFFINITY = 1e-3  # weaker neighbours are dropped: a guess
 FEWEST_NEIGHBOURS = 4  # always kept, since fewer do not determine a rotation
 FEWEST_CENTERS = 4  # of a body, for the same reason
+REACH = 0.058  # diagonals: distance that halves an affinity (guess)
+AGREEMENT = 0.003  # diagonals: difference of motion (RMS, per frame) that halves an affinity (guess)
+NEIGHBOURS = 16  # largest number of neighbours of a center (guess)
+SPREAD = 1.0  # weight of the even spread (Lloyd) (guess)
+RIGIDITY = 3.0  # weight of the rigid term (guess)
+TOLERANCE = 1e-5  # stop when a round can lower the energy by no more than this share (guess)
+ROUNDS = 300  # largest number of rounds per frame (guess)
+SEED = 0  # of the samples of the volume
 
 
 @dataclass(frozen=True, slots=True)
 class TrackOptions:
-    """Options of volume tracking; lengths in units of the sequence's bounding-box diagonal; values are guesses."""
+    """Options of volume tracking; lengths in units of the sequence's bounding-box diagonal; both are guesses."""
 
     centers: int = 2000  # K, over all bodies
     samples: int = 45_000  # points that represent the volume of a frame
-    reach: float = 0.058  # distance that halves an affinity
-    agreement: float = 0.003  # difference of motion (RMS, per frame) that halves an affinity
-    neighbours: int = 16  # largest number of neighbours of a center
-    spread: float = 1.0  # weight of the even spread (Lloyd)
-    rigidity: float = 3.0  # weight of the rigid term
-    tolerance: float = 1e-5  # stop when a round can lower the energy by no more than this share
-    rounds: int = 300  # largest number of rounds per frame
-    seed: int = 0
 
     def __post_init__(self) -> None:
         if self.centers < 1:
@@ -57,11 +57,11 @@ def track_centers(frames: Sequence[Mesh], options: TrackOptions) -> Centers:
         raise InputError("no frames to track; give at least one")
     samples = _samples(frames, 0, options)
     first, bodies, owners = _spread_over_bodies(samples, options)
-    graph = _Affinities(first, bodies, options)
+    graph = _Affinities(first, bodies)
     track = [first]
     for t in range(1, len(frames)):
         following = _samples(frames, t, options)
-        now, rotations, next_owners = _follow(track, following, graph, options)
+        now, rotations, next_owners = _follow(track, following, graph)
         graph.learn(track[-1], now, rotations, samples.points, owners)
         track.append(now)
         samples, owners = following, next_owners
@@ -74,14 +74,14 @@ def _samples(frames: Sequence[Mesh], t: int, options: TrackOptions) -> Samples:
         raise InputError(f"frame {t} is empty; code it separately and track the frames around it")
     if not np.isfinite(frame.vertices).all():
         raise InputError(f"frame {t} has coordinates that are not finite; repair it first")
-    return interior_samples(frame, options.samples, np.random.default_rng((options.seed, t)))
+    return interior_samples(frame, options.samples, np.random.default_rng((SEED, t)))
 
 
 def _spread_over_bodies(
     samples: Samples, options: TrackOptions
 ) -> tuple[Float64[np.ndarray, "K 3"], Int32[np.ndarray, " K"], Int32[np.ndarray, " N"]]:
     """Return the centers of the first frame, the body of each center, and the center that owns each sample."""
-    generator = np.random.default_rng((options.seed, 0, 1))
+    generator = np.random.default_rng((SEED, 0, 1))
     owners = np.zeros(len(samples.points), np.int32)
     places: list[Float64[np.ndarray, "K 3"]] = []
     counts = _shares(np.bincount(samples.bodies), options.centers)
@@ -90,7 +90,7 @@ def _spread_over_bodies(
         points = np.ascontiguousarray(samples.points[mine])
         centers = points[np.sort(generator.choice(len(points), count, replace=False))]
         owned = np.zeros(len(points), np.int32)
-        _core.spread_centers(points, centers, owned, options.tolerance, options.rounds)
+        _core.spread_centers(points, centers, owned, TOLERANCE, ROUNDS)
         owners[mine] = owned + sum(len(c) for c in places)
         places.append(centers)
     return np.concatenate(places), np.repeat(np.arange(len(counts)), counts).astype(np.int32), owners
@@ -104,7 +104,7 @@ def _shares(sizes: Int64[np.ndarray, " B"], centers: int) -> Int64[np.ndarray, "
 
 
 def _follow(
-    track: list[Float64[np.ndarray, "K 3"]], samples: Samples, graph: _Affinities, options: TrackOptions
+    track: list[Float64[np.ndarray, "K 3"]], samples: Samples, graph: _Affinities
 ) -> tuple[Float64[np.ndarray, "K 3"], Float64[np.ndarray, "K 3 3"], Int32[np.ndarray, " N"]]:
     """Return the centers in the next frame, the rotation of each on the way there, and the owner of each sample."""
     centers = 2 * track[-1] - track[-2] if len(track) > 1 else track[-1].copy()
@@ -113,7 +113,7 @@ def _follow(
     offsets, indices, weights = graph.lists()
     _core.follow_centers(
         samples.points, track[-1], offsets, indices, weights, centers, rotations, owners,
-        options.spread, options.rigidity, options.tolerance, options.rounds,
+        SPREAD, RIGIDITY, TOLERANCE, ROUNDS,
     )  # fmt: skip
     return centers, rotations.reshape(-1, 3, 3), owners
 
@@ -121,14 +121,11 @@ def _follow(
 class _Affinities:
     """Affinities of pairs of centers that are near in the first frame; distance and different motion weaken them."""
 
-    def __init__(
-        self, centers: Float64[np.ndarray, "K 3"], bodies: Int32[np.ndarray, " K"], options: TrackOptions
-    ) -> None:
-        self._options = options
+    def __init__(self, centers: Float64[np.ndarray, "K 3"], bodies: Int32[np.ndarray, " K"]) -> None:
         rows, columns = [np.zeros(0, np.int64)], [np.zeros(0, np.int64)]
         for body in range(int(bodies.max()) + 1):
             mine = np.flatnonzero(bodies == body)
-            nearest = min(2 * options.neighbours + 1, len(mine))
+            nearest = min(2 * NEIGHBOURS + 1, len(mine))
             _, neighbours = cKDTree(centers[mine]).query(centers[mine], k=np.arange(1, nearest + 1))
             rows.append(np.repeat(mine, nearest))
             columns.append(mine[neighbours].reshape(-1))
@@ -160,13 +157,12 @@ class _Affinities:
 
     def lists(self) -> tuple[Int32[np.ndarray, " K1"], Int32[np.ndarray, " P"], Float64[np.ndarray, " P"]]:
         """Return neighbour lists (offsets, indices, affinities) with the strongest neighbours of each center."""
-        o = self._options
-        halvings = self._distance / o.reach**2 + self._difference / o.agreement**2
+        halvings = self._distance / REACH**2 + self._difference / AGREEMENT**2
         affinity = np.maximum(exp(-math.log(2) * halvings), 1e-6)
         order = np.lexsort((halvings, self._i))
         rank = np.empty(len(order), np.int64)
         rank[order] = np.arange(len(order)) - self._offsets[self._i[order]]
-        listed = (rank < FEWEST_NEIGHBOURS) | ((rank < o.neighbours) & (affinity >= LEAST_AFFINITY))
+        listed = (rank < FEWEST_NEIGHBOURS) | ((rank < NEIGHBOURS) & (affinity >= LEAST_AFFINITY))
         return _offsets(self._i[listed], len(self._offsets) - 1), self._j[listed], affinity[listed]
 
 

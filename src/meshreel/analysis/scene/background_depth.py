@@ -20,7 +20,7 @@ from ...geometry.raycast import Rays, pixels_near
 from ...geometry.topology import face_normals, part_of, without_fragments
 from ...geometry.tsdf import ALONE, GRAZING, SEEN, extract, integrate
 from ...types import Mesh
-from .background import BackgroundOptions
+from .background import FRAGMENT, least_frames
 
 RIM = 3  # pixels around moving surface that are ignored: a guess
 HIDDEN = np.float32(-1)  # in place of a depth: moving surface hides the still surface there
@@ -28,6 +28,9 @@ OPEN = 0.3  # least share of the moments in which a pixel is not hidden that mus
 SMOOTH, SPREAD, ROUNDS = 2, 1.5, 2  # pixels around, standard deviation in pixels, and rounds of smoothing (decision 28)
 SIMILAR = 4.0  # times the noise, standard deviation of the inverse depths that are averaged (decision 28)
 SECOND_MEDIAN = 0.6745 * 6**0.5  # of the absolute second difference of normally distributed values, in deviations
+FINER_VOXEL = 0.75  # in voxels of the frames: averaged depth has less noise (decision 19)
+FACING = 0.15  # cosine: faces that no camera sees more frontally lie between two real surfaces (decision 19)
+HOLE = 0.4  # m: shorter loops of its border are closed where no camera saw through (decision 28)
 FINER = 3  # times the rows and columns of the pictures, interpolated, that are fused (decision 28)
 
 
@@ -40,20 +43,20 @@ class Moment:
     still: Bool[np.ndarray, " F"]
 
 
-def fuse_still_depth(moments: Iterable[Moment], voxel: float, options: BackgroundOptions = BackgroundOptions()) -> Mesh:
+def fuse_still_depth(moments: Iterable[Moment], voxel: float) -> Mesh:
     """Fuse the still surface in the depth pictures of some moments; `voxel` (m) is that of the frames' meshes."""
-    usual = usual_pictures(moments, options)
+    usual = usual_pictures(moments)
     if not usual:
         return Mesh.empty()
     usual = [_smooth(picture) for picture in usual]
     fine = [picture.finer(FINER) for picture in usual]
     past = [_continued(picture).finer(FINER) for picture in usual]
-    mesh = extract(integrate(fine, options.finer * voxel, GRAZING if len(usual) > 1 else ALONE, past), SEEN)
-    whole = without_fragments(_facing(mesh, usual, options.facing), options.fragment)
-    return close_holes(whole, options.hole, FreeSpace.of(usual).at)
+    mesh = extract(integrate(fine, FINER_VOXEL * voxel, GRAZING if len(usual) > 1 else ALONE, past), SEEN)
+    whole = without_fragments(_facing(mesh, usual, FACING), FRAGMENT)
+    return close_holes(whole, HOLE, FreeSpace.of(usual).at)
 
 
-def usual_pictures(moments: Iterable[Moment], options: BackgroundOptions = BackgroundOptions()) -> list[DepthPicture]:
+def usual_pictures(moments: Iterable[Moment]) -> list[DepthPicture]:
     """Return for each camera the median depth of every pixel over the moments in which it sees still surface."""
     stacks: dict[int, list[np.ndarray]] = {}
     cameras: dict[int, DepthPicture] = {}
@@ -65,7 +68,7 @@ def usual_pictures(moments: Iterable[Moment], options: BackgroundOptions = Backg
                 stacks.setdefault(number, []).append(_still(picture, rays, moment))
     usual = list[DepthPicture]()
     for number, stack in sorted(stacks.items()):
-        depth = _medians(np.stack(stack), options)
+        depth = _medians(np.stack(stack))
         if depth.any():
             usual.append(DepthPicture(cameras[number].camera, depth, cameras[number].unit, cameras[number].far))
     return usual
@@ -79,14 +82,14 @@ def _still(picture: DepthPicture, rays: Rays, moment: Moment) -> np.ndarray:
     return np.where(binary_dilation(moves, iterations=RIM), HIDDEN, picture.depth.astype(np.float32))
 
 
-def _medians(stack: Float32[np.ndarray, "T H W"], options: BackgroundOptions) -> Float32[np.ndarray, "H W"]:
+def _medians(stack: Float32[np.ndarray, "T H W"]) -> Float32[np.ndarray, "H W"]:
     """Return for each pixel the median of its depths above 0; 0 where there are too few.
 
     A door that soon opens is measured a few times only, and the surface behind it perhaps never.
     """
     depths = np.sort(np.where(stack > 0, stack, np.inf), axis=0)
     count = np.isfinite(depths).sum(axis=0)
-    least = np.maximum(options.least(len(stack)), OPEN * (stack >= 0).sum(axis=0))
+    least = np.maximum(least_frames(len(stack)), OPEN * (stack >= 0).sum(axis=0))
     low, high = (np.take_along_axis(depths, np.maximum(at, 0)[None], 0)[0] for at in ((count - 1) // 2, count // 2))
     return np.where(count >= least, (low + high) / 2, 0).astype(np.float32)
 

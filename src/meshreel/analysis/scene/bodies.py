@@ -31,18 +31,12 @@ MOST_RINGS = 4  # largest number of rings added around moving faces where the ba
 AROUND = 0.9  # m around moving surface within which surface that the room lacks counts as moving: a guess
 SPECK = 0.002  # m^2: smaller pieces of surface that the room lacks are noise: a guess
 RING = 2.0  # cells, the longest edge of a face in a ring, so that large faces of a wall stay out of it: a guess
-
-
-@dataclass(frozen=True, slots=True)
-class BodyOptions:
-    """Options that decide which pieces form one body; all values are guesses."""
-
-    cell: float = 3.0  # cells of the scene: pieces of consecutive frames nearer than this are one
-    least: float = 0.1  # m^2: pieces that never reach this area are bits
-    lasts: int = 5  # frames: bits that are present in at least this many are a body of their own
-    large: float = 0.02  # m^2, of such a body in a frame at least, on average
-    beside: float = 0.9  # m: other bits at most this far from a body join it, such as feet below legs no camera sees
-    touches: float = 2.0  # cells of the scene: the same for a bit that is present in one frame only
+NEAR = 3.0  # cells of the scene: pieces of consecutive frames nearer than this are one (guess)
+LEAST = 0.1  # m^2: pieces that never reach this area are bits (guess)
+LASTS = 5  # frames: bits that are present in at least this many are a body of their own (guess)
+LARGE = 0.02  # m^2, of such a body in a frame at least, on average (guess)
+BESIDE = 0.9  # m: other bits at most this far from a body join it, such as feet below legs no camera sees (guess)
+TOUCHES = 2.0  # cells of the scene: the same for a bit that is present in one frame only (guess)
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,19 +106,22 @@ def beyond(mesh: Mesh, moves: Bool[np.ndarray, " F"], room: Surface, far: float)
     return body | moves
 
 
-def find_bodies(moving: Sequence[Mesh], size: float, options: BodyOptions = BodyOptions()) -> Bodies:
-    """Find the bodies in the moving surface of consecutive frames; `size` is the width of the scene's cells, m."""
-    lattice = _lattice(moving, options.cell * size)
+def find_bodies(moving: Sequence[Mesh], size: float, near: float = NEAR) -> Bodies:
+    """Find the bodies in the moving surface of consecutive frames; `size` is the width of the scene's cells, m.
+
+    Pieces of consecutive frames that are nearer than `near` cells are one.
+    """
+    lattice = _lattice(moving, near * size)
     pieces = [piece for frame, mesh in enumerate(moving) for piece in _pieces(frame, mesh, lattice)]
     label = _linked(pieces)
     clusters = [np.flatnonzero(label == number) for number in range(label.max(initial=-1) + 1)]
-    large = [c for c in clusters if max(pieces[k].area for k in c) >= options.least]
+    large = [c for c in clusters if max(pieces[k].area for k in c) >= LEAST]
     bodies: list[list[list[Mesh]]] = [[[] for _ in moving] for _ in large]
     for body, cluster in zip(bodies, large, strict=True):
         for k in cluster:
             body[pieces[k].frame].append(pieces[k].mesh)
-    small = [[pieces[k] for k in c] for c in clusters if max(pieces[k].area for k in c) < options.least]
-    dropped = sum(_given(bodies, bits, len(moving), size, options) for bits in small)
+    small = [[pieces[k] for k in c] for c in clusters if max(pieces[k].area for k in c) < LEAST]
+    dropped = sum(_given(bodies, bits, len(moving), size) for bits in small)
     return Bodies([[concatenate(meshes) for meshes in body] for body in bodies], dropped)
 
 
@@ -141,13 +138,13 @@ def at_most(bodies: Sequence[list[Mesh]], most: int) -> list[list[Mesh]]:
     return [[concatenate(meshes) for meshes in zip(*part, strict=True)] for part in parts]
 
 
-def same_bodies(before: Sequence[Mesh], now: Sequence[Mesh], size: float, options: BodyOptions) -> list[int]:
+def same_bodies(before: Sequence[Mesh], now: Sequence[Mesh], size: float, near: float = NEAR) -> list[int]:
     """Match the bodies of a frame to those of the frame before by the cells that they share.
 
     Return for each body in `now` the index in `before` of the body that it continues, -1 for none. No body is continued
     twice.
     """
-    lattice = _lattice([*before, *now], options.cell * size)
+    lattice = _lattice([*before, *now], near * size)
     cells = [[around(_cells(mesh, lattice)) for mesh in meshes] for meshes in (before, now)]
     shared = np.array([[len(np.intersect1d(a, b, assume_unique=True)) for a in cells[0]] for b in cells[1]])
     matches = [-1] * len(now)
@@ -194,13 +191,13 @@ def _linked(pieces: list[_Piece]) -> Int64[np.ndarray, " N"]:
     return linked(np.array(links, np.int64).reshape(-1, 2), len(pieces))
 
 
-def _given(bodies: list[list[list[Mesh]]], bits: list[_Piece], frames: int, size: float, options: BodyOptions) -> int:
+def _given(bodies: list[list[list[Mesh]]], bits: list[_Piece], frames: int, size: float) -> int:
     """Make lasting bits a body, else add each to the nearest body of its frame; return the number of dropped faces.
 
     A bit that is present in one frame only is noise, unless it touches a body.
     """
     present = len({bit.frame for bit in bits})
-    if present >= options.lasts and sum(bit.area for bit in bits) >= options.large * present:
+    if present >= LASTS and sum(bit.area for bit in bits) >= LARGE * present:
         body: list[list[Mesh]] = [[] for _ in range(frames)]
         for bit in bits:
             body[bit.frame].append(bit.mesh)
@@ -210,7 +207,7 @@ def _given(bodies: list[list[list[Mesh]]], bits: list[_Piece], frames: int, size
     for bit in bits:
         near = [(_gap(bit.mesh, body[bit.frame]), number) for number, body in enumerate(bodies) if body[bit.frame]]
         gap, number = min(near, default=(np.inf, -1))
-        if gap <= (options.beside if present > 1 else options.touches * size):
+        if gap <= (BESIDE if present > 1 else TOUCHES * size):
             bodies[number][bit.frame].append(bit.mesh)
         else:
             dropped += len(bit.mesh.faces)

@@ -9,7 +9,6 @@ leg. A body that leaves all its places has no part that never moves, so growth f
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float64, Int32, Int64
@@ -29,42 +28,36 @@ _FULL = 0.8  # share of the frames until it vanished in which a place had surfac
 _ALIKE = 0.95  # least cosine between the normals of places of a plane: a guess
 _FLAT = 0.99  # the same where a plane is continued: neighbours on a ball at rest have .97
 _AROUND = 64  # nearest places seen free whose mean share describes a neighbourhood: a guess
+_SHARE = 0.03  # smallest share of frames in which a place must be seen free to be evidence of motion (decision 18)
+_EVIDENCE = 30.0  # links: cost of calling a place still that is always seen free (decision 18)
+_STILL = (0.2, 0.3)  # cost of calling a place moving: constant, and times the shares around it (decision 18)
+_HOLLOW = 6.0  # rate at which a link weakens as the normals at its ends turn towards each other (decision 18)
+_REACH = 0.8  # m: moving places lie no farther than this from places that are seen free (decision 18)
+_FEWEST = 60  # smaller connected sets of places that are seen free are noise (decision 18)
+_LEAST = 0.32  # m^2: connected moving places that cover less area over time are flicker (decision 18)
 
 
-@dataclass(frozen=True, slots=True)
-class CutOptions:
-    """Costs of a place on either side of the cut, in units of a link between neighbours (decision 18)."""
-
-    share: float = 0.03  # smallest share of frames in which a place must be seen free to be evidence of motion
-    evidence: float = 30.0  # cost of calling a place still that is always seen free
-    still: tuple[float, float] = (0.2, 0.3)  # cost of calling a place moving: constant, and times the shares around it
-    hollow: float = 6.0  # rate at which a link weakens as the normals at its ends turn towards each other
-    reach: float = 0.8  # m: moving places lie no farther than this from places that are seen free
-    fewest: int = 60  # smaller connected sets of places that are seen free are noise
-    least: float = 0.32  # m^2: connected moving places that cover less area over time are flicker
-
-
-def moving_places(places: Places, options: CutOptions = CutOptions()) -> Bool[np.ndarray, " P"]:
+def moving_places(places: Places) -> Bool[np.ndarray, " P"]:
     """Return True for each place whose surface belongs to something that moves."""
     share = places.free_share
-    seeds = _large(places, share >= options.share, options.fewest)
+    seeds = _large(places, share >= _SHARE, _FEWEST)
     moving = np.zeros(len(places.keys), bool)
     if not seeds.any():
         return moving
     middles = places.middles
-    bound = np.nextafter(options.reach, np.inf)  # makes the search ten times as fast
+    bound = np.nextafter(_REACH, np.inf)  # makes the search ten times as fast
     gaps = cKDTree(middles[seeds]).query(middles, distance_upper_bound=bound)[0]
-    near = np.flatnonzero(gaps <= options.reach)
-    moves = np.where(share >= options.share / 2, options.evidence * share, 0.0)[near]
-    always, around = options.still
+    near = np.flatnonzero(gaps <= _REACH)
+    moves = np.where(share >= _SHARE / 2, _EVIDENCE * share, 0.0)[near]
+    always, around = _STILL
     rests = always + around * _around(middles[near], middles[seeds], share[seeds])
     first, second = _links(places, near)
     turn = _hollow(middles[near], places.normals[near], first, second)
-    links = exp(-options.hollow * turn)
+    links = exp(-_HOLLOW * turn)
     moving[near] = _cut(moves, rests, np.stack([first, second]), links)
     moving &= ~_continued(places, moving)
     moving |= _left_together(places, moving)
-    return _large(places, moving, round(options.least / places.lattice.size**2))
+    return _large(places, moving, round(_LEAST / places.lattice.size**2))
 
 
 def _continued(places: Places, moving: Bool[np.ndarray, " P"]) -> Bool[np.ndarray, " P"]:

@@ -27,21 +27,16 @@ from ...types import Frames, Mesh, evenly
 
 _DEEPEST = 65_535  # largest stored depth (uint16), in units of a cell / _FINENESS; 0: nothing seen
 _FINENESS = 16  # units of a stored depth in a cell: a guess
-_TOGETHER = 32  # frames whose pictures are in memory together, so that places are projected once for them: a guess
+_TOGETHER = 32  # frames whose pictures are in memory together, so that places are projected once for all: a guess
+_FRAMES = 16  # smallest number of inspected frames, spread over the sequence; all if it has fewer (decision 18)
+_RATE = 4.0  # 1/s, lowest rate of inspected frames: a body present only between two of them is not carved (decision 18)
+_PAST = 2.0  # cells by which a view must see past the middle of a place (decision 18)
+_VIEWS = 2  # smallest number of views that must see past it (decision 18)
 
 
-@dataclass(frozen=True, slots=True)
-class PlacesOptions:
-    """Options of free-space carving: which frames are inspected, and when a place is seen free (decision 18)."""
-
-    frames: int = 16  # smallest number of inspected frames, spread over the sequence; all if it has fewer
-    rate: float = 4.0  # 1/s, lowest rate of inspected frames: a body present only between two of them is not carved
-    past: float = 2.0  # cells by which a view must see past the middle of a place
-    views: int = 2  # smallest number of views that must see past it
-
-    def chosen(self, count: int, frame_rate: float) -> list[int]:
-        """Return the numbers of the frames to inspect in a sequence of `count` frames."""
-        return evenly(count, max(self.frames, math.ceil((count - 1) / frame_rate * self.rate) + 1))
+def inspected(count: int, frame_rate: float) -> list[int]:
+    """Return the numbers of the frames to inspect in a sequence of `count` frames."""
+    return evenly(count, max(_FRAMES, math.ceil((count - 1) / frame_rate * _RATE) + 1))
 
 
 Report = Callable[[float], None]  # receives the share of the work that is done, 0 to 1
@@ -160,7 +155,7 @@ class _Observation:
     measured: list[DepthPicture | None] | None  # for each camera; None without cameras
 
 
-def find_places(observed: Observations, lattice: Lattice, options: PlacesOptions = PlacesOptions()) -> Places:
+def find_places(observed: Observations, lattice: Lattice) -> Places:
     """Find the places of a scene and count observations there; frames after the first 32 are read twice.
 
     Meshes are in memory one at a time. Takes about 1 s of CPU for a frame of 500,000 faces.
@@ -178,39 +173,39 @@ def find_places(observed: Observations, lattice: Lattice, options: PlacesOptions
         observed.report((number + 1) / passes)
     keys, normals = cells.places()
     places = Places(lattice, keys, neighbours(keys), normals, Tally(len(keys)), cameras.eyes())
-    for occupied, free in _states(observations, places, observed.views, options):
+    for occupied, free in _states(observations, places, observed.views):
         places.tally.add(occupied, free)
     observations.clear()
-    for occupied, free in states(observed, range(_TOGETHER, len(observed.frames)), places, options):
+    for occupied, free in states(observed, range(_TOGETHER, len(observed.frames)), places):
         places.tally.add(occupied, free)
         observed.report((len(observed.frames) - _TOGETHER + places.tally.frames) / passes)
     return places
 
 
 def states(
-    observed: Observations, numbers: range, places: Places, options: PlacesOptions = PlacesOptions()
+    observed: Observations, numbers: range, places: Places
 ) -> Iterator[tuple[Bool[np.ndarray, " P"], Bool[np.ndarray, " P"]]]:
     """Yield for each frame in `numbers` two masks of places: occupied ones, and others that are seen free."""
     for start in range(0, len(numbers), _TOGETHER):
         together = (observed.observe(number, places.lattice) for number in numbers[start : start + _TOGETHER])
-        yield from _states(list(together), places, observed.views, options)
+        yield from _states(list(together), places, observed.views)
 
 
 def _states(
-    frames: Sequence[_Observation], places: Places, views: Sequence[Camera], options: PlacesOptions
+    frames: Sequence[_Observation], places: Places, views: Sequence[Camera]
 ) -> Iterator[tuple[Bool[np.ndarray, " P"], Bool[np.ndarray, " P"]]]:
     """Yield the states of the places in frames whose observations are in memory; see `states`."""
     seen_past = np.zeros((len(frames), len(places.keys)), np.uint8)
     middles, size = places.middles, places.lattice.size
     for number, view in enumerate(views):
         pixels, inside, depth = view.seen(middles)
-        limit = (depth + options.past * size) / (size / _FINENESS)
+        limit = (depth + _PAST * size) / (size / _FINENESS)
         for counts, frame in zip(seen_past, frames, strict=True):
             counts[inside[frame.depths[number].reshape(-1)[pixels] > limit]] += 1
-    sensed = _sensed(frames, places, options.past * size)
+    sensed = _sensed(frames, places, _PAST * size)
     for counts, frame, (doubtful, clear) in zip(seen_past, frames, sensed, strict=True):
         occupied = _near(places.keys, places.beside, frame.cells)
-        yield occupied, ((counts >= options.views) & ~doubtful | clear) & ~occupied
+        yield occupied, ((counts >= _VIEWS) & ~doubtful | clear) & ~occupied
 
 
 def _sensed(

@@ -9,7 +9,6 @@ sequence (docs/decisions/0018-places.md); and labels are cleaned on the surface.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from functools import lru_cache
 
 import numpy as np
@@ -24,59 +23,49 @@ from ...geometry.voxels import Lattice
 from ...types import Mesh, MeshSequence, evenly
 from . import color_change
 from .color_looks import SIDE, ColorLooks
-from .cut import CutOptions, moving_places
+from .cut import moving_places
 from .labelling import ByMasks, ByPlace, looks
 from .masks import Masker
-from .places import Observations, PlacesOptions, Report, find_places, silent
-from .settle import Rest, SettleOptions, find_rest
-from .views import ViewsOptions, place_views
+from .places import Observations, Report, find_places, inspected, silent
+from .settle import Rest, find_rest
+from .views import place_views
 
 _PROBES = 3  # frames used to place the views: a guess
 _WIDTH = 4.75  # smallest width of a cell, in median distances between two frames: decision 18
 _WIDEST = 4.0  # largest width of a cell, in edge lengths: decision 18
 _LOOKS = 5  # frames that are compared to decide if surface stands still: a guess
 _THINNED = 7  # one vertex in this many is measured when two frames are compared: a guess, for speed
+_THRESHOLD = 0.3  # the paper's tau: a low one followed by clean-up misses less than a high one (guess)
+_ISLAND = 0.01  # m^2: connected faces with less area take the label of the faces around them (guess)
+Cameras = tuple[Camera, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class SegmentOptions:
-    """Options of the separation of a scene into moving and still faces."""
+def segment(frames: MeshSequence, cameras: Cameras = (), report: Report = silent) -> ByPlace:
+    """Segment a scene by geometric change over the whole sequence.
 
-    views: ViewsOptions = field(default_factory=ViewsOptions)
-    places: PlacesOptions = field(default_factory=PlacesOptions)
-    cut: CutOptions = field(default_factory=CutOptions)
-    settle: SettleOptions = field(default_factory=SettleOptions)
-    threshold: float = 0.3  # the paper's tau: a low value, followed by clean-up, misses less than a high one
-    island: float = 0.01  # m^2: connected faces with less area take the label of the faces around them
-    cameras: tuple[Camera, ...] = ()  # views of one picture size; none: they are placed by `views`
-
-
-def segment(frames: MeshSequence, options: SegmentOptions = SegmentOptions(), report: Report = silent) -> ByPlace:
-    """Segment a scene by geometric change over the whole sequence; `options.places` selects the inspected frames.
-
-    If nothing moves and the faces turn their backs to the inside of the scene, it is segmented again with all faces
-    reversed.
+    It is looked at by the given cameras, which are of one size, or by placed ones. If nothing moves and the faces turn
+    their backs to the inside of the scene, it is segmented again with all faces reversed.
     """
     frames = captured(frames)
-    chosen = _with_surface(frames, options.places.chosen(len(frames), frames.frame_rate))
+    chosen = _with_surface(frames, inspected(len(frames), frames.frame_rate))
     if not chosen:
         nothing = np.zeros(0, np.int64), np.zeros(0, bool), Rest.none(0)
-        return ByPlace(1.0, Lattice(np.zeros(3), 1.0), *nothing, options.island)
-    places = _by_place(frames, chosen, options, report)
+        return ByPlace(1.0, Lattice(np.zeros(3), 1.0), *nothing, _ISLAND)
+    places = _by_place(frames, chosen, cameras, report)
     if not places.chosen.any() and _faces_away(frames[chosen[0]]):
-        reversed_places = _by_place(turned_over(frames), chosen, options, silent)
+        reversed_places = _by_place(turned_over(frames), chosen, cameras, silent)
         places = reversed_places if reversed_places.chosen.any() else places
     return places
 
 
-def _by_place(frames: CapturedSequence, chosen: Sequence[int], options: SegmentOptions, report: Report) -> ByPlace:
-    cell, views = edge_length(frames, chosen), _views(frames, chosen, options)
+def _by_place(frames: CapturedSequence, chosen: Sequence[int], cameras: Cameras, report: Report) -> ByPlace:
+    cell, views = edge_length(frames, chosen), _views(frames, chosen, cameras)
     noise = _apart(frames[chosen[0]], frames[chosen[len(chosen) // 2]])
     lattice = Lattice.near(frames[chosen[0]], max(cell, min(_WIDTH * noise, _WIDEST * cell)))
-    inspected = picked(frames, chosen)
-    pictures = None if inspected.depth is None else inspected.depth.__getitem__
-    places = find_places(Observations(inspected, views, pictures, report), lattice, options.places)
-    moving = moving_places(places, options.cut)
+    frames_seen = picked(frames, chosen)
+    pictures = None if frames_seen.depth is None else frames_seen.depth.__getitem__
+    places = find_places(Observations(frames_seen, views, pictures, report), lattice)
+    moving = moving_places(places)
 
     @lru_cache(maxsize=1)  # successive queries about places beside a change concern the same frames
     def looked_at(numbers: tuple[int, ...]) -> tuple[list[Surface], list[Int64[np.ndarray, " V"]]]:
@@ -87,11 +76,11 @@ def _by_place(frames: CapturedSequence, chosen: Sequence[int], options: SegmentO
         surfaces, keys = looked_at(tuple(numbers))
         return [_stands(surfaces, [np.isin(k, places.keys[g]) for k in keys], 2 * cell, times * noise) for g in groups]
 
-    rest = find_rest(places, moving, chosen, frames.frame_rate, options.settle, holds)
+    rest = find_rest(places, moving, chosen, frames.frame_rate, holds)
     looks = _color_looks(frames, chosen, color_change.SIDE) if moving.any() else None
     usual = [chosen[number] for number in evenly(len(chosen), color_change.MOMENTS)]
     colors = None if looks is None else color_change.ColorChange.of(frames, looks, usual, cell)
-    return ByPlace(cell, lattice, places.keys, moving, rest, options.island, colors)
+    return ByPlace(cell, lattice, places.keys, moving, rest, _ISLAND, colors)
 
 
 def _faces_away(mesh: Mesh) -> bool:
@@ -102,32 +91,30 @@ def _faces_away(mesh: Mesh) -> bool:
     return bool((areas * (normals * away).sum(axis=1)).sum() > 0)
 
 
-def segment_by(masker: Masker, frames: MeshSequence, options: SegmentOptions = SegmentOptions()) -> ByMasks:
+def segment_by(masker: Masker, frames: MeshSequence, cameras: Cameras = ()) -> ByMasks:
     """Segment a scene by the masks of `masker`; if it `observes`, it receives every frame before the first mask."""
     chosen = _to_see(frames)
-    colors = None if masker.views or options.cameras else _color_looks(frames, chosen)
-    cameras = masker.views if colors is None else colors.views
-    views = _looking(cameras, frames, chosen) or _views(frames, chosen, options)
+    colors = None if masker.views or cameras else _color_looks(frames, chosen)
+    given = masker.views if colors is None else colors.views
+    views = _looking(given, frames, chosen) or _views(frames, chosen, cameras)
     if masker.observes:
         few = chosen[:: max(1, len(chosen) // _PROBES)]
         masker.foresee([looks(frames[number], views) for number in few], colors)
         for number in range(len(frames)):
             masker.observe(number, looks(frames[number], views), views)
-    return ByMasks(masker, views, edge_length(frames, chosen), options.threshold, options.island)
+    return ByMasks(masker, views, edge_length(frames, chosen), _THRESHOLD, _ISLAND)
 
 
-def scene_views(frames: MeshSequence, options: SegmentOptions = SegmentOptions()) -> tuple[Camera, ...]:
+def scene_views(frames: MeshSequence, cameras: Cameras = ()) -> tuple[Camera, ...]:
     """Return the views of a scene: given cameras, or placed ones. Raises InputError if no frame has a surface."""
-    return _views(frames, _to_see(frames), options)
+    return _views(frames, _to_see(frames), cameras)
 
 
-def mask_views(
-    frames: MeshSequence, options: SegmentOptions = SegmentOptions()
-) -> tuple[tuple[Camera, ...], ColorLooks | None]:
+def mask_views(frames: MeshSequence, cameras: Cameras = ()) -> tuple[Cameras, ColorLooks | None]:
     """Return views for masks: given cameras, or colour cameras with their pictures, or placed views."""
     chosen = _to_see(frames)
-    colors = None if options.cameras else _color_looks(frames, chosen)
-    return _views(frames, chosen, options) if colors is None else colors.views, colors
+    colors = None if cameras else _color_looks(frames, chosen)
+    return _views(frames, chosen, cameras) if colors is None else colors.views, colors
 
 
 def _color_looks(frames: MeshSequence, chosen: Sequence[int], side: int = SIDE) -> ColorLooks | None:
@@ -149,10 +136,10 @@ def _with_surface(frames: MeshSequence, numbers: Sequence[int]) -> list[int]:
     return [number for number in numbers if not frames[number].is_empty]
 
 
-def _views(frames: MeshSequence, chosen: Sequence[int], options: SegmentOptions) -> tuple[Camera, ...]:
-    """Return the cameras in the options, or views placed for a few of the chosen frames."""
+def _views(frames: MeshSequence, chosen: Sequence[int], cameras: Cameras) -> tuple[Camera, ...]:
+    """Return the given cameras, or views placed for a few of the chosen frames."""
     few = picked(frames, chosen[:: max(1, len(chosen) // _PROBES)])
-    return _looking(options.cameras, frames, chosen) or place_views(few, options.views, few.up)
+    return _looking(cameras, frames, chosen) or place_views(few, few.up)
 
 
 def _looking(

@@ -26,16 +26,10 @@ _ALIKE = 1  # largest difference, in inspected frames, between neighbours that c
 
 
 Holds = Callable[[Sequence[Int64[np.ndarray, " C"]], list[int], float], Sequence[bool]]
-
-
-@dataclass(frozen=True, slots=True)
-class SettleOptions:
-    """Conditions for a change of the room (decision 18)."""
-
-    rest: float = 10.0  # s of uninterrupted rest before or after the change: people do not stand still for as long
-    still: float = 0.8  # s of rest that suffice for surface that moves no more than noise, as a crate's (decision 28)
-    share: float = 0.8  # smallest share of the inspected frames in that time that have surface at the place
-    least: float = 0.15  # m^2, smallest area that changes together
+_REST = 10.0  # s of uninterrupted rest before or after the change: people do not stand still for as long (decision 18)
+_SHORT_REST = 0.8  # s of rest that suffice for surface that moves no more than noise, as a crate's (decision 28)
+_SHARE = 0.8  # smallest share of the inspected frames in that time that have surface at the place (decision 18)
+_LEAST = 0.15  # m^2, smallest area that changes together (decision 18)
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +55,6 @@ def find_rest(
     moving: Bool[np.ndarray, " P"],
     numbers: Sequence[int],
     frame_rate: float,
-    options: SettleOptions = SettleOptions(),
     holds: Holds = lambda groups, _numbers, _times: [False] * len(groups),
 ) -> Rest:
     """Find the frames in which moving places rest; `numbers` are those of the inspected frames.
@@ -71,17 +64,17 @@ def find_rest(
     """
     rest = Rest.none(len(places.keys))
     frames, tally = np.asarray(numbers, np.int32), places.tally
-    least = round(options.least / places.lattice.size**2)
+    least = round(_LEAST / places.lattice.size**2)
     for stay, order, out, never in (
         (tally.after, frames, rest.since, NEVER),
         (tally.before, frames[::-1], rest.until, 0),
     ):
-        at = _settled(stay, len(order), options.share)
-        lasts = abs(order[-1] - order[at]) >= min(options.rest, options.still) * frame_rate
+        at = _settled(stay, len(order), _SHARE)
+        lasts = abs(order[-1] - order[at]) >= min(_REST, _SHORT_REST) * frame_rate
         for group in _together(places, moving & (at >= 0) & lasts, at, least):
             # Rest begins with the last place to come to rest: a slowing object reaches its last place before it stands.
             last = min(int(at[group].max()) + 1, len(order) - 1)
-            long = abs(int(order[-1] - order[last])) >= options.rest * frame_rate
+            long = abs(int(order[-1] - order[last])) >= _REST * frame_rate
             if long or holds([group], order[last:].tolist(), _STILL)[0]:
                 out[group] = order[last] if never else order[last] + 1
         _join(places, moving & (stay.first >= 0) & (stay.count >= _FEWEST), order, out, never, holds)

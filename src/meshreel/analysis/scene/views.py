@@ -28,42 +28,46 @@ _TOUCHES = 1e-3  # of a ray's length: a hit this near its end is the sample itse
 _INSIDE = 0.5  # a place that sees more than this share of its samples from behind is inside an object; a guess
 _SURE = 0.9  # probability that a pixel meets a face of its size; below 1, so that a further view still gains: a guess
 _WAYS = np.array([w for w in itertools.product((-1.0, 0.0, 1.0), repeat=3) if any(w)])
-
-
-@dataclass(frozen=True, slots=True)
-class ViewsOptions:
-    """Number and size of the views, and the effort spent on placing them; defaults from decision 17."""
-
-    count: int = 14
-    width: int = 320  # pixels
-    height: int = 240  # pixels
-    fov: float = 75.0  # degrees, horizontal
-    places: int = 6  # candidate places along the longest side of the box
-    reach: float = 1.0  # size of the box in which views stand, in sizes of the scene's box: 2 for a lone body
-    frames: int = 4  # frames inspected, spread evenly over those given
-    samples: int = 2048  # points sampled on the surface of each inspected frame
+_ACROSS = rounded(math.tan(math.radians(75.0) / 2))  # of half the horizontal field of view (decision 17)
+_PLACES = 6  # candidate places along the longest side of the box (decision 17)
+_FRAMES = 4  # frames inspected, spread evenly over those given (decision 17)
+_SAMPLES = 2048  # points sampled on the surface of each inspected frame (decision 17)
 
 
 def place_views(
-    meshes: Sequence[Mesh] | Frames, options: ViewsOptions = ViewsOptions(), up: Up = "y"
+    meshes: Sequence[Mesh] | Frames, up: Up = "y", count: int = 14, width: int = 320, height: int = 240
 ) -> tuple[Camera, ...]:
-    """Place views that together see nearly all of the meshes; the same meshes always give the same views.
+    """Place `count` views of `width` x `height` pixels that together see nearly all of the meshes (decision 17).
 
-    Only `options.frames` of the meshes are read. Raises InputError if none of those has a surface. Takes some 4 s of
+    Only `_FRAMES` of the meshes are read. Raises InputError if none of those has a surface. Takes some 4 s of
     CPU for four frames of 500,000 faces.
     """
-    chosen = sorted({int(k) for k in np.linspace(0, len(meshes) - 1, options.frames)}) if len(meshes) else []
-    samples = [_Samples.of(mesh, options.samples) for mesh in (meshes[k] for k in chosen) if not mesh.is_empty]
+    chosen = sorted({int(k) for k in np.linspace(0, len(meshes) - 1, _FRAMES)}) if len(meshes) else []
+    samples = [_Samples.of(mesh, _SAMPLES) for mesh in (meshes[k] for k in chosen) if not mesh.is_empty]
     if not samples:
         raise InputError(f"none of the {len(chosen)} inspected frames has a surface; give a frame with faces")
     low = np.min([s.mesh.vertices[s.mesh.faces].min(axis=(0, 1)) for s in samples], axis=0)
     high = np.max([s.mesh.vertices[s.mesh.faces].max(axis=(0, 1)) for s in samples], axis=0)
-    places = _outside(_grid(low, high, options), samples)
-    candidates = [_looking(eye, turn, options) for eye, _ in places for turn in _turns(up)]
+    places = _outside(_grid(low, high), samples)
+    lens = _Lens(width, height)
+    candidates = [_looking(eye, turn, lens) for eye, _ in places for turn in _turns(up)]
     pixels = np.empty((len(candidates), sum(len(part.points) for part in samples)), np.float32)  # some 100 MB
     for number, (eye, sees) in enumerate(places):
-        pixels[len(_WAYS) * number : len(_WAYS) * (number + 1)] = _pixels(eye, sees, samples, _turns(up), options)
-    return _greedy(candidates, pixels, options.count)
+        pixels[len(_WAYS) * number : len(_WAYS) * (number + 1)] = _pixels(eye, sees, samples, _turns(up), lens)
+    return _greedy(candidates, pixels, count)
+
+
+@dataclass(frozen=True, slots=True)
+class _Lens:
+    """Size of the pictures of all views, pixels."""
+
+    width: int
+    height: int
+
+    @property
+    def focal(self) -> float:
+        """Distance of the picture from the eye, pixels."""
+        return self.width / 2 / _ACROSS
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,11 +101,9 @@ class _Samples:
         return free, free & ((self.normals * ahead).sum(axis=1) > 0)
 
 
-def _grid(low: np.ndarray, high: np.ndarray, options: ViewsOptions) -> list[Float64[np.ndarray, " 3"]]:
+def _grid(low: np.ndarray, high: np.ndarray) -> list[Float64[np.ndarray, " 3"]]:
     """Return the middles of equal cells of the box as candidate places."""
-    more = (high - low) * (options.reach - 1) / 2
-    low, high = low - more, high + more
-    step = float((high - low).max()) / options.places or 1.0
+    step = float((high - low).max()) / _PLACES or 1.0
     parts = [max(1, round(side / step)) for side in (high - low).tolist()]
     cells = np.stack(np.meshgrid(*(np.arange(n) for n in parts), indexing="ij"), axis=-1).reshape(-1, 3)
     return list(low + (high - low) * (cells + 0.5) / parts)
@@ -127,12 +129,11 @@ def _pixels(
     sees: list[np.ndarray],
     samples: list[_Samples],
     turns: Float64[np.ndarray, "W 3 3"],
-    options: ViewsOptions,
+    lens: _Lens,
 ) -> Float32[np.ndarray, "W N"]:
     """Return the size in pixels, at most 1, of each sample's face in each viewing direction; all frames in one row."""
-    across = rounded(math.tan(math.radians(options.fov) / 2))
-    high = across * options.height / options.width
-    focal = options.width / 2 / across
+    focal, across = lens.focal, _ACROSS
+    high = across * lens.height / lens.width
     sizes = []
     for part, free in zip(samples, sees, strict=True):
         ahead = part.points[free] - eye
@@ -158,13 +159,12 @@ def _greedy(candidates: list[Camera], pixels: Float32[np.ndarray, "C N"], count:
     return tuple(chosen)
 
 
-def _looking(eye: Float64[np.ndarray, " 3"], turn: Float64[np.ndarray, "3 3"], options: ViewsOptions) -> Camera:
+def _looking(eye: Float64[np.ndarray, " 3"], turn: Float64[np.ndarray, "3 3"], lens: _Lens) -> Camera:
     """Return a camera at `eye` with the rotation `turn` from world to camera."""
-    focal = options.width / 2 / rounded(math.tan(math.radians(options.fov) / 2))
     extrinsic = np.eye(4)
     extrinsic[:3, :3], extrinsic[:3, 3] = turn, -products(turn, eye[:, None])[:, 0]
-    center = (options.width / 2, options.height / 2)
-    return Camera(options.width, options.height, (focal, focal), center, CameraPose.of_world(extrinsic))
+    center = (lens.width / 2, lens.height / 2)
+    return Camera(lens.width, lens.height, (lens.focal, lens.focal), center, CameraPose.of_world(extrinsic))
 
 
 @cache

@@ -24,6 +24,8 @@ from ..layers.graph import connectivity, hierarchy
 from ..steps import rung_of
 
 SIBLINGS = 24  # weight of the siblings' mean, 64ths: with 8 or 40, 1 to 3 % more bytes on basketball_player
+FINER = 0.65  # step of the base, on which all others rest, in steps (guess)
+PRICE = 0.12  # price of a bit, in squared steps (guess)
 CHROMA = 64  # factor of colour differences, 64ths (guess)
 
 
@@ -35,15 +37,6 @@ class ColoredMesh:
     levels: int
     frames: int
     vertices: int  # after the subdivisions
-
-
-@dataclass(frozen=True, slots=True)
-class ColorCodingOptions:
-    """Options of the colours of vertices."""
-
-    step: float = 0.0909  # quantiser step, in units of the whole range
-    finer: float = 0.65  # step of the base, on which all others rest, in steps (guess)
-    price: float = 0.12  # price of a bit, in squared steps (guess)
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,18 +52,19 @@ class EncodedColors:
 def encode_colors(
     meshes: Sequence[ColoredMesh],
     colors: Sequence[UInt8[np.ndarray, "_ _ 3"]],
-    options: ColorCodingOptions,
+    step: float,
     before: Float64[np.ndarray, "V 3"] | None = None,
     layered: bool = False,
 ) -> EncodedColors:
     """Encode the colours of the vertices of meshes, the first of them predicted from `before` if given.
 
-    With `layered`, each level of the first mesh is a separate layer, and the other meshes together are one.
+    `step` is the quantiser step, in units of the whole range. With `layered`, each level of the first mesh is a
+    separate layer, and the other meshes together are one.
     """
     head = VertexColors(Form.VERTEX_COLORS, Origin.ALONE if before is None else Origin.PREVIOUS, CHROMA)
     parts, decoded_colors, state = [pack(head)], list[UInt8[np.ndarray, "_ _ 3"]](), None
     for number, (mesh, target) in enumerate(zip(meshes, colors, strict=True)):
-        records = _encode_mesh(mesh, target, options, None if number else before)
+        records = _encode_mesh(mesh, target, step, None if number else before)
         decoded, last = _decode_mesh(b"".join(records), mesh, head, None if number else before)
         state = last if number == 0 else state
         decoded_colors.append(decoded)
@@ -114,7 +108,7 @@ def decode_colors(
 def _encode_mesh(
     mesh: ColoredMesh,
     colors: UInt8[np.ndarray, "T V 3"],
-    options: ColorCodingOptions,
+    step: float,
     before: Float64[np.ndarray, "V 3"] | None,
 ) -> list[bytes]:
     """Return the records of a mesh: one for its base, and one for each level."""
@@ -123,7 +117,7 @@ def _encode_mesh(
     rows = np.moveaxis(values.reshape(frames, -1, 3), 0, 2).reshape(mesh.vertices, 3 * frames)
     prediction = np.zeros((mesh.vertices, 3)) if before is None else before
     start = np.repeat(prediction, frames, axis=1)  # luma of all frames, then one difference, then the other
-    places, base = hierarchy(mesh.base), Rate(rung_of(options.step * options.finer), options.price)
+    places, base = hierarchy(mesh.base), Rate(rung_of(step * FINER), PRICE)
     field = encode_field((rows[:count] - start[:count])[places.order], places.graph, base)
     decoded = np.empty((count, 3 * frames))
     decoded[places.order] = field.decoded
@@ -133,7 +127,7 @@ def _encode_mesh(
         near = connectivity(faces, count)
         more = slice(count, count + len(near.level.edges))
         middles = (decoded[near.level.edges[:, 0]] + decoded[near.level.edges[:, 1]]) / 2
-        rate = Rate(rung_of(options.step), options.price)
+        rate = Rate(rung_of(step), PRICE)
         field = encode_field(rows[more] - middles - start[more], near.siblings.graph(SIBLINGS), rate)
         records.append(pack(ColorsLevel(SIBLINGS, field.record)))
         decoded = np.concatenate([decoded, middles + (field.decoded + start[more])])

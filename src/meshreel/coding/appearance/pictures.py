@@ -11,7 +11,6 @@ import os
 import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 from threading import get_native_id
@@ -28,7 +27,7 @@ from ...shapes import UInt8
 from ...types import LUMA
 
 PRESET = 4  # of SVT: 6 takes half as long for 5 % more bytes (basketball_player)
-MOST_CRF = 63  # of SVT
+CRF, MOST_CRF = 42, 63  # constant rate factors of SVT at quality 50, and at most; larger is coarser
 ENCODERS = {VideoCodec.AV1: "libsvtav1", VideoCodec.H264: "libx264"}
 DECODERS = {VideoCodec.AV1: "libdav1d", VideoCodec.H264: "h264"}
 X264 = (  # no picture waits for another; one key picture; BT.709, limited range; start codes. Without
@@ -48,31 +47,21 @@ SLICES = (1, 2, 5)  # types of a NAL unit (H.264, table 7-1) with a first slice
 BLUE, RED = 1.8556, 1.5748  # blue and red of a full colour difference (ITU-R BT.709)
 
 
-@dataclass(frozen=True, slots=True)
-class VideoOptions:
-    """Options of the video of a chain's pictures."""
-
-    crf: int = 42  # SVT's constant rate factor, 1 to 63; larger is coarser
-    preset: int = PRESET
-
-    def __post_init__(self) -> None:
-        if not 1 <= self.crf <= MOST_CRF or not 0 <= self.preset <= 13:
-            raise InputError(f"crf {self.crf}, preset {self.preset}: give 1 to 63 and 0 to 13")
-
-
 class VideoEncoder:
     """Encoder of the pictures of one chain, of which only the first is a key picture."""
 
-    def __init__(self, width: int, height: int, options: VideoOptions, codec: VideoCodec = VideoCodec.AV1) -> None:
-        """Open the encoder. Raises InputError if PyAV or its encoder is missing."""
+    def __init__(self, width: int, height: int, crf: int = CRF, codec: VideoCodec = VideoCodec.AV1) -> None:
+        """Open the encoder. Raises InputError for a rate factor out of range, or if PyAV or its encoder is missing."""
+        if not 1 <= crf <= MOST_CRF:
+            raise InputError(f"rate factor {crf}: give 1 to {MOST_CRF}")
         self._context = context = _context(ENCODERS[codec], "w")
         context.width, context.height, context.pix_fmt = width, height, "yuv420p"
         context.time_base, context.framerate = Fraction(1, 30), Fraction(30)
         if codec == VideoCodec.AV1:
             params = "lp=1:keyint=-1:color-primaries=1:transfer-characteristics=1:matrix-coefficients=1:color-range=0"
-            context.options = {"crf": str(options.crf), "preset": str(options.preset), "svtav1-params": params}
+            context.options = {"crf": str(crf), "preset": str(PRESET), "svtav1-params": params}
         else:
-            context.options = {"crf": f"{H264_SCALE * options.crf + H264_OFFSET:.1f}", "x264-params": X264}
+            context.options = {"crf": f"{H264_SCALE * crf + H264_OFFSET:.1f}", "x264-params": X264}
         with _as_urgent_as_before():
             context.open()
         self._codec, self._count = codec, 0

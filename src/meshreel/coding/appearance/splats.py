@@ -7,8 +7,7 @@ order of their faces, so that neighbours are alike.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import accumulate, pairwise
 
 import numpy as np
@@ -24,38 +23,20 @@ from ..steps import RUNGS, rung_of, step_of
 
 ROUND = 1.1  # largest ratio of scales of a splat that counts as round, with angle 0 (guess): invisible
 MOST_BITS = 14  # of a number of a splat
+PLACE_BITS, TURN_BITS, OPACITY_BITS, COLOR_BITS = 7, 6, 6, 7  # of the weights of a face's corners, and so on (guess)
+OFFSET_STEP = 1e-4  # normalised: .2 mm on a person (guess)
+LAYERS = (0.125, 0.5, 1.0)  # share of the splats that the first k layers have (guess)
 
 
-@dataclass(frozen=True, slots=True)
-class SplatCodingOptions:
-    """Options of the coding of splats."""
-
-    place_bits: int = 7  # of the weights of a face's corners
-    turn_bits: int = 6
-    opacity_bits: int = 6
-    color_bits: int = 7
-    offset_step: float = 1e-4  # normalised: .2 mm on a person
-    layers: tuple[float, ...] = (0.125, 0.5, 1.0)  # shares of the splats in the first k layers
-
-    def __post_init__(self) -> None:
-        bits = (self.place_bits, self.turn_bits, self.opacity_bits, self.color_bits)
-        if not all(1 <= some <= MOST_BITS for some in bits) or not 0 < self.offset_step < 1:
-            raise InputError(f"bits {bits}, offset step {self.offset_step:g}: give 1 to {MOST_BITS}, and 0 to 1")
-        if not self.layers or self.layers[-1] != 1 or min(np.diff((0.0, *self.layers))) <= 0:
-            raise InputError(f"layers {self.layers}: give shares that rise from above 0 to 1")
-
-
-def encode_splats(
-    splats: Splats, importance: Float64[np.ndarray, " N"], options: SplatCodingOptions = SplatCodingOptions()
-) -> tuple[bytes, tuple[int, ...]]:
+def encode_splats(splats: Splats, importance: Float64[np.ndarray, " N"]) -> tuple[bytes, tuple[int, ...]]:
     """Encode splats; return the payload and the ends of its layers. Raises InputError for values without a code."""
     _check_input(splats, importance)
-    o, rungs = options, _rungs(splats.scales)
+    rungs = _rungs(splats.scales)
     middle = int(np.median(rungs[:, 0]))
-    bits = (o.place_bits, o.turn_bits, o.opacity_bits, o.color_bits)
-    head = Gaussians(Form.GAUSSIANS, *bits, rung_of(o.offset_step), middle, len(splats))
+    bits = (PLACE_BITS, TURN_BITS, OPACITY_BITS, COLOR_BITS)
+    head = Gaussians(Form.GAUSSIANS, *bits, rung_of(OFFSET_STEP), middle, len(splats))
     parts = [pack(head)]
-    for number, chosen in enumerate(_layers(splats, importance, options.layers)):
+    for number, chosen in enumerate(_layers(splats, importance)):
         record = pack(_encode_layer(splats.take(chosen), head))
         parts = [parts[0] + record] if number == 0 else [*parts, record]
     return b"".join(parts), tuple(accumulate(map(len, parts)))
@@ -167,21 +148,19 @@ def _on_lattice(weights: Float64[np.ndarray, "N 2"], size: int) -> Int64[np.ndar
     return places
 
 
-def _layers(
-    splats: Splats, importance: Float64[np.ndarray, " N"], shares: Sequence[float]
-) -> list[Int64[np.ndarray, " _"]]:
+def _layers(splats: Splats, importance: Float64[np.ndarray, " N"]) -> list[Int64[np.ndarray, " _"]]:
     """Return the splats of each layer, in the order of their places.
 
     Layers are spread evenly over the surface: among neighbours in that order, the most important come first.
     """
     order = _by_place(splats)
     n, rank = len(order), np.empty(len(order))
-    run = max(round(shares[-1] / shares[0]), 1)  # neighbours of which one is in the first layer
+    run = max(round(LAYERS[-1] / LAYERS[0]), 1)  # neighbours of which one is in the first layer
     for start in range(0, n, run):
         values = importance[order[start : start + run]]
         rank[start : start + len(values)][np.argsort(-values, kind="stable")] = np.arange(len(values))
     by_rank = np.argsort(rank, kind="stable")
-    bounds = [0, *(max(round(share * n), 1) for share in shares)]
+    bounds = [0, *(max(round(share * n), 1) for share in LAYERS)]
     parts = (np.sort(by_rank[a:b]) for a, b in pairwise(bounds) if b > a)
     return [order[part] for part in parts]
 

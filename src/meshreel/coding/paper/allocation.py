@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...errors import InputError
-from ...format.layout import AnchorRule
 from ...geometry.strict import log2
 from ...geometry.topology import components
 from ...shapes import Float64, Int32, Int64
@@ -23,6 +22,7 @@ from .laplacian import System
 
 WORTH = 1.8  # squared steps per bit, slope of the curve of distortion over rate (measured; decision 5)
 LARGE = 1000  # vertices from which on a connected part gets all six anchors (decision 5): a guess
+PRICE = 0.5  # price of a bit, in squared steps (guess)
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,8 +31,6 @@ class DisplacementOptions:
 
     step: float = 8e-4  # quantiser step of a component; its error is about half of it
     basis_size: int | None = None  # number of components; None: those that pay
-    price: float = 0.5  # price of a bit, in squared steps
-    anchor_rule: AnchorRule = AnchorRule.FARTHEST
     anchor_count: int | None = None  # None: the better of six per connected part and one in twenty vertices
     anchor_weight: int = 4  # 1 to 255
     offsets: tuple[int, ...] = (0, -4, -2, 2, 4)  # steps tried for a component, from `step`, octaves / 8 (guess)
@@ -100,7 +98,7 @@ def round_deltas(
     steps, vertices = steps_of(rungs), system.vertices
     if options.dead_zone is not None:
         return quantize.forward(deltas, steps, options.dead_zone)
-    price = options.price * (options.step / steps) ** 2  # of a bit, in the component's own squared steps
+    price = PRICE * (options.step / steps) ** 2  # of a bit, in the component's own squared steps
     symbols = np.rint(deltas / steps)
     for _ in range(2):
         symbols = system.quantize(deltas, steps, price * _slopes(symbols[:vertices]))

@@ -12,7 +12,7 @@ import numpy as np
 from ...errors import FormatError, InputError
 from ...format import records
 from ...format.budget import LIMITS
-from ...format.layout import Component, DisplacementHead
+from ...format.layout import AnchorRule, Component, DisplacementHead
 from ...shapes import Float64
 from ...types import Mesh
 from .. import entropy, klt
@@ -20,6 +20,7 @@ from ..steps import RUNGS
 from . import laplacian, quantize
 from .allocation import Allocation, DisplacementOptions, allocate, alternatives, cost, round_deltas, steps_of
 
+ANCHORS = AnchorRule.FARTHEST  # where they lie (decision 5)
 MOST_FRAMES = 65_535  # of a group: a uint16 in the head
 MOST_BITS = 30  # fraction bits of the mean and of a basis vector, so that values fit int32
 
@@ -80,7 +81,7 @@ def _encode(field: Float64[np.ndarray, "V T 3"], base: Mesh, options: Displaceme
     Components and steps are chosen before the chain, which `decode_displacements` undoes line by line.
     """
     vertices = len(field)
-    anchors = laplacian.anchors(options.anchor_rule, options.anchor_count or 0, base.faces, vertices)
+    anchors = laplacian.anchors(ANCHORS, options.anchor_count or 0, base.faces, vertices)
     system = laplacian.System(base, anchors, options.anchor_weight)
     neighbours = entropy.causal_neighbours(base.faces, vertices)
     choice = allocate(field, system, neighbours, options)
@@ -105,7 +106,7 @@ def _head(
     coded = zip(choice.basis.bits[1:].tolist(), choice.rungs.tolist(), streams, strict=True)
     return DisplacementHead(
         frames=frames,
-        anchor_rule=options.anchor_rule,
+        anchor_rule=ANCHORS,
         anchor_count=options.anchor_count or 0,
         anchor_weight=options.anchor_weight,
         mean_bits=int(choice.basis.bits[0]),

@@ -110,9 +110,9 @@ class _Chain:
         colors = [_vertex_colors(paint, mesh) for paint, mesh in zip(paints, meshes, strict=True)]
         texture = options.texture if pictured and not self._groups and group.form == Form.LAYERS else None
         is_covered = texture is not None or self._video is not None
-        coding = replace(options.colors, step=COARSER * options.colors.step) if is_covered else options.colors
+        step = COARSER * options.color_step if is_covered else options.color_step
         try:
-            encoded = encode_group_colors(canvas, colors, coding, None if before is None else before.colors)
+            encoded = encode_group_colors(canvas, colors, step, None if before is None else before.colors)
         except CostlyError:  # the summary tells of it
             self.pass_on(replace(group, lost_colors=True))
             return after

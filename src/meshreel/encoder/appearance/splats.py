@@ -18,14 +18,17 @@ from ...format.layout import ChunkKind, Form
 from ...geometry.splats import Carrier
 from ...types import Mesh, evenly
 from ..group.interval import Interval
-from .options import SplatOptions
+
+FRAMES = 16  # of a chain, whose pictures are looked at, at most (guess)
+VIEWS = 6  # of each, where there are no colour cameras (guess)
+SIZE = 256  # pixels, of the longer side of the body in a picture (guess)
 
 
 class ChainSplats:
     """The frames of a chain, and in the end its splats."""
 
-    def __init__(self, options: SplatOptions, interval: Interval) -> None:
-        self._options, self._interval = options, interval
+    def __init__(self, count: int, interval: Interval) -> None:
+        self._splats, self._interval = count, interval
         self._frames, self._every, self._count = list[tuple[int, Carrier]](), 1, 0
 
     def add(self, form: Form, canvas: Canvas, meshes: Sequence[Mesh], numbers: Sequence[int]) -> None:
@@ -36,7 +39,7 @@ class ChainSplats:
             if self._count % self._every == 0:
                 self._frames.append((number, carrier))
             self._count += 1
-            if len(self._frames) == 4 * self._options.frames:  # of a long chain, not all are in memory
+            if len(self._frames) == 4 * FRAMES:  # of a long chain, not all are in memory
                 self._frames, self._every = self._frames[::2], 2 * self._every
 
     def companions(self) -> tuple[Companion, ...]:
@@ -44,24 +47,24 @@ class ChainSplats:
 
         Raises InputError where no picture shows the surface.
         """
-        o, some = self._options, self._frames
+        some = self._frames
         if not some:
             return ()
-        chosen = [some[k] for k in evenly(len(some), o.frames)]
+        chosen = [some[k] for k in evenly(len(some), FRAMES)]
         frames = [SplatFrame(carrier, self._views(number)) for number, carrier in chosen]
         try:
-            splats, importance = fit_splats(frames, o.fit)
+            splats, importance = fit_splats(frames, self._splats)
         except InputError as error:
             first = self._interval.first_frame
             raise InputError(f"frames {first + some[0][0]} to {first + some[-1][0]}: {error}") from error
-        payload, layers = encode_splats(splats, importance, o.coding)
+        payload, layers = encode_splats(splats, importance)
         return (Companion(ChunkKind.SPLATS, payload, layers),)
 
     def _views(self, number: int) -> tuple[SplatView, ...]:
         """Return pictures of a frame: of colour cameras, or rendered from around it."""
-        interval, o = self._interval, self._options
+        interval = self._interval
         mesh, views = interval.frames[number], interval.views
         if views is not None:
             at = interval.first_frame + number
-            return taken(views.pictures(at), mesh, views.surface(at), o.size)
-        return rendered(mesh, ring(mesh, o.views, o.size, GOLDEN * number, interval.up)) if mesh.is_colored else ()
+            return taken(views.pictures(at), mesh, views.surface(at), SIZE)
+        return rendered(mesh, ring(mesh, VIEWS, SIZE, GOLDEN * number, interval.up)) if mesh.is_colored else ()

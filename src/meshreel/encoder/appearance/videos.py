@@ -27,7 +27,7 @@ class Videos:
         if options.compatible:
             self._codecs[ChunkKind.COMPATIBLE] = VideoCodec.H264
         size = layout.width, layout.height
-        self._encoders = {kind: VideoEncoder(*size, options.video, codec) for kind, codec in self._codecs.items()}
+        self._encoders = {kind: VideoEncoder(*size, options.crf, codec) for kind, codec in self._codecs.items()}
         self._packets = {kind: list[bytes]() for kind in self._codecs}
 
     def add(self, pixels: UInt8[np.ndarray, "H W 3"]) -> None:

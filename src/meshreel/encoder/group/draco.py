@@ -18,6 +18,8 @@ from ...metrics.distance import Original
 from ...types import Mesh
 from .target import Fidelity, measure
 
+LEVELS = (1, 0)  # midpoint subdivisions in the decoder, which are tried (guess)
+
 
 @dataclass(frozen=True, slots=True)
 class IntraOptions:
@@ -25,7 +27,6 @@ class IntraOptions:
 
     fractions: tuple[float, ...] = (0.04, 0.08, 0.15, 0.25, 0.5, 1.0)  # of the vertices kept
     steps: tuple[float, ...] = (2.0, 1.4, 1.0, 0.7, 0.5, 0.35)  # lattice steps, in units of the distance to reach
-    levels: tuple[int, ...] = (1, 0)  # midpoint subdivisions in the decoder
     finer: bool = False  # where the step that one frame needs fails on others, finer ones are tried, which takes longer
 
 
@@ -76,7 +77,7 @@ def _on_one_frame(
         if min(sizes) > budget:
             return  # more vertices cost more
         affordable = [(step, size) for step, size in zip(steps, sizes, strict=True) if size <= budget]
-        for levels in options.levels:
+        for levels in LEVELS:
             if not _reaches(original, reduced, affordable[-1][0], levels, target):
                 continue  # the finest step is the best one
             reached = False

@@ -20,7 +20,7 @@ from ...analysis.fit.slide import Slide
 from ...analysis.fit.surface_fit import Fitting, strongest_components
 from ...analysis.follow.embedded import Painter, Tracker
 from ...analysis.follow.fused_template import fused_mesh
-from ...analysis.follow.template import base_mesh, shared_detail
+from ...analysis.follow.template import LEVELS, base_mesh, shared_detail
 from ...coding.layers.coder import LayersState
 from ...coding.reference_mesh import CodedReference, code_on_lattice
 from ...geometry.painted import Paint
@@ -116,7 +116,7 @@ class Candidate:
             return []
         o, found = self._options, list[Candidate]()
         for error in o.errors:
-            options = replace(o, template=replace(o.template, error=error * o.template.error), errors=())
+            options = replace(o, template_error=error * o.template_error, errors=())
             found.append(Candidate.of_key(ahead, self.key, options, self._tracker))
             found[-1].follow(ahead)
         return found
@@ -163,11 +163,9 @@ class Candidate:
         self, ahead: Ahead, numbers: range, positions: Float64[np.ndarray, "T V 3"]
     ) -> Float64[np.ndarray, "T V 3"]:
         """Return fits to frames, slid to where these have the colours of the key frame, if they have colours."""
-        options, faces = self._options.slide, self.reference.base.faces
-        if options is None:
-            return positions
+        faces = self.reference.base.faces
         if self.slide is None and (paint := ahead.paint(self.key, ahead.at(self.key).mesh)) is not None:
-            self.slide = Slide(faces, self._fits[self.key], paint, options)
+            self.slide = Slide(faces, self._fits[self.key], paint)
         if self.slide is None:
             return positions
         pairs = [(number, ahead.paint(number, ahead.at(number).mesh)) for number in numbers if number != self.key]
@@ -200,7 +198,7 @@ class Candidate:
             residual = self._tracker.residual(number)
             if residual is None:
                 residual = self._tracker.step(number, ahead.at(number), ahead.painter(number))
-            if residual > self._tracker.limits.lost:
+            if residual > self._tracker.lost:
                 self._ends[side] = number
                 return
             yield number
@@ -209,7 +207,7 @@ class Candidate:
         """Make the template of what all tracked frames have in common; return False where nothing is left of it."""
         tracked = sorted([self.key, *(number for side in (LATER, EARLIER) for number in self._tracked(ahead, side))])
         surfaces = [ahead.at(number) for number in tracked]
-        fused = fused_mesh(self._tracker.motion(tracked), surfaces, self._noise, self._options.fused)
+        fused = fused_mesh(self._tracker.motion(tracked), surfaces, self._noise)
         if fused.is_empty or (reference := self._coded(ahead, fused)) is None:
             return False
         placed = reference.base.vertices
@@ -233,7 +231,7 @@ class Candidate:
         """Return a base mesh of a surface as decoded; None where nothing is left of it."""
         o = self._options
         lattice = o.layers.step_above(self._tolerated) * (LATTICE if len(ahead) > 1 else LATTICE_ALONE)
-        reference = code_on_lattice(base_mesh(surface, o.template, self._tolerated), lattice, o.template.levels)
+        reference = code_on_lattice(base_mesh(surface, o.template_error, self._tolerated), lattice, LEVELS)
         note("template, coded", reference.base.vertices, reference.base.faces)
         return None if reference.mesh.is_empty else reference
 

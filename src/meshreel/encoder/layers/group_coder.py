@@ -93,10 +93,10 @@ class GroupCoder:
         """Return the encoded layers, with a layer of patches where that pays."""
         payload, layers = encoded.payload, encoded.layers
         decoded = [Mesh(positions, faces) for positions in encoded.positions]
-        if self.options.tails is None:
+        if not self.options.tails:
             return _Shown(payload, layers, decoded)
         known, free = [surface.surface for surface in self.surfaces], [surface.free for surface in self.surfaces]
-        found = find_tails(known, decoded, len(payload), self.options.tails, noise=self.noise, free=free)
+        found = find_tails(known, decoded, len(payload), noise=self.noise, free=free)
         if found is None:
             return _Shown(payload, layers, decoded)
         payload += pack(found.record)

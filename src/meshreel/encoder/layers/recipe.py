@@ -102,7 +102,7 @@ class _Planner:
         note("frames", *(array for mesh in meshes for array in (mesh.vertices, mesh.faces)))
         target = target_of(meshes, self._target, noise)
         ahead = Ahead(self._at, list(self._surfaces.values()), noise, target, frame_rate=self._interval.frame_rate)
-        return replace(ahead, paint=self._interval.paint) if self._options.slide and self._colored else ahead
+        return replace(ahead, paint=self._interval.paint) if self._colored else ahead
 
     def _standing(self, ahead: Ahead) -> list[Coded]:
         """Code the template where it was, if its residual there is hardly larger than usual: a fit would only slide."""

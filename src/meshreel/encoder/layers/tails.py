@@ -33,16 +33,10 @@ LEAST_BYTES = 4  # bytes of a region or a patch at least (guess)
 DRACO_HEAD = 36  # bytes of a Draco mesh that all patches share
 EXACT = 1e-7  # RMS distance of the rest, of the diagonal, below which no byte is worth spending (guess)
 NOISY_REST = 1.0  # RMS noise that the rest of a noisy body may be off (guess)
-
-
-@dataclass(frozen=True, slots=True)
-class TailOptions:
-    """Candidates that the search for patches tries."""
-
-    thresholds: tuple[float, ...] = (4.0, 6.0, 9.0)  # distances of the tails, in RMS distances of the rest
-    shares: tuple[float, ...] = (0.1, 0.25, 0.5)  # of a patch's vertices that are kept
-    lattice: float = 2.0  # spacing of the patches' lattice, in RMS distances of the rest
-    exchange: float = 1.33  # relative fall of the squared error for a rise of the rate: 4 dB a doubling (decision 13)
+THRESHOLDS = (4.0, 6.0, 9.0)  # distances of the tails, in RMS distances of the rest (guess)
+SHARES = (0.1, 0.25, 0.5)  # of a patch's vertices that are kept (guess)
+LATTICE = 2.0  # spacing of the patches' lattice, in RMS distances of the rest (guess)
+EXCHANGE = 1.33  # relative fall of the squared error for a rise of the rate: 4 dB a doubling (decision 13)
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +51,6 @@ def find_tails(
     frames: Sequence[Mesh | Surface],
     decoded: Sequence[Mesh],
     size: int,
-    options: TailOptions = TailOptions(),
     *,
     noise: float,
     free: Sequence[FreeSpace | None] = (),
@@ -78,10 +71,10 @@ def find_tails(
         return None
     if noise > 0:  # a foot that the template lacks may be more than a tail
         usual = min(usual, (NOISY_REST * noise) ** 2)
-    price = options.exchange * len(frames) * usual / size
+    price = EXCHANGE * len(frames) * usual / size
     usual = max(usual, noise**2)
-    rung = _rung([surface.mesh for surface in surfaces], options.lattice * usual**0.5)
-    search = _Search(shown, faces, usual, price, options, rung, noise)
+    rung = _rung([surface.mesh for surface in surfaces], LATTICE * usual**0.5)
+    search = _Search(shown, faces, usual, price, rung, noise)
     gone = ghosts(shown, faces, search.far if noise > 0 else None)
     best, least = None, np.inf if gone.any() else search.cost(None)
     better = list[_Coded]()  # each than those before it
@@ -118,7 +111,6 @@ class _Search:
     faces: Int32[np.ndarray, "F 3"]
     usual: float  # mean squared distance without the tails
     price: float  # of a byte, squared distances summed over the frames
-    options: TailOptions
     rung: int  # of the patches' lattice
     noise: float  # RMS distance of the frames from the truth
 
@@ -144,7 +136,7 @@ class _Search:
 
     def masks(self, gone: Bool[np.ndarray, "T F"]) -> Iterator[Bool[np.ndarray, "T F"]]:
         """Yield a mask of the faces worth dropping for each threshold, with those gone anyway; no empty one."""
-        for threshold in self.options.thresholds:
+        for threshold in THRESHOLDS:
             chosen = gone | self._paying(np.stack([frame.apart > threshold**2 * self.usual for frame in self.frames]))
             if chosen.any():
                 yield chosen
@@ -166,10 +158,8 @@ class _Search:
 
     def patches(self, best: _Coded | None) -> Iterator[tuple[Mesh, ...]]:
         """Yield the patches worth their bytes for each threshold."""
-        if not self.options.shares:
-            return
         left = [frame.left(best.parts.dropped[t] if best else None) for t, frame in enumerate(self.frames)]
-        for threshold in self.options.thresholds:
+        for threshold in THRESHOLDS:
             meshes = tuple(
                 self._patch(frame, squared, threshold) for frame, squared in zip(self.frames, left, strict=True)
             )
@@ -184,7 +174,7 @@ class _Search:
     @property
     def far(self) -> float:
         """Squared distance beyond which surface of a frame has no counterpart."""
-        return max(FAR**2, self.options.thresholds[0] ** 2 * self.usual)
+        return max(FAR**2, THRESHOLDS[0] ** 2 * self.usual)
 
     def _is_hole(self, frame: ShownFrame, squared: Float64[np.ndarray, " N"], faces: Int64[np.ndarray, " S"]) -> bool:
         corners = frame.original.faces[faces]
@@ -206,7 +196,7 @@ class _Search:
 
     def _reduced(self, frame: ShownFrame, faces: Int64[np.ndarray, " S"]) -> Iterator[Mesh]:
         mesh = clean(Mesh(frame.original.vertices, frame.original.faces[faces]))
-        for share in self.options.shares:
+        for share in SHARES:
             small = decimate(mesh, max(4, round(share * len(mesh.vertices))))
             step = step_of(self.rung)
             small = clean(Mesh(np.rint(small.vertices / step) * step, small.faces))

@@ -16,7 +16,7 @@ from typing import ClassVar
 import numpy as np
 from jaxtyping import Float64
 
-from ...analysis.fit.surface_fit import Fit, Guides, fit_frames, snap_to_vertices
+from ...analysis.fit.surface_fit import Fit, FitOptions, Guides, fit_frames, snap_to_vertices
 from ...analysis.groups import cut_at
 from ...analysis.reference.extraction import MDS, extract_reference, predict
 from ...analysis.reference.track import track_centers
@@ -34,6 +34,10 @@ from ..group.interval import Interval
 from ..group.progress import Stages
 from ..group.target import measure, target_of
 from .options import PaperOptions
+
+REFERENCE_BITS = 14  # of the reference's lattice (paper: qp = 14)
+LEVELS = 1  # midpoint subdivisions of the decoded reference (decision 10)
+DEPTH = 1  # nested cuts at most; frames that are lost after them are coded one by one (guess)
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +63,7 @@ FindGroups = Callable[[Interval, PaperOptions, "Stages | None"], list[FoundGroup
 def find_groups(interval: Interval, options: PaperOptions, stages: Stages | None = None) -> list[FoundGroup]:
     """Cut an interval into groups that one reference follows each, or none does; every frame has a surface.
 
-    The interval is cut where the fit fails, `options.groups.depth` times at most.
+    The interval is cut where the fit fails, `DEPTH` times at most.
     """
     frames = list(interval.frames)
     stages = stages or Stages(None, len(frames))
@@ -68,7 +72,7 @@ def find_groups(interval: Interval, options: PaperOptions, stages: Stages | None
     centers = track_centers(frames, options.track)
     note("centers", centers.positions)
     stages.add("track", len(frames))
-    return _Cutting(options, interval.noise).groups(frames, centers, options.groups.depth, stages)
+    return _Cutting(options, interval.noise).groups(frames, centers, DEPTH, stages)
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,20 +112,21 @@ class PaperRecipe:
 
 
 def analyze(
-    frames: Sequence[Mesh], centers: Centers, options: PaperOptions, stages: Stages
+    frames: Sequence[Mesh], centers: Centers, options: PaperOptions, stages: Stages, again: bool = False
 ) -> tuple[Fitted, Float64[np.ndarray, " T"]]:
     """Return the fitted reference of a group, as decoded, and each frame's residual (paper, sections 3.3.1 and 3.3.2).
 
-    Raises NoReferenceError where no surface can be made of the frames.
+    Fewer poses are tried `again`, of a part of frames that were one group. Raises NoReferenceError where no surface can
+    be made of the frames.
     """
-    reference = extract_reference(frames, centers, options.reference, options.pose == "mds")
+    reference = extract_reference(frames, centers, options.reference, options.pose == "mds", again)
     if reference.mesh.is_empty:
         raise NoReferenceError("no surface is common to the frames")
     stages.add("reference", len(frames))
-    coded = code_reference(reference.mesh, options.reference_bits, options.levels)
+    coded = code_reference(reference.mesh, REFERENCE_BITS, LEVELS)
     if coded.base.is_empty:
         raise NoReferenceError("the reference mesh has no faces left after Draco")
-    predictions = predict(reference, coded.base, centers, options.reference.deform)
+    predictions = predict(reference, coded.base, centers)
     fit = _fit(coded, predictions, frames, options, reference.key)
     stages.add("fit", len(frames))
     return Fitted(coded, fit.positions, reference.frame == MDS), fit.residuals
@@ -136,7 +141,7 @@ def _fit(
 ) -> Fit:
     if options.fit == "nearest":
         return snap_to_vertices(coded.base.faces, predictions, frames)
-    return fit_frames(coded.base.faces, predictions, frames, options.surface_fit, Guides(key=key))
+    return fit_frames(coded.base.faces, predictions, frames, FitOptions(), Guides(key=key))
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,6 +150,7 @@ class _Cutting:
 
     options: PaperOptions
     noise: float
+    again: bool = False  # the frames are a part of some that were one group
 
     def groups(self, frames: Sequence[Mesh], centers: Centers, depth: int, stages: Stages) -> list[FoundGroup]:
         """Cut frames as `find_groups` does, from tracked centers; `depth` times at most."""
@@ -152,12 +158,12 @@ class _Cutting:
         if len(frames) == 1:
             return [FoundGroup(frames, None)]
         try:
-            fitted, residuals = analyze(frames, centers, options, stages)
+            fitted, residuals = analyze(frames, centers, options, stages, self.again)
         except NoReferenceError:
             return [FoundGroup(frames, None)]
         note("reference, coded", fitted.reference.base.vertices, fitted.reference.base.faces)
         note("fit", fitted.positions)
-        cut = cut_at(residuals / target_of(frames, options.target, self.noise).distance, options.groups)
+        cut = cut_at(residuals / target_of(frames, options.target, self.noise).distance)
         if cut is None or not options.cuts:
             return [FoundGroup(frames, fitted)]
         if depth == 0:
@@ -165,9 +171,9 @@ class _Cutting:
         head, tail = frames[:cut], frames[cut:]
         known = replace(centers, positions=centers.positions[:cut])
         retracked = track_centers(tail, options.track)  # centers that were lost before the cut would spoil the tail
-        quick = replace(self, options=replace(options, reference=options.reference.fewer_trials()))
+        parts = replace(self, again=True)
         again = Stages(None, len(frames))  # these frames have been through the stages once
-        return [*quick.groups(head, known, depth - 1, again), *quick.groups(tail, retracked, depth - 1, again)]
+        return [*parts.groups(head, known, depth - 1, again), *parts.groups(tail, retracked, depth - 1, again)]
 
 
 def _encode_group(found: FoundGroup, options: PaperOptions, noise: float) -> Iterator[EncodedGroup]:
@@ -175,7 +181,7 @@ def _encode_group(found: FoundGroup, options: PaperOptions, noise: float) -> Ite
     frames = found.frames
     if found.fitted is not None:
         with suppress(CostlyError):
-            group = laplacian(frames, found.fitted.reference, found.fitted.positions, options.coded)
+            group = laplacian(frames, found.fitted.reference, found.fitted.positions, options.displacements)
             is_fixed = options.displacements.basis_size is not None or not options.cuts
             group = group if is_fixed else cheaper(frames, group, options.intra)
             yield replace(group, canonical=found.fitted.canonical and group.form == Form.LAPLACIAN)

@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Bool, UInt16
 from scipy.spatial import cKDTree
 
-from ...analysis.scene.bodies import BodyOptions, with_ring
+from ...analysis.scene.bodies import NEAR, with_ring
 from ...analysis.scene.labelling import Segmentation
 from ...geometry.topology import part_of
 from ...types import Mesh, MeshSequence
@@ -31,7 +31,7 @@ class FrameLabels:
 def label_frames(sequence: MeshSequence, segmentation: Segmentation, options: EncoderOptions) -> Iterator[FrameLabels]:
     """Yield the labels of each frame; a body has the same number in all frames."""
     cell = segmentation.cell
-    tracks = Tracks(cell, options.scene.bodies if options.scene else BodyOptions())
+    tracks = Tracks(cell, options.scene.near if options.scene else NEAR)
     for frames in key_intervals(sequence, segmentation, options):
         moving = list[Bool[np.ndarray, " F"]]()
         parts, coded = list[Mesh](), list[Mesh]()

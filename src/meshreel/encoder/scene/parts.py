@@ -13,7 +13,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 from jaxtyping import Bool, Float64
 
-from ...analysis.scene.background import BackgroundOptions, fuse_background
+from ...analysis.scene.background import FRAMES, fuse_background
 from ...analysis.scene.background_depth import Moment, fuse_still_depth
 from ...analysis.scene.bodies import beyond, ring, with_ring
 from ...analysis.scene.labelling import Segmentation
@@ -110,14 +110,14 @@ def take_apart(
     check_one_unit(seen)
     segmentation: Segmentation
     if masker is None:
-        segmentation = segment(sequence, options.segment, lambda share: stages.reach("segment", share))
+        segmentation = segment(sequence, options.cameras, lambda share: stages.reach("segment", share))
     else:
-        segmentation = segment_by(masker, sequence, options.segment)
+        segmentation = segment_by(masker, sequence, options.cameras)
     stages.reach("segment", 1.0)
-    background = _background(sequence, segmentation, options.background, stages)
+    background = _background(sequence, segmentation, options.from_depth, stages)
     if background.is_empty:
-        _check_nothing_lost(sequence, segmentation, options.background)
-    changes = [_change(sequence, segmentation, frame, options.background) for frame in segmentation.changes]
+        _check_nothing_lost(sequence, segmentation)
+    changes = [_change(sequence, segmentation, frame, options.from_depth) for frame in segmentation.changes]
     stages.reach("background", 1.0)
     found = _measured(sequence, segmentation, background, changes, stages)
     unit = float(np.median(found.sizes)) if found.sizes else 0.0
@@ -132,9 +132,9 @@ def free_space(sequence: CapturedSequence) -> tuple[FreeSpace, ...]:
     return () if depth is None else tuple(FreeSpace.of(depth[number]) for number in some)
 
 
-def _check_nothing_lost(sequence: MeshSequence, segmentation: Segmentation, options: BackgroundOptions) -> None:
+def _check_nothing_lost(sequence: MeshSequence, segmentation: Segmentation) -> None:
     """Raise InputError where there is no background, but much of a frame stands still: the file would lack it."""
-    for number in evenly(len(sequence), options.frames):
+    for number in evenly(len(sequence), FRAMES):
         mesh = sequence[number]
         still = segmentation.still_at_first(number, mesh)
         if still.sum() > LOST * len(mesh.faces):
@@ -143,24 +143,22 @@ def _check_nothing_lost(sequence: MeshSequence, segmentation: Segmentation, opti
             raise InputError(f"{text}: {size}; if so, encode with --dynamic-only")
 
 
-def _background(
-    sequence: CapturedSequence, segmentation: Segmentation, options: BackgroundOptions, stages: Stages
-) -> Mesh:
+def _background(sequence: CapturedSequence, segmentation: Segmentation, from_depth: bool, stages: Stages) -> Mesh:
     """Fuse the surface that stands still at first, from the cameras' depth where it is known."""
-    numbers, cell = evenly(len(sequence), options.frames), segmentation.cell
+    numbers, cell = evenly(len(sequence), FRAMES), segmentation.cell
 
     def stands(number: int, mesh: Mesh) -> Bool[np.ndarray, " F"]:
         stages.reach("background", number / len(sequence))
         return segmentation.still_at_first(number, mesh)
 
-    if options.depth and sequence.depth is not None:
-        return _fused(sequence, numbers, stands, cell, options)
+    if from_depth and sequence.depth is not None:
+        return _fused(sequence, numbers, stands, cell)
 
     def clear(number: int, mesh: Mesh) -> Bool[np.ndarray, " F"]:
         still = stands(number, mesh)
         return still & ~ring(mesh, ~still, cell)
 
-    return fuse_background(picked(sequence, numbers, clear), cell, options)
+    return fuse_background(picked(sequence, numbers, clear), cell)
 
 
 def _fused(
@@ -168,22 +166,21 @@ def _fused(
     numbers: Sequence[int],
     still: Callable[[int, Mesh], Bool[np.ndarray, " F"]],
     cell: float,
-    options: BackgroundOptions,
 ) -> Mesh:
     """Fuse the still faces of some frames from their depth pictures, which are known."""
     depth = sequence.depth
     assert depth is not None
     meshes = ((number, sequence[number]) for number in numbers)
-    return fuse_still_depth((Moment(depth[k], mesh, still(k, mesh)) for k, mesh in meshes), cell, options)
+    return fuse_still_depth((Moment(depth[k], mesh, still(k, mesh)) for k, mesh in meshes), cell)
 
 
-def _change(sequence: CapturedSequence, segmentation: Segmentation, frame: int, options: BackgroundOptions) -> Change:
-    numbers = [frame + number for number in evenly(len(sequence) - frame, options.frames)]
-    if options.depth and sequence.depth is not None:
-        room = _fused(sequence, numbers, lambda k, mesh: ~segmentation.moving(k, mesh), segmentation.cell, options)
+def _change(sequence: CapturedSequence, segmentation: Segmentation, frame: int, from_depth: bool) -> Change:
+    numbers = [frame + number for number in evenly(len(sequence) - frame, FRAMES)]
+    if from_depth and sequence.depth is not None:
+        room = _fused(sequence, numbers, lambda k, mesh: ~segmentation.moving(k, mesh), segmentation.cell)
         return Change(frame, part_of(room, segmentation.came(frame, room)))
     later = picked(sequence, numbers, lambda _, mesh: segmentation.came(frame, mesh))
-    return Change(frame, fuse_background(later, segmentation.cell, options))
+    return Change(frame, fuse_background(later, segmentation.cell))
 
 
 def _room_after(background: Mesh, changes: Sequence[Change]) -> Surface | None:

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import pairwise
 
-from ...analysis.scene.bodies import BodyOptions, at_most, find_bodies, same_bodies
+from ...analysis.scene.bodies import at_most, find_bodies, same_bodies
 from ...analysis.scene.labelling import Segmentation
 from ...analysis.survey import Survey
 from ...format.checks import MOST_TRACKS
@@ -45,7 +45,7 @@ def encode_bodies(job: Job, parts: Parts) -> CodedBodies:
 
     The intervals of the whole scene are one stream: workers need not wait for the last body of a key interval.
     """
-    tracks, found = Tracks(parts.segmentation.cell, job.scene.bodies), list[TrackGroup]()
+    tracks, found = Tracks(parts.segmentation.cell, job.scene.near), list[TrackGroup]()
     places = deque[tuple[int, int]]()  # track and first frame of intervals that are not encoded yet
 
     def intervals() -> Iterator[Interval]:
@@ -100,7 +100,7 @@ def key_intervals(sequence: MeshSequence, segmentation: Segmentation, options: E
     longest = max(1, round(options.key_interval * frame_rate))
     others = set(segmentation.changes)
     if options.scene is not None:
-        others |= set(refreshes(count, frame_rate, options.scene.background))
+        others |= set(refreshes(count, frame_rate, options.scene))
     for start, stop in pairwise(sorted({0, count} | others)):
         pieces = -(-(stop - start) // longest)
         yield from (range(a, b) for a, b in pairwise(start + (stop - start) * k // pieces for k in range(pieces + 1)))
@@ -122,8 +122,8 @@ def _cut(meshes: Sequence[Mesh], frames: range, seen: Survey, longest: int) -> l
 class Tracks:
     """Assigns the bodies of each key interval to tracks: to their own from before, or to one that is free."""
 
-    def __init__(self, cell: float, options: BodyOptions) -> None:
-        self._cell, self._options = cell, options
+    def __init__(self, cell: float, near: float) -> None:
+        self._cell, self._near = cell, near
         self._last: list[Mesh] = []  # of each track, in the last frame so far
         self._frames = 0
         self._began: list[int] = []  # the first frame of each track's first key interval
@@ -131,9 +131,9 @@ class Tracks:
 
     def of(self, moving: Sequence[Mesh]) -> list[tuple[int, list[Mesh]]]:
         """Return each track's mesh in each frame of the next key interval."""
-        apart = find_bodies(moving, self._cell, self._options)
+        apart = find_bodies(moving, self._cell, self._near)
         bodies, self.dropped = at_most(apart.meshes, MOST_TRACKS), self.dropped + apart.dropped
-        before = same_bodies(self._last, [body[0] for body in bodies], self._cell, self._options)
+        before = same_bodies(self._last, [body[0] for body in bodies], self._cell, self._near)
         free = [number for number in range(len(self._last) + len(bodies) + 1) if number not in before]
         numbers = [free.pop(0) if old < 0 else old for old in before]
         count = max([len(self._last), 1, *(number + 1 for number in numbers)])

@@ -14,7 +14,6 @@ from jaxtyping import Bool, Float64, UInt8
 from ...analysis.appearance.background import median_colors
 from ...analysis.appearance.bake import Texels, picture, texels_of
 from ...analysis.appearance.unwrap import projected, unwrap
-from ...analysis.scene.background import BackgroundOptions
 from ...analysis.survey import Survey
 from ...coding.appearance.atlas import encode_atlas
 from ...coding.appearance.pictures import MOST_CRF
@@ -35,6 +34,7 @@ from ..appearance.colors import fitting_size
 from ..appearance.options import AppearanceOptions, TextureOptions
 from ..appearance.videos import layered_pictures
 from ..group.views import Views
+from ..settings.options import SceneOptions
 from .parts import Change, Parts
 
 FRACTIONS = (0.75, 0.5, 0.35, 0.22, 0.15, 0.1, 0.07, 0.045, 0.03, 0.02)  # of the background's vertices (decision 19)
@@ -63,7 +63,7 @@ class Static:
 
 
 def encode_static(
-    parts: Parts, count: int, frame_rate: float, options: BackgroundOptions, pictured: bool = False
+    parts: Parts, count: int, frame_rate: float, options: SceneOptions, pictured: bool = False
 ) -> list[Static]:
     """Encode the states of the background: as few faces as stay about as near to it as the noise.
 
@@ -96,7 +96,7 @@ def encode_static(
     return found
 
 
-def refreshes(count: int, frame_rate: float, options: BackgroundOptions) -> range:
+def refreshes(count: int, frame_rate: float, options: SceneOptions) -> range:
     """Return the frames at which the whole background is sent; the first frame is one of them."""
     return range(0, count, count if options.refresh is None else max(1, round(options.refresh * frame_rate)))
 
@@ -135,7 +135,7 @@ def _normalised(mesh: Mesh, seen: Survey) -> Mesh:
 
 
 def colored_states(
-    sequence: CapturedSequence, parts: Parts, background: BackgroundOptions, options: AppearanceOptions | None
+    sequence: CapturedSequence, parts: Parts, background: SceneOptions, options: AppearanceOptions | None
 ) -> list[Static]:
     """Encode the states of the background with the colours that still surface has from each state to the next."""
     if options is None or not is_colored(sequence):
@@ -158,7 +158,7 @@ def colored_states(
         colors, seen = looks.colors(frames, np.concatenate(points), np.concatenate(normals))
         shown = spread_colors(mesh, colors[:count].astype(np.float64), seen[:count])[count - coded.vertices :]
         try:
-            encoded = encode_group_colors(canvas, [shown], options.colors, None)
+            encoded = encode_group_colors(canvas, [shown], options.color_step, None)
         except CostlyError:  # the summary tells of it
             bare = True
         if bare:
@@ -201,15 +201,15 @@ def _pictured(
     options: TextureOptions,
 ) -> list[Companion]:
     """Return a slow video of what a background looks like, where shadows move: what a frame hides is as usual."""
-    crf = options.video.crf - FINER + round(ENLARGED * math.log2(max(1.0, surface.scale)))
-    video = replace(options.video, crf=min(max(1, crf), MOST_CRF))
+    crf = options.crf - FINER + round(ENLARGED * math.log2(max(1.0, surface.scale)))
+    slow = replace(options, crf=min(max(1, crf), MOST_CRF))
 
     def picture_of(frame: int) -> UInt8[np.ndarray, "H W 3"]:
         colors, seen = looks.moment(min(frame + some.step // 2, frames[-1]), surface.places, surface.normals)
         return picture(surface.texels, np.where(seen[:, None], colors, usual[0]), usual[1] | seen)
 
     some = frames[:: max(1, round(looks.frame_rate / PICTURES_A_SECOND))]
-    return layered_pictures(surface.layout, some, picture_of, replace(options, video=video))
+    return layered_pictures(surface.layout, some, picture_of, slow)
 
 
 class _Looks:

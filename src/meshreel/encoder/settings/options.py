@@ -1,6 +1,6 @@
 """Options of the encoder: a recipe with its own options, how a scene is taken apart, and the key interval.
 
-`EncoderOptions()` is what `encode` uses by default; `presets.preset_options` makes options for a preset and a quality.
+`EncoderOptions()` is what `encode` uses by default; `Settings.resolved` makes options of what a user chooses.
 """
 
 from __future__ import annotations
@@ -8,9 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from importlib.util import find_spec
 
-from ...analysis.scene.background import BackgroundOptions
-from ...analysis.scene.bodies import BodyOptions
-from ...analysis.scene.segmentation import SegmentOptions
+from ...analysis.scene.bodies import NEAR
+from ...analysis.scene.segmentation import Cameras
 from ...errors import InputError
 from ..appearance.options import AppearanceOptions
 from ..layers.options import LayersOptions
@@ -28,9 +27,12 @@ MethodOptions = PaperOptions | LayersOptions  # the class names the recipe
 class SceneOptions:
     """Options of the separation of a scene into a background and moving bodies."""
 
-    segment: SegmentOptions = field(default_factory=SegmentOptions)
-    background: BackgroundOptions = field(default_factory=BackgroundOptions)
-    bodies: BodyOptions = field(default_factory=BodyOptions)
+    cameras: Cameras = ()  # that look at the scene, of one size; none: they are placed
+    from_depth: bool = True  # fuse the background from depth pictures where the sequence has them
+    coarse: float = 0.5  # RMS distance that decimation may cost the background, in RMS noise (decision 19)
+    lattice: float = 0.3  # spacing of the background's lattice, in RMS noise (decision 19)
+    refresh: float | None = None  # s between two copies of the background in the file; None: one copy
+    near: float = NEAR  # cells of the scene: pieces of consecutive frames nearer than this are one body
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +49,7 @@ class EncoderOptions:
         if not 0 <= self.quality <= 100:
             raise InputError(f"quality must be in 0 to 100, got {self.quality:g}")
         if not isinstance(self.method, MethodOptions):
-            raise InputError(f"method {self.method!r}: give PaperOptions or LayersOptions, or use preset_options")
+            raise InputError(f"method {self.method!r}: give PaperOptions or LayersOptions, or use Settings")
         if self.scene is not None and not isinstance(self.scene, SceneOptions):
             raise InputError(f"scene {self.scene!r}: give SceneOptions, or None where nothing stands still")
         if not 0 < self.key_interval <= MOST_SECONDS:

@@ -1,6 +1,6 @@
-"""Presets: one name and one quality from 0 to 100 set every option of the encoder.
+"""Presets: a quality from 0 to 100 sets every option of a recipe, of a scene and of colours.
 
-In -> out: what a user chooses -> EncoderOptions. The curves were fitted to rate-distortion points of a captured dancer
+The curves were fitted to rate-distortion points of a captured dancer
 (decision 9); docs/results.md has the rates they lead to.
 """
 
@@ -10,25 +10,18 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...analysis.appearance.splat_fit import FitSplatsOptions
 from ...analysis.follow.embedded import Stage
-from ...analysis.follow.template import TemplateOptions
 from ...analysis.reference.extraction import ReferenceOptions
-from ...analysis.reference.fuse import FuseOptions
 from ...analysis.reference.track import TrackOptions
-from ...analysis.scene.background import BackgroundOptions
-from ...coding.appearance.colors import ColorCodingOptions
-from ...coding.appearance.pictures import VideoOptions
 from ...coding.layers.coder import LayerCodingOptions
 from ...coding.paper.displacements import DisplacementOptions
-from ...errors import InputError
 from ...geometry.strict import rounded
-from ..appearance.options import AppearanceOptions, SplatOptions, TextureOptions
+from ..appearance.options import AppearanceOptions, TextureOptions
 from ..group.draco import IntraOptions
 from ..group.target import Fidelity
-from ..layers.options import LayersOptions
-from ..paper.options import PaperOptions
-from .options import EncoderOptions, SceneOptions
+from ..layers.options import LayersOptions, template_error
+from ..paper.options import PLAIN_OFFSETS, PLAIN_ZONE, PaperOptions
+from .options import SceneOptions
 
 LITERAL_DEPTH = 9  # of Poisson reconstruction (paper, section 3.3.2)
 KNEE = 85.0  # quality above which steps are halved every 8 points: the curve ended for want of steps (decision 33)
@@ -43,60 +36,6 @@ EXACT_INTRA = IntraOptions(
     finer=True,
 )
 LITERAL_ANCHORS = 400  # anchors of a reference in `paper-literal`: the paper gives no number (guess)
-PRESETS = ("best", "paper", "paper-literal")
-COLORS = ("auto", "texture", "vertices", "none")
-EFFORTS = ("fast", "normal", "thorough")
-
-
-def preset_options(
-    preset: str = "best",
-    quality: float = 50.0,
-    basis_size: int | None = None,
-    group_size: int | None = None,
-    centers: int | None = None,
-    key_interval: float | None = None,
-    effort: str = "normal",
-    color: str = "auto",
-    color_quality: float | None = None,
-    texture: int | None = None,
-    compatible: bool = False,
-    splats: int | None = None,
-) -> EncoderOptions:
-    """Return the encoder's options for a preset at a quality; `basis_size` fixes the components of a group.
-
-    `effort` is how long the preset `best` searches: see `EFFORTS`. `color` is one of `COLORS`: textures where the
-    frames have pictures, textures always, colours of vertices only, or none; `color_quality` is that of colours, by
-    default `quality`; `texture` is the width of textures, texels; `compatible` adds them as H.264; `splats` is
-    how many splats a chain of groups has, none if not given. Raises InputError for an unknown preset or values out of
-    range.
-    """
-    if preset not in PRESETS:
-        raise InputError(f"no preset is called {preset!r}; known: {', '.join(PRESETS)}")
-    if not 0 <= quality <= 100:
-        raise InputError(f"quality must be in 0 to 100, got {quality:g}")
-    if preset == "best" and basis_size is not None:
-        raise InputError(f"basis size {basis_size}: preset `best` chooses the components; use preset `paper`")
-    if preset == "best" and centers is not None:
-        raise InputError(f"centers {centers}: preset `best` tracks none; use preset `paper`")
-    if effort not in EFFORTS:
-        raise InputError(f"no effort is called {effort!r}; known: {', '.join(EFFORTS)}")
-    if preset != "best" and effort != "normal":
-        raise InputError(f"effort {effort}: preset `{preset}` has one effort; use preset `best`")
-    if preset != "best" and key_interval is not None:
-        raise InputError(f"key interval {key_interval:g}: groups of preset `{preset}` all decode on their own")
-    method = (
-        layers_options(float(quality), effort)
-        if preset == "best"
-        else paper_options(float(quality), centers, basis_size, preset == "paper-literal")
-    )
-    if group_size is not None:
-        method = replace(method, group_size=group_size)
-    appearance = appearance_options(
-        float(quality if color_quality is None else color_quality), color, texture, compatible, splats
-    )
-    scene = SceneOptions(background=_background(float(quality)))
-    options = EncoderOptions(method, scene, appearance, quality=float(quality))
-    return options if key_interval is None else replace(options, key_interval=key_interval)
 
 
 def paper_options(
@@ -116,18 +55,14 @@ def paper_options(
     )
     if not literal:
         return options
-    anchored = replace(options.displacements, anchor_count=LITERAL_ANCHORS)
-    reference = replace(options.reference, fuse=FuseOptions(poisson=LITERAL_DEPTH))
-    return replace(
-        options,
-        reference=reference,
-        pose="mds",
-        fit="nearest",
-        rounding="plain",
-        steps="uniform",
-        cuts=False,
-        displacements=anchored,
-    )
+    plain = plain_displacements(options.displacements)
+    reference = replace(options.reference, poisson=LITERAL_DEPTH)
+    return replace(options, reference=reference, pose="mds", fit="nearest", cuts=False, displacements=plain)
+
+
+def plain_displacements(options: DisplacementOptions) -> DisplacementOptions:
+    """Return the options with one step, plain rounding and as many anchors as `paper-literal` has."""
+    return replace(options, offsets=PLAIN_OFFSETS, dead_zone=PLAIN_ZONE, anchor_count=LITERAL_ANCHORS)
 
 
 def layers_options(quality: float = 50.0, effort: str = "normal") -> LayersOptions:
@@ -135,7 +70,7 @@ def layers_options(quality: float = 50.0, effort: str = "normal") -> LayersOptio
     step, coarser = motion_step(quality), _step(quality)
     options = LayersOptions(
         target=Fidelity(distance=0.2 * coarser + 0.00005, angle=7.0, worst=coarser),  # what templates reach
-        template=TemplateOptions(error=rounded(0.00088 * (motion_step(min(quality, DENSEST)) / 0.0012) ** 0.55)),
+        template_error=template_error(motion_step(min(quality, DENSEST))),
         layers=LayerCodingOptions(step=step),
         tolerance=tolerance(quality),
     )
@@ -156,8 +91,9 @@ def tolerance(quality: float) -> float:
     return rounded(2 ** ((50 - quality) / 32))
 
 
-def _background(quality: float) -> BackgroundOptions:
-    usual, times = BackgroundOptions(), tolerance(quality)
+def scene_options(quality: float = 50.0) -> SceneOptions:
+    """Return the options of a scene at a quality: its background is as near to the truth as the bodies."""
+    usual, times = SceneOptions(), tolerance(quality)
     return replace(usual, coarse=rounded(usual.coarse * times), lattice=rounded(usual.lattice * times))
 
 
@@ -171,7 +107,7 @@ def _fast(options: LayersOptions) -> LayersOptions:
         embedded=replace(options.embedded, coarse=coarse, fine=fine, samples=3000),
         fit=replace(rounds, iterations=20, tolerance=3e-3),
         plan=replace(options.plan, keys=2, misses=1),
-        tails=None,
+        tails=False,
         measured=4,
         floor=False,
     )
@@ -197,23 +133,12 @@ def appearance_options(
     compatible: bool = False,
     splats: int | None = None,
 ) -> AppearanceOptions | None:
-    """Return the options of colours at a quality; None for no colours. Raises InputError for values out of range."""
-    if color not in COLORS:
-        raise InputError(f"color must be one of {', '.join(COLORS)}, got {color!r}")
-    if not 0 <= quality <= 100:
-        raise InputError(f"color quality must be in 0 to 100, got {quality:g}")
-    if (texture is not None or compatible) and color in ("vertices", "none"):
-        given = f"texture {texture}" if texture is not None else "compatible"
-        raise InputError(f"{given} and color {color!r}: there are no textures; leave one of both out")
+    """Return the options of colours at a quality; None for no colours."""
     if color == "none":
-        if splats is not None:
-            raise InputError(f"{splats} splats and color 'none': splats are fitted to colours; leave one of both out")
         return None
-    drawn = None if splats is None else SplatOptions(FitSplatsOptions(splats))
-    vertices, video = ColorCodingOptions(step=color_step(quality)), VideoOptions(crf=rate_factor(quality))
-    if color == "vertices":
-        return AppearanceOptions(vertices, None, splats=drawn)
-    return AppearanceOptions(vertices, TextureOptions(texture, video, color == "texture", compatible), splats=drawn)
+    crf = rate_factor(quality)
+    textures = None if color == "vertices" else TextureOptions(texture, crf, color == "texture", compatible)
+    return AppearanceOptions(color_step(quality), textures, splats=splats)
 
 
 def rate_factor(quality: float) -> int:

@@ -13,7 +13,7 @@ from meshreel.encoder.group.progress import Stages
 from meshreel.encoder.paper.options import PaperOptions
 from meshreel.encoder.sequence import Encoder
 from meshreel.encoder.settings.options import EncoderOptions
-from meshreel.encoder.settings.presets import preset_options
+from meshreel.encoder.settings.settings import Settings
 from meshreel.errors import InputError
 from meshreel.types import Mesh
 
@@ -56,7 +56,7 @@ class TvmcCodec(Prepared):
     def encoder_options(self) -> EncoderOptions:
         """Options of preset `paper` at the quality with `vertices` vertices, which sets the target of references."""
         quality = quality_of_vertices(self.vertices)
-        options = preset_options("paper", quality=quality, group_size=self.group_size, centers=self.centers)
+        options = Settings("paper", quality, group_size=self.group_size, centers=self.centers).resolved()
         assert isinstance(options.method, PaperOptions)
         reference = replace(options.method.reference, vertices=self.vertices)
         return replace(options, method=replace(options.method, reference=reference))

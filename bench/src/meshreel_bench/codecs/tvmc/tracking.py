@@ -56,7 +56,7 @@ def track_sequence(encoder: Encoder, options: EncoderOptions) -> Tracking:
             groups += _groups(interval, encoder.find(interval, options.method, None), options.method)
     seen, states = survey(sequence) if parts is None else parts.seen, list[Static]()
     if parts is not None and options.scene is not None:
-        states = encode_static(parts, len(sequence), sequence.frame_rate, options.scene.background)
+        states = encode_static(parts, len(sequence), sequence.frame_rate, options.scene)
     return Tracking(seen, states, sorted(groups, key=lambda group: group.first_frame))
 
 

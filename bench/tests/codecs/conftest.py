@@ -1,0 +1,17 @@
+"""Scenes are looked at by few, small views."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+
+from tests.small_options import look_quickly
+
+
+@pytest.fixture(scope="module", autouse=True)
+def small_views() -> Iterator[None]:
+    """Scenes are looked at in few frames, by few, small views."""
+    with pytest.MonkeyPatch.context() as patch:
+        look_quickly(patch.setattr)
+        yield
