@@ -82,7 +82,7 @@ def test_faces_that_no_camera_sees_from_the_front_are_dropped(monkeypatch):
     assert distances(front.vertices, all_of_it).max() < 1e-6
 
 
-@pytest.mark.parametrize("pictures", [[None], [], [AHEAD.picture(np.zeros((AHEAD.height, AHEAD.width), np.uint16))]])
+@pytest.mark.parametrize("pictures", [[None], [], [AHEAD.picture(np.zeros((AHEAD.view.height, AHEAD.view.width), np.uint16))]])
 def test_of_nothing_there_is_nothing(pictures):
     empty = Moment(pictures, Mesh.empty(), np.zeros(0, bool))
     assert fuse_still_depth([empty] * 3, VOXEL).is_empty

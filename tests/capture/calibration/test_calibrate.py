@@ -10,7 +10,6 @@ import pytest
 from meshreel.capture.calibration.calibrate import refine, refine_views
 from meshreel.capture.calibration.calibration_sheet import write_calibration_sheet
 from meshreel.capture.calibration.still_view import still_view
-from meshreel.capture.recording import looked_at
 from meshreel.capture.rig.cameras import posed
 from meshreel.capture.rig.rig import read_rig
 from meshreel.capture.simulated.demo_room import RoomOptions, furnished_room, room_cameras
@@ -28,7 +27,7 @@ def room(tmp_path_factory):
     frames = furnished_room(RoomOptions(frames=12, frame_rate=2.0, spacing=0.06))
     simulate_rig(folder, frames, cameras, 2.0, SensorOptions(noise=0.5))
     rig = read_rig(folder)
-    return tuple(still_view(one, looked_at(rig, number)) for number, one in enumerate(rig.cameras))
+    return tuple(still_view(one, rig.looked_at(number)) for number, one in enumerate(rig.cameras))
 
 
 def mistaken(views, random, **amounts):
