@@ -1,4 +1,3 @@
-import json
 from pathlib import Path
 
 import numpy as np
@@ -59,11 +58,6 @@ def test_rays_undo_projection():
     assert np.allclose(camera.project(origins + 3 * directions), pixels)
 
 
-def test_points_behind_a_pinhole_have_no_image():
-    camera = views_around(Box(np.full(3, -1.0), np.full(3, 1.0)))[0]
-    assert not np.isfinite(camera.project(np.array([[0, 0, -1.0], [0, 0, 0]]))).any()
-
-
 def test_the_box_is_around_all_frames_and_ignores_empty_ones():
     frames = MeshList((sphere(), Mesh.empty(), moved(sphere(), (4, 0, 0))))
     box = Box.of(frames)
@@ -96,25 +90,11 @@ def test_a_single_camera_that_open3d_wrote_is_read(tmp_path: Path):
     assert np.allclose(ours.intrinsic, camera.intrinsic.intrinsic_matrix)
 
 
-@pytest.mark.parametrize("text", ["", "{", "[]", "{}", '{"parameters": [{}]}', '{"parameters": 3}', "\x00"])
-def test_a_bad_camera_file_is_an_input_error(tmp_path: Path, text: str):
-    path = tmp_path / "bad.json"
-    path.write_text(text)
-    with pytest.raises(InputError, match=r"bad\.json"):
-        read_cameras(path)
-    with pytest.raises(InputError, match="missing"):
-        read_cameras(tmp_path / "missing.json")
-
-
-@pytest.mark.parametrize("change", [{"width": 0}, {"height": 10**6}, {"intrinsic_matrix": [0] * 9}])
-def test_absurd_cameras_are_input_errors(tmp_path: Path, change: dict):
-    path = tmp_path / "views.json"
-    path.write_bytes(pack_cameras(views_around(Box(np.zeros(3), np.ones(3)))))
-    record = json.loads(path.read_text())
-    record["parameters"][1]["intrinsic"].update(change)
-    path.write_text(json.dumps(record))
-    with pytest.raises(InputError):
-        read_cameras(path)
+def test_a_camera_file_that_is_bad_or_missing_is_an_input_error_that_names_it(tmp_path: Path):
+    (tmp_path / "bad.json").write_text('{"parameters": [{}]}')
+    for name in ("bad", "missing"):
+        with pytest.raises(InputError, match=rf"{name}\.json"):
+            read_cameras(tmp_path / f"{name}.json")
 
 
 @pytest.mark.parametrize("options", [{"width": 3}, {"up": "x"}])

@@ -12,6 +12,7 @@ from meshreel_bench.datasets import BODIES, DEMO, SYNTHETIC, Store, checksums, f
 from meshreel_bench.datasets.remesh import SideBySide
 from meshreel_bench.datasets.scenes import PROCEDURAL
 
+from meshreel.capture.calibration.remembered import REMEMBERED
 from meshreel.errors import InputError
 from meshreel.types import MeshList
 from tests.shared_data import ROOT
@@ -68,7 +69,10 @@ def test_a_file_more_or_one_by_another_name_is_other_data(planted):
     (folder / "b.obj").write_text("")
     second = checksums.checksum(folder)
     (folder / "b.obj").rename(folder / "c.obj")
-    assert len({first, second, checksums.checksum(folder)}) == 3
+    third = checksums.checksum(folder)
+    assert len({first, second, third}) == 3
+    (folder / REMEMBERED).write_text("{}")  # of an encode, beside a rig's description
+    assert checksums.checksum(folder) == third
 
 
 def test_a_table_of_checksums_is_rewritten_from_the_data(planted):

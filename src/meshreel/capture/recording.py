@@ -102,7 +102,7 @@ class Recording(MeshSequence):
         return Corrected(self.pictures, self._corrections) if self.rig.color_cameras else None
 
     def _corrections(self) -> Corrections:
-        """Return the data of the rig from all its frames, chosen or not."""
+        """Return the corrections that all frames of the rig give, whichever were chosen."""
         if len(self.rig.color_cameras) < 2:
             return ()
         whole = self if self.numbers == self.rig.frames else Recording(self.rig, self.options, keep=False)

@@ -62,8 +62,8 @@ def test_a_body_that_never_leaves_casts_a_shadow():
 
 
 def test_the_usual_depth_is_the_median_of_enough_measured_depths(monkeypatch):
-    depth = np.full((AHEAD.height, AHEAD.width), 1000, np.uint16)
-    others = [depth, np.where(np.arange(AHEAD.width) < 8, 0, depth + 4), depth + 400]
+    depth = np.full((AHEAD.view.height, AHEAD.view.width), 1000, np.uint16)
+    others = [depth, np.where(np.arange(AHEAD.view.width) < 8, 0, depth + 4), depth + 400]
     nothing = Mesh.empty(), np.zeros(0, bool)
     pictures = [Moment([AHEAD.picture(one.astype(np.uint16))], *nothing) for one in others]
     usual = usual_pictures(pictures)[0].depth
@@ -82,7 +82,9 @@ def test_faces_that_no_camera_sees_from_the_front_are_dropped(monkeypatch):
     assert distances(front.vertices, all_of_it).max() < 1e-6
 
 
-@pytest.mark.parametrize("pictures", [[None], [], [AHEAD.picture(np.zeros((AHEAD.view.height, AHEAD.view.width), np.uint16))]])
+@pytest.mark.parametrize(
+    "pictures", [[None], [], [AHEAD.picture(np.zeros((AHEAD.view.height, AHEAD.view.width), np.uint16))]]
+)
 def test_of_nothing_there_is_nothing(pictures):
     empty = Moment(pictures, Mesh.empty(), np.zeros(0, bool))
     assert fuse_still_depth([empty] * 3, VOXEL).is_empty
@@ -93,8 +95,8 @@ def test_plain_meshes_have_no_depth():
 
 
 def test_a_door_that_opens_soon_is_no_room_where_nothing_is_behind_it():
-    depth = np.full((AHEAD.height, AHEAD.width), 2000.0)
-    opened = np.where(np.arange(AHEAD.width) < 20, 0, depth)
+    depth = np.full((AHEAD.view.height, AHEAD.view.width), 2000.0)
+    opened = np.where(np.arange(AHEAD.view.width) < 20, 0, depth)
     moments_ = [Moment([AHEAD.picture(one.astype(np.uint16))], Mesh.empty(), np.zeros(0, bool))
                 for one in [depth] * 2 + [opened] * 8]  # fmt: skip
     usual = usual_pictures(moments_)[0].depth
@@ -102,10 +104,10 @@ def test_a_door_that_opens_soon_is_no_room_where_nothing_is_behind_it():
 
 
 def test_a_floor_seen_at_a_grazing_angle_has_no_cracks():
-    rows = (np.arange(AHEAD.height) + 0.5 - AHEAD.center[1] - 0.5) / AHEAD.focal[1]
+    rows = (np.arange(AHEAD.view.height) + 0.5 - AHEAD.view.center[1]) / AHEAD.view.focal[1]
     with np.errstate(divide="ignore"):
         below = np.where(rows > 0, 1.2 / np.where(rows > 0, rows, 1), 0)
-    depth = np.where((below > 1) & (below < 4), below * 1000, 0)[:, None] * np.ones(AHEAD.width)
+    depth = np.where((below > 1) & (below < 4), below * 1000, 0)[:, None] * np.ones(AHEAD.view.width)
     picture = AHEAD.picture(depth.astype(np.uint16))
     mesh = fuse_still_depth([Moment([picture], Mesh.empty(), np.zeros(0, bool))], VOXEL)
     seen = Rays(mesh).look(AHEAD.view).depth
@@ -128,7 +130,7 @@ def test_a_step_and_what_it_hides_leave_no_slit_between_them():
 
 
 def test_what_a_camera_does_not_measure_is_closed_if_small():
-    depth = np.full((AHEAD.height, AHEAD.width), 2000, np.uint16)
+    depth = np.full((AHEAD.view.height, AHEAD.view.width), 2000, np.uint16)
     depth[40:43, 40:43] = 0
     mesh = fuse_still_depth([Moment([AHEAD.picture(depth)], Mesh.empty(), np.zeros(0, bool))], VOXEL)
     assert np.isfinite(Rays(mesh).look(AHEAD.view).depth[38:46, 38:46]).all()

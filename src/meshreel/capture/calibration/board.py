@@ -17,8 +17,9 @@ from jaxtyping import UInt8
 
 from ...errors import InputError
 from ...geometry import strict
+from ...geometry.cameras import Matrix
 from ..rig.cameras import ColorCamera
-from .poses import Pose, mean_pose, pose_of
+from .poses import mean_pose, pose_of
 
 LEAST_CORNERS = 6  # of a board in a picture: four and one to check them, and one more (guess)
 WORST = 2.0  # pixels between corners and where the board's pose puts them, root mean square (guess)
@@ -79,7 +80,7 @@ def opencv() -> Any:
     return cv2
 
 
-def poses_by_board(cameras: Sequence[ColorCamera], options: BoardOptions) -> tuple[dict[str, Pose], list[str]]:
+def poses_by_board(cameras: Sequence[ColorCamera], options: BoardOptions) -> tuple[dict[str, Matrix], list[str]]:
     """Return poses of cameras, and a warning for cameras that do not see the board together with the first one.
 
     The first camera that sees it with another keeps its pose. Raises InputError where no two see it in one frame.
@@ -105,11 +106,11 @@ def poses_by_board(cameras: Sequence[ColorCamera], options: BoardOptions) -> tup
     return {cameras[n].name: pose for n, pose in placed.items()}, [f"{text}; poses stay as given"] if lost else []
 
 
-def _seen(camera: ColorCamera, board: Any) -> dict[int, Pose]:
+def _seen(camera: ColorCamera, board: Any) -> dict[int, Matrix]:
     """Return the board's pose in the camera, by frame."""
     frames = sorted(camera.files)
     chosen = sorted({frames[int(k)] for k in np.linspace(0, len(frames) - 1, LOOKED_AT)})
-    found = dict[int, Pose]()
+    found = dict[int, Matrix]()
     for frame in chosen:
         picture = camera.picture(frame)
         if picture is not None and (pose := _board_pose(picture.pixels, camera, board)) is not None:
@@ -117,7 +118,7 @@ def _seen(camera: ColorCamera, board: Any) -> dict[int, Pose]:
     return found
 
 
-def _board_pose(pixels: UInt8[np.ndarray, "H W 3"], camera: ColorCamera, board: Any) -> Pose | None:
+def _board_pose(pixels: UInt8[np.ndarray, "H W 3"], camera: ColorCamera, board: Any) -> Matrix | None:
     """Return the pose of a board in the camera's coordinates, None where it is not seen well."""
     cv2 = opencv()
     grey = cv2.cvtColor(np.ascontiguousarray(pixels), cv2.COLOR_RGB2GRAY)

@@ -20,10 +20,10 @@ from jaxtyping import Float64
 
 from ...errors import InputError
 from ...geometry import strict
+from ...geometry.cameras import Matrix
 from ...io.file_names import last_number
 from ...io.read import read_input
 
-Pose = Float64[np.ndarray, "4 4"]
 FORMS = (
     "COLMAP's images.txt or images.bin, OpenCV's .yml, caliscope's .toml, tf_static as .yaml or .json, or a rig.json"
 )
@@ -31,7 +31,7 @@ _TURNS, _SHIFTS = ("Rot", "R", "rvec"), ("T", "t", "tvec")  # OpenCV's names of 
 _DAMAGED = (ValueError, LookupError, TypeError, AttributeError, ArithmeticError, struct.error, RecursionError)
 
 
-def read_poses(path: Path) -> dict[str, Pose]:
+def read_poses(path: Path) -> dict[str, Matrix]:
     """Read the poses in a file, of which the name tells the form, or in a folder of COLMAP's.
 
     Raises InputError where it cannot be read or has none.
@@ -55,7 +55,7 @@ def read_poses(path: Path) -> dict[str, Pose]:
     return poses
 
 
-def pose_for(name: str, poses: Mapping[str, Pose], kind: str) -> Pose | None:
+def pose_for(name: str, poses: Mapping[str, Matrix], kind: str) -> Matrix | None:
     """Return the pose of the camera with a name, None where there is none.
 
     In a file it may go on after the name, as in left/00001.png and left_depth_optical_frame; of those, `kind` (color or
@@ -71,7 +71,7 @@ def pose_for(name: str, poses: Mapping[str, Pose], kind: str) -> Pose | None:
     return poses[found[0]] if found else None
 
 
-def mean_pose(poses: Iterable[Pose]) -> Pose:
+def mean_pose(poses: Iterable[Matrix]) -> Matrix:
     """Return the mean of poses; of more than two, those far from most do not count."""
     stack = np.array(list(poses))
     if len(stack) > 2:
@@ -100,7 +100,7 @@ def pose_of(turns: Any, shifts: Any) -> Float64[np.ndarray, "*T 4 4"]:
     return poses
 
 
-def pose_in_root(above: Mapping[str, tuple[str, Pose]], frame: str) -> tuple[str, Pose]:
+def pose_in_root(above: Mapping[str, tuple[str, Matrix]], frame: str) -> tuple[str, Matrix]:
     """Return the root of a frame, and the frame's pose in it; `above` has each frame's parent, and its pose there.
 
     Raises ValueError for frames that hang on each other.
@@ -114,18 +114,18 @@ def pose_in_root(above: Mapping[str, tuple[str, Pose]], frame: str) -> tuple[str
     raise ValueError(f"frame {frame} hangs on itself")
 
 
-def _seen_from(turn: Any, shift: Any) -> Pose:
+def _seen_from(turn: Any, shift: Any) -> Matrix:
     """Return the camera-to-world matrix of a world-to-camera rotation and translation."""
     return strict.inverse(pose_of(turn, shift))
 
 
-def _colmap_text(data: bytes) -> dict[str, Pose]:
+def _colmap_text(data: bytes) -> dict[str, Matrix]:
     lines = [line for line in data.decode().splitlines() if not line.startswith("#")]
     rows = [line.split(maxsplit=9) for line in lines[::2] if line.strip()]  # every second one has points
     return _colmap((row[9], [float(number) for number in row[1:8]]) for row in rows)
 
 
-def _colmap_binary(data: bytes) -> dict[str, Pose]:
+def _colmap_binary(data: bytes) -> dict[str, Matrix]:
     found, offset = [], 8
     for _ in range(struct.unpack_from("<Q", data)[0]):
         _, *numbers, _ = struct.unpack_from("<I7dI", data, offset)
@@ -135,7 +135,7 @@ def _colmap_binary(data: bytes) -> dict[str, Pose]:
     return _colmap(found)
 
 
-def _colmap(images: Iterable[tuple[str, list[float]]]) -> dict[str, Pose]:
+def _colmap(images: Iterable[tuple[str, list[float]]]) -> dict[str, Matrix]:
     """Return the poses of cameras: the mean over the images of a folder, or that of an image by its own name."""
     groups = defaultdict(list)
     for name, numbers in images:
@@ -144,7 +144,7 @@ def _colmap(images: Iterable[tuple[str, list[float]]]) -> dict[str, Pose]:
     return {name: mean_pose(poses) for name, poses in groups.items()}
 
 
-def _toml(data: bytes) -> dict[str, Pose]:
+def _toml(data: bytes) -> dict[str, Matrix]:
     """Parse caliscope's [cameras.0], or anipose's [cam_0] with a name."""
     record = tomllib.loads(data.decode())
     tables = {name: table for name, table in record.get("cameras", record).items() if isinstance(table, dict)}
@@ -152,7 +152,7 @@ def _toml(data: bytes) -> dict[str, Pose]:
     return {t.get("name", name): _seen_from(t["rotation"], t["translation"]) for name, t in posed.items()}
 
 
-def _yaml(data: bytes) -> dict[str, Pose]:
+def _yaml(data: bytes) -> dict[str, Matrix]:
     """Parse YAML of OpenCV's FileStorage, or of `ros2 topic echo /tf_static`."""
     try:
         import yaml
@@ -173,7 +173,7 @@ def _yaml(data: bytes) -> dict[str, Pose]:
     return _opencv({key: value for record in records for key, value in record.items()})
 
 
-def _opencv(record: dict[str, Any]) -> dict[str, Pose]:
+def _opencv(record: dict[str, Any]) -> dict[str, Matrix]:
     """Return poses of matrices R_left and T_left for each camera left, or of lists rvecs, Ts and cam_ids."""
     matrices = {key: value["data"] for key, value in record.items() if isinstance(value, dict) and "data" in value}
     if "rvecs" in matrices and "Ts" in matrices:
@@ -197,7 +197,7 @@ def _json(data: bytes) -> dict[str, Any]:
     return {camera["name"]: camera["camera_to_world"] for camera in record["cameras"]}
 
 
-def _transforms(records: list[dict[str, Any]]) -> dict[str, Pose]:
+def _transforms(records: list[dict[str, Any]]) -> dict[str, Matrix]:
     """Return the poses of optical frames, or of all frames where none is named so, in the frame at the root of each."""
     above = {}
     for record in records:

@@ -12,13 +12,14 @@ from pathlib import Path
 
 from ...errors import InputError
 from ...geometry import strict
+from ...geometry.cameras import Matrix
 from ...io.read import read_json
 from ..rig.cameras import posed
 from ..rig.rig import RIG, Rig
-from .poses import Pose, pose_for
+from .poses import pose_for
 
 
-def with_poses(rig: Rig, depth: Mapping[str, Pose], color: Mapping[str, Pose]) -> Rig:
+def with_poses(rig: Rig, depth: Mapping[str, Matrix], color: Mapping[str, Matrix]) -> Rig:
     """Return a rig with other poses, by the names of depth cameras and of colour cameras; others stay."""
     eyes, cameras, motions = {eye.beside: eye for eye in rig.color_cameras}, [], []
     for number, camera in enumerate(rig.cameras):
@@ -36,7 +37,7 @@ def with_poses(rig: Rig, depth: Mapping[str, Pose], color: Mapping[str, Pose]) -
     return replace(rig, cameras=tuple(cameras), color_cameras=tuple(colors))
 
 
-def posed_by(rig: Rig, poses: Mapping[str, Pose], kind: str, where: Path) -> tuple[Rig, list[str]]:
+def posed_by(rig: Rig, poses: Mapping[str, Matrix], kind: str, where: Path) -> tuple[Rig, list[str]]:
     """Return a rig with the poses of a file, which are those of its depth or its colour cameras (`kind`).
 
     Also return a warning that names cameras without one. Raises InputError where it has none of any camera.

@@ -18,9 +18,9 @@ from typing import Any
 import numpy as np
 
 from ...errors import InputError
-from ...geometry.cameras import Camera
+from ...geometry.cameras import Camera, Matrix
 from ...io.depth_pictures import parse_depth
-from ..calibration.poses import Pose, pose_in_root, pose_of
+from ..calibration.poses import pose_in_root, pose_of
 from .takes import Picture, Pictures, Sensor, Stream, Take, lens_of, picture_size
 
 KIND = "a ROS 1 or RealSense .bag, a ROS 2 bag, an .mcap"
@@ -117,7 +117,7 @@ class _Bag:
                 found += [] if first is None else [_topic(name, kind.msgcount, first)]
         return found
 
-    def tree(self) -> dict[str, tuple[str, Pose]]:
+    def tree(self) -> dict[str, tuple[str, Matrix]]:
         """Return each frame's parent, and its pose in that one."""
         stills = [one for _, message in self.messages("/tf_static") for one in message.transforms]
         return {
@@ -261,6 +261,6 @@ def _unpacked(form: str, data: bytes) -> Picture:
     return parse_depth(data, form) if form.split(";")[0].strip() in DEEP else data
 
 
-def _matrix(transform: Any) -> Pose:
+def _matrix(transform: Any) -> Matrix:
     turn, place = transform.rotation, transform.translation
     return pose_of([turn.x, turn.y, turn.z, turn.w], [place.x, place.y, place.z])
