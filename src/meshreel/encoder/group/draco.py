@@ -16,7 +16,7 @@ from ...format.budget import CostlyError
 from ...geometry.decimate import decimate
 from ...metrics.distance import Original
 from ...types import Mesh
-from .target import Fidelity, measure
+from .target import Fidelity, Target, measure
 
 LEVELS = (1, 0)  # midpoint subdivisions in the decoder, which are tried (guess)
 
@@ -31,7 +31,7 @@ class IntraOptions:
 
 
 def cheapest_intra(
-    frames: Sequence[Mesh], target: Fidelity, most_bytes: float, options: IntraOptions
+    frames: Sequence[Mesh], target: Target, most_bytes: float, options: IntraOptions
 ) -> tuple[bytes, Fidelity] | None:
     """Find a `draco` payload under `most_bytes` that reaches the target in distance and angle, with its fidelity.
 
@@ -66,7 +66,7 @@ def coarse_enough(frames: Sequence[Mesh], step: float) -> float:
 
 
 def _on_one_frame(
-    original: Original, target: Fidelity, budget: float, options: IntraOptions
+    original: Original, target: Target, budget: float, options: IntraOptions
 ) -> Iterator[tuple[int, float, float, int]]:
     """Yield bytes, fraction, step and levels of candidates that reach the target on one frame within the budget."""
     frame = original.mesh
@@ -89,7 +89,7 @@ def _on_one_frame(
                         break
 
 
-def _reaches(original: Original, reduced: Mesh, step: float, levels: int, target: Fidelity) -> bool:
+def _reaches(original: Original, reduced: Mesh, step: float, levels: int, target: Target) -> bool:
     fidelity = _fidelity([original], encode_intra([reduced], step, levels))
     return fidelity is not None and fidelity.reaches(target)
 

@@ -17,7 +17,7 @@ from ...format.budget import CostlyError
 from ...format.layout import Form
 from ...types import Mesh
 from .draco import IntraOptions, cheapest_intra, finest_intra
-from .target import NO_ERROR, Fidelity
+from .target import NO_ERROR, Fidelity, Target
 
 # Times the bytes that half the distance (6 dB) may cost: a finer template gains 4 dB for that (decision 7).
 MOST_FOR_HALF = 2
@@ -62,7 +62,7 @@ def cheaper(frames: Sequence[Mesh], group: EncodedGroup, options: IntraOptions) 
     return EncodedGroup(Form.DRACO, len(frames), payload, (), fidelity)
 
 
-def intra_only(frames: Sequence[Mesh], target: Fidelity, options: IntraOptions) -> EncodedGroup:
+def intra_only(frames: Sequence[Mesh], target: Target, options: IntraOptions) -> EncodedGroup:
     """Encode frames in the `draco` form at the target's fidelity, or as finely as that form can.
 
     Where its bytes may not hold so many frames, the group has only the first of them. Raises InputError where they may

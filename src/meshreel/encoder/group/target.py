@@ -16,21 +16,31 @@ from ...types import Mesh
 
 
 @dataclass(frozen=True, slots=True)
-class Fidelity:
-    """Error measures of decoded frames against the originals; smaller is better, except for `psnr`."""
+class Target:
+    """Errors that frames should not exceed; smaller is better."""
 
     distance: float  # RMS over the frames of the symmetric surface distance, normalised units
     angle: float  # mean normal error over the frames, degrees
     worst: float  # the largest symmetric distance of a frame, normalised units
+
+    def scaled(self, factor: float) -> Target:
+        """Return the same target with its distances multiplied by `factor`."""
+        return replace(self, distance=self.distance * factor, worst=self.worst * factor)
+
+
+@dataclass(frozen=True, slots=True)
+class Fidelity(Target):
+    """Error measures of decoded frames against the originals."""
+
     psnr: float = 0.0  # d2_psnr_paper, mean over the frames, dB; larger is better
 
     def scaled(self, factor: float) -> Fidelity:
         """Return the same fidelity with its distances multiplied by `factor`."""
         return replace(self, distance=self.distance * factor, worst=self.worst * factor)
 
-    def reaches(self, other: Fidelity) -> bool:
-        """True where neither the distance nor the normal error is larger than the other's."""
-        return self.distance <= other.distance and self.angle <= other.angle
+    def reaches(self, target: Target) -> bool:
+        """True where neither the distance nor the normal error is larger than the target's."""
+        return self.distance <= target.distance and self.angle <= target.angle
 
 
 NO_ERROR = Fidelity(0.0, 0.0, 0.0, PSNR_CEILING)
@@ -46,7 +56,7 @@ def measure(originals: Sequence[Mesh | Original], decoded: Sequence[Mesh]) -> Fi
     return Fidelity(math.sqrt(mean_square), angle, max(distances), psnr)
 
 
-def target_of(frames: Sequence[Mesh], relative: Fidelity, noise: float) -> Fidelity:
+def target_of(frames: Sequence[Mesh], relative: Target, noise: float) -> Target:
     """Return the fidelity that these frames should reach, normalised.
 
     `relative` is in units of a frame's diagonal and counts for the smallest frame, so that none is lost. Frames with

@@ -26,7 +26,7 @@ from ...coding.reference_mesh import CodedReference, code_on_lattice
 from ...geometry.painted import Paint
 from ...types import Mesh
 from ..group.digests import note
-from ..group.target import Fidelity
+from ..group.target import Target
 from .options import LayersOptions
 
 LATTICE = 0.33  # spacing of the base's lattice, in steps: the motion codes what it rounds away (decision 14)
@@ -42,7 +42,7 @@ class Ahead:
     first: int  # number of the first of them in its interval
     surfaces: list[FrameSurface]
     noise: float  # RMS distance of the frames from the truth, normalised
-    target: Fidelity  # that the frames should reach, normalised
+    target: Target  # that the frames should reach, normalised
     paint: Callable[[int, Mesh], Paint | None] = lambda *_: None  # as `Interval.paint`
     frame_rate: float = 30.0  # 1/s
 

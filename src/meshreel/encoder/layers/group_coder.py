@@ -21,7 +21,7 @@ from ...types import Mesh
 from ..group.digests import note
 from ..group.draco import cheapest_intra
 from ..group.forms import EncodedGroup, cheaper, intra_only, most_for
-from ..group.target import Fidelity, measure
+from ..group.target import Target, measure
 from .options import LayersOptions
 from .tails import find_tails
 
@@ -33,7 +33,7 @@ class GroupCoder:
     """Inputs of the coding of a group, beside its template."""
 
     surfaces: Sequence[FrameSurface]
-    target: Fidelity  # that the frames should reach, normalised
+    target: Target  # that the frames should reach, normalised
     noise: float  # RMS distance of the frames from the truth, normalised
     options: LayersOptions
     floor: bool = True  # Draco is tried in place of every group, not only where nothing else holds

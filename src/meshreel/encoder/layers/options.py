@@ -12,7 +12,7 @@ from ...errors import InputError
 from ...geometry.strict import rounded
 from ..group.draco import IntraOptions
 from ..group.interval import check_group_size
-from ..group.target import Fidelity
+from ..group.target import Target
 
 STEP = LayerCodingOptions().step
 # Under noise, following a template is preferred to cutting the group (decision 16).
@@ -29,7 +29,7 @@ class LayersOptions:
     """Options of the recipe of layers (`layers.py`); the defaults are those of quality 50."""
 
     group_size: int = 16  # most frames in a group
-    target: Fidelity = Fidelity(0.2 * STEP + 0.00005, 7.0, STEP)  # that every frame should reach, of its own diagonal
+    target: Target = Target(0.2 * STEP + 0.00005, 7.0, STEP)  # that every frame should reach, of its own diagonal
     predict: bool = True  # groups from the one before, where its template still fits
     embedded: EmbeddedOptions = field(default_factory=EmbeddedOptions)
     template_error: float = template_error(STEP)  # RMS distance of a key frame from its base mesh, diagonals

@@ -10,7 +10,7 @@ from ...analysis.reference.track import TrackOptions
 from ...coding.paper.displacements import DisplacementOptions
 from ..group.draco import IntraOptions
 from ..group.interval import check_group_size
-from ..group.target import Fidelity
+from ..group.target import Target
 
 PLAIN_ZONE = 0.5  # of a step: rounding to the nearest symbol, as the paper has it
 PLAIN_OFFSETS = (0,)  # the same step for all components, as the paper has it
@@ -29,7 +29,7 @@ class PaperOptions:
     cuts: bool = True  # groups in two where a reference does not follow, then Draco; False: one group always
 
     group_size: int = 10  # most frames in a group, the paper's GoF
-    target: Fidelity = Fidelity(0.0005, 7.0, 0.0008)  # that every frame should reach, relative to its own diagonal
+    target: Target = Target(0.0005, 7.0, 0.0008)  # that every frame should reach, relative to its own diagonal
     track: TrackOptions = field(default_factory=TrackOptions)
     reference: ReferenceOptions = field(default_factory=ReferenceOptions)
     displacements: DisplacementOptions = field(default_factory=DisplacementOptions)

@@ -18,7 +18,7 @@ from ...coding.paper.displacements import DisplacementOptions
 from ...geometry.strict import rounded
 from ..appearance.options import AppearanceOptions, TextureOptions
 from ..group.draco import IntraOptions
-from ..group.target import Fidelity
+from ..group.target import Target
 from ..layers.options import LayersOptions, template_error
 from ..paper.options import PLAIN_OFFSETS, PLAIN_ZONE, PaperOptions
 from .options import SceneOptions
@@ -49,7 +49,7 @@ def paper_options(
     centers = 2000 if centers is None else centers
     options = PaperOptions(
         track=TrackOptions(centers=centers, samples=max(45_000, 4 * centers)),
-        target=Fidelity(distance=0.5 * step + 0.0001, angle=7.0, worst=step),
+        target=Target(distance=0.5 * step + 0.0001, angle=7.0, worst=step),
         reference=ReferenceOptions(vertices=reference_vertices(quality)),
         displacements=DisplacementOptions(step=step, basis_size=basis_size),
     )
@@ -69,14 +69,14 @@ def layers_options(quality: float = 50.0, effort: str = "normal") -> LayersOptio
     """Return the options of the recipe of layers at a quality."""
     step, coarser = motion_step(quality), _step(quality)
     options = LayersOptions(
-        target=Fidelity(distance=0.2 * coarser + 0.00005, angle=7.0, worst=coarser),  # what templates reach
+        target=Target(distance=0.2 * coarser + 0.00005, angle=7.0, worst=coarser),  # what templates reach
         template_error=template_error(motion_step(min(quality, DENSEST))),
         layers=LayerCodingOptions(step=step),
         tolerance=tolerance(quality),
     )
     if quality >= EXACT:
         share, angle = (rounded(np.interp(quality, (EXACT, 100.0), ends)) for ends in (EXACT_DISTANCE, EXACT_ANGLE))
-        target = Fidelity(distance=share * step, angle=angle, worst=step)
+        target = Target(distance=share * step, angle=angle, worst=step)
         options = replace(options, target=target, flat=1.0, intra=EXACT_INTRA)
     if effort == "fast":
         return _fast(options)
