@@ -78,7 +78,7 @@ struct Tally {
     uint64_t most, faces = 0, points = 0, steps = 0;
 };
 
-// Where the parts of the positions are.
+// Offsets of the parts of the positions.
 struct Places {
     DracoReader symbols;
     const uint8_t *bounds, *numbers;

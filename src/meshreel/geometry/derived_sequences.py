@@ -51,9 +51,9 @@ def captured(sequence: MeshSequence) -> CapturedSequence:
 
     Raises InputError if the sequence names an up axis that does not exist.
     """
-    capable = sequence if isinstance(sequence, CapturedSequence) else DerivedSequence(sequence)
-    check_up(capable.up)
-    return capable
+    known = sequence if isinstance(sequence, CapturedSequence) else DerivedSequence(sequence)
+    check_up(known.up)
+    return known
 
 
 def only(sequence: MeshSequence, numbers: Sequence[int]) -> MeshSequence:
@@ -62,8 +62,8 @@ def only(sequence: MeshSequence, numbers: Sequence[int]) -> MeshSequence:
     Of frames in files, only the names are sent; others are read now.
     """
     cut = getattr(sequence, "only", None)
-    part: MeshSequence = Held.of(sequence, numbers) if cut is None else cut(numbers)
-    return part
+    found: MeshSequence = Held.of(sequence, numbers) if cut is None else cut(numbers)
+    return found
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,18 +139,18 @@ class DerivedSequence(MeshSequence):
 
     @property
     def up(self) -> Up:
-        """The axis that points up; y where the source does not know it."""
+        """The axis that points up; y if the source does not know it."""
         known: Up = getattr(self.source, "up", "y")
         return self.axis or known
 
     @property
     def depth(self) -> DepthFrames | None:
-        """The depth pictures of the frames; None where the source knows none."""
+        """The depth pictures of the frames; None if the source has none."""
         return self._of_frames(getattr(self.source, "depth", None))
 
     @property
     def colors(self) -> ColorFrames | None:
-        """The pictures of colour cameras; None where the source has none."""
+        """The pictures of colour cameras; None if the source has none."""
         return self._of_frames(getattr(self.source, "colors", None))
 
     def _of_frames(self, pictures: Any) -> Any:
@@ -158,7 +158,7 @@ class DerivedSequence(MeshSequence):
 
     @property
     def files(self) -> tuple[Path, ...]:
-        """The files that the frames are read from; none where the source names none."""
+        """The files that the frames are read from; none if the source names none."""
         return getattr(self.source, "files", ())
 
     @property
@@ -181,7 +181,7 @@ class DerivedSequence(MeshSequence):
         return of_source if self.memory is None else (self.memory.digests, of_source)
 
     def learn(self, observed: Any) -> None:
-        """Take what another process observed; raises InputError for a frame that was another when it was read first."""
+        """Take what another process observed; raises InputError for a frame that has changed since."""
         if self.memory is not None:
             digests, observed = observed
             for number, now in digests.items():
@@ -258,15 +258,15 @@ def picked(
 
 def digest(meshes: Iterable[Mesh]) -> str:
     """Return a digest of a mesh, 16 characters."""
-    hashed = hashlib.sha256()
+    found = hashlib.sha256()
     for mesh in meshes:
         for array in (mesh.vertices, mesh.faces, mesh.colors, mesh.uv):
             if array is not None:
-                hashed.update(f"{array.shape}".encode())
-                hashed.update(np.ascontiguousarray(array).data)
+                found.update(f"{array.shape}".encode())
+                found.update(np.ascontiguousarray(array).data)
         if mesh.texture is not None:
-            hashed.update(mesh.texture.pixels.data)
-    return hashed.hexdigest()[:16]
+            found.update(mesh.texture.pixels.data)
+    return found.hexdigest()[:16]
 
 
 def _welded(source: MeshSequence, number: int) -> Mesh:
