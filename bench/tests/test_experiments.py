@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from meshreel_bench.codecs import make_codec
 from meshreel_bench.codecs.variants import VARIANTS
-from meshreel_bench.experiments import EXPERIMENTS, ablations, find_experiment, speed
+from meshreel_bench.experiments import EXPERIMENTS, ablations, find_experiment, layers
 from meshreel_bench.experiments.study import INSTEAD, Gains
 from meshreel_bench.rows import read_rows
 
@@ -39,8 +39,8 @@ def test_tables_share_the_points_of_figure_6():
 
 
 def test_promises_of_speed_are_about_points_that_are_declared():
-    declared = list(speed.STUDY.points())
-    for promise in [each for each in speed.PROMISES if not isinstance(each, Gains)]:
+    declared = list(layers.SPEED.points())
+    for promise in [each for each in layers.SPEED_PROMISES if not isinstance(each, Gains)]:
         for which in (promise.which, *getattr(promise, "than", ())):
             fits = [p for p in declared if p.sequence == which.sequence and p.options.items() >= which.options.items()]
             assert any(make_codec(p.codec, dict(p.options)).name == which.curve for p in fits), which

@@ -36,16 +36,16 @@ command = App(name="bench", help=HELP)  # of `meshreel bench`
 @Parameter(name="*")
 @dataclass(frozen=True, slots=True)
 class Running:
-    """Settings of the measurement of points."""
+    """Options of a run: time limit, processes, retries."""
 
     jobs: int = 1
-    """Points to measure side by side, each in a process; the rows are the same but for times."""
+    """Points to measure in parallel, each in a process of its own; only times change."""
     limit: float = 3600.0
-    """Seconds that a point may take; one that takes longer, crashes or decodes nonsense becomes a row that says so."""
+    """Seconds per point; a point that takes longer, crashes or decodes invalid meshes is recorded as failed."""
     retry: Annotated[bool, Parameter(negative="")] = False
-    """Measure points again that failed before; those that were measured are never measured again."""
+    """Measure failed points again; successful ones are never repeated."""
     ssim: bool = True
-    """Render and compare pictures too (slower)."""
+    """Compare rendered pictures too (slower)."""
 
     def __post_init__(self) -> None:
         if self.jobs < 1 or not 0 < self.limit <= LONGEST:
@@ -56,20 +56,20 @@ class Running:
 @Parameter(name="*")
 @dataclass(frozen=True, slots=True)
 class Selection:
-    """Selection of points, with the folder of their data."""
+    """Selection of points and of their data."""
 
     data: Path = DATA
-    """The folder of the benchmark's sequences, or of those that TSMC's authors release: then of these, where there are
-    any, as answering/meshes/mesh_00.obj with answering/view_00.json."""
+    """Folder of the benchmark data, or of the data that TSMC's authors release (answering/meshes/mesh_00.obj with
+    answering/view_00.json)."""
     small: bool = False
-    """A point of each codec on a few procedural frames: minutes, and no data."""
+    """One point per codec on a few procedural frames: takes minutes, needs no data."""
     only: Annotated[tuple[str, ...], Parameter(consume_multiple=True, negative="")] = ()
-    """Only the points of these codecs, as `tvmc`."""
+    """Only points of these codecs, e.g. `tvmc`."""
     on: Annotated[tuple[str, ...], Parameter(consume_multiple=True, negative="")] = ()
-    """Only the points on these sequences, as `synthetic4`; or on any other: a name below the data, or a path."""
+    """Only points on these sequences, e.g. `synthetic4`; also a name below the data, or a path."""
     add: Annotated[tuple[str, ...], Parameter(consume_multiple=True, negative="")] = ()
-    """More operating points, of any codec, as `zipmesh`, `draco:qp=12` (`codec:option=value,option=value`), or
-    `necgs:full` (`codec:configuration`)."""
+    """Additional operating points, e.g. `zipmesh`, `draco:qp=12` (`codec:option=value,option=value`) or `necgs:full`
+    (`codec:configuration`)."""
 
     def points(self, name: str, ssim: bool) -> list[Point]:
         """Return the points of an experiment. Raises InputError where there are none."""
@@ -125,15 +125,15 @@ def run(
     reading: Reading = Reading(),
     common: Common = Common(),
 ) -> None:
-    """Run an experiment and print what it promised and reached.
+    """Run an experiment and print its targets beside the measured values.
 
-    Rows that the output has are not run again. Sequences that take long to make are kept in a folder beside it, whose
-    name ends in `.cache`. How files are read (`--fps`, `--frames`, `--scale`) is about sequences of your own.
+    Rows that the output already has are not measured again. Sequences that take long to make are kept beside it, in a
+    folder whose name ends in `.cache`. `--fps`, `--frames` and `--scale` apply to your own sequences.
 
     Parameters
     ----------
     experiment
-        Which one; `meshreel-bench list` has their names.
+        Name of the experiment; `meshreel-bench list` shows all.
     output
         A JSON-lines file.
     """
@@ -169,13 +169,9 @@ def run(
 
 @command.command
 def report(
-    rows: list[Path],
-    /,
-    *,
-    output: Annotated[Path, Parameter(name=["--output", "-o"])],
-    common: Common = Common(),
+    rows: list[Path], /, *, output: Annotated[Path, Parameter(name=["--output", "-o"])], common: Common = Common()
 ) -> None:
-    """Write pages, plots and tables from rows, and from nothing else.
+    """Write pages, plots and tables from measured rows alone.
 
     `results.md` is the first page; `results/` beside it has an appendix and a plot for each experiment; rows on the
     paper's sequences also make `reproducing.md`. Same rows, same bytes.
@@ -183,7 +179,7 @@ def report(
     Parameters
     ----------
     rows
-        JSON-lines files that `run` wrote, of any experiments; of a point that several have, the first counts.
+        JSON-lines files that `run` wrote, of any experiments; if several have a point, the first counts.
     output
         The folder to write into.
     """
@@ -221,7 +217,7 @@ def codecs(*, common: Common = Common()) -> None:
 
 
 def check_one_source(rows: Sequence[Row]) -> None:
-    """Raise InputError where rows of one name are of sequences of different content, which share no curve."""
+    """Raise InputError if rows under one name were measured on sequences of different content."""
     sources: dict[str, str | None] = {}
     for row in rows:
         if sources.setdefault(row.point.sequence, row.source) != row.source:
@@ -244,7 +240,7 @@ def describe(row: Row) -> str:
 
 
 def _measured(row: Row) -> str:
-    """Return the measured values of a point in a line, or its failure."""
+    """Return rate, quality and time of a point, or the reason of its failure."""
     if row.failed:
         return f"failed: {row.failed}"
     parts = [f"{row.mbps:.3f} Mbps"] if row.stream else []
@@ -254,7 +250,7 @@ def _measured(row: Row) -> str:
 
 
 def verdict_table(found: Sequence[Verdict]) -> Table | str:
-    """Return the targets that rows decide, a line each, or a line that says that they decide none."""
+    """Return a table of the targets that rows decide, or a sentence if they decide none."""
     decided = [each for each in found if each.value is not None]
     if not decided:
         return f"these points decide none of {len(found)} targets; `meshreel-bench report` makes curves of them"

@@ -1,4 +1,4 @@
-"""Protocol of a codec that can be compared: a sequence becomes bytes, and bytes a sequence; nothing else passes."""
+"""Protocol of a codec: a sequence becomes bytes, and bytes alone become a sequence."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class Codec(Protocol):
         """The operating point, ready for JSON."""
 
     def encode(self, sequence: MeshSequence, progress: Progress | None = None) -> bytes:
-        """Return all that a decoder needs; its length is the rate."""
+        """Return the complete stream; its length is the rate."""
 
     def decode(self, data: bytes) -> Sequence[Mesh]:
         """Return the frames, from the bytes alone; may decode lazily, frame by frame."""
@@ -33,7 +33,7 @@ class Codec(Protocol):
 
 @runtime_checkable
 class TwoStepCodec(Codec, Protocol):
-    """A codec whose encoder first analyses what does not depend on the rate: a sweep does that once for its points."""
+    """A codec whose encoder starts with an analysis that operating points share, so that a sweep runs it once."""
 
     @property
     def analysis_key(self) -> str:
@@ -48,7 +48,7 @@ class TwoStepCodec(Codec, Protocol):
 
 @runtime_checkable
 class BackgroundCodec(Codec, Protocol):
-    """A codec that sends what stands still apart."""
+    """A codec that sends a static background separately."""
 
     def background_bytes(self, data: bytes) -> int:
         """Return the share of the bytes that is sent once."""
@@ -56,7 +56,7 @@ class BackgroundCodec(Codec, Protocol):
 
 @runtime_checkable
 class ColorCodec(Codec, Protocol):
-    """A codec of colours in a container of its own."""
+    """A codec that stores colours in a container other than .reel."""
 
     def color_bytes(self, data: bytes) -> ColorBytes | None:
         """Return the share of the bytes that colours take; None where there are none."""

@@ -1,4 +1,4 @@
-"""Points and rows: what is to be measured, and what was measured. In -> out: a file of JSON lines <-> rows."""
+"""Points to measure and rows of measurements. In -> out: a file of JSON lines <-> rows."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Metrics = Literal["distances", "views", "parallel views", "regions", "colors", "
 
 
 class Point(msgspec.Struct, frozen=True):
-    """A codec at an operating point on a sequence: what one row measures."""
+    """A codec at an operating point on a sequence, which one row measures."""
 
     sequence: str
     codec: str
@@ -110,7 +110,7 @@ class Decoding(msgspec.Struct, frozen=True):
 
 
 class Row(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True, forbid_unknown_fields=True):
-    """Measured values of a point, or its failure."""
+    """Measurements of a point, or the reason why there are none."""
 
     point: Point
     name: str  # of the codec, as it calls itself: points of one name are a curve
@@ -198,7 +198,7 @@ def disagreements(rows: Iterable[Row]) -> list[tuple[Row, Row]]:
 
 
 def mixtures(rows: Iterable[Row]) -> list[list[list[Row]]]:
-    """Return the rows of sequences that were made anew between, by make, the one with most rows first."""
+    """Return the rows of sequences that were generated again between measurements, by version, the largest first."""
     found: dict[object, list[tuple[float, Row]]] = {}
     for row in rows:
         if diagonal := row.metrics.get("diagonal_m") or row.metrics.get("input_diagonal_m"):

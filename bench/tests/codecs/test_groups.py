@@ -1,4 +1,4 @@
-"""What encodes at several rates share: spans are found once, and found only for what they were found for."""
+"""Encodes at several rates share groups, which are found once and only for their interval and options."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 from meshreel_bench.codecs import groups as stored
 from meshreel_bench.codecs.groups import GroupStore, prepare, shared_options
-from meshreel_bench.codecs.tvmc.tracking import track_sequence
+from meshreel_bench.codecs.tvmc.codec import track_sequence
 
 from meshreel.capture.simulated.procedural import SoftBodiesOptions, soft_bodies
 from meshreel.encoder.group.interval import Interval

@@ -9,13 +9,8 @@ import pytest
 from jaxtyping import TypeCheckError
 from meshreel_bench.codecs import make_codec
 from meshreel_bench.codecs.klt_tsdf import KltTsdfCodec, codec
-from meshreel_bench.codecs.klt_tsdf.basis import MOST, ONE, basis_of, decode_basis, encode_basis, learned
-from meshreel_bench.codecs.klt_tsdf.blocks import (
-    decode_bits,
-    decode_places,
-    encode_bits,
-    encode_places,
-)
+from meshreel_bench.codecs.klt_tsdf.codec import decode_bits, decode_places, encode_bits, encode_places
+from meshreel_bench.codecs.klt_tsdf.components import MOST, ONE, basis_of, decode_basis, encode_basis, learned
 from meshreel_bench.codecs.klt_tsdf.grid import VOLUME, prepared, sample, voxel_index
 from meshreel_bench.codecs.klt_tsdf.surface import Field, cells_at, crossed, polygonize
 
@@ -42,7 +37,7 @@ def stream(body):
 
 
 def outcome(data: bytes) -> str:
-    """What decoding every frame comes to; other errors than FormatError are raised."""
+    """Decode every frame and return the outcome; other errors than FormatError are raised."""
     try:
         video = SMALL.decode(data)
         frames = [video[number] for number in range(len(video))]

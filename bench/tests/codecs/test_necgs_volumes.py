@@ -4,10 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from meshreel_bench.codecs.necgs.cubes import cut, extract
-from meshreel_bench.codecs.necgs.grid import MARGIN, Placement, box_of, place_grids, truncated_distances
-from meshreel_bench.codecs.necgs.shape import Shape, dequantize, quantize
-from meshreel_bench.codecs.necgs.stream import Coded, decode_stream, encode_stream
+from meshreel_bench.codecs.necgs.stream import Coded, Shape, decode_stream, dequantize, encode_stream, quantize
+from meshreel_bench.codecs.necgs.volumes import (
+    MARGIN,
+    Placement,
+    box_of,
+    cut,
+    extract,
+    place_grids,
+    truncated_distances,
+)
 
 from meshreel.capture.simulated.procedural import SoftBodiesOptions, soft_bodies
 from meshreel.errors import FormatError, InputError

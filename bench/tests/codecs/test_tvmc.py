@@ -9,11 +9,8 @@ import numpy as np
 import pytest
 from meshreel_bench.codecs import make_codec
 from meshreel_bench.codecs.tvmc import TvmcCodec
-from meshreel_bench.codecs.tvmc.codec import quality_of_vertices
-from meshreel_bench.codecs.tvmc.layout import Kind, unpack_stream
-from meshreel_bench.codecs.tvmc.tracked import decode_tracked, encode_tracked
-from meshreel_bench.codecs.tvmc.tracking import Tracked, track_sequence
-from meshreel_bench.codecs.tvmc.video import TvmcVideo
+from meshreel_bench.codecs.tvmc.codec import Tracked, quality_of_vertices, track_sequence
+from meshreel_bench.codecs.tvmc.stream import Kind, TvmcVideo, decode_tracked, encode_tracked, unpack_stream
 
 from meshreel.capture.simulated.procedural import SoftBodiesOptions, soft_bodies
 from meshreel.encoder.sequence import Encoder
@@ -39,7 +36,7 @@ def quick_analysis(monkeypatch):
 
 @pytest.fixture(scope="module")
 def tracking():
-    """What a walking body is made of, in two groups."""
+    """A walking body, tracked in two groups."""
     return tracked(BODY, replace(SMALL, group_size=2))
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from meshreel_bench.codecs.tvmc.tracked import MOST_CELLS, decode_cloud, encode_cloud, surface_order
+from meshreel_bench.codecs.tvmc.stream import MOST_CELLS, decode_cloud, encode_cloud, surface_order
 
 from meshreel.coding.reference_mesh import code_reference
 from meshreel.errors import InputError

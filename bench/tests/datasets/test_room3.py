@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from meshreel_bench.datasets.room3 import FRAMES, NAMES, PEOPLE, THINGS, Parts, Room3, moving_parts, thing_poses
+from meshreel_bench.datasets.rooms import FRAMES, NAMES, PEOPLE, THINGS, Parts, Room3, moving_parts, thing_poses
 from meshreel_bench.datasets.scenes import TRUE, open_scene
 from meshreel_bench.measure.parts import missed, part_values
 

@@ -9,8 +9,7 @@ import pytest
 from meshreel_bench.codecs import make_codec
 from meshreel_bench.datasets import Dataset, Store
 from meshreel_bench.datasets import scenes as module
-from meshreel_bench.datasets.captured import Captured
-from meshreel_bench.datasets.scenes import SceneFrames, open_scene, true_scene
+from meshreel_bench.datasets.scenes import Captured, SceneFrames, open_scene, true_scene
 from meshreel_bench.measure.metrics import Measured, _flicker, measure_frames
 from meshreel_bench.measure.point import measure_point
 from meshreel_bench.report.values import value

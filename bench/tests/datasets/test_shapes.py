@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from meshreel_bench.datasets import SHAPES, Store
-from meshreel_bench.datasets.shapes import MODULE, TEETH, gears, prism
+from meshreel_bench.datasets.remesh import MODULE, TEETH, gears, prism
 
 from meshreel.analysis.pieces import bodies_of, pieces_of
 from meshreel.geometry.closest_points import distances

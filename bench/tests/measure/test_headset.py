@@ -6,8 +6,7 @@ import os
 import shutil
 
 import pytest
-from meshreel_bench.measure.headset import headset_values
-from meshreel_bench.playing import ROOT, WEB
+from meshreel_bench.measure.headset import ROOT, WEB, headset_values
 
 from meshreel.errors import InputError
 

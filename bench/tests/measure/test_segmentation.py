@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from meshreel_bench.datasets import Store
+from meshreel_bench.measure.parts import score_labels
 from meshreel_bench.measure.point import dynamic_ratio, measure_point
-from meshreel_bench.measure.segmentation import score_labels
 from meshreel_bench.names import FLOOR_RATIO, FOUND_NAME
 from meshreel_bench.rows import Point
 

@@ -74,7 +74,7 @@ def test_what_a_codec_has_started_ends_with_its_process(whole):
 
 
 def _runs(pid):
-    """Whether a process runs; one that has ended may wait for whoever adopted it."""
+    """Return whether a process runs; one that has ended may wait for its adopter."""
     try:
         return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
     except FileNotFoundError:

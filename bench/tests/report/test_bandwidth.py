@@ -6,8 +6,7 @@ import msgspec
 import pytest
 from meshreel_bench.experiments.study import D2
 from meshreel_bench.names import BEST, DRACO, FLOOR_RATIO, FOUND_NAME, VDMC, VDMC_HERE
-from meshreel_bench.report.bandwidth import RAW, headline_table, vdmc_table
-from meshreel_bench.report.published import anchor_rows
+from meshreel_bench.report.bandwidth import RAW, anchor_rows, headline_table, vdmc_table
 from meshreel_bench.rows import Decoding
 
 from bench.tests.made_up import floor, row

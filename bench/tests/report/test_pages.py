@@ -9,9 +9,8 @@ import msgspec
 import pytest
 from meshreel_bench.experiments import EXPERIMENTS
 from meshreel_bench.experiments.study import D2, MASKED, NORMALS
-from meshreel_bench.names import BEST, VDMC, VDMC_HERE
+from meshreel_bench.names import BEST, VDMC, VDMC_HERE, looks_of
 from meshreel_bench.report import pages
-from meshreel_bench.report.looks import looks_of
 from meshreel_bench.report.pages import write_report
 from meshreel_bench.report.plots import curves_figure
 from meshreel_bench.report.values import curve_of, rated

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import msgspec
 import pandas as pd
+from meshreel_bench import names
 from meshreel_bench.experiments.study import D2, MASKED, NORMALS
-from meshreel_bench.report.equal import rate_ratio, rate_table
+from meshreel_bench.report.comparison import beyond_table, losses, rate_ratio, rate_table, winners_table
 from meshreel_bench.report.tables import (
     bd_table,
     failure_table,
@@ -81,3 +82,18 @@ def test_failures_floors_and_makers_are_listed():
     made = [msgspec.structs.replace(each, made_by=Maker("0.1.0", "abc")) for each in BEST]
     lines = maker_table([*made, *DRACO])
     assert len(lines) == 4 and any("| 0.1.0 | abc |" in line and line.endswith("| 3 |") for line in lines)
+
+
+def test_the_first_page_says_who_needs_how_many_bytes_and_where_others_win():
+    best = [row(name, names.BEST, rate, 60 + 5 * rate) for name in ("ball", "cube") for rate in (0.5, 1.0, 2.0)]
+    draco = [row("ball", names.DRACO, rate, 50 + 4 * rate) for rate in (2.0, 4.0, 8.0)]
+    cheap = [row("cube", names.DRACO, rate, 70 + rate) for rate in (0.25, 0.5)]
+    assert winners_table([*best, *draco], []) == []  # a codec on one of two sequences is a variant
+    [line] = winners_table([*best, *draco, *cheap], [])[2:]
+    assert line.startswith("| Draco | **3.") and "(1 of 2)" in line and len(line.split(" | ")) == 3
+    assert list(losses([*best, *draco], [])) == [] and winners_table(draco, []) == []
+    assert (
+        next(losses([*best, *cheap], [])) == "- cube: Draco needs at most 0.25 times its bytes at equal D2, paper form."
+    )
+    beyond = "| ball | 70 dB at 2 Mbps; Draco 82 dB at 8 | 0.7 at 2 Mbps; Draco 0.82 at 8 |"
+    assert beyond_table([*best, *draco, *cheap])[2:] == [beyond]

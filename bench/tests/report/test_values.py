@@ -72,11 +72,6 @@ def test_groups_with_surface_have_a_mean_length_and_the_largest_step_at_their_bo
     assert value(ROW, "border_step_db") is None and value(floor("ball"), "group_frames") is None
 
 
-def test_the_fall_at_the_ends_is_that_of_the_worse_end():
-    made = msgspec.structs.replace(ROW, per_frame={"d2_psnr_paper": [58.0, 60.0, 59.0]})
-    assert value(made, "fall_at_ends_db") == 2.0
-
-
 def test_a_curve_has_the_points_of_its_name_and_larger_is_better():
     rows = [row("ball", "best", 1.0, 60.0), row("ball", "best", 2.0, 65.0), row("ball", "draco", 3.0, 66.0)]
     found = curve(rows, "best", NORMALS)

@@ -1,4 +1,4 @@
-"""Codecs that can be compared: plug-ins of the entry point group `meshreel.codecs`, the baselines here included.
+"""Lookup of codecs among the plug-ins of the entry point group `meshreel.codecs`, which has the baselines here, too.
 
 In: the name of a codec and its operating point. Out: a Codec.
 """
@@ -34,7 +34,7 @@ def make_codec(name: str, options: dict[str, Any]) -> Codec:
 
 
 def codec_version(name: str) -> str | None:
-    """Return the distribution that brings a codec, and its version; None for this one, whose version every row has."""
+    """Return name and version of the distribution of a codec; None for this one, whose version every row has."""
     entry = _entry(name)
     if entry is None or entry.dist is None or entry.module.partition(".")[0] == __name__.partition(".")[0]:
         return None

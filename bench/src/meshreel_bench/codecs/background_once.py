@@ -23,7 +23,7 @@ from .draco import Frames, Point, check_point, decimated, write_frames
 
 @dataclass(frozen=True, slots=True)
 class Still:
-    """A scene taken apart."""
+    """States of the background of a scene, and its moving faces by frame."""
 
     background: Sequence[Static]
     moving: Frames
@@ -43,7 +43,6 @@ class BackgroundOnceDracoCodec(TwoSteps):
 
     @property
     def name(self) -> str:
-        """The name in rows and plots."""
         return "background_once_draco" + ("_subdivided" if self.levels else "")
 
     def analyse(self, sequence: MeshSequence, progress: Progress | None = None) -> Still:

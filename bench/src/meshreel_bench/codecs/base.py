@@ -1,4 +1,4 @@
-"""Bases of the codecs here, which are frozen dataclasses whose fields are the operating point, and of their frames."""
+"""Base classes of the codecs here (frozen dataclasses whose fields are the operating point) and of decoded frames."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Options:
 
 
 class TwoSteps(Options):
-    """A codec that first finds what does not depend on the rate; see `TwoStepCodec`."""
+    """A `TwoStepCodec` whose `encode` is its analysis followed by its coding."""
 
     __slots__ = ()
 

@@ -54,7 +54,6 @@ class ColoredDracoCodec(Options):
 
     @property
     def name(self) -> str:
-        """The name in rows and plots."""
         return f"Draco with colours, {self.color}"
 
     def encode(self, sequence: MeshSequence, _progress: Progress | None = None) -> bytes:
@@ -73,7 +72,6 @@ class ColoredDracoCodec(Options):
         return msgspec.msgpack.encode(Frames(meshes, self._pictures(pictures)))
 
     def decode(self, data: bytes) -> Sequence[Mesh]:
-        """Return the frames, from the bytes alone."""
         stream = msgspec.msgpack.decode(data, type=Frames)
         found = [(mesh, Mesh.of(mesh.points, mesh.faces)) for mesh in map(DracoPy.decode, stream.meshes)]
         if self.color == "vertices":

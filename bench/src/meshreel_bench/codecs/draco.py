@@ -34,7 +34,7 @@ ON_THE_WAY = 3  # vertices after the first step, in those that are wanted
 
 
 class Point(NamedTuple):
-    """Settings of the coding of single frames."""
+    """Bits and subdivisions of a single frame."""
 
     qp: int  # bits along the longest side of the frame
     levels: int = 0  # midpoint subdivisions in the decoder
@@ -54,7 +54,6 @@ class DracoCodec(Options):
 
     @property
     def name(self) -> str:
-        """The name in rows and plots."""
         return "draco" if self.level == LEVEL else "draco, other levels"
 
     def encode(self, sequence: MeshSequence, progress: Progress | None = None) -> bytes:
@@ -66,7 +65,6 @@ class DracoCodec(Options):
         return write_frames(frames, [Point(self.qp)] * len(sequence), progress)
 
     def decode(self, data: bytes) -> Sequence[Mesh]:
-        """Return the frames, from the bytes alone."""
         return Options.decode(self, data) if self.level == LEVEL else decode_alone(data)
 
 
@@ -94,7 +92,6 @@ class DecimatedDracoCodec(TwoSteps):
 
     @property
     def name(self) -> str:
-        """The name in rows and plots."""
         return "decimated_draco" + ("_subdivided" if self.levels else f", {ALONE}" if self.decoder else "")
 
     @property
@@ -120,7 +117,6 @@ class DecimatedDracoCodec(TwoSteps):
         return write_frames(analysis, points, progress)
 
     def decode(self, data: bytes) -> Sequence[Mesh]:
-        """Return the frames, from the bytes alone."""
         return decode_alone(data) if self.decoder else Options.decode(self, data)
 
 

@@ -1,4 +1,4 @@
-"""Groups found by the paper's analysis, kept for encodes of one sequence at several rates: they do not depend on these.
+"""Cache of groups that the paper's analysis finds, for encodes of one sequence at several rates.
 
 In: an encoder, options. Out: the encoder, which analyses no more what it has analysed.
 """
@@ -34,7 +34,7 @@ class GroupStore:
             self._known[key] = tuple((len(group.frames), group.fitted) for group in found)
 
     def find(self, interval: Interval, options: PaperOptions, stages: Stages | None = None) -> list[FoundGroup]:
-        """Return the result of `paper.find_groups`, from the store if the interval is kept."""
+        """Return the groups of `paper.find_groups`, from the store if the interval is kept."""
         if (known := self._known.get(_key(interval, options))) is None:
             return find_groups(interval, options, stages)
         frames, groups, first = list(interval.frames), list[FoundGroup](), 0

@@ -74,7 +74,6 @@ class MeshoptCodec(Options):
         return _Frame(len(order), len(mesh.faces), tuple(low.tolist()), step, vertices, indices)
 
     def decode(self, data: bytes) -> Sequence[Mesh]:
-        """Return the frames, from the bytes alone."""
         return [_mesh(zlib.decompress(each)) for each in msgspec.msgpack.decode(data, type=list[bytes])]
 
 

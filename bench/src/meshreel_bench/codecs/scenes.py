@@ -34,7 +34,6 @@ class SceneDracoCodec(Options):
 
     @property
     def name(self) -> str:
-        """The name in rows and plots."""
         return "a: decimated Draco" + (", subdivided" if self.levels else "")
 
     def encode(self, sequence: MeshSequence, progress: Progress | None = None) -> bytes:
@@ -65,7 +64,6 @@ class BackgroundDracoCodec(Options):
 
     @property
     def name(self) -> str:
-        """The name in rows and plots."""
         given = "" if self.labels == TRUE else f", labels {self.labels}"
         return "b: background once, decimated Draco" + (", subdivided" if self.levels else "") + given
 
@@ -81,7 +79,6 @@ class BackgroundDracoCodec(Options):
         return _written(frames.frame_rate, meshes, points, progress)
 
     def decode(self, data: bytes) -> Sequence[Mesh]:
-        """Return the frames, from the bytes alone."""
         still, *frames = open_video(data)
         return [concatenate([still, moving]) for moving in frames]
 

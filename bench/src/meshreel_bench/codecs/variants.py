@@ -22,7 +22,7 @@ Method = TypeVar("Method", LayersOptions, PaperOptions)
 
 
 def _method(kind: type[Method], change: Callable[[Method], Method], text: str) -> Change:
-    """A change of one recipe; `text` says for errors which, and what presets it has."""
+    """Return a change of one method; `text` names the method and its presets in errors."""
 
     def changed(options: EncoderOptions) -> EncoderOptions:
         if not isinstance(options.method, kind):

@@ -27,12 +27,10 @@ from meshreel.io.file_names import MESHES, is_pattern
 from meshreel.io.sequence import FileSequence, SequenceOptions, open_sequence
 from meshreel.types import MeshSequence
 
-from .captured import Captured
 from .checksums import check_source, checksum, known_checksums
-from .remesh import Place, RemeshedSequence, RemeshOptions, SideBySide
-from .rooms import PEOPLE, ROOM
-from .scenes import PROCEDURAL, ROOM3, SCENES, SceneData, open_scene
-from .shapes import gears, prism
+from .remesh import Place, RemeshedSequence, RemeshOptions, SideBySide, gears, prism
+from .rooms import ROOM, WALKERS
+from .scenes import PROCEDURAL, ROOM3, SCENES, Captured, SceneData, open_scene
 from .walker import FRAMES, Truth, Walker
 
 DEMO = "demo"  # procedural bodies: needs no benchmark data
@@ -80,7 +78,7 @@ class Dataset:
 
 @dataclass(frozen=True, slots=True)
 class Store:
-    """Folders of sequences, and of those that take long to make."""
+    """Folders of the benchmark data and of generated sequences, and options of reading."""
 
     data: Path  # the folder of the benchmark data
     cache: Path | None = None  # scenes, recordings and remeshed bodies are kept here; scenes and recordings need it
@@ -134,7 +132,7 @@ class Store:
 
 
 def released_in(data: Path) -> tuple[str, ...]:
-    """Return which sequences of TSMC's authors a folder holds."""
+    """Return the names of the sequences of TSMC's authors in a folder."""
     return tuple(name for name in RELEASED if any((data / name / MESHES).glob("*")))
 
 
@@ -152,7 +150,7 @@ def forth_and_back(source: MeshSequence, count: int) -> DerivedSequence:
 
 def _scene(name: str, data: Path, frames: int | None, cache: Path | None) -> Dataset:
     if name in SCENES:
-        for source in (ROOM, *(Path(PERFORMERS, f"{body}.npz") for body in PEOPLE)):
+        for source in (ROOM, *(Path(PERFORMERS, f"{body}.npz") for body in WALKERS)):
             check_source(data / source, source)
     try:
         scene = open_scene(name, data, _kept(name, cache), frames)
@@ -204,10 +202,10 @@ def _places(name: str, data: Path) -> Sequence[Path]:
 
 
 def _is_path(name: str) -> bool:
-    """Return whether a name is meant as a path."""
+    """Return whether a text is meant as a path rather than a name."""
     return name.startswith(".") or any(sign in name for sign in {"/", os.sep})
 
 
 def _is_known(path: Path, data: Path) -> bool:
-    """Return whether a path belongs to the benchmark data, which have checksums."""
+    """Return whether a path is among the benchmark data with checksums."""
     return path.is_relative_to(data) and path.relative_to(data).as_posix() in known_checksums()

@@ -1,4 +1,9 @@
-"""The benchmark scenes `room2` and `room2-standing`: a furnished room, two people, four simulated cameras, as a rig."""
+"""The benchmark scenes, as rigs of four cameras: `room2` and `room2-standing` of captures, `room3` procedural.
+
+Two people are in a furnished room. In `room3` a crate is pushed and left, a door opens, a box is carried and set down;
+two people touch and pass, one sits down and stands up. y is up, in metres; the floor is at height 0. The truth of
+`room3` has each part by name: see `Parts`.
+"""
 
 from __future__ import annotations
 
@@ -7,17 +12,23 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Float64
+from jaxtyping import Bool, Float64, Int64
 
-from meshreel.capture.simulated.simulated_rig import SceneFrame, SensorOptions, corner_cameras, simulate_rig
+from meshreel.capture.simulated.demo_room import Box, box
+from meshreel.capture.simulated.figure import Pose, figure, turn_about_y
+from meshreel.capture.simulated.implicit import polygonize
+from meshreel.capture.simulated.procedural import grid_of_frame
+from meshreel.capture.simulated.simulated_rig import TRUTH, SceneFrame, SensorOptions, corner_cameras, simulate_rig
 from meshreel.errors import InputError
+from meshreel.geometry.topology import concatenate, subdivide_midpoint
 from meshreel.io.meshes import read_mesh
+from meshreel.io.write import replacing
 from meshreel.types import Mesh
 
 ROOM = Path("rooms/lr_kt2.obj")  # its y axis points down
-PEOPLE = {"crane": (0.2, 0.0, 3.0), "samba": (-0.9, 0.0, 2.85)}  # m: where there is room to walk
+WALKERS = {"crane": (0.2, 0.0, 3.0), "samba": (-0.9, 0.0, 2.85)}  # m: where there is room to walk
 SPEEDS = {"room2": 1.0, "room2-standing": 0.4}  # of the people
-FRAMES = 60
+ROOM_FRAMES = 60
 FRAME_RATE = 30.0  # 1/s
 CAMERAS = 4
 WALLS = (0.35, 0.0, 0.35)  # m from the walls to the cameras
@@ -28,15 +39,12 @@ class RoomOptions:
     """Choice of a scene, and precision of its measurement."""
 
     name: str = "room2"
-    frames: int = FRAMES
+    frames: int = ROOM_FRAMES
     sensor: SensorOptions = SensorOptions()
 
 
 def simulate_room(
-    folder: Path,
-    data: Path,
-    options: RoomOptions = RoomOptions(),
-    progress: Callable[[int], None] = lambda _done: None,
+    folder: Path, data: Path, options: RoomOptions = RoomOptions(), progress: Callable[[int], None] = lambda _done: None
 ) -> int:
     """Writes the scene's rig and its truth into a folder; the number of frames. Some five minutes for 60 frames."""
     room = furnished(data)
@@ -61,7 +69,7 @@ def furnished(data: Path) -> Mesh:
 def scene(room: Mesh, data: Path, speed: float, count: int) -> Iterator[SceneFrame]:
     """The clean frames; the people's vertices are interpolated between those of their captures."""
     people = []
-    for name, place in PEOPLE.items():
+    for name, place in WALKERS.items():
         path = data / "performers" / f"{name}.npz"
         if not path.exists():
             raise InputError(f"{path}: is missing; give the folder of the benchmark data")
@@ -76,3 +84,161 @@ def _at(vertices: Float64[np.ndarray, "T V 3"], time: float) -> Float64[np.ndarr
     before = min(int(time), len(vertices) - 2)
     share = min(time - before, 1.0)
     return (1 - share) * vertices[before] + share * vertices[before + 1]
+
+
+FRAMES, RATE, LEFT = 60, 30.0, 28  # frames, 1/s; the frame from which on the crate stands
+THINGS, PEOPLE = ("crate", "door", "box"), ("person 0", "person 1", "person 2")  # carrier, pusher, sitter
+NAMES = ("room", *THINGS, *PEOPLE)  # in the order of their faces in a frame
+LOW, HIGH = np.array([-1.9, 0.0, -1.75]), np.array([1.9, 2.5, 1.75])  # of the cameras
+CYCLE, STRIDE, SOLE = 0.86, 0.5, 0.005  # m: walked in a step cycle; a step at 1 m/s; by which feet would sink in
+PARTS = "parts.npz"  # beside the truth
+STILL: tuple[Box, ...] = (
+    ((-2.3, -0.1, -2.1), (2.3, 0.0, 2.1)),  # floor and walls; that at the back has a doorway,
+    ((-2.3, 0.0, -2.1), (0.8, 2.5, -2.0)),
+    ((1.65, 0.0, -2.1), (2.3, 2.5, -2.0)),
+    ((0.8, 2.05, -2.1), (1.65, 2.5, -2.0)),
+    ((-2.3, 0.0, 2.0), (2.3, 2.5, 2.1)),
+    *(((x, 0.0, -2.0), (x + 0.1, 2.5, 2.0)) for x in (-2.3, 2.2)),
+    ((0.3, -0.1, -3.2), (2.2, 0.0, -2.1)),  # which leads to a corridor
+    ((0.3, 0.0, -3.3), (2.2, 2.5, -3.2)),
+    ((1.62, 0.0, 0.6), (2.15, 0.44, 1.7)),  # a seat with a back
+    ((2.05, 0.44, 0.6), (2.2, 0.85, 1.7)),
+    ((1.06, 0.68, -0.4), (1.56, 0.72, 0.35)),  # a table
+    *(((x, 0.0, z), (x + 0.05, 0.68, z + 0.05)) for x in (1.14, 1.48) for z in (-0.38, 0.28)),
+    ((-2.2, 0.0, -2.0), (-1.3, 1.6, -1.6)),  # a cupboard, a shelf, a chest with things on it
+    ((-2.2, 0.95, 0.2), (-1.9, 1.0, 1.4)),
+    ((-1.6, 0.0, 1.5), (-0.5, 0.6, 2.0)),
+    ((-1.4, 0.6, 1.6), (-1.15, 0.9, 1.85)),
+    ((-0.9, 0.6, 1.65), (-0.6, 0.7, 1.95)),
+)
+BOXES: dict[str, Box] = {  # of the things, about their own origins
+    "crate": ((-0.2, 0.0, -0.2), (0.2, 0.78, 0.2)),
+    "door": ((0.0, 0.01, -0.02), (0.83, 2.04, 0.02)),
+    "box": ((-0.15, -0.12, -0.13), (0.15, 0.12, 0.13)),
+}
+HINGE, OPEN = (0.81, 0.0, -1.97), np.radians(-80)  # of the door: it opens into the room
+ARM, HELD = (0.0, -SOLE, 0.56), (0.0, 1.04, 0.36)  # m: the crate before the pusher, the box before the carrier
+ON_TABLE = (1.24, 0.841, -0.08)  # m: the box, set down
+TURNED = -np.pi / 2  # rad: heading to the left, -x
+TO_LEFT, TO_RIGHT = turn_about_y(TURNED), turn_about_y(-TURNED)
+
+Vector = Float64[np.ndarray, "3"]
+PerFrame = Float64[np.ndarray, " T"]
+_Walk = list[tuple[Vector, float, float, float]]  # what a `Pose` begins with, in each frame
+
+
+@dataclass(frozen=True, slots=True)
+class Parts:
+    """Truth of the parts of each frame, whose faces follow each other in the order of `NAMES`, people's last."""
+
+    faces: Int64[np.ndarray, "T P"]  # number of a part's faces in a frame
+    poses: Float64[np.ndarray, "T K 4 4"]  # of `THINGS`, to the world: the same faces move rigidly
+
+    def of_faces(self, number: int) -> Int64[np.ndarray, " F"]:
+        """Return the part, as its number in `NAMES`, of each face of a clean frame."""
+        return np.repeat(np.arange(len(NAMES)), self.faces[number])
+
+
+def moving_parts(poses: Float64[np.ndarray, "T K 4 4"]) -> Bool[np.ndarray, "T P"]:
+    """Return a mask of moving parts: people always, things whose pose differs in the frame before or after."""
+    steps = (np.diff(poses, axis=0) != 0).any(axis=(2, 3))
+    things = np.pad(steps, ((1, 0), (0, 0))) | np.pad(steps, ((0, 1), (0, 0)))
+    return np.pad(np.pad(things, ((0, 0), (1, 0))), ((0, 0), (0, len(PEOPLE))), constant_values=True)
+
+
+@dataclass(frozen=True, slots=True)
+class Room3:
+    """Clean frames of the scene, made when they are read."""
+
+    frames: int = FRAMES  # the first ones
+    spacing: float = 0.012  # m, of the grid of people's surface
+
+    def parts(self, number: int) -> list[Mesh]:
+        """Return the mesh of each part of a frame in the order of `NAMES`; people and things are closed."""
+        still = concatenate([box(corners) for corners in STILL])
+        poses, grid = thing_poses()[number], grid_of_frame(number, self.spacing, 0)
+        things = [_placed(box(BOXES[name]), pose) for name, pose in zip(THINGS, poses, strict=True)]
+        people = [polygonize((figure(pose, 0.7 * self.spacing),), 0.01, grid) for pose in _people(number)]
+        return [*(subdivide_midpoint(mesh) for mesh in (still, *things)), *people]
+
+    def record(self, folder: Path, width: int = 640) -> None:
+        """Write the rig and its truth, with `parts.npz`; three minutes for 60 frames."""
+        counts, poses = list[list[int]](), thing_poses()[: self.frames]
+
+        def frames() -> Iterator[SceneFrame]:
+            for number in range(self.frames):
+                parts = self.parts(number)
+                counts.append([len(part.faces) for part in parts])
+                yield SceneFrame(concatenate(parts), np.repeat(moving_parts(poses)[number], counts[-1]))
+
+        cameras = corner_cameras(LOW, HIGH, width)
+        simulate_rig(folder, frames(), cameras, RATE)
+        with replacing(folder / TRUTH / PARTS) as file:
+            np.savez_compressed(file, allow_pickle=False, faces=np.array(counts), poses=poses)
+
+
+def read_parts(rig: Path) -> Parts | None:
+    """Read the parts beside the truth of a rig; None where it has none."""
+    if not (rig / TRUTH / PARTS).exists():
+        return None
+    with np.load(rig / TRUTH / PARTS, allow_pickle=False) as archive:
+        return Parts(archive["faces"], archive["poses"])
+
+
+def thing_poses() -> Float64[np.ndarray, "T K 4 4"]:
+    """Return the poses of crate, door and box in all frames."""
+    carrier, pusher = _walks()
+    poses, down = np.tile(np.eye(4), (FRAMES, len(THINGS), 1, 1)), _eased(45, 56)[:, None]
+    poses[:, 0, :3, 3] = [pusher[min(number, LEFT)][0] + TO_LEFT @ ARM for number in range(FRAMES)]
+    poses[:, 1, :3, 3] = HINGE
+    poses[:, 1, :3, :3] = [turn_about_y(OPEN * share) for share in _eased(3, 27)]
+    poses[:, 2, :3, 3] = (1 - down) * [place + TO_RIGHT @ HELD for place, *_ in carrier] + down * ON_TABLE
+    poses[:, 2, :3, :3] = TO_RIGHT
+    return poses
+
+
+def _people(number: int) -> tuple[Pose, Pose, Pose]:
+    """Return the poses of the carrier, the pusher and the sitter."""
+    carrier, pusher = _walks()
+    held, seat = thing_poses()[number, 2, :3, 3], np.array([1.38, SOLE, 1.15])
+    hands = _both(held, TO_RIGHT, (0.17, 0.0, -0.1))
+    grips = _both(pusher[number][0], TO_LEFT, (0.12, 0.84, 0.33))
+    knees = _both(seat, TO_LEFT, (0.12, 0.6, 0.06))
+    bow, on = 0.15 * _eased(45, 56)[number], 1 - _eased(27, 35)[number]
+    down = _eased(4, 24)[number] * (1 - _eased(34, 57)[number])
+    hips, lean = (-0.4 * down, -0.36 * down), 0.55 * np.sin(np.pi * down)
+    return (
+        Pose(*carrier[number], wrists=hands, reach=(1.0, 1.0), lean=bow),
+        Pose(*pusher[number], wrists=grips, reach=(on, on), lean=0.5 * on, girth=1.1),
+        Pose(seat, TURNED, 0.25, 0.0, knees, (down, down), hips=hips, lean=lean, size=0.98, girth=0.92),
+    )
+
+
+def _both(place: Vector, turn: Float64[np.ndarray, "3 3"], apart: tuple[float, float, float]) -> tuple[Vector, Vector]:
+    """Return the places of a left and a right wrist beside a place."""
+    return place + turn @ apart, place + turn @ (apart * np.array([-1.0, 1.0, 1.0]))
+
+
+def _walks() -> tuple[_Walk, _Walk]:
+    """Return the ways of the carrier, to the table, and of the pusher, who leaves the crate and turns away."""
+    speeds = 1.25 * _eased(2, 6) * (1 - _eased(23, LEFT)) + _eased(31, 38)
+    pusher = _walked((1.0, SOLE, -0.62), speeds, TURNED * (1 + _eased(29, 42)))
+    return _walked((-0.88, SOLE, -0.12), 1.1 * (1 - _eased(42, 52)), np.full(FRAMES, -TURNED)), pusher
+
+
+def _walked(start: tuple[float, float, float], speeds: PerFrame, headings: PerFrame) -> _Walk:
+    """Return place, heading, step cycles so far and stride in each frame; speeds in m/s."""
+    ways = np.stack([np.sin(headings), np.zeros(FRAMES), np.cos(headings)], axis=1)
+    steps = np.concatenate([[0.0], speeds[:-1] / RATE])
+    places = start + np.cumsum(steps[:, None] * np.roll(ways, 1, axis=0), axis=0)
+    return list(zip(places, headings, np.cumsum(steps) / CYCLE, STRIDE * np.minimum(speeds, 1.0), strict=True))
+
+
+def _eased(first: int, last: int) -> PerFrame:
+    """Return a smooth step over the frames: 0 up to `first`, 1 from `last` on."""
+    share = np.clip((np.arange(FRAMES) - first) / (last - first), 0, 1)
+    return share * share * (3 - 2 * share)
+
+
+def _placed(mesh: Mesh, pose: Float64[np.ndarray, "4 4"]) -> Mesh:
+    return Mesh.of(mesh.vertices @ pose[:3, :3].T + pose[:3, 3], mesh.faces)

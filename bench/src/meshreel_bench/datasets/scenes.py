@@ -20,23 +20,65 @@ from meshreel.analysis import scene as segmenter
 from meshreel.analysis.scene.background import FRAMES
 from meshreel.analysis.scene.background_depth import Moment, fuse_still_depth
 from meshreel.analysis.scene.segmentation import segment
-from meshreel.capture.recording import open_recording
+from meshreel.capture.recording import Recording, open_recording
 from meshreel.capture.rig.fusion import FusionOptions
 from meshreel.capture.rig.rig import RIG
 from meshreel.capture.simulated import demo_room
 from meshreel.capture.simulated.simulated_rig import TRUTH
 from meshreel.capture.simulated.truth import Truth, read_truth
+from meshreel.geometry.cameras import Camera
 from meshreel.geometry.closest_points import Surface, carried_labels
+from meshreel.geometry.color_views import ColorFrames
 from meshreel.geometry.decimate import decimate_faces
+from meshreel.geometry.depth import DepthFrames
 from meshreel.geometry.derived_sequences import DerivedSequence
 from meshreel.io.meshes import read_mesh
-from meshreel.io.write import make_folder, replacing, write_mesh
+from meshreel.io.sequence import open_sequence
+from meshreel.io.write import frame_names, make_folder, replacing, write_mesh
 from meshreel.metrics.scene_accuracy import Scene, Sight
-from meshreel.types import Mesh, MeshSequence, evenly
+from meshreel.types import Frames, Mesh, MeshSequence, Up, evenly
 
-from . import room3
-from .captured import Captured
+from . import rooms
 from .rooms import SPEEDS, RoomOptions, simulate_room
+
+
+class Captured(Frames):
+    """The frames of a recording, made as `meshreel capture` makes them where the folder lacks them."""
+
+    def __init__(self, recording: Recording, folder: Path) -> None:
+        make_folder(folder)
+        for number, name in enumerate(frame_names(len(recording), "ply")):
+            if not (folder / name).exists():
+                write_mesh(recording[number], folder / name)
+        self._recording, self._meshes = recording, open_sequence(folder)
+        self.frame_rate = recording.frame_rate
+
+    def __len__(self) -> int:
+        return len(self._recording)
+
+    def __getitem__(self, index: int) -> Mesh:
+        return self._meshes[range(len(self))[index]]
+
+    @property
+    def cameras(self) -> tuple[Camera, ...]:
+        """Cameras of the capture."""
+        return tuple(camera.view for camera in self._recording.rig.cameras)
+
+    @property
+    def up(self) -> Up:
+        """The axis that points up."""
+        return self._recording.up
+
+    @property
+    def colors(self) -> ColorFrames | None:
+        """The pictures of the colour cameras, by frame."""
+        return self._recording.colors
+
+    @property
+    def depth(self) -> DepthFrames:
+        """The depth pictures of the cameras, by frame."""
+        return self._recording.depth
+
 
 SCENES = tuple(SPEEDS)
 ROOM3 = "room3"  # needs no benchmark data
@@ -54,25 +96,25 @@ class SceneData:
     folder: Path  # where everything about it is kept
     meshes: Captured
     truth: Truth
-    parts: room3.Parts | None = None  # of the truth, where it has them by name
+    parts: rooms.Parts | None = None  # of the truth, where it has them by name
 
     def true(self, number: int) -> Scene:
         """Prepare a clean frame for measurements; where parts have names, things that move are no people."""
-        people = None if self.parts is None else self.parts.of_faces(number) > len(room3.THINGS)
+        people = None if self.parts is None else self.parts.of_faces(number) > len(rooms.THINGS)
         return true_scene(self.truth, number, people)
 
     def judged(self, number: int, source: str) -> Bool[np.ndarray, " F"]:
         """Return the labels of a frame without those of things at rest, which may be room already, or not yet."""
         if self.parts is None:
             return self.labels(number, source)
-        parts, counts = self.parts.of_faces(number), room3.moving_parts(self.parts.poses)[number]
+        parts, counts = self.parts.of_faces(number), rooms.moving_parts(self.parts.poses)[number]
         counts[0] = True  # the room
         path = self.folder / "labels" / f"judged-{number:05}.npy"
         clean, mesh = self.truth[number].mesh, self.meshes[number]
         return self.labels(number, source)[_kept_array(path, lambda: _nearest_labels(clean, counts[parts], mesh))]
 
     def labels(self, number: int, source: str = TRUE) -> Bool[np.ndarray, " F"]:
-        """Return a mask of a frame's moving faces: by the nearest clean face (`TRUE`), or as the encoder finds them."""
+        """Return a mask of moving faces: those nearest to moving clean faces (`TRUE`), or found by the encoder."""
         if source == TRUE:
             path = self.folder / "labels" / f"{TRUE}-{number:05}.npy"
             clean = self.truth[number]
@@ -117,7 +159,7 @@ def open_scene(name: str, data: Path, cache: Path, frames: int | None = None) ->
         _simulate(name, rig, data, frames)
     fusion = FusionOptions(demo_room.VOXEL) if name == PROCEDURAL else FusionOptions()
     recording, _ = open_recording(rig, fusion, keep=False)
-    return SceneData(name, folder, Captured(recording, meshes), read_truth(rig / TRUTH), room3.read_parts(rig))
+    return SceneData(name, folder, Captured(recording, meshes), read_truth(rig / TRUTH), rooms.read_parts(rig))
 
 
 def _simulate(name: str, rig: Path, data: Path, frames: int | None) -> None:
@@ -126,7 +168,7 @@ def _simulate(name: str, rig: Path, data: Path, frames: int | None) -> None:
         room = demo_room.RoomOptions(PROCEDURAL_FRAMES if frames is None else frames)
         demo_room.record_room(rig, room)
     elif name == ROOM3:
-        room3.Room3(room3.FRAMES if frames is None else frames).record(rig)
+        rooms.Room3(rooms.FRAMES if frames is None else frames).record(rig)
     else:
         simulate_room(rig, data, RoomOptions(name) if frames is None else RoomOptions(name, frames))
 

@@ -58,7 +58,7 @@ class Walker(Frames):
 
 @dataclass(frozen=True, slots=True)
 class Truth:
-    """Appearance of the person in cameras without errors."""
+    """True appearance of the person, as cameras without errors see it."""
 
     def luma(
         self, number: int, points: Float64[np.ndarray, "N 3"]

@@ -18,7 +18,7 @@ from PIL import Image
 import meshreel
 from meshreel.capture.rig.rig import read_cameras
 
-from ..playing import WEB, playing
+from ..measure.headset import WEB, playing
 
 FRAMES = 45  # of the recording
 ALL = 99  # layers: no file has more
@@ -28,7 +28,7 @@ QUALITY = 75  # of WebP, 0 to 100; chosen by eye
 
 
 def main(folder: Path = Path("docs/pictures"), demo: Path | None = None) -> None:
-    """Draw the demo's room from the frames of the player, and tell what it took."""
+    """Write the moving picture of the demo and its numbers."""
     with tempfile.TemporaryDirectory() as temporary:
         if demo is None:
             demo = Path(temporary) / "demo"
@@ -49,7 +49,7 @@ def main(folder: Path = Path("docs/pictures"), demo: Path | None = None) -> None
 
 
 def played(file: Path, frames: range, folder: Path) -> list[Image.Image]:
-    """Return pictures of some frames in the player."""
+    """Return the player's pictures of frames."""
     query = f"?autoplay=0&controls=0&layers={ALL}&interpolate=off&background=white&camera={CAMERA}"
     with playing(file) as address:
         values = [address + query, folder, *SIZE, *frames]

@@ -7,25 +7,124 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import matplotlib
 import numpy as np
+from jaxtyping import Float64
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from PIL import Image
 
-from meshreel.analysis.reference.extraction import MDS
+from meshreel.analysis.fit.surface_fit import Fit, FitOptions, Guides, fit_frames
+from meshreel.analysis.reference.centers import largest_distances, reference_centers
+from meshreel.analysis.reference.deform import bind, center_motions, move
+from meshreel.analysis.reference.extraction import MDS, Reference, extract_reference, predict
+from meshreel.analysis.reference.track import track_centers
+from meshreel.analysis.survey import survey
+from meshreel.capture.simulated.procedural import SoftBodiesOptions, soft_bodies
+from meshreel.coding import klt
+from meshreel.coding.group import decode_group, payload_bytes_by_purpose
+from meshreel.coding.paper.group import encode_laplacian
+from meshreel.coding.reference_mesh import CodedReference, code_reference
 from meshreel.encoder.paper.options import PaperOptions
+from meshreel.encoder.paper.recipe import LEVELS, REFERENCE_BITS
 from meshreel.geometry.topology import components as connected
+from meshreel.geometry.topology import vertex_normals
 from meshreel.metrics.error_sheet import SheetOptions, write_sheet
 from meshreel.metrics.viewpoints import Box
-from meshreel.types import Mesh, MeshList
+from meshreel.types import Centers, Mesh, MeshList
 
-from . import drawing, room_picture
+from . import drawing
 from .drawing import BODIES, Sheet, camera_for, draw_edges, draw_points, normal_colored, shaded
-from .stages import CONTACT, FIRST, Stages, compute, story
+
+FIRST, COUNT = 27, 10  # of the story's 90 frames: the hands meet on the way
+CONTACT = 5  # of these: the two surfaces are melted into one
+
+
+@dataclass(frozen=True, slots=True)
+class Moved:
+    """A frame in another pose, colored by the normals of its own pose."""
+
+    mesh: Mesh
+    colors: Float64[np.ndarray, "V 3"]  # RGB, 0 to 1
+
+
+@dataclass(frozen=True, slots=True)
+class Stages:
+    """Results of every stage on one group; coordinates are normalised: the sequence's diagonal is 1."""
+
+    frames: tuple[Mesh, ...]
+    centers: Centers
+    spread: Float64[np.ndarray, "K 3"]  # the reference centers of eq. 5
+    stress: float
+    reference: Reference
+    moved: tuple[Moved, ...]  # the frames in the pose of eq. 5
+    coded: CodedReference
+    predictions: Float64[np.ndarray, "T V 3"]
+    fit: Fit
+    basis: klt.Basis
+    payload: bytes
+    components: int
+    decoded: tuple[Mesh, ...]
+
+    @property
+    def parts(self) -> dict[str, int]:
+        """Bytes of the group's payload by purpose."""
+        return payload_bytes_by_purpose(self.payload)
+
+
+def story() -> MeshList:
+    """Frames of the procedural story, in metres."""
+    people = soft_bodies(SoftBodiesOptions())
+    return MeshList(tuple(people[FIRST + t] for t in range(COUNT)), people.frame_rate)
+
+
+def compute(sequence: MeshList, options: PaperOptions) -> Stages:
+    """The stages of a sequence that is one group."""
+    seen = survey(sequence)
+    frames = tuple(seen.normalise(mesh) for mesh in sequence)
+    centers = track_centers(frames, options.track)
+    middle = centers.positions[len(frames) // 2]
+    spread = reference_centers(largest_distances(centers), middle)
+    reference = extract_reference(frames, centers, options.reference)
+    coded = code_reference(reference.mesh, REFERENCE_BITS, LEVELS)
+    predictions = predict(reference, coded.base, centers)
+    fit = fit_frames(coded.base.faces, predictions, frames, FitOptions(), Guides(key=reference.key))
+    field = np.moveaxis(fit.positions, 0, 1) - coded.base.vertices[:, None]
+    payload, layers = encode_laplacian(coded, field, options.displacements)
+    moved = tuple(
+        _moved(frame, own, spread.positions, reference) for frame, own in zip(frames, centers.positions, strict=True)
+    )
+    return Stages(
+        frames=frames,
+        centers=centers,
+        spread=spread.positions,
+        stress=spread.stress,
+        reference=reference,
+        moved=moved,
+        coded=coded,
+        predictions=predictions,
+        fit=fit,
+        basis=klt.fit(field),
+        payload=payload,
+        components=len(layers) - 1,
+        decoded=tuple(decode_group(payload, len(frames))),
+    )
+
+
+def _moved(
+    frame: Mesh,
+    own: Float64[np.ndarray, "K 3"],
+    pose: Float64[np.ndarray, "K 3"],
+    reference: Reference,
+) -> Moved:
+    binding = bind(frame, own, reference.neighbours)
+    motions = center_motions(own, pose, reference.neighbours)
+    vertices = move(frame.vertices, binding, motions, reference.neighbours)
+    return Moved(Mesh(vertices, frame.faces), (vertex_normals(frame) + 1) / 2)
+
 
 Picture = Callable[[Stages, Path], None]
 
@@ -34,7 +133,7 @@ def main(folder: Path = Path("docs/pictures")) -> None:
     """Draw every picture into a folder."""
     folder.mkdir(parents=True, exist_ok=True)
     matplotlib.rcParams["font.family"] = "DejaVu Sans"  # comes with matplotlib: the same letters everywhere
-    room_picture.draw(folder / "room.png")
+    drawing.draw_room(folder / "room.png")
     stages = compute(story(), PaperOptions())
     for name, draw in PICTURES.items():
         draw(stages, folder / f"{name}.png")
@@ -73,7 +172,7 @@ def centers(stages: Stages, path: Path) -> None:
     sheet.write(path)
 
 
-def reference_centers(stages: Stages, path: Path) -> None:
+def spread_centers(stages: Stages, path: Path) -> None:
     """A frame's centers beside those of eq. 5, from the front and from the side."""
     sheet = Sheet(4, 300)
     poses = (stages.centers.positions[CONTACT], stages.spread)
@@ -118,7 +217,7 @@ def reference(stages: Stages, path: Path) -> None:
 
 
 def fit(stages: Stages, path: Path) -> None:
-    """Draw the distance of the reference from a frame: only deformed, then fitted."""
+    """Distance of the reference from a frame: deformed only, then fitted."""
     sheet = Sheet(4, 260, bar=True)
     last = len(stages.frames) - 1
     frame, faces = stages.frames[last], stages.coded.base.faces
@@ -155,7 +254,7 @@ def components(stages: Stages, path: Path) -> None:
 
 
 def decoded(stages: Stages, path: Path) -> None:
-    """Draw the sheet of `meshreel compare --sheet`: original, decoded, error."""
+    """Original, decoded and error, as `meshreel compare --sheet` draws them."""
     last = len(stages.frames) - 1
     pictures = MeshList(stages.frames), MeshList(stages.decoded)
     write_sheet(*pictures, path, SheetOptions(frames=(0, last), height=340))
@@ -180,7 +279,7 @@ def parts(stages: Stages, path: Path) -> None:
 PICTURES: dict[str, Picture] = {
     "frames": frames,
     "centers": centers,
-    "reference-centers": reference_centers,
+    "reference-centers": spread_centers,
     "deformed": deformed,
     "reference": reference,
     "fit": fit,
@@ -191,7 +290,7 @@ PICTURES: dict[str, Picture] = {
 
 
 def _around_hands(stages: Stages, t: int) -> Mesh:
-    """Return the points in the middle between the two people, within a tenth of the diagonal."""
+    """Vertices within a tenth of the diagonal around the middle between the two people."""
     box = Box.of(stages.frames)
     middle = box.center + [0, 0.14 * box.size[1], 0]
     frame = stages.frames[t]

@@ -4,26 +4,26 @@ from __future__ import annotations
 
 from meshreel.errors import InputError
 
-from . import ablations, color, figure6, headset, layers, mpeg, recordings, scenes, speed, splats
+from . import ablations, color, figure6, headset, layers, scenes
 from .study import Study
 
 # In the order of the report.
 EXPERIMENTS: dict[str, Study] = {
     "figure6": figure6.STUDY,
-    "mpeg": mpeg.STUDY,
+    "mpeg": figure6.MPEG,
     "long": figure6.LONG,
     "table1": figure6.TABLE_1,
     "table2": figure6.TABLE_2,
-    "table3": splats.TABLE_3,
+    "table3": color.TABLE_3,
     "ablation_paper": ablations.PAPER,
     "ablation_centers": ablations.CENTERS,
     "ablation_gof": ablations.GOF,
     "ablation_stages": ablations.STAGES,
     "ablation_scene": ablations.SCENE,
     "scenes": scenes.STUDY,
-    "recordings": recordings.STUDY,
+    "recordings": scenes.RECORDINGS,
     "layers": layers.STUDY,
-    "speed": speed.STUDY,
+    "speed": layers.SPEED,
     "tracker": ablations.TRACKERS,
     "headset": headset.STUDY,
     "color": color.STUDY,

@@ -36,19 +36,9 @@ PAPER = Study(
     title="The paper as written: preset `paper` put back step by step",
     sequences=("dancer", "crane60", "procedural_room"),
     sweeps=(
-        Sweep(
-            "meshreel",
-            {"basis_size": (3, 5, 10, 30)},
-            {"preset": "paper"},
-            M_IS_10,
-        ),
+        Sweep("meshreel", {"basis_size": (3, 5, 10, 30)}, {"preset": "paper"}, M_IS_10),
         *(Sweep("meshreel", {}, AT_10 | {"variant": name}) for name in (UNIFORM, IN_MDS_POSE, BOTH)),
-        Sweep(
-            "meshreel",
-            {"basis_size": (3, 5, 10, 30)},
-            {"preset": LITERAL_PRESET},
-            M_IS_10,
-        ),
+        Sweep("meshreel", {"basis_size": (3, 5, 10, 30)}, {"preset": LITERAL_PRESET}, M_IS_10),
         Sweep("meshreel", {}, {"preset": LITERAL_PRESET, "basis_size": 10, "variant": RELEASED}),
         Sweep(
             "meshreel",

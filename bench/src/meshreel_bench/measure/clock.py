@@ -1,20 +1,26 @@
-"""Processor time by stage, the time of a fixed loop meanwhile, work, and peak memory."""
+"""Processor time by stage, the time of a fixed loop meanwhile, work, peak memory, and the machine of this process."""
 
 from __future__ import annotations
 
 import builtins
+import os
+import platform
 import signal
+import subprocess
 import sys
 import time
 from collections.abc import Mapping, Sequence
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from meshreel import __version__
+from meshreel.encoder.group.digests import processor
 from meshreel.geometry.work import since, so_far
 
-from ..rows import Encoding
+from ..rows import Encoding, Maker
 
 NUMBERS, STEPS = 200_000, 200_000  # of the fixed loop
 SAMPLES, PAUSE = 5, 1.0  # of the loop before and after what is measured, and s between two meanwhile (guess)
@@ -79,7 +85,7 @@ class StageTimer:
 
 
 def cost_of(timers: Sequence[StageTimer], frames: int) -> Encoding:
-    """Return the time per frame while these timers ran, and this process's peak memory."""
+    """Return the cost of a frame while these timers ran, and this process's peak memory."""
 
     def a_frame(totals: Sequence[Mapping[str, float]]) -> dict[str, float]:
         names = dict.fromkeys(name for total in totals for name in total)
@@ -107,3 +113,30 @@ def peak_rss_mb() -> float | None:
         return None
     unit = 1 if sys.platform == "darwin" else 1024
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit / 1e6
+
+
+_DIGITS = 12  # of a commit
+
+
+@cache
+def maker() -> Maker:
+    """Return version, commit and machine of this process."""
+    machine = (platform.platform(), platform.python_version(), processor(), os.cpu_count())
+    return Maker(__version__, _commit(), *machine)
+
+
+def _commit() -> str:
+    """Return the commit of the checkout that this package runs from, with + where files differ."""
+    here = Path(__file__).resolve().parent
+    try:
+        head = _git(here, "rev-parse", "HEAD")
+        _git(here, "ls-files", "--error-unmatch", Path(__file__).name)
+        changed = _git(here, "status", "--porcelain", "--", ":(top)src", ":(top)bench/src", ":(top)core")
+    except (OSError, subprocess.SubprocessError):  # no git, or the package is installed
+        return "none: installed"
+    return head[:_DIGITS] + ("+" if changed else "")
+
+
+def _git(folder: Path, *words: str) -> str:
+    answer = subprocess.run(["git", *words], cwd=folder, capture_output=True, text=True, check=True, timeout=10)
+    return answer.stdout.strip()

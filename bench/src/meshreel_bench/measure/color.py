@@ -89,7 +89,7 @@ def texel_psnr(found: Iterable[Float64[np.ndarray, " 4"]]) -> dict[str, float]:
 
 
 def color_bytes(reader: ReelReader) -> ColorBytes | None:
-    """Return the bytes of a file's colours, and of the base meshes of independent groups; None: no colours."""
+    """Return the bytes of a file's colours and of the base meshes of independent groups; None without colours."""
     sizes, pictures = dict.fromkeys(("vertices", "atlas", "background"), 0), list[int]()
     for chunk in reader.chunks:
         if chunk.kind == ChunkKind.PICTURES and chunk.frame_count:

@@ -1,4 +1,4 @@
-"""A headset, without one: what playing takes of a browser that is slowed down, and what an aarch64 decodes.
+"""Cost of playing in a browser that is slowed down, in place of a headset; decoding for aarch64.
 
 In: a .reel file, a level, a display's rate, a throttle. Out: values of the player's `?bench` page in headless Chromium,
 by `web/headset.mjs`. The file is joined to itself, so that groups are decoded and uploaded while it plays.
@@ -8,9 +8,12 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import subprocess
 import sys
 import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from math import ceil
 from pathlib import Path
 from typing import Any
@@ -23,7 +26,6 @@ from meshreel.edit.edits import concat
 from meshreel.errors import InputError
 
 from ..experiments.headset import AARCH64, HOLDS
-from ..playing import ROOT, WEB, playing
 
 SECONDS = 3.0  # of playing that is measured
 BUFFERED = 3.0  # s that the player decodes ahead, and that come before the measured ones
@@ -31,7 +33,7 @@ Values = dict[str, float | None]
 
 
 def headset_values(data: bytes, level: int, throttle: float, rate: float) -> Values:
-    """Return the cost of playing levels up to `level`, the better of two tries if the first loses pictures.
+    """Return the cost of playing levels up to `level`; the better of two tries if the first loses pictures.
 
     InputError without the checkout, Node or Chromium.
     """
@@ -67,7 +69,7 @@ def _values(found: dict[str, Any], rate: float) -> dict[str, float]:
 
 
 def aarch64_values(data: bytes) -> Values:
-    """Return whether frames of a file that an aarch64 decodes, under QEMU, are those of this machine, to the bit."""
+    """Return whether a decoder for aarch64, under QEMU, returns the same frames as this machine's, to the bit."""
     with tempfile.TemporaryDirectory() as name:
         path = Path(name, "file.reel")
         path.write_bytes(data)
@@ -88,3 +90,19 @@ def _output(command: list[str], folder: Path, **environment: str) -> str:
             f"{command[0]} failed: {(error.stderr or error.stdout)[-200:]}; `scripts/setup web` brings what it needs"
         ) from None
     return done.stdout
+
+
+ROOT = Path(__file__).parents[4]  # of the checkout
+WEB = ROOT / "web"
+
+
+@contextmanager
+def playing(file: Path) -> Iterator[str]:
+    """Yield the address at which `meshreel play` serves a file meanwhile."""
+    play = [sys.executable, "-u", "-m", "meshreel", "play", str(file), "--no-browser", "--json"]
+    with subprocess.Popen(play, stdout=subprocess.PIPE, text=True) as server:
+        try:
+            assert server.stdout is not None
+            yield json.loads(server.stdout.readline())["addresses"][0]
+        finally:
+            server.send_signal(signal.SIGINT)

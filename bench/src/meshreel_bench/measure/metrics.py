@@ -101,7 +101,7 @@ def _colors(frames: Measured) -> dict[str, float]:
 
 
 def _depth(frames: Measured) -> Values:
-    """Return metrics of all frames by a recording's depth pictures, and of bodies in the input beside them."""
+    """Return values of all frames of a recording against its depth pictures, and the flicker of bodies in the input."""
     source = captured(frames.known.sequence)
     if source.depth is None:
         raise InputError("only recordings have depth pictures; measure others without them")
@@ -138,7 +138,7 @@ def _means(against: str, references: Sequence[Scene], decoded: Sequence[Mesh], c
 
 
 def _flicker(scene: SceneData, numbers: Sequence[int], video: Frames) -> Values:
-    """Return how much people's normals change between frames beyond the truth, degrees, and over the input's."""
+    """Return the change of people's normals between frames beyond the truth, degrees, and its ratio to the input's."""
     found = dict[str, list[float]](truth=[], input=[])
     for number in numbers[:-1]:
         clean = (_true(scene, number), scene.true(number + 1))
@@ -188,7 +188,7 @@ def count_bridges(original: Mesh, decoded: Mesh) -> int:
 
 
 def _nearest_body(whole: Mesh, bodies: Int64[np.ndarray, " W"], decoded: Mesh) -> Int64[np.ndarray, " V"]:
-    """For each decoded vertex, the component of the original whose surface is nearest."""
+    """Return the component of the original nearest to each decoded vertex."""
     middle = whole.vertices.mean(axis=0)  # closest points are found in float32
     surface = Surface(Mesh.of(whole.vertices - middle, whole.faces))
     return bodies[whole.faces[surface.closest(decoded.vertices - middle).faces, 0]]

@@ -1,22 +1,23 @@
-"""Measures of a file's parts of a scene: bytes of each, time until an object at rest becomes room, missed people.
+"""Parts of a scene in a file: labels of what moves, bytes of each part, people missed, things that become room.
 
-In: a decoded video, and the truth by part. Which part a decoded face is of follows from the nearest clean face.
+In: labels, or a decoded video and the truth by part. A decoded face is of the part of the nearest clean face.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 import numpy as np
 from jaxtyping import Bool, Float64
 
 from meshreel.decoder.video import Video
+from meshreel.errors import InputError
 from meshreel.geometry.closest_points import distances
 from meshreel.metrics.even_points import scatter
 from meshreel.metrics.scene_accuracy import Scene, visible
 from meshreel.types import Mesh
 
-from ..datasets.room3 import NAMES, PEOPLE, THINGS, Parts, moving_parts
+from ..datasets.rooms import NAMES, PEOPLE, THINGS, Parts, moving_parts
 
 FAR = 0.03  # m: surface that the decoded one is farther from is missed
 SHOWN = 0.9  # share of a thing's visible surface that is the background's where the thing is room (guess)
@@ -52,7 +53,7 @@ def _part_bytes(true: Callable[[int], Scene], parts: Parts, video: Video) -> dic
 
 
 def _room_after_s(true: Callable[[int], Scene], parts: Parts, video: Video, name: str) -> float:
-    """Return how long after its last motion a thing is room, and stays so, s; the rest of the video where it is not."""
+    """Return the time from a thing's last motion until it stays room, s; the rest of the video if it never does."""
     which = NAMES.index(name)
     rest, frame = int(np.flatnonzero(moving_parts(parts.poses)[:, which])[-1]) + 1, len(video)
     while frame > rest and _is_room(true(frame - 1), parts.of_faces(frame - 1) == which, video, frame - 1):
@@ -69,3 +70,24 @@ def _is_room(clean: Scene, own: Bool[np.ndarray, " F"], video: Video, frame: int
 
 def _away(points: Float64[np.ndarray, "N 3"], mesh: Mesh) -> Float64[np.ndarray, " N"]:
     return np.full(len(points), np.inf) if mesh.is_empty else distances(points, mesh)
+
+
+Labels = Bool[np.ndarray, " _"]  # True: the face moves; one a face of the frame
+
+
+def score_labels(found: Iterable[Labels], true: Iterable[Labels]) -> dict[str, float | None]:
+    """Return scores of labels frame by frame: 1, 1 and 0 are perfect. InputError where frames do not fit."""
+    overlaps, called, static = list[float](), 0, 0
+    try:
+        for number, (a, b) in enumerate(zip(found, true, strict=True)):
+            if a.shape != b.shape:
+                raise InputError(f"frame {number}: {len(a)} labels for {len(b)} faces; label every face once")
+            either = int((a | b).sum())
+            overlaps.append(float((a & b).sum()) / either if either else 1.0)
+            called, static = called + int((a & ~b).sum()), static + int((~b).sum())
+    except ValueError:  # of zip: InputError is none
+        raise InputError(f"only {len(overlaps)} frames have labels both found and true; label every frame") from None
+    if not overlaps:
+        raise InputError("labels of 0 frames; give one frame at least")
+    mean, worst = float(np.mean(overlaps)), min(overlaps)
+    return {"iou_mean": mean, "iou_worst": worst, "static_called_dynamic": called / max(static, 1)}

@@ -34,15 +34,14 @@ from ..experiments.study import FLOOR, HEADSET, TRACKER
 from ..experiments.study import FOUND as SEGMENTATION
 from ..names import FLOOR_RATIO, FOUND_NAME
 from ..rows import Encoding, Group, Point, Row, Stream, checked
-from .clock import StageTimer, cost_of
+from .clock import StageTimer, cost_of, maker
 from .color import color_bytes
-from .decode import decoded_apart
 from .headset import aarch64_values, headset_values
-from .maker import maker
 from .metrics import Measured, measure_frames
-from .segmentation import Labels, score_labels
+from .parts import Labels, score_labels
 from .splats import splat_values
 from .tracker import tracker_values
+from .worker import decoded_apart
 
 TRUTH_NAME, UNCOMPRESSED = "the truth itself", "uncompressed"
 LONG = 60  # frames: half as many of a longer sequence are compared by pictures

@@ -1,6 +1,6 @@
-"""Sweeps: points become rows of a file, one after the other or side by side, each as soon as it is there.
+"""Sweeps: points become rows of a file, one after another or in parallel, each appended when it is measured.
 
-A point whose codec crashes, raises, takes too long or decodes nonsense has a row as well, that says so.
+A point whose codec crashes, raises, takes too long or decodes invalid meshes has a row with the reason.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ Report = Callable[[Row, bool], None]  # of a row, and whether it is new
 
 @dataclass(frozen=True, slots=True)
 class Measuring:
-    """Settings of the measurement of points."""
+    """Options of a sweep."""
 
     store: Store
     limit_s: float | None = None  # wall time of a point
@@ -63,7 +63,7 @@ def run_points(
 
 
 def _is_valid(row: Row, how: Measuring) -> bool:
-    """Return whether a row is still valid for its point."""
+    """Return whether sequence and codec of a row are unchanged."""
     if row.failed and how.retry:
         return False
     return row.source == how.store.digest(row.point.sequence) and row.codec_version == codec_version(row.point.codec)
@@ -78,7 +78,7 @@ def runs_of(points: Sequence[Point]) -> list[list[Point]]:
 
 
 def _shared(point: Point) -> object:
-    """Return a key that is equal for points that share an analysis, or the played file."""
+    """Return a key that is equal for points that share an analysis, or a played file."""
     if point.codec == HEADSET:
         return point.sequence, point.codec
     try:

@@ -26,8 +26,8 @@ from meshreel.format.layout import MAGIC
 from meshreel.geometry.splats import Bound, bind
 from meshreel.types import Mesh, evenly
 
-from ..carriers import Chain, alone, chains_of
 from ..datasets import Dataset
+from ..datasets.solid import Chain, alone, chains_of
 
 COUNT, SIZE = 8000, 256  # splats, and pixels of the longer side of the body
 FITTED, VIEWS, VIEWS_ALONE = 16, 6, 16  # frames of a chain, cameras of each, and of a frame with splats of its own
@@ -40,7 +40,7 @@ FLOATS = 14  # numbers of a splat with harmonics of degree 0: place 3, scale 3, 
 
 @dataclass(slots=True)
 class _Found:
-    """Errors of pictures of splats against those of the originals, and sizes and times of sets of splats."""
+    """Errors of pictures of splats against the originals, and sizes, counts and times of sets of splats."""
 
     squares: dict[str, list[float]]
     scores: list[float]
@@ -52,7 +52,7 @@ class _Found:
 def splat_values(
     known: Dataset, painted: Callable[[int], Mesh], decoded: Sequence[Mesh], numbers: Sequence[int], data: bytes
 ) -> dict[str, float]:
-    """Return the metrics of splats on the decoded frames; `painted` has the frames in colour."""
+    """Return quality and rate of splats on decoded frames; `painted` returns a frame in colour."""
     count, unit = len(known.sequence), known.sequence[0].diagonal  # splats are in units of it, as in a file
     chains = (
         chains_of(data)
@@ -76,7 +76,7 @@ def splat_values(
 
 
 def _judge(chain: Chain, wanted: Sequence[int], painted: Callable[[int], Mesh], found: _Found) -> Bound:
-    """Fit a chain's splats to every second frame, and judge them in some of these and in those behind them."""
+    """Fit the splats of a chain to every second frame, and judge them in some of these and in the frames after."""
     some = chain[::2] if len(chain) > 1 else chain
     chosen = [some[k] for k in evenly(len(some), FITTED)]
     views, steps = (VIEWS, STEPS) if len(chosen) > 1 else (VIEWS_ALONE, STEPS_ALONE)

@@ -37,7 +37,7 @@ Track = Float64[np.ndarray, "T K 3"]
 
 
 def tracker_values(sequence: MeshSequence, method: str) -> dict[str, float | None]:
-    """Return how far centers are from the true motion, and CPU s a frame. InputError where faces change."""
+    """Return distances of centers from the true motion, and CPU s a frame. InputError where faces change."""
     if method not in (OURS, PUBLISHED):
         raise InputError(f"no tracker is called {method!r}; give {OURS} or {PUBLISHED}")
     seen, options = survey(sequence), TrackOptions()
@@ -60,7 +60,7 @@ def tracker_values(sequence: MeshSequence, method: str) -> dict[str, float | Non
 
 
 def carried(frames: Sequence[Mesh], centers: Float64[np.ndarray, "K 3"], count: int) -> Track:
-    """Return where the surface takes points of the first frame's volume: each as rigidly as the vertices around it.
+    """Return points of the first frame's volume moved with the surface, each as rigidly as the vertices around it.
 
     These are the nearest that face away from it, so that those of a hand do not move the hip that it touches.
     """
@@ -123,7 +123,7 @@ def _rigid(affinity: np.ndarray, before: np.ndarray, now: np.ndarray) -> tuple[n
 
 
 def _differences(points: np.ndarray, centers: np.ndarray, turns: np.ndarray, shifts: np.ndarray) -> np.ndarray:
-    """Return the mean square of how differently the motions of i and of j move what i owns, for all pairs."""
+    """Return the mean squared difference between the motions of i and j on the points that i owns, for all pairs."""
     owners, count = cKDTree(centers).query(points)[1], len(centers)
     extended = np.column_stack([points, np.ones(len(points))])
     each = (extended[:, :, None] * extended[:, None]).reshape(-1, 16)

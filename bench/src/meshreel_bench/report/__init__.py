@@ -1,1 +1,1 @@
-"""Pages made from rows, and from nothing else: one page of results, an appendix for each experiment, plots."""
+"""Pages made from rows alone: one page of results, an appendix for each experiment, plots."""

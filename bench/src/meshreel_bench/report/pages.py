@@ -15,14 +15,12 @@ from meshreel.io.write import make_folder, replacing
 
 from ..experiments import EXPERIMENTS
 from ..experiments.study import D2, MASKED, Study
-from ..names import title
+from ..names import looks_of, title
 from ..rows import Row, disagreements, failed_rows, measured_rows, mixtures
 from . import tables
-from .equal import rate_table
-from .headline import headline
-from .looks import looks_of
+from .bandwidth import anchor_rows
+from .comparison import beyond_table, headline, losses, rate_table, winners_table
 from .plots import drawable, plot_curves
-from .published import anchor_rows
 from .reproducing import reproducing_page
 from .values import curve_of, rated, sequences
 from .verdicts import verdicts
@@ -32,6 +30,12 @@ OPEN = "figure6"  # the experiment that rows belong to which none declares, not 
 WITH_VDMC = (OPEN, "mpeg")  # experiments in whose plots V-DMC's points are
 SHOWN = ("synthetic4", "dancer", "room2")  # sequences whose curves are on the first page
 TEXT = "results.md"  # package data: the first page, with a line {NAME} for each part that is made
+BEYOND = "Other codecs go beyond the best measured point of `best`; the furthest of them:"
+MISSED = "## Missed targets"
+DOUBTS = (
+    "## Rows to measure again: bytes differ between two experiments, as the encoder changed",
+    "## Rows to measure again: the scene was made anew, and its diagonal differs from most",
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,12 +54,12 @@ class Part:
 
     @property
     def is_drawn(self) -> bool:
-        """True if it has a plot."""
+        """True if the experiment has a plot."""
         return drawable(self.rows, self.study.measures[:2])
 
     @property
     def drawn(self) -> list[Row]:
-        """Rows of its plots: some have V-DMC's points beside those that were measured."""
+        """Rows of the plots of this experiment; some have V-DMC's points, too."""
         there = sequences(self.rows) if self.name in WITH_VDMC else []
         return [*self.rows, *(row for row in anchor_rows() if row.point.sequence in there)]
 
@@ -107,8 +111,8 @@ def _write(rows: Sequence[Row], folder: Path) -> list[Path]:
     studies = {part.name: part.rows for part in parts}
     if page := reproducing_page(studies):
         pages[Path("reproducing.md")] = page
-    if found := headline(studies):
-        pages[Path(FOLDER, "headline.json")] = json.dumps(found, indent=2).splitlines()
+    if numbers := headline(studies):
+        pages[Path(FOLDER, "headline.json")] = json.dumps(numbers, indent=2).splitlines()
     for name, lines in pages.items():
         with replacing(folder / name) as file:
             file.write(("\n".join(lines) + "\n").encode(errors="backslashreplace"))
@@ -132,11 +136,18 @@ def _plot_name(part: Part, sequence: str) -> str:
 
 
 def _first_page(parts: Sequence[Part]) -> list[str]:
-    """Return the lines of the first page: verdicts, three plots and one table."""
-    paper = reproducing_page({part.name: part.rows for part in parts if part.name == OPEN})
+    """Return the lines of `results.md`: a comparison on one screen, then plots, BD-rates and what is missed."""
+    rows = {part.name: part.rows for part in parts}
+    open_rows, points = rows.get(OPEN, []), [row for name in WITH_VDMC for row in rows.get(name, ())]
+    paper = reproducing_page({OPEN: open_rows})
     made = {
-        "{verdicts}": [*_kept_promises(parts), *_doubts(parts)],
-        "{reproducing}": ["The numbers of the paper beside ours: [reproducing.md](reproducing.md)."] if paper else [],
+        "{winners}": winners_table(open_rows, points) or ["No codec was measured beside `best`."],
+        "{losses}": list(losses(open_rows, points)),
+        "{beyond}": _section(BEYOND, beyond_table(open_rows)),
+        "{verdicts}": [_kept_promises(parts)],
+        "{reproducing}": ["The paper's own numbers stand beside ours in [reproducing.md](reproducing.md)."]
+        if paper
+        else [],
         "{plots}": [
             line
             for part, name in _shown(parts)
@@ -146,13 +157,21 @@ def _first_page(parts: Sequence[Part]) -> list[str]:
             line for p in parts if p.name == OPEN for line in tables.summary_table(p.rows, p.study.best or "", D2)
         ],
         "{appendices}": [f"- [{p.study.title}]({FOLDER}/appendix-{p.name}.md), {_counted(p)}" for p in parts],
+        "{missed}": _section(MISSED, _missed(parts)),
+        "{doubts}": [line for head, lines in _doubts(parts).items() for line in _section(head, lines)],
     }
     page = (files(__package__) / TEXT).read_text(encoding="utf-8")
-    return [line for text in page.splitlines() for line in made.get(text, [text])]
+    lines = [line for text in page.splitlines() for line in made.get(text, [text])]
+    return [line for number, line in enumerate(lines) if line or lines[number - 1]]  # no two blank lines together
 
 
-def _doubts(parts: Sequence[Part]) -> list[str]:
-    """Return notes on rows that cannot be compared: of points whose bytes differ by experiment, or of other data."""
+def _section(head: str, lines: Sequence[str]) -> list[str]:
+    """Return lines under a heading or a sentence; nothing without lines."""
+    return ["", head, "", *lines] if lines else []
+
+
+def _doubts(parts: Sequence[Part]) -> dict[str, list[str]]:
+    """Return by heading the rows to measure again: points whose bytes differ by experiment, codecs given other data."""
     names = {id(row): part.name for part in reversed(parts) for row in part.rows}
     rows = [row for part in parts for row in part.rows]
     points = [
@@ -164,28 +183,23 @@ def _doubts(parts: Sequence[Part]) -> list[str]:
         for most, *others in mixtures(rows)
         for other in others
     ]
-    lists = {
-        "Measured by two experiments with different bytes, as the encoder changed between them": points,
-        "Measured on other data than most, as scenes were made anew between (their diagonals differ)": data,
+    return {
+        head: [f"- {tables.text(line)}" for line in lines] for head, lines in zip(DOUBTS, (points, data), strict=True)
     }
-    return [
-        line
-        for head, lines in lists.items()
-        if lines
-        for line in ("", f"{head}; the next run mends it:", "", *(f"- {tables.text(each)}" for each in lines))
-    ]
 
 
-def _kept_promises(parts: Sequence[Part]) -> list[str]:
-    """Return how many targets are met, and those that are not."""
-    found = [verdict for part in parts for verdict in verdicts(part.study, part.rows) if verdict.met is not None]
-    missed = [verdict for verdict in found if not verdict.met]
-    if not found:
-        return ["No target was measured."]
-    if not missed:
-        return [f"All {len(found)} targets that were measured are met."]
-    head = f"Of {len(found)} targets {len(found) - len(missed)} are met. Missed:"
-    return [head, "", *(f"- {tables.text(v.text)} ({v.bound}): {tables.text(v.value)}" for v in missed)]
+def _kept_promises(parts: Sequence[Part]) -> str:
+    """Return in a sentence how many targets are met."""
+    decided = [verdict for part in parts for verdict in verdicts(part.study, part.rows) if verdict.met is not None]
+    met = sum(bool(verdict.met) for verdict in decided)
+    if met == len(decided):
+        return f"All {met} targets that were measured are met." if met else "No target was measured."
+    return f"Of {len(decided)} targets, {met} are met; [the others](#missed-targets) are listed at the end."
+
+
+def _missed(parts: Sequence[Part]) -> list[str]:
+    every = [verdict for part in parts for verdict in verdicts(part.study, part.rows) if verdict.met is False]
+    return [f"- {tables.text(v.text)} ({v.bound}): {tables.text(v.value)}" for v in every]
 
 
 def _counted(part: Part) -> str:

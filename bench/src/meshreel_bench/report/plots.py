@@ -15,9 +15,8 @@ import numpy as np
 from meshreel.io.write import replacing
 
 from ..experiments.study import Measure
-from ..names import BEST, title
+from ..names import BEST, Look, title
 from ..rows import Row
-from .looks import Look
 from .values import curve_of, floors, rated, value
 
 RATE = ("mbps", "rate (Mbps)")
@@ -126,7 +125,7 @@ def set_rates(panel: Any, rates: Sequence[float]) -> None:
 
 @contextmanager
 def _settings() -> Iterator[None]:
-    """Matplotlib as it comes, with the letters and lines of a paper."""
+    """Use the defaults of matplotlib with the fonts and lines of a paper."""
     import matplotlib
 
     with matplotlib.rc_context():

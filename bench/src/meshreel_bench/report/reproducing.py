@@ -10,8 +10,7 @@ from ..experiments import EXPERIMENTS
 from ..experiments.headset import FILM, HOLDS, THROTTLES
 from ..names import BEST, LITERAL, LITERAL_FINEST, TSMC, TUNED
 from ..rows import Row
-from .bandwidth import headline_table, vdmc_table
-from .published import RELEASED, TABLE_1, TABLE_2, Published
+from .bandwidth import RELEASED, TABLE_1, TABLE_2, Published, headline_table, vdmc_table
 from .values import curve_of, rated, value
 
 WRITTEN = (LITERAL, LITERAL_FINEST)  # the second where the first does not reach
@@ -24,7 +23,7 @@ TEXT = "reproducing.md"  # package data: the page, with a line {NAME} for each t
 
 
 def reproducing_page(studies: Mapping[str, Sequence[Row]]) -> list[str]:
-    """Return the lines of the page from the rows of experiments; none where no row stands beside the paper's."""
+    """Return the lines of the page from the rows of experiments; none if no row has a counterpart in the paper."""
     both = [row for name in ("figure6", "long") for row in studies.get(name, ())]
     every = [row for row in both if row.point.metrics == "views"]  # the truth itself has no rate
     own = rated(every)
@@ -47,7 +46,7 @@ def reproducing_page(studies: Mapping[str, Sequence[Row]]) -> list[str]:
 
 
 def _canonical(rows: Sequence[Row]) -> str:
-    """Return in how many groups preset `paper` took the MDS pose, of how many."""
+    """Return a sentence: groups of preset `paper` in the MDS pose, of all."""
     streams = [row.stream for row in rows if curve_of(row) in (TSMC, TUNED) and row.stream]
     return f"{sum(each.canonical for each in streams)} of {sum(len(each.groups) for each in streams)} groups"
 
@@ -131,7 +130,7 @@ def _figure_9(rows: Sequence[Row]) -> Iterator[str]:
 
 
 def _strongest(rows: Mapping[object, Row]) -> str:
-    """Return by how much a browser may be slower and still shows and decodes all in time."""
+    """Return the strongest throttle at which a browser still shows and decodes all in time."""
     holds = ""
     for throttle, row in sorted(rows.items(), key=lambda pair: float(str(pair[0]))):
         if (value(row, "shown_share") or 0.0) < HOLDS or (value(row, "decode_load") or 0.0) > 1:
@@ -168,7 +167,7 @@ def _shown(row: Row | None) -> str:
 
 
 def _setting(row: Row) -> str:
-    """Return the settings of TSMC: several of its options choose a rate."""
+    """Return the settings of TSMC, several of which choose the rate."""
     name = curve_of(row)
     if name in (TSMC, *WRITTEN):
         finest = f", {row.options['centers']} centers, {row.options['variant']}" if name == LITERAL_FINEST else ""

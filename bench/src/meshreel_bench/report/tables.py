@@ -1,4 +1,4 @@
-"""Tables in Markdown, made from data frames. Names and reasons are escaped: what a row holds is never markup."""
+"""Tables in Markdown, made from data frames. Texts of rows are escaped, so that they are never markup."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import pandas as pd
 
 from ..bd_rate import bd_rate
 from ..experiments.study import Measure
+from ..names import in_order
 from ..rows import Options, Row
-from .looks import in_order
 from .values import curve, curve_of, is_twin, rated, sequences, value
 from .verdicts import Verdict
 
@@ -119,7 +119,7 @@ def bd_cell(rows: Sequence[Row], test: str, other: str, measure: Measure) -> str
 
 
 def verdict_table(found: Sequence[Verdict]) -> list[str]:
-    """Return targets and what was measured."""
+    """Return a table of targets and measured values."""
     records = [{"target": text(v.text), "bound": v.bound, "measured": text(v.value or ""), " ": v.word} for v in found]
     return markdown(pd.DataFrame(records))
 
@@ -139,7 +139,7 @@ def failure_table(rows: Sequence[Row]) -> list[str]:
 
 
 def maker_table(rows: Sequence[Row]) -> list[str]:
-    """Return versions, commits and machines, and how many rows each has made."""
+    """Return versions, commits and machines with the number of rows that each made."""
     names = ("meshreel", "commit", "platform", "cpu", "python", "cores")
     found = [{name: text(getattr(row.made_by, name, None) or "not recorded") for name in names} for row in rows]
     table = pd.DataFrame(found).rename(columns={"cpu": "processor", "python": "Python"})

@@ -14,7 +14,7 @@ from meshreel.encoder.run.surveying import SLICE
 from ..bd_rate import Curve, hull
 from ..experiments.study import D2, FLOOR, Measure
 from ..names import ONCE_SUBDIVIDED, SUBDIVIDED, USUAL
-from ..rows import ColorBytes, Group, Row
+from ..rows import ColorBytes, Group, Row, Stream
 
 SECONDS = 10.0  # in which a background is sent once, for `mbps_background_10s`
 HALF = 30  # frames of each half of a long sequence
@@ -26,7 +26,7 @@ VARIATION, DRAWS = 0.35, 20  # of an interval's time: its deviation over its mea
 
 
 def value(row: Row, key: str) -> float | None:
-    """Return a row's value by name: a metric, or one of `DERIVED`; None if it was not measured."""
+    """Return the value of a row by name: a metric, or one of `DERIVED`; None if it was not measured."""
     for prefix, found in (("encode_s.", row.encoding.stages_s), ("work.", row.encoding.work)) if row.encoding else ():
         if key.startswith(prefix):
             return found.get(key.removeprefix(prefix))
@@ -72,12 +72,6 @@ def _second_half_over_first(row: Row) -> float | None:
     return halves[1] / halves[0]
 
 
-def _fall_at_ends(row: Row) -> float | None:
-    """Return by how much D2 of the first or the last frame is below that of the middle one, dB."""
-    found = [each for each in row.per_frame.get("d2_psnr_paper", ()) if each is not None]
-    return found[len(found) // 2] - min(found[0], found[-1]) if found else None
-
-
 def _border_step(row: Row) -> float | None:
     """Return the largest step of D2 from the last frame of a group to the first of the next, dB."""
     found, groups = row.per_frame.get("d2_psnr_paper", []), row.stream.groups if row.stream else []
@@ -86,17 +80,10 @@ def _border_step(row: Row) -> float | None:
     return max((abs(a - b) for a, b in pairs if a is not None and b is not None), default=None)
 
 
-def _of_groups(row: Row) -> tuple[float, int] | None:
-    """Return the mean length of groups with surface, frames, and how many are of Draco."""
+def _of_groups(row: Row, forms: Sequence[str], total: Callable[[list[int]], float]) -> float | None:
+    """Return a total of the lengths of groups in some of the forms with surface; None without groups."""
     groups = [group for group in row.stream.groups if group.form != "empty"] if row.stream else []
-    drawn = [group.form for group in groups].count("draco")
-    return (float(np.mean([group.frames for group in groups])), drawn) if groups else None
-
-
-def _drawn_frames(row: Row) -> float | None:
-    """Return how many frames, over all tracks, are of Draco."""
-    groups = row.stream.groups if row.stream else []
-    return sum(group.frames for group in groups if group.form == "draco") if groups else None
+    return total([group.frames for group in groups if group.form in (forms or [group.form])]) if groups else None
 
 
 def _at_rest(seconds: float | None, reference_s: float | None) -> float | None:
@@ -105,7 +92,7 @@ def _at_rest(seconds: float | None, reference_s: float | None) -> float | None:
 
 
 def _efficiency(row: Row, workers: int, interval: int) -> float | None:
-    """Return the busy share of workers' time in an hour of frames, by a row's times and without the parent."""
+    """Return the share of their time that workers are busy with an hour of frames, by a row's times."""
     stages = row.encoding.stages_s if row.encoding else {}
     if "survey" not in stages:
         return None
@@ -117,7 +104,7 @@ def _efficiency(row: Row, workers: int, interval: int) -> float | None:
 
 
 def _end(times: np.ndarray, workers: int) -> float:
-    """Return when the last of some calls is done, s."""
+    """Return the time at which the last of several calls is done, s."""
     free = [0.0] * workers
     for seconds in times.tolist():
         heapreplace(free, free[0] + seconds)
@@ -154,11 +141,9 @@ def _color_mbps(row: Row, share: Callable[[ColorBytes], int]) -> float | None:
     return row.mbps * share(row.stream.colors) / row.stream.bytes
 
 
-def _of_background(row: Row) -> float:
-    """Return the rate of what stands still, with its colours, Mbps."""
-    assert row.stream is not None
-    colors = row.stream.colors.background if row.stream.colors else 0
-    return row.mbps * (row.stream.background_bytes + colors) / row.stream.bytes
+def _of_background(stream: Stream) -> int:
+    """Return the bytes of the background with its colours."""
+    return stream.background_bytes + (stream.colors.background if stream.colors else 0)
 
 
 DERIVED: dict[str, Callable[[Row], float | None]] = {
@@ -168,29 +153,26 @@ DERIVED: dict[str, Callable[[Row], float | None]] = {
     "background_color_mbps": lambda row: _color_mbps(row, lambda known: known.background),
     "color_share": lambda row: found / row.mbps if (found := _color_mbps(row, lambda known: known.all)) else None,
     "background_bytes": lambda row: row.stream.background_bytes if row.stream else None,
-    "background_mbps": lambda row: _of_background(row) if row.stream else None,
+    "background_mbps": lambda row: row.mbps * _of_background(row.stream) / row.stream.bytes if row.stream else None,
     "border_step_db": _border_step,
-    "group_frames": lambda row: found[0] if (found := _of_groups(row)) else None,
-    "draco_groups": lambda row: found[1] if (found := _of_groups(row)) else None,
-    "draco_frames": _drawn_frames,
+    "group_frames": lambda row: _of_groups(row, (), lambda lengths: float(np.mean(lengths))),
+    "draco_groups": lambda row: _of_groups(row, ("draco",), len),
+    "draco_frames": lambda row: _of_groups(row, ("draco",), sum),
     "canonical_groups": lambda row: row.stream.canonical if row.stream else None,
     "encode_s": lambda row: row.encoding.s if row.encoding else None,
     "encode_s_at_rest": lambda row: _at_rest(row.encoding.s, row.encoding.reference_s) if row.encoding else None,
     "encode_mb": lambda row: row.encoding.peak_rss_mb if row.encoding else None,
     "decode_ms": lambda row: row.decoding.frame_ms if row.decoding else None,
-    "decode_ms_at_rest": lambda row: (
-        _at_rest(row.decoding.frame_ms, row.decoding.reference_s) if row.decoding else None
-    ),
+    "decode_ms_at_rest": lambda row: _at_rest(d.frame_ms, d.reference_s) if (d := row.decoding) else None,
     "first_frame_ms": lambda row: row.decoding.first_frame_ms if row.decoding else None,
     "decode_mb": lambda row: row.decoding.peak_rss_mb if row.decoding else None,
     "ssim_masked_without_keys": _without_keys,
     "second_half_over_first": _second_half_over_first,
-    "fall_at_ends_db": _fall_at_ends,
 }
 
 
 def curve_of(row: Row) -> str:
-    """Return the curve of a point: its codec, and where the basis is fixed, what else is not the preset's own."""
+    """Return the curve of a point: its codec and, if the basis is fixed, other options that differ from the preset."""
     if row.options.get("basis_size") is None:
         return row.name
     quality = row.options.get("quality")
@@ -230,7 +212,7 @@ def hull_of(rows: Sequence[Row], names: Sequence[str], measure: Measure) -> Curv
 
 
 def floors(rows: Iterable[Row]) -> dict[str, float]:
-    """Return the values of the truth itself by metric; against the input, those of the input against the truth."""
+    """Return the values of the truth itself by metric; those against the input are the input's against the truth."""
     found = [row for row in rows if row.point.codec == FLOOR and not row.failed]
     known: dict[str, Any] = dict(found[0].metrics) if found else {}
     if found and found[0].point.metrics == "regions":

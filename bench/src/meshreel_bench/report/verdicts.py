@@ -1,4 +1,4 @@
-"""Verdicts on promises. In: the promises of a study, its rows. Out: what was measured, and whether it is kept."""
+"""Verdicts on promises. In: the promises of a study, its rows. Out: measured values, and whether promises are kept."""
 
 from __future__ import annotations
 
@@ -134,7 +134,7 @@ def _gain(promise: Gains, rows: Sequence[Row], key: str) -> BdRate:
 
 
 def _ends(promise: Gains, own: Sequence[Row]) -> list[Verdict]:
-    """Return up to which quality there is a gain, where that is promised."""
+    """Return a verdict on the quality up to which there is a gain, if that is promised."""
     if promise.ends_past is None:
         return []
     [measure] = [each for each in promise.measures if each.key == promise.ends_past.key]
@@ -236,7 +236,7 @@ def _resolved(bound: Bound, floor: dict[str, float]) -> Bound | None:
 
 
 def _miss(row: Row, bound: Bound) -> float:
-    """Return how far a row is from a bound; 0 where it keeps it."""
+    """Return the distance of a row from a bound; 0 if the bound is kept."""
     found = value(row, bound.key)
     if found is None:
         return inf

@@ -41,7 +41,7 @@ class Blocks:
 
 
 def prepared(mesh: Mesh) -> Mesh:
-    """The mesh welded and without faces of no area: what signs are told from."""
+    """Return the mesh welded and without faces of zero area, which have no sign."""
     return clean(weld(mesh))
 
 
@@ -74,7 +74,7 @@ def block_keys(places: Int64[np.ndarray, "B 3"]) -> Int64[np.ndarray, " B"]:
 def signed_distances(
     mesh: Mesh, points: Float64[np.ndarray, "N 3"]
 ) -> tuple[Float64[np.ndarray, " N"], Bool[np.ndarray, " N"]]:
-    """Distances in the unit of the mesh, positive outside, and whether they mean something."""
+    """Return distances in the unit of the mesh, positive outside, and a mask of those whose sign is known."""
     surface, normals = Surface(mesh), _Normals(mesh)
     values, known, past = np.empty(len(points)), np.ones(len(points), bool), np.zeros(len(points), bool)
     for start in range(0, len(points), _CHUNK):
@@ -96,7 +96,7 @@ def signed_distances(
 
 
 def _is_nearly_closed(mesh: Mesh, points: Float64[np.ndarray, "N 3"], values: Float64[np.ndarray, " N"]) -> bool:
-    """Return whether winding numbers agree with the signs near the surface on inside and outside."""
+    """Return whether winding numbers agree with the signs near the surface."""
     near = np.flatnonzero(np.abs(values) < 1)
     some = near[:: max(len(near) // _ASKED, 1)]
     alike = winding_inside(mesh, points[some]) == (values[some] < 0)
@@ -141,7 +141,7 @@ def _summed(index: np.ndarray, vectors: Float64[np.ndarray, "F 3 3"], count: int
 
 
 def _touched(mesh: Mesh) -> Int64[np.ndarray, "B 3"]:
-    """The blocks that some cell beside the surface is in."""
+    """Return the blocks of all cells beside the surface."""
     cells = around(distinct(_CELLS.keys(spread(mesh, 1.0)[0])))
     return _BLOCKS.cells(distinct(_BLOCKS.keys(_CELLS.centers(cells)))) if len(cells) else np.zeros((0, 3), np.int64)
 
@@ -149,7 +149,7 @@ def _touched(mesh: Mesh) -> Int64[np.ndarray, "B 3"]:
 def _crossings(
     values: Float64[np.ndarray, "B N"], known: Bool[np.ndarray, "B N"]
 ) -> tuple[Bool[np.ndarray, "B N"], Bool[np.ndarray, "B N"]]:
-    """Voxels at edges that the surface crosses; and those at none, but at edges where the sign changes far from it."""
+    """Return masks of voxels at edges that the surface crosses, and of those whose sign changes only far from it."""
     shape = (len(values), POINTS, POINTS, POINTS)
     values, known = values.reshape(shape), known.reshape(shape)
     near, phantom = np.zeros(shape, bool), np.zeros(shape, bool)

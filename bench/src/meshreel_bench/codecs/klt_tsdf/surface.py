@@ -15,10 +15,9 @@ from jaxtyping import Bool, Int32, Int64
 from meshreel.geometry.voxels import distinct, moved
 from meshreel.types import Mesh
 
-from ..necgs.cubes import cases_of, cut
-from .basis import ONE
+from ..necgs.volumes import cases_of, cut
+from .components import LARGEST, ONE, STEP_ONE, Model, distances
 from .grid import OFFSETS, POINTS, SIDE, VOLUME, block_keys
-from .weights import LARGEST, STEP_ONE, Model, distances
 
 _SURE = 3 * ONE * STEP_ONE  # three voxels: what is farther has no more of a vote
 _BARELY = ONE * STEP_ONE // 64
@@ -70,7 +69,7 @@ def _closed(
     values: Int32[np.ndarray, "O S S S"],
     known: Bool[np.ndarray, "O S S S"],
 ) -> Int32[np.ndarray, "O S S S"]:
-    """The distances without surface that leaves the blocks by less than a voxel, which would end there in a hole.
+    """Return distances without surface that leaves the blocks by less than a voxel, which would end there in a hole.
 
     A block that is not there is on one side, that of its known voxels; others, if near, are put on this one.
     """

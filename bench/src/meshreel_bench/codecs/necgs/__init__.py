@@ -12,7 +12,7 @@ Differs from the publication:
 - Each frame has a grid around it, moved by whole cells; the authors scale meshes to a cube. Open surfaces are coded,
   too: a sheet has an inside behind its faces, and flips of sign far from any surface are left out (`grid`).
 - Training starts from weights that preserve the size of values and from an empty volume; with PyTorch's own rule values
-  fade. `encode` refuses sets of which training has lost a frame.
+  fade.
 - Networks narrow as the authors' do, in proportion to `channels`; no head layer, no grids of 256. The defaults are a
   quarter as wide with fewer, faster steps, and weight the structural similarities 1 instead of 10. The publication's
   point, for a GPU: `necgs:full`.

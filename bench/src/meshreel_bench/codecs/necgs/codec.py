@@ -13,26 +13,22 @@ from itertools import repeat
 from typing import Any
 
 import numpy as np
-from jaxtyping import Bool, Float16, Float32
+from jaxtyping import Bool, Float16
 
 from meshreel.errors import InputError
 from meshreel.types import Mesh, MeshSequence
 
 from ...codec import Progress
 from ..base import DecodedFrames, TwoSteps
-from .cubes import extract
-from .grid import Placement, box_of, place_grids, truncated_distances
-from .keep import keep, key_of, recall
-from .shape import BITS, MOST_CHANNELS, MOST_FEATURES, RESOLUTIONS, Shape
-from .stream import Coded, decode_stream, encode_stream
+from .stream import BITS, MOST_CHANNELS, MOST_FEATURES, RESOLUTIONS, Coded, Shape, decode_stream, encode_stream
+from .volumes import Placement, box_of, extract, place_grids, truncated_distances
 
 # For tests and a first look: limbs and heads, no faces, in seconds.
 QUICK: dict[str, Any] = {"resolution": 32, "channels": 8, "epochs": 60, "fitting": 10}
 # The publication's own, for a GPU; of its authors' code what it does not tell.
 FULL: dict[str, Any] = {"resolution": 128, "channels": 64, "epochs": 400, "fitting": 100, "batch": 4, "rate": 1e-3}
 FULL |= {"structure": 10.0, "workers": 0}
-MOST_STRUCTURE = 1000.0  # a guess
-KEPT = 0.1  # least share of inside points that original and decoded volume have in common; a guess
+MOST_STRUCTURE = 1000  # a guess
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,26 +67,16 @@ class NecgsCodec(TwoSteps):
                 object.__setattr__(self, field.name, FULL[field.name])
         if self.resolution not in RESOLUTIONS:
             raise InputError(f"resolution {self.resolution}: give one of {', '.join(map(str, RESOLUTIONS))}")
-        for name, value, least, most in (
-            ("features", self.features, 1, MOST_FEATURES),
-            ("channels", self.channels, 1, MOST_CHANNELS),
-            ("bits", self.bits, BITS[0], BITS[-1]),
-            ("epochs", self.epochs, 1, 100_000),
-            ("fitting", self.fitting, 0, 10_000),
-            ("batch", self.batch, 1, 1024),
-            ("seed", self.seed, 0, 2**31),
-            ("workers", self.workers, 0, 1024),
-        ):
-            if not least <= value <= most:
-                raise InputError(f"{name} {value}: give {least} to {most}")
+        limits = {"features": (1, MOST_FEATURES), "channels": (1, MOST_CHANNELS), "bits": (BITS[0], BITS[-1])}
+        limits |= {"epochs": (1, 100_000), "fitting": (0, 10_000), "batch": (1, 1024), "seed": (0, 2**31)}
+        for name, (least, most) in (limits | {"workers": (0, 1024), "structure": (0, MOST_STRUCTURE)}).items():
+            if not least <= getattr(self, name) <= most:
+                raise InputError(f"{name} {getattr(self, name)}: give {least} to {most}")
         if not (math.isfinite(self.rate) and 0 < self.rate <= 1):
             raise InputError(f"rate {self.rate}: give a learning rate above 0, at most 1")
-        if not 0 <= self.structure <= MOST_STRUCTURE:
-            raise InputError(f"structure {self.structure}: give a weight of 0 to {MOST_STRUCTURE:g}")
 
     @property
     def name(self) -> str:
-        """The name in rows and plots."""
         return "necgs" if self.configuration == "small" else "necgs_full"
 
     @property
@@ -106,7 +92,10 @@ class NecgsCodec(TwoSteps):
     def analyse(self, sequence: MeshSequence, progress: Progress | None = None) -> FittedVolumes:
         """Return the volume of each frame. Raises InputError without the extra and for frames that are not finite."""
         _need_torch()
-        boxes = [box_of(_checked(mesh, number)) for number, mesh in enumerate(sequence)]
+        for number, mesh in enumerate(sequence):
+            if not np.isfinite(mesh.vertices).all():
+                raise InputError(f"frame {number}: a coordinate is not finite; repair the mesh")
+        boxes = [box_of(mesh) for mesh in sequence]
         placement = place_grids(boxes, self.resolution)
         full, trimmed, volumes = np.array([box is not None for box in boxes], bool), False, list[np.ndarray]()
         numbers = np.flatnonzero(full).tolist()
@@ -128,30 +117,16 @@ class NecgsCodec(TwoSteps):
             yield from executor.map(fitted, meshes, *how)
 
     def code(self, analysis: FittedVolumes, progress: Progress | None = None) -> bytes:
-        """Return the stream. Raises InputError where training ends without the surface of a frame."""
+        """Return the stream. Raises InputError without the extra."""
         _need_torch()
-        from .train import train
+        from .network import train
 
-        volumes = analysis.fitted
         report = partial(progress, "train") if progress else lambda _done, _total: None
         features, parameters = np.zeros((0, self.shape.feature_size), np.int32), list[np.ndarray]()
-        if volumes:
-            features, parameters = train(volumes, self, report)
-        coded = Coded(self.shape, analysis.trimmed, analysis.full, analysis.placement, features, parameters)
-        self._check_surfaces(coded, volumes)
-        return encode_stream(coded)
-
-    def _check_surfaces(self, coded: Coded, volumes: Sequence[np.ndarray]) -> None:
-        """Raise InputError where training has lost the surface of a frame or replaced it by another one."""
-        frames = _Decoded(coded, self.device)
-        for row, number in enumerate(np.flatnonzero(coded.full).tolist()):
-            wanted, made = volumes[row].astype(np.float32), frames.volume(row)
-            kept = 0.0 if extract(made, coded.trimmed).is_empty else _shared_inside(wanted, made)
-            if kept < KEPT and not extract(wanted, coded.trimmed).is_empty:
-                raise InputError(
-                    f"frame {number}: training ended with {kept:.0%} of its body; "
-                    f"give more epochs than {self.epochs}, another rate than {self.rate:g} or another seed"
-                )
+        if analysis.fitted:
+            features, parameters = train(analysis.fitted, self, report)
+        place = analysis.placement
+        return encode_stream(Coded(self.shape, analysis.trimmed, analysis.full, place, features, parameters))
 
     def decode(self, data: bytes) -> Sequence[Mesh]:
         """Return the frames, each decoded on access. Raises FormatError for damaged bytes."""
@@ -176,20 +151,17 @@ class _Decoded(DecodedFrames):
     def frame(self, number: int) -> Mesh:
         if not self._coded.full[number]:
             return Mesh.empty()
-        mesh = extract(self.volume(int(self._rows[number])), self._coded.trimmed)
-        return self._coded.placement.forward(mesh, number, self._coded.shape.resolution)
-
-    def volume(self, row: int) -> Float32[np.ndarray, "K K K 4"]:
-        """Return the TSDF-Def volume of a frame; rows number the frames that are not empty."""
         assert self._network is not None, "a set with surface has a network"
-        return self._network.volume(self._coded.features[row])
+        volume = self._network.volume(self._coded.features[int(self._rows[number])])
+        mesh = extract(volume, self._coded.trimmed)
+        return self._coded.placement.forward(mesh, number, self._coded.shape.resolution)
 
 
 def fitted(mesh: Mesh, resolution: int, steps: int) -> tuple[Float16[np.ndarray, "K K K 4"], bool]:
     """Return the volume of a mesh in cells, and whether it has sheets."""
     import torch
 
-    from .fit import fit_volume
+    from .network import fit_volume, keep, key_of, recall
 
     key = key_of(("volume", resolution, steps, mesh.vertices, mesh.faces))
     if (known := recall(key)) is None:
@@ -197,18 +169,6 @@ def fitted(mesh: Mesh, resolution: int, steps: int) -> tuple[Float16[np.ndarray,
         volume = fit_volume(distances, mesh, steps).astype(np.float16)  # half the memory
         keep(key, known := (torch.from_numpy(volume), sheets))
     return known[0].numpy(), known[1]
-
-
-def _shared_inside(a: Float32[np.ndarray, "K K K 4"], b: Float32[np.ndarray, "K K K 4"]) -> float:
-    """Return the points inside both volumes as a share of those inside at least one."""
-    either = ((a[..., 0] < 0) | (b[..., 0] < 0)).sum()
-    return float(((a[..., 0] < 0) & (b[..., 0] < 0)).sum() / max(either, 1))
-
-
-def _checked(mesh: Mesh, number: int) -> Mesh:
-    if not np.isfinite(mesh.vertices).all():
-        raise InputError(f"frame {number}: a coordinate is not finite; repair the mesh")
-    return mesh
 
 
 def _need_torch() -> None:

@@ -1,16 +1,24 @@
-"""TVMC* at an operating point. In -> out: a sequence <-> the bytes of `layout`."""
+"""TVMC* at an operating point. In -> out: a sequence <-> the bytes of `stream`."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from jaxtyping import Float64
 
+from meshreel.analysis.survey import Survey, survey
 from meshreel.coding.layers.patches import run_lengths
+from meshreel.coding.reference_mesh import CodedReference
+from meshreel.encoder.group.forms import intra_only
+from meshreel.encoder.group.interval import Interval
 from meshreel.encoder.group.progress import Stages
+from meshreel.encoder.group.target import target_of
 from meshreel.encoder.paper.options import PaperOptions
+from meshreel.encoder.paper.recipe import FoundGroup, displacement_field
+from meshreel.encoder.scene.static import Static, encode_static
 from meshreel.encoder.sequence import Encoder
 from meshreel.encoder.settings.options import EncoderOptions
 from meshreel.encoder.settings.settings import Settings
@@ -19,10 +27,19 @@ from meshreel.types import Mesh
 
 from ...codec import Progress
 from ..meshreel import Prepared
-from .layout import MAGIC, VERSION, Group, Kind, State, Stream, pack_stream, unpack_stream
-from .tracked import MOST_CELLS, encode_tracked
-from .tracking import Tracked, Tracking, Untracked, track_sequence
-from .video import TvmcVideo
+from .stream import (
+    MAGIC,
+    MOST_CELLS,
+    VERSION,
+    Group,
+    Kind,
+    State,
+    Stream,
+    TvmcVideo,
+    encode_tracked,
+    pack_stream,
+    unpack_stream,
+)
 
 USUAL = 2000  # vertices of a reference
 LEAST_QP, MOST_QP = 2, 16  # bits; guesses
@@ -106,3 +123,56 @@ def _group(group: Tracked | Untracked, step: float) -> Group:
         return Group(group.first_frame, group.frame_count, Kind.DRACO, group.payload)
     payload = encode_tracked(group.reference, group.field, step)
     return Group(group.first_frame, group.field.shape[1], Kind.TRACKED, payload)
+
+
+@dataclass(frozen=True, slots=True)
+class Tracked:
+    """A group of frames that one reference follows."""
+
+    first_frame: int
+    reference: CodedReference
+    field: Float64[np.ndarray, "V T 3"]  # displacements of its base, normalised
+
+
+@dataclass(frozen=True, slots=True)
+class Untracked:
+    """A group of frames that no reference follows, as Draco meshes."""
+
+    first_frame: int
+    frame_count: int
+    payload: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class Tracking:
+    """A tracked sequence."""
+
+    seen: Survey
+    states: list[Static]  # of the background; empty: everything may move
+    groups: list[Tracked | Untracked]  # of frames with surface, in the order of their first frames
+
+
+def track_sequence(encoder: Encoder, options: EncoderOptions) -> Tracking:
+    """Return the groups of each body, by a prepared encoder's analysis. Raises InputError for unusable frames."""
+    sequence, parts, groups = encoder.sequence, encoder.parts(options), list[Tracked | Untracked]()
+    assert isinstance(options.method, PaperOptions), "references are those of the paper's recipe"
+    for interval in encoder.intervals(options):
+        if not interval.frames[0].is_empty:
+            groups += _groups(interval, encoder.find(interval, options.method, None), options.method)
+    seen, states = survey(sequence) if parts is None else parts.seen, list[Static]()
+    if parts is not None and options.scene is not None:
+        states = encode_static(parts, len(sequence), sequence.frame_rate, options.scene)
+    return Tracking(seen, states, sorted(groups, key=lambda group: group.first_frame))
+
+
+def _groups(interval: Interval, found: Sequence[FoundGroup], options: PaperOptions) -> Iterator[Tracked | Untracked]:
+    """Yield the groups of an interval."""
+    first = interval.first_frame
+    for group in found:
+        if group.fitted is None:
+            target = target_of(group.frames, options.target, interval.noise)
+            yield Untracked(first, len(group.frames), intra_only(group.frames, target, options.intra).payload)
+        else:
+            reference = group.fitted.reference
+            yield Tracked(first, reference, displacement_field(reference, group.fitted.positions))
+        first += len(group.frames)
