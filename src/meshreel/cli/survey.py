@@ -6,7 +6,8 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from ..encoder.sequence import Encoder, warnings_of
+from ..encoder.file.notices import warnings_of
+from ..encoder.sequence import Encoder
 from ..errors import InputError
 from ..io.remote import located, uploaded
 from ..io.write import check_apart

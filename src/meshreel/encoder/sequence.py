@@ -6,17 +6,14 @@ over processes, and memory does not grow with the length of the sequence.
 
 from __future__ import annotations
 
-import json
 import warnings
-from collections import deque
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from concurrent.futures import Executor
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import BinaryIO
 
-import numpy as np
 from threadpoolctl import threadpool_limits
 
 from ..analysis.scene.masks import Masker
@@ -25,37 +22,34 @@ from ..analysis.scene.segmentation import Cameras
 from ..analysis.survey import Survey
 from ..coding.background import decode_background
 from ..container.writer import ReelWriter
-from ..decoder.video import open as open_video
 from ..edit.audio import Given, packed_audio
 from ..edit.metadata import rounded, upright
 from ..errors import InputError
-from ..format.layout import Form, Header
-from ..geometry.closest_points import distances
+from ..format.layout import Form
 from ..geometry.derived_sequences import captured, unchanging, welded
-from ..geometry.topology import drop_unreferenced
 from ..geometry.work import since, so_far
 from ..io.remote import Place
-from ..metrics.distance import PSNR_CEILING, psnr
 from ..types import MeshSequence, as_sequence, evenly
 from .file.metadata import chosen_options, metadata_of
+from .file.notices import warnings_of, warnings_of_colors, warnings_of_scene
 from .file.summary import GroupSummary, SceneSummary, Summary
+from .file.written import make_header, mean_psnr, write_in_order, write_tracked
 from .group.digests import WriteLines, note, noted
 from .group.interval import Interval
 from .group.progress import Progress, Stages
 from .paper.recipe import FindGroups, find_groups
-from .run.interval_files import IntervalFiles, made_of, opened, write_companions, write_group
+from .run.interval_files import IntervalFiles, made_of, opened
 from .run.job import Job
 from .run.surveying import Excerpt, facts_of, known_survey, surveyed, write_survey
 from .scene.kept import pack_parts, unpack_parts
 from .scene.parts import Parts, take_apart
 from .scene.scene import Tracks, encode_bodies, scene_intervals
-from .scene.static import Static, colored_states, is_colored
-from .scene.tracks import TrackGroup, encode_tracked, intervals_of, tracked_bodies
+from .scene.static import colored_states, is_colored
+from .scene.tracks import encode_tracked, intervals_of, tracked_bodies
 from .settings.options import EncoderOptions, as_installed
 from .settings.settings import Color, Effort, Preset, Settings, TextureSize
 
 MEASURED = 4  # frames of a scene that are compared with the decoded ones (guess)
-ASTRAY = 0.005  # of the surface: noise, and what a border of the background lacks, is less (guess)
 
 
 def encode(
@@ -254,12 +248,12 @@ def _encode_tracked(job: Job, file: BinaryIO, name: str, seen: Survey, audio: by
     note("survey", seen.low, seen.high, seen.diagonals, seen.dropped, seen.pieces)
     with ReelWriter(file, make_header(sequence.frame_rate, seen, {}), name, audio) as writer:
         for encoded in encode_tracked(job, seen):
-            groups += [_added(writer, each, [], seen.diagonal) for each in encoded]
+            groups += [write_tracked(writer, each, [], seen.diagonal) for each in encoded]
         part = None if job.chosen is None else (job.chosen.start, len(sequence))
         metadata = metadata_of(options, groups, sequence.up, part)
         writer.header = make_header(sequence.frame_rate, seen, metadata)
     texts = warnings_of(seen) if job.chosen is None else ()  # the survey told of them
-    return Summary(writer.size, tuple(groups), (*texts, *_bare(groups)), audio=len(audio))
+    return Summary(writer.size, tuple(groups), (*texts, *warnings_of_colors(groups)), audio=len(audio))
 
 
 def _encode_scene(job: Job, file: BinaryIO, name: str, parts: Parts, audio: bytes) -> Summary:
@@ -273,101 +267,14 @@ def _encode_scene(job: Job, file: BinaryIO, name: str, parts: Parts, audio: byte
     note("background, coded", *(state.payload for state in states))
     with ReelWriter(file, make_header(sequence.frame_rate, seen, {}), name, audio) as writer:
         coded = encode_bodies(job, parts)
-        groups = _added_in_order(writer, coded.groups, states, seen)
+        groups = write_in_order(writer, coded.groups, states, seen)
         metadata = {**chosen_options(options, groups), "noise_m": rounded(parts.noise), **upright(sequence.up)}
         writer.header = make_header(sequence.frame_rate, seen, metadata)
     measured = evenly(len(sequence), MEASURED)
-    psnr = _measured(sequence, file, seen.diagonal, measured)
+    psnr = mean_psnr(sequence, file, seen.diagonal, measured)
     size, tracks = sum(map(len, states)), 1 + max(group.track for group in groups)
     faces = len(decode_background(states[0].payload).faces) if states else 0
     scene = SceneSummary(size, faces, parts.noise, psnr, tuple(measured), tracks)
     moves = any(group.form != Form.EMPTY for group in groups)
-    texts = (*warnings_of(seen), *_warnings_of_scene(parts, moves, coded.dropped), *_bare(groups, states))
+    texts = (*warnings_of(seen), *warnings_of_scene(parts, moves, coded.dropped), *warnings_of_colors(groups, states))
     return Summary(writer.size, tuple(groups), texts, scene, audio=len(audio))
-
-
-def _added_in_order(
-    writer: ReelWriter, coded: Sequence[TrackGroup], states: Sequence[Static], seen: Survey
-) -> list[GroupSummary]:
-    """Write all groups, and each state of the background before the first group that is shown with it."""
-    groups, waiting, static = list[GroupSummary](), deque(states), list[int]()
-    for each in coded:
-        while waiting and waiting[0].frame <= each.first_frame:
-            state = waiting.popleft()
-            static = [writer.add_static(state.payload, depends_on=static if state.is_patch else ())]
-            write_companions(writer, static[0], state.companions, None)
-        with_static = each.track == 0 and not seen.is_bare(each.first_frame)
-        groups.append(_added(writer, each, static if with_static else [], seen.unit))
-    return groups
-
-
-def _added(writer: ReelWriter, each: TrackGroup, static: list[int], unit: float) -> GroupSummary:
-    """Write a group of a track, with the chunk of the background that its frames are shown with."""
-    group = each.group
-    write_group(writer, each.first_frame, group, each.track, static)
-    key = None if group.key is None else each.first_frame + group.key
-    fidelity = group.fidelity.scaled(unit)
-    colors = sum(map(len, group.companions))
-    facts = (group.form, group.frame_count, len(group.stored or group.payload), fidelity, group.predicted)
-    return GroupSummary(*facts, key, each.track, each.share, colors, group.lost_colors, group.canonical)
-
-
-def _measured(sequence: MeshSequence, file: BinaryIO, diagonal: float, numbers: Sequence[int]) -> float:
-    """Return the mean d2_psnr_paper, dB, over some frames of a file."""
-    with open_video(file) as video:
-        found = []
-        for number in numbers:
-            points, shown = drop_unreferenced(sequence[number]).vertices, video[number]
-            if not len(points) or shown.is_empty:
-                found.append(PSNR_CEILING if not len(points) and shown.is_empty else 0.0)
-                continue
-            gap = float((distances(points, shown) ** 2).mean())
-            found.append(min(psnr(gap, diagonal), PSNR_CEILING))
-    return float(np.mean(found))
-
-
-def warnings_of(seen: Survey) -> tuple[str, ...]:
-    """Return warnings of surface that no file of the sequence has."""
-    found = []
-    if seen.dropped:
-        found.append(f"{seen.dropped} faces without area or with the vertices of another face are not kept")
-    if seen.flattened:
-        count, first = len(seen.flattened), seen.flattened[0]
-        text = f"{count} frames have faces, but none with an area: they count as empty (first frame {first} of these)"
-        found.append(text)
-    return tuple(found)
-
-
-def _warnings_of_scene(parts: Parts, moves: bool, dropped: int) -> Iterator[str]:
-    """Yield warnings of still surface, of all moving surface or of `dropped` faces of it that the file lacks."""
-    if parts.astray > ASTRAY:
-        text = f"{100 * parts.astray:.1f} % of the surface stands still, but is far from the background that frames"
-        why = "it flies, or is there for a while only"
-        yield f"{text} share, and is not kept: {why}; to keep all, encode with --dynamic-only"
-    if not moves:
-        least = 2 * parts.segmentation.cell
-        text = f"nothing moves by more than {least:.2g} m, or no view sees it: the whole scene is background"
-        yield f"{text}; if something does, encode with --dynamic-only"
-    if dropped:
-        yield f"{dropped} faces of bits that move, far from all bodies and there only for a moment, are not kept"
-
-
-def _bare(groups: Sequence[GroupSummary], states: Sequence[Static] = ()) -> Iterator[str]:
-    """Yield a warning of what has colours that the file has not."""
-    frames = sum(group.frame_count for group in groups if group.lost_colors)
-    bare = [f"{frames} frames"] * (frames > 0) + ["the background"] * any(state.lost_colors for state in states)
-    if bare:
-        yield f"no colours of {' and of '.join(bare)}: they would cost a reader too much"
-
-
-def make_header(frame_rate: float, seen: Survey, metadata: dict[str, Any]) -> Header:
-    """Return the header of a file whose coordinates are normalised by a survey."""
-    low, high = ((corner - seen.center) / seen.unit for corner in (seen.low, seen.high))
-    return Header(
-        frame_rate=frame_rate,
-        origin=tuple(map(float, seen.center)),
-        scale=seen.unit,
-        minimum=tuple(map(float, low)),
-        maximum=tuple(map(float, high)),
-        metadata=json.dumps(metadata, separators=(",", ":")),
-    )
