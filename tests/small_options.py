@@ -16,7 +16,7 @@ from meshreel.encoder.scene import parts
 from meshreel.encoder.settings.options import EncoderOptions
 from meshreel.encoder.settings.settings import Settings
 
-VIEWS = (8, 96, 72)  # number and size of views, pixels
+VIEWS = (6, 120, 90)  # number and size of views, pixels
 TRIALS = IntraOptions(fractions=(1.0,), steps=(1.4, 0.7))
 
 

@@ -79,7 +79,7 @@ def test_the_pictures_are_small() -> None:
 def test_the_readme_names_the_size_of_its_moving_picture() -> None:
     facts = json.loads((ROOT / "docs" / "pictures" / "moving.json").read_text(encoding="utf-8"))
     seconds = facts["frames"] / facts["frame_rate"]
-    said = f"recorded by {facts['cameras']} depth cameras for {seconds:g} s: {facts['bytes'] / 1000:.0f} kB"
+    said = f"recorded by {facts['cameras']} depth cameras for {seconds:g} s, in {facts['bytes'] / 1000:.0f} kB"
     assert said in " ".join(RUN[0].read_text(encoding="utf-8").split())
 
 
@@ -87,7 +87,10 @@ def test_the_readme_says_the_headline_of_the_results() -> None:
     found = json.loads((ROOT / "docs" / "results" / "headline.json").read_text(encoding="utf-8"))
     person, times = found["person"], found["times_larger_at_equal_d2"]
     text = " ".join(RUN[0].read_text(encoding="utf-8").split())
-    assert f"person of {person['triangles']:,} triangles for {person['seconds']:g} s: {person['kilobytes']} kB" in text
+    assert (
+        f"person of {person['triangles']:,} triangles takes {person['kilobytes']} kB for {person['seconds']:g} s"
+        in text
+    )
     shown = re.findall(r"\| ([^|]+) \| ([\d.]+) \|", text)
     assert {name.strip(): float(number) for name, number in shown} == {
         "Draco, every frame": times["Draco"]["median"],
@@ -95,8 +98,8 @@ def test_the_readme_says_the_headline_of_the_results() -> None:
         "TVMC*": times["TVMC*"]["median"],
     }
     d1, pictures = found["vdmc_times"]["mpeg_d1_psnr"], found["vdmc_times"]["ssim_masked"]
-    assert f"sheet {d1[0]:.1f} to {d1[-1]:.1f} times the bytes at equal D1" in text
-    assert f"at equal masked SSIM {pictures[0]:.1f} to {pictures[-1]:.1f} times" in text
+    assert f"needs {d1[0]:.1f} to {d1[-1]:.1f} times the bytes at equal D1, by its published sheet" in text
+    assert f"needs {pictures[0]:.1f} to {pictures[-1]:.1f} times the bytes at equal masked SSIM" in text
 
 
 def _run_page(page: Path, folder: Path, *arguments: str) -> str:

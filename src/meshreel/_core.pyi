@@ -22,8 +22,10 @@ class GroupState:
     def nbytes_beyond(self, before: GroupState | None) -> int: ...
 
 class AtlasLayout:
-    width: int
-    height: int
+    @property
+    def width(self) -> int: ...
+    @property
+    def height(self) -> int: ...
 
 class Group:
     def __init__(

@@ -12,13 +12,13 @@ from meshreel.io.depth_pictures import write_depth
 RADIUS, WALL = 0.4, 1.2  # m; the ball is at the origin, the wall behind it at z = WALL
 
 
-def camera(name="front", side=0.0, size=96, **changed):
+def camera(name="front", side=0.0, size=96, focal=None, **changed):
     """A camera two metres from the ball, `side` degrees around the vertical axis, that looks at it."""
     angle = np.radians(side)
     turn = np.array([[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]])
     pose = np.eye(4)
     pose[:3, :3], pose[:3, 3] = turn, turn @ [0, 0, -2]
-    view = Camera(size, size, (float(size), float(size)), (size / 2, size / 2), CameraPose.of_camera(pose))
+    view = Camera(size, size, focal or (float(size), float(size)), (size / 2, size / 2), CameraPose.of_camera(pose))
     return DepthCamera(name, view, **({"depth_range": (0.2, 4.0)} | changed))
 
 

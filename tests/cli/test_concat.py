@@ -64,8 +64,8 @@ def test_parts_have_the_tracks_of_the_whole(run, slide, surveyed, tmp_path):
     """The second of two bodies is gone in the last part."""
     (folder := tmp_path / "two").mkdir()
     for number in range(6):
-        gone = [] if number > 3 else [moved(sphere(levels=2), (4 + 0.1 * number, 0, 0))]
-        write_mesh(concatenate([sphere(levels=2), *gone]), folder / f"frame_{number}.ply")
+        gone = [] if number > 3 else [moved(sphere(levels=3), (4 + 0.1 * number, 0, 0))]
+        write_mesh(concatenate([sphere(levels=3), *gone]), folder / f"frame_{number}.ply")
     survey, whole = tmp_path / "two.json", tmp_path / "whole.reel"
     assert run("survey", folder, "-o", survey, "--fps", "10").code == 0
     assert "2 tracks, " in run("encode", folder, "-o", whole, *FLAGS).out

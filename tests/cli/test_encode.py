@@ -288,7 +288,7 @@ def test_what_is_missing_for_colours_is_told_before_anything_is_encoded(run, tmp
     def encode(*_: object) -> None:
         raise InputError("encoding began")
 
-    monkeypatch.setattr("meshreel.encoder.appearance.colors.find_spec", lambda _: None)
+    monkeypatch.setattr("meshreel.encoder.settings.options.find_spec", lambda _: None)
     monkeypatch.setattr("meshreel.cli.encode.Encoder.encode", encode)
     lines = TRIANGLE.replace("\n", " 1 0 0\n") + "f 1 2 3\n"
     for color, warned in (("auto", True), ("vertices", False)):

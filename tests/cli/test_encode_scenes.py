@@ -178,9 +178,9 @@ def test_depth_of_eight_bits_is_refused(run, rig, tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["--background-refresh", "0"], ["--background-refresh 0", "seconds above 0"]),
-        (["--background-refresh", "inf"], ["--background-refresh inf", "seconds above 0"]),
-        (["--background-refresh", "1", "--dynamic-only"], ["--dynamic-only", "leave out --background-refresh"]),
+        (["--background-refresh", "0"], ["background refresh 0", "seconds above 0"]),
+        (["--background-refresh", "inf"], ["background refresh inf", "seconds above 0"]),
+        (["--background-refresh", "1", "--dynamic-only"], ["dynamic only", "leave background refresh out"]),
         (["--masks", "masks", "--dynamic-only"], ["--dynamic-only", "masks"]),
         (["--views", "none.json"], ["none.json", "cannot be read"]),
         (["--masks", "masks"], ["cameras.json", "cannot be read"]),

@@ -65,7 +65,7 @@ def test_the_handler_of_sigterm_is_given_back(run):
     [
         (("bench", "run", "figure6"), "meshreel bench run: --output is missing: A JSON-lines file"),
         (("bench", "run", "figure6", "-o"), "meshreel bench run: -o is missing: A JSON-lines file"),
-        (("bench", "run"), "meshreel bench run: EXPERIMENT is missing: Which one"),
+        (("bench", "run"), "meshreel bench run: EXPERIMENT is missing: Name of the experiment"),
         (("decode", "x.reel"), "meshreel decode: --output is missing"),
         (("export",), "meshreel export: FILE is missing"),
     ],

@@ -10,11 +10,11 @@ import numpy as np
 from cyclopts import Parameter
 from jaxtyping import UInt8
 
-from ..analysis.scene.camerasation import mask_views, scene_views, segment, segment_by
 from ..analysis.scene.labelling import Segmentation
 from ..analysis.scene.masks import CAMERAS, Masker
 from ..analysis.scene.pictures import write_views
 from ..analysis.scene.preview import FrameViews, label_colors, look_at_labels, sheet
+from ..analysis.scene.segmentation import mask_views, scene_views, segment, segment_by
 from ..encoder.scene.labels import FrameLabels, label_frames
 from ..encoder.settings.options import EncoderOptions, SceneOptions
 from ..errors import InputError

@@ -124,8 +124,8 @@ def slits(depth: np.ndarray) -> int:
 
 
 def test_a_step_and_what_it_hides_leave_no_slit_between_them():
-    depth = np.full((SHARP.height, SHARP.width), 3000, np.uint16)
-    depth[:, SHARP.width // 2 :] = 2000
+    depth = np.full((SHARP.view.height, SHARP.view.width), 3000, np.uint16)
+    depth[:, SHARP.view.width // 2 :] = 2000
     assert slits(depth) == 0
 
 

@@ -14,7 +14,7 @@ from meshreel.analysis.scene.segmentation import scene_views, segment_by
 from meshreel.analysis.scene.views import place_views
 from meshreel.analysis.scene.votes import Votes
 from meshreel.errors import InputError
-from meshreel.geometry.cameras import pack_cameras
+from meshreel.geometry.cameras import CameraPose, pack_cameras
 from meshreel.geometry.raycast import Rays
 from meshreel.io.write import write_picture
 from meshreel.types import Mesh, MeshList
@@ -82,7 +82,7 @@ def test_masks_of_more_frames_are_remarked(masks: Path):
 
 
 def test_cameras_that_see_nothing_of_the_scene_are_refused(masks: Path):
-    away = tuple(replace(view, extrinsic=view.extrinsic + np.diag([0, 0, 1e4], 1)) for view in VIEWS)
+    away = tuple(replace(view, pose=CameraPose.of_world(view.extrinsic + np.diag([0, 0, 1e4], 1))) for view in VIEWS)
     (masks / CAMERAS).write_bytes(pack_cameras(away))
     frames = MeshList((Mesh.empty(), ROOM))
     with pytest.raises(InputError, match=r"the 3 given cameras see no face in any of 1 frames \(the first is 1\)"):

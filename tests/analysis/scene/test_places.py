@@ -12,21 +12,25 @@ from meshreel.analysis.scene import places as module
 from meshreel.analysis.scene.cut import moving_places
 from meshreel.analysis.scene.places import Observations, Places, find_places, inspected, states
 from meshreel.analysis.scene.views import place_views
+from meshreel.geometry.cameras import CameraPose
 from meshreel.geometry.depth import DepthPicture
 from meshreel.geometry.raycast import Rays
 from meshreel.geometry.voxels import Lattice
 from meshreel.types import Frames, Mesh
 from tests.metrics.shapes import moved, plane
 from tests.scenes import CELL, RADIUS, ball, room, with_room
-from tests.small_options import VIEWS
 
 LATTICE = Lattice(np.zeros(3), CELL)
 FROM, TO = 0.6, 1.6  # m, where the ball lies in the first half of the frames and in the second
 FRAMES = with_room([ball(FROM)] * 2 + [ball(TO)] * 2)
 
 
+VIEWS = (8, 96, 72)  # number and size, pixels
+
+
 @pytest.fixture(scope="module")
-def views():
+def views(small_views):
+    del small_views  # by which they are placed
     return place_views(FRAMES, "y", *VIEWS)
 
 
@@ -209,7 +213,7 @@ def test_a_place_that_a_camera_measured_past_is_free_even_if_no_view_sees_it(vie
 
 def turned_away(view):
     """The same camera, looking back."""
-    return replace(view, extrinsic=np.diag([-1.0, 1, -1, 1]) @ view.extrinsic)
+    return replace(view, pose=CameraPose.of_world(np.diag([-1.0, 1, -1, 1]) @ view.extrinsic))
 
 
 def test_where_no_camera_usually_measures_anything_views_decide(views):

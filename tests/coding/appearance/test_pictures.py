@@ -156,5 +156,5 @@ def test_without_pyav_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> Non
 
 
 def test_options_out_of_range_are_refused() -> None:
-    with pytest.raises(InputError, match="crf 64"):
+    with pytest.raises(InputError, match="rate factor 64"):
         VideoEncoder(96, 64, 64)

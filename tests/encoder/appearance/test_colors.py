@@ -15,7 +15,6 @@ from meshreel.container.reader import ReelReader
 from meshreel.container.sources import BytesSource
 from meshreel.container.writer import Companion, ReelWriter
 from meshreel.edit.edits import concat
-from meshreel.encoder.appearance import colors as appearance
 from meshreel.encoder.run.surveying import Excerpt, read_survey
 from meshreel.encoder.sequence import Encoder
 from meshreel.encoder.settings.options import as_installed
@@ -256,7 +255,7 @@ def test_parts_of_a_sequence_are_joined_with_their_colors(tmp_path: Path) -> Non
 
 
 def test_missing_packages_leave_colors_of_vertices(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(appearance, "find_spec", lambda name: None if name == "av" else name)
+    monkeypatch.setattr("meshreel.encoder.settings.options.find_spec", lambda name: None if name == "av" else name)
     options, warnings = as_installed(Settings().resolved())
     assert options.appearance.texture is None and "meshreel[color]" in warnings[0]
     with pytest.raises(InputError, match=r"av missing; pip install"):

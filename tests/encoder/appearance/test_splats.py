@@ -118,7 +118,7 @@ def test_a_sequence_without_colours_is_refused(tmp_path) -> None:
 
 
 def test_without_torch_nothing_is_encoded_and_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("meshreel.encoder.appearance.colors.find_spec", lambda _: None)
+    monkeypatch.setattr("meshreel.encoder.settings.options.find_spec", lambda _: None)
     with pytest.raises(InputError, match=r"meshreel\[splats\]"):
         as_installed(options())
 

@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from meshreel.analysis.follow.template import base_mesh
+from meshreel.analysis.follow.embedded import LOST, Tracker
+from meshreel.analysis.follow.template import LEVELS, base_mesh
 from meshreel.encoder.group.interval import Interval
 from meshreel.encoder.group.target import target_of
 from meshreel.encoder.layers import recipe as layered
@@ -26,7 +27,7 @@ SHEET = noisy(sheet(), NOISE, 0)
 
 
 def test_without_noise_limits_rounds_and_steps_are_those_of_the_options() -> None:
-    assert BEST.embedded.limits(0.0).lost == BEST.embedded.lost
+    assert Tracker(SHEET, 0, BEST.embedded).lost == LOST
     first, second = BEST.fit.rounds(0.0)
     assert (first.gates, first.smoothing, second.anchor) == (BEST.fit.gates, BEST.fit.smoothing, BEST.fit.pull)
     assert BEST.layers.step_above(0.0) == BEST.layers.step
@@ -34,10 +35,12 @@ def test_without_noise_limits_rounds_and_steps_are_those_of_the_options() -> Non
 
 def test_noise_makes_nothing_finer() -> None:
     assert BEST.layers.step_above(NOISE) > BEST.layers.step
-    assert BEST.embedded.limits(NOISE).lost > BEST.embedded.lost
+    assert Tracker(SHEET, 0, BEST.embedded, NOISE).lost > LOST
     first, second = BEST.fit.rounds(NOISE)
     assert second.anchor > BEST.fit.pull and min(first.gates) > min(BEST.fit.gates)
-    assert len(base_mesh(SHEET, BEST.template, NOISE).vertices) < len(base_mesh(SHEET, BEST.template).vertices)
+    assert len(base_mesh(SHEET, BEST.template_error, NOISE).vertices) < len(
+        base_mesh(SHEET, BEST.template_error).vertices
+    )
 
 
 def test_a_target_is_no_nearer_to_noisy_frames_than_the_truth_is() -> None:
@@ -52,7 +55,7 @@ def test_a_noisy_sheet_with_moving_holes_is_one_group_and_nearer_to_the_truth_th
     frames = [with_hole(noisy(mesh, NOISE, t), holes[t], 0.05, 0.04) for t, mesh in enumerate(truth)]
     (group,) = LayersRecipe(BEST).encode(Interval(frames, NOISE))
     assert group.form == Form.LAYERS
-    faces, positions, _ = decode_layers(group.payload[: group.layers[BEST.template.levels]])
+    faces, positions, _ = decode_layers(group.payload[: group.layers[LEVELS]])
     before, after = [], []
     for clean_mesh, frame, places in zip(truth, frames, positions, strict=True):
         inner = clean_mesh.vertices[np.abs(clean_mesh.vertices[:, :2]).max(axis=1) < 0.4 * SIDE]

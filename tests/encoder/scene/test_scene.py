@@ -32,6 +32,7 @@ from meshreel.encoder.settings.options import EncoderOptions, SceneOptions
 from meshreel.errors import InputError
 from meshreel.format.checks import MOST_TRACKS
 from meshreel.format.layout import Form
+from meshreel.geometry.cameras import CameraPose
 from meshreel.geometry.closest_points import distances
 from meshreel.geometry.derived_sequences import captured
 from meshreel.geometry.topology import concatenate, face_normals
@@ -50,8 +51,8 @@ FAR = np.array([1e6, -1e6, 2e6])
 
 
 def in_scene(options, **changes):
-    """The options with other values of how a scene is segmented."""
-    return replace(options, scene=replace(options.scene, segment=replace(options.scene.segment, **changes)))
+    """The options with other values of how a scene is taken apart."""
+    return replace(options, scene=replace(options.scene, **changes))
 
 
 def encoded(frames, path, options=OPTIONS, rate=30.0, **more):
@@ -157,7 +158,7 @@ def test_a_scene_that_is_encoded_again_is_taken_apart_once(tmp_path, monkeypatch
     assert len(count) == 3
     for _ in range(2):  # cameras of the same numbers, made anew
         views = scene_views(MeshList(tuple(ROLLING), 4.0))
-        cameras = tuple(replace(view, extrinsic=view.extrinsic.copy()) for view in views)
+        cameras = tuple(replace(view, pose=CameraPose.of_world(view.extrinsic.copy())) for view in views)
         encoder.encode(tmp_path / "given.reel", in_scene(other, cameras=cameras))
     assert len(count) == 4
 
