@@ -116,6 +116,7 @@ def test_draco_takes_a_group_that_costs_less_that_way(tmp_path):
 def test_a_group_is_cut_where_one_reference_cannot_follow(tmp_path, monkeypatch):
     monkeypatch.setattr("meshreel.analysis.reference.extraction.KEYS", 1)
     monkeypatch.setattr("meshreel.analysis.reference.extraction.TRIAL_VERTICES", 150)
+    monkeypatch.setattr("meshreel.analysis.reference.extraction.VOXEL", 1.0)
     one, other = sliding_sphere(2, levels=2), [Mesh.of(BALL.vertices * [1, 0.2, 3] + [0, 1, 0], BALL.faces)] * 2
     video, summary = decoded(MeshList((*one, *other)), tmp_path / "a.reel")
     assert len(summary.groups) > 1

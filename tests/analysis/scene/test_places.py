@@ -29,9 +29,12 @@ VIEWS = (8, 96, 72)  # number and size, pixels
 
 
 @pytest.fixture(scope="module")
-def views(small_views):
-    del small_views  # by which they are placed
-    return place_views(FRAMES, "y", *VIEWS)
+def views():
+    """Views that few samples of few frames place."""
+    with pytest.MonkeyPatch.context() as patch:
+        for name, value in (("_PLACES", 4), ("_FRAMES", 2), ("_SAMPLES", 256)):
+            patch.setattr(f"meshreel.analysis.scene.views.{name}", value)
+        return place_views(FRAMES, "y", *VIEWS)
 
 
 @dataclass(frozen=True)

@@ -110,7 +110,7 @@ def _trials(
     If `alone`, only the MDS pose is tried, with the surface of each of them first.
     """
     surfaces = [FrameSurface(frame) for frame in group.frames]
-    count = min(KEYS - again, len(group.frames))
+    count = min(max(1, KEYS - again), len(group.frames))
     keys = sorted({int(key) for key in (np.arange(count) + 0.5) * len(group.frames) / count})
     if alone:
         return tuple(_trial(group, surfaces, _Attempt(MDS, key, canonical), options) for key in keys)
