@@ -74,6 +74,7 @@ def test_the_sdist_contains_what_the_wheel_is_built_from_and_nothing_else(unpack
     names = {path.name for path in unpacked.iterdir()}
     assert names == {"CMakeLists.txt", "LICENSE", "NOTICE", "PKG-INFO", "core", "pyproject.toml", "src", *PAGES}
     assert {path.name for path in (unpacked / "core").iterdir()} == {
+        "decoder",
         "include",
         "python",
         "src",
