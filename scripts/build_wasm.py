@@ -19,6 +19,8 @@ FLAGS = (
     *("-ffp-contract=off", "-fno-fast-math", "-fno-math-errno", "-fno-trapping-math"),
     *("-fwasm-exceptions", "-mexception-handling", "-fno-rtti"),
     *("-DEIGEN_DONT_VECTORIZE", "-DEIGEN_MPL2_ONLY", "-DNDEBUG"),
+    # Eigen without `throw`: the order of blocks around one depends on the compiler's memory, and so on paths.
+    "-U__EXCEPTIONS",
     *("-Wl,--gc-sections", "-Wl,-z,stack-size=1048576"),
 )
 
