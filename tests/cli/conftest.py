@@ -44,8 +44,9 @@ class Said:
 
 
 @pytest.fixture
-def run(capsys):
-    """Runs a command line in this process."""
+def run(capsys, monkeypatch):
+    """Runs a command line in this process, without the lines of progress that a busy machine would print."""
+    monkeypatch.setattr("meshreel.cli.console.EVERY", 600.0)
 
     def call(*arguments: str | Path) -> Said:
         code = main([str(argument) for argument in arguments])

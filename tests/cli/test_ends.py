@@ -87,8 +87,9 @@ def test_a_full_disk_leaves_nothing_and_says_so(balls, tmp_path):
     process = start(tmp_path, balls, "run", limit=600)
     _, errors = process.communicate(timeout=120)
     assert process.returncode == 2
-    assert errors.startswith("meshreel: error: ") and errors.count("\n") == 1
-    assert "a.reel" in errors and "too large); free space, or choose another folder" in errors
+    [error] = [line for line in errors.splitlines() if " so far" not in line]  # progress, on a busy machine
+    assert error.startswith("meshreel: error: ")
+    assert "a.reel" in error and "too large); free space, or choose another folder" in error
     assert list((tmp_path / "out").iterdir()) == []
 
 
