@@ -8,9 +8,8 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-import format_cpp
+import format_code
 import format_tables
-import format_typescript
 import reliability
 
 from meshreel.format.layout import PAYLOADS, RECORDS
@@ -25,8 +24,8 @@ def made() -> dict[Path, str]:
     """Each generated file as it should be."""
     return {
         DOCUMENT: format_tables.fill_tables(DOCUMENT.read_text(encoding="utf-8"), RECORDS + PAYLOADS),
-        MODULE: format_typescript.typescript(RECORDS + PAYLOADS),
-        HEADER: format_cpp.cpp(RECORDS + PAYLOADS),
+        MODULE: format_code.typescript(RECORDS + PAYLOADS),
+        HEADER: format_code.cpp(RECORDS + PAYLOADS),
         reliability.PAGE: reliability.filled(),
     }
 

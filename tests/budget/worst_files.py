@@ -81,7 +81,7 @@ def file_of(*groups: tuple[int, bytes], depends: bool = False) -> bytes:
         for frames, payload in groups:
             last = writer.last_of(0)
             before = (last,) if depends and last is not None else ()
-            writer.add_group(writer.frame_count, frames, payload, depends_on=before)
+            writer.add_group(writer.frames_of(0), frames, payload, depends_on=before)
     return file.getvalue()
 
 

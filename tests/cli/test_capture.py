@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from meshreel.cli import main
-from meshreel.cli.flags import Reading
-from meshreel.cli.sources import open_source
+from meshreel.cli.sources import Reading, open_source
 from meshreel.geometry import tsdf
 from meshreel.io.depth_pictures import read_depth, write_depth
 from meshreel.io.sequence import open_sequence

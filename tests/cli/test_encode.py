@@ -10,7 +10,7 @@ from dataclasses import replace
 import pytest
 
 import meshreel
-from meshreel.cli.encode import command
+from meshreel.cli.encode import encode as command
 from meshreel.encoder.settings.options import EncoderOptions
 from meshreel.errors import InputError
 from meshreel.io.sequence import SequenceOptions

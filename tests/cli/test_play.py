@@ -103,7 +103,7 @@ def test_a_download_that_is_under_way_does_not_hold_up_the_end(started, tmp_path
 @pytest.fixture
 def told_once(monkeypatch):
     """`play` ends as soon as it has told its address."""
-    monkeypatch.setattr("meshreel.cli.play.run", lambda _app, _options, tell: tell(["http://127.0.0.1:1/"]))
+    monkeypatch.setattr("meshreel.cli.serve.run", lambda _app, _options, tell: tell(["http://127.0.0.1:1/"]))
 
 
 @pytest.mark.usefixtures("told_once")

@@ -11,8 +11,7 @@ from shutil import which
 import pytest
 
 import meshreel
-from meshreel.cli import COMMANDS, make_app
-from meshreel.cli.examples import EXAMPLES
+from meshreel.cli import COMMANDS, EXAMPLES, make_app
 from tests.cli.conftest import failed
 
 

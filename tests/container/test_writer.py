@@ -215,7 +215,7 @@ def test_tracks_interleave_and_each_has_its_own_frames_and_last_group():
         with pytest.raises(InputError, match="chunk 5: track 2 from frame 0 behind track 1 from frame 4"):
             writer.add_group(0, 12, EMPTY, track=2)
         writer.add_group(10, 2, EMPTY, depends_on=(1, changed))
-        assert (writer.frame_count, writer.last_of(0)) == (12, 5)
+        assert (writer.frames_of(0), writer.last_of(0)) == (12, 5)
     reader = ReelReader(BytesSource(file.getvalue()))
     assert [[group.number for group in groups] for groups in reader.tracks] == [[1, 5], [2, 4]]
     assert [chunk.depends_on for chunk in reader.chunks] == [(), (0,), (0,), (0,), (3, 2), (1, 3)]

@@ -36,11 +36,11 @@ def made() -> bytes:
     with ReelWriter(file, HEADER) as writer:
         for length, key in zip(LENGTHS, KEYS, strict=True):
             before = () if key or writer.last_of(0) is None else (writer.last_of(0),)
-            wanted = moving(reference, length, writer.frame_count)
+            wanted = moving(reference, length, writer.frames_of(0))
             coded = encode_layers(reference, wanted, previous=state if before else None)
-            writer.add_group(writer.frame_count, length, coded.payload, coded.layers, before)
+            writer.add_group(writer.frames_of(0), length, coded.payload, coded.layers, before)
             state = coded.state
-        writer.add_group(writer.frame_count, EMPTY, encode_empty())
+        writer.add_group(writer.frames_of(0), EMPTY, encode_empty())
     return file.getvalue()
 
 

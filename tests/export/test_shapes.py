@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 from meshreel.errors import InputError
-from meshreel.export.animated_glb import animated_glb
-from meshreel.export.animated_usd import animated_usd
-from meshreel.export.shapes import Animation, AnimationWriter, Points, Shape, changes
+from meshreel.export.animated_glb import GlbWriter, animated_glb
+from meshreel.export.animated_usd import UsdWriter, animated_usd
+from meshreel.export.shapes import Animation, Points, Shape, changes
 from tests.play_glb import PlayedGlb
 
 WRITERS = {"glb": animated_glb, "usdc": animated_usd, "usda": animated_usd, "usdz": animated_usd}
@@ -37,7 +37,7 @@ def shape(
 @pytest.fixture(params=WRITERS)
 def write(
     request: pytest.FixtureRequest, tmp_path: Path
-) -> Callable[[Animation], AbstractContextManager[AnimationWriter]]:
+) -> Callable[[Animation], AbstractContextManager[GlbWriter | UsdWriter]]:
     """Opens a writer of each kind on a file in an empty folder."""
     if request.param != "glb":
         pytest.importorskip("pxr")

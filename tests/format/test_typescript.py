@@ -7,7 +7,7 @@ from pathlib import Path
 
 from meshreel.format.layout import PAYLOADS, RECORDS
 from meshreel.format.records import record_fields
-from scripts.format_typescript import typescript
+from scripts.format_code import typescript
 
 CORE = Path(__file__).resolve().parents[2] / "web" / "player-core" / "src"
 TEXT = typescript(RECORDS + PAYLOADS)

@@ -14,7 +14,7 @@ from rich.table import Table
 
 from meshreel.cli import run_app
 from meshreel.cli.console import Common
-from meshreel.cli.flags import Reading
+from meshreel.cli.sources import Reading
 from meshreel.errors import InputError
 
 from .codecs import codec_names, codec_version, make_codec

@@ -52,10 +52,36 @@ COMMANDS = {
     "doctor": "Report installed packages and extras, and what this machine can do with them.",
     "completion": "Print a script that lets a shell complete commands and flags.",
 }
-EDITS = ("cut", "concat", "retime", "transform", "tag")  # commands that share a module
+SHARED = {  # modules with several commands
+    **dict.fromkeys(("cut", "concat", "retime", "transform", "tag"), "edits"),
+    **dict.fromkeys(("encode", "survey"), "encode"),
+    **dict.fromkeys(("decode", "export"), "decode"),
+    **dict.fromkeys(("play", "serve"), "serve"),
+    **dict.fromkeys(("completion", "doctor", "player"), "tools"),
+}
+EXAMPLES = {  # two of each command, shown below its help; a test parses each
+    "capture": ("rig -o scan --voxel 0.02", "scan.bag -o rig"),
+    "calibrate": ("rig --in-place", "rig --board charuco --in-place"),
+    "segment": ("room -o labels", "room -o views --views-only"),
+    "survey": ("scan -o scan.json", "s3://takes/walk -o s3://takes/walk.json --fps 25"),
+    "encode": ("scan -o scan.reel --quality 50 --fps 30", "'takes/walk_*.obj' -o walk.reel --audio walk.opus --jobs 4"),
+    "cut": ("walk.reel -o step.reel --frames 30:90", "walk.reel -o step.reel --frames 30:90 --keys"),
+    "concat": ("walk-1.reel walk-2.reel -o walk.reel", "s3://takes/walk-1.reel s3://takes/walk-2.reel -o walk.reel"),
+    "retime": ("walk.reel -o film.reel --fps 24", "walk.reel -o slow.reel --speed 0.25"),
+    "transform": ("walk.reel -o small.reel --scale 0.001", "walk.reel -o turned.reel --rotate 90 0 0 --up z"),
+    "tag": ("walk.reel title='A walk' take=3 -o tagged.reel", "walk.reel --audio walk.opus -o heard.reel"),
+    "decode": ("scan.reel -o meshes --format ply", "room.reel -o background --only background"),
+    "export": ("scan.reel --glb", "scan.reel -o scan.usdz --texture"),
+    "info": ("scan.reel", "scan.reel --groups --json"),
+    "compare": ("scan scan.reel --sheet errors.png", "'takes/walk_*.obj' walk.reel --scale 0.001 --no-ssim"),
+    "play": ("scan.reel", "scan.reel --host 0.0.0.0 --https"),
+    "serve": ("recordings --port 8000", "recordings --cors https://example.org"),
+    "player": ("--copy-to site/player", ""),
+    "demo": ("", "-o demo --frames 8 --jobs 2"),
+    "doctor": ("", "--json"),
+    "completion": ("bash >> ~/.bashrc", "zsh > ~/.zfunc/_meshreel"),
+}
 BENCH = "Measure codecs against each other."
-
-
 EXTRAS = {  # extras of packages that are not in `encode`
     **dict.fromkeys(("starlette", "uvicorn", "trustme"), "play"),
     **dict.fromkeys(("matplotlib", "skimage"), "demo"),
@@ -72,7 +98,7 @@ PLUGINS = "meshreel.commands"  # entry points with which other distributions add
 
 def place_of(name: str) -> str:
     """Return module and function of a command, as `module:function`."""
-    return f"meshreel.cli.edits:{name}" if name in EDITS else f"meshreel.cli.{name}:command"
+    return f"meshreel.cli.{SHARED.get(name, name)}:{name if name in SHARED else 'command'}"
 
 
 def make_app(names: Sequence[str] = tuple(COMMANDS)) -> App:
@@ -81,16 +107,19 @@ def make_app(names: Sequence[str] = tuple(COMMANDS)) -> App:
 
     from cyclopts import App
 
-    from .examples import epilogue
-
     help = "Compression of time-varying meshes."
     app = App(name="meshreel", help=help, version=__version__, suppress_keyboard_interrupt=False)
     for name in names:
-        app.command(place_of(name), name=name, help=COMMANDS[name], help_epilogue=epilogue(name))
+        app.command(place_of(name), name=name, help=COMMANDS[name], help_epilogue=_epilogue(name))
     added = {entry.name: entry.value for entry in entry_points(group=PLUGINS) if entry.name not in COMMANDS}
     for name, where in added.items():
         app.command(where, name=name, help=BENCH)
     return app
+
+
+def _epilogue(name: str) -> str:
+    """Return the end of a command's help, in Markdown."""
+    return "\n".join(["Examples:", "", *(f"    meshreel {name} {line}".rstrip() for line in EXAMPLES[name])])
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -87,9 +87,8 @@ def command(
             calibration = refined(posed, progress)
         posed = with_poses(posed, {camera.name: camera.view.pose.to_world for camera in calibration.cameras}, {})
         warnings += calibration.warnings
-        write_calibration_sheet(
-            calibration, posed.up, path.with_name("calibration.png") if in_place else path.with_suffix(".png")
-        )
+        picture = path.with_name("calibration.png") if in_place else path.with_suffix(".png")
+        write_calibration_sheet(calibration, posed.up, picture)
     new = described(posed)
     if in_place:
         with replacing(rig / BEFORE) as file:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -13,7 +13,7 @@ from cyclopts import Parameter
 
 from ..capture.recording import Recording, open_recording
 from ..capture.recordings import is_rig, open_take
-from ..capture.recordings.takes import Stream, Take
+from ..capture.recordings.takes import Take
 from ..capture.rig.cameras import ColorCamera, DepthCamera
 from ..capture.rig.fusion import FusionOptions
 from ..capture.rig.rig import Rig, read_rig
@@ -71,10 +71,8 @@ def command(
     """
     options = FusionOptions(voxel, truncation, fragment)
     if show:  # reads no picture
-        recordings = [read_rig(path) if is_rig(path) else open_take(path) for path in inputs]
-        lines = [line for each in recordings for line in (_rig_lines(each) if isinstance(each, Rig) else _lines(each))]
-        rows = [_rig_row(each) if isinstance(each, Rig) else _take_row(each) for each in recordings]
-        return common.result({"recordings": rows}, *lines)
+        facts = [_rig_facts(read_rig(path)) if is_rig(path) else _take_facts(open_take(path)) for path in inputs]
+        return common.result({"recordings": [row for row, _ in facts]}, *(line for _, of in facts for line in of))
     if output is None:
         raise InputError("--output is missing: a folder for meshes, or for the rig of recordings; or give --list")
     if len(inputs) > 1 or (inputs[0].exists() and not is_rig(inputs[0])):
@@ -84,34 +82,26 @@ def command(
     return _fuse(inputs[0], output, options, frames, format, common)
 
 
-def _take_row(take: Take) -> dict[str, Any]:
-    cameras = [
-        {"name": sensor.name, "depth": _row(sensor.depth)}
-        | {"color": None if sensor.color is None else _row(sensor.color)}
-        | {"poses": 0 if sensor.poses is None else len(sensor.poses)}
-        for sensor in take.sensors
-    ]
-    return {"path": str(take.path), "kind": take.kind, "cameras": cameras, "others": list(take.others)}
-
-
-def _row(stream: Stream) -> dict[str, Any]:
-    about = {"width": stream.width, "height": stream.height, "pictures": stream.count, "seconds": stream.seconds}
-    return about | {"pictures_per_second": stream.rate, "calibrated": stream.lens is not None}
-
-
-def _lines(take: Take) -> Iterator[str]:
-    yield f"{take.path}: {take.kind}"
+def _take_facts(take: Take) -> tuple[dict[str, Any], list[str]]:
+    """Return a row for JSON and lines for the terminal."""
+    cameras, lines = list[dict[str, Any]](), [f"{take.path}: {take.kind}"]
     for sensor in take.sensors:
+        camera: dict[str, Any] = {"name": sensor.name, "depth": None, "color": None}
         for kind, stream in (("depth", sensor.depth), ("color", sensor.color)):
             if stream is not None:
+                size = {"width": stream.width, "height": stream.height, "pictures": stream.count}
+                rate = {"seconds": stream.seconds, "pictures_per_second": stream.rate}
+                camera[kind] = size | rate | {"calibrated": stream.lens is not None}
                 calibration = "calibrated" if stream.lens is not None else f"NOT calibrated: {take.calibrate}"
                 times = f"{stream.count} pictures in {stream.seconds:.2f} s ({stream.rate:.4g} a second)"
-                yield f"  {sensor.name}: {kind} {stream.width} x {stream.height}, {times}, {calibration}"
-    if take.others:
-        yield f"  not read: {', '.join(take.others)}"
+                lines.append(f"  {sensor.name}: {kind} {stream.width} x {stream.height}, {times}, {calibration}")
+        cameras.append(camera | {"poses": 0 if sensor.poses is None else len(sensor.poses)})
+    lines += [f"  not read: {', '.join(take.others)}"] if take.others else []
+    return {"path": str(take.path), "kind": take.kind, "cameras": cameras, "others": list(take.others)}, lines
 
 
-def _rig_row(rig: Rig) -> dict[str, Any]:
+def _rig_facts(rig: Rig) -> tuple[dict[str, Any], list[str]]:
+    """Return a row for JSON and lines for the terminal."""
     streams: list[tuple[str, DepthCamera | ColorCamera, Mapping[int, Path]]] = []
     streams += [("depth", camera, files) for camera, files in zip(rig.cameras, rig.files, strict=True)]
     streams += [("color", camera, camera.files) for camera in rig.color_cameras]
@@ -119,16 +109,12 @@ def _rig_row(rig: Rig) -> dict[str, Any]:
         {"name": one.name, "kind": kind, "width": one.view.width, "height": one.view.height, "pictures": len(files)}
         for kind, one, files in streams
     ]
-    about = {"path": str(rig.folder), "kind": "a rig", "frames": len(rig.frames), "frame_rate": rig.frame_rate}
-    return about | {"cameras": cameras}
-
-
-def _rig_lines(rig: Rig) -> Iterator[str]:
-    row = _rig_row(rig)
-    yield f"{rig.folder}: a rig, {row['frames']} frames, {rig.frame_rate:g} a second"
-    for camera in row["cameras"]:
+    lines = [f"{rig.folder}: a rig, {len(rig.frames)} frames, {rig.frame_rate:g} a second"]
+    for camera in cameras:
         size = f"{camera['width']} x {camera['height']}, {camera['pictures']} pictures"
-        yield f"  {camera['name']}: {camera['kind']} {size}, calibrated"
+        lines.append(f"  {camera['name']}: {camera['kind']} {size}, calibrated")
+    about = {"path": str(rig.folder), "kind": "a rig", "frames": len(rig.frames), "frame_rate": rig.frame_rate}
+    return about | {"cameras": cameras}, lines
 
 
 def _make_rig(inputs: list[Path], output: Path, common: Common) -> None:

@@ -12,28 +12,33 @@ import numpy as np
 from cyclopts import Parameter
 from rich.table import Table
 
+from ..analysis.appearance.splat_fit import SplatView
+from ..analysis.appearance.splat_raster import draw
+from ..analysis.appearance.splat_views import GOLDEN, rendered, ring, taken
 from ..capture.simulated.truth import Truth, read_truth
 from ..container.sources import FileSource
 from ..decoder.describe import describe_file
 from ..decoder.video import Video
 from ..decoder.video import open as open_video
+from ..encoder.group.progress import Progress
 from ..errors import FormatError, InputError
-from ..export.splats import check_splats
+from ..export.frames import check_splats
 from ..format.layout import MAGIC, ChunkKind
 from ..geometry.cameras import Camera
 from ..geometry.derived_sequences import CapturedSequence, captured, picked
+from ..geometry.splats import Bound
 from ..geometry.topology import weld
 from ..io.sequence import SequenceOptions, open_sequence
+from ..metrics.color import PEAK, psnr
 from ..metrics.comparison import ComparisonOptions, compare_sequences
 from ..metrics.depth import DepthJudge, judge
 from ..metrics.error_sheet import SheetOptions, write_sheet
 from ..metrics.scene_accuracy import Scene, Sight, compare_with_truth
+from ..metrics.ssim import BORDER, ssim_map
 from ..metrics.viewpoints import read_cameras
-from ..types import UP_AXES, Frames, MeshSequence
+from ..types import UP_AXES, Frames, MeshSequence, evenly
 from .console import Common, StageBars
-from .flags import Knowing, Looking, Reading
-from .sources import open_source
-from .splats import compare_splats
+from .sources import Knowing, Looking, Reading, open_source
 
 ALIKE = 0.2  # share of the measured depth: a decoded scene that covers less is of another recording (guess)
 OF_BOTH = {"truth": "against the truth", "depth": "by the depth pictures"}  # metrics of originals and decoded meshes
@@ -79,7 +84,8 @@ def command(
     if sheet is not None:
         import_module("matplotlib")  # if it is missing, fail before minutes of measuring
     source = open_source([originals], reading, common)
-    sequence, stored = source.sequence, open_decoded(decoded, reading)
+    sequence, as_read = source.sequence, SequenceOptions(reading.fps, weld=weld)
+    stored: MeshSequence = open_video(decoded) if is_reel(decoded) else open_sequence(decoded, as_read)
     same = len(stored) == len(sequence)
     numbers = range(len(stored)) if same else reading.options().chosen(len(stored))  # of the frames in `decoded`
     other = stored if same else picked(stored, numbers)
@@ -97,16 +103,21 @@ def command(
             if splats and isinstance(other, Video):
                 row |= compare_splats(sequence, other, progress)
             if truth is not None:
-                row["truth"] = against_truth(
-                    sequence, other, truth, range(0, len(sequence), knowing.truth_every), progress
-                )
+                looked_at = range(0, len(sequence), knowing.truth_every)
+                row["truth"] = against_truth(sequence, other, truth, looked_at, progress)
         if sheet is not None:
             write_sheet(sequence, other, sheet, sheet_options)
     except FormatError as error:  # names the chunk, but not the file
         raise FormatError(f"{decoded}: {error}; copy the file again, or compare frames before it") from None
     warnings = [*source.warnings, *(f"{decoded}: {w}" for w in getattr(stored, "warnings", ()))]
     warnings += _other(row, originals, decoded)
-    _tell({"warnings": warnings} | _rate(decoded, stored) | row, sheet, common)
+    described = describe_file(Path(decoded)) if isinstance(stored, Video) else {}
+    rates = ("bytes", "mbps", "bytes_by_content", "mbps_by_content")
+    row = {"warnings": warnings} | {name: described[name] for name in rates if described} | row
+    common.warn(warnings)
+    texts: list[object] = [both_table(title, row[name]) for name, title in OF_BOTH.items() if name in row]
+    texts += [f"picture: {sheet}"] if sheet is not None else []
+    common.result(row, metric_table(row), *_cameras(row), *texts)
 
 
 def _other(row: dict[str, Any], originals: str, decoded: str) -> Iterator[str]:
@@ -117,33 +128,12 @@ def _other(row: dict[str, Any], originals: str, decoded: str) -> Iterator[str]:
         yield f"{text}; is it of another recording, or of other frames (--frames)?"
 
 
-def _tell(row: dict[str, Any], sheet: Path | None, common: Common) -> None:
-    common.warn(row["warnings"])
-    texts: list[object] = [both_table(title, row[name]) for name, title in OF_BOTH.items() if name in row]
-    texts += [f"picture: {sheet}"] if sheet is not None else []
-    common.result(row, metric_table(row), *_cameras(row), *texts)
-
-
 def _measured(
     sequence: MeshSequence, other: MeshSequence, options: ComparisonOptions, progress: StageBars
 ) -> dict[str, Any]:
     """Compare the meshes of all frames, and judge those of a rig by its depth pictures."""
     row = compare_sequences(sequence, counted(other, progress), options).to_row()
     return row if captured(sequence).depth is None else row | {"depth": by_depth(captured(sequence), other, progress)}
-
-
-def _rate(decoded: str, other: MeshSequence) -> dict[str, Any]:
-    """Return the size and rate of a .reel file; nothing for meshes."""
-    if not isinstance(other, Video):
-        return {}
-    described = describe_file(Path(decoded))
-    return {name: described[name] for name in ("bytes", "mbps", "bytes_by_content", "mbps_by_content")}
-
-
-def open_decoded(decoded: str, reading: Reading) -> MeshSequence:
-    if is_reel(decoded):
-        return open_video(decoded)
-    return open_sequence(decoded, SequenceOptions(reading.fps, weld=weld))
 
 
 def _options(looking: Looking, sequence: MeshSequence, decoded: MeshSequence) -> ComparisonOptions:
@@ -153,7 +143,9 @@ def _options(looking: Looking, sequence: MeshSequence, decoded: MeshSequence) ->
     """
     options = looking.options(captured(sequence).depth is None)
     if isinstance(decoded, Video) and not options.keys:
-        return replace(options, keys=recorded_keys(decoded.reader.metadata, len(decoded)))
+        recorded = decoded.reader.metadata.get("key_frames")
+        numbers = recorded if isinstance(recorded, list) else []  # a foreign file may have invalid values
+        return replace(options, keys=tuple(n for n in numbers if type(n) is int and 0 <= n < len(decoded)))
     return options
 
 
@@ -223,13 +215,6 @@ def is_reel(path: str) -> bool:
         return source.get_bytes(0, len(MAGIC)) == MAGIC
 
 
-def recorded_keys(metadata: dict[str, Any], count: int) -> tuple[int, ...]:
-    """Return the key frames below `count` recorded in a file; ignore invalid values, which a foreign file may have."""
-    recorded = metadata.get("key_frames")
-    numbers = recorded if isinstance(recorded, list) else []
-    return tuple(number for number in numbers if type(number) is int and 0 <= number < count)
-
-
 def metric_table(row: dict[str, Any]) -> Table:
     """Return a table of metrics, one per line: mean over frames, worst frame, and mean without key frames.
 
@@ -268,3 +253,45 @@ def _cameras(row: dict[str, Any]) -> list[str]:
 
 def _number(value: int | float | None) -> str:
     return "" if value is None else f"{value:.6g}"
+
+
+FRAMES, VIEWS, SIZE = 8, 4, 256  # frames that are compared, cameras around each, and pixels of the longer side
+ASIDE = 0.11  # turns, from a camera to which the encoder fitted splats
+
+
+def compare_splats(sequence: MeshSequence, video: Video, progress: Progress) -> dict[str, Any]:
+    """Return PSNR, dB, and SSIM of pictures of splats in some frames, cropped to the bodies.
+
+    They are compared with a rig's pictures, or with renders of coloured meshes from cameras that were not used to fit.
+    Raises InputError if there are neither.
+    """
+    numbers, squares, scores = evenly(len(sequence), FRAMES), list[float](), list[float]()
+    for done, number in enumerate(numbers, 1):
+        if (bound := video.splats(number)) is not None:
+            for square, score in (errors(bound, view) for view in held_out(sequence, video, number)):
+                squares.append(square)
+                scores.append(score)
+        progress("splats", done, len(numbers))
+    if not squares:
+        raise InputError("--splats: no frame of the originals has colours and splats; compare with coloured originals")
+    row = {"splats_psnr": psnr(PEAK**2 * float(np.mean(squares))), "splats_ssim": float(np.mean(scores))}
+    return row | {"splats_views": len(squares)}
+
+
+def held_out(sequence: MeshSequence, video: Video, number: int) -> tuple[SplatView, ...]:
+    """Return pictures of a frame: a rig's, or renders from cameras that were not used to fit."""
+    if (colors := captured(sequence).colors) is not None:
+        pictures = [picture for picture in colors[number] if picture is not None]
+        return taken(pictures, video.moving(number), sequence[number], SIZE)
+    mesh, up = sequence[number], captured(sequence).up
+    return rendered(mesh, ring(mesh, VIEWS, SIZE, GOLDEN * number + ASIDE, up)) if mesh.is_colored else ()
+
+
+def errors(bound: Bound, view: SplatView) -> tuple[float, float]:
+    """Return the mean squared error, of values 0 to 1, and SSIM of a picture of splats; unknown pixels are left out."""
+    drawn = np.clip(draw(bound, view.camera), 0, 1)
+    known = np.isfinite(view.pixels)
+    target = np.where(known, view.pixels, drawn).astype(np.float64)
+    inside = slice(BORDER, -BORDER)
+    square = float(np.square(drawn - target)[known].mean()) if known.any() else 0.0
+    return square, float(ssim_map(drawn.astype(np.float64), target)[inside, inside].mean())

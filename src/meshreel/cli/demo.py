@@ -57,14 +57,9 @@ def command(
     jobs
         Number of intervals to encode side by side; the file is the same.
     """
-    if jobs < 1:
-        raise InputError(f"--jobs must be at least 1, got {jobs}")
     if seed < 0:
         raise InputError(f"--seed must not be negative, got {seed}")
-    options, room = (
-        Settings(quality=quality).resolved(),
-        RoomOptions(frames=frames, seed=seed),
-    )  # errors before work begins
+    options, room = Settings(quality=quality).resolved(), RoomOptions(frames=frames, seed=seed)  # errors before work
     file, picture = output / "demo.reel", output / "demo.png"
     with common.stages(frames) as progress, workers(jobs) as executor:
         capture = _captured(output / "rig", room, progress)

@@ -1,4 +1,4 @@
-"""`meshreel encode`: encode a mesh sequence into one .reel file."""
+"""`meshreel encode` and `survey`: encode a mesh sequence, or survey it for encodes of its parts."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from typing import Annotated, Any
 
 from cyclopts import Parameter
 
+from ..encoder.file.notices import warnings_of
 from ..encoder.file.summary import SceneSummary, Summary
 from ..encoder.group.digests import WriteLines, machine_line
 from ..encoder.rate_control import Goal, encode_to
@@ -21,13 +22,13 @@ from ..encoder.sequence import Encoder
 from ..encoder.settings.options import EncoderOptions, as_installed
 from ..encoder.settings.settings import QUALITY, Settings
 from ..errors import InputError
-from ..io.remote import Place, located
+from ..geometry.derived_sequences import upright
+from ..io.remote import Place, located, uploaded
 from ..io.sequence import SequenceOptions
 from ..io.write import check_apart, replacing
-from ..types import MeshSequence
+from ..types import MeshSequence, Up
 from .console import Common
-from .flags import Hearing, Reading
-from .sources import Masking, open_source
+from .sources import Hearing, Masking, Reading, open_source
 from .workers import workers
 
 
@@ -70,9 +71,8 @@ class Part:
         """Return the frames to encode, None for all of a sequence without a survey. Raises InputError."""
         if self.survey is None:
             if self.part is not None:
-                raise InputError(
-                    f"--part {self.part}: needs the --survey that all parts share; meshreel survey writes it"
-                )
+                text = "needs the --survey that all parts share; meshreel survey writes it"
+                raise InputError(f"--part {self.part}: {text}")
             return None
         surveyed, chosen = read_survey(located(self.survey)), SequenceOptions(frames=frames).chosen(len(sequence))
         if self.part is None:
@@ -91,7 +91,7 @@ class Part:
 _PART = re.compile(r"(\d{1,9})/([1-9]\d{0,8})")
 
 
-def command(
+def encode(
     inputs: list[str],
     /,
     *,
@@ -152,7 +152,7 @@ def command(
     options = options_at(quality)
     lacking = as_installed(options)[1]  # raises InputError before recordings are read
     source = open_source(inputs, reading if part.survey is None else replace(reading, frames=":"), common)
-    sequence, masker = masking.upright(source), masking.masker(len(source.sequence))
+    sequence, masker = upright(source.sequence, masking.up), masking.masker(len(source.sequence))
     excerpt = part.excerpt(sequence, reading.frames, options)
     here = jobs == 1 and cluster is None  # with workers, this process reads no frame
     early = lacking if sequence.colors is not None or (lacking and here and is_colored(sequence)) else ()
@@ -267,3 +267,46 @@ def _reached(row: dict[str, Any]) -> str:
         return f"quality {row['quality']:g}"
     measured = "" if row["scene"] is None else f" in {len(row['scene']['measured_frames'])} frames"
     return f"quality {row['quality']:g}, D2-PSNR {psnr:.2f} dB{measured}"
+
+
+def survey(
+    inputs: list[str],
+    /,
+    *,
+    output: Annotated[str, Parameter(name=["--output", "-o"])],
+    reading: Reading = Reading(),
+    up: Annotated[Up | None, Parameter(allow_leading_hyphen=True)] = None,
+    jobs: int = 1,
+    cluster: str | None = None,
+    common: Common = Common(),
+) -> None:
+    """Read all frames of a sequence once, and write the facts about the whole that encodes of its parts need.
+
+    Parameters
+    ----------
+    inputs
+        The meshes, as `encode` takes them.
+    output
+        The .json file to write: box, size and digest of the frames. Give it to `encode --survey`. It may be a URL, as
+        the inputs may (extra `remote`).
+    up
+        Axis that points up, as `encode` takes it.
+    jobs
+        Number of processes that read side by side; the file is the same.
+    cluster
+        Address of a Dask scheduler whose workers read, as `encode` takes it.
+    """
+    place = located(output)
+    if place.suffix != ".json":
+        raise InputError(f"{output}: the output must end in .json")
+    if reading.frames != ":":
+        raise InputError(f"--frames {reading.frames}: a survey is of all frames; give --frames to encode --survey")
+    source = open_source(inputs, reading, common)
+    sequence = upright(source.sequence, up)
+    with uploaded(place) as path, common.stages(len(sequence)) as progress, workers(jobs, cluster) as executor:
+        check_apart(path, sequence.files)
+        surveyed = Encoder(sequence, executor, progress).survey(path)
+    warnings = (*source.warnings, *warnings_of(surveyed))
+    common.warn(warnings)
+    row = {"output": str(place), "frames": len(sequence), "warnings": warnings}
+    common.result(row, f"{place}: {len(sequence)} frames, {surveyed.diagonal:.3g} m large")

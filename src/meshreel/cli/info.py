@@ -41,7 +41,9 @@ def command(
     head = f"{file}: {length}, {size}, {row['mbps']:.4g} Mbps"
     metadata = {name: str(value) for name, value in row["metadata"].items()}
     short = {name: text if len(text) <= _LONGEST else f"{text[:_LONGEST]} ..." for name, text in metadata.items()}
-    recorded = _printable(", ".join(f"{name} {text}" for name, text in (metadata if groups else short).items()))
+    recorded = ", ".join(f"{name} {text}" for name, text in (metadata if groups else short).items())
+    # Control characters are escaped: an untrusted file must not control the terminal.
+    recorded = "".join(letter if letter.isprintable() else repr(letter)[1:-1] for letter in recorded)
     is_long, more = len(row["bytes_by_content"]) > MOST_CONTENTS and not groups, None if groups else MOST
     tables = [rate_table(row | _added_up(row) if is_long else row)]
     if row["background"] or len(row["tracks"]) > 1:
@@ -78,11 +80,6 @@ def _looks(row: dict[str, Any]) -> str:
         begin = f", from {sound['start_s']:g} s" if "start_s" in sound else ""
         parts.append(f"audio: {sound.get('type', 'damaged')}, {sound['bytes']} bytes{begin}")
     return "; ".join([*parts, *([f"{hidden} frames more are hidden"] if hidden else [])])
-
-
-def _printable(text: str) -> str:
-    """Return the text with control characters escaped: an untrusted file must not control the terminal."""
-    return "".join(letter if letter.isprintable() else repr(letter)[1:-1] for letter in text)
 
 
 def _added_up(row: dict[str, Any]) -> dict[str, Any]:

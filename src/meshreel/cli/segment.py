@@ -15,16 +15,16 @@ from ..analysis.scene.masks import CAMERAS, Masker
 from ..analysis.scene.pictures import write_views
 from ..analysis.scene.preview import FrameViews, label_colors, look_at_labels, sheet
 from ..analysis.scene.segmentation import mask_views, scene_views, segment, segment_by
-from ..encoder.scene.labels import FrameLabels, label_frames
+from ..encoder.scene.labels import label_frames
 from ..encoder.settings.options import EncoderOptions, SceneOptions
 from ..errors import InputError
 from ..geometry.cameras import pack_cameras
+from ..geometry.derived_sequences import upright
 from ..io.mask_pictures import is_mask
 from ..io.write import frame_names, left_over, make_folder, replacing, write_colored, write_picture
 from ..types import MeshSequence, evenly
 from .console import Common
-from .flags import Reading
-from .sources import Masking, open_source
+from .sources import Masking, Reading, open_source
 
 COLUMNS = 4  # views in the sheet (guess)
 MOST_PREVIEWS = 16  # frames whose pictures are in memory together (guess)
@@ -64,7 +64,7 @@ def command(
     if views_only and (masking.masks or masking.sam3):
         raise InputError("--views-only needs no masks; leave out --masks and --sam3")
     source = open_source(inputs, reading, common)
-    scene, sequence = SceneOptions(masking.cameras), masking.upright(source)
+    scene, sequence = SceneOptions(masking.cameras), upright(source.sequence, masking.up)
     masker = masking.masker(len(source.sequence))
     left = _left_over(output, len(source.sequence), views_only, previews)
     if views_only:
@@ -107,7 +107,7 @@ def _write_labels(scene: _Labelling, output: Path, previews: int, common: Common
     frames, count, options = scene.frames, len(scene.frames), scene.options
     chosen = evenly(count, previews)
     names = [Path(name).stem for name in frame_names(count, "npz")]
-    tally, rows = _Tally(), list[tuple[FrameViews, list[int]]]()
+    moving, of_bodies, rows = list[int](), list[list[int]](), list[tuple[FrameViews, list[int]]]()
     with common.stages(count) as progress:
         by: Segmentation
         if scene.masker is None:
@@ -122,7 +122,8 @@ def _write_labels(scene: _Labelling, output: Path, previews: int, common: Common
         for number, labels in enumerate(label_frames(frames, by, EncoderOptions(scene=options))):
             with replacing(output / LABELS / f"{names[number]}.npz") as file:
                 np.savez_compressed(file, moving=labels.moving, bodies=labels.bodies)
-            tally.add(labels)
+            moving.append(int(labels.moving.sum()))
+            of_bodies.append(np.bincount(labels.bodies).tolist())
             if number in chosen:
                 mesh = frames[number]
                 colors = label_colors(labels.moving, labels.bodies)
@@ -134,33 +135,21 @@ def _write_labels(scene: _Labelling, output: Path, previews: int, common: Common
         file.write(pack_cameras(views))
     if chosen:
         write_picture(_sheet(rows), output / SHEET)
-    return tally.row() | {"views": len(views)}
+    return _totals(moving, of_bodies) | {"views": len(views)}
 
 
-class _Tally:
-    """Counts of faces over all frames."""
-
-    def __init__(self) -> None:
-        self._faces, self._moving = list[int](), list[int]()
-        self._bodies: dict[int, list[int]] = {}  # face counts of each body in the frames that have it
-
-    def add(self, labels: FrameLabels) -> None:
-        self._faces.append(len(labels.moving))
-        self._moving.append(int(labels.moving.sum()))
-        for number, faces in enumerate(np.bincount(labels.bodies).tolist()):
-            if number and faces:
-                self._bodies.setdefault(number, []).append(faces)
-
-    def row(self) -> dict[str, Any]:
-        bodies = [
-            {"body": number, "frames": len(faces), "faces": sum(faces) // len(faces)}
-            for number, faces in sorted(self._bodies.items())
-        ]
-        shares = [moving / max(faces, 1) for moving, faces in zip(self._moving, self._faces, strict=True)]
-        share = sum(self._moving) / max(sum(self._faces), 1)
-        shares_row = {"moving_share": share, "moving_share_least": min(shares), "moving_share_most": max(shares)}
-        counted = {"frames": len(self._faces), "faces": sum(self._faces), "moving": sum(self._moving)}
-        return counted | shares_row | {"bodies": bodies}
+def _totals(moving: list[int], of_bodies: list[list[int]]) -> dict[str, Any]:
+    """Return counts over all frames, from the moving faces of each frame and the faces of each of its bodies."""
+    bodies = []
+    for number in range(1, max(map(len, of_bodies))):  # 0: faces of no body
+        faces = [counts[number] for counts in of_bodies if len(counts) > number and counts[number]]
+        bodies += [{"body": number, "frames": len(faces), "faces": sum(faces) // len(faces)}] if faces else []
+    totals = [sum(counts) for counts in of_bodies]
+    shares = [count / max(total, 1) for count, total in zip(moving, totals, strict=True)]
+    counted = {"frames": len(totals), "faces": sum(totals), "moving": sum(moving)}
+    share = sum(moving) / max(sum(totals), 1)
+    shares_row = {"moving_share": share, "moving_share_least": min(shares), "moving_share_most": max(shares)}
+    return counted | shares_row | {"bodies": bodies}
 
 
 def _sheet(previews: list[tuple[FrameViews, list[int]]]) -> UInt8[np.ndarray, "Y X 3"]:

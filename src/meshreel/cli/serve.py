@@ -1,12 +1,15 @@
-"""`meshreel serve`: serve a folder of .reel files as a gallery."""
+"""`meshreel play` and `serve`: play one .reel file in a browser, or serve a folder of them as a gallery."""
 
 from __future__ import annotations
 
+import threading
+import webbrowser
 from pathlib import Path
 from typing import Annotated
 
 from cyclopts import Parameter
 
+from ..decoder.video import open as open_video
 from ..errors import InputError
 from ..server.app import make_app
 from ..server.library import Library
@@ -14,7 +17,40 @@ from ..server.run import ServerOptions, run
 from .console import Common
 
 
-def command(
+def play(
+    file: Path,
+    /,
+    *,
+    browser: Annotated[bool, Parameter(negative="--no-browser")] = True,
+    server: Annotated[ServerOptions, Parameter(name="*")] = ServerOptions(),
+    common: Common = Common(),
+) -> None:
+    """Play a .reel file in a browser, on this machine or on a headset. Ctrl-C stops it.
+
+    Parameters
+    ----------
+    file
+        The .reel file.
+    browser
+        Open the page in the browser of this machine.
+    """
+    with open_video(file):  # a damaged file is an error before the server starts
+        pass
+
+    def announce(urls: list[str]) -> None:
+        common.result({"file": str(file), "addresses": urls}, f"playing {file} at {' '.join(urls)}  (Ctrl-C stops)")
+        if browser:  # in a thread: a text browser returns only when it is closed
+            threading.Thread(target=_open, args=(urls[0], common), daemon=True).start()
+
+    run(make_app(Library.of_file(file), hosts=server.hosts), server, announce)
+
+
+def _open(address: str, common: Common) -> None:
+    if not webbrowser.open(address):
+        common.note(f"no browser was found: open {address}")
+
+
+def serve(
     folder: Path,
     /,
     *,

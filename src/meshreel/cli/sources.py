@@ -1,4 +1,4 @@
-"""Inputs of commands that take scenes: mesh files, the folder of a rig or recordings, and flags for masks."""
+"""Inputs of commands, and flags that several commands share: reading and comparing meshes, masks, audio, truth."""
 
 from __future__ import annotations
 
@@ -17,15 +17,19 @@ from ..capture.recording import open_recording
 from ..capture.recordings import is_rig, is_take, open_take
 from ..capture.recordings.takes import Take
 from ..capture.recordings.to_rig import write_takes
+from ..edit.audio import packed_audio
 from ..errors import InputError
-from ..geometry.derived_sequences import DerivedSequence, upright
+from ..geometry.topology import weld
 from ..io.remote import Remote, located
-from ..io.sequence import capture_record, open_sequence
+from ..io.sequence import SequenceOptions, capture_record, open_sequence
+from ..metrics.comparison import ComparisonOptions
+from ..metrics.mpeg import MpegOptions
+from ..metrics.viewpoints import ViewOptions
 from ..types import MeshSequence, Up
 from .console import Common
-from .flags import Reading
 
-_READ = Reading()
+_READ = SequenceOptions()
+_VIEWS = ViewOptions()
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,15 +64,14 @@ def open_source(inputs: Sequence[str], reading: Reading, common: Common = Common
     if isinstance(folder, Remote) or len(inputs) > 1 or not is_rig(folder) or any(folder.glob("frame_*.ply")):
         options, made = reading.options(), capture_record(folder) if len(inputs) == 1 else {}
         rate = made.get("frames_per_second")
-        if reading.fps == _READ.fps and isinstance(rate, (int, float)) and rate > 0:
+        if reading.fps == _READ.frame_rate and isinstance(rate, (int, float)) and rate > 0:
             options = replace(options, frame_rate=float(rate))
-        sequence = open_sequence(inputs[0] if len(inputs) == 1 else list(inputs), options)
-        return Source(sequence)
+        return Source(open_sequence(inputs[0] if len(inputs) == 1 else list(inputs), options))
     reading.options()  # raises InputError for invalid values
     if reading.scale != _READ.scale:
         raise InputError(f"--scale {reading.scale:g}: {folder} is a rig, whose poses are in metres; leave it out")
     recording, remarks = open_recording(folder, frames=reading.frames)
-    if reading.fps not in (_READ.fps, recording.frame_rate):
+    if reading.fps not in (_READ.frame_rate, recording.frame_rate):
         text = f"--fps {reading.fps:g}: {folder} is a rig of {recording.frame_rate:g} frames a second"
         raise InputError(f"{text}; leave it out, or mend the rig's description")
     return Source(recording, tuple(remarks))
@@ -122,10 +125,6 @@ class Masking:
         """True if any flag except --up is given."""
         return replace(self, up=None) != Masking()
 
-    def upright(self, source: Source) -> DerivedSequence:
-        """Return the sequence with its axis that points up: that of --up, else that of the cameras."""
-        return upright(source.sequence, self.up)
-
     @property
     def cameras(self) -> Cameras:
         """Cameras of --views, or none. Raises InputError if their file is wrong."""
@@ -138,3 +137,81 @@ class Masking:
         if self.sam3 is not None:
             return Sam3Masks(self.sam3, self.prompts or None, Sam3Options(None, self.prompt_by, self.device))
         return None
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """Flags for reading mesh files as a sequence."""
+
+    fps: float = _READ.frame_rate
+    """Frames per second; by default 30, or the rate of the recording for a folder that `capture` wrote."""
+    frames: str = _READ.frames
+    """Frames to use, as A:B with B excluded."""
+    scale: float = _READ.scale
+    """Factor from the unit of the files to metres."""
+
+    def options(self) -> SequenceOptions:
+        """Return the options of `open_sequence`, which welds vertices that repeat a position."""
+        return SequenceOptions(self.fps, self.frames, self.scale, weld)
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, slots=True)
+class Looking:
+    """Flags for the metrics, cameras and key frames of a comparison."""
+
+    ssim: bool | None = None
+    """Also render pictures and compare them by SSIM (some seconds per frame, half a minute of a room). By default not
+    where a rig's depth pictures judge the frames."""
+    cameras: Path | None = None
+    """File of Open3D pinhole cameras for SSIM; by default four views around the sequence."""
+    width: int = _VIEWS.width
+    """Size of the rendered pictures, pixels."""
+    height: int = _VIEWS.height
+    """Size of the rendered pictures, pixels."""
+    up: Annotated[Up, Parameter(allow_leading_hyphen=True)] = "y"
+    """The axis that points up."""
+    keys: Annotated[tuple[int, ...], Parameter(consume_multiple=True, negative="")] = ()
+    """Key frames: means without them are printed, too. By default those that the .reel file names."""
+    mpeg: Annotated[bool, Parameter(negative="")] = False
+    """Also compare by MPEG's measures, as mmetric and V-DMC's conditions have them: D1, D2 and IBSM (some 20 seconds
+    per frame)."""
+
+    def options(self, ssim: bool) -> ComparisonOptions:
+        """Return the options of `compare_sequences`; `ssim` decides if no flag requests or excludes SSIM."""
+        ssim = (ssim or self.cameras is not None) if self.ssim is None else self.ssim
+        views, mpeg = ViewOptions(self.width, self.height, up=self.up), MpegOptions() if self.mpeg else None
+        return ComparisonOptions(self.cameras, views, ssim, self.keys, mpeg)
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, slots=True)
+class Knowing:
+    """Flags for a comparison with the truth of a simulated rig."""
+
+    truth: Path | None = None
+    """Folder `truth` of the simulated rig from which the originals were captured: both are also compared with it."""
+    truth_every: int = 1
+    """Compare each Nth frame with the truth, from the first (seconds per frame of half a million faces)."""
+
+    def __post_init__(self) -> None:
+        if self.truth_every < 1:
+            raise InputError(f"--truth-every {self.truth_every}: give 1 for all frames, 6 for every sixth")
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, slots=True)
+class Hearing:
+    """Flags for the audio file of the frames."""
+
+    audio: str | None = None
+    """An audio file that players play with the frames: Opus (.opus, .webm), AAC (.m4a, .aac) or MP3, kept as it is."""
+    audio_start: float = 0.0
+    """Seconds from the first frame to the beginning of --audio; below 0, that much of it is left out."""
+
+    def payload(self) -> bytes:
+        """Return the payload of an audio chunk, empty without audio. Raises InputError for files of other types."""
+        if self.audio is None and self.audio_start:
+            raise InputError(f"--audio-start {self.audio_start:g}: needs --audio, the file that begins then")
+        return b"" if self.audio is None else packed_audio(self.audio, self.audio_start)

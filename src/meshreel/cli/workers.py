@@ -37,9 +37,8 @@ def workers(jobs: int, cluster: str | None = None) -> Iterator[Executor | None]:
         raise InputError(f"--jobs must be at least 1, got {jobs}")
     if cluster is not None:
         if jobs > 1:
-            raise InputError(
-                f"--jobs {jobs} and --cluster {cluster}: the cluster has workers of its own, give one of both"
-            )
+            text = "the cluster has workers of its own, give one of both"
+            raise InputError(f"--jobs {jobs} and --cluster {cluster}: {text}")
         with _cluster(cluster) as executor:
             yield executor
         return

@@ -23,14 +23,10 @@ class _UrlSource:
 
     def __init__(self, url: str) -> None:
         self._url, self.bytes_read = url, 0
-        self._begin, self._size = self._counted(0, FIRST_REQUEST)  # first bytes of the file
-
-    @property
-    def size(self) -> int:
-        return self._size
+        self._begin, self.size = self._counted(0, FIRST_REQUEST)  # first bytes of the file
 
     def get_bytes(self, offset: int, length: int) -> bytes:
-        end = min(offset + length, self._size)
+        end = min(offset + length, self.size)
         if end <= len(self._begin):
             return self._begin[offset:end]
         return self._counted(offset, end - offset)[0]
@@ -56,7 +52,7 @@ class StoreSource(_UrlSource):
             from fsspec.core import url_to_fs
 
             system, path = url_to_fs(self._url)
-            size = int(system.size(path)) if offset == 0 else self._size
+            size = int(system.size(path)) if offset == 0 else self.size
             data: bytes = system.cat_file(path, start=offset, end=min(offset + length, size))
         except ImportError as error:
             text = "a URL needs the extra `remote`, pip install 'meshreel[remote]', and some protocols a package more"

@@ -13,22 +13,9 @@ from itertools import accumulate, pairwise
 import numpy as np
 
 from ..errors import FormatError
-from ..format.budget import check_frames, check_head
-from ..format.checks import COMPANIONS, check_header, check_index, parse_metadata, unpack_audio
-from ..format.edit import parse_edit
-from ..format.layout import (
-    EDITED,
-    MAGIC,
-    VERSION,
-    AudioFile,
-    Checksum,
-    ChunkKind,
-    Form,
-    Header,
-    Index,
-    Layer,
-    Preamble,
-)
+from ..format.budget import check_head
+from ..format.checks import COMPANIONS, check_file, unpack_audio
+from ..format.layout import EDITED, MAGIC, VERSION, AudioFile, Checksum, ChunkKind, Form, Header, Index, Layer, Preamble
 from ..format.records import least_size, unpack, unpack_all
 from ..shapes import Float64
 from ..types import Up, known_up
@@ -72,29 +59,23 @@ class Chunk:
         if self.frame_count == 0:
             return f"chunk {self.number} ({'audio' if self.kind == ChunkKind.AUDIO else f'{what}static'})"
         track = "" if self.is_alone else f"track {self.track}, "
-        return (
-            f"chunk {self.number} ({what}{track}frames {self.first_frame} to {self.first_frame + self.frame_count - 1})"
-        )
+        last = self.first_frame + self.frame_count - 1
+        return f"chunk {self.number} ({what}{track}frames {self.first_frame} to {last})"
 
 
 class ReelReader:
     """Checked head of a file, and access to its chunks; does not close the source."""
 
     def __init__(self, source: Source) -> None:
-        self._source, self._bytes_read = source, 0
+        self.source, self._bytes_read = source, 0
         self.header, self.index, self.head_size, flags = _read_head(source)
-        check_index(self.index)
-        self.metadata = parse_metadata(self.header.metadata)
-        groups = (entry for entry in self.index.chunks if entry.kind == ChunkKind.GROUP)
-        self.coded_count = sum(entry.frames for entry in groups if entry.track == 0)  # frames, hidden ones included
-        self.edit = parse_edit(self.metadata, flags, self.coded_count)
+        # `size`: bytes of the whole file, even if it is truncated.
+        self.metadata, self.edit, self.size = check_file(self.header, self.index, flags, self.head_size)
         self.chunks = _chunks(self.index, self.head_size, -self.edit.first)
         self.groups = tuple(chunk for chunk in self.chunks if chunk.kind == ChunkKind.GROUP)
         self.tracks = _by_track(self.groups)  # the groups of each
         self.frame_count = self.edit.end - self.edit.first
-        check_header(self.header, self.frame_count)
-        self.size = self.chunks[-1].end  # bytes of the whole file, even if it is truncated
-        check_frames(sum(group.frame_count for group in self.groups), self.size)
+        self.coded_count = sum(group.frame_count for group in self.tracks[0])  # frames, hidden ones included
         if source.size > self.size:
             raise FormatError(f"{source.size - self.size} bytes behind the last chunk, copy the file again")
         self._companions = {(c.depends_on[0], c.kind): c for c in self.chunks if c.kind in COMPANIONS}
@@ -106,13 +87,9 @@ class ReelReader:
         self._times = list(accumulate(self.header.intervals, initial=self.header.first_time))
 
     @property
-    def source(self) -> Source:
-        return self._source
-
-    @property
     def bytes_read(self) -> int:
         """Bytes received over the network, head included; for a local file, the bytes of the chunks that were read."""
-        count: int = getattr(self._source, "bytes_read", self._bytes_read)
+        count: int = getattr(self.source, "bytes_read", self._bytes_read)
         return count
 
     @property
@@ -141,7 +118,7 @@ class ReelReader:
     @property
     def missing(self) -> tuple[Chunk, ...]:
         """The chunks that a truncated file has lost, entirely or in part; none in a complete file."""
-        return tuple(chunk for chunk in self.chunks if chunk.end > self._source.size)
+        return tuple(chunk for chunk in self.chunks if chunk.end > self.source.size)
 
     @property
     def is_colored(self) -> bool:
@@ -240,13 +217,19 @@ class ReelReader:
 
     def _read(self, chunk: Chunk, offset: int, layers: tuple[Layer, ...]) -> bytes:
         size = sum(layer.size for layer in layers)
-        if offset + size > self._source.size:
-            raise FormatError(f"{chunk}: truncated, the file ends at byte {self._source.size} of {self.size}")
-        payload = self._source.get_bytes(offset, size)
+        if offset + size > self.source.size:
+            raise FormatError(f"{chunk}: truncated, the file ends at byte {self.source.size} of {self.size}")
+        payload = self.source.get_bytes(offset, size)
         self._bytes_read += size
         if len(payload) != size:
             raise FormatError(f"{chunk}: truncated, {len(payload)} of {size} bytes")
-        _check_payload(chunk, payload, layers)
+        start = 0
+        for number, layer in enumerate(layers):
+            if zlib.crc32(memoryview(payload)[start : start + layer.size]) != layer.crc:
+                raise FormatError(f"{chunk}: layer {number} is damaged, its checksum does not match")
+            start += layer.size
+        if payload[0] != chunk.form:
+            raise FormatError(f"{chunk}: its form is {payload[0]}, the index says {chunk.form}")
         return payload
 
 
@@ -275,9 +258,8 @@ def _read_head(source: Source) -> tuple[Header, Index, int, int]:
 def _chunks(index: Index, offset: int, first_frame: int) -> tuple[Chunk, ...]:
     """Return the chunks of an index, with positions from `offset` on and frames of each track from `first_frame` on."""
     chunks: list[Chunk] = []
-    frames = [first_frame] * (
-        1 + max((entry.track for entry in index.chunks if entry.kind == ChunkKind.GROUP), default=0)
-    )
+    tracks = (entry.track for entry in index.chunks if entry.kind == ChunkKind.GROUP)
+    frames = [first_frame] * (1 + max(tracks, default=0))
     for number, entry in enumerate(index.chunks):
         is_group = entry.kind == ChunkKind.GROUP
         of = chunks[entry.depends_on[0]] if entry.kind in COMPANIONS else None
@@ -292,19 +274,7 @@ def _chunks(index: Index, offset: int, first_frame: int) -> tuple[Chunk, ...]:
 
 
 def _by_track(groups: tuple[Chunk, ...]) -> tuple[tuple[Chunk, ...], ...]:
-    tracks: list[list[Chunk]] = []
+    tracks: list[list[Chunk]] = [[] for _ in {group.track for group in groups}]
     for group in groups:
-        if group.track == len(tracks):
-            tracks.append([])
         tracks[group.track].append(group)
     return tuple(map(tuple, tracks))
-
-
-def _check_payload(chunk: Chunk, payload: bytes, layers: tuple[Layer, ...]) -> None:
-    offset = 0
-    for number, layer in enumerate(layers):
-        if zlib.crc32(memoryview(payload)[offset : offset + layer.size]) != layer.crc:
-            raise FormatError(f"{chunk}: layer {number} is damaged, its checksum does not match")
-        offset += layer.size
-    if payload[0] != chunk.form:
-        raise FormatError(f"{chunk}: its form is {payload[0]}, the index says {chunk.form}")

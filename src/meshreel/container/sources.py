@@ -61,11 +61,7 @@ class StreamSource:
         self._name = type(file).__name__ if name is None else name
         if not file.seekable() or not isinstance(file.read(0), bytes):
             raise InputError(f"{self._name} is no binary file that can seek; open it with mode 'rb', or give its bytes")
-        self._size = file.seek(0, 2)
-
-    @property
-    def size(self) -> int:
-        return self._size
+        self.size = file.seek(0, 2)
 
     def get_bytes(self, offset: int, length: int) -> bytes:
         try:

@@ -15,23 +15,12 @@ from dataclasses import dataclass, replace
 from itertools import accumulate
 from pathlib import Path
 from types import TracebackType
-from typing import IO, Any, Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 from ..errors import FormatError, InputError
-from ..format.budget import check_frames, check_head
-from ..format.checks import IndexChecks, check_header, check_index, parse_metadata
-from ..format.layout import (
-    MAGIC,
-    VERSION,
-    Checksum,
-    ChunkKind,
-    Form,
-    Header,
-    Index,
-    IndexEntry,
-    Layer,
-    Preamble,
-)
+from ..format.budget import check_head
+from ..format.checks import IndexChecks, check_file, check_header, parse_metadata
+from ..format.layout import MAGIC, VERSION, Checksum, ChunkKind, Form, Header, Index, IndexEntry, Layer, Preamble
 from ..format.records import least_size, pack
 from ..io.unfinished import FULL, sync_folder, unfinished
 from .sources import Stream
@@ -101,11 +90,6 @@ class ReelWriter:
         self._chunks: list[Stored] = []
         self._checks = IndexChecks()
 
-    @property
-    def frame_count(self) -> int:
-        """Number of frames added to the first track."""
-        return self.frames_of(0)
-
     def frames_of(self, track: int) -> int:
         """Return the number of frames added to a track: the first frame of its next group."""
         return self._checks.frames[track] if track < len(self._checks.frames) else 0
@@ -119,7 +103,10 @@ class ReelWriter:
             pack(self.header)
             check_header(self.header, len(self.header.intervals) + 1)  # before encoding, not after it
             parse_metadata(self.header.metadata)
-            self._spool = _open_spool(self._output)  # for chunks that are in memory
+            folder = self._output.parent if isinstance(self._output, Path) else None
+            if isinstance(self._output, Path) and self._output.is_dir():
+                raise IsADirectoryError(None, "is a folder, name a file")
+            self._spool = tempfile.TemporaryFile(dir=folder)  # for chunks that are in memory
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: object, trace: TracebackType | None) -> None:
@@ -136,8 +123,7 @@ class ReelWriter:
 
         The payload has form DRACO or PATCH; for PATCH, `depends_on` is the number of the state that it changes.
         """
-        form = _form(payload)
-        entry = IndexEntry(ChunkKind.STATIC, form, 0, 0, tuple(depends_on), _layers(payload, ()))
+        entry = IndexEntry(ChunkKind.STATIC, _form(payload), 0, 0, tuple(depends_on), _layers(payload, ()))
         return self._add(entry, payload)
 
     def add_group(
@@ -188,7 +174,7 @@ class ReelWriter:
     def atlas_of(self, number: int, before: int | None) -> int:
         """Return the number of the atlas of a group's pictures: its own, or that of the group before."""
         own_atlas = self.companion_of(number, ChunkKind.ATLAS)
-        atlas = self._checks.atlas_of(before) if own_atlas is None and before is not None else own_atlas
+        atlas = self._checks.atlases.get(before) if own_atlas is None and before is not None else own_atlas
         if atlas is None:
             raise InputError(f"pictures of chunk {number}, which has no atlas; add one first")
         return atlas
@@ -210,29 +196,24 @@ class ReelWriter:
         return stored
 
     def _finish(self) -> None:
-        self._checks.finish()
-        check_header(self.header, self.frame_count)
+        index, place = with_audio(Index(tuple(self._entries)), self._audio)
+        head = pack_head(self.header, index)
+        check_file(self.header, index, 0, len(head))
         if self._audio:
-            index, place = with_audio(Index(tuple(self._entries)), self._audio)
-            check_index(index)
-            self._entries = list(index.chunks)
             self._chunks.insert(place, self._kept(self._audio))
-        head = pack_head(self.header, Index(tuple(self._entries)))
-        size = len(head) + sum(layer.size for entry in self._entries for layer in entry.layers)
-        check_frames(sum(self._checks.frames), size)
         if not isinstance(self._output, Path):
-            self._copy(head, self._output)
+            self._copy(head, index, self._output)
             return
         with unfinished(self._output) as file:
-            self._copy(head, file)
+            self._copy(head, index, file)
         sync_folder(self._output.parent)
 
-    def _copy(self, head: bytes, output: Sink) -> None:
+    def _copy(self, head: bytes, index: Index, output: Sink) -> None:
         """Write the head and the chunks, each of which must still match its entry."""
         output.write(head)
-        if len(self._chunks) != len(self._entries):
+        if len(self._chunks) != len(index.chunks):
             raise InputError(f"{self._name}: a chunk could not be written, encode again")
-        for entry, chunk in zip(self._entries, self._chunks, strict=True):
+        for entry, chunk in zip(index.chunks, self._chunks, strict=True):
             data, ends = chunk.read(), list(accumulate(layer.size for layer in entry.layers))
             if len(data) != len(chunk) or _layers(data, ends) != entry.layers:
                 raise InputError(f"{self._name}: a chunk could not be written, encode again")
@@ -254,35 +235,26 @@ def pack_head(header: Header, index: Index, flags: int = 0) -> bytes:
 
 
 def with_audio(index: Index, payload: bytes) -> tuple[Index, int]:
-    """Return an index with an additional AUDIO chunk, and its number.
+    """Return an index with an additional AUDIO chunk, and its number; without a payload, the same index.
 
     It lies behind all chunks that the first frame needs and before the others, so that a file plays while it arrives.
     """
     later, frames = len(index.chunks), dict[int, int]()
+    if not payload:
+        return index, later
     for number, entry in enumerate(index.chunks):
         if entry.kind == ChunkKind.GROUP:
             if entry.track in frames:
                 later = number
                 break
             frames[entry.track] = number
-    audio = IndexEntry(ChunkKind.AUDIO, Form.AUDIO_FILE, 0, 0, (), _layers(payload, _pieces(len(payload))))
+    layers = _layers(payload, (*range(AUDIO_PIECE, len(payload), AUDIO_PIECE), len(payload)))
+    audio = IndexEntry(ChunkKind.AUDIO, Form.AUDIO_FILE, 0, 0, (), layers)
     moved = [
         replace(entry, depends_on=tuple(number + (number >= later) for number in entry.depends_on))
         for entry in index.chunks
     ]
     return Index((*moved[:later], audio, *moved[later:])), later
-
-
-def _pieces(size: int) -> tuple[int, ...]:
-    return (*range(AUDIO_PIECE, size, AUDIO_PIECE), size)
-
-
-def _open_spool(output: Path | Sink) -> IO[bytes]:
-    if not isinstance(output, Path):
-        return tempfile.TemporaryFile()
-    if output.is_dir():
-        raise IsADirectoryError(None, "is a folder, name a file")
-    return tempfile.TemporaryFile(dir=output.parent)
 
 
 def _form(payload: bytes) -> Form:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from ..errors import InputError
 from ..format.budget import LIMITS
@@ -44,30 +44,20 @@ def packed_audio(audio: Given, start: float, first_time: int = 0) -> bytes:
     return pack(AudioFile(Form.AUDIO_FILE, kind, first_time + round(1e6 * start), data))
 
 
-@dataclass(slots=True)
-class JoinedAudio:
-    """The audio of files that are joined: all files with audio must have the same."""
+def joined_audio(joined: AudioFile | None, path: Place, record: AudioFile | None, later: int) -> AudioFile | None:
+    """Return the audio of joined files, with that of a next one, which begins `later` microseconds after its own time.
 
-    record: AudioFile | None = None
-
-    def add(self, path: Place, record: AudioFile | None, later: int) -> None:
-        """Add the audio of a file whose frames begin `later` microseconds after its own first time.
-
-        Raises InputError where it is another one, or the same at another time.
-        """
-        if record is None:
-            return
-        moved = replace(record, start=record.start + later)
-        if self.record is None:
-            self.record = moved
-        elif moved.data != self.record.data or abs(moved.start - self.record.start) > _CLOSE:
-            text = f"{path}: has other audio than a file before it, or the same at another time, and a file has one"
-            raise InputError(f"{text}; take it away with meshreel tag FILE --no-audio, and add one to the joined file")
-
-    @property
-    def payload(self) -> bytes:
-        """The payload of the joined file; no bytes if there is no audio."""
-        return b"" if self.record is None else pack(self.record)
+    Raises InputError where it is another one, or the same at another time.
+    """
+    if record is None:
+        return joined
+    moved = replace(record, start=record.start + later)
+    if joined is None:
+        return moved
+    if moved.data != joined.data or abs(moved.start - joined.start) > _CLOSE:
+        text = f"{path}: has other audio than a file before it, or the same at another time, and a file has one"
+        raise InputError(f"{text}; take it away with meshreel tag FILE --no-audio, and add one to the joined file")
+    return joined
 
 
 def audio_type(data: bytes, name: str) -> AudioType:

@@ -14,9 +14,8 @@ from ..container.reader import Chunk, ReelReader
 from ..container.sources import source_at
 from ..container.writer import pack_head, with_audio
 from ..errors import FormatError, InputError
-from ..format.budget import check_frames
-from ..format.checks import check_header, check_index, parse_metadata
-from ..format.edit import ITEM, parse_edit
+from ..format.checks import check_file
+from ..format.edit import ITEM
 from ..format.layout import EDITED, ChunkKind, Header, Index, IndexEntry
 from ..io.remote import Place, uploaded
 from ..io.write import check_apart, replacing
@@ -49,8 +48,7 @@ def opened(path: Place) -> Iterator[tuple[Place, ReelReader]]:
     """Open a file for the block; from a URL, only the head and the chunks that are copied are fetched."""
     source = source_at(path if isinstance(path, Path) else path.url)
     try:
-        reader = ReelReader(source)
-        yield path, reader
+        yield path, ReelReader(source)
     except FormatError as error:
         known = str(error).startswith(str(path))
         raise error if known else FormatError(f"{path}: {error}") from error
@@ -79,7 +77,7 @@ def silent(reader: ReelReader) -> list[int]:
     return [chunk.number for chunk in reader.chunks if chunk.kind != ChunkKind.AUDIO]
 
 
-def with_metadata(header: Header, metadata: dict[str, Any]) -> Header:
+def _with_metadata(header: Header, metadata: dict[str, Any]) -> Header:
     try:
         text = json.dumps(metadata, separators=(",", ":"), allow_nan=False)
     except (TypeError, ValueError) as error:
@@ -89,22 +87,19 @@ def with_metadata(header: Header, metadata: dict[str, Any]) -> Header:
     return replace(header, metadata=text)
 
 
-def written(output: Place, header: Header, pieces: Sequence[Piece], audio: bytes = b"") -> Edited:
+def written(
+    output: Place, header: Header, metadata: dict[str, Any], pieces: Sequence[Piece], audio: bytes = b""
+) -> Edited:
     """Write the chunks of all pieces, and audio, under one head; the file appears when it is complete."""
-    index = Index(tuple(entry for piece in pieces for entry in piece.entries))
+    header, index = _with_metadata(header, metadata), Index(tuple(e for piece in pieces for e in piece.entries))
     coded = sum(entry.frames for entry in index.chunks if entry.kind == ChunkKind.GROUP and entry.track == 0)
     if output in [piece.path for piece in pieces]:
         raise InputError(f"{output}: is the input, which it would replace; choose another name")
-    index, place_of_audio = with_audio(index, audio) if audio else (index, 0)
+    index, place_of_audio = with_audio(index, audio)
+    flags = EDITED if ITEM in metadata else 0
     try:
-        metadata = parse_metadata(header.metadata)
-        flags = EDITED if ITEM in metadata else 0
-        edit = parse_edit(metadata, flags, coded)
-        check_header(header, edit.end - edit.first)
-        check_index(index)
         head = pack_head(header, index, flags)
-        size = len(head) + sum(layer.size for entry in index.chunks for layer in entry.layers)
-        check_frames(sum(entry.frames for entry in index.chunks if entry.kind == ChunkKind.GROUP), size)
+        _, edit, size = check_file(header, index, flags, len(head))
     except FormatError as error:
         raise InputError(f"{output}: cannot be stored: {error}") from error
     with uploaded(output) as place:
@@ -123,7 +118,4 @@ def _payloads(pieces: Sequence[Piece]) -> Iterator[bytes]:
             for number, entry in zip(piece.numbers, piece.entries, strict=True):
                 if number >= len(reader.chunks) or reader.chunks[number].layers != entry.layers:
                     raise InputError(f"{path}: changed while it was read; start again when it is complete")
-                try:
-                    yield reader.read_chunk(number)
-                except FormatError as error:
-                    raise FormatError(f"{path}: {error}") from error
+                yield reader.read_chunk(number)

@@ -12,29 +12,24 @@ from typing import Any
 
 import numpy as np
 
-from ..container.reader import ReelReader
+from ..container.reader import Chunk, ReelReader
 from ..errors import InputError
+from ..format.checks import COMPANIONS
 from ..format.edit import ITEM, Edit, is_rotation, nearest_rotation
-from ..format.layout import Header
+from ..format.layout import ChunkKind, Header
+from ..format.records import pack
 from ..io.read import first_difference
 from ..io.remote import Place, located
 from ..io.sequence import SequenceOptions
 from ..types import Up, check_up
-from .audio import Given, JoinedAudio, packed_audio
-from .copies import Edited, Piece, check_known, opened, piece_of, silent, with_metadata, written
-from .file_intervals import interval_of, kept_chunks
+from .audio import Given, joined_audio, packed_audio
+from .copies import Edited, Piece, check_known, opened, piece_of, silent, written
 from .metadata import HISTORY, MEANS, PART, joined_metadata, of_all_parts, place_of, scaled_metadata, upright
 
 Name = str | Place
 Numbers = Sequence[Any] | np.ndarray
 Part = tuple[dict[str, Any], int]  # the metadata of a file, and its number of frames
-_OWN = (
-    "key_frames",
-    PART,
-    HISTORY,
-    ITEM,
-    "up",
-)  # metadata that `tag` does not change: others depend on them
+_OWN = ("key_frames", PART, HISTORY, ITEM, "up")  # metadata that `tag` does not change: others depend on them
 
 
 def cut(source: Name, output: Name, frames: str, at_keys: bool = False) -> Edited:
@@ -63,7 +58,7 @@ def cut(source: Name, output: Name, frames: str, at_keys: bool = False) -> Edite
             metadata["key_frames"] = [key - shown.start for key in keys if isinstance(key, int) and key in shown]
         metadata |= edit.item(len(whole)) | _history(metadata, f"cut {shown.start}:{shown.stop}")
         piece = piece_of(path, reader, numbers)
-    return written(located(output), with_metadata(header, metadata), [piece])
+    return written(located(output), header, metadata, [piece])
 
 
 def concat(sources: Sequence[Name], output: Name) -> Edited:
@@ -74,7 +69,7 @@ def concat(sources: Sequence[Name], output: Name) -> Edited:
     """
     if not sources:
         raise InputError("no files to join; give at least one")
-    pieces, parts, heads, hidden, audio = list[Piece](), list[Part](), list[ReelReader](), [0, 0], JoinedAudio()
+    pieces, parts, heads, hidden, audio = list[Piece](), list[Part](), list[ReelReader](), [0, 0], None
     for source in sources:
         with opened(located(source)) as (path, reader):
             first = heads[0] if heads else reader
@@ -87,7 +82,8 @@ def concat(sources: Sequence[Name], output: Name) -> Edited:
             hidden = [hidden[0] or ends[0], ends[1]]
             pieces.append(piece_of(path, reader, silent(reader), sum(len(piece.numbers) for piece in pieces)))
             heads.append(reader)
-            audio.add(path, reader.read_audio(), _begin_of_last(heads) - reader.header.first_time)
+            later = _begin_of_last(heads) - reader.header.first_time
+            audio = joined_audio(audio, path, reader.read_audio(), later)
     frames = sum(count for _, count in parts)
     header, place = _timed(heads), place_of(parts[0][0])
     edit = Edit(hidden[0], hidden[0] + frames, heads[0].edit.rotation)
@@ -95,7 +91,7 @@ def concat(sources: Sequence[Name], output: Name) -> Edited:
     if place is None and len(sources) > 1:
         before = [entry for of, _ in parts for entry in _history(of)[HISTORY]]
         metadata |= _history({HISTORY: [*dict.fromkeys(before)]}, f"concat of {len(sources)} files")
-    done = written(located(output), with_metadata(header, metadata), pieces, audio.payload)
+    done = written(located(output), header, metadata, pieces, b"" if audio is None else pack(audio))
     return replace(done, missing=max(place[1] - frames, 0) if place else 0)
 
 
@@ -275,4 +271,52 @@ def _relabelled(
     if audio is not None:
         check_known(path, reader.chunks)
         piece = piece_of(path, reader, silent(reader))
-    return written(located(output), with_metadata(header, metadata), [piece], audio or b"")
+    return written(located(output), header, metadata, [piece], audio or b"")
+
+
+def interval_of(reader: ReelReader, frames: range) -> range:
+    """Return the shortest interval that contains given frames, and begins and ends with groups of all tracks.
+
+    It begins with groups that name no group before. Pictures of a background are counted from the first frame that it
+    is shown in, which an interval then begins with. Hidden frames have numbers below 0, or from `frame_count` on.
+    """
+    start, end = frames.start, frames.stop
+    while True:
+        groups = [_group_at(own, start) for own in reader.tracks]
+        earlier = min(_stands_alone(reader, group).first_frame for group in groups)
+        later = max(own.first_frame + own.frame_count for own in (_group_at(of, end - 1) for of in reader.tracks))
+        counted = [reader.shown_from(state) for state in _timed_states(reader, range(start, end))]
+        if (found := (min([earlier, *counted]), later)) == (start, end):
+            return range(start, end)
+        start, end = found
+
+
+def kept_chunks(reader: ReelReader, interval: range) -> list[int]:
+    """Return the numbers of the chunks that an interval needs, and of audio, in the order of the file."""
+    kept = {group.number for group in reader.groups if group.first_frame in interval}
+    waiting = list(kept)
+    while waiting:
+        new = set(reader.chunks[waiting.pop()].depends_on) - kept
+        kept |= new
+        waiting += new
+    kept |= {c.number for c in reader.chunks if c.kind in COMPANIONS and c.depends_on[0] in kept}
+    return sorted(kept | ({reader.audio.number} if reader.audio else set()))
+
+
+def _group_at(groups: tuple[Chunk, ...], frame: int) -> Chunk:
+    return next(group for group in reversed(groups) if group.first_frame <= frame)
+
+
+def _stands_alone(reader: ReelReader, group: Chunk) -> Chunk:
+    """Return the first group of a group's chain of predictions."""
+    while (before := reader.group_before(group)) is not None:
+        group = before
+    return group
+
+
+def _timed_states(reader: ReelReader, frames: range) -> list[Chunk]:
+    """Return the states of the background that are shown in some of the frames and have pictures."""
+    some = [g for g in reader.groups if g.first_frame < frames.stop and g.first_frame + g.frame_count > frames.start]
+    named = [reader.chunks[number] for number in {number for group in some for number in group.depends_on}]
+    kinds = (ChunkKind.PICTURES, ChunkKind.COMPATIBLE)
+    return [c for c in named if c.kind == ChunkKind.STATIC and any(reader.companion_of(c, kind) for kind in kinds)]

@@ -87,8 +87,13 @@ def scaled_metadata(metadata: dict[str, Any], scale: float) -> dict[str, Any]:
 
     Raises KeyError, TypeError or ValueError for metadata that no encoder wrote.
     """
-    found = {name: _scaled(value, scale) if name.endswith("_m") else value for name, value in metadata.items()}
-    if PART in metadata and scale != 1:
+    if scale == 1:
+        return metadata
+    found = {
+        name: rounded(value * scale) if name.endswith("_m") and type(value) in (int, float) else value
+        for name, value in metadata.items()
+    }
+    if PART in metadata:
         squares, worst, *others = metadata[PART]["totals"]
         exact = [None if squares is None else squares * scale**2, None if worst is None else worst * scale, *others]
         found[PART] = metadata[PART] | {"totals": exact}
@@ -121,10 +126,6 @@ def upright(up: Up) -> dict[str, Any]:
 def rounded(value: float) -> float | None:
     """Round to four significant digits; None if JSON has no such number."""
     return float(f"{value:.4g}") if math.isfinite(value) else None
-
-
-def _scaled(value: Any, scale: float) -> Any:
-    return rounded(value * scale) if type(value) in (int, float) and scale != 1 else value
 
 
 def _number(value: float | None) -> float:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
-from itertools import accumulate
+from itertools import accumulate, chain
 from pathlib import Path
 
 import numpy as np
@@ -22,10 +22,10 @@ from ..errors import InputError
 from ..format.layout import Form
 from ..geometry.topology import vertex_normals
 from ..types import Mesh, Up
-from .animated_glb import animated_glb
-from .animated_usd import EXTENSIONS, animated_usd
+from .animated_glb import GlbWriter, animated_glb
+from .animated_usd import EXTENSIONS, UsdWriter, animated_usd
 from .frames import Part
-from .shapes import Animation, AnimationWriter, Points, Shape, check_output
+from .shapes import Animation, Points, Shape, check_output
 
 MOST_FRAMES = 64  # of a shape, all in memory together; viewers limit the morph targets of a mesh (guess)
 _FAR = 8.0  # diagonals; coordinates farther from the origin are stored relative to the center (guess)
@@ -75,19 +75,17 @@ def export(
     decoders, numbers = Decoders(), range(len(reader.tracks))
     tracks = tuple(Track(reader, number, options.layers, decoders=decoders) for number in numbers)
     source = _Source(reader, tracks, Background(reader, decoders=decoders), frames, options.texture)
+    states = _states(source) if options.only != "moving" else ()
+    moving = _moving(source, progress) if options.only != "background" else ()
     written = 0
     with _writer(path, _animation(reader, frames, options.up or reader.up), options.compressed) as writer:
-        if options.only != "moving":
-            for shape in _states(source):
-                writer.add(shape)
-                written += 1
-        for shape in _moving(source, progress) if options.only != "background" else ():
+        for shape in chain(states, moving):
             writer.add(shape)
             written += 1
     return written
 
 
-def _writer(path: Path, animation: Animation, compressed: bool) -> AbstractContextManager[AnimationWriter]:
+def _writer(path: Path, animation: Animation, compressed: bool) -> AbstractContextManager[GlbWriter | UsdWriter]:
     check_output(path)
     extension = path.suffix.lower()
     if extension == ".glb":
@@ -128,9 +126,8 @@ def _moving(source: _Source, progress: Progress | None) -> Iterator[Shape]:
     frames = source.frames
     for number, groups in enumerate(source.reader.tracks):
         for group in groups:
-            exported = range(
-                max(group.first_frame, frames.start), min(group.first_frame + group.frame_count, frames.stop)
-            )
+            end = min(group.first_frame + group.frame_count, frames.stop)
+            exported = range(max(group.first_frame, frames.start), end)
             if exported:
                 yield from _group_shapes(source, group, exported)
                 if progress is not None:

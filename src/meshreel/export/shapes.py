@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 from jaxtyping import Bool, Float32, Float64, Int32, UInt8
@@ -87,13 +86,6 @@ class Animation:
         if not np.isfinite(local).all():
             raise InputError(f"{shape}: a vertex {np.abs(vertices).max():g} m away, which float32 does not hold")
         return local
-
-
-class AnimationWriter(Protocol):
-    """A writer of animated files."""
-
-    def add(self, shape: Shape) -> None:
-        """Write a shape, computing its frames one by one. Raises InputError if the file cannot hold it."""
 
 
 def changes(shape: Shape, count: int) -> Iterator[tuple[int, bool]]:

@@ -6,7 +6,8 @@ import json
 from typing import Any, NoReturn
 
 from ..errors import FormatError
-from .budget import LIMITS, CostlyError
+from .budget import LIMITS, CostlyError, check_frames
+from .edit import Edit, parse_edit
 from .layout import AudioFile, ChunkKind, Form, Header, Index, IndexEntry
 from .records import unpack_all
 
@@ -58,7 +59,7 @@ class IndexChecks:
         self._bearers: set[int] = set()  # groups that may have splats: those that begin with a mesh of all frames
         # Number of the chunk with the colours, atlas or pictures of a chunk, by that chunk's number and the kind.
         self.companions: dict[tuple[int, int], int] = {}
-        self._atlases: dict[int, int] = {}  # of each group with pictures, the number of its atlas
+        self.atlases: dict[int, int] = {}  # of each group with pictures, the number of its atlas
         self._has_audio = False
         self._count = 0
 
@@ -94,10 +95,6 @@ class IndexChecks:
         self._count += 1
         return number
 
-    def atlas_of(self, group: int) -> int | None:
-        """Return the number of the atlas that a group's pictures use."""
-        return self._atlases.get(group)
-
     def finish(self) -> None:
         """Raise FormatError if there are no frames, or if a track has another number of frames than the first."""
         if not self.frames:
@@ -109,12 +106,11 @@ class IndexChecks:
     def _changes_of(self, entry: IndexEntry) -> int:
         """Return the number of patches that lead to a STATIC chunk: 0 for a mesh, 1 + those of its base for a patch."""
         number = self._count
+        what = f"chunk {number}: a static chunk of form {Form(entry.form).name}"
         if entry.form not in (Form.DRACO, Form.PATCH) or entry.track:
-            raise FormatError(f"chunk {number}: a static chunk of form {Form(entry.form).name} and track {entry.track}")
+            raise FormatError(f"{what} and track {entry.track}")
         if len(entry.depends_on) != (entry.form == Form.PATCH):
-            raise FormatError(
-                f"chunk {number}: a static chunk of form {Form(entry.form).name} depends on {entry.depends_on}"
-            )
+            raise FormatError(f"{what} depends on {entry.depends_on}")
         if entry.form == Form.DRACO:
             return 0
         [before] = entry.depends_on
@@ -137,7 +133,7 @@ class IndexChecks:
             raise FormatError(f"chunk {number}: {kind.name} of {of} that depend on {entry.depends_on[1:]}")
         self.companions[of, kind] = number
         if entry.form == Form.VIDEO:
-            self._atlases[of] = entry.depends_on[1]
+            self.atlases[of] = entry.depends_on[1]
 
     def _needed(self, kind: ChunkKind, of: int, before: int | None) -> tuple[tuple[int, ...], ...]:
         """Return the allowed dependencies of a companion of chunk `of`, beside `of`; `before` predicts that chunk."""
@@ -152,7 +148,7 @@ class IndexChecks:
         if atlas is not None:
             return ((atlas,),)
         last = None if before is None else self.companions.get((before, kind))
-        return () if last is None or before is None else ((self._atlases[before], last),)
+        return () if last is None or before is None else ((self.atlases[before], last),)
 
     def _add_audio(self, entry: IndexEntry) -> None:
         size = sum(layer.size for layer in entry.layers)
@@ -177,9 +173,8 @@ class IndexChecks:
             )
         groups = [other for other in entry.depends_on if other not in self._changes]
         if groups and (not begun or groups != [self.groups[track]]):
-            raise FormatError(
-                f"chunk {number}: depends on {groups}, neither a static chunk before it nor the last group of its track"
-            )
+            text = "neither a static chunk before it nor the last group of its track"
+            raise FormatError(f"chunk {number}: depends on {groups}, {text}")
         if len(entry.depends_on) - len(groups) > 1:
             raise FormatError(f"chunk {number}: depends on {entry.depends_on}, on several static chunks")
         if not begun:
@@ -196,6 +191,18 @@ def check_index(index: Index) -> None:
     for entry in index.chunks:
         checks.add(entry)
     checks.finish()
+
+
+def check_file(header: Header, index: Index, flags: int, head_size: int) -> tuple[dict[str, Any], Edit, int]:
+    """Check the records of a head of `head_size` bytes; return its metadata, its edit, and the file's size in bytes."""
+    check_index(index)
+    metadata = parse_metadata(header.metadata)
+    groups = [entry for entry in index.chunks if entry.kind == ChunkKind.GROUP]
+    edit = parse_edit(metadata, flags, sum(entry.frames for entry in groups if entry.track == 0))
+    check_header(header, edit.end - edit.first)
+    size = head_size + sum(layer.size for entry in index.chunks for layer in entry.layers)
+    check_frames(sum(entry.frames for entry in groups), size)
+    return metadata, edit, size
 
 
 def unpack_audio(payload: bytes) -> AudioFile:

@@ -74,11 +74,7 @@ class Header:
     scale: Annotated[float, F64, "m, above 0"]
     minimum: Annotated[tuple[float, ...], Array(3, F32), "lower corner of the sequence's bounding box, normalised"]
     maximum: Annotated[tuple[float, ...], Array(3, F32), "upper corner of this box"]
-    metadata: Annotated[
-        str,
-        Text(U16),
-        "a JSON object, not needed for decoding: `up` (axis; y if absent), preset ...",
-    ]
+    metadata: Annotated[str, Text(U16), "a JSON object, not needed for decoding: `up` (axis; y if absent), preset ..."]
     first_time: Annotated[int, I64, "time of frame 0, microseconds"] = 0
     intervals: Annotated[
         tuple[int, ...],

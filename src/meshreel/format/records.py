@@ -64,17 +64,13 @@ class Field:
 
 
 def record_fields(record_type: type) -> tuple[Field, ...]:
-    return _declared(record_type)
+    return _declared(record_type)  # for type checkers, which do not know that all types can be hashed
 
 
 @cache
 def _declared(record_type: type) -> tuple[Field, ...]:
     hints = get_type_hints(record_type, include_extras=True)
-    declared = []
-    for field in fields(record_type):
-        kind, meaning = hints[field.name].__metadata__
-        declared.append(Field(field.name, kind, meaning))
-    return tuple(declared)
+    return tuple(Field(field.name, *hints[field.name].__metadata__) for field in fields(record_type))
 
 
 @dataclass(frozen=True, slots=True)

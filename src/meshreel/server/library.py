@@ -19,7 +19,7 @@ from ..io.file_names import is_text
 
 SUFFIX = ".reel"
 HIDDEN = "."  # first character of hidden names
-Version = tuple[int, int, int]  # size in bytes; mtime and ctime in ns
+Version = tuple[int, int, int]  # of a file, which changes with its contents: size in bytes; mtime and ctime in ns
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,7 +85,8 @@ class Library:
         if path is None:
             return Entry(name, error="is not there any more")
         try:
-            return _facts(name, path, _version(path))
+            found = path.stat()
+            return _facts(name, path, (found.st_size, found.st_mtime_ns, found.st_ctime_ns))
         except (MeshreelError, OSError) as error:
             return Entry(name, error=_without_path(error, path))
 
@@ -111,12 +112,6 @@ def _without_path(error: MeshreelError | OSError, path: Path) -> str:
     """Return the text of an error without the path: viewers need not know the folders of the server."""
     text = error.strerror if isinstance(error, OSError) else str(error)
     return (text or type(error).__name__).removeprefix(f"{path}: ")
-
-
-def _version(path: Path) -> Version:
-    """Return a version of a file that changes with its contents, from its size and times."""
-    found = path.stat()
-    return found.st_size, found.st_mtime_ns, found.st_ctime_ns
 
 
 def as_text(name: str) -> str:

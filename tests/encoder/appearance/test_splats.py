@@ -15,8 +15,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from meshreel.analysis.appearance.splat_fit import fit_splats
-from meshreel.cli.decode import command as decode
-from meshreel.cli.splats import compare_splats
+from meshreel.cli.compare import compare_splats
+from meshreel.cli.decode import decode
 from meshreel.coding.intra import encode_intra
 from meshreel.container.reader import Chunk, ReelReader
 from meshreel.container.sources import BytesSource
@@ -27,7 +27,7 @@ from meshreel.encoder.sequence import encode
 from meshreel.encoder.settings.options import EncoderOptions, as_installed
 from meshreel.encoder.settings.settings import Settings
 from meshreel.errors import FormatError, InputError
-from meshreel.export.splats import write_splats
+from meshreel.export.frames import write_splats
 from meshreel.format.layout import ChunkKind
 from meshreel.types import Mesh, MeshList
 from tests.golden import GOLDEN

@@ -18,10 +18,10 @@ import numpy as np
 
 from meshreel.analysis.appearance.splat_fit import SplatFrame, SplatView, fit_splats
 from meshreel.analysis.appearance.splat_views import GOLDEN, rendered, ring
-from meshreel.cli.splats import ASIDE, errors
+from meshreel.cli.compare import ASIDE, errors
 from meshreel.coding.appearance.splats import decode_splats, encode_splats
 from meshreel.errors import InputError
-from meshreel.export.splats import write_splats
+from meshreel.export.frames import write_splats
 from meshreel.format.layout import MAGIC
 from meshreel.geometry.splats import Bound, bind
 from meshreel.types import Mesh, evenly

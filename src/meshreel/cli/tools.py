@@ -1,24 +1,33 @@
-"""`meshreel doctor`: installed packages and extras, and what this machine can do with them."""
+"""`meshreel doctor`, `player` and `completion`: what is installed, the player's files, and a script for a shell."""
 
 from __future__ import annotations
 
 import platform
 import re
 import webbrowser
+from contextlib import suppress
+from importlib import import_module
 from importlib.metadata import PackageNotFoundError, requires, version
-from importlib.resources import files
-from typing import Any
+from importlib.resources import as_file, files
+from pathlib import Path
+from typing import Any, Literal
 
 from rich.table import Table
 
 from .. import __version__
+from ..errors import InputError
+from ..io.write import make_folder, replacing
+from . import COMMANDS, make_app, place_of
 from .console import Common
 
 _NEEDS = re.compile(r"([A-Za-z0-9._-]+)[^;]*(?:;.*extra == [\"']([a-z0-9]+)[\"'])?")
 _CODECS = {"AV1 decoded": "libdav1d", "AV1 encoded": "libsvtav1", "H.264 encoded": "libx264"}
+EMBED = """\
+<script type="module" src="{folder}/meshreel-player.js"></script>
+<meshreel-player src="walk.reel" controls loop style="width: 640px; aspect-ratio: 16 / 9"></meshreel-player>"""
 
 
-def command(*, common: Common = Common()) -> None:
+def doctor(*, common: Common = Common()) -> None:
     """Report installed packages by extra, the video codecs, and if a GPU and a browser are found."""
     row: dict[str, Any] = {"meshreel": __version__, "python": platform.python_version(), "system": platform.platform()}
     row |= {"extras": _extras(), "codecs": _codecs(), "gpu": _gpu()}
@@ -78,3 +87,49 @@ def _gpu() -> str | None:
     except ImportError:
         return None
     return str(torch.cuda.get_device_name()) if torch.cuda.is_available() else None
+
+
+def player(*, copy_to: Path | None = None, common: Common = Common()) -> None:
+    """Copy the player's files for a web server, or print the folder where they are.
+
+    Parameters
+    ----------
+    copy_to
+        The folder to copy them to, made if needed; files of the same names are replaced. The files stay together.
+    """
+    with as_file(files("meshreel") / "player") as folder:
+        built = sorted(path for path in folder.iterdir() if path.is_file())
+        if not any(path.name == "meshreel-player.js" for path in built):
+            raise InputError(f"{folder}: the player is not built; run scripts/build-web, or install a wheel")
+        if copy_to is None:
+            common.result({"folder": str(folder), "files": [path.name for path in built]}, str(folder))
+            return
+        make_folder(copy_to)
+        for path in built:
+            with replacing(copy_to / path.name) as file:
+                file.write(path.read_bytes())
+    embed = EMBED.format(folder=copy_to.resolve().name)  # "." has no name
+    text = f"{copy_to}: {len(built)} files; in a page beside that folder:\n{embed}"
+    common.result({"folder": str(copy_to), "files": [path.name for path in built]}, text)
+
+
+def completion(shell: Literal["bash", "zsh", "fish"], /, *, common: Common = Common()) -> None:
+    """Print a script that lets a shell complete commands and flags.
+
+    It lacks the flags of commands whose packages are not installed.
+
+    Parameters
+    ----------
+    shell
+        The shell: append the script to ~/.bashrc, or write it where zsh or fish look for completions.
+    """
+    usable = list[str]()
+    for name in COMMANDS:
+        with suppress(ImportError):
+            import_module(place_of(name).partition(":")[0])
+            usable.append(name)
+    script = make_app(usable).generate_completion(shell=shell)
+    if common.json or common.quiet:
+        common.result({"shell": shell, "script": script})
+    else:
+        print(script)
