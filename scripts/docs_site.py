@@ -87,8 +87,7 @@ def _sample(name: str) -> Path:
 def make_samples(folder: Path) -> None:
     """Write the samples that are not there yet, and a picture of each."""
     import meshreel
-    from meshreel.capture.recording import open_recording
-    from meshreel.capture.rig.fusion import FusionOptions
+    from meshreel.capture.recording import FusionOptions, open_recording
     from meshreel.capture.simulated.demo_room import VOXEL, RoomOptions, record_room
     from meshreel.capture.simulated.procedural import SoftBodiesOptions, soft_bodies
     from meshreel.geometry.picture import picture

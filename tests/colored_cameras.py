@@ -14,7 +14,7 @@ from meshreel.capture.rig.cameras import DepthCamera, posed
 from meshreel.capture.simulated.figure import Pose, figure
 from meshreel.capture.simulated.implicit import polygonize
 from meshreel.capture.simulated.procedural import grid_of_frame
-from meshreel.capture.simulated.simulated_color import ColorSensorOptions, Painter, SimulatedColor
+from meshreel.capture.simulated.simulated_rig import ColorSensorOptions, Painter, SimulatedColor
 from meshreel.capture.simulated.solid_colors import WALKER, person_colors
 from meshreel.geometry.cameras import Camera, CameraPose, looking_at
 from meshreel.geometry.color_views import ColorPicture

@@ -7,7 +7,7 @@ import numpy as np
 from meshreel.capture.rig.cameras import DepthCamera
 from meshreel.capture.rig.rig import write_rig
 from meshreel.geometry.cameras import Camera, CameraPose
-from meshreel.io.depth_pictures import write_depth
+from meshreel.io.write import write_picture
 
 RADIUS, WALL = 0.4, 1.2  # m; the ball is at the origin, the wall behind it at z = WALL
 
@@ -45,5 +45,5 @@ def record(folder, cameras, balls, wall=True):
     write_rig(folder, tuple(cameras), 15.0)
     for one, place in zip(cameras, places, strict=True):
         for number, ball in enumerate(balls):
-            write_depth(measured(one, ball, wall), place / f"depth_{number:05}.png")
+            write_picture(measured(one, ball, wall), place / f"depth_{number:05}.png")
     return folder

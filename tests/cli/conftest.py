@@ -14,7 +14,7 @@ import pytest
 from meshreel.analysis.scene.pictures import write_views
 from meshreel.analysis.scene.views import place_views
 from meshreel.cli import main
-from meshreel.geometry.raycast import Rays
+from meshreel.geometry.cameras import Rays
 from meshreel.io.write import write_mesh, write_picture
 from tests.capture.depth_scenes import camera, record
 from tests.golden import GOLDEN

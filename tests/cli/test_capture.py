@@ -10,9 +10,10 @@ import pytest
 
 from meshreel.cli import main
 from meshreel.cli.sources import Reading, open_source
-from meshreel.geometry import tsdf
-from meshreel.io.depth_pictures import read_depth, write_depth
+from meshreel.geometry import reconstruct
+from meshreel.io.pictures import read_depth
 from meshreel.io.sequence import open_sequence
+from meshreel.io.write import write_picture
 from tests.capture.depth_scenes import RADIUS, camera, record
 from tests.capture.recordings.files import tum
 from tests.cli.conftest import failed
@@ -83,7 +84,7 @@ def test_a_recording_that_was_made_again_is_not_mixed_with_the_one_before(rig, t
     command = ["capture", str(rig), "-o", str(tmp_path / "frames"), "--voxel", "0.05"]
     assert main(command) == 0
     path = rig / "side" / "depth" / "depth_00001.png"
-    write_depth(read_depth(path) // 2, path)
+    write_picture(read_depth(path) // 2, path)
     assert main(command) == 2
     assert "(pictures[1] " in capsys.readouterr().err
 
@@ -91,13 +92,13 @@ def test_a_recording_that_was_made_again_is_not_mixed_with_the_one_before(rig, t
 def test_pictures_of_noise_alone_give_frames_without_a_surface_which_are_reported(rig, tmp_path, capsys):
     random = np.random.default_rng(0)
     for path in rig.rglob("depth_*.png"):
-        write_depth(random.integers(0, 65_535, (96, 96)).astype(np.uint16), path)
+        write_picture(random.integers(0, 65_535, (96, 96)).astype(np.uint16), path)
     assert main(["capture", str(rig), "-o", str(tmp_path / "frames"), "--voxel", "0.1"]) == 0
     assert "3 of 3 fused frames have no surface, as frame_00000.ply" in capsys.readouterr().err
 
 
 def test_surface_in_too_many_blocks_is_refused_with_the_frame(rig, tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr(tsdf, "MOST_BLOCKS", 10)
+    monkeypatch.setattr(reconstruct, "MOST_BLOCKS", 10)
     assert main(["capture", str(rig), "-o", str(tmp_path / "frames"), "--voxel", "0.02"]) == 2
     error = capsys.readouterr().err
     assert "rig: frame 0: surface in " in error and "are depth_unit_m and depth_max_m right?" in error

@@ -11,7 +11,7 @@ import pytest
 import meshreel
 from meshreel.capture.recording import open_recording
 from meshreel.capture.simulated.demo_room import RoomOptions, record_room
-from meshreel.capture.simulated.truth import read_truth
+from meshreel.capture.simulated.simulated_rig import read_truth
 from meshreel.cli.console import called_as
 from tests.capture.depth_scenes import camera, record
 from tests.cli.conftest import failed

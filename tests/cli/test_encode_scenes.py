@@ -14,8 +14,7 @@ from meshreel.capture.recording import open_recording
 from meshreel.cli.encode import describe
 from meshreel.encoder.group.interval import Interval
 from meshreel.encoder.paper.recipe import PaperRecipe
-from meshreel.io.depth_pictures import write_depth
-from meshreel.io.write import write_mesh
+from meshreel.io.write import write_mesh, write_picture
 from tests.capture.depth_scenes import camera, measured, record
 from tests.cli.conftest import failed
 from tests.small_options import quick
@@ -154,7 +153,7 @@ def test_a_camera_that_moves_is_refused(run, tmp_path):
     folder = record(tmp_path / "rig", [still, camera("moved", 10)], [(0, 0, 0)] * 6)
     for number in range(6):
         elsewhere = camera("moved", 10 + 8 * number)
-        write_depth(measured(elsewhere), folder / "moved" / "depth" / f"depth_{number:05}.png")
+        write_picture(measured(elsewhere), folder / "moved" / "depth" / f"depth_{number:05}.png")
     for command in (("encode", folder, "-o", tmp_path / "a.reel"), ("segment", folder, "-o", tmp_path / "out")):
         assert failed(run(*command), "camera moved seems to move")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["rig"]
@@ -162,7 +161,7 @@ def test_a_camera_that_moves_is_refused(run, tmp_path):
 
 def test_depth_that_is_all_zero_is_reported_and_gives_empty_frames(run, rig, tmp_path):
     for picture in rig.glob("*/depth/*.png"):
-        write_depth(np.zeros((96, 96), np.uint16), picture)
+        write_picture(np.zeros((96, 96), np.uint16), picture)
     said = run("encode", rig, "-o", tmp_path / "a.reel")
     assert said.code == 0 and "1 group of form empty" in said.out
     assert said.err.count("measures nothing in 3 of 3 frames looked at") == 2

@@ -17,7 +17,7 @@ from meshreel.export.animated_usd import animated_usd
 from meshreel.export.frames import write_frames
 from meshreel.export.shapes import Animation, Points, Shape
 from meshreel.format.layout import ChunkKind
-from meshreel.geometry.painted import Painted
+from meshreel.geometry.color_views import Painted
 from meshreel.geometry.topology import concatenate
 from meshreel.io.sequence import open_sequence
 from meshreel.types import GREY, Mesh, Texture

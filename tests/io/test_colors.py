@@ -16,7 +16,7 @@ import trimesh
 from PIL import Image
 
 from meshreel.errors import InputError
-from meshreel.geometry.painted import Painted
+from meshreel.geometry.color_views import Painted
 from meshreel.geometry.topology import clean, concatenate, part_of, weld
 from meshreel.io.glb_file import cut_at_seams, from_linear, to_linear
 from meshreel.io.meshes import read_mesh

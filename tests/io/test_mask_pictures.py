@@ -9,7 +9,7 @@ import pytest
 from PIL import Image
 
 from meshreel.errors import InputError
-from meshreel.io.mask_pictures import find_masks, read_mask
+from meshreel.io.pictures import find_masks, read_mask
 from meshreel.io.write import write_picture
 
 NUMBERS = np.array([[0, 1, 2, 255], [0, 0, 7, 7]], np.uint8)

@@ -12,13 +12,12 @@ import pytest
 import meshreel
 from meshreel.analysis.scene.masks import read_views
 from meshreel.capture.rig.rig import read_rig
-from meshreel.capture.simulated.truth import _labels
+from meshreel.capture.simulated.simulated_rig import _labels
 from meshreel.encoder.run.interval_files import IntervalFiles
 from meshreel.errors import InputError
-from meshreel.io import read
-from meshreel.io.depth_pictures import read_depth
-from meshreel.io.mask_pictures import read_mask
-from meshreel.io.read import read_file
+from meshreel.io import files
+from meshreel.io.files import read_file
+from meshreel.io.pictures import read_depth, read_mask
 from meshreel.io.sequence import open_sequence
 from meshreel.io.write import replacing
 
@@ -112,7 +111,7 @@ def test_an_archive_of_nothing_but_zeros_ends_at_once(tmp_path):
 
 def test_a_file_that_grows_while_it_is_read_is_bounded(tmp_path, monkeypatch):
     (tmp_path / "a").write_bytes(bytes(100))
-    monkeypatch.setattr(read, "MOST_BYTES", 99)
+    monkeypatch.setattr(files, "MOST_BYTES", 99)
     monkeypatch.setattr(
         os, "fstat", lambda number, real=os.fstat: os.stat_result([*real(number)[:6], 9, *real(number)[7:10]])
     )

@@ -13,7 +13,7 @@ import pytest
 
 from meshreel.errors import InputError
 from meshreel.io.file_names import find_frames
-from meshreel.io.remote import Remote, located, uploaded
+from meshreel.io.files import Remote, located, uploaded
 from meshreel.io.sequence import open_sequence
 from meshreel.io.write import write_mesh
 from tests.spheres import sliding_sphere
@@ -171,7 +171,7 @@ def test_what_takes_no_file_is_refused_before_the_work(url, words):
 
 def test_paths_need_no_fsspec(scan):
     code = (
-        "import sys; from meshreel.io.sequence import open_sequence as o; from meshreel.io.remote import *\n"
+        "import sys; from meshreel.io.sequence import open_sequence as o; from meshreel.io.files import *\n"
         f"o({str(scan)!r})[0]\nwith uploaded(located('a')): pass\nsys.exit('fsspec' in sys.modules)"
     )
     subprocess.run([sys.executable, "-c", code], check=True)

@@ -10,8 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from meshreel.io.polygons import Unreadable
-from meshreel.io.text_lines import Lines
+from meshreel.io.polygons import Lines, Unreadable
 
 DECIMALS = st.from_regex(r"[+-]?([0-9]{1,25}\.?[0-9]{0,25}|\.[0-9]{1,25})([eE][+-]?[0-9]{1,3})?", fullmatch=True)
 PRINTED = st.builds(lambda value, digits: f"{value:.{digits}g}", st.floats(allow_nan=False), st.integers(1, 40))

@@ -9,13 +9,12 @@ import sys
 import pytest
 
 from meshreel.errors import InputError
-from meshreel.io.unfinished import claim, discard, part_of, unfinished
-from meshreel.io.write import check_apart, replacing
+from meshreel.io.write import check_apart, claim, discard, part_of, replacing, unfinished
 
 HOLD = """
 import sys, time
 from pathlib import Path
-from meshreel.io.unfinished import unfinished
+from meshreel.io.write import unfinished
 with unfinished(Path(sys.argv[1])) as file:
     file.write(b"half")
     file.flush()

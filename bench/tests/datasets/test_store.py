@@ -12,7 +12,7 @@ from meshreel_bench.datasets import BODIES, DEMO, SYNTHETIC, Store, checksums, f
 from meshreel_bench.datasets.remesh import SideBySide
 from meshreel_bench.datasets.scenes import PROCEDURAL
 
-from meshreel.capture.calibration.remembered import REMEMBERED
+from meshreel.capture.calibration.colors import REMEMBERED
 from meshreel.errors import InputError
 from meshreel.types import MeshList
 from tests.shared_data import ROOT

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import pickle
 import tempfile
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
@@ -15,22 +16,52 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float64
+from jaxtyping import Float64, UInt16
 
 from ..errors import InputError
 from ..geometry.color_views import ColorPicture, ColorViews, spread_colors
 from ..geometry.depth import DepthPicture, apart
-from ..geometry.topology import vertex_normals
+from ..geometry.reconstruct import GRAZING, SEEN, TRUNCATION, extract, integrate
+from ..geometry.topology import vertex_normals, without_fragments
 from ..io.sequence import SequenceOptions
 from ..types import Mesh, MeshSequence, Up, evenly
-from .calibration.colors import CalibrationOptions, Corrected, Corrections, corrections_of
-from .calibration.remembered import remembered
+from .calibration.colors import CalibrationOptions, Corrected, Corrections, corrections_of, remembered
 from .rig.cameras import ColorCamera
-from .rig.fusion import FusionOptions, fuse_depths
-from .rig.rig import RIG, SINGLE, Rig, read_rig
+from .rig.rig import RIG, SINGLE, DepthCamera, Rig, read_rig
 
 MOVED = 0.5  # share of pixels that differ from their usual depth, in the median frame, of a camera that moves (guess)
 LEAST = 0.3  # share of pixels with a measurement below which a frame is ignored: it may show no background (guess)
+FINER = 2  # times the rows and columns of the pictures, interpolated, that are fused (decision 28)
+
+
+@dataclass(frozen=True, slots=True)
+class FusionOptions:
+    """Resolution of the fused surface and removal of fragments."""
+
+    voxel: float = 0.02  # m, side of a voxel
+    truncation: float | None = None  # voxels before and behind a depth that it constrains; None: by the cameras
+    fragment: float = 0.002  # m^2: connected components with less area are dropped
+
+    def __post_init__(self) -> None:
+        if not 1e-4 <= self.voxel <= 1:
+            raise InputError(f"voxel {self.voxel:g}: give metres, 0.0001 to 1; 0.02 suits a room")
+        if not (self.truncation is None or 1 <= self.truncation <= 20) or not 0 <= self.fragment < np.inf:
+            text = f"truncation {self.truncation}, fragment {self.fragment:g}"
+            raise InputError(f"{text}: give 1 to 20 voxels and an area from 0 on")
+
+
+def fuse_depths(depths: Sequence[tuple[DepthCamera, UInt16[np.ndarray, "H W"]]], options: FusionOptions) -> Mesh:
+    """Fuse the cameras' depths into a mesh, which is empty where no camera measured anything in its range.
+
+    Raises InputError where the surface takes more blocks of voxels than `reconstruct.MOST_BLOCKS`.
+    """
+    pictures = [camera.picture(inside) for camera, depth in depths if (inside := camera.in_range(depth)).any()]
+    if not pictures:
+        return Mesh.empty()
+    fine = [picture.finer(FINER) for picture in pictures]
+    # Surface seen at a grazing angle needs more voxels, limbs that are seen from both sides bear fewer.
+    truncation = options.truncation or (GRAZING if len(depths) == 1 else TRUNCATION)
+    return without_fragments(extract(integrate(fine, options.voxel, truncation), SEEN), options.fragment)
 
 
 class Recording(MeshSequence):
@@ -41,9 +72,7 @@ class Recording(MeshSequence):
     frame once.
     """
 
-    def __init__(
-        self, rig: Rig, options: FusionOptions = FusionOptions(), frames: str = ":", keep: bool = True
-    ) -> None:
+    def __init__(self, rig: Rig, options: FusionOptions, frames: str = ":", keep: bool = True) -> None:
         numbers = rig.frames
         chosen = SequenceOptions(frames=frames).chosen(len(numbers))
         self.rig, self.options = rig, options
@@ -182,10 +211,9 @@ def open_recording(
         if blind:
             warnings.append(f"camera {camera.name} measures nothing in {blind} of {len(seen)} frames looked at")
         if (share := moved_share(seen)) > MOVED:
-            raise InputError(
-                f"{folder}: camera {camera.name} seems to move: {100 * share:.0f} % of its pixels see something else "
-                "than usual; record with cameras that stand still, or cut the recording where it was moved"
-            )
+            text = f"{folder}: camera {camera.name} seems to move: {100 * share:.0f} % of its pixels see something else"
+            remedy = "record with cameras that stand still, or cut the recording where it was moved"
+            raise InputError(f"{text} than usual; {remedy}")
     return Recording(rig, options, frames, keep), warnings
 
 

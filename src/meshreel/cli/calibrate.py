@@ -11,11 +11,9 @@ from cyclopts import Parameter
 from rich.table import Table
 
 from ..capture.calibration.board import BoardOptions, poses_by_board
-from ..capture.calibration.calibrate import Calibration
+from ..capture.calibration.calibrate import Calibration, write_calibration_sheet
 from ..capture.calibration.calibrate import refine as refined
-from ..capture.calibration.calibration_sheet import write_calibration_sheet
-from ..capture.calibration.poses import read_poses
-from ..capture.calibration.rig_poses import described, posed_by, with_poses
+from ..capture.calibration.poses import described, posed_by, read_poses, with_poses
 from ..capture.recording import open_recording
 from ..capture.rig.rig import RIG, SINGLE
 from ..errors import InputError

@@ -11,14 +11,13 @@ from typing import Annotated, Any, Literal
 
 from cyclopts import Parameter
 
-from ..capture.recording import Recording, open_recording
+from ..capture.recording import FusionOptions, Recording, open_recording
 from ..capture.recordings import is_rig, open_take
 from ..capture.recordings.takes import Take
 from ..capture.rig.cameras import ColorCamera, DepthCamera
-from ..capture.rig.fusion import FusionOptions
 from ..capture.rig.rig import Rig, read_rig
 from ..errors import InputError
-from ..io.read import first_difference, read_json
+from ..io.files import first_difference, read_json
 from ..io.sequence import CAPTURED
 from ..io.write import frame_names, make_folder, replacing, write_mesh
 from .console import Common

@@ -15,7 +15,7 @@ from rich.table import Table
 from ..analysis.appearance.splat_fit import SplatView
 from ..analysis.appearance.splat_raster import draw
 from ..analysis.appearance.splat_views import GOLDEN, rendered, ring, taken
-from ..capture.simulated.truth import Truth, read_truth
+from ..capture.simulated.simulated_rig import Truth, read_truth
 from ..container.sources import FileSource
 from ..decoder.describe import describe_file
 from ..decoder.video import Video

@@ -10,12 +10,10 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from ..capture.recording import Recording, open_recording
-from ..capture.rig.fusion import FusionOptions
+from ..capture.recording import FusionOptions, Recording, open_recording
 from ..capture.rig.rig import RIG, read_cameras
 from ..capture.simulated.demo_room import VOXEL, WIDTH, RoomOptions, record_room, room_cameras
-from ..capture.simulated.simulated_rig import TRUTH
-from ..capture.simulated.truth import read_truth
+from ..capture.simulated.simulated_rig import TRUTH, read_truth
 from ..decoder.describe import describe_file
 from ..decoder.video import open as open_video
 from ..encoder.sequence import encode

@@ -11,7 +11,7 @@ from cyclopts import Parameter
 from .. import edit
 from ..edit.edits import Edited
 from ..errors import InputError
-from ..io.remote import Place, located
+from ..io.files import Place, located
 from ..types import Up
 from .console import Common
 

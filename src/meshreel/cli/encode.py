@@ -23,7 +23,7 @@ from ..encoder.settings.options import EncoderOptions, as_installed
 from ..encoder.settings.settings import QUALITY, Settings
 from ..errors import InputError
 from ..geometry.derived_sequences import upright
-from ..io.remote import Place, located, uploaded
+from ..io.files import Place, located, uploaded
 from ..io.sequence import SequenceOptions
 from ..io.write import check_apart, replacing
 from ..types import MeshSequence, Up

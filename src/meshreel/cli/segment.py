@@ -20,7 +20,7 @@ from ..encoder.settings.options import EncoderOptions, SceneOptions
 from ..errors import InputError
 from ..geometry.cameras import pack_cameras
 from ..geometry.derived_sequences import upright
-from ..io.mask_pictures import is_mask
+from ..io.pictures import is_mask
 from ..io.write import frame_names, left_over, make_folder, replacing, write_colored, write_picture
 from ..types import MeshSequence, evenly
 from .console import Common

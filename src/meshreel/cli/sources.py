@@ -20,7 +20,7 @@ from ..capture.recordings.to_rig import write_takes
 from ..edit.audio import packed_audio
 from ..errors import InputError
 from ..geometry.topology import weld
-from ..io.remote import Remote, located
+from ..io.files import Remote, located
 from ..io.sequence import SequenceOptions, capture_record, open_sequence
 from ..metrics.comparison import ComparisonOptions
 from ..metrics.mpeg import MpegOptions

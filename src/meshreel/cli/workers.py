@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 from .. import __version__
 from ..encoder.run.worker import Told, die_with_parent, end_with_parent, tell_to
 from ..errors import InputError
-from ..io.read import first_difference
+from ..io.files import first_difference
 
 if TYPE_CHECKING:
     from distributed import Client

@@ -18,8 +18,7 @@ from ..format.layout import DracoGroup, Form, LaplacianGroup, StaticPatch
 from ..format.records import unpack_all
 from ..geometry.atlas import Layout
 from ..geometry.splats import Carrier
-from ..geometry.subdivision import levels_of
-from ..geometry.topology import concatenate
+from ..geometry.topology import concatenate, levels_of
 from ..shapes import Bool, Float32, Float64, Int32, UInt8
 from ..types import Mesh
 from .appearance.colors import ColoredMesh, EncodedColors, decode_colors, encode_colors

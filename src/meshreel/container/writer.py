@@ -22,7 +22,7 @@ from ..format.budget import check_head
 from ..format.checks import IndexChecks, check_file, check_header, parse_metadata
 from ..format.layout import MAGIC, VERSION, Checksum, ChunkKind, Form, Header, Index, IndexEntry, Layer, Preamble
 from ..format.records import least_size, pack
-from ..io.unfinished import FULL, sync_folder, unfinished
+from ..io.write import FULL, sync_folder, unfinished
 from .sources import Stream
 
 SKIPPED = 255  # the kind of a chunk that no reader knows, now or later (FORMAT.md: a byte)

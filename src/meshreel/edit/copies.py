@@ -17,7 +17,7 @@ from ..errors import FormatError, InputError
 from ..format.checks import check_file
 from ..format.edit import ITEM
 from ..format.layout import EDITED, ChunkKind, Header, Index, IndexEntry
-from ..io.remote import Place, uploaded
+from ..io.files import Place, uploaded
 from ..io.write import check_apart, replacing
 
 _MOST = 0xFFFF  # bytes of metadata (FORMAT.md)

@@ -18,8 +18,7 @@ from ..format.checks import COMPANIONS
 from ..format.edit import ITEM, Edit, is_rotation, nearest_rotation
 from ..format.layout import ChunkKind, Header
 from ..format.records import pack
-from ..io.read import first_difference
-from ..io.remote import Place, located
+from ..io.files import Place, first_difference, located
 from ..io.sequence import SequenceOptions
 from ..types import Up, check_up
 from .audio import Given, joined_audio, packed_audio

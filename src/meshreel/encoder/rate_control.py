@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from ..errors import InputError
-from ..io.remote import Place, located
+from ..io.files import Place, located
 from .file.summary import Summary
 from .run.interval_files import opened
 from .sequence import Encoder

@@ -28,7 +28,7 @@ from ..errors import InputError
 from ..format.layout import Form
 from ..geometry.derived_sequences import captured, unchanging, welded
 from ..geometry.work import since, so_far
-from ..io.remote import Place
+from ..io.files import Place
 from ..types import MeshSequence, as_sequence, evenly
 from .file.metadata import chosen_options, metadata_of
 from .file.notices import warnings_of, warnings_of_colors, warnings_of_scene

@@ -20,8 +20,7 @@ from typing import IO, Any, BinaryIO
 import numpy as np
 
 from ..errors import InputError
-from ..io.glb_file import COLORS, PLACES, Faces, GlbFile, cut_at_seams, light
-from ..io.meshopt import by_use, check_meshopt
+from ..io.glb_file import COLORS, PLACES, Faces, GlbFile, by_use, check_meshopt, cut_at_seams, light
 from ..io.write import replacing
 from .shapes import Animation, Points, Shape, changes, unit_normals
 

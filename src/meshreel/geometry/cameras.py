@@ -1,25 +1,36 @@
-"""Pinhole cameras, packed into and unpacked from Open3D's pinhole camera JSON.
+"""Pinhole cameras, what they see of a mesh by ray casting, and their packing into Open3D's pinhole camera JSON.
 
 A camera looks along +z of its own frame, with x to the right and y down, as in Open3D and OpenCV. Pixel (column i,
 row j) covers [i, i + 1) x [j, j + 1), and its middle is at i + 1/2, j + 1/2. Files in which the middles of pixels are
 whole numbers (rig.json, calibrations of OpenCV) are converted where they are read and written.
+
+Rays are cast by the core's tree of boxes: it decides in float32, about the middle of the mesh, which face a ray meets;
+the distance to it is float64.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float64, Int64
+from jaxtyping import Bool, Float32, Float64, Int32, Int64
 
+from .. import _core
 from ..errors import InputError
+from ..types import Mesh
 from .strict import inverse, products
+from .topology import face_normals
 
 Matrix = Float64[np.ndarray, "4 4"]
+Points = Float64[np.ndarray, "N 3"]
+Numbers = Int64[np.ndarray, " N"]
+Lengths = Float64[np.ndarray, "*S"]
 _RIGID = 1e-3  # largest error of an entry of R R^T: some tools write few digits (guess)
+_VERSION = {"version_major": 1, "version_minor": 0}  # of Open3D's JSON
 _LARGEST = 1e9  # largest number of a matrix: keeps everything computed from it finite (guess)
 
 
@@ -75,7 +86,7 @@ class CameraPose:
 class Camera:
     """Pinhole camera whose lens distorts by OpenCV's `k1 k2 p1 p2 k3 k4 k5 k6`; equal numbers make equal cameras.
 
-    Rays and what is computed from them (`seen`, `raycast`) leave the bends out.
+    Rays and what is computed from them leave the bends out.
     """
 
     width: int  # pixels
@@ -117,7 +128,7 @@ class Camera:
         focal, center = (self.focal[0] * x, self.focal[1] * y), (self.center[0] * x, self.center[1] * y)
         return replace(self, width=width, height=height, focal=focal, center=center)
 
-    def local(self, points: Float64[np.ndarray, "N 3"]) -> Float64[np.ndarray, "N 3"]:
+    def local(self, points: Points) -> Points:
         """Return points of the world in the camera frame."""
         return products(points, self.extrinsic[:3, :3].T) + self.extrinsic[:3, 3]
 
@@ -143,15 +154,13 @@ class Camera:
             x, y = bent(points[:, 0] / depth[:, 0], points[:, 1] / depth[:, 0], self.distortion)
         return products(np.stack([x, y, np.ones(len(x))], axis=1), self.intrinsic.T)[:, :2]
 
-    def seen(
-        self, points: Float64[np.ndarray, "P 3"]
-    ) -> tuple[Int64[np.ndarray, " N"], Int64[np.ndarray, " N"], Float64[np.ndarray, " N"]]:
+    def seen(self, points: Float64[np.ndarray, "P 3"]) -> tuple[Numbers, Numbers, Float64[np.ndarray, " N"]]:
         """Project points of the world; return what `pixels` does, and the depths of the points inside the picture."""
         local = self.local(points)
         pixels, inside = self.pixels(local)
         return pixels, inside, local[inside, 2]
 
-    def pixels(self, points: Float64[np.ndarray, "P 3"]) -> tuple[Int64[np.ndarray, " N"], Int64[np.ndarray, " N"]]:
+    def pixels(self, points: Float64[np.ndarray, "P 3"]) -> tuple[Numbers, Numbers]:
         """Project points of the camera frame; return the pixels, counted row by row, of those inside the picture, and
         the numbers of these points.
         """
@@ -162,22 +171,12 @@ class Camera:
 
     def record(self) -> dict[str, Any]:
         """Return the camera as a record of Open3D's JSON, in which matrices are stored column by column."""
-        return {
-            "class_name": "PinholeCameraParameters",
-            "extrinsic": self.extrinsic.T.reshape(-1).tolist(),
-            "intrinsic": {
-                "height": self.height,
-                "intrinsic_matrix": self.intrinsic.T.reshape(-1).tolist(),
-                "width": self.width,
-            },
-            "version_major": 1,
-            "version_minor": 0,
-        }
+        matrix, extrinsic = self.intrinsic.T.reshape(-1).tolist(), self.extrinsic.T.reshape(-1).tolist()
+        intrinsic = {"height": self.height, "intrinsic_matrix": matrix, "width": self.width}
+        return {"class_name": "PinholeCameraParameters", "extrinsic": extrinsic, "intrinsic": intrinsic} | _VERSION
 
 
-def bent(
-    x: Float64[np.ndarray, "*S"], y: Float64[np.ndarray, "*S"], distortion: tuple[float, ...]
-) -> tuple[Float64[np.ndarray, "*S"], Float64[np.ndarray, "*S"]]:
+def bent(x: Lengths, y: Lengths, distortion: tuple[float, ...]) -> tuple[Lengths, Lengths]:
     """Return where a lens shows places of the plane at depth 1; `distortion` is OpenCV's, missing numbers are 0."""
     k1, k2, p1, p2, k3, k4, k5, k6 = (*distortion, *[0.0] * 8)[:8]
     r2 = x * x + y * y
@@ -188,12 +187,8 @@ def bent(
 
 def pack_cameras(cameras: Sequence[Camera]) -> bytes:
     """Pack cameras into the JSON of an Open3D PinholeCameraTrajectory."""
-    record = {
-        "class_name": "PinholeCameraTrajectory",
-        "parameters": [camera.record() for camera in cameras],
-        "version_major": 1,
-        "version_minor": 0,
-    }
+    parameters = [camera.record() for camera in cameras]
+    record = {"class_name": "PinholeCameraTrajectory", "parameters": parameters} | _VERSION
     return (json.dumps(record, indent=1) + "\n").encode()
 
 
@@ -231,3 +226,91 @@ def _camera(entry: dict[str, Any]) -> Camera:
     if reason := broken(extrinsic):
         raise ValueError(f"an extrinsic matrix, column by column, that {reason}")
     return Camera.of(width, height, intrinsic, extrinsic)
+
+
+@dataclass(frozen=True, slots=True)
+class Hit:
+    """First intersection of each of N rays with the surface."""
+
+    faces: Int32[np.ndarray, " N"]  # -1: none
+    distances: Float64[np.ndarray, " N"]  # in lengths of the ray's direction; infinite: none
+    barycentric: Float64[np.ndarray, "N 3"]  # weights of the face's three vertices; (1, 0, 0): none
+
+
+@dataclass(frozen=True, slots=True)
+class Seen:
+    """Face and depth that a camera sees at each pixel."""
+
+    faces: Int32[np.ndarray, "H W"]  # the paper's eq. 1; -1: none
+    depth: Float32[np.ndarray, "H W"]  # m, along the optical axis; infinite: none
+
+
+class Rays:
+    """A mesh prepared for ray casting; rays meet faces from both sides, and no ray meets an empty mesh."""
+
+    def __init__(self, mesh: Mesh) -> None:
+        self._mesh = mesh
+        self._tree = None if mesh.is_empty else _core.SurfaceTree(mesh.vertices, mesh.faces)
+
+    def cast(self, origins: Float64[np.ndarray, "M 3"], directions: Float64[np.ndarray, "N 3"]) -> Hit:
+        """Find the first intersection of each of N rays; they have N origins, or one."""
+        if self._tree is None:
+            weights = np.zeros((len(directions), 3))
+            weights[:, 0] = 1
+            return Hit(np.full(len(directions), -1, np.int32), np.full(len(directions), np.inf), weights)
+        origins, directions = np.ascontiguousarray(origins), np.ascontiguousarray(directions)
+        return Hit(*self._tree.cast(origins, directions, True))
+
+    def look(self, camera: Camera) -> Seen:
+        """Find the face and the depth that a camera sees at each pixel."""
+        shape = camera.height, camera.width
+        faces, depth = self._from(camera, np.stack([*_ways(camera)], axis=-1).reshape(-1, 3))
+        return Seen(faces.reshape(shape), depth.astype(np.float32).reshape(shape))
+
+    def faces_in(self, camera: Camera, pixels: Bool[np.ndarray, "H W"]) -> Int32[np.ndarray, " N"]:
+        """Find the face that a camera sees in each of some pixels, row by row; -1: none."""
+        return self._from(camera, np.stack([ways[pixels] for ways in _ways(camera)], axis=-1))[0]
+
+    def _from(self, camera: Camera, ways: Points) -> tuple[Int32[np.ndarray, " N"], Float64[np.ndarray, " N"]]:
+        """Return the faces that rays of a camera meet, and the distances in lengths of their ways."""
+        if self._tree is None:
+            return np.full(len(ways), -1, np.int32), np.full(len(ways), np.inf)
+        return self._tree.cast(camera.eye[None], ways, False)[:2]
+
+    def backs(self, camera: Camera, seen: Seen) -> Bool[np.ndarray, "H W"]:
+        """Return a mask of the pixels that see the back of a face; `seen` is the result of `look`."""
+        if self._mesh.is_empty:
+            return np.zeros(seen.faces.shape, bool)
+        normals = self._normals[seen.faces]  # arbitrary where no face is seen
+        along = sum(normals[..., axis] * ways for axis, ways in enumerate(_ways(camera)))
+        return (along > 0) & (seen.faces >= 0)
+
+    @cached_property
+    def _normals(self) -> Float64[np.ndarray, "F 3"]:
+        return face_normals(self._mesh)[0]
+
+
+def pixels_near(camera: Camera, mesh: Mesh) -> Bool[np.ndarray, "H W"]:
+    """Return a mask of pixels that contains all that see faces: the boxes of projected faces, a pixel wider.
+
+    If the camera's plane cuts a face, these are all pixels.
+    """
+    local = camera.local(mesh.vertices)
+    ahead = (local[:, 2] > 0)[mesh.faces]
+    if (ahead.any(axis=1) & ~ahead.all(axis=1)).any():
+        return np.ones((camera.height, camera.width), bool)
+    size = np.array([camera.width, camera.height])
+    corners = camera.project(local)[mesh.faces[ahead.all(axis=1)]]
+    low = np.clip(np.floor(corners.min(axis=1)) - 1, 0, size).astype(np.int64)
+    high = np.clip(np.floor(corners.max(axis=1)) + 2, 0, size).astype(np.int64)
+    steps = np.zeros((camera.height + 1, camera.width + 1), np.int64)  # of the number of boxes, along both axes
+    for x, y, step in ((low, low, 1), (high, high, 1), (low, high, -1), (high, low, -1)):
+        np.add.at(steps, (y[:, 1], x[:, 0]), step)
+    return steps.cumsum(axis=0).cumsum(axis=1)[:-1, :-1] > 0
+
+
+def _ways(camera: Camera) -> Iterator[Float64[np.ndarray, "H W"]]:
+    """Yield the ray directions of all pixels, one world axis at a time; each goes one metre along the optical axis."""
+    columns, rows = np.arange(camera.width) + 0.5, np.arange(camera.height)[:, None] + 0.5
+    for right, down, ahead in products(inverse(camera.extrinsic[:3, :3]), inverse(camera.intrinsic)):
+        yield right * columns + (down * rows + ahead)

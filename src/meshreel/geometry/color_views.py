@@ -1,7 +1,7 @@
-"""Colours of places on a surface in camera pictures: projected, tested for occlusion, and blended.
+"""Colours of places on a surface: from camera pictures, from a texture, or blended from vertices.
 
-In: pictures with their cameras, and a mesh that may hide places from them. Out: a colour for each place that some
-camera saw, from those that looked at it most squarely.
+In camera pictures, places are projected, tested for occlusion by a mesh, and blended: cameras that looked at a place
+most squarely count most.
 """
 
 from __future__ import annotations
@@ -11,13 +11,17 @@ from dataclasses import dataclass, replace
 from typing import Protocol, runtime_checkable
 
 import numpy as np
-from jaxtyping import Bool, Float32, Float64, UInt8
+from jaxtyping import Bool, Float, Float32, Float64, Int32, Int64, UInt8
 
 from ..types import GREY, Mesh, Placement
-from .cameras import Camera, CameraPose
-from .raycast import Rays
+from .cameras import Camera, CameraPose, Rays
+from .closest_points import Surface
 from .strict import products
-from .topology import face_normals
+from .topology import blend, face_normals
+
+Points = Float64[np.ndarray, "N 3"]  # also normals, and colours from 0 to 255
+Mask = Bool[np.ndarray, " N"]
+_Pair = tuple[Int64[np.ndarray, " N"], Int64[np.ndarray, " N"], Float64[np.ndarray, " N"]]
 
 MOST_SIDE = 512  # pixels, of the depth pictures that test occlusion: a third of the time of whole ones (guess)
 MARGIN = 0.01  # of the depth, and at least as many metres: how far a place may lie behind the visible surface (guess)
@@ -34,9 +38,7 @@ class ColorPicture:
     pixels: UInt8[np.ndarray, "H W 3"]
     gains: tuple[float, float, float] = (1.0, 1.0, 1.0)  # factors by which its channels are too bright
 
-    def project(
-        self, points: Float64[np.ndarray, "N 3"]
-    ) -> tuple[Float64[np.ndarray, "N 2"], Float64[np.ndarray, " N"]]:
+    def project(self, points: Points) -> tuple[Float64[np.ndarray, "N 2"], Float64[np.ndarray, " N"]]:
         """Return positions in the picture, NaN for points that are not in front, and depths along the optical axis."""
         local = self.camera.local(points)
         return self.camera.project(local), local[:, 2]
@@ -69,9 +71,7 @@ class ColorViews:
         rays = Rays(hides)
         self.views = [View(picture, rays, margin, clear) for picture in pictures]
 
-    def at(
-        self, points: Float64[np.ndarray, "N 3"], normals: Float64[np.ndarray, "N 3"]
-    ) -> tuple[Float64[np.ndarray, "N 3"], Bool[np.ndarray, " N"]]:
+    def at(self, points: Points, normals: Points) -> tuple[Points, Mask]:
         """Return the colours of places with these normals, 0 to 255, and a mask of those that some camera saw."""
         sums, weights = np.zeros((len(points), 3)), np.zeros(len(points))
         for view in self.views:
@@ -109,9 +109,7 @@ class View:
         steps = _steps(_smooth(self._depth) if clear else self._depth)
         self._from_step = distance_transform_edt(~steps) * self._shrink
 
-    def weights(
-        self, points: Float64[np.ndarray, "N 3"], normals: Float64[np.ndarray, "N 3"], at_step: float = 0.0
-    ) -> Float64[np.ndarray, " N"]:
+    def weights(self, points: Points, normals: Points, at_step: float = 0.0) -> Float64[np.ndarray, " N"]:
         """Return how well the picture shows places: the cube of the cosine of the view, less near steps; 0 if hidden.
 
         `at_step` is the share of the weight that remains at a step.
@@ -133,7 +131,7 @@ class View:
         weights[rows] = np.where(hidden, 0.0, cosine[rows] ** 3 * np.maximum(near, at_step))
         return weights
 
-    def colors(self, points: Float64[np.ndarray, "N 3"], chosen: Bool[np.ndarray, " N"]) -> Float64[np.ndarray, "N 3"]:
+    def colors(self, points: Points, chosen: Mask) -> Points:
         """Return the colours of the chosen places in the picture; 0 of others."""
         colors = np.zeros((len(points), 3))
         colors[chosen] = sampled(self.picture.pixels, self.picture.project(points[chosen])[0]) / self.picture.gains
@@ -165,21 +163,15 @@ def _steps(depth: Float32[np.ndarray, "H W"]) -> Bool[np.ndarray, "H W"]:
     return steps
 
 
-def sampled(pixels: UInt8[np.ndarray, "H W 3"], positions: Float64[np.ndarray, "N 2"]) -> Float64[np.ndarray, "N 3"]:
+def sampled(pixels: UInt8[np.ndarray, "H W 3"], positions: Float64[np.ndarray, "N 2"]) -> Points:
     """Return the colours at positions in a picture, blended between the middles of pixels."""
     height, width = pixels.shape[:2]
     x, y = np.clip(positions - 0.5, 0, [width - 1, height - 1]).T
     x0, y0 = np.minimum(x.astype(np.int64), width - 2), np.minimum(y.astype(np.int64), height - 2)
-    fx, fy = (x - x0)[:, None], (y - y0)[:, None]
-    flat, at = pixels.reshape(-1, 3), y0 * width + x0
-    upper = flat[at] * (1 - fx) + flat[at + 1] * fx
-    lower = flat[at + width] * (1 - fx) + flat[at + width + 1] * fx
-    return upper * (1 - fy) + lower * fy
+    return _between(pixels, (x0, x0 + 1, x - x0), (y0, y0 + 1, y - y0))
 
 
-def spread_colors(
-    mesh: Mesh, colors: Float64[np.ndarray, "V 3"], seen: Bool[np.ndarray, " V"]
-) -> UInt8[np.ndarray, "V 3"]:
+def spread_colors(mesh: Mesh, colors: Points, seen: Mask) -> UInt8[np.ndarray, "N 3"]:
     """Return colours of all vertices of a mesh: those that no camera saw have the means of neighbours, ring by ring."""
     ends = np.concatenate([mesh.faces, mesh.faces[:, [1, 2, 0]]]).reshape(-1)
     others = np.concatenate([mesh.faces[:, [1, 2, 0]], mesh.faces]).reshape(-1)
@@ -193,3 +185,70 @@ def spread_colors(
         new = counts > 0
         values[new] = sums[new] / counts[new, None]
         reached_vertices |= new
+
+
+@runtime_checkable
+class Paint(Protocol):
+    """Source of colours of points on a surface."""
+
+    def at(self, points: Points, normals: Points) -> tuple[Points, Mask]:
+        """Return the colours of points with these normals, 0 to 255, and a mask of the known ones."""
+
+    def pixels_on(self, mesh: Mesh) -> float:
+        """Return the number of pixels of its pictures that show a mesh; infinite without pictures."""
+
+
+class Painted:
+    """A mesh with faces and colours, prepared for repeated queries."""
+
+    def __init__(self, mesh: Mesh, far: float = np.inf) -> None:
+        """Take the mesh; colours of points farther from it than `far`, in the unit of its vertices, are unknown."""
+        self._mesh, self._surface, self._far = mesh, Surface(mesh), far
+        self._pixels = None if mesh.uv is None or mesh.texture is None else mesh.texture.pixels
+
+    def at(self, points: Points, normals: Points) -> tuple[Points, Mask]:
+        """Return the colours at the closest points of the mesh, whatever the normals, and a mask of near points."""
+        del normals
+        hits = self._surface.closest(points)
+        return self.on(hits.faces, hits.barycentric), np.linalg.norm(hits.points - points, axis=1) <= self._far
+
+    def pixels_on(self, mesh: Mesh) -> float:
+        """Return the number of texels of the painted mesh, whatever `mesh`; infinite without a texture."""
+        del mesh
+        if self._pixels is None or self._mesh.uv is None:
+            return np.inf
+        a, b, c = np.moveaxis(self._mesh.uv.astype(np.float64), 1, 0)
+        areas = np.abs((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]) / 2
+        return float(np.nansum(areas)) * self._pixels.shape[0] * self._pixels.shape[1]
+
+    def on(self, faces: Int32[np.ndarray, " N"], barycentric: Float64[np.ndarray, "N 3"]) -> Points:
+        """Return the colours at places inside faces."""
+        mesh = self._mesh
+        if mesh.colors is None:
+            colors = np.full((len(faces), 3), float(GREY))
+        else:
+            colors = blend(mesh.colors.astype(np.float64), mesh.faces[faces], barycentric)
+        if self._pixels is not None and mesh.uv is not None:
+            places = np.einsum("nkc,nk->nc", mesh.uv[faces].astype(np.float64), barycentric)
+            textured = np.isfinite(places).all(axis=1)
+            colors[textured] = bilinear(self._pixels, places[textured])
+        return colors
+
+
+def bilinear(pixels: UInt8[np.ndarray, "H W 3"], places: Float[np.ndarray, "N 2"]) -> Points:
+    """Return the colours at places of a texture, as in `Mesh.uv`; outside of 0 to 1 the texture is repeated."""
+    height, width = pixels.shape[:2]
+    x, y = np.asarray(places, np.float64).T
+    x, y = (x - np.floor(x)) * width - 0.5, (1.0 - (y - np.floor(y))) * height - 0.5
+    left, above = np.floor(x), np.floor(y)
+    x0, y0 = left.astype(np.int64) % width, above.astype(np.int64) % height
+    return _between(pixels, (x0, (x0 + 1) % width, x - left), (y0, (y0 + 1) % height, y - above))
+
+
+def _between(pixels: UInt8[np.ndarray, "H W 3"], columns: _Pair, rows: _Pair) -> Points:
+    """Blend the pixels of two columns and two rows each; a pair ends with the share of its second."""
+    (x0, x1, fx), (y0, y1, fy) = ((first, second, share[:, None]) for first, second, share in (columns, rows))
+    width, flat = pixels.shape[1], pixels.reshape(-1, 3)
+    upper = flat[y0 * width + x0] * (1 - fx) + flat[y0 * width + x1] * fx
+    lower = flat[y1 * width + x0] * (1 - fx) + flat[y1 * width + x1] * fx
+    return upper * (1 - fy) + lower * fy

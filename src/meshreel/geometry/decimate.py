@@ -37,7 +37,7 @@ def decimate(mesh: Mesh, vertices: int, border: float = BOUNDARY_WEIGHT) -> Mesh
     if len(mesh.vertices) <= vertices or mesh.diagonal == 0:
         return mesh
     work.count("decimations")
-    if is_open := has_boundary(mesh):
+    if is_open := len(border_edges(mesh)) > 0:
         mesh = _roughly(mesh, ROUGHLY * vertices)
     faces = max(len(mesh.faces) - 2 * (len(mesh.vertices) - vertices), 4)
     for _ in range(ROUNDS):
@@ -61,7 +61,7 @@ def decimate_faces(mesh: Mesh, faces: int) -> Mesh:
     if len(mesh.faces) <= faces or mesh.diagonal == 0:
         return mesh
     work.count("decimations")
-    if has_boundary(mesh):
+    if len(border_edges(mesh)):
         return clean(_collapse_open(_roughly(mesh, ROUGHLY * faces // 2), faces, BOUNDARY_WEIGHT))
     return clean(_collapse_closed(mesh, faces))
 
@@ -72,10 +72,6 @@ def _roughly(mesh: Mesh, vertices: int) -> Mesh:
         return mesh
     rough = clean(_collapse_closed(mesh, 2 * vertices))
     return rough if len(rough.vertices) >= vertices // 2 else mesh  # many bits may be lost in one pass
-
-
-def has_boundary(mesh: Mesh) -> bool:
-    return len(border_edges(mesh)) > 0
 
 
 def _collapse_closed(mesh: Mesh, faces: int) -> Mesh:

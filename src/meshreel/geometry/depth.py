@@ -13,12 +13,12 @@ from scipy.ndimage import minimum_filter
 from ..types import Placement
 from .cameras import Camera
 
+_Shares = tuple[Int64[np.ndarray, " N"], Float64[np.ndarray, " N"]]  # pixels, and how much each counts
+
 FACING = 0.3  # least cosine between a surface's normal and the direction to a camera that measures it (guess)
-THROUGH = (
-    0.03,
-    0.015,
-)  # m, and share of the depth: a measurement so far behind a place proves it free (guess)
+THROUGH = (0.03, 0.015)  # m, and share of the depth: a measurement so far behind a place proves it free (guess)
 APART = (0.06, 0.02)  # m, and share of the depth: measurements farther apart are of different surfaces (guess)
+WORLD = Placement(1.0, (0.0, 0.0, 0.0))
 STEP = 0.03  # of the depth, between neighbours: pixels that differ by more are of two surfaces (guess)
 
 
@@ -49,11 +49,11 @@ class DepthPicture:
         depth between two surfaces results: pixels farther apart than `STEP` are not mixed.
         """
         inverse = inverse_depths(self.depth)
-        rows, columns = (_between(count, factor) for count in inverse.shape)
-        nearest = inverse[rows.nearest][:, columns.nearest]
+        (rows, nearest_rows), (columns, nearest_columns) = (_between(count, factor) for count in inverse.shape)
+        nearest = inverse[nearest_rows][:, nearest_columns]
         sums, weights = np.zeros(nearest.shape), np.zeros(nearest.shape)
-        for row, down in ((rows.before, 1 - rows.share), (rows.after, rows.share)):
-            for column, right in ((columns.before, 1 - columns.share), (columns.after, columns.share)):
+        for row, down in rows:
+            for column, right in columns:
                 values = inverse[row][:, column]
                 weight = np.where(np.abs(values - nearest) <= STEP * nearest, down[:, None] * right, 0.0)
                 sums += weight * values
@@ -73,13 +73,13 @@ class FreeSpace:
     """Space that depth cameras saw through at one moment, queried in any coordinates."""
 
     pictures: tuple[DepthPicture, ...]  # each depth the least of nine pixels, 0 if one of them has none
-    place: Placement = Placement(1.0, (0.0, 0.0, 0.0))  # of the coordinates, in the world
+    place: Placement  # of the coordinates, in the world
 
     @staticmethod
-    def of(pictures: Sequence[DepthPicture | None], place: Placement | None = None) -> FreeSpace:
-        """Return the space that cameras saw through, in the coordinates of `place`, or of the world."""
+    def of(pictures: Sequence[DepthPicture | None], place: Placement = WORLD) -> FreeSpace:
+        """Return the space that cameras saw through, in the coordinates of `place`."""
         eroded = (replace(each, depth=minimum_filter(each.depth, 3)) for each in pictures if each is not None)
-        return FreeSpace(tuple(eroded)) if place is None else FreeSpace(tuple(eroded), place)
+        return FreeSpace(tuple(eroded), place)
 
     def at(self, points: Float64[np.ndarray, "N 3"]) -> Bool[np.ndarray, " N"]:
         """Return the points that some camera saw past: it measured a larger depth in all nine pixels around."""
@@ -111,22 +111,13 @@ class FreeSpace:
             yield picture.camera, inside, depth, ahead, np.maximum(THROUGH[0], THROUGH[1] * ahead)
 
 
-@dataclass(frozen=True, slots=True)
-class _Between:
-    """Pixels along one axis around the middles of finer ones, and how far these are from the first to the second."""
-
-    before: Int64[np.ndarray, " N"]
-    after: Int64[np.ndarray, " N"]
-    share: Float64[np.ndarray, " N"]
-    nearest: Int64[np.ndarray, " N"]
-
-
-def _between(count: int, factor: int) -> _Between:
+def _between(count: int, factor: int) -> tuple[list[_Shares], Int64[np.ndarray, " N"]]:
+    """Return the pixels of an axis before and after the middles of finer ones, with their shares, and the nearest."""
     places = (np.arange(count * factor) + 0.5) / factor - 0.5
     before = np.floor(places).astype(np.int64)
     share = places - before
     first, second, nearest = (np.clip(before + k, 0, count - 1) for k in (0, 1, share >= 0.5))
-    return _Between(first, second, share, nearest)
+    return [(first, 1 - share), (second, share)], nearest
 
 
 @runtime_checkable
@@ -135,4 +126,3 @@ class DepthFrames(Protocol):
 
     def __getitem__(self, index: int, /) -> list[DepthPicture | None]:
         """Return a frame's pictures, one for each camera; None for a camera that lacks the frame."""
-        ...

@@ -61,8 +61,7 @@ def only(sequence: MeshSequence, numbers: Sequence[int]) -> MeshSequence:
 
     Of frames in files, only the names are sent; others are read now.
     """
-    cut = getattr(sequence, "only", None)
-    found: MeshSequence = Held.of(sequence, numbers) if cut is None else cut(numbers)
+    found: MeshSequence = sequence.only(numbers) if hasattr(sequence, "only") else Held.of(sequence, numbers)
     return found
 
 
@@ -242,9 +241,7 @@ def turned_over(source: MeshSequence) -> DerivedSequence:
 
 
 def picked(
-    source: MeshSequence,
-    numbers: Sequence[int],
-    choose: Callable[[int, Mesh], Bool[np.ndarray, " F"]] | None = None,
+    source: MeshSequence, numbers: Sequence[int], choose: Callable[[int, Mesh], Bool[np.ndarray, " F"]] | None = None
 ) -> DerivedSequence:
     """Return some frames, by their numbers, or faces of them that `choose` selects by a frame's number and mesh."""
     if choose is None:
@@ -271,8 +268,7 @@ def digest(meshes: Iterable[Mesh]) -> str:
 
 def _welded(source: MeshSequence, number: int) -> Mesh:
     mesh = source[number]
-    faces = mesh.faces
-    if faces.size and (faces.min() < 0 or faces.max() >= len(mesh.vertices)):
+    if mesh.faces.size and (mesh.faces.min() < 0 or mesh.faces.max() >= len(mesh.vertices)):
         return mesh  # the survey refuses it with the number of its frame
     return weld(mesh)
 

@@ -17,6 +17,10 @@ from .closest_points import Surface
 from .strict import rounded
 from .topology import connected_faces, face_normals, weld
 
+Points = Float64[np.ndarray, "N 3"]
+Labels = Int64[np.ndarray, " N"]
+OfFaces = Int64[np.ndarray, " F"]
+
 BLOCK = 4  # grid points along a side of a block, which is classified at once if no surface crosses it (guess)
 MOST_BLOCKS = 1 << 19  # of the sampling grid; bounds memory if a few small bodies lie far apart (guess)
 SPECK = 0.002  # share of all samples below which a component is noise (guess)
@@ -27,8 +31,8 @@ SHEET = 0.05  # interior samples per area h^2 below which a component is a sheet
 class Samples:
     """N points in the volume of a mesh, each with the body it belongs to; specks are not sampled."""
 
-    points: Float64[np.ndarray, "N 3"]
-    bodies: Int64[np.ndarray, " N"]  # 0, 1, ..., largest volume first
+    points: Points
+    bodies: Labels  # 0, 1, ..., largest volume first
 
 
 def interior_samples(mesh: Mesh, count: int, generator: np.random.Generator) -> Samples:
@@ -50,12 +54,12 @@ def interior_samples(mesh: Mesh, count: int, generator: np.random.Generator) -> 
     return _without_specks(*_with_sheets(solid, parts, points, labels, spacing))
 
 
-def winding_inside(mesh: Mesh, queries: Float64[np.ndarray, "N 3"]) -> Bool[np.ndarray, " N"]:
+def winding_inside(mesh: Mesh, queries: Points) -> Bool[np.ndarray, " N"]:
     """Return whether each query lies inside the mesh: |winding number| > 1/2, whatever the faces' orientation."""
     return np.abs(winding_numbers(mesh, queries)) > 0.5
 
 
-def winding_numbers(mesh: Mesh, queries: Float64[np.ndarray, "N 3"]) -> Float64[np.ndarray, " N"]:
+def winding_numbers(mesh: Mesh, queries: Points) -> Float64[np.ndarray, " N"]:
     """Return the winding number of the mesh around each query: inside, 1 if faces point outward and -1 if inward.
 
     All faces must have an area above 0.
@@ -87,12 +91,12 @@ def _cube_root(value: float) -> float:
     return rounded(float(value) ** (1 / 3))
 
 
-def _inside_grid(mesh: Mesh, spacing: float, generator: np.random.Generator) -> Float64[np.ndarray, "N 3"]:
+def _inside_grid(mesh: Mesh, spacing: float, generator: np.random.Generator) -> Points:
     """Return the jittered grid points inside the mesh; blocks far from the surface are classified as a whole."""
     low, side = mesh.vertices.min(axis=0), BLOCK * spacing
     shape = np.floor(np.ptp(mesh.vertices, axis=0) / side).astype(np.int64) + 1
     centers = low + (np.indices(tuple(shape)).reshape(3, -1).T + 0.5) * side
-    near = _touched(mesh, low, side, shape)
+    near = _touched((mesh.vertices[mesh.faces] - low) / side, shape)
     winding = np.zeros(len(centers))
     winding[~near] = np.abs(winding_numbers(mesh, centers[~near]))
     near |= np.abs(winding - 0.5) < 0.3  # in the mouth of a hole it changes smoothly, without a surface
@@ -105,11 +109,9 @@ def _inside_grid(mesh: Mesh, spacing: float, generator: np.random.Generator) -> 
     return points[keep]
 
 
-def _touched(
-    mesh: Mesh, low: Float64[np.ndarray, " 3"], side: float, shape: Int64[np.ndarray, " 3"]
-) -> Bool[np.ndarray, " B"]:
-    """Return a mask of the blocks that any face's bounding box meets."""
-    corners = np.floor((mesh.vertices[mesh.faces] - low) / side).astype(np.int64)
+def _touched(places: Float64[np.ndarray, "F 3 3"], shape: Int64[np.ndarray, " 3"]) -> Bool[np.ndarray, " B"]:
+    """Return a mask of the blocks that any face's bounding box meets; `places` of the corners are in blocks."""
+    corners = np.floor(places).astype(np.int64)
     first, last = corners.min(axis=1), corners.max(axis=1)
     touched = np.zeros(tuple(shape), dtype=bool)
     small = (last - first).max(axis=1) <= 1
@@ -120,7 +122,7 @@ def _touched(
     return touched.reshape(-1)
 
 
-def _parts(mesh: Mesh) -> Int64[np.ndarray, " F"]:
+def _parts(mesh: Mesh) -> OfFaces:
     """Label each face with its body: its connected component, or the component that encloses it."""
     labels = connected_faces(mesh.faces, len(mesh.vertices))
     if labels.max() > 0:  # UV seams look like gaps until equal positions are welded
@@ -140,11 +142,7 @@ def _parts(mesh: Mesh) -> Int64[np.ndarray, " F"]:
 
 
 def _with_sheets(
-    mesh: Mesh,
-    parts: Int64[np.ndarray, " F"],
-    points: Float64[np.ndarray, "N 3"],
-    labels: Int64[np.ndarray, " N"],
-    spacing: float,
+    mesh: Mesh, parts: OfFaces, points: Points, labels: Labels, spacing: float
 ) -> tuple[Float64[np.ndarray, "S 3"], Int64[np.ndarray, " S"]]:
     """Add samples on the surface of parts that enclose almost no volume."""
     areas = np.bincount(parts, face_normals(mesh)[1])
@@ -157,9 +155,7 @@ def _with_sheets(
     return np.concatenate([points, more]), np.concatenate([labels, parts[faces]])
 
 
-def _on_surface(
-    mesh: Mesh, weights: Float64[np.ndarray, " F"], count: int
-) -> tuple[Float64[np.ndarray, "N 3"], Int64[np.ndarray, " N"]]:
+def _on_surface(mesh: Mesh, weights: Float64[np.ndarray, " F"], count: int) -> tuple[Points, Labels]:
     """Return points at equal steps of the summed face weights, and the face of each.
 
     Inside a face, points follow a low-discrepancy pattern (R2, M. Roberts 2018).
@@ -173,7 +169,7 @@ def _on_surface(
     return a + u[:, None] * (b - a) + v[:, None] * (c - a), faces
 
 
-def _without_specks(points: Float64[np.ndarray, "N 3"], labels: Int64[np.ndarray, " N"]) -> Samples:
+def _without_specks(points: Points, labels: Labels) -> Samples:
     """Drop the samples of specks and renumber the bodies, largest first."""
     sizes = np.bincount(labels)
     order = np.argsort(-sizes, kind="stable")

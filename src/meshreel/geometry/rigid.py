@@ -10,12 +10,16 @@ import numpy as np
 from ..shapes import Float64
 from . import strict
 
+Motions = Float64[np.ndarray, "N 8"]
+Rotations = Float64[np.ndarray, "N 3 3"]
+Points = Float64[np.ndarray, "N 3"]
+
 DEGENERATE = 1e-10  # share of the largest singular value below which one does not constrain the rotation (guess)
 
 
 def fit_rigid(
     source: Float64[np.ndarray, "N n 3"], target: Float64[np.ndarray, "N n 3"], weights: Float64[np.ndarray, "N n"]
-) -> tuple[Float64[np.ndarray, "N 3 3"], Float64[np.ndarray, "N 3"]]:
+) -> tuple[Rotations, Points]:
     """Fit rotations R and translations t that minimise sum w |R source + t - target|^2 in each of N rows (Kabsch).
 
     Points on a line, or a single point, leave part of the rotation open: the smallest rotation is chosen.
@@ -28,40 +32,34 @@ def fit_rigid(
     return rotations, middle_t - np.einsum("nij,nj->ni", rotations, middle_s)
 
 
-def from_rigid(
-    rotations: Float64[np.ndarray, "N 3 3"], translations: Float64[np.ndarray, "N 3"]
-) -> Float64[np.ndarray, "N 8"]:
+def from_rigid(rotations: Rotations, translations: Points) -> Motions:
     """Return the unit dual quaternions of the motions x -> R x + t."""
     real = quaternions(rotations)
     pure = np.concatenate([np.zeros((len(real), 1)), translations], axis=1)
     return np.concatenate([real, multiply(pure, real) / 2], axis=1)
 
 
-def blend(motions: Float64[np.ndarray, "N n 8"], weights: Float64[np.ndarray, "N n"]) -> Float64[np.ndarray, "N 8"]:
+def blend(motions: Float64[np.ndarray, "N n 8"], weights: Float64[np.ndarray, "N n"]) -> Motions:
     """Blend each row's n motions into their weighted mean, a unit dual quaternion.
 
     q and -q are one rotation: each motion is first flipped to the hemisphere of its row's first motion.
     """
     real = motions[..., :4]
     sign = np.where(np.einsum("nik,nk->ni", real, real[:, 0]) < 0, -1.0, 1.0)
-    return normalize(strict.products((weights * sign)[:, None, :], motions)[:, 0])
-
-
-def normalize(motions: Float64[np.ndarray, "N 8"]) -> Float64[np.ndarray, "N 8"]:
-    """Return the nearest unit dual quaternions: |real| = 1 and real . dual = 0."""
-    length = np.linalg.norm(motions[:, :4], axis=1, keepdims=True)
-    real, dual = motions[:, :4] / length, motions[:, 4:] / length
+    sums = strict.products((weights * sign)[:, None, :], motions)[:, 0]
+    length = np.linalg.norm(sums[:, :4], axis=1, keepdims=True)  # the nearest unit: |real| = 1 and real . dual = 0
+    real, dual = sums[:, :4] / length, sums[:, 4:] / length
     return np.concatenate([real, dual - np.sum(real * dual, axis=1, keepdims=True) * real], axis=1)
 
 
-def apply(motions: Float64[np.ndarray, "N 8"], points: Float64[np.ndarray, "N 3"]) -> Float64[np.ndarray, "N 3"]:
+def apply(motions: Motions, points: Points) -> Points:
     """Move each point by its unit dual quaternion."""
     real, dual = motions[:, :4], motions[:, 4:]
     translation = 2 * (real[:, :1] * dual[:, 1:] - dual[:, :1] * real[:, 1:] + np.cross(real[:, 1:], dual[:, 1:]))
     return rotate(motions, points) + translation
 
 
-def rotate(motions: Float64[np.ndarray, "N 8"], vectors: Float64[np.ndarray, "N 3"]) -> Float64[np.ndarray, "N 3"]:
+def rotate(motions: Motions, vectors: Points) -> Points:
     """Rotate each vector, such as a normal, by its unit dual quaternion without translating it."""
     w, axis = motions[:, :1], motions[:, 1:4]
     return vectors + 2 * np.cross(axis, np.cross(axis, vectors) + w * vectors)
@@ -74,7 +72,7 @@ def multiply(a: Float64[np.ndarray, "N 4"], b: Float64[np.ndarray, "N 4"]) -> Fl
     return np.concatenate([scalar[:, None], vector], axis=1)
 
 
-def _nearest_rotations(covariances: Float64[np.ndarray, "N 3 3"]) -> Float64[np.ndarray, "N 3 3"]:
+def _nearest_rotations(covariances: Rotations) -> Rotations:
     rotations, size = strict.nearest_rotations(covariances)
     open_axis = size[:, 1] <= DEGENERATE * size[:, 0]  # rank 1 or 0: pull the open part towards no rotation
     if open_axis.any():
@@ -83,22 +81,20 @@ def _nearest_rotations(covariances: Float64[np.ndarray, "N 3 3"]) -> Float64[np.
     return rotations
 
 
-def quaternions(rotations: Float64[np.ndarray, "N 3 3"]) -> Float64[np.ndarray, "N 4"]:
+def quaternions(rotations: Rotations) -> Float64[np.ndarray, "N 4"]:
     """Return unit quaternions of rotations, from the largest of w, x, y, z, to avoid a division by a small one."""
     r = rotations
     trace = np.trace(r, axis1=1, axis2=2)
     d0, d1, d2 = r[:, 0, 0], r[:, 1, 1], r[:, 2, 2]
     xw, yw, zw = r[:, 2, 1] - r[:, 1, 2], r[:, 0, 2] - r[:, 2, 0], r[:, 1, 0] - r[:, 0, 1]
     xy, xz, yz = r[:, 1, 0] + r[:, 0, 1], r[:, 0, 2] + r[:, 2, 0], r[:, 2, 1] + r[:, 1, 2]
-    rows = np.stack(  # 4 q q^T: each row is q times one of its own components
-        [
-            np.stack([1 + trace, xw, yw, zw], axis=1),
-            np.stack([xw, 1 + d0 - d1 - d2, xy, xz], axis=1),
-            np.stack([yw, xy, 1 - d0 + d1 - d2, yz], axis=1),
-            np.stack([zw, xz, yz, 1 - d0 - d1 + d2], axis=1),
-        ],
-        axis=1,
-    )
-    best = np.argmax(np.stack([1 + trace, rows[:, 1, 1], rows[:, 2, 2], rows[:, 3, 3]], axis=1), axis=1)
+    columns = [  # 4 q q^T: each is q times one of its own components
+        [1 + trace, xw, yw, zw],
+        [xw, 1 + d0 - d1 - d2, xy, xz],
+        [yw, xy, 1 - d0 + d1 - d2, yz],
+        [zw, xz, yz, 1 - d0 - d1 + d2],
+    ]
+    rows = np.ascontiguousarray(np.moveaxis(np.array(columns), 2, 0))
+    best = rows.diagonal(axis1=1, axis2=2).argmax(axis=1)
     q = rows[np.arange(len(r)), best]
     return q / np.linalg.norm(q, axis=1, keepdims=True)

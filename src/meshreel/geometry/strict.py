@@ -14,6 +14,7 @@ import numpy as np
 from .. import _core
 from ..shapes import Float, Float64
 
+Matrices = Float64[np.ndarray, "N 3 3"]
 Array = Float[np.ndarray, "..."]  # of float32 or float64
 
 
@@ -43,7 +44,7 @@ def inverse(matrix: Float64[np.ndarray, "n n"]) -> Float64[np.ndarray, "n n"]:
     return inverses(matrix[None])[0]
 
 
-def determinants(matrices: Float64[np.ndarray, "N 3 3"]) -> Float64[np.ndarray, " N"]:
+def determinants(matrices: Matrices) -> Float64[np.ndarray, " N"]:
     (a, b, c), (d, e, f), (g, h, i) = np.moveaxis(matrices, 0, 2)
     return a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)
 
@@ -54,9 +55,7 @@ def eigen(matrix: Float64[np.ndarray, "n n"]) -> tuple[Float64[np.ndarray, " n"]
     return values[0], vectors[0]
 
 
-def nearest_rotations(
-    matrices: Float64[np.ndarray, "N 3 3"],
-) -> tuple[Float64[np.ndarray, "N 3 3"], Float64[np.ndarray, "N 2"]]:
+def nearest_rotations(matrices: Matrices) -> tuple[Matrices, Float64[np.ndarray, "N 2"]]:
     """Return the rotation nearest to each matrix, and the two largest singular values of the matrix.
 
     The rotation's quaternion is an eigenvector (Horn 1987). It is not unique where the second value is 0, and none for
@@ -74,7 +73,7 @@ def nearest_rotations(
     return rotations_of(np.roll(vectors[:, :, 3], 1, axis=1)), sizes
 
 
-def rotations_of(quaternions: Float64[np.ndarray, "N 4"]) -> Float64[np.ndarray, "N 3 3"]:
+def rotations_of(quaternions: Float64[np.ndarray, "N 4"]) -> Matrices:
     """Return the rotations of quaternions (w, x, y, z) of any length above 0."""
     w, x, y, z = (quaternions / np.sqrt((quaternions**2).sum(axis=1, keepdims=True))).T
     rows = [

@@ -14,12 +14,11 @@ from pathlib import Path, PurePath, PurePosixPath
 from typing import TypeVar
 
 from ..errors import InputError
+from .files import Place, Remote, located
 from .meshes import EXTENSIONS
-from .remote import Place, Remote, located
 
 MESHES = "meshes"  # name of a folder of frames beside the files of their cameras
 _MAGIC = re.compile(r"[*?\[]")
-_LAST = re.compile(r"(\d+)(?!.*\d)")
 _P = TypeVar("_P", bound=PurePath)
 
 
@@ -66,12 +65,6 @@ def find_frames(source: str | Path | Iterable[str | Path]) -> tuple[tuple[Place,
     raise InputError(f"{source}: no such file or folder; check the path")
 
 
-def last_number(name: str) -> int | None:
-    """Return the last whole number in a name; None if it has no number."""
-    match = _LAST.search(name)
-    return None if match is None else int(match[1])
-
-
 def _find_remote(place: Remote) -> tuple[tuple[Remote, ...], tuple[str, ...]]:
     """Return the frame files of a folder behind a URL or of a pattern, or the single file."""
     wild = _MAGIC.search(place.url)
@@ -94,14 +87,10 @@ def _globbed(pattern: Path) -> tuple[Path, list[Path]]:
     fixed = next(k for k, part in enumerate(pattern.parts) if _MAGIC.search(part))
     root = Path(*pattern.parts[:fixed])
     try:
-        meshes = [path for path in root.glob(str(Path(*pattern.parts[fixed:]))) if _is_mesh(path)]
+        paths = list(root.glob(str(Path(*pattern.parts[fixed:]))))
     except ValueError as error:
         raise InputError(f"{pattern}: is no pattern ({error}); mend it, or name the folder") from None
-    return root, meshes
-
-
-def _is_mesh(path: Path) -> bool:
-    return _has_mesh_name(path) and not path.is_dir()
+    return root, [path for path in paths if _has_mesh_name(path) and not path.is_dir()]
 
 
 def _has_mesh_name(path: PurePath) -> bool:
@@ -110,7 +99,7 @@ def _has_mesh_name(path: PurePath) -> bool:
 
 def _listed(folder: Path) -> list[Path]:
     try:
-        return [path for path in folder.iterdir() if _is_mesh(path)]
+        return [path for path in folder.iterdir() if _has_mesh_name(path) and not path.is_dir()]
     except OSError as error:
         raise InputError(f"{folder}: cannot be read ({error.strerror}); check its rights") from None
 
@@ -136,20 +125,16 @@ def _ordered(source: Place, root: _P, paths: list[_P]) -> tuple[tuple[_P, ...], 
         return tuple(names), (f"{source}: the {len(paths)} file names have no numbers; taken in alphabetical order",)
     if len(patterns) > 1:
         first, second = sorted(patterns.values())[:2]
-        raise InputError(
-            f"{source}: names follow {len(patterns)} patterns, as {first!r} and {second!r}; "
-            "give a glob that fits one of them"
-        )
+        text = f"{source}: names follow {len(patterns)} patterns, as {first!r} and {second!r}"
+        raise InputError(f"{text}; give a glob that fits one of them")
     columns = list(zip(*numbers.values(), strict=True))
     varying = next((k for k in reversed(range(len(columns))) if len(set(columns[k])) > 1), 0)
     key = {path: number[varying] for path, number in numbers.items()}
     order = sorted(names, key=lambda path: key[path])
     for before, after in pairwise(order):
         if key[before] == key[after]:
-            raise InputError(
-                f"{source}: {names[before]!r} and {names[after]!r} both have frame number {key[before]}; "
-                "give a glob that fits only one of them"
-            )
+            text = f"{source}: {names[before]!r} and {names[after]!r} both have frame number {key[before]}"
+            raise InputError(f"{text}; give a glob that fits only one of them")
     return tuple(order), _gaps(source, [key[path] for path in order])
 
 

@@ -14,12 +14,13 @@ from io import BytesIO
 from typing import IO, Any, BinaryIO
 
 import numpy as np
-from jaxtyping import Bool, Float32, Int32, Int64, UInt8, UInt16
+from jaxtyping import Bool, Float32, Int32, Int64, UInt8, UInt16, UInt32
 
 from ..errors import InputError
-from .meshopt import ATTRIBUTES, TRIANGLES, exponential, pack_stream
 from .pictures import pack_picture
 from .polygons import shares_of
+
+Corners = Float32[np.ndarray, "F 3 2"]  # as `Mesh.uv`
 
 MOST_BYTES = (1 << 32) - 1  # of a GLB file, whose header has 32 bits for its length (glTF 2.0, "GLB File Format")
 COLORS, PLACES = "COLOR_0", "TEXCOORD_0"
@@ -29,6 +30,7 @@ _VERTICES, _INDICES = 34962, 34963  # targets of a buffer view (glTF 2.0)
 _RESTART = 65535  # largest value of 16 bits: restarts a primitive, so it is no index (glTF 2.0)
 _UNLIT = "KHR_materials_unlit"
 _MESHOPT = ["EXT_meshopt_compression", "KHR_mesh_quantization"]
+ATTRIBUTES, TRIANGLES = "ATTRIBUTES", "TRIANGLES"  # modes of meshoptimizer's streams (EXT_meshopt_compression)
 _MATT = {"metallicFactor": 0.0, "roughnessFactor": 0.9}  # for viewers without KHR_materials_unlit
 
 
@@ -190,9 +192,7 @@ class GlbFile:
             raise InputError(f"{text}; {self._remedy}")
 
 
-def distinct_places(
-    uv: Float32[np.ndarray, "F 3 2"],
-) -> tuple[Float32[np.ndarray, "P 2"], Int64[np.ndarray, "F 3"]]:
+def distinct_places(uv: Corners) -> tuple[Float32[np.ndarray, "P 2"], Int64[np.ndarray, "F 3"]]:
     """Return the distinct places in a texture, and the number of each corner's place; NaN is a place, too."""
     pairs = np.ascontiguousarray(uv).reshape(-1, 2).view(np.int64)  # places with equal bits are equal
     places, numbers = np.unique(pairs, return_inverse=True)
@@ -200,7 +200,7 @@ def distinct_places(
 
 
 def cut_at_seams(
-    faces: Int32[np.ndarray, "F 3"], uv: Float32[np.ndarray, "F 3 2"]
+    faces: Int32[np.ndarray, "F 3"], uv: Corners
 ) -> tuple[Int64[np.ndarray, " W"], Int32[np.ndarray, "F 3"], Float32[np.ndarray, "W 2"]]:
     """Return vertices' numbers, faces, and one texture coordinate for each vertex, as GPUs need them.
 
@@ -237,3 +237,40 @@ def light(colors: UInt8[np.ndarray, "V 3"]) -> Float32[np.ndarray, "V 3"]:
 
 def _words(*values: int) -> bytes:
     return np.array(values, dtype="<u4").tobytes()
+
+
+def check_meshopt() -> Any:
+    """Return the package. Raises InputError if it is not installed."""
+    try:
+        import meshoptimizer
+    except ImportError:
+        raise InputError("meshoptimizer is not installed; pip install 'meshreel[glb]'") from None
+    return meshoptimizer
+
+
+def pack_stream(data: bytes, mode: str, stride: int) -> bytes:
+    """Encode vertices of `stride` bytes, a multiple of 4, or corners of triangles of 2 or 4 bytes, as a stream."""
+    package, count = check_meshopt(), len(data) // stride
+    if mode == TRIANGLES:
+        package.encode_index_version(1)  # of streams in the extension, as 0 for vertices
+        corners = np.frombuffer(data, f"<u{stride}").astype(np.uint32)
+        return bytes(package.encode_index_buffer(corners, count, int(corners.max()) + 1))
+    package.encode_vertex_version(0)
+    return bytes(package.encode_vertex_buffer(np.frombuffer(data, np.uint8).reshape(-1, stride), count, stride))
+
+
+def exponential(values: Float32[np.ndarray, " N"], bits: int) -> UInt32[np.ndarray, " N"]:
+    """Round to multiples of 2^-bits in the layout of filter EXPONENTIAL: a 24-bit factor, and -bits above it."""
+    factors = np.rint(values.astype(np.float64) * 2**bits).astype(np.int64)
+    return ((factors & 0xFFFFFF) | ((-bits & 0xFF) << 24)).astype(np.uint32)
+
+
+def by_use(corners: Int32[np.ndarray, "F 3"], count: int) -> tuple[Int64[np.ndarray, " W"], Int32[np.ndarray, "F 3"]]:
+    """Return vertices of `count` in the order of their use, and faces in an order that uses them together."""
+    ordered = np.zeros(corners.size, np.uint32)
+    check_meshopt().optimize_vertex_cache(ordered, corners.reshape(-1).astype(np.uint32), corners.size, count)
+    used, first = np.unique(ordered, return_index=True)
+    order = used[np.argsort(first)].astype(np.int64)
+    renamed = np.zeros(count, np.int32)
+    renamed[order] = np.arange(len(order))
+    return order, renamed[ordered].reshape(-1, 3)

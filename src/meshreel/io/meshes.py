@@ -13,15 +13,13 @@ import numpy as np
 
 from ..errors import InputError
 from ..types import Mesh
+from .files import Place, read_input
 from .glb import parse_glb
 from .obj import parse_obj
-from .off import parse_off
 from .pictures import texture_of_materials
 from .ply import parse_ply
 from .polygons import Dropped, Polygons, Unreadable, triangulate
-from .read import read_input
-from .remote import Place
-from .stl import parse_stl
+from .stl_off import parse_off, parse_stl
 
 _PARSERS: dict[str, Callable[[bytes], Polygons]] = {
     ".obj": parse_obj,

@@ -93,9 +93,8 @@ class Archive:
         if faces.ndim != 2 or (faces.shape[1] < 3 and len(faces)) or faces.dtype.kind not in "iu":
             raise InputError(f"{path}: 'faces' is {faces.dtype} {faces.shape}; it must be integers F x 3")
         if uv is not None and (uv.shape != (*faces.shape, 2) or uv.dtype.kind != "f"):
-            raise InputError(
-                f"{path}: 'uv' is {uv.dtype} {uv.shape}; it must be fractions, two for each corner of a face"
-            )
+            text = f"{path}: 'uv' is {uv.dtype} {uv.shape}"
+            raise InputError(f"{text}; it must be fractions, two for each corner of a face")
         self._check_colors()
         self._uv = None if uv is None else uv.astype(np.float32).reshape(-1, 2)
         self._corners: Int64[np.ndarray, " C"] = faces.astype(np.int64).reshape(-1)

@@ -10,8 +10,9 @@ import re
 import numpy as np
 from jaxtyping import Float32, Float64, Int64, UInt8
 
-from .polygons import Dropped, Polygons, Unreadable, eight_bits
-from .text_lines import Lines
+from .polygons import Dropped, Lines, Polygons, Unreadable, eight_bits
+
+Numbers = Int64[np.ndarray, " N"]  # of lines, or one for each of them
 
 _KNOWN = (
     *("vt", "vn", "vp", "l", "p", "o", "g", "s", "mg", "usemtl", "mtllib", "usemap", "maplib", "lod", "bevel"),
@@ -39,43 +40,39 @@ def parse_obj(data: bytes) -> Polygons:
     return Polygons(vertices, corners, sizes, dropped, colors, uv, None, materials, used)
 
 
-def _vertices(
-    lines: Lines, chosen: Int64[np.ndarray, " V"]
-) -> tuple[Float64[np.ndarray, "V 3"], UInt8[np.ndarray, "V 3"] | None]:
+def _vertices(lines: Lines, chosen: Numbers) -> tuple[Float64[np.ndarray, "N 3"], UInt8[np.ndarray, "N 3"] | None]:
     """Return positions of vertices and, if all have them, colours: three numbers behind the position."""
     values, counts = lines.values(chosen, skip=1)
-    short = np.flatnonzero(counts < 3)
-    if len(short):
-        where = chosen[short[0]]
-        raise Unreadable(f"line {where + 1} ({lines.line(where)!r}) has {counts[short[0]]} coordinates instead of 3")
+    _check_counts(lines, chosen, counts, "coordinates instead of 3")
     begins = np.cumsum(counts) - counts
     colored = len(counts) > 0 and (counts >= 6).all()
     colors = eight_bits(values[begins[:, None] + np.arange(3, 6)]) if colored else None
     return values[begins[:, None] + np.arange(3)], colors
 
 
-def _faces(
-    lines: Lines, chosen: Int64[np.ndarray, " P"], defined: Int64[np.ndarray, " P"], count: int
-) -> tuple[Int64[np.ndarray, " C"], Int64[np.ndarray, " P"]]:
+def _faces(lines: Lines, chosen: Numbers, defined: Numbers, count: int) -> tuple[Int64[np.ndarray, " C"], Numbers]:
     """Return corners (from 0) and polygon sizes; `defined` vertices precede each face line, `count` are in the file."""
     values, sizes = lines.values(chosen, skip=1, stop="/")
-    short = np.flatnonzero(sizes < 3)
-    if len(short):
-        where = chosen[short[0]]
-        raise Unreadable(f"line {where + 1} ({lines.line(where)!r}) has {sizes[short[0]]} corners instead of 3 or more")
+    _check_counts(lines, chosen, sizes, "corners instead of 3 or more")
     bad = np.flatnonzero((np.abs(values) > count) | (values == 0) | (values != np.floor(values)) | np.isnan(values))
     if len(bad):
         where = chosen[np.searchsorted(np.cumsum(sizes), bad[0], side="right")]
-        raise Unreadable(
-            f"line {where + 1} ({lines.line(where)!r}) refers to vertex {values[bad[0]]:g}, "
-            f"but the file has {count} vertices"
-        )
+        text = f"line {where + 1} ({lines.line(where)!r}) refers to vertex {values[bad[0]]:g}"
+        raise Unreadable(f"{text}, but the file has {count} vertices")
     corners = values.astype(np.int64)
     return np.where(corners > 0, corners - 1, corners + np.repeat(defined, sizes)), sizes
 
 
+def _check_counts(lines: Lines, chosen: Numbers, counts: Numbers, wanted: str) -> None:
+    """Raise Unreadable for the first line with fewer than 3 numbers."""
+    short = np.flatnonzero(counts < 3)
+    if len(short):
+        where = chosen[short[0]]
+        raise Unreadable(f"line {where + 1} ({lines.line(where)!r}) has {counts[short[0]]} {wanted}")
+
+
 def _places(
-    lines: Lines, chosen: Int64[np.ndarray, " W"], faces: Int64[np.ndarray, " P"], defined: Int64[np.ndarray, " C"]
+    lines: Lines, chosen: Int64[np.ndarray, " W"], faces: Numbers, defined: Int64[np.ndarray, " C"]
 ) -> Float32[np.ndarray, "C 2"] | None:
     """Return each corner's texture coordinates, NaN if it has none; `defined` coordinates precede each corner."""
     if not len(chosen):

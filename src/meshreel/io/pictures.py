@@ -1,12 +1,16 @@
-"""Pictures of textures and of colour cameras: any file that Pillow reads, as 8-bit sRGB.
+"""Pictures: of textures and of colour cameras, as 8-bit sRGB, from any file that Pillow reads; of depth; and masks.
 
-In: a file, or the materials that an OBJ names. Out: an array H x W x 3, read on access and cached for a while.
+In: a file, or the materials that an OBJ names. Out: an array H x W x 3, read on access and cached for a while. Depth is
+16-bit grayscale PNG, the usual recording of depth cameras, in the unit of the camera; 0 means no measurement. Masks are
+8-bit PNG of object numbers, 0 for still surface (gray or palette indices, as by DAVIS and most mask tools), one folder
+for each view.
 """
 
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator
+import re
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from functools import lru_cache, partial
 from pathlib import Path
@@ -17,9 +21,8 @@ from jaxtyping import UInt8, UInt16
 
 from ..errors import InputError
 from ..types import Texture
+from .files import Place, read_file, read_input
 from .polygons import Dropped
-from .read import read_file, read_input
-from .remote import Place
 
 if TYPE_CHECKING:
     from PIL import Image
@@ -27,6 +30,15 @@ if TYPE_CHECKING:
 FORMATS = ("PNG", "JPEG", "WEBP", "AVIF", "BMP", "TIFF", "TGA", "GIF", "PPM")  # EPS would start another program
 MOST_PIXELS = 1 << 26  # of a picture: 8192 x 8192, 200 MB in memory (guess)
 DEEP = ("I;16", "I;16B", "I;16L", "I")  # modes of 16-bit grey pictures in versions of Pillow
+_AGAIN = "record the frame again, or delete the file"
+_MODES = ("L", "P", "1")  # of Pillow: gray, palette, black and white
+_LIKE = "name folders view00, view01 ... and files frame_00000.png ..."
+
+
+def last_number(name: str) -> int | None:
+    """Return the last whole number in a name; None if it has no number."""
+    match = re.search(r"(\d+)(?!.*\d)", name)
+    return None if match is None else int(match[1])
 
 
 def read_picture(place: Place) -> UInt8[np.ndarray, "H W 3"]:
@@ -42,9 +54,8 @@ def _read(place: Place, changed: int) -> UInt8[np.ndarray, "H W 3"]:
 
 def parse_picture(data: bytes, where: str) -> UInt8[np.ndarray, "H W 3"]:
     """Return the picture in the bytes of a file. Raises as `read_picture` does; messages begin with `where`."""
-    with opened(
-        data, where, "give PNG or JPEG, or --color none", "write it again, or encode with --color none"
-    ) as image:
+    wanted, remedy = "give PNG or JPEG, or --color none", "write it again, or encode with --color none"
+    with opened(data, where, wanted, remedy) as image:
         if image.mode in DEEP:
             pixels = np.repeat((np.asarray(image).astype(np.float64)[..., None] / 257).round(), 3, axis=2)
             pixels = np.clip(pixels, 0, 255).astype(np.uint8)
@@ -140,3 +151,76 @@ def _parse_materials(text: str, picture_of: dict[str, str | None]) -> Dropped:
         elif keyword in ("norm", "bump", "map_bump", "map_kn"):
             dropped.add("normal maps")
     return frozenset(dropped)
+
+
+def read_depth(path: Path) -> UInt16[np.ndarray, "H W"]:
+    """Read a 16-bit grayscale PNG. Raises InputError if it cannot be read or has fewer bits."""
+    return parse_depth(read_input(path, _AGAIN), str(path))
+
+
+def parse_depth(data: bytes, where: str) -> UInt16[np.ndarray, "H W"]:
+    """Return the depths in the bytes of a file. Raises as `read_depth` does; messages begin with `where`."""
+    wanted = "store depth as 16-bit grayscale PNG"
+    with opened(data, where, wanted, _AGAIN) as image:
+        if image.mode not in DEEP:
+            kind = "8 bits a pixel" if image.mode in ("L", "P", "1") else f"mode {image.mode}"
+            raise InputError(f"{where}: a depth picture of {kind}; {wanted}")
+        return np.array(image, dtype=np.uint16)
+
+
+def read_mask(path: Path) -> UInt8[np.ndarray, "H W"]:
+    """Read object numbers from an 8-bit gray or palette PNG. Raises InputError for other or unreadable files."""
+    wanted, remedy = "store object numbers as 8-bit gray PNG", "make the mask again"
+    with opened(read_input(path, remedy), str(path), wanted, remedy) as image:
+        if image.mode not in _MODES:
+            raise InputError(f"{path}: a mask of mode {image.mode}; {wanted}")
+        return np.array(image).astype(np.uint8)
+
+
+def is_mask(path: Path) -> bool:
+    """Return True if the header of a file is that of a mask, False for color pictures and other files."""
+    try:
+        with opened(read_input(path), "", "", "") as image:
+            return image.mode in _MODES
+    except InputError:
+        return False
+
+
+def find_masks(folder: Path, views: int, frames: int) -> list[list[Path]]:
+    """Return the files of the masks by view and frame, whose numbers are the last numbers in their names.
+
+    Raises InputError if a view or a frame has no mask, or two.
+    """
+    places = _numbered(folder, (path for path in _listed(folder) if path.is_dir()), "view")
+    masks = []
+    for view in range(views):
+        if view not in places:
+            raise InputError(f"{folder}: has no folder of view {view} of {views}; {_LIKE}")
+        pictures = (path for path in _listed(places[view]) if path.suffix.lower() == ".png")
+        files = _numbered(places[view], pictures, "frame")
+        lost = [frame for frame in range(frames) if frame not in files]
+        if lost:
+            text = f"{places[view]}: has no mask of frame {lost[0]} ({len(lost)} of {frames} are missing)"
+            raise InputError(f"{text}; {_LIKE}; where nothing moves, give a black one")
+        masks.append([files[frame] for frame in range(frames)])
+    return masks
+
+
+def _listed(folder: Path) -> list[Path]:
+    try:
+        return sorted(path for path in folder.iterdir() if not path.name.startswith("."))
+    except OSError as error:
+        raise InputError(f"{folder}: masks cannot be read ({error.strerror}); check the path and its rights") from None
+
+
+def _numbered(folder: Path, paths: Iterable[Path], what: str) -> dict[int, Path]:
+    numbered: dict[int, Path] = {}
+    for path in paths:
+        number = last_number(path.stem if path.suffix.lower() == ".png" else path.name)
+        if number is None:
+            continue
+        if number in numbered:
+            text = f"{numbered[number].name} and {path.name} are both {what} {number}"
+            raise InputError(f"{folder}: {text}; keep one of them")
+        numbered[number] = path
+    return numbered

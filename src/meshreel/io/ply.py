@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .. import _core
-from .polygons import Dropped, Polygons, Unreadable, eight_bits, shares_of
-from .text_lines import Lines, whole
+from .polygons import Dropped, Lines, Polygons, Unreadable, eight_bits, shares_of, whole
 
 _TYPES = {
     **dict.fromkeys(("char", "int8"), "i1"),
@@ -43,10 +42,6 @@ class _Element:
     name: str
     rows: int
     properties: tuple[_Property, ...]
-
-    @property
-    def least_bytes(self) -> int:
-        return self.rows * sum((p.count or p.dtype).itemsize for p in self.properties)
 
 
 def parse_ply(data: bytes) -> Polygons:
@@ -164,7 +159,8 @@ class _Binary:
         self._data, self._at = data, 0
 
     def read(self, element: _Element, wanted: str | None) -> tuple[Columns, np.ndarray, np.ndarray]:
-        if self._at + element.least_bytes > len(self._data):
+        least = element.rows * sum((p.count or p.dtype).itemsize for p in element.properties)
+        if self._at + least > len(self._data):
             raise Unreadable(f"PLY announces {element.rows} {element.name} rows but the file is too short (truncated?)")
         if element.rows == 0 or not element.properties:
             return {p.name: np.zeros(0) for p in element.properties}, np.zeros(0, np.int64), np.zeros(0, np.int64)
@@ -174,8 +170,7 @@ class _Binary:
         row = np.dtype([part for pair in zip(counts, fields, strict=True) for part in pair])
         if self._at + row.itemsize * element.rows <= len(self._data):
             rows = np.frombuffer(self._data, dtype=row, count=element.rows, offset=self._at)
-            even = all((rows[f"n{k}"] == n).all() for k, n in enumerate(lengths) if element.properties[k].count)
-            if even:
+            if all((rows[f"n{k}"] == n).all() for k, n in enumerate(lengths) if element.properties[k].count):
                 self._at += row.itemsize * element.rows
                 return _even_rows(element, rows, wanted)
         return self._uneven_rows(element, wanted)

@@ -1,6 +1,7 @@
-"""Polygons of a mesh file, and their triangulation.
+"""Polygons of a mesh file, their triangulation, and lines of numbers in text files.
 
-In: vertices and the corners of all polygons. Out: triangles in the order of the file, with their orientation.
+In: vertices and the corners of all polygons. Out: triangles in the order of the file, with their orientation. Numbers
+of lines are parsed by the core.
 """
 
 from __future__ import annotations
@@ -8,10 +9,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float32, Float64, Int64, UInt8
+from jaxtyping import Bool, Float32, Float64, Int64, UInt8
 
+from .. import _core
 from ..types import Texture
 
+Points = Float64[np.ndarray, "V 3"]
+Corners = Int64[np.ndarray, "P N"]
 Dropped = frozenset[str]  # names of data in a file other than geometry
 
 
@@ -80,7 +84,7 @@ def triangulate(polygons: Polygons) -> Int64[np.ndarray, "F 3"]:
     return faces
 
 
-def _cut(vertices: Float64[np.ndarray, "V 3"], polygons: Int64[np.ndarray, "P N"]) -> Int64[np.ndarray, "P N-2 3"]:
+def _cut(vertices: Points, polygons: Corners) -> Int64[np.ndarray, "P N-2 3"]:
     """Return the triangles of polygons with N corners each."""
     fans = _fans(polygons)
     folded = _folds(vertices, polygons, fans)
@@ -94,17 +98,13 @@ def _cut(vertices: Float64[np.ndarray, "V 3"], polygons: Int64[np.ndarray, "P N"
     return fans
 
 
-def _fans(polygons: Int64[np.ndarray, "P N"]) -> Int64[np.ndarray, "P N-2 3"]:
+def _fans(polygons: Corners) -> Int64[np.ndarray, "P N-2 3"]:
     hub = np.repeat(polygons[:, :1], polygons.shape[1] - 2, axis=1)
     return np.stack([hub, polygons[:, 1:-1], polygons[:, 2:]], axis=2)
 
 
-def _folds(
-    vertices: Float64[np.ndarray, "V 3"],
-    polygons: Int64[np.ndarray, "P N"],
-    fans: Int64[np.ndarray, "P N-2 3"],
-) -> np.ndarray:
-    """Return a mask of the polygons whose fan has a triangle that faces away from the polygon, bool P."""
+def _folds(vertices: Points, polygons: Corners, fans: Int64[np.ndarray, "P N-2 3"]) -> Bool[np.ndarray, " P"]:
+    """Return a mask of the polygons whose fan has a triangle that faces away from the polygon."""
     normals = _newell(vertices[polygons])
     a, b, c = (vertices[fans[:, :, k]] for k in range(3))
     return (np.einsum("pnd,pd->pn", np.cross(b - a, c - a), normals) < 0).any(axis=1)
@@ -142,3 +142,59 @@ def _is_ear(flat: Float64[np.ndarray, "N 2"], ring: list[int], k: int) -> bool:
 
 def _turn(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray | np.floating:
     return (b[0] - a[0]) * (c[..., 1] - a[1]) - (b[1] - a[1]) * (c[..., 0] - a[0])
+
+
+@dataclass(frozen=True, slots=True)
+class Lines:
+    """Text and the positions of its lines."""
+
+    text: UInt8[np.ndarray, " B"]
+    starts: Int64[np.ndarray, " L"]  # behind leading blanks
+    ends: Int64[np.ndarray, " L"]  # before comments and newlines: text goes on behind each of them
+
+    @staticmethod
+    def of(data: bytes, comment: str = "#") -> Lines:
+        """Return the lines of a text with any newlines, without comments and leading blanks."""
+        text = np.frombuffer(data + b"\n", dtype=np.uint8)
+        starts, ends = _core.split_lines(text[:-1], comment)
+        return Lines(text, starts.view(np.int64), ends.view(np.int64))  # of the same size, by its usual name
+
+    def __len__(self) -> int:
+        return len(self.starts)
+
+    def whole(self, number: int | np.integer) -> str:
+        """Return one line."""
+        return self.text[self.starts[number] : self.ends[number]].tobytes().decode("utf-8", "replace").strip()
+
+    def line(self, number: int | np.integer) -> str:
+        """Return one line, shortened for an error message."""
+        text = self.whole(number)
+        return text if len(text) <= 60 else text[:57] + "..."
+
+    def values(
+        self, chosen: Int64[np.ndarray, " N"], skip: int = 0, stop: str = "", field: int = 0
+    ) -> tuple[Float64[np.ndarray, " M"], Int64[np.ndarray, " N"]]:
+        """Return all numbers of the chosen lines, without their first `skip` bytes, and the count in each line.
+
+        A number ends at the letter `stop` in a word. A `field` above 0 selects the text behind this many of these
+        letters, NaN if that is no number.
+        """
+        starts, ends = self.starts[chosen] + skip, self.ends[chosen]
+        values, counts, bad = _core.read_numbers(self.text, starts, ends, stop or "\0", field)
+        if bad >= 0:
+            number = int(np.searchsorted(self.starts, bad, side="right")) - 1
+            word = self.text[bad : self.ends[number]].tobytes().split()[0]
+            start = (word.split(stop.encode())[0] if stop else word)[:20].decode("utf-8", "replace")
+            raise Unreadable(f"line {number + 1} ({self.line(number)!r}) has {start!r} where a number must be")
+        return values, counts.astype(np.int64)
+
+
+def whole(values: np.ndarray, what: str) -> Int64[np.ndarray, "..."]:
+    """Return the values as integers. Raises Unreadable for fractions, NaN, and magnitudes of 2^53 or more."""
+    if np.can_cast(values.dtype, np.int64):
+        return values.astype(np.int64)
+    with np.errstate(invalid="ignore"):
+        bad = np.flatnonzero(~((np.abs(values) < 2**53) & (values == np.floor(values))))
+    if len(bad):
+        raise Unreadable(f"{what} is {values.reshape(-1)[bad[0]]:g} where a whole number must be")
+    return values.astype(np.int64)

@@ -19,10 +19,9 @@ import numpy as np
 from ..errors import InputError
 from ..types import Mesh, MeshSequence, Up, known_up
 from .file_names import find_frames
+from .files import Place, Remote, located, read_file
 from .meshes import Loaded, read_mesh
 from .npz import Archive
-from .read import read_file
-from .remote import Place, Remote, located
 
 CAPTURED = "capture.json"  # record of the capture, in a folder that `meshreel capture` wrote
 _FRAMES = re.compile(r"(-?\d{1,18})?:(-?\d{1,18})?")
@@ -107,10 +106,10 @@ class FileSequence(MeshSequence):
     """Frames read from files on access; only counts are kept of them."""
 
     def __init__(
-        self, frames: Files | Archive, options: SequenceOptions, remarks: Sequence[str] = (), up: Up = "y"
+        self, frames: Files | Archive, options: SequenceOptions, remarks: tuple[str, ...] = (), up: Up = "y"
     ) -> None:
         """Read `frames` with `options`; `remarks` are warnings known already, `up` is the axis that points up."""
-        self._frames, self._options, self._remarks, self._seen = frames, options, tuple(remarks), _Seen()
+        self._frames, self._options, self._remarks, self._seen = frames, options, remarks, _Seen()
         self._chosen = options.chosen(len(frames))
         self.up: Up = up
 
@@ -220,7 +219,5 @@ def _warnings(seen: _Seen, remarks: tuple[str, ...]) -> Iterator[str]:
             units = "--scale 1000 if it is in kilometres, or was scaled from millimetres twice"
         yield f"frame {seen.largest[1]} is {size:.3g} m from corner to corner: meshreel counts in metres; give {units}"
     if seen.smallest and seen.largest and seen.largest[0] > _SUSPICIOUS_RATIO * seen.smallest[0]:
-        yield (
-            f"frame {seen.largest[1]} is {seen.largest[0] / seen.smallest[0]:.3g} times as large as frame "
-            f"{seen.smallest[1]}: are they in the same unit?"
-        )
+        text = f"frame {seen.largest[1]} is {seen.largest[0] / seen.smallest[0]:.3g} times as large as frame"
+        yield f"{text} {seen.smallest[1]}: are they in the same unit?"

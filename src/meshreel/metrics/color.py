@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float64
 
-from ..geometry.painted import Painted
+from ..geometry.color_views import Painted
 from ..types import LUMA, Mesh
 from .even_points import scatter
 

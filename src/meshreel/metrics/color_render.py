@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float32, Int32
 
-from ..geometry.painted import Painted
-from ..geometry.raycast import Rays
+from ..geometry.cameras import Rays
+from ..geometry.color_views import Painted
 from ..types import Mesh
 from .color import PEAK, TO_YUV, psnr
 from .render import Pixels, crop_of

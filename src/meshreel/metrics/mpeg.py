@@ -17,8 +17,8 @@ from jaxtyping import Bool, Float64, Int64
 from scipy.spatial import cKDTree
 
 from ..errors import InputError
-from ..geometry.painted import Painted
-from ..geometry.raycast import Rays
+from ..geometry.cameras import Rays
+from ..geometry.color_views import Painted
 from ..geometry.topology import face_normals
 from ..types import Mesh
 from .color import PEAK, TO_YUV

@@ -14,7 +14,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from jaxtyping import Bool, Float32, Float64, Int32
 
-from ..geometry.raycast import Rays
+from ..geometry.cameras import Rays
 from ..geometry.topology import blend
 from ..types import Mesh
 from .normals import interpolate, welded_normals

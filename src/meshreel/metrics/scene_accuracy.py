@@ -25,9 +25,8 @@ import numpy as np
 from jaxtyping import Bool, Float32, Float64
 
 from ..errors import InputError
-from ..geometry.cameras import Camera
+from ..geometry.cameras import Camera, Rays
 from ..geometry.closest_points import Surface, carried_labels
-from ..geometry.raycast import Rays
 from ..geometry.topology import face_normals
 from ..types import Frames, Mesh
 from .comparison import Row, finite

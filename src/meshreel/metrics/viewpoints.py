@@ -16,7 +16,7 @@ from jaxtyping import Float64
 
 from ..errors import InputError
 from ..geometry.cameras import Camera, CameraPose, unpack_cameras
-from ..io.read import read_input
+from ..io.files import read_input
 from ..types import UP_AXES, Mesh, check_up
 
 MARGIN = 1.05  # times the box, so that nothing touches the border (guess)

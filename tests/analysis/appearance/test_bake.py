@@ -12,7 +12,7 @@ from meshreel.analysis.appearance.bake import bake, picture, texels_of
 from meshreel.analysis.appearance.unwrap import unwrap
 from meshreel.analysis.appearance.vertices import vertex_colors
 from meshreel.geometry.atlas import Layout
-from meshreel.geometry.painted import Painted, bilinear
+from meshreel.geometry.color_views import Painted, bilinear
 from meshreel.geometry.topology import subdivide_midpoint
 from meshreel.types import GREY, Mesh, Texture
 from tests.metrics.shapes import sphere

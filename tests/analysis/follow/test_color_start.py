@@ -10,7 +10,7 @@ import pytest
 from meshreel.analysis.fit.frame import FrameSurface
 from meshreel.analysis.follow.color_start import ColoredPlaces
 from meshreel.analysis.follow.embedded import Tracker
-from meshreel.geometry.painted import Painted
+from meshreel.geometry.color_views import Painted
 from meshreel.types import Mesh
 from tests.analysis.follow.test_embedded import SMALL, tube
 

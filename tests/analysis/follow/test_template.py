@@ -10,7 +10,7 @@ import pytest
 from meshreel.analysis.follow import template
 from meshreel.analysis.follow.template import CURVATURE, FEWEST, NOISY_ERROR, base_mesh, shared_detail
 from meshreel.geometry.closest_points import Surface
-from meshreel.geometry.subdivision import heights, levels_of, refine
+from meshreel.geometry.topology import heights, levels_of, refine
 from meshreel.types import Mesh
 from tests.spheres import sliding_sphere
 

@@ -7,8 +7,7 @@ import pytest
 
 from meshreel.analysis.reference.extraction import MDS, Reference, ReferenceOptions, extract_reference, predict
 from meshreel.geometry.closest_points import Surface
-from meshreel.geometry.decimate import has_boundary
-from meshreel.geometry.topology import components, face_normals, subdivide_midpoint
+from meshreel.geometry.topology import border_edges, components, face_normals, subdivide_midpoint
 from meshreel.types import Centers, Mesh
 
 from .test_deform import ball, inside, rotation
@@ -50,7 +49,7 @@ def test_two_balls_that_touch_in_some_frames_are_separate_and_whole_in_the_refer
     assert [parts(frame) for frame in frames] == [1, 1, 2, 2]
     reference = extract_reference(frames, centers, QUICK)
     assert parts(reference.mesh) == 2
-    assert not has_boundary(reference.mesh)
+    assert not len(border_edges(reference.mesh))
 
 
 def test_the_pose_of_mds_is_taken_where_it_is_asked_for() -> None:

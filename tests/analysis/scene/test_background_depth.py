@@ -7,10 +7,10 @@ import pytest
 from scipy.ndimage import binary_erosion
 
 from meshreel.analysis.scene.background_depth import Moment, fuse_still_depth, usual_pictures
-from meshreel.capture.rig.fusion import FusionOptions, fuse_depths
+from meshreel.capture.recording import FusionOptions, fuse_depths
+from meshreel.geometry.cameras import Rays
 from meshreel.geometry.closest_points import distances
 from meshreel.geometry.derived_sequences import captured
-from meshreel.geometry.raycast import Rays
 from meshreel.types import Mesh, MeshList
 from tests.capture.depth_scenes import RADIUS, WALL, camera, measured
 

@@ -8,9 +8,8 @@ import pytest
 from meshreel.analysis.scene.color_change import ColorChange
 from meshreel.analysis.scene.color_looks import ColorLooks
 from meshreel.analysis.scene.labelling import ByPlace, Rest
-from meshreel.geometry.cameras import Camera, looking_at
+from meshreel.geometry.cameras import Camera, Rays, looking_at
 from meshreel.geometry.color_views import ColorPicture
-from meshreel.geometry.raycast import Rays
 from meshreel.geometry.voxels import Lattice, spread
 from meshreel.types import Mesh
 from tests.analysis.scene.test_views import box, together

@@ -16,7 +16,7 @@ from meshreel.analysis.scene.hypotheses import (
     variation,
 )
 from meshreel.analysis.scene.views import place_views
-from meshreel.geometry.raycast import Rays
+from meshreel.geometry.cameras import Rays
 from tests.analysis.scene.test_views import ROOM, box, together
 from tests.metrics.shapes import moved, sphere
 

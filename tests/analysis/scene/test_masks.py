@@ -14,8 +14,7 @@ from meshreel.analysis.scene.segmentation import scene_views, segment_by
 from meshreel.analysis.scene.views import place_views
 from meshreel.analysis.scene.votes import Votes
 from meshreel.errors import InputError
-from meshreel.geometry.cameras import CameraPose, pack_cameras
-from meshreel.geometry.raycast import Rays
+from meshreel.geometry.cameras import CameraPose, Rays, pack_cameras
 from meshreel.io.write import write_picture
 from meshreel.types import Mesh, MeshList
 from tests.analysis.scene.test_views import ROOM

@@ -11,7 +11,7 @@ from PIL import Image
 from meshreel.analysis.scene.masks import CAMERAS, read_views
 from meshreel.analysis.scene.pictures import normal_picture, write_views
 from meshreel.errors import InputError
-from meshreel.geometry.raycast import Rays
+from meshreel.geometry.cameras import Rays
 from meshreel.metrics.viewpoints import Box, ViewOptions, views_around
 from meshreel.types import Mesh, MeshList
 from tests.metrics.shapes import moved, plane, sphere

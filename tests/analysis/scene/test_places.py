@@ -12,9 +12,8 @@ from meshreel.analysis.scene import places as module
 from meshreel.analysis.scene.cut import moving_places
 from meshreel.analysis.scene.places import Observations, Places, find_places, inspected, states
 from meshreel.analysis.scene.views import place_views
-from meshreel.geometry.cameras import CameraPose
+from meshreel.geometry.cameras import CameraPose, Rays
 from meshreel.geometry.depth import DepthPicture
-from meshreel.geometry.raycast import Rays
 from meshreel.geometry.voxels import Lattice
 from meshreel.types import Frames, Mesh
 from tests.metrics.shapes import moved, plane

@@ -19,8 +19,8 @@ from meshreel.analysis.scene.segmentation import segment_by
 from meshreel.analysis.scene.views import place_views
 from meshreel.analysis.scene.votes import Votes
 from meshreel.errors import InputError
+from meshreel.geometry.cameras import Rays
 from meshreel.geometry.color_views import ColorPicture
-from meshreel.geometry.raycast import Rays
 from meshreel.types import MeshList
 from tests.analysis.scene.test_views import box, together
 from tests.metrics.shapes import moved, sphere

@@ -9,7 +9,7 @@ from hypothesis.extra.numpy import arrays
 
 from meshreel.analysis.scene.views import place_views
 from meshreel.analysis.scene.votes import Votes
-from meshreel.geometry.raycast import Rays
+from meshreel.geometry.cameras import Rays
 from meshreel.types import Mesh
 from tests.metrics.shapes import sphere
 

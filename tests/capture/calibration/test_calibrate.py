@@ -7,8 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from meshreel.capture.calibration.calibrate import refine, refine_views
-from meshreel.capture.calibration.calibration_sheet import write_calibration_sheet
+from meshreel.capture.calibration.calibrate import refine, refine_views, write_calibration_sheet
 from meshreel.capture.calibration.still_view import still_view
 from meshreel.capture.rig.cameras import posed
 from meshreel.capture.rig.rig import read_rig

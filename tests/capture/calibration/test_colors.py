@@ -2,18 +2,33 @@
 
 from __future__ import annotations
 
+import json
+import pickle
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from PIL import Image
 
-from meshreel.capture.calibration.colors import CalibrationOptions, Correction, Moment, calibrate, fit_gains
-from meshreel.capture.simulated.simulated_color import shade_of
+from meshreel.capture import recording as recordings
+from meshreel.capture.calibration.colors import (
+    REMEMBERED,
+    CalibrationOptions,
+    Correction,
+    Moment,
+    calibrate,
+    fit_gains,
+    remembered,
+)
+from meshreel.capture.recording import FusionOptions, open_recording
+from meshreel.capture.rig.rig import read_rig
+from meshreel.capture.simulated.simulated_rig import shade_of
 from meshreel.geometry.color_views import ColorPicture, ColorViews
 from meshreel.geometry.topology import face_normals
 from meshreel.metrics.color import TO_YUV
 from meshreel.metrics.even_points import scatter
 from meshreel.types import Mesh, evenly
+from tests.capture.depth_scenes import camera, record
 from tests.colored_cameras import TRUE, WRONG, Shown, around, ball, person
 
 QUICK = CalibrationOptions(frames=4, places=1500)
@@ -138,3 +153,94 @@ def test_a_person_has_the_true_texture_in_spite_of_wrong_cameras() -> None:
     before, after = luma_psnr(wrong, number, pictures), luma_psnr(wrong, number, mended)
     print(f"luma of texels that are seen: {before:.2f} dB with wrong cameras, {after:.2f} dB with calibrated ones")  # noqa: T201
     assert after >= 33 > 18 > before  # measured: 34.06 and 17.00
+
+
+FOUND = tuple(Correction(np.full(3, 0.1 * (k + 1)), np.arange(6) / 700 - k) for k in range(2))
+
+
+@pytest.fixture
+def folder(tmp_path):
+    folder = record(tmp_path / "rig", [camera("left", -20), camera("right", 20)], [(0.1 * k, 0, 0) for k in range(3)])
+    described = json.loads((folder / "rig.json").read_text())
+    for entry in described["cameras"]:
+        entry["color"] = f"{entry['name']}/color"
+        (folder / entry["color"]).mkdir()
+        for number in range(3):
+            Image.new("RGB", (96, 96), (90, 80, 70)).save(folder / entry["color"] / f"{number}.png")
+    (folder / "rig.json").write_text(json.dumps(described))
+    return folder
+
+
+@pytest.fixture
+def asked(monkeypatch):
+    """Numbers of frames that corrections were found from, one for each time."""
+    found = []
+    monkeypatch.setattr(recordings, "corrections_of", lambda frames, *_: found.append(len(frames)) or FOUND)
+    return found
+
+
+def same(corrections):
+    pairs = zip(corrections, FOUND, strict=True)
+    return all(np.array_equal(a.gains, b.gains) and np.array_equal(a.pose, b.pose) for a, b in pairs)
+
+
+def test_all_frames_of_a_rig_tell_once_whichever_are_asked_for(folder, asked):
+    described = (folder / "rig.json").read_bytes()
+    part = open_recording(folder, frames="1:2")[0]
+    assert asked == []  # nobody looked at a picture
+    (left, right), raw = part.colors[0], part.pictures[0]
+    assert asked == [3] and same(part.colors.corrections)
+    assert left.gains != right.gains and not np.array_equal(left.camera.extrinsic, raw[0].camera.extrinsic)
+    np.testing.assert_array_equal(left.pixels, raw[0].pixels)
+    again = open_recording(folder)[0].colors
+    assert same(again.corrections) and asked == [3] and (folder / "rig.json").read_bytes() == described
+    assert same(pickle.loads(pickle.dumps(again)).corrections)
+
+
+def test_other_poses_pictures_and_options_are_calibrated_again(folder, asked):
+    def looked(options=FusionOptions()):
+        return same(open_recording(folder, options)[0].colors.corrections)
+
+    assert looked() and looked(FusionOptions(0.03)) and looked() and asked == [3] * 3
+    described = json.loads((folder / "rig.json").read_text())
+    described["cameras"][0]["camera_to_world"][0][3] += 0.001
+    (folder / "rig.json").write_text(json.dumps(described))
+    assert looked() and asked == [3] * 4
+    Image.new("RGB", (96, 96), (1, 200, 3)).save(folder / "left" / "color" / "1.png", compress_level=0)
+    assert looked() and looked() and asked == [3] * 5
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        lambda record: record["cameras"][0]["log2_gains"].append(1.0),
+        lambda record: record["cameras"][0].update(motion=[float("nan")] * 6),
+        lambda record: record["cameras"][0].update(name="other"),
+        lambda record: record["cameras"].append(record["cameras"][0]),
+        lambda record: record.update(cameras=5),
+        lambda record: record["cameras"].pop(),
+    ],
+)
+def test_a_damaged_file_is_found_again(folder, damage):
+    rig = read_rig(folder)
+    assert same(remembered(rig, [0, 2], {}, lambda: FOUND))
+    record = json.loads((folder / REMEMBERED).read_text())
+    damage(record)
+    (folder / REMEMBERED).write_text(json.dumps(record))
+    assert same(remembered(rig, [0, 2], {}, lambda: FOUND))
+    (folder / REMEMBERED).write_bytes(b"[" * 100_000)
+    assert same(remembered(rig, [0, 2], {}, lambda: FOUND))
+
+
+def test_that_nothing_is_to_be_mended_is_remembered_too(folder):
+    rig, asked = read_rig(folder), []
+    assert [remembered(rig, [0], {}, lambda: asked.append(1) or ()) for _ in range(2)] == [(), ()] and len(asked) == 1
+
+
+def test_a_folder_that_may_not_be_written_stays_as_it_is(folder):
+    before = sorted(folder.iterdir())
+    folder.chmod(0o555)
+    try:
+        assert same(remembered(read_rig(folder), [0], {}, lambda: FOUND)) and sorted(folder.iterdir()) == before
+    finally:
+        folder.chmod(0o755)

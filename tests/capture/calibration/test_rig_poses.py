@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from meshreel.capture.calibration.rig_poses import described, posed_by, with_poses
+from meshreel.capture.calibration.poses import described, posed_by, with_poses
 from meshreel.capture.rig.rig import read_rig
 from meshreel.errors import InputError
 from tests.capture.depth_scenes import camera, record

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from meshreel.io.depth_pictures import write_depth
 from meshreel.io.pictures import pack_picture
+from meshreel.io.write import write_picture
 from tests.capture.depth_scenes import camera, measured
 
 SIZE, COUNT, RATE = 96, 4, 10
@@ -38,7 +38,7 @@ def tum(folder, depth_times=TIMES, color_times=TIMES, poses=(STILL,) * COUNT, nu
     for name in ("depth", "rgb"):
         (folder / name).mkdir(parents=True)
     for number in range(COUNT):
-        write_depth((DEPTHS[number] * 5).astype(np.uint16), folder / "depth" / f"{number}.png")
+        write_picture((DEPTHS[number] * 5).astype(np.uint16), folder / "depth" / f"{number}.png")
         (folder / "rgb" / f"{number}.jpg").write_bytes(jpeg(number))
     for name, times, kind in (("depth", depth_times, "png"), ("rgb", color_times, "jpg")):
         rows = [f"{time:.4f} {name}/{number}.{kind}" for number, time in enumerate(times)]
@@ -57,7 +57,7 @@ def stray(folder, poses=(STILL,) * COUNT):
     for name in ("depth", "confidence"):
         (folder / name).mkdir(parents=True)
     for number in range(COUNT):
-        write_depth(DEPTHS[number], folder / "depth" / f"{number:06}.png")
+        write_picture(DEPTHS[number], folder / "depth" / f"{number:06}.png")
         sure = np.full((SIZE, SIZE), 2, np.uint8)
         sure[0] = 0
         (folder / "confidence" / f"{number:06}.png").write_bytes(pack_picture(sure))

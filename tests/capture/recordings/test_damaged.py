@@ -88,7 +88,7 @@ def test_a_damaged_folder_is_an_input_error(tmp_path, made, change, text):
 
 def test_pictures_of_another_size_are_refused(tmp_path, made):
     folder = files.tum(tmp_path / "desk")
-    files.write_depth(DEPTHS[0][:50], folder / "depth" / "2.png")
+    files.write_picture(DEPTHS[0][:50], folder / "depth" / "2.png")
     with pytest.raises(InputError, match=r"depth of camera: picture 2 .* 96 x 50 pixels where its lens has 96 x 96"):
         made(folder)
 

@@ -15,8 +15,9 @@ from meshreel.capture.recording import open_recording
 from meshreel.capture.rig.cameras import posed
 from meshreel.capture.rig.rig import read_rig
 from meshreel.errors import InputError
-from meshreel.geometry.raycast import Rays
-from meshreel.io.depth_pictures import read_depth, write_depth
+from meshreel.geometry.cameras import Rays
+from meshreel.io.pictures import read_depth
+from meshreel.io.write import write_picture
 from tests.capture.depth_scenes import camera, measured, record
 from tests.spheres import sliding_sphere
 
@@ -63,7 +64,7 @@ def test_a_folder_with_one_camera_is_a_rig(tmp_path):
     entry = camera().record() | {"frames_per_second": 8}
     del entry["name"]
     (tmp_path / "camera.json").write_text(json.dumps(entry))
-    write_depth(measured(camera()), tmp_path / "depth" / "take2_0639.png")
+    write_picture(measured(camera()), tmp_path / "depth" / "take2_0639.png")
     rig = read_rig(tmp_path)
     assert rig.frames == [639] and rig.frame_rate == 8 and rig.cameras[0].name == tmp_path.name
 
@@ -147,7 +148,7 @@ def test_a_description_may_begin_with_a_byte_order_mark(folder):
 def test_frames_that_no_camera_has_are_reported(folder):
     for name in ("front", "side"):
         for number in (3, 4, 6):
-            write_depth(measured(camera()), folder / name / "depth" / f"depth_{number:05}.png")
+            write_picture(measured(camera()), folder / name / "depth" / f"depth_{number:05}.png")
     assert read_rig(folder).missing() == [
         "no camera has 1 of the frames 0 to 6, for example 5; the frames after a gap are shown earlier"
     ]
@@ -234,7 +235,7 @@ def test_colour_cameras_that_are_wrong_are_refused(folder, change, words):
     ("name", "words"), [("still.png", "no frame number"), ("again_1.png", "is frame 1, as"), ("x_00007.png", None)]
 )
 def test_names_must_number_frames(folder, name, words):
-    write_depth(measured(camera()), folder / "front" / "depth" / name)
+    write_picture(measured(camera()), folder / "front" / "depth" / name)
     if words is None:
         assert read_rig(folder).frames == [0, 1, 2, 7]
         return
@@ -256,7 +257,7 @@ def test_a_camera_without_pictures_is_refused(folder):
         (lambda path: Image.new("RGB", (96, 96)).save(path), "mode RGB"),
         (lambda path: path.write_bytes(b"no picture"), "is no picture"),
         (lambda path: path.write_bytes(path.read_bytes()[:-60]), "cannot be read"),
-        (lambda path: write_depth(np.ones((8, 9), np.uint16), path), "9 x 8 pixels where camera front has 96 x 96"),
+        (lambda path: write_picture(np.ones((8, 9), np.uint16), path), "9 x 8 pixels where camera front has 96 x 96"),
     ],
 )
 def test_pictures_that_hold_no_depth_are_refused(folder, made, words):
@@ -280,14 +281,14 @@ def test_a_picture_that_claims_an_enormous_size_is_refused(folder):
 
 def test_depth_pictures_keep_every_bit(tmp_path):
     depth = np.arange(60_000, 60_000 + 99 * 7, dtype=np.uint16).reshape(99, 7)
-    write_depth(depth, tmp_path / "1.png")
+    write_picture(depth, tmp_path / "1.png")
     assert np.array_equal(read_depth(tmp_path / "1.png"), depth)
 
 
 def test_a_recording_gives_frames_and_reports_blind_cameras(folder):
     blank = np.zeros((96, 96), np.uint16)
     for number in range(3):
-        write_depth(blank, folder / "side" / "depth" / f"depth_{number:05}.png")
+        write_picture(blank, folder / "side" / "depth" / f"depth_{number:05}.png")
     recording, warnings = open_recording(folder)
     assert warnings == ["camera side measures nothing in 3 of 3 frames looked at"]
     assert len(recording) == 3 and recording.frame_rate == 15 and not recording[2].is_empty
@@ -302,7 +303,7 @@ def test_a_moving_camera_is_detected_in_its_depths(tmp_path):
     assert len(recording) == 6
     moving = record(tmp_path / "moving", [camera()], walking)
     for number in range(6):
-        write_depth(measured(camera(side=8.0 * number)), moving / "front" / "depth" / f"depth_{number:05}.png")
+        write_picture(measured(camera(side=8.0 * number)), moving / "front" / "depth" / f"depth_{number:05}.png")
     with pytest.raises(InputError, match=r"camera front seems to move: .* stand still"):
         open_recording(moving)
 

@@ -9,7 +9,7 @@ import pytest
 
 from meshreel.capture.simulated.demo_room import FURNITURE, SIZE, RoomOptions, furnished_room, room_cameras
 from meshreel.errors import InputError
-from meshreel.geometry.raycast import Rays
+from meshreel.geometry.cameras import Rays
 from meshreel.geometry.topology import components, face_normals, unique_edges
 from meshreel.types import Mesh
 

@@ -17,8 +17,7 @@ from meshreel.errors import FormatError, InputError
 from meshreel.format.budget import LIMITS
 from meshreel.format.layout import LayersGroup, LayersLevel, Origin
 from meshreel.format.records import pack, unpack
-from meshreel.geometry.subdivision import heights, refine, subdivide
-from meshreel.geometry.topology import subdivide_midpoint
+from meshreel.geometry.topology import heights, refine, subdivide, subdivide_midpoint
 from meshreel.types import Mesh
 
 from ..bodies import ball, moving, sheet

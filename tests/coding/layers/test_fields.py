@@ -16,8 +16,7 @@ from meshreel.coding.steps import RUNGS
 from meshreel.errors import FormatError, InputError
 from meshreel.format.layout import CodedField
 from meshreel.format.records import pack, unpack
-from meshreel.geometry.subdivision import subdivide
-from meshreel.geometry.topology import vertex_normals
+from meshreel.geometry.topology import subdivide, vertex_normals
 
 from ..bodies import ball, moving
 

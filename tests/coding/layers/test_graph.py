@@ -7,8 +7,7 @@ from hypothesis import strategies as st
 
 from meshreel.coding.layers.graph import Graph, hierarchy, siblings
 from meshreel.errors import FormatError
-from meshreel.geometry.subdivision import subdivide
-from meshreel.geometry.topology import subdivide_midpoint, unique_edges
+from meshreel.geometry.topology import subdivide, subdivide_midpoint, unique_edges
 from meshreel.types import Mesh
 
 from ..bodies import ball, sheet

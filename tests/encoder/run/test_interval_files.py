@@ -35,7 +35,7 @@ from meshreel.encoder.sequence import Encoder
 from meshreel.errors import InputError
 from meshreel.format.layout import Form
 from meshreel.geometry import derived_sequences
-from meshreel.io import unfinished
+from meshreel.io import write
 from meshreel.types import Mesh, MeshList
 from tests.capture.depth_scenes import camera, record
 from tests.small_options import quick
@@ -400,7 +400,7 @@ def test_a_file_that_no_limit_allows_leaves_the_old_output(fake, tmp_path):
 
 
 def test_a_disk_that_is_full_at_any_file_leaves_the_old_output_and_what_resume_needs(fake, tmp_path, monkeypatch):
-    path, real, left = tmp_path / "a.reel", unfinished.sync, set[int]()
+    path, real, left = tmp_path / "a.reel", write.sync, set[int]()
     capacities = list(range(500, 20_000, 173))  # bytes
 
     def sync(file):
@@ -414,7 +414,7 @@ def test_a_disk_that_is_full_at_any_file_leaves_the_old_output_and_what_resume_n
         path.write_bytes(b"old")
         with monkeypatch.context() as full:
             full.setattr(module, "sync", sync)
-            full.setattr(unfinished, "sync", sync)
+            full.setattr(write, "sync", sync)
             try:
                 encode(path)
                 break

@@ -17,7 +17,7 @@ from meshreel.analysis.appearance.vertices import vertex_colors
 from meshreel.coding.appearance.pictures import VideoDecoder, VideoEncoder, from_i420, to_i420
 from meshreel.coding.mesh import COMPRESSION_LEVEL
 from meshreel.errors import InputError
-from meshreel.geometry.painted import Painted
+from meshreel.geometry.color_views import Painted
 from meshreel.types import Mesh, MeshSequence, Texture
 
 from ..codec import Progress

@@ -9,7 +9,7 @@ from functools import cache
 from importlib.resources import files
 from pathlib import Path
 
-from meshreel.capture.calibration.remembered import REMEMBERED
+from meshreel.capture.calibration.colors import REMEMBERED
 from meshreel.errors import InputError
 
 TABLE = "checksums.json"  # package data: by path below the benchmark data; `python -m` this with their folder writes it

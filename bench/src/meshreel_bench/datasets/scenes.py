@@ -20,12 +20,10 @@ from meshreel.analysis import scene as segmenter
 from meshreel.analysis.scene.background import FRAMES
 from meshreel.analysis.scene.background_depth import Moment, fuse_still_depth
 from meshreel.analysis.scene.segmentation import segment
-from meshreel.capture.recording import Recording, open_recording
-from meshreel.capture.rig.fusion import FusionOptions
+from meshreel.capture.recording import FusionOptions, Recording, open_recording
 from meshreel.capture.rig.rig import RIG
 from meshreel.capture.simulated import demo_room
-from meshreel.capture.simulated.simulated_rig import TRUTH
-from meshreel.capture.simulated.truth import Truth, read_truth
+from meshreel.capture.simulated.simulated_rig import TRUTH, Truth, read_truth
 from meshreel.geometry.cameras import Camera
 from meshreel.geometry.closest_points import Surface, carried_labels
 from meshreel.geometry.color_views import ColorFrames

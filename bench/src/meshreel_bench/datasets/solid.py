@@ -25,8 +25,8 @@ from meshreel.encoder.settings.settings import Settings
 from meshreel.errors import InputError
 from meshreel.format.layout import Form
 from meshreel.geometry.closest_points import Surface
+from meshreel.geometry.color_views import Painted
 from meshreel.geometry.derived_sequences import DerivedSequence
-from meshreel.geometry.painted import Painted
 from meshreel.geometry.splats import Carrier
 from meshreel.geometry.topology import blend, subdivide_midpoint
 from meshreel.types import Mesh, MeshSequence, Placement, Texture

@@ -16,8 +16,13 @@ from meshreel.capture.rig.rig import RIG
 from meshreel.capture.simulated.figure import Pose, figure
 from meshreel.capture.simulated.implicit import polygonize
 from meshreel.capture.simulated.procedural import grid_of_frame
-from meshreel.capture.simulated.simulated_color import ColorSensorOptions, shade_of
-from meshreel.capture.simulated.simulated_rig import SceneFrame, SensorOptions, simulate_rig
+from meshreel.capture.simulated.simulated_rig import (
+    ColorSensorOptions,
+    SceneFrame,
+    SensorOptions,
+    shade_of,
+    simulate_rig,
+)
 from meshreel.capture.simulated.solid_colors import WALKER, person_colors
 from meshreel.geometry.cameras import Camera, CameraPose, looking_at
 from meshreel.geometry.closest_points import Surface

@@ -19,8 +19,7 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from meshreel.analysis.scene.segmentation import segment
-from meshreel.capture.recording import Recording, open_recording
-from meshreel.capture.rig.fusion import FusionOptions
+from meshreel.capture.recording import FusionOptions, Recording, open_recording
 from meshreel.capture.simulated.demo_room import RoomOptions, furnished_room, room_cameras
 from meshreel.capture.simulated.simulated_rig import SensorOptions, simulate_rig
 from meshreel.decoder.video import open as open_video

@@ -12,9 +12,8 @@ from meshreel.container.reader import ReelReader
 from meshreel.decoder.video import Video
 from meshreel.format.layout import ChunkKind, Form, Pictures
 from meshreel.format.records import unpack_all
-from meshreel.geometry.color_views import ColorPicture
-from meshreel.geometry.painted import Painted
-from meshreel.geometry.raycast import Rays
+from meshreel.geometry.cameras import Rays
+from meshreel.geometry.color_views import ColorPicture, Painted
 from meshreel.geometry.topology import blend
 from meshreel.metrics.color import PEAK, POINTS, TO_YUV, psnr
 from meshreel.metrics.color_render import Colored

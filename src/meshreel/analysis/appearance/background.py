@@ -10,7 +10,7 @@ from collections.abc import Iterable
 import numpy as np
 from jaxtyping import Bool, Float64, UInt8
 
-from ...geometry.painted import Paint
+from ...geometry.color_views import Paint
 from ...types import GREY
 
 BLOCK = 1 << 16  # places whose medians are taken at a time: 16 frames of them take 10 MB

@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Bool, Float64, Int32, Int64, UInt8
 
 from ...geometry.atlas import Layout
-from ...geometry.painted import Paint
+from ...geometry.color_views import Paint
 from ...geometry.topology import blend, face_normals
 from ...types import GREY, Mesh
 

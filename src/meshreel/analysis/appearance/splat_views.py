@@ -13,10 +13,8 @@ from functools import partial
 import numpy as np
 from jaxtyping import Float64
 
-from ...geometry.cameras import Camera, CameraPose, looking_at
-from ...geometry.color_views import ColorPicture, sampled
-from ...geometry.painted import Painted
-from ...geometry.raycast import Hit, Rays, pixels_near
+from ...geometry.cameras import Camera, CameraPose, Hit, Rays, looking_at, pixels_near
+from ...geometry.color_views import ColorPicture, Painted, sampled
 from ...types import UP_AXES, Mesh, Up
 from .splat_fit import SplatView
 

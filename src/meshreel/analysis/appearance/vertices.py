@@ -8,8 +8,7 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float64, UInt8
 
-from ...geometry.color_views import spread_colors
-from ...geometry.painted import Paint
+from ...geometry.color_views import Paint, spread_colors
 from ...geometry.topology import face_normals
 from ...types import GREY, Mesh
 

@@ -15,10 +15,9 @@ from typing import Any
 import numpy as np
 from jaxtyping import Bool, Float64, Int32
 
-from ...geometry.painted import Paint
+from ...geometry.color_views import Paint
 from ...geometry.strict import inverses
-from ...geometry.subdivision import subdivide
-from ...geometry.topology import face_normals, unique_edges, vertex_normals
+from ...geometry.topology import face_normals, subdivide, unique_edges, vertex_normals
 from ...types import LUMA, Mesh
 
 ITERATIONS = 160  # of the flow in each round: 160 edges of the template far; with 80, .3 dB worse at quality 80

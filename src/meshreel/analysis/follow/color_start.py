@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Float64, Int64
 from scipy.spatial import cKDTree
 
-from ...geometry.painted import Paint
+from ...geometry.color_views import Paint
 from ...geometry.topology import vertex_normals
 from ...types import Mesh
 from ..fit.frame import FrameSurface

@@ -20,7 +20,7 @@ from ... import _core
 from ...errors import InputError
 from ...geometry import work
 from ...geometry.closest_points import Surface, area_samples
-from ...geometry.painted import Paint
+from ...geometry.color_views import Paint
 from ...geometry.rigid import quaternions
 from ...geometry.strict import products, rotations_of
 from ...geometry.topology import clean, vertex_normals

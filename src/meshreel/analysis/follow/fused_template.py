@@ -15,7 +15,7 @@ import numpy as np
 
 from ...geometry import work
 from ...geometry.decimate import decimate
-from ...geometry.mean_surface import MeanOptions, MeanSurface
+from ...geometry.reconstruct import MeanOptions, MeanSurface
 from ...geometry.topology import drop_small, edge_lengths
 from ...types import Mesh
 from ..fit.frame import FrameSurface

@@ -14,7 +14,7 @@ from jaxtyping import Float64, Int32
 
 from ...geometry.closest_points import Surface
 from ...geometry.decimate import BOUNDARY_WEIGHT, decimate
-from ...geometry.subdivision import heights, levels_of, refine
+from ...geometry.topology import heights, levels_of, refine
 from ...types import Mesh
 
 NOISY_ERROR = 0.5  # RMS distances of the noise that a base mesh may miss in addition (decision 16)

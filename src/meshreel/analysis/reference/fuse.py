@@ -16,9 +16,7 @@ import numpy as np
 from jaxtyping import Bool, Float32, Float64, Int32, Int64
 
 from ...geometry.decimate import decimate
-from ...geometry.holes import close_holes
-from ...geometry.mean_surface import MeanOptions, MeanSurface
-from ...geometry.poisson import poisson_surface
+from ...geometry.reconstruct import MeanOptions, MeanSurface, close_holes, poisson_surface
 from ...geometry.rigid import apply
 from ...geometry.topology import (
     clean,

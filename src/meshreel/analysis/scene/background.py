@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 
-from ...geometry.mean_surface import MeanOptions, MeanSurface
+from ...geometry.reconstruct import MeanOptions, MeanSurface
 from ...geometry.topology import without_fragments
 from ...types import Mesh
 

@@ -14,11 +14,10 @@ import numpy as np
 from jaxtyping import Bool, Float32
 from scipy.ndimage import binary_dilation
 
+from ...geometry.cameras import Rays, pixels_near
 from ...geometry.depth import STEP, DepthPicture, FreeSpace, inverse_depths
-from ...geometry.holes import close_holes
-from ...geometry.raycast import Rays, pixels_near
+from ...geometry.reconstruct import ALONE, GRAZING, SEEN, close_holes, extract, integrate
 from ...geometry.topology import face_normals, part_of, without_fragments
-from ...geometry.tsdf import ALONE, GRAZING, SEEN, extract, integrate
 from ...types import Mesh
 from .background import FRAGMENT, least_frames
 

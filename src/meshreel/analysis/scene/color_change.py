@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Bool, Float32
 from scipy.ndimage import binary_opening, uniform_filter
 
-from ...geometry.raycast import Rays
+from ...geometry.cameras import Rays
 from ...types import Frames, Mesh
 from .color_looks import ColorLooks
 

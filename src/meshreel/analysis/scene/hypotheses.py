@@ -12,8 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Int32
 
-from ...geometry.cameras import Camera
-from ...geometry.raycast import Seen
+from ...geometry.cameras import Camera, Seen
 from ...geometry.strict import inverse, products
 
 APART = (0.06, 0.02)  # m, and share of the depth: a pixel whose depth varies by more sees motion; guesses

@@ -14,8 +14,7 @@ import numpy as np
 from jaxtyping import Bool, Float64, Int64, UInt8
 from scipy.spatial import cKDTree
 
-from ...geometry.cameras import Camera
-from ...geometry.raycast import Rays, Seen
+from ...geometry.cameras import Camera, Rays, Seen
 from ...geometry.topology import connected_faces, face_normals, unique_edges
 from ...geometry.voxels import Lattice, spread
 from ...types import Mesh

@@ -13,11 +13,9 @@ import numpy as np
 from jaxtyping import Bool, UInt8
 
 from ...errors import InputError
-from ...geometry.cameras import Camera, unpack_cameras
-from ...geometry.raycast import Seen
-from ...io.file_names import last_number
-from ...io.mask_pictures import find_masks, read_mask
-from ...io.read import read_file
+from ...geometry.cameras import Camera, Seen, unpack_cameras
+from ...io.files import read_file
+from ...io.pictures import find_masks, last_number, read_mask
 from .color_looks import ColorLooks
 
 CAMERAS = "cameras.json"  # file name: Open3D's pinhole camera JSON, beside the folders of the views

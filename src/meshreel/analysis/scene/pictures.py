@@ -12,8 +12,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float64, UInt8
 
-from ...geometry.cameras import Camera, pack_cameras
-from ...geometry.raycast import Rays, Seen
+from ...geometry.cameras import Camera, Rays, Seen, pack_cameras
 from ...io.write import frame_names, make_folder, replacing, write_picture
 from ...types import Frames
 from .color_looks import ColorLooks

@@ -18,9 +18,8 @@ import numpy as np
 from jaxtyping import Bool, Float32, Float64, Int32, Int64, UInt16
 from scipy.ndimage import minimum_filter
 
-from ...geometry.cameras import Camera
+from ...geometry.cameras import Camera, Rays
 from ...geometry.depth import DepthPicture
-from ...geometry.raycast import Rays
 from ...geometry.topology import face_normals
 from ...geometry.voxels import Lattice, distinct, neighbours, spread
 from ...types import Frames, Mesh, evenly

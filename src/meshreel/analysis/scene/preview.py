@@ -11,8 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Integer, UInt8
 
-from ...geometry.cameras import Camera
-from ...geometry.raycast import Rays, Seen
+from ...geometry.cameras import Camera, Rays, Seen
 from ...types import Mesh
 from .pictures import normal_picture
 

@@ -20,8 +20,7 @@ import numpy as np
 from jaxtyping import Bool, Float32, Int32, UInt8
 
 from ...errors import InputError
-from ...geometry.cameras import Camera
-from ...geometry.raycast import Seen
+from ...geometry.cameras import Camera, Seen
 from .color_looks import ColorLooks
 from .hypotheses import Hypotheses, HypothesisOptions, hypotheses, moving_in_views, reference_view, tour
 from .masks import Masker

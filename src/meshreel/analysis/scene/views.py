@@ -18,8 +18,7 @@ import numpy as np
 from jaxtyping import Float32, Float64, Int64
 
 from ...errors import InputError
-from ...geometry.cameras import Camera, CameraPose
-from ...geometry.raycast import Rays
+from ...geometry.cameras import Camera, CameraPose, Rays
 from ...geometry.strict import dot, norm, products, rounded
 from ...geometry.topology import face_normals
 from ...types import UP_AXES, Frames, Mesh, Up

@@ -66,9 +66,8 @@ class BoardOptions:
             return board
         except Exception as error:  # OpenCV's, or Python's where it returns nothing
             text = f"a board of {self.columns} x {self.rows} with {name[5:]} is none to OpenCV"
-            raise InputError(
-                f"{text}; give its numbers of columns and rows, and a dictionary with enough markers"
-            ) from error
+            remedy = "give its numbers of columns and rows, and a dictionary with enough markers"
+            raise InputError(f"{text}; {remedy}") from error
 
 
 def opencv() -> Any:

@@ -1,13 +1,18 @@
-"""Gains and poses of colour cameras, solved from what several of them see of the same surface.
+"""Gains and poses of colour cameras, solved from what several of them see of the same surface, and remembered.
 
 In: moments of a recording, each a mesh in metres and what the cameras took of it. Out: for each camera three gains and
-a rigid motion with which the cameras agree best. The meshes stay where they are: geometry says where the world is.
+a rigid motion with which the cameras agree best. The meshes stay where they are: geometry says where the world is. A
+file beside `rig.json` keeps them, with the digest of what they were computed from: with other cameras, pictures or
+options they are found again.
 """
 
 from __future__ import annotations
 
+import hashlib
+import json
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -15,16 +20,21 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float64, Int64
 
+from ...errors import InputError
 from ...geometry import strict
 from ...geometry.cameras import CameraPose
 from ...geometry.color_views import ColorFrames, ColorPicture, ColorViews, sampled
 from ...geometry.topology import face_normals, subdivide_midpoint
+from ...io.write import replacing
 from ...types import Frames, Mesh, evenly
+from ..rig.rig import Rig
 
 Moment = tuple[Mesh, Sequence[ColorPicture | None]]  # a frame's surface, and a picture for each camera that has one
 Colors = Float64[np.ndarray, "C N 3"]  # of places in the pictures of cameras; 0 where a camera does not see a place
 Gains = Float64[np.ndarray, "C 3"]  # log2
 Poses = Float64[np.ndarray, "C 6"]  # turns as vectors and ways, in the cameras' frames; rad, m
+Matrix = Float64[np.ndarray, "CD CD"]  # of normal equations
+Slope = Float64[np.ndarray, "C D"]
 Trust = Float64[np.ndarray, "C N"]  # in a camera's colour of a place; 0: it does not see it
 
 DARK, BRIGHT = 8.0, 250.0  # levels beyond which a ratio says nothing: noise, and what is cut off (guess)
@@ -33,6 +43,8 @@ GAIN_ERROR, POSE_ERROR = 0.5, 0.02  # log2; rad and m: expected, where colours l
 GAIN_ROUNDS = 6  # in which outliers lose their weight (guess)
 APART = 0.5  # pixels from a place to both sides, where the slopes of colours are measured
 STEP = 1e-5  # rad, m: for derivatives of positions in a picture
+REMEMBERED = "color_calibration.json"
+_DAMAGED = (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError)
 LN2 = math.log(2)
 SMALL = np.finfo(np.float64).tiny
 
@@ -278,7 +290,7 @@ def _compared(values: Colors, trust: Trust, least: float) -> tuple[Colors, Trust
 
 def _equations(
     slopes: Float64[np.ndarray, "C N k D"], residuals: Float64[np.ndarray, "C N k"], weights: Trust
-) -> tuple[Float64[np.ndarray, "CD CD"], Float64[np.ndarray, "C D"]]:
+) -> tuple[Matrix, Slope]:
     """Return the normal equations of the least weighted sum of squares of values about the means of their places."""
     cameras, _, _, count = slopes.shape
     weighted = slopes * weights[..., None, None]
@@ -291,10 +303,57 @@ def _equations(
     return normal, np.einsum("cnki,cnk->ci", weighted, residuals)
 
 
-def _solved(
-    normal: Float64[np.ndarray, "CD CD"], slope: Float64[np.ndarray, "C D"], estimate: np.ndarray, deviation: float
-) -> Float64[np.ndarray, "C D"]:
+def _solved(normal: Matrix, slope: Slope, estimate: np.ndarray, deviation: float) -> Slope:
     """Return the step to subtract from what is known, which is expected to be as large as `deviation`."""
     right = slope + estimate / deviation**2
     step = strict.products(strict.inverse(normal + np.eye(slope.size) / deviation**2), right.reshape(-1, 1))
     return step.reshape(slope.shape)
+
+
+def remembered(
+    rig: Rig, looked_at: Sequence[int], depends_on: dict[str, Any], find: Callable[[], Corrections]
+) -> Corrections:
+    """Return the corrections of a rig's colour cameras from its folder, or find them and try to write them there.
+
+    `looked_at` are the frames that they are found from, and `depends_on` is all else that they depend on beside the
+    cameras. A file that is damaged or of other pictures is replaced; a folder that cannot be written stays as it is.
+    """
+    digest = _digest(rig, looked_at, depends_on)
+    with suppress(*_DAMAGED):
+        record = json.loads((rig.folder / REMEMBERED).read_bytes())
+        if record["of"] == digest:
+            return _corrections(rig, record["cameras"])
+    found = find()
+    entries = [
+        {"name": camera.name, "log2_gains": one.gains.tolist(), "motion": one.pose.tolist()}
+        for camera, one in zip(rig.color_cameras, found, strict=False)
+    ]
+    with suppress(OSError, InputError):
+        if rig.folder.stat().st_mode & 0o222:  # root could write where nobody is meant to
+            with replacing(rig.folder / REMEMBERED) as file:
+                file.write((json.dumps({"of": digest, "cameras": entries}, indent=1) + "\n").encode())
+    return found
+
+
+def _corrections(rig: Rig, entries: list[dict[str, Any]]) -> Corrections:
+    """Return corrections as they were written. Raises ValueError unless each is of its camera, and finite."""
+    if entries and [entry["name"] for entry in entries] != [camera.name for camera in rig.color_cameras]:
+        raise ValueError("of other cameras")
+    return tuple(Correction(_numbers(entry["log2_gains"], 3), _numbers(entry["motion"], 6)) for entry in entries)
+
+
+def _numbers(values: Any, count: int) -> Float64[np.ndarray, " n"]:
+    numbers = np.array(values, dtype=np.float64)
+    if numbers.shape != (count,) or not np.isfinite(numbers).all():
+        raise ValueError(f"{values!r:.40} are not {count} finite numbers")
+    return numbers
+
+
+def _digest(rig: Rig, looked_at: Sequence[int], depends_on: dict[str, Any]) -> str:
+    """Return the digest of all that corrections depend on; pictures count by their sizes in bytes."""
+    files = [*rig.files, *(camera.files for camera in rig.color_cameras)]
+    sizes = [[each[frame].stat().st_size if frame in each else -1 for frame in looked_at] for each in files]
+    colors = [camera.view.record() | {"distortion": camera.view.distortion} for camera in rig.color_cameras]
+    cameras = [camera.record() for camera in rig.cameras]
+    facts = depends_on | {"cameras": cameras, "colors": colors, "frames": list(looked_at), "sizes": sizes}
+    return hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()

@@ -14,6 +14,8 @@ from jaxtyping import Bool, Float64
 from ...geometry.depth import apart, depth_noise
 from ..rig.cameras import DepthCamera
 
+Picture = Float64[np.ndarray, "H W"]
+
 CHANGES = 0.25  # share of the frames in which a still pixel may measure something else (guess)
 WINDOW = 100  # a side of the window that a plane is fitted to, in the picture's width (guess)
 FULL = 0.6  # share of the window's pixels that must have a depth (guess)
@@ -35,7 +37,7 @@ class StillView:
         return np.isfinite(self.points[..., 2])
 
 
-def still_view(camera: DepthCamera, depths: list[Float64[np.ndarray, "H W"]]) -> StillView:
+def still_view(camera: DepthCamera, depths: list[Picture]) -> StillView:
     """Return the planes that a camera sees in most of the frames; depths are in m, 0 where nothing is measured."""
     from scipy.ndimage import correlate1d
 
@@ -44,7 +46,7 @@ def still_view(camera: DepthCamera, depths: list[Float64[np.ndarray, "H W"]]) ->
     half = max(2, round(camera.view.width / WINDOW / 2))
     steps = np.arange(-half, half + 1.0)
 
-    def sums(values: Float64[np.ndarray, "H W"], right: int, down: int) -> Float64[np.ndarray, "H W"]:
+    def sums(values: Picture, right: int, down: int) -> Picture:
         across = correlate1d(values, steps**right, axis=1, mode="constant")
         return correlate1d(across, steps**down, axis=0, mode="constant")
 
@@ -53,11 +55,8 @@ def still_view(camera: DepthCamera, depths: list[Float64[np.ndarray, "H W"]]) ->
     with np.errstate(invalid="ignore", divide="ignore"):
         count = sums(weight, 0, 0)
         i, j, s = (total / count for total in (sums(weight, 1, 0), sums(weight, 0, 1), sums(inverse, 0, 0)))
-        ii, ij, jj = (
-            sums(weight, 2, 0) / count - i * i,
-            sums(weight, 1, 1) / count - i * j,
-            sums(weight, 0, 2) / count - j * j,
-        )
+        ii, jj = sums(weight, 2, 0) / count - i * i, sums(weight, 0, 2) / count - j * j
+        ij = sums(weight, 1, 1) / count - i * j
         is_, js = sums(inverse, 1, 0) / count - i * s, sums(inverse, 0, 1) / count - j * s
         ss = sums(inverse**2, 0, 0) / count - s * s
         size = ii * jj - ij * ij
@@ -73,12 +72,7 @@ def still_view(camera: DepthCamera, depths: list[Float64[np.ndarray, "H W"]]) ->
     return _planes(camera, np.where(flat, depth, np.nan), right, down)
 
 
-def _planes(
-    camera: DepthCamera,
-    depth: Float64[np.ndarray, "H W"],
-    right: Float64[np.ndarray, "H W"],
-    down: Float64[np.ndarray, "H W"],
-) -> StillView:
+def _planes(camera: DepthCamera, depth: Picture, right: Picture, down: Picture) -> StillView:
     """Return the planes of pixels, from depths and the changes of the inverse depth to the right and down, 1/m."""
     (fx, fy), rays = camera.view.focal, camera.view.ahead
     a, b = right * fx, down * fy
@@ -86,9 +80,7 @@ def _planes(
     return StillView(camera, rays * depth[..., None], normals / np.linalg.norm(normals, axis=2, keepdims=True))
 
 
-def _usual(
-    stack: Float64[np.ndarray, "T H W"],
-) -> tuple[Float64[np.ndarray, "H W"], Float64[np.ndarray, "H W"]]:
+def _usual(stack: Float64[np.ndarray, "T H W"]) -> tuple[Picture, Picture]:
     """Return the median of each pixel's measurements, NaN where many are of something else."""
     ordered = np.sort(np.where(stack > 0, stack, np.inf), axis=0)
     count = np.isfinite(ordered).sum(axis=0)

@@ -68,6 +68,5 @@ def open_take(path: Path) -> Take:
         with reading(path):
             return found[0].read(path)
     known = "; ".join(reader.KIND for reader in readers())
-    raise InputError(
-        f"{path}: is neither the folder of a rig (rig.json, camera.json) nor a recording that can be read: {known}"
-    )
+    text = "is neither the folder of a rig (rig.json, camera.json) nor a recording that can be read"
+    raise InputError(f"{path}: {text}: {known}")

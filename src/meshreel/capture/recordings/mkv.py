@@ -56,9 +56,8 @@ def read(path: Path) -> Take:
         back = cameras["COLOR"]["Rt"]
         apart = np.linalg.inv(pose_of(np.reshape(back["Rotation"], (3, 3)), back["Translation"]))
     sensor = Sensor("kinect", streams["DEPTH"], 0.001, streams.get("COLOR"), apart)
-    return Take(
-        path, KIND, (sensor,), f"the file has no {CALIBRATION} attached; record it with the camera's SDK", others
-    )
+    remedy = f"the file has no {CALIBRATION} attached; record it with the camera's SDK"
+    return Take(path, KIND, (sensor,), remedy, others)
 
 
 def _cameras(data: bytes | None) -> dict[str, dict[str, Any]]:

@@ -15,8 +15,8 @@ from pathlib import Path
 import numpy as np
 
 from ...errors import InputError
-from ...io.file_names import last_number
-from ...io.read import MOST_BYTES, read_file
+from ...io.files import MOST_BYTES, read_file
+from ...io.pictures import last_number
 from ..calibration.poses import pose_of
 from .takes import Picture, Pictures, Sensor, Stream, Take, lens_of, picture_size, reading
 
@@ -65,7 +65,8 @@ def read(path: Path) -> Take:
 
     given = np.array(about.get("poses") or np.zeros((0, 7)), np.float64).reshape(-1, 7)
     poses = pose_of(given[:, :4], given[:, 4:]) @ FLIP if len(given) else None
-    beside = stream(color, _size(load, next(iter(color.values()))), load) if color else None
+    first = next(iter(color.values()), "")
+    beside = stream(color, picture_size(load(first), first), load) if color else None
     sensor = Sensor("phone", stream(deep, (int(width), int(height)), decode), 1.0, beside, np.eye(4), poses)
     return Take(path, KIND, (sensor,), "its metadata have no K; export the recording again")
 
@@ -73,10 +74,6 @@ def read(path: Path) -> Take:
 def _folder(path: Path) -> Path | None:
     places = (path, path / EXPORT)
     return next((p for p in places if (p / "metadata.json").is_file() and (p / "depth").is_dir()), None)
-
-
-def _size(load: Callable[[str], bytes], name: str) -> tuple[int, int]:
-    return picture_size(load(name), name)
 
 
 def _stored(folder: Path, name: str) -> bytes:

@@ -19,7 +19,7 @@ import numpy as np
 
 from ...errors import InputError
 from ...geometry.cameras import Camera, Matrix
-from ...io.depth_pictures import parse_depth
+from ...io.pictures import parse_depth
 from ..calibration.poses import pose_in_root, pose_of
 from .takes import Picture, Pictures, Sensor, Stream, Take, lens_of, picture_size
 
@@ -36,9 +36,8 @@ def fits(path: Path) -> bool:
     """Return whether a file has an extension of bags, or a folder what ROS 2 writes."""
     if path.is_file():
         return path.suffix.lower() in (".bag", ".mcap", ".db3")
-    return (path / "metadata.yaml").is_file() and any(
-        kind in one.name for one in path.iterdir() for kind in (".mcap", ".db3")
-    )
+    names = [one.name for one in path.iterdir()] if (path / "metadata.yaml").is_file() else []
+    return any(kind in name for name in names for kind in (".mcap", ".db3"))
 
 
 def read(path: Path) -> Take:
@@ -120,9 +119,8 @@ class _Bag:
     def tree(self) -> dict[str, tuple[str, Matrix]]:
         """Return each frame's parent, and its pose in that one."""
         stills = [one for _, message in self.messages("/tf_static") for one in message.transforms]
-        return {
-            one.child_frame_id.lstrip("/"): (one.header.frame_id.lstrip("/"), _matrix(one.transform)) for one in stills
-        }
+        parents = [(one.header.frame_id.lstrip("/"), _matrix(one.transform)) for one in stills]
+        return dict(zip((one.child_frame_id.lstrip("/") for one in stills), parents, strict=True))
 
 
 @contextmanager

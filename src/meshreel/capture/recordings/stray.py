@@ -12,10 +12,8 @@ import numpy as np
 from jaxtyping import Float64
 
 from ...errors import InputError
-from ...io.depth_pictures import read_depth
-from ...io.file_names import last_number
-from ...io.pictures import read_picture
-from ...io.read import read_file, read_input
+from ...io.files import read_file, read_input
+from ...io.pictures import last_number, read_depth, read_picture
 from ..calibration.poses import pose_of
 from .takes import Pictures, Sensor, Stream, Take, lens_of, picture_size, reading
 
@@ -69,9 +67,8 @@ def _odometry(path: Path) -> tuple[dict[int, float], Float64[np.ndarray, "T 4 4"
     if not np.isfinite(table).all():
         raise ValueError("it has a number that is not finite")
     columns = {title: table[:, number] for number, title in enumerate(titles)}
-    times = (
-        dict(zip(columns["frame"].astype(int).tolist(), columns["timestamp"].tolist(), strict=True)) if titled else {}
-    )
+    stamped = (columns[name].tolist() for name in ("frame", "timestamp")) if titled else ([], [])
+    times = {int(frame): time for frame, time in zip(*stamped, strict=True)}
     turns, places = (np.stack([columns[name] for name in names], axis=1) for names in (("qx", "qy", "qz", "qw"), "xyz"))
     return times, pose_of(turns, places) if len(table) else None
 

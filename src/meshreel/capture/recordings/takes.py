@@ -18,6 +18,7 @@ from ...geometry.cameras import Camera
 from ...io.pictures import opened
 
 Picture = np.ndarray | bytes  # depths H x W in the sensor's unit, integers or floats; colours H x W x 3; a PNG or JPEG
+Pair = tuple[float, float]  # along x and y
 Pictures = Iterator[tuple[float, Picture]]  # each with its time on the take's clock, s
 
 
@@ -66,13 +67,7 @@ class Take:
     others: tuple[str, ...] = ()  # streams that are not read
 
 
-def lens_of(
-    width: int,
-    height: int,
-    focal: tuple[float, float],
-    center: tuple[float, float],
-    distortion: tuple[float, ...] = (),
-) -> Camera:
+def lens_of(width: int, height: int, focal: Pair, center: Pair, distortion: tuple[float, ...] = ()) -> Camera:
     """Return the lens of intrinsics that call the middles of pixels whole numbers, as most recorders do.
 
     Raises ValueError where the distortion is not finite.

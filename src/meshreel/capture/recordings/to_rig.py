@@ -22,8 +22,7 @@ from jaxtyping import Bool, Float64, Int64
 from ...errors import InputError
 from ...geometry.cameras import Camera
 from ...io.pictures import pack_picture
-from ...io.unfinished import cannot_be_written, part_of
-from ...io.write import make_folder
+from ...io.write import cannot_be_written, make_folder, part_of
 from ..rig.cameras import DepthCamera, distortion_of, placed
 from ..rig.rig import write_rig
 from .takes import Picture, Sensor, Stream, Take, check_size, picture_size, reading
@@ -35,6 +34,7 @@ APART = (1e-4, 3600.0)  # s, between pictures: outside, time stamps are in anoth
 LONGEST_GAP = 1e9  # frames: one whose time stamp is damaged may be as far away as 64 bits reach (guess)
 LONGEST_NAME = 100  # characters of a camera's name, and of its folder (guess)
 QUALITY = 95  # of JPEG, for colours that a package decoded: a third of a PNG's bytes
+Pack = Callable[[Picture, Camera], tuple[bytes, str]]  # a picture to the bytes of a file, and its extension
 Report = Callable[[int], None]  # how many pictures were read so far
 
 
@@ -170,18 +170,11 @@ class _Part:
         if self.stream is not None:
             self.color = self._write(self.stream, folder / "color", _colored, report)
 
-    def _write(
-        self,
-        stream: Stream,
-        folder: Path,
-        pack: Callable[[Picture, Camera], tuple[bytes, str]],
-        report: Callable[[], None],
-    ) -> _Written:
-        written, what = _Written(), f"{self.take.path}: {folder.name} of {self.sensor.name}"
+    def _write(self, stream: Stream, folder: Path, pack: Pack, report: Callable[[], None]) -> _Written:
+        written, name = _Written(), f"{folder.name} of {self.sensor.name}"
+        what = f"{self.take.path}: {name}"
         make_folder(folder)
-        with reading(
-            self.take.path, lambda: f", {folder.name} of {self.sensor.name} from picture {len(written.files)} on"
-        ):
+        with reading(self.take.path, lambda: f", {name} from picture {len(written.files)} on"):
             for number, (time, picture) in enumerate(stream.pictures()):
                 if not np.isfinite(time):
                     raise ValueError(f"picture {number} has the time {time}")

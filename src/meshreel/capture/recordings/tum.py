@@ -15,8 +15,8 @@ import numpy as np
 from jaxtyping import Float64
 
 from ...errors import InputError
-from ...io.depth_pictures import read_depth
-from ...io.read import read_input
+from ...io.files import read_input
+from ...io.pictures import read_depth
 from ..calibration.poses import pose_of
 from .takes import Picture, Pictures, Sensor, Stream, Take, lens_of, picture_size, reading
 

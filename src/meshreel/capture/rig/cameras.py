@@ -18,8 +18,7 @@ from ...errors import InputError
 from ...geometry.cameras import Camera, CameraPose, Matrix, broken
 from ...geometry.color_views import ColorPicture
 from ...geometry.depth import DepthPicture
-from ...io.file_names import last_number
-from ...io.pictures import read_picture
+from ...io.pictures import last_number, read_picture
 
 PICTURES = {"depth": (".png",), "color": (".png", ".jpg", ".jpeg", ".webp", ".bmp")}
 MOST_DISTORTION = 10.0  # of a coefficient: beyond, the picture would fold many times (guess)

@@ -20,8 +20,8 @@ from jaxtyping import Float64, UInt16
 
 from ...errors import InputError
 from ...geometry.cameras import Camera, Matrix
-from ...io.depth_pictures import read_depth
-from ...io.read import read_json
+from ...io.files import read_json
+from ...io.pictures import read_depth
 from ...io.write import replacing
 from ...types import UP_AXES, UPS, Up
 from .cameras import ColorCamera, DepthCamera, check_frames, check_size, distortion_of, pictures_in, placed

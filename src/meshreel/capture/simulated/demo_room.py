@@ -22,9 +22,8 @@ from ..rig.cameras import DepthCamera
 from .figure import Pose, figure
 from .implicit import polygonize
 from .procedural import check_frames, grid_of_frame
-from .simulated_color import ColorSensorOptions
-from .simulated_rig import SceneFrame, SensorOptions, corner_cameras, simulate_rig
-from .solid_colors import CHILD, WALKER, person_colors, room_colors
+from .simulated_rig import ColorSensorOptions, SceneFrame, SensorOptions, corner_cameras, simulate_rig
+from .solid_colors import CHILD, WALKER, Colors, Points, person_colors, room_colors
 
 # Sizes and speeds for a demo of a minute or two.
 WIDTH = 256  # pixels of a depth picture (guess)
@@ -41,6 +40,7 @@ _SOLE = 0.01  # m by which feet would sink into the floor (guess)
 _TURN = 0.6  # rad/s, of the child (guess)
 _TOUCH = 0.01  # m; each person is meshed alone (guess)
 
+Parts = Int64[np.ndarray, " F"]
 Vector = Float64[np.ndarray, " 3"] | tuple[float, float, float]
 Box = tuple[tuple[float, float, float], tuple[float, float, float]]  # lowest and highest corner, m
 FURNITURE: tuple[Box, ...] = (
@@ -100,13 +100,7 @@ class Room:
         seconds = number / self.options.frame_rate
         return _walker(seconds), _child(seconds)
 
-    def _colors(
-        self,
-        number: int,
-        parts: Int64[np.ndarray, " F"],
-        points: Float64[np.ndarray, "N 3"],
-        faces: Int64[np.ndarray, " N"],
-    ) -> Float64[np.ndarray, "N 3"]:
+    def _colors(self, number: int, parts: Parts, points: Points, faces: Int64[np.ndarray, " N"]) -> Colors:
         """Return the colours of places on faces of a frame, of which `parts` are the room's (0) and each person's."""
         colors, part = room_colors(points), parts[faces]
         for person, (pose, outfit) in enumerate(zip(self._poses(number), (WALKER, CHILD), strict=True), 1):
@@ -127,10 +121,7 @@ def furnished_room(options: RoomOptions | None = None) -> Room:
 
 
 def record_room(
-    folder: Path,
-    options: RoomOptions,
-    width: int = WIDTH,
-    progress: Callable[[int], None] = lambda _done: None,
+    folder: Path, options: RoomOptions, width: int = WIDTH, progress: Callable[[int], None] = lambda _done: None
 ) -> None:
     """Write what four depth cameras measure, and the truth; `progress` gets the number of finished frames."""
     sensor, cameras = SensorOptions(noise=NOISE, seed=options.seed), room_cameras(width)

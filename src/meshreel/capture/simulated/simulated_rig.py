@@ -1,35 +1,49 @@
-"""Simulation of a rig: depths that cameras would measure of known meshes, with sensor errors (paper, section 4.1).
+"""Simulation of a rig: depths and colours that cameras would see of known meshes, with sensor errors (paper, 4.1).
 
 Meshes of a scene frame by frame, and cameras -> a rig's folder, which `rig.py` reads, and beside it the truth: the
-clean mesh of each frame and which of its faces move. Everything follows from the seed.
+clean mesh of each frame and which of its faces move, to be read on demand. Everything follows from the seed.
 """
 
 from __future__ import annotations
 
 import json
 import math
+import operator
+import zipfile
+import zlib
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from io import BytesIO
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-from jaxtyping import Bool, Float64, UInt16
+from jaxtyping import Bool, Float64, Int64, UInt8, UInt16
 
 from ...errors import InputError
-from ...geometry.cameras import Camera, CameraPose, looking_at
+from ...geometry.cameras import Camera, CameraPose, Rays, looking_at
 from ...geometry.depth import depth_noise
-from ...geometry.raycast import Rays
+from ...geometry.strict import products
 from ...geometry.topology import concatenate, face_normals
-from ...io.depth_pictures import write_depth
+from ...io.files import read_file
+from ...io.meshes import read_mesh
 from ...io.write import make_folder, replacing, write_mesh, write_picture
 from ...types import Mesh
 from ..rig.cameras import DepthCamera, posed
-from ..rig.rig import RIG, write_rig
-from .simulated_color import ColorSensorOptions, Painter, SimulatedColor, turned
+from ..rig.rig import RIG, read_cameras, write_rig
+
+Depth = Float64[np.ndarray, "H W"]  # m
+Pixels = UInt8[np.ndarray, "H W 3"]
+# Colours, 0 to 255, of places and the faces that they are on.
+Painter = Callable[[Float64[np.ndarray, "N 3"], Int64[np.ndarray, " N"]], Float64[np.ndarray, "N 3"]]
 
 TRUTH = "truth"  # folder of the clean meshes
 LABELS = "dynamic.npz"  # file in that folder: for each frame, a bit per face of its mesh
+_DAMAGED = (OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError)
 DEEPEST = 65_535  # units, largest value of a 16-bit depth picture
+AMBIENT = 0.8  # of the light that comes from everywhere (guess)
+LIGHT = (0.3, 0.9, 0.3)  # where the rest comes from, at first; it turns about the second axis (guess)
+TURNS = 0.02  # of the light a frame, rad (guess)
 JUMP = 0.05  # m between neighbouring pixels: where they are farther apart, flying pixels come up (guess)
 
 
@@ -71,10 +85,8 @@ def corner_cameras(
 ) -> tuple[DepthCamera, ...]:
     """Return cameras with the paper's field of view (75 x 65 degrees) high up around a box, looking down at its middle.
 
-    Pictures are 0.9 times as high as wide; those of the paper have 640 x 576 pixels.
-
-    `low` and `high` are the box's corners, m; the cameras stand on an ellipse through its vertical edges, the first at
-    45 degrees; y is up.
+    Pictures are 0.9 times as high as wide; those of the paper have 640 x 576 pixels. `low` and `high` are the box's
+    corners, m; the cameras stand on an ellipse through its vertical edges, the first at 45 degrees; y is up.
     """
     middle, half = (low + high) / 2, (high - low) / 2
     target = np.array([middle[0], low[1] + 0.4 * (high[1] - low[1]), middle[2]])
@@ -100,9 +112,8 @@ def simulate_rig(
 ) -> int:
     """Write what the cameras measure of each frame, and the truth; return the number of frames.
 
-    With `color`, each has a colour camera beside it, which sees frames that have a `paint`.
-
-    `rig.json` is written last: a folder without it is incomplete. `progress` gets the number of finished frames.
+    With `color`, each has a colour camera beside it, which sees frames that have a `paint`. `rig.json` is written last:
+    a folder without it is incomplete. `progress` gets the number of finished frames.
     """
     places = [folder / camera.name / "depth" for camera in cameras]  # where `rig.json` will name them
     for place in (*places, folder / TRUTH):
@@ -113,14 +124,14 @@ def simulate_rig(
     for camera in cameras[: len(eyes)]:
         make_folder(folder / camera.name / "color")
     for number, frame in enumerate(frames):
-        scene = _Rays(frame.mesh)
+        rays, normals = Rays(frame.mesh), face_normals(frame.mesh)[0]
         for which, (camera, place) in enumerate(zip(cameras, places, strict=True)):
             random = np.random.default_rng([sensor.seed, number, which])
-            write_depth(_measured(scene, camera, sensor, random), place / f"depth_{number:05}.png")
+            clean = _flown(_cut_grazing(rays, normals, camera.view, sensor.grazing), sensor.flying, random)
+            write_picture(_measured(clean, camera, sensor, random), place / f"depth_{number:05}.png")
             if which < len(eyes) and frame.paint is not None:
                 picture = eyes[which].picture(frame.mesh, frame.paint, number, random)
-                path = folder / camera.name / "color" / f"color_{number:05}.png"
-                write_picture(picture, path)
+                write_picture(picture, folder / camera.name / "color" / f"color_{number:05}.png")
         write_mesh(frame.mesh, folder / TRUTH / f"frame_{number:05}.ply")
         labels[f"frame_{number:05}"] = np.packbits(frame.dynamic)
         count = number + 1
@@ -137,33 +148,21 @@ def simulate_rig(
     return count
 
 
-class _Rays:
-    """A mesh prepared for ray casting."""
-
-    def __init__(self, mesh: Mesh) -> None:
-        self._normals = face_normals(mesh)[0]
-        self._rays = Rays(mesh)
-
-    def cast(self, camera: DepthCamera) -> tuple[Float64[np.ndarray, "H W"], Float64[np.ndarray, "H W"]]:
-        """Return the depth along the optical axis, m, infinite for a miss, and the cosine between ray and normal."""
-        to_world = camera.view.pose.to_world
-        directions = camera.view.ahead @ to_world[:3, :3].T
-        answer = self._rays.cast(to_world[None, :3, 3], directions.reshape(-1, 3))
-        depth = answer.distances.reshape(directions.shape[:2])  # directions go one metre along the axis
-        cosines = np.zeros(depth.shape)
-        hit = np.isfinite(depth)
-        faces = answer.faces.reshape(depth.shape)[hit]
-        along = directions[hit] / np.linalg.norm(directions[hit], axis=1)[:, None]
-        cosines[hit] = np.abs((self._normals[faces] * along).sum(axis=1))
-        return depth, cosines
+def _cut_grazing(rays: Rays, normals: Float64[np.ndarray, "F 3"], camera: Camera, grazing: float) -> Depth:
+    """Return the depth along the optical axis, infinite for a miss, and `grazing` degrees or more from the normal."""
+    directions = camera.ahead @ camera.pose.to_world[:3, :3].T
+    answer = rays.cast(camera.pose.to_world[None, :3, 3], directions.reshape(-1, 3))
+    depth = answer.distances.reshape(directions.shape[:2])  # directions go one metre along the axis
+    cosines, hit = np.zeros(depth.shape), np.isfinite(depth)
+    faces = answer.faces.reshape(depth.shape)[hit]
+    along = directions[hit] / np.linalg.norm(directions[hit], axis=1)[:, None]
+    cosines[hit] = np.abs((normals[faces] * along).sum(axis=1))
+    return np.where(cosines >= math.cos(math.radians(grazing)), depth, np.inf)
 
 
 def _measured(
-    scene: _Rays, camera: DepthCamera, sensor: SensorOptions, random: np.random.Generator
+    depth: Depth, camera: DepthCamera, sensor: SensorOptions, random: np.random.Generator
 ) -> UInt16[np.ndarray, "H W"]:
-    depth, cosines = scene.cast(camera)
-    depth = np.where(cosines >= math.cos(math.radians(sensor.grazing)), depth, np.inf)
-    depth = _flown(depth, sensor, random)
     seen = np.isfinite(depth) & (random.random(depth.shape) >= sensor.holes)
     depth = np.where(seen, depth, 0.0)
     depth += sensor.noise * depth_noise(depth) * random.standard_normal(depth.shape)
@@ -171,9 +170,7 @@ def _measured(
     return camera.in_range(np.where(seen & (units > 0) & (units <= DEEPEST), units, 0).astype(np.uint16))
 
 
-def _flown(
-    depth: Float64[np.ndarray, "H W"], sensor: SensorOptions, random: np.random.Generator
-) -> Float64[np.ndarray, "H W"]:
+def _flown(depth: Depth, flying: float, random: np.random.Generator) -> Depth:
     """Mix the depths of both sides at some pixels beside a jump (flying pixels)."""
     found = depth.copy()
     for axis in (0, 1):
@@ -181,7 +178,7 @@ def _flown(
         with np.errstate(invalid="ignore"):  # two misses side by side
             jumps = np.isfinite(depth) & np.isfinite(beside) & (np.abs(depth - beside) > JUMP)
         np.moveaxis(jumps, axis, 0)[0] = False  # the first row has no neighbour
-        mixed = jumps & (random.random(depth.shape) < sensor.flying)
+        mixed = jumps & (random.random(depth.shape) < flying)
         share = random.random(depth.shape)
         found[mixed] = share[mixed] * depth[mixed] + (1 - share[mixed]) * beside[mixed]
     return found
@@ -193,3 +190,125 @@ def _mistaken(camera: DepthCamera, sensor: SensorOptions, random: np.random.Gene
     pose = turned(camera.view.pose.to_world, degrees, random)
     pose[:3, 3] += apart * random.standard_normal(3)
     return posed(camera, pose)
+
+
+@dataclass(frozen=True, slots=True)
+class Truth:
+    """Clean frames of a simulated rig, with its true cameras."""
+
+    paths: tuple[Path, ...]  # of the clean meshes
+    packed: tuple[np.ndarray, ...]  # a bit per face, set if it moves; untrusted, checked frame by frame
+    cameras: tuple[DepthCamera, ...]  # with their true poses
+    frame_rate: float  # 1/s
+
+    def only(self, numbers: Sequence[int]) -> Truth:
+        """Return the truth of some of its frames, which are numbered anew."""
+        return replace(self, paths=tuple(self.paths[k] for k in numbers), packed=tuple(self.packed[k] for k in numbers))
+
+    def __len__(self) -> int:
+        return len(self.paths)
+
+    def __getitem__(self, index: int) -> SceneFrame:
+        number = range(len(self))[operator.index(index)]
+        mesh = read_mesh(self.paths[number]).mesh
+        bits, faces = self.packed[number], len(mesh.faces)
+        if bits.dtype != np.uint8 or bits.shape != ((faces + 7) // 8,):
+            text = f"{bits.dtype} {bits.shape} for {faces} faces"
+            raise InputError(f"{self.paths[number]}: {LABELS} has {text}, not a bit a face; simulate the rig again")
+        return SceneFrame(mesh, np.unpackbits(bits, count=faces).astype(bool))
+
+
+def read_truth(folder: Path) -> Truth:
+    """Read the truth in a folder. Raises InputError where a part of it is missing, damaged or inconsistent."""
+    cameras, rate = read_cameras(folder)
+    paths = {path.stem: path for path in sorted(folder.glob("frame_*.ply"))}
+    if not paths:
+        raise InputError(f"{folder}: has no clean meshes (frame_00000.ply); give the folder `truth` of a simulated rig")
+    labels = _labels(folder / LABELS)
+    if unlike := sorted(labels.keys() ^ paths.keys()):
+        text = f"{len(paths)} clean meshes and labels of {len(labels)} frames, unlike in {unlike[0]}"
+        raise InputError(f"{folder}: {text}; simulate the rig again")
+    return Truth(tuple(paths.values()), tuple(labels[name] for name in paths), cameras, rate)
+
+
+def _labels(path: Path) -> dict[str, np.ndarray]:
+    """Return packed labels by frame name."""
+    try:
+        with np.load(BytesIO(read_file(path)), allow_pickle=False) as archive:
+            return {name: archive[name] for name in archive.files}
+    except _DAMAGED as error:
+        raise InputError(f"{path}: labels cannot be read ({error}); simulate the rig again") from None
+
+
+@dataclass(frozen=True, slots=True)
+class ColorSensorOptions:
+    """Errors of colour cameras."""
+
+    scale: float = 2.0  # pixels of a colour picture's width for each of a depth picture's
+    gain: float = 0.0  # standard deviation of a camera's exposure, as a share
+    balance: float = 0.0  # the same of each channel's
+    blur: float = 0.5  # pixels, standard deviation
+    noise: float = 1.5  # levels of 255, standard deviation
+    pose_error: float = 0.0  # degrees, standard deviation of the error in the rig's file
+
+    def __post_init__(self) -> None:
+        numbers = (self.gain, self.balance, self.blur, self.noise, self.pose_error)
+        if not all(math.isfinite(value) and value >= 0 for value in numbers) or not 0.1 <= self.scale <= 16:
+            raise InputError(f"color sensor {numbers}, scale {self.scale:g}: give numbers from 0 on, scale 0.1 to 16")
+
+
+@dataclass(frozen=True, slots=True)
+class SimulatedColor:
+    """A colour camera with the eyes of a depth camera."""
+
+    camera: DepthCamera  # with the size and the numbers of the colour pictures
+    gains: Float64[np.ndarray, "3"]  # of the channels
+    sensor: ColorSensorOptions
+
+    @staticmethod
+    def beside(depth: DepthCamera, sensor: ColorSensorOptions, random: np.random.Generator) -> SimulatedColor:
+        """Return a camera in the place of a depth camera, with errors of its own."""
+        width, height = (round(side * sensor.scale) for side in (depth.view.width, depth.view.height))
+        camera = replace(depth, view=depth.view.resized(width, height))
+        gains = np.exp(sensor.gain * random.standard_normal() + sensor.balance * random.standard_normal(3))
+        return SimulatedColor(camera, gains, sensor)
+
+    def record(self, folder: str, random: np.random.Generator) -> dict[str, Any]:
+        """Return the object of `rig.json` that describes it, with the error of its pose."""
+        known = posed(self.camera, turned(self.camera.view.pose.to_world, self.sensor.pose_error, random)).record()
+        names = ("width", "height", "fx", "fy", "cx", "cy", "camera_to_world")
+        return {"folder": folder} | {name: known[name] for name in names}
+
+    def picture(self, mesh: Mesh, paint: Painter, frame: int, random: np.random.Generator) -> Pixels:
+        """Render a mesh in a frame as the camera sees it, on black."""
+        from scipy.ndimage import gaussian_filter
+
+        camera = self.camera.view
+        seen = Rays(mesh).look(camera)
+        rows, columns = np.nonzero(seen.faces >= 0)
+        depth, faces = seen.depth[rows, columns].astype(np.float64), seen.faces[rows, columns].astype(np.int64)
+        ahead = np.linalg.solve(camera.intrinsic, np.stack([columns + 0.5, rows + 0.5, np.ones(len(rows))])).T
+        to_world = camera.pose.to_world
+        points = products(ahead * depth[:, None], to_world[:3, :3].T) + to_world[:3, 3]
+        image = np.zeros((*seen.faces.shape, 3))
+        image[rows, columns] = paint(points, faces) * shade_of(mesh, faces, frame)[:, None] * self.gains
+        image = np.stack([gaussian_filter(image[..., k], self.sensor.blur) for k in range(3)], axis=2)
+        image += self.sensor.noise * random.standard_normal(image.shape)
+        return np.clip(np.rint(image), 0, 255).astype(np.uint8)
+
+
+def turned(pose: Float64[np.ndarray, "4 4"], degrees: float, random: np.random.Generator) -> Float64[np.ndarray, "4 4"]:
+    """Return a pose that is wrong by a turn with this standard deviation."""
+    from scipy.spatial.transform import Rotation
+
+    wrong = pose.copy()
+    wrong[:3, :3] = Rotation.from_rotvec(degrees * random.standard_normal(3), degrees=True).as_matrix() @ pose[:3, :3]
+    return wrong
+
+
+def shade_of(mesh: Mesh, faces: Int64[np.ndarray, " N"], frame: int) -> Float64[np.ndarray, " N"]:
+    """Return the share of light that faces have in a frame; part of it turns about the second axis."""
+    x, y, z = np.array(LIGHT) / np.linalg.norm(LIGHT)
+    c, s = math.cos(TURNS * frame), math.sin(TURNS * frame)
+    light = np.array([c * x + s * z, y, c * z - s * x])
+    return AMBIENT + (1 - AMBIENT) * np.abs(face_normals(mesh)[0][faces] @ light)

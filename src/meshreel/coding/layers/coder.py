@@ -18,7 +18,7 @@ from ...errors import FormatError, InputError
 from ...format.budget import LIMITS, Size, check_cost, layers_cost
 from ...format.layout import Form, LayersGroup, LayersLevel, LayersPatches, Origin
 from ...format.records import pack, unpack, unpack_all
-from ...geometry.subdivision import heights, refine, subdivide, write_frames
+from ...geometry.topology import heights, refine, subdivide, write_frames
 from ...shapes import Float64, Int32
 from ...types import Mesh, Placement
 from ..mesh import check_growth, check_step, decode_mesh

@@ -12,7 +12,7 @@ import numpy as np
 
 from ... import _core
 from ...format.layout import LayersLevel, Origin
-from ...geometry.subdivision import Level
+from ...geometry.topology import Level
 from ...shapes import Float64
 from ...types import Placement
 from .fields import EncodedField, Rate, encode_field

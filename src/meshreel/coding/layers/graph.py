@@ -12,7 +12,7 @@ import numpy as np
 
 from ... import _core
 from ...errors import FormatError
-from ...geometry.subdivision import Level, subdivide
+from ...geometry.topology import Level, subdivide
 from ...shapes import Float64, Int32, Int64
 from ...types import Mesh
 

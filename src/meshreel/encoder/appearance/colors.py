@@ -22,7 +22,7 @@ from ...coding.layers.coder import LayersState
 from ...container.writer import Companion
 from ...format.budget import CostlyError
 from ...format.layout import ChunkKind, Form
-from ...geometry.painted import Paint
+from ...geometry.color_views import Paint
 from ...types import GREY, Mesh
 from ..group.forms import EncodedGroup
 from ..group.interval import Interval

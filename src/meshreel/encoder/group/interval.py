@@ -12,9 +12,9 @@ import numpy as np
 from ...analysis.pieces import piece_of_faces
 from ...analysis.survey import Survey
 from ...errors import InputError
+from ...geometry.color_views import Paint, Painted
 from ...geometry.depth import FreeSpace
 from ...geometry.derived_sequences import DerivedSequence
-from ...geometry.painted import Paint, Painted
 from ...geometry.topology import clean, part_of
 from ...types import Frames, Mesh, Up
 from .views import Sight, Views

@@ -23,7 +23,7 @@ from ...analysis.follow.fused_template import fused_mesh
 from ...analysis.follow.template import LEVELS, base_mesh, shared_detail
 from ...coding.layers.coder import LayersState
 from ...coding.reference_mesh import CodedReference, code_on_lattice
-from ...geometry.painted import Paint
+from ...geometry.color_views import Paint
 from ...types import Mesh
 from ..group.digests import note
 from ..group.target import Target

@@ -28,10 +28,8 @@ from ...errors import FormatError, InputError
 from ...format.checks import COMPANIONS
 from ...format.layout import ChunkKind, Form, Header
 from ...geometry.derived_sequences import DerivedSequence
-from ...io.read import first_difference
-from ...io.remote import Place, located, uploaded
-from ...io.unfinished import cannot_be_written, claim, discard, part_of, sync, sync_folder, unfinished
-from ...io.write import check_apart
+from ...io.files import Place, first_difference, located, uploaded
+from ...io.write import cannot_be_written, check_apart, claim, discard, part_of, sync, sync_folder, unfinished
 from ..group.digests import versions
 from ..group.forms import EncodedGroup
 from ..group.interval import Interval

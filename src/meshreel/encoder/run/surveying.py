@@ -22,8 +22,7 @@ from ...errors import InputError
 from ...format.checks import LARGEST
 from ...geometry.derived_sequences import DerivedSequence
 from ...geometry.work import Work, add, since, so_far
-from ...io.read import read_input
-from ...io.remote import Place
+from ...io.files import Place, read_input
 from ...io.write import replacing
 from .job import Job
 from .schedule import Call, as_done

@@ -24,10 +24,9 @@ from ...format.budget import Chain, CostlyError
 from ...format.layout import ChunkKind
 from ...geometry.atlas import Layout
 from ...geometry.closest_points import distances
-from ...geometry.color_views import spread_colors
+from ...geometry.color_views import Paint, Painted, spread_colors
 from ...geometry.decimate import decimate_faces
 from ...geometry.derived_sequences import CapturedSequence
-from ...geometry.painted import Paint, Painted
 from ...geometry.topology import clean, face_normals, vertex_normals
 from ...types import Mesh, MeshSequence, Placement, evenly
 from ..appearance.colors import fitting_size
