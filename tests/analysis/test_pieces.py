@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from meshreel.analysis.pieces import Piece, bodies_of, piece_of_faces, pieces_of
+from meshreel.analysis.survey import Piece, bodies_of, piece_of_faces, pieces_of
 from meshreel.format.checks import MOST_TRACKS
 from meshreel.geometry.topology import concatenate, part_of
 from meshreel.types import Mesh

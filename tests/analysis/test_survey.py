@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from meshreel.analysis.groups import cut_at
+from meshreel.analysis.plan import cut_at
 from meshreel.analysis.survey import survey
 from meshreel.types import Mesh, MeshList
 

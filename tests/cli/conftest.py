@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from meshreel.analysis.scene.pictures import write_views
+from meshreel.analysis.scene.masks import write_views
 from meshreel.analysis.scene.views import place_views
 from meshreel.cli import main
 from meshreel.geometry.cameras import Rays

@@ -10,7 +10,7 @@ import tracemalloc
 import pytest
 
 import meshreel
-from meshreel.analysis.scene.masks import read_views
+from meshreel.analysis.scene.masks import read_view_file
 from meshreel.capture.rig.rig import read_rig
 from meshreel.capture.simulated.simulated_rig import _labels
 from meshreel.encoder.run.interval_files import IntervalFiles
@@ -69,7 +69,11 @@ def test_what_is_no_description_of_a_rig_ends_at_once(tmp_path, make):
 @posix
 @pytest.mark.parametrize("make", [os.mkfifo, zeros, sparse])
 @pytest.mark.parametrize(
-    ("name", "of"), [("cameras.json", read_views), ("labels.npz", lambda folder: _labels(folder / "labels.npz"))]
+    ("name", "of"),
+    [
+        ("cameras.json", lambda folder: read_view_file(folder / "cameras.json")),
+        ("labels.npz", lambda folder: _labels(folder / "labels.npz")),
+    ],
 )
 def test_what_are_no_cameras_or_labels_ends_at_once(tmp_path, make, name, of):
     make(tmp_path / name)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from meshreel.metrics.color_render import Colored
+from meshreel.metrics.color import Colored
 from meshreel.metrics.render import Crop, Pixels
 from meshreel.metrics.viewpoints import Camera
 from meshreel.types import Mesh

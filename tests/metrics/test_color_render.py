@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from meshreel.metrics.color_render import render_errors
+from meshreel.metrics.color import render_errors
 from meshreel.metrics.comparison import ComparisonOptions, compare_sequences
 from meshreel.metrics.viewpoints import Box, ViewOptions, views_around
 from meshreel.types import Mesh, Texture

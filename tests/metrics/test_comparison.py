@@ -11,8 +11,7 @@ from meshreel.geometry.cameras import pack_cameras
 from meshreel.metrics.comparison import ComparisonOptions, OriginalFrame, compare_sequences
 from meshreel.metrics.distance import PSNR_CEILING, surface_errors
 from meshreel.metrics.mpeg import MpegOptions, mpeg_errors
-from meshreel.metrics.render import Visible
-from meshreel.metrics.ssim import ssim_normals
+from meshreel.metrics.render import Visible, ssim_normals
 from meshreel.metrics.viewpoints import Box, ViewOptions, views_around
 from meshreel.types import Mesh, MeshList
 

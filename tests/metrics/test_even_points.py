@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from meshreel.metrics.even_points import scatter
+from meshreel.metrics.surface_samples import scatter
 from meshreel.types import Mesh
 from tests.metrics.shapes import plane, sphere
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from meshreel.metrics.flicker import Patch, angles_after_motion
+from meshreel.metrics.depth import Patch, angles_after_motion
 from meshreel.types import Mesh
 
 AXES = np.array([0.3, 0.9, 0.2])  # m, of an ellipsoid like a person

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from meshreel.metrics.distance import surface_errors
-from meshreel.metrics.normals import angles, interpolate, welded_normals
+from meshreel.metrics.surface_samples import angles, interpolate, welded_normals
 from meshreel.types import Mesh
 
 from .shapes import noisy, plane, sphere

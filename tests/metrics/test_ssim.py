@@ -2,8 +2,7 @@ import numpy as np
 import pytest
 
 from meshreel.metrics import render
-from meshreel.metrics.render import Crop, look
-from meshreel.metrics.ssim import ssim_map, ssim_normals
+from meshreel.metrics.render import Crop, look, ssim_map, ssim_normals
 from meshreel.metrics.viewpoints import Box, ViewOptions, views_around
 from meshreel.types import Mesh
 

@@ -7,7 +7,7 @@ import pytest
 from meshreel_bench.datasets import SHAPES, Store
 from meshreel_bench.datasets.remesh import MODULE, TEETH, gears, prism
 
-from meshreel.analysis.pieces import bodies_of, pieces_of
+from meshreel.analysis.survey import bodies_of, pieces_of
 from meshreel.geometry.closest_points import distances
 from meshreel.geometry.inside import winding_inside
 from meshreel.geometry.topology import border_edges, components, face_normals

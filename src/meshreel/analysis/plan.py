@@ -1,7 +1,8 @@
 """Plan groups: cut frames only where another template saves more than it costs (decision 24).
 
 In -> out: the residuals that each template leaves on each frame -> groups of successive frames, each with its template
-or with none. Residuals are in units of the distance to reach; a cost is a sum of their squares.
+or with none. Residuals are in units of the distance to reach; a cost is a sum of their squares. Preset `paper`, with
+one reference for all frames, cuts a group by the fit of its frames (section 3.3.2: GoF; decision 15).
 """
 
 from __future__ import annotations
@@ -21,6 +22,8 @@ LOST = 1e6  # targets, in place of an infinite residual
 SMALL = 0.1  # squared targets that do not justify another key (guess)
 REACHED = 1.0  # squared targets of a frame that is coded alone
 POP = 1.5  # dB, largest step of the quality at a cut without a price (guess)
+LIMIT = 2.0  # a frame is lost if its residual is larger than this many times the target (guess)
+TOLERANCE = 2.0  # or larger than the target and than this many times the group's median (guess)
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,3 +128,21 @@ def next_key(plan: Plan, tried: Collection[int]) -> int | None:
     middle, center = (worst.start + worst.stop - 1) / 2, (len(excess) - 1) / 2
     untried = (frame for frame in worst if frame not in tried)
     return min(untried, key=lambda frame: (abs(frame - middle), abs(frame - center), -frame))
+
+
+def cut_at(residuals: Float64[np.ndarray, " T"]) -> int | None:
+    """Return the frame that should begin a second group, or None if one reference follows all frames.
+
+    Residuals are in units of the distance to reach. The cut leaves the residuals on each side most alike (least squares
+    on their logarithms), which separates frames that are followed well from those that are not.
+    """
+    limit = min(LIMIT, max(1.0, TOLERANCE * float(np.median(residuals))))
+    if len(residuals) < 2 or residuals.max() <= limit:
+        return None
+    logs = np.log(np.clip(residuals, 1e-6, 1e6))
+    spread = [_scatter(logs[:cut]) + _scatter(logs[cut:]) for cut in range(1, len(logs))]
+    return 1 + int(np.argmin(spread))
+
+
+def _scatter(values: Float64[np.ndarray, " n"]) -> float:
+    return float(((values - values.mean()) ** 2).sum())

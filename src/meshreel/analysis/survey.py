@@ -1,6 +1,9 @@
-"""Survey a sequence in one pass before coding: bounding box, empty frames, intervals, invalid input.
+"""Survey a sequence in one pass before coding: bounding box, empty frames, intervals, invalid input, scenes, bodies.
 
 In -> out: MeshSequence -> Survey. Errors in any frame surface here, before minutes are spent on the first frames.
+Bodies without a background are large connected pieces of cleaned frames. Connectivity decides, not distance: gear
+wheels that mesh share no vertex and are two bodies. Pieces connected in any frame are one body in all. A scene is a
+sequence of open surface most of which is in the same place in all frames; a lone body moves or is closed.
 """
 
 from __future__ import annotations
@@ -10,17 +13,27 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from jaxtyping import Float64
+from jaxtyping import Float64, Int64
 
 from ..errors import InputError
+from ..format.checks import MOST_TRACKS
 from ..geometry.strict import norm
-from ..geometry.topology import clean, drop_unreferenced
-from ..types import Mesh, MeshSequence
-from .pieces import Piece, pieces_of
+from ..geometry.topology import border_edges, clean, components, drop_unreferenced, edge_lengths, face_normals, linked
+from ..geometry.voxels import Lattice, around, distinct, spread
+from ..types import Frames, Mesh, MeshSequence, evenly
 
 UNLIKE = 30.0  # times the median size: a larger frame of a room must be in another unit; a guess
 LARGEST_RATIO = 10.0  # largest ratio of the diagonals of two frames in one interval: a guess
 Report = Callable[[str, int], object]  # takes a stage, and the number of further frames that have passed it
+LEAST = 0.05  # share of the area of the frame's largest piece: smaller pieces are bits (guess)
+LEAST_FACES = 500  # smaller pieces are bits: a separate track would cost more than they do (guess)
+Box = tuple[float, ...]  # m, six: the lower and the upper corner, along the axes
+# Set between captured rooms and captured bodies.
+PROBES = 4  # frames inspected, spread over the sequence (guess)
+SHARE = 0.6  # smallest share of a frame's surface that stands still in a scene (guess)
+CELLS = 200  # cells along a frame's diagonal: 4 cm in a room (guess)
+BORDER = 1.0  # diagonals, least length of the borders of an open surface; holes of a captured body have less (guess)
+COARSEST = 32  # smallest number of median edge lengths along the diagonal of a captured room (guess)
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,3 +158,129 @@ def check(mesh: Mesh, where: str) -> None:
     if not mesh.is_empty and not (mesh.faces.min() >= 0 and mesh.faces.max() < len(mesh.vertices)):
         wrong = mesh.faces.max() if mesh.faces.min() >= 0 else mesh.faces.min()
         raise InputError(f"{where}: a face refers to vertex {wrong}, but there are {len(mesh.vertices)} (from 0)")
+
+
+@dataclass(frozen=True, slots=True)
+class Piece:
+    """Place and size of a large connected piece of a frame."""
+
+    box: Box  # of the piece alone
+    around: Box  # of the piece and its bits
+    vertices: int  # of the piece and its bits
+
+
+def pieces_of(mesh: Mesh) -> tuple[Piece, ...]:
+    """Return the large pieces of a cleaned frame; none if it is a single piece."""
+    split = _found(mesh)
+    if split is None:
+        return ()
+    counts = np.bincount(split.piece[split.labels])
+    arounds = [box_around(split.boxes[split.piece == number]) for number in range(len(split.own))]
+    rows = zip(split.boxes[split.own].tolist(), arounds, counts.tolist(), strict=True)
+    return tuple(Piece(tuple(box), tuple(larger.tolist()), count) for box, larger, count in rows)
+
+
+def piece_of_faces(mesh: Mesh) -> Int64[np.ndarray, " F"]:
+    """Return the number of each face's piece among those of `pieces_of`; 0 for a frame of a single piece."""
+    split = _found(mesh)
+    if split is None:
+        return np.zeros(len(mesh.faces), np.int64)
+    return split.piece[split.labels[mesh.faces[:, 0]]]
+
+
+@dataclass(frozen=True, slots=True)
+class _Found:
+    """The connected components of a frame, and their assignment to pieces."""
+
+    labels: Int64[np.ndarray, " V"]  # the component of each vertex
+    boxes: Float64[np.ndarray, "C 6"]  # m, of each component
+    own: Int64[np.ndarray, " P"]  # the large component of each piece
+    piece: Int64[np.ndarray, " C"]  # the piece of each component: its own, or the nearest
+
+
+def _found(mesh: Mesh) -> _Found | None:
+    """Return the pieces of a frame; None if it is a single piece."""
+    labels = components(mesh.faces, len(mesh.vertices))
+    if labels.max(initial=0) == 0:
+        return None
+    of_faces = labels[mesh.faces[:, 0]]
+    areas, faces = np.bincount(of_faces, face_normals(mesh)[1]), np.bincount(of_faces)
+    own = np.flatnonzero((areas >= LEAST * areas.max()) & (faces >= LEAST_FACES))
+    if len(own) < 2:
+        return None
+    order = np.argsort(labels, kind="stable")
+    starts = np.searchsorted(labels[order], np.arange(len(areas)))
+    corners = [best.reduceat(mesh.vertices[order], starts, axis=0) for best in (np.minimum, np.maximum)]
+    boxes = np.concatenate(corners, axis=1)
+    return _Found(labels, boxes, own, _nearest(boxes, own))
+
+
+def _nearest(boxes: Float64[np.ndarray, "C 6"], pieces: Int64[np.ndarray, " P"]) -> Int64[np.ndarray, " C"]:
+    """Return the number of each component's piece: the piece with the nearest box, then the nearest middle."""
+    lows, highs = boxes[:, :3], boxes[:, 3:]
+    gaps = np.maximum(np.maximum(lows[pieces] - highs[:, None], lows[:, None] - highs[pieces]), 0.0)
+    middles = lows + highs
+    gap, middle_gap = ((offsets**2).sum(axis=2) for offsets in (gaps, middles[pieces] - middles[:, None]))
+    nearest = np.lexsort((middle_gap, gap), axis=-1)[:, 0]
+    nearest[pieces] = np.arange(len(pieces))
+    return nearest
+
+
+def bodies_of(frames: Sequence[tuple[Piece, ...]]) -> list[Int64[np.ndarray, " P"]] | None:
+    """Number the pieces of consecutive frames by the bodies that they belong to; None if all are one body.
+
+    A piece belongs to one body with the piece most like it in place and size in the next frame, and in the frame
+    before: so each body is in all frames, and pieces that merge or split are one body.
+    """
+    counts = [len(pieces) for pieces in frames]
+    if min(counts, default=0) < 2:
+        return None
+    starts, links = np.cumsum([0, *counts]), list[tuple[int, int]]()
+    boxes = [np.array([piece.box for piece in pieces]) for pieces in frames]
+    for number in range(len(frames) - 1):
+        distances = unlike(boxes[number], boxes[number + 1])
+        first, second = starts[number], starts[number + 1]
+        links += [(first + k, second + int(best)) for k, best in enumerate(distances.argmin(axis=1))]
+        links += [(first + int(best), second + k) for k, best in enumerate(distances.argmin(axis=0))]
+    label = linked(np.array(links, np.int64).reshape(-1, 2), int(starts[-1]))
+    if not 1 < label.max() + 1 <= MOST_TRACKS:
+        return None
+    return np.split(label, starts[1:-1])
+
+
+def unlike(boxes: Float64[np.ndarray, "P 6"], others: Float64[np.ndarray, "Q 6"]) -> Float64[np.ndarray, "P Q"]:
+    """Return the dissimilarity of boxes, m^2: the sum over both corners of their squared distance."""
+    return ((boxes[:, None] - others) ** 2).sum(axis=2)
+
+
+def box_around(boxes: Float64[np.ndarray, "P 6"]) -> Float64[np.ndarray, "6"]:
+    return np.concatenate([boxes[:, :3].min(axis=0), boxes[:, 3:].max(axis=0)])
+
+
+def is_scene(frames: Frames) -> bool:
+    """Return whether a sequence has a background; False for empty sequences and single frames.
+
+    Raises InputError if one of the few inspected frames is invalid.
+    """
+    numbers = evenly(len(frames), PROBES)
+    meshes = []
+    for number in numbers:
+        check(mesh := frames[number], f"frame {number}")
+        meshes += [] if mesh.is_empty else [drop_unreferenced(mesh)]
+    sizes = [mesh.diagonal for mesh in meshes]
+    if len(meshes) < 2 or sizes[0] == 0 or max(sizes) > UNLIKE * min(sizes):
+        return False
+    if not _is_open(meshes[0]) or np.median(edge_lengths(meshes[0])) * COARSEST > sizes[0]:
+        return False
+    lattice = Lattice.near(meshes[0], meshes[0].diagonal / CELLS)
+    cells = [distinct(lattice.keys(spread(mesh, lattice.size)[0])) for mesh in meshes]
+    wide = [around(occupied) for occupied in cells]
+    still = [np.mean([np.isin(occupied, other).mean() for other in wide]) for occupied in cells]
+    return float(np.median(still)) >= SHARE
+
+
+def _is_open(mesh: Mesh) -> bool:
+    """Return whether the borders of a mesh are long; a few small holes do not make a body open."""
+    border = border_edges(mesh)
+    length = np.linalg.norm(mesh.vertices[border[:, 0]] - mesh.vertices[border[:, 1]], axis=1).sum()
+    return bool(length > BORDER * mesh.diagonal)

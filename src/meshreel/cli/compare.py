@@ -12,9 +12,8 @@ import numpy as np
 from cyclopts import Parameter
 from rich.table import Table
 
-from ..analysis.appearance.splat_fit import SplatView
+from ..analysis.appearance.splat_fit import GOLDEN, SplatView, rendered, ring, taken
 from ..analysis.appearance.splat_raster import draw
-from ..analysis.appearance.splat_views import GOLDEN, rendered, ring, taken
 from ..capture.simulated.simulated_rig import Truth, read_truth
 from ..container.sources import FileSource
 from ..decoder.describe import describe_file
@@ -33,8 +32,8 @@ from ..metrics.color import PEAK, psnr
 from ..metrics.comparison import ComparisonOptions, compare_sequences
 from ..metrics.depth import DepthJudge, judge
 from ..metrics.error_sheet import SheetOptions, write_sheet
+from ..metrics.render import BORDER, ssim_map
 from ..metrics.scene_accuracy import Scene, Sight, compare_with_truth
-from ..metrics.ssim import BORDER, ssim_map
 from ..metrics.viewpoints import read_cameras
 from ..types import UP_AXES, Frames, MeshSequence, evenly
 from .console import Common, StageBars

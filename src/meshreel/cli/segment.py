@@ -11,9 +11,7 @@ from cyclopts import Parameter
 from jaxtyping import UInt8
 
 from ..analysis.scene.labelling import Segmentation
-from ..analysis.scene.masks import CAMERAS, Masker
-from ..analysis.scene.pictures import write_views
-from ..analysis.scene.preview import FrameViews, label_colors, look_at_labels, sheet
+from ..analysis.scene.masks import CAMERAS, FrameViews, Masker, label_colors, look_at_labels, sheet, write_views
 from ..analysis.scene.segmentation import mask_views, scene_views, segment, segment_by
 from ..encoder.scene.labels import label_frames
 from ..encoder.settings.options import EncoderOptions, SceneOptions

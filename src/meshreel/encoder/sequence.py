@@ -17,9 +17,8 @@ from typing import BinaryIO
 from threadpoolctl import threadpool_limits
 
 from ..analysis.scene.masks import Masker
-from ..analysis.scene.probe import is_scene
 from ..analysis.scene.segmentation import Cameras
-from ..analysis.survey import Survey
+from ..analysis.survey import Survey, is_scene
 from ..coding.background import decode_background
 from ..container.writer import ReelWriter
 from ..edit.audio import Given, packed_audio

@@ -1,21 +1,25 @@
-"""Errors of colours between two surfaces, point by point, as MPEG's tools measure them on sampled meshes.
+"""Errors of colours between two surfaces, point by point as MPEG's tools measure them, and in unlit renders on white.
 
-An original and a decoded mesh with colours -> ColorErrors. Points are spread evenly over one surface and have their
+An original and a decoded mesh with colours -> ColorErrors: points are spread evenly over one surface and have their
 colours compared with those of the closest points of the other; the same the other way round, and the worse counts.
-Luma and colour differences are those of ITU-R BT.709, full range.
+With cameras -> RenderErrors. Luma and colour differences are those of ITU-R BT.709, full range.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float64
+from jaxtyping import Float64, Int32
 
+from ..geometry.cameras import Rays
 from ..geometry.color_views import Painted
 from ..types import LUMA, Mesh
-from .even_points import scatter
+from .render import MARGIN, Picture, Pixels, crop_of, ssim_view
+from .surface_samples import scatter
+from .viewpoints import AnyCamera
 
 POINTS = 60_000  # on each surface: a seventh of the texels of a person's texture of 1024 x 1024 (guess)
 PEAK = 255.0
@@ -61,3 +65,54 @@ def _squares(mesh: Mesh, own: Painted, other: Painted) -> Float64[np.ndarray, " 
     sample = scatter(mesh, np.ones(len(mesh.faces), bool), POINTS)
     errors = own.on(sample.faces.astype(np.int32), sample.barycentric) - other.at(sample.points, sample.points)[0]
     return np.square(errors @ TO_YUV.T).mean(axis=0)
+
+
+@dataclass(frozen=True, slots=True)
+class RenderErrors:
+    """Errors of coloured pictures, over all views; PSNRs are those of luma, dB, infinite for equal pictures."""
+
+    y_union: float  # over pixels that either mesh covers: silhouettes count
+    y_inside: float  # over those that both cover
+    ssim: float  # masked, as `NormalSsim.masked`
+
+
+@dataclass(frozen=True, slots=True)
+class ColorView(Picture):
+    """Picture of a mesh in its colours, and the faces that it sees."""
+
+    faces: Int32[np.ndarray, "H W"]  # -1 where nothing is seen
+
+
+class Colored:
+    """A mesh prepared for several views in its colours; a mesh without colours is grey (`render.Visible`)."""
+
+    def __init__(self, mesh: Mesh) -> None:
+        self._surface = None if mesh.is_empty else (Rays(mesh), Painted(mesh))
+
+    def look(self, pixels: Pixels) -> ColorView:
+        shape, image = pixels.crop.shape, np.ones((*pixels.crop.shape, 3), np.float32)
+        if self._surface is None or 0 in shape:
+            return ColorView(np.zeros(shape, bool), image, np.full(shape, -1, np.int32))
+        rays, painted = self._surface
+        hit = rays.cast(*pixels.world_rays)
+        covered = hit.faces >= 0
+        colors = painted.on(hit.faces[covered], hit.barycentric[covered])
+        image.reshape(-1, 3)[covered] = np.clip(np.rint(colors), 0, 255) / 255
+        return ColorView(covered.reshape(shape), image, hit.faces.reshape(shape))
+
+
+def render_errors(original: Mesh, decoded: Mesh, cameras: Sequence[AnyCamera]) -> RenderErrors:
+    """Compare pictures of two meshes in their colours; meshes that no view sees are equal."""
+    pair, scores = (Colored(original), Colored(decoded)), list[float]()
+    squares, counts = np.zeros(2), np.zeros(2)
+    for camera in cameras:
+        pixels = Pixels(camera, crop_of([original, decoded], camera, MARGIN))
+        a, b = (colored.look(pixels) for colored in pair)
+        squared_luma = np.square(PEAK * ((a.colors - b.colors).astype(np.float64) @ TO_YUV[0]))
+        for area, mask in enumerate((a.covered | b.covered, a.covered & b.covered)):
+            squares[area] += squared_luma[mask].sum()
+            counts[area] += mask.sum()
+        masked = ssim_view(a, b, pixels)[1]
+        scores += [] if masked is None else [masked]
+    union, inside = (squares / np.maximum(counts, 1)).tolist()
+    return RenderErrors(psnr(union), psnr(inside), float(np.mean(scores)) if scores else 1.0)

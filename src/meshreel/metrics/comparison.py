@@ -18,11 +18,10 @@ import numpy as np
 
 from ..errors import InputError
 from ..types import Mesh
-from .color import color_errors
-from .color_render import render_errors
+from .color import color_errors, render_errors
 from .distance import PSNR_CEILING, Original, SurfaceErrors, surface_errors
 from .mpeg import MpegOptions, mpeg_errors
-from .ssim import Remembered, ssim_normals
+from .render import Remembered, ssim_normals
 from .viewpoints import AnyCamera, Box, ViewOptions, read_cameras, views_around
 
 Row = dict[str, Any]
@@ -95,9 +94,7 @@ class OriginalFrame:
 
 
 def compare_sequences(
-    originals: Iterable[Mesh | OriginalFrame],
-    decoded: Iterable[Mesh],
-    options: ComparisonOptions | None = None,
+    originals: Iterable[Mesh | OriginalFrame], decoded: Iterable[Mesh], options: ComparisonOptions | None = None
 ) -> Comparison:
     """Measure `decoded` against `originals`, frame by frame (two sequences of equal length).
 
@@ -158,15 +155,9 @@ def aggregate(frames: Sequence[Row]) -> Row:
 
 
 def _distance_row(errors: SurfaceErrors) -> Row:
-    row: Row = {
-        "diagonal_m": errors.diagonal,
-        "d2_psnr_paper": errors.d2_psnr_paper,
-        "d1_psnr": errors.d1_psnr,
-        "d2_psnr": errors.d2_psnr,
-        "symmetric_psnr": errors.symmetric_psnr,
-        "normal_error_deg": errors.angle,
-        "normal_error_at_vertices_deg": errors.vertex_angle,
-    }
+    row: Row = {"diagonal_m": errors.diagonal}
+    row |= {name: getattr(errors, name) for name in ("d2_psnr_paper", "d1_psnr", "d2_psnr", "symmetric_psnr")}
+    row |= {"normal_error_deg": errors.angle, "normal_error_at_vertices_deg": errors.vertex_angle}
     for name, one_way in (("forward", errors.forward), ("backward", errors.backward)):
         row[f"rms_{name}_m"] = one_way.rms
         row[f"rms_{name}_percent"] = errors.percent(one_way.rms)

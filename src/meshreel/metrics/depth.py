@@ -2,7 +2,9 @@
 
 Depth pictures of still cameras and decoded meshes -> a row of numbers. No truth is needed, so recordings are judged as
 simulated rigs are. A pixel shows still surface where its depth is the usual one, and a body where it is nearer. Pixels
-beside a step in depth or a hole do not count: a sensor mixes both sides there.
+beside a step in depth or a hole do not count: a sensor mixes both sides there. For the flicker of a body, its motion is
+removed piece by piece: the points of a frame are registered to those of the next, first all together, then in blocks of
+half the size each time, point to plane. Real deformation within a block remains: compare with the flicker of the input.
 """
 
 from __future__ import annotations
@@ -12,16 +14,21 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Bool, Float64
+from jaxtyping import Bool, Float64, Int64
 from scipy.ndimage import binary_closing, binary_dilation, distance_transform_edt, label, maximum_filter, minimum_filter
+from scipy.spatial import cKDTree
+from scipy.spatial.transform import Rotation
 
 from ..geometry.cameras import Camera
+from ..geometry.closest_points import Surface
 from ..geometry.depth import STEP, DepthFrames, DepthPicture, apart
 from ..types import Frames, Mesh, evenly
 from .comparison import Row
-from .flicker import Patch, angles_after_motion
 from .render import Crop, Pixels, View, Visible
+from .surface_samples import angles, interpolate, welded_normals
 
+Mask = Bool[np.ndarray, "H W"]
+Depths = Float64[np.ndarray, "H W"]  # m
 ASIDE = 2  # pixels around a step or a hole that do not count (guess)
 NEAR = (0.03, 0.015)  # m, and share of the depth, within which surface covers a measurement
 LEAST_LOST = 0.01  # m^2, smallest connected area without coverage that counts as a lost run (guess)
@@ -34,6 +41,13 @@ LIMB = 50  # pixels, fewest of a body's lower third in a frame that shows it (gu
 ENDS = (0.02, 0.98)  # quantiles of the heights of measured points at which a body begins and ends (guess)
 LOWEST = 0.1  # quantile over frames of a body's lower end: the floor that it stands on (guess)
 PARTS = ("all", "still", "body")
+SIZES = (4.8, 0.6, 0.3, 0.15)  # m, of the blocks, coarse to fine; the first is a whole body (guess)
+ROUNDS = 4  # of registration, for each size (guess)
+REACH = 0.3  # of a block's size, largest distance of a point from its match during registration (guess)
+FARTHEST = 0.3  # m, upper limit of this distance
+MATCHED = 0.02  # m: points that end farther from the next frame's surface are left out (guess)
+SAMPLES = 4000  # largest number of a body's points that are registered (guess)
+DAMPING = 1e-3  # share of a block's points, prevents sliding along a plane (guess)
 
 
 @dataclass(frozen=True)  # no slots: cached properties need a dict
@@ -41,17 +55,17 @@ class Judged:
     """One camera's depth picture of one frame, the decoded surface seen from there, and masks of the pixels."""
 
     camera: Camera
-    depth: Float64[np.ndarray, "H W"]  # m, measured
+    depth: Depths  # m, measured
     view: View  # of the decoded surface
-    clear: Bool[np.ndarray, "H W"]  # pixels that count
-    body: Bool[np.ndarray, "H W"]  # measured nearer than usual
+    clear: Mask  # pixels that count
+    body: Mask  # measured nearer than usual
 
-    def of(self, part: str) -> Bool[np.ndarray, "H W"]:
+    def of(self, part: str) -> Mask:
         """Return the pixels of one of `PARTS` that count."""
         return self.clear & {"all": np.True_, "still": ~self.body, "body": self.body}[part]
 
     @cached_property
-    def off_body(self) -> Bool[np.ndarray, "H W"]:
+    def off_body(self) -> Mask:
         """Pixels of covered still surface, farther than `FOOT` from a body."""
         still = self.of("still") & self.covered
         if not self.body.any():
@@ -59,29 +73,29 @@ class Judged:
         return still & (distance_transform_edt(~self.body) * self.depth > FOOT * self.camera.focal[0])
 
     @cached_property
-    def shown(self) -> Float64[np.ndarray, "H W"]:
+    def shown(self) -> Depths:
         """Decoded depth, m; infinite where nothing was decoded."""
         depth = np.full(self.depth.shape, np.inf)
         depth[self.view.covered] = self.view.points @ self.camera.extrinsic[2, :3] + self.camera.extrinsic[2, 3]
         return depth
 
     @cached_property
-    def near(self) -> Float64[np.ndarray, "H W"]:
+    def near(self) -> Depths:
         """Distance within which decoded surface covers a measurement, m."""
         return np.maximum(NEAR[0], NEAR[1] * self.depth)
 
     @cached_property
-    def covered(self) -> Bool[np.ndarray, "H W"]:
+    def covered(self) -> Mask:
         """Pixels whose measurement is on decoded surface."""
         return np.abs(self.shown - self.depth) <= self.near
 
     @property
-    def invented(self) -> Bool[np.ndarray, "H W"]:
+    def invented(self) -> Mask:
         """Pixels in which decoded surface stands where the camera saw through."""
         return self.shown < self.depth - self.near
 
     @property
-    def cracks(self) -> Bool[np.ndarray, "H W"]:
+    def cracks(self) -> Mask:
         """Pixels in which something was measured and nothing decoded, in slits between decoded surface."""
         slits = binary_closing(self.view.covered, iterations=ASIDE) & ~self.view.covered
         return slits & (self.depth > 0)
@@ -137,7 +151,7 @@ class DepthJudge:
         covered = np.concatenate([each.covered[body] for each, body in views])
         return int((heights < third).sum()), int(covered[heights < third].sum())
 
-    def _body(self, camera: int, depth: Float64[np.ndarray, "H W"]) -> Bool[np.ndarray, "H W"]:
+    def _body(self, camera: int, depth: Depths) -> Mask:
         nearer = depth < self._usual.get(camera, 0.0) - apart(depth)
         return _large((depth > 0) & nearer, SPECK)
 
@@ -178,7 +192,7 @@ def judge(judged: DepthJudge, decoded: Frames, numbers: Iterable[int], refreshes
     return {"frames_judged": len(rows)} | rates | {"per_frame": [{"frame": r["frame"]} | _rates(r, 1) for r in rows]}
 
 
-def clear_pixels(picture: DepthPicture) -> Bool[np.ndarray, "H W"]:
+def clear_pixels(picture: DepthPicture) -> Mask:
     """Return the pixels of a depth picture that have a measurement, with no step in depth and no hole beside them."""
     depth = picture.depth.astype(np.float64)
     most, least = maximum_filter(depth, 3), minimum_filter(depth, 3)
@@ -237,9 +251,7 @@ def _share(part: float, whole: float) -> float | None:
     return part / whole if whole else None
 
 
-def _points(
-    camera: Camera, depth: Float64[np.ndarray, "H W"], pixels: Bool[np.ndarray, "H W"]
-) -> Float64[np.ndarray, "N 3"]:
+def _points(camera: Camera, depth: Depths, pixels: Mask) -> Float64[np.ndarray, "N 3"]:
     """Return the measured places of some pixels in world coordinates, m."""
     rows, columns = np.nonzero(pixels)
     homogeneous = np.stack([columns + 0.5, rows + 0.5, np.ones(len(rows))])
@@ -247,13 +259,13 @@ def _points(
     return (camera.extrinsic[:3, :3].T @ (local - camera.extrinsic[:3, 3:])).T
 
 
-def _large(pixels: Bool[np.ndarray, "H W"], least: int) -> Bool[np.ndarray, "H W"]:
+def _large(pixels: Mask, least: int) -> Mask:
     """Return the connected areas of at least so many pixels."""
     areas = label(pixels)[0]
     return pixels & (np.bincount(areas.reshape(-1)) >= least)[areas]
 
 
-def _usual(stack: Float64[np.ndarray, "T H W"]) -> Float64[np.ndarray, "H W"]:
+def _usual(stack: Float64[np.ndarray, "T H W"]) -> Depths:
     """Return each pixel's depth of the still scene, m; 0 where nothing was measured.
 
     Infinite where only moving surface was measured: the scene behind it is too far or too dark.
@@ -262,7 +274,7 @@ def _usual(stack: Float64[np.ndarray, "T H W"]) -> Float64[np.ndarray, "H W"]:
     missing = (stack <= 0).sum(axis=0)
     last = len(stack) - 1
 
-    def at(share: float) -> Float64[np.ndarray, "H W"]:
+    def at(share: float) -> Depths:
         rank = missing + np.floor(share * (last - missing)).astype(np.int64)
         return np.maximum(np.take_along_axis(ordered, np.clip(rank, 0, last)[None], 0)[0], 0)
 
@@ -270,3 +282,63 @@ def _usual(stack: Float64[np.ndarray, "T H W"]) -> Float64[np.ndarray, "H W"]:
     far = apart(usual)
     seldom = (np.abs(stack - usual) <= far).mean(axis=0) < SELDOM
     return np.where(seldom & (usual - near > far), np.inf, usual)
+
+
+@dataclass(frozen=True, slots=True)
+class Patch:
+    """Points of a surface with their unit normals."""
+
+    points: Float64[np.ndarray, "N 3"]  # m
+    normals: Float64[np.ndarray, "N 3"]
+
+    @staticmethod
+    def join(patches: Iterable[Patch]) -> Patch:
+        points, normals = zip(*((each.points, each.normals) for each in patches), strict=True)
+        return Patch(np.concatenate(points), np.concatenate(normals))
+
+    def at(self, which: Bool[np.ndarray, " N"] | Int64[np.ndarray, " M"]) -> Patch:
+        return Patch(self.points[which], self.normals[which])
+
+
+def angles_after_motion(before: Patch, after: Patch, surface: Mesh) -> Float64[np.ndarray, " M"]:
+    """Return the angles between points' normals and the next frame's at their moved positions, degrees.
+
+    `surface` is the next frame's whole surface, `after` the body's points on it: points without one of these within
+    `MATCHED` are left out.
+    """
+    if not (len(before.points) and len(after.points)):
+        return np.zeros(0)
+    tree = cKDTree(after.points)
+    count = len(before.points)
+    moved = before.at(np.unique(np.linspace(0, count - 1, min(count, SAMPLES)).astype(np.int64)))
+    first = moved.points
+    for size in SIZES:
+        blocks = np.unique(np.floor(first / size).astype(np.int64), axis=0, return_inverse=True)[1].reshape(-1)
+        for _ in range(ROUNDS):
+            away, at = tree.query(moved.points, distance_upper_bound=min(REACH * size, FARTHEST))
+            near = np.isfinite(away)
+            moved = _laid(moved, after.at(np.where(near, at, 0)), near, blocks, size)
+    moved = moved.at(tree.query(moved.points)[0] <= MATCHED)
+    hits = Surface(surface).closest(moved.points)
+    return angles(moved.normals, interpolate(welded_normals(surface), surface.faces[hits.faces], hits.barycentric))
+
+
+def _laid(
+    moved: Patch, onto: Patch, near: Bool[np.ndarray, " N"], blocks: Int64[np.ndarray, " N"], size: float
+) -> Patch:
+    """Move each block rigidly by one linear step that brings its points near a match into the match's plane."""
+    count = blocks.max() + 1
+    sizes = np.maximum(np.bincount(blocks, minlength=count), 1)
+    middles = np.stack([np.bincount(blocks, axis, count) for axis in moved.points.T], axis=1) / sizes[:, None]
+    local = (moved.points - middles[blocks]) / size
+    rows = np.concatenate([np.cross(local, onto.normals), onto.normals], axis=1) * near[:, None]
+    off = np.einsum("nd,nd->n", onto.points - moved.points, onto.normals)
+    squares = np.zeros((count, 6, 6))
+    sums = np.zeros((count, 6))
+    np.add.at(squares, blocks, rows[:, :, None] * rows[:, None, :])
+    np.add.at(sums, blocks, rows * off[:, None])
+    squares += (DAMPING * sizes)[:, None, None] * np.eye(6)
+    steps = np.linalg.solve(squares, sums[..., None])[..., 0]
+    turns = Rotation.from_rotvec(steps[:, :3] / size).as_matrix()[blocks]
+    points = np.einsum("nij,nj->ni", turns, moved.points - middles[blocks]) + middles[blocks] + steps[blocks, 3:]
+    return Patch(points, np.einsum("nij,nj->ni", turns, moved.normals))

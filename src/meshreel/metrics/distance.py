@@ -16,8 +16,7 @@ from jaxtyping import Float64
 
 from ..geometry.strict import dot
 from ..types import Mesh
-from .normals import WORST_ANGLE, angles
-from .surface_samples import RESOLUTION, Matches, Samples, match, sample, used_surface
+from .surface_samples import RESOLUTION, WORST_ANGLE, Matches, Samples, angles, match, sample, used_surface
 
 _LEAST, _MOST = 1e-3, 1e6  # m, extents of meshes that are measured in metres; others are scaled (guess)
 PSNR_CEILING = -20 * math.log10(RESOLUTION)  # dB, about 132; stands for an infinite PSNR in a mean over frames

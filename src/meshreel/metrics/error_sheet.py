@@ -20,7 +20,7 @@ from ..geometry.cameras import Camera
 from ..geometry.closest_points import Surface
 from ..io.write import replacing
 from ..types import UP_AXES, Frames, Mesh
-from .color_render import Colored
+from .color import Colored
 from .distance import surface_errors
 from .render import Crop, Pixels, View, look
 from .surface_samples import used_surface

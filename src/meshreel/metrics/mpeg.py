@@ -25,6 +25,9 @@ from .color import PEAK, TO_YUV
 from .surface_samples import used_surface
 from .viewpoints import Box
 
+Points = Float64[np.ndarray, "N 3"]
+Values = Float64[np.ndarray, " N"]
+Way = Float64[np.ndarray, " 3"]  # a direction, or a place
 CEILING = 99.99  # dB
 VIEWS = 16  # on a Fibonacci sphere
 DEPTH_PEAK = 3.0  # radii: mmetric's depth buffer ends there, though surface lies within two of the camera
@@ -71,8 +74,8 @@ def mpeg_errors(original: Mesh, decoded: Mesh, box: Box, options: MpegOptions = 
 class Cloud:
     """Points of a surface with the normals of their faces; points at one place are one, with their mean normal."""
 
-    points: Float64[np.ndarray, "N 3"]
-    normals: Float64[np.ndarray, "N 3"]
+    points: Points
+    normals: Points
 
     @classmethod
     def of(cls, mesh: Mesh, box: Box, grid: int) -> Cloud:
@@ -98,8 +101,8 @@ class Cloud:
 
 
 def _crossed(
-    mesh: Mesh, faces: Int64[np.ndarray, " F"], axis: int, grid: tuple[Float64[np.ndarray, " 3"], float]
-) -> tuple[Float64[np.ndarray, "N 3"], Int64[np.ndarray, " N"]]:
+    mesh: Mesh, faces: Int64[np.ndarray, " F"], axis: int, grid: tuple[Way, float]
+) -> tuple[Points, Int64[np.ndarray, " N"]]:
     """Return the points where a grid's lines along an axis meet faces, and those faces; `grid`: corner and spacing."""
     low, step = grid
     corners = mesh.vertices[mesh.faces[faces]]
@@ -124,7 +127,7 @@ def _crossed(
     return points, faces[face_numbers]
 
 
-def _turn(a: Float64[np.ndarray, "N 2"], b: Float64[np.ndarray, "N 2"]) -> Float64[np.ndarray, " N"]:
+def _turn(a: Float64[np.ndarray, "N 2"], b: Float64[np.ndarray, "N 2"]) -> Values:
     return a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
 
 
@@ -149,9 +152,7 @@ class _Drawn:
     def __init__(self, mesh: Mesh) -> None:
         self._rays, self._painted = Rays(mesh), Painted(mesh) if mesh.is_colored else None
 
-    def seen(
-        self, starts: Float64[np.ndarray, "N 3"], way: Float64[np.ndarray, " 3"]
-    ) -> tuple[Bool[np.ndarray, " N"], Float64[np.ndarray, " N"], Float64[np.ndarray, " N"]]:
+    def seen(self, starts: Points, way: Way) -> tuple[Bool[np.ndarray, " N"], Values, Values]:
         """Return a mask of the rays that meet the mesh, their lengths, and the luma there."""
         hit = self._rays.cast(starts, np.broadcast_to(way, starts.shape))
         hits, luma = hit.faces >= 0, np.zeros(len(starts))
@@ -161,16 +162,14 @@ class _Drawn:
         return hits, np.where(hits, hit.distances, 0.0), luma
 
 
-def directions() -> Iterator[Float64[np.ndarray, " 3"]]:
+def directions() -> Iterator[Way]:
     """Yield the directions from the middle of the box to the cameras, from +y to -y."""
     for number in range(VIEWS):
         y, turn = 1 - 2 * number / (VIEWS - 1), math.pi * (3 - math.sqrt(5)) * number
         yield np.array([math.cos(turn) * math.sqrt(1 - y * y), y, math.sin(turn) * math.sqrt(1 - y * y)])
 
 
-def _rays(
-    way: Float64[np.ndarray, " 3"], points: Float64[np.ndarray, "N 3"], radius: float, pixels: int
-) -> Float64[np.ndarray, "P 3"]:
+def _rays(way: Way, points: Points, radius: float, pixels: int) -> Float64[np.ndarray, "P 3"]:
     """Return the points where a picture's rays cross the plane through its middle, within the points' rectangle."""
     up = np.array([0.0, 0.0, 1.0]) if abs(abs(way[1]) - 1) < 1e-6 else np.array([0.0, 1.0, 0.0])
     right = np.cross(up, way) / np.linalg.norm(np.cross(up, way))

@@ -1,17 +1,12 @@
 """Accuracy and coverage of a scene against the truth: of all surface, of moving people and of the still background.
 
 Two meshes of one frame with labelled faces, and the cameras that saw it -> a row of numbers. The truth is known only of
-simulated rigs. The noisy input may take the place of the truth.
-
-- Accuracy (backward: from points spread evenly over the decoded area to the reference): median distance and RMS, m;
-  mean normal error, degrees (interpolated vertex normals, as everywhere); D2-PSNR, dB.
-- Coverage (forward: from the reference's area to the decoded one): RMS, m, the share within 20 mm, and D2-PSNR, dB. Of
-  a truth only visible surface counts: in a camera's picture and range, not hidden, not edge-on
-  (`SightOptions.grazing`).
-- The peak of both PSNRs is the diagonal of the whole reference scene, for its parts too. Forward is the paper's way
-  and serves for the noisy input; against a truth it measures only the size of holes, so backward counts there.
-- SSIM of normal renders from these cameras, over pixels where either mesh shows the part (masked SSIM).
-- Flicker of people: change of the normals in these renders between successive frames, beyond the truth's.
+simulated rigs; the noisy input may take its place. Accuracy is measured backward, from points spread evenly over the
+decoded area to the reference; coverage forward, of a truth from visible surface only: in a camera's picture and range,
+not hidden, not edge-on. The peak of PSNRs is the diagonal of the whole reference scene, for its parts too. Forward is
+the paper's way and serves for the noisy input; against a truth it measures only the size of holes. SSIM is that of
+normal renders from these cameras, over pixels where either mesh shows the part; flicker of people is the change of the
+normals in these renders between successive frames, beyond the truth's.
 """
 
 from __future__ import annotations
@@ -22,7 +17,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Bool, Float32, Float64
+from jaxtyping import Bool, Float64
 
 from ..errors import InputError
 from ..geometry.cameras import Camera, Rays
@@ -31,10 +26,8 @@ from ..geometry.topology import face_normals
 from ..types import Frames, Mesh
 from .comparison import Row, finite
 from .distance import PSNR_CEILING, psnr, quantile
-from .even_points import Scatter, scatter
-from .normals import WORST_ANGLE, angles, interpolate, welded_normals
-from .render import BACKGROUND, Crop, Pixels
-from .ssim import BORDER, ssim_map
+from .render import BACKGROUND, BORDER, Crop, Picture, Pixels, ssim_map
+from .surface_samples import WORST_ANGLE, Scatter, angles, interpolate, scatter, welded_normals
 
 PARTS = ("all", "people", "background")
 
@@ -60,11 +53,9 @@ class Sight:
 
 
 @dataclass(frozen=True, slots=True)
-class Picture:
-    """Picture of a scene from one camera, with its moving pixels."""
+class ScenePicture(Picture):
+    """Picture of a scene's normals from one camera, with its moving pixels."""
 
-    colors: Float32[np.ndarray, "H W 3"]  # of normals, as `render` has them
-    covered: Bool[np.ndarray, "H W"]
     dynamic: Bool[np.ndarray, "H W"]
 
 
@@ -111,7 +102,7 @@ class Scene:
         return samples
 
     @cached_property
-    def pictures(self) -> tuple[Picture, ...]:
+    def pictures(self) -> tuple[ScenePicture, ...]:
         return tuple(_picture(self, sight.camera) for sight in self.sights)
 
     @cached_property
@@ -148,9 +139,8 @@ def scene_row(reference: Scene, decoded: Scene) -> Row:
     row: Row = {"diagonal_m": reference.mesh.diagonal}
     backward, forward = _Matched.of(decoded, reference), _Matched.of(reference, decoded)
     for part in PARTS:
-        values = _accuracy(backward.part(part), forward.part(part), reference) | _coverage(
-            forward.part(part), reference
-        )
+        lost = forward.part(part)
+        values = _accuracy(backward.part(part), lost, reference) | _coverage(lost, reference)
         row |= {name if part == "all" else f"{part}_{name}": value for name, value in values.items()}
     return row | _ssim_row(reference.pictures, decoded.pictures)
 
@@ -281,7 +271,7 @@ def _only(points: Scatter, kept: Bool[np.ndarray, " N"]) -> Scatter:
     return Scatter(points.points[kept], points.faces[kept], points.barycentric[kept], points.area * share)
 
 
-def _picture(scene: Scene, camera: Camera) -> Picture:
+def _picture(scene: Scene, camera: Camera) -> ScenePicture:
     shape = (camera.height, camera.width)
     colors = np.full((*shape, 3), BACKGROUND, np.float32)
     covered, dynamic = np.zeros(shape, bool), np.zeros(shape, bool)
@@ -293,10 +283,10 @@ def _picture(scene: Scene, camera: Camera) -> Picture:
         faces, weights = hit.faces[covered.ravel()], hit.barycentric[covered.ravel()]
         colors[covered] = (interpolate(scene.normals, scene.mesh.faces[faces], weights) + 1) / 2
         dynamic[covered] = scene.dynamic[faces]
-    return Picture(colors, covered, dynamic)
+    return ScenePicture(covered, colors, dynamic)
 
 
-def _ssim_row(reference: Sequence[Picture], decoded: Sequence[Picture]) -> Row:
+def _ssim_row(reference: Sequence[ScenePicture], decoded: Sequence[ScenePicture]) -> Row:
     scores: dict[str, list[float]] = {part: [] for part in PARTS}
     for a, b in zip(reference, decoded, strict=True):
         scored = ssim_map(a.colors.astype(np.float64), b.colors.astype(np.float64))
@@ -307,7 +297,7 @@ def _ssim_row(reference: Sequence[Picture], decoded: Sequence[Picture]) -> Row:
     return {names[part]: float(np.mean(values)) if values else None for part, values in scores.items()}
 
 
-def _masks(a: Picture, b: Picture) -> Iterator[tuple[str, Bool[np.ndarray, "H W"]]]:
+def _masks(a: ScenePicture, b: ScenePicture) -> Iterator[tuple[str, Bool[np.ndarray, "H W"]]]:
     """Yield the pixels of each part, without the border that SSIM leaves out."""
     inside = np.zeros(a.covered.shape, bool)
     inside[BORDER:-BORDER, BORDER:-BORDER] = True

@@ -1,7 +1,10 @@
-"""Samples of two surfaces around the same origin, and the closest points of one surface to the samples of the other.
+"""Samples of surfaces, their closest points on another surface, and the angles between the normals there.
 
 Two meshes -> Samples -> Matches. Samples of a mesh are its vertices, in order, followed by a quadrature of its area, so
-that one round of queries serves both the vertex-based metrics and the area-weighted ones.
+that one round of queries serves both the vertex-based metrics and the area-weighted ones. Mesh -> Scatter: points for
+equal areas without random numbers; the same mesh gives the same points. Normals are area-weighted vertex normals,
+interpolated with barycentric weights; vertices at equal positions (UV seams) share one. Their error does not show in
+distance PSNR (57-63 dB can go with 11-17 degrees).
 """
 
 from __future__ import annotations
@@ -10,16 +13,19 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Float64, Int32
+from jaxtyping import Bool, Float64, Int32, Int64
 
 from ..geometry.closest_points import Surface
-from ..geometry.topology import drop_unreferenced, face_normals, subdivide_midpoint
+from ..geometry.strict import angle
+from ..geometry.topology import blend, drop_unreferenced, face_normals, subdivide_midpoint, vertex_normals
 from ..types import Mesh
-from .normals import interpolate, unit, welded_normals
 
+Points = Float64[np.ndarray, "N 3"]
 RESOLUTION = 2.0**-22  # of the diagonal; below it a distance is rounding of the float32 queries and counts as 0
 _ENOUGH_FACES = 12_000  # a coarser mesh is subdivided before it is sampled (guess)
 _MOST_LEVELS = 6  # of that subdivision (guess)
+WORST_ANGLE = 180.0  # degrees; the error where one of the two meshes is empty
+_R2 = np.array([0.7548776662466927, 0.5698402909980532])  # 1 / g and 1 / g^2, where g^3 = g + 1
 
 
 @dataclass(frozen=True)
@@ -28,8 +34,8 @@ class Samples:
 
     mesh: Mesh  # centered, without zero-area faces and unreferenced vertices
     vertex_normals: Float64[np.ndarray, "V 3"]
-    points: Float64[np.ndarray, "N 3"]  # the V vertices of the mesh first
-    normals: Float64[np.ndarray, "N 3"]  # interpolated at the points
+    points: Points  # the V vertices of the mesh first
+    normals: Points  # interpolated at the points
     weights: Float64[np.ndarray, " N"]
 
     @cached_property
@@ -42,8 +48,8 @@ class Matches:
     """Closest points of one mesh to the samples of the other."""
 
     distances: Float64[np.ndarray, " N"]  # m, to the closest point
-    offsets: Float64[np.ndarray, "N 3"]  # m, from the sample to its closest point
-    normals: Float64[np.ndarray, "N 3"]  # interpolated at the closest point
+    offsets: Points  # m, from the sample to its closest point
+    normals: Points  # interpolated at the closest point
 
 
 def sample(mesh: Mesh, center: Float64[np.ndarray, " 3"]) -> Samples:
@@ -84,3 +90,77 @@ def used_surface(mesh: Mesh) -> Mesh:
 
 def _centroids(values: Float64[np.ndarray, "V 3"], faces: Int32[np.ndarray, "F 3"]) -> Float64[np.ndarray, "F 3"]:
     return (values[faces[:, 0]] + values[faces[:, 1]] + values[faces[:, 2]]) / 3
+
+
+def welded_normals(mesh: Mesh) -> Float64[np.ndarray, "V 3"]:
+    """Return unit normals of the vertices of `mesh`, in order; vertices at exactly equal positions share one."""
+    if len(mesh.vertices) == 0:
+        return np.zeros((0, 3))
+    representative = _first_at_position(mesh.vertices)
+    if representative is None:
+        return vertex_normals(mesh)
+    return vertex_normals(Mesh.of(mesh.vertices, representative[mesh.faces]))[representative]
+
+
+def interpolate(normals: Float64[np.ndarray, "V 3"], corners: Int32[np.ndarray, "N 3"], weights: Points) -> Points:
+    """Interpolate unit normals inside faces given by their corners; zero where the corners' normals cancel."""
+    return unit(blend(normals, corners, weights))
+
+
+def unit(vectors: Points) -> Points:
+    """Scale vectors to length 1; zero stays zero."""
+    length = np.sqrt(np.einsum("nd,nd->n", vectors, vectors))
+    return vectors / np.where(length > 0, length, 1.0)[:, None]
+
+
+def angles(a: Points, b: Points) -> Float64[np.ndarray, " N"]:
+    """Return angles in degrees between unit vectors, 0 to 180; exact for small angles, unlike an arc cosine.
+
+    The angle is 180 where either vector is zero: a surface without a normal matches none that has one.
+    """
+    differences = np.linalg.norm(a - b, axis=1)
+    sums = np.linalg.norm(a + b, axis=1)
+    undefined = (~a.any(axis=1)) | (~b.any(axis=1))
+    return np.where(undefined, WORST_ANGLE, np.degrees(2 * angle(differences, sums)))
+
+
+def _first_at_position(vertices: Float64[np.ndarray, "V 3"]) -> Int64[np.ndarray, " V"] | None:
+    """Return, for each vertex, the index of one vertex at its position; None if all positions differ."""
+    order = np.lexsort(vertices.T)
+    ordered = vertices[order]
+    new = np.ones(len(order), dtype=bool)
+    new[1:] = (ordered[1:] != ordered[:-1]).any(axis=1)
+    if new.all():
+        return None
+    representative = np.empty(len(order), dtype=np.int64)
+    representative[order] = order[np.flatnonzero(new)[np.cumsum(new) - 1]]
+    return representative
+
+
+@dataclass(frozen=True, slots=True)
+class Scatter:
+    """N points on a mesh, with their faces and barycentric weights."""
+
+    points: Points  # in the mesh's unit
+    faces: Int64[np.ndarray, " N"]
+    barycentric: Points  # weights of the face's three vertices
+    area: float  # of the chosen faces, in the mesh's unit, squared
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+
+def scatter(mesh: Mesh, chosen: Bool[np.ndarray, " F"], count: int) -> Scatter:
+    """Spread `count` points over the chosen faces; none if these have no area."""
+    which = np.flatnonzero(chosen)
+    ends = np.cumsum(face_normals(mesh)[1][which])
+    area = float(ends[-1]) if len(ends) else 0.0
+    if area <= 0:
+        return Scatter(np.zeros((0, 3)), np.zeros(0, np.int64), np.zeros((0, 3)), 0.0)
+    steps = np.arange(count)
+    at = np.searchsorted(ends, (steps + 0.5) * (area / count), side="right")
+    faces = which[np.minimum(at, len(which) - 1)]
+    square = (0.5 + _R2 * (steps[:, None] + 1)) % 1
+    folded = np.where(square.sum(axis=1, keepdims=True) > 1, 1 - square, square)  # the square onto a triangle
+    weights = np.column_stack([1 - folded.sum(axis=1), folded])
+    return Scatter(blend(mesh.vertices, mesh.faces[faces], weights), faces, weights, area)

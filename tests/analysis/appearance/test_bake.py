@@ -7,10 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from meshreel.analysis.appearance.background import median_colors
-from meshreel.analysis.appearance.bake import bake, picture, texels_of
-from meshreel.analysis.appearance.unwrap import unwrap
-from meshreel.analysis.appearance.vertices import vertex_colors
+from meshreel.analysis.appearance.bake import bake, median_colors, picture, texels_of, unwrap, vertex_colors
 from meshreel.geometry.atlas import Layout
 from meshreel.geometry.color_views import Painted, bilinear
 from meshreel.geometry.topology import subdivide_midpoint

@@ -7,9 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from meshreel.analysis.appearance.splat_fit import SplatFrame, SplatView, fit_splats
-from meshreel.analysis.appearance.splat_raster import Drawing, Flat, camera_matrices, draw, project
-from meshreel.analysis.appearance.splat_views import rendered, ring, taken
+from meshreel.analysis.appearance.splat_fit import SplatFrame, SplatView, fit_splats, rendered, ring, taken
+from meshreel.analysis.appearance.splat_raster import Drawing, Flat, draw, project
 from meshreel.errors import InputError
 from meshreel.geometry.cameras import CameraPose
 from meshreel.geometry.color_views import ColorPicture
@@ -45,7 +44,7 @@ def shown(bound: Bound, view: SplatView) -> float:
 def flat() -> tuple[Flat, np.ndarray, np.ndarray]:
     camera = ring(PAINTED, 1, 24, 0.1)[0]
     bound = bind(some_splats(40, len(BALL.faces)), Carrier(BALL.vertices / FINE.diagonal, BALL.faces, 0, unit=6.0))
-    flat = project(np, bound.means, bound.axes, bound.scales, camera_matrices(camera))
+    flat = project(np, bound.means, bound.axes, bound.scales, (camera.extrinsic[:3], camera.intrinsic))
     return flat, 0.9 * bound.opacities, bound.colors
 
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from meshreel.analysis.fit.closeness import Closeness
-from meshreel.analysis.fit.frame import FrameSurface
+from meshreel.analysis.fit.frame import Closeness, FrameSurface
 from meshreel.types import Mesh
 from tests.spheres import sliding_sphere
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from meshreel.analysis.fit.border import border_sides
+from meshreel.analysis.fit.frame import border_sides
 from meshreel.analysis.fit.surface_fit import FitOptions, Guides, fit_frames, snap_to_vertices, strongest_components
 from meshreel.errors import InputError
 from meshreel.geometry.topology import drop_unreferenced, face_normals, subdivide_midpoint

@@ -10,9 +10,7 @@ from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from meshreel.analysis.fit.frame import FrameSurface
-from meshreel.analysis.follow.embedded import NORMAL_REACH
-from meshreel.analysis.follow.embedded_graph import Binding
-from meshreel.analysis.follow.embedded_pose import Pose, moved, turned
+from meshreel.analysis.follow.embedded_graph import NORMAL_REACH, Binding, Pose, moved, turned
 from tests.analysis.fit.formulas import normals_at, pair_weights
 
 STILL = 1e-4  # squared row weight of a turn times its lever

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from meshreel.analysis.fit.frame import FrameSurface
-from meshreel.analysis.follow.color_start import ColoredPlaces
-from meshreel.analysis.follow.embedded import Tracker
+from meshreel.analysis.follow.embedded import ColoredPlaces, Tracker
 from meshreel.geometry.color_views import Painted
 from meshreel.types import Mesh
 from tests.analysis.follow.test_embedded import SMALL, tube
@@ -32,7 +31,7 @@ def found(colored: bool) -> float:
     key, frame = fingers(0.0), fingers(APART)
     paints = [(lambda mesh=mesh: Painted(mesh)) if colored else None for mesh in (key, frame)]
     tracker = Tracker(key, 0, SMALL, paint=paints[0])
-    tracker.step(1, frame, paints[1])
+    tracker.step(1, FrameSurface(frame), paints[1])
     moved = tracker.placed(1, key.vertices, tracker.bound(key))
     return float(np.sqrt(((moved - frame.vertices) ** 2).sum(axis=1).mean()))
 

@@ -10,8 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from meshreel import _core
 from meshreel.analysis.fit.frame import FrameSurface
-from meshreel.analysis.follow.embedded_graph import build_graph, farthest_first
-from meshreel.analysis.follow.embedded_pose import Pose
+from meshreel.analysis.follow.embedded_graph import Pose, build_graph, farthest_first
 from meshreel.geometry.closest_points import area_samples
 from meshreel.geometry.topology import vertex_normals
 from meshreel.types import Mesh
@@ -25,7 +24,7 @@ GATE, RIGIDITY, TORN, PLACE, LEAST, SAMPLES, NODES = 0.08, 0.3, 0.5, 0.01, 0.3, 
 def graph_on(mesh: Mesh) -> Graph:
     samples = area_samples(mesh, SAMPLES)
     graph = build_graph(mesh, farthest_first(mesh, samples, NODES))
-    points, bound = mesh.vertices[samples], graph.bind(mesh.vertices[samples], graph.cells[samples], 4)
+    points, bound = mesh.vertices[samples], graph.bind(mesh.vertices[samples], graph.cells[samples])
     held, normals = np.random.default_rng(0).uniform(0.2, 1, len(graph.edges)), vertex_normals(mesh)[samples]
     edges, indices = graph.edges.astype(np.int32), bound.indices.astype(np.int32)
     return Graph(graph.nodes, edges, held, points, normals, indices, bound.weights)

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from meshreel.analysis.fit.frame import FrameSurface
-from meshreel.analysis.follow.embedded import Motion
-from meshreel.analysis.follow.embedded_graph import build_graph, farthest_first
-from meshreel.analysis.follow.fused_template import fused_mesh
+from meshreel.analysis.follow.embedded_graph import Motion, build_graph, farthest_first
+from meshreel.analysis.follow.template import fused_mesh
 from meshreel.geometry.closest_points import Surface, area_samples
 from meshreel.geometry.topology import clean
 from meshreel.types import Mesh

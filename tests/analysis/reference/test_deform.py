@@ -5,16 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from meshreel.analysis.reference.centers import affinity, largest_distances
-from meshreel.analysis.reference.deform import (
+from meshreel.analysis.reference.centers import (
     Neighbours,
+    affinity,
     bind,
-    blended,
     center_motions,
+    largest_distances,
     move,
     neighbours,
 )
-from meshreel.geometry.rigid import rotate
+from meshreel.geometry.rigid import blend, rotate
 from meshreel.geometry.topology import subdivide_midpoint, vertex_normals
 from meshreel.types import Centers, Mesh
 
@@ -74,7 +74,8 @@ def test_normals_turn_with_their_points() -> None:
     mesh, source = ball((0, 0, 0)), inside((0, 0, 0))
     near = kin(source)
     motions = center_motions(source, source @ rotation(1.0).T, near)
-    turned = rotate(blended(bind(mesh, source, near), motions, near), vertex_normals(mesh))
+    bound = bind(mesh, source, near)
+    turned = rotate(blend(motions[near.indices[bound.nearest]], bound.weights), vertex_normals(mesh))
     np.testing.assert_allclose(turned, vertex_normals(mesh) @ rotation(1.0).T, atol=1e-9)
 
 
@@ -100,7 +101,7 @@ def test_a_vertex_nearest_to_a_center_of_the_other_body_stays_with_its_body(monk
     near = kin(touching, parted)
     half = len(mesh.vertices) // 2
     guarded = deform(mesh, touching, parted, near)
-    monkeypatch.setattr("meshreel.analysis.reference.deform.GUARD_CHOICES", 1)
+    monkeypatch.setattr("meshreel.analysis.reference.centers.GUARD_CHOICES", 1)
     alone = deform(mesh, touching, parted, near)
     lost = [int((np.abs(v[:half] - mesh.vertices[:half]).max(axis=1) > 1e-3).sum()) for v in (guarded, alone)]
     assert lost[1] > 0

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.ndimage import binary_erosion
 
-from meshreel.analysis.scene.background_depth import Moment, fuse_still_depth, usual_pictures
+from meshreel.analysis.scene.background import Moment, fuse_still_depth, usual_pictures
 from meshreel.capture.recording import FusionOptions, fuse_depths
 from meshreel.geometry.cameras import Rays
 from meshreel.geometry.closest_points import distances
@@ -68,7 +68,7 @@ def test_the_usual_depth_is_the_median_of_enough_measured_depths(monkeypatch):
     pictures = [Moment([AHEAD.picture(one.astype(np.uint16))], *nothing) for one in others]
     usual = usual_pictures(pictures)[0].depth
     assert (usual[:, 8:] == 1004).all() and (usual[:, :8] == 1200).all()  # the mean of the middle two
-    monkeypatch.setattr("meshreel.analysis.scene.background.SEEN", 0.9)
+    monkeypatch.setattr("meshreel.analysis.scene.background.SHARED", 0.9)
     usual = usual_pictures(pictures)[0].depth
     assert (usual[:, :8] == 0).all() and (usual[:, 8:] == 1004).all()
 
@@ -76,7 +76,7 @@ def test_the_usual_depth_is_the_median_of_enough_measured_depths(monkeypatch):
 def test_faces_that_no_camera_sees_from_the_front_are_dropped(monkeypatch):
     depth = measured(AHEAD)
     front = fuse_still_depth(moments([depth]), VOXEL)
-    monkeypatch.setattr("meshreel.analysis.scene.background_depth.FACING", 0.0)
+    monkeypatch.setattr("meshreel.analysis.scene.background.FACING", 0.0)
     all_of_it = fuse_still_depth(moments([depth]), VOXEL)
     assert len(front.faces) < len(all_of_it.faces)
     assert distances(front.vertices, all_of_it).max() < 1e-6

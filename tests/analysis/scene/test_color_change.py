@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from meshreel.analysis.scene.color_change import ColorChange
-from meshreel.analysis.scene.color_looks import ColorLooks
+from meshreel.analysis.scene.color_looks import ColorChange, ColorLooks
 from meshreel.analysis.scene.labelling import ByPlace, Rest
 from meshreel.geometry.cameras import Camera, Rays, looking_at
 from meshreel.geometry.color_views import ColorPicture

@@ -8,11 +8,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from meshreel.analysis.scene.masks import CAMERAS, ImageMasks, Masker, one_size, read_view_file, read_views
-from meshreel.analysis.scene.pictures import write_views
+from meshreel.analysis.scene.labelling import Votes
+from meshreel.analysis.scene.masks import (
+    CAMERAS,
+    ImageMasks,
+    Masker,
+    one_size,
+    read_view_file,
+    write_views,
+)
 from meshreel.analysis.scene.segmentation import scene_views, segment_by
 from meshreel.analysis.scene.views import place_views
-from meshreel.analysis.scene.votes import Votes
 from meshreel.errors import InputError
 from meshreel.geometry.cameras import CameraPose, Rays, pack_cameras
 from meshreel.io.write import write_picture
@@ -47,7 +53,7 @@ def test_painted_pictures_find_the_faces_they_were_painted_on(masks: Path):
 
 
 def test_the_views_of_the_folder_are_those_it_was_made_for(masks: Path):
-    for ours, other in zip(VIEWS, read_views(masks), strict=True):
+    for ours, other in zip(VIEWS, read_view_file(masks / CAMERAS), strict=True):
         assert np.array_equal(ours.extrinsic, other.extrinsic) and np.array_equal(ours.intrinsic, other.intrinsic)
 
 

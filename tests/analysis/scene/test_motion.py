@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from meshreel.analysis.scene.motion import SIDE, motion_prompts, thinned
+from meshreel.analysis.scene.hypotheses import SIDE, motion_prompts, thinned
 
 WALKER, BALL = 1.5, 2.0  # m, their depths
 

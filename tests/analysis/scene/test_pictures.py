@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from meshreel.analysis.scene.masks import CAMERAS, read_views
-from meshreel.analysis.scene.pictures import normal_picture, write_views
+from meshreel.analysis.scene.masks import CAMERAS, normal_picture, read_view_file, write_views
 from meshreel.errors import InputError
 from meshreel.geometry.cameras import Rays
 from meshreel.metrics.viewpoints import Box, ViewOptions, views_around
@@ -52,7 +51,7 @@ def test_an_edge_between_near_and_far_is_not_blurred():
 def test_a_folder_of_views_has_a_picture_a_view_and_frame_and_its_cameras(tmp_path: Path):
     told: list[int] = []
     write_views(tmp_path / "views", MeshList((sphere(), Mesh.empty())), VIEWS, told.append)
-    assert told == [1, 2] and len(read_views(tmp_path / "views")) == 4
+    assert told == [1, 2] and len(read_view_file(tmp_path / "views" / CAMERAS)) == 4
     names = sorted(path.relative_to(tmp_path / "views").as_posix() for path in (tmp_path / "views").rglob("*.png"))
     assert names == [f"view{view:02}/frame_{frame:05}.png" for view in range(4) for frame in range(2)]
     with Image.open(tmp_path / "views" / "view03" / "frame_00001.png") as empty:

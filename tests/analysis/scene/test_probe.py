@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from meshreel.analysis.scene.probe import is_scene
+from meshreel.analysis.survey import is_scene
 from meshreel.errors import InputError
 from meshreel.types import Mesh
 from tests.metrics.shapes import moved, plane, sphere

@@ -12,12 +12,11 @@ import numpy as np
 import pytest
 
 from meshreel.analysis.scene import sam3
-from meshreel.analysis.scene.hypotheses import HypothesisOptions, Tracked, reference_view
-from meshreel.analysis.scene.masks import Masker
-from meshreel.analysis.scene.pictures import normal_picture
+from meshreel.analysis.scene.hypotheses import Tracked, reference_view
+from meshreel.analysis.scene.labelling import Votes
+from meshreel.analysis.scene.masks import Masker, normal_picture
 from meshreel.analysis.scene.segmentation import segment_by
 from meshreel.analysis.scene.views import place_views
-from meshreel.analysis.scene.votes import Votes
 from meshreel.errors import InputError
 from meshreel.geometry.cameras import Rays
 from meshreel.geometry.color_views import ColorPicture
@@ -29,7 +28,7 @@ WALLS = box((0, 0, 0), (5, 2.5, 4), inwards=True)
 FRAMES = [together(WALLS, moved(sphere(0.4, levels=2), (x, 1.2, 2))) for x in (1.0, 1.8, 2.6, 3.4)]
 VIEWS = place_views(FRAMES, "y", 3, 80, 60)
 SEEN = [[Rays(mesh).look(view) for view in VIEWS] for mesh in FRAMES]
-EASILY = sam3.Sam3Options(reference=1, hypotheses=HypothesisOptions(variation=0.001, overlap=0.01))
+EASILY = sam3.Sam3Options(reference=1, variation=0.001, overlap=0.01)
 
 
 @pytest.fixture(scope="module")
@@ -83,7 +82,7 @@ def test_masks_are_made_with_the_default_prompts(weights: Path):
 
 
 def test_where_nothing_varies_nothing_moves(weights: Path):
-    masker = sam3.Sam3Masks(weights, ("person",), sam3.Sam3Options(hypotheses=HypothesisOptions(variation=1.0)))
+    masker = sam3.Sam3Masks(weights, ("person",), sam3.Sam3Options(variation=1.0))
     for frame in range(3):
         masker.observe(frame, SEEN[0], VIEWS)
     assert not masker.masks(1, SEEN[0], VIEWS).any()
@@ -184,7 +183,7 @@ def test_the_view_in_which_most_changes_is_followed(tmp_path: Path, monkeypatch:
 
 def test_a_scene_is_segmented_by_a_model_that_knows_nothing(weights: Path):
     """As the command line does: no reference view is named."""
-    masker = sam3.Sam3Masks(weights, ("person", "ball"), sam3.Sam3Options(hypotheses=EASILY.hypotheses))
+    masker = sam3.Sam3Masks(weights, ("person", "ball"), replace(EASILY, reference=None))
     found = segment_by(masker, MeshList(tuple(FRAMES)), best_last())
     assert found.moving(1, FRAMES[1]).shape == (len(FRAMES[1].faces),)
     assert masker.reference == len(VIEWS) - 1

@@ -10,10 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from meshreel.analysis.scene import labelling
+from meshreel.analysis.scene.cut import Rest
 from meshreel.analysis.scene.labelling import ByPlace, without_islands
 from meshreel.analysis.scene.masks import Masker
 from meshreel.analysis.scene.segmentation import segment, segment_by
-from meshreel.analysis.scene.settle import Rest
 from meshreel.geometry.topology import components, concatenate, face_normals
 from meshreel.geometry.voxels import Lattice
 from meshreel.types import Mesh, MeshList

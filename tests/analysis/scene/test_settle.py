@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from jaxtyping import Int64
 
-from meshreel.analysis.scene import cut, settle
+from meshreel.analysis.scene import cut
+from meshreel.analysis.scene.cut import NEVER, Rest, find_rest
 from meshreel.analysis.scene.labelling import ByPlace
 from meshreel.analysis.scene.places import Places, Tally
 from meshreel.analysis.scene.segmentation import segment
-from meshreel.analysis.scene.settle import NEVER, Rest, find_rest
 from meshreel.analysis.scene.views import place_views
 from meshreel.analysis.survey import survey
 from meshreel.coding.background import decode_background, decode_change
@@ -68,8 +68,8 @@ def of_seconds() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("meshreel.analysis.scene.places._FRAMES", FRAMES)
         patch.setattr(cut, "_LEAST", 0.1)
-        patch.setattr(settle, "_LEAST", 0.1)
-        patch.setattr(settle, "_REST", 1.5)
+        patch.setattr(cut, "_LEAST_CHANGE", 0.1)
+        patch.setattr(cut, "_REST", 1.5)
         yield
 
 
@@ -94,15 +94,15 @@ def test_a_box_moves_only_while_it_is_carried(scene: MeshList, found: ByPlace) -
 
 
 def test_without_enough_rest_it_moves_always(scene: MeshList, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(settle, "_REST", 20.0)
-    monkeypatch.setattr(settle, "_SHORT_REST", 20.0)
+    monkeypatch.setattr(cut, "_REST", 20.0)
+    monkeypatch.setattr(cut, "_SHORT_REST", 20.0)
     found = segment(scene, CAMERAS)
     assert found.rest.changes == []
     assert found.moving(0, scene[0])[ROOM:].mean() > 0.9
 
 
 def test_what_stands_still_as_a_thing_does_needs_no_long_rest(scene: MeshList, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(settle, "_REST", 20.0)
+    monkeypatch.setattr(cut, "_REST", 20.0)
     found = segment(scene, CAMERAS)
     assert len(found.rest.changes) == 2
 

@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from meshreel.analysis.scene.labelling import Votes
 from meshreel.analysis.scene.views import place_views
-from meshreel.analysis.scene.votes import Votes
 from meshreel.geometry.cameras import Rays
 from meshreel.types import Mesh
 from tests.metrics.shapes import sphere

@@ -26,7 +26,7 @@ from meshreel.capture.simulated.simulated_rig import shade_of
 from meshreel.geometry.color_views import ColorPicture, ColorViews
 from meshreel.geometry.topology import face_normals
 from meshreel.metrics.color import TO_YUV
-from meshreel.metrics.even_points import scatter
+from meshreel.metrics.surface_samples import scatter
 from meshreel.types import Mesh, evenly
 from tests.capture.depth_scenes import camera, record
 from tests.colored_cameras import TRUE, WRONG, Shown, around, ball, person

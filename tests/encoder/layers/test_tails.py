@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 import meshreel
-from meshreel.analysis.fit import closeness
 from meshreel.coding.group import payload_bytes_by_purpose
 from meshreel.coding.layers.patches import decode_patches
 from meshreel.encoder.group.target import Fidelity, measure
@@ -168,7 +167,7 @@ def sequence() -> MeshList:
 
 def test_a_file_has_the_layer_where_it_pays_and_plays_without_it(sequence: MeshList, tmp_path, monkeypatch) -> None:
     monkeypatch.setattr("meshreel.analysis.follow.embedded.LOST", 1.0)  # else the frame with the knob is alone
-    monkeypatch.setattr(closeness, "WRONG", 1.0)
+    monkeypatch.setattr("meshreel.analysis.fit.frame.WRONG", 1.0)
     encode(sequence, tmp_path / "with.reel", options=options())
     patched = meshreel.open(tmp_path / "with.reel")
     assert payload_bytes_by_purpose(patched.reader.read_chunk(0))["patches"] > 0

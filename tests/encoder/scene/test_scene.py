@@ -12,9 +12,9 @@ import pytest
 
 import meshreel
 import meshreel.encoder.scene.scene as scene
+from meshreel.analysis.scene.cut import Rest
 from meshreel.analysis.scene.labelling import ByPlace
 from meshreel.analysis.scene.segmentation import scene_views
-from meshreel.analysis.scene.settle import Rest
 from meshreel.analysis.survey import survey
 from meshreel.coding.background import decode_background
 from meshreel.coding.intra import decode_intra, encode_empty, encode_intra

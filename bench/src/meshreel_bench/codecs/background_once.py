@@ -6,8 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
-from meshreel.analysis.scene.probe import is_scene
-from meshreel.analysis.survey import survey
+from meshreel.analysis.survey import is_scene, survey
 from meshreel.encoder.group.progress import Stages
 from meshreel.encoder.scene.parts import take_apart
 from meshreel.encoder.scene.static import Static, encode_static

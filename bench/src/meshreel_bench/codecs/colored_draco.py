@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import UInt8
 from PIL import Image
 
-from meshreel.analysis.appearance.vertices import vertex_colors
+from meshreel.analysis.appearance.bake import vertex_colors
 from meshreel.coding.appearance.pictures import VideoDecoder, VideoEncoder, from_i420, to_i420
 from meshreel.coding.mesh import COMPRESSION_LEVEL
 from meshreel.errors import InputError

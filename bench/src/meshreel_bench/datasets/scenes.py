@@ -17,8 +17,7 @@ from jaxtyping import Bool
 
 from meshreel import geometry
 from meshreel.analysis import scene as segmenter
-from meshreel.analysis.scene.background import FRAMES
-from meshreel.analysis.scene.background_depth import Moment, fuse_still_depth
+from meshreel.analysis.scene.background import FRAMES, Moment, fuse_still_depth
 from meshreel.analysis.scene.segmentation import segment
 from meshreel.capture.recording import FusionOptions, Recording, open_recording
 from meshreel.capture.rig.rig import RIG

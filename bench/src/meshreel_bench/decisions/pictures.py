@@ -18,8 +18,7 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from meshreel.analysis.fit.surface_fit import Fit, FitOptions, Guides, fit_frames
-from meshreel.analysis.reference.centers import largest_distances, reference_centers
-from meshreel.analysis.reference.deform import bind, center_motions, move
+from meshreel.analysis.reference.centers import bind, center_motions, largest_distances, move, reference_centers
 from meshreel.analysis.reference.extraction import MDS, Reference, extract_reference, predict
 from meshreel.analysis.reference.track import track_centers
 from meshreel.analysis.survey import survey

@@ -15,10 +15,9 @@ from meshreel.format.records import unpack_all
 from meshreel.geometry.cameras import Rays
 from meshreel.geometry.color_views import ColorPicture, Painted
 from meshreel.geometry.topology import blend
-from meshreel.metrics.color import PEAK, POINTS, TO_YUV, psnr
-from meshreel.metrics.color_render import Colored
-from meshreel.metrics.even_points import scatter
+from meshreel.metrics.color import PEAK, POINTS, TO_YUV, Colored, psnr
 from meshreel.metrics.render import Crop, Pixels
+from meshreel.metrics.surface_samples import scatter
 from meshreel.types import Mesh, MeshSequence
 
 from ..datasets.walker import Truth

@@ -13,8 +13,8 @@ from jaxtyping import Bool, Float64
 from meshreel.decoder.video import Video
 from meshreel.errors import InputError
 from meshreel.geometry.closest_points import distances
-from meshreel.metrics.even_points import scatter
 from meshreel.metrics.scene_accuracy import Scene, visible
+from meshreel.metrics.surface_samples import scatter
 from meshreel.types import Mesh
 
 from ..datasets.rooms import NAMES, PEOPLE, THINGS, Parts, moving_parts

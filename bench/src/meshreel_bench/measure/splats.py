@@ -16,8 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from meshreel.analysis.appearance.splat_fit import SplatFrame, SplatView, fit_splats
-from meshreel.analysis.appearance.splat_views import GOLDEN, rendered, ring
+from meshreel.analysis.appearance.splat_fit import GOLDEN, SplatFrame, SplatView, fit_splats, rendered, ring
 from meshreel.cli.compare import ASIDE, errors
 from meshreel.coding.appearance.splats import decode_splats, encode_splats
 from meshreel.errors import InputError

@@ -15,6 +15,8 @@ from jaxtyping import Float32, Float64, Int64
 from ...geometry.cameras import Camera
 from ...geometry.splats import Bound
 
+Pairs = Int64[np.ndarray, " P"]  # a number for each pair of a pixel and a Gaussian
+Shares = Float64[np.ndarray, " N"]  # of each Gaussian
 BLUR = 0.3  # pixels squared, added to projected variances so that no Gaussian falls between pixels
 LEAST = 1 / 255  # smallest opacity that is drawn: less changes no 8-bit picture
 MOST = 0.999  # largest opacity, so that Gaussians behind it have a gradient (guess)
@@ -31,10 +33,6 @@ class Flat:
     conics: Any  # N 3, 1 / pixels squared
     spreads: Any  # N 2, variances along x and y, pixels squared
     depths: Any  # N
-
-    @property
-    def tensors(self) -> tuple[Any, Any, Any, Any]:
-        return self.centers, self.conics, self.spreads, self.depths
 
 
 def project(xp: Any, means: Any, axes: Any, scales: Any, camera: tuple[Any, Any]) -> Flat:
@@ -54,27 +52,17 @@ def project(xp: Any, means: Any, axes: Any, scales: Any, camera: tuple[Any, Any]
     return Flat(centers, conics, xp.stack([xx, yy], axis=1), depths)
 
 
-def camera_matrices(camera: Camera) -> tuple[Float64[np.ndarray, "3 4"], Float64[np.ndarray, "3 3"]]:
-    return camera.extrinsic[:3], camera.intrinsic
-
-
 class Drawing:
     """A picture of Gaussians, with the values that its gradients need."""
 
     def __init__(
-        self,
-        flat: Flat,
-        opacities: Float64[np.ndarray, " N"],
-        colors: Float64[np.ndarray, "N 3"],
-        size: tuple[int, int],
+        self, flat: Flat, opacities: Shares, colors: Float64[np.ndarray, "N 3"], size: tuple[int, int]
     ) -> None:
         """Draw Gaussians on white; `size` is height and width."""
         self._flat, self._opacities, self._colors, self.size = flat, opacities, colors, size
         index, x, y = _pairs(flat, opacities, size)
-        self._dx, self._dy = (
-            (at + 0.5 - center[index]).astype(np.float32)
-            for at, center in ((x, flat.centers[:, 0]), (y, flat.centers[:, 1]))
-        )
+        self._dx = (x + 0.5 - flat.centers[index, 0]).astype(np.float32)
+        self._dy = (y + 0.5 - flat.centers[index, 1]).astype(np.float32)
         a, b, c = (flat.conics[:, k].astype(np.float32)[index] for k in range(3))
         power = -0.5 * (a * self._dx**2 + c * self._dy**2) - b * self._dx * self._dy
         alphas = opacities.astype(np.float32)[index] * np.exp(power)
@@ -105,7 +93,7 @@ class Drawing:
         channels = [np.bincount(self._pixels, self.weights * own[:, k], count) + WHITE * self._rest for k in range(3)]
         self.picture: Float64[np.ndarray, "H W 3"] = np.stack(channels, axis=1).reshape(*self.size, 3)
 
-    def shares(self, values: Float64[np.ndarray, "H W"] | None = None) -> Float64[np.ndarray, " N"]:
+    def shares(self, values: Float64[np.ndarray, "H W"] | None = None) -> Shares:
         """Return the sum over all pixels of each Gaussian's weight times the pixel's value."""
         weights = self.weights if values is None else self.weights * values.reshape(-1)[self._pixels]
         return np.bincount(self._index, weights, len(self._opacities))
@@ -117,9 +105,8 @@ class Drawing:
         of_pairs = pixels[self._pixels]
         gains = (of_pairs * self._colors[index]).sum(axis=1)
         added = np.concatenate([[0.0], np.cumsum(self.weights * gains)])
-        behind = (
-            added[self._starts[self._pixels + 1]] - added[1:] + (WHITE * self._rest * pixels.sum(axis=1))[self._pixels]
-        )
+        white = (WHITE * self._rest * pixels.sum(axis=1))[self._pixels]
+        behind = added[self._starts[self._pixels + 1]] - added[1:] + white
         alphas = (self._left * gains - behind / (1 - self._alphas)) * self._is_free
         powers = alphas * self._alphas
         a, b, c = (flat.conics[index, k] for k in range(3))
@@ -131,9 +118,7 @@ class Drawing:
         return np.stack(sums[:2], axis=1), np.stack(sums[2:], axis=1), opacities, np.stack(colors, axis=1)
 
 
-def _pairs(
-    flat: Flat, opacities: Float64[np.ndarray, " N"], size: tuple[int, int]
-) -> tuple[Int64[np.ndarray, " P"], Int64[np.ndarray, " P"], Int64[np.ndarray, " P"]]:
+def _pairs(flat: Flat, opacities: Shares, size: tuple[int, int]) -> tuple[Pairs, Pairs, Pairs]:
     """Return Gaussian, column and row of each pixel in the boxes that Gaussians reach, the nearest Gaussian first."""
     reach = np.sqrt(2 * np.log(np.maximum(opacities / LEAST, 1))[:, None] * flat.spreads)
     limits = np.array([size[1], size[0]])
@@ -150,7 +135,7 @@ def _pairs(
     return index, low[index, 0] + within - rows * sides[index, 0], low[index, 1] + rows
 
 
-def _stable_order(pixels: Int64[np.ndarray, " P"]) -> Int64[np.ndarray, " P"]:
+def _stable_order(pixels: Pairs) -> Pairs:
     """Return a stable order by pixel, by NumPy's radix sort, which exists for 16 bits."""
     order = np.argsort((pixels & 0xFFFF).astype(np.uint16), kind="stable")
     if pixels.max(initial=0) > 0xFFFF:
@@ -160,5 +145,5 @@ def _stable_order(pixels: Int64[np.ndarray, " P"]) -> Int64[np.ndarray, " P"]:
 
 def draw(bound: Bound, camera: Camera) -> Float32[np.ndarray, "H W 3"]:
     """Return the picture of Gaussians on white, sRGB, 0 to 1."""
-    flat = project(np, bound.means, bound.axes, bound.scales, camera_matrices(camera))
+    flat = project(np, bound.means, bound.axes, bound.scales, (camera.extrinsic[:3], camera.intrinsic))
     return Drawing(flat, bound.opacities, bound.colors, (camera.height, camera.width)).picture.astype(np.float32)

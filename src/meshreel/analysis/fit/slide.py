@@ -20,6 +20,8 @@ from ...geometry.strict import inverses
 from ...geometry.topology import face_normals, subdivide, unique_edges, vertex_normals
 from ...types import LUMA, Mesh
 
+Points = Float64[np.ndarray, "V 3"]  # of the template
+Luma = Float64[np.ndarray, " N"]  # at the vertices of the finer mesh, 0 to 255
 ITERATIONS = 160  # of the flow in each round: 160 edges of the template far; with 80, .3 dB worse at quality 80
 LIGHT = 40  # blurs whose result is light, not texture; with 15 or 120, .3 dB worse on basketball_player
 LEVELS = 2  # midpoint subdivisions to the mesh at whose vertices colours are compared (guess)
@@ -31,12 +33,7 @@ MOST = 0.7  # edges of the template, largest motion of a vertex in a round (gues
 class Slide:
     """A template of constant connectivity, with its luma in the key frame."""
 
-    def __init__(
-        self,
-        faces: Int32[np.ndarray, "F 3"],
-        key: Float64[np.ndarray, "V 3"],
-        paint: Paint,
-    ) -> None:
+    def __init__(self, faces: Int32[np.ndarray, "F 3"], key: Points, paint: Paint) -> None:
         """Take the template's positions on the key frame, and the source of that frame's colours."""
         from scipy.sparse import eye_array, kron
 
@@ -49,7 +46,7 @@ class Slide:
         self._blur = _means_over(self._finer_faces, self._finer.shape[0])
         self._luma, self._known = self._texture(self._sampled(key), paint)
 
-    def to(self, positions: Float64[np.ndarray, "V 3"], paint: Paint) -> Float64[np.ndarray, "V 3"]:
+    def to(self, positions: Points, paint: Paint) -> Points:
         """Return the positions on a frame, slid so that its colours agree with the key frame's."""
         slid = positions
         for blurs in BLURS:
@@ -57,11 +54,11 @@ class Slide:
             slid = slid + self._flow(slid, mesh, *self._texture(mesh, paint), blurs)
         return slid
 
-    def _sampled(self, positions: Float64[np.ndarray, "V 3"]) -> Mesh:
+    def _sampled(self, positions: Points) -> Mesh:
         """Return the finer mesh at whose vertices colours are compared."""
         return Mesh(self._finer @ positions, self._finer_faces)
 
-    def _texture(self, mesh: Mesh, paint: Paint) -> tuple[Float64[np.ndarray, " N"], Bool[np.ndarray, " N"]]:
+    def _texture(self, mesh: Mesh, paint: Paint) -> tuple[Luma, Bool[np.ndarray, " N"]]:
         """Return the luma at the finer mesh's vertices without lighting, and a mask of known values."""
         colors, seen = paint.at(mesh.vertices, vertex_normals(mesh))
         luma = np.where(seen, (colors * np.array(LUMA)).sum(axis=1), 0.0)
@@ -70,14 +67,7 @@ class Slide:
             light, around = self._blur @ light, self._blur @ around
         return np.where(seen, luma - light / np.maximum(around, 1e-9), 0.0), seen
 
-    def _flow(
-        self,
-        positions: Float64[np.ndarray, "V 3"],
-        mesh: Mesh,
-        luma: Float64[np.ndarray, " N"],
-        known: Bool[np.ndarray, " N"],
-        blurs: int,
-    ) -> Float64[np.ndarray, "V 3"]:
+    def _flow(self, positions: Points, mesh: Mesh, luma: Luma, known: Bool[np.ndarray, " N"], blurs: int) -> Points:
         """Return tangential offsets of the template that bring the luma of the frame nearer to that of the key frame.
 
         They minimise squared differences of luma and from the neighbours' offsets, by Jacobi iterations whose bound on
@@ -121,7 +111,7 @@ def _blocks(matrices: Float64[np.ndarray, "V 3 3"]) -> Any:
     return bsr_array((matrices, np.arange(len(matrices)), np.arange(len(matrices) + 1)))
 
 
-def _tangential(vectors: Float64[np.ndarray, "V 3"], normals: Float64[np.ndarray, "V 3"]) -> Float64[np.ndarray, "V 3"]:
+def _tangential(vectors: Points, normals: Points) -> Points:
     return vectors - normals * (vectors * normals).sum(axis=1, keepdims=True)
 
 
@@ -130,7 +120,7 @@ def _edge(mesh: Mesh) -> float:
     return float(np.sqrt(face_normals(mesh)[1].mean() * 4 / np.sqrt(3)))
 
 
-def _slopes(mesh: Mesh, values: Float64[np.ndarray, " V"]) -> Float64[np.ndarray, "V 3"]:
+def _slopes(mesh: Mesh, values: Float64[np.ndarray, " V"]) -> Points:
     """Return the gradient of vertices' values along the surface, the mean over the faces at each vertex."""
     normals, areas = face_normals(mesh)
     a, b, c = np.moveaxis(mesh.vertices[mesh.faces], 1, 0)

@@ -28,7 +28,10 @@ FOLLOWED = 6e-4  # RMS noise from which the second fit trusts the coherent posit
 NOISY_ROUNDS = slice(1, 3)  # of the first fit: motion is smooth under noise, and tighter rounds fit it (decision 16)
 GATE = 6.0  # RMS distances of the noise that a pair may be apart at least: three standard deviations (guess)
 MANY = 5000  # smallest number of a template's vertices for which strides apply (guess)
-Coherence = Callable[[Float64[np.ndarray, "T V 3"]], Float64[np.ndarray, "T V 3"]]
+Faces = Int32[np.ndarray, "F 3"]
+Points = Float64[np.ndarray, "V 3"]  # positions of the template in one frame
+Positions = Float64[np.ndarray, "T V 3"]  # in every frame
+Coherence = Callable[[Positions], Positions]
 AGREEMENT = 0.3  # smallest cosine between the normals of a pair (guess)
 ANCHOR = 0.02  # row weight of the offset from the prediction (guess)
 
@@ -80,7 +83,7 @@ class Rounds:
 class Guides:
     """Optional priors of a fit that a caller supplies."""
 
-    rest: Float64[np.ndarray, "V 3"] | None = None  # the template's shape; None: that of the key frame's fit
+    rest: Points | None = None  # the template's shape; None: that of the key frame's fit
     coherence: Coherence | None = None  # first fit -> positions that attract the second fit; None: `components`
     key: int | None = None  # frame that is fitted first; None: the middle one
     noise: float = 0.0  # RMS distance of the frames from the truth; 0: a clean capture
@@ -90,16 +93,12 @@ class Guides:
 class Fit:
     """Positions of a template on every frame, with their residuals."""
 
-    positions: Float64[np.ndarray, "T V 3"]
+    positions: Positions
     residuals: Float64[np.ndarray, " T"]  # symmetric RMS distance; infinite for an empty frame
 
 
 def fit_frames(
-    faces: Int32[np.ndarray, "F 3"],
-    predictions: Float64[np.ndarray, "T V 3"],
-    frames: Sequence[Mesh],
-    options: FitOptions,
-    guides: Guides = Guides(),
+    faces: Faces, predictions: Positions, frames: Sequence[Mesh], options: FitOptions, guides: Guides = Guides()
 ) -> Fit:
     """Fit a template to each frame, starting from its predicted positions.
 
@@ -119,9 +118,7 @@ def fit_frames(
     return Fit(positions, np.array([_residual(Mesh.of(fitted, faces), surface) for fitted, surface in pairs]))
 
 
-def snap_to_vertices(
-    faces: Int32[np.ndarray, "F 3"], predictions: Float64[np.ndarray, "T V 3"], frames: Sequence[Mesh]
-) -> Fit:
+def snap_to_vertices(faces: Faces, predictions: Positions, frames: Sequence[Mesh]) -> Fit:
     """Move each predicted vertex to the nearest vertex of its frame, as the paper's released code does.
 
     Neighbours may fall on one vertex. An empty frame keeps the prediction and has an infinite residual.
@@ -139,19 +136,17 @@ def _residual(fitted: Mesh, frame: FrameSurface | None) -> float:
     """Return the RMS distance of vertices from the other surface, the larger of both directions."""
     if frame is None:
         return np.inf
-    template, frame_points = fitted.vertices, frame.mesh.vertices
-    to_fit = np.linalg.norm(Surface(fitted).closest(frame_points).points - frame_points, axis=1)
-    to_frame = np.linalg.norm(frame.surface.closest(template).points - template, axis=1)
+    to_fit, to_frame = Surface(fitted).distances(frame.mesh.vertices), frame.surface.distances(fitted.vertices)
     return float(np.sqrt(max(np.mean(to_fit**2), np.mean(to_frame**2))))
 
 
 def fit_surfaces(
-    faces: Int32[np.ndarray, "F 3"],
-    predictions: Float64[np.ndarray, "T V 3"],
+    faces: Faces,
+    predictions: Positions,
     surfaces: Sequence[FrameSurface | None],
     options: FitOptions,
     guides: Guides = Guides(),
-) -> Float64[np.ndarray, "T V 3"]:
+) -> Positions:
     """Fit a template to prepared frames (None: an empty one); return its positions without residuals."""
     positions = predictions.copy()
     fitting = Fitting(faces, predictions.shape[1], options, guides.noise)
@@ -173,7 +168,7 @@ def fit_surfaces(
     return positions
 
 
-def strongest_components(positions: Float64[np.ndarray, "T V 3"], key: int, count: int) -> Float64[np.ndarray, "T V 3"]:
+def strongest_components(positions: Positions, key: int, count: int) -> Positions:
     """Rebuild the trajectories relative to the key frame from their `count` strongest components (eqs. 8-9)."""
     frames, vertices, _ = positions.shape
     field = (positions - positions[key]).transpose(1, 0, 2).reshape(vertices, 3 * frames)
@@ -188,54 +183,29 @@ def strongest_components(positions: Float64[np.ndarray, "T V 3"], key: int, coun
 class Fitting:
     """A template of V vertices prepared for fits to frames, one frame at a time."""
 
-    def __init__(self, faces: Int32[np.ndarray, "F 3"], vertices: int, options: FitOptions, noise: float = 0.0) -> None:
+    def __init__(self, faces: Faces, vertices: int, options: FitOptions, noise: float = 0.0) -> None:
         """`noise` is the RMS distance of the frames from the truth; 0: a clean capture."""
         self._template, self._options = _core.FitTemplate(faces, vertices), options
         chosen = options if vertices >= MANY else replace(options, strides=None)  # few: match all
         self._first, self._second = chosen.rounds(noise)
 
-    def first(
-        self,
-        surface: FrameSurface | None,
-        rest: Float64[np.ndarray, "V 3"],
-        prediction: Float64[np.ndarray, "V 3"],
-    ) -> Float64[np.ndarray, "V 3"]:
+    def first(self, surface: FrameSurface | None, rest: Points, prediction: Points) -> Points:
         """Fit a frame from its prediction, keeping the shape `rest` where the frame has no surface nearby."""
         work.count("frames fitted")
         return self._fitted(surface, rest, prediction, prediction, self._first)
 
-    def second(
-        self,
-        surface: FrameSurface | None,
-        coherent: Float64[np.ndarray, "V 3"],
-        first: Float64[np.ndarray, "V 3"],
-    ) -> Float64[np.ndarray, "V 3"]:
+    def second(self, surface: FrameSurface | None, coherent: Points, first: Points) -> Points:
         """Fit a frame again, near coherent positions made from the first fit."""
         work.count("frames fitted again")
         return self._fitted(surface, coherent, coherent, coherent if self._options.restart else first, self._second)
 
     def _fitted(
-        self,
-        surface: FrameSurface | None,
-        rest: Float64[np.ndarray, "V 3"],
-        place: Float64[np.ndarray, "V 3"],
-        start: Float64[np.ndarray, "V 3"],
-        rounds: Rounds,
-    ) -> Float64[np.ndarray, "V 3"]:
+        self, surface: FrameSurface | None, rest: Points, place: Points, start: Points, rounds: Rounds
+    ) -> Points:
         """Fit a frame in the core; an empty frame keeps its start."""
         if surface is None:
             return start
-        return self._template.fit(
-            surface.target,
-            rest,
-            place,
-            start,
-            np.array(rounds.gates),
-            np.array(rounds.smoothing),
-            np.array(rounds.strides, np.int32),
-            AGREEMENT,
-            rounds.anchor,
-            self._options.tolerance,
-            self._options.iterations,
-            rounds.turn,
-        )
+        gates, smoothing = np.array(rounds.gates), np.array(rounds.smoothing)
+        strides, options = np.array(rounds.strides, np.int32), self._options
+        limits = (AGREEMENT, rounds.anchor, options.tolerance, options.iterations, rounds.turn)
+        return self._template.fit(surface.target, rest, place, start, gates, smoothing, strides, *limits)

@@ -2,7 +2,8 @@
 
 In: the key frame's clean mesh, then neighbour frames of any connectivity. Out: its positions in each frame. A graph of
 nodes on the mesh is moved by point-to-plane ICP, few nodes first, as rigidly as possible, starting from the neighbour
-frame's result with extrapolated velocity. Coordinates are normalised: the sequence's diagonal is 1.
+frame's result with extrapolated velocity. Coordinates are normalised: the sequence's diagonal is 1. Colours give a
+start where shape misleads: if a body moves by its own thickness, the nearest surface is another finger, leg or side.
 It replaces the paper's volume tracking (section 3.1) in preset `best` (docs/decisions/0011-correspondence.md).
 """
 
@@ -25,22 +26,25 @@ from ...geometry.rigid import quaternions
 from ...geometry.strict import products, rotations_of
 from ...geometry.topology import clean, vertex_normals
 from ...types import Mesh
-from ..fit.closeness import shared_distance
-from ..fit.frame import ON_BORDER, FrameSurface
-from .color_start import ColoredPlaces
-from .embedded_graph import Binding, DeformationGraph, build_graph, farthest_first
-from .embedded_pose import Pose, moved, rotation, turned, unmoved
+from ..fit.frame import ON_BORDER, FrameSurface, shared_distance
+from .embedded_graph import (
+    Binding,
+    DeformationGraph,
+    Motion,
+    Nodes,
+    Pose,
+    build_graph,
+    farthest_first,
+    moved,
+    rotation,
+    turned,
+)
 from .rigid import RigidBody, RigidMotion
 
-NORMAL_REACH = 0.01  # diagonals, weight of a difference of unit normals in a search: a guess
-NOISY_LOST = (
-    3.0  # RMS distances of the noise that a residual may have in addition: legs appear and vanish (decision 16)
-)
-BACK_ROUNDS = 2  # rounds of the inverse, the first of which only estimates the nodes that move a point: a guess
+NOISY_LOST = 3.0  # RMS distances of the noise that a residual may have in addition: legs vanish (decision 16)
 Painter = Callable[[], Paint | None]  # opens the colour source of a frame, if it has one
 CLEARLY = 0.8  # share of the best residual that a start by colour must reach: it is rougher than one by shape (guess)
 UNUSUAL = 1.25  # a frame is retried if its residual exceeds this many times the median so far (decision 15)
-NEIGHBOURS = 4  # nodes that move a point (guess)
 AGREEMENT = 0.3  # smallest cosine between the normals of a pair (guess)
 TORN = (0.5, 0.15)  # an edge off by this share of its length counts a quarter; try, retry (decision 15)
 DOUBT = 0.0005  # diagonals: a frame with a larger, unusual residual is tried again from elsewhere (decision 15)
@@ -48,6 +52,11 @@ LOST = 0.004  # diagonals: a frame with a larger residual is lost: no surface fi
 DAMPING = 0.01  # squared row weight of a node's step relative to its data (guess)
 ITERATIONS = 60  # largest number of conjugate-gradient iterations per round (guess)
 TOLERANCE = 1e-2  # relative residual at which they stop (guess)
+Samples = Float64[np.ndarray, "S 3"]
+GREY = 0.001  # diagonals equivalent to one level of a colour, of 255; .0003 does as well (decision 28)
+REACH = 0.3  # diagonals, largest joint distance in place and colour of a pair (guess)
+AROUND = 40  # samples next to a node whose median offset it takes (guess)
+FEWEST = 200  # smallest number of samples of known colour, on either side, for an estimate (guess)
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,8 +102,8 @@ class Tracker:
         nodes = farthest_first(self.mesh, self._samples, o.fine.nodes)
         self._graph, coarse = build_graph(self.mesh, nodes), build_graph(self.mesh, nodes[: o.coarse.nodes])
         self._fine, self._few = self._rest(self._graph), self._rest(coarse)
-        self._nodes_by_few = coarse.bind(self._graph.nodes, coarse.cells[nodes], NEIGHBOURS)
-        self._all = self._graph.bind(self.mesh.vertices, self._graph.cells, NEIGHBOURS)
+        self._nodes_by_few = coarse.bind(self._graph.nodes, coarse.cells[nodes])
+        self._all = self._graph.bind(self.mesh.vertices, self._graph.cells)
         self._poses = {key: Pose.at(self._graph.nodes)}
         self._residuals = {key: 0.0}
         self._paint = paint
@@ -102,23 +111,19 @@ class Tracker:
         self._body = RigidBody(self.mesh, noise) if noise > 0 else None  # bending costs clean bodies nothing
         self._rigid = {} if self._body is None else {key: RigidMotion.none()}
 
-    def step(self, frame: int, mesh: Mesh | FrameSurface, paint: Painter | None = None) -> float:
+    def step(self, frame: int, surface: FrameSurface, paint: Painter | None = None) -> float:
         """Register a frame, starting from the nearest registered frame between it and the key; return its residual.
 
-        An empty frame gets its neighbour's pose and an infinite residual. A frame may be registered again. `paint`
-        opens the frame's colour source.
+        A frame may be registered again. `paint` opens the frame's colour source.
         """
         if frame == self.key:
             raise InputError(f"frame {frame} is the key: it needs no registration; step to another")
-        surface = mesh if isinstance(mesh, FrameSurface) else None if mesh.is_empty else FrameSurface(mesh)
-        if surface is not None and not np.isfinite(surface.mesh.vertices).all():
+        if not np.isfinite(surface.mesh.vertices).all():
             raise InputError(f"frame {frame} has coordinates that are not finite; repair it first")
         work.count("frames tracked")
-        pose, residual = self._poses[self._known(frame)], np.inf
-        if surface is not None:
-            pose, residual = self._follow(frame, surface, paint)
+        pose, residual = self._follow(frame, surface, paint)
         self._poses[frame], self._residuals[frame] = pose, residual
-        if surface is not None and self._body is not None and self._known(frame) in self._rigid:
+        if self._body is not None and self._known(frame) in self._rigid:
             start = RigidMotion.between(self._graph.nodes, pose.positions)
             motion = self._body.brought(surface, start)
             if self._body.holds(surface, motion, residual):
@@ -155,7 +160,7 @@ class Tracker:
 
     def _rest(self, graph: DeformationGraph) -> _Rest:
         points, normals = self.mesh.vertices[self._samples], vertex_normals(self.mesh)[self._samples]
-        binding = graph.bind(points, graph.cells[self._samples], NEIGHBOURS)
+        binding = graph.bind(points, graph.cells[self._samples])
         return _Rest(graph.nodes, graph.edges, points, normals, binding, np.ones(len(graph.edges)))
 
     def _known(self, frame: int) -> int:
@@ -254,10 +259,10 @@ class Tracker:
 class _Rest:
     """Deformation graph at rest, with the samples bound to it."""
 
-    nodes: Float64[np.ndarray, "N 3"]
+    nodes: Nodes
     edges: Int64[np.ndarray, "E 2"]
-    points: Float64[np.ndarray, "S 3"]
-    normals: Float64[np.ndarray, "S 3"]
+    points: Samples
+    normals: Samples
     binding: Binding
     held: Float64[np.ndarray, " E"]  # factor of each edge's squared row weight: 1, or a quarter for one that is torn
 
@@ -268,47 +273,34 @@ class _Rest:
         return _core.Deformation(self.nodes, edges, self.held, self.points, self.normals, bound, weights)
 
 
-@dataclass(frozen=True, slots=True)
-class Motion:
-    """Motion of the key mesh through T frames."""
-
-    mesh: Mesh  # the key frame's
-    graph: DeformationGraph
-    rotations: Float64[np.ndarray, "T N 3 3"]
-    positions: Float64[np.ndarray, "T N 3"]
-    residuals: Float64[np.ndarray, " T"]  # symmetric RMS; 0 at the key, infinite at an empty frame
-
-    def bound(self, points: Float64[np.ndarray, "P 3"], normals: Float64[np.ndarray, "P 3"] | None = None) -> Binding:
-        """Bind points on or near the key mesh to the nodes of the nearest vertices.
-
-        Normals prevent binding to a near sheet that faces away.
-        """
-        key_vertices = np.concatenate([self.mesh.vertices, NORMAL_REACH * vertex_normals(self.mesh)], axis=1)
-        queries = points if normals is None else np.concatenate([points, NORMAL_REACH * normals], axis=1)
-        vertices = cKDTree(key_vertices[:, : queries.shape[1]]).query(queries)[1].reshape(-1)
-        return self.graph.bind(points, self.graph.cells[vertices], NEIGHBOURS)
-
-    def back(self, frame: int, mesh: Mesh) -> Mesh:
-        """Move a mesh on or near a frame to the pose of the key frame, by the inverse of `moved`.
-
-        Faces with a vertex at which the motion has no inverse are left out.
-        """
-        pose = Pose(self.rotations[frame], self.positions[frame])
-        binding = self.graph.bind(self.mesh.vertices, self.graph.cells, NEIGHBOURS)
-        vertices = moved(self.mesh.vertices, self.graph.nodes, binding, pose)
-        facing = turned(vertex_normals(self.mesh), binding, pose)
-        queries = np.concatenate([mesh.vertices, NORMAL_REACH * vertex_normals(mesh)], axis=1)
-        near = cKDTree(np.concatenate([vertices, NORMAL_REACH * facing], axis=1)).query(queries)[1].reshape(-1)
-        points, cells = self.mesh.vertices[near], self.graph.cells[near]
-        for _ in range(BACK_ROUNDS):
-            points, invertible = unmoved(
-                mesh.vertices, self.graph.nodes, self.graph.bind(points, cells, NEIGHBOURS), pose
-            )
-        return clean(Mesh(points, mesh.faces[invertible[mesh.faces].all(axis=1)]))
-
-
 def _extrapolated(first: Pose, last: Pose, ratio: float) -> Pose:
     """Continue from pose `last` by `ratio` times the step from `first` to it."""
     turn = quaternions(products(last.rotations, first.rotations.transpose(0, 2, 1)))
     turns = rotations_of(turn * [1, ratio, ratio, ratio])  # the tangent of half the angle grows; exact for a ratio of 1
     return Pose(products(turns, last.rotations), last.positions + ratio * (last.positions - first.positions))
+
+
+class ColoredPlaces:
+    """Samples of a key mesh with their colours."""
+
+    def __init__(self, mesh: Mesh, samples: Int64[np.ndarray, " S"], paint: Paint) -> None:
+        """Take the key's mesh, the vertices that are its samples, and the source of its colours."""
+        self._colors, self._known = paint.at(mesh.vertices[samples], vertex_normals(mesh)[samples])
+
+    def offsets(self, nodes: Nodes, points: Samples, frame: FrameSurface, count: int, paint: Paint) -> Nodes | None:
+        """Return each node's offset to samples of its colour, of about `count` in a frame; None: unknown.
+
+        `points` are the last positions of the key's samples.
+        """
+        samples = frame.samples(count)
+        colors, known = paint.at(frame.mesh.vertices[samples], frame.normals[samples])
+        frame_points, key_points = frame.mesh.vertices[samples][known], points[self._known]
+        if min(len(frame_points), len(key_points)) < FEWEST:
+            return None
+        joint = cKDTree(np.concatenate([frame_points, GREY * colors[known]], axis=1))
+        far, near = joint.query(np.concatenate([key_points, GREY * self._colors[self._known]], axis=1))
+        paired = far <= REACH
+        if paired.sum() < FEWEST:
+            return None
+        around = cKDTree(key_points[paired]).query(nodes, AROUND)[1]
+        return np.median((frame_points[near[paired]] - key_points[paired])[around], axis=1)

@@ -1,7 +1,8 @@
-"""Build a graph of nodes on a mesh, and bind points to the nodes that are nearest along the surface.
+"""Graph of nodes on a mesh, bindings of points to the nodes nearest along the surface, and poses that move them.
 
 In: the key frame's mesh. Out: nodes (farthest-point samples), edges between cells that touch, bindings of points.
-A hand near a hip shares no node with it: only nodes within two edges of a point's cell may move it.
+A hand near a hip shares no node with it: only nodes within two edges of a point's cell may move it. A point p bound to
+nodes j goes to sum w_j (R_j (p - g_j) + t_j) (Sumner et al. 2007).
 """
 
 from __future__ import annotations
@@ -9,17 +10,25 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float64, Int64
+from jaxtyping import Bool, Float64, Int64
 from scipy import sparse
 from scipy.sparse import csgraph
 from scipy.spatial import cKDTree
 
-from ...geometry.topology import components, unique_edges, vertex_normals
+from ...geometry.strict import determinants, inverses, nearest_rotations, products
+from ...geometry.topology import clean, components, unique_edges, vertex_normals
 from ...types import Mesh
 
+Points = Float64[np.ndarray, "P 3"]
+Nodes = Float64[np.ndarray, "N 3"]
+Cells = Int64[np.ndarray, " P"]  # the node to which each point belongs
 TURN = 0.01  # diagonals, weight of a difference of unit normals, so that both sides of a thin part get nodes: a guess
 SEEDED = 0.25  # largest share of nodes that begin a component: a guess
 TOGETHER = 2048  # points that are bound together: bounds memory (guess)
+NORMAL_REACH = 0.01  # diagonals, weight of a difference of unit normals in a search: a guess
+BACK_ROUNDS = 2  # rounds of the inverse, the first of which only estimates the nodes that move a point: a guess
+NEIGHBOURS = 4  # nodes that move a point (guess)
+FLATTEST = 0.1  # a blend of rotations with a smaller determinant has no usable inverse: a guess
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,24 +43,22 @@ class Binding:
 class DeformationGraph:
     """Nodes on a mesh, with edges; every vertex belongs to the cell of the node that is nearest along the surface."""
 
-    nodes: Float64[np.ndarray, "N 3"]
+    nodes: Nodes
     edges: Int64[np.ndarray, "E 2"]  # both directions of each pair of touching cells
     cells: Int64[np.ndarray, " V"]
     hood: Int64[np.ndarray, "N h"]  # each node and those at most two edges away, padded with -1
 
-    def bind(self, points: Float64[np.ndarray, "P 3"], cells: Int64[np.ndarray, " P"], count: int) -> Binding:
-        """Bind each point to the `count` nearest nodes of its cell's hood; weights fall to 0 at the next nearest."""
+    def bind(self, points: Points, cells: Cells) -> Binding:
+        """Bind points to the nearest `NEIGHBOURS` nodes of their cells' hoods; weights fall to 0 at the next one."""
         blocks = (slice(at, at + TOGETHER) for at in range(0, max(len(points), 1), TOGETHER))
-        bound = [self._bound(points[rows], cells[rows], count) for rows in blocks]
+        bound = [self._bound(points[rows], cells[rows]) for rows in blocks]
         return Binding(*(np.concatenate(parts) for parts in zip(*bound, strict=True)))
 
-    def _bound(
-        self, points: Float64[np.ndarray, "P 3"], cells: Int64[np.ndarray, " P"], count: int
-    ) -> tuple[Int64[np.ndarray, "P k"], Float64[np.ndarray, "P k"]]:
+    def _bound(self, points: Points, cells: Cells) -> tuple[Int64[np.ndarray, "P k"], Float64[np.ndarray, "P k"]]:
         hood = self.hood[cells]
         away = np.linalg.norm(self.nodes[hood] - points[:, None], axis=2)
         away[hood < 0] = np.inf
-        count = min(count, hood.shape[1])
+        count = min(NEIGHBOURS, hood.shape[1])
         nearest = np.argsort(away, axis=1, kind="stable")[:, : count + 1]
         away, indices = np.take_along_axis(away, nearest, axis=1), np.take_along_axis(hood, nearest, axis=1)
         finite = np.where(np.isfinite(away), away, 0.0)
@@ -114,7 +121,98 @@ def _hoods(pairs: Int64[np.ndarray, "E 2"], count: int) -> Int64[np.ndarray, "N 
     two.sort_indices()
     sizes = np.diff(two.indptr)
     hood = np.full((count, int(sizes.max())), -1, np.int64)
-    hood[np.repeat(np.arange(count), sizes), np.arange(len(two.indices)) - np.repeat(two.indptr[:-1], sizes)] = (
-        two.indices
-    )
+    hood[np.arange(hood.shape[1]) < sizes[:, None]] = two.indices  # row by row
     return hood
+
+
+@dataclass(frozen=True, slots=True)
+class Pose:
+    """Positions of the nodes, and their rotations relative to rest."""
+
+    rotations: Float64[np.ndarray, "N 3 3"]
+    positions: Nodes
+
+    @staticmethod
+    def at(nodes: Nodes) -> Pose:
+        """Return the pose of nodes at rest."""
+        return Pose(np.tile(np.eye(3), (len(nodes), 1, 1)), nodes.copy())
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """Motion of the key mesh through T frames."""
+
+    mesh: Mesh  # the key frame's
+    graph: DeformationGraph
+    rotations: Float64[np.ndarray, "T N 3 3"]
+    positions: Float64[np.ndarray, "T N 3"]
+    residuals: Float64[np.ndarray, " T"]  # symmetric RMS; 0 at the key, infinite at an empty frame
+
+    def bound(self, points: Points, normals: Points | None = None) -> Binding:
+        """Bind points on or near the key mesh to the nodes of the nearest vertices.
+
+        Normals prevent binding to a near sheet that faces away.
+        """
+        key_vertices = np.concatenate([self.mesh.vertices, NORMAL_REACH * vertex_normals(self.mesh)], axis=1)
+        queries = points if normals is None else np.concatenate([points, NORMAL_REACH * normals], axis=1)
+        vertices = cKDTree(key_vertices[:, : queries.shape[1]]).query(queries)[1].reshape(-1)
+        return self.graph.bind(points, self.graph.cells[vertices])
+
+    def back(self, frame: int, mesh: Mesh) -> Mesh:
+        """Move a mesh on or near a frame to the pose of the key frame, by the inverse of `moved`.
+
+        Faces with a vertex at which the motion has no inverse are left out.
+        """
+        pose = Pose(self.rotations[frame], self.positions[frame])
+        binding = self.graph.bind(self.mesh.vertices, self.graph.cells)
+        vertices = moved(self.mesh.vertices, self.graph.nodes, binding, pose)
+        facing = turned(vertex_normals(self.mesh), binding, pose)
+        queries = np.concatenate([mesh.vertices, NORMAL_REACH * vertex_normals(mesh)], axis=1)
+        near = cKDTree(np.concatenate([vertices, NORMAL_REACH * facing], axis=1)).query(queries)[1].reshape(-1)
+        points, cells = self.mesh.vertices[near], self.graph.cells[near]
+        for _ in range(BACK_ROUNDS):
+            binding = self.graph.bind(points, cells)
+            points, invertible = unmoved(mesh.vertices, self.graph.nodes, binding, pose)
+        return clean(Mesh(points, mesh.faces[invertible[mesh.faces].all(axis=1)]))
+
+
+def moved(points: Points, nodes: Nodes, binding: Binding, pose: Pose) -> Points:
+    """Move bound points from the rest of the nodes to a pose."""
+    blended = _affine(nodes, binding, pose)
+    return np.einsum("pij,pj->pi", blended[:, :, :3], points) + blended[:, :, 3]
+
+
+def unmoved(points: Points, nodes: Nodes, binding: Binding, pose: Pose) -> tuple[Points, Bool[np.ndarray, " P"]]:
+    """Move bound points from a pose back to rest; also return False for points whose motion has no inverse."""
+    blended = _affine(nodes, binding, pose)
+    linear, offsets = blended[:, :, :3].copy(), points - blended[:, :, 3]
+    invertible = np.abs(determinants(linear)) > FLATTEST
+    linear[~invertible] = np.eye(3)
+    return products(inverses(linear), offsets[:, :, None])[:, :, 0], invertible
+
+
+def _affine(nodes: Nodes, binding: Binding, pose: Pose) -> Float64[np.ndarray, "P 3 4"]:
+    """Blend the nodes' motions at each bound point."""
+    offsets = pose.positions - np.einsum("nij,nj->ni", pose.rotations, nodes)
+    affine = np.concatenate([pose.rotations, offsets[:, :, None]], axis=2).reshape(-1, 12)
+    return _blend(affine, binding).reshape(-1, 3, 4)
+
+
+def turned(vectors: Points, binding: Binding, pose: Pose) -> Points:
+    """Rotate unit vectors (normals) of bound points with their nodes."""
+    blended = _blend(pose.rotations.reshape(-1, 9), binding).reshape(-1, 3, 3)
+    result = np.einsum("pij,pj->pi", blended, vectors)
+    length = np.linalg.norm(result, axis=1, keepdims=True)
+    return result / np.where(length > 0, length, 1.0)
+
+
+def rotation(binding: Binding, pose: Pose) -> Float64[np.ndarray, "P 3 3"]:
+    """Return the rotation nearest to the blend of the nodes' rotations at each bound point."""
+    return nearest_rotations(_blend(pose.rotations.reshape(-1, 9), binding).reshape(-1, 3, 3))[0]
+
+
+def _blend(rows: Float64[np.ndarray, "N n"], binding: Binding) -> Float64[np.ndarray, "P n"]:
+    points, count = binding.indices.shape
+    starts = np.arange(points + 1) * count
+    shares = sparse.csr_array((binding.weights.reshape(-1), binding.indices.reshape(-1), starts), (points, len(rows)))
+    return shares @ rows

@@ -16,8 +16,7 @@ from ...geometry.rigid import fit_rigid
 from ...geometry.strict import inverse, products, rotations_of
 from ...geometry.topology import vertex_normals
 from ...types import Mesh
-from ..fit.closeness import STRAY, shared_distance
-from ..fit.frame import ON_BORDER, FrameSurface
+from ..fit.frame import ON_BORDER, STRAY, FrameSurface, shared_distance
 from .embedded_graph import farthest_first
 
 ROUNDS = 20  # largest number of point-to-plane steps (guess)

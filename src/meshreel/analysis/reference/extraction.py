@@ -3,24 +3,51 @@
 In: the frames and their tracked centers. Out: the mesh and the pose of the centers in which it lies.
 
 Differs from the paper: the pose is that of MDS or of a frame, whichever mesh is nearest to the frames after a quick
-surface fit; MDS must be clearly better, since displacements from it need more components (decision 6).
+surface fit; MDS must be clearly better, since displacements from it need more components (decision 6). The key frame's
+surface comes first, and other frames add what it lacks. Faces that tear, or join parts that are separate in some frame,
+are cut. Surfaces are joined by the mean of their signed distances, unless `poisson`, which makes surface far from all.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float64
+from jaxtyping import Bool, Float64, Int32, Int64
 
 from ...geometry.closest_points import Surface
+from ...geometry.decimate import decimate
+from ...geometry.reconstruct import MeanOptions, MeanSurface, close_holes, poisson_surface
+from ...geometry.topology import (
+    clean,
+    drop_small,
+    drop_unreferenced,
+    large_pieces,
+    subdivide_midpoint,
+    unique_edges,
+    vertex_areas,
+    vertex_normals,
+)
 from ...types import Centers, Mesh
 from ..fit.frame import FrameSurface
 from ..fit.surface_fit import FitOptions, Guides, fit_surfaces
-from .centers import affinity, largest_distances, reference_centers
-from .deform import Neighbours, moved_to, neighbours
-from .fuse import VOXEL, Group, GroupCenters
+from .centers import (
+    Binding,
+    Neighbours,
+    Pairs,
+    Points,
+    Pose,
+    affinity,
+    bind,
+    center_motions,
+    center_spacing,
+    largest_distances,
+    move,
+    moved_to,
+    neighbours,
+    reference_centers,
+)
 
 MDS = -1  # stands for the pose of eq. 5 where a frame number is expected
 TRIAL_FIT = FitOptions(gates=(0.024, 0.012), smoothing=(2.0, 0.7), components=0, iterations=20)  # quick: a guess
@@ -31,6 +58,14 @@ CANONICAL_GAIN = 0.85  # the MDS pose must leave at most this share of the best 
 TRIAL_FRAMES = 4  # frames to which a trial is fitted (guess)
 TRIAL_VOXEL = 1.0  # of a trial, in mean edges of the frames' meshes (guess)
 TRIAL_VERTICES = 2000  # vertices of a trial's mesh, at most (guess)
+Edges = tuple[Int64[np.ndarray, "E 2"], Int64[np.ndarray, "F 3"]]  # result of geometry.topology.unique_edges
+VOXEL = 0.5  # mean edges of the frames' meshes, of the grid on which surfaces are joined (guess)
+COVER = 0.3  # a frame adds surface where earlier ones have less than this share of its own (guess)
+REACH = 2.0  # voxels: surfaces closer than this are joined to their mean (guess)
+PAST = 1.5  # voxels by which pieces are continued past their borders, so that they meet (guess)
+TORN = 3.0  # an edge that grows to more than this factor, plus half a center spacing, tears (guess)
+SMALLEST = 0.01  # connected bits with less than this share of the largest one's faces are dropped (guess)
+HOLE = 0.08  # holes with a shorter perimeter, which cuts leave, are closed; share of the mesh's diagonal (guess)
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,29 +82,22 @@ class Trial:
 
     frame: int  # frame whose centers are the pose, or MDS
     key: int  # frame whose surface comes first
-    rms: float  # symmetric surface distance after a quick fit, mean over the frames tried, in units of the vertices
-    worst: float  # largest such distance over the frames tried
+    misfit: float  # symmetric distance after a quick fit, mean and largest over the frames tried added, in their unit
 
 
 @dataclass(frozen=True, slots=True)
 class Reference:
-    """Reference mesh, the pose of the centers in which it lies, and the trials from which the pose was chosen."""
+    """Reference mesh, and the pose of the centers in which it lies."""
 
     mesh: Mesh
-    pose: Float64[np.ndarray, "K 3"]
+    pose: Pose
     frame: int  # frame whose centers are the pose, or MDS
     key: int  # frame whose surface comes first
     neighbours: Neighbours
-    stress: float  # of the MDS pose, eq. 5
-    trials: tuple[Trial, ...]
 
 
 def extract_reference(
-    frames: Sequence[Mesh],
-    centers: Centers,
-    options: ReferenceOptions,
-    canonical: bool = False,
-    again: bool = False,
+    frames: Sequence[Mesh], centers: Centers, options: ReferenceOptions, canonical: bool = False, again: bool = False
 ) -> Reference:
     """Extract the reference of a group in the pose that fits best; its mesh is empty if all frames are.
 
@@ -79,22 +107,14 @@ def extract_reference(
     assert len(frames) == len(centers), "one pose of the centers for each frame"
     distances = largest_distances(centers)
     kin = neighbours(affinity(distances))
-    full = np.array([t for t, frame in enumerate(frames) if not frame.is_empty], dtype=int)
-    if len(full) == 0:
-        return Reference(Mesh.empty(), centers.positions[0], 0, 0, kin, 0.0, ())
-    tracked = GroupCenters(centers.positions[full], distances, kin)
-    group = Group([frames[t] for t in full], tracked, options.poisson)
-    spread = reference_centers(distances, group.positions[len(full) // 2])
-    trials = _trials(group, spread.positions, options, canonical, again)
-    best = _best(trials)
-    pose = spread.positions if best.frame == MDS else group.positions[best.frame]
-    mesh = group.fused(pose, best.key, VOXEL, options.vertices)
-    trials = tuple(
-        replace(trial, frame=MDS if trial.frame == MDS else int(full[trial.frame]), key=int(full[trial.key]))
-        for trial in trials
-    )
-    best = _best(trials)
-    return Reference(mesh, pose, best.frame, best.key, kin, spread.stress, trials)
+    full = [t for t, frame in enumerate(frames) if not frame.is_empty]
+    if not full:
+        return Reference(Mesh.empty(), centers.positions[0], 0, 0, kin)
+    group = Group([frames[t] for t in full], centers.positions[full], distances, kin, options.poisson)
+    best = min(_trials(group, options, canonical, again), key=_misfit)
+    mesh = group.fused(group.pose(best.frame), best.key, VOXEL, options.vertices)
+    frame = MDS if best.frame == MDS else full[best.frame]
+    return Reference(mesh, group.pose(best.frame), frame, full[best.key], kin)
 
 
 def predict(reference: Reference, mesh: Mesh, centers: Centers) -> Float64[np.ndarray, "T V 3"]:
@@ -102,42 +122,30 @@ def predict(reference: Reference, mesh: Mesh, centers: Centers) -> Float64[np.nd
     return moved_to(mesh, reference.pose, centers.positions, reference.neighbours)
 
 
-def _trials(
-    group: Group, canonical: Float64[np.ndarray, "K 3"], options: ReferenceOptions, alone: bool, again: bool
-) -> tuple[Trial, ...]:
+def _trials(group: Group, options: ReferenceOptions, alone: bool, again: bool) -> list[Trial]:
     """Try the poses of some key frames, each with its own surface first, then the MDS pose with the best of these.
 
     If `alone`, only the MDS pose is tried, with the surface of each of them first.
     """
-    surfaces = [FrameSurface(frame) for frame in group.frames]
     count = min(max(1, KEYS - again), len(group.frames))
     keys = sorted({int(key) for key in (np.arange(count) + 0.5) * len(group.frames) / count})
     if alone:
-        return tuple(_trial(group, surfaces, _Attempt(MDS, key, canonical), options) for key in keys)
-    trials = [_trial(group, surfaces, _Attempt(key, key, group.positions[key]), options) for key in keys]
+        return [_trial(group, MDS, key, options) for key in keys]
+    trials = [_trial(group, key, key, options) for key in keys]
     if len(group.frames) > 1:
         best = sorted(trials, key=_misfit)[: 1 if again else CANONICAL_KEYS]
-        trials += [_trial(group, surfaces, _Attempt(MDS, trial.key, canonical), options) for trial in best]
-    return tuple(trials)
+        trials += [_trial(group, MDS, trial.key, options) for trial in best]
+    return trials
 
 
-@dataclass(frozen=True, slots=True)
-class _Attempt:
-    """A pose to try, and the frame whose surface comes first."""
-
-    frame: int  # frame whose centers are the pose, or MDS
-    key: int
-    pose: Float64[np.ndarray, "K 3"]
-
-
-def _trial(group: Group, surfaces: list[FrameSurface], attempt: _Attempt, options: ReferenceOptions) -> Trial:
+def _trial(group: Group, frame: int, key: int, options: ReferenceOptions) -> Trial:
     """Make a quick reference in a pose, fit it to some frames, first and last included, and measure the misfit."""
-    frame, key, pose = attempt.frame, attempt.key, attempt.pose
+    surfaces, pose = group.surfaces, group.pose(frame)
     if len(surfaces) == 1:
-        return Trial(frame, key, 0.0, 0.0)  # nothing to choose from
+        return Trial(frame, key, 0.0)  # nothing to choose from
     mesh = group.fused(pose, key, TRIAL_VOXEL, min(options.vertices, TRIAL_VERTICES))
     if mesh.is_empty:
-        return Trial(frame, key, np.inf, np.inf)
+        return Trial(frame, key, np.inf)
     tried = sorted({key, *np.linspace(0, len(surfaces) - 1, TRIAL_FRAMES).round().astype(int).tolist()})
     frames = [surfaces[t] for t in tried]
     fitted = fit_surfaces(mesh.faces, group.sent(mesh, pose)[tried], frames, TRIAL_FIT, Guides(key=tried.index(key)))
@@ -147,25 +155,123 @@ def _trial(group: Group, surfaces: list[FrameSurface], attempt: _Attempt, option
         to_fit = Surface(Mesh(moved, mesh.faces)).distances(original[:: max(1, len(original) // PROBES)])
         to_frame = _outside(frame_surface.surface, moved, group.edge)
         rms.append(max(np.sqrt(np.mean(to_fit**2)), np.sqrt(np.mean(to_frame**2))))
-    return Trial(frame, key, float(np.mean(rms)), float(np.max(rms)))
-
-
-def _best(trials: Sequence[Trial]) -> Trial:
-    """Return the trial with the least misfit; that of the MDS pose is raised, since it needs more components."""
-    return min(trials, key=lambda trial: _misfit(trial) / (CANONICAL_GAIN if trial.frame == MDS else 1.0))
+    return Trial(frame, key, float(np.mean(rms)) + float(np.max(rms)))
 
 
 def _misfit(trial: Trial) -> float:
-    return trial.rms + trial.worst
+    """Return a trial's misfit; that of the MDS pose is raised, since it needs more components."""
+    return trial.misfit / (CANONICAL_GAIN if trial.frame == MDS else 1.0)
 
 
 def _outside(surface: Surface, points: Float64[np.ndarray, "N 3"], most: float) -> Float64[np.ndarray, " N"]:
-    """Return distances to a surface, at most `most` for points inside it.
-
-    Where bodies touch, the frame has no surface between them, but a good reference has.
-    """
+    """Return distances to a surface, at most `most` for points inside: where bodies touch, it lacks surface."""
     hits = surface.closest(points)
     offset = points - hits.points
     gaps = np.linalg.norm(offset, axis=1)
     inside = np.einsum("nd,nd->n", offset, surface.normals[hits.faces]) < 0
     return np.where(inside, np.minimum(gaps, most), gaps)
+
+
+class Group:
+    """Frames with data that hold in every pose: neighbourhoods of centers, bindings, faces that join separate parts."""
+
+    def __init__(
+        self,
+        frames: Sequence[Mesh],
+        positions: Float64[np.ndarray, "T K 3"],
+        distances: Pairs,
+        kin: Neighbours,
+        poisson: int | None = None,
+    ) -> None:
+        """Bind non-empty frames to their centers; `poisson` is the depth of the paper's reconstruction, if it joins.
+
+        The largest distances (eq. 5's d) and the neighbourhoods are those over all frames of the group.
+        """
+        self.frames, self.positions, self.kin, self.poisson = frames, positions, kin, poisson
+        self.distances, self.spacing = distances, center_spacing(distances)
+        self.canonical = reference_centers(distances, positions[len(frames) // 2]).positions
+        self.surfaces = [FrameSurface(frame) for frame in frames]
+        self.edges = [unique_edges(frame.faces) for frame in frames]
+        lengths = [_lengths(each.vertices, edges).mean() for each, (edges, _) in zip(frames, self.edges, strict=True)]
+        self.edge = float(np.mean(lengths))
+        self.bindings = [bind(frame, pose, kin) for frame, pose in zip(frames, positions, strict=True)]
+        self.parting = [self._parting(*each) for each in zip(self.edges, self.bindings, positions, strict=True)]
+
+    def pose(self, frame: int) -> Pose:
+        """Return the pose of the centers in a frame, or that of eq. 5 for `MDS`."""
+        return self.canonical if frame == MDS else self.positions[frame]
+
+    def sent(self, mesh: Mesh, pose: Pose) -> Float64[np.ndarray, "T V 3"]:
+        """Deform the vertices of a mesh in this pose to each frame."""
+        return moved_to(mesh, pose, self.positions, self.kin)
+
+    def pieces(self, pose: Pose, key: int) -> list[Mesh]:
+        """Return the surface in a pose in pieces: the key frame's, then pieces that it lacks from frames next to it.
+
+        If tracking drifts, frames disagree by more than their detail, and the mean of all would be blurred.
+        """
+        covered, pieces = np.zeros(len(pose)), list[Mesh]()
+        for t in sorted(range(len(self.frames)), key=lambda t: (abs(t - key), t)):
+            moved, faces = self._moved(t, pose)
+            nearest = self.bindings[t].nearest
+            area = np.bincount(nearest, vertex_areas(Mesh(self.frames[t].vertices, faces)), len(pose))
+            lacking = self._around(covered) < COVER * self._around(area)
+            covered += np.where(lacking, area, 0)
+            pieces.append(drop_unreferenced(Mesh(moved, faces[lacking[nearest][faces].any(axis=1)])))
+        return pieces
+
+    def fused(self, pose: Pose, key: int, voxel: float, vertices: int) -> Mesh:
+        """Make one mesh in a pose with about `vertices` vertices, no surface far from the frames', no face that tears.
+
+        `voxel` is in mean edges of the frames' meshes.
+        """
+        mesh = decimate(drop_small(self._joined(self.pieces(pose, key), voxel), SMALLEST), vertices)
+        if mesh.is_empty:
+            return mesh
+        edges = unique_edges(mesh.faces)
+        bad = self._parting(edges, bind(mesh, pose, self.kin), pose)
+        for moved in self.sent(mesh, pose):
+            bad |= self._torn(mesh.vertices, moved, edges)
+        intact = drop_small(clean(Mesh.of(mesh.vertices, mesh.faces[~bad])), SMALLEST)
+        return close_holes(intact, HOLE * mesh.diagonal)
+
+    def _joined(self, pieces: Sequence[Mesh], voxel: float) -> Mesh:
+        if self.poisson is not None:
+            pieces = [subdivide_midpoint(piece) for piece in pieces]
+            points = np.concatenate([piece.vertices for piece in pieces])
+            normals = np.concatenate([vertex_normals(piece) for piece in pieces])
+            return poisson_surface(points, normals, self.poisson, self.edge)
+        mean = MeanSurface(voxel * self.edge, MeanOptions(reach=REACH, past=PAST))
+        for piece in pieces:
+            mean.add(piece)
+        return mean.surface(1)
+
+    def _moved(self, t: int, pose: Pose) -> tuple[Points, Int32[np.ndarray, "F 3"]]:
+        """Return a frame's vertices in a pose, and those of its faces that do not tear on the way."""
+        frame, binding = self.frames[t], self.bindings[t]
+        points = move(frame.vertices, binding, center_motions(self.positions[t], pose, self.kin), self.kin)
+        spoiled = np.zeros(len(points), bool)
+        spoiled[frame.faces[self.parting[t] | self._torn(frame.vertices, points, self.edges[t])]] = True
+        faces = frame.faces[~spoiled[frame.faces].any(axis=1)]
+        faces = faces[large_pieces(faces, len(points), SMALLEST)]  # else: bound to the wrong body's centers
+        return points, faces
+
+    def _parting(self, edges: Edges, binding: Binding, pose: Pose) -> Bool[np.ndarray, " F"]:
+        """Return the faces that join centers which are much farther from each other in some frame than in this pose."""
+        i, j = binding.nearest[edges[0]].T
+        now = np.linalg.norm(pose[i] - pose[j], axis=1)
+        return (self.distances[i, j] > TORN * now + self.spacing / 2)[edges[1]].any(axis=1)
+
+    def _torn(self, source: Points, target: Points, edges: Edges) -> Bool[np.ndarray, " F"]:
+        """Return the faces with an edge that is much longer in one pose than in the other."""
+        before, after = _lengths(source, edges[0]), _lengths(target, edges[0])
+        far = np.maximum(before, after) > TORN * np.minimum(before, after) + self.spacing / 2
+        return far[edges[1]].any(axis=1)
+
+    def _around(self, amounts: Float64[np.ndarray, " K"]) -> Float64[np.ndarray, " K"]:
+        """Sum amounts over each center's neighbourhood: surface passes between neighbours from frame to frame."""
+        return np.sum(amounts[self.kin.indices] * self.kin.affinities, axis=1)
+
+
+def _lengths(vertices: Points, edges: np.ndarray) -> Float64[np.ndarray, " E"]:
+    return np.linalg.norm(vertices[edges[:, 0]] - vertices[edges[:, 1]], axis=1)

@@ -21,7 +21,11 @@ from ...errors import InputError
 from ...geometry.inside import Samples, interior_samples
 from ...geometry.strict import exp
 from ...types import Centers, Mesh
+from .centers import Pose
 
+Points = Float64[np.ndarray, "N 3"]  # samples of the volume
+Owners = Int32[np.ndarray, " N"]  # the center that owns each sample
+Matrices = Float64[np.ndarray, "K 3 3"]  # of each center
 LEAST_AFFINITY = 1e-3  # weaker neighbours are dropped: a guess
 FEWEST_NEIGHBOURS = 4  # always kept, since fewer do not determine a rotation
 FEWEST_CENTERS = 4  # of a body, for the same reason
@@ -77,13 +81,11 @@ def _samples(frames: Sequence[Mesh], t: int, options: TrackOptions) -> Samples:
     return interior_samples(frame, options.samples, np.random.default_rng((SEED, t)))
 
 
-def _spread_over_bodies(
-    samples: Samples, options: TrackOptions
-) -> tuple[Float64[np.ndarray, "K 3"], Int32[np.ndarray, " K"], Int32[np.ndarray, " N"]]:
+def _spread_over_bodies(samples: Samples, options: TrackOptions) -> tuple[Pose, Int32[np.ndarray, " K"], Owners]:
     """Return the centers of the first frame, the body of each center, and the center that owns each sample."""
     generator = np.random.default_rng((SEED, 0, 1))
     owners = np.zeros(len(samples.points), np.int32)
-    places: list[Float64[np.ndarray, "K 3"]] = []
+    places: list[Pose] = []
     counts = _shares(np.bincount(samples.bodies), options.centers)
     for body, count in enumerate(counts):
         mine = np.flatnonzero(samples.bodies == body)
@@ -103,9 +105,7 @@ def _shares(sizes: Int64[np.ndarray, " B"], centers: int) -> Int64[np.ndarray, "
     return np.minimum(counts, sizes)
 
 
-def _follow(
-    track: list[Float64[np.ndarray, "K 3"]], samples: Samples, graph: _Affinities
-) -> tuple[Float64[np.ndarray, "K 3"], Float64[np.ndarray, "K 3 3"], Int32[np.ndarray, " N"]]:
+def _follow(track: list[Pose], samples: Samples, graph: _Affinities) -> tuple[Pose, Matrices, Owners]:
     """Return the centers in the next frame, the rotation of each on the way there, and the owner of each sample."""
     centers = 2 * track[-1] - track[-2] if len(track) > 1 else track[-1].copy()
     rotations = np.zeros((len(centers), 9))
@@ -113,7 +113,7 @@ def _follow(
     offsets, indices, weights = graph.lists()
     _core.follow_centers(
         samples.points, track[-1], offsets, indices, weights, centers, rotations, owners,
-        SPREAD, RIGIDITY, TOLERANCE, ROUNDS,
+        SPREAD, RIGIDITY, TOLERANCE, ROUNDS
     )  # fmt: skip
     return centers, rotations.reshape(-1, 3, 3), owners
 
@@ -121,7 +121,7 @@ def _follow(
 class _Affinities:
     """Affinities of pairs of centers that are near in the first frame; distance and different motion weaken them."""
 
-    def __init__(self, centers: Float64[np.ndarray, "K 3"], bodies: Int32[np.ndarray, " K"]) -> None:
+    def __init__(self, centers: Pose, bodies: Int32[np.ndarray, " K"]) -> None:
         rows, columns = [np.zeros(0, np.int64)], [np.zeros(0, np.int64)]
         for body in range(int(bodies.max()) + 1):
             mine = np.flatnonzero(bodies == body)
@@ -135,14 +135,7 @@ class _Affinities:
         self._distance = _squared(centers[self._i] - centers[self._j])  # largest so far, squared
         self._difference = np.zeros(len(self._i))  # of motion, largest so far, squared
 
-    def learn(
-        self,
-        before: Float64[np.ndarray, "K 3"],
-        now: Float64[np.ndarray, "K 3"],
-        rotations: Float64[np.ndarray, "K 3 3"],
-        points: Float64[np.ndarray, "N 3"],
-        owners: Int32[np.ndarray, " N"],
-    ) -> None:
+    def learn(self, before: Pose, now: Pose, rotations: Matrices, points: Points, owners: Owners) -> None:
         """Weaken affinities by one step: by the distances after it, and by how differently two centers' motions move
         the samples that one of them owned before it.
         """
@@ -170,13 +163,11 @@ def _offsets(rows: Int64[np.ndarray, " P"], count: int) -> Int32[np.ndarray, " K
     return np.concatenate([[0], np.cumsum(np.bincount(rows, minlength=count))]).astype(np.int32)
 
 
-def _squared(differences: Float64[np.ndarray, "N 3"]) -> Float64[np.ndarray, " N"]:
+def _squared(differences: Points) -> Float64[np.ndarray, " N"]:
     return np.einsum("ij,ij->i", differences, differences)
 
 
-def _moments(
-    points: Float64[np.ndarray, "N 3"], owners: Int32[np.ndarray, " N"], centers: Float64[np.ndarray, "K 3"]
-) -> tuple[Float64[np.ndarray, "K 3"], Float64[np.ndarray, "K 3 3"]]:
+def _moments(points: Points, owners: Owners, centers: Pose) -> tuple[Pose, Matrices]:
     """Return mean and covariance of the samples that each center owns; of the center itself if it owns none."""
     count = len(centers)
     size = np.maximum(np.bincount(owners, minlength=count), 1)

@@ -1,23 +1,41 @@
 """Fuse the still surface of many frames into one background mesh (paper, section 3.2; decision 19).
 
-In: the still faces of some frames. Out: one mesh. Signed distances to the surfaces of the frames are averaged, which
-reduces noise, and surface that people hide in one frame comes from others.
+In: the still faces of some frames, or their depth pictures. Out: one mesh. Signed distances to the surfaces of the
+frames are averaged, which reduces noise, and surface that people hide in one frame comes from others. Of depth, the
+median over time of every pixel is fused, which lies on a surface and has less noise, so voxels may be finer. Cameras
+must not move; a sequence that offers depth pictures has checked that.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from dataclasses import dataclass, replace
 
-from ...geometry.reconstruct import MeanOptions, MeanSurface
-from ...geometry.topology import without_fragments
+import numpy as np
+from jaxtyping import Bool, Float32
+from scipy.ndimage import binary_dilation
+
+from ...geometry.cameras import Rays, pixels_near
+from ...geometry.depth import STEP, DepthPicture, FreeSpace, inverse_depths
+from ...geometry.reconstruct import ALONE, GRAZING, SEEN, MeanOptions, MeanSurface, close_holes, extract, integrate
+from ...geometry.topology import face_normals, part_of, without_fragments
 from ...types import Mesh
 
 FRAMES = 20  # of a scene: largest number of fused frames, spread over the sequence (decision 19)
-SEEN = 0.15  # smallest share of the frames that must have surface at a voxel (decision 19)
+SHARED = 0.15  # smallest share of the frames that must have surface at a voxel (decision 19)
 STEADY = 0.6  # voxels: where the standard deviation of the distances is larger, the surface was not still (decision 19)
 PAST = 0.5  # voxels by which a surface is continued past its border, so that borders do not recede (decision 19)
 FRAGMENT = 0.02  # m^2: connected pieces with less area are dropped (decision 19)
+RIM = 3  # pixels around moving surface that are ignored: a guess
+HIDDEN = np.float32(-1)  # in place of a depth: moving surface hides the still surface there
+OPEN = 0.3  # least share of the moments in which a pixel is not hidden that must have a depth there (guess)
+SIMILAR = 4.0  # times the noise, standard deviation of the inverse depths that are averaged (decision 28)
+SECOND_MEDIAN = 0.6745 * 6**0.5  # of the absolute second difference of normally distributed values, in deviations
+FINER_VOXEL = 0.75  # in voxels of the frames: averaged depth has less noise (decision 19)
+FACING = 0.15  # cosine: faces that no camera sees more frontally lie between two real surfaces (decision 19)
+HOLE = 0.4  # m: shorter loops of its border are closed where no camera saw through (decision 28)
+FINER = 3  # times the rows and columns of the pictures, interpolated, that are fused (decision 28)
 
 
 def fuse_background(frames: Iterable[Mesh], voxel: float) -> Mesh:
@@ -32,4 +50,123 @@ def fuse_background(frames: Iterable[Mesh], voxel: float) -> Mesh:
 
 def least_frames(count: int) -> int:
     """Return how many of `count` frames must have surface at a voxel."""
-    return max(1, math.ceil(SEEN * count))
+    return max(1, math.ceil(SHARED * count))
+
+
+SMOOTH, SPREAD, ROUNDS = 2, 1.5, 2  # pixels around, standard deviation in pixels, and rounds of smoothing (decision 28)
+
+
+@dataclass(frozen=True, slots=True)
+class Moment:
+    """Depth pictures and mesh of one frame of a scene, and the still faces of the mesh."""
+
+    pictures: list[DepthPicture | None]  # one for each camera
+    mesh: Mesh
+    still: Bool[np.ndarray, " F"]
+
+
+def fuse_still_depth(moments: Iterable[Moment], voxel: float) -> Mesh:
+    """Fuse the still surface in the depth pictures of some moments; `voxel` (m) is that of the frames' meshes."""
+    usual = usual_pictures(moments)
+    if not usual:
+        return Mesh.empty()
+    usual = [_smooth(picture) for picture in usual]
+    fine = [picture.finer(FINER) for picture in usual]
+    past = [_continued(picture).finer(FINER) for picture in usual]
+    mesh = extract(integrate(fine, FINER_VOXEL * voxel, GRAZING if len(usual) > 1 else ALONE, past), SEEN)
+    whole = without_fragments(_facing(mesh, usual, FACING), FRAGMENT)
+    return close_holes(whole, HOLE, FreeSpace.of(usual).at)
+
+
+def usual_pictures(moments: Iterable[Moment]) -> list[DepthPicture]:
+    """Return for each camera the median depth of every pixel over the moments in which it sees still surface."""
+    stacks: dict[int, list[np.ndarray]] = {}
+    cameras: dict[int, DepthPicture] = {}
+    for moment in moments:
+        rays = Rays(moment.mesh)
+        for number, picture in enumerate(moment.pictures):
+            if picture is not None:
+                cameras[number] = picture
+                stacks.setdefault(number, []).append(_still(picture, rays, moment))
+    usual = list[DepthPicture]()
+    for number, stack in sorted(stacks.items()):
+        depth = _medians(np.stack(stack))
+        if depth.any():
+            usual.append(DepthPicture(cameras[number].camera, depth, cameras[number].unit, cameras[number].far))
+    return usual
+
+
+def _still(picture: DepthPicture, rays: Rays, moment: Moment) -> np.ndarray:
+    """Return the depths of a picture; `HIDDEN` at pixels that see moving faces, and within `RIM` of them."""
+    moves = pixels_near(picture.camera, Mesh(moment.mesh.vertices, moment.mesh.faces[~moment.still]))
+    faces = rays.faces_in(picture.camera, moves)  # of the whole mesh: still faces may hide moving ones
+    moves[moves] = (faces >= 0) & ~np.append(moment.still, True)[faces]
+    return np.where(binary_dilation(moves, iterations=RIM), HIDDEN, picture.depth.astype(np.float32))
+
+
+def _medians(stack: Float32[np.ndarray, "T H W"]) -> Float32[np.ndarray, "H W"]:
+    """Return for each pixel the median of its depths above 0; 0 where there are too few.
+
+    A door that soon opens is measured a few times only, and the surface behind it perhaps never.
+    """
+    depths = np.sort(np.where(stack > 0, stack, np.inf), axis=0)
+    count = np.isfinite(depths).sum(axis=0)
+    least = np.maximum(least_frames(len(stack)), OPEN * (stack >= 0).sum(axis=0))
+    low, high = (np.take_along_axis(depths, np.maximum(at, 0)[None], 0)[0] for at in ((count - 1) // 2, count // 2))
+    return np.where(count >= least, (low + high) / 2, 0).astype(np.float32)
+
+
+def _smooth(picture: DepthPicture) -> DepthPicture:
+    """Smooth a depth picture along surfaces: sensors round depth to steps, which averaging over time does not remove.
+
+    Inverse depths are averaged, so that planes stay planes, with neighbours at a similar depth.
+    """
+    inverse = inverse_depths(picture.depth)
+    (height, width), similar = inverse.shape, np.float32(max(SIMILAR * _noise(inverse), 1e-6))
+    places = range(-SMOOTH, SMOOTH + 1)
+    for _ in range(ROUNDS):
+        padded, around = np.pad(inverse, SMOOTH), np.maximum(inverse, np.float32(1e-9))
+        sums, weights = np.zeros_like(inverse), np.zeros_like(inverse)
+        for down in places:
+            for right in places:
+                shifted = padded[SMOOTH + down : SMOOTH + down + height, SMOOTH + right : SMOOTH + right + width]
+                offset = (shifted - inverse) / (similar * around)
+                weight = np.exp(-(offset**2) / 2 - np.float32((down**2 + right**2) / (2 * SPREAD**2))) * (shifted > 0)
+                sums += weight * shifted
+                weights += weight
+        inverse = np.where(inverse > 0, sums / np.maximum(weights, np.float32(1e-9)), 0)
+    return replace(picture, depth=inverse_depths(inverse))
+
+
+def _continued(picture: DepthPicture) -> DepthPicture:
+    """Return a depth picture's surfaces continued a pixel past their borders, behind nearer surface or a hole.
+
+    On a grid each surface ends a voxel before the one that hides it, which would leave a gap in the room.
+    """
+    inverse, farthest = np.pad(inverse_depths(picture.depth), 1), np.zeros((1, 1), np.float32)
+    for axis, way in ((0, 1), (0, -1), (1, 1), (1, -1)):
+        depth, before = np.roll(inverse, way, axis), np.roll(inverse, 2 * way, axis)
+        guess = np.where(np.abs(depth - before) <= STEP * depth, 2 * depth - before, depth)
+        hidden = (depth > 0) & ((inverse == 0) | (guess < (1 - STEP) * inverse))
+        farthest = np.maximum(farthest, np.where(hidden, guess, 0))  # the nearest of several
+    return replace(picture, depth=inverse_depths(farthest[1:-1, 1:-1]))
+
+
+def _noise(inverse: Float32[np.ndarray, "H W"]) -> float:
+    """Return the typical noise of inverse depths, as a share of them, from second differences: 0 on planes."""
+    differences = np.abs(inverse[:, :-2] - 2 * inverse[:, 1:-1] + inverse[:, 2:])
+    measured = (inverse[:, :-2] > 0) & (inverse[:, 1:-1] > 0) & (inverse[:, 2:] > 0)
+    shares = differences[measured] / inverse[:, 1:-1][measured]
+    return float(np.median(shares)) / SECOND_MEDIAN if len(shares) else 0.0
+
+
+def _facing(mesh: Mesh, pictures: list[DepthPicture], least: float) -> Mesh:
+    """Drop the faces that no camera sees frontally, with at least this cosine between its ray and the normal."""
+    if mesh.is_empty:
+        return mesh
+    normals, middles = face_normals(mesh)[0], mesh.vertices[mesh.faces].mean(axis=1)
+    best = np.full(len(middles), -1.0)
+    for picture in pictures:
+        rays = picture.camera.eye - middles
+        best = np.maximum(best, (rays * normals).sum(axis=1) / np.maximum(np.linalg.norm(rays, axis=1), 1e-12))
+    return part_of(mesh, best >= least)

@@ -1,6 +1,7 @@
-"""Labels of moving faces, from moving places or from masks, behind one protocol (paper, section 3.2).
+"""Labels of moving faces, from moving places or from masks (paper, section 3.2).
 
 In: the number and the mesh of a frame. Out: a label for each face, and the faces that a change of the room affects.
+Masks of views are lifted to faces by votes: each pixel votes on the face that it sees (eqs. 1 to 4).
 """
 
 from __future__ import annotations
@@ -8,60 +9,23 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, Protocol, runtime_checkable
+from typing import Any
 
 import numpy as np
-from jaxtyping import Bool, Float64, Int64, UInt8
+from jaxtyping import Bool, Float64, Int32, Int64, UInt8
 from scipy.spatial import cKDTree
 
 from ...geometry.cameras import Camera, Rays, Seen
 from ...geometry.topology import connected_faces, face_normals, unique_edges
 from ...geometry.voxels import Lattice, spread
 from ...types import Mesh
-from .color_change import ColorChange
+from .color_looks import ColorChange
+from .cut import NEAR_CHANGE, NEVER, Rest
 from .masks import Masker
-from .settle import NEAR_CHANGE, NEVER, Rest
-from .votes import Votes
 
 _REMEMBERED = 600  # frames whose labels are kept, some 50 kB each: a guess, enough for seconds of a scene
 _FLICKER_AREA = 0.2  # m^2: smaller separate moving surface beside an object at rest is flicker (decision 28)
 _ELSEWHERE = 2.0  # cells: surface farther from the middle of every known place is at no place (decision 18)
-
-
-@runtime_checkable
-class Segmentation(Protocol):
-    """Labels of the moving faces of every frame of a scene, and the frames in which the room itself changes."""
-
-    @property
-    def cell(self) -> float:
-        """Usual length of the frames' edges, m."""
-        ...
-
-    @property
-    def noise(self) -> float:
-        """Scale of the frames' noise, m, at least one cell: a distance of several times this is not noise."""
-        ...
-
-    @property
-    def changes(self) -> list[int]:
-        """Numbers of the first frames after each change of the room, ascending."""
-        ...
-
-    def moving(self, frame: int, mesh: Mesh) -> Bool[np.ndarray, " F"]:
-        """Return True for each moving face of `mesh`, which is frame number `frame`."""
-        ...
-
-    def still_at_first(self, frame: int, mesh: Mesh) -> Bool[np.ndarray, " F"]:
-        """Return True for each face of frame `frame` that belongs to the room as it is in the first frame."""
-        ...
-
-    def came(self, change: int, mesh: Mesh) -> Bool[np.ndarray, " F"]:
-        """Return True for each face of `mesh`, any frame, at surface that has become part of the room at `change`."""
-        ...
-
-    def gone(self, change: int, mesh: Mesh) -> Bool[np.ndarray, " F"]:
-        """Return True for each face of `mesh`, any mesh of the room, at surface that has left the room at `change`."""
-        ...
 
 
 @dataclass(slots=True)
@@ -104,6 +68,7 @@ class ByPlace:
 
     @property
     def changes(self) -> list[int]:
+        """Numbers of the first frames after each change of the room, ascending."""
         return self.rest.changes
 
     def moving(self, frame: int, mesh: Mesh) -> Bool[np.ndarray, " F"]:
@@ -132,15 +97,16 @@ class ByPlace:
         return kept
 
     def still_at_first(self, frame: int, mesh: Mesh) -> Bool[np.ndarray, " F"]:
+        """Return True for each face of a frame that belongs to the room as it is in the first frame."""
         still = self.faces_at(mesh, ~self.chosen | (self.rest.until > frame))
         return still if self.colors is None else still & ~self.moving(frame, mesh)
 
     def came(self, change: int, mesh: Mesh) -> Bool[np.ndarray, " F"]:
-        """Return True for each face at a place that rests from `change` on."""
+        """Return True for each face of any frame at a place that rests from `change` on: it is part of the room now."""
         return self.faces_at(mesh, self.rest.since == change)
 
     def gone(self, change: int, mesh: Mesh) -> Bool[np.ndarray, " F"]:
-        """Return True for each face at a place that rests until `change`."""
+        """Return True for each face of any mesh of the room at a place that rests until `change`: it leaves then."""
         return self.faces_at(mesh, self.rest.until == change)
 
     def faces_at(self, mesh: Mesh, chosen: Bool[np.ndarray, " P"], elsewhere: bool = False) -> Bool[np.ndarray, " F"]:
@@ -231,6 +197,9 @@ class ByMasks:
         return without_islands(mesh, moves, self.island)
 
 
+Segmentation = ByPlace | ByMasks  # labels of a scene's frames
+
+
 def looks(mesh: Mesh, views: Sequence[Camera]) -> list[Seen]:
     """Render a mesh in each view."""
     rays = Rays(mesh)
@@ -284,3 +253,24 @@ def _filled(mesh: Mesh, moves: Bool[np.ndarray, " F"], labelled: Bool[np.ndarray
             return moves
         moves[reached] = 2 * votes[face_edges[reached]].sum(axis=1) > weight[face_edges[reached]].sum(axis=1)
         labelled |= reached
+
+
+@dataclass(frozen=True, slots=True)
+class Votes:
+    """Numbers of pixels, over all views, that see each face (U) and that see it as moving (V)."""
+
+    dynamic: Int64[np.ndarray, " F"]  # eq. 2; at most `seen`
+    seen: Int64[np.ndarray, " F"]  # eq. 3; 0: no view sees the face
+
+    @staticmethod
+    def of(ids: Int32[np.ndarray, "X H W"], masks: Bool[np.ndarray, "X H W"], faces: int) -> Votes:
+        """Count the votes on `faces` faces; `ids`: the face that each pixel sees, -1: none; `masks`: moving pixels."""
+        assert ids.shape == masks.shape, "one mask per view"
+        hit = ids >= 0
+        dynamic = np.bincount(ids[hit & masks], minlength=faces)  # eq. 2
+        return Votes(dynamic, np.bincount(ids[hit], minlength=faces))  # eq. 3
+
+    @property
+    def score(self) -> Float64[np.ndarray, " F"]:
+        """Share of the pixels seeing a face that call it moving, 0 to 1; 0 for a face that no view sees."""
+        return self.dynamic / np.maximum(self.seen, 1)  # eq. 4

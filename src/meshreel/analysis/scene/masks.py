@@ -1,24 +1,147 @@
-"""Masks of moving pixels from image files or from a tracker, behind one protocol (paper, section 3.2).
+"""Masks of moving pixels, from image files or a tracker, and pictures for tools that make them (paper, section 3.2).
 
-In: the faces and depths that the views see in a frame. Out: one mask per view, True at moving surface.
+In: the faces and depths that the views see in a frame, and the pictures of colour cameras if there are any. Out: one
+mask per view, True at moving surface; pictures without lens distortion, or normals as colors, also in folders laid out
+as `ImageMasks` reads them; and sheets of pictures of a segmentation, in the colors of its bodies.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol, runtime_checkable
 
 import numpy as np
-from jaxtyping import Bool, UInt8
+from jaxtyping import Bool, Float64, Integer, UInt8
 
 from ...errors import InputError
-from ...geometry.cameras import Camera, Seen, unpack_cameras
-from ...io.files import read_file
+from ...geometry.cameras import Camera, Rays, Seen, pack_cameras, unpack_cameras
+from ...io.files import read_input
 from ...io.pictures import find_masks, last_number, read_mask
+from ...io.write import frame_names, make_folder, replacing, write_picture
+from ...types import Frames, Mesh
 from .color_looks import ColorLooks
 
+_BODIES = ((214, 39, 40), (31, 119, 180), (44, 160, 44), (255, 127, 14), (148, 103, 189), (23, 190, 207))
+_LIGHT = np.array([0.36, 0.80, 0.48])
+_AMBIENT = 0.45  # share of the color that unlit surface keeps: chosen by eye
+_LEGEND = "light gray: still; colors: moving, one color per body (six in turn); dark gray: moving, part of no body"
+Picture = UInt8[np.ndarray, "H W 3"]
 CAMERAS = "cameras.json"  # file name: Open3D's pinhole camera JSON, beside the folders of the views
+VIEW_FILES = "view_*.json"  # as TSMC's authors release the cameras of a scene
+
+
+def normal_picture(seen: Seen, view: Camera) -> Picture:
+    """Render normals n in world axes as colors (n + 1) / 2; white where nothing is seen.
+
+    Normals are computed from the depths of neighbouring pixels, so they face the camera whatever the orientation of the
+    faces.
+    """
+    ahead = view.ahead
+    hit = np.isfinite(seen.depth)
+    points = np.where(hit, seen.depth, np.nan)[..., None] * ahead
+    normals = np.nan_to_num(np.cross(_step(points, 1), _step(points, 0)))
+    normals *= -np.sign((normals * ahead).sum(axis=-1, keepdims=True))
+    world = np.einsum("hwd,de->hwe", normals, view.extrinsic[:3, :3])
+    world /= np.maximum(np.linalg.norm(world, axis=-1, keepdims=True), 1e-30)
+    colors = np.rint(255 * (world + 1) / 2).astype(np.uint8)
+    return np.where(hit[..., None], colors, np.uint8(255))
+
+
+def write_views(
+    folder: Path,
+    frames: Frames,
+    views: Sequence[Camera],
+    report: Callable[[int], None] = lambda _done: None,
+    colors: ColorLooks | None = None,
+) -> None:
+    """Write pictures of each frame from each view: view00/frame_00000.png ..., and `cameras.json` last.
+
+    The pictures are those in `colors`, if given, whose views these are; else normals. A tool that makes masks from them
+    keeps names and sizes, and puts the same `cameras.json` beside its masks. `report` is called with the number of
+    finished frames.
+    """
+    views = one_size(views, "views")
+    places = [folder / f"view{number:02}" for number in range(len(views))]
+    for place in places:
+        make_folder(place)
+    for number, name in enumerate(frame_names(len(frames), "png")):
+        rays = Rays(frames[number])
+        for view, place in enumerate(places):
+            photo = None if colors is None else colors.at(number, view)
+            picture = normal_picture(rays.look(views[view]), views[view]) if photo is None else photo
+            write_picture(picture, place / name)
+        report(number + 1)
+    with replacing(folder / CAMERAS) as file:
+        file.write(pack_cameras(views))
+
+
+def _step(points: Float64[np.ndarray, "H W 3"], axis: int) -> Float64[np.ndarray, "H W 3"]:
+    """Return the vector to the next point along an axis, to the side that differs less in depth: edges stay sharp."""
+    ahead = np.diff(points, axis=axis)
+    none = np.full_like(np.take(points, [0], axis=axis), np.nan)
+    after, before = np.concatenate([ahead, none], axis=axis), np.concatenate([none, ahead], axis=axis)
+    costs = [np.where(np.isnan(step[..., 2:]), np.inf, np.abs(step[..., 2:])) for step in (after, before)]
+    return np.where(costs[0] <= costs[1], after, before)
+
+
+_RESTS, _NO_BODY = (205, 205, 205), (90, 90, 90)
+_GAP, _LEFT, _TOP, _TEXT = 4, 64, 24, 14  # pixels: between pictures, left of them, above and below them, of text
+
+
+def label_colors(moving: Bool[np.ndarray, " F"], bodies: Integer[np.ndarray, " F"]) -> UInt8[np.ndarray, "F 3"]:
+    """Return a color for each face: light gray if still, one of six by the body's number, dark gray if of no body."""
+    by_body = np.array(_BODIES, np.uint8)[(bodies.astype(np.int64) - 1) % len(_BODIES)]
+    colors = np.where((bodies > 0)[:, None], by_body, np.array(_NO_BODY, np.uint8))
+    return np.where(moving[:, None], colors, np.array(_RESTS, np.uint8))
+
+
+def colored_picture(seen: Seen, view: Camera, colors: UInt8[np.ndarray, "F 3"]) -> Picture:
+    """Render a view in the faces' colors under one light; white where nothing is seen."""
+    normals = normal_picture(seen, view).astype(np.float64) * (2 / 255) - 1
+    light = _AMBIENT + (1 - _AMBIENT) * np.abs(normals @ _LIGHT)
+    hit = seen.faces >= 0
+    picture = np.full((*hit.shape, 3), 255, np.uint8)
+    picture[hit] = np.rint(colors[seen.faces[hit]] * np.minimum(light[hit], 1)[:, None])
+    return picture
+
+
+def look_at_labels(
+    mesh: Mesh, moving: Bool[np.ndarray, " F"], bodies: Integer[np.ndarray, " F"], views: Sequence[Camera]
+) -> tuple[list[Picture], list[int]]:
+    """Return each view's picture, and the number of moving faces that it sees."""
+    rays, colors = Rays(mesh), label_colors(moving, bodies)
+    looks = [rays.look(view) for view in views]
+    pictures = [colored_picture(seen, view, colors) for seen, view in zip(looks, views, strict=True)]
+    return pictures, [int(moving[np.unique(seen.faces[seen.faces >= 0])].sum()) for seen in looks]
+
+
+@dataclass(frozen=True, slots=True)
+class FrameViews:
+    """Pictures of one frame, one for each view."""
+
+    frame: int
+    pictures: Sequence[Picture]
+
+
+def sheet(rows: Sequence[FrameViews], views: Sequence[int]) -> UInt8[np.ndarray, "Y X 3"]:
+    """Draw pictures of one size on a sheet: a row per frame, a column per view, with their numbers and a legend."""
+    from PIL import Image, ImageDraw, ImageFont
+
+    height, width, _ = rows[0].pictures[0].shape
+    size = (_LEFT + len(views) * (width + _GAP), _TOP + len(rows) * (height + _GAP) + _TOP)
+    image = Image.new("RGB", size, "white")
+    draw, font = ImageDraw.Draw(image), ImageFont.load_default(_TEXT)
+    for k, view in enumerate(views):
+        draw.text((_LEFT + k * (width + _GAP), _GAP), f"view {view}", "black", font)
+    for i, row in enumerate(rows):
+        top = _TOP + i * (height + _GAP)
+        draw.text((_GAP, top), f"frame\n{row.frame}", "black", font)
+        for k, picture in enumerate(row.pictures):
+            image.paste(Image.fromarray(picture), (_LEFT + k * (width + _GAP), top))
+    draw.text((_LEFT, size[1] - _TOP + _GAP), _LEGEND, "black", font)
+    return np.asarray(image)
 
 
 @runtime_checkable
@@ -41,7 +164,6 @@ class Masker(Protocol):
 
     def masks(self, frame: int, seen: Sequence[Seen], views: Sequence[Camera]) -> Bool[np.ndarray, "X H W"]:
         """Return the masks of one frame in the order of the views; True: moving."""
-        ...
 
 
 class ImageMasks(Masker):
@@ -54,7 +176,7 @@ class ImageMasks(Masker):
 
     def __init__(self, folder: Path, frames: int) -> None:
         """Read every file of `frames` frames. Raises InputError if one is missing, damaged or of another size."""
-        self.views = read_views(folder)
+        self.views = read_view_file(folder / CAMERAS, "the cameras of the masks, as Open3D pinhole camera JSON")
         self._files = find_masks(folder, len(self.views), frames)
         for view, files in zip(self.views, self._files, strict=True):
             for frame, path in enumerate(files):
@@ -76,14 +198,6 @@ class ImageMasks(Masker):
         return np.stack([read_mask(files[frame]) for files in self._files])
 
 
-def read_views(folder: Path) -> tuple[Camera, ...]:
-    """Read the views, all of one size, from a folder's `cameras.json`. Raises InputError if it is invalid."""
-    return read_view_file(folder / CAMERAS, "the cameras of the masks, as Open3D pinhole camera JSON")
-
-
-VIEW_FILES = "view_*.json"  # as TSMC's authors release the cameras of a scene
-
-
 def read_view_file(path: Path, wanted: str = "Open3D pinhole camera JSON") -> tuple[Camera, ...]:
     """Read views, all of one size, from a file, or from the files `view_00.json` and so on of a folder.
 
@@ -94,18 +208,11 @@ def read_view_file(path: Path, wanted: str = "Open3D pinhole camera JSON") -> tu
         if not files:
             raise InputError(f"{path}: holds no {VIEW_FILES}; give {wanted}, or a folder with such files")
         return one_size([view for file in files for view in read_view_file(file, wanted)], str(path))
-    try:
-        data = read_file(path)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror or error}); give {wanted}") from None
-    return one_size(unpack_cameras(data, str(path)), str(path))
+    return one_size(unpack_cameras(read_input(path, f"give {wanted}"), str(path)), str(path))
 
 
 def one_size(views: Sequence[Camera], name: str) -> tuple[Camera, ...]:
-    """Return the views as a tuple after checking that there is at least one and that all have one picture size.
-
-    Raises InputError, which calls them `name`.
-    """
+    """Return the views as a tuple. Raises InputError, which calls them `name`, if there is none or sizes differ."""
     if not views:
         raise InputError(f"{name}: has 0 cameras; give at least one")
     sizes = sorted({(view.width, view.height) for view in views})

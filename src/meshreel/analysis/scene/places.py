@@ -24,6 +24,9 @@ from ...geometry.topology import face_normals
 from ...geometry.voxels import Lattice, distinct, neighbours, spread
 from ...types import Frames, Mesh, evenly
 
+Mask = Bool[np.ndarray, " P"]  # of places
+Keys = Int64[np.ndarray, " P"]  # of the cells of places, sorted
+_Counted = tuple[Camera, Int32[np.ndarray, "H W"]]  # a camera, and the frames in which each of its pixels has a depth
 _DEEPEST = 65_535  # largest stored depth (uint16), in units of a cell / _FINENESS; 0: nothing seen
 _FINENESS = 16  # units of a stored depth in a cell: a guess
 _TOGETHER = 32  # frames whose pictures are in memory together, so that places are projected once for all: a guess
@@ -41,10 +44,6 @@ def inspected(count: int, frame_rate: float) -> list[int]:
 Report = Callable[[float], None]  # receives the share of the work that is done, 0 to 1
 
 
-def silent(share: float) -> None:
-    del share
-
-
 @dataclass(frozen=True, slots=True)
 class Observations:
     """Frames, the views of them, and the depth pictures that cameras took of each frame, if there are any."""
@@ -52,7 +51,7 @@ class Observations:
     frames: Sequence[Mesh] | Frames
     views: Sequence[Camera]
     pictures: Callable[[int], list[DepthPicture | None]] | None = None  # of a frame: one for each camera
-    report: Report = silent  # called with the progress of `find_places`
+    report: Report = lambda _share: None  # called with the progress of `find_places`
 
     def observe(self, number: int, lattice: Lattice) -> _Observation:
         points, _ = spread(mesh := self.frames[number], 1.5 * lattice.size)
@@ -85,7 +84,7 @@ class Tally:
         none = np.full(places, -1, np.int32)
         self._after, self._before = (Stay(none.copy(), np.zeros(places, np.int32)) for _ in range(2))
 
-    def add(self, occupied: Bool[np.ndarray, " P"], free: Bool[np.ndarray, " P"]) -> None:
+    def add(self, occupied: Mask, free: Mask) -> None:
         early = occupied & (self.free == 0)
         self._before.first[early] = self.frames
         self._before.count[early] += 1
@@ -128,7 +127,7 @@ class Places:
     """Cells of a scene that have surface in any inspected frame, and the counts of observations there."""
 
     lattice: Lattice
-    keys: Int64[np.ndarray, " P"]  # sorted
+    keys: Keys  # sorted
     beside: Int32[np.ndarray, "P 26"]  # numbers of the neighbouring places; a place's own number where there is none
     normals: Float64[np.ndarray, "P 3"]  # mean normal of the surface there, unit length; 0 where normals cancel
     tally: Tally
@@ -160,18 +159,19 @@ def find_places(observed: Observations, lattice: Lattice) -> Places:
     Meshes are in memory one at a time. Takes about 1 s of CPU for a frame of 500,000 faces.
     """
     passes = len(observed.frames) + max(0, len(observed.frames) - _TOGETHER)
-    observations, cells, cameras = list[_Observation](), _Known(), _Cameras()
+    observations, cells, cameras = list[_Observation](), _Known(), dict[int, _Counted]()
     for number in range(len(observed.frames)):
         occupied_cells, normals = _cells(mesh := observed.frames[number], lattice)
         cells.add(occupied_cells, normals)
         if number < _TOGETHER:
             observations.append(observed.of_mesh(number, mesh, occupied_cells, lattice))
-            cameras.add(observations[-1].measured)
+            _count_depths(cameras, observations[-1].measured)
         elif observed.pictures is not None:
-            cameras.add(observed.pictures(number))
+            _count_depths(cameras, observed.pictures(number))
         observed.report((number + 1) / passes)
     keys, normals = cells.places()
-    places = Places(lattice, keys, neighbours(keys), normals, Tally(len(keys)), cameras.eyes())
+    eyes = {number: Eye(camera, 2 * count >= len(observed.frames)) for number, (camera, count) in cameras.items()}
+    places = Places(lattice, keys, neighbours(keys), normals, Tally(len(keys)), eyes)
     for occupied, free in _states(observations, places, observed.views):
         places.tally.add(occupied, free)
     observations.clear()
@@ -181,18 +181,14 @@ def find_places(observed: Observations, lattice: Lattice) -> Places:
     return places
 
 
-def states(
-    observed: Observations, numbers: range, places: Places
-) -> Iterator[tuple[Bool[np.ndarray, " P"], Bool[np.ndarray, " P"]]]:
+def states(observed: Observations, numbers: range, places: Places) -> Iterator[tuple[Mask, Mask]]:
     """Yield for each frame in `numbers` two masks of places: occupied ones, and others that are seen free."""
     for start in range(0, len(numbers), _TOGETHER):
         together = (observed.observe(number, places.lattice) for number in numbers[start : start + _TOGETHER])
         yield from _states(list(together), places, observed.views)
 
 
-def _states(
-    frames: Sequence[_Observation], places: Places, views: Sequence[Camera]
-) -> Iterator[tuple[Bool[np.ndarray, " P"], Bool[np.ndarray, " P"]]]:
+def _states(frames: Sequence[_Observation], places: Places, views: Sequence[Camera]) -> Iterator[tuple[Mask, Mask]]:
     """Yield the states of the places in frames whose observations are in memory; see `states`."""
     seen_past = np.zeros((len(frames), len(places.keys)), np.uint8)
     middles, size = places.middles, places.lattice.size
@@ -207,9 +203,7 @@ def _states(
         yield occupied, ((counts >= _VIEWS) & ~doubtful | clear) & ~occupied
 
 
-def _sensed(
-    frames: Sequence[_Observation], places: Places, reach: float
-) -> Iterator[tuple[Bool[np.ndarray, " P"], Bool[np.ndarray, " P"]]]:
+def _sensed(frames: Sequence[_Observation], places: Places, reach: float) -> Iterator[tuple[Mask, Mask]]:
     """Yield masks of the doubtful and of the clear places in each frame, by the depths that cameras measured.
 
     Doubtful: a camera that usually measures there measured nothing more than `reach` (m) past the place. Clear: a
@@ -232,23 +226,12 @@ def _sensed(
         yield expected & ~past, clear
 
 
-class _Cameras:
-    """Cameras of the frames added so far, with counts of the frames in which each pixel has a depth."""
-
-    def __init__(self) -> None:
-        self._frames = 0
-        self._counts: dict[int, tuple[Camera, Int32[np.ndarray, "H W"]]] = {}
-
-    def add(self, pictures: Sequence[DepthPicture | None] | None) -> None:
-        self._frames += 1
-        for number, picture in enumerate(pictures or ()):
-            if picture is not None:
-                none = np.zeros(picture.depth.shape, np.int32)
-                self._counts.setdefault(number, (picture.camera, none))[1][picture.depth > 0] += 1
-
-    def eyes(self) -> dict[int, Eye]:
-        """Return the cameras that took at least one picture, by number."""
-        return {number: Eye(camera, 2 * count >= self._frames) for number, (camera, count) in self._counts.items()}
+def _count_depths(cameras: dict[int, _Counted], pictures: Sequence[DepthPicture | None] | None) -> None:
+    """Add the pictures of a frame to the counts of their cameras."""
+    for number, picture in enumerate(pictures or ()):
+        if picture is not None:
+            none = np.zeros(picture.depth.shape, np.int32)
+            cameras.setdefault(number, (picture.camera, none))[1][picture.depth > 0] += 1
 
 
 class _Known:
@@ -264,7 +247,7 @@ class _Known:
         if len(self._new) == _TOGETHER:  # merging after every frame would sort all keys each time
             self._take()
 
-    def places(self) -> tuple[Int64[np.ndarray, " P"], Float64[np.ndarray, "P 3"]]:
+    def places(self) -> tuple[Keys, Float64[np.ndarray, "P 3"]]:
         """Return the sorted keys of the cells, and the mean normals there, of unit length; 0 where they cancel."""
         self._take()
         length = np.linalg.norm(self._sums, axis=1, keepdims=True)
@@ -295,9 +278,7 @@ def _stored(rays: Rays, view: Camera, unit: float) -> UInt16[np.ndarray, "H W"]:
     return np.clip(np.rint(depth / unit), 0, _DEEPEST).astype(np.uint16)
 
 
-def _near(
-    keys: Int64[np.ndarray, " P"], beside: Int32[np.ndarray, "P 26"], own: Int64[np.ndarray, " C"]
-) -> Bool[np.ndarray, " P"]:
+def _near(keys: Keys, beside: Int32[np.ndarray, "P 26"], own: Int64[np.ndarray, " C"]) -> Mask:
     """Return True for each place that has surface of a frame (its cells are `own`) in it or in a neighbouring place."""
     occupied = np.zeros(len(keys), bool)
     occupied[np.searchsorted(keys, own)] = True

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
@@ -22,10 +22,8 @@ from jaxtyping import Bool, Float32, Int32, UInt8
 from ...errors import InputError
 from ...geometry.cameras import Camera, Seen
 from .color_looks import ColorLooks
-from .hypotheses import Hypotheses, HypothesisOptions, hypotheses, moving_in_views, reference_view, tour
-from .masks import Masker
-from .motion import thinned
-from .pictures import normal_picture
+from .hypotheses import OVERLAP, VARIATION, Hypotheses, hypotheses, moving_in_views, reference_view, thinned, tour
+from .masks import Masker, Picture, normal_picture
 from .sam3_trackers import PointTracker, WordTracker
 
 AUTOMATIC = ("person", "animal", "vehicle", "object")  # default prompts: things that may move; a guess
@@ -39,7 +37,8 @@ class Sam3Options:
     reference: int | None = None  # number of the view that is tracked over time; None: the one with most changes
     prompt_by: PromptBy = "words"  # prompts of objects: words, or points at which the reference view sees motion
     device: str = "cpu"  # torch's name of a device: cpu, cuda, cuda:1 ...
-    hypotheses: HypothesisOptions = field(default_factory=HypothesisOptions)
+    variation: float = VARIATION  # smallest variation over time of a moving object's mask
+    overlap: float = OVERLAP  # smallest intersection over union of two masks of one object
 
 
 class Sam3Masks(Masker):
@@ -60,7 +59,7 @@ class Sam3Masks(Masker):
         self._options = options
         self._chosen = options.reference
         self._colors: ColorLooks | None = None
-        self._pictures: list[UInt8[np.ndarray, "H W 3"]] = []
+        self._pictures: list[Picture] = []
         self._depths: list[Float32[np.ndarray, "h w"]] = []
         self._moving: Hypotheses | None = None
         self._known: dict[int, UInt8[np.ndarray, " B"]] = {}
@@ -100,7 +99,7 @@ class Sam3Masks(Masker):
         order = tour(views, self._reference(views))
         pictures = [self._picture(frame, number, seen, views) for number in order]
         tracked = self._tracker.through_views(pictures, moving.objects[frame])
-        objects = moving_in_views(tracked, moving, frame, self._options.hypotheses)
+        objects = moving_in_views(tracked, moving, frame, self._options.overlap)
         return objects[np.argsort(order)]
 
     def _hypotheses(self) -> Hypotheses:
@@ -108,13 +107,11 @@ class Sam3Masks(Masker):
         if self._moving is None:
             assert self._pictures, "observe the frames first"
             tracked = self._tracker.over_time(self._pictures, self._depths)
-            self._moving = hypotheses(tracked, self._options.hypotheses)
+            self._moving = hypotheses(tracked, self._options.variation)
             self._pictures, self._depths = [], []
         return self._moving
 
-    def _picture(
-        self, frame: int, number: int, seen: Sequence[Seen], views: Sequence[Camera]
-    ) -> UInt8[np.ndarray, "H W 3"]:
+    def _picture(self, frame: int, number: int, seen: Sequence[Seen], views: Sequence[Camera]) -> Picture:
         photo = None if self._colors is None else self._colors.at(frame, number)
         return normal_picture(seen[number], views[number]) if photo is None else photo
 

@@ -15,8 +15,7 @@ from jaxtyping import Float32, Int32, UInt8
 from scipy.ndimage import label
 
 from ...errors import InputError
-from .hypotheses import Tracked
-from .motion import Prompt, motion_prompts
+from .hypotheses import Prompt, Tracked, motion_prompts
 
 _WORDS = 32  # tokens of a prompt, fixed by the model
 _TOKENIZER = "tokenizer.json, or vocab.json with merges.txt"

@@ -21,13 +21,11 @@ from ...geometry.derived_sequences import CapturedSequence, captured, picked, tu
 from ...geometry.topology import edge_lengths, face_normals
 from ...geometry.voxels import Lattice
 from ...types import Mesh, MeshSequence, evenly
-from . import color_change
-from .color_looks import SIDE, ColorLooks
-from .cut import moving_places
+from .color_looks import CHANGE_SIDE, MOMENTS, SIDE, ColorChange, ColorLooks
+from .cut import Rest, find_rest, moving_places
 from .labelling import ByMasks, ByPlace, looks
 from .masks import Masker
-from .places import Observations, Report, find_places, inspected, silent
-from .settle import Rest, find_rest
+from .places import Observations, Report, find_places, inspected
 from .views import place_views
 
 _PROBES = 3  # frames used to place the views: a guess
@@ -40,7 +38,7 @@ _ISLAND = 0.01  # m^2: connected faces with less area take the label of the face
 Cameras = tuple[Camera, ...]
 
 
-def segment(frames: MeshSequence, cameras: Cameras = (), report: Report = silent) -> ByPlace:
+def segment(frames: MeshSequence, cameras: Cameras = (), report: Report = lambda _share: None) -> ByPlace:
     """Segment a scene by geometric change over the whole sequence.
 
     It is looked at by the given cameras, which are of one size, or by placed ones. If nothing moves and the faces turn
@@ -53,7 +51,7 @@ def segment(frames: MeshSequence, cameras: Cameras = (), report: Report = silent
         return ByPlace(1.0, Lattice(np.zeros(3), 1.0), *nothing, _ISLAND)
     places = _by_place(frames, chosen, cameras, report)
     if not places.chosen.any() and _faces_away(frames[chosen[0]]):
-        reversed_places = _by_place(turned_over(frames), chosen, cameras, silent)
+        reversed_places = _by_place(turned_over(frames), chosen, cameras, lambda _share: None)
         places = reversed_places if reversed_places.chosen.any() else places
     return places
 
@@ -77,9 +75,9 @@ def _by_place(frames: CapturedSequence, chosen: Sequence[int], cameras: Cameras,
         return [_stands(surfaces, [np.isin(k, places.keys[g]) for k in keys], 2 * cell, times * noise) for g in groups]
 
     rest = find_rest(places, moving, chosen, frames.frame_rate, holds)
-    looks = _color_looks(frames, chosen, color_change.SIDE) if moving.any() else None
-    usual = [chosen[number] for number in evenly(len(chosen), color_change.MOMENTS)]
-    colors = None if looks is None else color_change.ColorChange.of(frames, looks, usual, cell)
+    looks = _color_looks(frames, chosen, CHANGE_SIDE) if moving.any() else None
+    usual = [chosen[number] for number in evenly(len(chosen), MOMENTS)]
+    colors = None if looks is None else ColorChange.of(frames, looks, usual, cell)
     return ByPlace(cell, lattice, places.keys, moving, rest, _ISLAND, colors)
 
 
@@ -105,7 +103,7 @@ def segment_by(masker: Masker, frames: MeshSequence, cameras: Cameras = ()) -> B
     return ByMasks(masker, views, edge_length(frames, chosen), _THRESHOLD, _ISLAND)
 
 
-def scene_views(frames: MeshSequence, cameras: Cameras = ()) -> tuple[Camera, ...]:
+def scene_views(frames: MeshSequence, cameras: Cameras = ()) -> Cameras:
     """Return the views of a scene: given cameras, or placed ones. Raises InputError if no frame has a surface."""
     return _views(frames, _to_see(frames), cameras)
 
@@ -136,15 +134,13 @@ def _with_surface(frames: MeshSequence, numbers: Sequence[int]) -> list[int]:
     return [number for number in numbers if not frames[number].is_empty]
 
 
-def _views(frames: MeshSequence, chosen: Sequence[int], cameras: Cameras) -> tuple[Camera, ...]:
+def _views(frames: MeshSequence, chosen: Sequence[int], cameras: Cameras) -> Cameras:
     """Return the given cameras, or views placed for a few of the chosen frames."""
     few = picked(frames, chosen[:: max(1, len(chosen) // _PROBES)])
     return _looking(cameras, frames, chosen) or place_views(few, few.up)
 
 
-def _looking(
-    views: tuple[Camera, ...] | None, frames: MeshSequence, chosen: Sequence[int]
-) -> tuple[Camera, ...] | None:
+def _looking(views: Cameras | None, frames: MeshSequence, chosen: Sequence[int]) -> Cameras | None:
     """Return `views` unchanged. Raises InputError if they see no face of any chosen frame."""
     if views and chosen and not any((s.faces >= 0).any() for k in chosen for s in looks(frames[k], views)):
         text = f"the {len(views)} given cameras see no face in any of {len(chosen)} frames (the first is {chosen[0]})"

@@ -11,7 +11,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
@@ -23,6 +23,7 @@ from ...geometry.strict import dot, norm, products, rounded
 from ...geometry.topology import face_normals
 from ...types import UP_AXES, Frames, Mesh, Up
 
+Place = Float64[np.ndarray, " 3"]
 _TOUCHES = 1e-3  # of a ray's length: a hit this near its end is the sample itself; a guess
 _INSIDE = 0.5  # a place that sees more than this share of its samples from behind is inside an object; a guess
 _SURE = 0.9  # probability that a pixel meets a face of its size; below 1, so that a further view still gains: a guess
@@ -48,25 +49,13 @@ def place_views(
     low = np.min([s.mesh.vertices[s.mesh.faces].min(axis=(0, 1)) for s in samples], axis=0)
     high = np.max([s.mesh.vertices[s.mesh.faces].max(axis=(0, 1)) for s in samples], axis=0)
     places = _outside(_grid(low, high), samples)
-    lens = _Lens(width, height)
+    focal = width / 2 / _ACROSS
+    lens = Camera(width, height, (focal, focal), (width / 2, height / 2))
     candidates = [_looking(eye, turn, lens) for eye, _ in places for turn in _turns(up)]
     pixels = np.empty((len(candidates), sum(len(part.points) for part in samples)), np.float32)  # some 100 MB
     for number, (eye, sees) in enumerate(places):
         pixels[len(_WAYS) * number : len(_WAYS) * (number + 1)] = _pixels(eye, sees, samples, _turns(up), lens)
     return _greedy(candidates, pixels, count)
-
-
-@dataclass(frozen=True, slots=True)
-class _Lens:
-    """Size of the pictures of all views, pixels."""
-
-    width: int
-    height: int
-
-    @property
-    def focal(self) -> float:
-        """Distance of the picture from the eye, pixels."""
-        return self.width / 2 / _ACROSS
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,7 +81,7 @@ class _Samples:
         points = np.einsum("kn,nkd->nd", np.stack([1 - u - v, u, v]), mesh.vertices[mesh.faces[faces]])
         return _Samples(mesh, Rays(mesh), points, faces, normals[faces], areas[faces])
 
-    def seen_from(self, eye: Float64[np.ndarray, " 3"]) -> tuple[np.ndarray, np.ndarray]:
+    def seen_from(self, eye: Place) -> tuple[np.ndarray, np.ndarray]:
         """Return masks of the samples that are visible from `eye`, and of those visible from behind."""
         ahead = self.points - eye
         hit = self.rays.cast(np.broadcast_to(eye, ahead.shape), ahead)
@@ -100,7 +89,7 @@ class _Samples:
         return free, free & ((self.normals * ahead).sum(axis=1) > 0)
 
 
-def _grid(low: np.ndarray, high: np.ndarray) -> list[Float64[np.ndarray, " 3"]]:
+def _grid(low: np.ndarray, high: np.ndarray) -> list[Place]:
     """Return the middles of equal cells of the box as candidate places."""
     step = float((high - low).max()) / _PLACES or 1.0
     parts = [max(1, round(side / step)) for side in (high - low).tolist()]
@@ -108,13 +97,8 @@ def _grid(low: np.ndarray, high: np.ndarray) -> list[Float64[np.ndarray, " 3"]]:
     return list(low + (high - low) * (cells + 0.5) / parts)
 
 
-def _outside(
-    eyes: list[Float64[np.ndarray, " 3"]], samples: list[_Samples]
-) -> list[tuple[Float64[np.ndarray, " 3"], list[np.ndarray]]]:
-    """Return the places that lie inside no object in any frame, with the visible samples of each frame.
-
-    Return all places if none is outside: the faces' orientation is then unreliable.
-    """
+def _outside(eyes: list[Place], samples: list[_Samples]) -> list[tuple[Place, list[np.ndarray]]]:
+    """Return the places inside no object in any frame, or all if none is, with the visible samples of each frame."""
     places, outside = [], []
     for eye in eyes:
         looks = [part.seen_from(eye) for part in samples]
@@ -124,14 +108,10 @@ def _outside(
 
 
 def _pixels(
-    eye: np.ndarray,
-    sees: list[np.ndarray],
-    samples: list[_Samples],
-    turns: Float64[np.ndarray, "W 3 3"],
-    lens: _Lens,
+    eye: np.ndarray, sees: list[np.ndarray], samples: list[_Samples], turns: Float64[np.ndarray, "W 3 3"], lens: Camera
 ) -> Float32[np.ndarray, "W N"]:
     """Return the size in pixels, at most 1, of each sample's face in each viewing direction; all frames in one row."""
-    focal, across = lens.focal, _ACROSS
+    focal, across = lens.focal[0], _ACROSS
     high = across * lens.height / lens.width
     sizes = []
     for part, free in zip(samples, sees, strict=True):
@@ -158,12 +138,11 @@ def _greedy(candidates: list[Camera], pixels: Float32[np.ndarray, "C N"], count:
     return tuple(chosen)
 
 
-def _looking(eye: Float64[np.ndarray, " 3"], turn: Float64[np.ndarray, "3 3"], lens: _Lens) -> Camera:
-    """Return a camera at `eye` with the rotation `turn` from world to camera."""
+def _looking(eye: Place, turn: Float64[np.ndarray, "3 3"], lens: Camera) -> Camera:
+    """Return a camera with this lens at `eye`, with the rotation `turn` from world to camera."""
     extrinsic = np.eye(4)
     extrinsic[:3, :3], extrinsic[:3, 3] = turn, -products(turn, eye[:, None])[:, 0]
-    center = (lens.width / 2, lens.height / 2)
-    return Camera(lens.width, lens.height, (lens.focal, lens.focal), center, CameraPose.of_world(extrinsic))
+    return replace(lens, pose=CameraPose.of_world(extrinsic))
 
 
 @cache

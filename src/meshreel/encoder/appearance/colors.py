@@ -12,9 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...analysis.appearance.bake import bake, picture, texels_of
-from ...analysis.appearance.unwrap import unwrap
-from ...analysis.appearance.vertices import vertex_colors
+from ...analysis.appearance.bake import bake, picture, texels_of, unwrap, vertex_colors
 from ...coding.appearance.atlas import encode_atlas
 from ...coding.colored import Canvas, canvas_of, encode_group_colors, finest_faces
 from ...coding.group import continue_group

@@ -8,8 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ...analysis.appearance.splat_fit import SplatFrame, SplatView, fit_splats
-from ...analysis.appearance.splat_views import GOLDEN, rendered, ring, taken
+from ...analysis.appearance.splat_fit import GOLDEN, SplatFrame, SplatView, fit_splats, rendered, ring, taken
 from ...coding.appearance.splats import encode_splats
 from ...coding.colored import Canvas
 from ...container.writer import Companion

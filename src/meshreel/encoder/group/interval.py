@@ -9,8 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ...analysis.pieces import piece_of_faces
-from ...analysis.survey import Survey
+from ...analysis.survey import Survey, piece_of_faces
 from ...errors import InputError
 from ...geometry.color_views import Paint, Painted
 from ...geometry.depth import FreeSpace

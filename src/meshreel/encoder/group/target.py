@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from ...metrics.distance import PSNR_CEILING, Original, surface_errors
-from ...metrics.normals import WORST_ANGLE
+from ...metrics.surface_samples import WORST_ANGLE
 from ...types import Mesh
 
 

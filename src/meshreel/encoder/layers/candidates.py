@@ -14,13 +14,11 @@ from functools import partial
 import numpy as np
 from jaxtyping import Float64
 
-from ...analysis.fit.closeness import Closeness
-from ...analysis.fit.frame import FrameSurface
+from ...analysis.fit.frame import Closeness, FrameSurface
 from ...analysis.fit.slide import Slide
 from ...analysis.fit.surface_fit import Fitting, strongest_components
 from ...analysis.follow.embedded import Painter, Tracker
-from ...analysis.follow.fused_template import fused_mesh
-from ...analysis.follow.template import LEVELS, base_mesh, shared_detail
+from ...analysis.follow.template import LEVELS, base_mesh, fused_mesh, shared_detail
 from ...coding.layers.coder import LayersState
 from ...coding.reference_mesh import CodedReference, code_on_lattice
 from ...geometry.color_views import Paint

@@ -17,7 +17,7 @@ import numpy as np
 from jaxtyping import Float64
 
 from ...analysis.fit.surface_fit import Fit, FitOptions, Guides, fit_frames, snap_to_vertices
-from ...analysis.groups import cut_at
+from ...analysis.plan import cut_at
 from ...analysis.reference.extraction import MDS, extract_reference, predict
 from ...analysis.reference.track import track_centers
 from ...coding.group import decode_group

@@ -16,8 +16,7 @@ from typing import Any
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from ...analysis.pieces import Piece
-from ...analysis.survey import Survey, joined, survey, survey_of
+from ...analysis.survey import Piece, Survey, joined, survey, survey_of
 from ...errors import InputError
 from ...format.checks import LARGEST
 from ...geometry.derived_sequences import DerivedSequence

@@ -14,10 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from ...analysis.scene.color_change import SIDE, ColorChange
-from ...analysis.scene.color_looks import ColorLooks
+from ...analysis.scene.color_looks import CHANGE_SIDE, ColorChange, ColorLooks
+from ...analysis.scene.cut import Rest
 from ...analysis.scene.labelling import ByPlace
-from ...analysis.scene.settle import Rest
 from ...analysis.survey import Survey
 from ...geometry.derived_sequences import CapturedSequence
 from ...geometry.voxels import Lattice
@@ -78,5 +77,5 @@ def _colors(arrays: Any, sequence: CapturedSequence) -> ColorChange | None:
     """Return the usual view of the colour cameras, or None if the scene has none."""
     if "looks" not in arrays or sequence.colors is None:
         return None
-    looks = ColorLooks(sequence.colors, int(arrays["looks"]), SIDE)
+    looks = ColorLooks(sequence.colors, int(arrays["looks"]), CHANGE_SIDE)
     return ColorChange(looks, float(arrays["nearer"]), *(arrays[name] for name in _COLORS))

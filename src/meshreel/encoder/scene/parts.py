@@ -13,8 +13,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 from jaxtyping import Bool, Float64
 
-from ...analysis.scene.background import FRAMES, fuse_background
-from ...analysis.scene.background_depth import Moment, fuse_still_depth
+from ...analysis.scene.background import FRAMES, Moment, fuse_background, fuse_still_depth
 from ...analysis.scene.bodies import beyond, ring, with_ring
 from ...analysis.scene.labelling import Segmentation
 from ...analysis.scene.masks import Masker

@@ -11,9 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Bool, Float64, UInt8
 
-from ...analysis.appearance.background import median_colors
-from ...analysis.appearance.bake import Texels, picture, texels_of
-from ...analysis.appearance.unwrap import projected, unwrap
+from ...analysis.appearance.bake import Texels, median_colors, picture, projected, texels_of, unwrap
 from ...analysis.survey import Survey
 from ...coding.appearance.atlas import encode_atlas
 from ...coding.appearance.pictures import MOST_CRF

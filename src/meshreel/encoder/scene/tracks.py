@@ -15,8 +15,7 @@ from itertools import chain
 import numpy as np
 from jaxtyping import Float64, Int64
 
-from ...analysis.pieces import Piece, around, bodies_of, unlike
-from ...analysis.survey import Survey
+from ...analysis.survey import Piece, Survey, bodies_of, box_around, unlike
 from ...geometry.strict import norm, rounded
 from ...metrics.distance import PSNR_CEILING, psnr
 from ..group.forms import EncodedGroup, empty_groups
@@ -171,7 +170,7 @@ def _matched(last: Float64[np.ndarray, "K 6"], first: Float64[np.ndarray, "B 6"]
 def _boxes(pieces: Sequence[Piece], numbers: Int64[np.ndarray, " P"], count: int) -> Float64[np.ndarray, "B 6"]:
     """Return the box of each body in a frame, without bits."""
     boxes = np.array([piece.box for piece in pieces])
-    return np.array([around(boxes[numbers == body]) for body in range(count)])
+    return np.array([box_around(boxes[numbers == body]) for body in range(count)])
 
 
 def _body(
@@ -179,7 +178,7 @@ def _body(
 ) -> Body:
     """Return the body of this number, in a track."""
     mine = [[some[k] for k in np.flatnonzero(of == number).tolist()] for some, of in zip(pieces, numbers, strict=True)]
-    boxes = [around(np.array([piece.around for piece in some])) for some in mine]
+    boxes = [box_around(np.array([piece.around for piece in some])) for some in mine]
     diagonals = tuple(norm(box[3:] - box[:3]) for box in boxes)
     ours, whole = (sum(piece.vertices for piece in chain.from_iterable(some)) for some in (mine, pieces))
     return Body(track, number, tuple(tuple(some.tolist()) for some in numbers), diagonals, ours / whole)

@@ -24,7 +24,7 @@ from torch.nn import functional
 
 from meshreel.errors import InputError
 from meshreel.geometry.closest_points import Surface
-from meshreel.metrics.even_points import scatter
+from meshreel.metrics.surface_samples import scatter
 from meshreel.types import Mesh
 
 from .codec import NecgsCodec
