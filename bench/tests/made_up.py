@@ -1,7 +1,5 @@
 """Rows made up, for tests of the report."""
 
-from __future__ import annotations
-
 import msgspec
 from meshreel_bench.rows import Decoding, Encoding, Group, Point, Row, Stream
 

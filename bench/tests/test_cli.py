@@ -1,7 +1,5 @@
 """The command `meshreel-bench`: rows into a file, and from the file a report."""
 
-from __future__ import annotations
-
 import dataclasses
 import json
 import shlex
@@ -77,7 +75,7 @@ def test_operating_points_on_a_users_sequence_are_measured_once_and_reported(ben
 @pytest.mark.parametrize(
     ("arguments", "reason"),
     [
-        (("run", "figure7", "-o", "r.jsonl"), "no experiment is called 'figure7'"),
+        (("run", "figure7", "-o", "r.jsonl"), "no experiment is called 'figure7'; known: ablation_centers"),
         (("run", "table2", "-o", "r.jsonl", "--only", "zip"), "table2 has no points of zip"),
         (("run", "table2", "-o", "r.cache"), "give a file, as rows.jsonl"),
         (("run", "table2", "-o", "r.jsonl", "--jobs", "0"), "give at least 1"),
@@ -114,13 +112,10 @@ def test_the_commands_of_codecs_md_parse():
         make_app().parse_args(tokens, exit_on_error=False, print_error=False)
 
 
-def test_an_operating_point_is_a_codec_and_its_options():
+def test_an_operating_point_is_a_codec_and_its_options_and_a_row_is_described_in_one_printable_line():
     assert operating_point("decimated_draco:fraction=0.5,qp=9") == ("decimated_draco", {"fraction": 0.5, "qp": 9})
     assert operating_point("necgs:full,seed=2") == ("necgs", {"configuration": "full", "seed": 2})
     with pytest.raises(InputError, match="does not take"):
         operating_point("draco:bits=9")
-
-
-def test_a_row_is_described_in_one_printable_line():
     assert describe(row("ball", "best", 1.0, 60.0)) == "ball best quality 1.0: 1.000 Mbps, 60.00 dB, 7.00 s/frame"
     assert describe(failed("ball\x1b[2J", "draco", "no\nluck")) == "ball?[2J draco qp 9: failed: no luck"

@@ -1,17 +1,12 @@
 """Experiments: what their declarations mean."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest
 from meshreel_bench.codecs import make_codec
-from meshreel_bench.codecs.variants import VARIANTS
-from meshreel_bench.experiments import EXPERIMENTS, ablations, find_experiment, layers
+from meshreel_bench.experiments import EXPERIMENTS, layers
 from meshreel_bench.experiments.study import INSTEAD, Gains
 from meshreel_bench.rows import read_rows
-
-from meshreel.errors import InputError
 
 RESULTS = Path(__file__).resolve().parents[2] / "docs" / "results"
 
@@ -33,9 +28,8 @@ def test_every_row_that_is_shown_is_of_a_point_that_an_experiment_declares():
 
 
 def test_tables_share_the_points_of_figure_6():
-    all_points = {point.key for point in find_experiment("figure6").points()}
-    for name in ("table1", "table2"):
-        assert {point.key for point in find_experiment(name).points()} < all_points
+    points = {name: {point.key for point in EXPERIMENTS[name].points()} for name in ("figure6", "table1", "table2")}
+    assert points["table1"] < points["figure6"] and points["table2"] < points["figure6"]
 
 
 def test_promises_of_speed_are_about_points_that_are_declared():
@@ -44,12 +38,3 @@ def test_promises_of_speed_are_about_points_that_are_declared():
         for which in (promise.which, *getattr(promise, "than", ())):
             fits = [p for p in declared if p.sequence == which.sequence and p.options.items() >= which.options.items()]
             assert any(make_codec(p.codec, dict(p.options)).name == which.curve for p in fits), which
-
-
-def test_every_part_that_is_switched_off_is_a_variant():
-    assert set(ablations.PARTS) <= set(VARIANTS)
-
-
-def test_an_unknown_experiment_is_refused():
-    with pytest.raises(InputError, match="no experiment is called 'figure7'; known: ablation_centers"):
-        find_experiment("figure7")

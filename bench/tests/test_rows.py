@@ -1,7 +1,5 @@
 """Rows: what a file of them means, and which of several rows of a point counts."""
 
-from __future__ import annotations
-
 import msgspec
 import pytest
 from meshreel_bench.rows import Point, append_row, checked, disagreements, join_rows, mixtures, read_rows
@@ -10,14 +8,11 @@ from bench.tests.made_up import failed, floor, row
 from meshreel.errors import InputError
 
 
-def test_rows_come_back_from_a_file_as_they_were(tmp_path):
+def test_rows_come_back_as_they_were_with_the_rate_of_all_bytes_over_the_time_that_they_play(tmp_path):
     rows = [row("ball", "best", 1.0, 60.0), floor("ball", d2_psnr_paper=None), failed("ball", "draco", "no\nluck")]
     for each in rows:
         append_row(tmp_path / "new" / "rows.jsonl", each)
     assert read_rows(tmp_path / "new" / "rows.jsonl") == rows
-
-
-def test_the_rate_is_that_of_all_bytes_over_the_time_that_they_play():
     assert row("ball", "best", 1.5, 60.0).mbps == pytest.approx(1.5, rel=1e-5)
 
 
@@ -51,16 +46,13 @@ def test_a_line_that_is_no_row_is_refused(tmp_path, line, reason):
         read_rows(file)
 
 
-def test_a_last_line_that_ends_without_a_break_is_kept_if_it_is_whole_and_refused_if_it_is_no_row(tmp_path):
+def test_a_last_line_that_ends_without_a_break_is_kept_if_it_is_whole(tmp_path):
     file, rows = tmp_path / "rows.jsonl", [row("ball", "best", rate, 60.0) for rate in (1.0, 2.0, 3.0)]
     for each in rows[:2]:
         append_row(file, each)
     file.write_bytes(file.read_bytes().rstrip(b"\n"))
     append_row(file, rows[2])
     assert read_rows(file) == rows
-    (tmp_path / "notes.txt").write_bytes(b"my only copy\xe9")
-    with pytest.raises(InputError, match="line 1: not a row"):
-        read_rows(tmp_path / "notes.txt")
 
 
 @pytest.mark.parametrize("options", [{"q": float("nan")}, {"q": b"a"}, {"q": object()}, {"q": [1]}, {1: 2}, None])
@@ -70,6 +62,9 @@ def test_a_row_that_could_not_be_read_again_is_refused_before_it_is_written(opti
 
 
 def test_what_is_no_file_of_rows_is_refused(tmp_path):
+    (tmp_path / "notes.txt").write_bytes(b"my only copy\xe9")
+    with pytest.raises(InputError, match="line 1: not a row"):
+        read_rows(tmp_path / "notes.txt")
     with pytest.raises(InputError, match="cannot be read"):
         read_rows(tmp_path / "none.jsonl")
     (tmp_path / "file").write_text("")
@@ -85,9 +80,7 @@ def test_of_a_point_the_last_row_of_a_file_counts_and_of_several_files_the_first
         append_row(tmp_path / "rows.jsonl", each)
     assert read_rows(tmp_path / "rows.jsonl") == [second]
     assert join_rows([[lost], [first], [second]]) == [first]
-
-
-def test_points_that_differ_in_frames_or_metrics_are_different_points():
+    # points that differ in frames or metrics are different points
     points = [Point("a", "b"), Point("a", "b", frames=3), Point("a", "b", metrics="regions"), Point("a", "b", {"q": 1})]
     assert len({point.key for point in points}) == 4
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float64
@@ -67,7 +68,7 @@ def bd_rate(anchor: Curve, test: Curve, highest: float = math.inf) -> BdRate:
         below = "" if math.isinf(highest) else f" below {highest:.4g}"
         reason = f"no common quality{below}: {_range(anchor.name, a)}, {_range(test.name, b)}"
         return BdRate(anchor.name, test.name, None, low, high, counts, reason)
-    mean = (_integral(b, low, high) - _integral(a, low, high)) / (high - low)
+    mean = float(_log_rate(b).integrate(low, high) - _log_rate(a).integrate(low, high)) / (high - low)
     return BdRate(anchor.name, test.name, 100 * math.expm1(mean), low, high, counts)
 
 
@@ -83,7 +84,7 @@ def bd_bound(anchor: Curve, test: Curve, highest: float = math.inf) -> BdRate:
     low, high = float(a[0, 0]), float(min(a[-1, 0], highest))
     if not low < high <= b[0, 0]:
         return found
-    mean = float(b[0, 1]) - _integral(a, low, high) / (high - low)
+    mean = float(b[0, 1]) - float(_log_rate(a).integrate(low, high)) / (high - low)
     return BdRate(anchor.name, test.name, 100 * math.expm1(mean), low, high, found.points, at_most=True)
 
 
@@ -102,7 +103,7 @@ def rate_at(curve: Curve, quality: float) -> RateAt:
         return RateAt(None)
     if quality <= ends[0][0]:
         return RateAt(ends[0][1], at_most=quality < ends[0][0])
-    return RateAt(math.exp(_log_rate(_front(curve), np.array([quality]))[0]))
+    return RateAt(math.exp(_log_rate(_front(curve))(quality)))
 
 
 def reach(curve: Curve) -> tuple[tuple[float, float], tuple[float, float]] | None:
@@ -115,22 +116,10 @@ def reach(curve: Curve) -> tuple[tuple[float, float], tuple[float, float]] | Non
 class GainEnd:
     """Highest quality at which a codec needs less rate than its anchor, within the range that both reach."""
 
-    quality: float | None  # where the curves cross; None: no gain, or no overlap
-    reached: bool  # False: the gain lasts to the end of the overlap, and `quality` is that end
-    anchor_best: float  # best quality of the anchor
-    test_best: float  # best quality of the codec
+    quality: float | None = None  # where the curves cross; None: no gain, or no overlap
+    reached: bool = False  # False: the gain lasts to the end of the overlap, and `quality` is that end
+    where: str = "no gain at any common quality"  # or what ends the gain, without numbers
     share: float = 0.0  # of the overlap, in quality, over which there is a gain
-
-    @property
-    def where(self) -> str:
-        """Description of what ends the gain, without numbers."""
-        if self.quality is None:
-            return "no gain at any common quality"
-        if self.reached:
-            return "the curves cross"
-        return (
-            "the codec's best point, still a gain" if self.test_best <= self.anchor_best else "the anchors' best point"
-        )
 
 
 def hull(name: str, curves: Sequence[Curve]) -> Curve:
@@ -152,15 +141,16 @@ def hull(name: str, curves: Sequence[Curve]) -> Curve:
 def gain_end(anchor: Curve, test: Curve) -> GainEnd:
     """Find the highest quality within the overlap at which `test` needs less rate than `anchor`."""
     a, b = _front(anchor), _front(test)
-    best = [float(points[-1, 0]) if len(points) else math.nan for points in (a, b)]
-    low, high = (max(a[0, 0], b[0, 0]), min(best)) if len(a) and len(b) else (0.0, 0.0)
+    low, high = (max(a[0, 0], b[0, 0]), min(a[-1, 0], b[-1, 0])) if len(a) and len(b) else (0.0, 0.0)
     if low >= high:
-        return GainEnd(None, False, *best)
+        return GainEnd()
     at = np.linspace(low, high, _GRID)
-    gains = np.flatnonzero(_log_rate(b, at) < _log_rate(a, at))
+    gains = np.flatnonzero(_log_rate(b)(at) < _log_rate(a)(at))
     if len(gains) == 0:
-        return GainEnd(None, False, *best)
-    return GainEnd(float(at[gains[-1]]), bool(gains[-1] < _GRID - 1), best[0], best[1], len(gains) / _GRID)
+        return GainEnd()
+    end = "the codec's best point, still a gain" if b[-1, 0] <= a[-1, 0] else "the anchors' best point"
+    reached = bool(gains[-1] < _GRID - 1)
+    return GainEnd(float(at[gains[-1]]), reached, "the curves cross" if reached else end, len(gains) / _GRID)
 
 
 def beats(test: Curve, anchor: Curve, least: float = 0.0) -> bool | None:
@@ -169,17 +159,12 @@ def beats(test: Curve, anchor: Curve, least: float = 0.0) -> bool | None:
     Where the overlap of the curves is not above `least`, their points decide: the winner has a better and cheaper point
     for each point of the other up to its own best quality.
     """
-    if have_range(test, anchor, least):
+    found = bd_rate(anchor, test)
+    if found.percent is not None and found.high - found.low > least:
         return gain_end(anchor, test).share == 1.0
     a, b = _front(anchor), _front(test)
     won, lost = _dominates(b, a), _dominates(a, b)
     return won if won != lost else None
-
-
-def have_range(test: Curve, anchor: Curve, least: float = 0.0) -> bool:
-    """Return whether two curves have a BD-rate over a range of qualities wider than `least`."""
-    found = bd_rate(anchor, test)
-    return found.percent is not None and found.high - found.low > least
 
 
 def _dominates(b: Float64[np.ndarray, "N 2"], a: Float64[np.ndarray, "M 2"]) -> bool:
@@ -203,16 +188,11 @@ def _best(curve: Curve) -> list[tuple[float, float]]:
     return kept
 
 
-def _integral(points: Float64[np.ndarray, "N 2"], low: float, high: float) -> float:
+def _log_rate(points: Float64[np.ndarray, "N 2"]) -> Any:
+    """Return ln rate as a function of quality."""
     from scipy.interpolate import PchipInterpolator
 
-    return float(PchipInterpolator(points[:, 0], points[:, 1]).integrate(low, high))
-
-
-def _log_rate(points: Float64[np.ndarray, "N 2"], at: Float64[np.ndarray, " Q"]) -> Float64[np.ndarray, " Q"]:
-    from scipy.interpolate import PchipInterpolator
-
-    return np.asarray(PchipInterpolator(points[:, 0], points[:, 1])(at), dtype=np.float64)
+    return PchipInterpolator(points[:, 0], points[:, 1])
 
 
 def _cross(a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]) -> float:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Annotated
 
@@ -22,9 +22,10 @@ from .datasets import Store, released_in, views_missing
 from .experiments import EXPERIMENTS, find_experiment
 from .experiments.study import Sweep
 from .measure.runner import Measuring, run_points
+from .report.pages import parts_of, write_report
 from .report.values import value
 from .report.verdicts import Verdict, verdicts
-from .rows import Options, Point, Row, failed_rows, join_rows, measured_rows, read_rows
+from .rows import Options, Point, Row, join_rows, parted, read_rows
 
 HELP = "Measure codecs against each other, and make tables and plots of the rows."
 CACHE = ".cache"  # ending of the folder beside the rows where sequences are kept
@@ -79,7 +80,8 @@ class Selection:
             if any("\ud800" <= sign <= "\udfff" for sign in each):
                 raise InputError(f"--on {each!r}: the name is not UTF-8, which rows are; rename it")
         added = [Sweep(codec, {}, options) for codec, options in map(operating_point, self.add)]
-        every = study.extended(on if others else [], added).points(self.small)
+        wider = replace(study, sequences=on if others else study.sequences, sweeps=(*study.sweeps, *added))
+        every = wider.points(self.small)
         points = list({point.key: point for point in every}.values())  # what is added may be there already
         points = [point for point in points if point.codec in (self.only or [point.codec])]
         points = [point for point in points if point.sequence in (on or [point.sequence])]
@@ -158,9 +160,9 @@ def run(
             common.note(f"{done}/{len(points)} {describe(row)}{before}")
 
         rows = run_points(points, output, how, report, opening)
-    failed = failed_rows(rows)
+    measured, failed = parted(rows)
     common.warn(tuple(describe(row) for row in failed))
-    found = verdicts(find_experiment(experiment), measured_rows(rows))
+    found = verdicts(find_experiment(experiment), measured)
     counts = {"output": str(output), "rows": len(rows), "failed": len(failed)}
     common.result(counts | {"promises": [asdict(verdict) for verdict in found]}, verdict_table(found))
     if len(failed) == len(rows):
@@ -183,11 +185,9 @@ def report(
     output
         The folder to write into.
     """
-    from .report.pages import parts_of, write_report  # pandas: workers, which read this module, do without
-
     joined = join_rows(_some_rows(path) for path in rows)
     check_one_source(joined)
-    common.warn(tuple(describe(row) for row in failed_rows(joined)))
+    common.warn(tuple(describe(row) for row in parted(joined)[1]))
     written = [str(path) for path in write_report(joined, output)]
     found = [verdict for part in parts_of(joined) for verdict in verdicts(part.study, part.rows)]
     record = {"files": written, "promises": [asdict(verdict) for verdict in found]}

@@ -33,20 +33,16 @@ class OrthographicCamera:
 
     def record(self) -> dict[str, Any]:
         """Return the camera as a record like Open3D's, with the side of a pixel in place of intrinsics."""
-        return {
-            "class_name": "OrthographicCamera",
-            "extrinsic": self.extrinsic.T.reshape(-1).tolist(),
-            "size": [self.width, self.height],
-            "pixel_m": self.pixel,
-        }
+        place = {"class_name": "OrthographicCamera", "extrinsic": self.extrinsic.T.reshape(-1).tolist()}
+        return place | {"size": [self.width, self.height], "pixel_m": self.pixel}
 
 
-def parallel_views_around(box: Box, size: int = 512, up: str = "y") -> list[OrthographicCamera]:
-    """Return orthographic views of the box from the sides of `views_around`, size x size pixels."""
-    ViewOptions(size, size, up=up)
-    across, height = extent(box, up)
+def parallel_views_around(box: Box, size: int = 512) -> list[OrthographicCamera]:
+    """Return orthographic views of the box from the sides of `views_around`, size x size pixels; y points up."""
+    ViewOptions(size, size)
+    across, height = extent(box, "y")
     pixel = MARGIN * max(across, height) / size
     return [
         OrthographicCamera(size, size, pixel, looking(box.center, axes, 0.0), back=2 * (across + height))
-        for axes in sides(up)
+        for axes in sides("y")
     ]

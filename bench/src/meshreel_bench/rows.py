@@ -248,11 +248,7 @@ def append_row(path: Path, row: Row) -> None:
         raise InputError(f"{text}; free space, or choose another file") from None
 
 
-def measured_rows(rows: Iterable[Row]) -> list[Row]:
-    """Return the rows of which something was measured."""
-    return [row for row in rows if row.failed is None]
-
-
-def failed_rows(rows: Iterable[Row]) -> list[Row]:
-    """Return the rows of which nothing was measured."""
-    return [row for row in rows if row.failed is not None]
+def parted(rows: Iterable[Row]) -> tuple[list[Row], list[Row]]:
+    """Return the rows of which something was measured, and those of which nothing was."""
+    every = list(rows)
+    return [row for row in every if row.failed is None], [row for row in every if row.failed is not None]

@@ -1,7 +1,5 @@
 """NeCGS as a whole, tiny: what it learns, that it learns it twice alike, and what it refuses."""
 
-from __future__ import annotations
-
 import hashlib
 import subprocess
 import sys
@@ -70,17 +68,12 @@ def test_larger_networks_take_more_bytes_and_are_better():
 
 
 @torch_only
-def test_more_epochs_are_better(balls):
-    short = replace(TINY, epochs=10)
-    assert quality(BALLS, short.decode(short.encode(BALLS))) < quality(BALLS, TINY.decode(balls)) - 3
-
-
-@torch_only
-def test_more_bits_take_more_bytes_and_are_better(balls):
-    coarse = replace(TINY, bits=5)
+@pytest.mark.parametrize(("less", "larger", "better"), [({"epochs": 10}, 0.0, 3), ({"bits": 5}, 1.5, 1)])
+def test_more_epochs_are_better_and_more_bits_take_more_bytes_too(balls, less, larger, better):
+    coarse = replace(TINY, **less)
     data = coarse.encode(BALLS)
-    assert len(data) < len(balls) / 1.5
-    assert quality(BALLS, coarse.decode(data)) < quality(BALLS, TINY.decode(balls)) - 1
+    assert len(balls) > larger * len(data)
+    assert quality(BALLS, coarse.decode(data)) < quality(BALLS, TINY.decode(balls)) - better
 
 
 @torch_only
@@ -181,6 +174,28 @@ def test_the_quick_configuration_has_a_person_s_shape():
 
 
 @torch_only
+def test_a_set_whose_training_lost_a_frame_is_refused_by_its_number():
+    frames = MeshList((Mesh.empty(), *BALLS.meshes[:2]))
+    for absurd in (replace(HASTY, epochs=1), replace(HASTY, rate=1e-9), replace(HASTY, rate=1.0)):
+        with pytest.raises(InputError, match=r"frame 1: .* more epochs than .* another rate .* seed"):
+            absurd.encode(frames)
+
+
+@torch_only
+def test_a_frame_that_became_another_body_is_refused(monkeypatch):
+    from meshreel_bench.codecs.necgs import network
+
+    def other(volumes, codec, told):
+        turned = [np.ascontiguousarray(-volume) for volume in volumes]
+        return trained(turned, codec, told)
+
+    trained = network.train
+    monkeypatch.setattr(network, "train", other)
+    with pytest.raises(InputError, match=r"frame 0: training ended with \d% of its body"):
+        TINY.encode(MeshList(BALLS.meshes[:1]))
+
+
+@torch_only
 def test_open_walls_are_trimmed_where_they_end():
     wall = Mesh.of([[0, 0, 0], [2, 0, 0], [0, 2, 0], [2, 2, 0]], [[0, 1, 2], [1, 3, 2]])
     codec = replace(TINY, epochs=200)
@@ -192,14 +207,10 @@ def test_open_walls_are_trimmed_where_they_end():
 
 
 @torch_only
-def test_devices_that_are_not_there_are_told(balls):
+def test_devices_that_are_not_there_and_what_is_no_mesh_are_told(balls):
     for device in ("nothing", "cuda:77"):
         with pytest.raises(InputError, match="cannot be used"):
             replace(TINY, device=device).decode(balls)
-
-
-@torch_only
-def test_what_is_no_mesh_is_refused_by_frame():
     broken = Mesh.of([[0, 0, 0], [1, 0, 0], [0, np.nan, 0]], [[0, 1, 2]])
     with pytest.raises(InputError, match="frame 1"):
         HASTY.encode(MeshList((BALLS[0], broken)))

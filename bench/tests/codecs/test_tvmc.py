@@ -1,18 +1,28 @@
 """TVMC*: displacements come back in order, frames from the bytes alone, and damaged bytes are told."""
 
-from __future__ import annotations
-
 import zlib
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from meshreel_bench.codecs import make_codec
-from meshreel_bench.codecs.tvmc import TvmcCodec
-from meshreel_bench.codecs.tvmc.codec import Tracked, quality_of_vertices, track_sequence
-from meshreel_bench.codecs.tvmc.stream import Kind, TvmcVideo, decode_tracked, encode_tracked, unpack_stream
+from meshreel_bench.codecs.tvmc import Tracked, TvmcCodec, quality_of_vertices, track_sequence
+from meshreel_bench.codecs.tvmc.stream import (
+    MOST_CELLS,
+    Kind,
+    TvmcVideo,
+    decode_cloud,
+    decode_tracked,
+    encode_cloud,
+    encode_tracked,
+    surface_order,
+    unpack_stream,
+)
 
 from meshreel.capture.simulated.procedural import SoftBodiesOptions, soft_bodies
+from meshreel.coding.reference_mesh import code_reference
 from meshreel.encoder.sequence import Encoder
 from meshreel.encoder.settings.presets import reference_vertices
 from meshreel.errors import FormatError, InputError, NoReferenceError
@@ -58,14 +68,6 @@ def percent(original, found):
 
 def kinds(data):
     return [(group.first_frame, group.frame_count, group.kind) for group in unpack_stream(data).groups]
-
-
-def with_checksum(data):
-    """The bytes with the checksum that fits them, so that what is behind it is tried."""
-    return data[:-4] + zlib.crc32(data[:-4]).to_bytes(4, "little")
-
-
-# ---- sequences
 
 
 @pytest.mark.parametrize("step", [1e-2, 1e-4])
@@ -122,9 +124,6 @@ def test_empty_frames_are_legal_and_stay_in_their_places():
     assert [mesh.is_empty for mesh in SMALL.decode(data)] == [True, False, True, True]
     nothing = SMALL.decode(SMALL.encode(MeshList((Mesh.empty(),) * 3)))
     assert [len(mesh.vertices) for mesh in nothing] == [0, 0, 0]
-
-
-def test_no_frames_are_refused():
     with pytest.raises(InputError, match="no frames"):
         SMALL.encode(MeshList(()))
 
@@ -156,13 +155,7 @@ def test_coordinates_around_a_million_keep_their_millimetres():
 
 @pytest.mark.parametrize(
     ("options", "words"),
-    [
-        ({"qp": 1}, "qp 1"),
-        ({"qp": 17}, "qp 17"),
-        ({"group_size": 0}, "group size"),
-        ({"centers": 0}, "centers"),
-        ({"bits": 8}, "bits"),
-    ],
+    [({"qp": 1}, "qp 1"), ({"qp": 17}, "qp 17"), ({"group_size": 0}, "group size"), ({"centers": 0}, "centers")],
 )
 def test_options_out_of_range_are_refused(options, words):
     with pytest.raises(InputError, match=words):
@@ -170,16 +163,10 @@ def test_options_out_of_range_are_refused(options, words):
 
 
 def test_a_reference_has_the_quality_of_its_vertices():
-    assert [reference_vertices(quality_of_vertices(count)) for count in (800, 1300, 2000, 5000)] == [
-        800,
-        1300,
-        2000,
-        5000,
-    ]
+    counts = [800, 1300, 2000, 5000]
+    assert [reference_vertices(quality_of_vertices(count)) for count in counts] == counts
     assert (quality_of_vertices(4), quality_of_vertices(10**6)) == (0, 100)
 
-
-# ---- scenes
 
 ROLLING = with_room([ball(0.5 + 0.35 * t) for t in range(4)])
 
@@ -205,9 +192,6 @@ def test_a_scene_has_its_background_once_and_its_body_tracked(rolling):
         assert of_body(frame).sum() > 0 and found.diagonal == pytest.approx(clean.diagonal, abs=CELL)
 
 
-# ---- damaged bytes
-
-
 def test_every_truncation_and_every_flipped_byte_is_told(stream):
     places = np.unique(np.linspace(0, len(stream) - 1, 400).astype(int))
     for place in places:
@@ -221,11 +205,43 @@ def test_every_truncation_and_every_flipped_byte_is_told(stream):
         TvmcVideo(stream + b"\0")
 
 
-def test_another_version_is_told_as_one(stream):
+def test_another_version_is_told_as_one_and_frames_beyond_the_end_are_no_frames(stream):
+    other = stream[:4] + bytes([9]) + stream[5:-4]
     with pytest.raises(FormatError, match="version"):
-        TvmcVideo(with_checksum(stream[:4] + bytes([9]) + stream[5:]))
-
-
-def test_frames_beyond_the_end_are_no_frames(stream):
+        TvmcVideo(other + zlib.crc32(other).to_bytes(4, "little"))
     with pytest.raises(IndexError):
         TvmcVideo(stream)[4]
+
+
+@settings(max_examples=60)
+@given(
+    count=st.integers(1, 300),
+    spread=st.sampled_from([0, 1, 15, 16383]),
+    offset=st.sampled_from([0.0, -3.7, 1e4]),
+    seed=st.integers(0, 1000),
+)
+def test_points_come_back_in_their_order_to_within_half_a_step(count, spread, offset, seed):
+    random, step = np.random.default_rng(seed), 3e-4
+    points = step * (offset + spread * random.random((count, 3)))
+    points[random.integers(0, count, count // 2)] = points[0]  # what a k-d tree or a table of points would merge
+    found = decode_cloud(encode_cloud(points, step), step)
+    assert np.abs(found - points).max() <= step / 2 * (1 + 1e-9)
+    assert np.array_equal(found, np.rint(points / step) * step)  # to the bit, on every platform
+
+
+def test_the_surface_order_names_every_vertex_once_neighbours_together():
+    mesh = Mesh.of(np.zeros((6, 3)), [[4, 2, 0], [2, 3, 4]])  # 1 and 5 are in no face
+    assert surface_order(mesh).tolist() == [4, 2, 0, 3, 1, 5]
+
+
+def test_along_the_surface_displacements_take_fewer_bytes():
+    reference = code_reference(sliding_sphere(1, levels=3)[0], 14, 1)
+    field = 0.1 * np.sin(3 * reference.base.vertices)
+    along = field[surface_order(reference.base)]
+    assert len(encode_cloud(along, 1e-3)) < 0.85 * len(encode_cloud(field, 1e-3))
+
+
+@pytest.mark.parametrize("points", [np.full((3, 3), np.nan), np.full((3, 3), 2.0 * MOST_CELLS)])
+def test_points_that_no_lattice_holds_are_refused(points):
+    with pytest.raises(InputError, match="steps"):
+        encode_cloud(points, 1.0)

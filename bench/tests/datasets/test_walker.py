@@ -1,7 +1,5 @@
 """The walker: cameras that err, and what they would see without errors."""
 
-from __future__ import annotations
-
 import numpy as np
 from meshreel_bench.datasets import WALKER, Store
 from meshreel_bench.datasets.walker import Truth
@@ -35,12 +33,8 @@ def test_a_texture_is_compared_at_its_texels_whatever_all_cameras_gain():
     for gain, noise in ((1.0, 0.0), (1.2, 0.0), (1.0, 5.0)):
         luma = gain * (100 + 50 * (np.arange(8) % 2)) + noise * np.array([1, 1, -1, -1] * 2)
         pixels = np.rint(np.repeat(np.tile(luma[None, :, None], (8, 1, 1)), 3, axis=2)).astype(np.uint8)
-        mesh = Mesh(
-            corners,
-            np.array([[0, 1, 2]], np.int32),
-            uv=np.float32(corners[None, :, :2] / 8),
-            texture=Texture.of(pixels),
-        )
+        faces, uv = np.array([[0, 1, 2]], np.int32), np.float32(corners[None, :, :2] / 8)
+        mesh = Mesh(corners, faces, uv=uv, texture=Texture.of(pixels))
         found = texel_psnr([texel_products(Stripes(), 0, mesh)])["texel_y_psnr"]
         assert found > 60 if not noise else abs(found - 20 * np.log10(255 / 5)) < 0.5
     assert texel_psnr([texel_products(Truth(), 0, Mesh.empty())]) == {}

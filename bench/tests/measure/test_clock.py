@@ -1,7 +1,5 @@
 """Clocks: stages, work, and a fixed loop whose own time is not charged."""
 
-from __future__ import annotations
-
 import builtins
 import time
 

@@ -1,7 +1,5 @@
 """Colours beside pictures, the bytes of colours and swimming, where the answer is known."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

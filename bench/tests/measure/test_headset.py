@@ -1,7 +1,5 @@
 """Playing in a browser that is slowed down: values that agree with each other, on a procedural file."""
 
-from __future__ import annotations
-
 import os
 import shutil
 

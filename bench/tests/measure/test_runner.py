@@ -1,12 +1,17 @@
-"""Sweeps: rows are there as soon as they are measured, once; a codec that misbehaves costs its own row."""
+"""Sweeps and fresh processes: rows come as soon as they are measured; a codec that misbehaves costs its own row."""
 
-from __future__ import annotations
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
 
 import numpy as np
 import pytest
 from meshreel_bench import codecs
 from meshreel_bench.datasets import Store
 from meshreel_bench.measure.runner import Measuring, run_points, runs_of
+from meshreel_bench.measure.worker import WorkerError, in_fresh_process
 from meshreel_bench.rows import Point, read_rows
 
 from meshreel.errors import InputError
@@ -84,9 +89,8 @@ def test_rows_that_are_there_are_not_measured_again_unless_they_failed_and_it_is
 
     def run(**how):
         heard.clear()
-        run_points(
-            points, file, Measuring(store, **how), lambda row, new: heard.append((row.point.options["how"], new))
-        )
+        told = lambda row, new: heard.append((row.point.options["how"], new))  # noqa: E731
+        run_points(points, file, Measuring(store, **how), told)
         return heard
 
     assert run() == [("well", True), ("no bytes", True)]
@@ -97,20 +101,16 @@ def test_rows_that_are_there_are_not_measured_again_unless_they_failed_and_it_is
     assert len(read_rows(file)) == 2
 
 
-def test_a_row_has_rate_times_and_metrics_of_what_a_fresh_process_decodes(store, tmp_path):
+def test_a_row_has_rate_times_and_metrics_of_what_a_fresh_process_decodes_of_a_sequence_that_is_there(store, tmp_path):
     options = {"qp": 9, "level": 7}
-    [row] = run_points(
-        [Point("ball", "draco", options, metrics="distances")], tmp_path / "rows.jsonl", Measuring(store)
-    )
+    point = Point("ball", "draco", options, metrics="distances")
+    [row] = run_points([point], tmp_path / "rows.jsonl", Measuring(store))
     assert row.name == "draco" and row.options == options and row.frames == 2 and row.measured_frames == [0, 1]
     assert row.stream.bytes > 100 and [group.form for group in row.stream.groups] == ["draco"] * 2
     assert row.encoding.reference_s > 0 and row.decoding.reference_s > 0 and row.encoding.work == {}
     assert row.encoding.s > 0 and row.decoding.vertices == 18 and row.decoding.frame_ms > 0
     assert row.metrics["d2_psnr_paper"] > 55 and row.metrics["bridges"] == row.metrics["degenerate_faces"] == 0
     assert "ssim" not in row.metrics and len(row.per_frame["d2_psnr_paper"]) == 2
-
-
-def test_a_missing_sequence_is_no_codecs_failure(store, tmp_path):
     with pytest.raises(InputError, match="no sequence 'nobody'"):
         run_points([Point("nobody", "draco")], tmp_path / "rows.jsonl", Measuring(store))
 
@@ -118,3 +118,72 @@ def test_a_missing_sequence_is_no_codecs_failure(store, tmp_path):
 def test_points_that_share_an_analysis_are_one_run():
     points = [Point("a", "decimated_draco", {"fraction": f, "qp": qp}) for f, qp in ((0.5, 8), (0.2, 8), (0.5, 9))]
     assert runs_of([*points, Point("a", "unknown")]) == [[points[0], points[2]], [points[1]], [Point("a", "unknown")]]
+
+
+def numbers(count):
+    yield from range(count)
+
+
+def ending(how):
+    """Yield once, then end in some way."""
+    yield os.getpid()
+    if how == "crash":
+        os.abort()
+    if how == "exit":
+        os._exit(3)
+    if how == "raise":
+        raise ValueError("not\ntoday")
+    time.sleep(600)
+
+
+def threads():
+    print("codecs may print")
+    yield os.environ["OMP_NUM_THREADS"]
+
+
+def test_values_come_from_another_process_with_one_thread():
+    assert list(in_fresh_process(numbers, 3, limit_s=60)) == [0, 1, 2]
+    assert list(in_fresh_process(threads)) == ["1"]
+
+
+@pytest.mark.parametrize(
+    ("how", "reason"),
+    [
+        ("crash", "ended by signal SIGABRT"),
+        ("exit", "ended by exit code 3"),
+        ("raise", "^ValueError: not today$"),
+        ("hang", "longer than 5 s of wall time"),
+    ],
+)
+def test_a_process_that_ends_or_takes_too_long_says_why(how, reason):
+    values = in_fresh_process(ending, how, limit_s=60 if how != "hang" else 5)
+    pid = next(values)
+    with pytest.raises(WorkerError, match=reason):
+        next(values)
+    with pytest.raises(OSError, match="No such process"):
+        os.kill(pid, 0)
+
+
+def starting():
+    """Yield the process that it has started and leaves."""
+    yield subprocess.Popen([sys.executable, "-c", "import time; time.sleep(600)"]).pid
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="reads /proc")
+@pytest.mark.parametrize("whole", [True, False])
+def test_what_a_codec_has_started_ends_with_its_process(whole):
+    values = in_fresh_process(starting, limit_s=60)
+    pid = next(values)
+    assert list(values) == [] if whole else values.close() is None
+    deadline = time.monotonic() + 30
+    while _runs(pid):
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+
+
+def _runs(pid):
+    """Return whether a process runs; one that has ended may wait for its adopter."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except FileNotFoundError:
+        return False

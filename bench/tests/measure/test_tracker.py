@@ -1,7 +1,5 @@
 """Accuracy of tracking: the truth is right, and both trackers are near it."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from meshreel_bench.measure.tracker import carried, published_track, tracker_values

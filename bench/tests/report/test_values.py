@@ -1,7 +1,5 @@
 """Values of rows: metrics, rates, what follows from groups and frames."""
 
-from __future__ import annotations
-
 import msgspec
 import pytest
 from meshreel_bench.experiments.study import D2, NORMALS

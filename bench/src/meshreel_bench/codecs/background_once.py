@@ -15,9 +15,8 @@ from meshreel.geometry.derived_sequences import captured
 from meshreel.geometry.topology import part_of
 from meshreel.types import Mesh, MeshSequence
 
-from ..codec import Progress
-from .base import TwoSteps
-from .draco import Frames, Point, check_point, decimated, write_frames
+from ..codec import Progress, TwoSteps
+from .draco import Frames, check_point, decimated, write_frames
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,8 +58,7 @@ class BackgroundOnceDracoCodec(TwoSteps):
         return Still(states, Frames(sequence.frame_rate, parts.seen, moving))
 
     def code(self, analysis: Still, progress: Progress | None = None) -> bytes:
-        """Return a .reel file of single frames in front of a background."""
         frame_rate, seen, meshes = analysis.moving
         small = Frames(frame_rate, seen, (decimated(mesh, self.fraction) for mesh in meshes))
-        points = [Point(self.qp, self.levels)] * len(seen.diagonals)
+        points = [(self.qp, self.levels)] * len(seen.diagonals)
         return write_frames(small, points, progress, analysis.background)

@@ -20,9 +20,8 @@ from meshreel.errors import InputError
 from meshreel.geometry.color_views import Painted
 from meshreel.types import Mesh, MeshSequence, Texture
 
-from ..codec import Progress
+from ..codec import Options, Progress
 from ..rows import ColorBytes
-from .base import Options
 from .draco import check_qp
 
 WAYS = ("vertices", "avif", "av1")

@@ -24,8 +24,7 @@ from meshreel.errors import InputError
 from meshreel.geometry.decimate import decimate, decimate_faces
 from meshreel.types import Mesh, MeshSequence
 
-from ..codec import Progress
-from .base import Options, TwoSteps
+from ..codec import Options, Progress, TwoSteps
 
 LARGE = 100_000  # faces; a larger mesh is decimated in two steps, as QEM to a number of vertices takes some rounds
 LEVEL = 7  # of compression, that of this project's own streams
@@ -33,11 +32,7 @@ ALONE = "DracoPy"  # in place of this project's own decoder
 ON_THE_WAY = 3  # vertices after the first step, in those that are wanted
 
 
-class Point(NamedTuple):
-    """Bits and subdivisions of a single frame."""
-
-    qp: int  # bits along the longest side of the frame
-    levels: int = 0  # midpoint subdivisions in the decoder
+Point = tuple[int, int]  # of a frame: bits along its longest side, and midpoint subdivisions in the decoder
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,12 +52,11 @@ class DracoCodec(Options):
         return "draco" if self.level == LEVEL else "draco, other levels"
 
     def encode(self, sequence: MeshSequence, progress: Progress | None = None) -> bytes:
-        """Return a .reel file of single frames."""
         if self.level != LEVEL:
             return encode_alone(((mesh.vertices, mesh.faces) for mesh in sequence), self.qp, self.level)
         seen = survey(sequence)
         frames = Frames(sequence.frame_rate, seen, (seen.normalise(frame) for frame in sequence))
-        return write_frames(frames, [Point(self.qp)] * len(sequence), progress)
+        return write_frames(frames, [(self.qp, 0)] * len(sequence), progress)
 
     def decode(self, data: bytes) -> Sequence[Mesh]:
         return Options.decode(self, data) if self.level == LEVEL else decode_alone(data)
@@ -96,11 +90,9 @@ class DecimatedDracoCodec(TwoSteps):
 
     @property
     def analysis_key(self) -> str:
-        """Equal for operating points of one fraction."""
         return f"decimated to {self.fraction!r}"
 
     def analyse(self, sequence: MeshSequence, progress: Progress | None = None) -> Frames:
-        """Return the decimated frames."""
         seen, meshes = survey(sequence), list[Mesh]()
         for frame in sequence:
             meshes.append(decimated(seen.normalise(frame), self.fraction))
@@ -109,11 +101,10 @@ class DecimatedDracoCodec(TwoSteps):
         return Frames(sequence.frame_rate, seen, meshes)
 
     def code(self, analysis: Frames, progress: Progress | None = None) -> bytes:
-        """Return a .reel file of single frames."""
         if self.decoder:
             unit, center = analysis.seen.unit, analysis.seen.center
             return encode_alone(((unit * mesh.vertices + center, mesh.faces) for mesh in analysis.meshes), self.qp)
-        points = [Point(self.qp, self.levels)] * len(analysis.seen.diagonals)
+        points = [(self.qp, self.levels)] * len(analysis.seen.diagonals)
         return write_frames(analysis, points, progress)
 
     def decode(self, data: bytes) -> Sequence[Mesh]:
@@ -145,11 +136,6 @@ def check_qp(qp: int) -> None:
         raise InputError(f"qp {qp}: give 2 to 20 bits")
 
 
-def lattice_step(extent: float, qp: int) -> float:
-    """Return the spacing at which a mesh `extent` wide takes `qp` bits, wherever the lattice's origin lies."""
-    return max(extent, 1e-12) / (2**qp - 3)
-
-
 def decimated(mesh: Mesh, fraction: float) -> Mesh:
     """Return the mesh with a fraction of its vertices; large meshes take two steps."""
     if fraction == 1 or mesh.is_empty:
@@ -164,8 +150,8 @@ def encode_frame(mesh: Mesh, point: Point) -> bytes:
     """Return the payload of a group of one frame."""
     if mesh.is_empty:
         return encode_empty()
-    extent = float((mesh.vertices.max(axis=0) - mesh.vertices.min(axis=0)).max())
-    return encode_intra([mesh], lattice_step(extent, point.qp), point.levels)
+    (qp, levels), extent = point, float((mesh.vertices.max(axis=0) - mesh.vertices.min(axis=0)).max())
+    return encode_intra([mesh], max(extent, 1e-12) / (2**qp - 3), levels)  # wherever the lattice's origin lies
 
 
 def write_frames(

@@ -18,9 +18,8 @@ import numpy as np
 from meshreel.errors import InputError
 from meshreel.types import Mesh, MeshSequence
 
-from ..codec import Progress
+from ..codec import Options, Progress
 from ..names import MESHOPT
-from .base import Options
 from .draco import check_qp
 
 
@@ -46,7 +45,6 @@ class MeshoptCodec(Options):
             raise InputError(f"qp {self.qp}: meshoptimizer's places have 16 bits; give 2 to 16")
 
     def encode(self, sequence: MeshSequence, progress: Progress | None = None) -> bytes:
-        """Return the frames' records."""
         found = list[bytes]()
         for number, mesh in enumerate(sequence, 1):
             found.append(zlib.compress(msgspec.msgpack.encode(self._frame(mesh)), 9))

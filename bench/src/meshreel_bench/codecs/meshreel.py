@@ -2,19 +2,29 @@
 
 from __future__ import annotations
 
+import hashlib
 import tempfile
-from dataclasses import asdict, dataclass
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from typing import TypeVar
 
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from meshreel.encoder.group.interval import Interval
+from meshreel.encoder.group.progress import Stages
+from meshreel.encoder.layers.options import LayersOptions
+from meshreel.encoder.paper.options import PaperOptions
+from meshreel.encoder.paper.recipe import Fitted, FoundGroup, find_groups
 from meshreel.encoder.sequence import Encoder
-from meshreel.encoder.settings.options import EncoderOptions
+from meshreel.encoder.settings.options import EncoderOptions, SceneOptions
+from meshreel.encoder.settings.presets import plain_displacements
 from meshreel.encoder.settings.settings import Settings
+from meshreel.errors import InputError
 from meshreel.types import MeshSequence
 
-from ..codec import Progress
-from .base import TwoSteps
-from .groups import prepare, shared_options
-from .variants import find_variant
+from ..codec import Progress, TwoSteps
 
 
 class Prepared(TwoSteps):
@@ -70,14 +80,141 @@ class MeshreelCodec(Prepared):
 
     @property
     def encoder_options(self) -> EncoderOptions:
-        """Options of the encoder."""
         chosen = {name: value for name, value in asdict(self).items() if value is not None and name != "variant"}
         return find_variant(self.variant)(Settings(**chosen).resolved())
 
     def code(self, analysis: Encoder, progress: Progress | None = None) -> bytes:
-        """Return the .reel file."""
         analysis.progress = progress
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "video.reel"
             analysis.encode(path, self.encoder_options)
             return path.read_bytes()
+
+
+Found = tuple[tuple[int, Fitted | None], ...]  # of each group its number of frames, and the reference that follows them
+
+
+class GroupStore:
+    """Groups by interval and options, each found once. It keeps references and positions, but no frames."""
+
+    def __init__(self) -> None:
+        self._known: dict[bytes, Found] = {}
+
+    def find(self, interval: Interval, options: PaperOptions, stages: Stages | None = None) -> list[FoundGroup]:
+        """Return the groups of `paper.find_groups`."""
+        if (key := _key(interval, options)) not in self._known:
+            found = find_groups(interval, options, stages)
+            self._known[key] = tuple((len(group.frames), group.fitted) for group in found)
+        frames, groups, first = list(interval.frames), list[FoundGroup](), 0
+        for count, fitted in self._known[key]:
+            groups.append(FoundGroup(frames[first : first + count], fitted))
+            first += count
+        return groups
+
+
+@threadpool_limits.wrap(limits=1)
+def prepare(encoder: Encoder, options: EncoderOptions) -> None:
+    """Find in advance what `encode` finds before a rate is chosen; raises what `encode` raises.
+
+    These are the parts of a scene and, for the paper's recipe, its groups for any size of the basis. They take a few
+    hundred kB a frame, as long as the encoder lives.
+    """
+    parts, count = encoder.parts(options), len(encoder.sequence)
+    if isinstance(options.method, PaperOptions):
+        store, stages = GroupStore(), Stages(encoder.progress, count)
+        encoder.find = store.find
+        for interval in encoder.intervals(options):
+            if not interval.frames[0].is_empty:
+                store.find(interval, options.method, stages if parts is None else None)
+            stages.reach("fit", interval.stop / count)
+
+
+def shared_options(options: EncoderOptions) -> EncoderOptions:
+    """Return the options with defaults for all that encodes at several rates need not share.
+
+    The paper's recipe shares all but the coding of displacements; that of layers only how a scene is taken apart.
+    """
+    if isinstance(options.method, PaperOptions):
+        return replace(options, method=_shared(options.method), quality=EncoderOptions().quality)
+    return EncoderOptions(scene=options.scene)
+
+
+def _shared(options: PaperOptions) -> PaperOptions:
+    return replace(options, displacements=PaperOptions().displacements)
+
+
+def _key(interval: Interval, options: PaperOptions) -> bytes:
+    """Return a key that is equal where the groups are."""
+    digest = hashlib.sha256(repr((_shared(options), interval.noise)).encode())
+    for frame in interval.frames:
+        for array in (frame.vertices, frame.faces):
+            digest.update(repr((array.shape, array.dtype)).encode())
+            digest.update(np.ascontiguousarray(array).data)
+    return digest.digest()
+
+
+UNIFORM, IN_MDS_POSE, BOTH = "one step, plain rounding", "MDS pose, no cuts", "MDS pose, no cuts, one step"
+RELEASED, LARGER = "the release's step", "reference of 5000 vertices"
+TOGETHER, FROM_MESHES = "one sequence", "background from meshes"  # of a scene
+RELEASED_STEP = 5e-5  # of a diagonal: the release has 1e-4 m, and people's diagonals are about 2 m
+Change = Callable[[EncoderOptions], EncoderOptions]
+Method = TypeVar("Method", LayersOptions, PaperOptions)
+
+
+def _method(kind: type[Method], change: Callable[[Method], Method], text: str) -> Change:
+    """Return a change of one method; `text` names the method and its presets in errors."""
+
+    def changed(options: EncoderOptions) -> EncoderOptions:
+        if not isinstance(options.method, kind):
+            raise InputError(f"this variant changes {text}")
+        return replace(options, method=change(options.method))
+
+    return changed
+
+
+def _layers(change: Callable[[LayersOptions], LayersOptions]) -> Change:
+    return _method(LayersOptions, change, "the recipe of layers; use preset `best`")
+
+
+def _paper(change: Callable[[PaperOptions], PaperOptions]) -> Change:
+    return _method(PaperOptions, change, "the paper's recipe; use preset `paper` or `paper-literal`")
+
+
+def _plain(options: PaperOptions) -> PaperOptions:
+    """One step, plain rounding, and as many anchors as `paper-literal` has."""
+    return replace(options, displacements=plain_displacements(options.displacements))
+
+
+def _scene(change: Callable[[SceneOptions], SceneOptions]) -> Change:
+    return lambda options: replace(options, scene=change(options.scene or SceneOptions()))
+
+
+PARTS: dict[str, Change] = {  # of preset `best`, switched off
+    "no shared detail": _layers(lambda o: replace(o, fit=replace(o.fit, components=0))),
+    "middle key, no cuts": _layers(lambda o: replace(o, plan=replace(o.plan, keys=1, limit=1e9, worth=1e9))),
+    "flat midpoints": _layers(lambda o: replace(o, layers=replace(o.layers, curvatures=(0,)))),
+    "plain rounding": _layers(lambda o: replace(o, layers=replace(o.layers, price=0.0))),
+    "errors along the surface count": _layers(lambda o: replace(o, layers=replace(o.layers, tangential=1.0))),
+    "no tails": _layers(lambda o: replace(o, tails=False)),
+}
+VARIANTS: dict[str, Change] = {
+    "fast": lambda options: Settings(options.preset, options.quality, "fast").resolved(),  # type: ignore[arg-type]
+    **PARTS,
+    "groups alone": _layers(lambda o: replace(o, predict=False)),
+    UNIFORM: _paper(_plain),
+    IN_MDS_POSE: _paper(lambda o: replace(o, pose="mds", cuts=False)),
+    BOTH: _paper(lambda o: replace(_plain(o), pose="mds", cuts=False)),
+    RELEASED: _paper(lambda o: replace(o, displacements=replace(o.displacements, step=RELEASED_STEP))),
+    LARGER: _paper(lambda o: replace(o, reference=replace(o.reference, vertices=5000))),
+    FROM_MESHES: _scene(lambda o: replace(o, from_depth=False)),
+    TOGETHER: _scene(lambda o: replace(o, near=1e4)),  # all pieces are near each other
+}
+
+
+def find_variant(name: str | None) -> Change:
+    """The change called `name`; None changes nothing. Raises InputError for an unknown one."""
+    if name is None:
+        return lambda options: options
+    if name not in VARIANTS:
+        raise InputError(f"no variant is called {name!r}; known: {', '.join(sorted(VARIANTS))}")
+    return VARIANTS[name]

@@ -14,9 +14,8 @@ from meshreel.geometry.decimate import decimate_faces
 from meshreel.geometry.topology import concatenate, drop_unreferenced
 from meshreel.types import Mesh, MeshSequence
 
-from ..codec import Progress
+from ..codec import Options, Progress
 from ..datasets.scenes import FOUND, TRUE, SceneFrames
-from .base import Options
 from .draco import Frames, Point, check_qp, write_frames
 
 
@@ -29,18 +28,16 @@ class SceneDracoCodec(Options):
     levels: int = 0  # midpoint subdivisions in the decoder
 
     def __post_init__(self) -> None:
-        check_qp(self.qp)
-        _check_share(self.share)
+        _check(self.qp, self.share)
 
     @property
     def name(self) -> str:
         return "a: decimated Draco" + (", subdivided" if self.levels else "")
 
     def encode(self, sequence: MeshSequence, progress: Progress | None = None) -> bytes:
-        """Return a .reel file of single frames."""
         frames = _scene_frames(sequence)
         meshes = [frames.scene.decimated(number, self.share) for number in frames.in_scene]
-        return _written(frames.frame_rate, meshes, [Point(self.qp, self.levels)] * len(meshes), progress)
+        return _written(frames.frame_rate, meshes, [(self.qp, self.levels)] * len(meshes), progress)
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,10 +52,8 @@ class BackgroundDracoCodec(Options):
     labels: str = TRUE  # which faces move: see SceneData.labels
 
     def __post_init__(self) -> None:
-        for qp in (self.qp, self.background_qp):
-            check_qp(qp)
-        for share in (self.share, self.background_share):
-            _check_share(share)
+        _check(self.qp, self.share)
+        _check(self.background_qp, self.background_share)
         if self.labels not in (TRUE, FOUND):
             raise InputError(f"labels {self.labels!r}: give {TRUE} or {FOUND}")
 
@@ -75,7 +70,7 @@ class BackgroundDracoCodec(Options):
             mesh = frames.scene.meshes[number]
             moving = drop_unreferenced(Mesh.of(mesh.vertices, mesh.faces[frames.scene.labels(number, self.labels)]))
             meshes.append(_with_share(moving, self.share))
-        points = [Point(self.background_qp), *[Point(self.qp, self.levels)] * len(frames)]
+        points = [(self.background_qp, 0), *[(self.qp, self.levels)] * len(frames)]
         return _written(frames.frame_rate, meshes, points, progress)
 
     def decode(self, data: bytes) -> Sequence[Mesh]:
@@ -83,11 +78,11 @@ class BackgroundDracoCodec(Options):
         return [concatenate([still, moving]) for moving in frames]
 
     def background_bytes(self, data: bytes) -> int:
-        """Return the size of the background in the file."""
         return open_video(data).reader.groups[0].size
 
 
-def _check_share(share: float) -> None:
+def _check(qp: int, share: float) -> None:
+    check_qp(qp)
     if not 0 < share <= 1:
         raise InputError(f"share {share:g}: give 0 < share <= 1")
 

@@ -28,7 +28,7 @@ from meshreel.io.sequence import FileSequence, SequenceOptions, open_sequence
 from meshreel.types import MeshSequence
 
 from .checksums import check_source, checksum, known_checksums
-from .remesh import Place, RemeshedSequence, RemeshOptions, SideBySide, gears, prism
+from .remesh import Place, RemeshOptions, SideBySide, gears, prism, remeshed
 from .rooms import ROOM, WALKERS
 from .scenes import PROCEDURAL, ROOM3, SCENES, Captured, SceneData, open_scene
 from .walker import FRAMES, Truth, Walker
@@ -112,7 +112,7 @@ class Store:
         if name in REMESHED:
             body, most, options = REMESHED[name]
             source = _open_files(body, self.data, min(frames or most, most))
-            return Dataset(RemeshedSequence(source, None if self.cache is None else self.cache / name, options))
+            return Dataset(remeshed(source, None if self.cache is None else self.cache / name, options))
         folder = _found(name, self.data)
         seen_from = read_view_file(folder) if folder.is_dir() and any(folder.glob(VIEW_FILES)) else ()
         return Dataset(_open_files(name, self.data, frames, self.own), seen_from)

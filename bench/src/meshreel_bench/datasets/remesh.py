@@ -35,24 +35,21 @@ class RemeshOptions:
     jitter: float = 0.35  # largest move of a vertex along the surface, of its shortest edge
 
 
-class RemeshedSequence(DerivedSequence):
-    """The frames of a sequence, remeshed when they are asked for; a folder keeps them as PLY files."""
+def remeshed(source: MeshSequence, folder: Path | None, options: RemeshOptions) -> DerivedSequence:
+    """Return the frames, remeshed when they are asked for; a folder keeps them as PLY files."""
+    if folder is not None:
+        folder.mkdir(parents=True, exist_ok=True)
 
-    def __init__(self, source: MeshSequence, folder: Path | None = None, options: RemeshOptions = RemeshOptions()):
-        super().__init__(source)
-        self._folder, self._options = folder, options
-        if folder is not None:
-            folder.mkdir(parents=True, exist_ok=True)
-
-    def __getitem__(self, index: int) -> Mesh:
-        number = range(len(self))[operator.index(index)]
-        if self._folder is None:
-            return remesh(self.source[number], number, self._options)
-        o = self._options
-        path = self._folder / f"{o.vertices}-{o.levels}-{o.jitter:g}-{number:05}.ply"
+    def frame(frames: MeshSequence, index: int) -> Mesh:
+        number = range(len(frames))[operator.index(index)]
+        if folder is None:
+            return remesh(frames[number], number, options)
+        path = folder / f"{options.vertices}-{options.levels}-{options.jitter:g}-{number:05}.ply"
         if not path.exists():
-            write_mesh(remesh(self.source[number], number, o), path)
+            write_mesh(remesh(frames[number], number, options), path)
         return read_mesh(path, str(path)).mesh
+
+    return DerivedSequence(source, frame)
 
 
 class SideBySide(Frames):
@@ -72,7 +69,7 @@ class SideBySide(Frames):
         return concatenate([Mesh.of(mesh.vertices + way[number % len(way)], mesh.faces) for mesh, way in frames])
 
 
-def remesh(mesh: Mesh, seed: int, options: RemeshOptions = RemeshOptions()) -> Mesh:
+def remesh(mesh: Mesh, seed: int, options: RemeshOptions) -> Mesh:
     """The same surface with other vertices and faces; coordinates are float32 numbers, so that files keep them."""
     if mesh.is_empty:
         return mesh

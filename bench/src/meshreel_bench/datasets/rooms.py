@@ -7,7 +7,7 @@ two people touch and pass, one sits down and stands up. y is up, in metres; the 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,7 +18,7 @@ from meshreel.capture.simulated.demo_room import Box, box
 from meshreel.capture.simulated.figure import Pose, figure, turn_about_y
 from meshreel.capture.simulated.implicit import polygonize
 from meshreel.capture.simulated.procedural import grid_of_frame
-from meshreel.capture.simulated.simulated_rig import TRUTH, SceneFrame, SensorOptions, corner_cameras, simulate_rig
+from meshreel.capture.simulated.simulated_rig import TRUTH, SceneFrame, corner_cameras, simulate_rig
 from meshreel.errors import InputError
 from meshreel.geometry.topology import concatenate, subdivide_midpoint
 from meshreel.io.meshes import read_mesh
@@ -28,30 +28,16 @@ from meshreel.types import Mesh
 ROOM = Path("rooms/lr_kt2.obj")  # its y axis points down
 WALKERS = {"crane": (0.2, 0.0, 3.0), "samba": (-0.9, 0.0, 2.85)}  # m: where there is room to walk
 SPEEDS = {"room2": 1.0, "room2-standing": 0.4}  # of the people
-ROOM_FRAMES = 60
-FRAME_RATE = 30.0  # 1/s
 CAMERAS = 4
 WALLS = (0.35, 0.0, 0.35)  # m from the walls to the cameras
 
 
-@dataclass(frozen=True, slots=True)
-class RoomOptions:
-    """Choice of a scene, and precision of its measurement."""
-
-    name: str = "room2"
-    frames: int = ROOM_FRAMES
-    sensor: SensorOptions = SensorOptions()
-
-
-def simulate_room(
-    folder: Path, data: Path, options: RoomOptions = RoomOptions(), progress: Callable[[int], None] = lambda _done: None
-) -> int:
-    """Writes the scene's rig and its truth into a folder; the number of frames. Some five minutes for 60 frames."""
+def simulate_room(folder: Path, data: Path, name: str, frames: int) -> None:
+    """Write a scene's rig and its truth into a folder. Some five minutes for 60 frames."""
     room = furnished(data)
     low, high = room.vertices.min(axis=0), room.vertices.max(axis=0)
     cameras = corner_cameras(low + WALLS, high - np.array(WALLS), count=CAMERAS)
-    frames = scene(room, data, SPEEDS[options.name], options.frames)
-    return simulate_rig(folder, frames, cameras, FRAME_RATE, options.sensor, progress)
+    simulate_rig(folder, scene(room, data, SPEEDS[name], frames), cameras, RATE)
 
 
 def furnished(data: Path) -> Mesh:
@@ -157,7 +143,8 @@ class Room3:
         """Return the mesh of each part of a frame in the order of `NAMES`; people and things are closed."""
         still = concatenate([box(corners) for corners in STILL])
         poses, grid = thing_poses()[number], grid_of_frame(number, self.spacing, 0)
-        things = [_placed(box(BOXES[name]), pose) for name, pose in zip(THINGS, poses, strict=True)]
+        boxes = ((box(BOXES[name]), pose) for name, pose in zip(THINGS, poses, strict=True))
+        things = [Mesh.of(mesh.vertices @ pose[:3, :3].T + pose[:3, 3], mesh.faces) for mesh, pose in boxes]
         people = [polygonize((figure(pose, 0.7 * self.spacing),), 0.01, grid) for pose in _people(number)]
         return [*(subdivide_midpoint(mesh) for mesh in (still, *things)), *people]
 
@@ -238,7 +225,3 @@ def _eased(first: int, last: int) -> PerFrame:
     """Return a smooth step over the frames: 0 up to `first`, 1 from `last` on."""
     share = np.clip((np.arange(FRAMES) - first) / (last - first), 0, 1)
     return share * share * (3 - 2 * share)
-
-
-def _placed(mesh: Mesh, pose: Float64[np.ndarray, "4 4"]) -> Mesh:
-    return Mesh.of(mesh.vertices @ pose[:3, :3].T + pose[:3, 3], mesh.faces)

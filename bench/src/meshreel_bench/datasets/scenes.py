@@ -23,66 +23,39 @@ from meshreel.capture.recording import FusionOptions, Recording, open_recording
 from meshreel.capture.rig.rig import RIG
 from meshreel.capture.simulated import demo_room
 from meshreel.capture.simulated.simulated_rig import TRUTH, Truth, read_truth
-from meshreel.geometry.cameras import Camera
 from meshreel.geometry.closest_points import Surface, carried_labels
-from meshreel.geometry.color_views import ColorFrames
 from meshreel.geometry.decimate import decimate_faces
-from meshreel.geometry.depth import DepthFrames
 from meshreel.geometry.derived_sequences import DerivedSequence
 from meshreel.io.meshes import read_mesh
 from meshreel.io.sequence import open_sequence
 from meshreel.io.write import frame_names, make_folder, replacing, write_mesh
 from meshreel.metrics.scene_accuracy import Scene, Sight
-from meshreel.types import Frames, Mesh, MeshSequence, Up, evenly
+from meshreel.types import Mesh, MeshSequence, evenly
 
 from . import rooms
-from .rooms import SPEEDS, RoomOptions, simulate_room
 
 
-class Captured(Frames):
+class Captured(DerivedSequence):
     """The frames of a recording, made as `meshreel capture` makes them where the folder lacks them."""
 
     def __init__(self, recording: Recording, folder: Path) -> None:
+        super().__init__(recording)
         make_folder(folder)
         for number, name in enumerate(frame_names(len(recording), "ply")):
             if not (folder / name).exists():
                 write_mesh(recording[number], folder / name)
-        self._recording, self._meshes = recording, open_sequence(folder)
-        self.frame_rate = recording.frame_rate
-
-    def __len__(self) -> int:
-        return len(self._recording)
+        self._meshes = open_sequence(folder)
+        self.cameras = tuple(camera.view for camera in recording.rig.cameras)
 
     def __getitem__(self, index: int) -> Mesh:
         return self._meshes[range(len(self))[index]]
 
-    @property
-    def cameras(self) -> tuple[Camera, ...]:
-        """Cameras of the capture."""
-        return tuple(camera.view for camera in self._recording.rig.cameras)
 
-    @property
-    def up(self) -> Up:
-        """The axis that points up."""
-        return self._recording.up
-
-    @property
-    def colors(self) -> ColorFrames | None:
-        """The pictures of the colour cameras, by frame."""
-        return self._recording.colors
-
-    @property
-    def depth(self) -> DepthFrames:
-        """The depth pictures of the cameras, by frame."""
-        return self._recording.depth
-
-
-SCENES = tuple(SPEEDS)
+SCENES = tuple(rooms.SPEEDS)
 ROOM3 = "room3"  # needs no benchmark data
 TRUE = "truth"  # labels: those of the nearest clean faces
 FOUND = "found"  # labels: those that the encoder finds
 PROCEDURAL = "procedural_room"  # the room of `meshreel demo`: needs no benchmark data
-PROCEDURAL_FRAMES = 60
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -106,22 +79,32 @@ class SceneData:
             return self.labels(number, source)
         parts, counts = self.parts.of_faces(number), rooms.moving_parts(self.parts.poses)[number]
         counts[0] = True  # the room
-        path = self.folder / "labels" / f"judged-{number:05}.npy"
-        clean, mesh = self.truth[number].mesh, self.meshes[number]
-        return self.labels(number, source)[_kept_array(path, lambda: _nearest_labels(clean, counts[parts], mesh))]
+        counted = self._kept_labels(f"judged-{number:05}", self.truth[number].mesh, counts[parts], number)
+        return self.labels(number, source)[counted]
 
     def labels(self, number: int, source: str = TRUE) -> Bool[np.ndarray, " F"]:
         """Return a mask of moving faces: those nearest to moving clean faces (`TRUE`), or found by the encoder."""
         if source == TRUE:
-            path = self.folder / "labels" / f"{TRUE}-{number:05}.npy"
             clean = self.truth[number]
-            return _kept_array(path, lambda: _nearest_labels(clean.mesh, clean.dynamic, self.meshes[number]))
+            return self._kept_labels(f"{TRUE}-{number:05}", clean.mesh, clean.dynamic, number)
         path = self.folder / "labels" / f"{_kept_as(source)}.npz"
         if not path.exists():
             _find_labels(self.meshes, path)
         with np.load(path, allow_pickle=False) as archive:
             bits = archive[f"frame_{number:05}"]
         return np.unpackbits(bits, count=len(self.meshes[number].faces)).astype(bool)
+
+    def _kept_labels(self, name: str, clean: Mesh, labels: Bool[np.ndarray, " F"], number: int) -> np.ndarray:
+        """Label the faces of a frame: each takes the label of the clean face nearest to its middle."""
+        path = self.folder / "labels" / f"{name}.npy"
+        if not path.exists():
+            mesh = self.meshes[number]
+            none = np.zeros(len(mesh.faces), bool)
+            make_folder(path.parent)
+            with replacing(path) as file:
+                np.save(file, none if clean.is_empty else carried_labels(Surface(clean), labels, mesh))
+        found: np.ndarray = np.load(path)
+        return found
 
     def background(self, source: str = TRUE) -> Mesh:
         """Background fused over time from the rig's depth, as the encoder fuses it."""
@@ -135,8 +118,9 @@ class SceneData:
         return _kept_mesh(path, lambda: decimate_faces(mesh, round(share * len(mesh.faces))))
 
     def _fused(self, source: str) -> Mesh:
-        meshes = ((number, self.meshes[number]) for number in evenly(len(self.meshes), FRAMES))
-        moments = (Moment(self.meshes.depth[k], mesh, ~self.labels(k, source)) for k, mesh in meshes)
+        depth, meshes = self.meshes.depth, ((k, self.meshes[k]) for k in evenly(len(self.meshes), FRAMES))
+        assert depth is not None, "recordings have depth pictures"
+        moments = (Moment(depth[k], mesh, ~self.labels(k, source)) for k, mesh in meshes)
         return fuse_still_depth(moments, FusionOptions().voxel)
 
 
@@ -153,21 +137,19 @@ def open_scene(name: str, data: Path, cache: Path, frames: int | None = None) ->
     folder = cache / (name if frames is None else f"{name}-{frames}")
     rig, meshes = folder / "rig", folder / "meshes"
     if not (rig / RIG).exists():
-        _simulate(name, rig, data, frames)
+        _simulate(name, rig, data, rooms.FRAMES if frames is None else frames)
     fusion = FusionOptions(demo_room.VOXEL) if name == PROCEDURAL else FusionOptions()
     recording, _ = open_recording(rig, fusion, keep=False)
     return SceneData(name, folder, Captured(recording, meshes), read_truth(rig / TRUTH), rooms.read_parts(rig))
 
 
-def _simulate(name: str, rig: Path, data: Path, frames: int | None) -> None:
-    """Write the rig and the truth of a scene."""
+def _simulate(name: str, rig: Path, data: Path, frames: int) -> None:
     if name == PROCEDURAL:
-        room = demo_room.RoomOptions(PROCEDURAL_FRAMES if frames is None else frames)
-        demo_room.record_room(rig, room)
+        demo_room.record_room(rig, demo_room.RoomOptions(frames))
     elif name == ROOM3:
-        rooms.Room3(rooms.FRAMES if frames is None else frames).record(rig)
+        rooms.Room3(frames).record(rig)
     else:
-        simulate_room(rig, data, RoomOptions(name) if frames is None else RoomOptions(name, frames))
+        rooms.simulate_room(rig, data, name, frames)
 
 
 @cache
@@ -197,23 +179,8 @@ def true_scene(truth: Truth, number: int, people: Bool[np.ndarray, " F"] | None 
     return Scene(frame.mesh, frame.dynamic if people is None else people, sights, complete=True)
 
 
-def _nearest_labels(clean: Mesh, labels: Bool[np.ndarray, " F"], fused: Mesh) -> Bool[np.ndarray, " G"]:
-    """Label the faces of a fused mesh: each takes the label of the clean face nearest to its middle."""
-    if clean.is_empty:
-        return np.zeros(len(fused.faces), bool)
-    return carried_labels(Surface(clean), labels, fused)
-
-
 def _kept_mesh(path: Path, make: Callable[[], Mesh]) -> Mesh:
     if not path.exists():
         make_folder(path.parent)
         write_mesh(make(), path)
     return read_mesh(path).mesh
-
-
-def _kept_array(path: Path, make: Callable[[], np.ndarray]) -> np.ndarray:
-    if not path.exists():
-        make_folder(path.parent)
-        with replacing(path) as file:
-            np.save(file, make())
-    return np.load(path)

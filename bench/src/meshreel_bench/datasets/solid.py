@@ -39,21 +39,16 @@ TRACKED = 80.0  # quality of a template that carries colours
 CELL = 6  # pixels of the square that a face has in a texture: about 3 mm each on bodies of 10,000 vertices
 
 
-class InColours(DerivedSequence):
-    """The frames of a sequence, each with a texture of its own: a square for each face."""
+def in_colours(source: MeshSequence, painted: Callable[[int], Mesh]) -> DerivedSequence:
+    """Return the frames, each with a texture of its own: a square for each face; `painted` returns one in colour."""
 
-    def __init__(self, source: MeshSequence, painted: Callable[[int], Mesh]) -> None:
-        """Take the frames, and what returns a mesh of the same surface in colour."""
-        super().__init__(source)
-        self._painted, self._known = painted, dict[int, Mesh]()  # some 2 MB each: painting takes a second
+    @cache  # some 2 MB each: painting takes a second
+    def frame(number: int) -> Mesh:
+        mesh = source[number]
+        is_bare = not (mesh.is_colored or mesh.is_empty)
+        return textured(mesh, Painted(painted(number))) if is_bare else mesh
 
-    def __getitem__(self, index: int) -> Mesh:
-        number = range(len(self))[index]
-        if number not in self._known:
-            mesh = self.source[number]
-            is_bare = not (mesh.is_colored or mesh.is_empty)
-            self._known[number] = textured(mesh, Painted(self._painted(number))) if is_bare else mesh
-        return self._known[number]
+    return DerivedSequence(source, lambda _, number: frame(number))
 
 
 def textured(mesh: Mesh, paint: Painted) -> Mesh:
@@ -130,14 +125,9 @@ def chains_of(data: bytes) -> list[Chain]:
         meshes, state = continue_group(payload, chunk.frame_count, None, before, place)
         numbers = range(chunk.first_frame, chunk.first_frame + chunk.frame_count)
         if chunk.form not in (Form.LAYERS, Form.LAPLACIAN):
-            chains += [[(k, alone(mesh))] for k, mesh in zip(numbers, meshes, strict=True)]
+            chains += [[(k, Carrier(mesh.vertices, mesh.faces, 0))] for k, mesh in zip(numbers, meshes, strict=True)]
             continue
         canvas = canvas_of(payload, [len(mesh.vertices) for mesh in meshes], None, before)
         carried = list(zip(numbers, canvas.carriers(meshes), strict=True))
         chains = [*chains[:-1], chains[-1] + carried] if before is not None else [*chains, carried]
     return chains
-
-
-def alone(mesh: Mesh) -> Carrier:
-    """Return the carrier of splats in a frame that shares no faces with others."""
-    return Carrier(mesh.vertices, mesh.faces, 0)

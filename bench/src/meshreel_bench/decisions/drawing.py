@@ -19,13 +19,14 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from meshreel.analysis.scene.segmentation import segment
-from meshreel.capture.recording import FusionOptions, Recording, open_recording
+from meshreel.capture.recording import FusionOptions, open_recording
 from meshreel.capture.simulated.demo_room import RoomOptions, furnished_room, room_cameras
 from meshreel.capture.simulated.simulated_rig import SensorOptions, simulate_rig
 from meshreel.decoder.video import open as open_video
 from meshreel.encoder.sequence import encode
+from meshreel.geometry.cameras import looking_at
 from meshreel.geometry.closest_points import Surface
-from meshreel.geometry.topology import components, concatenate, part_of
+from meshreel.geometry.topology import blend, components, concatenate, face_normals, part_of
 from meshreel.metrics.render import Crop, look
 from meshreel.metrics.viewpoints import Box
 from meshreel.types import Mesh
@@ -35,6 +36,7 @@ from ..parallel_views import OrthographicCamera, parallel_views_around
 DPI = 100
 TOP, GAP, RIGHT = 26, 6, 80  # pixels over, between and, for a color bar, right of the panels
 LIGHT = np.array([0.3, 0.5, 0.8]) / np.linalg.norm([0.3, 0.5, 0.8])
+GREY = 0.82
 BOTTOM = 8  # pixels under them
 FINE = 3  # rays a pixel and axis, averaged
 COLORS = 256  # of a picture's palette
@@ -65,7 +67,7 @@ class Sheet:
         bar.tick_params(labelsize=7)
 
     def write(self, path: Path) -> None:
-        """The PNG, with few colors, so that it is small."""
+        """The PNG."""
         write_figure(self.figure, path)
 
     def _axes(self, left: int, width: int) -> Any:
@@ -73,11 +75,23 @@ class Sheet:
         return self.figure.add_axes((left / wide, BOTTOM / high, width / wide, self.size / high))
 
 
+def chart(wide: float, high: float) -> tuple[Figure, Any]:
+    """An empty figure, inches, and its axes."""
+    figure = Figure(figsize=(wide, high), dpi=DPI, layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure, figure.add_subplot()
+
+
 def write_figure(figure: Figure, path: Path) -> None:
     """A figure as a PNG with a palette."""
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png", dpi=DPI, metadata={"Software": None})
-    picture = Image.open(buffer).convert("RGB").quantize(COLORS, Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
+    write_small(buffer, path)
+
+
+def write_small(source: io.BytesIO | Path, path: Path) -> None:
+    """A picture with few colors, so that it is small."""
+    picture = Image.open(source).convert("RGB").quantize(COLORS, Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
     picture.save(path, optimize=True)
 
 
@@ -88,10 +102,7 @@ def camera_for(meshes: list[Mesh], size: int, view: int = 0) -> OrthographicCame
 
 def oblique(meshes: list[Mesh], towards_eye: np.ndarray, shape: tuple[int, int], margin: float) -> OrthographicCamera:
     """A parallel view that holds all meshes, `shape` pixels wide and high, `margin` times as large as they need."""
-    ahead = -towards_eye / np.linalg.norm(towards_eye)
-    right = np.cross(ahead, [0.0, 1.0, 0.0])
-    right /= np.linalg.norm(right)
-    rotation = np.stack([right, np.cross(ahead, right), ahead])
+    rotation = looking_at(towards_eye, np.zeros(3))[:3, :3].T
     turned = np.concatenate([mesh.vertices for mesh in meshes]) @ rotation.T
     low, high = turned.min(axis=0), turned.max(axis=0)
     extrinsic = np.eye(4)
@@ -107,7 +118,10 @@ def shaded(mesh: Mesh, camera: OrthographicCamera, colors: Float64[np.ndarray, "
     picture = np.ones((camera.height, camera.width, 3))
     turned = view.normals @ camera.extrinsic[:3, :3].T * [1, -1, -1]
     light = 0.45 + 0.55 * np.abs(turned @ LIGHT)
-    base = np.full((len(view.points), 3), 0.82) if colors is None else _at_points(mesh, view.points, colors)
+    base = np.full((len(view.points), 3), GREY)
+    if colors is not None:
+        hits = Surface(mesh).closest(view.points)
+        base = blend(colors, mesh.faces[hits.faces], hits.barycentric)
     picture[view.covered] = base * light[:, None]
     return _averaged(picture)
 
@@ -134,13 +148,9 @@ def placed(points: Float64[np.ndarray, "K 3"], camera: OrthographicCamera) -> Fl
 def draw_edges(axes: Any, mesh: Mesh, camera: OrthographicCamera, line: float = 0.3) -> None:
     """The mesh's faces with their edges, nearest last."""
     points = placed(mesh.vertices, camera)
-    flat = camera.project(points)[mesh.faces]
-    a, b, c = (points[mesh.faces[:, k]] for k in range(3))
-    normals = np.cross(b - a, c - a)
-    normals /= np.maximum(np.linalg.norm(normals, axis=1), 1e-300)[:, None]
-    front = normals[:, 2] < 0
+    flat, normals = camera.project(points)[mesh.faces], face_normals(Mesh(points, mesh.faces))[0]
     order = np.argsort(-points[mesh.faces][:, :, 2].mean(axis=1), kind="stable")
-    order = order[front[order]]
+    order = order[normals[order, 2] < 0]  # the front
     light = 0.45 + 0.55 * np.abs((normals * [1, -1, -1]) @ LIGHT)
     grey = np.repeat((0.85 * light)[:, None], 3, axis=1)
     axes.add_collection(
@@ -150,12 +160,7 @@ def draw_edges(axes: Any, mesh: Mesh, camera: OrthographicCamera, line: float = 
 
 
 def draw_points(
-    axes: Any,
-    points: Float64[np.ndarray, "K 3"],
-    camera: OrthographicCamera,
-    colors: np.ndarray,
-    size: float = 7.0,
-    rim: float = 0.2,
+    axes: Any, points: np.ndarray, camera: OrthographicCamera, colors: np.ndarray, size: float = 7.0, rim: float = 0.2
 ) -> None:
     """Points as dots, nearest last."""
     local = placed(points, camera)
@@ -174,22 +179,18 @@ def _averaged(picture: np.ndarray) -> np.ndarray:
     return picture.reshape(high, FINE, wide, FINE, 3).mean(axis=(1, 3))
 
 
-def _at_points(mesh: Mesh, points: np.ndarray, colors: np.ndarray) -> np.ndarray:
-    hits = Surface(mesh).closest(points)
-    return np.einsum("nk,nkd->nd", hits.barycentric, colors[mesh.faces[hits.faces]])
-
-
 FRAMES, SHOWN = 20, 9
 WIDTH, NOISE, VOXEL = 256, 0.3, 0.03  # as `meshreel demo` has them
 PANEL = 300  # pixels
-GREY = np.full(3, 0.82)
 FROM = np.array([0.42, 0.42, 1.0])  # where the picture is seen from
 
 
 def draw_room(path: Path) -> None:
     """A fused frame, the faces that move, the background alone, the frame decoded."""
     with tempfile.TemporaryDirectory() as folder:
-        capture = captured(Path(folder) / "rig")
+        rig, room = Path(folder) / "rig", furnished_room(RoomOptions(frames=FRAMES))
+        simulate_rig(rig, room, room_cameras(WIDTH), room.options.frame_rate, SensorOptions(noise=NOISE))
+        capture = open_recording(rig, FusionOptions(VOXEL))[0]
         frame, moves = capture[SHOWN], segment(capture).moving(SHOWN, capture[SHOWN])
         encode(capture, Path(folder) / "room.reel")
         with open_video(Path(folder) / "room.reel") as video:
@@ -203,17 +204,10 @@ def draw_room(path: Path) -> None:
     sheet.write(path)
 
 
-def captured(folder: Path) -> Recording:
-    """The frames as they are fused."""
-    room = furnished_room(RoomOptions(frames=FRAMES))
-    simulate_rig(folder, room, room_cameras(WIDTH), room.options.frame_rate, SensorOptions(noise=NOISE))
-    return open_recording(folder, FusionOptions(VOXEL))[0]
-
-
 def _colored(mesh: Mesh, moves: np.ndarray) -> tuple[Mesh, Float64[np.ndarray, "V 3"]]:
     """The mesh with what moves split off, and a color for each of its vertices: one a body, the largest first."""
     still, moving = (part_of(mesh, chosen) for chosen in (~moves, moves))
     label = components(moving.faces, len(moving.vertices))
     rank = np.argsort(np.argsort(-np.bincount(label), kind="stable"), kind="stable")[label]
-    colors = np.concatenate([np.tile(GREY, (len(still.vertices), 1)), BODIES[rank % len(BODIES)]])
+    colors = np.concatenate([np.full((len(still.vertices), 3), GREY), BODIES[rank % len(BODIES)]])
     return concatenate([still, moving]), colors

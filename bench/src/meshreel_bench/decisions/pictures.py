@@ -7,18 +7,22 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import matplotlib
 import numpy as np
 from jaxtyping import Float64
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
-from PIL import Image
 
 from meshreel.analysis.fit.surface_fit import Fit, FitOptions, Guides, fit_frames
-from meshreel.analysis.reference.centers import bind, center_motions, largest_distances, move, reference_centers
+from meshreel.analysis.reference.centers import (
+    ReferenceCenters,
+    bind,
+    center_motions,
+    largest_distances,
+    move,
+    reference_centers,
+)
 from meshreel.analysis.reference.extraction import MDS, Reference, extract_reference, predict
 from meshreel.analysis.reference.track import track_centers
 from meshreel.analysis.survey import survey
@@ -43,35 +47,20 @@ CONTACT = 5  # of these: the two surfaces are melted into one
 
 
 @dataclass(frozen=True, slots=True)
-class Moved:
-    """A frame in another pose, colored by the normals of its own pose."""
-
-    mesh: Mesh
-    colors: Float64[np.ndarray, "V 3"]  # RGB, 0 to 1
-
-
-@dataclass(frozen=True, slots=True)
 class Stages:
     """Results of every stage on one group; coordinates are normalised: the sequence's diagonal is 1."""
 
     frames: tuple[Mesh, ...]
     centers: Centers
-    spread: Float64[np.ndarray, "K 3"]  # the reference centers of eq. 5
-    stress: float
+    spread: ReferenceCenters  # of eq. 5
     reference: Reference
-    moved: tuple[Moved, ...]  # the frames in the pose of eq. 5
+    moved: list[tuple[Mesh, Float64[np.ndarray, "V 3"]]]  # the frames in the pose of eq. 5, RGB by their own normals
     coded: CodedReference
     predictions: Float64[np.ndarray, "T V 3"]
     fit: Fit
     basis: klt.Basis
     payload: bytes
     components: int
-    decoded: tuple[Mesh, ...]
-
-    @property
-    def parts(self) -> dict[str, int]:
-        """Bytes of the group's payload by purpose."""
-        return payload_bytes_by_purpose(self.payload)
 
 
 def story() -> MeshList:
@@ -93,39 +82,14 @@ def compute(sequence: MeshList, options: PaperOptions) -> Stages:
     fit = fit_frames(coded.base.faces, predictions, frames, FitOptions(), Guides(key=reference.key))
     field = np.moveaxis(fit.positions, 0, 1) - coded.base.vertices[:, None]
     payload, layers = encode_laplacian(coded, field, options.displacements)
-    moved = tuple(
-        _moved(frame, own, spread.positions, reference) for frame, own in zip(frames, centers.positions, strict=True)
-    )
-    return Stages(
-        frames=frames,
-        centers=centers,
-        spread=spread.positions,
-        stress=spread.stress,
-        reference=reference,
-        moved=moved,
-        coded=coded,
-        predictions=predictions,
-        fit=fit,
-        basis=klt.fit(field),
-        payload=payload,
-        components=len(layers) - 1,
-        decoded=tuple(decode_group(payload, len(frames))),
-    )
-
-
-def _moved(
-    frame: Mesh,
-    own: Float64[np.ndarray, "K 3"],
-    pose: Float64[np.ndarray, "K 3"],
-    reference: Reference,
-) -> Moved:
-    binding = bind(frame, own, reference.neighbours)
-    motions = center_motions(own, pose, reference.neighbours)
-    vertices = move(frame.vertices, binding, motions, reference.neighbours)
-    return Moved(Mesh(vertices, frame.faces), (vertex_normals(frame) + 1) / 2)
-
-
-Picture = Callable[[Stages, Path], None]
+    moved = list[tuple[Mesh, np.ndarray]]()
+    for frame, own in zip(frames, centers.positions, strict=True):
+        binding = bind(frame, own, reference.neighbours)
+        motions = center_motions(own, spread.positions, reference.neighbours)
+        vertices = move(frame.vertices, binding, motions, reference.neighbours)
+        moved.append((Mesh(vertices, frame.faces), (vertex_normals(frame) + 1) / 2))
+    sent = klt.fit(field), payload, len(layers) - 1
+    return Stages(frames, centers, spread, reference, moved, coded, predictions, fit, *sent)
 
 
 def main(folder: Path = Path("docs/pictures")) -> None:
@@ -174,9 +138,9 @@ def centers(stages: Stages, path: Path) -> None:
 def spread_centers(stages: Stages, path: Path) -> None:
     """A frame's centers beside those of eq. 5, from the front and from the side."""
     sheet = Sheet(4, 300)
-    poses = (stages.centers.positions[CONTACT], stages.spread)
+    poses = (stages.centers.positions[CONTACT], stages.spread.positions)
     box = [Mesh.of(pose, np.zeros((0, 3))) for pose in poses]
-    names = (f"frame {FIRST + CONTACT}", f"reference (stress {stages.stress:.3f})")
+    names = (f"frame {FIRST + CONTACT}", f"reference (stress {stages.spread.stress:.3f})")
     for panel in range(4):
         pose, view = poses[panel % 2], panel // 2
         draw_points(sheet.axes[panel], pose, camera_for(box, 300, view), BODIES[stages.centers.bodies % 3])
@@ -187,12 +151,12 @@ def spread_centers(stages: Stages, path: Path) -> None:
 def deformed(stages: Stages, path: Path) -> None:
     """Frames in the pose of the reference centers, in the colors that their normals had in the frame."""
     sheet = Sheet(4, 300)
-    camera = camera_for([moved.mesh for moved in stages.moved], 300)
+    camera = camera_for([mesh for mesh, _ in stages.moved], 300)
     last = len(stages.frames) - 1
     for panel, t in enumerate((0, CONTACT, last)):
-        moved = stages.moved[t]
-        sheet.image(panel, f"frame {FIRST + t}, moved", shaded(moved.mesh, camera, moved.colors))
-    together = [stages.moved[t].mesh.vertices for t in (0, CONTACT, last)]
+        mesh, normals = stages.moved[t]
+        sheet.image(panel, f"frame {FIRST + t}, moved", shaded(mesh, camera, normals))
+    together = [stages.moved[t][0].vertices for t in (0, CONTACT, last)]
     colors = np.repeat(BODIES, [len(points) for points in together], axis=0)
     draw_points(sheet.axes[3], np.concatenate(together), camera, colors, 1.0, 0.0)
     sheet.axes[3].set_title("points of the three, laid together", fontsize=9)
@@ -207,9 +171,10 @@ def reference(stages: Stages, path: Path) -> None:
     coarse = stages.reference.mesh
     pose = "MDS" if stages.reference.frame == MDS else f"frame {FIRST + stages.reference.frame}"
     sheet.image(0, f"{len(coarse.vertices)} vertices, {_parts(coarse)}, pose of {pose}", shaded(base, camera))
+    low, size = coarse.vertices.min(axis=0), np.ptp(coarse.vertices, axis=0)
     for panel, (mesh, name) in enumerate(((coarse, "before subdivision"), (base, "after it")), 1):
-        low, high = coarse.vertices.min(axis=0), coarse.vertices.max(axis=0)
-        top = Mesh.of(_inside(mesh, (high - low) * [0, 0.68, 0] + low, (high - low) * [0.45, 1, 1] + low), [])
+        inside = (mesh.vertices >= size * [0, 0.68, 0] + low) & (mesh.vertices <= size * [0.45, 1, 1] + low)
+        top = Mesh.of(mesh.vertices[inside.all(axis=1)], [])
         draw_edges(sheet.axes[panel], mesh, camera_for([top], 340), 0.4)
         sheet.axes[panel].set_title(f"{name}: {len(mesh.faces)} faces", fontsize=9)
     sheet.write(path)
@@ -235,9 +200,7 @@ def fit(stages: Stages, path: Path) -> None:
 
 def components(stages: Stages, path: Path) -> None:
     """The energy of each KLT component, as many in color as are sent, and the quantiser's base step."""
-    figure = Figure(figsize=(8, 3), dpi=drawing.DPI, layout="constrained")
-    FigureCanvasAgg(figure)
-    axes = figure.add_subplot()
+    figure, axes = drawing.chart(8, 3)
     deviations = 100 * np.sqrt(stages.basis.energies)
     numbers = np.arange(len(deviations)) + 1
     kept = numbers <= stages.components
@@ -254,20 +217,17 @@ def components(stages: Stages, path: Path) -> None:
 
 def decoded(stages: Stages, path: Path) -> None:
     """Original, decoded and error, as `meshreel compare --sheet` draws them."""
-    last = len(stages.frames) - 1
-    pictures = MeshList(stages.frames), MeshList(stages.decoded)
-    write_sheet(*pictures, path, SheetOptions(frames=(0, last), height=340))
-    picture = Image.open(path).convert("RGB").quantize(256, Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
-    picture.save(path, optimize=True)
+    count = len(stages.frames)
+    pictures = MeshList(stages.frames), MeshList(tuple(decode_group(stages.payload, count)))
+    write_sheet(*pictures, path, SheetOptions(frames=(0, count - 1), height=340))
+    drawing.write_small(path, path)
 
 
 def parts(stages: Stages, path: Path) -> None:
     """The payload's bytes by what they are for."""
-    figure = Figure(figsize=(8, 1.5), dpi=drawing.DPI, layout="constrained")
-    FigureCanvasAgg(figure)
-    axes = figure.add_subplot()
+    figure, axes = drawing.chart(8, 1.5)
     start = 0
-    for number, (name, size) in enumerate(stages.parts.items()):
+    for number, (name, size) in enumerate(payload_bytes_by_purpose(stages.payload).items()):
         axes.barh(0, size, left=start, label=f"{name}: {size}", color=f"C{number}")
         start += size
     axes.set(yticks=[], xlim=(0, start), xlabel=f"bytes of the group: {start}, for {len(stages.frames)} frames")
@@ -275,7 +235,7 @@ def parts(stages: Stages, path: Path) -> None:
     drawing.write_figure(figure, path)
 
 
-PICTURES: dict[str, Picture] = {
+PICTURES: dict[str, Callable[[Stages, Path], None]] = {
     "frames": frames,
     "centers": centers,
     "reference-centers": spread_centers,
@@ -290,11 +250,9 @@ PICTURES: dict[str, Picture] = {
 
 def _around_hands(stages: Stages, t: int) -> Mesh:
     """Vertices within a tenth of the diagonal around the middle between the two people."""
-    box = Box.of(stages.frames)
+    box, vertices = Box.of(stages.frames), stages.frames[t].vertices
     middle = box.center + [0, 0.14 * box.size[1], 0]
-    frame = stages.frames[t]
-    near = np.linalg.norm(frame.vertices[:, :2] - middle[:2], axis=1) < 0.08
-    return replace(frame, vertices=frame.vertices[near], faces=np.zeros((0, 3), np.int32))
+    return Mesh.of(vertices[np.linalg.norm(vertices[:, :2] - middle[:2], axis=1) < 0.08], [])
 
 
 def _parts(mesh: Mesh) -> str:
@@ -308,10 +266,6 @@ def _colors_by_place(stages: Stages) -> np.ndarray:
     low, high = first.min(axis=0), first.max(axis=0)
     share = (first - low) / (high - low)
     return matplotlib.colormaps["turbo"]((3.2 * share[:, 1] + 0.5 * share[:, 0]) % 1.0)[:, :3]
-
-
-def _inside(mesh: Mesh, low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    return mesh.vertices[((mesh.vertices >= low) & (mesh.vertices <= high)).all(axis=1)]
 
 
 if __name__ == "__main__":

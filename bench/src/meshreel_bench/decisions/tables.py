@@ -40,9 +40,9 @@ def table(name: str, rows: Sequence[Row]) -> str:
     return "".join(f"| {' | '.join(line)} |\n" for line in shown)
 
 
-def thousandths(key: str, digits: int = 2) -> Cell:
+def thousandths(key: str) -> Cell:
     """Return the cell of a value times 1000."""
-    return lambda row: f"{1000 * row[key]:.{digits}f}"
+    return lambda row: f"{1000 * row[key]:.2f}"
 
 
 def optional(key: str, form: str) -> Cell:

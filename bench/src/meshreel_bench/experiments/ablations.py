@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..codecs.variants import BOTH, FROM_MESHES, IN_MDS_POSE, RELEASED, TOGETHER, UNIFORM
+from ..codecs.meshreel import BOTH, FROM_MESHES, IN_MDS_POSE, PARTS, RELEASED, TOGETHER, UNIFORM
 from ..names import BEST, LITERAL, LITERAL_FINEST, MORE_CENTERS, OURS, PUBLISHED, TSMC
 from ..rows import Options
 from .scenes import MEASURES
@@ -67,14 +67,6 @@ PAPER = Study(
         "back on their own; surface and displacement come together in `paper-literal`. Nearest vertices are its limit",
         f"at m = 30: more centers, {MORE_CENTERS}, predict better where they are, and {RELEASED} codes them finely.",
     ),
-)
-PARTS = (
-    "no shared detail",
-    "middle key, no cuts",
-    "flat midpoints",
-    "plain rounding",
-    "errors along the surface count",
-    "no tails",
 )
 LONG = "crane60"  # groups alone show only where there are several
 WHOLE = {"preset": "best"}

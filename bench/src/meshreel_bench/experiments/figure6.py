@@ -5,8 +5,8 @@ SYSTEMS are the paper's, at operating points of their own, and the anchors that 
 
 from __future__ import annotations
 
+from ..codecs.meshreel import LARGER
 from ..codecs.necgs import QUICK
-from ..codecs.variants import LARGER
 from ..names import BEST, DRACO, KLT, NECGS, TUNED, TVMC
 from ..rows import Options
 from .study import (

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 from ..rows import Metrics, Option, Point
 
@@ -213,10 +213,6 @@ class Study:
                 yield Point(sequence, FLOOR, {}, frames, metrics=self.metrics)
             for sweep in self.sweeps:
                 yield from sweep.points(sequence, frames, self.metrics)
-
-    def extended(self, sequences: Sequence[str], sweeps: Sequence[Sweep]) -> Study:
-        """Return the same study on these sequences instead, where there are any, and with these sweeps, too."""
-        return replace(self, sequences=sequences or self.sequences, sweeps=(*self.sweeps, *sweeps))
 
 
 # In a codec's place: the truth itself, labels of what moves, tracked centers, and playing.

@@ -92,13 +92,9 @@ def cost_of(timers: Sequence[StageTimer], frames: int) -> Encoding:
         return {name: sum(total.get(name, 0.0) for total in totals) / frames for name in names}
 
     references = [each for timer in timers for each in timer.references]
-    return Encoding(
-        s=sum(timer.seconds for timer in timers) / frames,
-        stages_s=a_frame([timer.stages for timer in timers]),
-        peak_rss_mb=peak_rss_mb(),
-        reference_s=float(np.mean(references)),
-        work=a_frame([timer.work for timer in timers]),
-    )
+    seconds, work = sum(timer.seconds for timer in timers) / frames, a_frame([timer.work for timer in timers])
+    stages = a_frame([timer.stages for timer in timers])
+    return Encoding(seconds, stages, peak_rss_mb(), float(np.mean(references)), work)
 
 
 def peak_rss_mb() -> float | None:

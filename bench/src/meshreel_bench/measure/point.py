@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import pickle
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 
@@ -28,7 +28,7 @@ from ..codec import BackgroundCodec, Codec, ColorCodec, TwoStepCodec
 from ..codecs import codec_version, make_codec
 from ..datasets import Dataset, Store
 from ..datasets.scenes import FOUND, TRUE, SceneFrames
-from ..datasets.solid import InColours, coloured
+from ..datasets.solid import coloured, in_colours
 from ..experiments.headset import AARCH64, ENCODED
 from ..experiments.study import FLOOR, HEADSET, TRACKER
 from ..experiments.study import FOUND as SEGMENTATION
@@ -37,8 +37,7 @@ from ..rows import Encoding, Group, Point, Row, Stream, checked
 from .clock import StageTimer, cost_of, maker
 from .color import color_bytes
 from .headset import aarch64_values, headset_values
-from .metrics import Measured, measure_frames
-from .parts import Labels, score_labels
+from .metrics import Labels, Measured, measure_frames, score_labels
 from .splats import splat_values
 from .tracker import tracker_values
 from .worker import decoded_apart
@@ -51,8 +50,7 @@ KEYS = "key_frames"  # of a file's metadata: numbers of the frames that others a
 
 def measure_points(points: Sequence[Point], store: Store) -> Iterator[Row]:
     """Yield the row of each point; those that share an analysis should come together."""
-    for point in points:
-        yield checked(measure_point(point, store))
+    return (checked(measure_point(point, store)) for point in points)
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,22 +66,17 @@ class _Case:
 
 def measure_point(point: Point, store: Store) -> Row:
     """Return the row of a point. Raises InputError where it cannot be measured, and whatever its codec raises."""
-    case = _case(point, store)
-    return STAND_INS.get(point.codec, _coded)(case)
-
-
-def _case(point: Point, store: Store) -> _Case:
     known = _opened(point.sequence, point.frames, store)
     painted = coloured(point.sequence, store, point.frames) if point.metrics == "splats" else None
     if painted is not None:  # colours tell where the surface slides
-        known = replace(known, sequence=InColours(known.sequence, painted))
+        known = replace(known, sequence=in_colours(known.sequence, painted))
     count = len(known.sequence)
     is_long = count > LONG and point.metrics == "views"
     some = evenly(count, SOME if known.cameras else LONG // 2 if is_long else count)
     whole = not known.cameras or point.sampled or point.metrics == "regions"
     numbers = list(range(count)) if point.metrics == "depth" else some if whole else some[::2]
     row = empty_row(point, store, frames=count, frame_rate=known.sequence.frame_rate, measured_frames=numbers)
-    return _Case(row, known, store, some, painted)
+    return STAND_INS.get(point.codec, _coded)(_Case(row, known, store, some, painted))
 
 
 def _coded(case: _Case) -> Row:
@@ -91,7 +84,9 @@ def _coded(case: _Case) -> Row:
     row, known, point = case.row, case.known, case.row.point
     codec = make_codec(point.codec, point.options)
     decoder = pickle.dumps(codec)  # before it has seen a frame, so that it can keep none
-    source = _sampled(known, case.some) if point.sampled else known.sequence
+    source: MeshSequence = known.sequence
+    if point.sampled:
+        source = picked(source, case.some) if known.scene is None else SceneFrames(known.scene, case.some)
     data, encoding = _encoded(codec, source, (point.sequence, point.frames, point.sampled))
     numbers = row.measured_frames
     wanted = list(range(len(case.some))) if point.sampled else numbers
@@ -100,23 +95,19 @@ def _coded(case: _Case) -> Row:
         metrics, per_frame = measure_frames(Measured(known, numbers, meshes, data), point.metrics)
     else:
         metrics, per_frame = dict(splat_values(known, case.painted, meshes, numbers, data)), {}
-    return msgspec.structs.replace(
-        row,
-        name=codec.name,
-        options=codec.options,
-        stream=_stream(codec, data, len(source)),
-        encoding=encoding,
-        decoding=decoding,
-        metrics=metrics,
-        per_frame=per_frame,
-    )
+    costs = {"stream": _stream(codec, data, len(source)), "encoding": encoding, "decoding": decoding}
+    found = costs | {"metrics": metrics, "per_frame": per_frame}
+    return msgspec.structs.replace(row, name=codec.name, options=codec.options, **found)
 
 
 def _truth(case: _Case) -> Row:
     """Return the row of what nobody coded: meshes under splats, clean ones of a scene, or what a recording moves."""
     row, known = case.row, case.known
-    if case.painted is not None:
-        return _uncompressed(row, known, case.painted)
+    if case.painted is not None:  # the meshes as they are: float32 places and int32 corners
+        meshes = list(known.sequence)
+        size = sum(12 * (len(mesh.vertices) + len(mesh.faces)) for mesh in meshes)
+        splats = dict[str, float | None](splat_values(known, case.painted, meshes, range(len(meshes)), b""))
+        return msgspec.structs.replace(row, name=UNCOMPRESSED, stream=Stream(size, len(meshes)), metrics=splats)
     if known.scene is None and not known.cameras:
         raise InputError("the truth itself is known of simulated scenes, and what moves of those with cameras")
     if known.scene is None:
@@ -129,7 +120,6 @@ def _truth(case: _Case) -> Row:
 
 
 def _tracked(case: _Case) -> Row:
-    """Return the row of a tracker of volumes."""
     values = tracker_values(case.known.sequence, str(case.row.point.options["method"]))
     return msgspec.structs.replace(case.row, metrics=values)
 
@@ -161,25 +151,10 @@ def _found_ratio(frames: MeshSequence) -> dict[str, float | None]:
     return {FLOOR_RATIO: dynamic_ratio((mesh, found.moving(number, mesh)) for number, mesh in meshes)}
 
 
-def _uncompressed(row: Row, known: Dataset, painted: Callable[[int], Mesh]) -> Row:
-    """Return the row of splats on the meshes as they are: float32 places and int32 corners."""
-    meshes = list(known.sequence)
-    size = sum(12 * (len(mesh.vertices) + len(mesh.faces)) for mesh in meshes)
-    metrics = dict[str, float | None](splat_values(known, painted, meshes, range(len(meshes)), b""))
-    return msgspec.structs.replace(row, name=UNCOMPRESSED, stream=Stream(size, len(meshes)), metrics=metrics)
-
-
 def empty_row(point: Point, store: Store, **known: Any) -> Row:
     """Return the row of a point without what is measured of it."""
-    return Row(
-        point=point,
-        name=point.codec,
-        options=point.options,
-        made_by=maker(),
-        source=store.digest(point.sequence),
-        codec_version=codec_version(point.codec),
-        **known,
-    )
+    known |= {"made_by": maker(), "source": store.digest(point.sequence), "codec_version": codec_version(point.codec)}
+    return Row(point=point, name=point.codec, options=point.options, **known)
 
 
 @lru_cache(maxsize=1)
@@ -193,35 +168,21 @@ def _file(name: str, frames: int | None, store: Store) -> bytes:
     return make_codec("meshreel", ENCODED).encode(_opened(name, frames, store).sequence)
 
 
-def _sampled(known: Dataset, numbers: Sequence[int]) -> MeshSequence:
-    return picked(known.sequence, numbers) if known.scene is None else SceneFrames(known.scene, numbers)
-
-
-@dataclass(slots=True)
-class _Analysed:
-    """The last analysis, for points that share it."""
-
-    key: object = None
-    analysis: Any = None
-    timers: list[StageTimer] = field(default_factory=list)
-
-
-_LAST = _Analysed()
+_LAST = dict[object, tuple[Any, list[StageTimer]]]()  # the last analysis, for points that share it
 
 
 def _encoded(codec: Codec, source: MeshSequence, what: object) -> tuple[bytes, Encoding]:
     """Return the bytes and what they cost; a shared analysis counts in each of its points."""
-    before = list[StageTimer]()
+    analysis, before = None, list[StageTimer]()
     if isinstance(codec, TwoStepCodec):
-        key = (what, codec.analysis_key)
-        if _LAST.key != key:
-            _LAST.key = _LAST.analysis = None  # one in memory is enough
+        if (key := (what, str(codec.analysis_key))) not in _LAST:
+            _LAST.clear()  # one in memory is enough
             with StageTimer() as timer:
-                _LAST.analysis = codec.analyse(source, timer)
-            _LAST.timers, _LAST.key = [timer], key
-        before = _LAST.timers
+                analysis = codec.analyse(source, timer)
+            _LAST[key] = analysis, [timer]
+        analysis, before = _LAST[key]
     with StageTimer() as timer:
-        data = codec.code(_LAST.analysis, timer) if isinstance(codec, TwoStepCodec) else codec.encode(source, timer)
+        data = codec.code(analysis, timer) if isinstance(codec, TwoStepCodec) else codec.encode(source, timer)
     if type(data) is not bytes or not data:
         raise InputError(
             f"{codec.name} encodes to {'no byte' if data == b'' else type(data).__name__}; give bytes, one at least"
@@ -255,9 +216,4 @@ def _segmented(case: _Case) -> Row:
     return msgspec.structs.replace(case.row, metrics=scores)
 
 
-STAND_INS: dict[str, Callable[[_Case], Row]] = {
-    SEGMENTATION: _segmented,
-    TRACKER: _tracked,
-    HEADSET: _played,
-    FLOOR: _truth,
-}
+STAND_INS = {SEGMENTATION: _segmented, TRACKER: _tracked, HEADSET: _played, FLOOR: _truth}

@@ -10,8 +10,9 @@ import shutil
 import subprocess
 import tempfile
 import time
+from collections import defaultdict
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -22,11 +23,11 @@ from meshreel.coding.appearance.splats import decode_splats, encode_splats
 from meshreel.errors import InputError
 from meshreel.export.frames import write_splats
 from meshreel.format.layout import MAGIC
-from meshreel.geometry.splats import Bound, bind
+from meshreel.geometry.splats import Bound, Carrier, bind
 from meshreel.types import Mesh, evenly
 
 from ..datasets import Dataset
-from ..datasets.solid import Chain, alone, chains_of
+from ..datasets.solid import Chain, chains_of
 
 COUNT, SIZE = 8000, 256  # splats, and pixels of the longer side of the body
 FITTED, VIEWS, VIEWS_ALONE = 16, 6, 16  # frames of a chain, cameras of each, and of a frame with splats of its own
@@ -37,15 +38,8 @@ PATH = "splat-transform"  # of npm: PlayCanvas' converter, which writes SPZ and 
 FLOATS = 14  # numbers of a splat with harmonics of degree 0: place 3, scale 3, rotation 4, opacity, colour 3
 
 
-@dataclass(slots=True)
-class _Found:
-    """Errors of pictures of splats against the originals, and sizes, counts and times of sets of splats."""
-
-    squares: dict[str, list[float]]
-    scores: list[float]
-    sizes: list[int]
-    seconds: list[float]
-    counts: list[int]
+# Squared errors of pictures against the originals, scores, and sizes, counts and times of sets of splats, by name.
+_Found = defaultdict[str, list[float]]
 
 
 def splat_values(
@@ -56,21 +50,21 @@ def splat_values(
     chains = (
         chains_of(data)
         if data.startswith(MAGIC)
-        else [[(k, alone(mesh))] for k, mesh in zip(numbers, decoded, strict=True)]
+        else [[(k, Carrier(mesh.vertices, mesh.faces, 0))] for k, mesh in zip(numbers, decoded, strict=True)]
     )
     chains = [[(k, replace(c, vertices=c.vertices / unit)) for k, c in chain] for chain in chains]
     of_frame = {number: chain for chain in chains for number, _ in chain}
     wanted = [k for k in evenly(count, JUDGED) if k in of_frame]
-    found, alone_each = (_Found({"whole": [], "exact": [], "fitted": [], "between": []}, [], [], [], []) for _ in "ab")
+    found, alone_each = _Found(list), _Found(list)
     last: Bound | None = None
-    of_unit = lambda k: _scaled(painted(k), unit)  # noqa: E731
+    of_unit = lambda k: (mesh := painted(k)).at(mesh.vertices / unit)  # noqa: E731
     for chain in {id(of_frame[k]): of_frame[k] for k in wanted}.values():
         last = _judge(chain, [k for k in wanted if k in dict(chain)], of_unit, found)
         for k in (k for k in wanted if k in dict(chain) and len(chain) > 1):
             _judge([(k, dict(chain)[k])], [k], of_unit, alone_each)
     rate = known.sequence.frame_rate
     whole = _values(found, len(chains), count, rate)
-    own = _values(alone_each, count, count, rate) if alone_each.scores else whole  # where all frames are alone
+    own = _values(alone_each, count, count, rate) if alone_each else whole  # where all frames are alone
     return whole | {f"splats_own_{name}": own[f"splats_{name}"] for name in ("psnr", "ssim")} | _anchors(last, rate)
 
 
@@ -82,11 +76,11 @@ def _judge(chain: Chain, wanted: Sequence[int], painted: Callable[[int], Mesh], 
     frames = [SplatFrame(carrier, _rendered(painted(k), views, GOLDEN * k)) for k, carrier in chosen]
     start = time.process_time()
     splats, importance = fit_splats(frames, COUNT, steps)
-    found.seconds.append(time.process_time() - start)
+    found["seconds"].append(time.process_time() - start)
     payload, _ = encode_splats(splats, importance)
     coded, carriers, last = decode_splats(payload, 1 + int(splats.faces.max())), dict(chain), None
-    found.sizes.append(len(payload))
-    found.counts.append(len(splats))
+    found["size"].append(len(payload))
+    found["count"].append(len(splats))
     known = np.array([k for k, _ in chosen])
     fitted = {int(known[np.abs(known - k).argmin()]) for k in wanted}
     between = {k + 1 for k in fitted} & carriers.keys()
@@ -94,16 +88,12 @@ def _judge(chain: Chain, wanted: Sequence[int], painted: Callable[[int], Mesh], 
         for view in _rendered(painted(number), HELD, GOLDEN * number + ASIDE):
             last = bind(coded, carriers[number])
             square, score = errors(last, view)
-            found.squares["fitted" if number in fitted else "between"].append(square)
-            found.squares["whole"].append(square)
-            found.scores.append(score)
-            found.squares["exact"].append(errors(bind(splats, carriers[number]), view)[0])
+            for name in ("whole", "fitted" if number in fitted else "between"):
+                found[name].append(square)
+            found["ssim"].append(score)
+            found["exact"].append(errors(bind(splats, carriers[number]), view)[0])
     assert last is not None
     return last
-
-
-def _scaled(mesh: Mesh, unit: float) -> Mesh:
-    return mesh.at(mesh.vertices / unit)
 
 
 def _rendered(mesh: Mesh, views: int, turn: float) -> tuple[SplatView, ...]:
@@ -111,20 +101,21 @@ def _rendered(mesh: Mesh, views: int, turn: float) -> tuple[SplatView, ...]:
 
 
 def _values(found: _Found, sets: int, frames: int, rate: float) -> dict[str, float]:
-    db = {name: -10 * float(np.log10(np.mean(values))) for name, values in found.squares.items() if values}
-    size = float(np.mean(found.sizes))
+    means = {name: float(np.mean(values)) for name, values in found.items()}
+    db = {name: -10 * float(np.log10(means[name])) for name in ("whole", "exact", "fitted", "between") if name in means}
+    size = means["size"]
     return {
         "splats_psnr": db["whole"],
-        "splats_ssim": float(np.mean(found.scores)),
+        "splats_ssim": means["ssim"],
         "splats_lost_db": db["exact"] - db["whole"],
         "splats_fitted_psnr": db["fitted"],
         **({"splats_between_psnr": db["between"]} if "between" in db else {}),
         "splats_set_bytes": size,
         "splats_sets": sets,
-        "splats_count": float(np.mean(found.counts)),
+        "splats_count": means["count"],
         "splats_mbps": 8 * size * sets * rate / frames / 1e6,
         "splats_per_frame_mbps": 8 * size * rate / 1e6,
-        "splats_fit_s": float(np.mean(found.seconds)),
+        "splats_fit_s": means["seconds"],
     }
 
 

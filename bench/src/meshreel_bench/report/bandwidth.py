@@ -48,23 +48,17 @@ class Table(msgspec.Struct, frozen=True):
 _TABLES = msgspec.json.decode((files(__package__) / DATA).read_bytes(), type=dict[str, Table])
 TABLE_1, TABLE_2 = _TABLES["table_1"].systems, _TABLES["table_2"].systems
 RELEASED = {name: _TABLES[name].systems for name in ("dancer", "synthetic4")}
-ANCHORS = [table for table in _TABLES.values() if table.sequence is not None]
 
 
-def anchor_rows(sequence: str | None = None) -> list[Row]:
-    """Return V-DMC's points on a sequence of ours, or on all, as rows; only what is published of them is known."""
-    return [_row(table, each) for table in ANCHORS if sequence in (None, table.sequence) for each in table.systems]
+def anchor_rows() -> list[Row]:
+    """Return V-DMC's points on sequences of ours as rows; only what is published of them is known."""
+    return [_row(table, each) for table in _TABLES.values() if table.sequence is not None for each in table.systems]
 
 
 def _row(table: Table, point: Published) -> Row:
     assert table.sequence is not None and table.frames is not None and point.mbps is not None
-    metrics = {
-        "d2_psnr_paper": point.d2_psnr,
-        "symmetric_psnr": point.symmetric_psnr,
-        "normal_error_deg": point.normal_error_deg,
-        "ssim_masked": point.ssim_masked,
-        "mpeg_d1_psnr": point.mpeg_d1_psnr,
-    }
+    known = ("symmetric_psnr", "normal_error_deg", "ssim_masked", "mpeg_d1_psnr")
+    metrics = {"d2_psnr_paper": point.d2_psnr} | {name: getattr(point, name) for name in known}
     size = round(point.mbps * 1e6 / 8 * table.frames / FRAME_RATE)
     return Row(
         point=Point(table.sequence, point.codec, {"rate": point.system}, table.frames),

@@ -6,8 +6,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from statistics import mean, median
 from typing import Any
 
-import pandas as pd
-
 from ..bd_rate import RateAt, rate_at, reach
 from ..experiments.figure6 import D1, SCENES
 from ..experiments.study import D2, MASKED, NORMALS, Measure
@@ -48,7 +46,7 @@ def winners_table(rows: Sequence[Row], points: Sequence[Row]) -> list[str]:
     if records and any(vdmc.values()):
         cells = {f"bodies, equal {m.name}": _range([RateAt(ratio) for *_, ratio in own]) for m, own in vdmc.items()}
         records.append({HEAD: f"V-DMC TM4 with UVs, {len(vdmc[D2])} rates on one body"} | cells)
-    return markdown(pd.DataFrame(records).fillna("")) if records and any(BEST in own for own in curves.values()) else []
+    return markdown(records) if any(BEST in own for own in curves.values()) else []
 
 
 def _range(ratios: Sequence[RateAt | None]) -> str:
@@ -92,7 +90,7 @@ def beyond_table(rows: Sequence[Row]) -> list[str]:
         cells = {measure.name: _beyond(own, measure) for measure in (D2, MASKED)}
         if any(cells.values()):
             records.append({"sequence": text(name)} | cells)
-    return markdown(pd.DataFrame(records)) if records else []
+    return markdown(records)
 
 
 def _beyond(rows: Sequence[Row], measure: Measure) -> str:
@@ -112,15 +110,16 @@ def rate_table(rows: Sequence[Row], best: str, measures: Sequence[Measure]) -> l
     names = in_order(map(curve_of, rows))
     if best not in names or len(names) < 2:
         return []
-    table = pd.DataFrame({"codec": [text(name) for name in names]})
+    records = [{"codec": text(name)} for name in names]
     for measure in measures:
         quality = _common_quality(rows, best, measure)
         if quality is not None:
             head = f"Mbps at {measure.shown(quality)} ({measure.name}) ↓"
-            table[head] = [_cell(rows, name, best, measure, quality) for name in names]
-    if len(table.columns) == 1:
+            for record, name in zip(records, names, strict=True):
+                record[head] = _cell(rows, name, best, measure, quality)
+    if len(records[0]) == 1:
         return []
-    lines = markdown(table)
+    lines = markdown(records)
     notes = {
         "≤ ": "≤: the rate of its cheapest point, which is better still.",
         "- (": "-: even its best point, which is shown, is not as good.",
@@ -170,7 +169,8 @@ def _usual(rows: Sequence[Row]) -> list[Row]:
 
 def headline(studies: Mapping[str, Sequence[Row]]) -> dict[str, Any]:
     """Return the README's numbers from the rows of studies by name, ready for JSON; empty if they are not measured."""
-    people = [_person(row) for row in studies.get("layers", ()) if _is_person(row)]
+    best = [row for row in studies.get("layers", ()) if row.name == BEST and row.options.get("quality") == QUALITY]
+    people = [_person(row) for row in best if row.point.sequence in PEOPLE]
     usual = _usual(studies.get("figure6", ()))
     bodies = [name for name in sequences(usual) if name not in SCENES]
     table = {
@@ -185,10 +185,6 @@ def headline(studies: Mapping[str, Sequence[Row]]) -> dict[str, Any]:
     rows = [row for name in ("figure6", "mpeg") for row in studies.get(name, ())]
     vdmc = {each.key: sorted(round(ratio, 2) for *_, ratio in vdmc_ratios(rows, each)) for each in (D1, D2, MASKED)}
     return {"person": person, "times_larger_at_equal_d2": ratios, "vdmc_times": vdmc}
-
-
-def _is_person(row: Row) -> bool:
-    return row.name == BEST and row.point.sequence in PEOPLE and row.options.get("quality") == QUALITY
 
 
 def _person(row: Row) -> dict[str, Any]:

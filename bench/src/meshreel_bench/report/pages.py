@@ -16,7 +16,7 @@ from meshreel.io.write import make_folder, replacing
 from ..experiments import EXPERIMENTS
 from ..experiments.study import D2, MASKED, Study
 from ..names import looks_of, title
-from ..rows import Row, disagreements, failed_rows, measured_rows, mixtures
+from ..rows import Row, disagreements, mixtures, parted
 from . import tables
 from .bandwidth import anchor_rows
 from .comparison import beyond_table, headline, losses, rate_table, winners_table
@@ -48,11 +48,6 @@ class Part:
     failed: list[Row]
 
     @property
-    def rated(self) -> list[Row]:
-        """Rows that have a rate and a quality."""
-        return rated(self.rows)
-
-    @property
     def is_drawn(self) -> bool:
         """True if the experiment has a plot."""
         return drawable(self.rows, self.study.measures[:2])
@@ -74,7 +69,7 @@ def parts_of(rows: Sequence[Row]) -> list[Part]:
     for name, study in EXPERIMENTS.items():
         own = [row for row in rows if row.point.key in declared[name] | (others if name == home else set())]
         if own:
-            parts.append(Part(name, study, measured_rows(own), failed_rows(own)))
+            parts.append(Part(name, study, *parted(own)))
     return parts
 
 
@@ -92,7 +87,6 @@ def write_report(rows: Sequence[Row], folder: Path) -> list[Path]:
 
 
 def _write(rows: Sequence[Row], folder: Path) -> list[Path]:
-    """Write a report into an empty folder."""
     make_folder(folder / FOLDER)
     parts = parts_of(rows)
     # Colours tell the curves of a page apart.
@@ -140,11 +134,13 @@ def _first_page(parts: Sequence[Part]) -> list[str]:
     rows = {part.name: part.rows for part in parts}
     open_rows, points = rows.get(OPEN, []), [row for name in WITH_VDMC for row in rows.get(name, ())]
     paper = reproducing_page({OPEN: open_rows})
+    every = [verdict for part in parts for verdict in verdicts(part.study, part.rows) if verdict.met is not None]
+    missed = [verdict for verdict in every if not verdict.met]
     made = {
         "{winners}": winners_table(open_rows, points) or ["No codec was measured beside `best`."],
         "{losses}": list(losses(open_rows, points)),
         "{beyond}": _section(BEYOND, beyond_table(open_rows)),
-        "{verdicts}": [_kept_promises(parts)],
+        "{verdicts}": [_kept_promises(len(every), len(every) - len(missed))],
         "{reproducing}": ["The paper's own numbers stand beside ours in [reproducing.md](reproducing.md)."]
         if paper
         else [],
@@ -156,8 +152,12 @@ def _first_page(parts: Sequence[Part]) -> list[str]:
         "{table}": [
             line for p in parts if p.name == OPEN for line in tables.summary_table(p.rows, p.study.best or "", D2)
         ],
-        "{appendices}": [f"- [{p.study.title}]({FOLDER}/appendix-{p.name}.md), {_counted(p)}" for p in parts],
-        "{missed}": _section(MISSED, _missed(parts)),
+        "{appendices}": [
+            f"- [{p.study.title}]({FOLDER}/appendix-{p.name}.md), {len(p.rows) + len(p.failed)} points"
+            + (f", {len(p.failed)} of them failed" if p.failed else "")
+            for p in parts
+        ],
+        "{missed}": _section(MISSED, [f"- {tables.text(v.text)} ({v.bound}): {tables.text(v.value)}" for v in missed]),
         "{doubts}": [line for head, lines in _doubts(parts).items() for line in _section(head, lines)],
     }
     page = (files(__package__) / TEXT).read_text(encoding="utf-8")
@@ -188,23 +188,11 @@ def _doubts(parts: Sequence[Part]) -> dict[str, list[str]]:
     }
 
 
-def _kept_promises(parts: Sequence[Part]) -> str:
+def _kept_promises(decided: int, met: int) -> str:
     """Return in a sentence how many targets are met."""
-    decided = [verdict for part in parts for verdict in verdicts(part.study, part.rows) if verdict.met is not None]
-    met = sum(bool(verdict.met) for verdict in decided)
-    if met == len(decided):
+    if met == decided:
         return f"All {met} targets that were measured are met." if met else "No target was measured."
-    return f"Of {len(decided)} targets, {met} are met; [the others](#missed-targets) are listed at the end."
-
-
-def _missed(parts: Sequence[Part]) -> list[str]:
-    every = [verdict for part in parts for verdict in verdicts(part.study, part.rows) if verdict.met is False]
-    return [f"- {tables.text(v.text)} ({v.bound}): {tables.text(v.value)}" for v in every]
-
-
-def _counted(part: Part) -> str:
-    failed = f", {len(part.failed)} of them failed" if part.failed else ""
-    return f"{len(part.rows) + len(part.failed)} points{failed}"
+    return f"Of {decided} targets, {met} are met; [the others](#missed-targets) are listed at the end."
 
 
 def _appendix(part: Part) -> Iterator[str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from importlib.resources import files
 
 from ..datasets import RELEASED as DATA_OF_AUTHORS
@@ -30,10 +30,14 @@ def reproducing_page(studies: Mapping[str, Sequence[Row]]) -> list[str]:
     if not {row.point.sequence for row in own} & {*SCENES, *FOUR_AND_TWO, *RELEASED}:
         return []
     literal = [row for row in rated(studies.get("ablation_paper", ())) if curve_of(row) in WRITTEN]
-    page = (files(__package__) / TEXT).read_text(encoding="utf-8").replace("{canonical}", _canonical(own))
+    streams = [row.stream for row in own if curve_of(row) in (TSMC, TUNED) and row.stream]
+    canonical = f"{sum(each.canonical for each in streams)} of {sum(len(each.groups) for each in streams)} groups"
+    page = (files(__package__) / TEXT).read_text(encoding="utf-8").replace("{canonical}", canonical)  # in the MDS pose
     lines = {
-        "{table_1}": _table_1(own),
-        "{table_2}": _table_2(own),
+        "{table_1}": _beside(own, SCENES, TABLE_1, lambda rows, codec, _system: _near_best(rows, codec)),
+        "{table_2}": _beside(
+            own, FOUR_AND_TWO, TABLE_2, lambda rows, codec, system: _as_good(rows, codec, _wanted(system or TABLE_2[0]))
+        ),
         "{table_3}": _table_3(rated(studies.get("table3", ()))),
         "{headline}": headline_table(every),
         "{vdmc}": vdmc_table([*own, *studies.get("mpeg", ())]),
@@ -45,32 +49,21 @@ def reproducing_page(studies: Mapping[str, Sequence[Row]]) -> list[str]:
     return [line for text in page.splitlines() for line in lines.get(text, [text])]
 
 
-def _canonical(rows: Sequence[Row]) -> str:
-    """Return a sentence: groups of preset `paper` in the MDS pose, of all."""
-    streams = [row.stream for row in rows if curve_of(row) in (TSMC, TUNED) and row.stream]
-    return f"{sum(each.canonical for each in streams)} of {sum(len(each.groups) for each in streams)} groups"
-
-
-def _table_1(rows: Sequence[Row]) -> Iterator[str]:
-    scenes = _measured(rows, SCENES)
-    yield from _heads(["paper", *(f"here, {scene}" for scene in scenes)])
-    for system in (*TABLE_1, None):
+def _beside(
+    rows: Sequence[Row],
+    names: Sequence[str],
+    systems: Sequence[Published],
+    found: Callable[[Sequence[Row], str, Published | None], str],
+) -> Iterator[str]:
+    """Yield published systems, and `best`, each beside what is found of its codec on every sequence."""
+    names = [name for name in names if rated(rows, name)] or names[:1]
+    yield f"| {' | '.join(['system', 'paper', *(f'here, {name}' for name in names)])} |"
+    yield "|" + "---|" * (len(names) + 2)
+    for system in (*systems, None):
         codec = BEST if system is None else system.codec
-        yield _line(system, codec, [_published(system), *(_near_best(rated(rows, scene), codec) for scene in scenes)])
-
-
-def _measured(rows: Sequence[Row], names: Sequence[str]) -> list[str]:
-    return [name for name in names if rated(rows, name)] or list(names[:1])
-
-
-def _table_2(rows: Sequence[Row]) -> Iterator[str]:
-    names = _measured(rows, FOUR_AND_TWO)
-    yield from _heads(["paper", *(f"here, {name}" for name in names)])
-    for system in (*TABLE_2, None):
-        codec = BEST if system is None else system.codec
-        wanted = _wanted(system or TABLE_2[0])
-        found = [_as_good(rated(rows, name), codec, wanted) for name in names]
-        yield _line(system, codec, [_published(system), *found])
+        head = f"meshreel `{codec.removeprefix('meshreel ')}`" if system is None else f"{system.system} (`{codec}`)"
+        cells = [head, _published(system), *(found(rated(rows, name), codec, system) for name in names)]
+        yield f"| {' | '.join(cells)} |"
 
 
 def _released(rows: Sequence[Row]) -> Iterator[str]:
@@ -137,16 +130,6 @@ def _strongest(rows: Mapping[object, Row]) -> str:
             return holds or "none"
         holds = str(throttle)
     return f"{holds} or more"
-
-
-def _heads(columns: Sequence[str]) -> Iterator[str]:
-    yield f"| {' | '.join(['system', *columns])} |"
-    yield "|" + "---|" * (len(columns) + 1)
-
-
-def _line(system: Published | None, codec: str, cells: Sequence[str]) -> str:
-    name = f"meshreel `{codec.removeprefix('meshreel ')}`" if system is None else f"{system.system} (`{codec}`)"
-    return f"| {name} | {' | '.join(cells)} |"
 
 
 def _published(system: Published | None) -> str:

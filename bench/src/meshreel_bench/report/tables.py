@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
-
-import pandas as pd
+from collections import Counter
+from collections.abc import Mapping, Sequence
 
 from ..bd_rate import bd_rate
 from ..experiments.study import Measure
@@ -23,12 +22,13 @@ def text(found: object) -> str:
     return re.sub(r"(?<![A-Za-z0-9])_|_(?![A-Za-z0-9])", r"\\_", line)
 
 
-def markdown(table: pd.DataFrame) -> list[str]:
+def markdown(records: Sequence[Mapping[str, object]]) -> list[str]:
     """Return the lines of a table, numbers in four digits; columns of which nothing is known are left out."""
-    known = table.loc[:, [bool(table[name].map(_cell).any()) for name in table.columns]]
-    heads = [str(name) for name in known.columns]
-    lines = [f"| {' | '.join(heads)} |", "|" + "---|" * len(heads)]
-    return lines + [f"| {' | '.join(map(_cell, line))} |" for line in known.itertuples(index=False, name=None)]
+    every = dict.fromkeys(name for record in records for name in record)
+    heads = [name for name in every if any(_cell(record.get(name)) for record in records)]
+    lines = [heads, *([_cell(record.get(name)) for name in heads] for record in records)] if heads else []
+    shown = [f"| {' | '.join(line)} |" for line in lines]
+    return [*shown[:1], "|" + "---|" * len(heads), *shown[1:]] if shown else []
 
 
 def point_table(rows: Sequence[Row], measures: Sequence[Measure]) -> list[str]:
@@ -38,12 +38,8 @@ def point_table(rows: Sequence[Row], measures: Sequence[Measure]) -> list[str]:
     for row in sorted(rows, key=lambda row: (order.index(curve_of(row)), row.mbps)):
         assert row.stream is not None
         stages, work = (row.encoding.stages_s, row.encoding.work) if row.encoding else ({}, {})
-        record: dict[str, object] = {
-            "codec": text(row.name),
-            "operating point": text(operating_point(row)),
-            "Mbps": row.mbps,
-        }
-        record |= {measure.label: value(row, measure.key) for measure in measures}
+        record: dict[str, object] = {"codec": text(row.name), "operating point": text(operating_point(row))}
+        record |= {"Mbps": row.mbps} | {measure.label: value(row, measure.key) for measure in measures}
         record |= {
             "worst frame (dB)": value(row, "d2_psnr_paper_worst"),
             "background (kB)": row.stream.background_bytes / 1000 or None,
@@ -56,7 +52,7 @@ def point_table(rows: Sequence[Row], measures: Sequence[Measure]) -> list[str]:
             "decode peak (MB)": value(row, "decode_mb"),
         }
         records.append(record)
-    return markdown(pd.DataFrame(records))
+    return markdown(records)
 
 
 def value_table(rows: Sequence[Row]) -> list[str]:
@@ -69,7 +65,7 @@ def value_table(rows: Sequence[Row]) -> list[str]:
         head = {"sequence": text(row.point.sequence), "measured": measured, "frames": str(row.frames)}
         listed = ", ".join(f"{key} {_cell(number)}" for key, number in (found | kept).items())
         records.append(head | {"values": text(listed)})
-    return markdown(pd.DataFrame(records)) if records else []
+    return markdown(records)
 
 
 def bd_table(rows: Sequence[Row], one: str, measures: Sequence[Measure], is_anchor: bool = False) -> list[str]:
@@ -84,24 +80,19 @@ def bd_table(rows: Sequence[Row], one: str, measures: Sequence[Measure], is_anch
             pair = (other, one) if is_anchor else (one, other)
             cells = {f"rate at equal {m.name} ↓": bd_cell(rows, *pair, m) for m in measures}
             records.append({head: text(other)} | cells)
-    return markdown(pd.DataFrame(records))
+    return markdown(records)
 
 
 def summary_table(rows: Sequence[Row], one: str, measure: Measure) -> list[str]:
     """Return BD-rates of a curve against every other one by one measure: a line a curve, a column a sequence."""
-    records: dict[str, dict[str, str]] = {}
-    for sequence in sequences(rows):
-        own = rated(rows, sequence)
-        names = in_order(map(curve_of, own))
-        for other in names if one in names else ():
-            if other != one and not is_twin(other, measure):
-                records.setdefault(other, {})[text(sequence)] = bd_cell(own, one, other, measure)
-    if not records:
-        return []
-    table = pd.DataFrame.from_dict(records, orient="index").reindex(columns=list(map(text, sequences(rows))))
-    table = table.loc[in_order(records)]
-    table.insert(0, f"{text(one)} against: rate at equal {measure.name} ↓", [text(name) for name in table.index])
-    return markdown(table)
+    head, records = f"{text(one)} against: rate at equal {measure.name} ↓", list[dict[str, str]]()
+    curves = {name: set(map(curve_of, rated(rows, name))) for name in sequences(rows)}
+    for other in in_order(set[str]().union(*curves.values()) - {one}):
+        both = [name for name, own in curves.items() if {one, other} <= own and not is_twin(other, measure)]
+        cells = {text(name): "" for name in curves}
+        cells |= {text(name): bd_cell(rated(rows, name), one, other, measure) for name in both}
+        records += [{head: text(other)} | cells] if both else []
+    return markdown(records)
 
 
 def bd_cell(rows: Sequence[Row], test: str, other: str, measure: Measure) -> str:
@@ -121,36 +112,31 @@ def bd_cell(rows: Sequence[Row], test: str, other: str, measure: Measure) -> str
 def verdict_table(found: Sequence[Verdict]) -> list[str]:
     """Return a table of targets and measured values."""
     records = [{"target": text(v.text), "bound": v.bound, "measured": text(v.value or ""), " ": v.word} for v in found]
-    return markdown(pd.DataFrame(records))
+    return markdown(records)
 
 
 def failure_table(rows: Sequence[Row]) -> list[str]:
     """Return points of which nothing was measured, and why."""
     records = [
-        {
-            "sequence": text(row.point.sequence),
-            "codec": text(row.name),
-            "operating point": text(_listed(row.options)),
-            "reason": text(row.failed),
-        }
+        {"sequence": text(row.point.sequence), "codec": text(row.name)}
+        | {"operating point": text(_listed(row.options)), "reason": text(row.failed)}
         for row in rows
     ]
-    return markdown(pd.DataFrame(records))
+    return markdown(records)
 
 
 def maker_table(rows: Sequence[Row]) -> list[str]:
     """Return versions, commits and machines with the number of rows that each made."""
-    names = ("meshreel", "commit", "platform", "cpu", "python", "cores")
-    found = [{name: text(getattr(row.made_by, name, None) or "not recorded") for name in names} for row in rows]
-    table = pd.DataFrame(found).rename(columns={"cpu": "processor", "python": "Python"})
-    counts = table.value_counts(sort=False).rename("rows").reset_index()
-    return markdown(counts.assign(rows=counts["rows"].map(str)))
+    heads = {"meshreel": "meshreel", "commit": "commit", "platform": "platform", "cpu": "processor", "python": "Python"}
+    heads |= {"cores": "cores"}
+    made = Counter(tuple(text(getattr(row.made_by, n, None) or "not recorded") for n in heads) for row in rows)
+    return markdown([dict(zip(heads.values(), own, strict=True)) | {"rows": str(n)} for own, n in made.items()])
 
 
 def _cell(cell: object) -> str:
     if isinstance(cell, str):
         return cell
-    return "" if cell is None or pd.isna(cell) else f"{cell:.4g}"
+    return "" if cell is None or cell != cell else f"{cell:.4g}"  # not a number
 
 
 def _listed(options: Options) -> str:

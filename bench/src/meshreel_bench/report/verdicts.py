@@ -9,20 +9,7 @@ from itertools import pairwise
 from math import inf
 
 from ..bd_rate import BdRate, Curve, bd_bound, beats, gain_end, rate_at
-from ..experiments.study import (
-    Always,
-    Bound,
-    Flat,
-    Gains,
-    LeastRate,
-    Needs,
-    NoMore,
-    Promise,
-    Reaches,
-    Rises,
-    Study,
-    Which,
-)
+from ..experiments import study
 from ..rows import Row
 from .values import curve, curve_of, floors, hull_of, is_twin, rated, sequences, value
 
@@ -45,18 +32,18 @@ class Verdict:
         return {None: "not measured", True: "met", False: "MISSED"}[self.met]
 
 
-def verdicts(study: Study, rows: Sequence[Row]) -> list[Verdict]:
-    """Return a verdict on each promise of a study."""
-    return [found for promise in study.promises for found in _judged(promise, rows)]
+def verdicts(experiment: study.Study, rows: Sequence[Row]) -> list[Verdict]:
+    """Return a verdict on each promise of an experiment."""
+    return [found for promise in experiment.promises for found in _judged(promise, rows)]
 
 
 @singledispatch
-def _judged(promise: Promise, _rows: Sequence[Row]) -> list[Verdict]:
+def _judged(promise: study.Promise, _rows: Sequence[Row]) -> list[Verdict]:
     raise TypeError(f"no verdict on a {type(promise).__name__}")
 
 
 @_judged.register
-def _(promise: Reaches, rows: Sequence[Row]) -> list[Verdict]:
+def _(promise: study.Reaches, rows: Sequence[Row]) -> list[Verdict]:
     """The cheapest row that keeps all bounds, or the nearest one."""
     floor = floors(row for row in rows if row.point.sequence == promise.which.sequence)
     limits = [_resolved(bound, floor) for bound in promise.bounds]
@@ -75,7 +62,7 @@ def _(promise: Reaches, rows: Sequence[Row]) -> list[Verdict]:
 
 
 @_judged.register
-def _(promise: Needs, rows: Sequence[Row]) -> list[Verdict]:
+def _(promise: study.Needs, rows: Sequence[Row]) -> list[Verdict]:
     most = f"{100 * promise.most:g} % of the other's" if promise.than else f"{promise.most:g} Mbps"
     limit = f"{_text(promise.bound)} at <= {most}" + (f" (aim {promise.aim})" if promise.aim else "")
     rates = list[float | None]()
@@ -93,7 +80,7 @@ def _(promise: Needs, rows: Sequence[Row]) -> list[Verdict]:
 
 
 @_judged.register
-def _(promise: Always, rows: Sequence[Row]) -> list[Verdict]:
+def _(promise: study.Always, rows: Sequence[Row]) -> list[Verdict]:
     """The worst row."""
     own = [row for row in _chosen(rows, promise.which) if value(row, promise.bound.key) is not None]
     bound = f"{_text(promise.bound)} at every point"
@@ -108,7 +95,7 @@ def _(promise: Always, rows: Sequence[Row]) -> list[Verdict]:
 
 
 @_judged.register
-def _(promise: Gains, rows: Sequence[Row]) -> list[Verdict]:
+def _(promise: study.Gains, rows: Sequence[Row]) -> list[Verdict]:
     text = f"{promise.sequence}: rate at equal quality against the hull of {', '.join(promise.anchors)}"
     text += ", below the noise floor" if promise.below_floor else ""
     bound = f"<= {promise.most:g} % by each measure"
@@ -122,7 +109,7 @@ def _(promise: Gains, rows: Sequence[Row]) -> list[Verdict]:
     return [Verdict(text, bound, "; ".join(found), met), *_ends(promise, own)]
 
 
-def _gain(promise: Gains, rows: Sequence[Row], key: str) -> BdRate:
+def _gain(promise: study.Gains, rows: Sequence[Row], key: str) -> BdRate:
     """Return the BD-rate by one measure; over all qualities where none of both is below the floor."""
     own = rated(rows, promise.sequence)
     [measure] = [each for each in promise.measures if each.key == key]
@@ -133,7 +120,7 @@ def _gain(promise: Gains, rows: Sequence[Row], key: str) -> BdRate:
     return rate if rate.percent is not None else bd_bound(anchor, test)
 
 
-def _ends(promise: Gains, own: Sequence[Row]) -> list[Verdict]:
+def _ends(promise: study.Gains, own: Sequence[Row]) -> list[Verdict]:
     """Return a verdict on the quality up to which there is a gain, if that is promised."""
     if promise.ends_past is None:
         return []
@@ -146,11 +133,11 @@ def _ends(promise: Gains, own: Sequence[Row]) -> list[Verdict]:
 
 
 @_judged.register
-def _(promise: LeastRate, rows: Sequence[Row]) -> list[Verdict]:
+def _(promise: study.LeastRate, rows: Sequence[Row]) -> list[Verdict]:
     return [_least_rate(promise, rows, sequence) for sequence in sequences(rows)]
 
 
-def _least_rate(promise: LeastRate, rows: Sequence[Row], sequence: str) -> Verdict:
+def _least_rate(promise: study.LeastRate, rows: Sequence[Row], sequence: str) -> Verdict:
     own, truth = rated(rows, sequence), floors(row for row in rows if row.point.sequence == sequence)
     text = f"{sequence}: {promise.curve} needs less rate than every other codec wherever both reach a quality"
     met, lost, beyond = list[bool | None](), list[str](), dict[str, list[str]]()
@@ -177,7 +164,7 @@ def _least_rate(promise: LeastRate, rows: Sequence[Row], sequence: str) -> Verdi
 
 
 @_judged.register
-def _(promise: Rises, rows: Sequence[Row]) -> list[Verdict]:
+def _(promise: study.Rises, rows: Sequence[Row]) -> list[Verdict]:
     falls, checked = list[str](), 0
     for sequence in sequences(rows):
         points = curve(rated(rows, sequence), promise.curve, promise.measure)
@@ -191,7 +178,7 @@ def _(promise: Rises, rows: Sequence[Row]) -> list[Verdict]:
 
 
 @_judged.register
-def _(promise: Flat, rows: Sequence[Row]) -> list[Verdict]:
+def _(promise: study.Flat, rows: Sequence[Row]) -> list[Verdict]:
     text = f"{promise.which.sequence}: memory of an encode does not grow with the number of frames"
     bound = f"within {100 * promise.within:g} %"
     own = [row for row in _chosen(rows, promise.which) if row.point.frames and value(row, "encode_mb") is not None]
@@ -204,7 +191,7 @@ def _(promise: Flat, rows: Sequence[Row]) -> list[Verdict]:
 
 
 @_judged.register
-def _(promise: NoMore, rows: Sequence[Row]) -> list[Verdict]:
+def _(promise: study.NoMore, rows: Sequence[Row]) -> list[Verdict]:
     bound = f"<= {promise.factor:g} times"
     found = [value(row, promise.key) for which in (promise.which, *promise.than) for row in _chosen(rows, which)[:1]]
     own, *others = [number for number in found if number is not None] or [0.0]
@@ -215,7 +202,7 @@ def _(promise: NoMore, rows: Sequence[Row]) -> list[Verdict]:
     return [Verdict(promise.text, bound, shown, ratio <= promise.factor)]
 
 
-def _chosen(rows: Sequence[Row], which: Which) -> list[Row]:
+def _chosen(rows: Sequence[Row], which: study.Which) -> list[Row]:
     """Return the rows that a promise is about."""
     return [
         row
@@ -227,15 +214,15 @@ def _chosen(rows: Sequence[Row], which: Which) -> list[Row]:
     ]
 
 
-def _resolved(bound: Bound, floor: dict[str, float]) -> Bound | None:
+def _resolved(bound: study.Bound, floor: dict[str, float]) -> study.Bound | None:
     """Return the bound as a number; None where it is beyond a noise floor that is not known."""
     if not bound.over_floor:
         return bound
     known = floor.get(bound.key)
-    return None if known is None else Bound(bound.key, known + bound.limit, bound.unit, bound.least)
+    return None if known is None else study.Bound(bound.key, known + bound.limit, bound.unit, bound.least)
 
 
-def _miss(row: Row, bound: Bound) -> float:
+def _miss(row: Row, bound: study.Bound) -> float:
     """Return the distance of a row from a bound; 0 if the bound is kept."""
     found = value(row, bound.key)
     if found is None:
@@ -244,7 +231,7 @@ def _miss(row: Row, bound: Bound) -> float:
     return max(0.0, (bound.limit - found if bound.least else found - bound.limit) / step)
 
 
-def _text(bound: Bound) -> str:
+def _text(bound: study.Bound) -> str:
     sign = ">=" if bound.least else "<="
     if not bound.over_floor:
         return f"{sign} {_number(bound.limit, bound.unit)}"

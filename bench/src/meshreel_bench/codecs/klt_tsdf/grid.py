@@ -50,7 +50,8 @@ def sample(mesh: Mesh) -> Blocks:
     if mesh.is_empty:
         none = np.zeros((0, VOLUME), bool)
         return Blocks(np.zeros((0, 3), np.int64), np.zeros((0, VOLUME)), none, none)
-    places = _touched(mesh)
+    cells = around(distinct(_CELLS.keys(spread(mesh, 1.0)[0])))  # beside the surface
+    places = _BLOCKS.cells(distinct(_BLOCKS.keys(_CELLS.centers(cells))))
     keys, index = voxel_index(places)
     values, known = signed_distances(mesh, _CELLS.cells(keys).astype(np.float64))
     values, known = values[index], known[index]
@@ -135,15 +136,8 @@ def _angles(corners: Float64[np.ndarray, "F 3 3"], corner: int) -> Float64[np.nd
 
 
 def _summed(index: np.ndarray, vectors: Float64[np.ndarray, "F 3 3"], count: int) -> Float64[np.ndarray, "K 3"]:
-    """The sum of the vectors of each index."""
     flat = index.reshape(-1)
     return np.stack([np.bincount(flat, vectors[..., axis].reshape(-1), count) for axis in range(3)], axis=1)
-
-
-def _touched(mesh: Mesh) -> Int64[np.ndarray, "B 3"]:
-    """Return the blocks of all cells beside the surface."""
-    cells = around(distinct(_CELLS.keys(spread(mesh, 1.0)[0])))
-    return _BLOCKS.cells(distinct(_BLOCKS.keys(_CELLS.centers(cells)))) if len(cells) else np.zeros((0, 3), np.int64)
 
 
 def _crossings(

@@ -27,7 +27,7 @@ from meshreel.geometry.closest_points import Surface
 from meshreel.metrics.surface_samples import scatter
 from meshreel.types import Mesh
 
-from .codec import NecgsCodec
+from . import NecgsCodec
 from .stream import SIDE, Shape, dequantize, quantize
 from .volumes import cut, grid_points, place
 
@@ -206,12 +206,11 @@ _WINDOW, _SIGMA = 11, 1.5  # points, of the structural similarity
 KEPT_S = 30.0  # between two states that are kept
 _STABLE = (0.01**2, 0.03**2)
 
-Volumes = Sequence[np.ndarray]  # K x K x K x 4 each
 Report = Callable[[int, int], None]  # epochs done, epochs
 
 
 @repeatable()
-def train(volumes: Volumes, options: NecgsCodec, report: Report) -> tuple[np.ndarray, list[np.ndarray]]:
+def train(volumes: Sequence[np.ndarray], options: NecgsCodec, report: Report) -> tuple[np.ndarray, list[np.ndarray]]:
     """Return symbols of features, N x features, and of the network's tensors, flat; the same for a seed and machine."""
     place, shape = choose_device(options.device), options.shape
     generator = torch.Generator().manual_seed(options.seed)
@@ -308,16 +307,12 @@ def key_of(parts: Iterable[Any]) -> str:
 
 def recall(key: str) -> Any:
     """Return the state that was kept by this name, or None."""
-    import torch
-
     path = _path(key)
     return None if path is None or not path.exists() else torch.load(path, map_location="cpu", weights_only=True)
 
 
 def keep(key: str, state: Any) -> None:
     """Keep a state of tensors, numbers, lists and dicts, in the place of one of the same name."""
-    import torch
-
     if (path := _path(key)) is not None:
         path.parent.mkdir(parents=True, exist_ok=True)
         torch.save(state, part := path.with_suffix(f".{os.getpid()}"))

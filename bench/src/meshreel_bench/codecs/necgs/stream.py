@@ -113,14 +113,8 @@ def encode_stream(coded: Coded) -> bytes:
     shape, placement = coded.shape, coded.placement
     shifts = np.diff(placement.shifts[coded.full], axis=0, prepend=np.zeros((1, 3), np.int32))
     inner = _Inner(
-        resolution=shape.resolution,
-        features=shape.features,
-        channels=shape.channels,
-        bits=shape.bits,
-        trimmed=int(coded.trimmed),
-        frames=len(coded.full),
-        cell=placement.cell,
-        anchor=placement.anchor,
+        *(shape.resolution, shape.features, shape.channels, shape.bits),
+        *(int(coded.trimmed), len(coded.full), placement.cell, placement.anchor),
         full=np.packbits(coded.full).tobytes(),
         shifts=encode_integers(shifts.astype(np.int32).reshape(-1)),
         symbols=encode_integers(coded.features.reshape(-1)),

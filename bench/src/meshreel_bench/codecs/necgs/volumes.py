@@ -106,7 +106,9 @@ class _Signs:
     def __init__(self, mesh: Mesh) -> None:
         self.surface = Surface(mesh)
         self._closed = not len(border_edges(weld(mesh)))
-        self.has_sheets = not self._closed and self._many_are_sheets()
+        some = np.arange(0, len(mesh.faces), max(1, len(mesh.faces) // _ASKED))  # a sample
+        areas = self.surface.areas[some]
+        self.has_sheets = not self._closed and bool(areas[self._sheets(some)].sum() > SHEETS * areas.sum())
 
     def inside(self, points: Float64[np.ndarray, "N 3"], hits: Hits) -> Bool[np.ndarray, " N"]:
         """Return a mask of points inside a body or behind the closest sheet."""
@@ -122,12 +124,6 @@ class _Signs:
         """Return a mask of points inside a body; a closed mesh may have all its faces turned inwards."""
         numbers = winding_numbers(self.surface.mesh, points)
         return (np.abs(numbers) if self._closed else numbers) > 0.5
-
-    def _many_are_sheets(self) -> bool:
-        """Return whether sheets exceed the share `SHEETS` of the area, by a sample of the faces."""
-        some = np.arange(0, len(self.surface.mesh.faces), max(1, len(self.surface.mesh.faces) // _ASKED))
-        areas = self.surface.areas[some]
-        return bool(areas[self._sheets(some)].sum() > SHEETS * areas.sum())
 
     def _sheets(self, faces: Int[np.ndarray, " N"]) -> Bool[np.ndarray, " N"]:
         """Return a mask of faces without an inside on either side."""

@@ -29,7 +29,7 @@ from meshreel.format.records import Nested, least_size, pack, unpack_all
 from meshreel.geometry.topology import concatenate, subdivide_midpoint
 from meshreel.types import Mesh, Placement
 
-from ..base import DecodedFrames
+from ...codec import DecodedFrames
 
 MAGIC = b"TVMC"
 VERSION = 1
@@ -103,11 +103,6 @@ def unpack_stream(data: bytes) -> Stream:
     return unpack_all(Stream, data[:size])
 
 
-def is_bare(stream: Stream, frame: int) -> bool:
-    """Return whether a frame is shown without the background."""
-    return bool(np.searchsorted(np.cumsum(stream.bare), frame, side="right") % 2 == 1) if stream.bare else False
-
-
 MOST_CELLS = 1 << 22  # steps from 0; Draco's float32 hold these plus the range of a frame
 
 
@@ -139,17 +134,9 @@ def encode_cloud(points: Float64[np.ndarray, "V 3"], step: float) -> bytes:
         raise InputError(f"displacements of {np.abs(cells).max():g} steps; give a larger step, and finite vertices")
     low = cells.min(axis=0)
     bits = max(1, int((cells - low).max()).bit_length())
-    return bytes(
-        DracoPy.encode(
-            cells,
-            None,
-            quantization_bits=bits,
-            compression_level=COMPRESSION_LEVEL,
-            quantization_range=float(2**bits - 1),  # a cell of Draco's is a cell of ours
-            quantization_origin=low,
-            preserve_order=True,
-        )
-    )
+    lattice = {"quantization_range": float(2**bits - 1), "quantization_origin": low}  # a cell of Draco's is one of ours
+    how = {"quantization_bits": bits, "compression_level": COMPRESSION_LEVEL, "preserve_order": True}
+    return bytes(DracoPy.encode(cells, None, **how, **lattice))
 
 
 def decode_cloud(data: bytes, step: float) -> Float64[np.ndarray, "V 3"]:
@@ -184,14 +171,10 @@ class TvmcVideo(DecodedFrames):
         return self._place.of(concatenate([*self._still(number), *self._moving(number)]))
 
     def _moving(self, frame: int) -> Iterator[Mesh]:
-        """Return the bodies of a frame, normalised."""
         near = range(bisect_left(self._firsts, frame - MOST_FRAMES + 1), bisect_right(self._firsts, frame))
-        groups = [number for number in near if frame < self._end(number)]
+        groups = [n for n in near if frame < self._firsts[n] + self.stream.groups[n].frame_count]
         self._decoded = {number: self._decoded.get(number) or self._decode(number) for number in groups}
         return (meshes[frame - self._firsts[number]] for number, meshes in self._decoded.items())
-
-    def _end(self, number: int) -> int:
-        return self._firsts[number] + self.stream.groups[number].frame_count
 
     def _decode(self, number: int) -> list[Mesh]:
         group = self.stream.groups[number]
@@ -203,7 +186,7 @@ class TvmcVideo(DecodedFrames):
         """Yield the background of a frame, normalised, if it has one."""
         states = self.stream.states
         number = bisect_right([state.first_frame for state in states], frame) - 1
-        if number < 0 or is_bare(self.stream, frame):
+        if number < 0 or np.searchsorted(np.cumsum(self.stream.bare), frame, side="right") % 2 == 1:  # or bare
             return
         if number != self._background[0]:
             first = number

@@ -1,13 +1,11 @@
 """Encodes at several rates share groups, which are found once and only for their interval and options."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest
-from meshreel_bench.codecs import groups as stored
-from meshreel_bench.codecs.groups import GroupStore, prepare, shared_options
-from meshreel_bench.codecs.tvmc.codec import track_sequence
+from meshreel_bench.codecs import meshreel as stored
+from meshreel_bench.codecs.meshreel import GroupStore, prepare, shared_options
+from meshreel_bench.codecs.tvmc import track_sequence
 
 from meshreel.capture.simulated.procedural import SoftBodiesOptions, soft_bodies
 from meshreel.encoder.group.interval import Interval
@@ -81,7 +79,7 @@ def test_bodies_of_a_noisy_scene_are_analysed_once_with_their_noise(codec, monke
 def test_kept_groups_are_those_that_find_groups_returns():
     store, ball = GroupStore(), list(deforming_sphere(3, levels=2))
     options = replace(PAPER.method, target=Fidelity(1e-7, 1.0, 1e-7))  # never reached
-    store.keep(Interval(ball), options)
+    store.find(Interval(ball), options)
     kept, found = store.find(Interval(ball), options), find_groups(Interval(ball), options)
     assert [len(group.frames) for group in kept] == [len(group.frames) for group in found] and len(kept) > 1
     for ours, theirs in zip(kept, found, strict=True):
