@@ -1,7 +1,5 @@
 """A small body that moves, with colours of its vertices or a texture, and files of it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

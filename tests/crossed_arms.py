@@ -4,8 +4,6 @@
 capsules are the same in all frames, so that `carried` tells where a place of the surface is in another one.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from jaxtyping import Float64
 from scipy.spatial.transform import Rotation

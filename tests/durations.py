@@ -4,8 +4,6 @@ Each test's CPU time, with that of the processes that it waited for, goes into t
 makes `durations.json` of such reports. CPU time hardly depends on what else the machine does.
 """
 
-from __future__ import annotations
-
 import json
 import os
 from collections.abc import Generator

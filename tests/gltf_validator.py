@@ -1,7 +1,5 @@
 """Khronos's validator for glTF files, if Node and its npm package are installed."""
 
-from __future__ import annotations
-
 import json
 import os
 import shutil

@@ -3,8 +3,6 @@
 Of pictures the I420 planes are recorded, never sRGB, which is a matter of the reader.
 """
 
-from __future__ import annotations
-
 import hashlib
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Writes a .reel file with a tone to its standard output, for tests of the player: its start, and the tone's length."""
 
-from __future__ import annotations
-
 import sys
 import tempfile
 from pathlib import Path

@@ -4,8 +4,6 @@ They lie in build/tests/kept under a digest of the sources, the helpers of tests
 change of any makes all of them again. A file gets its name when it is whole: two workers never see half of one.
 """
 
-from __future__ import annotations
-
 import hashlib
 import importlib.metadata
 import os

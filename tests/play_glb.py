@@ -1,7 +1,5 @@
 """Independent player of animated GLB files, written from the glTF 2.0 specification."""
 
-from __future__ import annotations
-
 import io
 import json
 import struct

@@ -1,7 +1,5 @@
 """Player of USD files for the tests, built on USD itself."""
 
-from __future__ import annotations
-
 import io
 from dataclasses import replace
 from pathlib import Path

@@ -4,8 +4,6 @@ A process of its own, so that it runs as for a user, without the tests' type che
 meshes of their own: it makes a folder `scan`, and everything in the preset is small.
 """
 
-from __future__ import annotations
-
 import re
 import sys
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Tiny scenes with known parts: a corner of a room, open on two sides, and what moves in it."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

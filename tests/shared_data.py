@@ -1,7 +1,5 @@
 """Where the optional benchmark data lies; tests that need it skip, with the reason, where it is missing."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """Small bodies that bend, turn and move: 66 or 258 vertices, of one topology, half of them with noise."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from meshreel.types import Mesh

@@ -1,7 +1,5 @@
 """Encoder options that are quick on small procedural bodies: few centers and nodes, coarse templates, few trials."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any

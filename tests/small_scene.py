@@ -1,7 +1,5 @@
 """A small scene with a background: a room, open at its front, in which two balls move; noise in every frame."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from meshreel.geometry.topology import concatenate, weld

@@ -1,7 +1,5 @@
 """Spheres whose motion is known exactly."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from meshreel.geometry.topology import subdivide_midpoint

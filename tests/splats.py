@@ -1,7 +1,5 @@
 """Splats of all kinds, for tests."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from meshreel.geometry.splats import Splats

@@ -1,7 +1,5 @@
 """Golden files of version 1 decode to the bits they always decoded to."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

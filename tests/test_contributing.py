@@ -1,7 +1,5 @@
 """CONTRIBUTING.md is true: its diagrams are the contracts that lint-imports checks, and the paths in the docs exist."""
 
-from __future__ import annotations
-
 import re
 import tomllib
 from pathlib import Path

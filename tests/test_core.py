@@ -1,7 +1,5 @@
 """The stub of the compiled core names what the core has."""
 
-from __future__ import annotations
-
 import ast
 from pathlib import Path
 

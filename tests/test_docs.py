@@ -1,7 +1,5 @@
 """README, tutorial and docs are true: their Python runs, their commands parse, and their links exist."""
 
-from __future__ import annotations
-
 import json
 import os
 import re

@@ -1,7 +1,5 @@
 """The notebooks of docs/examples run as they stand, and are kept without outputs."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

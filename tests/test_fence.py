@@ -1,7 +1,5 @@
 """The public names, and the packages that decoding must not import."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """The corpus of the fuzzers: only FormatError, verdicts that the player must reach too, and mutants with right sums."""
 
-from __future__ import annotations
-
 import json
 from random import Random
 

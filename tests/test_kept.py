@@ -1,7 +1,5 @@
 """What tests keep is made once for equal keys, and again where a key, or what a path holds, is another."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """Meshes, sequences of them, and the axis that points up."""
 
-from __future__ import annotations
-
 import os
 import sys
 from dataclasses import replace
@@ -167,12 +165,6 @@ def test_pyvista_gets_vertices_faces_and_colors(mesh: Mesh):
     assert mesh.colors is None or np.array_equal(found.point_data["RGB"], mesh.colors)
 
 
-def test_pyvista_missing_is_named(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setitem(sys.modules, "pyvista", None)
-    with pytest.raises(ImportError, match="pip install pyvista"):
-        TRIANGLE.to_pyvista()
-
-
 def test_a_sequence_that_knows_its_frame_rate_keeps_it():
     class Frames(list):
         fps = 24.0
@@ -197,10 +189,11 @@ def test_a_colour_that_is_none_is_refused(value: float):
         as_sequence([wrong])
 
 
-def test_open3d_missing_names_the_extra(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setitem(sys.modules, "open3d", None)
-    with pytest.raises(ImportError, match=r"meshreel\[open3d\]"):
-        TRIANGLE.to_open3d()
+@pytest.mark.parametrize(("module", "words"), [("pyvista", "pip install pyvista"), ("open3d", r"meshreel\[open3d\]")])
+def test_a_library_that_is_missing_is_named(monkeypatch: pytest.MonkeyPatch, module: str, words: str):
+    monkeypatch.setitem(sys.modules, module, None)
+    with pytest.raises(ImportError, match=words):
+        getattr(TRIANGLE, f"to_{module}")()
 
 
 def test_the_box_of_a_mesh_has_its_diagonal_and_middle():

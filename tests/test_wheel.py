@@ -1,7 +1,5 @@
 """The wheel, as a user gets it: built, installed into a new environment with the extra `play`, and played from."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os

@@ -1,7 +1,5 @@
 """Audio files of a tone, made here, for tests of what is heard."""
 
-from __future__ import annotations
-
 import io
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Pieces of frames: large ones, each with the bits near it; what is one piece in any frame is one body in all."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -62,10 +60,6 @@ def test_the_order_of_faces_changes_the_numbers_of_pieces_and_nothing_else(order
     assert [(*part.vertices.min(axis=0), *part.vertices.max(axis=0)) for part in parts] == [p.around for p in pieces]
 
 
-def test_pieces_that_move_apart_are_bodies_in_whatever_order_the_frames_have_them():
-    assert bodies([at(0), at(3)], [at(5), at(-1)], [at(-2), at(7)]) == [[0, 1], [1, 0], [0, 1]]
-
-
 def test_rings_of_a_chain_are_bodies():
     """Their boxes overlap, their surfaces share no vertex."""
     frames = [
@@ -84,14 +78,6 @@ def ring(turn: float) -> Mesh:
     beyond = 12 * ((u + 1) % 40) + (v + 1) % 12
     faces = [np.stack(corners, axis=2).reshape(-1, 3) for corners in ((here, right, beyond), (here, beyond, above))]
     return Mesh.of(points, np.concatenate(faces))
-
-
-def test_what_touches_once_is_one_body_and_the_others_stay_apart():
-    both = Mesh(np.concatenate([at(0).vertices, at(2).vertices]), np.concatenate([BALL.faces, BALL.faces + 258]))
-    both = Mesh(both.vertices, np.concatenate([both.faces, [[0, 1, 258]]]).astype(np.int32))
-    apart = [at(0), at(3), at(9)]
-    assert bodies(apart, [both, at(9)], apart) == [[0, 0, 1], [0, 1], [0, 0, 1]]
-    assert bodies(apart[:2], [both], apart[:2]) is None
 
 
 def test_what_comes_or_goes_is_one_body_with_what_is_most_like_it():

@@ -1,7 +1,5 @@
 """Plans: the cheapest of all ways to share frames among templates, found also by trying every way."""
 
-from __future__ import annotations
-
 from itertools import groupby, product
 
 import numpy as np

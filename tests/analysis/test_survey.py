@@ -1,7 +1,5 @@
 """The survey: bounding box, scale, and intervals that hold frames of one kind."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from meshreel.analysis.plan import cut_at

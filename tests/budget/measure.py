@@ -1,7 +1,5 @@
 """What decoding all of a file costs in a fresh process: memory above the idle import, and processor time."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """The worst legal file of each form costs no more than FORMAT.md promises ("What a file may cost")."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from dataclasses import asdict, replace

@@ -1,7 +1,5 @@
 """The most expensive files that the rules admit, built for a number of bytes: of each form, and of the container."""
 
-from __future__ import annotations
-
 import io
 from collections.abc import Callable
 from dataclasses import replace

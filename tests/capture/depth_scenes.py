@@ -1,7 +1,5 @@
 """A ball in front of a wall as depth cameras see it: exact depths, by arithmetic alone."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from meshreel.capture.rig.cameras import DepthCamera

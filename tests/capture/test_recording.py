@@ -1,7 +1,5 @@
 """A recording fuses each frame once, keeps it while the disk has room, and gives its depth pictures."""
 
-from __future__ import annotations
-
 import shutil
 import signal
 import sys

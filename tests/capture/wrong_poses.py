@@ -1,7 +1,5 @@
 """Poses that are wrong by known amounts, and what is left of the errors."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.spatial.transform import Rotation
 

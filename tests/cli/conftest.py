@@ -1,7 +1,5 @@
 """Fixtures of the tests of commands: small inputs, and a function that runs a command and returns its output."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from dataclasses import dataclass

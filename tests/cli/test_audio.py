@@ -1,7 +1,5 @@
 """Audio from the command line: in, seen, and out again, byte for byte."""
 
-from __future__ import annotations
-
 import pytest
 
 import meshreel

@@ -1,7 +1,5 @@
 """`meshreel calibrate`: new poses beside the old ones, or in place where that is asked for."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

@@ -1,7 +1,5 @@
 """`meshreel capture`: a rig's folder becomes frames, all of them, also after an interruption."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """A Dask cluster of worker processes: it writes the bytes of one process, also where a worker is killed on the way."""
 
-from __future__ import annotations
-
 import os
 import signal
 import sys

@@ -1,7 +1,5 @@
 """Parts of a sequence, encoded apart from one survey, join to the bytes of one encode of the whole."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 

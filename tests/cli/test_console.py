@@ -1,7 +1,5 @@
 """Progress on standard error: lines outside a terminal, and the time that is left."""
 
-from __future__ import annotations
-
 import time
 
 import pytest

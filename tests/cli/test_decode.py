@@ -1,7 +1,5 @@
 """`meshreel decode`: a file becomes meshes, whole or as far as it can be read."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -61,13 +59,6 @@ def test_a_damaged_group_costs_only_its_frames_and_the_exit_code(run, tmp_path):
     said = run("decode", tmp_path / "a.reel", "-o", tmp_path / "out")
     assert failed(said, "frames 2 to 5", "4 of 10 frames are lost")
     assert len(list((tmp_path / "out").iterdir())) == 6
-
-
-def test_a_frame_that_is_lost_has_no_file_of_a_run_before(run, tmp_path):
-    assert run("decode", FILE, "-o", tmp_path / "out").code == 0
-    (tmp_path / "a.reel").write_bytes(FILE.read_bytes()[:-1])
-    assert failed(run("decode", tmp_path / "a.reel", "-o", tmp_path / "out"), "1 of 10 frames", "copy the file again")
-    assert not (tmp_path / "out" / "frame_00009.ply").exists() and len(list((tmp_path / "out").iterdir())) == 9
 
 
 @pytest.mark.parametrize("only", ["all", "background", "moving"])

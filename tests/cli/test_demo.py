@@ -1,7 +1,5 @@
 """`meshreel demo`: from nothing to a file, its numbers against the truth, and a picture."""
 
-from __future__ import annotations
-
 import sys
 from functools import partial
 

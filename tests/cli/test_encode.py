@@ -1,10 +1,7 @@
 """`meshreel encode`: accepted inputs and options, and a one-line error for all others."""
 
-from __future__ import annotations
-
 import inspect
 import json
-import shutil
 from dataclasses import replace
 
 import pytest
@@ -84,34 +81,17 @@ def test_groups_are_predicted_between_the_frames_that_the_key_interval_asks_for(
 @pytest.mark.usefixtures("quick_presets")
 def test_a_target_is_met_and_its_quality_reported(run, balls, tmp_path):
     out = tmp_path / "a.reel"
-    first = run("encode", balls, "-o", out, "--frames", ":1", "--quality", "45", "--json").row
-    said = run("encode", balls, "-o", out, "--frames", ":1", "--target-mbps", first["mbps"], "--json")
-    assert said.code == 0 and said.row["mbps"] == pytest.approx(first["mbps"], rel=0.05)
-    assert run("info", out, "--json").row["metadata"]["quality"] == said.row["quality"]
-    assert failed(run("encode", balls, "-o", out, "--frames", ":1", "--target-mbps", "1e-6"), "a.reel", "no quality")
-    assert [path.name for path in tmp_path.iterdir()] == ["a.reel"]
-
-
-@pytest.mark.usefixtures("quick_presets")
-def test_the_quality_and_the_psnr_of_a_target_are_reported(run, balls, tmp_path):
-    out = tmp_path / "a.reel"
     first = run("encode", balls, "-o", out, "--frames", ":1", "--quality", "45.67891", "--json").row
     recorded = run("info", out, "--json").row["metadata"]
     assert recorded["quality"] == 45.68  # four digits of it
     assert first["d2_psnr_paper"] == pytest.approx(recorded["d2_psnr_paper"], abs=0.01)
-    goal = ("--target-mbps", f"{first['mbps']}")
-    row = run("encode", balls, "-o", out, "--frames", ":1", *goal, "--json").row
-    assert row["quality"] == float(f"{row['quality']:.4g}")
-    text = run("encode", balls, "-o", out, "--frames", ":1", *goal).out
-    assert text.endswith(f"; quality {row['quality']:g}, D2-PSNR {row['d2_psnr_paper']:.2f} dB\n")
-
-
-@pytest.mark.usefixtures("quick_presets")
-def test_two_processes_write_the_same_file_as_one(run, balls, tmp_path):
-    for jobs in ("1", "2"):
-        said = run("encode", balls, "-o", tmp_path / f"{jobs}.reel", "--group-size", "1", "--jobs", jobs, "--quiet")
-        assert (said.code, said.err) == (0, "")
-    assert (tmp_path / "1.reel").read_bytes() == (tmp_path / "2.reel").read_bytes()
+    said = run("encode", balls, "-o", out, "--frames", ":1", "--target-mbps", first["mbps"])
+    assert said.code == 0 and meshreel.open(out).reader.size * 8 * 30 / 1e6 == pytest.approx(first["mbps"], rel=0.05)
+    recorded = run("info", out, "--json").row["metadata"]
+    assert recorded["quality"] == float(f"{recorded['quality']:.4g}")
+    assert f"; quality {recorded['quality']:g}, D2-PSNR {recorded['d2_psnr_paper']:.2f} dB\n" in said.out
+    assert failed(run("encode", balls, "-o", out, "--frames", ":1", "--target-mbps", "1e-6"), "a.reel", "no quality")
+    assert [path.name for path in tmp_path.iterdir()] == ["a.reel"]
 
 
 @pytest.mark.usefixtures("quick_presets")
@@ -164,13 +144,6 @@ def test_what_is_dropped_or_welded_is_said_once(run, tmp_path):
     assert run("encode", tmp_path, "-o", tmp_path / "a.reel", "--quiet").err == ""
 
 
-@pytest.mark.usefixtures("quick_presets")
-def test_quads_and_polygons_are_triangulated(run, tmp_path):
-    obj(tmp_path, "f0.obj", TRIANGLE + "v 1 1 0\nv 0.5 1.5 0\nf 1 2 4 5 3\n")
-    assert run("encode", tmp_path, "-o", tmp_path / "a.reel").code == 0
-    assert len(meshreel.open(tmp_path / "a.reel")[0].faces) == 3
-
-
 def test_a_missing_input_and_an_empty_folder_are_reported(run, tmp_path):
     out = tmp_path / "a.reel"
     assert failed(run("encode", tmp_path / "none", "-o", out), "none", "no such file")
@@ -184,9 +157,6 @@ def test_a_missing_input_and_an_empty_folder_are_reported(run, tmp_path):
     [
         (TRIANGLE + "f 1 2 4\n", ("vertex 4", "3 vertices")),
         (TRIANGLE.replace("1 0 0", "nan 0 0") + "f 1 2 3\n", ("vertex 1", "not within")),
-        (TRIANGLE.replace("1 0 0", "inf 0 0") + "f 1 2 3\n", ("vertex 1", "not within")),
-        ("v 0 0 zero\n", ("line 1",)),
-        ("", ("0 bytes",)),
     ],
 )
 def test_a_frame_that_cannot_be_used_is_reported_with_file_and_number(run, tmp_path, text, words):
@@ -203,20 +173,10 @@ def test_a_frame_that_cannot_be_used_is_reported_with_file_and_number(run, tmp_p
         (["-o", "a.mp4"], [".reel"]),
         (["-o", "a.reel", "--quality", "101"], ["quality", "101"]),
         (["-o", "a.reel", "--quality", "high"], ["high"]),
-        (["-o", "a.reel", "--group-size", "0"], ["group size", "0"]),
-        (["-o", "a.reel", "--preset", "paper", "--centers", "0"], ["centers", "0"]),
-        (["-o", "a.reel", "--preset", "paper", "--basis-size", "-1"], ["-1"]),
-        (["-o", "a.reel", "--basis-size", "4"], ["basis size 4", "preset `paper`"]),
-        (["-o", "a.reel", "--centers", "300"], ["centers 300", "preset `paper`"]),
-        (["-o", "a.reel", "--key-interval", "0"], ["key interval 0"]),
-        (["-o", "a.reel", "--key-interval", "2", "--preset", "paper"], ["key interval 2"]),
         (["-o", "a.reel", "--quality", "50", "--target-psnr", "60"], ["--quality 50", "one of both"]),
         (["-o", "a.reel", "--quality", "0", "--target-mbps", "1"], ["--quality 0", "one of both"]),
         (["-o", "a.reel", "--target-mbps", "1", "--target-psnr", "60"], ["60", "1", "one of them"]),
-        (["-o", "a.reel", "--target-psnr", "-3"], ["-3 dB"]),
-        (["-o", "a.reel", "--target-mbps", "0"], ["0 Mbps"]),
         (["-o", "a.reel", "--fps", "0"], ["frame rate"]),
-        (["-o", "a.reel", "--scale", "-1"], ["scale"]),
         (["-o", "a.reel", "--frames", "1-2"], ["1-2"]),
         (["-o", "a.reel", "--frames", "7:"], ["leave 0"]),
         (["-o", "a.reel", "--jobs", "0"], ["jobs"]),
@@ -229,22 +189,6 @@ def test_an_impossible_option_is_an_error_before_anything_is_read(run, balls, tm
     monkeypatch.chdir(tmp_path)
     assert failed(run("encode", balls, *arguments), *words)
     assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.usefixtures("quick_presets")
-def test_a_folder_that_is_not_there_or_is_the_target_is_reported(run, balls, tmp_path):
-    assert failed(run("encode", balls, "-o", tmp_path / "none" / "a.reel", "--frames", ":1"), "a.reel")
-    (tmp_path / "b.reel").mkdir()
-    assert failed(run("encode", balls, "-o", tmp_path / "b.reel", "--frames", ":1"), "b.reel")
-
-
-@pytest.mark.usefixtures("quick_presets")
-def test_a_file_that_is_there_stays_as_it_is_when_encoding_fails(run, balls, tmp_path):
-    (tmp_path / "a.reel").write_bytes(b"before")
-    shutil.copytree(balls, tmp_path / "in")
-    (tmp_path / "in" / "ball_2.ply").write_bytes(b"ply\n")
-    assert failed(run("encode", tmp_path / "in", "-o", tmp_path / "a.reel"), "frame 2", "ball_2.ply")
-    assert (tmp_path / "a.reel").read_bytes() == b"before"
 
 
 def test_debug_shows_the_traceback(run, tmp_path):

@@ -1,7 +1,5 @@
 """`meshreel encode` of scenes: reports, masks, rigs, and errors."""
 
-from __future__ import annotations
-
 import re
 import shutil
 
@@ -14,11 +12,9 @@ from meshreel.capture.recording import open_recording
 from meshreel.cli.encode import describe
 from meshreel.encoder.group.interval import Interval
 from meshreel.encoder.paper.recipe import PaperRecipe
-from meshreel.io.write import write_mesh, write_picture
-from tests.capture.depth_scenes import camera, measured, record
+from meshreel.io.write import write_picture
 from tests.cli.conftest import failed
 from tests.small_options import quick
-from tests.small_scene import scene
 
 pytestmark = pytest.mark.usefixtures("quick_presets", "quick_bodies")
 FRAMES = ("--fps", "10")
@@ -77,24 +73,6 @@ def test_where_all_moves_there_is_no_background(run, scan, painted, tmp_path):
         assert video.background(0).is_empty and not video.moving(0).is_empty
 
 
-def test_where_nothing_moves_there_is_a_background_alone(run, tmp_path):
-    for number, mesh in enumerate(scene(3, moving=False)):
-        write_mesh(mesh, tmp_path / f"frame_{number}.ply")
-    out = tmp_path / "a.reel"
-    said = run("encode", tmp_path, "-o", out, *FRAMES, "--json")
-    assert said.code == 0 and {group["form"] for group in said.row["groups"]} == {"empty"}
-    with meshreel.open(out) as video:
-        assert video.moving(2).is_empty and not video.background(2).is_empty
-        assert np.array_equal(video[0].vertices, video[2].vertices)
-    assert run("segment", tmp_path, "-o", tmp_path / "out", "--json").row["moving"] == 0
-
-
-def test_a_scene_of_which_nothing_is_to_be_taken_apart_has_one_part(run, scan, tmp_path):
-    row = run("encode", scan, "-o", tmp_path / "a.reel", "--frames", ":2", "--dynamic-only", "--json").row
-    assert row["scene"] is None and "background" not in describe(row)
-    assert run("info", tmp_path / "a.reel", "--json").row["background"] == []
-
-
 def test_a_background_that_leaves_nothing_of_the_rate_is_reported_at_once(run, scan, tmp_path):
     out = tmp_path / "a.reel"
     said = run("encode", scan, "-o", out, *FRAMES, "--target-mbps", "0.0001")
@@ -148,17 +126,6 @@ def test_captured_meshes_have_the_rate_of_their_recording(run, rig, tmp_path):
         assert video.frame_rate == 7
 
 
-def test_a_camera_that_moves_is_refused(run, tmp_path):
-    still = camera("front")
-    folder = record(tmp_path / "rig", [still, camera("moved", 10)], [(0, 0, 0)] * 6)
-    for number in range(6):
-        elsewhere = camera("moved", 10 + 8 * number)
-        write_picture(measured(elsewhere), folder / "moved" / "depth" / f"depth_{number:05}.png")
-    for command in (("encode", folder, "-o", tmp_path / "a.reel"), ("segment", folder, "-o", tmp_path / "out")):
-        assert failed(run(*command), "camera moved seems to move")
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["rig"]
-
-
 def test_depth_that_is_all_zero_is_reported_and_gives_empty_frames(run, rig, tmp_path):
     for picture in rig.glob("*/depth/*.png"):
         write_picture(np.zeros((96, 96), np.uint16), picture)
@@ -168,23 +135,13 @@ def test_depth_that_is_all_zero_is_reported_and_gives_empty_frames(run, rig, tmp
     assert failed(run("segment", rig, "-o", tmp_path / "out"), "has a surface; give a frame with faces")
 
 
-def test_depth_of_eight_bits_is_refused(run, rig, tmp_path):
-    Image.fromarray(np.full((96, 96), 200, np.uint8)).save(rig / "left" / "depth" / "depth_00002.png")
-    for command in (("encode", rig, "-o", tmp_path / "a.reel"), ("segment", rig, "-o", tmp_path / "out")):
-        assert failed(run(*command), "depth_00002.png", "8 bits a pixel", "16-bit")
-
-
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["--background-refresh", "0"], ["background refresh 0", "seconds above 0"]),
-        (["--background-refresh", "inf"], ["background refresh inf", "seconds above 0"]),
-        (["--background-refresh", "1", "--dynamic-only"], ["dynamic only", "leave background refresh out"]),
         (["--masks", "masks", "--dynamic-only"], ["--dynamic-only", "masks"]),
         (["--views", "none.json"], ["none.json", "cannot be read"]),
         (["--masks", "masks"], ["cameras.json", "cannot be read"]),
         (["--sam3", "masks"], ["masks: holds no weights of SAM3", "model.safetensors"]),
-        (["--sam3", "none"], ["none: holds no weights of SAM3"]),
         (["--sam3", "none", "--masks", "masks"], ["--masks masks", "one of both"]),
     ],
 )
@@ -193,12 +150,3 @@ def test_impossible_flags_are_errors_before_anything_is_written(run, scan, tmp_p
     (tmp_path / "masks").mkdir()
     assert failed(run("encode", scan, "-o", "a.reel", *arguments), *words)
     assert [path.name for path in tmp_path.iterdir()] == ["masks"]
-
-
-def test_masks_of_another_size_stop_an_encode_before_it_begins(run, scan, painted, tmp_path):
-    shutil.copytree(painted, tmp_path / "masks")
-    Image.fromarray(np.zeros((60, 80), np.uint8)).save(tmp_path / "masks" / "view01" / "frame_00003.png")
-    said = run("encode", scan, "-o", tmp_path / "a.reel", "--masks", tmp_path / "masks")
-    assert failed(said, "frame_00003.png (frame 3): 80 x 60 pixels")
-    said = run("encode", scan, "-o", tmp_path / "a.reel", "--masks", tmp_path / "masks", "--frames", ":1")
-    assert said.code == 0  # frames that are not encoded need no masks

@@ -2,8 +2,6 @@
 process lives, and the next run takes over what is left beside it.
 """
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

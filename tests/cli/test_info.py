@@ -1,14 +1,12 @@
 """`meshreel info`: the contents of a file and their bytes."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 
 import meshreel
 from meshreel.coding.intra import encode_empty
 from meshreel.container.writer import ReelWriter
-from tests.cli.conftest import FILE, SCENE, failed
+from tests.cli.conftest import FILE, SCENE
 from tests.container.files import HEADER, PAYLOADS
 from tests.golden import GOLDEN
 
@@ -131,23 +129,6 @@ def test_damage_of_a_scene_is_reported_by_chunk_track_and_frames(run, tmp_path):
         assert said.code == 0 and words in said.err and said.err.count("\n") == 1
         assert said.row["bytes_by_content"]["damaged"] == chunks[number].size
         assert sum(said.row["bytes_by_content"].values()) == len(data)
-
-
-def test_a_truncated_scene_is_reported_with_its_missing_bytes(run, tmp_path):
-    data, chunks = SCENE.read_bytes(), meshreel.open(SCENE).reader.chunks
-    cut = chunks[3].offset + 10
-    (tmp_path / "a.reel").write_bytes(data[:cut])
-    row = run("info", tmp_path / "a.reel", "--json").row
-    assert row["bytes_by_content"]["missing"] == row["bytes_missing"] == len(data) - cut
-    assert row["background"][1]["bytes_by_content"] == {"damaged": 10, "missing": chunks[3].size - 10}
-    assert sum(row["bytes_by_content"].values()) == len(data)
-
-
-def test_other_files_are_refused(run, tmp_path):
-    (tmp_path / "a.reel").write_bytes(b"PK\x03\x04")
-    assert failed(run("info", tmp_path / "a.reel"), "a.reel", "not a .reel")
-    assert failed(run("info", tmp_path / "b.reel", "--json"), "b.reel")
-    assert failed(run("info"), "FILE")
 
 
 def test_a_predicted_group_is_marked(run):

@@ -1,7 +1,5 @@
 """`meshreel play` and `meshreel serve`: real processes, asked over HTTP and stopped."""
 
-from __future__ import annotations
-
 import json
 import signal
 import subprocess

@@ -1,7 +1,5 @@
 """`meshreel segment`: labels as NumPy files, previews, and pictures for tools that make masks."""
 
-from __future__ import annotations
-
 import json
 import shutil
 
@@ -74,11 +72,6 @@ def test_masks_move_the_faces_that_they_show(run, scan, painted, tmp_path):
         assert moving[ROOM_FACES:].mean() > 0.95 and moving[:ROOM_FACES].mean() < 0.01
 
 
-def test_masks_of_more_frames_than_are_read_are_reported(run, scan, painted, tmp_path):
-    said = run("segment", scan, "-o", tmp_path / "out", "--masks", painted, "--frames", "1:3", "--previews", "0")
-    assert said.code == 0 and "has masks for 2 more frames than the 2 of the sequence" in said.err
-
-
 def test_masks_that_were_painted_in_place_are_not_replaced_by_pictures(run, scan, painted, tmp_path):
     shutil.copytree(painted, tmp_path / "painted")
     mask = tmp_path / "painted" / "view00" / "frame_00000.png"
@@ -133,25 +126,6 @@ def test_the_pictures_of_a_rig_s_colour_cameras_are_those_for_masks(run, rig, tm
     assert (np.asarray(Image.open(tmp_path / "out" / "view00" / "frame_00002.png")) == 80).all()
 
 
-def test_masks_that_are_missing_or_of_another_size_are_reported_before_anything_is_written(
-    run, scan, painted, tmp_path
-):
-    masks, out = tmp_path / "masks", tmp_path / "out"
-    shutil.copytree(painted, masks)
-    lost = masks / "view03" / "frame_00002.png"
-    Image.fromarray(np.zeros((45, 60), np.uint8)).save(lost)
-    said = run("segment", scan, "-o", out, "--masks", masks)
-    assert failed(said, "frame_00002.png (frame 2): 60 x 45 pixels where its camera has 120 x 90")
-    lost.unlink()
-    assert failed(
-        run("segment", scan, "-o", out, "--masks", masks), "view03: has no mask of frame 2 (1 of 4 are missing)"
-    )
-    shutil.rmtree(masks / "view02")
-    assert failed(run("segment", scan, "-o", out, "--masks", masks), "no folder of view 2 of 6")
-    assert failed(run("segment", scan, "-o", out, "--masks", tmp_path / "none"), "cameras.json", "cannot be read")
-    assert not out.exists()
-
-
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -181,9 +155,3 @@ def test_impossible_flags_are_errors(run, scan, tmp_path, arguments, words, monk
 def test_the_help_says_how_labels_are_read(run):
     told = " ".join(run("segment", "--help").out.replace("│", " ").split())
     assert 'np.load(file)["moving"]' in told and "--masks" in told and "--empty-prompts" not in told
-
-
-def test_frames_without_a_surface_have_no_views_and_are_reported(run, tmp_path):
-    for number in range(2):
-        (tmp_path / f"frame_{number}.obj").write_text("v 0 0 0\n")
-    assert failed(run("segment", tmp_path, "-o", tmp_path / "out"), "has a surface; give a frame with faces")

@@ -1,7 +1,5 @@
 """What helps with meshreel itself: examples in the help, completion, the player's files, and the doctor."""
 
-from __future__ import annotations
-
 import shlex
 import subprocess
 import sys

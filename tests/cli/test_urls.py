@@ -1,7 +1,5 @@
 """Commands whose inputs and outputs are URLs write the bytes that they write on a disk; a failed one writes nothing."""
 
-from __future__ import annotations
-
 import functools
 import http.server
 import threading

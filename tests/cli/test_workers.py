@@ -1,7 +1,5 @@
 """Worker processes of commands tell how far they are."""
 
-from __future__ import annotations
-
 from meshreel.cli.workers import workers
 from meshreel.encoder.run.worker import tell
 

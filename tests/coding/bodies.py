@@ -1,7 +1,5 @@
 """Small groups for tests of the form `layers`: coded references, and the desired positions of their vertices."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from meshreel.coding.reference_mesh import CodedReference, code_reference

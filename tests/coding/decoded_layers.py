@@ -1,7 +1,5 @@
 """A group of form `layers` decoded by itself, without patches."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from meshreel.coding.layers.coder import LayersState, place_layers, read_layers

@@ -3,8 +3,6 @@
 `python -m tests.coding.draco_bombs` prints the latter as JSON, for the tests of the player.
 """
 
-from __future__ import annotations
-
 import base64
 import io
 import json

@@ -4,8 +4,6 @@ Each is a valid mesh with some bytes changed, or a mesh of random symbols of edg
 gives a mesh or a FormatError; the counts are of those that Draco got to see.
 """
 
-from __future__ import annotations
-
 import sys
 import time
 from collections import Counter

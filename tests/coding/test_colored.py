@@ -34,10 +34,7 @@ def test_frames_without_surface_have_no_colours_and_those_around_them_keep_their
 
 def test_colours_behind_a_group_with_patches_are_the_same_whichever_frame_is_asked_for_first() -> None:
     file, state = BytesIO(), None
-    with (
-        meshreel.open(GOLDEN / "layers_patched.reel") as video,
-        ReelWriter(file, video.reader.header) as writer,
-    ):
+    with meshreel.open(GOLDEN / "layers_patched.reel") as video, ReelWriter(file, video.reader.header) as writer:
         for chunk in video.reader.groups:
             payload, last = video.reader.read_chunk(chunk.number), writer.last_of(0)
             ends = tuple(accumulate(layer.size for layer in chunk.layers))

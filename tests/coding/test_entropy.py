@@ -1,7 +1,5 @@
 """The range coder: inverse laws, rate against the entropy of its own contexts, hostile bytes."""
 
-from __future__ import annotations
-
 import contextlib
 
 import hypothesis.extra.numpy as hnp

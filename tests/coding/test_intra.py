@@ -1,7 +1,5 @@
 """The form `draco`: frames on a lattice, and refused payloads."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -44,42 +42,23 @@ def test_subdivision_to_an_absurd_size_is_refused_before_memory_is_taken() -> No
         decode_intra(encode_intra([BALL], 1e-3, levels))
 
 
-@pytest.mark.parametrize("step", [0.0, -1e-3])
-def test_a_lattice_without_spacing_is_refused(step: float) -> None:
-    with pytest.raises(FormatError, match="not above 0"):
-        decode_intra(pack(DracoGroup(Form.DRACO, 0, step, (encode_mesh(BALL, 1e-3),))))
-
-
 def test_bytes_that_are_no_draco_mesh_are_refused() -> None:
     for bad in (b"DRACO", encode_mesh(BALL, 1e-3)[:-20], b"\0" * 50):
         with pytest.raises(FormatError, match="Draco"):
             decode_intra(pack(DracoGroup(Form.DRACO, 0, 1e-3, (bad,))))
 
 
-def test_a_mesh_too_wide_for_its_step_is_an_input_error() -> None:
-    with pytest.raises(InputError, match="at most 21"):
-        encode_mesh(BALL, 1e-8)
-
-
 @pytest.mark.filterwarnings("error")
-@pytest.mark.parametrize("step", [1e-300, 1e-310, 5e-324, 0.0, -1e-3, math.inf, math.nan])
+@pytest.mark.parametrize("step", [1e-8, 1e-300, 1e-310, 5e-324, 0.0, -1e-3, math.inf, math.nan])
 def test_a_step_that_no_lattice_has_is_refused_without_a_warning(step: float) -> None:
     with pytest.raises(InputError, match="at most 21 bits"):
         encode_mesh(BALL, step)
-
-
-@pytest.mark.filterwarnings("error")
-@pytest.mark.parametrize("step", [1e-310, 5e-324])
-def test_bytes_with_a_step_next_to_nothing_are_refused_without_a_warning(step: float) -> None:
-    with pytest.raises(FormatError, match="not finite"):
-        decode_intra(pack(DracoGroup(Form.DRACO, 0, step, (encode_mesh(BALL, 1e-3),))))
-
-
-@pytest.mark.filterwarnings("error")
-@pytest.mark.parametrize("step", [1e-300, 0.0])
-def test_a_reference_on_a_lattice_too_fine_for_its_type_is_refused_without_a_warning(step: float) -> None:
-    with pytest.raises(InputError, match="at most 21 bits"):
-        code_on_lattice(BALL, step, 1)
+    if step in (1e-300, 0.0):
+        with pytest.raises(InputError, match="at most 21 bits"):
+            code_on_lattice(BALL, step, 1)
+    if step in (1e-310, 5e-324, 0.0, -1e-3):
+        with pytest.raises(FormatError, match="not finite" if step > 0 else "not above 0"):
+            decode_intra(pack(DracoGroup(Form.DRACO, 0, step, (encode_mesh(BALL, 1e-3),))))
 
 
 def test_an_empty_group_is_one_byte() -> None:

@@ -1,7 +1,5 @@
 """Draco meshes: what they claim is held against their bytes before Draco sees them; encoders keep the same rules."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

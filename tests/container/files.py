@@ -1,9 +1,8 @@
 """A small .reel file with a static chunk, layers and dependent groups, for the tests of reading and of damage."""
 
-from __future__ import annotations
-
 import io
 
+from meshreel.container.sources import BytesSource
 from meshreel.container.writer import ReelWriter
 from meshreel.format.layout import DracoGroup, EmptyGroup, Form, Header, LaplacianGroup
 from meshreel.format.records import pack
@@ -28,3 +27,15 @@ def small_file(header: Header = HEADER) -> bytes:
         writer.add_group(10, 5, PAYLOADS[2])
         writer.add_group(15, 3, PAYLOADS[3])
     return file.getvalue()
+
+
+class Counted(BytesSource):
+    """Remembers which byte ranges were asked for."""
+
+    def __init__(self, data: bytes) -> None:
+        super().__init__(data)
+        self.ranges: list[tuple[int, int]] = []
+
+    def get_bytes(self, offset: int, length: int) -> bytes:
+        self.ranges.append((offset, length))
+        return super().get_bytes(offset, length)

@@ -1,7 +1,5 @@
 """Hostile files: FormatError and nothing else, before memory is spent; undamaged chunks stay readable."""
 
-from __future__ import annotations
-
 import tracemalloc
 import zlib
 from dataclasses import replace
@@ -27,6 +25,10 @@ CHUNKS = ReelReader(BytesSource(DATA)).chunks
 HEAD_SIZE = CHUNKS[0].offset
 
 
+def changed(place: int, flip: int) -> bytes:
+    return DATA[:place] + bytes([DATA[place] ^ flip]) + DATA[place + 1 :]
+
+
 def read_all(data: bytes) -> list[bytes | None]:
     """Each chunk's payload, None where it is refused."""
     reader = ReelReader(BytesSource(data))
@@ -44,12 +46,6 @@ def expected(is_damaged: list[bool]) -> list[bytes | None]:
     return [None if bad else payload for bad, payload in zip(is_damaged, PAYLOADS, strict=True)]
 
 
-@pytest.mark.parametrize("size", range(HEAD_SIZE))
-def test_a_file_that_ends_in_its_head_is_refused(size):
-    with pytest.raises(FormatError):
-        ReelReader(BytesSource(DATA[:size]))
-
-
 @pytest.mark.parametrize("size", range(HEAD_SIZE, len(DATA)))
 def test_a_file_that_ends_in_its_chunks_loses_only_those(size):
     lost = [chunk.end > size for chunk in CHUNKS]
@@ -65,14 +61,7 @@ def test_layers_before_the_end_of_a_truncated_file_are_readable():
         reader.read_chunk(1, 2)
 
 
-@pytest.mark.parametrize("flip", [0x01, 0x10, 0x80, 0xFF])
-def test_a_changed_byte_in_the_head_refuses_the_file(flip):
-    for place in range(HEAD_SIZE):
-        with pytest.raises(FormatError):
-            ReelReader(BytesSource(changed(place, flip)))
-
-
-@pytest.mark.parametrize("flip", [0x01, 0x10, 0x80, 0xFF])
+@pytest.mark.parametrize("flip", [0x01, 0xFF])
 def test_a_changed_byte_in_a_chunk_refuses_that_chunk_only(flip):
     for place in range(HEAD_SIZE, len(DATA)):
         damaged = [chunk.offset <= place < chunk.end for chunk in CHUNKS]
@@ -86,20 +75,22 @@ def test_layers_before_a_changed_byte_are_readable():
         reader.read_chunk(1, 2)
 
 
-def test_an_extra_byte_is_refused():
-    with pytest.raises(FormatError, match="1 bytes behind the last chunk"):
-        ReelReader(BytesSource(DATA + b"\0"))
-
-
-@pytest.mark.parametrize("version", [0, 2, 255])
-def test_an_unknown_version_is_refused_with_both_versions_named(version):
-    with pytest.raises(FormatError, match=f"format version {version}: this reader knows version {VERSION}"):
-        ReelReader(BytesSource(DATA[:8] + bytes([version]) + DATA[9:]))
-
-
-def test_other_files_are_not_reel_files():
-    for data in (b"", b"ply\nformat ascii 1.0\n", b"REEL\n\x1a\n" + DATA[8:], bytes(1000)):
-        with pytest.raises(FormatError, match=r"not a \.reel file"):
+@pytest.mark.parametrize(
+    ("files", "words"),
+    [
+        ([DATA[:size] for size in range(HEAD_SIZE)], None),
+        ([changed(place, flip) for place in range(HEAD_SIZE) for flip in (0x01, 0xFF)], None),
+        ([DATA + b"\0"], "1 bytes behind the last chunk"),
+        ([b"", b"ply\nformat ascii 1.0\n", b"REEL\n\x1a\n" + DATA[8:], bytes(1000)], r"not a \.reel file"),
+        *(
+            ([DATA[:8] + bytes([v]) + DATA[9:]], f"version {v}: this reader knows version {VERSION}")
+            for v in (0, 2, 255)
+        ),
+    ],
+)
+def test_damaged_and_other_files_are_refused(files, words):
+    for data in files:
+        with pytest.raises(FormatError, match=words):
             ReelReader(BytesSource(data))
 
 
@@ -169,10 +160,6 @@ def test_any_head_with_a_matching_checksum_is_read_or_refused(body):
         return
     assert reader.missing == reader.chunks
     assert all(isinstance(chunk, Chunk) for chunk in reader.chunks)
-
-
-def changed(place: int, flip: int) -> bytes:
-    return DATA[:place] + bytes([DATA[place] ^ flip]) + DATA[place + 1 :]
 
 
 def test_a_head_of_a_sparse_file_is_refused_before_it_is_read():

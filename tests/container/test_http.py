@@ -1,7 +1,5 @@
 """Files behind a URL: whole, by ranges, and where the server fails."""
 
-from __future__ import annotations
-
 import io
 import sys
 import threading

@@ -1,11 +1,7 @@
 """A written file is read back by the necessary byte ranges and no others."""
 
-from __future__ import annotations
-
 import io
 import json
-import subprocess
-import sys
 from dataclasses import replace
 
 import pytest
@@ -13,28 +9,11 @@ import pytest
 from meshreel.container.reader import FIRST_REQUEST, ReelReader
 from meshreel.container.sources import BytesSource, FileSource, Source
 from meshreel.container.writer import ReelWriter, pack_head
-from meshreel.errors import InputError
 from meshreel.format.checks import MOST_TRACKS
 from meshreel.format.layout import ChunkKind, EmptyGroup, Form, Index, Layer
 from meshreel.format.records import pack
-from tests.container.files import FRAMES, HEADER, PAYLOADS, small_file
+from tests.container.files import FRAMES, HEADER, PAYLOADS, Counted, small_file
 from tests.golden import GOLDEN
-
-
-class CountingSource:
-    """Remembers which ranges were asked for."""
-
-    def __init__(self, data: bytes) -> None:
-        self.inner = BytesSource(data)
-        self.ranges: list[tuple[int, int]] = []
-
-    @property
-    def size(self) -> int:
-        return self.inner.size
-
-    def get_bytes(self, offset: int, length: int) -> bytes:
-        self.ranges.append((offset, length))
-        return self.inner.get_bytes(offset, length)
 
 
 def test_every_chunk_comes_back():
@@ -87,7 +66,7 @@ def test_the_first_layers_are_a_prefix_of_the_chunk():
 
 
 def test_a_chunk_costs_one_request_of_exactly_its_bytes():
-    source = CountingSource(small_file())
+    source = Counted(small_file())
     assert isinstance(source, Source)
     reader = ReelReader(source)
     assert source.ranges == [(0, source.size)]
@@ -99,7 +78,7 @@ def test_a_chunk_costs_one_request_of_exactly_its_bytes():
 
 def test_a_long_head_costs_a_second_request():
     header = replace(HEADER, metadata=json.dumps({"note": "x" * FIRST_REQUEST}))
-    source = CountingSource(small_file(header))
+    source = Counted(small_file(header))
     reader = ReelReader(source)
     assert source.ranges == [(0, FIRST_REQUEST), (FIRST_REQUEST, reader.head_size - FIRST_REQUEST)]
     assert reader.read_chunk(3) == PAYLOADS[3]
@@ -166,9 +145,9 @@ def test_a_chunk_of_a_kind_to_come_may_have_any_track_and_frames():
 def test_the_largest_number_of_tracks_is_read_quickly():
     file = io.BytesIO()
     with ReelWriter(file, HEADER) as writer:
-        for first in range(0, 100, 10):
+        for first in range(0, 100, 50):
             for track in range(MOST_TRACKS):
-                writer.add_group(first, 10, pack(EmptyGroup(Form.EMPTY)), track=track)
+                writer.add_group(first, 50, pack(EmptyGroup(Form.EMPTY)), track=track)
     reader = ReelReader(BytesSource(file.getvalue()))
     assert [chunk.track for chunk in reader.chunks_of_frame(57)] == list(range(MOST_TRACKS))
     assert {chunk.first_frame for chunk in reader.chunks_of_frame(57)} == {50}
@@ -192,15 +171,3 @@ def test_a_file_on_disk_reads_like_one_in_memory(tmp_path):
         assert isinstance(source, Source)
         assert ReelReader(source).read_chunk(3) == PAYLOADS[3]
         assert source.get_bytes(source.size - 3, 100) == small_file()[-3:]
-
-
-def test_a_missing_file_or_a_folder_is_an_input_error(tmp_path):
-    for path in (tmp_path / "none.reel", tmp_path):
-        with pytest.raises(InputError, match="cannot be opened"):
-            FileSource(path)
-
-
-def test_reading_imports_nothing_but_the_standard_library():
-    code = "import sys, json, meshreel.container.reader; print(json.dumps(sorted(sys.modules)))"
-    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert not {"scipy", "open3d", "torch", "igl", "skimage", "trimesh"} & set(json.loads(result.stdout))

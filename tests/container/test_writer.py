@@ -1,16 +1,10 @@
 """A file appears whole or not at all, and bad calls are refused where they are made."""
 
-from __future__ import annotations
-
 import errno
 import io
 import os
-import signal
-import subprocess
-import sys
 import tracemalloc
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
@@ -26,32 +20,6 @@ EMPTY = pack(EmptyGroup(Form.EMPTY))
 STATIC = PAYLOADS[0]
 PATCH = pack(StaticPatch(Form.PATCH, 0.001, 0, b"", b"mesh"))
 BIG = bytes([Form.DRACO]) + bytes(999_999)
-
-IN_A_CHILD = """
-import os, resource, signal, sys
-from meshreel.container.writer import ReelWriter
-from meshreel.errors import InputError
-from tests.container.files import HEADER
-limit, path = int(sys.argv[1]), sys.argv[2]
-if limit:
-    resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
-try:
-    with ReelWriter(path, HEADER) as writer:
-        for group in range(3):
-            writer.add_group(10 * group, 10, bytes([3]) + bytes(999_999))
-        if not limit:
-            os.kill(os.getpid(), signal.SIGKILL)
-except InputError as error:
-    sys.exit(str(error))
-"""
-
-
-def in_a_child(limit: int, path: Path) -> subprocess.CompletedProcess[str]:
-    """Runs a writer of 3 MB that may write `limit` bytes a file, or is killed before it ends."""
-    root = Path(__file__).resolve().parents[2]
-    environment = os.environ | {"PYTHONPATH": f"{root / 'src'}{os.pathsep}{root}"}
-    command = [sys.executable, "-c", IN_A_CHILD, str(limit), str(path)]
-    return subprocess.run(command, env=environment, capture_output=True, text=True)
 
 
 def test_a_file_and_memory_get_the_same_bytes(tmp_path):
@@ -86,20 +54,6 @@ def test_an_exception_while_the_file_is_put_together_leaves_nothing(tmp_path, mo
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_killed_encoder_leaves_nothing(tmp_path):
-    assert in_a_child(0, tmp_path / "out.reel").returncode == -signal.SIGKILL
-    assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.parametrize("limit", [500_000, 3_000_050])
-def test_a_disk_that_fills_up_is_an_input_error_and_leaves_nothing(tmp_path, limit):
-    result = in_a_child(limit, tmp_path / "out.reel")  # full while spooling, full while putting together
-    assert result.returncode == 1
-    assert "out.reel: cannot be written: File too large" in result.stderr
-    assert len(result.stderr.splitlines()) == 1
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_a_file_object_that_is_full_is_an_input_error():
     class Full(io.BytesIO):
         def write(self, _: object) -> int:
@@ -124,12 +78,6 @@ def test_a_chunk_that_failed_to_be_written_spoils_the_file_even_if_the_error_is_
         with pytest.raises(InputError, match="No space left"):
             writer.add_group(10, 10, BIG)
     assert list(tmp_path.iterdir()) == []
-
-
-def test_an_impossible_target_is_refused_before_any_work(tmp_path):
-    for path in (tmp_path, tmp_path / "none" / "out.reel"):
-        with pytest.raises(InputError, match="cannot be written"), ReelWriter(path, HEADER):
-            raise AssertionError("the block must not run")
 
 
 @pytest.mark.parametrize(

@@ -1,9 +1,6 @@
 """Groups that are predicted from the one before: any frame in any order, coarser on demand, damage, threads."""
 
-from __future__ import annotations
-
 import io
-from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
 
 import numpy as np
@@ -22,6 +19,7 @@ from meshreel.decoder.tracks import Track
 from meshreel.errors import FormatError
 from meshreel.format.layout import Header
 from tests.coding.bodies import ball, moving
+from tests.container.files import Counted
 from tests.golden import frame_record
 
 LENGTHS = (3, 2, 4, 2, 3)
@@ -66,29 +64,17 @@ def test_a_frame_asked_for_first_is_the_same(frame: int):
     assert frame_record(meshreel.open(DATA)[frame]) == WHOLE[frame]
 
 
-class Counted(BytesSource):
-    """Remembers where was read."""
-
-    def __init__(self, data: bytes) -> None:
-        super().__init__(data)
-        self.offsets: list[int] = []
-
-    def get_bytes(self, offset: int, length: int) -> bytes:
-        self.offsets.append(offset)
-        return super().get_bytes(offset, length)
-
-
 def test_a_frame_costs_its_chain_and_the_next_group_only_itself():
     source = Counted(DATA)
     video = meshreel.open(source)
     offsets = [group.offset for group in video.reader.groups]
-    source.offsets.clear()
+    source.ranges.clear()
     video[3]
-    assert source.offsets == offsets[:2]
+    assert [offset for offset, _ in source.ranges] == offsets[:2]
     video[5]
-    assert source.offsets == offsets[:3]
+    assert [offset for offset, _ in source.ranges] == offsets[:3]
     video[11]
-    assert source.offsets == [*offsets[:3], *offsets[3:5]]
+    assert [offset for offset, _ in source.ranges] == [*offsets[:3], *offsets[3:5]]
 
 
 def test_a_frame_asked_for_first_places_the_frames_of_its_own_group_alone(monkeypatch: pytest.MonkeyPatch):
@@ -110,14 +96,6 @@ def test_a_coarser_video_has_the_first_vertices_of_the_whole(layers: int):
         few, all = coarse[frame].vertices, whole[frame].vertices
         assert len(few) == len(all) if layers > 1 else len(few) < len(all) / 3
         np.testing.assert_array_equal(few, all[: len(few)])
-
-
-def test_coarser_videos_read_fewer_bytes_and_never_the_finest_layers():
-    sizes = []
-    for layers in (0, 1, 2):
-        reader = meshreel.open(DATA).reader
-        sizes.append(sum(len(reader.read_chunk(group.number, layers + 1)) for group in reader.groups))
-    assert sizes[0] < sizes[1] < sizes[2]
 
 
 def test_whole_and_coarser_videos_of_one_file_do_not_disturb_each_other():
@@ -152,14 +130,6 @@ def test_where_only_the_finest_layer_is_damaged_the_coarser_ones_still_decode():
     video = meshreel.open(bytes(data)).at(1)
     for frame in range(sum(LENGTHS[:3])):
         np.testing.assert_array_equal(video[frame].vertices, meshreel.open(DATA).at(1)[frame].vertices)
-
-
-def test_a_truncated_file_keeps_what_is_before():
-    groups = meshreel.open(DATA).reader.groups
-    video = meshreel.open(DATA[: groups[1].end + 3])
-    assert [frame_record(video[frame]) for frame in range(5)] == WHOLE[:5]
-    with pytest.raises(FormatError, match="truncated"):
-        video[5]
 
 
 def test_an_index_that_hides_the_dependence_is_refused_at_the_group():
@@ -199,14 +169,6 @@ class Contended(Track):
 
 def test_what_another_thread_left_is_used_only_where_it_is_right():
     assert [frame_record(mesh) for mesh in Contended(ReelReader(BytesSource(DATA)), 0)] == WHOLE
-
-
-def test_threads_that_share_a_video_get_the_frames_they_asked_for():
-    video = meshreel.open(DATA)
-    frames = np.random.default_rng(0).integers(0, COUNT, 60).tolist()
-    with ThreadPoolExecutor(4) as executor:
-        found = list(executor.map(lambda frame: frame_record(video[frame]), frames))
-    assert found == [WHOLE[frame] for frame in frames]
 
 
 @pytest.mark.parametrize("most", [0, 30_000, 60_000])

@@ -1,7 +1,5 @@
 """What a notebook shows of a video and of a mesh, and videos in other processes."""
 
-from __future__ import annotations
-
 import io
 import multiprocessing
 import os

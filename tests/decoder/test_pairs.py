@@ -1,7 +1,5 @@
 """The decoder in C++ against the pairs in `coding/`: the same bits and refusals on golden files and the corpus."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 from typing import Any

@@ -1,7 +1,5 @@
 """Pictures of a file: the same by every way, within a bound on memory, and damage that costs colours only."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 

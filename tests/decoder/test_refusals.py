@@ -1,7 +1,5 @@
 """A chunk that was refused for its bytes is refused from memory; one that could not be read is tried again."""
 
-from __future__ import annotations
-
 import io
 from collections import Counter
 from collections.abc import Callable
@@ -14,7 +12,6 @@ from meshreel.coding.intra import encode_empty
 from meshreel.container.reader import ReelReader
 from meshreel.container.sources import BytesSource
 from meshreel.container.writer import ReelWriter
-from meshreel.decoder import cache
 from meshreel.errors import FormatError, InputError
 from tests.container.files import HEADER
 from tests.decoder.test_chains import COUNT, DATA, WHOLE
@@ -130,13 +127,3 @@ def test_a_refused_state_of_the_background_is_decoded_once(decoded: Counter[int]
             video[frame]
     assert list(decoded.values()) == [1]
     assert video.moving(0).is_empty
-
-
-def test_each_refusal_is_kept():
-    refusals, chunks = cache.Refusals(), ReelReader(BytesSource(DATA)).chunks
-    for chunk in chunks[:3]:
-        with pytest.raises(FormatError, match=r"chunk . .*: bad"), refusals.of(chunk):
-            raise FormatError("bad")
-    for chunk in chunks[:3]:
-        with pytest.raises(FormatError, match=rf"{chunk.number} .*: bad"):
-            refusals.check(chunk)

@@ -1,7 +1,5 @@
 """Vertices of several frames in one array: the same numbers, in the caller's memory, as float64 or float32."""
 
-from __future__ import annotations
-
 import io
 
 import numpy as np
@@ -49,25 +47,6 @@ def test_other_videos_give_the_vertices_of_their_frames_too(name: str):
     assert meshreel.open(path).vertices(0, 1).tobytes() == meshreel.open(path)[0].vertices.tobytes()
 
 
-@pytest.mark.parametrize(
-    "out",
-    [np.zeros((3, 9, 3), np.float16), np.zeros((4, 9, 3)), np.zeros((3, 9))],
-)
-def test_an_array_that_no_frames_fit_is_refused(out: np.ndarray):
-    with pytest.raises(InputError, match="3 frames: give one of float64 or float32"):
-        meshreel.open(DATA).vertices(0, 3, out)
-
-
-def test_an_array_for_other_meshes_is_refused():
-    with pytest.raises(InputError, match="frame 0 has"):
-        meshreel.open(DATA).vertices(0, 3, np.zeros((3, 9, 3)))
-
-
-def test_a_frame_of_another_size_is_named():
-    with pytest.raises(InputError, match=f"frame {MOVING} has 0 vertices"):
-        meshreel.open(DATA).vertices(0, COUNT)
-
-
 def test_vertices_that_are_no_longer_the_same_are_refused_though_as_many():
     corners, file = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0.5, 0.5, 0.5]], io.BytesIO()
     pyramid = [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]]
@@ -78,6 +57,20 @@ def test_vertices_that_are_no_longer_the_same_are_refused_though_as_many():
     assert len(video[0].vertices) == len(video[1].vertices)
     with pytest.raises(InputError, match="frame 1 has other vertices than frame 0"):
         video.vertices(0, 2)
+
+
+@pytest.mark.parametrize(
+    ("last", "out", "words"),
+    [
+        *((3, np.zeros(shape, kind), "3 frames: give one of float64 or float32")
+          for shape, kind in (((3, 9, 3), np.float16), ((4, 9, 3), float), ((3, 9), float))),
+        (3, np.zeros((3, 9, 3)), "frame 0 has"),
+        (COUNT, None, f"frame {MOVING} has 0 vertices"),
+    ],
+)  # fmt: skip
+def test_arrays_and_frames_that_do_not_fit_are_refused(last: int, out: np.ndarray | None, words: str):
+    with pytest.raises(InputError, match=words):
+        meshreel.open(DATA).vertices(0, last, out)
 
 
 @pytest.mark.parametrize(("first", "last"), [(-1, 1), (0, COUNT + 1), (2, 2)])

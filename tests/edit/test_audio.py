@@ -1,7 +1,5 @@
 """Audio: kept byte for byte, found by its bytes, in step after every edit."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Edits copy chunks: frames are the same before and after, to the bit, and nothing hidden is shown."""
 
-from __future__ import annotations
-
 import io
 import json
 import time
@@ -20,7 +18,7 @@ from meshreel.edit.edits import concat, cut, retime, tag, transform
 from meshreel.edit.metadata import MEANS
 from meshreel.errors import FormatError, InputError
 from meshreel.format.edit import is_rotation
-from meshreel.format.layout import EDITED, Header
+from meshreel.format.layout import Header
 from tests.decoder.test_chains import DATA
 from tests.golden import GOLDEN, colored_record, frame_record
 from tests.metrics.shapes import sphere
@@ -322,34 +320,6 @@ def test_every_truncation_and_every_flipped_byte_is_a_format_error_or_the_same_f
                 assert str(source) in str(error) and not output.exists()
                 continue
             assert records(meshreel.open(output)) == wanted  # the damage is in a chunk that is not kept
-
-
-ITEMS = [
-    None,
-    [],
-    1,
-    {"frames": [0]},
-    {"frames": [0, 15]},
-    {"frames": [3, 3]},
-    {"frames": [-1, 3]},
-    {"frames": [0.0, 3]},
-    {"frames": [False, 3]},
-    {"frames": "0:3"},
-    {"rotation": [1] * 9},
-    {"rotation": [1, 0, 0, 0, 1, 0, 0, 0, -1]},
-    {"rotation": [1, 0, 0, 0, 1, 0, 0, 0, "1"]},
-    {"rotation": [1, 0, 0, 0, 1, 0, 0, 0]},
-    {"rotation": {"x": 1}},
-    {"mirror": True},
-]
-
-
-@pytest.mark.parametrize("item", ITEMS)
-def test_an_edit_that_cannot_be_followed_is_refused(item):
-    reader = ReelReader(BytesSource(FILES[0].read_bytes()))
-    head = pack_head(replace(reader.header, metadata=json.dumps({"edit": item})), reader.index, EDITED)
-    with pytest.raises(FormatError, match=r"Header.metadata: edit"):
-        meshreel.open(head + FILES[0].read_bytes()[reader.head_size :])
 
 
 def test_without_its_flag_an_edit_is_metadata_like_others_and_other_flags_are_refused():

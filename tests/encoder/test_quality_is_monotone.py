@@ -1,7 +1,5 @@
 """`--quality` from 0 to 100: more costs more and is better by every metric, on a captured body and on a made one."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import pairwise
 

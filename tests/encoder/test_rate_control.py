@@ -1,7 +1,5 @@
 """Encoding to a target: the search as arithmetic, and files that meet what was asked for."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import replace
@@ -21,7 +19,6 @@ from meshreel.format.layout import Form
 from meshreel.metrics.comparison import ComparisonOptions, compare_sequences
 from meshreel.types import MeshList
 from tests.small_options import quick, with_method
-from tests.spheres import deforming_sphere
 
 
 def searched(goal: Goal, curve: Callable[[float], float]) -> tuple[float | None, int]:
@@ -112,21 +109,6 @@ def test_a_file_meets_the_psnr_that_was_asked_for(tmp_path) -> None:
         assert video.reader.metadata["quality"] == quality
     assert [path.name for path in tmp_path.iterdir()] == ["a.reel"]
     assert summary.size == (tmp_path / "a.reel").stat().st_size
-
-
-def test_a_file_meets_the_rate_that_was_asked_for(tmp_path) -> None:
-    summary, _ = encode_to(Encoder(BODY), tmp_path / "a.reel", Goal(mbps=0.33), options_at)
-    assert summary.size * 8 * BODY.frame_rate / len(BODY) / 1e6 == pytest.approx(0.33, rel=0.05)
-
-
-@pytest.mark.parametrize("goal", [Goal(psnr=200.0), Goal(mbps=1e-6)])
-def test_a_target_out_of_reach_is_an_error_and_leaves_the_folder_as_it_was(goal: Goal, tmp_path) -> None:
-    (tmp_path / "a.reel").write_bytes(b"before")
-    balls = MeshList(tuple(deforming_sphere(1, levels=1)))
-    with pytest.raises(InputError, match=r"a\.reel: no quality gives .*; quality .* gives "):
-        encode_to(Encoder(balls), tmp_path / "a.reel", goal, options_at)
-    assert [path.name for path in tmp_path.iterdir()] == ["a.reel"]
-    assert (tmp_path / "a.reel").read_bytes() == b"before"
 
 
 def test_a_path_that_cannot_be_written_is_refused_before_anything_is_coded(tmp_path, monkeypatch) -> None:

@@ -1,7 +1,5 @@
 """Equal input and options give equal bytes: on any number of threads, with workers, elsewhere, on older processors."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os

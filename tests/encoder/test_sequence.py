@@ -1,10 +1,7 @@
 """The chain of preset `paper` on small bodies: what goes in comes out, whatever it is, and the same bytes each time."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -21,12 +18,14 @@ from meshreel.format.layout import Form
 from meshreel.io.sequence import SequenceOptions, open_sequence
 from meshreel.metrics.distance import surface_errors
 from meshreel.types import Mesh, MeshList
+from tests.metrics.shapes import plane
 from tests.small_options import quick, with_method
-from tests.spheres import deforming_sphere, sliding_sphere
+from tests.spheres import sliding_sphere
 
 paper = partial(quick, "paper")
 BODY = SoftBodiesOptions(frames=6, people=1, spacing=0.035)
 BALL = sliding_sphere(1, levels=2)[0]
+NONE = Mesh.empty()
 
 
 @pytest.fixture(scope="module")
@@ -78,33 +77,6 @@ def test_what_the_summary_says_of_a_group_is_what_the_file_gives(body):
     assert video.reader.metadata["rms_m"] > 0
 
 
-def test_the_same_input_gives_the_same_bytes_with_an_executor_too(body, tmp_path):
-    sequence, path, _ = body
-    stages: list[tuple[str, int, int]] = []
-    with ThreadPoolExecutor(2) as executor:
-        encode(
-            sequence,
-            tmp_path / "b.reel",
-            options=paper(group_size=3),
-            executor=executor,
-            progress=lambda *done: stages.append(done),
-        )
-    assert (tmp_path / "b.reel").read_bytes() == path.read_bytes()
-    assert ("survey", 6, 6) in stages and ("code", 6, 6) in stages
-
-
-def test_every_stage_reports_every_frame(tmp_path):
-    last: dict[str, int] = {}
-    encode(
-        sliding_sphere(2, levels=2),
-        tmp_path / "a.reel",
-        options=paper(),
-        progress=lambda s, done, _: last.update({s: done}),
-    )
-    assert last == dict.fromkeys(last, 2)
-    assert {"survey", "track", "code"} <= set(last)
-
-
 def test_draco_takes_a_group_that_costs_less_that_way(tmp_path):
     coarse = sliding_sphere(2, levels=1)  # 18 vertices: any reference costs more
     options = with_method(paper(), intra=IntraOptions((1.0,), (2.0, 1.0, 0.7, 0.5)))
@@ -124,67 +96,35 @@ def test_a_group_is_cut_where_one_reference_cannot_follow(tmp_path, monkeypatch)
     assert max(percent(a, b) for a, b in zip((*one, *other), video, strict=True)) < 2
 
 
-def test_frames_without_faces_are_legal_and_stay_in_their_places(tmp_path):
-    frames = (Mesh.empty(), BALL, Mesh.empty(), Mesh.of(np.zeros((3, 3)), []))
-    video, summary = decoded(MeshList(frames), tmp_path / "a.reel")
-    assert [mesh.is_empty for mesh in video] == [True, False, True, True]
-    assert [group.form for group in summary.groups] == [Form.EMPTY, Form.DRACO, Form.EMPTY]
-
-
-def test_a_sequence_of_nothing_but_empty_frames_is_legal(tmp_path):
-    video, _ = decoded(MeshList((Mesh.empty(),) * 3), tmp_path / "a.reel")
-    assert all(mesh.is_empty for mesh in video)
-
-
-def test_one_frame_is_legal(tmp_path):
-    video, summary = decoded(MeshList((BALL,)), tmp_path / "a.reel")
-    assert [group.form for group in summary.groups] == [Form.DRACO]
-    assert percent(BALL, video[0]) < 0.2
-
-
 def test_a_list_of_foreign_meshes_gives_the_bytes_of_the_same_sequence(tmp_path):
     encode(MeshList((BALL, BALL)), tmp_path / "a.reel", options=paper())
     encode([BALL.to_trimesh(), (BALL.vertices, BALL.faces)], tmp_path / "b.reel", options=paper())
     assert (tmp_path / "a.reel").read_bytes() == (tmp_path / "b.reel").read_bytes()
 
 
-def test_no_frames_are_refused(tmp_path):
-    with pytest.raises(InputError, match="no frames"):
-        encode(MeshList(()), tmp_path / "a.reel", options=paper())
-    assert list(tmp_path.iterdir()) == []
+def moving(mesh: Mesh, count: int = 3) -> list[Mesh]:
+    return [Mesh(mesh.vertices + [0.1 * k, 0, 0], mesh.faces) for k in range(count)]
 
 
-def test_meshes_of_one_face_come_back(tmp_path):
-    frames = tuple(Mesh.of([[0, 0, 0], [1, 0, 0], [0, 1 + t, 0]], [[0, 1, 2]]) for t in range(3))
-    video, _ = decoded(MeshList(frames), tmp_path / "a.reel")
-    assert [len(mesh.faces) for mesh in video] == [1, 1, 1]
-    assert max(percent(a, b) for a, b in zip(frames, video, strict=True)) < 1
-
-
-def test_a_flat_open_sheet_comes_back(tmp_path):
-    x, z = (c.reshape(-1) for c in np.meshgrid(np.linspace(0, 1, 9), np.linspace(0, 1, 9)))
-    corners = np.arange(81).reshape(9, 9)
-    a, b, c, d = (part.reshape(-1) for part in (corners[:-1, :-1], corners[1:, :-1], corners[1:, 1:], corners[:-1, 1:]))
-    faces = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
-    frames = tuple(Mesh.of(np.stack([x + 0.05 * t, 0 * x, z], axis=1), faces) for t in range(3))
-    video, _ = decoded(MeshList(frames), tmp_path / "a.reel")
-    assert max(percent(p, q) for p, q in zip(frames, video, strict=True)) < 1
-
-
-def test_two_frames_of_very_different_scale_are_both_kept(tmp_path):
-    frames = (BALL, Mesh.of(1000 * BALL.vertices, BALL.faces))
-    video, _ = decoded(MeshList(frames), tmp_path / "a.reel")
-    assert max(percent(a, b) for a, b in zip(frames, video, strict=True)) < 1
-
-
-def test_coordinates_around_a_million_keep_their_millimetres(tmp_path):
-    far = [4.5e6, 1.2e2, 5.1e6]
-    balls = sliding_sphere(2, levels=2)
-    near, _ = decoded(balls, tmp_path / "near.reel")
-    video, _ = decoded(MeshList(tuple(Mesh.of(b.vertices + far, b.faces) for b in balls)), tmp_path / "far.reel")
-    for ball, here, there in zip(balls, near, video, strict=True):
-        back = Mesh.of(there.vertices - far, there.faces)
-        assert percent(ball, back) < 1.2 * percent(ball, here) + 0.001
+@pytest.mark.parametrize(
+    ("frames", "forms"),
+    [
+        pytest.param([NONE, BALL, NONE, Mesh.of(BALL.vertices, np.zeros((0, 3)))], "EDE", id="frames without faces"),
+        pytest.param([NONE] * 3, "E", id="nothing at all"),
+        pytest.param([BALL], "D", id="one frame"),
+        pytest.param([Mesh.of(np.diag([1, 1 + t, 1]), [[0, 1, 2]]) for t in range(3)], None, id="meshes of one face"),
+        pytest.param(moving(plane(1.0, 8)), None, id="a flat open sheet"),
+        pytest.param([BALL, Mesh(1000 * BALL.vertices, BALL.faces)], None, id="different scales"),
+    ],
+)
+def test_sequences_at_the_edges_come_back(frames, forms, tmp_path):
+    video, summary = decoded(MeshList(tuple(frames), 12.5), tmp_path / "a.reel")
+    assert forms in (None, "".join(group.form.name[0] for group in summary.groups))
+    assert video.frame_rate == 12.5 and video.timestamps == pytest.approx(np.arange(len(frames)) / 12.5)
+    for original, found in zip(frames, video, strict=True):
+        assert found.is_empty == (len(original.faces) == 0)
+        assert len(found.faces) == 1 or len(original.faces) != 1
+        assert found.is_empty or percent(original, found) < 1
 
 
 def degenerate(mesh):
@@ -222,20 +162,19 @@ def test_meshes_that_are_not_clean_are_coded_all_the_same(spoil, count, tmp_path
         assert 100 * forward.rms / original.diagonal < 1  # the body is there, whatever became of the rest
 
 
-@pytest.mark.parametrize("bad", [np.nan, np.inf])
-def test_a_coordinate_that_is_not_finite_is_refused_with_its_frame(bad, tmp_path):
-    vertices = BALL.vertices.copy()
-    vertices[3, 1] = bad
-    with pytest.raises(InputError, match=r"frame 1: vertex 3 .*finite"):
-        encode(MeshList((BALL, Mesh.of(vertices, BALL.faces))), tmp_path / "a.reel", options=paper())
+@pytest.mark.parametrize(
+    ("frames", "words"),
+    [
+        ([], "no frames"),
+        *(([BALL, Mesh.of([*BALL.vertices[1:], [bad, 0, 0]], BALL.faces)], "frame 1: vertex 65 .*finite")
+          for bad in (np.nan, np.inf)),
+        *(([BALL, Mesh.of(BALL.vertices, [*BALL.faces, [0, 1, k]])], f"frame 1: .*vertex {k}") for k in (-1, 66)),
+    ],
+)  # fmt: skip
+def test_frames_that_cannot_be_coded_are_refused_with_their_number(frames, words, tmp_path):
+    with pytest.raises(InputError, match=words):
+        encode(MeshList(tuple(frames)), tmp_path / "a.reel", options=paper())
     assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.parametrize("index", [-1, 66])
-def test_a_face_that_names_no_vertex_is_refused_with_its_frame(index, tmp_path):
-    with pytest.raises(InputError, match=rf"frame 1: .*vertex {index}"):
-        frames = (BALL, Mesh.of(BALL.vertices, [*BALL.faces, [0, 1, index]]))
-        encode(MeshList(frames), tmp_path / "a.reel", options=paper())
 
 
 def test_a_bad_file_is_named_with_its_frame_before_anything_is_coded(tmp_path):
@@ -262,20 +201,14 @@ def test_absurd_options_are_refused():
         meshreel.Settings("unknown")
 
 
-def test_a_deforming_ball_keeps_its_frame_rate(tmp_path):
-    sequence = MeshList(tuple(deforming_sphere(2, levels=2)), frame_rate=12.5)
-    video, _ = decoded(sequence, tmp_path / "a.reel")
-    assert video.frame_rate == 12.5
-    assert video.timestamps == pytest.approx([0, 0.08])
-
-
 def test_a_path_that_cannot_be_written_is_refused_before_anything_is_read(tmp_path: Path) -> None:
     class Unread(MeshList):
         def __getitem__(self, index: int) -> Mesh:
             raise AssertionError("read")
 
-    with pytest.raises(InputError, match="cannot be written"):
-        encode(Unread((Mesh.empty(),) * 3), tmp_path / "nowhere" / "x.reel")
+    for path in (tmp_path / "nowhere" / "x.reel", tmp_path):
+        with pytest.raises(InputError, match="cannot be written"):
+            encode(Unread((NONE,) * 3), path)
 
 
 def test_vertices_that_repeat_a_position_are_welded_as_the_command_line_does(tmp_path):

@@ -1,7 +1,5 @@
 """The Blender add-on, with a stand-in for Blender that takes arrays as `foreach_set` does: of the right length only."""
 
-from __future__ import annotations
-
 import importlib.util
 import sys
 import tomllib

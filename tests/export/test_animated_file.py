@@ -1,7 +1,5 @@
 """Exported files show the decoded mesh at the time of each frame, and motion between frames."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -282,17 +280,6 @@ def test_viewers_that_do_not_animate_show_the_first_frame(tmp_path, name):
     if not video[0].is_empty:
         apart = np.linalg.norm(again.vertices[:, None] - video[0].vertices[None], axis=2)  # parts in any order
         assert max(apart.min(axis=0).max(), apart.min(axis=1).max()) <= 2 * AWAY * video[0].diagonal
-
-
-@pytest.mark.parametrize("extension", ["glb", "usdc"])
-def test_a_file_of_one_frame_shows_it(tmp_path, extension):
-    mesh = next(mesh for mesh in meshreel.open(GOLDEN / "layers.reel"))
-    meshreel.encode(
-        MeshList((Mesh.of(mesh.vertices - mesh.vertices[0], mesh.faces),), 10.0), tmp_path / "a.reel", options=quick()
-    )
-    video = meshreel.open(tmp_path / "a.reel")
-    assert export(video, tmp_path / f"a.{extension}") == 1
-    assert_shows(seen(play(tmp_path / f"a.{extension}").shown(0)), parts_of(video, 0), video[0].diagonal)
 
 
 @pytest.mark.parametrize("extension", ["glb", "usdc", "usdz"])

@@ -1,7 +1,5 @@
 """Exported files show the colours and textures of the decoder; single frames keep those that their format has."""
 
-from __future__ import annotations
-
 import pickle
 from dataclasses import replace
 from pathlib import Path

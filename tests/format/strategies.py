@@ -1,7 +1,5 @@
 """Hypothesis strategies for any record, made from its declaration."""
 
-from __future__ import annotations
-
 from hypothesis import strategies as st
 
 from meshreel.format import kinds

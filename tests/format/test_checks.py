@@ -1,7 +1,5 @@
 """Laws of a head beyond its layout: each guard trips."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest

@@ -1,7 +1,5 @@
 """The tables of FORMAT.md follow from the layout."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess

@@ -1,7 +1,5 @@
 """FORMAT.md is true: its Python decodes what the encoder writes."""
 
-from __future__ import annotations
-
 import math
 import re
 from pathlib import Path

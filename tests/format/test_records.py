@@ -1,7 +1,5 @@
 """Laws of records: unpack undoes pack; bad bytes raise FormatError, values that do not fit InputError."""
 
-from __future__ import annotations
-
 import tracemalloc
 from dataclasses import dataclass
 from enum import IntEnum

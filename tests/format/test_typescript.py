@@ -1,7 +1,5 @@
 """The player's reader of records declares all fields and matches the layout."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

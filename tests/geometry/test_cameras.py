@@ -1,7 +1,5 @@
 """Pinhole cameras: rays and images undo each other, the eye is where rays start, and records come back."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 

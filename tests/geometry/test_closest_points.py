@@ -1,7 +1,5 @@
 """Closest points, distances and borders of surfaces."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Colours that cameras saw: where places are in pictures, what hides them, and which picture counts more."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

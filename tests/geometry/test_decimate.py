@@ -1,38 +1,25 @@
 """Quadric decimation."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
 from meshreel.errors import InputError
 from meshreel.geometry.closest_points import Surface
 from meshreel.geometry.decimate import decimate, decimate_faces
-from meshreel.geometry.topology import border_edges, clean, subdivide_midpoint
+from meshreel.geometry.topology import border_edges, clean
 from meshreel.types import Mesh
-
-
-def ball(levels: int = 5) -> Mesh:
-    octahedron = Mesh.of(
-        np.concatenate([np.eye(3), -np.eye(3)]),
-        [[0, 1, 2], [1, 3, 2], [3, 4, 2], [4, 0, 2], [1, 0, 5], [3, 1, 5], [4, 3, 5], [0, 4, 5]],
-    )
-    mesh = subdivide_midpoint(octahedron, levels)
-    return Mesh(mesh.vertices / np.linalg.norm(mesh.vertices, axis=1, keepdims=True), mesh.faces)
+from tests.metrics.shapes import plane, sphere
 
 
 def sheet(n: int = 40) -> Mesh:
-    x, y = np.meshgrid(np.linspace(0, 1, n), np.linspace(0, 1, n), indexing="ij")
-    i = np.arange(n * n).reshape(n, n)
-    a, b, c, d = i[:-1, :-1].ravel(), i[1:, :-1].ravel(), i[1:, 1:].ravel(), i[:-1, 1:].ravel()
-    faces = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
-    return Mesh.of(np.stack([x.ravel(), y.ravel(), 0.05 * np.sin(6 * x.ravel())], axis=1), faces)
+    mesh = plane(1.0, n - 1)
+    return Mesh.of(mesh.vertices + 0.05 * np.sin(6 * mesh.vertices[:, :1]) * (0, 0, 1), mesh.faces)
 
 
 @pytest.mark.parametrize("scale", [1e-3, 1.0, 1e3])
 @pytest.mark.parametrize("target", [200, 1000])
 def test_a_closed_mesh_reaches_its_count_and_keeps_its_shape_at_any_scale(scale: float, target: int) -> None:
-    whole = ball()
+    whole = sphere(levels=5)
     small = decimate(Mesh(whole.vertices * scale + 5 * scale, whole.faces), target)
     assert len(small.vertices) == pytest.approx(target, rel=0.02)
     assert not len(border_edges(small))
@@ -51,23 +38,23 @@ def test_an_open_mesh_keeps_its_border(scale: float) -> None:
 
 
 def test_what_is_left_is_clean_and_the_same_each_time() -> None:
-    a, b = decimate(ball(), 300), decimate(ball(), 300)
+    a, b = decimate(sphere(levels=5), 300), decimate(sphere(levels=5), 300)
     assert np.array_equal(a.vertices, b.vertices)
     assert np.array_equal(a.faces, b.faces)
     assert len(clean(a).faces) == len(a.faces)
 
 
 def test_a_mesh_that_is_small_enough_stays_and_an_empty_one_stays_empty() -> None:
-    assert np.array_equal(decimate(ball(2), 1000).vertices, ball(2).vertices)
+    assert np.array_equal(decimate(sphere(levels=2), 1000).vertices, sphere(levels=2).vertices)
     assert decimate(Mesh.empty(), 10).is_empty
 
 
 def test_an_impossible_count_is_refused() -> None:
     with pytest.raises(InputError, match="at least 4"):
-        decimate(ball(1), 3)
+        decimate(sphere(levels=1), 3)
 
 
-@pytest.mark.parametrize("mesh", [ball(4), sheet()], ids=["closed", "open"])
+@pytest.mark.parametrize("mesh", [sphere(levels=4), sheet()], ids=["closed", "open"])
 def test_one_collapse_reaches_a_number_of_faces(mesh: Mesh) -> None:
     small = decimate_faces(mesh, 500)
     assert 480 <= len(small.faces) <= 500
@@ -77,7 +64,7 @@ def test_one_collapse_reaches_a_number_of_faces(mesh: Mesh) -> None:
 
 def test_too_few_faces_are_refused() -> None:
     with pytest.raises(InputError, match="faces is 3"):
-        decimate_faces(ball(1), 3)
+        decimate_faces(sphere(levels=1), 3)
 
 
 def test_separate_triangles_may_be_fewer_than_what_a_quick_first_pass_leaves() -> None:

@@ -1,7 +1,5 @@
 """Depth pictures made finer along surfaces, and the space that cameras saw through."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

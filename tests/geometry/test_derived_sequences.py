@@ -1,7 +1,5 @@
 """Derived sequences: chosen frames, and what they know of their source."""
 
-from __future__ import annotations
-
 from typing import ClassVar
 
 import numpy as np

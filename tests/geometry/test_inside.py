@@ -1,30 +1,17 @@
 """Interior samples are even, inside and labelled by body, also for open, flat and dirty meshes."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
 from meshreel.geometry.inside import Samples, interior_samples, winding_inside, winding_numbers
-from meshreel.geometry.topology import subdivide_midpoint
+from meshreel.geometry.topology import concatenate, subdivide_midpoint
 from meshreel.types import Mesh
-
-OCTAHEDRON = Mesh.of(
-    [[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]],
-    [[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]],
-)
+from tests.metrics import shapes
+from tests.metrics.shapes import moved
 
 
 def sphere(radius: float = 0.3, center: tuple[float, float, float] = (0, 0, 0), levels: int = 4) -> Mesh:
-    ball = subdivide_midpoint(OCTAHEDRON, levels)
-    unit = ball.vertices / np.linalg.norm(ball.vertices, axis=1, keepdims=True)
-    return Mesh.of(unit * radius + np.array(center), ball.faces)
-
-
-def together(*meshes: Mesh) -> Mesh:
-    starts = np.cumsum([0] + [len(m.vertices) for m in meshes])
-    faces = [m.faces + start for m, start in zip(meshes, starts, strict=False)]
-    return Mesh.of(np.concatenate([m.vertices for m in meshes]), np.concatenate(faces))
+    return moved(shapes.sphere(radius, levels), center)
 
 
 def sheet(side: float = 0.5) -> Mesh:
@@ -74,21 +61,21 @@ def test_an_inside_out_mesh_is_filled() -> None:
 
 
 def test_bodies_are_numbered_by_volume() -> None:
-    samples = samples_of(together(sphere(0.1, (0.4, 0, 0)), sphere(0.2, (-0.2, 0, 0))))
+    samples = samples_of(concatenate([sphere(0.1, (0.4, 0, 0)), sphere(0.2, (-0.2, 0, 0))]))
     sizes = np.bincount(samples.bodies)
     assert sizes[0] / sizes[1] == pytest.approx(8, rel=0.1)
     assert (samples.points[samples.bodies == 0, 0] < 0.1).all()
 
 
 def test_a_speck_is_no_body() -> None:
-    samples = samples_of(together(sphere(0.3), sphere(0.01, (0.45, 0, 0), levels=2)))
+    samples = samples_of(concatenate([sphere(0.3), sphere(0.01, (0.45, 0, 0), levels=2)]))
     assert samples.bodies.max() == 0
     assert samples.points[:, 0].max() < 0.31
 
 
 def test_a_hollow_body_is_one_body_and_stays_hollow_where_its_inner_wall_looks_inwards() -> None:
     inner = sphere(0.15)
-    samples = samples_of(together(sphere(0.3), Mesh.of(inner.vertices, inner.faces[:, ::-1])))
+    samples = samples_of(concatenate([sphere(0.3), Mesh.of(inner.vertices, inner.faces[:, ::-1])]))
     assert samples.bodies.max() == 0
     assert np.linalg.norm(samples.points, axis=1).min() > 0.149
 
@@ -101,7 +88,7 @@ def test_a_flat_sheet_is_sampled_on_its_surface() -> None:
 
 
 def test_a_sheet_beside_a_solid_becomes_a_separate_body() -> None:
-    samples = samples_of(together(sphere(0.2, (0, 0, 0.5)), sheet()))
+    samples = samples_of(concatenate([sphere(0.2, (0, 0, 0.5)), sheet()]))
     assert samples.bodies.max() == 1
     assert np.abs(samples.points[samples.bodies == 1, 2]).max() < 1e-3
 
@@ -113,11 +100,6 @@ def test_zero_area_faces_do_no_harm() -> None:
     assert len(samples_of(Mesh.of(ball.vertices, [[0, 0, 1]])).points) == 2
 
 
-def test_the_same_generator_gives_the_same_samples() -> None:
-    a, b = samples_of(sphere()), samples_of(sphere())
-    assert a.points.tobytes() == b.points.tobytes()
-
-
 def test_winding_separates_inside_from_outside_and_accepts_an_empty_query() -> None:
     queries = np.array([[0, 0, 0], [0.29, 0, 0], [0.31, 0, 0], [5.0, 5, 5]])
     assert winding_inside(sphere(), queries).tolist() == [True, True, False, False]
@@ -125,4 +107,4 @@ def test_winding_separates_inside_from_outside_and_accepts_an_empty_query() -> N
 
 
 def test_nothing_lies_inside_a_mesh_without_faces():
-    assert winding_numbers(Mesh.of(OCTAHEDRON.vertices, []), np.zeros((2, 3))).tolist() == [0.0, 0.0]
+    assert winding_numbers(Mesh.of(np.eye(3), []), np.zeros((2, 3))).tolist() == [0.0, 0.0]

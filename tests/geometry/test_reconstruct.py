@@ -1,7 +1,5 @@
 """Grids of signed distances and the surface in them."""
 
-from __future__ import annotations
-
 import sys
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Rigid fits and unit dual quaternions."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings

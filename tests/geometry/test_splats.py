@@ -1,13 +1,11 @@
 """Splats on a mesh: they stay where they are on finer meshes, follow the mesh, and vanish with their face."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from meshreel.geometry.splats import Bound, Carrier, Splats, bind
+from meshreel.geometry.splats import Carrier, bind
 from meshreel.geometry.topology import subdivide_midpoint
 from tests.metrics.shapes import sphere
 from tests.splats import some_splats
@@ -61,14 +59,3 @@ def test_a_splat_is_transparent_on_a_face_without_area() -> None:
     flat = replace(carrier(0), vertices=np.zeros_like(BALL.vertices))
     found = bind(SPLATS, flat)
     assert not found.opacities.any() and np.isfinite(found.means).all()
-
-
-def test_parts_are_joined_in_their_order() -> None:
-    one = bind(SPLATS, carrier(0))
-    two = Bound.join([one, one])
-    np.testing.assert_array_equal(two.means[len(SPLATS) :], one.means)
-
-
-def test_some_splats_are_taken() -> None:
-    taken: Splats = SPLATS.take(np.array([3, 1]))
-    np.testing.assert_array_equal(taken.colors, SPLATS.colors[[3, 1]])

@@ -1,7 +1,5 @@
 """Strict algebra agrees with NumPy's to rounding, and its exp, log2 and angles are exact where they can be."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Laws of connectivity on which decoder and encoder rely."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import astuple
 
@@ -39,13 +37,6 @@ def area(mesh: Mesh) -> float:
     return float(face_normals(mesh)[1].sum())
 
 
-def test_edges_are_sorted_unique_and_found_again_from_the_faces() -> None:
-    edges, of_faces = unique_edges(SOLID.faces)
-    assert edges.tolist() == [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]]
-    for face, its in zip(SOLID.faces, of_faces, strict=True):
-        assert [set(edges[e]) for e in its] == [set(face[[0, 1]]), set(face[[1, 2]]), set(face[[2, 0]])]
-
-
 @pytest.mark.parametrize("levels", [0, 1, 3])
 def test_subdivision_keeps_the_surface_its_sides_and_its_vertices(levels: int) -> None:
     fine = subdivide_midpoint(SOLID, levels)
@@ -61,15 +52,6 @@ def test_new_vertices_are_midpoints_in_the_order_of_their_edges() -> None:
     edges, _ = unique_edges(SOLID.faces)
     midpoints = (CORNERS[edges[:, 0]] + CORNERS[edges[:, 1]]) / 2
     np.testing.assert_array_equal(subdivide_midpoint(SOLID).vertices[4:], midpoints)
-
-
-def test_normals_have_unit_length_and_are_zero_without_area() -> None:
-    flat = Mesh.of([[0, 0, 0], [2, 0, 0], [0, 3, 0], [1, 0, 0], [9, 9, 9]], [[0, 1, 2], [0, 3, 1]])
-    normals, areas = face_normals(flat)
-    np.testing.assert_array_equal(normals, [[0, 0, 1], [0, 0, 0]])
-    np.testing.assert_array_equal(areas, [3, 0])
-    np.testing.assert_array_equal(vertex_normals(flat)[[0, 1, 2]], [[0, 0, 1]] * 3)
-    np.testing.assert_array_equal(vertex_normals(flat)[[3, 4]], np.zeros((2, 3)))
 
 
 NUMBERS = st.sampled_from([0.0, -0.0, 1.0, -1.0, 0.1, 3e-160, 1e-170, 1e12, 1 + 2**-52])
@@ -143,36 +125,6 @@ def test_a_blend_of_corners_is_the_corner_the_middle_or_any_affine_field_between
     turn, shift = rng.normal(size=(3, 3)), rng.normal(size=3)
     np.testing.assert_allclose(blend(CORNERS @ turn + shift, corners, weights), points @ turn + shift, atol=1e-12)
     assert blend(CORNERS, np.zeros((0, 3), np.int32), np.zeros((0, 3))).shape == (0, 3)
-
-
-def test_vertex_normals_weigh_faces_by_area() -> None:
-    corner = Mesh.of([[0, 0, 0], [2, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 1, 2], [0, 2, 3]])  # areas 1 and 1/2
-    np.testing.assert_allclose(vertex_normals(corner)[0], np.array([1, 0, 2]) / 5**0.5, atol=1e-15)
-
-
-def test_welding_merges_equal_positions_and_drops_what_collapses() -> None:
-    soup = Mesh.of(CORNERS[SOLID.faces.reshape(-1)], np.arange(12).reshape(4, 3))
-    whole = weld(soup)
-    assert len(whole.vertices) == 4
-    np.testing.assert_array_equal(whole.vertices[whole.faces], soup.vertices[soup.faces])
-    twice = Mesh.of([[0, 0, 0], [0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3], [1, 2, 3]])
-    assert weld(twice).faces.tolist() == [[0, 1, 2], [0, 1, 2]]
-    assert weld(Mesh.empty()).is_empty and clean(Mesh.empty()).is_empty
-
-
-def test_cleaning_leaves_each_face_with_an_area_once_and_no_loose_vertex() -> None:
-    flat = [[0, 0, 1], [2, 2, 2], [3, 4, 4], [1, 0, 2], [0, 5, 1]]  # the last two: a repeated face, a zero area
-    points = np.concatenate([CORNERS, [[7, 7, 7]], [[0.5, 0, 0]]])
-    mesh = clean(Mesh.of(points, np.concatenate([flat[:3], SOLID.faces, flat[3:]])))
-    np.testing.assert_array_equal(mesh.vertices, CORNERS)
-    np.testing.assert_array_equal(mesh.faces, SOLID.faces)
-    again = clean(mesh)
-    np.testing.assert_array_equal(again.faces, mesh.faces)
-
-
-def test_unreferenced_vertices_are_removed_and_the_others_keep_their_order() -> None:
-    mesh = drop_unreferenced(Mesh.of(np.arange(18.0).reshape(6, 3), [[5, 1, 3]]))
-    assert mesh.vertices[:, 0].tolist() == [3, 9, 15] and mesh.faces.tolist() == [[2, 0, 1]]
 
 
 @settings(max_examples=100)

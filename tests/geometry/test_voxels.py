@@ -1,7 +1,5 @@
 """Laws of cells and their keys; no face and no crossed cell is left out."""
 
-from __future__ import annotations
-
 import itertools
 
 import numpy as np

@@ -1,7 +1,5 @@
 """NumPy's formulas of connectivity, which the core's loops replace: the plain statement of what they compute."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from meshreel.types import Mesh

@@ -1,7 +1,5 @@
 """Colours and textures of mesh files: what is read, what comes back after writing, and errors for bad pictures."""
 
-from __future__ import annotations
-
 import io
 import json
 from base64 import b64encode
@@ -44,6 +42,13 @@ def put(folder: Path, obj: str = QUAD, mtl: str = SKIN, picture: bytes | None = 
     else:
         (folder / "skin.png").write_bytes(picture)
     return folder / "m.obj"
+
+
+def put_ply(folder: Path, kind: str, rows: str) -> None:
+    names = "".join(f"property {kind} {name}\n" for name in ("red", "green", "blue"))
+    head = f"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n{names}"
+    face = "element face 1\nproperty list uchar int vertex_indices\nend_header\n"
+    (folder / "m.ply").write_text(f"{head}{face}{rows}3 0 1 2\n")
 
 
 @pytest.mark.parametrize("extension", ["ply", "obj", "glb", "npz"])
@@ -117,11 +122,7 @@ def test_khronos_finds_nothing_wrong_with_a_texture(tmp_path: Path) -> None:
     [("uchar", "255"), ("ushort", "65535"), ("int", "255"), *(("float", one) for one in ("1.0", "1.02", "255.0"))],
 )
 def test_ply_colors_of_all_kinds_are_8_bits(tmp_path: Path, kind: str, one: str) -> None:
-    names = "".join(f"property {kind} {name}\n" for name in ("red", "green", "blue"))
-    head = f"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n{names}"
-    rows = f"0 0 0 {one} 0 0\n1 0 0 0 {one} 0\n0 1 0 0 0 {one}\n3 0 1 2\n"
-    text = f"{head}element face 1\nproperty list uchar int vertex_indices\nend_header\n{rows}"
-    (tmp_path / "m.ply").write_text(text)
+    put_ply(tmp_path, kind, f"0 0 0 {one} 0 0\n1 0 0 0 {one} 0\n0 1 0 0 0 {one}\n")
     assert read_mesh(tmp_path / "m.ply").mesh.colors.tolist() == [[255, 0, 0], [0, 255, 0], [0, 0, 255]]
 
 
@@ -139,11 +140,7 @@ def test_ply_colors_of_all_kinds_are_8_bits(tmp_path: Path, kind: str, one: str)
 def test_a_colour_that_is_none_is_refused_with_file_vertex_and_value(
     tmp_path: Path, kind: str, row: str, told: str
 ) -> None:
-    names = "".join(f"property {kind} {name}\n" for name in ("red", "green", "blue"))
-    head = f"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n{names}"
-    rows = f"0 0 0 1 0 0\n1 0 0 {row}\n0 1 0 0 0 1\n3 0 1 2\n"
-    text = f"{head}element face 1\nproperty list uchar int vertex_indices\nend_header\n{rows}"
-    (tmp_path / "m.ply").write_text(text)
+    put_ply(tmp_path, kind, f"0 0 0 1 0 0\n1 0 0 {row}\n0 1 0 0 0 1\n")
     with pytest.raises(InputError, match=rf"m.ply: .*{told}"):
         read_mesh(tmp_path / "m.ply")
 
@@ -315,15 +312,10 @@ def test_colors_of_a_glb_that_are_not_of_its_vertices_are_an_error(tmp_path: Pat
 @pytest.mark.parametrize("uri", ["data", "file"])
 def test_the_texture_of_a_glb_may_be_text_but_not_another_file(tmp_path: Path, uri: str) -> None:
     write_mesh(patched(), tmp_path / "m.glb")
-    data = (tmp_path / "m.glb").read_bytes()
-    size = int.from_bytes(data[12:16], "little")
-    tree = json.loads(data[20 : 20 + size])
     inline = f"data:image/png;base64,{b64encode(pack_picture(PICTURE)).decode()}"
-    tree["images"] = [{"uri": inline if uri == "data" else "skin.png"}]
-    text = json.dumps(tree).encode()
-    text += b" " * (-len(text) % 4)
-    chunks = len(text).to_bytes(4, "little") + b"JSON" + text + data[20 + size :]
-    (tmp_path / "m.glb").write_bytes(b"glTF\2\0\0\0" + (12 + len(chunks)).to_bytes(4, "little") + chunks)
+    images = [{"uri": inline if uri == "data" else "skin.png"}]
+    data = rewritten((tmp_path / "m.glb").read_bytes(), lambda tree: tree.update(images=images))
+    (tmp_path / "m.glb").write_bytes(data)
     loaded = read_mesh(tmp_path / "m.glb")
     if uri == "data":
         np.testing.assert_array_equal(loaded.mesh.texture.pixels, PICTURE)

@@ -1,7 +1,5 @@
 """Damaged and hostile mesh files: each is an InputError that names the file."""
 
-from __future__ import annotations
-
 import io
 import os
 import zipfile

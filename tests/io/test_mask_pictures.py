@@ -1,7 +1,5 @@
 """Masks: object numbers from all kinds of PNG, and errors for missing files."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -27,8 +25,7 @@ def test_gray_and_palette_and_black_and_white_pictures_give_their_numbers(tmp_pa
 
 
 @pytest.mark.parametrize(
-    ("picture", "told"),
-    [(np.zeros((4, 4, 3), np.uint8), "mode RGB"), (np.zeros((4, 4), np.uint16), "mode I")],
+    ("picture", "told"), [(np.zeros((4, 4, 3), np.uint8), "mode RGB"), (np.zeros((4, 4), np.uint16), "mode I")]
 )
 def test_pictures_of_other_kinds_are_refused(tmp_path: Path, picture: np.ndarray, told: str):
     Image.fromarray(picture).save(tmp_path / "other.png")

@@ -1,7 +1,5 @@
 """Mesh files: the contents of each format, and the error for each kind of damage."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -55,10 +53,7 @@ def test_dropped_data_of_obj_files_is_named(tmp_path: Path) -> None:
 
 
 BAD_OBJ = {
-    "nan": (
-        TRIANGLE.replace("v 1 0 0", "v 1 nan 0"),
-        r"vertex 1 is at \(1, nan, 0\), and 1 in all are not",
-    ),
+    "nan": (TRIANGLE.replace("v 1 0 0", "v 1 nan 0"), r"vertex 1 is at \(1, nan, 0\), and 1 in all are not"),
     "infinite": (TRIANGLE.replace("v 1 0 0", "v 1e999 0 0"), r"vertex 1 is at \(inf, 0, 0\)"),
     "index_too_large": (TRIANGLE.replace("f 1 2 3", "f 1 2 4"), r"line 4 .* vertex 4, but the file has 3 vertices"),
     "index_zero": (TRIANGLE.replace("f 1 2 3", "f 0 1 2"), r"line 4 \('f 0 1 2'\) refers to vertex 0"),

@@ -1,7 +1,5 @@
 """Input files are regular and of bounded size: pipes, devices and sparse files end at once, with file and frame."""
 
-from __future__ import annotations
-
 import os
 import sys
 import time

@@ -1,7 +1,5 @@
 """Files behind URLs are found, read and written as files on a disk are; what is not there is an error that names it."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Numbers in lines of text are those of Python's float()."""
 
-from __future__ import annotations
-
 import locale
 import re
 

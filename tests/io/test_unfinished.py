@@ -1,7 +1,5 @@
 """An output in the making has one name: a living process keeps it, and a dead one's is taken over."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Pictures of coloured meshes, as bytes."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from meshreel.metrics.color import Colored

@@ -1,7 +1,5 @@
 """Meshes with known geometry, and closest points by brute force."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from meshreel.geometry.topology import subdivide_midpoint

@@ -1,7 +1,5 @@
 """PSNRs of colours against formulas."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Coloured pictures and their errors, on shapes of which the answer is known."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Decoded frames beside depth pictures of a wall with a box before it: what is covered, invented, lost and flickers."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -71,12 +71,6 @@ def test_empty_and_identical_frames_can_be_drawn(tmp_path: Path, pair: tuple[Mes
     assert (tmp_path / "sheet.png").stat().st_size > 1000
 
 
-def test_the_same_meshes_give_the_same_bytes(tmp_path: Path):
-    for name in ("a.png", "b.png"):
-        write_sheet(MeshList((BODY,)), MeshList((noisy(BODY, 0.02),)), tmp_path / name, SheetOptions(height=48))
-    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
-
-
 def test_missing_frames_are_refused(tmp_path: Path):
     one, two = MeshList((BODY,)), MeshList((BODY, BODY))
     with pytest.raises(InputError, match="0 to 0"):

@@ -1,7 +1,5 @@
 """Flicker of bodies: motion is none, changed normals are."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation

@@ -1,7 +1,5 @@
 """Accuracy and coverage on scenes with known answers: a ball that moves in front of a still wall."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

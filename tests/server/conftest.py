@@ -1,7 +1,5 @@
 """A folder of .reel files, and a player's folder that stands for the built one."""
 
-from __future__ import annotations
-
 import shutil
 import threading
 

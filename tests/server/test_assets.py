@@ -1,7 +1,5 @@
 """Files of the built player: compression, types, and addresses that name their contents."""
 
-from __future__ import annotations
-
 import re
 
 import pytest

@@ -1,7 +1,5 @@
 """The attacks of scripts/attack-server, fewer of each kind than its report has."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Ends of the server's process, whatever runs: real processes, which get signals."""
 
-from __future__ import annotations
-
 import json
 import signal
 import socket

@@ -1,7 +1,5 @@
 """The files of a library, and the facts of each."""
 
-from __future__ import annotations
-
 import os
 import sys
 

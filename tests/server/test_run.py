@@ -1,7 +1,5 @@
 """Addresses of the server and how it announces them."""
 
-from __future__ import annotations
-
 import re
 import socket
 import ssl

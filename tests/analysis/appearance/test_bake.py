@@ -1,7 +1,5 @@
 """Baking: texels and the places that they have, colours of texels and vertices, and what lies between charts."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -36,21 +34,6 @@ def test_a_texture_of_twice_the_size_has_the_same_colors() -> None:
     rows, columns = np.divmod(texels.pixels, 64)
     wanted = bilinear(PICTURE, np.stack([(columns + 0.5) / 32, 1 - (rows + 0.5) / 32], axis=1))
     assert seen.all() and np.abs(colors - wanted).max() <= 0.51
-
-
-def test_places_outside_of_a_texture_are_those_of_its_repetition() -> None:
-    places = np.random.default_rng(1).random((50, 2))
-    np.testing.assert_allclose(bilinear(PICTURE, places), bilinear(PICTURE, places + [3, -2]), atol=1e-6)
-    assert bilinear(PICTURE, np.array([[0.5 / 16, 1 - 0.5 / 16]]))[0].tolist() == PICTURE[0, 0].tolist()
-
-
-def test_faces_without_a_place_have_the_colors_of_their_vertices() -> None:
-    uv = TEXTURED.uv.copy()
-    uv[1] = np.nan
-    red = np.tile(np.array([200, 0, 0], np.uint8), (4, 1))
-    some = Painted(replace(TEXTURED, uv=uv, colors=red))
-    assert some.on(np.array([1], np.int32), np.array([[0.2, 0.3, 0.5]])).tolist() == [[200, 0, 0]]
-    assert Painted(replace(TEXTURED, uv=uv)).on(np.array([1], np.int32), np.ones((1, 3)) / 3).tolist() == [[GREY] * 3]
 
 
 def test_what_is_between_charts_leads_from_one_to_the_other() -> None:

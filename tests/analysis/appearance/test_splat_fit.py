@@ -1,7 +1,5 @@
 """Splats fitted to pictures: gradients are right, pictures of other cameras and frames come out, bad input is told."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

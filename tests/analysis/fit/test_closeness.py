@@ -1,22 +1,15 @@
 """Closeness: distances of samples of both surfaces, and templates that are wrong though they are near."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
 from meshreel.analysis.fit.frame import Closeness, FrameSurface
+from meshreel.geometry.topology import concatenate
 from meshreel.types import Mesh
 from tests.spheres import sliding_sphere
 
 BALL = Mesh.of(sliding_sphere(1)[0].vertices / 12**0.5, sliding_sphere(1)[0].faces)  # diagonal 1
 RADIUS = float(np.linalg.norm(BALL.vertices[0]))
-
-
-def joined(*meshes: Mesh) -> Mesh:
-    begins = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
-    faces = [mesh.faces + begin for mesh, begin in zip(meshes, begins[:-1], strict=True)]
-    return Mesh.of(np.concatenate([mesh.vertices for mesh in meshes]), np.concatenate(faces))
 
 
 def closeness(template: Mesh, frame: Mesh, noise: float = 0.0) -> float:
@@ -34,8 +27,8 @@ def test_the_distance_is_that_of_parallel_surfaces():
 
 def test_a_template_that_lacks_surface_is_wrong_and_so_is_one_with_more():
     speck = Mesh.of(0.25 * BALL.vertices + [0.5, 0, 0], BALL.faces)  # a sixteenth of the area
-    assert closeness(BALL, joined(BALL, speck)) == np.inf
-    assert closeness(joined(BALL, speck), BALL) == np.inf
+    assert closeness(BALL, concatenate([BALL, speck])) == np.inf
+    assert closeness(concatenate([BALL, speck]), BALL) == np.inf
 
 
 def test_a_template_turned_inside_out_is_wrong_though_it_is_near():
@@ -49,8 +42,8 @@ def test_a_template_turned_inside_out_is_wrong_though_it_is_near():
 
 def test_surfaces_that_face_each_other_in_every_frame_are_not_wrong():
     inner = Mesh.of(0.999 * BALL.vertices, BALL.faces[:, ::-1])  # a shell: each side is nearest to the other
-    shell = joined(BALL, inner)
-    moved = joined(BALL, Mesh.of(0.9985 * BALL.vertices, BALL.faces[:, ::-1]))
+    shell = concatenate([BALL, inner])
+    moved = concatenate([BALL, Mesh.of(0.9985 * BALL.vertices, BALL.faces[:, ::-1])])
     measure = Closeness(shell.faces, moved.vertices, 5e-4)
     first = measure.of(moved.vertices, FrameSurface(shell))
     assert first < 0.001 and measure.of(moved.vertices * 1.0001, FrameSurface(shell)) < 0.001
@@ -76,5 +69,8 @@ def gaps(mesh: Mesh, other: Mesh) -> np.ndarray:
 
 def test_noisy_surfaces_are_compared_where_both_have_something():
     noise, far = 0.003, Mesh.of(0.25 * BALL.vertices + [0.6, 0, 0], BALL.faces)
-    assert closeness(BALL, joined(BALL, far), noise) < noise and closeness(joined(BALL, far), BALL, noise) < noise
+    assert (
+        closeness(BALL, concatenate([BALL, far]), noise) < noise
+        and closeness(concatenate([BALL, far]), BALL, noise) < noise
+    )
     assert closeness(BALL, Mesh.of(BALL.vertices + [3.0, 0, 0], BALL.faces), noise) == np.inf

@@ -1,7 +1,5 @@
 """The core's fit against the formulas that it computes."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

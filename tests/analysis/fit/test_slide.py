@@ -1,7 +1,5 @@
 """The slide of a template to where its colours were: analytic patterns, no texture, places that nobody sees."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """One round of an embedded deformation as formulas on arrays, which the core's loops must agree with."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Fingers that move by the distance between them: shape alone takes each for its neighbour, colour does not."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The core's embedded deformation against the formulas that it computes."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

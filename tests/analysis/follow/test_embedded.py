@@ -1,7 +1,5 @@
 """Embedded deformation against motions with known answers."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -9,10 +7,10 @@ from meshreel.analysis.fit.frame import FrameSurface
 from meshreel.analysis.follow.embedded import EmbeddedOptions, Stage, Tracker
 from meshreel.analysis.follow.embedded_graph import Motion, Pose
 from meshreel.analysis.follow.embedded_graph import moved as moved_by
-from meshreel.capture.simulated.procedural import SoftBodiesOptions, soft_bodies
 from meshreel.errors import InputError
-from meshreel.geometry.topology import clean, drop_unreferenced, subdivide_midpoint, vertex_normals
+from meshreel.geometry.topology import concatenate, drop_unreferenced
 from meshreel.types import Mesh
+from tests.analysis.fit.test_surface_fit import ball, sheet
 
 SMALL = EmbeddedOptions(
     coarse=Stage(40, (0.1, 0.08, 0.06, 0.045, 0.03), (10.0, 3.0, 1.0, 0.5, 0.2)),
@@ -23,15 +21,8 @@ AXES = np.array([0.3, 0.12, 0.18])
 RADIUS, LENGTH, SIDES = 0.03, 0.4, 24
 
 
-def ball(levels: int) -> Mesh:
-    corners = np.concatenate([np.eye(3), -np.eye(3)])[[0, 3, 1, 4, 2, 5]]
-    faces = [[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]]
-    mesh = subdivide_midpoint(Mesh.of(corners, faces), levels)
-    return Mesh(mesh.vertices / np.linalg.norm(mesh.vertices, axis=1)[:, None], mesh.faces)
-
-
 def ellipsoid(levels: int = 4) -> Mesh:
-    mesh = ball(levels)
+    mesh = ball(levels, 1.0)
     return Mesh(mesh.vertices * AXES, mesh.faces)
 
 
@@ -144,13 +135,12 @@ def test_fast_steps_are_followed_from_the_speed_of_the_ones_before() -> None:
 
 
 def test_several_bodies_go_their_own_ways() -> None:
-    one = ball(3)
-    faces = np.concatenate([one.faces, one.faces + len(one.vertices)])
+    one = ball(3, 1.0)
 
     def both(t: int) -> Mesh:
         shapes = [one.vertices * [0.1, 0.06, 0.08] + [0.13 + 0.02 * t, 0, 0]]
         shapes += [one.vertices * [0.06, 0.09, 0.1] - [0.08, 0.02 * t, 0]]
-        return Mesh.of(np.concatenate(shapes), faces)
+        return concatenate([Mesh(shape, one.faces) for shape in shapes])
 
     frames = [shuffled(both(t), t) if t else both(t) for t in range(4)]
     moved = move(register(frames[0], frames, 0, SMALL), frames[0].vertices)
@@ -166,20 +156,9 @@ def test_an_open_mesh_is_followed_and_its_border_does_not_pull() -> None:
     assert np.abs(moved[1] - frames[1].vertices).max() < 0.002
 
 
-def test_steps_in_both_directions_are_the_same_as_all_at_once() -> None:
-    mesh = ellipsoid(3)
-    frames = [Mesh(mesh.vertices @ turn(0.05 * k).T, mesh.faces) for k in range(5)]
-    tracker = Tracker(frames[2], 2, SMALL)
-    residuals = [tracker.step(frame, FrameSurface(frames[frame])) for frame in (3, 4, 1, 0)]
-    one, all_at_once = tracker.motion(range(5)), register(frames[2], frames, 2, SMALL)
-    assert np.array_equal(one.positions, all_at_once.positions)
-    assert np.array_equal(one.rotations, all_at_once.rotations)
-    assert residuals == [tracker.residual(frame) for frame in (3, 4, 1, 0)]
-
-
 def test_a_frame_that_is_something_else_has_a_large_residual_and_stays_finite() -> None:
     tracker = Tracker(ellipsoid(3), 0, SMALL)
-    assert tracker.step(1, FrameSurface(Mesh(ball(3).vertices * 0.02 + 0.4, ball(3).faces))) > 0.1
+    assert tracker.step(1, FrameSurface(Mesh(ball(3, 0.02).vertices + 0.4, ball(3).faces))) > 0.1
     spike = Mesh.of(np.random.default_rng(0).normal(0, 0.2, (300, 3)), np.arange(300).reshape(-1, 3))
     tracker.step(2, FrameSurface(spike))
     assert np.isfinite(move(tracker.motion([1, 2]), np.zeros((1, 3)))).all()
@@ -194,32 +173,11 @@ def test_the_smallest_meshes_are_legal() -> None:
 
 
 def test_normals_keep_a_point_off_a_near_sheet_that_faces_away() -> None:
-    x, y = np.meshgrid(np.linspace(-0.3, 0.3, 25), np.linspace(-0.3, 0.3, 25), indexing="ij")
-    i = np.arange(625).reshape(25, 25)
-    a, b, c, d = (k.reshape(-1) for k in (i[:-1, :-1], i[1:, :-1], i[1:, 1:], i[:-1, 1:]))
-    faces = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
-    flat = np.stack([x, y, np.zeros_like(x)], axis=-1).reshape(-1, 3)
-
-    def sheets(gap: float) -> Mesh:
-        return Mesh.of(
-            np.concatenate([flat + [0, 0, gap], flat]),
-            np.concatenate([faces[:, ::-1], faces[:, ::-1] + 625][:1] + [faces + 625]),
-        )
-
-    frames = [sheets(0.01), sheets(0.02)]
+    frames = [concatenate([sheet(25, gap, up=False), sheet(25)]) for gap in (0.01, 0.02)]
     asked = np.array([[0.1, 0.1, 0.006]])
     up = np.array([[0.0, 0.0, 1.0]])
     motion = register(frames[0], frames, 0, SMALL)
     assert abs(move(motion, asked, -up)[1, 0, 2] - move(motion, asked, up)[1, 0, 2] - 0.01) < 0.002
-
-
-def test_the_same_input_gives_the_same_bits() -> None:
-    people = soft_bodies(SoftBodiesOptions(frames=2, spacing=0.05, people=1))
-    frames = [clean(Mesh(mesh.vertices / 2, mesh.faces)) for mesh in people]
-    points, normals = frames[0].vertices, vertex_normals(frames[0])
-    one, two = (register(frames[0], frames, 0, SMALL) for _ in range(2))
-    assert np.array_equal(move(one, points, normals), move(two, points, normals))
-    assert one.residuals[1] < 0.004
 
 
 def test_keys_and_frames_that_cannot_be_are_refused() -> None:

@@ -1,7 +1,5 @@
 """Frames fused into one surface: sheets with holes, borders and noise whose truth is known."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from meshreel.analysis.fit.frame import FrameSurface
@@ -10,6 +8,7 @@ from meshreel.analysis.follow.template import fused_mesh
 from meshreel.geometry.closest_points import Surface, area_samples
 from meshreel.geometry.topology import clean
 from meshreel.types import Mesh
+from tests.metrics.shapes import moved, plane
 
 SIDE, CELLS = 0.5, 40  # of the sheet
 HOLE = 0.06  # half a hole's side
@@ -17,11 +16,8 @@ HOLE = 0.06  # half a hole's side
 
 def sheet(height: float = 0.0) -> Mesh:
     """A gently curved square, open all round."""
-    x, y = np.meshgrid(*[np.linspace(-SIDE / 2, SIDE / 2, CELLS + 1)] * 2, indexing="ij")
-    at = np.arange((CELLS + 1) ** 2).reshape(CELLS + 1, CELLS + 1)
-    a, b, c, d = at[:-1, :-1].ravel(), at[1:, :-1].ravel(), at[1:, 1:].ravel(), at[:-1, 1:].ravel()
-    faces = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
-    return Mesh.of(np.stack([x, y, height + 0.5 * x**2], axis=-1).reshape(-1, 3), faces)
+    flat = moved(plane(SIDE, CELLS, height), (-SIDE / 2, -SIDE / 2, 0))
+    return Mesh.of(flat.vertices + 0.5 * flat.vertices[:, :1] ** 2 * (0, 0, 1), flat.faces)
 
 
 def with_hole(mesh: Mesh, x: float, y: float, half: float = HOLE) -> Mesh:

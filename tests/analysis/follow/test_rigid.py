@@ -1,7 +1,5 @@
 """Rigid bodies: a box that turns is found again under noise, an arm that bends is not taken for one."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

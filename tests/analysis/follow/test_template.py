@@ -1,7 +1,5 @@
 """The base mesh meets its error, and detail that all frames share survives where that of one frame does not."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Center-affinity deformation: eq. 7."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -15,8 +13,9 @@ from meshreel.analysis.reference.centers import (
     neighbours,
 )
 from meshreel.geometry.rigid import blend, rotate
-from meshreel.geometry.topology import subdivide_midpoint, vertex_normals
+from meshreel.geometry.topology import concatenate, vertex_normals
 from meshreel.types import Centers, Mesh
+from tests.metrics import shapes
 
 
 def deform(mesh: Mesh, source: np.ndarray, target: np.ndarray, near: Neighbours) -> np.ndarray:
@@ -30,13 +29,7 @@ def rotation(angle: float) -> np.ndarray:
 
 
 def ball(middle: tuple[float, float, float], radius: float = 0.1) -> Mesh:
-    octahedron = Mesh.of(
-        np.concatenate([np.eye(3), -np.eye(3)]),
-        [[0, 1, 2], [1, 3, 2], [3, 4, 2], [4, 0, 2], [1, 0, 5], [3, 1, 5], [4, 3, 5], [0, 4, 5]],
-    )
-    mesh = subdivide_midpoint(octahedron, 4)
-    unit = mesh.vertices / np.linalg.norm(mesh.vertices, axis=1, keepdims=True)
-    return Mesh(unit * radius + np.array(middle), mesh.faces)
+    return shapes.moved(shapes.sphere(radius), middle)
 
 
 def inside(middle: tuple[float, float, float], count: int = 150, radius: float = 0.1, seed: int = 0) -> np.ndarray:
@@ -47,10 +40,6 @@ def inside(middle: tuple[float, float, float], count: int = 150, radius: float =
         gap = np.minimum(gap, np.linalg.norm(points - points[chosen[-1]], axis=1))
         chosen.append(int(np.argmax(gap)))
     return points[chosen] + np.array(middle)
-
-
-def both(a: Mesh, b: Mesh) -> Mesh:
-    return Mesh.of(np.concatenate([a.vertices, b.vertices]), np.concatenate([a.faces, b.faces + len(a.vertices)]))
 
 
 def kin(*poses: np.ndarray):  # type: ignore[no-untyped-def]
@@ -81,7 +70,7 @@ def test_normals_turn_with_their_points() -> None:
 
 def test_two_balls_that_touch_separate_without_damage() -> None:
     left, right = (-0.1, 0, 0), (0.1, 0, 0)  # radius .1: they touch at the origin
-    mesh = both(ball(left), ball(right))
+    mesh = concatenate([ball(left), ball(right)])
     touching = np.concatenate([inside(left), inside(right, seed=1)])
     shift = np.array([0.3, 0, 0])
     parted = touching + shift * (np.arange(300) >= 150)[:, None]
@@ -93,7 +82,7 @@ def test_two_balls_that_touch_separate_without_damage() -> None:
 
 def test_a_vertex_nearest_to_a_center_of_the_other_body_stays_with_its_body(monkeypatch: pytest.MonkeyPatch) -> None:
     left, right = (-0.1, 0, 0), (0.1, 0, 0)
-    mesh = both(ball(left), ball(right))
+    mesh = concatenate([ball(left), ball(right)])
     own = inside(left)
     own = own[own[:, 0] < -0.03]  # the left body has no center near the contact, the right one pokes into it
     touching = np.concatenate([own, inside(right, seed=1), [[0.002, 0.0, 0.0]]])

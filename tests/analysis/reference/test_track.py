@@ -1,7 +1,5 @@
 """Centers are even, rigid where the body is, distributed over bodies, separate again after contact, repeatable."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np
@@ -12,8 +10,9 @@ from meshreel import _core
 from meshreel.analysis.reference.track import TrackOptions, track_centers
 from meshreel.errors import InputError
 from meshreel.geometry.inside import interior_samples
+from meshreel.geometry.topology import concatenate
 from meshreel.types import Mesh
-from tests.geometry.test_inside import sheet, sphere, together
+from tests.geometry.test_inside import sheet, sphere
 
 OPTIONS = TrackOptions(centers=150, samples=8000)
 
@@ -82,7 +81,7 @@ def test_a_flat_sheet_is_tracked() -> None:
 
 
 def test_two_bodies_share_the_centers_by_volume() -> None:
-    track = track_centers([together(sphere(0.1, (0.4, 0, 0)), sphere(0.2, (-0.2, 0, 0)))], OPTIONS)
+    track = track_centers([concatenate([sphere(0.1, (0.4, 0, 0)), sphere(0.2, (-0.2, 0, 0))])], OPTIONS)
     assert track.positions.shape == (1, 150, 3)
     small = track.bodies == 1
     assert small.sum() == pytest.approx(150 / 9, abs=2)
@@ -90,13 +89,13 @@ def test_two_bodies_share_the_centers_by_volume() -> None:
 
 
 def test_a_small_body_gets_centers_too() -> None:
-    track = track_centers([together(sphere(0.3), sphere(0.06, (0.45, 0, 0)))], OPTIONS)
+    track = track_centers([concatenate([sphere(0.3), sphere(0.06, (0.45, 0, 0))])], OPTIONS)
     assert (track.bodies == 1).sum() == 4
 
 
 def test_bodies_that_touch_keep_their_centers_when_they_separate() -> None:
     gaps = [0.06, 0.02, -0.01, -0.01, 0.02, 0.06]
-    frames = [together(sphere(0.2, (-0.2 - g / 2, 0, 0)), sphere(0.2, (0.2 + g / 2, 0, 0))) for g in gaps]
+    frames = [concatenate([sphere(0.2, (-0.2 - g / 2, 0, 0)), sphere(0.2, (0.2 + g / 2, 0, 0))]) for g in gaps]
     track = track_centers(frames, OPTIONS)
     left = track.positions[0, :, 0] < 0
     assert np.array_equal(track.positions[-1, :, 0] < 0, left)
@@ -106,14 +105,6 @@ def test_frames_of_other_connectivity_are_followed() -> None:
     fine, coarse = sphere(0.3, levels=4), sphere(0.3, levels=3)
     positions = track_centers([fine, coarse, fine], OPTIONS).positions
     assert np.linalg.norm(positions[2] - positions[0], axis=1).mean() < 0.01
-
-
-def test_the_same_input_gives_the_same_bytes_and_another_seed_others(monkeypatch: pytest.MonkeyPatch) -> None:
-    frames = [bean(), moved(bean(), rotation(0.1), np.zeros(3))]
-    first = track_centers(frames, OPTIONS).positions.tobytes()
-    assert track_centers(frames, OPTIONS).positions.tobytes() == first
-    monkeypatch.setattr("meshreel.analysis.reference.track.SEED", 1)
-    assert track_centers(frames, OPTIONS).positions.tobytes() != first
 
 
 def test_fewer_samples_than_centers_reduce_the_centers() -> None:

@@ -1,7 +1,5 @@
 """Scenes are looked at by few, small views."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import pytest

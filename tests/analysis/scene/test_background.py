@@ -1,14 +1,10 @@
 """Background from meshes: noise averages out, borders stay open, and surface hidden in one frame is recovered."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
-import pytest
 
 from meshreel.analysis.scene.background import FRAGMENT, fuse_background
-from meshreel.geometry.closest_points import distances
 from meshreel.geometry.topology import concatenate, face_normals
 from meshreel.types import Mesh
 from tests.metrics.shapes import moved, noisy, plane, sphere
@@ -84,18 +80,6 @@ def test_the_order_of_frames_does_not_matter_and_the_same_frames_give_the_same_m
     one, same, other = (fuse_background(some, VOXEL) for some in (frames, list(frames), frames[::-1]))
     assert np.array_equal(one.vertices, same.vertices) and np.array_equal(one.faces, same.faces)
     assert abs(height_error(one) - height_error(other)) < 1e-4 and abs(len(one.faces) - len(other.faces)) < 20
-
-
-@pytest.mark.parametrize("place", [(1e6, -2e6, 3e6), (300.0, 0.0, -500.0)])
-def test_far_away_scenes_keep_their_millimetres(place):
-    origin = VOXEL * np.round(np.array(place) / VOXEL)  # the voxels lie in them as they do here
-    near, far = fuse_background(floors(2), VOXEL), fuse_background([moved(m, origin) for m in floors(2)], VOXEL)
-    assert abs(len(far.faces) - len(near.faces)) < 20
-    back = moved(far, -origin)
-    inside = (np.abs(back.vertices[:, :2] - 0.8) < 0.61).all(axis=1)  # at its border, last digits say what is known
-    gaps = distances(back.vertices[inside], near)
-    assert (gaps < 1e-4).mean() > 0.99 and gaps.max() < 0.5 * VOXEL  # a saddle's corner has two sides: a toss
-    assert height_error(back) == pytest.approx(height_error(near), abs=1e-4)
 
 
 def test_of_nothing_there_is_nothing():

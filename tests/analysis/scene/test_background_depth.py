@@ -1,7 +1,5 @@
 """Background from depth pictures: noise, a body in front, and pixels between two surfaces."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.ndimage import binary_erosion
@@ -10,8 +8,7 @@ from meshreel.analysis.scene.background import Moment, fuse_still_depth, usual_p
 from meshreel.capture.recording import FusionOptions, fuse_depths
 from meshreel.geometry.cameras import Rays
 from meshreel.geometry.closest_points import distances
-from meshreel.geometry.derived_sequences import captured
-from meshreel.types import Mesh, MeshList
+from meshreel.types import Mesh
 from tests.capture.depth_scenes import RADIUS, WALL, camera, measured
 
 VOXEL = 0.02
@@ -88,10 +85,6 @@ def test_faces_that_no_camera_sees_from_the_front_are_dropped(monkeypatch):
 def test_of_nothing_there_is_nothing(pictures):
     empty = Moment(pictures, Mesh.empty(), np.zeros(0, bool))
     assert fuse_still_depth([empty] * 3, VOXEL).is_empty
-
-
-def test_plain_meshes_have_no_depth():
-    assert captured(MeshList((Mesh.empty(),))).depth is None
 
 
 def test_a_door_that_opens_soon_is_no_room_where_nothing_is_behind_it():

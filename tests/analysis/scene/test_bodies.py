@@ -1,7 +1,5 @@
 """Bodies are connected pieces tracked over time; small bits join a body or are counted as dropped."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -91,10 +89,7 @@ def test_bits_alone_without_any_body_are_kept_where_they_last():
 @settings(max_examples=30)
 @given(
     st.lists(
-        st.lists(
-            st.tuples(st.sampled_from([BALL, BIT]), st.floats(-3, 3), st.floats(-3, 3)),
-            max_size=4,
-        ),
+        st.lists(st.tuples(st.sampled_from([BALL, BIT]), st.floats(-3, 3), st.floats(-3, 3)), max_size=4),
         min_size=1,
         max_size=5,
     )
@@ -105,25 +100,6 @@ def test_no_face_is_lost_without_being_counted(frames):
     assert all(len(body) == len(frames) for body in found.meshes)
     kept = sum(len(mesh.faces) for body in found.meshes for mesh in body)
     assert kept + found.dropped == sum(len(mesh.faces) for mesh in meshes)
-
-
-@pytest.mark.parametrize("frames", [[], [NONE], [NONE] * 3])
-def test_where_nothing_moves_there_are_no_bodies(frames):
-    found = find_bodies(frames, CELL)
-    assert found.meshes == [] and found.dropped == 0
-
-
-def test_one_frame_has_its_pieces_as_bodies():
-    assert len(find_bodies([concatenate([at(0), at(3)])], CELL).meshes) == 2
-
-
-def test_bodies_far_from_the_origin_are_separated_too():
-    far = (1e6, -1e6, 2e6)
-    frames = [moved(concatenate([at(0.1 * t), at(3 - 0.1 * t)]), far) for t in range(3)]
-    bodies = find_bodies(frames, CELL).meshes
-    assert len(bodies) == 2
-    last, now = [body[-1] for body in bodies], [bodies[1][-1], bodies[0][-1]]
-    assert same_bodies(last, now, CELL) == [1, 0]
 
 
 def test_a_body_is_continued_by_that_which_shares_most_with_it():

@@ -1,7 +1,5 @@
 """Surface before the room by little is found where its hue is another one; shadows and noise are not."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -9,16 +7,17 @@ from meshreel.analysis.scene.color_looks import ColorChange, ColorLooks
 from meshreel.analysis.scene.labelling import ByPlace, Rest
 from meshreel.geometry.cameras import Camera, Rays, looking_at
 from meshreel.geometry.color_views import ColorPicture
+from meshreel.geometry.topology import concatenate
 from meshreel.geometry.voxels import Lattice, spread
 from meshreel.types import Mesh
-from tests.analysis.scene.test_views import box, together
+from tests.analysis.scene.test_views import box
 
 FLOOR, SKIN, SHADE = (180, 160, 150), (190, 130, 110), 0.6
 POSE = np.linalg.inv(looking_at(np.array([0.3, 2.0, 1.2]), np.array([0.0, 0, 0])))
 EYE = Camera.of(160, 120, np.array([[140.0, 0, 80], [0, 140, 60], [0, 0, 1]]), POSE)
 ROOM = box((-1, -0.1, -1), (1, 0, 1))
 FOOT = box((-0.1, 0.0, -0.1), (0.15, 0.05, 0.1))
-COME = together(ROOM, FOOT)
+COME = concatenate([ROOM, FOOT])
 
 
 def picture(mesh: Mesh, shaded: bool = False, skin: tuple[int, int, int] = SKIN) -> ColorPicture:

@@ -1,7 +1,5 @@
 """Views from colour cameras: of one size, straight, and looking where the cameras look."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The minimum cut is the least of all cuts; places seen free, and the places that belong to them, move."""
 
-from __future__ import annotations
-
 import itertools
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Masks of another tool are found, checked, and lifted to the faces on which they were drawn."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

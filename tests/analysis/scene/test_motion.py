@@ -1,7 +1,5 @@
 """Prompts of points: they lie on what moves, in a frame that shows it, and beside it."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from meshreel.analysis.scene.hypotheses import SIDE, motion_prompts, thinned

@@ -1,7 +1,5 @@
 """Pictures of the views: normals as colors, and folders from which other tools make masks."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Detection of scenes: rooms are scenes, lone bodies are not."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -14,10 +12,9 @@ from tests.scenes import ball, figure, room, with_room
 ROLLING = with_room([ball(0.5 + 0.25 * t) for t in range(5)])
 
 
-@pytest.mark.parametrize("offset", [(0, 0, 0), (1e6, -1e6, 2e6)])
-def test_a_room_is_a_scene_with_or_without_people_and_anywhere_in_space(offset):
-    assert is_scene([moved(mesh, offset) for mesh in ROLLING])
-    assert is_scene([moved(room(), offset)] * 2)
+def test_a_room_is_a_scene_with_or_without_people_and_anywhere_in_space():
+    assert is_scene([moved(mesh, (1e6, -1e6, 2e6)) for mesh in ROLLING])
+    assert is_scene([room()] * 2)
 
 
 def test_a_body_alone_is_none_moving_or_still():
@@ -51,11 +48,6 @@ def test_empty_and_single_frames_are_none_and_empty_ones_between_do_no_harm():
 
 def test_frames_without_extent_are_none():
     assert not is_scene([Mesh.of(np.ones((3, 3)), [[0, 1, 2]])] * 3)
-
-
-def test_a_vertex_that_no_face_uses_is_ignored():
-    stray = [Mesh.of([*mesh.vertices, [1e7, 0, 0]], mesh.faces) for mesh in ROLLING]
-    assert is_scene(stray)
 
 
 @pytest.mark.parametrize("spoil", ["nan", "face"])

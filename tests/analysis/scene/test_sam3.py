@@ -1,7 +1,5 @@
 """Masks by SAM3: the whole way from pictures to faces with an untrained model, and folders without weights."""
 
-from __future__ import annotations
-
 import json
 import sys
 from dataclasses import replace
@@ -20,12 +18,13 @@ from meshreel.analysis.scene.views import place_views
 from meshreel.errors import InputError
 from meshreel.geometry.cameras import Rays
 from meshreel.geometry.color_views import ColorPicture
+from meshreel.geometry.topology import concatenate
 from meshreel.types import MeshList
-from tests.analysis.scene.test_views import box, together
+from tests.analysis.scene.test_views import box
 from tests.metrics.shapes import moved, sphere
 
 WALLS = box((0, 0, 0), (5, 2.5, 4), inwards=True)
-FRAMES = [together(WALLS, moved(sphere(0.4, levels=2), (x, 1.2, 2))) for x in (1.0, 1.8, 2.6, 3.4)]
+FRAMES = [concatenate([WALLS, moved(sphere(0.4, levels=2), (x, 1.2, 2))]) for x in (1.0, 1.8, 2.6, 3.4)]
 VIEWS = place_views(FRAMES, "y", 3, 80, 60)
 SEEN = [[Rays(mesh).look(view) for view in VIEWS] for mesh in FRAMES]
 EASILY = sam3.Sam3Options(reference=1, variation=0.001, overlap=0.01)

@@ -1,7 +1,5 @@
 """What cleans SAM3's masks, and that transformers uses it: of doubles one is kept, and areas are counted."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Segmentation: moving faces are found, still ones are not, and labels are clean."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -107,22 +105,6 @@ def test_moving_surface_below_the_least_area_is_not_found():
 def test_a_ball_that_rests_for_half_of_the_time_is_found_there_too():
     frames = with_room([ball(0.5)] * 3 + [ball(0.5 + 0.3 * t) for t in range(1, 4)])
     assert min(overlaps(frames, segment(MeshList(tuple(frames))))) > 0.9
-
-
-def test_the_order_of_time_does_not_matter(rolling):
-    back = segment(MeshList(tuple(ROLLING[::-1])))  # other views, for other frames are first
-    for number, mesh in enumerate(ROLLING):
-        assert overlap(back.moving(number, mesh), rolling.moving(number, mesh)) > 0.9
-
-
-def test_the_same_frames_give_the_same_segmentation(rolling):
-    again = segment(MeshList(tuple(ROLLING)))
-    assert again.keys.tobytes() == rolling.keys.tobytes() and again.chosen.tobytes() == rolling.chosen.tobytes()
-
-
-def test_scenes_far_from_the_origin_are_segmented_too():
-    far = [moved(mesh, (1e6, -1e6, 2e6)) for mesh in ROLLING]
-    assert min(overlaps(far, segment(MeshList(tuple(far))))) > 0.9
 
 
 def test_empty_frames_are_passed_over_and_nothing_moves_where_there_is_nothing():

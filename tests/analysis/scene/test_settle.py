@@ -16,7 +16,7 @@ from meshreel.analysis.scene.views import place_views
 from meshreel.analysis.survey import survey
 from meshreel.coding.background import decode_background, decode_change
 from meshreel.encoder.group.progress import Stages
-from meshreel.encoder.scene.parts import take_apart
+from meshreel.encoder.scene.parts import Parts, take_apart
 from meshreel.encoder.scene.static import encode_static
 from meshreel.encoder.settings.options import SceneOptions
 from meshreel.format.budget import CostlyError
@@ -79,6 +79,11 @@ def scene() -> MeshList:
 
 
 @pytest.fixture(scope="module")
+def parts(scene: MeshList) -> Parts:
+    return take_apart(captured(scene), survey(scene), OPTIONS, Stages(None, FRAMES))
+
+
+@pytest.fixture(scope="module")
 def found(scene: MeshList) -> ByPlace:
     return segment(scene, CAMERAS)
 
@@ -114,8 +119,7 @@ def test_changes_are_two_of_the_frames(found: ByPlace) -> None:
     assert (found.rest.since[~found.chosen] == NEVER).all()
 
 
-def test_the_background_has_a_patch_for_each_change(scene: MeshList) -> None:
-    parts = take_apart(captured(scene), survey(scene), OPTIONS, Stages(None, FRAMES))
+def test_the_background_has_a_patch_for_each_change(parts: Parts) -> None:
     states = encode_static(parts, FRAMES, 4.0, OPTIONS)
     assert [state.is_patch for state in states] == [False, True, True]
     place, rooms = Placement(parts.seen.unit, tuple(parts.seen.center)), [decode_background(states[0].payload)]
@@ -129,12 +133,11 @@ def test_the_background_has_a_patch_for_each_change(scene: MeshList) -> None:
     assert max(distance_to(room, np.array([1.2, 0.0, 1.5])) for room in (first, between, last)) < 0.01
 
 
-def test_a_change_that_costs_more_than_its_bytes_may_is_a_whole_background(scene: MeshList, monkeypatch) -> None:
+def test_a_change_that_costs_more_than_its_bytes_may_is_a_whole_background(parts: Parts, monkeypatch) -> None:
     def costly(payload: bytes, before: Mesh) -> Mesh:
         raise CostlyError(f"{len(payload)} bytes for {len(before.faces)} faces")
 
     monkeypatch.setattr("meshreel.encoder.scene.static.decode_change", costly)
-    parts = take_apart(captured(scene), survey(scene), OPTIONS, Stages(None, FRAMES))
     states = encode_static(parts, FRAMES, 4.0, OPTIONS)
     assert [state.is_patch for state in states] == [False, False, False]
     place = Placement(parts.seen.unit, tuple(parts.seen.center))
@@ -144,10 +147,9 @@ def test_a_change_that_costs_more_than_its_bytes_may_is_a_whole_background(scene
     assert distance_to(last, there) < 0.03 < 0.15 < distance_to(last, here)
 
 
-def test_a_background_repeated_at_a_change_is_complete(scene: MeshList, found: ByPlace) -> None:
+def test_a_background_repeated_at_a_change_is_complete(parts: Parts, found: ByPlace) -> None:
     """A viewer who joins in between waits for the next whole background; patches after it refer to its faces."""
     gone, came = found.rest.changes
-    parts = take_apart(captured(scene), survey(scene), OPTIONS, Stages(None, FRAMES))
     states = encode_static(parts, FRAMES, 4.0, replace(OPTIONS, refresh=gone / 4.0))
     whole = {frame: frame % gone == 0 for frame in sorted({*range(0, FRAMES, gone), came})}
     assert {state.frame: not state.is_patch for state in states} == whole
@@ -160,8 +162,7 @@ def test_a_background_repeated_at_a_change_is_complete(scene: MeshList, found: B
         assert distance_to(place.of(mesh), np.array([1.2, 0.0, 1.5])) < 0.01
 
 
-def test_surface_that_settles_without_a_background_is_a_whole_background(scene: MeshList) -> None:
-    parts = take_apart(captured(scene), survey(scene), OPTIONS, Stages(None, FRAMES))
+def test_surface_that_settles_without_a_background_is_a_whole_background(parts: Parts) -> None:
     states = encode_static(replace(parts, background=Mesh.empty()), FRAMES, 4.0, OPTIONS)
     came = parts.changes[-1].frame
     assert [(state.frame, state.is_patch) for state in states] == [(came, False)]

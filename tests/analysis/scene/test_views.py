@@ -1,14 +1,12 @@
 """Views: they see a room from inside, a body from outside, stay out of solids, and are the same every time."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
 from meshreel.analysis.scene.labelling import looks
 from meshreel.analysis.scene.views import place_views
 from meshreel.errors import InputError
-from meshreel.geometry.topology import face_normals, subdivide_midpoint
+from meshreel.geometry.topology import concatenate, face_normals, subdivide_midpoint
 from meshreel.types import Mesh, MeshList
 from tests.metrics.shapes import moved, sphere
 
@@ -25,13 +23,14 @@ def box(low, high, inwards=False, levels=4) -> Mesh:
     return subdivide_midpoint(Mesh.of(low + _CORNERS * (high - low), faces[:, ::-1] if inwards else faces), levels)
 
 
-def together(*meshes: Mesh) -> Mesh:
-    starts = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
-    faces = [mesh.faces + start for mesh, start in zip(meshes, starts, strict=False)]
-    return Mesh.of(np.concatenate([mesh.vertices for mesh in meshes]), np.concatenate(faces))
+ROOM = concatenate(
+    [box((0, 0, 0), (5, 2.5, 4), inwards=True), box((1, 0, 1), (2.5, 1, 2)), moved(sphere(0.3), (4, 1, 3))]
+)
 
 
-ROOM = together(box((0, 0, 0), (5, 2.5, 4), inwards=True), box((1, 0, 1), (2.5, 1, 2)), moved(sphere(0.3), (4, 1, 3)))
+@pytest.fixture(scope="module")
+def views():
+    return place_views([ROOM], **SMALL)
 
 
 def seen_share(mesh, views):
@@ -46,8 +45,7 @@ def test_nearly_all_of_a_room_is_seen_and_more_with_more_views():
     assert shares == sorted(shares) and shares[-1] > 0.95 and shares[0] < 0.9
 
 
-def test_views_are_in_the_box_and_not_in_solids():
-    views = place_views([ROOM], **SMALL)
+def test_views_are_in_the_box_and_not_in_solids(views):
     eyes = np.array([view.eye for view in views])
     assert ((eyes > [0, 0, 0]) & (eyes < [5, 2.5, 4])).all()
     assert not ((eyes > [1, 0, 1]) & (eyes < [2.5, 1, 2])).all(axis=1).any()
@@ -57,20 +55,21 @@ def test_views_are_in_the_box_and_not_in_solids():
 
 def test_views_see_the_surface_of_all_inspected_frames():
     ball = sphere(0.3)
-    moments = MeshList(tuple(together(box((0, 0, 0), (5, 2.5, 4), True), moved(ball, (x, 1, 2))) for x in (1, 2, 4)))
+    moments = MeshList(
+        tuple(concatenate([box((0, 0, 0), (5, 2.5, 4), True), moved(ball, (x, 1, 2))]) for x in (1, 2, 4))
+    )
     views = place_views(moments, **SMALL)
     for mesh in moments:
         ids = np.stack([seen.faces for seen in looks(mesh, views)])
         assert np.unique(ids[ids >= len(mesh.faces) - len(ball.faces)]).size > 0.6 * len(ball.faces)
 
 
-def test_the_same_meshes_give_the_same_views_which_are_all_of_one_size():
-    first, again = place_views([ROOM], **SMALL), place_views([ROOM], **SMALL)
-    for one, other in zip(first, again, strict=True):
-        assert np.array_equal(one.extrinsic, other.extrinsic) and (one.width, one.height) == (160, 120)
-        turn = one.extrinsic[:3, :3]
+def test_views_differ_and_are_all_of_one_size(views):
+    for view in views:
+        turn = view.extrinsic[:3, :3]
         assert np.allclose(turn @ turn.T, np.eye(3)) and np.linalg.det(turn) == pytest.approx(1)
-    assert len({tuple(view.extrinsic.ravel()) for view in first}) == 14
+        assert (view.width, view.height) == (160, 120)
+    assert len({tuple(view.extrinsic.ravel()) for view in views}) == 14
 
 
 @pytest.mark.parametrize(("up", "axis"), [("y", 1), ("z", 2), ("-y", 1)])
@@ -80,14 +79,9 @@ def test_pictures_stand_upright(up, axis):
             assert (view.extrinsic[1, axis] < 0) == (not up.startswith("-"))  # y points down in a picture
 
 
-def test_far_away_scenes_are_seen_as_well():
-    far = moved(ROOM, (1e6, -1e6, 2e6))
-    assert seen_share(far, place_views([far])) > 0.95
-
-
 def test_faces_without_area_do_no_harm():
     flat = Mesh.of([[0, 0, 0], [1, 1, 1], [2, 2, 2]], [[0, 1, 2], [0, 0, 0]])
-    assert len(place_views([flat], **SMALL)) == len(place_views([together(ROOM, flat)], **SMALL)) == 14
+    assert len(place_views([concatenate([ROOM, flat])], **SMALL)) == 14
 
 
 def test_empty_frames_are_passed_over_and_none_but_empty_ones_refused():

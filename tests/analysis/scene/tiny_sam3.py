@@ -1,7 +1,5 @@
 """A tiny SAM3 video model for tests, with random weights and single letters as tokens."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

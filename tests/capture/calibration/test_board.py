@@ -1,7 +1,5 @@
 """A board in rendered pictures tells how cameras stand to each other, also through other cameras."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation

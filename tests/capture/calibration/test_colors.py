@@ -1,7 +1,5 @@
 """Gains and poses of colour cameras: found where cameras overlap, and left alone where nothing is gained."""
 
-from __future__ import annotations
-
 import json
 import pickle
 from dataclasses import replace

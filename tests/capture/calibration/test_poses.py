@@ -1,7 +1,5 @@
 """Poses in files of other programs are read as matrices from cameras to the world, and damage is named."""
 
-from __future__ import annotations
-
 import json
 import struct
 

@@ -1,7 +1,5 @@
 """A rig takes other poses: colour cameras go with their depth cameras, and all else of the description stays."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The rig of recordings, for tests."""
 
-from __future__ import annotations
-
 import pytest
 
 from meshreel.capture.recordings import open_take

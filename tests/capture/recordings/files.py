@@ -1,7 +1,5 @@
 """Recordings of a ball before a wall, written by the packages that read them: each at 10 pictures a second."""
 
-from __future__ import annotations
-
 import io
 import json
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Recordings that are damaged, incomplete or not what they seem end with an error that names them, or are told of."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

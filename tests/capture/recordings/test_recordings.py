@@ -1,7 +1,5 @@
 """Recordings of every format become rigs whose depth, colour, times and poses are those that were written."""
 
-from __future__ import annotations
-
 import json
 import os
 import sys

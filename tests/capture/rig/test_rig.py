@@ -1,7 +1,5 @@
 """Rigs on disk: a written rig is read back, and errors name what is wrong."""
 
-from __future__ import annotations
-
 import json
 import struct
 import zlib
@@ -109,10 +107,7 @@ def mirrored(rig):
         (lambda r: r["cameras"][0].update(cx=1e300), "camera front: focal .* center"),
         (lambda r: r["cameras"][0].update(name=None), "name is None; give text"),
         (lambda r: r["cameras"][0].update(depth=None), "depth is None; give text"),
-        (
-            lambda r: r["cameras"][0].update(color=["a"]),
-            "color of camera front is",
-        ),
+        (lambda r: r["cameras"][0].update(color=["a"]), "color of camera front is"),
         (lambda r: r["cameras"][0].update(camera_to_world="x"), "camera_to_world is not 4 rows"),
         (lambda r: r["cameras"][0].update(camera_to_world=[[1], [0, 1], [0], [1]]), "camera_to_world is not 4 rows"),
         (lambda r: r["cameras"][0]["camera_to_world"][0].__setitem__(3, 1e6), r"front.*1e\+06 m from the world"),

@@ -1,7 +1,5 @@
 """The demo's room: people are closed and move, the room stands still, and cameras see both."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A procedural person sits down, leans, and opens crossed arms."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The demo's people are closed, touch and part, and have new connectivity in every frame."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -9,15 +7,9 @@ from meshreel.capture.simulated.implicit import field
 from meshreel.capture.simulated.procedural import SoftBodiesOptions, cast, soft_bodies
 from meshreel.errors import InputError
 from meshreel.geometry.topology import components, face_normals, unique_edges
-from meshreel.types import Mesh
-from tests.spheres import deforming_sphere, sliding_sphere
+from tests.capture.simulated.test_demo_room import volume
 
 COARSE = SoftBodiesOptions(frames=90, spacing=0.06)
-
-
-def volume(mesh: Mesh) -> float:
-    a, b, c = (mesh.vertices[mesh.faces[:, k]] for k in range(3))
-    return float(np.einsum("fd,fd->", np.cross(a, b), c) / 6)
 
 
 @pytest.mark.parametrize("number", [0, 12, 42, 75])
@@ -42,15 +34,6 @@ def test_vertices_lie_on_the_surface_that_they_sample() -> None:
     assert np.quantile(off, 0.99) < 1e-3  # m
 
 
-def test_a_frame_is_the_same_whenever_it_is_made_and_unlike_its_neighbors() -> None:
-    options = SoftBodiesOptions(frames=90, spacing=0.06, people=1)
-    one, two = soft_bodies(options), soft_bodies(options)
-    assert [len(one[k].faces) > 0 for k in (3, 5)] == [True, True]
-    assert np.array_equal(one[4].vertices, two[4].vertices)
-    assert np.array_equal(one[4].faces, two[-86].faces)
-    assert not np.array_equal(one[4].faces, one[5].faces)
-
-
 def test_a_third_person_and_a_frame_rate_can_be_chosen() -> None:
     sequence = soft_bodies(SoftBodiesOptions(frames=2, frame_rate=15.0, people=3, spacing=0.06))
     assert (len(list(sequence)), sequence.frame_rate) == (2, 15.0)
@@ -61,11 +44,3 @@ def test_a_third_person_and_a_frame_rate_can_be_chosen() -> None:
 def test_impossible_options_are_refused(options: dict) -> None:
     with pytest.raises(InputError, match=rf"{next(iter(options))} .* (ask|choose|suits|give)"):
         SoftBodiesOptions(**options)
-
-
-def test_spheres_move_as_documented() -> None:
-    slid = sliding_sphere(4, step=0.1)
-    assert np.allclose(slid[3].vertices - slid[0].vertices, [0.3, 0, 0])
-    assert volume(slid[0]) == pytest.approx(4 * np.pi / 3, rel=0.03)
-    stretched = deforming_sphere(8)
-    assert volume(stretched[2]) == pytest.approx(1.3 * volume(stretched[0]))

@@ -1,7 +1,5 @@
 """Simulated rigs: exact depth without sensor errors, errors of the chosen size, and a truth with labels."""
 
-from __future__ import annotations
-
 import shutil
 from dataclasses import replace
 

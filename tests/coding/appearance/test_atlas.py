@@ -1,7 +1,5 @@
 """Atlases: places come back, finer faces lie where subdivision puts them, and damage (FORMAT.md has a decoder)."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Pictures as video: colours of planes, one packet a picture, the same bytes again, and damage."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -1,31 +1,20 @@
-from __future__ import annotations
-
 import contextlib
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from meshreel import _core
 from meshreel.coding.group import continue_group, decode_group, payload_bytes_by_purpose
 from meshreel.coding.layers.coder import encode_layers
-from meshreel.coding.layers.patches import (
-    Patches,
-    _parted,
-    decode_patches,
-    decode_runs,
-    encode_patches,
-    encode_runs,
-)
+from meshreel.coding.layers.patches import decode_patches, decode_runs, encode_patches, encode_runs
 from meshreel.errors import FormatError, InputError
 from meshreel.format.budget import LIMITS
-from meshreel.format.layout import LayersPatches
 from meshreel.format.records import pack
-from meshreel.geometry.topology import drop_unreferenced
-from meshreel.types import Mesh, Placement
+from meshreel.types import Mesh
 
 from ..bodies import ball, moving
 from ..paper.test_laplacian import icosahedron
@@ -92,19 +81,6 @@ def test_frames_are_shown_without_the_faces_and_with_the_meshes() -> None:
         np.testing.assert_array_equal(frame.vertices[len(plain.vertices) :], DECODED[t].vertices)
 
 
-def test_decoding_with_a_placement_equals_placing_the_decoded_group() -> None:
-    place = Placement(1.7, (3.0, -0.25, 1e6))
-    for payload in (PAYLOAD, CODED.payload):
-        for levels in (None, 0, 1, BALL.levels + 1):
-            placed, state = continue_group(payload, FRAMES, levels, None, place)
-            plain, wanted = continue_group(payload, FRAMES, levels, None)
-            for mine, theirs in zip(placed, plain, strict=True):
-                np.testing.assert_array_equal(mine.vertices, place.of(theirs).vertices)
-                np.testing.assert_array_equal(mine.faces, theirs.faces)
-            assert state is not None and wanted is not None
-            np.testing.assert_array_equal(state.base, wanted.base)
-
-
 @given(st.lists(st.tuples(st.booleans(), st.integers(1, 20)), max_size=9))
 def test_the_faces_that_are_kept_are_those_not_dropped(runs: list[tuple[bool, int]]) -> None:
     gone = np.repeat(np.array([bit for bit, _ in runs], bool), [length for _, length in runs])
@@ -159,17 +135,6 @@ def test_meshes_too_wide_for_the_lattice_are_refused() -> None:
         encode_patches(DROPPED, wide, 100)
 
 
-@pytest.mark.parametrize("size", range(1, len(pack(RECORD))))
-def test_a_truncated_record_is_refused(size: int) -> None:
-    with pytest.raises(FormatError):
-        decode_group(PAYLOAD[: len(CODED.payload) + size], FRAMES)
-
-
-def test_bytes_behind_it_are_refused() -> None:
-    with pytest.raises(FormatError, match="too many"):
-        decode_group(PAYLOAD + b"x", FRAMES)
-
-
 @pytest.mark.parametrize(
     "damage",
     [
@@ -191,40 +156,9 @@ def test_a_damaged_record_is_refused(damage: dict[str, object]) -> None:
         decode_patches(replace(RECORD, **damage), FRAMES, FACES)  # type: ignore[arg-type]
 
 
-@settings(max_examples=60)
-@given(st.integers(0, len(pack(RECORD)) - 1), st.integers(1, 255))
-def test_flipped_bits_give_a_valid_mesh_or_a_format_error(at: int, flip: int) -> None:
-    data = bytearray(PAYLOAD)
-    data[len(CODED.payload) + at] ^= flip
-    with contextlib.suppress(FormatError):
-        for mesh in decode_group(bytes(data), FRAMES):
-            assert np.isfinite(mesh.vertices).all()
-            assert mesh.is_empty or (mesh.faces.min() >= 0 and mesh.faces.max() < len(mesh.vertices))
-
-
 def test_a_mask_over_other_faces_is_refused() -> None:
     with pytest.raises(FormatError):
         decode_patches(RECORD, FRAMES, FACES - 1)
-
-
-def test_frames_without_changes_keep_the_templates_faces_themselves() -> None:
-    plain = Patches(np.zeros((1, FACES), bool), (Mesh.empty(),))
-    assert plain.apply(CODED.positions[:1], BALL.base.faces)[0].faces is BALL.base.faces
-    assert isinstance(RECORD, LayersPatches)
-
-
-def test_each_frame_gets_its_faces_and_the_vertices_they_use_in_their_order() -> None:
-    generator = np.random.default_rng(5)
-    of_vertices = generator.integers(0, 6, 300)
-    of_vertices[of_vertices == 3] = 2  # a frame without any
-    groups = [np.flatnonzero(of_vertices == t) for t in (0, 1, 2, 4, 5)]
-    faces = np.concatenate([generator.choice(group, (30, 3)) for group in groups])
-    mesh = Mesh.of(generator.normal(size=(300, 3)), generator.permutation(faces))
-    of_faces = of_vertices[mesh.faces[:, 0]]
-    for t, part in enumerate(_parted(mesh, of_vertices, of_faces, 6)):
-        wanted = drop_unreferenced(Mesh(mesh.vertices, mesh.faces[of_faces == t]))
-        np.testing.assert_array_equal(part.vertices, wanted.vertices)
-        np.testing.assert_array_equal(part.faces, wanted.faces)
 
 
 def test_patches_of_absurd_size_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:

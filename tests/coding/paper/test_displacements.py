@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import contextlib
 import dataclasses
 import math
@@ -7,8 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from meshreel.coding import entropy
 from meshreel.coding.paper import displacements
@@ -72,11 +68,6 @@ def test_a_finer_step_costs_more_and_errs_less() -> None:
     assert errors == sorted(errors, reverse=True)
 
 
-def test_equal_fields_give_equal_bytes_and_equal_bytes_equal_fields() -> None:
-    assert encode_displacements(FIELD.copy(), BASE, DisplacementOptions()) == DATA
-    np.testing.assert_array_equal(decode_displacements(DATA, BASE), decode_displacements(bytes(DATA), BASE))
-
-
 @pytest.mark.parametrize("count", [0, 1, 3, 15, 99])
 def test_basis_size_is_the_number_of_components(count: int) -> None:
     data = encode_displacements(FIELD, BASE, DisplacementOptions(basis_size=count))
@@ -118,36 +109,8 @@ def test_a_rigid_shift_travels_in_the_mean() -> None:
     np.testing.assert_allclose(decode_displacements(data, BASE), field, atol=1e-4)
 
 
-def test_every_truncation_and_a_byte_too_many_are_refused() -> None:
-    for size in [*range(200), *range(200, len(DATA), 37)]:
-        with pytest.raises(FormatError):
-            decode_displacements(DATA[:size], BASE)
-    with pytest.raises(FormatError):
-        decode_displacements(DATA + b"\0", BASE)
-
-
-@settings(max_examples=60)
-@given(st.integers(0, len(DATA) - 1), st.integers(1, 255))
-def test_a_damaged_byte_decodes_to_finite_numbers_or_is_refused(where: int, flip: int) -> None:
-    damaged = bytearray(DATA)
-    damaged[where] ^= flip
-    try:
-        field = decode_displacements(bytes(damaged), BASE)
-    except FormatError:
-        return
-    assert np.isfinite(field).all()
-    assert len(field) == len(BASE.vertices)
-
-
 @pytest.mark.parametrize(
-    "change",
-    [
-        {"frames": 0},
-        {"anchor_weight": 0},
-        {"mean_bits": 31},
-        {"frames": 65535},
-        {"anchor_count": 2**63},
-    ],
+    "change", [{"frames": 0}, {"anchor_weight": 0}, {"mean_bits": 31}, {"frames": 65535}, {"anchor_count": 2**63}]
 )
 def test_absurd_heads_are_refused(change: dict[str, int]) -> None:
     head, offset = records.unpack(DisplacementHead, DATA)

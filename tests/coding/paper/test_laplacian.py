@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np
@@ -41,10 +39,6 @@ def spoiled() -> Mesh:
     vertices[faces[200, 1]] = vertices[faces[200, 0]] + 1e-300
     extra = [faces[7], faces[7], [5, 5, 9], [8, 8, 8]]
     return Mesh.of(vertices, np.concatenate([faces, extra]))
-
-
-def dense(base: Mesh, anchors: np.ndarray) -> np.ndarray:
-    return forward(np.eye(len(base.vertices)), base, anchors)
 
 
 def test_mean_value_weights_agree_with_their_trigonometric_definition() -> None:

@@ -1,7 +1,5 @@
 """Colours through encoder, file and decoder: all forms, chains, textures, parts, journals, damage."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from io import BytesIO
 from itertools import accumulate

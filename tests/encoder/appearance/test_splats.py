@@ -1,7 +1,5 @@
 """Splats in files: a set for each chain, which all its frames have; what has no colours, or no one mesh, has none."""
 
-from __future__ import annotations
-
 import gzip
 import io
 import struct
@@ -24,7 +22,7 @@ from meshreel.container.writer import Companion, ReelWriter
 from meshreel.decoder.video import Video
 from meshreel.decoder.video import open as open_video
 from meshreel.encoder.sequence import encode
-from meshreel.encoder.settings.options import EncoderOptions, as_installed
+from meshreel.encoder.settings.options import EncoderOptions
 from meshreel.encoder.settings.settings import Settings
 from meshreel.errors import FormatError, InputError
 from meshreel.export.frames import write_splats
@@ -117,12 +115,6 @@ def test_a_sequence_without_colours_is_refused(tmp_path) -> None:
         Settings(color="none", splats=100).resolved()
 
 
-def test_without_torch_nothing_is_encoded_and_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("meshreel.encoder.settings.options.find_spec", lambda _: None)
-    with pytest.raises(InputError, match=r"meshreel\[splats\]"):
-        as_installed(options())
-
-
 def test_frames_with_meshes_of_their_own_have_no_splats(video: Video) -> None:
     reader, out = video.reader, io.BytesIO()
     group = reader.groups[0]
@@ -151,10 +143,9 @@ def test_damaged_splats_cost_no_frame(video: Video) -> None:
         damaged.splats(0)
 
 
-def test_a_file_without_splats_has_none_in_any_frame(tmp_path) -> None:
-    encode(ball(3), tmp_path / "x.reel", color="vertices")
-    with open_video(tmp_path / "x.reel") as video:
-        assert not video.reader.has_splats and video.splats(0) is None
+def test_a_file_without_splats_has_none_in_any_frame() -> None:
+    with open_video(GOLDEN / "mixed.reel") as video:
+        assert not video.reader.has_splats and video.splats(2) is None
 
 
 def test_a_viewer_of_splats_reads_what_is_written(video: Video, tmp_path) -> None:

@@ -1,7 +1,5 @@
 """Progress counts each frame once and forward, and moves while a group is worked on."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from fractions import Fraction
 

@@ -1,10 +1,7 @@
 """Preset `best` from sequence to file: random-access points, executors, what is recorded, odd input."""
 
-from __future__ import annotations
-
-from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
-from multiprocessing import get_context
 
 import numpy as np
 import pytest
@@ -15,7 +12,7 @@ from meshreel.format.layout import Form
 from meshreel.metrics.comparison import ComparisonOptions, compare_sequences
 from meshreel.metrics.distance import surface_errors
 from meshreel.types import Mesh, MeshList
-from tests.small_options import quick, resolve_small, with_method
+from tests.small_options import quick, resolve_small
 from tests.spheres import sliding_sphere
 
 OPTIONS = quick(group_size=2, key_interval=0.2)
@@ -53,36 +50,6 @@ def test_an_executor_gives_the_same_bytes(written, tmp_path):
     assert (tmp_path / "b.reel").read_bytes() == path.read_bytes()
     assert replace(again, work={}) == replace(summary, work={})  # each interval reads its frames again
     assert {last[stage] for stage in ("survey", "track", "fit", "code")} == {8}
-
-
-def test_processes_give_the_same_bytes(written, tmp_path):
-    path, summary = written
-    with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as executor:
-        again = encode(BALLS, tmp_path / "b.reel", options=OPTIONS, executor=executor)
-    assert replace(again, work={}) == replace(summary, work={})
-    assert (tmp_path / "b.reel").read_bytes() == path.read_bytes()
-
-
-def test_at_most_two_intervals_for_each_worker_are_submitted_at_once(tmp_path):
-    class Waiting(ThreadPoolExecutor):
-        most = now = 0
-
-        def submit(self, *arguments):
-            self.now += 1
-            self.most = max(self.most, self.now)
-            future = super().submit(*arguments)
-            real = future.result
-            future.result = lambda: (real(), setattr(self, "now", self.now - 1))[0]
-            return future
-
-    with Waiting(2) as executor:
-        encode(
-            BALLS,
-            tmp_path / "b.reel",
-            options=with_method(replace(OPTIONS, key_interval=0.05), group_size=1),
-            executor=executor,
-        )
-    assert executor.most == 4
 
 
 def test_more_empty_frames_than_a_group_holds_are_more_groups(tmp_path, monkeypatch):

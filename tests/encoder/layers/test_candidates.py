@@ -1,7 +1,5 @@
 """Candidates: templates that are followed outward from their key until lost, with nothing done twice."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from meshreel.analysis.fit.frame import FrameSurface
@@ -25,16 +23,6 @@ def ahead(meshes: list[Mesh], first: int = 0) -> Ahead:
     return Ahead(first, [FrameSurface(mesh) for mesh in meshes], 0.0, target_of(meshes, OPTIONS.target, 0.0))
 
 
-def test_a_key_is_followed_on_both_sides():
-    frames = ahead(sliding(5))
-    one = Candidate.of_key(frames, 2, OPTIONS)
-    one.follow(frames)
-    assert (one.residuals(frames) < 1).all() and one.follows(frames, frames.numbers)
-    positions = one.fit(frames, frames.numbers)
-    shifts = (positions - positions[2]).mean(axis=1)
-    np.testing.assert_allclose(shifts, np.outer(np.arange(-2, 3), [0.01, 0, 0]), atol=2e-4)
-
-
 def test_a_key_is_followed_up_to_the_first_frame_that_is_lost_and_no_farther():
     frames = ahead([OTHER, OTHER, *sliding(3), OTHER, *sliding(2)])
     one, before = Candidate.of_key(frames, 3, OPTIONS), so_far()
@@ -42,20 +30,6 @@ def test_a_key_is_followed_up_to_the_first_frame_that_is_lost_and_no_farther():
     assert np.isfinite(one.residuals(frames)).tolist() == [False, False, True, True, True, False, False, False]
     work = since(before)
     assert work["frames tracked"] == 4 and work["frames fitted"] <= 4  # the two beside the lost ones are not touched
-
-
-def test_what_is_known_of_a_candidate_stays_when_frames_are_left_behind():
-    meshes = sliding(6)
-    frames = ahead(meshes[:4])
-    one = Candidate.of_key(frames, 2, OPTIONS)
-    one.follow(frames)
-    before = so_far()
-    one.follow(frames)
-    assert since(before) == {}
-    later = Ahead(2, [*frames.surfaces[2:], *(FrameSurface(mesh) for mesh in meshes[4:])], 0.0, frames.target)
-    one.follow(later)
-    assert since(before)["frames tracked"] == since(before)["frames fitted"] == 2
-    assert np.isfinite(one.residuals(later)).all()
 
 
 def test_a_key_of_which_nothing_is_left_is_lost():

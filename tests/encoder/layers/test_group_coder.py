@@ -1,7 +1,5 @@
 """One group of layers: what is measured of it, and when Draco takes its place."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

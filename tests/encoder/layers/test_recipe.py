@@ -1,7 +1,5 @@
 """Segments become groups of layers: what follows is predicted, what cannot be followed is cut, nothing is lost."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -22,10 +20,11 @@ from meshreel.encoder.layers import recipe as layered
 from meshreel.encoder.layers.group_coder import GroupCoder
 from meshreel.encoder.layers.recipe import LayersRecipe
 from meshreel.format.layout import Form
+from meshreel.geometry.topology import concatenate
 from meshreel.types import Mesh
 from tests.crossed_arms import FRAMES, arms, stray_share
 from tests.small_options import quick
-from tests.spheres import deforming_sphere, sliding_sphere
+from tests.spheres import sliding_sphere
 
 OPTIONS = quick(group_size=4).method
 BALL = Mesh.of(sliding_sphere(1, levels=2)[0].vertices / 12**0.5, sliding_sphere(1, levels=2)[0].faces)  # diagonal 1
@@ -34,12 +33,6 @@ FINE = Mesh.of(sliding_sphere(1)[0].vertices / 12**0.5, sliding_sphere(1)[0].fac
 
 def moved(mesh: Mesh, *by: float) -> Mesh:
     return Mesh.of(mesh.vertices + by, mesh.faces)
-
-
-def joined(*meshes: Mesh) -> Mesh:
-    begins = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
-    faces = [mesh.faces + begin for mesh, begin in zip(meshes, begins[:-1], strict=True)]
-    return Mesh.of(np.concatenate([mesh.vertices for mesh in meshes]), np.concatenate(faces))
 
 
 def decoded(groups: Sequence[EncodedGroup]) -> list[Mesh]:
@@ -65,12 +58,6 @@ def coded(frames: Sequence[Mesh], options=OPTIONS) -> list[EncodedGroup]:
         assert again.distance == pytest.approx(group.fidelity.distance, rel=1e-6, abs=1e-12)
         at = end
     return groups
-
-
-def test_one_frame_is_a_group_of_its_own():
-    (group,) = coded([BALL])
-    assert (group.frame_count, group.predicted) == (1, False)
-    assert group.fidelity.distance < 4e-4
 
 
 def test_of_a_body_that_stands_still_all_groups_but_the_first_are_predicted_and_tiny():
@@ -154,7 +141,7 @@ def test_an_open_sheet_keeps_its_borders():
 
 def test_two_bodies_that_go_apart_stay_two():
     small = Mesh.of(0.5 * BALL.vertices, BALL.faces)
-    frames = [joined(moved(small, -0.2 - 0.01 * t, 0, 0), moved(small, 0.2 + 0.01 * t, 0, 0)) for t in range(4)]
+    frames = [concatenate([moved(small, -0.2 - 0.01 * t, 0, 0), moved(small, 0.2 + 0.01 * t, 0, 0)]) for t in range(4)]
     groups = coded(frames)
     assert max(group.fidelity.worst for group in groups) < 1e-3
     for mesh in decoded(groups):
@@ -164,7 +151,7 @@ def test_two_bodies_that_go_apart_stay_two():
 
 def test_a_sphere_that_becomes_two_is_never_lost():
     small = Mesh.of(0.6 * BALL.vertices, BALL.faces)
-    frames = [BALL] * 2 + [joined(moved(small, -0.16, 0, 0), moved(small, 0.16, 0, 0))] * 2
+    frames = [BALL] * 2 + [concatenate([moved(small, -0.16, 0, 0), moved(small, 0.16, 0, 0)])] * 2
     groups = coded(frames)
     assert len(groups) > 1
     assert max(group.fidelity.worst for group in groups) < 2e-3
@@ -180,7 +167,7 @@ def test_meshes_of_one_face_are_kept(count: int):
 def test_bodies_that_are_not_clean_are_kept():
     a, b, _ = BALL.faces[0]
     fin = Mesh.of([*BALL.vertices, 1.2 * BALL.vertices[a]], [*BALL.faces, [a, b, len(BALL.vertices)]])
-    speck = joined(BALL, Mesh.of([[0.4, 0, 0], [0.402, 0, 0], [0.4, 0.002, 0]], [[0, 1, 2]]))
+    speck = concatenate([BALL, Mesh.of([[0.4, 0, 0], [0.402, 0, 0], [0.4, 0.002, 0]], [[0, 1, 2]])])
     groups = coded([fin, fin, speck, speck])
     found = decoded(groups)
     forward = [measure([BALL], [mesh]).distance for mesh in found]
@@ -213,14 +200,6 @@ def test_only_the_frames_of_one_group_are_asked_for_at_a_time():
         frames.asked.clear()
         next(groups)
         assert set(frames.asked) - {0} == set(range(2 * number, 2 * number + 2)) - {0}  # whether 0 is empty is asked
-
-
-def test_the_same_frames_give_the_same_bytes():
-    frames = list(deforming_sphere(2, levels=2))
-    frames = [Mesh.of(mesh.vertices / 4, mesh.faces) for mesh in frames]
-    assert [list(LayersRecipe(OPTIONS).encode(Interval(frames)))] * 2 == [
-        list(LayersRecipe(OPTIONS).encode(Interval(frames))) for _ in range(2)
-    ]
 
 
 def test_a_body_with_new_connectivity_in_every_frame_is_followed():

@@ -1,7 +1,5 @@
 """Patches are found where surface is missing or too much, and nowhere else; and only where they pay."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -19,6 +17,7 @@ from meshreel.encoder.settings.settings import Settings
 from meshreel.format.records import pack
 from meshreel.geometry.cameras import Camera
 from meshreel.geometry.depth import DepthPicture, FreeSpace
+from meshreel.geometry.topology import concatenate
 from meshreel.types import Mesh, MeshList, Placement
 from tests.coding.paper.test_laplacian import icosahedron
 from tests.small_options import with_method
@@ -32,11 +31,6 @@ def knob(scale: float = 0.05, at: float = 0.4) -> Mesh:
     """A small ball beside the large one."""
     small = icosahedron(1)
     return Mesh.of(scale * small.vertices + [at, 0, 0], small.faces)
-
-
-def both(one: Mesh, other: Mesh) -> Mesh:
-    return Mesh.of(np.concatenate([one.vertices, other.vertices]),
-                   np.concatenate([one.faces, other.faces + len(one.vertices)]))  # fmt: skip
 
 
 def noisy(mesh: Mesh, frames: int = 6) -> np.ndarray:
@@ -56,7 +50,7 @@ def test_a_perfect_template_has_no_tails() -> None:
 
 
 def test_surface_that_is_not_there_any_more_is_dropped() -> None:
-    template = both(BALL, knob())
+    template = concatenate([BALL, knob()])
     frames = [template] * 3 + [BALL] * 3
     found = find_tails(frames, meshes(noisy(template), template.faces), SIZE, noise=0.0)
     assert found is not None
@@ -66,7 +60,7 @@ def test_surface_that_is_not_there_any_more_is_dropped() -> None:
 
 
 def test_surface_that_is_new_is_added() -> None:
-    frames = [BALL] * 5 + [both(BALL, knob())]
+    frames = [BALL] * 5 + [concatenate([BALL, knob()])]
     found = find_tails(frames, meshes(noisy(BALL), BALL.faces), SIZE, noise=0.0)
     assert found is not None
     assert [len(frame.faces) > len(BALL.faces) for frame in found.frames] == [False] * 5 + [True]
@@ -76,13 +70,13 @@ def test_surface_that_is_new_is_added() -> None:
 
 def test_without_shares_nothing_is_added(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("meshreel.encoder.layers.tails.SHARES", ())
-    frames = [BALL] * 5 + [both(BALL, knob())]
+    frames = [BALL] * 5 + [concatenate([BALL, knob()])]
     assert find_tails(frames, meshes(noisy(BALL), BALL.faces), SIZE, noise=0.0) is None
 
 
 def test_where_bytes_are_dear_nothing_is_sent(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("meshreel.encoder.layers.tails.EXCHANGE", 1e9)
-    frames = [BALL] * 5 + [both(BALL, knob(0.004, 0.32))]
+    frames = [BALL] * 5 + [concatenate([BALL, knob(0.004, 0.32)])]
     assert find_tails(frames, meshes(noisy(BALL), BALL.faces), SIZE, noise=0.0) is None
 
 
@@ -99,7 +93,7 @@ def sheet(step: float = 0.05) -> Mesh:
 @pytest.mark.parametrize("noise", [1e-9, 3e-7, 2e-6])
 def test_patches_on_an_almost_exact_template_are_close_to_the_frame(noise: float, axes) -> None:
     flat = Mesh.of(sheet().vertices[:, axes], sheet().faces)
-    frames = [flat] * 3 + [both(flat, knob(at=0.45))]
+    frames = [flat] * 3 + [concatenate([flat, knob(at=0.45)])]
     places = np.repeat(flat.vertices[None], 4, axis=0)
     places = places + noise * np.random.default_rng(0).normal(size=places.shape)
     found = find_tails(frames, meshes(places, flat.faces), SIZE, noise=0.0)
@@ -110,8 +104,8 @@ def test_patches_on_an_almost_exact_template_are_close_to_the_frame(noise: float
 
 
 def test_a_mask_that_pays_is_kept_where_a_patch_beside_it_does_not(monkeypatch: pytest.MonkeyPatch) -> None:
-    template = both(BALL, knob(0.012))
-    frames = [both(BALL, knob(0.012, at=-0.4)), template, BALL]
+    template = concatenate([BALL, knob(0.012)])
+    frames = [concatenate([BALL, knob(0.012, at=-0.4)]), template, BALL]
     places = noisy(template, 3)
     monkeypatch.setattr(tails._Search, "holds", lambda _, tried: all(mesh.is_empty for mesh in tried.parts.meshes))
     found = find_tails(frames, meshes(places, template.faces), SIZE, noise=0.0)
@@ -121,8 +115,8 @@ def test_a_mask_that_pays_is_kept_where_a_patch_beside_it_does_not(monkeypatch: 
 @pytest.mark.parametrize("size", [300, 30_000])
 @pytest.mark.parametrize("scale", [0.01, 0.05])
 def test_tails_remove_the_error_that_their_bytes_are_worth(size: int, scale: float) -> None:
-    template = both(BALL, knob(scale))
-    frames = [both(BALL, knob(scale, -0.4))] * 2 + [template] * 4
+    template = concatenate([BALL, knob(scale)])
+    frames = [concatenate([BALL, knob(scale, -0.4)])] * 2 + [template] * 4
     places = noisy(template)
     found = find_tails(frames, meshes(places, template.faces), size, noise=0.0)
     assert found is not None
@@ -135,8 +129,8 @@ def test_tails_remove_the_error_that_their_bytes_are_worth(size: int, scale: flo
 
 
 def test_the_frames_are_those_that_the_record_decodes_to() -> None:
-    template = both(BALL, knob())
-    frames = [both(BALL, knob(at=-0.4)), template, BALL]
+    template = concatenate([BALL, knob()])
+    frames = [concatenate([BALL, knob(at=-0.4)]), template, BALL]
     places = noisy(template, 3)
     found = find_tails(frames, meshes(places, template.faces), SIZE, noise=0.0)
     assert found is not None and found.record.mesh and found.record.dropped
@@ -162,7 +156,7 @@ def options(**changes: object) -> EncoderOptions:
 def sequence() -> MeshList:
     """A ball that grows; beside it, in the first frame only, a knob."""
     frames = [Mesh.of((1 + 0.02 * t) * BALL.vertices, BALL.faces) for t in range(4)]
-    return MeshList((both(frames[0], knob()), *frames[1:]))
+    return MeshList((concatenate([frames[0], knob()]), *frames[1:]))
 
 
 def test_a_file_has_the_layer_where_it_pays_and_plays_without_it(sequence: MeshList, tmp_path, monkeypatch) -> None:
@@ -185,7 +179,7 @@ def test_tails_can_be_switched_off(sequence: MeshList, tmp_path) -> None:
 
 
 def test_surface_that_a_frame_lacks_stays_unless_a_camera_saw_through_it():
-    more = both(BALL, knob())
+    more = concatenate([BALL, knob()])
     camera = Camera.of(64, 64, np.array([[60.0, 0, 32], [0, 60.0, 32], [0, 0, 1]]), np.eye(4))
     away = DepthPicture(camera, np.full((64, 64), 9.0, np.float32), 1.0, 10.0)  # nothing up to nine metres
     place = Placement(1.0, (0.0, 0.0, 3.0))
@@ -198,17 +192,17 @@ def test_surface_that_a_frame_lacks_stays_unless_a_camera_saw_through_it():
 
 @pytest.mark.parametrize(("measured", "stays"), [(0, False), (2, True)])
 def test_surface_that_cameras_face_and_hardly_ever_measure_goes(measured: int, stays: bool) -> None:
-    more, bare = both(BALL, knob()), Mesh(BALL.vertices + NOISE[0], BALL.faces)
+    more, bare = concatenate([BALL, knob()]), Mesh(BALL.vertices + NOISE[0], BALL.faces)
     camera = Camera.of(64, 64, np.array([[60.0, 0, 32], [0, 60.0, 32], [0, 0, 1]]), np.eye(4))
     dark = DepthPicture(camera, np.zeros((64, 64), np.float32), 1.0, 10.0)
     free = [FreeSpace.of([dark], Placement(1.0, (0.0, 0.0, 3.0)))] * 4
-    frames = [both(bare, knob())] * measured + [bare] * (4 - measured)
+    frames = [concatenate([bare, knob()])] * measured + [bare] * (4 - measured)
     found = find_tails(frames, [more] * 4, SIZE, noise=1e-3, free=free)
     faces = len(more.faces) if found is None else len(found.frames[-1].faces)
     assert (faces == len(more.faces)) == stays
 
 
 def test_holes_of_noisy_bodies_are_patched_at_any_price():
-    frame = both(Mesh(BALL.vertices + NOISE[0], BALL.faces), knob())
+    frame = concatenate([Mesh(BALL.vertices + NOISE[0], BALL.faces), knob()])
     found = find_tails([frame] * 2, [BALL] * 2, 10, noise=1e-3)  # a byte costs more than the knob
     assert found is not None and all(len(mesh.faces) > len(BALL.faces) for mesh in found.frames)

@@ -1,7 +1,5 @@
 """Which form a group takes: Draco per frame only where it is the better bargain."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest

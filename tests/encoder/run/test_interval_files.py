@@ -1,13 +1,10 @@
 """An encode that was stopped continues, to the bytes of one that was not; what does not belong to it is refused."""
 
-from __future__ import annotations
-
 import errno
 import hashlib
 import json
 import os
 import shutil
-import sys
 import tempfile
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
@@ -374,29 +371,6 @@ def test_a_frame_that_changes_after_the_survey_is_refused(fake, tmp_path, monkey
     fake()
     with pytest.raises(InputError, match=r"frame \d: has changed while it was encoded, or .*; encode again"):
         encode(tmp_path / "a.reel", sequence=Moving(BALLS.meshes, 10.0))
-
-
-@pytest.mark.skipif(sys.platform == "win32", reason="POSIX limits")
-def test_a_file_that_no_limit_allows_leaves_the_old_output(fake, tmp_path):
-    import resource
-
-    fake()
-    path = tmp_path / "a.reel"
-    whole, before = encode(path), resource.getrlimit(resource.RLIMIT_FSIZE)
-    for limit in range(0, 8000, 61):
-        path.write_bytes(b"old")
-        fake()
-        resource.setrlimit(resource.RLIMIT_FSIZE, (limit, before[1]))
-        try:
-            encode(path)
-            break
-        except InputError as error:
-            assert "a.reel: cannot be written" in str(error) and "free space" in str(error)
-        finally:
-            resource.setrlimit(resource.RLIMIT_FSIZE, before)
-        assert path.read_bytes() == b"old"
-        assert {file.name for file in tmp_path.iterdir()} <= {"a.reel", "a.reel.part"}
-    assert path.read_bytes() == whole and limit > 0
 
 
 def test_a_disk_that_is_full_at_any_file_leaves_the_old_output_and_what_resume_needs(fake, tmp_path, monkeypatch):

@@ -1,7 +1,5 @@
 """Calls in workers: few at a time, done in any order; a task of an encode is small, and only workers read the files."""
 
-from __future__ import annotations
-
 import pickle
 import threading
 from concurrent.futures import Executor, Future, ThreadPoolExecutor

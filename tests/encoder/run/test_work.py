@@ -1,7 +1,5 @@
 """Work: how often a frame is tracked and fitted, which depends on no machine."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

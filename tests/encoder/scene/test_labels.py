@@ -1,7 +1,5 @@
 """Labels of faces: every face of a body has its number in all frames, and faces of no body have none."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from meshreel.encoder.scene.labels import label_frames

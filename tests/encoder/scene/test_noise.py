@@ -1,7 +1,5 @@
 """Noisy, open, incomplete frames through the layered encoder."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A scene in a file: round trips of its parts, tracks over key intervals, and warnings about lost surface."""
 
-from __future__ import annotations
-
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
@@ -40,7 +38,7 @@ from meshreel.geometry.voxels import Lattice
 from meshreel.types import Mesh, MeshList, Placement
 from tests import small_scene
 from tests.metrics.shapes import moved, plane, sphere
-from tests.scenes import CELL, NOISE, RADIUS, SIDE, ball, of_body, room, with_room
+from tests.scenes import CELL, NOISE, RADIUS, SIDE, ball, room, with_room
 from tests.small_options import quick
 
 NONE = Mesh.empty()
@@ -163,23 +161,15 @@ def test_a_scene_that_is_encoded_again_is_taken_apart_once(tmp_path, monkeypatch
     assert len(count) == 4
 
 
-def test_preset_paper_has_scenes_too(tmp_path):
-    options = quick(preset="paper", group_size=1)
-    video, summary = encoded(ROLLING, tmp_path / "a.reel", options)
-    assert summary.scene is not None and len(statics(video)) == 1
-    assert_rolls(video)
-
-
 @pytest.mark.parametrize("preset", ["paper", "best"])
 def test_bodies_need_not_be_nearer_to_noisy_frames_than_the_truth_is(preset, monkeypatch, tmp_path):
     noises, coded = [], scene.encode_intervals
     monkeypatch.setattr(
-        scene,
-        "encode_intervals",
-        lambda job, some: coded(job, (noises.append(i.noise) or i for i in some)),
+        scene, "encode_intervals", lambda job, some: coded(job, (noises.append(i.noise) or i for i in some))
     )
-    video, _ = encoded(ROLLING, tmp_path / "a.reel", quick(preset=preset, group_size=1))
-    assert noises
+    video, summary = encoded(ROLLING, tmp_path / "a.reel", quick(preset=preset, group_size=1))
+    assert_rolls(video)
+    assert summary.scene is not None and noises
     target = quick(preset=preset).method.target
     for noise in noises:
         assert 0.5 * NOISE < noise * video.reader.header.scale < 3 * NOISE
@@ -219,23 +209,11 @@ def test_a_clean_scene_needs_few_faces_for_its_flat_walls(tmp_path):
 
 @pytest.mark.usefixtures("plainly")
 def test_a_frame_without_surface_stays_without(tmp_path):
-    frames = [*ROLLING[:2], NONE, *ROLLING[2:]]
+    frames = [NONE, NONE, *ROLLING[:2], NONE, *ROLLING[2:]]
     video, summary = encoded(frames, tmp_path / "a.reel")
-    assert [mesh.is_empty for mesh in video] == [False, False, True, False, False]
+    assert [mesh.is_empty for mesh in video] == [True, True, False, False, True, False, False]
     assert summary.scene is not None and len(statics(video)) == 1
-    assert rms(ROLLING[2].vertices, video[3]) < 3 * NOISE and summary.psnr > 30
-
-
-@pytest.mark.usefixtures("plainly")
-def test_a_first_frame_without_surface_is_legal(tmp_path):
-    video, _ = encoded([NONE, NONE, *ROLLING[:3]], tmp_path / "a.reel")
-    assert [mesh.is_empty for mesh in video] == [True, True, False, False, False]
-    assert rms(ROLLING[0].vertices, video[2]) < 3 * NOISE
-
-
-def test_one_frame_is_no_scene(tmp_path):
-    video, summary = encoded([plane(1.0, 6)], tmp_path / "a.reel")
-    assert summary.scene is None and rms(plane(1.0, 6).vertices, video[0]) < 0.01
+    assert rms(ROLLING[2].vertices, video[5]) < 3 * NOISE and summary.psnr > 30
 
 
 @pytest.mark.usefixtures("plainly")
@@ -330,43 +308,30 @@ def at(*places: float) -> Mesh:
 
 
 @pytest.mark.usefixtures("plainly")
-def test_one_body_has_one_track():
-    assert tracks([at(0.1 * t) for t in range(4)]) == ["xxxx"]
+@pytest.mark.parametrize(
+    ("frames", "found"),
+    [
+        pytest.param([at(0.1 * t) for t in range(4)], ["xxxx"], id="one body"),
+        pytest.param([*[at(0)] * 4, *[at(0, 3)] * 2], ["xxxxxx", "....xx"], id="one enters late"),
+        pytest.param([at(0), *[at(0, 3)] * 3], ["xxxx", ".xxx"], id="one enters within an interval"),
+        pytest.param([*[at(0, 3)] * 2, *[at(0)] * 4], ["xxxxxx", "xx...."], id="one leaves"),
+        pytest.param(
+            [*[at(0, 3)] * 2, *[at(0)] * 2, *[at(0, 6)] * 2], ["xxxxxx", "xx..xx"], id="another takes its track"
+        ),
+        pytest.param([at()] * 4, ["...."], id="no body"),
+        pytest.param([*[at(0)] * 2, *[at()] * 2, *[at(0)] * 2], ["xx..xx"], id="all leave and one comes"),
+        pytest.param([*[at(1.3, 1.7)] * 2, *[at(1.0, 2.0)] * 2], ["xxxx", "..xx"], id="bodies part"),
+        pytest.param([*[at(0, 3)] * 2, *[at(3, 0)] * 2], ["xxxx", "xxxx"], id="whatever the order of faces"),
+    ],
+)
+def test_a_body_keeps_its_track_and_leaves_it_to_others(frames, found):
+    assert tracks(frames) == found
 
 
 @pytest.mark.usefixtures("plainly")
-def test_a_body_that_enters_late_has_a_track_that_was_empty_before():
-    assert tracks([at(0), at(0), at(0), at(0), at(0, 3), at(0, 3)]) == ["xxxxxx", "....xx"]
-
-
-@pytest.mark.usefixtures("plainly")
-def test_the_track_of_a_body_that_enters_within_an_interval_begins_with_an_empty_frame():
-    assert tracks([at(0), at(0, 3), at(0, 3), at(0, 3)]) == ["xxxx", ".xxx"]
-
-
-@pytest.mark.usefixtures("plainly")
-def test_the_track_of_a_body_that_left_is_empty_and_free_for_another_body():
-    assert tracks([at(0, 3), at(0, 3), at(0), at(0), at(0), at(0)]) == ["xxxxxx", "xx...."]
-    assert tracks([at(0, 3), at(0, 3), at(0), at(0), at(0, 6), at(0, 6)]) == ["xxxxxx", "xx..xx"]
-
-
-@pytest.mark.usefixtures("plainly")
-def test_frames_without_bodies_are_one_track_without_surface():
-    assert tracks([at()] * 4) == ["...."]
-    assert tracks([at(0), at(0), at(), at(), at(0), at(0)]) == ["xx..xx"]
-
-
-@pytest.mark.usefixtures("plainly")
-def test_bodies_that_meet_go_on_in_one_track_and_bodies_that_part_get_another():
+def test_bodies_that_meet_go_on_in_one_track():
     meeting = [at(0, 1.5), at(0.3, 1.2), at(0.46, 1.04), at(0.5, 1.0)]
     assert sorted(tracks(meeting)) == ["xx..", "xxxx"]
-    assert tracks([at(1.3, 1.7), at(1.3, 1.7), at(1.0, 2.0), at(1.0, 2.0)]) == ["xxxx", "..xx"]
-
-
-@pytest.mark.usefixtures("plainly")
-def test_a_body_keeps_its_track_whatever_the_order_of_faces():
-    frames = [at(0, 3), at(0, 3), at(3, 0), at(3, 0)]
-    assert tracks(frames) == ["xxxx", "xxxx"]
 
 
 @pytest.mark.usefixtures("plainly")
@@ -399,16 +364,6 @@ def test_a_background_is_no_finer_than_its_noise_asks_for():
         assert away <= max(options.coarse * noise, 1e-4)
         sizes.append(len(payload))
     assert sizes[0] > sizes[1] > sizes[2]
-
-
-@pytest.mark.usefixtures("plainly")
-def test_taking_a_scene_apart_finds_its_background_and_its_noise():
-    sequence = captured(MeshList(tuple(ROLLING)))
-    parts = take_apart(sequence, survey(sequence, cleaned=False), OPTIONS.scene, Stages(None, 4))
-    assert rms(parts.background.vertices, room()) < NOISE
-    assert 0.5 * NOISE < parts.noise < 3 * NOISE and parts.segmentation.cell == pytest.approx(CELL, rel=0.2)
-    number = 2
-    assert (parts.segmentation.moving(number, ROLLING[number]) == of_body(ROLLING[number])).mean() > 0.98
 
 
 @pytest.mark.usefixtures("plainly")

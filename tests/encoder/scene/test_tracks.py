@@ -1,8 +1,5 @@
 """Bodies that never touch are tracks of their own also without a background; nothing is lost, one is coded as ever."""
 
-from __future__ import annotations
-
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -171,16 +168,6 @@ def test_one_body_is_coded_as_whole_frames_are(tmp_path):
 def test_preset_paper_has_one_track(tmp_path):
     video, _ = encoded(TWO, tmp_path / "a.reel", replace(quick("paper", group_size=3), scene=None))
     assert len(video.tracks) == 1
-
-
-def test_the_order_in_which_bodies_are_coded_does_not_matter(two, tmp_path):
-    done: dict[str, int] = {}
-    with ThreadPoolExecutor(2) as executor:
-        encoded(
-            TWO, tmp_path / "a.reel", executor=executor, progress=lambda stage, count, _: done.update({stage: count})
-        )
-    assert (tmp_path / "a.reel").read_bytes() == two[0].read_bytes()
-    assert done["survey"] == done["code"] == done["fit"] == 3  # bodies share a frame
 
 
 @pytest.mark.usefixtures("plainly")
