@@ -22,18 +22,15 @@ from meshreel.coding.appearance.splats import encode_splats
 from meshreel.coding.background import decode_background, decode_change, encode_background, encode_change
 from meshreel.coding.colored import atlas_base, background_canvas, canvas_of, encode_group_colors
 from meshreel.coding.group import continue_group
-from meshreel.coding.intra import encode_empty, encode_intra
 from meshreel.coding.layers.coder import LayerCodingOptions, LayersState, encode_layers
 from meshreel.coding.layers.patches import encode_patches
-from meshreel.coding.paper.displacements import DisplacementOptions
-from meshreel.coding.paper.group import encode_laplacian
-from meshreel.coding.reference_mesh import CodedReference, code_reference
+from meshreel.coding.mesh import CodedReference, code_reference, encode_empty, encode_intra
+from meshreel.coding.paper.displacements import DisplacementOptions, encode_laplacian
 from meshreel.container.writer import Companion, ReelWriter
 from meshreel.decoder.video import Video
 from meshreel.decoder.video import open as open_video
 from meshreel.edit.audio import packed_audio
-from meshreel.encoder.appearance.options import TextureOptions
-from meshreel.encoder.appearance.videos import Videos, layered_pictures
+from meshreel.encoder.appearance.videos import TextureOptions, Videos, layered_pictures
 from meshreel.format.layout import ChunkKind, Header
 from meshreel.format.records import pack
 from meshreel.geometry.atlas import Layout

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from meshreel.encoder.sequence import Encoder
-from meshreel.encoder.settings.presets import appearance_options
+from meshreel.encoder.settings.options import appearance_options
 from meshreel.geometry.derived_sequences import welded
 from meshreel.types import Mesh, MeshList, Texture
 from tests.kept import kept

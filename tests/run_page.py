@@ -40,8 +40,8 @@ def small(made: Any) -> Any:
     """Options with little of everything, so that a page runs in seconds."""
     from meshreel.analysis.reference.extraction import ReferenceOptions
     from meshreel.analysis.reference.track import TrackOptions
-    from meshreel.encoder.group.draco import IntraOptions
-    from meshreel.encoder.paper.options import PaperOptions
+    from meshreel.encoder.group.forms import IntraOptions
+    from meshreel.encoder.paper.recipe import PaperOptions
 
     intra = IntraOptions(fractions=(0.5, 1.0), steps=(1.0,))
     paper = {"track": TrackOptions(100, 5000), "reference": ReferenceOptions(300)}

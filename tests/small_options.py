@@ -6,10 +6,9 @@ from typing import Any
 
 from meshreel.analysis.follow.embedded import EmbeddedOptions, Stage
 from meshreel.analysis.scene import places, segmentation, views
-from meshreel.encoder.group.draco import IntraOptions
-from meshreel.encoder.group.target import Fidelity
+from meshreel.encoder.group.forms import Fidelity, IntraOptions
 from meshreel.encoder.layers.options import LayersOptions
-from meshreel.encoder.paper.options import PaperOptions
+from meshreel.encoder.paper.recipe import PaperOptions
 from meshreel.encoder.scene import parts
 from meshreel.encoder.settings.options import EncoderOptions
 from meshreel.encoder.settings.settings import Settings

@@ -204,11 +204,6 @@ class Placement:
         """Return a mesh of normalised coordinates in metres."""
         return mesh.at(np.asarray(self.origin) + self.scale * mesh.vertices)
 
-    @property
-    def numbers(self) -> tuple[float, tuple[float, ...]]:
-        """Scale and origin as the pair of arguments that the compiled core takes."""
-        return self.scale, self.origin
-
 
 @runtime_checkable
 class Frames(Protocol):

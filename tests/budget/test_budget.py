@@ -11,17 +11,16 @@ import pytest
 
 import meshreel
 from meshreel.coding.group import decode_group
-from meshreel.coding.intra import encode_empty
 from meshreel.coding.layers.coder import read_layers
+from meshreel.coding.mesh import encode_empty
 from meshreel.coding.paper import laplacian
 from meshreel.container.reader import ReelReader
 from meshreel.container.sources import BytesSource
 from meshreel.container.writer import ReelWriter
-from meshreel.encoder.group.forms import IntraOptions, intra_only
+from meshreel.encoder.group.forms import Fidelity, IntraOptions, intra_only
 from meshreel.encoder.group.interval import Interval
-from meshreel.encoder.group.target import Fidelity
 from meshreel.encoder.layers.recipe import LayersRecipe
-from meshreel.encoder.settings.presets import layers_options
+from meshreel.encoder.settings.options import layers_options
 from meshreel.errors import FormatError, InputError
 from meshreel.format import budget
 from meshreel.format.budget import LIMITS, Chain, CostlyError, Size

@@ -12,11 +12,10 @@ from meshreel.coding import entropy
 from meshreel.coding.appearance.atlas import encode_atlas
 from meshreel.coding.appearance.pictures import VideoEncoder, encode_pictures
 from meshreel.coding.background import encode_background
-from meshreel.coding.intra import encode_empty
 from meshreel.coding.layers import orthonormal
 from meshreel.coding.layers.graph import Graph, connectivity, hierarchy
 from meshreel.coding.layers.patches import encode_patches
-from meshreel.coding.mesh import decode_mesh, encode_mesh
+from meshreel.coding.mesh import decode_mesh, encode_empty, encode_mesh
 from meshreel.coding.paper import laplacian
 from meshreel.container.writer import Companion, ReelWriter
 from meshreel.format import budget

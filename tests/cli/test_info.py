@@ -4,7 +4,7 @@ import json
 from dataclasses import replace
 
 import meshreel
-from meshreel.coding.intra import encode_empty
+from meshreel.coding.mesh import encode_empty
 from meshreel.container.writer import ReelWriter
 from tests.cli.conftest import FILE, SCENE
 from tests.container.files import HEADER, PAYLOADS

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from meshreel.coding.reference_mesh import CodedReference, code_reference
+from meshreel.coding.mesh import CodedReference, code_reference
 from meshreel.types import Mesh
 
 from .paper.test_laplacian import icosahedron

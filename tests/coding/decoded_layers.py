@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from meshreel.coding.layers.coder import LayersState, place_layers, read_layers
+from meshreel.coding.layers.coder import LayersState, decode_records, read_layers
 from meshreel.errors import FormatError
 
 
@@ -16,5 +16,4 @@ def decode_layers(
     records = read_layers(data, levels)
     if levels is None and records.end != len(data):
         raise FormatError(f"layers: {len(data) - records.end} bytes too many")
-    decoded = place_layers(records, previous)
-    return decoded.faces, decoded.positions, decoded.state
+    return decode_records(records, previous)

@@ -7,19 +7,20 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from meshreel import _core
 from meshreel.coding.background import decode_background, decode_change, encode_background, encode_change
 from meshreel.coding.entropy import encode_integers
-from meshreel.coding.intra import encode_empty, encode_intra
-from meshreel.coding.mesh import encode_mesh
+from meshreel.coding.mesh import encode_empty, encode_intra, encode_mesh
 from meshreel.errors import FormatError, InputError
 from meshreel.format.budget import LIMITS
 from meshreel.format.layout import Form, StaticPatch
 from meshreel.format.records import pack, unpack_all
-from meshreel.types import Mesh
+from meshreel.types import Mesh, Placement
 
 from .paper.test_laplacian import icosahedron
 
 STEP = 1e-3
+PLACE = Placement(1.7, (3.0, -0.25, 1e6))
 BALL = icosahedron(2)
 WHOLE = encode_background(BALL, STEP)
 BEFORE = decode_background(WHOLE)
@@ -73,6 +74,15 @@ def test_changes_of_changes_and_of_an_empty_background() -> None:
     anew = decode_change(encode_change(all_gone, np.zeros(0, bool), BALL, STEP), all_gone)
     np.testing.assert_array_equal(anew.vertices, BEFORE.vertices)
     np.testing.assert_array_equal(anew.faces, BEFORE.faces)
+
+
+def test_decoding_with_a_placement_equals_placing_the_decoded_background() -> None:
+    before = _core.Background(WHOLE, None, (PLACE.scale, PLACE.origin))
+    np.testing.assert_array_equal(before.arrays()[0], PLACE.of(BEFORE).vertices)
+    after = _core.Background(CHANGE, before, (PLACE.scale, PLACE.origin)).arrays()
+    wanted = PLACE.of(decode_change(CHANGE, BEFORE))
+    np.testing.assert_array_equal(after[0], wanted.vertices)
+    np.testing.assert_array_equal(after[1], wanted.faces)
 
 
 @pytest.mark.parametrize("meshes", [0, 2])

@@ -91,14 +91,9 @@ def test_the_rate_is_near_that_of_an_ideal_coder_with_the_same_contexts(body: Bo
 def test_columns_that_move_together_predict_each_other(body: Body) -> None:
     symbols, neighbours, streams = body
     lead = symbols[:, :1]
-    pair = entropy.weights_cost(np.concatenate([lead, -lead], axis=1), neighbours)
-    assert pair[1] < 0.5 * pair[0]
-    assert pair[0] == 8 * len(streams[0])
-
-
-def test_the_cost_is_the_length_of_the_streams(body: Body) -> None:
-    symbols, neighbours, streams = body
-    assert entropy.weights_cost(symbols, neighbours).tolist() == [8 * len(s) for s in streams]
+    first, second = entropy.encode_weights(np.concatenate([lead, -lead], axis=1), neighbours)
+    assert len(second) < 0.5 * len(first)
+    assert first == streams[0]
 
 
 @given(st.lists(SMALL_OR_ANY, min_size=1, max_size=30), st.integers(0, 255))

@@ -5,9 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from meshreel.coding.intra import decode_empty, decode_intra, encode_empty, encode_intra
-from meshreel.coding.mesh import encode_mesh
-from meshreel.coding.reference_mesh import code_on_lattice
+from meshreel.coding.mesh import code_on_lattice, decode_empty, decode_intra, encode_empty, encode_intra, encode_mesh
 from meshreel.errors import FormatError, InputError
 from meshreel.format.budget import LIMITS
 from meshreel.format.layout import DracoGroup, Form

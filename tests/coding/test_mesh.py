@@ -10,8 +10,7 @@ import DracoPy
 import pytest
 
 import meshreel
-from meshreel.coding.intra import decode_intra, encode_intra
-from meshreel.coding.mesh import check_claims, decode_mesh, encode_mesh
+from meshreel.coding.mesh import check_claims, decode_intra, decode_mesh, encode_intra, encode_mesh
 from meshreel.errors import FormatError, InputError
 from meshreel.io.meshes import read_mesh
 from tests.coding.draco_bombs import FAN, SLOW, Draco, bombs, flat, reel_of

@@ -9,7 +9,7 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 import pytest
 
 import meshreel
-from meshreel.coding.intra import encode_intra
+from meshreel.coding.mesh import encode_intra
 from meshreel.container.http import HttpSource
 from meshreel.container.reader import FIRST_REQUEST
 from meshreel.container.writer import ReelWriter

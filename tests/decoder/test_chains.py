@@ -8,8 +8,8 @@ import pytest
 
 import meshreel
 from meshreel import _core
-from meshreel.coding.intra import encode_empty
 from meshreel.coding.layers.coder import encode_layers
+from meshreel.coding.mesh import encode_empty
 from meshreel.container.reader import ReelReader
 from meshreel.container.sources import BytesSource
 from meshreel.container.writer import ReelWriter

@@ -13,7 +13,7 @@ from meshreel.coding.appearance.atlas import decode_atlas
 from meshreel.coding.appearance.splats import decode_splats
 from meshreel.coding.background import decode_background, decode_change
 from meshreel.coding.colored import atlas_base, canvas_of, decode_group_colors, paint_background
-from meshreel.coding.group import continue_group, skip_group
+from meshreel.coding.group import continue_group
 from meshreel.coding.layers.coder import LayersState
 from meshreel.container.reader import Chunk, ReelReader
 from meshreel.container.sources import BytesSource
@@ -69,17 +69,13 @@ class Walk:
             return
         previous, core_previous = (None, None) if before is None else self.states[before.number]
         frames, layers = chunk.frame_count, self.layers
-        wanted = outcome(lambda: continue_group(data, frames, layers, previous, self.place))
+        wanted = outcome(lambda: continue_group(data, frames, layers, previous))
         found = outcome(lambda: _core.Group(data, frames, layers, core_previous, self.core_place))
         assert (wanted is None) == (found is None), chunk
-        skipped = outcome(lambda: skip_group(data, frames, layers, previous))
-        if chunk.form == Form.LAYERS:
-            core = outcome(lambda: _core.Group(data, frames, layers, core_previous, self.core_place, shown=False))
-            assert (skipped is None) == (core is None)
         if wanted is None:
             return
         meshes, state = wanted
-        colored = self.read_companion(chunk, ChunkKind.COLORS)
+        painted, colored = None, self.read_companion(chunk, ChunkKind.COLORS)
         if colored is not None:
             canvas = canvas_of(data, [len(mesh.vertices) for mesh in meshes], layers, previous)
             painted = outcome(lambda: decode_group_colors(colored, canvas, previous, state))
@@ -87,10 +83,21 @@ class Walk:
             if painted is not None:
                 colors, state = painted
                 meshes = [Mesh(mesh.vertices, mesh.faces, some) for mesh, some in zip(meshes, colors, strict=True)]
-        self.states[chunk.number] = state, found.state
+        self.states[chunk.number] = state, self.skipped(chunk, data, core_previous, painted is not None)
+        meshes = [self.place.of(mesh) for mesh in meshes]
         for mesh, arrays in zip(meshes, found.frames(), strict=True):
             check_same(mesh, Mesh(*arrays))
         self.check_splats(chunk, data, [mesh.vertices for mesh in meshes], found, previous)
+
+    def skipped(
+        self, chunk: Chunk, data: bytes, previous: _core.GroupState | None, colored: bool
+    ) -> _core.GroupState | None:
+        """Return the state after a group that is not shown, which the next groups are decoded from."""
+        group = _core.Group(data, chunk.frame_count, self.layers, previous, self.core_place, shown=False)
+        of = self.reader.companion_of(chunk, ChunkKind.COLORS)
+        if colored and of is not None and group.state is not None:
+            group.paint(self.reader.read_chunk(of.number, group.state.levels + 1))
+        return group.state
 
     def check_splats(
         self, chunk: Chunk, data: bytes, places: list[np.ndarray], group: _core.Group, previous: LayersState | None
@@ -116,9 +123,7 @@ class Walk:
         if is_change and chunk.depends_on[0] not in self.backgrounds:
             return
         before, core_before = self.backgrounds[chunk.depends_on[0]] if is_change else (Mesh.empty(), None)
-        wanted = outcome(
-            lambda: decode_change(data, before, self.place) if is_change else decode_background(data, self.place)
-        )
+        wanted = outcome(lambda: decode_change(data, before) if is_change else decode_background(data))
         found = outcome(lambda: _core.Background(data, core_before, self.core_place))
         assert (wanted is None) == (found is None), chunk
         if wanted is None:
@@ -129,7 +134,7 @@ class Walk:
             assert (painted is None) == (outcome(lambda: found.paint(colored) or True) is None)
             wanted = wanted if painted is None else painted
         self.backgrounds[chunk.number] = wanted, found
-        check_same(wanted, Mesh(*found.arrays()))
+        check_same(self.place.of(wanted), Mesh(*found.arrays()))
         coded = self.read_companion(chunk, ChunkKind.ATLAS)
         if coded is not None:
             layout = outcome(lambda: decode_atlas(coded, atlas_base(data)))

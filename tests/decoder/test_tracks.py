@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 import meshreel
 from meshreel.coding.background import decode_background, decode_change, encode_background, encode_change
-from meshreel.coding.intra import decode_intra, encode_empty, encode_intra
 from meshreel.coding.layers.coder import encode_layers
+from meshreel.coding.mesh import decode_intra, encode_empty, encode_intra
 from meshreel.container.writer import ReelWriter
 from meshreel.decoder import tracks
 from meshreel.errors import FormatError

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import meshreel
-from meshreel.coding.intra import encode_intra
+from meshreel.coding.mesh import encode_intra
 from meshreel.container.writer import ReelWriter
 from meshreel.errors import InputError
 from meshreel.types import Mesh

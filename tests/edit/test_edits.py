@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import meshreel
-from meshreel.coding.intra import encode_intra
+from meshreel.coding.mesh import encode_intra
 from meshreel.container.reader import ReelReader
 from meshreel.container.sources import BytesSource
 from meshreel.container.writer import ReelWriter, pack_head

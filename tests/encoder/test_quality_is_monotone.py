@@ -7,8 +7,8 @@ import pytest
 
 from meshreel.capture.simulated.procedural import SoftBodiesOptions, soft_bodies
 from meshreel.decoder.video import open as open_video
-from meshreel.encoder.group.draco import IntraOptions
-from meshreel.encoder.paper.options import PaperOptions
+from meshreel.encoder.group.forms import IntraOptions
+from meshreel.encoder.paper.recipe import PaperOptions
 from meshreel.encoder.sequence import encode
 from meshreel.encoder.settings.options import EncoderOptions
 from meshreel.encoder.settings.settings import Settings

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 import meshreel
 from meshreel.capture.simulated.procedural import SoftBodiesOptions, soft_bodies
 from meshreel.encoder.file.summary import GroupSummary, SceneSummary, Summary
-from meshreel.encoder.group.target import Fidelity
+from meshreel.encoder.group.forms import Fidelity
 from meshreel.encoder.rate_control import TRIALS, Goal, Search, encode_to
 from meshreel.encoder.sequence import Encoder
 from meshreel.errors import InputError

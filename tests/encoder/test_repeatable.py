@@ -18,7 +18,7 @@ from threadpoolctl import threadpool_info
 import meshreel
 from meshreel.encoder.group.digests import line_of, listener, note, noted
 from meshreel.encoder.sequence import Encoder
-from meshreel.encoder.settings.presets import appearance_options
+from meshreel.encoder.settings.options import appearance_options
 from meshreel.format.layout import ChunkKind
 from meshreel.geometry.topology import concatenate
 from meshreel.types import Mesh, MeshList, Texture

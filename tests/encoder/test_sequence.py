@@ -11,7 +11,7 @@ import pytest
 
 import meshreel
 from meshreel.capture.simulated.procedural import SoftBodiesOptions, soft_bodies
-from meshreel.encoder.group.draco import IntraOptions
+from meshreel.encoder.group.forms import IntraOptions
 from meshreel.encoder.sequence import encode
 from meshreel.errors import InputError
 from meshreel.format.layout import Form

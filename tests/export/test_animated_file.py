@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import meshreel
-from meshreel.coding.intra import encode_intra
+from meshreel.coding.mesh import encode_intra
 from meshreel.container.writer import ReelWriter
 from meshreel.encoder.sequence import encode
 from meshreel.errors import FormatError, InputError

@@ -16,10 +16,9 @@ from meshreel.coding.appearance.splats import decode_splats, encode_splats
 from meshreel.coding.background import decode_background, decode_change, encode_background, encode_change
 from meshreel.coding.layers.coder import LayerCodingOptions, LayersState, encode_layers
 from meshreel.coding.layers.patches import encode_patches
-from meshreel.coding.mesh import decode_mesh
+from meshreel.coding.mesh import code_reference, decode_mesh
 from meshreel.coding.paper import laplacian
 from meshreel.coding.paper.displacements import DisplacementOptions, decode_displacements, encode_displacements
-from meshreel.coding.reference_mesh import code_reference
 from meshreel.coding.steps import step_of
 from meshreel.format import records
 from meshreel.format.layout import (

@@ -8,8 +8,8 @@ from meshreel_bench.codecs.meshreel import GroupStore, prepare, shared_options
 from meshreel_bench.codecs.tvmc import track_sequence
 
 from meshreel.capture.simulated.procedural import SoftBodiesOptions, soft_bodies
+from meshreel.encoder.group.forms import Fidelity
 from meshreel.encoder.group.interval import Interval
-from meshreel.encoder.group.target import Fidelity
 from meshreel.encoder.paper.recipe import find_groups
 from meshreel.encoder.sequence import Encoder, encode
 from meshreel.encoder.settings.options import EncoderOptions

@@ -22,9 +22,9 @@ from meshreel_bench.codecs.tvmc.stream import (
 )
 
 from meshreel.capture.simulated.procedural import SoftBodiesOptions, soft_bodies
-from meshreel.coding.reference_mesh import code_reference
+from meshreel.coding.mesh import code_reference
 from meshreel.encoder.sequence import Encoder
-from meshreel.encoder.settings.presets import reference_vertices
+from meshreel.encoder.settings.options import reference_vertices
 from meshreel.errors import FormatError, InputError, NoReferenceError
 from meshreel.geometry.closest_points import distances
 from meshreel.geometry.topology import concatenate

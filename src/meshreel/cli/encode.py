@@ -12,8 +12,7 @@ from typing import Annotated, Any
 
 from cyclopts import Parameter
 
-from ..encoder.file.notices import warnings_of
-from ..encoder.file.summary import SceneSummary, Summary
+from ..encoder.file.summary import SceneSummary, Summary, warnings_of
 from ..encoder.group.digests import WriteLines, machine_line
 from ..encoder.rate_control import Goal, encode_to
 from ..encoder.run.surveying import Excerpt, read_survey

@@ -13,7 +13,7 @@ from jaxtyping import UInt8
 from ..analysis.scene.labelling import Segmentation
 from ..analysis.scene.masks import CAMERAS, FrameViews, Masker, label_colors, look_at_labels, sheet, write_views
 from ..analysis.scene.segmentation import mask_views, scene_views, segment, segment_by
-from ..encoder.scene.labels import label_frames
+from ..encoder.scene.scene import label_frames
 from ..encoder.settings.options import EncoderOptions, SceneOptions
 from ..errors import InputError
 from ..geometry.cameras import pack_cameras

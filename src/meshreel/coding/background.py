@@ -14,11 +14,10 @@ from ..format.layout import Form, StaticPatch
 from ..format.records import pack, unpack_all
 from ..geometry.topology import concatenate, part_of
 from ..shapes import Bool
-from ..types import Mesh, Placement
+from ..types import Mesh
 from . import entropy
-from .intra import decode_intra, encode_intra
 from .layers.patches import fill_runs, run_lengths
-from .mesh import check_growth, check_step, decode_mesh, encode_mesh
+from .mesh import check_growth, check_step, decode_intra, decode_mesh, encode_intra, encode_mesh
 
 
 def encode_background(mesh: Mesh, step: float) -> bytes:
@@ -29,12 +28,12 @@ def encode_background(mesh: Mesh, step: float) -> bytes:
     return encode_intra([mesh], step, 0)
 
 
-def decode_background(data: bytes, place: Placement | None = None) -> Mesh:
-    """Decode a background, in normalised units or, with `place`, in metres. FormatError on anything but one mesh."""
+def decode_background(data: bytes) -> Mesh:
+    """Decode a background, in normalised units. Raises FormatError on anything but one mesh."""
     meshes = decode_intra(data)
     if len(meshes) != 1:
         raise FormatError(f"background: {len(meshes)} meshes, a state has one")
-    return meshes[0] if place is None else place.of(meshes[0])
+    return meshes[0]
 
 
 def encode_change(before: Mesh, dropped: Bool[np.ndarray, " F"], added: Mesh, step: float) -> bytes:
@@ -48,11 +47,10 @@ def encode_change(before: Mesh, dropped: Bool[np.ndarray, " F"], added: Mesh, st
     return pack(StaticPatch(Form.PATCH, step, len(runs), coded, encode_mesh(added, step)))
 
 
-def decode_change(data: bytes, before: Mesh, place: Placement | None = None) -> Mesh:
+def decode_change(data: bytes, before: Mesh) -> Mesh:
     """Decode the background after a change: the remaining vertices and faces of `before`, then the added ones.
 
-    Vertices that no remaining face uses are dropped. With `place`, `before` and the result are in metres. Raises
-    FormatError on anything but a change of this background.
+    Vertices that no remaining face uses are dropped. Raises FormatError on anything but a change of this background.
     """
     record = unpack_all(StaticPatch, data)
     if record.form != Form.PATCH:
@@ -62,7 +60,7 @@ def decode_change(data: bytes, before: Mesh, place: Placement | None = None) -> 
     added = decode_mesh(record.mesh, record.step)
     check_growth(added, 0)
     check_cost(change_cost(Size.of(before), Size.of(added)), len(data), "background")
-    after = changed(before, dropped, added if place is None else place.of(added))
+    after = changed(before, dropped, added)
     check_growth(after, 0)
     return after
 

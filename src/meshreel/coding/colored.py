@@ -16,10 +16,9 @@ from ..errors import FormatError
 from ..format.budget import check_colors
 from ..format.layout import DracoGroup, Form, LaplacianGroup, StaticPatch
 from ..format.records import unpack_all
-from ..geometry.atlas import Layout
 from ..geometry.splats import Carrier
 from ..geometry.topology import concatenate, levels_of
-from ..shapes import Bool, Float32, Float64, Int32, UInt8
+from ..shapes import Bool, Float64, Int32, UInt8
 from ..types import Mesh
 from .appearance.colors import ColoredMesh, EncodedColors, decode_colors, encode_colors
 from .layers.coder import LayersState, base_of, patches_of, read_layers
@@ -34,20 +33,7 @@ class Canvas:
     patches: tuple[int, ...] = ()  # vertices of each frame's patch; the last mesh has the vertices of all patches
     is_layered: bool = False  # each level of the first mesh is a layer
     dropped: Bool[np.ndarray, "T F"] | None = None  # faces of the template that each frame lacks
-    added: tuple[int, ...] = ()  # faces of the patch of each frame
     empty: tuple[int, ...] = ()  # frames without surface, which have no mesh in groups with one mesh per frame
-
-    def uv(self, layout: Layout) -> list[Float32[np.ndarray, "_ 3 2"]]:
-        """Return the texture coordinates of each frame's face corners; NaN for faces of patches."""
-        template = self.meshes[0]
-        template_uv = layout.uv(template.levels)
-        if self.dropped is None:
-            return [template_uv] * template.frames
-        by_frame = list[Float32[np.ndarray, "_ 3 2"]]()
-        for hidden, added in zip(self.dropped, self.added, strict=True):
-            shown = template_uv[~hidden] if hidden.any() else template_uv
-            by_frame.append(np.concatenate([shown, np.full((added, 3, 2), np.nan, np.float32)]) if added else shown)
-        return by_frame
 
     def carriers(self, frames: Sequence[Mesh], unit: float = 1.0) -> list[Carrier]:
         """Return the carrier of splats in each frame: the template's positions, and its faces that the frame lacks.
@@ -109,11 +95,10 @@ def canvas_of(
             return Canvas((ColoredMesh(base, levels, len(counts), counts[0]),), is_layered=True)
         added = tuple(len(mesh.vertices) for mesh in patches.meshes)
         template = ColoredMesh(base, levels, len(counts), counts[0] - added[0])
-        faces = tuple(len(mesh.faces) for mesh in patches.meshes)
         if not any(added):
-            return Canvas((template,), is_layered=True, dropped=patches.dropped, added=faces)
+            return Canvas((template,), is_layered=True, dropped=patches.dropped)
         patch = ColoredMesh(concatenate(patches.meshes), 0, 1, sum(added))
-        return Canvas((template, patch), added, True, patches.dropped, faces)
+        return Canvas((template, patch), added, True, patches.dropped)
     if form == Form.LAPLACIAN:
         record = unpack_all(LaplacianGroup, data)
         reference = decode_mesh(record.reference, record.step)

@@ -14,7 +14,7 @@ import numpy as np
 
 from .. import _core
 from ..errors import FormatError
-from ..shapes import Float64, Int32, Int64
+from ..shapes import Int32, Int64
 
 SYMBOLS_PER_BYTE = 22_800  # no stream says more: a coded bit costs at least 1 / 2840 bit
 
@@ -57,11 +57,6 @@ def decode_weights(streams: Sequence[bytes], count: int, neighbours: Neighbours)
     if failed >= 0:
         raise FormatError(f"weights, column {failed}: {len(streams[failed])} bytes are truncated or damaged")
     return np.ascontiguousarray(columns.T)
-
-
-def weights_cost(symbols: Int32[np.ndarray, "N M"], neighbours: Neighbours) -> Float64[np.ndarray, " M"]:
-    """Return the rate of each column in bits (whole bytes: the columns are coded and measured)."""
-    return np.array([8.0 * len(stream) for stream in encode_weights(symbols, neighbours)], dtype=np.float64)
 
 
 def encode_integers(values: Int32[np.ndarray, " N"]) -> bytes:

@@ -1,19 +1,24 @@
-"""Encode static meshes with Draco on a lattice that is in the stream (paper, section 3.3.3; decision 2).
+"""Encode meshes with Draco on a lattice that is in the stream (paper, section 3.3.3; decision 2).
 
 In -> out: Mesh <-> bytes. Draco reorders vertices, drops degenerate faces and splits non-manifold vertices, so an
-encoder must continue from its decoded bytes. The empty mesh is the empty string.
+encoder must continue from its decoded bytes. The empty mesh is the empty string. A group has the form `draco`, each
+frame a mesh, if no reference follows its motion, or if it is cheaper (docs/decisions/0007-draco-as-the-floor.md).
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from .. import _core
 from ..errors import FormatError, InputError
-from ..format.budget import LIMITS
+from ..format.budget import LIMITS, Size, check_cost, draco_cost
+from ..format.layout import DracoGroup, EmptyGroup, Form
+from ..format.records import pack, unpack_all
+from ..geometry.topology import subdivide_midpoint
 from ..types import Mesh
 
 MAX_BITS = 21  # bits per coordinate that Draco's float32 positions can hold
@@ -120,3 +125,57 @@ def check_step(step: float) -> None:
     """Raise FormatError if the spacing of a lattice is not above 0."""
     if not step > 0:
         raise FormatError(f"lattice spacing {step:g} is not above 0")
+
+
+@dataclass(frozen=True, slots=True)
+class CodedReference:
+    """Reference mesh as the decoder reconstructs it, with its bytes."""
+
+    data: bytes  # Draco
+    step: float  # spacing of its lattice, normalised units
+    levels: int  # midpoint subdivisions after decoding
+    mesh: Mesh  # decoded
+    base: Mesh  # decoded and subdivided
+
+
+def code_reference(mesh: Mesh, bits: int, levels: int) -> CodedReference:
+    """Code a reference on a lattice of 2^bits cells along its longest side (the paper: 14 bits)."""
+    extent = float((mesh.vertices.max(axis=0) - mesh.vertices.min(axis=0)).max())
+    return code_on_lattice(mesh, extent / (2**bits - 1), levels)
+
+
+def code_on_lattice(mesh: Mesh, step: float, levels: int) -> CodedReference:
+    """Code a reference on a lattice of spacing `step`, rounded to float32."""
+    step = float(np.float32(step))
+    data = encode_mesh(mesh, step)
+    decoded = decode_mesh(data, step)
+    return CodedReference(data, step, levels, decoded, subdivide_midpoint(decoded, levels))
+
+
+def encode_intra(meshes: Sequence[Mesh], step: float, levels: int) -> bytes:
+    """Encode the frames of a group as Draco meshes on a lattice of spacing `step` (normalised units)."""
+    return pack(DracoGroup(Form.DRACO, levels, step, encode_meshes(meshes, step)))
+
+
+def decode_intra(data: bytes) -> list[Mesh]:
+    """Decode the frames of a `draco` group, in normalised units. Raises FormatError on any other or damaged payload."""
+    record = unpack_all(DracoGroup, data)
+    check_step(record.step)
+    check_claims(record.meshes)  # of all frames together
+    meshes = [decode_mesh(frame, record.step) for frame in record.meshes]
+    for mesh in meshes:
+        check_growth(mesh, record.levels, len(meshes))
+    check_cost(draco_cost([Size.of(mesh, record.levels) for mesh in meshes]), len(data), "draco")
+    return [subdivide_midpoint(mesh, record.levels) for mesh in meshes]
+
+
+def encode_empty() -> bytes:
+    """Encode a group whose frames have no surface; their number is in the index."""
+    return pack(EmptyGroup(Form.EMPTY))
+
+
+def decode_empty(data: bytes, frame_count: int) -> list[Mesh]:
+    """Return `frame_count` empty meshes. Raises FormatError on any payload that is not an empty group."""
+    if unpack_all(EmptyGroup, data).form != Form.EMPTY:
+        raise FormatError("a payload that is not an empty group")
+    return [Mesh.empty()] * frame_count

@@ -87,13 +87,3 @@ class Refusals:
         for dependent in dependents:
             self._messages[dependent.number] = message
         raise FormatError(message)
-
-
-def read_only(mesh: Mesh) -> Mesh:
-    """Return read-only views of a mesh that is cached."""
-    vertices, faces = mesh.vertices.view(), mesh.faces.view()
-    colors, uv = (None if array is None else array.view() for array in (mesh.colors, mesh.uv))
-    for array in (vertices, faces, colors, uv):
-        if array is not None:
-            array.flags.writeable = False
-    return Mesh(vertices, faces, colors, uv, mesh.texture)

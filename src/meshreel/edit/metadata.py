@@ -1,6 +1,6 @@
 """Metadata of files that are joined, cut or scaled: from the metadata of parts to those of a whole.
 
-In: JSON objects as an encoder wrote them (`encoder.file.metadata`). Out: the same of the edited file.
+In: JSON objects as an encoder wrote them (`encoder.file.summary`). Out: the same of the edited file.
 Means over frames are joined from exact totals, so that parts give the metadata of one encode.
 """
 

@@ -29,19 +29,28 @@ from ..geometry.derived_sequences import captured, unchanging, welded
 from ..geometry.work import since, so_far
 from ..io.files import Place
 from ..types import MeshSequence, as_sequence, evenly
-from .file.metadata import chosen_options, metadata_of
-from .file.notices import warnings_of, warnings_of_colors, warnings_of_scene
-from .file.summary import GroupSummary, SceneSummary, Summary
-from .file.written import make_header, mean_psnr, write_in_order, write_tracked
+from .file.summary import (
+    GroupSummary,
+    SceneSummary,
+    Summary,
+    chosen_options,
+    make_header,
+    mean_psnr,
+    metadata_of,
+    warnings_of,
+    warnings_of_colors,
+    warnings_of_scene,
+    write_in_order,
+    write_tracked,
+)
 from .group.digests import WriteLines, note, noted
 from .group.interval import Interval
 from .group.progress import Progress, Stages
 from .paper.recipe import FindGroups, find_groups
 from .run.interval_files import IntervalFiles, made_of, opened
-from .run.job import Job
+from .run.schedule import Job
 from .run.surveying import Excerpt, facts_of, known_survey, surveyed, write_survey
-from .scene.kept import pack_parts, unpack_parts
-from .scene.parts import Parts, take_apart
+from .scene.parts import Parts, pack_parts, take_apart, unpack_parts
 from .scene.scene import Tracks, encode_bodies, scene_intervals
 from .scene.static import colored_states, is_colored
 from .scene.tracks import encode_tracked, intervals_of, tracked_bodies

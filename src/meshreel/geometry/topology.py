@@ -14,8 +14,8 @@ import numpy as np
 
 from .. import _core
 from ..errors import FormatError
-from ..shapes import Bool, Float, Float64, Int32, Int64
-from ..types import GREY, Mesh, Placement
+from ..shapes import Bool, Float64, Int32, Int64
+from ..types import GREY, Mesh
 from .atlas import side_by_side
 
 Triples = Float64[np.ndarray, "N 3"]
@@ -263,10 +263,3 @@ def refine(
     """
     rows = np.ascontiguousarray(coarse.transpose(1, 2, 0))
     return _core.refine(rows, level.coarse, level.edges, np.ascontiguousarray(scalars.T), curvature)
-
-
-def write_frames(
-    rows: Float64[np.ndarray, "V 3 T"], place: Placement | None, frames: Float[np.ndarray, "T V 3"]
-) -> None:
-    """Transpose rows, each of one coordinate in all frames, into `frames`. Raises FormatError if one is not finite."""
-    _core.frames_of_rows(rows, None if place is None else place.numbers, frames)

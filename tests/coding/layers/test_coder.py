@@ -7,7 +7,7 @@ import pytest
 from meshreel.coding.group import continue_group, decode_group, payload_bytes_by_purpose
 from meshreel.coding.layers import coder
 from meshreel.coding.layers.coder import EncodedLayers, LayerCodingOptions, encode_layers
-from meshreel.coding.reference_mesh import CodedReference, code_reference
+from meshreel.coding.mesh import CodedReference, code_reference
 from meshreel.errors import FormatError, InputError
 from meshreel.format.budget import LIMITS
 from meshreel.format.layout import LayersGroup, LayersLevel, Origin

@@ -14,7 +14,7 @@ from meshreel.coding.layers.patches import decode_patches, decode_runs, encode_p
 from meshreel.errors import FormatError, InputError
 from meshreel.format.budget import LIMITS
 from meshreel.format.records import pack
-from meshreel.types import Mesh
+from meshreel.types import Mesh, Placement
 
 from ..bodies import ball, moving
 from ..paper.test_laplacian import icosahedron
@@ -79,6 +79,17 @@ def test_frames_are_shown_without_the_faces_and_with_the_meshes() -> None:
         np.testing.assert_array_equal(frame.vertices[: len(plain.vertices)], plain.vertices)
         np.testing.assert_array_equal(frame.faces[count:] - len(plain.vertices), DECODED[t].faces)
         np.testing.assert_array_equal(frame.vertices[len(plain.vertices) :], DECODED[t].vertices)
+
+
+def test_decoding_with_a_placement_equals_placing_the_decoded_group() -> None:
+    place = Placement(1.7, (3.0, -0.25, 1e6))
+    for payload in (PAYLOAD, CODED.payload):
+        for levels in (None, 0, 1, BALL.levels + 1):
+            placed = _core.Group(payload, FRAMES, levels, None, (place.scale, place.origin))
+            plain = decode_group(payload, FRAMES, levels)
+            for (vertices, faces, *_), mesh in zip(placed.frames(), plain, strict=True):
+                np.testing.assert_array_equal(vertices, place.of(mesh).vertices)
+                np.testing.assert_array_equal(faces, mesh.faces)
 
 
 @given(st.lists(st.tuples(st.booleans(), st.integers(1, 20)), max_size=9))

@@ -15,8 +15,7 @@ from meshreel.container.writer import Companion, ReelWriter
 from meshreel.edit.edits import concat
 from meshreel.encoder.run.surveying import Excerpt, read_survey
 from meshreel.encoder.sequence import Encoder
-from meshreel.encoder.settings.options import as_installed
-from meshreel.encoder.settings.presets import appearance_options
+from meshreel.encoder.settings.options import appearance_options, as_installed
 from meshreel.encoder.settings.settings import Settings
 from meshreel.errors import FormatError, InputError
 from meshreel.format import budget

@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 from meshreel.analysis.appearance.splat_fit import fit_splats
 from meshreel.cli.compare import compare_splats
 from meshreel.cli.decode import decode
-from meshreel.coding.intra import encode_intra
+from meshreel.coding.mesh import encode_intra
 from meshreel.container.reader import Chunk, ReelReader
 from meshreel.container.sources import BytesSource
 from meshreel.container.writer import Companion, ReelWriter
@@ -54,7 +54,7 @@ def options(preset: str = "best", group_size: int = 3) -> EncoderOptions:
 @pytest.fixture(scope="module", autouse=True)
 def small_splats() -> Iterator[None]:
     """Few pictures, and small ones."""
-    module = "meshreel.encoder.appearance.splats"
+    module = "meshreel.encoder.appearance.colors"
     with pytest.MonkeyPatch.context() as patch:
         for name, value in (("FRAMES", 3), ("VIEWS", 4), ("SIZE", 64)):
             patch.setattr(f"{module}.{name}", value)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from meshreel.analysis.fit.frame import FrameSurface
-from meshreel.encoder.group.target import target_of
+from meshreel.encoder.group.forms import target_of
 from meshreel.encoder.layers.candidates import Ahead, Candidate
 from meshreel.geometry.work import since, so_far
 from meshreel.types import Mesh

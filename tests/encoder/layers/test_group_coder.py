@@ -7,9 +7,8 @@ import pytest
 
 from meshreel.analysis.fit.frame import FrameSurface
 from meshreel.coding.group import decode_group
-from meshreel.coding.reference_mesh import CodedReference, code_on_lattice
-from meshreel.encoder.group.forms import EncodedGroup
-from meshreel.encoder.group.target import Fidelity, measure, target_of
+from meshreel.coding.mesh import CodedReference, code_on_lattice
+from meshreel.encoder.group.forms import EncodedGroup, Fidelity, measure, target_of
 from meshreel.encoder.layers import group_coder as layers_group
 from meshreel.encoder.layers.group_coder import MOST_FOR_EDGES, GroupCoder
 from meshreel.format.layout import Form

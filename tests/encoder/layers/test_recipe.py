@@ -13,9 +13,8 @@ from meshreel.analysis.fit.frame import FrameSurface
 from meshreel.analysis.plan import Plan
 from meshreel.capture.simulated.procedural import SoftBodiesOptions, soft_bodies
 from meshreel.coding.group import continue_group
-from meshreel.encoder.group.forms import EncodedGroup
+from meshreel.encoder.group.forms import EncodedGroup, measure
 from meshreel.encoder.group.interval import Interval
-from meshreel.encoder.group.target import measure
 from meshreel.encoder.layers import recipe as layered
 from meshreel.encoder.layers.group_coder import GroupCoder
 from meshreel.encoder.layers.recipe import LayersRecipe

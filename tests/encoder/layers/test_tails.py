@@ -8,7 +8,7 @@ import pytest
 import meshreel
 from meshreel.coding.group import payload_bytes_by_purpose
 from meshreel.coding.layers.patches import decode_patches
-from meshreel.encoder.group.target import Fidelity, measure
+from meshreel.encoder.group.forms import Fidelity, measure
 from meshreel.encoder.layers import tails
 from meshreel.encoder.layers.tails import find_tails
 from meshreel.encoder.sequence import encode

@@ -5,9 +5,7 @@ from dataclasses import replace
 import pytest
 
 from meshreel.encoder.group import forms
-from meshreel.encoder.group.draco import IntraOptions, cheapest_intra
-from meshreel.encoder.group.forms import EncodedGroup, cheaper
-from meshreel.encoder.group.target import Fidelity
+from meshreel.encoder.group.forms import EncodedGroup, Fidelity, IntraOptions, cheaper, cheapest_intra
 from meshreel.format.layout import Form
 from tests.spheres import sliding_sphere
 
@@ -28,10 +26,10 @@ ASKED = Fidelity(distance=0.002, angle=30.0, worst=0.004)
     ],
 )
 def test_draco_is_taken_where_it_is_the_better_bargain(monkeypatch, size, distance, form):
-    found = bytes(500), Fidelity(distance=0.001, angle=1.0, worst=0.001)
+    found = EncodedGroup(Form.DRACO, 2, bytes(500), (), Fidelity(distance=0.001, angle=1.0, worst=0.001))
 
     def searched(_frames, target, most_bytes, _options):
-        return found if found[1].reaches(target) and len(found[0]) < most_bytes else None
+        return found if found.fidelity.reaches(target) and len(found.payload) < most_bytes else None
 
     monkeypatch.setattr(forms, "cheapest_intra", searched)
     group = EncodedGroup(Form.LAYERS, 2, bytes(size), (), Fidelity(distance, 2.0, distance))
@@ -41,11 +39,10 @@ def test_draco_is_taken_where_it_is_the_better_bargain(monkeypatch, size, distan
 def test_a_body_of_few_faces_is_left_to_draco():
     found = cheapest_intra(BALLS, ASKED, 1e6, OPTIONS)
     assert found is not None
-    payload, fidelity = found
-    group = EncodedGroup(Form.LAYERS, 2, bytes(len(payload) * 2 // 3), (), ASKED)
+    group = EncodedGroup(Form.LAYERS, 2, bytes(len(found.payload) * 2 // 3), (), ASKED)
     chosen = cheaper(BALLS, group, OPTIONS)
-    assert (chosen.form, chosen.payload, chosen.fidelity) == (Form.DRACO, payload, fidelity)
-    assert chosen.frame_count == 2 and fidelity.distance < ASKED.distance / 2
+    assert chosen.form == Form.DRACO and (chosen.payload, chosen.fidelity) == (found.payload, found.fidelity)
+    assert chosen.frame_count == 2 and found.fidelity.distance < ASKED.distance / 2
 
 
 def test_finer_steps_are_tried_where_another_frame_needs_them_and_only_where_asked():
@@ -54,4 +51,4 @@ def test_finer_steps_are_tried_where_another_frame_needs_them_and_only_where_ask
     assert cheapest_intra([middle], asked, 1e6, options) is not None
     assert cheapest_intra([fine, middle], asked, 1e6, options) is None
     found = cheapest_intra([fine, middle], asked, 1e6, replace(options, finer=True))
-    assert found is not None and found[1].reaches(asked)
+    assert found is not None and found.fidelity.reaches(asked)

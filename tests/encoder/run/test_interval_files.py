@@ -20,8 +20,7 @@ from meshreel.container.sources import FileSource
 from meshreel.container.writer import ReelWriter
 from meshreel.encoder import sequence as sequence_module
 from meshreel.encoder.group import digests
-from meshreel.encoder.group.forms import EncodedGroup
-from meshreel.encoder.group.target import Fidelity
+from meshreel.encoder.group.forms import EncodedGroup, Fidelity
 from meshreel.encoder.rate_control import Goal, encode_to
 from meshreel.encoder.run import interval_files as module
 from meshreel.encoder.run import schedule as recipe

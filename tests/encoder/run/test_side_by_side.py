@@ -9,8 +9,7 @@ import fsspec
 import numpy as np
 import pytest
 
-from meshreel.encoder.group.forms import EncodedGroup
-from meshreel.encoder.group.target import Fidelity
+from meshreel.encoder.group.forms import EncodedGroup, Fidelity
 from meshreel.encoder.run import schedule as recipe
 from meshreel.encoder.run.schedule import AHEAD, as_done, workers_of
 from meshreel.encoder.sequence import Encoder

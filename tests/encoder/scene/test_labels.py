@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from meshreel.encoder.scene.labels import label_frames
+from meshreel.encoder.scene.scene import label_frames
 from meshreel.geometry.topology import concatenate
 from meshreel.types import Mesh, MeshList
 from tests.encoder.scene.test_scene import ALL, NONE, SMALL, at

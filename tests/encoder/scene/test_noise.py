@@ -7,8 +7,8 @@ import pytest
 
 from meshreel.analysis.follow.embedded import LOST, Tracker
 from meshreel.analysis.follow.template import LEVELS, base_mesh
+from meshreel.encoder.group.forms import target_of
 from meshreel.encoder.group.interval import Interval
-from meshreel.encoder.group.target import target_of
 from meshreel.encoder.layers import recipe as layered
 from meshreel.encoder.layers.candidates import Candidate
 from meshreel.encoder.layers.options import LayersOptions

@@ -15,12 +15,11 @@ from meshreel.analysis.scene.labelling import ByPlace
 from meshreel.analysis.scene.segmentation import scene_views
 from meshreel.analysis.survey import survey
 from meshreel.coding.background import decode_background
-from meshreel.coding.intra import decode_intra, encode_empty, encode_intra
-from meshreel.encoder.group.forms import EncodedGroup
+from meshreel.coding.mesh import decode_intra, encode_empty, encode_intra
+from meshreel.encoder.group.forms import NO_ERROR, EncodedGroup, target_of
 from meshreel.encoder.group.progress import Stages
-from meshreel.encoder.group.target import NO_ERROR, target_of
 from meshreel.encoder.run.interval_files import IntervalFiles
-from meshreel.encoder.run.job import Job
+from meshreel.encoder.run.schedule import Job
 from meshreel.encoder.scene.parts import Parts, take_apart
 from meshreel.encoder.scene.scene import CodedBodies, encode_bodies
 from meshreel.encoder.scene.static import encode_static
@@ -360,7 +359,7 @@ def test_a_background_is_no_finer_than_its_noise_asks_for():
         parts, options = Parts(seen, ALL, with_room([NONE], sigma=0.002)[0], [], CELL, noise, noise), SceneOptions()
         payload = encode_static(parts, 1, 30.0, options)[0].payload
         place = Placement(1.0, tuple(seen.center))
-        away = rms(parts.background.vertices, decode_background(payload, place))
+        away = rms(parts.background.vertices, place.of(decode_background(payload)))
         assert away <= max(options.coarse * noise, 1e-4)
         sizes.append(len(payload))
     assert sizes[0] > sizes[1] > sizes[2]

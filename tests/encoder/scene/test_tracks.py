@@ -7,10 +7,9 @@ import pytest
 
 import meshreel
 from meshreel.analysis.survey import survey
-from meshreel.coding.intra import encode_empty, encode_intra
-from meshreel.encoder.group.forms import EncodedGroup
+from meshreel.coding.mesh import encode_empty, encode_intra
+from meshreel.encoder.group.forms import NO_ERROR, EncodedGroup, Fidelity, target_of
 from meshreel.encoder.group.interval import BodyFrames, Interval, NormalisedFrames
-from meshreel.encoder.group.target import NO_ERROR, Fidelity, target_of
 from meshreel.encoder.layers.recipe import LayersRecipe
 from meshreel.encoder.sequence import Encoder
 from meshreel.errors import InputError

@@ -8,10 +8,9 @@ from itertools import pairwise
 import pytest
 
 from meshreel.encoder.layers.options import LayersOptions
-from meshreel.encoder.paper.options import PaperOptions
+from meshreel.encoder.paper.recipe import PaperOptions
 from meshreel.encoder.sequence import encode
-from meshreel.encoder.settings.options import EncoderOptions
-from meshreel.encoder.settings.presets import displacement_step, reference_vertices
+from meshreel.encoder.settings.options import EncoderOptions, displacement_step, reference_vertices
 from meshreel.encoder.settings.settings import EFFORTS, PRESETS, Settings
 from meshreel.errors import InputError
 

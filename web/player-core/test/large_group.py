@@ -11,7 +11,7 @@ import sys
 import numpy as np
 
 from meshreel.coding.layers.coder import LayerCodingOptions, LayersState, encode_layers
-from meshreel.coding.reference_mesh import code_reference
+from meshreel.coding.mesh import code_reference
 from meshreel.container.writer import ReelWriter
 from meshreel.format.layout import Header
 from meshreel.types import Mesh

@@ -24,8 +24,7 @@ from meshreel.coding.appearance.pictures import VideoEncoder, to_i420
 from meshreel.decoder.video import Video
 from meshreel.decoder.video import open as open_video
 from meshreel.encoder.sequence import Encoder
-from meshreel.encoder.settings.options import EncoderOptions
-from meshreel.encoder.settings.presets import appearance_options
+from meshreel.encoder.settings.options import EncoderOptions, appearance_options
 from meshreel.format.layout import VideoCodec
 from meshreel.geometry.atlas import MOST_SIDE
 from meshreel.geometry.derived_sequences import welded

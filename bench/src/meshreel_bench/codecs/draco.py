@@ -16,9 +16,9 @@ import msgspec
 import numpy as np
 
 from meshreel.analysis.survey import Survey, survey
-from meshreel.coding.intra import encode_empty, encode_intra
+from meshreel.coding.mesh import encode_empty, encode_intra
 from meshreel.container.writer import ReelWriter
-from meshreel.encoder.file.written import make_header
+from meshreel.encoder.file.summary import make_header
 from meshreel.encoder.scene.static import Static
 from meshreel.errors import InputError
 from meshreel.geometry.decimate import decimate, decimate_faces

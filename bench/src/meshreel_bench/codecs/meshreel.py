@@ -15,11 +15,9 @@ from threadpoolctl import threadpool_limits
 from meshreel.encoder.group.interval import Interval
 from meshreel.encoder.group.progress import Stages
 from meshreel.encoder.layers.options import LayersOptions
-from meshreel.encoder.paper.options import PaperOptions
-from meshreel.encoder.paper.recipe import Fitted, FoundGroup, find_groups
+from meshreel.encoder.paper.recipe import Fitted, FoundGroup, PaperOptions, find_groups
 from meshreel.encoder.sequence import Encoder
-from meshreel.encoder.settings.options import EncoderOptions, SceneOptions
-from meshreel.encoder.settings.presets import plain_displacements
+from meshreel.encoder.settings.options import EncoderOptions, SceneOptions, plain_displacements
 from meshreel.encoder.settings.settings import Settings
 from meshreel.errors import InputError
 from meshreel.types import MeshSequence

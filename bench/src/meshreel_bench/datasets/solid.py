@@ -122,7 +122,8 @@ def chains_of(data: bytes) -> list[Chain]:
     for chunk in reader.tracks[0]:
         before = state if reader.group_before(chunk) is not None else None
         payload = reader.read_chunk(chunk.number)
-        meshes, state = continue_group(payload, chunk.frame_count, None, before, place)
+        normalised, state = continue_group(payload, chunk.frame_count, None, before)
+        meshes = [place.of(mesh) for mesh in normalised]
         numbers = range(chunk.first_frame, chunk.first_frame + chunk.frame_count)
         if chunk.form not in (Form.LAYERS, Form.LAPLACIAN):
             chains += [[(k, Carrier(mesh.vertices, mesh.faces, 0))] for k, mesh in zip(numbers, meshes, strict=True)]

@@ -29,10 +29,9 @@ from meshreel.analysis.survey import survey
 from meshreel.capture.simulated.procedural import SoftBodiesOptions, soft_bodies
 from meshreel.coding import klt
 from meshreel.coding.group import decode_group, payload_bytes_by_purpose
-from meshreel.coding.paper.group import encode_laplacian
-from meshreel.coding.reference_mesh import CodedReference, code_reference
-from meshreel.encoder.paper.options import PaperOptions
-from meshreel.encoder.paper.recipe import LEVELS, REFERENCE_BITS
+from meshreel.coding.mesh import CodedReference, code_reference
+from meshreel.coding.paper.displacements import encode_laplacian
+from meshreel.encoder.paper.recipe import LEVELS, REFERENCE_BITS, PaperOptions
 from meshreel.geometry.topology import components as connected
 from meshreel.geometry.topology import vertex_normals
 from meshreel.metrics.error_sheet import SheetOptions, write_sheet

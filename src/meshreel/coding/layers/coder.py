@@ -18,21 +18,20 @@ from ...errors import FormatError, InputError
 from ...format.budget import LIMITS, Size, check_cost, layers_cost
 from ...format.layout import Form, LayersGroup, LayersLevel, LayersPatches, Origin
 from ...format.records import pack, unpack, unpack_all
-from ...geometry.topology import heights, refine, subdivide, write_frames
+from ...geometry.topology import Level, heights, refine, subdivide
 from ...shapes import Float64, Int32
-from ...types import Mesh, Placement
-from ..mesh import check_growth, check_step, decode_mesh
-from ..reference_mesh import CodedReference
+from ...types import Mesh
+from ..mesh import CodedReference, check_growth, check_step, decode_mesh
 from ..steps import rung_of
-from .details import Shown, decode_last, decode_last_scalars, decode_level, encode_level
-from .fields import Rate
-from .graph import Connectivity, connectivity
+from .fields import EncodedField, Rate, encode_field
+from .graph import connectivity, siblings
 from .patches import Patches, decode_patches
-from .trajectories import decode_last_places, decode_trajectories, encode_trajectories
+from .trajectories import decode_trajectories, encode_trajectories
 
 NOISY_STEP = 0.8  # RMS distances of the noise by which a step is widened (decision 16)
 NOISY_DETAIL = 1.25  # RMS distances of the noise, least RMS of a column of detail: noise has 1 (decision 28)
 MOST_FRAMES = 255  # of a group: a byte in the head
+SIBLING_WEIGHTS = (36, 16)  # weights of the siblings' mean that the encoder tries, 64ths: guesses
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,20 +65,7 @@ class LayersState:
     faces: Int32[np.ndarray, "F 3"]  # of the base
     base: Float64[np.ndarray, "V 3"]  # the base's vertices in the last frame
     scalars: tuple[Float64[np.ndarray, " _"], ...]  # of the last frame, for each decoded level
-    finer: tuple[Connectivity, ...] = ()  # of the decoded levels, kept because it follows from the faces alone
     colors: Float64[np.ndarray, "W 3"] | None = None  # of all decoded vertices (appearance.colors)
-
-    @property
-    def count(self) -> int:
-        """Number of vertices of the decoded levels."""
-        return len(self.base) + sum(map(len, self.scalars))
-
-    def nbytes_beyond(self, previous: LayersState | None) -> int:
-        """Return the memory, bytes, that this state does not share with the state from which it was predicted."""
-        shared = () if previous is None else previous.finer
-        sizes = [near.nbytes for near in self.finer if not any(near is other for other in shared)]
-        colors = 0 if self.colors is None else self.colors.nbytes
-        return self.faces.nbytes + self.base.nbytes + sum(level.nbytes for level in self.scalars) + sum(sizes) + colors
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,10 +110,10 @@ def encode_layers(
             raise InputError(f"{positions.shape[1]} vertices where level {number} has {level.count}")
         curvature = options.curvature(number)
         aim = heights(positions[:, : level.count], decoded, level, curvature)
-        coded = encode_level(aim, level, options.rate(number, noise), curvature, _before(previous, number))
-        layers.append(pack(coded.record))
-        scalars.append(coded.scalars)
-        decoded, faces = refine(decoded, level, coded.scalars, curvature), level.faces
+        record, offsets = _encode_level(aim, level, options.rate(number, noise), curvature, _before(previous, number))
+        layers.append(pack(record))
+        scalars.append(offsets)
+        decoded, faces = refine(decoded, level, offsets, curvature), level.faces
     ends = tuple(accumulate(map(len, layers)))
     for count, end in enumerate(ends):
         check_cost(layers_cost(Size.of(base, count), frames), end, "layers")
@@ -154,83 +140,29 @@ def read_layers(data: bytes, levels: int | None = None) -> LayersRecords:
     return LayersRecords(head, tuple(data[start:end] for start, end in pairwise(ends)), ends[-1])
 
 
-@dataclass(frozen=True, slots=True)
-class DecodedLayers:
-    """Decoded group, with spare memory behind its positions."""
+def decode_records(
+    records: LayersRecords, previous: LayersState | None
+) -> tuple[Int32[np.ndarray, "F 3"], Float64[np.ndarray, "T V 3"], LayersState]:
+    """Decode the faces, the positions in every frame, and the state that predicts the next group.
 
-    faces: Int32[np.ndarray, "F 3"]
-    positions: Float64[np.ndarray, "T V 3"]
-    state: LayersState
-    spare: Int32[np.ndarray, "N 3"]  # memory for faces, behind the positions
-
-
-def place_layers(
-    records: LayersRecords, previous: LayersState | None, place: Placement | None = None, spare: bool = False
-) -> DecodedLayers:
-    """Decode records; with `place`, the positions are placed by it, but never the state.
-
-    With `spare`, the block of memory also has room for the faces of each frame: a single block avoids page faults,
-    which would take as long as decoding.
+    Raises FormatError if the records are damaged, or predicted from a missing group.
     """
-    head = records.head
-    base, previous = _start(records, previous)
-    rows = decode_trajectories(records.layers[0], base, head.frames)
-    last = np.ascontiguousarray(rows[:, :, -1])
-    faces, finest = base.faces, len(records.layers) - 1
-    room = None if finest else _Room.of(head.frames, len(rows), 0)
+    frames, base = records.head.frames, base_of(records, previous)
+    previous = previous if records.head.origin == Origin.PREVIOUS else None
+    rows = decode_trajectories(records.layers[0], base, frames)
+    last, faces = np.ascontiguousarray(rows[:, :, -1]), base.faces
     scalars: list[Float64[np.ndarray, " _"]] = []
-    finer: list[Connectivity] = []
     for number, record in enumerate(records.layers[1:], 1):
-        near = _level(previous, number, faces, len(rows), head.frames)
-        before = _before(previous, number)
-        if number < finest:
-            rows, offsets = decode_level(record, near, rows, before)
-        else:
-            room = _Room.of(head.frames, near.level.count, len(near.level.faces) * spare)
-            offsets = decode_last(record, near, rows, before, Shown(room.positions, place))
+        near = connectivity(faces, len(rows))
+        if 3 * frames * near.level.count > LIMITS.numbers:
+            raise FormatError(f"{frames} frames of {len(near.level.faces)} faces exceed {LIMITS.numbers} numbers")
+        rows, offsets = _core.decode_level(record, near.core, rows, _before(previous, number))
         faces = near.level.faces
-        finer.append(near)
         scalars.append(offsets)
-    assert room is not None
-    if not finer:
-        write_frames(rows, place, room.positions)
-    state = LayersState(base.faces, last, tuple(scalars), tuple(finer))
-    return DecodedLayers(faces, room.positions, state, room.faces)
-
-
-def state_after(records: LayersRecords, previous: LayersState | None) -> LayersState:
-    """Decode only the state that predicts the next group: a fraction of the work of `place_layers`.
-
-    Raises FormatError as that does, but checks only the last frame's base.
-    """
-    frames = records.head.frames
-    base, previous = _start(records, previous)
-    last = decode_last_places(records.layers[0], base, frames)
-    faces, vertices = base.faces, len(last)
-    scalars: list[Float64[np.ndarray, " _"]] = []
-    finer: list[Connectivity] = []
-    for number, record in enumerate(records.layers[1:], 1):
-        near = _level(previous, number, faces, vertices, frames)
-        scalars.append(decode_last_scalars(record, near, frames, _before(previous, number)))
-        faces, vertices = near.level.faces, near.level.count
-        finer.append(near)
-    return LayersState(base.faces, last, tuple(scalars), tuple(finer))
-
-
-@dataclass(frozen=True, slots=True)
-class _Room:
-    """Block of memory for the positions of a group and for faces."""
-
-    positions: Float64[np.ndarray, "T V 3"]
-    faces: Int32[np.ndarray, "N 3"]
-
-    @staticmethod
-    def of(frames: int, vertices: int, faces: int) -> _Room:
-        """Allocate memory for `vertices` vertices and `faces` faces in each frame."""
-        size = 3 * frames * vertices
-        block = _core.empty(size + (3 * frames * faces + 1) // 2)
-        rows = block[size:].view(np.int32)[: 3 * frames * faces]
-        return _Room(block[:size].reshape(frames, vertices, 3), rows.reshape(-1, 3))
+    if not np.isfinite(rows).all():
+        raise FormatError("layers: positions are not finite")
+    positions = np.ascontiguousarray(np.moveaxis(rows, 2, 0))
+    return faces, positions, LayersState(base.faces, last, tuple(scalars))
 
 
 def layers_bytes_by_purpose(data: bytes) -> dict[str, int]:
@@ -247,33 +179,16 @@ def layers_bytes_by_purpose(data: bytes) -> dict[str, int]:
     return sizes
 
 
-def base_of(records: LayersRecords, previous: LayersState | None) -> Mesh:
-    """Return the base mesh of a group. Raises FormatError as `place_layers` does."""
-    return _start(records, previous)[0]
-
-
-def has_patches(data: bytes, records: LayersRecords, levels: int | None) -> bool:
-    """Return whether patches follow `records` in a payload, and are decoded at this number of levels."""
-    return records.end < len(data) and (levels is None or levels > records.head.levels)
-
-
 def patches_of(data: bytes, records: LayersRecords, levels: int | None, faces: int) -> Patches | None:
     """Decode the patches of a payload whose finest level has `faces` faces; None if it has none, or they are off."""
-    if not has_patches(data, records, levels):
+    if records.end == len(data) or (levels is not None and levels <= records.head.levels):
         return None
     return decode_patches(unpack_all(LayersPatches, data[records.end :]), records.head.frames, faces)
 
 
-def _start(records: LayersRecords, previous: LayersState | None) -> tuple[Mesh, LayersState | None]:
-    """Return the base mesh of a group and the state that it is predicted from, if it is."""
+def base_of(records: LayersRecords, previous: LayersState | None) -> Mesh:
+    """Return the base mesh of a group. Raises FormatError as `decode_records` does."""
     head = records.head
-    previous = previous if head.origin == Origin.PREVIOUS else None
-    base = _base(head, previous)
-    check_cost(layers_cost(Size.of(base, len(records.layers) - 1), head.frames), records.end, "layers")
-    return base, previous
-
-
-def _base(head: LayersGroup, previous: LayersState | None) -> Mesh:
     check_step(head.step)
     if head.frames == 0:
         raise FormatError("layers: a group of 0 frames")
@@ -286,6 +201,7 @@ def _base(head: LayersGroup, previous: LayersState | None) -> Mesh:
     else:
         base = Mesh(previous.base, previous.faces)
     check_growth(base, head.levels, head.frames)
+    check_cost(layers_cost(Size.of(base, len(records.layers) - 1), head.frames), records.end, "layers")
     return base
 
 
@@ -303,17 +219,28 @@ def _before(previous: LayersState | None, number: int) -> Float64[np.ndarray, " 
     return previous.scalars[number - 1] if previous is not None and number <= len(previous.scalars) else None
 
 
-def _level(
-    previous: LayersState | None, number: int, faces: Int32[np.ndarray, "F 3"], vertices: int, frames: int
-) -> Connectivity:
-    """Return the connectivity of a level; a predicted group shares that of the previous one.
+def _encode_level(
+    scalars: Float64[np.ndarray, "T E"],
+    level: Level,
+    rate: Rate,
+    curvature: int,
+    previous: Float64[np.ndarray, " E"] | None,
+) -> tuple[LayersLevel, Float64[np.ndarray, "T E"]]:
+    """Encode the scalars of a level, alone or from the previous group; return its record, and them as they decode.
 
-    Raises FormatError if the level has too many numbers.
+    A scalar is the distance of a new vertex along the decoded normal there (geometry.subdivision). The cheaper sibling
+    weight is taken.
     """
-    if previous is not None and number <= len(previous.finer):
-        near = previous.finer[number - 1]
-    else:
-        near = connectivity(faces, vertices)
-    if 3 * frames * near.level.count > LIMITS.numbers:
-        raise FormatError(f"{frames} frames of {len(near.level.faces)} faces exceed {LIMITS.numbers} numbers")
-    return near
+    follows = previous is not None and ((scalars - previous) ** 2).sum() < (scalars**2).sum()
+    offsets = np.ascontiguousarray((scalars - previous if follows else scalars).T)
+    near = siblings(level)
+    tried = [(weight, encode_field(offsets, near.graph(weight), rate)) for weight in SIBLING_WEIGHTS]
+    weight, field = min(tried, key=lambda pair: _cost(pair[1], offsets, rate))
+    record = LayersLevel(Origin.PREVIOUS if follows else Origin.ALONE, curvature, weight, field.record)
+    return record, field.decoded.T + previous if follows else field.decoded.T
+
+
+def _cost(field: EncodedField, offsets: Float64[np.ndarray, "E T"], rate: Rate) -> float:
+    error = float(((field.decoded.T - offsets.T) ** 2).sum())
+    bits = 8 * (len(field.record.basis) + len(field.record.symbols))
+    return error + rate.price * rate.step**2 * bits

@@ -66,16 +66,6 @@ class EncodedField:
         """The decoded trajectories, computed on first use."""
         return decode_field(self.record, self.graph, self.width, self.head)
 
-    @property
-    def basis_bits(self) -> int:
-        """Bits of the head and the basis."""
-        return 8 * len(self.record.basis)
-
-    @property
-    def symbol_bits(self) -> int:
-        """Bits of the symbols."""
-        return 8 * len(self.record.symbols)
-
 
 def encode_field(
     trajectories: Float64[np.ndarray, "V C"],

@@ -64,13 +64,6 @@ class Connectivity:
         """The level for calls of the core, which refers to these arrays."""
         return _core.Level(self.level.coarse, self.level.edges, self.siblings.starts, self.siblings.near)
 
-    @property
-    def nbytes(self) -> int:
-        """Memory in bytes, without the coarser level's faces, which belong to another object."""
-        return (
-            self.level.edges.nbytes + self.level.faces.nbytes + self.siblings.starts.nbytes + self.siblings.near.nbytes
-        )
-
 
 def connectivity(faces: Int32[np.ndarray, "F 3"], vertices: int) -> Connectivity:
     """Build the connectivity of the next level. Raises FormatError if a face refers to a missing vertex."""

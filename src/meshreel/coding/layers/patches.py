@@ -12,11 +12,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from ... import _core
 from ...errors import FormatError, InputError
 from ...format.layout import LayersPatches
 from ...shapes import Bool, Float64, Int32, Int64
-from ...types import Mesh, Placement
+from ...types import Mesh
 from .. import entropy
 from ..mesh import check_growth, decode_mesh, encode_mesh
 from ..steps import RUNGS, step_of
@@ -31,37 +30,10 @@ class Patches:
     dropped: Bool[np.ndarray, "T F"]  # faces that a frame does not show
     meshes: tuple[Mesh, ...]  # mesh added to each frame; possibly empty
 
-    def apply(
-        self,
-        positions: Float64[np.ndarray, "T V 3"],
-        faces: Int32[np.ndarray, "F 3"],
-        place: Placement | None = None,
-        spare: Int32[np.ndarray, "N 3"] | None = None,
-    ) -> list[Mesh]:
-        """Return the patched frames: vertices and faces of a patch follow those of the template.
-
-        With `place`, they are in metres, and `positions` must be placed already. `spare` is memory for the faces of all
-        frames.
-        """
-        shown = self._shown(faces, spare)
-        return [
-            _joined(points, kept, patch if place is None or patch.is_empty else place.of(patch))
-            for points, kept, patch in zip(positions, shown, self.meshes, strict=True)
-        ]
-
-    def _shown(
-        self, faces: Int32[np.ndarray, "F 3"], spare: Int32[np.ndarray, "N 3"] | None
-    ) -> list[Int32[np.ndarray, "_ 3"]]:
-        """Return the remaining faces of each frame."""
-        faces_of = [faces] * len(self.dropped)
-        changed = np.flatnonzero(self.dropped.any(axis=1))
-        room = np.empty((len(changed) * len(faces), 3), np.int32) if spare is None or not len(spare) else spare
-        used = 0
-        for t in changed:
-            count = _core.keep_faces(faces, self.dropped[t].view(np.uint8), room[used : used + len(faces)])
-            faces_of[t] = room[used : used + count]
-            used += count
-        return faces_of
+    def apply(self, positions: Float64[np.ndarray, "T V 3"], faces: Int32[np.ndarray, "F 3"]) -> list[Mesh]:
+        """Return the patched frames: vertices and faces of a patch follow those of the template."""
+        frames = zip(positions, self.dropped, self.meshes, strict=True)
+        return [_joined(points, faces[~gone] if gone.any() else faces, patch) for points, gone, patch in frames]
 
 
 def reach(rung: int, frames: int) -> tuple[float, float]:

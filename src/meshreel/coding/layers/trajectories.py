@@ -62,11 +62,6 @@ def decode_trajectories(record: bytes, base: Mesh, frames: int) -> Float64[np.nd
     return _core.decode_motion(record, base.vertices, base.faces, frames)
 
 
-def decode_last_places(record: bytes, base: Mesh, frames: int) -> Float64[np.ndarray, "V 3"]:
-    """Decode the positions of the base's vertices in the last frame alone; otherwise as `decode_trajectories`."""
-    return _core.decode_last_places(record, base.vertices, base.faces, frames)
-
-
 def _bits(rate: Rate) -> int:
     """Return the fraction bits of shared motion: it is rounded to a sixteenth of a step."""
     return min(max(strict.ceil_log2(8.0 / rate.step), 0), MOST_BITS)

@@ -126,7 +126,8 @@ class _Components:
     ) -> Float64[np.ndarray, " M"]:
         """Return distortion + price * rate of each component, which add because the basis is orthonormal."""
         error = self.system.inverse(symbols * steps_of(rungs)) - self.weights
-        bits = entropy.weights_cost(symbols[: self.vertices], neighbours)
+        streams = entropy.encode_weights(symbols[: self.vertices], neighbours)
+        bits = np.array([8.0 * len(stream) for stream in streams], dtype=np.float64)
         bits += log2(2.0 * np.abs(symbols[self.vertices :]) + 1).sum(axis=0)
         bits += log2(2.0 * np.abs(self.basis.vectors) + 1).sum(axis=1)
         return (error**2).sum(axis=0) + WORTH * self.options.step**2 * bits

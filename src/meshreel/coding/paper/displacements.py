@@ -1,21 +1,26 @@
-"""Displacement fields <-> bytes: KLT, Laplacian coordinates, quantisation, entropy coding (paper, section 3.3.3).
+"""The form `laplacian`: a displacement field by KLT, Laplacian coordinates and entropy coding (paper, section 3.3.3).
 
 In: a field of V x T displacements of a base mesh as decoded, in units of the sequence's diagonal. Out: one payload:
 DisplacementHead, then for each component, strongest first, the stream of its anchors and the stream of its deltas. The
-head and the first k components decode without the rest.
+head and the first k components decode without the rest. A group is such a payload behind its reference mesh.
 """
 
 from __future__ import annotations
+
+from itertools import accumulate
 
 import numpy as np
 
 from ...errors import FormatError, InputError
 from ...format import records
-from ...format.budget import LIMITS
-from ...format.layout import AnchorRule, Component, DisplacementHead
+from ...format.budget import LIMITS, Size, check_cost, laplacian_cost
+from ...format.layout import AnchorRule, Component, DisplacementHead, Form, LaplacianGroup
+from ...format.records import pack, unpack_all
+from ...geometry.topology import subdivide_midpoint
 from ...shapes import Float64
 from ...types import Mesh
 from .. import entropy, klt
+from ..mesh import CodedReference, check_growth, check_step, decode_mesh
 from ..steps import RUNGS
 from . import laplacian, quantize
 from .allocation import Allocation, DisplacementOptions, allocate, alternatives, cost, round_deltas, steps_of
@@ -61,12 +66,6 @@ def decode_displacements(data: bytes, base: Mesh, components: int | None = None)
     except ValueError as error:  # collapsed faces, which no encoder's Draco keeps, tie parts that have no anchor
         raise FormatError(f"displacements: the base's least squares have no solution: {error}") from error
     return klt.inverse(weights, _read_basis(head, count))  # eq. 9
-
-
-def claims_of(data: bytes) -> tuple[int, int]:
-    """Return the numbers of frames and of components that the head of a payload claims."""
-    head = _read_head(data)[0]
-    return head.frames, len(head.components)
 
 
 def layer_sizes(data: bytes) -> list[int]:
@@ -152,3 +151,47 @@ def _streams(data: bytes, offset: int, components: tuple[Component, ...]) -> lis
 
 def _size(component: Component) -> int:
     return component.anchors_size + component.deltas_size
+
+
+def encode_laplacian(
+    reference: CodedReference, field: Float64[np.ndarray, "V T 3"], options: DisplacementOptions
+) -> tuple[bytes, tuple[int, ...]]:
+    """Encode a `laplacian` group; return its payload and its layer ends: k + 1 layers decode with k components.
+
+    Raises CostlyError if it takes so few bytes that readers would refuse them.
+    """
+    displacements = encode_displacements(field, reference.base, options)
+    record = LaplacianGroup(Form.LAPLACIAN, reference.levels, reference.step, reference.data, displacements)
+    payload = pack(record)
+    sizes = layer_sizes(displacements)
+    layers = tuple(accumulate(sizes[1:], initial=len(payload) - sum(sizes[1:])))
+    _check_growth(record, reference.mesh, layers[0])
+    return payload, layers
+
+
+def decode_laplacian(data: bytes, components: int | None = None) -> list[Mesh]:
+    """Decode the frames of a group from at most `components` components. Raises FormatError on damaged bytes."""
+    record = unpack_all(LaplacianGroup, data)
+    check_step(record.step)
+    reference = decode_mesh(record.reference, record.step)
+    _check_growth(record, reference, len(data))
+    base = subdivide_midpoint(reference, record.levels)
+    field = decode_displacements(record.displacements, base, components)
+    return [Mesh(np.ascontiguousarray(base.vertices + field[:, t]), base.faces) for t in range(field.shape[1])]
+
+
+def laplacian_bytes_by_purpose(data: bytes) -> dict[str, int]:
+    """Return the bytes of a payload by purpose. Raises FormatError on damaged bytes."""
+    record = unpack_all(LaplacianGroup, data)
+    head, *components = layer_sizes(record.displacements)
+    return {"reference": len(record.reference), "basis": head, "displacements": sum(components)}
+
+
+def _check_growth(record: LaplacianGroup, reference: Mesh, size: int) -> None:
+    """Raise FormatError if a group, of which `size` bytes are at hand, grows beyond the limits."""
+    head = _read_head(record.displacements)[0]
+    frames, components = head.frames, len(head.components)
+    check_growth(reference, record.levels, frames)
+    corners = np.bincount(reference.faces.reshape(-1)).astype(np.float64)
+    cost = laplacian_cost(Size.of(reference, record.levels), frames, components, int(corners @ corners))
+    check_cost(cost, size, "laplacian")

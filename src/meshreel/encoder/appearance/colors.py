@@ -1,4 +1,4 @@
-"""Colours of what is coded, after its geometry: of the vertices of each group, and the textures of a chain of groups.
+"""Colours of what is coded, after its geometry: of each group's vertices, and textures and splats of a chain of groups.
 
 In: groups as they are coded, the frames that they are of. Out: the same with what belongs to them. Where no frame has
 colours, nothing is done. A chain is a group that needs no other, and those that are predicted from it one after the
@@ -8,26 +8,29 @@ other: they have one atlas, in which the surface hardly changes, and their pictu
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from contextlib import suppress
+from dataclasses import replace
 
 import numpy as np
 
+from ... import _core
 from ...analysis.appearance.bake import bake, picture, texels_of, unwrap, vertex_colors
+from ...analysis.appearance.splat_fit import GOLDEN, SplatFrame, SplatView, fit_splats, rendered, ring, taken
 from ...coding.appearance.atlas import encode_atlas
+from ...coding.appearance.splats import encode_splats
 from ...coding.colored import Canvas, canvas_of, encode_group_colors, finest_faces
-from ...coding.group import continue_group
 from ...coding.layers.coder import LayersState
 from ...container.writer import Companion
+from ...errors import InputError
 from ...format.budget import CostlyError
 from ...format.layout import ChunkKind, Form
 from ...geometry.color_views import Paint
-from ...types import GREY, Mesh
-from ..group.forms import EncodedGroup
+from ...geometry.splats import Carrier
+from ...types import GREY, Mesh, evenly
+from ..group.forms import NORMALISED, EncodedGroup
 from ..group.interval import Interval
 from ..group.progress import Stages
-from .options import TEXTURE_SIZES, AppearanceOptions, TextureOptions
-from .splats import ChainSplats
-from .videos import Videos
+from .videos import TEXTURE_SIZES, AppearanceOptions, TextureOptions, Videos
 
 USED = 0.43  # of a texture is on the surface, as unwrapped; measured on basketball_player
 COARSER = 2.0  # steps of vertex colours beneath pictures, at half of their bytes (decision 28)
@@ -41,18 +44,17 @@ def colored_groups(
     if options is None:
         yield from groups
         return
-    at, state, chain = 0, None, _Chain(interval, options)
+    at, chain = 0, _Chain(interval, options)
     for group in groups:
         numbers = range(at, at + group.frame_count)
         at = numbers.stop
         if not group.predicted:
             yield from chain.done()
-            state, chain = None, _Chain(interval, options)
+            chain = _Chain(interval, options)
         meshes = [interval.frames[number] for number in numbers]
         paints = [interval.paint(number, mesh) for number, mesh in zip(numbers, meshes, strict=True)]
         if any(paint is not None for paint in paints):
-            pictured = has_pictures(interval, meshes, options)
-            state = chain.add(group, _Frames(numbers, paints), options, state, pictured)
+            chain.add(group, numbers, paints, has_pictures(interval, meshes, options))
             if stages is not None:
                 stages.add("color", group.frame_count)
         else:
@@ -69,14 +71,6 @@ def has_pictures(interval: Interval, meshes: Iterable[Mesh], options: Appearance
     return any(mesh.texture is not None for mesh in meshes)
 
 
-@dataclass(frozen=True, slots=True)
-class _Frames:
-    """Frames of a group: their numbers in the interval, and what knows their colours."""
-
-    numbers: range
-    paints: list[Paint | None]
-
-
 class _Chain:
     """Groups of one chain, their splats, and the video of their pictures."""
 
@@ -84,36 +78,37 @@ class _Chain:
         self._groups = list[EncodedGroup]()
         self._splats = None if options.splats is None else ChainSplats(options.splats, interval)
         self._pictured = list[bool]()  # whether each of the groups has pictures
+        self._options = options
         self._video: _Video | None = None
+        self._before: tuple[_core.GroupState | None, LayersState | None] = None, None  # that predict the next group
 
     def pass_on(self, group: EncodedGroup) -> None:
         """Add a group without colours."""
         self._groups.append(group)
         self._pictured.append(False)
 
-    def add(
-        self,
-        group: EncodedGroup,
-        frames: _Frames,
-        options: AppearanceOptions,
-        before: LayersState | None,
-        pictured: bool,
-    ) -> LayersState | None:
-        """Add a group with the colours of its frames; return the state that those of the next are predicted from."""
-        paints = frames.paints
-        meshes, after = continue_group(group.payload, len(paints), None, before)
-        canvas = canvas_of(group.payload, [len(mesh.vertices) for mesh in meshes], None, before)
+    def add(self, group: EncodedGroup, numbers: range, paints: Sequence[Paint | None], pictured: bool) -> None:
+        """Add a group with the colours of its frames, which have these numbers in the interval."""
+        options, (core, known) = self._options, self._before
+        decoded = _core.Group(group.payload, len(paints), None, core, NORMALISED)
+        meshes = [Mesh(*arrays) for arrays in decoded.frames()]
+        canvas = canvas_of(group.payload, [len(mesh.vertices) for mesh in meshes], None, known)
         if self._splats is not None:
-            self._splats.add(group.form, canvas, meshes, frames.numbers)
+            self._splats.add(group.form, canvas, meshes, numbers)
         colors = [_vertex_colors(paint, mesh) for paint, mesh in zip(paints, meshes, strict=True)]
         texture = options.texture if pictured and not self._groups and group.form == Form.LAYERS else None
         is_covered = texture is not None or self._video is not None
         step = COARSER * options.color_step if is_covered else options.color_step
-        try:
-            encoded = encode_group_colors(canvas, colors, step, None if before is None else before.colors)
-        except CostlyError:  # the summary tells of it
+        encoded, self._before = None, (None, None)
+        with suppress(CostlyError):
+            encoded = encode_group_colors(canvas, colors, step, None if known is None else known.colors)
+        if decoded.state is not None:
+            base, coded = canvas.meshes[0].base, None if encoded is None else encoded.state
+            last = LayersState(base.faces, meshes[-1].vertices[: len(base.vertices)], (), coded)
+            self._before = decoded.state, last
+        if encoded is None:  # the summary tells of it
             self.pass_on(replace(group, lost_colors=True))
-            return after
+            return
         companions = [Companion(ChunkKind.COLORS, encoded.payload, encoded.layers)]
         if texture is not None:
             self._video = _Video(canvas, texture, paints, meshes)
@@ -123,7 +118,6 @@ class _Chain:
                 self._video.add(paint, mesh)
         self._groups.append(replace(group, companions=tuple(companions)))
         self._pictured.append(self._video is not None)
-        return None if after is None else replace(after, colors=encoded.state)
 
     def done(self) -> list[EncodedGroup]:
         """Return the groups with their splats and pictures."""
@@ -180,3 +174,54 @@ def fitting_size(paints: Sequence[Paint | None], meshes: Sequence[Mesh]) -> int:
     paint = paints[some]
     wanted = 0.0 if paint is None else paint.pixels_on(meshes[some]) / USED
     return next((size for size in TEXTURE_SIZES if size <= MOST_FITTING and size * size >= wanted), MOST_FITTING)
+
+
+FRAMES = 16  # of a chain, whose pictures are looked at, at most (guess)
+VIEWS = 6  # of each, where there are no colour cameras (guess)
+SIZE = 256  # pixels, of the longer side of the body in a picture (guess)
+
+
+class ChainSplats:
+    """The frames of a chain, and in the end its splats."""
+
+    def __init__(self, count: int, interval: Interval) -> None:
+        self._splats, self._interval = count, interval
+        self._frames, self._every, self._count = list[tuple[int, Carrier]](), 1, 0
+
+    def add(self, form: Form, canvas: Canvas, meshes: Sequence[Mesh], numbers: Sequence[int]) -> None:
+        """Add the frames of a group, as decoded, with their numbers in the interval, where they are of one mesh."""
+        if form not in (Form.LAYERS, Form.LAPLACIAN):
+            return
+        for number, carrier in zip(numbers, canvas.carriers(meshes), strict=True):
+            if self._count % self._every == 0:
+                self._frames.append((number, carrier))
+            self._count += 1
+            if len(self._frames) == 4 * FRAMES:  # of a long chain, not all are in memory
+                self._frames, self._every = self._frames[::2], 2 * self._every
+
+    def companions(self) -> tuple[Companion, ...]:
+        """Return the splats, fitted to all frames together; none where no frame can have some.
+
+        Raises InputError where no picture shows the surface.
+        """
+        some = self._frames
+        if not some:
+            return ()
+        chosen = [some[k] for k in evenly(len(some), FRAMES)]
+        frames = [SplatFrame(carrier, self._views(number)) for number, carrier in chosen]
+        try:
+            splats, importance = fit_splats(frames, self._splats)
+        except InputError as error:
+            first = self._interval.first_frame
+            raise InputError(f"frames {first + some[0][0]} to {first + some[-1][0]}: {error}") from error
+        payload, layers = encode_splats(splats, importance)
+        return (Companion(ChunkKind.SPLATS, payload, layers),)
+
+    def _views(self, number: int) -> tuple[SplatView, ...]:
+        """Return pictures of a frame: of colour cameras, or rendered from around it."""
+        interval = self._interval
+        mesh, views = interval.frames[number], interval.views
+        if views is not None:
+            at = interval.first_frame + number
+            return taken(views.pictures(at), mesh, views.surface(at), SIZE)
+        return rendered(mesh, ring(mesh, VIEWS, SIZE, GOLDEN * number, interval.up)) if mesh.is_colored else ()

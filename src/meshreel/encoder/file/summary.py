@@ -1,12 +1,38 @@
-"""Summary of an encode: the size, the groups and the warnings of a written file."""
+"""Summary of an encode, and the writing of a file: its header, its groups in order, and its metadata.
+
+In: encoded groups, a writer. Out: their summaries, warnings of what the file lacks, and the errors of the written file.
+Decoding needs none of the metadata, but the rate includes them.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+import hashlib
+import json
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass, field
+from typing import Any, BinaryIO
 
-from ...format.layout import Form
+import numpy as np
+
+from ... import _core
+from ...analysis.survey import Survey
+from ...container.reader import Chunk, ReelReader
+from ...container.sources import StreamSource
+from ...container.writer import ReelWriter
+from ...edit.metadata import CANONICAL, KEYS, PART, Totals, rounded, upright
+from ...format.layout import Form, Header
+from ...geometry.closest_points import distances
+from ...geometry.topology import concatenate, drop_unreferenced
 from ...geometry.work import Work
-from ..group.target import Fidelity
+from ...metrics.distance import PSNR_CEILING, psnr
+from ...types import Mesh, MeshSequence, Up
+from ..group.forms import Fidelity
+from ..run.interval_files import write_companions, write_group
+from ..scene.parts import Parts
+from ..scene.static import Static
+from ..scene.tracks import TrackGroup
+from ..settings.options import EncoderOptions
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,3 +87,154 @@ class Summary:
         if self.scene is not None:
             return self.scene.psnr
         return sum(group.share * group.frame_count * group.fidelity.psnr for group in self.groups) / self.frame_count
+
+
+ASTRAY = 0.005  # of the surface: noise, and what a border of the background lacks, is less (guess)
+
+
+def warnings_of(seen: Survey) -> tuple[str, ...]:
+    """Return warnings of surface that no file of the sequence has."""
+    found = []
+    if seen.dropped:
+        found.append(f"{seen.dropped} faces without area or with the vertices of another face are not kept")
+    if seen.flattened:
+        count, first = len(seen.flattened), seen.flattened[0]
+        text = f"{count} frames have faces, but none with an area: they count as empty (first frame {first} of these)"
+        found.append(text)
+    return tuple(found)
+
+
+def warnings_of_scene(parts: Parts, moves: bool, dropped: int) -> Iterator[str]:
+    """Yield warnings of still surface, of all moving surface or of `dropped` faces of it that the file lacks."""
+    if parts.astray > ASTRAY:
+        text = f"{100 * parts.astray:.1f} % of the surface stands still, but is far from the background that frames"
+        why = "it flies, or is there for a while only"
+        yield f"{text} share, and is not kept: {why}; to keep all, encode with --dynamic-only"
+    if not moves:
+        least = 2 * parts.segmentation.cell
+        text = f"nothing moves by more than {least:.2g} m, or no view sees it: the whole scene is background"
+        yield f"{text}; if something does, encode with --dynamic-only"
+    if dropped:
+        yield f"{dropped} faces of bits that move, far from all bodies and there only for a moment, are not kept"
+
+
+def warnings_of_colors(groups: Sequence[GroupSummary], states: Sequence[Static] = ()) -> Iterator[str]:
+    """Yield a warning of what has colours that the file has not."""
+    frames = sum(group.frame_count for group in groups if group.lost_colors)
+    bare = [f"{frames} frames"] * (frames > 0) + ["the background"] * any(state.lost_colors for state in states)
+    if bare:
+        yield f"no colours of {' and of '.join(bare)}: they would cost a reader too much"
+
+
+def write_in_order(
+    writer: ReelWriter, coded: Sequence[TrackGroup], states: Sequence[Static], seen: Survey
+) -> list[GroupSummary]:
+    """Write all groups, and each state of the background before the first group that is shown with it."""
+    groups, waiting, static = list[GroupSummary](), deque(states), list[int]()
+    for each in coded:
+        while waiting and waiting[0].frame <= each.first_frame:
+            state = waiting.popleft()
+            static = [writer.add_static(state.payload, depends_on=static if state.is_patch else ())]
+            write_companions(writer, static[0], state.companions, None)
+        with_static = each.track == 0 and not seen.is_bare(each.first_frame)
+        groups.append(write_tracked(writer, each, static if with_static else [], seen.unit))
+    return groups
+
+
+def write_tracked(writer: ReelWriter, each: TrackGroup, static: list[int], unit: float) -> GroupSummary:
+    """Write a group of a track, with the chunk of the background that its frames are shown with."""
+    group = each.group
+    write_group(writer, each.first_frame, group, each.track, static)
+    key = None if group.key is None else each.first_frame + group.key
+    fidelity = group.fidelity.scaled(unit)
+    colors = sum(map(len, group.companions))
+    facts = (group.form, group.frame_count, len(group.stored or group.payload), fidelity, group.predicted)
+    return GroupSummary(*facts, key, each.track, each.share, colors, group.lost_colors, group.canonical)
+
+
+def mean_psnr(sequence: MeshSequence, file: BinaryIO, diagonal: float, numbers: Sequence[int]) -> float:
+    """Return the mean d2_psnr_paper, dB, over some frames of a file."""
+    reader, found = ReelReader(StreamSource(file)), []
+    for number in numbers:
+        points, shown = drop_unreferenced(sequence[number]).vertices, _shown(reader, number)
+        if not len(points) or shown.is_empty:
+            found.append(PSNR_CEILING if not len(points) and shown.is_empty else 0.0)
+            continue
+        gap = float((distances(points, shown) ** 2).mean())
+        found.append(min(psnr(gap, diagonal), PSNR_CEILING))
+    return float(np.mean(found))
+
+
+def _shown(reader: ReelReader, frame: int) -> Mesh:
+    """Decode the surface of a frame, m: its background, then its tracks, all without colours."""
+    (x, y, z), parts, background = reader.header.origin, list[Mesh](), None
+    place = reader.header.scale, (x, y, z)
+    static = reader.static_of_frame(frame)
+    for link in _chain(static, lambda link: reader.chunks[link.depends_on[0]] if link.depends_on else None):
+        background = _core.Background(reader.read_chunk(link.number), background, place)
+    parts += [] if background is None else [Mesh(*background.arrays())]
+    for track in range(len(reader.tracks)):
+        chunk, state = reader.chunk_of_frame(frame, track), None
+        for link in _chain(chunk, reader.group_before):
+            payload = reader.read_chunk(link.number)
+            group = _core.Group(payload, link.frame_count, None, state, place, shown=link is chunk)
+            state = group.state
+        parts.append(Mesh(*group.frames()[frame - chunk.first_frame]))
+    return concatenate(parts)
+
+
+def _chain(chunk: Chunk | None, before: Callable[[Chunk], Chunk | None]) -> list[Chunk]:
+    """Return the chunks that a chunk is decoded from, in order, itself last."""
+    chain = list[Chunk]()
+    while chunk is not None:
+        chain.append(chunk)
+        chunk = before(chunk)
+    return chain[::-1]
+
+
+def make_header(frame_rate: float, seen: Survey, metadata: dict[str, Any]) -> Header:
+    """Return the header of a file whose coordinates are normalised by a survey."""
+    low, high = ((corner - seen.center) / seen.unit for corner in (seen.low, seen.high))
+    return Header(
+        frame_rate=frame_rate,
+        origin=tuple(map(float, seen.center)),
+        scale=seen.unit,
+        minimum=tuple(map(float, low)),
+        maximum=tuple(map(float, high)),
+        metadata=json.dumps(metadata, separators=(",", ":")),
+    )
+
+
+def metadata_of(
+    options: EncoderOptions, groups: Sequence[GroupSummary], up: Up, part: tuple[int, int] | None = None
+) -> dict[str, Any]:
+    """Return the metadata of a file that is no scene; a `part` is its first frame, and the frames of the whole."""
+    totals, keys = totals_of(groups), sorted({group.key for group in groups if group.key is not None})
+    found = {**chosen_options(options, groups), KEYS: keys, **totals.means}
+    if part is None:
+        return found | upright(up)
+    digest = hashlib.sha256(repr(asdict(options)).encode()).hexdigest()[:16]
+    place = {"first_frame": part[0], "of": part[1]}
+    return found | upright(up) | {PART: place | {"totals": totals.exact, "options": digest}}
+
+
+def chosen_options(options: EncoderOptions, groups: Sequence[GroupSummary]) -> dict[str, Any]:
+    """Return the preset and the quality; of the paper's recipe also how many references lie in the pose of eq. 5."""
+    found = {"preset": options.preset, "quality": rounded(options.quality)}
+    return found | ({} if options.preset == "best" else {CANONICAL: sum(group.canonical for group in groups)})
+
+
+def totals_of(groups: Sequence[GroupSummary]) -> Totals:
+    """Return the totals of the groups of a file; bodies count by their share of the vertices."""
+    return Totals.added(
+        [
+            Totals(
+                group.frame_count if group.track == 0 else 0,
+                (count := group.share * group.frame_count) * group.fidelity.distance**2,
+                group.fidelity.worst,
+                count * group.fidelity.psnr,
+                count * group.fidelity.angle,
+            )
+            for group in groups
+        ]
+    )

@@ -1,26 +1,31 @@
-"""Forms of a group: coded groups and the choice of the cheaper form.
+"""Forms of a group: the fidelity to reach, the Draco floor that reaches it, and the choice of the cheaper form.
 
 In -> out: the frames of a group, and a reference that follows them or none -> an EncodedGroup with its fidelity.
+Decisions use the symmetric distance: the one-way form does not see surface that only the decoded frame has.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import TypeVar
 
 import numpy as np
 
-from ...coding.intra import encode_empty
+from ...coding.mesh import MAX_BITS, decode_intra, encode_empty, encode_intra
 from ...container.writer import Companion, Stored
 from ...errors import InputError
 from ...format.budget import CostlyError
 from ...format.layout import Form
+from ...geometry.decimate import decimate
+from ...metrics.distance import PSNR_CEILING, Original, surface_errors
+from ...metrics.surface_samples import WORST_ANGLE
 from ...types import Mesh
-from .draco import IntraOptions, cheapest_intra, finest_intra
-from .target import NO_ERROR, Fidelity, Target
 
 # Times the bytes that half the distance (6 dB) may cost: a finer template gains 4 dB for that (decision 7).
 MOST_FOR_HALF = 2
+NORMALISED = (1.0, (0.0, 0.0, 0.0))  # placement of a group that is decoded to be measured
 MOST_EMPTY = 65_535  # frames of a group without surface: what its field in the index holds
 
 
@@ -52,14 +57,11 @@ def cheaper(frames: Sequence[Mesh], group: EncodedGroup, options: IntraOptions) 
     That is where Draco is as good and smaller, or so much better that no finer template would reach it for the bytes,
     as on bodies of few, large faces.
     """
-    size = len(group.payload)
     found = cheapest_intra(frames, group.fidelity, most_for(group) * len(frames), options)
     if found is None:
         return group
-    payload, fidelity = found
-    if len(payload) >= size and fidelity.distance > group.fidelity.distance / 2:
-        return group
-    return EncodedGroup(Form.DRACO, len(frames), payload, (), fidelity)
+    is_better = len(found.payload) < len(group.payload) or found.fidelity.distance <= group.fidelity.distance / 2
+    return found if is_better else group
 
 
 def intra_only(frames: Sequence[Mesh], target: Target, options: IntraOptions) -> EncodedGroup:
@@ -70,17 +72,157 @@ def intra_only(frames: Sequence[Mesh], target: Target, options: IntraOptions) ->
     """
     found = cheapest_intra(frames, target, np.inf, options)
     try:
-        payload, fidelity = found or finest_intra(frames, target.distance)
+        return found or finest_intra(frames, target.distance)
     except CostlyError as error:
         if len(frames) > 1:
             return intra_only(frames[: len(frames) // 2], target, options)
         raise InputError(
             f"a mesh of {len(frames[0].faces)} faces: {error}, which no reader takes; simplify it"
         ) from error
-    return EncodedGroup(Form.DRACO, len(frames), payload, (), fidelity)
 
 
 def empty_groups(count: int) -> Iterator[EncodedGroup]:
     """Yield the groups of `count` frames without surface."""
     for start in range(0, count, MOST_EMPTY):
         yield EncodedGroup(Form.EMPTY, min(MOST_EMPTY, count - start), encode_empty(), (), NO_ERROR)
+
+
+LEVELS = (1, 0)  # midpoint subdivisions in the decoder, which are tried (guess)
+
+
+@dataclass(frozen=True, slots=True)
+class IntraOptions:
+    """Candidates that are tried for the `draco` form."""
+
+    fractions: tuple[float, ...] = (0.04, 0.08, 0.15, 0.25, 0.5, 1.0)  # of the vertices kept
+    steps: tuple[float, ...] = (2.0, 1.4, 1.0, 0.7, 0.5, 0.35)  # lattice steps, in units of the distance to reach
+    finer: bool = False  # where the step that one frame needs fails on others, finer ones are tried, which takes longer
+
+
+def cheapest_intra(
+    frames: Sequence[Mesh], target: Target, most_bytes: float, options: IntraOptions
+) -> EncodedGroup | None:
+    """Find a `draco` group under `most_bytes` that reaches the target in distance and angle.
+
+    Candidates are tried on the middle frame and ordered by their size there; the first that holds on all is taken.
+    """
+    originals, middle = [Original(frame) for frame in frames], len(frames) // 2
+    budget = most_bytes / len(frames)
+    for _, fraction, step, levels in sorted(_on_one_frame(originals[middle], target, budget, options)):
+        meshes = [_reduced(frame, fraction) for frame in frames]
+        payload = encode_intra(meshes, step, levels)
+        if len(payload) >= most_bytes:
+            continue
+        fidelity = _fidelity(originals, payload)
+        if fidelity is not None and fidelity.reaches(target):
+            return EncodedGroup(Form.DRACO, len(frames), payload, (), fidelity)
+    return None
+
+
+def finest_intra(frames: Sequence[Mesh], step: float) -> EncodedGroup:
+    """Encode every vertex in the `draco` form: the last resort where nothing cheaper reaches a target.
+
+    Raises CostlyError where readers would refuse so few bytes for the frames.
+    """
+    payload = encode_intra(frames, coarse_enough(frames, step), 0)
+    return EncodedGroup(Form.DRACO, len(frames), payload, (), measure(frames, decode_intra(payload)))
+
+
+def coarse_enough(frames: Sequence[Mesh], step: float) -> float:
+    """Return the lattice step, or the finest one that Draco has bits for over these frames' extent."""
+    extent = max((float(np.ptp(f.vertices, axis=0).max()) for f in frames if not f.is_empty), default=0.0)
+    return max(step, extent / 2 ** (MAX_BITS - 1))
+
+
+def _on_one_frame(
+    original: Original, target: Target, budget: float, options: IntraOptions
+) -> Iterator[tuple[int, float, float, int]]:
+    """Yield bytes, fraction, step and levels of candidates that reach the target on one frame within the budget."""
+    frame = original.mesh
+    for fraction in sorted(options.fractions):
+        reduced = _reduced(frame, fraction)
+        steps = [coarse_enough([frame], step * target.distance) for step in options.steps]
+        sizes = [len(encode_intra([reduced], step, 0)) for step in steps]
+        if min(sizes) > budget:
+            return  # more vertices cost more
+        affordable = [(step, size) for step, size in zip(steps, sizes, strict=True) if size <= budget]
+        for levels in LEVELS:
+            if not _reaches(original, reduced, affordable[-1][0], levels, target):
+                continue  # the finest step is the best one
+            reached = False
+            for step, size in affordable:
+                reached = reached or step == affordable[-1][0] or _reaches(original, reduced, step, levels, target)
+                if reached:  # finer ones do, too
+                    yield size, fraction, step, levels
+                    if not options.finer:
+                        break
+
+
+def _reaches(original: Original, reduced: Mesh, step: float, levels: int, target: Target) -> bool:
+    fidelity = _fidelity([original], encode_intra([reduced], step, levels))
+    return fidelity is not None and fidelity.reaches(target)
+
+
+def _fidelity(originals: Sequence[Original], payload: bytes) -> Fidelity | None:
+    """Return the fidelity of a payload, None where readers would refuse so few bytes for it."""
+    try:
+        return measure(originals, decode_intra(payload))
+    except CostlyError:
+        return None
+
+
+def _reduced(frame: Mesh, fraction: float) -> Mesh:
+    return frame if fraction >= 1 else decimate(frame, max(4, round(fraction * len(frame.vertices))))
+
+
+Errors = TypeVar("Errors", bound="Target")
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """Errors that frames should not exceed; smaller is better."""
+
+    distance: float  # RMS over the frames of the symmetric surface distance, normalised units
+    angle: float  # mean normal error over the frames, degrees
+    worst: float  # the largest symmetric distance of a frame, normalised units
+
+    def scaled(self: Errors, factor: float) -> Errors:
+        """Return the same with its distances multiplied by `factor`."""
+        return replace(self, distance=self.distance * factor, worst=self.worst * factor)
+
+
+@dataclass(frozen=True, slots=True)
+class Fidelity(Target):
+    """Error measures of decoded frames against the originals."""
+
+    psnr: float = 0.0  # d2_psnr_paper, mean over the frames, dB; larger is better
+
+    def reaches(self, target: Target) -> bool:
+        """True where neither the distance nor the normal error is larger than the target's."""
+        return self.distance <= target.distance and self.angle <= target.angle
+
+
+NO_ERROR = Fidelity(0.0, 0.0, 0.0, PSNR_CEILING)
+
+
+def measure(originals: Sequence[Mesh | Original], decoded: Sequence[Mesh]) -> Fidelity:
+    """Measure decoded frames; a frame with a surface on one side only has an infinite distance."""
+    errors = [surface_errors(a, b) for a, b in zip(originals, decoded, strict=True)]
+    distances = [e.symmetric_rms for e in errors]
+    mean_square = sum(d * d for d in distances) / len(errors)
+    angle = sum(e.angle for e in errors) / len(errors)
+    psnr = sum(min(e.d2_psnr_paper, PSNR_CEILING) for e in errors) / len(errors)
+    return Fidelity(math.sqrt(mean_square), angle, max(distances), psnr)
+
+
+def target_of(frames: Sequence[Mesh], relative: Target, noise: float) -> Target:
+    """Return the fidelity that these frames should reach, normalised.
+
+    `relative` is in units of a frame's diagonal and counts for the smallest frame, so that none is lost. Frames with
+    noise should be reached as nearly as the truth is; their normals say nothing.
+    """
+    target = relative.scaled(min(frame.diagonal for frame in frames) or 1.0)
+    if noise == 0:
+        return target
+    distance, worst = math.hypot(target.distance, noise), math.hypot(target.worst, noise)
+    return replace(target, distance=distance, worst=worst, angle=WORST_ANGLE)

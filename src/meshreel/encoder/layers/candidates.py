@@ -20,11 +20,11 @@ from ...analysis.fit.surface_fit import Fitting, strongest_components
 from ...analysis.follow.embedded import Painter, Tracker
 from ...analysis.follow.template import LEVELS, base_mesh, fused_mesh, shared_detail
 from ...coding.layers.coder import LayersState
-from ...coding.reference_mesh import CodedReference, code_on_lattice
+from ...coding.mesh import CodedReference, code_on_lattice
 from ...geometry.color_views import Paint
 from ...types import Mesh
 from ..group.digests import note
-from ..group.target import Target
+from ..group.forms import Target
 from .options import LayersOptions
 
 LATTICE = 0.33  # spacing of the base's lattice, in steps: the motion codes what it rounds away (decision 14)

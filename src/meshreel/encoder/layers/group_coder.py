@@ -13,15 +13,13 @@ from jaxtyping import Float64, Int32
 
 from ...analysis.fit.frame import FrameSurface
 from ...coding.layers.coder import EncodedLayers, LayersState, encode_layers
-from ...coding.reference_mesh import CodedReference
+from ...coding.mesh import CodedReference
 from ...format.budget import CostlyError
 from ...format.layout import Form
 from ...format.records import pack
 from ...types import Mesh
 from ..group.digests import note
-from ..group.draco import cheapest_intra
-from ..group.forms import EncodedGroup, cheaper, intra_only, most_for
-from ..group.target import Target, measure
+from ..group.forms import EncodedGroup, Target, cheaper, cheapest_intra, intra_only, measure, most_for
 from .options import LayersOptions
 from .tails import find_tails
 
@@ -65,16 +63,16 @@ class GroupCoder:
             half = len(self.surfaces) // 2
             return replace(self, surfaces=self.surfaces[:half]).layers(reference, positions[:half], previous)
         note("fields and symbols", encoded.payload)
-        shown = self._with_tails(encoded, reference.base.faces)
-        note("patches", shown.payload[len(encoded.payload) :])
+        payload, ends, shown = self._with_tails(encoded, reference.base.faces)
+        note("patches", payload[len(encoded.payload) :])
         count = len(self.surfaces)
         most = min(self.options.measured or count, count)
         some = [(2 * k + 1) * count // (2 * most) for k in range(most)]
-        fidelity = measure([self.surfaces[k].mesh for k in some], [shown.frames[k] for k in some])
+        fidelity = measure([self.surfaces[k].mesh for k in some], [shown[k] for k in some])
         note("fidelity", fidelity)
         is_predicted = previous is not None
-        chosen = EncodedGroup(Form.LAYERS, len(self.surfaces), shown.payload, shown.layers, fidelity, is_predicted)
-        if not np.isfinite(chosen.fidelity.distance) or any(mesh.is_empty for mesh in shown.frames):
+        chosen = EncodedGroup(Form.LAYERS, len(self.surfaces), payload, ends, fidelity, is_predicted)
+        if not np.isfinite(chosen.fidelity.distance) or any(mesh.is_empty for mesh in shown):
             return self.alone(), None  # the template has collapsed: nothing is comparable
         if (sharp := self._sharp(chosen)) is not None:
             return sharp, None
@@ -86,27 +84,19 @@ class GroupCoder:
         """Return the `draco` form of a group whose edges are lost, as those of few, large faces; else None."""
         if group.fidelity.angle <= self.options.flat * self.target.angle:
             return None
-        found = cheapest_intra(self.frames, self.target, MOST_FOR_EDGES * len(group.payload), self.options.intra)
-        return found and EncodedGroup(Form.DRACO, len(self.frames), found[0], (), found[1])
+        return cheapest_intra(self.frames, self.target, MOST_FOR_EDGES * len(group.payload), self.options.intra)
 
-    def _with_tails(self, encoded: EncodedLayers, faces: Int32[np.ndarray, "F 3"]) -> _Shown:
-        """Return the encoded layers, with a layer of patches where that pays."""
+    def _with_tails(
+        self, encoded: EncodedLayers, faces: Int32[np.ndarray, "F 3"]
+    ) -> tuple[bytes, tuple[int, ...], list[Mesh]]:
+        """Return the encoded layers, where each ends, and their frames, with a layer of patches where that pays."""
         payload, layers = encoded.payload, encoded.layers
         decoded = [Mesh(positions, faces) for positions in encoded.positions]
         if not self.options.tails:
-            return _Shown(payload, layers, decoded)
+            return payload, layers, decoded
         known, free = [surface.surface for surface in self.surfaces], [surface.free for surface in self.surfaces]
         found = find_tails(known, decoded, len(payload), noise=self.noise, free=free)
         if found is None:
-            return _Shown(payload, layers, decoded)
+            return payload, layers, decoded
         payload += pack(found.record)
-        return _Shown(payload, (*layers, len(payload)), found.frames)
-
-
-@dataclass(frozen=True, slots=True)
-class _Shown:
-    """A payload of layers, and the frames that it decodes to."""
-
-    payload: bytes
-    layers: tuple[int, ...]  # where each ends
-    frames: list[Mesh]
+        return payload, (*layers, len(payload)), found.frames

@@ -10,9 +10,8 @@ from ...analysis.plan import PlanOptions
 from ...coding.layers.coder import LayerCodingOptions
 from ...errors import InputError
 from ...geometry.strict import rounded
-from ..group.draco import IntraOptions
+from ..group.forms import IntraOptions, Target
 from ..group.interval import check_group_size
-from ..group.target import Target
 
 STEP = LayerCodingOptions().step
 # Under noise, following a template is preferred to cutting the group (decision 16).

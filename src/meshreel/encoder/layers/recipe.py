@@ -17,13 +17,12 @@ from jaxtyping import Float64
 
 from ...analysis.fit.frame import FrameSurface
 from ...analysis.plan import Plan, PlannedGroup, best_plan, next_key, rival
-from ...coding.group import payload_bytes_by_purpose
+from ...coding.layers.coder import layers_bytes_by_purpose
 from ...format.layout import Form
 from ..group.digests import note
-from ..group.forms import EncodedGroup, empty_groups, most_for
+from ..group.forms import EncodedGroup, empty_groups, most_for, target_of
 from ..group.interval import Interval
 from ..group.progress import Stages
-from ..group.target import target_of
 from .candidates import Ahead, Candidate, Followed
 from .group_coder import GroupCoder
 from .options import LayersOptions
@@ -207,8 +206,9 @@ def _is_patched(group: EncodedGroup) -> bool:
 
     Noisy bodies show sides of themselves that the template's frames did not have: a door that opens.
     """
-    sizes = payload_bytes_by_purpose(group.payload)
-    return group.form == Form.LAYERS and sizes.get("patches", 0) > PATCHED * len(group.payload)
+    if group.form != Form.LAYERS:
+        return False
+    return layers_bytes_by_purpose(group.payload).get("patches", 0) > PATCHED * len(group.payload)
 
 
 def _known(ahead: Ahead, candidates: Sequence[Candidate]) -> tuple[Float64[np.ndarray, "C T"], list[bool]]:

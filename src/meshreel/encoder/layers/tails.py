@@ -26,8 +26,7 @@ from ...geometry.depth import FreeSpace
 from ...geometry.strict import dot
 from ...geometry.topology import clean, concatenate, drop_unreferenced
 from ...types import Mesh
-from .ghosts import HOLE, ghosts, regions
-from .shown_frame import FAR, ShownFrame, squared_distances
+from .shown_frame import FAR, HOLE, ShownFrame, ghosts, regions, squared_distances
 
 LEAST_BYTES = 4  # bytes of a region or a patch at least (guess)
 DRACO_HEAD = 36  # bytes of a Draco mesh that all patches share

@@ -10,34 +10,72 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
-from typing import ClassVar
+from dataclasses import dataclass, field, replace
+from typing import ClassVar, Literal
 
 import numpy as np
 from jaxtyping import Float64
 
+from ... import _core
 from ...analysis.fit.surface_fit import Fit, FitOptions, Guides, fit_frames, snap_to_vertices
 from ...analysis.plan import cut_at
-from ...analysis.reference.extraction import MDS, extract_reference, predict
-from ...analysis.reference.track import track_centers
-from ...coding.group import decode_group
-from ...coding.paper.displacements import DisplacementOptions
-from ...coding.paper.group import encode_laplacian
-from ...coding.reference_mesh import CodedReference, code_reference
+from ...analysis.reference.extraction import MDS, ReferenceOptions, extract_reference, predict
+from ...analysis.reference.track import TrackOptions, track_centers
+from ...coding.mesh import CodedReference, code_reference
+from ...coding.paper.displacements import DisplacementOptions, encode_laplacian
 from ...errors import NoReferenceError
 from ...format.budget import CostlyError
 from ...format.layout import Form
 from ...types import Centers, Mesh
 from ..group.digests import note
-from ..group.forms import EncodedGroup, cheaper, empty_groups, intra_only
-from ..group.interval import Interval
+from ..group.forms import (
+    NORMALISED,
+    EncodedGroup,
+    IntraOptions,
+    Target,
+    cheaper,
+    empty_groups,
+    intra_only,
+    measure,
+    target_of,
+)
+from ..group.interval import Interval, check_group_size
 from ..group.progress import Stages
-from ..group.target import measure, target_of
-from .options import PaperOptions
 
 REFERENCE_BITS = 14  # of the reference's lattice (paper: qp = 14)
 LEVELS = 1  # midpoint subdivisions of the decoded reference (decision 10)
 DEPTH = 1  # nested cuts at most; frames that are lost after them are coded one by one (guess)
+PLAIN_ZONE = 0.5  # of a step: rounding to the nearest symbol, as the paper has it
+PLAIN_OFFSETS = (0,)  # the same step for all components, as the paper has it
+
+
+@dataclass(frozen=True, slots=True)
+class PaperOptions:
+    """Options of the paper's recipe (`paper.py`); the defaults are those of quality 50.
+
+    The first three, and the offsets and dead zone of `displacements`, say where the recipe is better than the paper's
+    words, or does as they say (preset `paper-literal`).
+    """
+
+    pose: Literal["fit", "mds"] = "fit"  # of the reference: whichever fits best (decision 6); that of eq. 5
+    fit: Literal["surface", "nearest"] = "surface"  # of the reference: to the surface; to the frames' nearest vertices
+    cuts: bool = True  # groups in two where a reference does not follow, then Draco; False: one group always
+
+    group_size: int = 10  # most frames in a group, the paper's GoF
+    target: Target = Target(0.0005, 7.0, 0.0008)  # that every frame should reach, relative to its own diagonal
+    track: TrackOptions = field(default_factory=TrackOptions)
+    reference: ReferenceOptions = field(default_factory=ReferenceOptions)
+    displacements: DisplacementOptions = field(default_factory=DisplacementOptions)
+    intra: IntraOptions = field(default_factory=IntraOptions)
+
+    def __post_init__(self) -> None:
+        check_group_size(self.group_size)
+
+    @property
+    def is_literal(self) -> bool:
+        """True if every step follows the paper's words."""
+        plain = (self.displacements.dead_zone, self.displacements.offsets) == (PLAIN_ZONE, PLAIN_OFFSETS)
+        return plain and (self.pose, self.fit, self.cuts) == ("mds", "nearest", False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -203,7 +241,8 @@ def laplacian(
         payload, layers = encode_laplacian(reference, displacement_field(reference, positions), options)
     except ValueError as error:  # least squares that are singular, or whose elimination fills in
         raise CostlyError(f"laplacian: {error}") from error
-    fidelity = measure(frames, decode_group(payload, len(frames)))
+    decoded = _core.Group(payload, len(frames), None, None, NORMALISED)
+    fidelity = measure(frames, [Mesh(*arrays) for arrays in decoded.frames()])
     return EncodedGroup(Form.LAPLACIAN, len(frames), payload, layers, fidelity)
 
 

@@ -31,9 +31,8 @@ from ...geometry.derived_sequences import DerivedSequence
 from ...io.files import Place, first_difference, located, uploaded
 from ...io.write import cannot_be_written, check_apart, claim, discard, part_of, sync, sync_folder, unfinished
 from ..group.digests import versions
-from ..group.forms import EncodedGroup
+from ..group.forms import EncodedGroup, Fidelity
 from ..group.interval import Interval
-from ..group.target import Fidelity
 from ..settings.options import EncoderOptions
 
 LOCK, WHOLE, SCENE = "lock", "whole.json", "scene.npz"

@@ -1,4 +1,4 @@
-"""Encoding of the intervals of a job, here or side by side in workers, in any order.
+"""Encoding job, and the encoding of its intervals: here, or side by side in workers, in any order.
 
 In -> out: a job, its intervals -> their groups, in order; those that an earlier run had done come from their files.
 """
@@ -7,23 +7,25 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import islice
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 from threadpoolctl import threadpool_limits
 
 from ...format.layout import Header
+from ...geometry.derived_sequences import DerivedSequence
 from ...geometry.work import Work, add, heard, since, so_far
-from ..appearance.options import AppearanceOptions
-from ..group.digests import listener, noted
+from ...types import evenly
+from ..appearance.colors import colored_groups, has_pictures
+from ..appearance.videos import AppearanceOptions
+from ..group.digests import listener, note, noted
 from ..group.forms import EncodedGroup
 from ..group.interval import Interval
 from ..group.progress import IntervalStages, Stages
-from ..recipe import Recipe, encode_interval
+from ..settings.options import EncoderOptions, SceneOptions
 from .interval_files import IntervalFiles, pack_interval
-from .job import Job
 from .worker import end_with_parent, tell
 
 AHEAD = 2  # calls for each worker, so that none waits for its next (guess)
@@ -32,6 +34,51 @@ _LOOK = 0.5  # s, between two looks at what workers tell of calls that are not d
 
 Call = tuple[int, Callable[..., Any], tuple[Any, ...]]  # number, function, arguments
 _Done = tuple[list[EncodedGroup], str]  # and lines of digests
+LOOKED_AT = 3  # frames of an interval whose textures tell whether it has some (guess)
+NEUTRAL = Header(1.0, (0.0, 0.0, 0.0), 1.0, (-1.0, -1.0, -1.0), (1.0, 1.0, 1.0), '{"encode":""}')  # in normalised units
+
+
+@runtime_checkable  # for the checks of arguments in tests
+class Recipe(Protocol):
+    """A method of encoding with its options: `LayersRecipe` or `PaperRecipe`."""
+
+    @property
+    def name(self) -> str:
+        """The name of the preset that uses it."""
+
+    @property
+    def group_size(self) -> int:
+        """The largest number of frames in a group."""
+
+    @property
+    def bodies_apart(self) -> bool:
+        """True if bodies that never touch become separate tracks."""
+
+    def longest(self, frame_rate: float) -> int:
+        """Return the largest number of frames in an interval, at this rate (1/s)."""
+
+    def encode(self, interval: Interval, stages: Stages | None = None) -> Iterator[EncodedGroup]:
+        """Yield the groups of an interval, in order, without colours."""
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """A sequence to encode, its options, and the means to do it."""
+
+    sequence: DerivedSequence
+    options: EncoderOptions
+    executor: Executor | None
+    stages: Stages
+    recipe: Recipe
+    files: IntervalFiles | None = None  # of the output, which the encoding of intervals needs
+    head: Header = NEUTRAL  # of the files of intervals
+    chosen: range | None = None  # the frames that are encoded; None: all
+
+    @property
+    def scene(self) -> SceneOptions:
+        """The options of a scene, where the sequence is one."""
+        assert self.options.scene is not None, "a sequence without scene options is not taken apart"
+        return self.options.scene
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,6 +156,19 @@ def _side_by_side(job: Job, files: IntervalFiles, intervals: Iterable[Interval])
             yield ready.pop(next_one)
             next_one += 1
     yield from (ready[number] for number in sorted(ready))
+
+
+def encode_interval(
+    interval: Interval, recipe: Recipe, appearance: AppearanceOptions | None = None, stages: Stages | None = None
+) -> Iterator[EncodedGroup]:
+    """Yield the groups of an interval, in order, with colours by `appearance`; None leaves colours out."""
+    count = len(interval.frames)
+    sample = (interval.frames[number] for number in evenly(count, LOOKED_AT))
+    splats = appearance is not None and appearance.splats is not None
+    interval = replace(interval, pictured=splats or has_pictures(interval, sample, appearance))
+    for group in colored_groups(recipe.encode(interval, stages), interval, appearance, stages):
+        note("payload", group.form.name, group.payload, *(one.read() for one in group.companions))
+        yield group
 
 
 def _task(job: Job, interval: Interval) -> Task:

@@ -23,8 +23,7 @@ from ...geometry.derived_sequences import DerivedSequence
 from ...geometry.work import Work, add, since, so_far
 from ...io.files import Place, read_input
 from ...io.write import replacing
-from .job import Job
-from .schedule import Call, as_done
+from .schedule import Call, Job, as_done
 from .worker import end_with_parent
 
 KIND = "meshreel survey 2"

@@ -5,17 +5,23 @@ In: the frames of a scene, options. Out: Parts, which the encoding of every inte
 
 from __future__ import annotations
 
+import io
 import math
+import zipfile
+import zlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
+from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float64
 
 from ...analysis.scene.background import FRAMES, Moment, fuse_background, fuse_still_depth
 from ...analysis.scene.bodies import beyond, ring, with_ring
-from ...analysis.scene.labelling import Segmentation
+from ...analysis.scene.color_looks import CHANGE_SIDE, ColorChange, ColorLooks
+from ...analysis.scene.cut import Rest
+from ...analysis.scene.labelling import ByPlace, Segmentation
 from ...analysis.scene.masks import Masker
 from ...analysis.scene.segmentation import segment, segment_by
 from ...analysis.survey import Survey, check_one_unit
@@ -24,6 +30,7 @@ from ...geometry.closest_points import Surface
 from ...geometry.depth import DepthPicture, FreeSpace
 from ...geometry.derived_sequences import CapturedSequence, picked
 from ...geometry.topology import components, concatenate, face_normals, part_of
+from ...geometry.voxels import Lattice
 from ...types import Mesh, MeshSequence, evenly
 from ..group.progress import Stages
 from ..settings.options import SceneOptions
@@ -255,3 +262,61 @@ def _measured(
     if not squares:
         return _Measured(0.0, 0.0, sizes, astray)
     return _Measured(math.sqrt(float(np.mean(squares))), float(np.mean(deviations)), sizes, astray)
+
+
+_COLORS = ("depth", "hue", "limit")  # arrays of a ColorChange
+_ODD = (KeyError, ValueError, TypeError, IndexError, OSError, EOFError, zipfile.BadZipFile, zlib.error)
+
+
+def pack_parts(parts: Parts) -> bytes | None:
+    """Pack the parts of a scene; None where masks segment it, whose source only the next run can open."""
+    by = parts.segmentation
+    if not isinstance(by, ByPlace):
+        return None
+    arrays: dict[str, Any] = {
+        "numbers": [parts.seen.unit, parts.noise, parts.deviation, parts.astray, by.cell, by.lattice.size, by.island],
+        "origin": by.lattice.origin,
+        "keys": by.keys,
+        "chosen": by.chosen,
+        "until": by.rest.until,
+        "since": by.rest.since,
+        "changes": np.array([change.frame for change in parts.changes], np.int64),
+    }
+    for number, mesh in enumerate([parts.background, *(change.came for change in parts.changes)]):
+        arrays |= {f"vertices {number}": mesh.vertices, f"faces {number}": mesh.faces}
+        arrays |= {} if mesh.colors is None else {f"colors {number}": mesh.colors}
+    if by.colors is not None:
+        arrays |= {name: getattr(by.colors, name) for name in _COLORS}
+        arrays |= {"looks": by.colors.looks.frame, "nearer": by.colors.nearer}
+    packed = io.BytesIO()
+    np.savez_compressed(packed, allow_pickle=False, **arrays)
+    return packed.getvalue()
+
+
+def unpack_parts(data: bytes, sequence: CapturedSequence, seen: Survey) -> Parts | None:
+    """Return the parts of a surveyed scene, or None where no encoder packed them."""
+    try:
+        with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
+            unit, noise, deviation, astray, cell, size, island = arrays["numbers"].tolist()
+            rest = Rest(arrays["until"], arrays["since"])
+            places = Lattice(arrays["origin"], size), arrays["keys"], arrays["chosen"]
+            by = ByPlace(cell, *places, rest, island, _colors(arrays, sequence))
+            frames = arrays["changes"].tolist()
+            background, *came = (_mesh(arrays, number) for number in range(1 + len(frames)))
+    except _ODD:
+        return None
+    changes = [Change(frame, mesh) for frame, mesh in zip(frames, came, strict=True)]
+    seen = replace(seen, scale=unit)
+    return Parts(seen, by, background, changes, noise, deviation, astray, free_space(sequence))
+
+
+def _mesh(arrays: Any, number: int) -> Mesh:
+    return Mesh(arrays[f"vertices {number}"], arrays[f"faces {number}"], arrays.get(f"colors {number}"))
+
+
+def _colors(arrays: Any, sequence: CapturedSequence) -> ColorChange | None:
+    """Return the usual view of the colour cameras, or None if the scene has none."""
+    if "looks" not in arrays or sequence.colors is None:
+        return None
+    looks = ColorLooks(sequence.colors, int(arrays["looks"]), CHANGE_SIDE)
+    return ColorChange(looks, float(arrays["nearer"]), *(arrays[name] for name in _COLORS))

@@ -15,17 +15,20 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import pairwise
 
-from ...analysis.scene.bodies import at_most, find_bodies, same_bodies
+import numpy as np
+from jaxtyping import Bool, UInt16
+from scipy.spatial import cKDTree
+
+from ...analysis.scene.bodies import NEAR, at_most, find_bodies, same_bodies, with_ring
 from ...analysis.scene.labelling import Segmentation
 from ...analysis.survey import Survey
 from ...format.checks import MOST_TRACKS
 from ...geometry.derived_sequences import digest
+from ...geometry.topology import part_of
 from ...types import Mesh, MeshSequence
 from ..group.forms import empty_groups
-from ..group.interval import Interval
-from ..group.views import Sight, Views
-from ..run.job import Job
-from ..run.schedule import encode_intervals
+from ..group.interval import Interval, Sight, Views
+from ..run.schedule import Job, encode_intervals
 from ..settings.options import EncoderOptions
 from .parts import Parts
 from .static import refreshes
@@ -75,22 +78,15 @@ def track_intervals(job: Job, parts: Parts, frames: range, tracks: Tracks) -> li
 
     Frames can where all have a surface or none has, and where they are of about one scale.
     """
-    moving, found = [parts.moving(k, job.sequence[k]) for k in frames], list[Interval]()
-    longest = job.recipe.longest(job.sequence.frame_rate)
-    for track, meshes in tracks.of(moving):
-        normalised = [parts.seen.normalise(mesh) for mesh in meshes]
-        for cut in _cut(normalised, frames, parts.seen, longest):
+    sequence, seen, found = job.sequence, parts.seen, list[Interval]()
+    longest = job.recipe.longest(sequence.frame_rate)
+    for track, meshes in tracks.of([parts.moving(k, sequence[k]) for k in frames]):
+        normalised = [seen.normalise(mesh) for mesh in meshes]
+        for cut in _cut(normalised, frames, seen, longest):
             some = normalised[cut.start : cut.stop]
             one = Interval(some, parts.body_noise, frames.start + cut.start, track, digest(some))
-            found.append(
-                replace(
-                    one,
-                    up=job.sequence.up,
-                    views=Views.of(job.sequence, parts.seen),
-                    sight=Sight.of(job.sequence, parts.seen),
-                    frame_rate=job.sequence.frame_rate,
-                )
-            )
+            one = replace(one, up=sequence.up, frame_rate=sequence.frame_rate)
+            found.append(replace(one, views=Views.of(sequence, seen), sight=Sight.of(sequence, seen)))
     return found
 
 
@@ -153,3 +149,40 @@ class Tracks:
             for group in empty_groups(began):
                 yield TrackGroup(track, first, group)
                 first += group.frame_count
+
+
+@dataclass(frozen=True, slots=True)
+class FrameLabels:
+    """Labels of the faces of one frame."""
+
+    moving: Bool[np.ndarray, " F"]
+    bodies: UInt16[np.ndarray, " F"]  # 1 + the track that has the face; 0: it stands still, or belongs to no body
+
+
+def label_frames(sequence: MeshSequence, segmentation: Segmentation, options: EncoderOptions) -> Iterator[FrameLabels]:
+    """Yield the labels of each frame; a body has the same number in all frames."""
+    cell = segmentation.cell
+    tracks = Tracks(cell, options.scene.near if options.scene else NEAR)
+    for frames in key_intervals(sequence, segmentation, options):
+        moving = list[Bool[np.ndarray, " F"]]()
+        parts, coded = list[Mesh](), list[Mesh]()
+        for number in frames:
+            mesh = sequence[number]
+            moving.append(segmentation.moving(number, mesh))
+            parts.append(part_of(mesh, moving[-1]))
+            coded.append(with_ring(mesh, moving[-1], cell))
+        bodies = tracks.of(coded)
+        for place, (chosen, part) in enumerate(zip(moving, parts, strict=True)):
+            labels = np.zeros(len(chosen), np.uint16)
+            labels[chosen] = _numbers(part, [(track + 1, meshes[place]) for track, meshes in bodies])
+            yield FrameLabels(chosen, labels)
+
+
+def _numbers(part: Mesh, bodies: list[tuple[int, Mesh]]) -> UInt16[np.ndarray, " F"]:
+    """Return the number of the body that has each moving face; bodies are connected pieces and a ring around them."""
+    found = np.zeros(len(part.faces), np.uint16)
+    corners = part.vertices[part.faces[:, 0]]
+    for number, body in bodies:
+        if not body.is_empty and len(corners):
+            found[cKDTree(body.vertices).query(corners)[0] == 0] = number  # a body has the frame's vertices
+    return found

@@ -28,9 +28,8 @@ from ...geometry.derived_sequences import CapturedSequence
 from ...geometry.topology import clean, face_normals, vertex_normals
 from ...types import Mesh, MeshSequence, Placement, evenly
 from ..appearance.colors import fitting_size
-from ..appearance.options import AppearanceOptions, TextureOptions
-from ..appearance.videos import layered_pictures
-from ..group.views import Views
+from ..appearance.videos import AppearanceOptions, TextureOptions, layered_pictures
+from ..group.interval import Views
 from ..settings.options import SceneOptions
 from .parts import Change, Parts
 

@@ -19,10 +19,8 @@ from ...analysis.survey import Piece, Survey, bodies_of, box_around, unlike
 from ...geometry.strict import norm, rounded
 from ...metrics.distance import PSNR_CEILING, psnr
 from ..group.forms import EncodedGroup, empty_groups
-from ..group.interval import BodyFrames, Interval, NormalisedFrames
-from ..group.views import Views
-from ..run.job import Job
-from ..run.schedule import encode_intervals
+from ..group.interval import BodyFrames, Interval, NormalisedFrames, Views
+from ..run.schedule import Job, encode_intervals
 
 
 @dataclass(frozen=True, slots=True)

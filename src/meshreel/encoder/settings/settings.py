@@ -10,8 +10,7 @@ from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
 from ...errors import InputError
-from .options import EncoderOptions
-from .presets import appearance_options, layers_options, paper_options, scene_options
+from .options import EncoderOptions, appearance_options, layers_options, paper_options, scene_options
 
 QUALITY = 50.0  # unless another is given (decision 9)
 Preset = Literal["best", "paper", "paper-literal"]

@@ -24,13 +24,11 @@ from jaxtyping import Float64
 
 from meshreel.analysis.survey import Survey, survey
 from meshreel.coding.layers.patches import run_lengths
-from meshreel.coding.reference_mesh import CodedReference
-from meshreel.encoder.group.forms import intra_only
+from meshreel.coding.mesh import CodedReference
+from meshreel.encoder.group.forms import intra_only, target_of
 from meshreel.encoder.group.interval import Interval
 from meshreel.encoder.group.progress import Stages
-from meshreel.encoder.group.target import target_of
-from meshreel.encoder.paper.options import PaperOptions
-from meshreel.encoder.paper.recipe import FoundGroup, displacement_field
+from meshreel.encoder.paper.recipe import FoundGroup, PaperOptions, displacement_field
 from meshreel.encoder.scene.static import Static, encode_static
 from meshreel.encoder.sequence import Encoder
 from meshreel.encoder.settings.options import EncoderOptions

@@ -18,9 +18,7 @@ import numpy as np
 from jaxtyping import Float64, Int32, Int64
 
 from meshreel.coding.background import decode_background, decode_change
-from meshreel.coding.intra import decode_intra
-from meshreel.coding.mesh import COMPRESSION_LEVEL, decode_mesh
-from meshreel.coding.reference_mesh import CodedReference
+from meshreel.coding.mesh import COMPRESSION_LEVEL, CodedReference, decode_intra, decode_mesh
 from meshreel.encoder.group.interval import MOST_FRAMES
 from meshreel.errors import FormatError, InputError
 from meshreel.format.kinds import F64, U8, U32, Array, Blob, Bytes, Choice, List, Varint
