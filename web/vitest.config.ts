@@ -7,6 +7,9 @@ import { BaseSequencer } from "vitest/node";
 import type { TestSpecification } from "vitest/node";
 
 const TIMED = "*/test/**/*.timed.test.ts"; // tests of a clock: after all others, one at a time, and again where something else disturbed them
+// Tests in a browser that only `scripts/test --all` runs: all but those of bits, of controls and of what is drawn.
+const LEFT_OUT = "*/test/**/!(conformance|element|controls|scene).browser.test.ts";
+const EXCLUDED = process.env.MESHREEL_ALL === "1" ? [TIMED] : [TIMED, LEFT_OUT];
 const RECORDED = new URL("../tests/durations.json", import.meta.url); // written by scripts/durations.py
 
 /** Files that took longest run first, so that no worker waits at the end; those that are not recorded are taken for long. */
@@ -31,7 +34,7 @@ export default defineConfig({
         test: {
           name: "untimed",
           include: ["test/*.test.ts", "*/test/**/*.test.ts"],
-          exclude: [TIMED],
+          exclude: EXCLUDED,
           maxWorkers: Math.max(2, availableParallelism() - 1), // two on two cores, too: browsers' tests wait much of the time
           sequence: { groupOrder: 0 },
         },
