@@ -1,4 +1,4 @@
-// A group of frames of any form, decoded from its payload. Beside src/meshreel/coding/{group,intra,colored}.py.
+// A group of frames of any form, decoded from its payload. Beside src/meshreel/coding/{group,mesh,colored}.py.
 #pragma once
 
 #include <cstdint>
