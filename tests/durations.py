@@ -1,4 +1,4 @@
-"""Durations of tests, recorded and used: files that take longest run first, so that no worker waits at the end.
+"""Durations of tests, recorded and used: tests that take long are slow, and the longest files run first.
 
 Each test's CPU time, with that of the processes that it waited for, goes into the JUnit report; `scripts/durations.py`
 makes `durations.json` of such reports. CPU time hardly depends on what else the machine does.
@@ -13,6 +13,7 @@ import pytest
 
 RECORDED = Path(__file__).with_name("durations.json")
 PROPERTY = "cpu"  # s, in the report
+LONGEST = 3.0  # s of CPU time: tests that take longer are marked slow, so that the others end within minutes
 _BEGUN = pytest.StashKey[float]()
 
 
@@ -29,12 +30,14 @@ def pytest_runtest_teardown(item: pytest.Item) -> Generator[None]:
     item.user_properties.append((PROPERTY, f"{cpu_seconds() - item.stash[_BEGUN]:.3f}"))
 
 
-@pytest.hookimpl(trylast=True)
+@pytest.hookimpl(tryfirst=True)  # before tests are chosen by their marks
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Put files that took longest first; those that are not recorded are taken for long."""
-    known = json.loads(RECORDED.read_text(encoding="utf-8"))["files"]
-    root = config.rootpath
-    items.sort(key=lambda item: -known.get(item.path.relative_to(root).as_posix(), float("inf")))
+    """Mark tests that take long as slow, and put the longest files first; those that are not recorded count as long."""
+    known, root = json.loads(RECORDED.read_text(encoding="utf-8")), config.rootpath
+    for item in items:
+        if known["tests"].get(item.nodeid, 0.0) > LONGEST:
+            item.add_marker("slow")
+    items.sort(key=lambda item: -known["files"].get(item.path.relative_to(root).as_posix(), float("inf")))
 
 
 def cpu_seconds() -> float:

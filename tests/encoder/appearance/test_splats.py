@@ -134,7 +134,7 @@ def ends(chunk: Chunk) -> tuple[int, ...]:
 
 def test_damaged_splats_cost_no_frame(video: Video) -> None:
     reader = video.reader
-    data = bytearray(reader._source.get_bytes(0, reader.size))
+    data = bytearray(reader.source.get_bytes(0, reader.size))
     of = next(chunk for chunk in reader.chunks if chunk.kind == ChunkKind.SPLATS)
     data[of.offset + 5] ^= 1
     damaged = Video(ReelReader(BytesSource(bytes(data))))
