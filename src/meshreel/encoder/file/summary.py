@@ -9,24 +9,22 @@ from __future__ import annotations
 import hashlib
 import json
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any, BinaryIO
 
 import numpy as np
 
-from ... import _core
 from ...analysis.survey import Survey
-from ...container.reader import Chunk, ReelReader
-from ...container.sources import StreamSource
 from ...container.writer import ReelWriter
+from ...decoder.video import open as open_video
 from ...edit.metadata import CANONICAL, KEYS, PART, Totals, rounded, upright
 from ...format.layout import Form, Header
 from ...geometry.closest_points import distances
-from ...geometry.topology import concatenate, drop_unreferenced
+from ...geometry.topology import drop_unreferenced
 from ...geometry.work import Work
 from ...metrics.distance import PSNR_CEILING, psnr
-from ...types import Mesh, MeshSequence, Up
+from ...types import MeshSequence, Up
 from ..group.forms import Fidelity
 from ..run.interval_files import write_companions, write_group
 from ..scene.parts import Parts
@@ -154,42 +152,16 @@ def write_tracked(writer: ReelWriter, each: TrackGroup, static: list[int], unit:
 
 def mean_psnr(sequence: MeshSequence, file: BinaryIO, diagonal: float, numbers: Sequence[int]) -> float:
     """Return the mean d2_psnr_paper, dB, over some frames of a file."""
-    reader, found = ReelReader(StreamSource(file)), []
-    for number in numbers:
-        points, shown = drop_unreferenced(sequence[number]).vertices, _shown(reader, number)
-        if not len(points) or shown.is_empty:
-            found.append(PSNR_CEILING if not len(points) and shown.is_empty else 0.0)
-            continue
-        gap = float((distances(points, shown) ** 2).mean())
-        found.append(min(psnr(gap, diagonal), PSNR_CEILING))
+    with open_video(file) as video:
+        surfaces, found = video.at(colors=False), []
+        for number in numbers:
+            points, shown = drop_unreferenced(sequence[number]).vertices, surfaces[number]
+            if not len(points) or shown.is_empty:
+                found.append(PSNR_CEILING if not len(points) and shown.is_empty else 0.0)
+                continue
+            gap = float((distances(points, shown) ** 2).mean())
+            found.append(min(psnr(gap, diagonal), PSNR_CEILING))
     return float(np.mean(found))
-
-
-def _shown(reader: ReelReader, frame: int) -> Mesh:
-    """Decode the surface of a frame, m: its background, then its tracks, all without colours."""
-    (x, y, z), parts, background = reader.header.origin, list[Mesh](), None
-    place = reader.header.scale, (x, y, z)
-    static = reader.static_of_frame(frame)
-    for link in _chain(static, lambda link: reader.chunks[link.depends_on[0]] if link.depends_on else None):
-        background = _core.Background(reader.read_chunk(link.number), background, place)
-    parts += [] if background is None else [Mesh(*background.arrays())]
-    for track in range(len(reader.tracks)):
-        chunk, state = reader.chunk_of_frame(frame, track), None
-        for link in _chain(chunk, reader.group_before):
-            payload = reader.read_chunk(link.number)
-            group = _core.Group(payload, link.frame_count, None, state, place, shown=link is chunk)
-            state = group.state
-        parts.append(Mesh(*group.frames()[frame - chunk.first_frame]))
-    return concatenate(parts)
-
-
-def _chain(chunk: Chunk | None, before: Callable[[Chunk], Chunk | None]) -> list[Chunk]:
-    """Return the chunks that a chunk is decoded from, in order, itself last."""
-    chain = list[Chunk]()
-    while chunk is not None:
-        chain.append(chunk)
-        chunk = before(chunk)
-    return chain[::-1]
 
 
 def make_header(frame_rate: float, seen: Survey, metadata: dict[str, Any]) -> Header:
