@@ -126,17 +126,6 @@ Out<double, 3> decode_motion(const nb::bytes& record, In<double, 2> positions, I
     return rows.shaped(base.vertices, 3, frames);
 }
 
-// V x 3 places in the last frame.
-Out<double, 2> decode_last_places(const nb::bytes& record, In<double, 2> positions, In<int32_t, 2> faces,
-                                  size_t frames) {
-    const mr_bytes bytes = bytes_of(record);
-    const mr_mesh base = mesh_of(positions, faces);
-    expect(frames <= UINT8_MAX);
-    Buffer<double> places(3 * base.vertices);
-    check_decoded(mr_decode_last_places(&bytes, &base, frames, places.data()));
-    return places.shaped(base.vertices, 3);
-}
-
 Out<double, 2> orthonormal_inverse(In<int32_t, 1> symbols, size_t count, size_t width) {
     expect(count <= width && symbols.shape(0) == count * width - count * (count > 0 ? count - 1 : 0) / 2);
     Buffer<double> vectors(count * width);
@@ -259,30 +248,6 @@ Out<double, 1> decode_last_level(const nb::bytes& record, const Level& level, In
     return last.shaped(shape.edge_count);
 }
 
-// The last frame's scalars of a level whose coarser one has `vertices` vertices in `frames` frames.
-Out<double, 1> decode_last_scalars(const nb::bytes& record, const Level& level, size_t frames, size_t vertices,
-                                   Previous previous) {
-    const mr_bytes bytes = bytes_of(record);
-    mr_level shape = view(frames, vertices, level.faces, level.edges);
-    shape.starts = level.starts.data(), shape.near = level.near.data();
-    shape.previous = previous && previous->shape(0) == level.edge_count() ? previous->data() : nullptr;
-    Buffer<double> last(shape.edge_count);
-    check_decoded(mr_decode_last_scalars(&bytes, &shape, last.data()));
-    return last.shaped(shape.edge_count);
-}
-
-// Fills T x V x 3 positions.
-template <class Number>
-void frames_of_rows(In<double, 3> rows, Place place, InOut<Number, 3> positions) {
-    const size_t vertices = rows.shape(0), frames = rows.shape(2);
-    expect(rows.shape(1) == 3 && positions.shape(0) == frames && positions.shape(1) == vertices);
-    expect(positions.shape(2) == 3);
-    check_decoded(mr_frames_of_rows(rows.data(), frames, vertices, Target(positions.data(), place).get()));
-}
-
-// Numbers that are not set to anything, in memory that arrays of the core had before.
-Out<double, 1> empty(size_t count) { return Buffer<double>(count).shaped(count); }
-
 // Copies the faces of which `dropped` is 0 to the beginning of `room`. Returns their number.
 size_t keep_faces(In<int32_t, 2> faces, In<uint8_t, 1> dropped, InOut<int32_t, 2> room) {
     const size_t count = faces.shape(0);
@@ -356,22 +321,16 @@ void bind_layers(nb::module_& m) {
     m.def("encode_field", &encode_field);
     m.def("decode_field", &decode_field);
     m.def("decode_motion", &decode_motion);
-    m.def("decode_last_places", &decode_last_places);
     m.def("decode_level", &decode_level, "record"_a, "level"_a, "rows"_a, "previous"_a.none());
     m.def("decode_last_level", &decode_last_level<double>, "record"_a, "level"_a, "rows"_a, "previous"_a.none(),
           "place"_a.none(), "positions"_a.noconvert());
     m.def("decode_last_level", &decode_last_level<float>, "record"_a, "level"_a, "rows"_a, "previous"_a.none(),
           "place"_a.none(), "positions"_a.noconvert());
-    m.def("decode_last_scalars", &decode_last_scalars, "record"_a, "level"_a, "frames"_a, "vertices"_a,
-          "previous"_a.none());
-    m.def("frames_of_rows", &frames_of_rows<double>, "rows"_a, "place"_a.none(), "positions"_a.noconvert());
-    m.def("frames_of_rows", &frames_of_rows<float>, "rows"_a, "place"_a.none(), "positions"_a.noconvert());
     m.def("decode_colors", &decode_colors, "records"_a, "vertices"_a, "faces"_a, "levels"_a, "count"_a, "frames"_a,
           "chroma"_a, "before"_a.none());
     m.def("color_values", &color_values);
     m.def("encode_places", &encode_places);
     m.def("decode_places", &decode_places);
-    m.def("empty", &empty, "count"_a);
     m.def("keep_faces", &keep_faces, "faces"_a, "dropped"_a, "room"_a.noconvert());
 }
 
