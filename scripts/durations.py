@@ -12,10 +12,11 @@ import xml.etree.ElementTree as ElementTree
 from collections import defaultdict
 from pathlib import Path
 
+from tests.durations import LONGEST
+
 ROOT = Path(__file__).resolve().parents[1]
 RECORDED = ROOT / "tests" / "durations.json"
 REPORTS = ROOT / "build" / "tests"
-LONG = 2.0  # s: a test that takes longer is recorded by itself
 PRINTED = 15  # tests
 
 
@@ -49,7 +50,7 @@ def record(seconds: dict[tuple[str, str], float]) -> dict[str, dict[str, float]]
         files[file] += taken
     known = json.loads(RECORDED.read_text(encoding="utf-8")) if RECORDED.exists() else {"files": {}, "tests": {}}
     kept = {test: taken for test, taken in known["tests"].items() if test.split("::")[0] not in files}
-    long = {f"{file}::{name}": taken for (file, name), taken in seconds.items() if taken >= LONG}
+    long = {f"{file}::{name}": taken for (file, name), taken in seconds.items() if taken > LONGEST}
     merged = {"files": known["files"] | dict(files), "tests": kept | long}
     return {
         kind: {name: round(taken, 1) for name, taken in sorted(rows.items()) if (ROOT / name.split("::")[0]).exists()}

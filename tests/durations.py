@@ -13,7 +13,7 @@ import pytest
 
 RECORDED = Path(__file__).with_name("durations.json")
 PROPERTY = "cpu"  # s, in the report
-LONGEST = 3.0  # s of CPU time: tests that take longer are marked slow, so that the others end within minutes
+LONGEST = 3.0  # s: tests that take longer are recorded by themselves, and slow, so that the others end within minutes
 _BEGUN = pytest.StashKey[float]()
 
 
@@ -35,7 +35,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     """Mark tests that take long as slow, and put the longest files first; those that are not recorded count as long."""
     known, root = json.loads(RECORDED.read_text(encoding="utf-8")), config.rootpath
     for item in items:
-        if known["tests"].get(item.nodeid, 0.0) > LONGEST:
+        if item.nodeid in known["tests"]:
             item.add_marker("slow")
     items.sort(key=lambda item: -known["files"].get(item.path.relative_to(root).as_posix(), float("inf")))
 
