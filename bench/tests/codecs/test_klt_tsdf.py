@@ -226,7 +226,7 @@ def test_places_and_bits_come_back():
 def test_options_that_cannot_be_are_refused(wrong):
     name, number = wrong.split()
     with pytest.raises(InputError, match="'qp'" if name == "qp" else wrong):
-        make_codec("klt_tsdf", {name: float(number)})
+        make_codec("klt_tsdf", {name: int(number) if number.isdigit() else float(number)})
 
 
 def test_every_truncation_every_extra_byte_and_a_byte_that_is_wrong_is_refused(stream):
