@@ -1,6 +1,9 @@
 """The checker behind the annotations: beartype, with an int accepted where a float is asked for (PEP 484)."""
 
 from collections.abc import Callable
+from functools import reduce
+from operator import or_
+from types import UnionType
 from typing import Any, Literal, Union, get_args, get_origin
 
 from beartype import BeartypeConf, beartype
@@ -18,5 +21,5 @@ def check(function: Callable[..., Any]) -> Callable[..., Any]:
 
 def _plain(hint: Any) -> Any:
     if get_origin(hint) is Literal:
-        return Union[tuple({type(value) for value in get_args(hint)})]
-    return Union[tuple(map(_plain, get_args(hint)))] if get_origin(hint) is Union else hint
+        return reduce(or_, {type(value) for value in get_args(hint)})
+    return reduce(or_, map(_plain, get_args(hint))) if get_origin(hint) in (Union, UnionType) else hint

@@ -191,6 +191,12 @@ def test_options_and_a_quality_or_preset_are_one_too_many(tmp_path):
             encode(MeshList((BALL,)), tmp_path / "a.reel", options=paper(), **given)
 
 
+def test_settings_are_options_too(tmp_path):
+    encode(MeshList((BALL,)), tmp_path / "a.reel", quality=20.0)
+    encode(MeshList((BALL,)), tmp_path / "b.reel", options=meshreel.Settings(quality=20.0))
+    assert (tmp_path / "a.reel").read_bytes() == (tmp_path / "b.reel").read_bytes()
+
+
 def test_absurd_options_are_refused():
     with pytest.raises(InputError, match="101"):
         replace(paper(), quality=101.0)

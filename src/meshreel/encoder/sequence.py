@@ -78,7 +78,7 @@ def encode(
     splats: int | None = None,
     dynamic_only: bool = False,
     background_refresh: float | None = None,
-    options: EncoderOptions | None = None,
+    options: EncoderOptions | Settings | None = None,
     executor: Executor | None = None,
     progress: Progress | None = None,
     resume: bool | None = None,
@@ -102,27 +102,28 @@ def encode(
     InputError where there is something to continue.
     """
     settings = Settings(
-        preset,
-        quality,
-        effort,
-        basis_size,
-        centers,
-        group_size,
-        key_interval,
-        color,
-        color_quality,
-        texture,
-        compatible,
-        splats,
-        dynamic_only,
-        background_refresh,
+        preset=preset,
+        quality=quality,
+        effort=effort,
+        basis_size=basis_size,
+        centers=centers,
+        group_size=group_size,
+        key_interval=key_interval,
+        color=color,
+        color_quality=color_quality,
+        texture=texture,
+        compatible=compatible,
+        splats=splats,
+        dynamic_only=dynamic_only,
+        background_refresh=background_refresh,
     )
     if options is not None and settings != Settings():
-        raise InputError("options and settings: leave the settings out, or give Settings(...).resolved() as options")
+        raise InputError("options and settings: leave the settings out, or give Settings(...) as options")
     heard = b"" if audio is None else packed_audio(audio, audio_start)
     encoder = Encoder(welded(as_sequence(sequence)), executor, progress)
     encoder.audio = heard
-    summary = encoder.encode(path, options or settings.resolved(), resume)
+    chosen = options or settings
+    summary = encoder.encode(path, chosen.resolved() if isinstance(chosen, Settings) else chosen, resume)
     for text in summary.warnings:
         warnings.warn(text, stacklevel=2)
     return summary

@@ -59,7 +59,7 @@ def test_every_setting_reaches_its_option():
 )
 def test_settings_that_make_no_sense_are_refused_with_the_remedy(given, words):
     with pytest.raises(InputError, match=words):
-        Settings(**given).resolved()
+        Settings(**given)
 
 
 def test_the_laplacian_form_follows_the_quality():

@@ -114,7 +114,7 @@ class Surveyed:
         for name, value in _about(sequence).items():
             if self.about[name] != value:
                 text = f"{self.name}: is of another sequence: {name} {self.about[name]}, and here {value}"
-                raise InputError(f"{text}; give the same inputs, or survey these")
+                raise InputError(f"{text}; give the same inputs, --fps and --up, or survey these")
         sequence.learn((dict(enumerate(self.digests)), None))
 
     def part(self, number: int, count: int, longest: int) -> Excerpt:

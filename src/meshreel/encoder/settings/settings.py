@@ -83,6 +83,7 @@ class Settings:
             raise InputError("dynamic only looks for no background: leave background refresh out")
         self._check_preset()
         self._check_color()
+        self.resolved()  # refuses what no option can have
 
     def _check_preset(self) -> None:
         """Raise InputError for what the preset does not have."""
@@ -110,7 +111,7 @@ class Settings:
             raise InputError(f"{text}; leave one of both out")
 
     def resolved(self) -> EncoderOptions:
-        """Return the options of the encoder. Raises InputError for numbers that no option can have."""
+        """Return the options of the encoder that follow from these choices."""
         quality = float(QUALITY if self.quality is None else self.quality)
         method = (
             layers_options(quality, self.effort)
