@@ -73,17 +73,19 @@ class ReelReader:
         self.metadata, self.edit, self.size = check_file(self.header, self.index, flags, self.head_size)
         self.chunks = _chunks(self.index, self.head_size, -self.edit.first)
         self.groups = tuple(chunk for chunk in self.chunks if chunk.kind == ChunkKind.GROUP)
-        self.tracks = _by_track(self.groups)  # the groups of each
+        tracks: list[list[Chunk]] = [[] for _ in {group.track for group in self.groups}]
+        self._shown_from = dict[int, int]()  # first frame of the first GROUP that depends on each STATIC
+        for group in self.groups:
+            tracks[group.track].append(group)
+            for number in group.depends_on:
+                self._shown_from.setdefault(number, group.first_frame)
+        self.tracks = tuple(map(tuple, tracks))  # the groups of each
         self.frame_count = self.edit.end - self.edit.first
         self.coded_count = sum(group.frame_count for group in self.tracks[0])  # frames, hidden ones included
         if source.size > self.size:
             raise FormatError(f"{source.size - self.size} bytes behind the last chunk, copy the file again")
         self._companions = {(c.depends_on[0], c.kind): c for c in self.chunks if c.kind in COMPANIONS}
         self._first_frames = [[group.first_frame for group in groups] for groups in self.tracks]
-        self._shown_from = dict[int, int]()  # first frame of the first GROUP that depends on each STATIC
-        for group in self.groups:
-            for number in group.depends_on:
-                self._shown_from.setdefault(number, group.first_frame)
         self._times = list(accumulate(self.header.intervals, initial=self.header.first_time))
 
     @property
@@ -271,10 +273,3 @@ def _chunks(index: Index, offset: int, first_frame: int) -> tuple[Chunk, ...]:
         if is_group:  # only groups have checked tracks: an unknown kind may have any
             frames[entry.track] += entry.frames
     return tuple(chunks)
-
-
-def _by_track(groups: tuple[Chunk, ...]) -> tuple[tuple[Chunk, ...], ...]:
-    tracks: list[list[Chunk]] = [[] for _ in {group.track for group in groups}]
-    for group in groups:
-        tracks[group.track].append(group)
-    return tuple(map(tuple, tracks))

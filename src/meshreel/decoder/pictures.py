@@ -57,12 +57,6 @@ class Decoders:
     def keep(self, first: tuple[int, int], place: _Place) -> None:
         self._places[first] = place
 
-    def check(self, link: tuple[int, int], stop: int | None) -> None:
-        """Raise the FormatError of refused bytes if the first `stop` pictures, or all, need them."""
-        whole, message = self.refused.get(link, (0, ""))
-        if message and (stop is None or stop > whole):
-            raise FormatError(message)
-
 
 @dataclass(frozen=True, slots=True)
 class _Shown:
@@ -173,7 +167,9 @@ class TrackPictures:
         """Return the place behind the first `count` pictures of the last link of a chain."""
         for link in chain if place is None else chain[chain.index(place.after) :]:
             stop, done, chunk = count if link == chain[-1] else None, 0, self._reader.chunks[link[0]]
-            self._decoders.check(link, stop)
+            whole, message = self._decoders.refused.get(link, (0, ""))
+            if message and (stop is None or stop > whole):
+                raise FormatError(message)
             data = self._reader.read_layer(*link)
             try:
                 record = self._record(link, data)

@@ -99,10 +99,10 @@ def encode_to(
             file.seek(0)
             file.truncate()
             summary = encoder.encode_into(file, options_at(quality), files)
-            value = goal.measured(summary, encoder.frame_rate)
+            value = goal.measured(summary, encoder.sequence.frame_rate)
             if abs(value - goal.wanted) <= goal.tolerance:
                 return summary, quality
-            if over := goal.exceeded_by_background(summary, encoder.frame_rate):
+            if over := goal.exceeded_by_background(summary, encoder.sequence.frame_rate):
                 raise InputError(f"{path}: {over}")
             search.learn(quality, value)
         raise InputError(f"{path}: no quality gives {goal.text_of(goal.wanted)}; {search.found()}")

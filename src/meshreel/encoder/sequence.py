@@ -153,11 +153,6 @@ class Encoder:
         self._scene: tuple[Cameras, bool, Parts] | None = None
         self._stands: bool | None = masker is not None or None  # most stands still; None: unknown yet
 
-    @property
-    def frame_rate(self) -> float:
-        """Frames per second of the sequence, 1/s."""
-        return self.sequence.frame_rate
-
     def intervals(self, options: EncoderOptions) -> Iterator[Interval]:
         """Yield the intervals that `encode` encodes, of all tracks of a scene."""
         job, parts = self._job(options), self.parts(options)

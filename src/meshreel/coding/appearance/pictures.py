@@ -140,7 +140,11 @@ def coded_pictures(packet: bytes, codec: VideoCodec) -> int:
 
     Raises FormatError if it shows none or several, decodes more than 8, or is AV1 of another profile than Main.
     """
-    coded, shown = _of_av1(packet) if codec == VideoCodec.AV1 else _of_h264(packet)
+    if codec == VideoCodec.AV1:
+        coded, shown = _of_av1(packet)
+    else:
+        heads = re.findall(rb"\x00\x00\x01(.)[\x80-\xff]", packet, re.DOTALL)  # of slices that begin with block 0
+        coded = shown = sum(head[0] & 31 in SLICES for head in heads)
     if shown != 1 or coded > MOST_CODED:
         raise FormatError(f"a packet of {len(packet)} bytes that decodes {coded} pictures and shows {shown}")
     return coded
@@ -164,18 +168,13 @@ def _of_av1(packet: bytes) -> tuple[int, int]:
     return coded, shown
 
 
-def _of_h264(packet: bytes) -> tuple[int, int]:
-    heads = re.findall(rb"\x00\x00\x01(.)[\x80-\xff]", packet, re.DOTALL)  # of slices that begin with block 0
-    count = sum(head[0] & 31 in SLICES for head in heads)
-    return count, count
-
-
 def to_i420(pixels: UInt8[np.ndarray, "H W 3"]) -> UInt8[np.ndarray, "R W"]:
     """Return the planes of a picture with even sides, one below the other: R is 3 H / 2."""
     red, green, blue = (pixels[..., k].astype(np.float64) for k in range(3))
     luma = LUMA[0] * red + LUMA[1] * green + LUMA[2] * blue
-    differences = [_halved((blue - luma) / BLUE), _halved((red - luma) / RED)]
-    planes = [16 + 219 / 255 * luma, *(128 + 224 / 255 * plane for plane in differences)]
+    wide = [(blue - luma) / BLUE, (red - luma) / RED]
+    halved = [(plane[::2, ::2] + plane[1::2, ::2] + plane[::2, 1::2] + plane[1::2, 1::2]) / 4 for plane in wide]
+    planes = [16 + 219 / 255 * luma, *(128 + 224 / 255 * plane for plane in halved)]
     flat = np.concatenate([np.rint(plane).astype(np.uint8).reshape(-1) for plane in planes])
     return flat.reshape(-1, pixels.shape[1])
 
@@ -205,10 +204,6 @@ def _without_comments(packet: bytes) -> bytes:
     """Return an access unit of H.264 without its comments, which x264 fills with 600 bytes about itself."""
     units = [unit for unit in re.split(b"\0{2,3}\1", packet) if unit and unit[0] & 31 != COMMENT]
     return b"".join(b"\0\0\0\1" + unit for unit in units)
-
-
-def _halved(plane: np.ndarray) -> np.ndarray:
-    return (plane[::2, ::2] + plane[1::2, ::2] + plane[::2, 1::2] + plane[1::2, 1::2]) / 4
 
 
 @contextmanager

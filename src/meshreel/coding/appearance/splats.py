@@ -67,7 +67,8 @@ def decode_splats(data: bytes, faces: int) -> Splats:
 def _encode_layer(splats: Splats, head: Gaussians) -> GaussiansLayer:
     """Encode the splats of a layer; they are in the order of their faces."""
     size, rungs = 1 << head.place_bits, _rungs(splats.scales)
-    places = _on_lattice(splats.weights, size)
+    places = np.clip(np.rint(splats.weights * size), 0, size).astype(np.int64)
+    places[:, 1] = np.minimum(places[:, 1], size - places[:, 0])  # a sum of 0 to `size`
     turns = np.rint(splats.turns / np.pi * (1 << head.turn_bits)).astype(np.int64) % (1 << head.turn_bits)
     turns[splats.scales[:, 0] < ROUND * splats.scales[:, 1]] = 0
     opacities = np.rint(splats.opacities * (1 << head.opacity_bits))
@@ -141,19 +142,12 @@ def _rungs(scales: Float64[np.ndarray, "N 2"]) -> Int64[np.ndarray, "N 2"]:
     return np.maximum.accumulate(rungs, axis=1)
 
 
-def _on_lattice(weights: Float64[np.ndarray, "N 2"], size: int) -> Int64[np.ndarray, "N 2"]:
-    """Round weights to integers of 0 to `size`, with a sum of 0 to `size`."""
-    places = np.clip(np.rint(weights * size), 0, size).astype(np.int64)
-    places[:, 1] = np.minimum(places[:, 1], size - places[:, 0])
-    return places
-
-
 def _layers(splats: Splats, importance: Float64[np.ndarray, " N"]) -> list[Int64[np.ndarray, " _"]]:
-    """Return the splats of each layer, in the order of their places.
+    """Return the splats of each layer, in the order of their faces after four subdivisions.
 
     Layers are spread evenly over the surface: among neighbours in that order, the most important come first.
     """
-    order = _by_place(splats)
+    order = np.argsort(locate(splats.faces, splats.weights, 4)[0], kind="stable")
     n, rank = len(order), np.empty(len(order))
     run = max(round(LAYERS[-1] / LAYERS[0]), 1)  # neighbours of which one is in the first layer
     for start in range(0, n, run):
@@ -163,11 +157,6 @@ def _layers(splats: Splats, importance: Float64[np.ndarray, " N"]) -> list[Int64
     bounds = [0, *(max(round(share * n), 1) for share in LAYERS)]
     parts = (np.sort(by_rank[a:b]) for a, b in pairwise(bounds) if b > a)
     return [order[part] for part in parts]
-
-
-def _by_place(splats: Splats) -> Int64[np.ndarray, " N"]:
-    """Return the order of splats by face, and inside a face by their face after four subdivisions."""
-    return np.argsort(locate(splats.faces, splats.weights, 4)[0], kind="stable")
 
 
 def _check_input(splats: Splats, importance: Float64[np.ndarray, " N"]) -> None:

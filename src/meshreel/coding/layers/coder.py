@@ -44,10 +44,6 @@ class LayerCodingOptions:
     price: float = 0.08  # price of a bit, in squared steps
     tangential: float = 0.4  # weight of squared errors of the base's vertices along the surface, 0 to 1
 
-    def curvature(self, level: int) -> int:
-        """Return the lift of a level's midpoints, 64ths."""
-        return self.curvatures[min(level, len(self.curvatures)) - 1]
-
     def step_above(self, noise: float) -> float:
         """Return the step for frames at this RMS distance from the truth: below the noise there is nothing to code."""
         return math.hypot(self.step, NOISY_STEP * noise)
@@ -108,7 +104,7 @@ def encode_layers(
         level = subdivide(faces, decoded.shape[1])
         if positions.shape[1] < level.count:
             raise InputError(f"{positions.shape[1]} vertices where level {number} has {level.count}")
-        curvature = options.curvature(number)
+        curvature = options.curvatures[min(number, len(options.curvatures)) - 1]
         aim = heights(positions[:, : level.count], decoded, level, curvature)
         record, offsets = _encode_level(aim, level, options.rate(number, noise), curvature, _before(previous, number))
         layers.append(pack(record))

@@ -119,17 +119,13 @@ class _Columns:
         self.weights = strict.products(self.vectors, trajectories.T)
         if np.abs(self.weights).max(initial=0) > MOST_WEIGHT * rate.step:
             raise InputError(f"a trajectory {np.abs(self.weights).max():g} long is too long for step {rate.step:g}")
-        self.symbols, self.decoded = self._quantized(graph, surface)
-        self.stream, self.sizes = _core.encode_field(self.symbols, graph.core)
-
-    def _quantized(
-        self, graph: Graph, surface: SurfaceWeight | None
-    ) -> tuple[Int32[np.ndarray, "M V"], Float64[np.ndarray, "M V"]]:
-        step, price = self.rate.step, self.rate.price
         if surface is None:
-            return _core.predict_forward(self.weights, graph.core, step, price)
-        metric = _core.Surface(self.vectors, surface.normals, surface.tangential)
-        return _core.predict_surface(self.weights, graph.core, metric, step, price)
+            coded = _core.predict_forward(self.weights, graph.core, rate.step, rate.price)
+        else:
+            metric = _core.Surface(self.vectors, surface.normals, surface.tangential)
+            coded = _core.predict_surface(self.weights, graph.core, metric, rate.step, rate.price)
+        self.symbols, self.decoded = coded
+        self.stream, self.sizes = _core.encode_field(self.symbols, graph.core)
 
     def pays(self) -> Bool[np.ndarray, " M"]:
         """Return a mask of the columns whose absence would cost more than their bits."""

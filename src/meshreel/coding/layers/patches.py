@@ -32,8 +32,14 @@ class Patches:
 
     def apply(self, positions: Float64[np.ndarray, "T V 3"], faces: Int32[np.ndarray, "F 3"]) -> list[Mesh]:
         """Return the patched frames: vertices and faces of a patch follow those of the template."""
-        frames = zip(positions, self.dropped, self.meshes, strict=True)
-        return [_joined(points, faces[~gone] if gone.any() else faces, patch) for points, gone, patch in frames]
+        frames = list[Mesh]()
+        for points, gone, patch in zip(positions, self.dropped, self.meshes, strict=True):
+            shown = faces[~gone] if gone.any() else faces
+            if not patch.is_empty:
+                shown = np.concatenate([shown, (patch.faces + len(points)).astype(np.int32)])
+                points = np.concatenate([points, patch.vertices])
+            frames.append(Mesh(points, shown))
+        return frames
 
 
 def reach(rung: int, frames: int) -> tuple[float, float]:
@@ -158,10 +164,3 @@ def _parted(
     ends = np.searchsorted(of_faces[order], np.arange(frames + 1)).tolist()
     spans = zip(pairwise(starts), pairwise(ends), strict=True)
     return tuple(Mesh.of(points[a:b].copy(), faces[c:d] - a) for (a, b), (c, d) in spans)
-
-
-def _joined(points: Float64[np.ndarray, "V 3"], faces: Int32[np.ndarray, "F 3"], patch: Mesh) -> Mesh:
-    if patch.is_empty:
-        return Mesh(points, faces)
-    more = (patch.faces + len(points)).astype(np.int32)
-    return Mesh(np.concatenate([points, patch.vertices]), np.concatenate([faces, more]))

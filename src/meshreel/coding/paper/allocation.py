@@ -82,9 +82,12 @@ def allocate(
         chosen = basis.energies > (0.4 * options.step) ** 2  # weaker components are not tried (guess)
     coded = _Components(field, basis.only(chosen), system, options)
     ladder = [np.full(coded.count, rung_of(options.step) + offset) for offset in options.offsets]
-    values = np.array([coded.value(coded.rounded(rungs), rungs, neighbours) for rungs in ladder])
+    values = np.array(
+        [coded.value(round_deltas(coded.deltas, rungs, system, options), rungs, neighbours) for rungs in ladder]
+    )
     rungs = np.choose(values.argmin(axis=0), ladder) if coded.count else ladder[0]
-    pays = values.min(axis=0) < coded.dropped() if options.basis_size is None else np.ones(coded.count, dtype=bool)
+    dropped = (coded.weights**2).sum(axis=0)  # the distortion caused by leaving a component out
+    pays = values.min(axis=0) < dropped if options.basis_size is None else np.ones(coded.count, dtype=bool)
     if not pays.all():
         chosen[chosen] = pays
         coded, rungs = _Components(field, basis.only(chosen), system, options), rungs[pays]
@@ -117,10 +120,6 @@ class _Components:
         self.weights = klt.forward(field, klt.dequantize(self.basis))
         self.deltas = system.forward(self.weights)
 
-    def rounded(self, rungs: Int64[np.ndarray, " M"]) -> Int32[np.ndarray, "R M"]:
-        """Return the symbols at a rung for each component."""
-        return round_deltas(self.deltas, rungs, self.system, self.options)
-
     def value(
         self, symbols: Int32[np.ndarray, "R M"], rungs: Int64[np.ndarray, " M"], neighbours: entropy.Neighbours
     ) -> Float64[np.ndarray, " M"]:
@@ -131,10 +130,6 @@ class _Components:
         bits += log2(2.0 * np.abs(symbols[self.vertices :]) + 1).sum(axis=0)
         bits += log2(2.0 * np.abs(self.basis.vectors) + 1).sum(axis=1)
         return (error**2).sum(axis=0) + WORTH * self.options.step**2 * bits
-
-    def dropped(self) -> Float64[np.ndarray, " M"]:
-        """Return the distortion caused by leaving each component out."""
-        return (self.weights**2).sum(axis=0)
 
 
 def steps_of(rungs: Int64[np.ndarray, " M"]) -> Float64[np.ndarray, " M"]:

@@ -95,7 +95,12 @@ class _Chain:
         canvas = canvas_of(group.payload, [len(mesh.vertices) for mesh in meshes], None, known)
         if self._splats is not None:
             self._splats.add(group.form, canvas, meshes, numbers)
-        colors = [_vertex_colors(paint, mesh) for paint, mesh in zip(paints, meshes, strict=True)]
+        colors = [
+            np.full(mesh.vertices.shape, GREY, np.uint8)
+            if paint is None or mesh.is_empty
+            else vertex_colors(paint, mesh)
+            for paint, mesh in zip(paints, meshes, strict=True)
+        ]
         texture = options.texture if pictured and not self._groups and group.form == Form.LAYERS else None
         is_covered = texture is not None or self._video is not None
         step = COARSER * options.color_step if is_covered else options.color_step
@@ -160,12 +165,6 @@ class _Video:
             self._colors[seen] = colors[seen]
             self._seen |= seen
         self.videos.add(picture(self._texels, self._colors, self._seen))
-
-
-def _vertex_colors(paint: Paint | None, mesh: Mesh) -> np.ndarray:
-    if paint is None or mesh.is_empty:
-        return np.full(mesh.vertices.shape, GREY, np.uint8)
-    return vertex_colors(paint, mesh)
 
 
 def fitting_size(paints: Sequence[Paint | None], meshes: Sequence[Mesh]) -> int:

@@ -181,7 +181,19 @@ def metadata_of(
     options: EncoderOptions, groups: Sequence[GroupSummary], up: Up, part: tuple[int, int] | None = None
 ) -> dict[str, Any]:
     """Return the metadata of a file that is no scene; a `part` is its first frame, and the frames of the whole."""
-    totals, keys = totals_of(groups), sorted({group.key for group in groups if group.key is not None})
+    totals = Totals.added(
+        [
+            Totals(
+                group.frame_count if group.track == 0 else 0,
+                (count := group.share * group.frame_count) * group.fidelity.distance**2,  # bodies count by their share
+                group.fidelity.worst,
+                count * group.fidelity.psnr,
+                count * group.fidelity.angle,
+            )
+            for group in groups
+        ]
+    )
+    keys = sorted({group.key for group in groups if group.key is not None})
     found = {**chosen_options(options, groups), KEYS: keys, **totals.means}
     if part is None:
         return found | upright(up)
@@ -194,19 +206,3 @@ def chosen_options(options: EncoderOptions, groups: Sequence[GroupSummary]) -> d
     """Return the preset and the quality; of the paper's recipe also how many references lie in the pose of eq. 5."""
     found = {"preset": options.preset, "quality": rounded(options.quality)}
     return found | ({} if options.preset == "best" else {CANONICAL: sum(group.canonical for group in groups)})
-
-
-def totals_of(groups: Sequence[GroupSummary]) -> Totals:
-    """Return the totals of the groups of a file; bodies count by their share of the vertices."""
-    return Totals.added(
-        [
-            Totals(
-                group.frame_count if group.track == 0 else 0,
-                (count := group.share * group.frame_count) * group.fidelity.distance**2,
-                group.fidelity.worst,
-                count * group.fidelity.psnr,
-                count * group.fidelity.angle,
-            )
-            for group in groups
-        ]
-    )

@@ -70,9 +70,11 @@ def intra_only(frames: Sequence[Mesh], target: Target, options: IntraOptions) ->
     Where its bytes may not hold so many frames, the group has only the first of them. Raises InputError where they may
     not hold one.
     """
-    found = cheapest_intra(frames, target, np.inf, options)
+    if (found := cheapest_intra(frames, target, np.inf, options)) is not None:
+        return found
     try:
-        return found or finest_intra(frames, target.distance)
+        payload = encode_intra(frames, coarse_enough(frames, target.distance), 0)  # every vertex: the last resort
+        return EncodedGroup(Form.DRACO, len(frames), payload, (), measure(frames, decode_intra(payload)))
     except CostlyError as error:
         if len(frames) > 1:
             return intra_only(frames[: len(frames) // 2], target, options)
@@ -117,15 +119,6 @@ def cheapest_intra(
         if fidelity is not None and fidelity.reaches(target):
             return EncodedGroup(Form.DRACO, len(frames), payload, (), fidelity)
     return None
-
-
-def finest_intra(frames: Sequence[Mesh], step: float) -> EncodedGroup:
-    """Encode every vertex in the `draco` form: the last resort where nothing cheaper reaches a target.
-
-    Raises CostlyError where readers would refuse so few bytes for the frames.
-    """
-    payload = encode_intra(frames, coarse_enough(frames, step), 0)
-    return EncodedGroup(Form.DRACO, len(frames), payload, (), measure(frames, decode_intra(payload)))
 
 
 def coarse_enough(frames: Sequence[Mesh], step: float) -> float:

@@ -58,45 +58,38 @@ class Interval:
 
     def free(self, number: int) -> FreeSpace | None:
         """Return the space that cameras saw through in frame `number`, counted from the first; None if unknown."""
-        return None if self.sight is None else self.sight.at(self.first_frame + number)
+        if self.sight is None:
+            return None
+        return FreeSpace.of(self.sight.depth[self.first_frame + number], self.sight.place)
 
     @property
     def observed(self) -> Any:
         """Observations from reading the frames, for `learn` of the interval that was sent."""
-        return self.frames.observed if isinstance(self.frames, NormalisedFrames) else None
+        return self.frames.sequence.observed if isinstance(self.frames, NormalisedFrames) else None
 
     def learn(self, observed: Any) -> None:
         """Take what a worker observed. Raises InputError for a frame that has changed since it was read first."""
         if isinstance(self.frames, NormalisedFrames):
-            self.frames.learn(observed)
+            self.frames.sequence.learn(observed)
 
 
 class NormalisedFrames(Frames):
     """Frames of a sequence in normalised coordinates, computed on access."""
 
     def __init__(self, sequence: DerivedSequence, seen: Survey, numbers: range) -> None:
-        self._sequence, self._seen, self._numbers = sequence, seen, numbers
+        self.sequence, self._seen, self._numbers = sequence, seen, numbers
 
     def __len__(self) -> int:
         return len(self._numbers)
 
     def __getitem__(self, index: int) -> Mesh:
-        return self._seen.normalise(self._sequence[self._numbers[index]])
+        return self._seen.normalise(self.sequence[self._numbers[index]])
 
     def only(self) -> NormalisedFrames:
         """Return the same frames, with nothing else of their sequence."""
         found = copy.copy(self)
-        found._sequence, found._seen = self._sequence.only(self._numbers), self._seen.without_frames()
+        found.sequence, found._seen = self.sequence.only(self._numbers), self._seen.without_frames()
         return found
-
-    @property
-    def observed(self) -> Any:
-        """Observations of the sequence."""
-        return self._sequence.observed
-
-    def learn(self, observed: Any) -> None:
-        """Take what the same frames observed in another process."""
-        self._sequence.learn(observed)
 
 
 class BodyFrames(NormalisedFrames):
@@ -111,10 +104,10 @@ class BodyFrames(NormalisedFrames):
 
     def __getitem__(self, index: int) -> Mesh:
         """Return the body in a frame. Raises InputError for a survey that has other pieces of the frame."""
-        mesh, bodies = clean(self._sequence[self._numbers[index]]), self._bodies[index]
+        mesh, bodies = clean(self.sequence[self._numbers[index]]), self._bodies[index]
         pieces = piece_of_faces(mesh)
         if (count := 1 + int(pieces.max(initial=0))) != len(bodies):
-            text = f"{self._sequence.name(self._numbers[index])}: has {count} large pieces, in its survey {len(bodies)}"
+            text = f"{self.sequence.name(self._numbers[index])}: has {count} large pieces, in its survey {len(bodies)}"
             raise InputError(f"{text}; write it again with meshreel survey")
         return self._seen.normalise(part_of(mesh, np.array(bodies)[pieces] == self._body))
 
@@ -167,12 +160,3 @@ class Sight:
 
     depth: DepthFrames
     place: Placement  # of the coordinates in which they are asked
-
-    @staticmethod
-    def of(sequence: CapturedSequence, seen: Survey) -> Sight | None:
-        """Return the sight of a sequence, None where no depth cameras are known."""
-        return None if sequence.depth is None else Sight(sequence.depth, Placement(seen.unit, tuple(seen.center)))
-
-    def at(self, number: int) -> FreeSpace:
-        """Return the space that cameras saw through in a frame."""
-        return FreeSpace.of(self.depth[number], self.place)

@@ -74,17 +74,14 @@ class GroupCoder:
         chosen = EncodedGroup(Form.LAYERS, len(self.surfaces), payload, ends, fidelity, is_predicted)
         if not np.isfinite(chosen.fidelity.distance) or any(mesh.is_empty for mesh in shown):
             return self.alone(), None  # the template has collapsed: nothing is comparable
-        if (sharp := self._sharp(chosen)) is not None:
-            return sharp, None
+        if fidelity.angle > self.options.flat * self.target.angle:  # edges are lost, as those of few, large faces
+            most_bytes = MOST_FOR_EDGES * len(payload)
+            sharp = cheapest_intra(self.frames, self.target, most_bytes, self.options.intra)
+            if sharp is not None:
+                return sharp, None
         if self.floor and most_for(chosen) > self.dearer:
             chosen = cheaper(self.frames, chosen, self.options.intra)
         return chosen, encoded.state if chosen.form == Form.LAYERS else None
-
-    def _sharp(self, group: EncodedGroup) -> EncodedGroup | None:
-        """Return the `draco` form of a group whose edges are lost, as those of few, large faces; else None."""
-        if group.fidelity.angle <= self.options.flat * self.target.angle:
-            return None
-        return cheapest_intra(self.frames, self.target, MOST_FOR_EDGES * len(group.payload), self.options.intra)
 
     def _with_tails(
         self, encoded: EncodedLayers, faces: Int32[np.ndarray, "F 3"]

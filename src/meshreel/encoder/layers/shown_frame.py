@@ -91,8 +91,9 @@ class ShownFrame:
             far = np.flatnonzero(squared > least)
             squared = squared.copy()
             squared[far] = np.minimum(squared[far], squared_distances(Surface(patch), self.points[far])[0])
-            more = self._apart(patch)
-            areas, apart = np.concatenate([areas, more[0]]), np.concatenate([apart, more[1]])
+            points, added = _samples(patch)
+            away = self._of_free(points, squared_distances(self.surface, points)[0], patch)
+            areas, apart = np.concatenate([areas, added]), np.concatenate([apart, away])
         return dot(self.weights, squared), dot(areas, apart) / float(areas.sum()) if areas.any() else np.inf
 
     def lost(self, squared: Float64[np.ndarray, " N"], limit: float) -> Iterator[Int64[np.ndarray, " S"]]:
@@ -109,10 +110,6 @@ class ShownFrame:
     def samples_of(self, faces: Int64[np.ndarray, " S"]) -> Int64[np.ndarray, " n"]:
         """Return the numbers of the samples on some of the frame's faces."""
         return np.concatenate([np.unique(self.original.faces[faces]), len(self.original.vertices) + faces])
-
-    def _apart(self, mesh: Mesh) -> tuple[Float64[np.ndarray, " F"], Float64[np.ndarray, " F"]]:
-        points, areas = _samples(mesh)
-        return areas, self._of_free(points, squared_distances(self.surface, points)[0], mesh)
 
     def _of_free(
         self, points: Float64[np.ndarray, "N 3"], squared: Float64[np.ndarray, " N"], mesh: Mesh

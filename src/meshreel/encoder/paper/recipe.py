@@ -17,7 +17,7 @@ import numpy as np
 from jaxtyping import Float64
 
 from ... import _core
-from ...analysis.fit.surface_fit import Fit, FitOptions, Guides, fit_frames, snap_to_vertices
+from ...analysis.fit.surface_fit import FitOptions, Guides, fit_frames, snap_to_vertices
 from ...analysis.plan import cut_at
 from ...analysis.reference.extraction import MDS, ReferenceOptions, extract_reference, predict
 from ...analysis.reference.track import TrackOptions, track_centers
@@ -71,12 +71,6 @@ class PaperOptions:
     def __post_init__(self) -> None:
         check_group_size(self.group_size)
 
-    @property
-    def is_literal(self) -> bool:
-        """True if every step follows the paper's words."""
-        plain = (self.displacements.dead_zone, self.displacements.offsets) == (PLAIN_ZONE, PLAIN_OFFSETS)
-        return plain and (self.pose, self.fit, self.cuts) == ("mds", "nearest", False)
-
 
 @dataclass(frozen=True, slots=True)
 class Fitted:
@@ -124,8 +118,10 @@ class PaperRecipe:
 
     @property
     def name(self) -> str:
-        """The name of the preset."""
-        return "paper-literal" if self.options.is_literal else "paper"
+        """The name of the preset: `paper-literal` if every step follows the paper's words."""
+        o = self.options
+        plain = (o.displacements.dead_zone, o.displacements.offsets) == (PLAIN_ZONE, PLAIN_OFFSETS)
+        return "paper-literal" if plain and (o.pose, o.fit, o.cuts) == ("mds", "nearest", False) else "paper"
 
     @property
     def group_size(self) -> int:
@@ -165,21 +161,12 @@ def analyze(
     if coded.base.is_empty:
         raise NoReferenceError("the reference mesh has no faces left after Draco")
     predictions = predict(reference, coded.base, centers)
-    fit = _fit(coded, predictions, frames, options, reference.key)
+    if options.fit == "nearest":
+        fit = snap_to_vertices(coded.base.faces, predictions, frames)
+    else:
+        fit = fit_frames(coded.base.faces, predictions, frames, FitOptions(), Guides(key=reference.key))
     stages.add("fit", len(frames))
     return Fitted(coded, fit.positions, reference.frame == MDS), fit.residuals
-
-
-def _fit(
-    coded: CodedReference,
-    predictions: Float64[np.ndarray, "T V 3"],
-    frames: Sequence[Mesh],
-    options: PaperOptions,
-    key: int,
-) -> Fit:
-    if options.fit == "nearest":
-        return snap_to_vertices(coded.base.faces, predictions, frames)
-    return fit_frames(coded.base.faces, predictions, frames, FitOptions(), Guides(key=key))
 
 
 @dataclass(frozen=True, slots=True)

@@ -118,8 +118,8 @@ def encode_intervals(job: Job, intervals: Iterable[Interval]) -> Iterator[list[E
 def _one_by_one(job: Job, files: IntervalFiles, intervals: Iterable[Interval]) -> Iterator[_Done]:
     """Encode intervals here, each when it is asked for."""
     for interval in intervals:
-        stages = _stages_of(job, interval)
-        if (known := _known(job, files, interval, stages)) is not None:
+        stages, known = _begun(job, files, interval)
+        if known is not None:
             yield known, ""
             continue
         data, lines = _task(job, interval).done(stages)
@@ -134,8 +134,8 @@ def _side_by_side(job: Job, files: IntervalFiles, intervals: Iterable[Interval])
 
     def calls() -> Iterator[Call]:
         for number, interval in enumerate(intervals):
-            stages = _stages_of(job, interval)
-            if (known := _known(job, files, interval, stages)) is not None:
+            stages, known = _begun(job, files, interval)
+            if known is not None:
                 ready[number] = known, ""
                 continue
             sent[number] = interval, stages
@@ -175,16 +175,13 @@ def _task(job: Job, interval: Interval) -> Task:
     return Task(interval, job.recipe, job.options.appearance, job.head, listener() is not None)
 
 
-def _stages_of(job: Job, interval: Interval) -> IntervalStages:
-    return IntervalStages(job.stages, len(interval.frames), job.recipe.group_size, interval.weight)
-
-
-def _known(job: Job, files: IntervalFiles, interval: Interval, stages: IntervalStages) -> list[EncodedGroup] | None:
-    """Return the groups of an interval that an earlier run encoded, or None."""
+def _begun(job: Job, files: IntervalFiles, interval: Interval) -> tuple[IntervalStages, list[EncodedGroup] | None]:
+    """Return the progress of an interval, and its groups if an earlier run encoded it."""
+    stages = IntervalStages(job.stages, len(interval.frames), job.recipe.group_size, interval.weight)
     known = files.take(interval, job.head)
     if known is not None:
         stages.reach("code", 1.0)
-    return known
+    return stages, known
 
 
 def encode_sent(task: Task, number: int) -> tuple[bytes, str, Any, Work]:

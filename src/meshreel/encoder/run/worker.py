@@ -41,12 +41,11 @@ def die_with_parent() -> None:
 @cache
 def end_with_parent() -> None:
     """Watch the process that started this one, where there is one, and end when it does, however it ended."""
-    if multiprocessing.parent_process() is not None:
-        threading.Thread(target=_watch, name="ends with its parent", daemon=True).start()
+    if (parent := multiprocessing.parent_process()) is None:
+        return
 
+    def watch() -> None:
+        parent.join()  # a pipe or a handle that the system closes with the parent
+        os._exit(1)
 
-def _watch() -> None:
-    parent = multiprocessing.parent_process()
-    assert parent is not None
-    parent.join()  # a pipe or a handle that the system closes with the parent
-    os._exit(1)
+    threading.Thread(target=watch, name="ends with its parent", daemon=True).start()

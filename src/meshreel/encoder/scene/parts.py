@@ -125,11 +125,9 @@ def take_apart(
         _check_nothing_lost(sequence, segmentation)
     changes = [_change(sequence, segmentation, frame, options.from_depth) for frame in segmentation.changes]
     stages.reach("background", 1.0)
-    found = _measured(sequence, segmentation, background, changes, stages)
-    unit = float(np.median(found.sizes)) if found.sizes else 0.0
-    seen = replace(seen, scale=unit or seen.diagonal)
-    facts = (found.noise, found.deviation, found.astray)
-    return Parts(seen, segmentation, background, changes, *facts, free_space(sequence))
+    sizes, noise, deviation, astray = _measured(sequence, segmentation, background, changes, stages)
+    seen = replace(seen, scale=(float(np.median(sizes)) if sizes else 0.0) or seen.diagonal)
+    return Parts(seen, segmentation, background, changes, noise, deviation, astray, free_space(sequence))
 
 
 def free_space(sequence: CapturedSequence) -> tuple[FreeSpace, ...]:
@@ -195,16 +193,6 @@ def _room_after(background: Mesh, changes: Sequence[Change]) -> Surface | None:
     return None if there.is_empty else Surface(there)
 
 
-@dataclass(frozen=True, slots=True)
-class _Measured:
-    """Noise, body sizes and stray surface measured in some frames."""
-
-    noise: float  # m, RMS distance of still surface from the background
-    deviation: float  # m, the same by the median
-    sizes: list[float]  # m, diagonals of the largest body of each frame
-    astray: float  # share of all surface that stands still far from the background
-
-
 def _as_far(
     points: Float64[np.ndarray, "N 3"], bodies: Float64[np.ndarray, "M 3"], cameras: list[DepthPicture | None]
 ) -> Bool[np.ndarray, " N"]:
@@ -225,8 +213,11 @@ def _mean_square(gaps: Float64[np.ndarray, " N"]) -> float:
 
 def _measured(
     sequence: CapturedSequence, segmentation: Segmentation, background: Mesh, changes: Sequence[Change], stages: Stages
-) -> _Measured:
-    """Measure noise and bodies in some frames; still surface that is far from the background is no noise."""
+) -> tuple[list[float], float, float, float]:
+    """Measure bodies and noise in some frames; still surface that is far from the background is no noise.
+
+    Return the diagonals of the largest body of each frame, m, and noise, deviation and astray as in `Parts`.
+    """
     far, depth = OUTLIER * segmentation.noise, sequence.depth
     squares, deviations, sizes, lost, whole = [], [], list[float](), 0.0, 0.0
 
@@ -260,8 +251,8 @@ def _measured(
     stages.reach("noise", 1.0)
     astray = lost / whole if whole else 0.0
     if not squares:
-        return _Measured(0.0, 0.0, sizes, astray)
-    return _Measured(math.sqrt(float(np.mean(squares))), float(np.mean(deviations)), sizes, astray)
+        return sizes, 0.0, 0.0, astray
+    return sizes, math.sqrt(float(np.mean(squares))), float(np.mean(deviations)), astray
 
 
 _COLORS = ("depth", "hue", "limit")  # arrays of a ColorChange
@@ -302,16 +293,15 @@ def unpack_parts(data: bytes, sequence: CapturedSequence, seen: Survey) -> Parts
             places = Lattice(arrays["origin"], size), arrays["keys"], arrays["chosen"]
             by = ByPlace(cell, *places, rest, island, _colors(arrays, sequence))
             frames = arrays["changes"].tolist()
-            background, *came = (_mesh(arrays, number) for number in range(1 + len(frames)))
+            background, *came = (
+                Mesh(arrays[f"vertices {number}"], arrays[f"faces {number}"], arrays.get(f"colors {number}"))
+                for number in range(1 + len(frames))
+            )
     except _ODD:
         return None
     changes = [Change(frame, mesh) for frame, mesh in zip(frames, came, strict=True)]
     seen = replace(seen, scale=unit)
     return Parts(seen, by, background, changes, noise, deviation, astray, free_space(sequence))
-
-
-def _mesh(arrays: Any, number: int) -> Mesh:
-    return Mesh(arrays[f"vertices {number}"], arrays[f"faces {number}"], arrays.get(f"colors {number}"))
 
 
 def _colors(arrays: Any, sequence: CapturedSequence) -> ColorChange | None:

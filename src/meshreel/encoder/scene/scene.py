@@ -25,7 +25,7 @@ from ...analysis.survey import Survey
 from ...format.checks import MOST_TRACKS
 from ...geometry.derived_sequences import digest
 from ...geometry.topology import part_of
-from ...types import Mesh, MeshSequence
+from ...types import Mesh, MeshSequence, Placement
 from ..group.forms import empty_groups
 from ..group.interval import Interval, Sight, Views
 from ..run.schedule import Job, encode_intervals
@@ -79,6 +79,8 @@ def track_intervals(job: Job, parts: Parts, frames: range, tracks: Tracks) -> li
     Frames can where all have a surface or none has, and where they are of about one scale.
     """
     sequence, seen, found = job.sequence, parts.seen, list[Interval]()
+    depth, place = sequence.depth, Placement(seen.unit, tuple(seen.center))
+    sight = None if depth is None else Sight(depth, place)
     longest = job.recipe.longest(sequence.frame_rate)
     for track, meshes in tracks.of([parts.moving(k, sequence[k]) for k in frames]):
         normalised = [seen.normalise(mesh) for mesh in meshes]
@@ -86,7 +88,7 @@ def track_intervals(job: Job, parts: Parts, frames: range, tracks: Tracks) -> li
             some = normalised[cut.start : cut.stop]
             one = Interval(some, parts.body_noise, frames.start + cut.start, track, digest(some))
             one = replace(one, up=sequence.up, frame_rate=sequence.frame_rate)
-            found.append(replace(one, views=Views.of(sequence, seen), sight=Sight.of(sequence, seen)))
+            found.append(replace(one, views=Views.of(sequence, seen), sight=sight))
     return found
 
 

@@ -12,7 +12,6 @@ import numpy as np
 from jaxtyping import Bool, Float64, UInt8
 
 from ...analysis.appearance.bake import Texels, median_colors, picture, projected, texels_of, unwrap
-from ...analysis.survey import Survey
 from ...coding.appearance.atlas import encode_atlas
 from ...coding.appearance.pictures import MOST_CRF
 from ...coding.background import changed, decode_background, decode_change, encode_background, encode_change
@@ -31,7 +30,7 @@ from ..appearance.colors import fitting_size
 from ..appearance.videos import AppearanceOptions, TextureOptions, layered_pictures
 from ..group.interval import Views
 from ..settings.options import SceneOptions
-from .parts import Change, Parts
+from .parts import Parts
 
 FRACTIONS = (0.75, 0.5, 0.35, 0.22, 0.15, 0.1, 0.07, 0.045, 0.03, 0.02)  # of the background's vertices (decision 19)
 HALVINGS = 2  # of the factor between two fractions, in search for a smaller mesh that is near enough (guess)
@@ -66,17 +65,22 @@ def encode_static(
     The first state is whole, as are those of a refresh; each change of the room is a patch of the state before, but for
     a background with pictures, whose atlas is of a whole state.
     """
-    noise = max(parts.deviation / parts.seen.unit, LEAST_NOISE)
+    seen = parts.seen
+    noise, place = max(parts.deviation / seen.unit, LEAST_NOISE), Placement(seen.unit, tuple(seen.center))
     step, most = options.lattice * noise, options.coarse * noise
-    payload, state = _coded(_normalised(parts.background, parts.seen), most, step)
+
+    def coded(mesh: Mesh) -> tuple[bytes, Mesh]:
+        return _coded(mesh.at((mesh.vertices - seen.center) / seen.unit), most, step)
+
+    payload, state = coded(parts.background)
     found = [] if state.is_empty else [Static(0, payload, False)]
     chain, changes = Chain(0, len(payload)), {change.frame: change for change in parts.changes}
     again = set(refreshes(count, frame_rate, options)) | (set(changes) if pictured else set())
     for frame in sorted({*changes, *again} - {0}):
         whole = state.is_empty or frame in again
         if change := changes.get(frame):
-            came = _coded(_normalised(change.came, parts.seen), most, step)[1]
-            before, gone = state, _gone(parts, state, change)
+            came = coded(change.came)[1]
+            before, gone = state, parts.segmentation.gone(frame, place.of(state))
             payload = encode_change(before, gone, came, step)
             try:
                 state = decode_change(payload, before)
@@ -97,37 +101,35 @@ def refreshes(count: int, frame_rate: float, options: SceneOptions) -> range:
     return range(0, count, count if options.refresh is None else max(1, round(options.refresh * frame_rate)))
 
 
-def _gone(parts: Parts, state: Mesh, change: Change) -> Bool[np.ndarray, " F"]:
-    """Return a mask of the background's faces, normalised, that a change removes."""
-    place = Placement(parts.seen.unit, tuple(parts.seen.center))
-    return parts.segmentation.gone(change.frame, place.of(state))
-
-
 def _coded(mesh: Mesh, most: float, step: float) -> tuple[bytes, Mesh]:
     """Encode a mesh with the fewest vertices that stay within an RMS distance; return payload and decoded mesh."""
     if mesh.is_empty:
         return b"", mesh
+
+    def tried(small: Mesh) -> tuple[bytes, Mesh, bool]:
+        """Return the payload of a simplified mesh, the decoded mesh, and whether this is near enough."""
+        payload = encode_background(small, step)
+        decoded = decode_background(payload)
+        near = not decoded.is_empty and float(np.sqrt((distances(mesh.vertices, decoded) ** 2).mean())) <= most
+        return payload, decoded, near
+
     steps = [clean(mesh)]  # each from the one before: these are nearer to the mesh than what is made from it at once
     for fraction in FRACTIONS:
         steps.append(decimate_faces(steps[-1], max(4, round(2 * fraction * len(mesh.vertices)))))
-    failed, best, found = 0, mesh, (b"", mesh)
+    failed = 0
     for best in reversed(steps):
-        found = _stored(best, step)
-        if is_near := _is_near(mesh, found[1], most):
+        payload, decoded, is_near = tried(best)
+        if is_near:
             break
         failed = len(best.faces)
     for _ in range(HALVINGS if failed and is_near else 0):
         small = decimate_faces(best, round((failed * len(best.faces)) ** 0.5))
-        stored = _stored(small, step)
-        if _is_near(mesh, stored[1], most):
-            best, found = small, stored
+        smaller = tried(small)
+        if smaller[2]:
+            best, (payload, decoded, _) = small, smaller
         else:
             failed = len(small.faces)
-    return found
-
-
-def _normalised(mesh: Mesh, seen: Survey) -> Mesh:
-    return mesh.at((mesh.vertices - seen.center) / seen.unit)
+    return payload, decoded
 
 
 def colored_states(
@@ -145,11 +147,11 @@ def colored_states(
         canvas, bare = background_canvas(state.payload), bare and state.is_patch  # what changes it has no colours, too
         [coded] = canvas.meshes
         frames, count = range(state.frame, end), len(mesh.vertices)
-        surface = (
-            _Unwrapped.of(mesh, *looks.layout(mesh, frames, texture.size)) if texture and not state.is_patch else None
-        )
-        points, normals = [mesh.vertices], [vertex_normals(mesh)]
-        if surface is not None:
+        points, normals, surface = [mesh.vertices], [vertex_normals(mesh)], None
+        if texture and not state.is_patch:
+            layout, scale = looks.layout(mesh, frames, texture.size)
+            texels = texels_of(layout, 0)
+            surface = _Unwrapped(layout, scale, texels, texels.places(mesh), face_normals(mesh)[0][texels.faces])
             points, normals = [*points, surface.places], [*normals, surface.normals]
         colors, seen = looks.colors(frames, np.concatenate(points), np.concatenate(normals))
         shown = spread_colors(mesh, colors[:count].astype(np.float64), seen[:count])[count - coded.vertices :]
@@ -182,11 +184,6 @@ class _Unwrapped:
     texels: Texels
     places: Float64[np.ndarray, "N 3"]
     normals: Float64[np.ndarray, "N 3"]
-
-    @staticmethod
-    def of(mesh: Mesh, layout: Layout, scale: float) -> _Unwrapped:
-        texels = texels_of(layout, 0)
-        return _Unwrapped(layout, scale, texels, texels.places(mesh), face_normals(mesh)[0][texels.faces])
 
 
 def _pictured(
@@ -223,7 +220,7 @@ class _Looks:
 
         What some frame shows away from steps in depth is taken from such frames: at steps, who stands there shines in.
         """
-        some = self._some(frames, STILL_FRAMES)
+        some = [frames[number] for number in evenly(len(frames), STILL_FRAMES)]
         if self._views is None:
             return median_colors(points, normals, map(self._paint, some))
         colors, known = median_colors(points, normals, (self._views.at(number, clear=True) for number in some))
@@ -243,10 +240,7 @@ class _Looks:
         """Return the places of a background in a texture, as cameras see it where there are some, and its scale."""
         if self._views is None:
             return unwrap(mesh, size or fitting_size([self._paint(frames.start)], [mesh])), 1.0
-        return projected(mesh, self._views.at(self._some(frames, 1)[0], hides=mesh))
-
-    def _some(self, frames: range, most: int) -> list[int]:
-        return [frames.start + number for number in evenly(len(frames), most)]
+        return projected(mesh, self._views.at(frames[evenly(len(frames), 1)[0]], hides=mesh))
 
     def _paint(self, number: int) -> Paint:
         if self._views is not None:
@@ -256,14 +250,3 @@ class _Looks:
         still = mesh.with_faces(~self._parts.segmentation.moving(number, mesh))
         far = max(NEAR * self._parts.noise, LEAST_NEAR) / seen.unit
         return Painted(still.at((still.vertices - seen.center) / seen.unit), far)
-
-
-def _stored(mesh: Mesh, step: float) -> tuple[bytes, Mesh]:
-    """Return the payload of a background, and what it decodes to."""
-    payload = encode_background(mesh, step)
-    return payload, decode_background(payload)
-
-
-def _is_near(mesh: Mesh, small: Mesh, most: float) -> bool:
-    """Return whether a simplified mesh is within an RMS distance of the vertices of a mesh."""
-    return not small.is_empty and float(np.sqrt((distances(mesh.vertices, small) ** 2).mean())) <= most

@@ -78,16 +78,15 @@ def intervals_of(job: Job, seen: Survey, planned: TrackedBodies) -> Iterator[Int
     """Yield an interval for each body of each key interval, whose frames are read where it is encoded."""
     views = Views.of(job.sequence, seen)
     for frames, bodies in planned.intervals:
+        whole = NormalisedFrames(job.sequence, seen, frames)
+        interval = Interval(whole, first_frame=frames.start, up=job.sequence.up, views=views)
         for body in bodies:
             if not body.bodies:
-                some = NormalisedFrames(job.sequence, seen, frames)
-                yield Interval(some, first_frame=frames.start, up=job.sequence.up, views=views)
+                yield interval
                 continue
             some = BodyFrames(job.sequence, seen, frames, body.number, body.bodies)
             larger = min(seen.diagonals[frames.start : frames.stop]) / min(body.diagonals)
-            weight = Fraction(1, len(bodies))
-            one = Interval(some, first_frame=frames.start, track=body.track, weight=weight, larger=larger)
-            yield replace(one, up=job.sequence.up, views=views)
+            yield replace(interval, frames=some, track=body.track, weight=Fraction(1, len(bodies)), larger=larger)
 
 
 def encode_tracked(job: Job, seen: Survey) -> Iterator[list[TrackGroup]]:

@@ -136,7 +136,7 @@ def plain_displacements(options: DisplacementOptions) -> DisplacementOptions:
 
 def layers_options(quality: float = 50.0, effort: str = "normal") -> LayersOptions:
     """Return the options of the recipe of layers at a quality."""
-    step, coarser = motion_step(quality), _step(quality)
+    step, coarser = motion_step(quality), rounded(0.0018 * 2 ** ((50 - quality) / 25))  # the latter without a knee
     options = LayersOptions(
         target=Target(distance=0.2 * coarser + 0.00005, angle=7.0, worst=coarser),  # what templates reach
         template_error=template_error(motion_step(min(quality, DENSEST))),
@@ -190,11 +190,6 @@ def motion_step(quality: float) -> float:
     return rounded(0.0018 * 2 ** ((50 - min(quality, KNEE)) / 25 - max(quality - KNEE, 0.0) / 8))
 
 
-def _step(quality: float) -> float:
-    """The same without a knee."""
-    return rounded(0.0018 * 2 ** ((50 - quality) / 25))
-
-
 def appearance_options(
     quality: float = 50.0,
     color: str = "auto",
@@ -205,19 +200,10 @@ def appearance_options(
     """Return the options of colours at a quality; None for no colours."""
     if color == "none":
         return None
-    crf = rate_factor(quality)
+    crf = round(62 - 0.4 * quality)  # 42 at 50, 54 at 20, 30 at 80
+    step = rounded(0.0909 * 2 ** ((50 - quality) / 35))  # as a share of the colours' range; halved every 35 points
     textures = None if color == "vertices" else TextureOptions(texture, crf, color == "texture", compatible)
-    return AppearanceOptions(color_step(quality), textures, splats=splats)
-
-
-def rate_factor(quality: float) -> int:
-    """Constant rate factor of textures' video: 42 at 50, 54 at 20, 30 at 80."""
-    return round(62 - 0.4 * quality)
-
-
-def color_step(quality: float) -> float:
-    """Quantiser step of colours of vertices as a share of their range: .0909 at 50, halved every 35 points."""
-    return rounded(0.0909 * 2 ** ((50 - quality) / 35))
+    return AppearanceOptions(step, textures, splats=splats)
 
 
 def displacement_step(quality: float) -> float:
