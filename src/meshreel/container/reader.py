@@ -74,11 +74,11 @@ class ReelReader:
         self.chunks = _chunks(self.index, self.head_size, -self.edit.first)
         self.groups = tuple(chunk for chunk in self.chunks if chunk.kind == ChunkKind.GROUP)
         tracks: list[list[Chunk]] = [[] for _ in {group.track for group in self.groups}]
-        self._shown_from = dict[int, int]()  # first frame of the first GROUP that depends on each STATIC
+        self.shown_from = dict[int, int]()  # of each STATIC, the first frame shown with it: its pictures begin there
         for group in self.groups:
             tracks[group.track].append(group)
             for number in group.depends_on:
-                self._shown_from.setdefault(number, group.first_frame)
+                self.shown_from.setdefault(number, group.first_frame)
         self.tracks = tuple(map(tuple, tracks))  # the groups of each
         self.frame_count = self.edit.end - self.edit.first
         self.coded_count = sum(group.frame_count for group in self.tracks[0])  # frames, hidden ones included
@@ -194,10 +194,6 @@ class ReelReader:
                 first = shown.pop()[0] if shown and shown[-1][1] == start else start
                 shown.append((first, end))
         return ranges
-
-    def shown_from(self, static: Chunk) -> int:
-        """Return the first frame shown with a STATIC chunk, from which its pictures are counted."""
-        return self._shown_from[static.number]
 
     def group_before(self, chunk: Chunk) -> Chunk | None:
         """Return the GROUP chunk that a chunk is predicted from, or None."""

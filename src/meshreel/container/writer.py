@@ -201,24 +201,19 @@ class ReelWriter:
         check_file(self.header, index, 0, len(head))
         if self._audio:
             self._chunks.insert(place, self._kept(self._audio))
-        if not isinstance(self._output, Path):
-            self._copy(head, index, self._output)
-            return
-        with unfinished(self._output) as file:
-            self._copy(head, index, file)
-        sync_folder(self._output.parent)
-
-    def _copy(self, head: bytes, index: Index, output: Sink) -> None:
-        """Write the head and the chunks, each of which must still match its entry."""
-        output.write(head)
-        if len(self._chunks) != len(index.chunks):
-            raise InputError(f"{self._name}: a chunk could not be written, encode again")
-        for entry, chunk in zip(index.chunks, self._chunks, strict=True):
-            data, ends = chunk.read(), list(accumulate(layer.size for layer in entry.layers))
-            if len(data) != len(chunk) or _layers(data, ends) != entry.layers:
+        output = self._output
+        with unfinished(output) if isinstance(output, Path) else nullcontext(output) as file:
+            file.write(head)
+            if len(self._chunks) != len(index.chunks):
                 raise InputError(f"{self._name}: a chunk could not be written, encode again")
-            output.write(data)
-        output.flush()
+            for entry, chunk in zip(index.chunks, self._chunks, strict=True):
+                data, ends = chunk.read(), list(accumulate(layer.size for layer in entry.layers))
+                if len(data) != len(chunk) or _layers(data, ends) != entry.layers:  # it must still match its entry
+                    raise InputError(f"{self._name}: a chunk could not be written, encode again")
+                file.write(data)
+            file.flush()
+        if isinstance(output, Path):
+            sync_folder(output.parent)
         self.size = len(head) + sum(map(len, self._chunks))
 
 

@@ -45,17 +45,14 @@ class Decoders:
     def __init__(self) -> None:
         self.lock = threading.Lock()
         self.refused = dict[tuple[int, int], tuple[int, str]]()  # valid pictures and error, by chunk and layer
-        self._places = dict[tuple[int, int], _Place]()  # by a chain's first chunk and layer, least recently used first
+        self.places = dict[tuple[int, int], _Place]()  # by a chain's first chunk and layer, least recently used first
 
     def take(self, first: tuple[int, int], texels: int, size: int) -> _Place | None:
         """Remove and return the place of a chain, whose decoding may fail; drop others until there is room for it."""
-        place = self._places.pop(first, None)
-        while self._places and are_costly([(texels, size), *((one.texels, one.size) for one in self._places.values())]):
-            del self._places[next(iter(self._places))]
+        place = self.places.pop(first, None)
+        while self.places and are_costly([(texels, size), *((one.texels, one.size) for one in self.places.values())]):
+            del self.places[next(iter(self.places))]
         return place
-
-    def keep(self, first: tuple[int, int], place: _Place) -> None:
-        self._places[first] = place
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,7 +102,7 @@ class TrackPictures:
         pictures = self._pictures_of(static)
         if pictures is None or mesh.texture is None:
             return mesh
-        at = self._at(pictures, frame - self._reader.shown_from(static))
+        at = self._at(pictures, frame - self._reader.shown_from[static.number])
         if self._background is None or self._background[:2] != (static.number, at):
             self._background = static.number, at, replace(mesh, texture=self._texture(pictures, at))
         return self._background[2]
@@ -157,7 +154,7 @@ class TrackPictures:
             place = None
         if place is None or (place.after, place.count) < wanted:
             place = self._advanced(place, chain, wanted[1], width, height)
-        decoders.keep(chain[0], place)
+        decoders.places[chain[0]] = place
         assert place.planes is not None
         return place.planes
 

@@ -46,6 +46,7 @@ class Track(Frames):
         self._place = placement(reader)
         self._group = NO_GROUP
         self._states = CachedStates({})
+        self._most = MOST_KEPT // len(reader.tracks)  # bytes of states: all tracks keep no more than a single one would
         self._pictures = TrackPictures(reader, decoders or Decoders())
         self._splats = TrackSplats(reader, layers)
         self._refusals = Refusals()  # of frames
@@ -82,7 +83,8 @@ class Track(Frames):
             decoded = _core.Group(payload, chunk.frame_count, self.layers, state, self._place)
         self._paint(chunk, decoded, None if chunk.form != Form.LAYERS else self.layers)
         with self._refusals.of(chunk):
-            texture = self._pictures.place(chunk, decoded) if self._is_colored(chunk) else None
+            is_colored = self._colored and self.reader.companion_of(chunk, ChunkKind.COLORS) is not None
+            texture = self._pictures.place(chunk, decoded) if is_colored else None
         if self.reader.edit.rotation:
             decoded.turn(self.reader.edit.rotation, self.reader.header.origin)
         meshes = _meshes(decoded.frames(), texture)
@@ -112,9 +114,6 @@ class Track(Frames):
             state = after
         return state, states
 
-    def _is_colored(self, chunk: Chunk) -> bool:
-        return self._colored and self.reader.companion_of(chunk, ChunkKind.COLORS) is not None
-
     def _paint(self, chunk: Chunk, group: _core.Group, layers: int | None) -> None:
         """Decode the colours of a group, if it has some, from at most `layers` layers beyond its first; None: all."""
         of = self.reader.companion_of(chunk, ChunkKind.COLORS) if self._colored else None
@@ -122,11 +121,6 @@ class Track(Frames):
             return
         with self._refusals.of(of):
             group.paint(self.reader.read_chunk(of.number, None if layers is None else layers + 1))
-
-    @property
-    def _most(self) -> int:
-        """Bytes of states to keep: all tracks together keep no more than a single track would."""
-        return MOST_KEPT // len(self.reader.tracks)
 
     def _read(self, chunk: Chunk) -> bytes:
         return self.reader.read_chunk(chunk.number, None if self.layers is None else self.layers + 1)

@@ -284,7 +284,7 @@ def interval_of(reader: ReelReader, frames: range) -> range:
         groups = [_group_at(own, start) for own in reader.tracks]
         earlier = min(_stands_alone(reader, group).first_frame for group in groups)
         later = max(own.first_frame + own.frame_count for own in (_group_at(of, end - 1) for of in reader.tracks))
-        counted = [reader.shown_from(state) for state in _timed_states(reader, range(start, end))]
+        counted = [reader.shown_from[state.number] for state in _timed_states(reader, range(start, end))]
         if (found := (min([earlier, *counted]), later)) == (start, end):
             return range(start, end)
         start, end = found

@@ -47,7 +47,9 @@ def encode_trajectories(
     frames = [vertex_normals(Mesh(np.ascontiguousarray(frame), base.faces)) for frame in positions]
     normals = np.stack(frames, axis=1)[places.order].reshape(len(base.vertices), -1)
     surface, coded = SurfaceWeight(np.ascontiguousarray(normals), tangential), list[tuple[SharedMotion, CodedField]]()
-    for alike in (_shifts(positions, base, rate), _poses(positions, base, rate)):
+    # Shared motion is rounded to a sixteenth of a step.
+    bits = min(max(strict.ceil_log2(8.0 / rate.step), 0), MOST_BITS)
+    for alike in (_shifts(positions, base, rate, bits), _poses(positions, base, bits)):
         if alike is not None:
             offsets = np.moveaxis(positions - alike.places, 0, 1)[places.order].reshape(normals.shape)
             coded.append((alike.kind, encode_field(offsets, places.graph, rate, surface, alike.head).record))
@@ -62,14 +64,9 @@ def decode_trajectories(record: bytes, base: Mesh, frames: int) -> Float64[np.nd
     return _core.decode_motion(record, base.vertices, base.faces, frames)
 
 
-def _bits(rate: Rate) -> int:
-    """Return the fraction bits of shared motion: it is rounded to a sixteenth of a step."""
-    return min(max(strict.ceil_log2(8.0 / rate.step), 0), MOST_BITS)
-
-
-def _shifts(positions: Float64[np.ndarray, "T V 3"], base: Mesh, rate: Rate) -> _Alike:
+def _shifts(positions: Float64[np.ndarray, "T V 3"], base: Mesh, rate: Rate, bits: int) -> _Alike:
     """Return the mean shift of each frame; no motion if it does not pay."""
-    offsets, bits = positions - base.vertices, _bits(rate)
+    offsets = positions - base.vertices
     mean = np.rint(np.ldexp(offsets.mean(axis=1), bits))
     worth = rate.price * rate.step**2 * strict.log2(2 * np.abs(mean) + 1).sum()
     if not len(base.vertices) * (np.ldexp(mean, -bits) ** 2).sum() > worth:
@@ -78,9 +75,9 @@ def _shifts(positions: Float64[np.ndarray, "T V 3"], base: Mesh, rate: Rate) -> 
     return _Alike(SharedMotion.SHIFTS, head, base.vertices + np.ldexp(mean, -bits)[:, None])
 
 
-def _poses(positions: Float64[np.ndarray, "T V 3"], base: Mesh, rate: Rate) -> _Alike | None:
+def _poses(positions: Float64[np.ndarray, "T V 3"], base: Mesh, bits: int) -> _Alike | None:
     """Return a pose for each frame; None if one turns too far, or if poses explain little of the motion."""
-    rest, bits = np.broadcast_to(base.vertices, positions.shape), _bits(rate)
+    rest = np.broadcast_to(base.vertices, positions.shape)
     turned = quaternions(fit_rigid(rest, positions, np.ones(positions.shape[:2]))[0])
     shifts = np.rint(np.ldexp((positions - rest).mean(axis=1), bits))
     turns, decoded_turn = np.zeros((len(positions), 3)), np.array([[1.0, 0.0, 0.0, 0.0]])

@@ -115,8 +115,7 @@ def cheapest_intra(
         payload = encode_intra(meshes, step, levels)
         if len(payload) >= most_bytes:
             continue
-        fidelity = _fidelity(originals, payload)
-        if fidelity is not None and fidelity.reaches(target):
+        if (fidelity := _reaching(originals, payload, target)) is not None:
             return EncodedGroup(Form.DRACO, len(frames), payload, (), fidelity)
     return None
 
@@ -140,28 +139,25 @@ def _on_one_frame(
             return  # more vertices cost more
         affordable = [(step, size) for step, size in zip(steps, sizes, strict=True) if size <= budget]
         for levels in LEVELS:
-            if not _reaches(original, reduced, affordable[-1][0], levels, target):
+            if _reaching([original], encode_intra([reduced], affordable[-1][0], levels), target) is None:
                 continue  # the finest step is the best one
             reached = False
             for step, size in affordable:
-                reached = reached or step == affordable[-1][0] or _reaches(original, reduced, step, levels, target)
-                if reached:  # finer ones do, too
+                reached = reached or step == affordable[-1][0]
+                if reached or _reaching([original], encode_intra([reduced], step, levels), target) is not None:
+                    reached = True  # finer ones do, too
                     yield size, fraction, step, levels
                     if not options.finer:
                         break
 
 
-def _reaches(original: Original, reduced: Mesh, step: float, levels: int, target: Target) -> bool:
-    fidelity = _fidelity([original], encode_intra([reduced], step, levels))
-    return fidelity is not None and fidelity.reaches(target)
-
-
-def _fidelity(originals: Sequence[Original], payload: bytes) -> Fidelity | None:
-    """Return the fidelity of a payload, None where readers would refuse so few bytes for it."""
+def _reaching(originals: Sequence[Original], payload: bytes, target: Target) -> Fidelity | None:
+    """Return the fidelity of a payload, None where it misses the target or readers would refuse so few bytes."""
     try:
-        return measure(originals, decode_intra(payload))
+        fidelity = measure(originals, decode_intra(payload))
     except CostlyError:
         return None
+    return fidelity if fidelity.reaches(target) else None
 
 
 def _reduced(frame: Mesh, fraction: float) -> Mesh:

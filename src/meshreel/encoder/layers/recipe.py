@@ -45,7 +45,7 @@ class LayersRecipe:
     colored: bool = True  # the file keeps colours, which then also tell where the surface is
 
     name: ClassVar[str] = "best"
-    bodies_apart: ClassVar[bool] = True
+    bodies_apart: ClassVar[bool] = True  # bodies that never touch become separate tracks
 
     @property
     def group_size(self) -> int:

@@ -10,7 +10,7 @@ from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import islice
-from typing import Any, Protocol, runtime_checkable
+from typing import Any
 
 from threadpoolctl import threadpool_limits
 
@@ -24,7 +24,7 @@ from ..group.digests import listener, note, noted
 from ..group.forms import EncodedGroup
 from ..group.interval import Interval
 from ..group.progress import IntervalStages, Stages
-from ..settings.options import EncoderOptions, SceneOptions
+from ..settings.options import EncoderOptions, Recipe, SceneOptions
 from .interval_files import IntervalFiles, pack_interval
 from .worker import end_with_parent, tell
 
@@ -36,29 +36,6 @@ Call = tuple[int, Callable[..., Any], tuple[Any, ...]]  # number, function, argu
 _Done = tuple[list[EncodedGroup], str]  # and lines of digests
 LOOKED_AT = 3  # frames of an interval whose textures tell whether it has some (guess)
 NEUTRAL = Header(1.0, (0.0, 0.0, 0.0), 1.0, (-1.0, -1.0, -1.0), (1.0, 1.0, 1.0), '{"encode":""}')  # in normalised units
-
-
-@runtime_checkable  # for the checks of arguments in tests
-class Recipe(Protocol):
-    """A method of encoding with its options: `LayersRecipe` or `PaperRecipe`."""
-
-    @property
-    def name(self) -> str:
-        """The name of the preset that uses it."""
-
-    @property
-    def group_size(self) -> int:
-        """The largest number of frames in a group."""
-
-    @property
-    def bodies_apart(self) -> bool:
-        """True if bodies that never touch become separate tracks."""
-
-    def longest(self, frame_rate: float) -> int:
-        """Return the largest number of frames in an interval, at this rate (1/s)."""
-
-    def encode(self, interval: Interval, stages: Stages | None = None) -> Iterator[EncodedGroup]:
-        """Yield the groups of an interval, in order, without colours."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,7 +10,7 @@ import math
 import zipfile
 import zlib
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import Any
 
@@ -35,7 +35,6 @@ from ...types import Mesh, MeshSequence, evenly
 from ..group.progress import Stages
 from ..settings.options import SceneOptions
 
-MOST_NOISE = 0.05  # RMS, of the diagonal of a body: beyond, nothing is left of a hand (guess)
 PROBES = 12  # frames, at most, in which moving surface is measured (guess)
 LOST = 0.5  # share of a frame's faces that may stand still where no background was found (guess)
 SEEN_THROUGH = 2  # of the probed frames, in which a place must be free that something stands at for a while (guess)
@@ -66,25 +65,19 @@ class Parts:
     deviation: float  # m, the same by the median, as a standard deviation: without its tails
     astray: float = 0.0  # share of the frames' surface that stands still, but is not in the background
     free: tuple[FreeSpace, ...] = ()  # of some frames; none where no depth is known
-    _rooms: dict[int, Surface | None] = field(default_factory=dict, repr=False)
-
-    @property
-    def body_noise(self) -> float:
-        """RMS distance of the bodies from the truth, normalised: as noisy as the surface that stands still."""
-        return min(self.noise / self.seen.unit, MOST_NOISE)
 
     @cached_property
-    def surface(self) -> Surface | None:
-        """The background, prepared for queries; None where there is none."""
-        return None if self.background.is_empty else Surface(self.background)
+    def room(self) -> Callable[[int], Surface | None]:
+        """The room after so many changes, prepared for queries; None where nothing stands in it."""
+        return _rooms(self.background, self.changes)
 
     def moving(self, frame: int, mesh: Mesh) -> Mesh:
         """Cut the surface that moves out of a frame, with what the room does not have there."""
         by, moves = self.segmentation, self.segmentation.moving(frame, mesh)
-        if (room := self._room(sum(change.frame <= frame for change in self.changes))) is not None:
+        if (room := self.room(sum(change.frame <= frame for change in self.changes))) is not None:
             more = beyond(mesh, moves, room, max(APART * self.deviation, LEAST_APART))
             moves |= more & self._is_left(mesh, more & ~moves)
-        return with_ring(mesh, moves, by.cell, self.surface)
+        return with_ring(mesh, moves, by.cell, self.room(0))
 
     def _is_left(self, mesh: Mesh, chosen: Bool[np.ndarray, " F"]) -> Bool[np.ndarray, " F"]:
         """Return which of some faces were seen through in other frames: room that is measured now and then was not."""
@@ -95,15 +88,6 @@ class Parts:
         found = chosen.copy()
         found[chosen] = seen >= min(SEEN_THROUGH, len(self.free))
         return found
-
-    def _room(self, changes: int) -> Surface | None:
-        """Return the room after some changes, prepared for queries: all that stood there since the first frame."""
-        if not changes:
-            return self.surface
-        if changes not in self._rooms:
-            self._rooms.clear()
-            self._rooms[changes] = _room_after(self.background, self.changes[:changes])
-        return self._rooms[changes]
 
 
 def take_apart(
@@ -187,10 +171,15 @@ def _change(sequence: CapturedSequence, segmentation: Segmentation, frame: int, 
     return Change(frame, fuse_background(later, segmentation.cell))
 
 
-def _room_after(background: Mesh, changes: Sequence[Change]) -> Surface | None:
-    """Return all that stood in the room up to some changes, prepared for queries; None where that is nothing."""
-    there = concatenate([background, *(change.came for change in changes)])
-    return None if there.is_empty else Surface(there)
+def _rooms(background: Mesh, changes: Sequence[Change]) -> Callable[[int], Surface | None]:
+    """Return a callable that prepares all that stood in the room up to so many changes; None where that is nothing."""
+
+    @lru_cache(maxsize=2)  # the first, and the one that frames of the same time have
+    def after(count: int) -> Surface | None:
+        there = concatenate([background, *(change.came for change in changes[:count])])
+        return None if there.is_empty else Surface(there)
+
+    return after
 
 
 def _as_far(
@@ -220,11 +209,7 @@ def _measured(
     """
     far, depth = OUTLIER * segmentation.noise, sequence.depth
     squares, deviations, sizes, lost, whole = [], [], list[float](), 0.0, 0.0
-
-    @lru_cache(maxsize=1)
-    def room_after(count: int) -> Surface | None:
-        return _room_after(background, changes[:count])
-
+    room_after = _rooms(background, changes)
     for number in evenly(len(sequence), PROBES):
         stages.reach("noise", number / len(sequence))
         mesh = sequence[number]

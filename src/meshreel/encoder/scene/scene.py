@@ -34,6 +34,8 @@ from .parts import Parts
 from .static import refreshes
 from .tracks import TrackGroup
 
+MOST_NOISE = 0.05  # RMS, of the diagonal of a body: beyond, nothing is left of a hand (guess)
+
 
 @dataclass(frozen=True, slots=True)
 class CodedBodies:
@@ -66,30 +68,27 @@ def encode_bodies(job: Job, parts: Parts) -> CodedBodies:
 
 
 def scene_intervals(job: Job, parts: Parts, tracks: Tracks) -> Iterator[Interval]:
-    """Yield the intervals of all tracks of a scene, in the order of time."""
-    for frames in key_intervals(job.sequence, parts.segmentation, job.options):
-        found = track_intervals(job, parts, frames, tracks)
-        weight = Fraction(len(frames), sum(len(interval.frames) for interval in found))
-        yield from (replace(interval, weight=weight) for interval in found)
+    """Yield the intervals of all tracks of a scene, in the order of time.
 
-
-def track_intervals(job: Job, parts: Parts, frames: range, tracks: Tracks) -> list[Interval]:
-    """Assign the moving surface of a key interval to tracks, and cut each track where frames cannot share an interval.
-
-    Frames can where all have a surface or none has, and where they are of about one scale.
+    The moving surface of a key interval is assigned to tracks, and each track is cut where frames cannot share an
+    interval: they can where all have a surface or none has, and where they are of about one scale.
     """
-    sequence, seen, found = job.sequence, parts.seen, list[Interval]()
+    sequence, seen = job.sequence, parts.seen
     depth, place = sequence.depth, Placement(seen.unit, tuple(seen.center))
     sight = None if depth is None else Sight(depth, place)
     longest = job.recipe.longest(sequence.frame_rate)
-    for track, meshes in tracks.of([parts.moving(k, sequence[k]) for k in frames]):
-        normalised = [seen.normalise(mesh) for mesh in meshes]
-        for cut in _cut(normalised, frames, seen, longest):
-            some = normalised[cut.start : cut.stop]
-            one = Interval(some, parts.body_noise, frames.start + cut.start, track, digest(some))
-            one = replace(one, up=sequence.up, frame_rate=sequence.frame_rate)
-            found.append(replace(one, views=Views.of(sequence, seen), sight=sight))
-    return found
+    noise = min(parts.noise / seen.unit, MOST_NOISE)  # of bodies: as noisy as the surface that stands still
+    for frames in key_intervals(sequence, parts.segmentation, job.options):
+        found = list[Interval]()
+        for track, meshes in tracks.of([parts.moving(k, sequence[k]) for k in frames]):
+            normalised = [seen.normalise(mesh) for mesh in meshes]
+            for cut in _cut(normalised, frames, seen, longest):
+                some = normalised[cut.start : cut.stop]
+                one = Interval(some, noise, frames.start + cut.start, track, digest(some))
+                one = replace(one, up=sequence.up, frame_rate=sequence.frame_rate)
+                found.append(replace(one, views=Views.of(sequence, seen), sight=sight))
+        weight = Fraction(len(frames), sum(len(interval.frames) for interval in found))
+        yield from (replace(interval, weight=weight) for interval in found)
 
 
 def key_intervals(sequence: MeshSequence, segmentation: Segmentation, options: EncoderOptions) -> Iterator[range]:

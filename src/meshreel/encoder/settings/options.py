@@ -42,6 +42,7 @@ EXACT_INTRA = IntraOptions(
 LITERAL_ANCHORS = 400  # anchors of a reference in `paper-literal`: the paper gives no number (guess)
 
 MethodOptions = PaperOptions | LayersOptions  # the class names the recipe
+Recipe = LayersRecipe | PaperRecipe  # a method of encoding with its options
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,7 +77,7 @@ class EncoderOptions:
         if not 0 < self.key_interval <= MOST_SECONDS:
             raise InputError(f"key interval {self.key_interval:g}: give seconds, above 0 and at most {MOST_SECONDS}")
 
-    def recipe(self, find: FindGroups = find_groups) -> LayersRecipe | PaperRecipe:
+    def recipe(self, find: FindGroups = find_groups) -> Recipe:
         """Return the method with its options; `find` finds the groups of the paper's."""
         if isinstance(self.method, LayersOptions):
             return LayersRecipe(self.method, self.key_interval, self.appearance is not None)
