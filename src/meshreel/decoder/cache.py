@@ -40,10 +40,6 @@ class CachedStates:
     known: dict[int, _core.GroupState | None]
     nbytes: int = 0
 
-    def copy(self) -> CachedStates:
-        """Return a cache that can grow while other threads read this one."""
-        return CachedStates(dict(self.known), self.nbytes)
-
     def add(
         self, number: int, state: _core.GroupState | None, before: _core.GroupState | None, most: int
     ) -> CachedStates:

@@ -101,7 +101,8 @@ class Track(Frames):
             self._lost.check(before, chain)
             chain.append(before)
         state = None if before is None else states.known[before.number]
-        states = CachedStates({}) if before is None else states.copy()
+        # A cache that can grow while other threads read this one.
+        states = CachedStates({}) if before is None else CachedStates(dict(states.known), states.nbytes)
         for link in reversed(chain[1:]):
             payload = self._read(link)
             after = None
@@ -185,25 +186,18 @@ class Background:
         before = before if chunk.form == Form.PATCH else None
         with self._refusals.of(chunk):
             core = _core.Background(payload, None if before is None else before.core, self._place)
-        texture = self._dress(chunk, core)
-        mesh = Mesh(*core.arrays(), before.mesh.texture if before is not None and texture is None else texture)
+        texture = None if before is None else before.mesh.texture
+        of = self.reader.companion_of(chunk, ChunkKind.COLORS) if self._colored else None
+        if of is not None:  # colours of added faces follow those of the remaining ones
+            with self._refusals.of(of):
+                core.paint(self.reader.read_chunk(of.number))
+            with self._refusals.of(chunk):
+                placed = self._pictures.place(chunk, core)
+            texture = texture if placed is None else placed(0)
+        mesh = Mesh(*core.arrays(), texture)
         with self._refusals.of(chunk):
             led = Chain(0, len(payload)) if before is None else before.led.then(before.mesh, mesh, len(payload))
         return _State(core, mesh, led)
-
-    def _dress(self, chunk: Chunk, state: _core.Background) -> Texture | None:
-        """Decode the colours of a state, if any, and its places in a texture; return its first picture.
-
-        Colours of added faces follow those of the remaining ones.
-        """
-        of = self.reader.companion_of(chunk, ChunkKind.COLORS) if self._colored else None
-        if of is None:
-            return None
-        with self._refusals.of(of):
-            state.paint(self.reader.read_chunk(of.number))
-        with self._refusals.of(chunk):
-            texture = self._pictures.place(chunk, state)
-        return None if texture is None else texture(0)
 
 
 def placement(reader: ReelReader) -> tuple[float, tuple[float, float, float]]:

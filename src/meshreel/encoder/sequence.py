@@ -158,7 +158,7 @@ class Encoder:
         job, parts = self._job(options), self.parts(options)
         if parts is None:
             seen = surveyed(job)
-            return intervals_of(job, seen, tracked_bodies(job, seen))
+            return intervals_of(job, seen, tracked_bodies(job, seen)[0])
         return scene_intervals(job, parts, Tracks(parts.segmentation.cell, job.scene.near))
 
     def parts(self, options: EncoderOptions) -> Parts | None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import Any
@@ -39,15 +38,12 @@ class Interval:
     pictured: bool = field(default=False, kw_only=True)  # with textures or splats, which frames of Draco cannot have
     larger: float = field(default=1.0, kw_only=True)  # times, the whole frames than the body: targets are of the former
 
-    @property
-    def stop(self) -> int:
-        """The number of the frame that follows."""
-        return self.first_frame + len(self.frames)
-
     def to_send(self) -> Interval:
         """Return the interval for a worker process, which reads those of its frames that are in files."""
         frames = self.frames.only() if isinstance(self.frames, NormalisedFrames) else self.frames
-        views = None if self.views is None else self.views.only(range(self.first_frame, self.stop))
+        if (views := self.views) is not None:
+            numbers = range(self.first_frame, self.first_frame + len(self.frames))
+            views = replace(views, sequence=only(views.sequence, numbers))
         return replace(self, frames=frames, views=views)
 
     def paint(self, number: int, mesh: Mesh) -> Paint | None:
@@ -131,10 +127,6 @@ class Views:
         """Return the views of a sequence, None where no colour cameras recorded it."""
         colors = sequence.colors
         return None if colors is None else Views(colors, sequence, Placement(seen.unit, tuple(seen.center)))
-
-    def only(self, numbers: Sequence[int]) -> Views:
-        """Return the views of these frames, under the same numbers, to send to another process."""
-        return replace(self, sequence=only(self.sequence, numbers))
 
     def at(self, number: int, clear: bool = False, hides: Mesh | None = None) -> ColorViews:
         """Return the cameras' views of a frame; if `clear`, only away from steps in depth.

@@ -47,11 +47,6 @@ class LayersRecipe:
     name: ClassVar[str] = "best"
     bodies_apart: ClassVar[bool] = True  # bodies that never touch become separate tracks
 
-    @property
-    def group_size(self) -> int:
-        """The largest number of frames in a group."""
-        return self.options.group_size
-
     def longest(self, frame_rate: float) -> int:
         """Return the number of frames in a key interval."""
         return max(1, round(self.key_interval * frame_rate))

@@ -174,17 +174,12 @@ def _large(
 def _unseen(frames: Sequence[ShownFrame], faces: Int32[np.ndarray, "F 3"], far: float) -> Bool[np.ndarray, "T F"]:
     """Return the faces that cameras often face and hardly ever measure, in the frames in which they do not."""
     faced, there = (np.stack(each) for each in zip(*(frame.measured(far) for frame in frames), strict=True))
-    counts = (faced.sum(axis=0), (faced & there).sum(axis=0), np.full(len(faces), len(frames)))
-    often, seen, most = (_pooled(each, faces) for each in counts)
+    counts = np.stack([faced.sum(axis=0), (faced & there).sum(axis=0), np.full(len(faces), len(frames))])
+    pooled = list(counts.astype(np.float64))
+    for _ in range(POOLED):  # sums over the faces near each
+        pooled = [np.bincount(faces.reshape(-1), each.repeat(3))[faces].sum(axis=1) for each in pooled]
+    often, seen, most = pooled
     return ~there & (seen < SELDOM * often) & (often >= OFTEN * most)
-
-
-def _pooled(counts: Int64[np.ndarray, " F"], faces: Int32[np.ndarray, "F 3"]) -> Float64[np.ndarray, " F"]:
-    """Return sums over the faces near each."""
-    found = counts.astype(np.float64)
-    for _ in range(POOLED):
-        found = np.bincount(faces.reshape(-1), found.repeat(3))[faces].sum(axis=1)
-    return found
 
 
 def _crumbs(

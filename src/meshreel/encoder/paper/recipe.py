@@ -123,11 +123,6 @@ class PaperRecipe:
         plain = (o.displacements.dead_zone, o.displacements.offsets) == (PLAIN_ZONE, PLAIN_OFFSETS)
         return "paper-literal" if plain and (o.pose, o.fit, o.cuts) == ("mds", "nearest", False) else "paper"
 
-    @property
-    def group_size(self) -> int:
-        """The largest number of frames in a group, the paper's GoF."""
-        return self.options.group_size
-
     def longest(self, frame_rate: float) -> int:
         """Return the number of frames in a group, at any rate: an interval is one group."""
         del frame_rate

@@ -75,13 +75,12 @@ class IntervalFiles:
     ) -> None:
         if error is None:
             sync_folder(self.output.parent)
-        elif self.lasting and (done := self._contents()):
-            if self._begun:
-                error.add_note(f"{self.path} has {done}: continue with --resume")
-            self._leave()
-            return
-        with suppress(OSError):
-            self._clear()
+        done = self._contents() if error is not None and self.lasting else ""
+        if not done:
+            with suppress(OSError):
+                self._clear()
+        elif error is not None and self._begun:
+            error.add_note(f"{self.path} has {done}: continue with --resume")
         self._leave()
 
     def check(self, made: dict[str, Any]) -> None:

@@ -154,7 +154,7 @@ def _task(job: Job, interval: Interval) -> Task:
 
 def _begun(job: Job, files: IntervalFiles, interval: Interval) -> tuple[IntervalStages, list[EncodedGroup] | None]:
     """Return the progress of an interval, and its groups if an earlier run encoded it."""
-    stages = IntervalStages(job.stages, len(interval.frames), job.recipe.group_size, interval.weight)
+    stages = IntervalStages(job.stages, len(interval.frames), job.recipe.options.group_size, interval.weight)
     known = files.take(interval, job.head)
     if known is not None:
         stages.reach("code", 1.0)
@@ -168,7 +168,7 @@ def encode_sent(task: Task, number: int) -> tuple[bytes, str, Any, Work]:
     """
     end_with_parent()
     count = len(task.interval.frames)
-    stages = IntervalStages(Stages(partial(tell, number), count), count, task.recipe.group_size)
+    stages = IntervalStages(Stages(partial(tell, number), count), count, task.recipe.options.group_size)
     with threadpool_limits(1):
         before = so_far()
         data, lines = task.done(stages)

@@ -75,19 +75,13 @@ class Parts:
         """Cut the surface that moves out of a frame, with what the room does not have there."""
         by, moves = self.segmentation, self.segmentation.moving(frame, mesh)
         if (room := self.room(sum(change.frame <= frame for change in self.changes))) is not None:
-            more = beyond(mesh, moves, room, max(APART * self.deviation, LEAST_APART))
-            moves |= more & self._is_left(mesh, more & ~moves)
+            more = beyond(mesh, moves, room, max(APART * self.deviation, LEAST_APART)) & ~moves
+            if self.free:  # room that is measured now and then was not seen through in other frames
+                middles = mesh.vertices[mesh.faces[more]].mean(axis=1)
+                seen = sum(free.at(middles).astype(np.int64) for free in self.free)
+                more[more] = seen >= min(SEEN_THROUGH, len(self.free))
+            moves |= more
         return with_ring(mesh, moves, by.cell, self.room(0))
-
-    def _is_left(self, mesh: Mesh, chosen: Bool[np.ndarray, " F"]) -> Bool[np.ndarray, " F"]:
-        """Return which of some faces were seen through in other frames: room that is measured now and then was not."""
-        if not self.free:
-            return chosen
-        middles = mesh.vertices[mesh.faces[chosen]].mean(axis=1)
-        seen = sum(free.at(middles).astype(np.int64) for free in self.free)
-        found = chosen.copy()
-        found[chosen] = seen >= min(SEEN_THROUGH, len(self.free))
-        return found
 
 
 def take_apart(

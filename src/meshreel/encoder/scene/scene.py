@@ -32,7 +32,7 @@ from ..run.schedule import Job, encode_intervals
 from ..settings.options import EncoderOptions
 from .parts import Parts
 from .static import refreshes
-from .tracks import TrackGroup
+from .tracks import TrackGroup, placed
 
 MOST_NOISE = 0.05  # RMS, of the diagonal of a body: beyond, nothing is left of a hand (guess)
 
@@ -59,11 +59,9 @@ def encode_bodies(job: Job, parts: Parts) -> CodedBodies:
             yield interval
 
     for groups in encode_intervals(job, intervals()):
-        track, first = places.popleft()
-        for group in groups:
-            found.append(TrackGroup(track, first, group))
-            first += group.frame_count
-    found += tracks.late()
+        found += placed(*places.popleft(), groups)
+    for track, began in enumerate(tracks.began):
+        found += placed(track, 0, empty_groups(began))
     return CodedBodies(sorted(found, key=lambda each: (each.first_frame, each.track)), tracks.dropped)
 
 
@@ -123,7 +121,7 @@ class Tracks:
         self._cell, self._near = cell, near
         self._last: list[Mesh] = []  # of each track, in the last frame so far
         self._frames = 0
-        self._began: list[int] = []  # the first frame of each track's first key interval
+        self.began: list[int] = []  # the first frame of each track's first key interval: before, it is empty
         self.dropped = 0  # faces that are in no track
 
     def of(self, moving: Sequence[Mesh]) -> list[tuple[int, list[Mesh]]]:
@@ -138,18 +136,10 @@ class Tracks:
         found = [empty] * count
         for number, body in zip(numbers, bodies, strict=True):
             found[number] = body
-        self._began += [self._frames] * (count - len(self._began))
+        self.began += [self._frames] * (count - len(self.began))
         self._last = [meshes[-1] for meshes in found]
         self._frames += len(moving)
         return list(enumerate(found))
-
-    def late(self) -> Iterator[TrackGroup]:
-        """Yield the empty frames that tracks have before the key interval in which they began."""
-        for track, began in enumerate(self._began):
-            first = 0
-            for group in empty_groups(began):
-                yield TrackGroup(track, first, group)
-                first += group.frame_count
 
 
 @dataclass(frozen=True, slots=True)

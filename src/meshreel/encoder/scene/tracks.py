@@ -44,18 +44,14 @@ class Body:
     share: float = 1.0  # of the vertices of the frames
 
 
-@dataclass(frozen=True, slots=True)
-class TrackedBodies:
-    """The key intervals of a sequence, each with its bodies."""
-
-    intervals: list[tuple[range, list[Body]]]
-    count: int  # of the whole sequence, also where the intervals are those of some of its frames
+Planned = list[tuple[range, list[Body]]]  # the key intervals of a sequence, each with its bodies
 
 
-def tracked_bodies(job: Job, seen: Survey) -> TrackedBodies:
-    """Return the key intervals and their bodies: one, in track 0, where the recipe codes none apart.
+def tracked_bodies(job: Job, seen: Survey) -> tuple[Planned, int]:
+    """Return the key intervals with their bodies: one, in track 0, where the recipe codes none apart.
 
-    Where some frames are chosen, these are the key intervals of the whole sequence as far as those frames go.
+    Where some frames are chosen, these are the key intervals of the whole sequence as far as those frames go. Also
+    return the number of tracks of the whole sequence.
     """
     numbered = seen.intervals(job.recipe.longest(job.sequence.frame_rate))
     if job.recipe.bodies_apart:
@@ -64,20 +60,20 @@ def tracked_bodies(job: Job, seen: Survey) -> TrackedBodies:
         whole = [(frames, [Body(0)]) for frames in numbered]
     tracks = 1 + max(body.track for _, bodies in whole for body in bodies)
     if (chosen := job.chosen) is None:
-        return TrackedBodies(whole, tracks)
-    cut = list[tuple[range, list[Body]]]()
+        return whole, tracks
+    cut: Planned = []
     for frames, bodies in whole:
         some = range(max(frames.start, chosen.start), min(frames.stop, chosen.stop))
         if len(some):
             at = slice(some.start - frames.start, some.stop - frames.start)
             cut.append((some, [replace(b, bodies=b.bodies[at], diagonals=b.diagonals[at]) for b in bodies]))
-    return TrackedBodies(cut, tracks)
+    return cut, tracks
 
 
-def intervals_of(job: Job, seen: Survey, planned: TrackedBodies) -> Iterator[Interval]:
+def intervals_of(job: Job, seen: Survey, planned: Planned) -> Iterator[Interval]:
     """Yield an interval for each body of each key interval, whose frames are read where it is encoded."""
     views = Views.of(job.sequence, seen)
-    for frames, bodies in planned.intervals:
+    for frames, bodies in planned:
         whole = NormalisedFrames(job.sequence, seen, frames)
         interval = Interval(whole, first_frame=frames.start, up=job.sequence.up, views=views)
         for body in bodies:
@@ -95,30 +91,32 @@ def encode_tracked(job: Job, seen: Survey) -> Iterator[list[TrackGroup]]:
     All tracks have all frames, some of them empty. The PSNR of a group is that of its whole frames; its other measures
     are its body's own.
     """
-    planned, first = tracked_bodies(job, seen), 0
+    (planned, count), first = tracked_bodies(job, seen), 0
     coded = encode_intervals(job, intervals_of(job, seen, planned))
-    for frames, bodies in planned.intervals:
+    for frames, bodies in planned:
         found, groups = list[TrackGroup](), [next(coded) for _ in bodies]
         psnrs = _psnrs(seen, frames, bodies, groups) if len(bodies) > 1 else None
         for body, some in zip(bodies, groups, strict=True):
-            found += _placed(body, first, some, psnrs)
-        for track in {*range(planned.count)} - {body.track for body in bodies}:
-            found += _placed(Body(track, share=0.0), first, empty_groups(len(frames)), None)
+            own = placed(body.track, first, some, body.share)
+            found += own if psnrs is None else [_with_psnr(each, first, psnrs) for each in own]
+        for track in {*range(count)} - {body.track for body in bodies}:
+            found += placed(track, first, empty_groups(len(frames)), 0.0)
         first += len(frames)
         yield sorted(found, key=lambda each: (each.first_frame, each.track))
 
 
-def _placed(
-    body: Body, first: int, groups: Iterable[EncodedGroup], psnrs: Float64[np.ndarray, " T"] | None
-) -> Iterator[TrackGroup]:
-    """Yield the groups of a body from a frame on, with the PSNRs of the frames where they are given."""
-    at = 0
+def placed(track: int, first: int, groups: Iterable[EncodedGroup], share: float = 1.0) -> Iterator[TrackGroup]:
+    """Yield the groups of a track from a frame on."""
     for group in groups:
-        if psnrs is not None:
-            psnr = float(psnrs[at : at + group.frame_count].mean())
-            group = replace(group, fidelity=replace(group.fidelity, psnr=psnr))
-        yield TrackGroup(body.track, first + at, group, body.share)
-        at += group.frame_count
+        yield TrackGroup(track, first, group, share)
+        first += group.frame_count
+
+
+def _with_psnr(each: TrackGroup, first: int, psnrs: Float64[np.ndarray, " T"]) -> TrackGroup:
+    """Return a group with the mean PSNR of its frames; those of a key interval begin with that of frame `first`."""
+    start = each.first_frame - first
+    psnr = float(psnrs[start : start + each.group.frame_count].mean())
+    return replace(each, group=replace(each.group, fidelity=replace(each.group.fidelity, psnr=psnr)))
 
 
 def _psnrs(
