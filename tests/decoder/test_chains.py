@@ -15,6 +15,7 @@ from meshreel.container.sources import BytesSource
 from meshreel.container.writer import ReelWriter
 from meshreel.decoder import tracks
 from meshreel.decoder.cache import CachedGroup, CachedStates
+from meshreel.decoder.pictures import Decoders
 from meshreel.decoder.tracks import Track
 from meshreel.errors import FormatError
 from meshreel.format.layout import Header
@@ -163,12 +164,12 @@ class Contended(Track):
         return video.tracks[0]._group
 
     @_group.setter
-    def _group(self, group: CachedGroup) -> None:
+    def _group(self, group: CachedGroup | None) -> None:
         pass
 
 
 def test_what_another_thread_left_is_used_only_where_it_is_right():
-    assert [frame_record(mesh) for mesh in Contended(ReelReader(BytesSource(DATA)), 0)] == WHOLE
+    assert [frame_record(mesh) for mesh in Contended(ReelReader(BytesSource(DATA)), 0, Decoders())] == WHOLE
 
 
 @pytest.mark.parametrize("most", [0, 30_000, 60_000])

@@ -63,7 +63,7 @@ def test_where_memory_is_short_one_decoder_is_left_and_the_pictures_are_the_same
     video = meshreel.open(SCENE)
     for one, other in zip(all_of(video), wanted, strict=True):
         np.testing.assert_array_equal(one, other)
-    assert len(video.tracks[0]._pictures._decoders._places) == 1 and kept.count >= 4
+    assert len(video.tracks[0]._pictures._decoders.places) == 1 and kept.count >= 4
 
 
 class Counting:

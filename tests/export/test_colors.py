@@ -13,7 +13,7 @@ from meshreel.export.animated_file import ExportOptions, export
 from meshreel.export.animated_glb import animated_glb
 from meshreel.export.animated_usd import animated_usd
 from meshreel.export.frames import write_frames
-from meshreel.export.shapes import Animation, Points, Shape
+from meshreel.export.shapes import Animation, Shape
 from meshreel.format.layout import ChunkKind
 from meshreel.geometry.color_views import Painted
 from meshreel.geometry.topology import concatenate
@@ -84,7 +84,7 @@ def test_faces_without_a_place_in_the_texture_have_the_colors_of_their_vertices(
     colors = np.random.default_rng(0).integers(0, 256, BALL.vertices.shape).astype(np.uint8) if colored else None
     uv = np.random.default_rng(1).random((len(BALL.faces), 3, 2)).astype(np.float32)
     uv[:7] = np.nan
-    frames = [Points(BALL.vertices + t, BALL.vertices, colors, Texture.of(CHECKS)) for t in range(2)]
+    frames = [Mesh(BALL.vertices + t, BALL.faces, colors, uv, Texture.of(CHECKS)) for t in range(2)]
     with writer(tmp_path / f"a.{extension}", Animation(np.arange(2) / 10, 10.0)) as file:
         file.add(Shape("part", "name", BALL.faces, 0, 2, frames, ((0, 2),), uv))
     [(mesh, _)] = play(tmp_path / f"a.{extension}").shown(0.1)["part"]

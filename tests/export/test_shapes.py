@@ -12,7 +12,8 @@ import pytest
 from meshreel.errors import InputError
 from meshreel.export.animated_glb import GlbWriter, animated_glb
 from meshreel.export.animated_usd import UsdWriter, animated_usd
-from meshreel.export.shapes import Animation, Points, Shape
+from meshreel.export.shapes import Animation, Shape
+from meshreel.types import Mesh
 from tests.play_glb import PlayedGlb
 
 WRITERS = {"glb": animated_glb, "usdc": animated_usd, "usda": animated_usd, "usdz": animated_usd}
@@ -27,9 +28,9 @@ def shape(
     count: int = 3, vertices: np.ndarray = TRIANGLE, shown: tuple[tuple[int, int], ...] = ((0, 3),), first: int = 0
 ) -> Shape:
     """A triangle that rises by 1 from frame to frame."""
-    up = np.tile([0.0, 0, 1], (len(vertices), 1))
-    frames = [Points(vertices + number * up, up) for number in range(count)]
-    return Shape("part", "name", np.array([[0, 1, 2]], np.int32), first, count, frames, shown)
+    faces = np.array([[0, 1, 2]], np.int32)
+    frames = [Mesh(vertices + [0, 0, number], faces) for number in range(count)]
+    return Shape("part", "name", faces, first, count, frames, shown)
 
 
 @pytest.fixture(params=WRITERS)
@@ -149,9 +150,8 @@ def test_a_still_shape_comes_and_goes_in_a_glb(tmp_path):
 @pytest.mark.parametrize(("count", "dtype"), [(65535, 5123), (65536, 5125)])
 def test_indices_have_16_bits_where_that_is_enough(tmp_path, count, dtype):
     """The greatest number of 16 bits is no index of glTF."""
-    up = np.tile([0.0, 0, 1], (count, 1))
-    points = Points(np.arange(3.0 * count).reshape(-1, 3) / count, up)
     faces = np.array([[0, 1, count - 1]], np.int32)
+    points = Mesh(np.arange(3.0 * count).reshape(-1, 3) / count, faces)
     with animated_glb(tmp_path / "a.glb", animation(1)) as writer:
         writer.add(Shape("part", "name", faces, 0, 1, [points], ((0, 1),)))
     played = PlayedGlb(tmp_path / "a.glb")

@@ -72,6 +72,7 @@ class ReelReader:
         # `size`: bytes of the whole file, even if it is truncated.
         self.metadata, self.edit, self.size = check_file(self.header, self.index, flags, self.head_size)
         self.chunks = _chunks(self.index, self.head_size, -self.edit.first)
+        self._static = {chunk.number for chunk in self.chunks if chunk.kind == ChunkKind.STATIC}
         self.groups = tuple(chunk for chunk in self.chunks if chunk.kind == ChunkKind.GROUP)
         tracks: list[list[Chunk]] = [[] for _ in {group.track for group in self.groups}]
         self.shown_from = dict[int, int]()  # of each STATIC, the first frame shown with it: its pictures begin there
@@ -156,7 +157,7 @@ class ReelReader:
 
     @property
     def has_background(self) -> bool:
-        return any(self._is_static(number) for group in self.groups for number in group.depends_on)
+        return bool(self.shown_from.keys() & self._static)
 
     @property
     def has_moving(self) -> bool:
@@ -181,7 +182,7 @@ class ReelReader:
 
     def static_of_frame(self, frame: int) -> Chunk | None:
         """Return the STATIC chunk shown with a frame: the newest that a group of the frame depends on."""
-        named = [n for chunk in self.chunks_of_frame(frame) for n in chunk.depends_on if self._is_static(n)]
+        named = [n for chunk in self.chunks_of_frame(frame) for n in chunk.depends_on if n in self._static]
         return self.chunks[max(named)] if named else None
 
     def static_ranges(self, frames: range) -> dict[int, list[tuple[int, int]]]:
@@ -197,10 +198,7 @@ class ReelReader:
 
     def group_before(self, chunk: Chunk) -> Chunk | None:
         """Return the GROUP chunk that a chunk is predicted from, or None."""
-        return next((self.chunks[n] for n in chunk.depends_on if not self._is_static(n)), None)
-
-    def _is_static(self, number: int) -> bool:
-        return self.chunks[number].kind == ChunkKind.STATIC
+        return next((self.chunks[n] for n in chunk.depends_on if n not in self._static), None)
 
     def read_chunk(self, number: int, layers: int | None = None) -> bytes:
         """Read the payload of a chunk, or its first `layers` (at least one). A FormatError names chunk and frames."""

@@ -24,13 +24,10 @@ MOST_KEPT = 1 << 25
 class CachedGroup:
     """Last group that a track decoded."""
 
-    number: int  # of its chunk; -1 before any group is decoded
+    number: int  # of its chunk
     frames: list[Mesh]
     nbytes: int  # memory of all frames
-    core: _core.Group | None  # None before any group is decoded
-
-
-NO_GROUP = CachedGroup(-1, [], 0, None)
+    core: _core.Group
 
 
 @dataclass(frozen=True, slots=True)

@@ -148,7 +148,7 @@ class TrackPictures:
     def _decoded(self, number: int, at: int) -> UInt8[np.ndarray, "R W"]:
         chain, decoders = self._chain(number, at), self._decoders
         width, height = self._sizes[self._reader.chunks[number].depends_on[1]]
-        wanted = chain[-1], 1 + (at % LAYER_PICTURES if self._is_static(number) else at)
+        wanted = chain[-1], 1 + (at % LAYER_PICTURES if self._reader.chunks[number].frame_count == 0 else at)
         place = decoders.take(chain[0], width * height, self._reader.chunks[number].size)
         if place is not None and (place.after, place.count) > wanted:
             place = None
@@ -194,12 +194,9 @@ class TrackPictures:
 
     def _chain(self, number: int, at: int) -> list[tuple[int, int]]:
         """Return chunks and layers of the pictures that must be decoded for one picture, its own last."""
-        if self._is_static(number):
+        if self._reader.chunks[number].frame_count == 0:  # a background
             return [(number, at // LAYER_PICTURES)]
         chain = [number]
         while len(before := self._reader.chunks[chain[-1]].depends_on) > 2:
             chain.append(before[2])
         return [(link, 0) for link in reversed(chain)]
-
-    def _is_static(self, number: int) -> bool:
-        return self._reader.chunks[number].frame_count == 0

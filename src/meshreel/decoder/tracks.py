@@ -18,7 +18,7 @@ from ..format.budget import LIMITS, Chain, together
 from ..format.layout import ChunkKind, Form
 from ..geometry.splats import Bound
 from ..types import Frames, Mesh, Texture
-from .cache import MOST_KEPT, NO_GROUP, CachedGroup, CachedStates, Refusals
+from .cache import MOST_KEPT, CachedGroup, CachedStates, Refusals
 from .pictures import Decoders, TrackPictures
 
 MOST_TOGETHER = 8 * LIMITS.numbers  # bytes: the groups of one frame take no more memory than the largest legal group
@@ -31,23 +31,22 @@ class Track(Frames):
         self,
         reader: ReelReader,
         number: int,
+        decoders: Decoders,
         layers: int | None = None,
         colored: bool = True,
-        decoders: Decoders | None = None,
     ) -> None:
         """Decode track `number` from at most `layers` layers of each group beyond its first; None: from all.
 
-        Pass one `decoders` to all tracks to share their memory limit.
+        The `decoders` of all tracks of a file are one, so that they share their memory limit.
         """
         self.reader = reader
         self._colored = colored and reader.is_colored
         self.number = number
         self.layers = layers
         self._place = placement(reader)
-        self._group = NO_GROUP
+        self._group: CachedGroup | None = None
         self._states = CachedStates({})
-        self._most = MOST_KEPT // len(reader.tracks)  # bytes of states: all tracks keep no more than a single one would
-        self._pictures = TrackPictures(reader, decoders or Decoders())
+        self._pictures = TrackPictures(reader, decoders)
         self._splats = TrackSplats(reader, layers)
         self._refusals = Refusals()  # of frames
         self._lost = Refusals()  # of states, which may be valid if frames of the same group are damaged
@@ -75,7 +74,7 @@ class Track(Frames):
     def _decoded(self, chunk: Chunk) -> CachedGroup:
         """Return a group, from the cache if it was the last one decoded."""
         group = self._group  # read once: another thread may replace it
-        if group.number == chunk.number:
+        if group is not None and group.number == chunk.number:
             return group
         state, states = self._state_before(chunk)
         payload = self._read(chunk)
@@ -123,6 +122,11 @@ class Track(Frames):
         with self._refusals.of(of):
             group.paint(self.reader.read_chunk(of.number, None if layers is None else layers + 1))
 
+    @property
+    def _most(self) -> int:
+        """Bytes of states to keep: all tracks together keep no more than a single track would."""
+        return MOST_KEPT // len(self.reader.tracks)
+
     def _read(self, chunk: Chunk) -> bytes:
         return self.reader.read_chunk(chunk.number, None if self.layers is None else self.layers + 1)
 
@@ -139,10 +143,10 @@ class _State:
 class Background:
     """The background of each frame. It has no layers: all of it is read, whatever the layers of the tracks."""
 
-    def __init__(self, reader: ReelReader, colored: bool = True, decoders: Decoders | None = None) -> None:
+    def __init__(self, reader: ReelReader, decoders: Decoders, colored: bool = True) -> None:
         self.reader = reader
         self._colored = colored
-        self._pictures = TrackPictures(reader, decoders or Decoders())
+        self._pictures = TrackPictures(reader, decoders)
         self._place = placement(reader)
         # Number of a chunk, its state, and the shown mesh; replaced as one for other threads.
         self._last: tuple[int, _State | None, Mesh] = (-1, None, Mesh.empty())
@@ -257,7 +261,7 @@ class TrackSplats:
             group = self._reader.group_before(group)
         return None
 
-    def bound(self, of: Chunk, group: _core.Group | None, index: int) -> Bound | None:
+    def bound(self, of: Chunk, group: _core.Group, index: int) -> Bound | None:
         """Return the splats of a frame of a group in metres; None if they are on another mesh.
 
         Raises FormatError on damaged bytes.
@@ -269,6 +273,5 @@ class TrackSplats:
             self._refusals.check(of)
             with self._refusals.of(of):
                 self._splats = of.number, _core.read_splats(data, owner)
-        assert group is not None
         bound = self._splats[1].bind(group, index, self._reader.header.scale)
         return None if bound is None else Bound(*bound)

@@ -76,8 +76,8 @@ class Video(Sequence[Mesh]):
         self.layers = layers
         self._colored = colored
         decoders, numbers = Decoders(), range(len(reader.tracks))
-        self.tracks = tuple(Track(reader, number, layers, colored, decoders) for number in numbers)
-        self._background = Background(reader, colored, decoders)
+        self.tracks = tuple(Track(reader, number, decoders, layers, colored) for number in numbers)
+        self._background = Background(reader, decoders, colored)
         self._close = close
 
     def at(self, layers: int | None = None, colors: bool = True) -> Video:

@@ -20,12 +20,11 @@ from ..decoder.pictures import Decoders
 from ..decoder.tracks import Background, Track
 from ..errors import InputError
 from ..format.layout import Form
-from ..geometry.topology import vertex_normals
 from ..types import Mesh, Up
 from .animated_glb import GlbWriter, animated_glb
 from .animated_usd import EXTENSIONS, UsdWriter, animated_usd
 from .frames import Part
-from .shapes import Animation, Points, Shape, check_output
+from .shapes import Animation, Shape, check_output
 
 MOST_FRAMES = 64  # of a shape, all in memory together; viewers limit the morph targets of a mesh (guess)
 _FAR = 8.0  # diagonals; coordinates farther from the origin are stored relative to the center (guess)
@@ -73,8 +72,8 @@ def export(
     """
     frames = range(reader.frame_count) if frames is None else frames
     decoders, numbers = Decoders(), range(len(reader.tracks))
-    tracks = tuple(Track(reader, number, options.layers, decoders=decoders) for number in numbers)
-    source = _Source(reader, tracks, Background(reader, decoders=decoders), frames, options.texture)
+    tracks = tuple(Track(reader, number, decoders, options.layers) for number in numbers)
+    source = _Source(reader, tracks, Background(reader, decoders), frames, options.texture)
     states = _states(source) if options.only != "moving" else ()
     moving = _moving(source, progress) if options.only != "background" else ()
     written = 0
@@ -118,8 +117,8 @@ def _states(source: _Source) -> Iterator[Shape]:
         mesh = source.background.of_frame(spans[0][0])
         if mesh is not None and not mesh.is_empty:
             visible = tuple((first - frames.start, end - frames.start) for first, end in spans)
-            points, uv = map(_points, [mesh]), _uv(source, mesh)
-            yield Shape("background", f"state_{number}", mesh.faces, visible[0][0], 1, points, visible, uv)
+            uv = _uv(source, mesh)
+            yield Shape("background", f"state_{number}", mesh.faces, visible[0][0], 1, [mesh], visible, uv)
 
 
 def _moving(source: _Source, progress: Progress | None) -> Iterator[Shape]:
@@ -147,8 +146,8 @@ def _group_shapes(source: _Source, group: Chunk, own: range) -> Iterator[Shape]:
             moving = [*meshes[a:b], *_ahead(source, group, meshes[:b], own[b - 1] + 1)]
             first, name = own[a] - source.frames.start, f"frames_{own[a]}_to_{own[b - 1]}"
             span = (first, first + b - a)
-            part, uv, points = f"track_{group.track}", _uv(source, meshes[a]), map(_points, moving)
-            yield Shape(part, name, meshes[a].faces, first, len(moving), points, (span,), uv)
+            part, uv = f"track_{group.track}", _uv(source, meshes[a])
+            yield Shape(part, name, meshes[a].faces, first, len(moving), moving, (span,), uv)
 
 
 def _shape_ranges(meshes: Sequence[Mesh]) -> Iterator[tuple[int, int]]:
@@ -186,10 +185,6 @@ def _is_moved(before: Mesh, after: Mesh) -> bool:
     """
     same_place = before.faces.ctypes.data == after.faces.ctypes.data
     return same_place and before.faces.shape == after.faces.shape and len(before.vertices) == len(after.vertices)
-
-
-def _points(mesh: Mesh) -> Points:
-    return Points(mesh.vertices, vertex_normals(mesh), mesh.colors, mesh.texture)
 
 
 def _uv(source: _Source, mesh: Mesh) -> Float32[np.ndarray, "F 3 2"] | None:

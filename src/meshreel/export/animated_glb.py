@@ -22,7 +22,8 @@ import numpy as np
 from ..errors import InputError
 from ..io.glb_file import COLORS, PLACES, Faces, GlbFile, by_use, check_meshopt, cut_at_seams, light
 from ..io.write import replacing
-from .shapes import Animation, Points, Shape, changes, unit_normals
+from ..types import Mesh
+from .shapes import Animation, Shape, changes, unit_normals
 
 BITS = 14  # of positions along the longest side of a shape in a compressed file, gltfpack's default
 _ROUNDED = {"NORMAL": 6, COLORS: 10}  # fractional bits, guesses: half a degree of normals, a 2048th of light
@@ -106,7 +107,7 @@ class GlbWriter:
         material = None if shape.pictured.all() else self._material(first.colors is not None)
         return file.put_faces(Faces(corners, shape.pictured, picture, material), frames, shape), lattice
 
-    def _rows(self, shape: Shape, frames: Iterable[Points], origins: np.ndarray) -> Iterator[dict[str, np.ndarray]]:
+    def _rows(self, shape: Shape, frames: Iterable[Mesh], origins: np.ndarray) -> Iterator[dict[str, np.ndarray]]:
         """Yield the attributes of each frame."""
         for frame in frames:
             row = {"POSITION": self._animation.local(shape, frame.vertices), "NORMAL": unit_normals(frame)}

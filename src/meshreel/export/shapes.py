@@ -11,10 +11,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Bool, Float32, Float64, Int32, UInt8
+from jaxtyping import Bool, Float32, Float64, Int32
 
 from ..errors import InputError
-from ..types import Texture, Up
+from ..geometry.topology import vertex_normals
+from ..types import Mesh, Up
 
 _TURNS: dict[Up, list[list[int]]] = {  # rotations that turn an axis to +y
     "y": [[1, 0, 0], [0, 1, 0], [0, 0, 1]],
@@ -22,16 +23,6 @@ _TURNS: dict[Up, list[list[int]]] = {  # rotations that turn an axis to +y
     "-y": [[1, 0, 0], [0, -1, 0], [0, 0, -1]],
     "-z": [[1, 0, 0], [0, 0, -1], [0, 1, 0]],
 }
-
-
-@dataclass(frozen=True, slots=True)
-class Points:
-    """The vertices of a shape in one frame."""
-
-    vertices: Float64[np.ndarray, "V 3"]  # m
-    normals: Float64[np.ndarray, "V 3"]  # of length 1, or 0 at vertices without a normal
-    colors: UInt8[np.ndarray, "V 3"] | None = None  # sRGB; all frames of a shape have colours, or none has
-    texture: Texture | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +34,7 @@ class Shape:
     faces: Int32[np.ndarray, "F 3"]  # at least one
     first: int  # number of its first frame
     count: int  # number of its frames, which are consecutive
-    frames: Iterable[Points]  # `count` of them
+    frames: Iterable[Mesh]  # `count` of them, m; all have colours, or none has
     shown: tuple[tuple[int, int], ...]  # ranges of frames that show it: end excluded, in order, with gaps between
     # Texture coordinates of the faces' corners in all frames, as `Mesh.uv`: all of a face's are NaN, or none is.
     uv: Float32[np.ndarray, "F 3 2"] | None = None
@@ -98,11 +89,11 @@ def changes(shape: Shape, count: int) -> Iterator[tuple[int, bool]]:
             yield end, False
 
 
-def unit_normals(points: Points) -> Float32[np.ndarray, "V 3"]:
+def unit_normals(frame: Mesh) -> Float32[np.ndarray, "V 3"]:
     """Return normals that all have length 1, as files require; vertices without a normal get +y."""
-    normals = points.normals.astype(np.float32)
-    normals[~points.normals.any(axis=1)] = (0, 1, 0)
-    return normals
+    normals = vertex_normals(frame)
+    normals[~normals.any(axis=1)] = (0, 1, 0)
+    return normals.astype(np.float32)
 
 
 def check_output(path: Path) -> None:

@@ -35,10 +35,8 @@ def encode_splats(splats: Splats, importance: Float64[np.ndarray, " N"]) -> tupl
     middle = int(np.median(rungs[:, 0]))
     bits = (PLACE_BITS, TURN_BITS, OPACITY_BITS, COLOR_BITS)
     head = Gaussians(Form.GAUSSIANS, *bits, rung_of(OFFSET_STEP), middle, len(splats))
-    parts = [pack(head)]
-    for number, chosen in enumerate(_layers(splats, importance)):
-        record = pack(_encode_layer(splats.take(chosen), head))
-        parts = [parts[0] + record] if number == 0 else [*parts, record]
+    first, *others = (pack(_encode_layer(splats.take(chosen), head)) for chosen in _layers(splats, importance))
+    parts = [pack(head) + first, *others]
     return b"".join(parts), tuple(accumulate(map(len, parts)))
 
 

@@ -58,7 +58,7 @@ def colored_groups(
             if stages is not None:
                 stages.add("color", group.frame_count)
         else:
-            chain.pass_on(group)
+            chain.groups.append(group)
     yield from chain.done()
 
 
@@ -75,17 +75,12 @@ class _Chain:
     """Groups of one chain, their splats, and the video of their pictures."""
 
     def __init__(self, interval: Interval, options: AppearanceOptions) -> None:
-        self._groups = list[EncodedGroup]()
+        self.groups = list[EncodedGroup]()
         self._splats = None if options.splats is None else ChainSplats(options.splats, interval)
-        self._pictured = list[bool]()  # whether each of the groups has pictures
+        self._pictured = list[int]()  # which of the groups have pictures
         self._options = options
         self._video: _Video | None = None
         self._before: tuple[_core.GroupState | None, LayersState | None] = None, None  # that predict the next group
-
-    def pass_on(self, group: EncodedGroup) -> None:
-        """Add a group without colours."""
-        self._groups.append(group)
-        self._pictured.append(False)
 
     def add(self, group: EncodedGroup, numbers: range, paints: Sequence[Paint | None], pictured: bool) -> None:
         """Add a group with the colours of its frames, which have these numbers in the interval."""
@@ -101,7 +96,7 @@ class _Chain:
             else vertex_colors(paint, mesh)
             for paint, mesh in zip(paints, meshes, strict=True)
         ]
-        texture = options.texture if pictured and not self._groups and group.form == Form.LAYERS else None
+        texture = options.texture if pictured and not self.groups and group.form == Form.LAYERS else None
         is_covered = texture is not None or self._video is not None
         step = COARSER * options.color_step if is_covered else options.color_step
         encoded, self._before = None, (None, None)
@@ -112,32 +107,28 @@ class _Chain:
             last = LayersState(base.faces, meshes[-1].vertices[: len(base.vertices)], (), coded)
             self._before = decoded.state, last
         if encoded is None:  # the summary tells of it
-            self.pass_on(replace(group, lost_colors=True))
+            self.groups.append(replace(group, lost_colors=True))
             return
         companions = [Companion(ChunkKind.COLORS, encoded.payload, encoded.layers)]
         if texture is not None:
             self._video = _Video(canvas, texture, paints, meshes)
             companions.append(Companion(ChunkKind.ATLAS, self._video.atlas))
         if self._video is not None:
+            self._pictured.append(len(self.groups))
             for paint, mesh in zip(paints, meshes, strict=True):
                 self._video.add(paint, mesh)
-        self._groups.append(replace(group, companions=tuple(companions)))
-        self._pictured.append(self._video is not None)
+        self.groups.append(replace(group, companions=tuple(companions)))
 
     def done(self) -> list[EncodedGroup]:
         """Return the groups with their splats and pictures."""
-        if self._splats is not None and self._groups:
-            first = self._groups[0]
-            companions = (*first.companions, *self._splats.companions())
-            self._groups[0] = replace(first, companions=companions)
-        if self._video is None:
-            return self._groups
-        counts = [group.frame_count for group, own in zip(self._groups, self._pictured, strict=True) if own]
-        pictures = iter(self._video.videos.finish(counts))
-        return [
-            replace(group, companions=(*group.companions, *next(pictures))) if own else group
-            for group, own in zip(self._groups, self._pictured, strict=True)
-        ]
+        groups = self.groups
+        if self._splats is not None and groups:
+            groups[0] = replace(groups[0], companions=(*groups[0].companions, *self._splats.companions()))
+        if self._video is not None:
+            pictures = self._video.videos.finish([groups[k].frame_count for k in self._pictured])
+            for k, own in zip(self._pictured, pictures, strict=True):
+                groups[k] = replace(groups[k], companions=(*groups[k].companions, *own))
+        return groups
 
 
 class _Video:
@@ -169,9 +160,8 @@ class _Video:
 
 def fitting_size(paints: Sequence[Paint | None], meshes: Sequence[Mesh]) -> int:
     """Return the width of the texture that has the detail of the pictures that show some of these frames."""
-    some = next((k for k, paint in enumerate(paints) if paint is not None), 0)
-    paint = paints[some]
-    wanted = 0.0 if paint is None else paint.pixels_on(meshes[some]) / USED
+    pairs = zip(paints, meshes, strict=True)
+    wanted = next(paint.pixels_on(mesh) for paint, mesh in pairs if paint is not None) / USED
     return next((size for size in TEXTURE_SIZES if size <= MOST_FITTING and size * size >= wanted), MOST_FITTING)
 
 

@@ -38,12 +38,16 @@ class Interval:
     pictured: bool = field(default=False, kw_only=True)  # with textures or splats, which frames of Draco cannot have
     larger: float = field(default=1.0, kw_only=True)  # times, the whole frames than the body: targets are of the former
 
+    @property
+    def stop(self) -> int:
+        """The number of the frame that follows."""
+        return self.first_frame + len(self.frames)
+
     def to_send(self) -> Interval:
         """Return the interval for a worker process, which reads those of its frames that are in files."""
         frames = self.frames.only() if isinstance(self.frames, NormalisedFrames) else self.frames
         if (views := self.views) is not None:
-            numbers = range(self.first_frame, self.first_frame + len(self.frames))
-            views = replace(views, sequence=only(views.sequence, numbers))
+            views = replace(views, sequence=only(views.sequence, range(self.first_frame, self.stop)))
         return replace(self, frames=frames, views=views)
 
     def paint(self, number: int, mesh: Mesh) -> Paint | None:

@@ -107,10 +107,6 @@ class ShownFrame:
         order = np.argsort(labels, kind="stable")
         yield from np.split(wide[order], np.flatnonzero(np.diff(labels[order])) + 1) if len(wide) else ()
 
-    def samples_of(self, faces: Int64[np.ndarray, " S"]) -> Int64[np.ndarray, " n"]:
-        """Return the numbers of the samples on some of the frame's faces."""
-        return np.concatenate([np.unique(self.original.faces[faces]), len(self.original.vertices) + faces])
-
     def _of_free(
         self, points: Float64[np.ndarray, "N 3"], squared: Float64[np.ndarray, " N"], mesh: Mesh
     ) -> Float64[np.ndarray, " F"]:

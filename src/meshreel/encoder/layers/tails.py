@@ -184,7 +184,9 @@ class _Search:
         """Return the patches of a frame where its samples are farther than a limit from the decoded mesh."""
         chosen = []
         for faces in frame.lost(squared, threshold**2 * self.usual):
-            samples, hole = frame.samples_of(faces), self._is_hole(frame, squared, faces)
+            corners = np.unique(frame.original.faces[faces])
+            samples = np.concatenate([corners, len(frame.original.vertices) + faces])
+            hole = self._is_hole(frame, squared, faces)
             if not hole and dot(frame.weights[samples], squared[samples]) < 2 * self.price * LEAST_BYTES:
                 continue
             tried = [(self._worth(frame, squared, samples, small), small) for small in self._reduced(frame, faces)]

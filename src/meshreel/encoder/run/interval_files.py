@@ -263,7 +263,11 @@ def pack_interval(interval: Interval, groups: Sequence[EncodedGroup], head: Head
 
     What the metadata have no room to say of its groups is in a chunk of a kind that readers skip.
     """
-    facts = [*map(_facts, groups)]
+    facts = list[list[Any]]()
+    for group in groups:  # what its chunk lacks, for JSON, in which null is an infinite number
+        values = [value if math.isfinite(value) else None for value in map(float, astuple(group.fidelity))]
+        key = None if group.key is None else int(group.key)
+        facts.append([*values, key, group.canonical, group.lost_colors])
     metadata = json.loads(head.metadata) | {"interval": place_of(interval), "groups": facts}
     is_long = len(json.dumps(metadata)) > _MOST
     metadata |= {"groups": None} if is_long else {}
@@ -318,12 +322,6 @@ def named(interval: Interval) -> str:
 def _name(interval: Interval) -> str:
     """Return the name of the file of an interval."""
     return f"{interval.first_frame:08}-{interval.track:03}.reel"
-
-
-def _facts(group: EncodedGroup) -> list[Any]:
-    """Return the facts about a group that its chunk lacks, for JSON, in which null is an infinite number."""
-    key, values = None if group.key is None else int(group.key), map(float, astuple(group.fidelity))
-    return [*(value if math.isfinite(value) else None for value in values), key, group.canonical, group.lost_colors]
 
 
 def _groups(path: Path, reader: ReelReader) -> list[EncodedGroup]:

@@ -27,7 +27,7 @@ from ...analysis.scene.segmentation import segment, segment_by
 from ...analysis.survey import Survey, check_one_unit
 from ...errors import InputError
 from ...geometry.closest_points import Surface
-from ...geometry.depth import DepthPicture, FreeSpace
+from ...geometry.depth import DepthFrames, DepthPicture, FreeSpace
 from ...geometry.derived_sequences import CapturedSequence, picked
 from ...geometry.topology import components, concatenate, face_normals, part_of
 from ...geometry.voxels import Lattice
@@ -98,10 +98,11 @@ def take_apart(
     else:
         segmentation = segment_by(masker, sequence, options.cameras)
     stages.reach("segment", 1.0)
-    background = _background(sequence, segmentation, options.from_depth, stages)
+    depth = sequence.depth if options.from_depth else None
+    background = _background(sequence, depth, segmentation, stages)
     if background.is_empty:
         _check_nothing_lost(sequence, segmentation)
-    changes = [_change(sequence, segmentation, frame, options.from_depth) for frame in segmentation.changes]
+    changes = [_change(sequence, depth, segmentation, frame) for frame in segmentation.changes]
     stages.reach("background", 1.0)
     sizes, noise, deviation, astray = _measured(sequence, segmentation, background, changes, stages)
     seen = replace(seen, scale=(float(np.median(sizes)) if sizes else 0.0) or seen.diagonal)
@@ -125,7 +126,9 @@ def _check_nothing_lost(sequence: MeshSequence, segmentation: Segmentation) -> N
             raise InputError(f"{text}: {size}; if so, encode with --dynamic-only")
 
 
-def _background(sequence: CapturedSequence, segmentation: Segmentation, from_depth: bool, stages: Stages) -> Mesh:
+def _background(
+    sequence: CapturedSequence, depth: DepthFrames | None, segmentation: Segmentation, stages: Stages
+) -> Mesh:
     """Fuse the surface that stands still at first, from the cameras' depth where it is known."""
     numbers, cell = evenly(len(sequence), FRAMES), segmentation.cell
 
@@ -133,8 +136,8 @@ def _background(sequence: CapturedSequence, segmentation: Segmentation, from_dep
         stages.reach("background", number / len(sequence))
         return segmentation.still_at_first(number, mesh)
 
-    if from_depth and sequence.depth is not None:
-        return _fused(sequence, numbers, stands, cell)
+    if depth is not None:
+        return _fused(sequence, depth, numbers, stands, cell)
 
     def clear(number: int, mesh: Mesh) -> Bool[np.ndarray, " F"]:
         still = stands(number, mesh)
@@ -145,21 +148,20 @@ def _background(sequence: CapturedSequence, segmentation: Segmentation, from_dep
 
 def _fused(
     sequence: CapturedSequence,
+    depth: DepthFrames,
     numbers: Sequence[int],
     still: Callable[[int, Mesh], Bool[np.ndarray, " F"]],
     cell: float,
 ) -> Mesh:
     """Fuse the still faces of some frames from their depth pictures, which are known."""
-    depth = sequence.depth
-    assert depth is not None
     meshes = ((number, sequence[number]) for number in numbers)
     return fuse_still_depth((Moment(depth[k], mesh, still(k, mesh)) for k, mesh in meshes), cell)
 
 
-def _change(sequence: CapturedSequence, segmentation: Segmentation, frame: int, from_depth: bool) -> Change:
+def _change(sequence: CapturedSequence, depth: DepthFrames | None, segmentation: Segmentation, frame: int) -> Change:
     numbers = [frame + number for number in evenly(len(sequence) - frame, FRAMES)]
-    if from_depth and sequence.depth is not None:
-        room = _fused(sequence, numbers, lambda k, mesh: ~segmentation.moving(k, mesh), segmentation.cell)
+    if depth is not None:
+        room = _fused(sequence, depth, numbers, lambda k, mesh: ~segmentation.moving(k, mesh), segmentation.cell)
         return Change(frame, part_of(room, segmentation.came(frame, room)))
     later = picked(sequence, numbers, lambda _, mesh: segmentation.came(frame, mesh))
     return Change(frame, fuse_background(later, segmentation.cell))
