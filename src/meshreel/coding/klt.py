@@ -75,17 +75,18 @@ def quantize(basis: Basis, count: int, step: float) -> BasisSymbols:
     vectors compensate the rounding of earlier ones.
     """
     width = len(basis.mean)
-    bits, rows = [_bits_for(1.0, step)], np.zeros((count, width), dtype=np.int64)
-    rounded = np.zeros((width, 0))
+    # Fraction bits of the mean and of each vector, with which rounding moves its amplitude by at most 1/32 of a step.
+    amplitudes = [1.0, *np.sqrt(basis.energies[:count]).tolist()]
+    bits = [min(max(strict.ceil_log2(max(16.0 * amplitude / step, 1.0)), 5), 24) for amplitude in amplitudes]
+    rows, rounded = np.zeros((count, width), dtype=np.int64), np.zeros((width, 0))
     for k in range(count):
-        bits.append(_bits_for(float(np.sqrt(basis.energies[k])), step))
         direction = basis.vectors[:, k]
         if k:
             inside = strict.products(_dual(rounded).T, direction[:, None])
             direction = direction - strict.products(rounded, inside)[:, 0]
         length = strict.norm(direction)
-        rows[k] = np.rint(direction / (length if length > 0.5 else 1.0) * 2.0 ** bits[-1]).astype(np.int64)
-        rounded = np.concatenate([rounded, np.ldexp(rows[k].astype(np.float64), -bits[-1])[:, None]], axis=1)
+        rows[k] = np.rint(direction / (length if length > 0.5 else 1.0) * 2.0 ** bits[k + 1]).astype(np.int64)
+        rounded = np.concatenate([rounded, np.ldexp(rows[k].astype(np.float64), -bits[k + 1])[:, None]], axis=1)
     mean = np.rint(basis.mean * 2.0 ** bits[0]).astype(np.int64)
     return BasisSymbols(mean, rows, np.array(bits, dtype=np.int64))
 
@@ -101,8 +102,3 @@ def dequantize(symbols: BasisSymbols) -> Basis:
     mean = np.ldexp(symbols.mean.astype(np.float64), -int(symbols.bits[0]))
     vectors = np.ldexp(symbols.vectors.astype(np.float64), -symbols.bits[1:].astype(np.int32)[:, None])
     return Basis(mean, np.ascontiguousarray(vectors.T), np.zeros(len(vectors)))
-
-
-def _bits_for(amplitude: float, step: float) -> int:
-    """Return the fraction bits, 5 to 24, at which rounding moves `amplitude` by at most 1/32 of a step."""
-    return min(max(strict.ceil_log2(max(16.0 * amplitude / step, 1.0)), 5), 24)

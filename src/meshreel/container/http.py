@@ -22,22 +22,20 @@ class _UrlSource:
     """
 
     def __init__(self, url: str) -> None:
-        self._url, self.bytes_read = url, 0
-        self._begin, self.size = self._counted(0, FIRST_REQUEST)  # first bytes of the file
+        self._url = url
+        self._begin, self.size = self._request(0, FIRST_REQUEST)  # first bytes of the file
+        self.bytes_read = len(self._begin)
 
     def get_bytes(self, offset: int, length: int) -> bytes:
         end = min(offset + length, self.size)
         if end <= len(self._begin):
             return self._begin[offset:end]
-        return self._counted(offset, end - offset)[0]
+        data, _ = self._request(offset, end - offset)
+        self.bytes_read += len(data)
+        return data
 
     def close(self) -> None:
         """Do nothing: no connection stays open."""
-
-    def _counted(self, offset: int, length: int) -> tuple[bytes, int]:
-        answer = self._request(offset, length)
-        self.bytes_read += len(answer[0])
-        return answer
 
     def _request(self, offset: int, length: int) -> tuple[bytes, int]:
         """Return the bytes of a range, or all bytes if the server has no ranges, and the size of the file."""

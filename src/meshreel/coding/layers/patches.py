@@ -42,10 +42,10 @@ class Patches:
         return frames
 
 
-def reach(rung: int, frames: int) -> tuple[float, float]:
-    """Return the largest coordinates of meshes of `frames` frames: along x, where they lie in a row, and in y and z."""
-    step = step_of(rung)
-    return (MOST_CELLS // frames // 2 - 0.75) * step, (MOST_CELLS // 2 - 0.75) * step
+def fits(far: Float64[np.ndarray, " 3"], rung: int, frames: int) -> bool:
+    """Return whether a lattice has cells for coordinates up to `far` in all frames, which lie in a row along x."""
+    most = (np.array([MOST_CELLS // frames // 2, MOST_CELLS // 2, MOST_CELLS // 2]) - 0.75) * step_of(rung)
+    return bool((far <= most).all())
 
 
 def encode_patches(

@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import Bool, Float64, Int32, Int64
 
 from ...coding import entropy
-from ...coding.layers.patches import Patches, encode_patches, encode_runs, reach
+from ...coding.layers.patches import Patches, encode_patches, encode_runs, fits
 from ...coding.mesh import encode_mesh
 from ...coding.steps import rung_of, step_of
 from ...format.layout import LayersPatches
@@ -201,7 +201,7 @@ class _Search:
             small = decimate(mesh, max(4, round(share * len(mesh.vertices))))
             step = step_of(self.rung)
             small = clean(Mesh(np.rint(small.vertices / step) * step, small.faces))
-            if not small.is_empty and _within(np.abs(small.vertices).max(axis=0), self.rung, len(self.frames)):
+            if not small.is_empty and fits(np.abs(small.vertices).max(axis=0), self.rung, len(self.frames)):
                 yield small
 
     def _worth(
@@ -217,11 +217,6 @@ def _rung(frames: Sequence[Mesh], step: float) -> int:
     """Return the rung of the wanted lattice, or of the finest lattice that holds every part of the frames."""
     rung = rung_of(step)
     far = np.max([np.abs(frame.vertices).max(axis=0) for frame in frames], axis=0)
-    while rung > 0 and not _within(far, rung, len(frames)):
+    while rung > 0 and not fits(far, rung, len(frames)):
         rung -= 1
     return rung
-
-
-def _within(far: Float64[np.ndarray, " 3"], rung: int, frames: int) -> bool:
-    across, elsewhere = reach(rung, frames)
-    return bool(far[0] <= across and far[1:].max() <= elsewhere)
