@@ -140,9 +140,6 @@ def cut_at(residuals: Float64[np.ndarray, " T"]) -> int | None:
     if len(residuals) < 2 or residuals.max() <= limit:
         return None
     logs = np.log(np.clip(residuals, 1e-6, 1e6))
-    spread = [_scatter(logs[:cut]) + _scatter(logs[cut:]) for cut in range(1, len(logs))]
+    sides = ((logs[:cut], logs[cut:]) for cut in range(1, len(logs)))
+    spread = [sum(((side - side.mean()) ** 2).sum() for side in both) for both in sides]
     return 1 + int(np.argmin(spread))
-
-
-def _scatter(values: Float64[np.ndarray, " n"]) -> float:
-    return float(((values - values.mean()) ** 2).sum())

@@ -8,8 +8,8 @@ sequence of open surface most of which is in the same place in all frames; a lon
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -65,10 +65,6 @@ class Survey:
     def is_bare(self, frame: int) -> bool:
         return self.diagonals[frame] == 0
 
-    def without_frames(self) -> Survey:
-        """Return the survey without the facts about single frames, which normalising does not need."""
-        return replace(self, diagonals=(), flattened=(), pieces=())
-
     def normalise(self, mesh: Mesh) -> Mesh:
         """Return the mesh cleaned and in normalised coordinates: centered, in multiples of `unit`."""
         mesh = clean(mesh)
@@ -77,20 +73,17 @@ class Survey:
     def intervals(self, size: int) -> list[range]:
         """Return even intervals of at most `size` frames, each of empty frames or of frames of similar size."""
         intervals = []
-        for start, stop in pairwise([0, *self._breaks(), len(self.diagonals)]):
+        breaks, least, most = [0], self.diagonals[0], self.diagonals[0]
+        for number, diagonal in enumerate(self.diagonals):
+            least, most = min(least, diagonal), max(most, diagonal)
+            if most > LARGEST_RATIO * least:  # only one is empty, or sizes differ
+                breaks.append(number)
+                least = most = diagonal
+        for start, stop in pairwise([*breaks, len(self.diagonals)]):
             parts = -(-(stop - start) // size)
             cuts = [start + (stop - start) * k // parts for k in range(parts + 1)]
             intervals += [range(a, b) for a, b in pairwise(cuts)]
         return intervals
-
-    def _breaks(self) -> Iterator[int]:
-        """Yield the frames that cannot share an interval with the one before: only one is empty, or sizes differ."""
-        least = most = self.diagonals[0]
-        for number, diagonal in enumerate(self.diagonals):
-            least, most = min(least, diagonal), max(most, diagonal)
-            if most > LARGEST_RATIO * least:
-                yield number
-                least = most = diagonal
 
 
 def survey(sequence: MeshSequence, report: Report = lambda *_: None, cleaned: bool = True) -> Survey:
@@ -211,19 +204,12 @@ def _found(mesh: Mesh) -> _Found | None:
     order = np.argsort(labels, kind="stable")
     starts = np.searchsorted(labels[order], np.arange(len(areas)))
     corners = [best.reduceat(mesh.vertices[order], starts, axis=0) for best in (np.minimum, np.maximum)]
-    boxes = np.concatenate(corners, axis=1)
-    return _Found(labels, boxes, own, _nearest(boxes, own))
-
-
-def _nearest(boxes: Float64[np.ndarray, "C 6"], pieces: Int64[np.ndarray, " P"]) -> Int64[np.ndarray, " C"]:
-    """Return the number of each component's piece: the piece with the nearest box, then the nearest middle."""
-    lows, highs = boxes[:, :3], boxes[:, 3:]
-    gaps = np.maximum(np.maximum(lows[pieces] - highs[:, None], lows[:, None] - highs[pieces]), 0.0)
-    middles = lows + highs
-    gap, middle_gap = ((offsets**2).sum(axis=2) for offsets in (gaps, middles[pieces] - middles[:, None]))
-    nearest = np.lexsort((middle_gap, gap), axis=-1)[:, 0]
-    nearest[pieces] = np.arange(len(pieces))
-    return nearest
+    (lows, highs), middles = corners, corners[0] + corners[1]
+    gaps = np.maximum(np.maximum(lows[own] - highs[:, None], lows[:, None] - highs[own]), 0.0)
+    gap, middle_gap = ((offsets**2).sum(axis=2) for offsets in (gaps, middles[own] - middles[:, None]))
+    nearest = np.lexsort((middle_gap, gap), axis=-1)[:, 0]  # the piece with the nearest box, then the nearest middle
+    nearest[own] = np.arange(len(own))
+    return _Found(labels, np.concatenate(corners, axis=1), own, nearest)
 
 
 def bodies_of(frames: Sequence[tuple[Piece, ...]]) -> list[Int64[np.ndarray, " P"]] | None:
@@ -270,17 +256,12 @@ def is_scene(frames: Frames) -> bool:
     sizes = [mesh.diagonal for mesh in meshes]
     if len(meshes) < 2 or sizes[0] == 0 or max(sizes) > UNLIKE * min(sizes):
         return False
-    if not _is_open(meshes[0]) or np.median(edge_lengths(meshes[0])) * COARSEST > sizes[0]:
+    ends = meshes[0].vertices[border_edges(meshes[0])]
+    is_open = np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1).sum() > BORDER * sizes[0]
+    if not is_open or np.median(edge_lengths(meshes[0])) * COARSEST > sizes[0]:
         return False
-    lattice = Lattice.near(meshes[0], meshes[0].diagonal / CELLS)
+    lattice = Lattice.near(meshes[0], sizes[0] / CELLS)
     cells = [distinct(lattice.keys(spread(mesh, lattice.size)[0])) for mesh in meshes]
     wide = [around(occupied) for occupied in cells]
     still = [np.mean([np.isin(occupied, other).mean() for other in wide]) for occupied in cells]
     return float(np.median(still)) >= SHARE
-
-
-def _is_open(mesh: Mesh) -> bool:
-    """Return whether the borders of a mesh are long; a few small holes do not make a body open."""
-    border = border_edges(mesh)
-    length = np.linalg.norm(mesh.vertices[border[:, 0]] - mesh.vertices[border[:, 1]], axis=1).sum()
-    return bool(length > BORDER * mesh.diagonal)

@@ -36,18 +36,14 @@ class Surface:
         self.mesh = mesh
         self.tree = _core.SurfaceTree(mesh.vertices, mesh.faces)  # the core's own
 
-    @property
+    @cached_property
     def normals(self) -> Float64[np.ndarray, "F 3"]:
-        return self._oriented[0]
-
-    @property
-    def areas(self) -> Float64[np.ndarray, " F"]:
-        """Areas of the faces, in squared units of the vertices."""
-        return self._oriented[1]
+        return face_normals(self.mesh)[0]  # computed on first use: most callers want points only
 
     @cached_property
-    def _oriented(self) -> tuple[Float64[np.ndarray, "F 3"], Float64[np.ndarray, " F"]]:
-        return face_normals(self.mesh)  # computed on first use: most callers want points only
+    def areas(self) -> Float64[np.ndarray, " F"]:
+        """Areas of the faces, in squared units of the vertices."""
+        return face_normals(self.mesh)[1]
 
     def closest(self, queries: Float64[np.ndarray, "N 3"]) -> Hits:
         """Find the closest point of the surface to each query, with its face and barycentric weights.
@@ -65,7 +61,8 @@ class Surface:
         """Move the vertices; updating the search structure takes a tenth of the time of building a new one."""
         self.mesh = Mesh(vertices, self.mesh.faces)
         self.tree.move(vertices)
-        self.__dict__.pop("_oriented", None)
+        for computed in ("normals", "areas"):
+            self.__dict__.pop(computed, None)
 
     def past_border(self, hits: Hits) -> Bool[np.ndarray, " N"]:
         """Return a mask of closest points on the mesh's border, whose queries lie beside the surface, not above it."""

@@ -84,31 +84,29 @@ class FreeSpace:
     def at(self, points: Float64[np.ndarray, "N 3"]) -> Bool[np.ndarray, " N"]:
         """Return the points that some camera saw past: it measured a larger depth in all nine pixels around."""
         free = np.zeros(len(points), bool)
-        for _, inside, depth, ahead, past in self._measured(self._world(points)):
+        for _, inside, depth, ahead, past in self._measured(points):
             free[inside[depth > ahead + past]] = True
         return free
 
     def faced(self, points: Float64[np.ndarray, "N 3"], normals: Float64[np.ndarray, "N 3"]) -> Bool[np.ndarray, " N"]:
         """Return the points with these normals that face some camera which measured nothing in front of them."""
-        world, facing_points = self._world(points), np.zeros(len(points), bool)
-        for camera, inside, depth, ahead, past in self._measured(world):
-            way = camera.eye - world[inside]
+        facing_points = np.zeros(len(points), bool)
+        for way, inside, depth, ahead, past in self._measured(points):
             facing = np.einsum("nd,nd->n", way, normals[inside]) > FACING * np.linalg.norm(way, axis=1)
             hidden = (depth > 0) & (depth < ahead - past)
             facing_points[inside[facing & ~hidden]] = True
         return facing_points
 
-    def _world(self, points: Float64[np.ndarray, "N 3"]) -> Float64[np.ndarray, "N 3"]:
-        return np.asarray(self.place.origin) + self.place.scale * points
-
-    def _measured(self, world: Float64[np.ndarray, "N 3"]) -> Iterator[tuple[Camera, Any, Any, Any, Any]]:
-        """Yield each camera, the numbers of the places in its picture, their measured and their own depths, and the
-        difference of both that is significant, m.
+    def _measured(self, points: Float64[np.ndarray, "N 3"]) -> Iterator[tuple[Any, Any, Any, Any, Any]]:
+        """Yield for each camera the ways to it from the points in its picture, their numbers, their measured and their
+        own depths, and the difference of both that is significant, m.
         """
+        world = np.asarray(self.place.origin) + self.place.scale * points
         for picture in self.pictures:
             pixels, inside, ahead = picture.camera.seen(world)
             depth = picture.depth.reshape(-1)[pixels] * picture.unit
-            yield picture.camera, inside, depth, ahead, np.maximum(THROUGH[0], THROUGH[1] * ahead)
+            significant = np.maximum(THROUGH[0], THROUGH[1] * ahead)
+            yield picture.camera.eye - world[inside], inside, depth, ahead, significant
 
 
 def _between(count: int, factor: int) -> tuple[list[_Shares], Int64[np.ndarray, " N"]]:

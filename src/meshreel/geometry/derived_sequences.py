@@ -235,11 +235,6 @@ def welded(source: MeshSequence) -> DerivedSequence:
     return DerivedSequence(source, _welded)
 
 
-def turned_over(source: MeshSequence) -> DerivedSequence:
-    """Return the same frames with the fronts of all faces where their backs were."""
-    return DerivedSequence(source, _turned_over)
-
-
 def picked(
     source: MeshSequence, numbers: Sequence[int], choose: Callable[[int, Mesh], Bool[np.ndarray, " F"]] | None = None
 ) -> DerivedSequence:
@@ -273,7 +268,8 @@ def _welded(source: MeshSequence, number: int) -> Mesh:
     return weld(mesh)
 
 
-def _turned_over(source: MeshSequence, number: int) -> Mesh:
+def turned_over(source: MeshSequence, number: int) -> Mesh:
+    """Return a frame with the fronts of all faces where their backs were, for `DerivedSequence`."""
     mesh = source[number]
     uv = None if mesh.uv is None else np.ascontiguousarray(mesh.uv[:, ::-1])
     return replace(mesh, faces=np.ascontiguousarray(mesh.faces[:, ::-1]), uv=uv)

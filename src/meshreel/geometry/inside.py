@@ -77,18 +77,14 @@ def _spacing(mesh: Mesh, count: int, generator: np.random.Generator) -> float:
     for pilot in (16_384, 131_072):
         if size.min() <= 0:
             return 0.0
-        step = _cube_root(size.prod() / pilot)
+        step = rounded(float(size.prod() / pilot) ** (1 / 3))
         shape = np.maximum(np.ceil(size / step), 1).astype(np.int64)
         grid = np.indices(tuple(shape)).reshape(3, -1).T
         inside = winding_inside(mesh, low + (grid + generator.random(grid.shape)) * (size / shape))
         if inside.sum() >= 200:
             break
     cells = count / inside.mean() if inside.any() else np.inf
-    return _cube_root(size.prod() / min(cells, MOST_BLOCKS * BLOCK**3)) if inside.any() else 0.0
-
-
-def _cube_root(value: float) -> float:
-    return rounded(float(value) ** (1 / 3))
+    return rounded(float(size.prod() / min(cells, MOST_BLOCKS * BLOCK**3)) ** (1 / 3)) if inside.any() else 0.0
 
 
 def _inside_grid(mesh: Mesh, spacing: float, generator: np.random.Generator) -> Points:

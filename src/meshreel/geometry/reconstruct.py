@@ -96,12 +96,8 @@ def extract(grid: Grid, least: float) -> Mesh:
     if not len(faces):
         return Mesh.empty()
     step = grid.voxel * ALIKE  # merges vertices at one voxel that differ by rounding
-    return _ordered(clean(weld(Mesh(np.rint(vertices / step) * step, faces))))
-
-
-def _ordered(mesh: Mesh) -> Mesh:
-    """Order vertices and faces by position; no two vertices may share one."""
-    order = np.lexsort(mesh.vertices.T[::-1])
+    mesh = clean(weld(Mesh(np.rint(vertices / step) * step, faces)))
+    order = np.lexsort(mesh.vertices.T[::-1])  # vertices and faces by position; no two vertices share one
     rank = np.empty(len(order), np.int32)
     rank[order] = np.arange(len(order), dtype=np.int32)
     faces = rank[mesh.faces]

@@ -28,7 +28,12 @@ def fit_rigid(
     middle_s = np.einsum("ni,nid->nd", share, source)
     middle_t = np.einsum("ni,nid->nd", share, target)
     s, t = source - middle_s[:, None], target - middle_t[:, None]
-    rotations = _nearest_rotations(strict.products(np.swapaxes(share[..., None] * t, 1, 2), s))
+    covariances = strict.products(np.swapaxes(share[..., None] * t, 1, 2), s)
+    rotations, size = strict.nearest_rotations(covariances)
+    open_axis = size[:, 1] <= DEGENERATE * size[:, 0]  # rank 1 or 0: pull the open part towards no rotation
+    if open_axis.any():
+        pull = np.maximum(size[open_axis, 0], np.finfo(float).tiny)[:, None, None] * 1e-6 * np.eye(3)
+        rotations[open_axis] = strict.nearest_rotations(covariances[open_axis] + pull)[0]
     return rotations, middle_t - np.einsum("nij,nj->ni", rotations, middle_s)
 
 
@@ -70,15 +75,6 @@ def multiply(a: Float64[np.ndarray, "N 4"], b: Float64[np.ndarray, "N 4"]) -> Fl
     scalar = a[:, 0] * b[:, 0] - np.sum(a[:, 1:] * b[:, 1:], axis=1)
     vector = a[:, :1] * b[:, 1:] + b[:, :1] * a[:, 1:] + np.cross(a[:, 1:], b[:, 1:])
     return np.concatenate([scalar[:, None], vector], axis=1)
-
-
-def _nearest_rotations(covariances: Rotations) -> Rotations:
-    rotations, size = strict.nearest_rotations(covariances)
-    open_axis = size[:, 1] <= DEGENERATE * size[:, 0]  # rank 1 or 0: pull the open part towards no rotation
-    if open_axis.any():
-        pull = np.maximum(size[open_axis, 0], np.finfo(float).tiny)[:, None, None] * 1e-6 * np.eye(3)
-        rotations[open_axis] = strict.nearest_rotations(covariances[open_axis] + pull)[0]
-    return rotations
 
 
 def quaternions(rotations: Rotations) -> Float64[np.ndarray, "N 4"]:

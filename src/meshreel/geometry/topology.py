@@ -48,12 +48,6 @@ def edge_lengths(mesh: Mesh) -> Float64[np.ndarray, " E"]:
     return np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1)
 
 
-def longest_edges(vertices: Float64[np.ndarray, "V 3"], faces: Int32[np.ndarray, "F 3"]) -> Float64[np.ndarray, " F"]:
-    """Return the length of the longest edge of each face, in the unit of the vertices."""
-    corners = vertices[faces]
-    return np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
-
-
 def subdivide_midpoint(mesh: Mesh, levels: int = 1) -> Mesh:
     """Cut each triangle into four at its edge midpoints, `levels` times (paper, section 3.3.2).
 
@@ -82,12 +76,6 @@ def blend(values: Float64[np.ndarray, "V 3"], corners: Int32[np.ndarray, "N 3"],
 def vertex_normals(mesh: Mesh) -> Float64[np.ndarray, "V 3"]:
     """Return area-weighted unit normals of the vertices; zero where a vertex has no face with an area."""
     return _core.vertex_normals(mesh.vertices, mesh.faces)
-
-
-def vertex_areas(mesh: Mesh) -> Float64[np.ndarray, " V"]:
-    """Return a third of the area of each vertex's faces, in squared units of the vertices."""
-    thirds = np.repeat(face_normals(mesh)[1] / 3, 3)
-    return np.bincount(mesh.faces.reshape(-1), thirds, len(mesh.vertices)).astype(np.float64)  # int if empty
 
 
 def weld(mesh: Mesh) -> Mesh:

@@ -73,15 +73,22 @@ class Slide:
         They minimise squared differences of luma and from the neighbours' offsets, by Jacobi iterations whose bound on
         the normal equations is a 3 x 3 block per vertex.
         """
+        from scipy.sparse import csr_array, diags_array
+
         shared = (known & self._known).astype(np.float64)
         key_luma, frame_luma = self._luma, luma
         for _ in range(blurs):
             key_luma, frame_luma = self._blur @ key_luma, self._blur @ frame_luma
-        edge, gaps, stiff = _edge(mesh), (frame_luma - key_luma) * shared, CONTRAST**2
+        edge = float(np.sqrt(face_normals(mesh)[1].mean() * 4 / np.sqrt(3)))  # of an equilateral triangle of mean area
+        gaps, stiff = (frame_luma - key_luma) * shared, CONTRAST**2
         slopes = _tangential(_slopes(mesh, frame_luma), vertex_normals(mesh)) * shared[:, None] * edge
         blocks = self._mean((slopes[:, :, None] * slopes[:, None]).reshape(-1, 9)).reshape(-1, 3, 3)
+        rows = np.arange(len(slopes)).repeat(3)
+        along = csr_array((slopes.reshape(-1), (rows, np.arange(slopes.size))), shape=(len(slopes), slopes.size))
+        at_template = along @ self._vectors
+        normal = diags_array(1 / self._shares.repeat(3)) @ (at_template.T @ at_template)  # each row over its share
         solve = _blocks(inverses(blocks + stiff * np.eye(3)))
-        step = (solve @ (_blocks(blocks) + stiff * self._around - self._normal(slopes))).tocsr()
+        step = (solve @ (_blocks(blocks) + stiff * self._around - normal)).tocsr()
         start = solve @ self._mean(slopes * gaps[:, None]).reshape(-1)
         flow = np.zeros(positions.size)  # edges of the finer mesh
         for _ in range(ITERATIONS):
@@ -89,15 +96,6 @@ class Slide:
         flow = _tangential(flow.reshape(-1, 3), vertex_normals(Mesh(positions, self._faces)))
         length, most = np.sqrt((flow**2).sum(axis=1, keepdims=True)), MOST * 2**LEVELS
         return flow * np.minimum(1.0, most / np.maximum(length, 1e-12)) * edge
-
-    def _normal(self, slopes: Float64[np.ndarray, "N 3"]) -> Any:
-        """Return the matrix of the normal equations of the differences of luma, 3V x 3V, each row over its share."""
-        from scipy.sparse import csr_array, diags_array
-
-        rows = np.arange(len(slopes)).repeat(3)
-        along = csr_array((slopes.reshape(-1), (rows, np.arange(slopes.size))), shape=(len(slopes), slopes.size))
-        at_template = along @ self._vectors
-        return diags_array(1 / self._shares.repeat(3)) @ (at_template.T @ at_template)
 
     def _mean(self, values: Float64[np.ndarray, "N C"]) -> Float64[np.ndarray, "V C"]:
         """Return the means of values at the finer mesh's vertices around each vertex of the template."""
@@ -113,11 +111,6 @@ def _blocks(matrices: Float64[np.ndarray, "V 3 3"]) -> Any:
 
 def _tangential(vectors: Points, normals: Points) -> Points:
     return vectors - normals * (vectors * normals).sum(axis=1, keepdims=True)
-
-
-def _edge(mesh: Mesh) -> float:
-    """Return the usual length of an edge: the side of an equilateral triangle of the mean area."""
-    return float(np.sqrt(face_normals(mesh)[1].mean() * 4 / np.sqrt(3)))
 
 
 def _slopes(mesh: Mesh, values: Float64[np.ndarray, " V"]) -> Points:

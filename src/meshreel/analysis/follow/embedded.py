@@ -166,10 +166,11 @@ class Tracker:
     def _known(self, frame: int) -> int:
         """Return the registered frame, between a frame and the key, that is nearest to it and not empty."""
         low, high = sorted((frame, self.key))
-        return min((f for f in self._followed() if low <= f <= high and f != frame), key=lambda f: abs(f - frame))
+        return min((f for f in self._followed if low <= f <= high and f != frame), key=lambda f: abs(f - frame))
 
+    @property
     def _followed(self) -> list[int]:
-        """Return the registered frames with a measured pose: the key, and all that are not empty."""
+        """Registered frames with a measured pose: the key, and all that are not empty."""
         return [frame for frame, residual in self._residuals.items() if residual < np.inf]
 
     def _follow(self, frame: int, surface: FrameSurface, paint: Painter | None) -> tuple[Pose, float]:
@@ -202,12 +203,15 @@ class Tracker:
         """Return the neighbour's pose and its extrapolation, the better match of the frame first."""
         last = self._known(frame)
         side = 1 if frame > last else -1
-        before = [f for f in self._followed() if (last - f) * side > 0]
+        before = [f for f in self._followed if (last - f) * side > 0]
         if not before:
             return [self._poses[last]]
         first = max(before, key=lambda f: f * side)
-        ahead = _extrapolated(self._poses[first], self._poses[last], (frame - last) / (last - first))
-        gate, poses = self.options.coarse.gates[-1], [ahead, self._poses[last]]
+        before_last, at, ratio = self._poses[first], self._poses[last], (frame - last) / (last - first)
+        turn = quaternions(products(at.rotations, before_last.rotations.transpose(0, 2, 1)))
+        turns = rotations_of(turn * [1, ratio, ratio, ratio])  # the tangent of half the angle grows; exact for 1
+        ahead = Pose(products(turns, at.rotations), at.positions + ratio * (at.positions - before_last.positions))
+        gate, poses = self.options.coarse.gates[-1], [ahead, at]
         weights = [self._fine.core.matched(surface, pose.rotations, pose.positions, gate, AGREEMENT) for pose in poses]
         return poses if weights[0] >= weights[1] else poses[::-1]
 
@@ -271,13 +275,6 @@ class _Rest:
         edges, bound = self.edges.astype(np.int32), self.binding.indices.astype(np.int32)
         weights = self.binding.weights
         return _core.Deformation(self.nodes, edges, self.held, self.points, self.normals, bound, weights)
-
-
-def _extrapolated(first: Pose, last: Pose, ratio: float) -> Pose:
-    """Continue from pose `last` by `ratio` times the step from `first` to it."""
-    turn = quaternions(products(last.rotations, first.rotations.transpose(0, 2, 1)))
-    turns = rotations_of(turn * [1, ratio, ratio, ratio])  # the tangent of half the angle grows; exact for a ratio of 1
-    return Pose(products(turns, last.rotations), last.positions + ratio * (last.positions - first.positions))
 
 
 class ColoredPlaces:

@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float64, Int64
+from jaxtyping import Float64, Int64
 from scipy import sparse
 from scipy.sparse import csgraph
 from scipy.spatial import cKDTree
@@ -96,7 +96,14 @@ def build_graph(mesh: Mesh, nodes: Int64[np.ndarray, " N"]) -> DeformationGraph:
     count = len(nodes)
     touching = np.unique((np.concatenate([i, j]) * count + np.concatenate([j, i]))[np.concatenate([i != j, i != j])])
     pairs = np.stack([touching // count, touching % count], axis=1)
-    return DeformationGraph(mesh.vertices[nodes], pairs, cells, _hoods(pairs, count))
+    adjacent = sparse.csr_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
+    adjacent = sparse.csr_array(adjacent + sparse.eye_array(count))
+    two = sparse.csr_array(adjacent @ adjacent)  # nodes at most two edges away
+    two.sort_indices()
+    sizes = np.diff(two.indptr)
+    hood = np.full((count, int(sizes.max())), -1, np.int64)
+    hood[np.arange(hood.shape[1]) < sizes[:, None]] = two.indices  # row by row
+    return DeformationGraph(mesh.vertices[nodes], pairs, cells, hood)
 
 
 def _cells(mesh: Mesh, edges: Int64[np.ndarray, "E 2"], nodes: Int64[np.ndarray, " N"]) -> Int64[np.ndarray, " V"]:
@@ -112,17 +119,6 @@ def _cells(mesh: Mesh, edges: Int64[np.ndarray, "E 2"], nodes: Int64[np.ndarray,
     if lost.any():
         cells[lost] = cKDTree(mesh.vertices[nodes]).query(mesh.vertices[lost])[1]
     return cells
-
-
-def _hoods(pairs: Int64[np.ndarray, "E 2"], count: int) -> Int64[np.ndarray, "N h"]:
-    adjacent = sparse.csr_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
-    adjacent = sparse.csr_array(adjacent + sparse.eye_array(count))
-    two = sparse.csr_array(adjacent @ adjacent)
-    two.sort_indices()
-    sizes = np.diff(two.indptr)
-    hood = np.full((count, int(sizes.max())), -1, np.int64)
-    hood[np.arange(hood.shape[1]) < sizes[:, None]] = two.indices  # row by row
-    return hood
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,7 +168,11 @@ class Motion:
         points, cells = self.mesh.vertices[near], self.graph.cells[near]
         for _ in range(BACK_ROUNDS):
             binding = self.graph.bind(points, cells)
-            points, invertible = unmoved(mesh.vertices, self.graph.nodes, binding, pose)
+            blended = _affine(self.graph.nodes, binding, pose)
+            linear, offsets = blended[:, :, :3].copy(), mesh.vertices - blended[:, :, 3]
+            invertible = np.abs(determinants(linear)) > FLATTEST
+            linear[~invertible] = np.eye(3)
+            points = products(inverses(linear), offsets[:, :, None])[:, :, 0]
         return clean(Mesh(points, mesh.faces[invertible[mesh.faces].all(axis=1)]))
 
 
@@ -180,15 +180,6 @@ def moved(points: Points, nodes: Nodes, binding: Binding, pose: Pose) -> Points:
     """Move bound points from the rest of the nodes to a pose."""
     blended = _affine(nodes, binding, pose)
     return np.einsum("pij,pj->pi", blended[:, :, :3], points) + blended[:, :, 3]
-
-
-def unmoved(points: Points, nodes: Nodes, binding: Binding, pose: Pose) -> tuple[Points, Bool[np.ndarray, " P"]]:
-    """Move bound points from a pose back to rest; also return False for points whose motion has no inverse."""
-    blended = _affine(nodes, binding, pose)
-    linear, offsets = blended[:, :, :3].copy(), points - blended[:, :, 3]
-    invertible = np.abs(determinants(linear)) > FLATTEST
-    linear[~invertible] = np.eye(3)
-    return products(inverses(linear), offsets[:, :, None])[:, :, 0], invertible
 
 
 def _affine(nodes: Nodes, binding: Binding, pose: Pose) -> Float64[np.ndarray, "P 3 4"]:

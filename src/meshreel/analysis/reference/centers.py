@@ -89,27 +89,19 @@ def _classical(distances: Pairs) -> Pose:
     gram = -0.5 * np.square(distances.astype(np.float64))
     gram -= gram.mean(axis=0, keepdims=True)
     gram -= gram.mean(axis=1, keepdims=True)
-    start = np.random.default_rng(SEED).standard_normal(len(gram))
-    values, vectors = _strongest(gram, start, min(LANCZOS, len(gram)))
-    return vectors * np.sqrt(np.maximum(values, 0))
-
-
-def _strongest(
-    matrix: Float64[np.ndarray, "K K"], start: Float64[np.ndarray, " K"], steps: int
-) -> tuple[Float64[np.ndarray, " 3"], Pose]:
-    """Return the three largest eigenvalues of a symmetric matrix and their vectors, by Lanczos steps."""
-    basis, inside = np.zeros((steps, len(start))), np.zeros((steps, steps))
-    vector = start
+    steps = min(LANCZOS, len(gram))  # towards the three largest eigenvalues
+    basis, inside = np.zeros((steps, len(gram))), np.zeros((steps, steps))
+    vector = np.random.default_rng(SEED).standard_normal(len(gram))
     for step in range(steps):
         basis[step] = vector / max(norm(vector), np.finfo(float).tiny)
-        image = products(matrix, basis[step][:, None])[:, 0]
+        image = products(gram, basis[step][:, None])[:, 0]
         inside[step, : step + 1] = inside[: step + 1, step] = products(basis[: step + 1], image[:, None])[:, 0]
         vector = image
         for _ in range(2):  # twice, because of rounding
             projections = products(basis[: step + 1], vector[:, None])
             vector = vector - products(basis[: step + 1].T, projections)[:, 0]
     values, vectors = eigen(inside)
-    return values[-3:], products(basis.T, vectors[:, -3:])
+    return products(basis.T, vectors[:, -3:]) * np.sqrt(np.maximum(values[-3:], 0))
 
 
 def _smacof(distances: Pairs, start: Pose) -> Pose:
@@ -204,8 +196,8 @@ def neighbours(affinity: Float32[np.ndarray, "K K"]) -> Neighbours:
 
 def center_motions(source: Pose, target: Pose, neighbours: Neighbours) -> Float64[np.ndarray, "K 8"]:
     """Fit each center's rigid motion between two poses to its neighbourhood, weighted by affinity (weighted Kabsch)."""
-    rotations, translations = fit_rigid(source[neighbours.indices], target[neighbours.indices], neighbours.affinities)
-    return from_rigid(rotations, translations)
+    near = neighbours.indices
+    return from_rigid(*fit_rigid(source[near], target[near], neighbours.affinities))
 
 
 def bind(mesh: Mesh, source: Pose, neighbours: Neighbours) -> Binding:
@@ -213,8 +205,11 @@ def bind(mesh: Mesh, source: Pose, neighbours: Neighbours) -> Binding:
     choices = min(GUARD_CHOICES, len(source))
     reach, near = cKDTree(source).query(mesh.vertices, k=choices)
     reach, near = reach.reshape(-1, choices), near.reshape(-1, choices).astype(np.int64)
-    if choices > 1 and not mesh.is_empty:
-        near = _behind_first(mesh, near, reach, source)
+    if choices > 1 and not mesh.is_empty:  # centers in front of the surface, outside a body, are farther
+        offset = source[near] - mesh.vertices[:, None]
+        front = np.maximum(np.einsum("vnd,vd->vn", offset, vertex_normals(mesh)), 0)
+        order = np.argsort(np.square(reach) + np.square(FRONT * front), axis=1, kind="stable")
+        near = np.take_along_axis(near, order, axis=1)
     nearest = near[:, 0]  # eq. 7
     if choices > 1 and not mesh.is_empty:
         for _ in range(GUARD_ROUNDS):
@@ -234,14 +229,6 @@ def moved_to(
     binding = bind(mesh, pose, neighbours)
     motions = (center_motions(pose, target, neighbours) for target in targets)
     return np.stack([move(mesh.vertices, binding, each, neighbours) for each in motions])
-
-
-def _behind_first(mesh: Mesh, near: Choices, reach: Weights, source: Pose) -> Choices:
-    """Sort each vertex's nearest centers by distance; those in front of the surface, outside a body, are farther."""
-    offset = source[near] - mesh.vertices[:, None]
-    front = np.maximum(np.einsum("vnd,vd->vn", offset, vertex_normals(mesh)), 0)
-    order = np.argsort(np.square(reach) + np.square(FRONT * front), axis=1, kind="stable")
-    return np.take_along_axis(near, order, axis=1)
 
 
 def _guard(
@@ -265,13 +252,10 @@ def _weights(points: Points, nearest: Int64[np.ndarray, " V"], source: Pose, nei
     rows = neighbours.indices[nearest]
     square = np.sum(np.square(points[:, None] - source[rows]), axis=2)
     square -= square.min(axis=1, keepdims=True)  # keeps weights from vanishing far from all centers
-    width = FALLOFF * _spacing(source, neighbours)
+    spacing = 1.0
+    if neighbours.indices.shape[1] > 1:
+        away = np.linalg.norm(source[neighbours.indices[:, 1:]] - source[:, None], axis=2)
+        spacing = float(np.median(away.min(axis=1)))
+    width = FALLOFF * spacing
     weights = neighbours.affinities[nearest] * exp(-square / max(width**2, np.finfo(float).tiny))
     return weights / weights.sum(axis=1, keepdims=True)
-
-
-def _spacing(source: Pose, neighbours: Neighbours) -> float:
-    if neighbours.indices.shape[1] < 2:
-        return 1.0
-    away = np.linalg.norm(source[neighbours.indices[:, 1:]] - source[:, None], axis=2)
-    return float(np.median(away.min(axis=1)))

@@ -23,10 +23,11 @@ from ...geometry.topology import (
     clean,
     drop_small,
     drop_unreferenced,
+    edge_lengths,
+    face_normals,
     large_pieces,
     subdivide_midpoint,
     unique_edges,
-    vertex_areas,
     vertex_normals,
 )
 from ...types import Centers, Mesh
@@ -153,7 +154,11 @@ def _trial(group: Group, frame: int, key: int, options: ReferenceOptions) -> Tri
     for frame_surface, moved in zip(frames, fitted, strict=True):
         original = frame_surface.mesh.vertices
         to_fit = Surface(Mesh(moved, mesh.faces)).distances(original[:: max(1, len(original) // PROBES)])
-        to_frame = _outside(frame_surface.surface, moved, group.edge)
+        hits = frame_surface.surface.closest(moved)
+        offset = moved - hits.points
+        gaps = np.linalg.norm(offset, axis=1)
+        inside = np.einsum("nd,nd->n", offset, frame_surface.surface.normals[hits.faces]) < 0
+        to_frame = np.where(inside, np.minimum(gaps, group.edge), gaps)  # where bodies touch, a frame lacks surface
         rms.append(max(np.sqrt(np.mean(to_fit**2)), np.sqrt(np.mean(to_frame**2))))
     return Trial(frame, key, float(np.mean(rms)) + float(np.max(rms)))
 
@@ -161,15 +166,6 @@ def _trial(group: Group, frame: int, key: int, options: ReferenceOptions) -> Tri
 def _misfit(trial: Trial) -> float:
     """Return a trial's misfit; that of the MDS pose is raised, since it needs more components."""
     return trial.misfit / (CANONICAL_GAIN if trial.frame == MDS else 1.0)
-
-
-def _outside(surface: Surface, points: Float64[np.ndarray, "N 3"], most: float) -> Float64[np.ndarray, " N"]:
-    """Return distances to a surface, at most `most` for points inside: where bodies touch, it lacks surface."""
-    hits = surface.closest(points)
-    offset = points - hits.points
-    gaps = np.linalg.norm(offset, axis=1)
-    inside = np.einsum("nd,nd->n", offset, surface.normals[hits.faces]) < 0
-    return np.where(inside, np.minimum(gaps, most), gaps)
 
 
 class Group:
@@ -192,8 +188,7 @@ class Group:
         self.canonical = reference_centers(distances, positions[len(frames) // 2]).positions
         self.surfaces = [FrameSurface(frame) for frame in frames]
         self.edges = [unique_edges(frame.faces) for frame in frames]
-        lengths = [_lengths(each.vertices, edges).mean() for each, (edges, _) in zip(frames, self.edges, strict=True)]
-        self.edge = float(np.mean(lengths))
+        self.edge = float(np.mean([edge_lengths(frame).mean() for frame in frames]))
         self.bindings = [bind(frame, pose, kin) for frame, pose in zip(frames, positions, strict=True)]
         self.parting = [self._parting(*each) for each in zip(self.edges, self.bindings, positions, strict=True)]
 
@@ -214,8 +209,12 @@ class Group:
         for t in sorted(range(len(self.frames)), key=lambda t: (abs(t - key), t)):
             moved, faces = self._moved(t, pose)
             nearest = self.bindings[t].nearest
-            area = np.bincount(nearest, vertex_areas(Mesh(self.frames[t].vertices, faces)), len(pose))
-            lacking = self._around(covered) < COVER * self._around(area)
+            thirds = np.repeat(face_normals(Mesh(self.frames[t].vertices, faces))[1] / 3, 3)
+            vertex_areas = np.bincount(faces.reshape(-1), thirds, len(nearest)).astype(np.float64)  # int if empty
+            area = np.bincount(nearest, vertex_areas, len(pose))
+            # Over neighbourhoods of centers, for surface passes between neighbours from frame to frame.
+            around = [np.sum(each[self.kin.indices] * self.kin.affinities, axis=1) for each in (covered, area)]
+            lacking = around[0] < COVER * around[1]
             covered += np.where(lacking, area, 0)
             pieces.append(drop_unreferenced(Mesh(moved, faces[lacking[nearest][faces].any(axis=1)])))
         return pieces
@@ -225,7 +224,18 @@ class Group:
 
         `voxel` is in mean edges of the frames' meshes.
         """
-        mesh = decimate(drop_small(self._joined(self.pieces(pose, key), voxel), SMALLEST), vertices)
+        pieces = self.pieces(pose, key)
+        if self.poisson is not None:
+            pieces = [subdivide_midpoint(piece) for piece in pieces]
+            points = np.concatenate([piece.vertices for piece in pieces])
+            normals = np.concatenate([vertex_normals(piece) for piece in pieces])
+            joined = poisson_surface(points, normals, self.poisson, self.edge)
+        else:
+            mean = MeanSurface(voxel * self.edge, MeanOptions(reach=REACH, past=PAST))
+            for piece in pieces:
+                mean.add(piece)
+            joined = mean.surface(1)
+        mesh = decimate(drop_small(joined, SMALLEST), vertices)
         if mesh.is_empty:
             return mesh
         edges = unique_edges(mesh.faces)
@@ -234,17 +244,6 @@ class Group:
             bad |= self._torn(mesh.vertices, moved, edges)
         intact = drop_small(clean(Mesh.of(mesh.vertices, mesh.faces[~bad])), SMALLEST)
         return close_holes(intact, HOLE * mesh.diagonal)
-
-    def _joined(self, pieces: Sequence[Mesh], voxel: float) -> Mesh:
-        if self.poisson is not None:
-            pieces = [subdivide_midpoint(piece) for piece in pieces]
-            points = np.concatenate([piece.vertices for piece in pieces])
-            normals = np.concatenate([vertex_normals(piece) for piece in pieces])
-            return poisson_surface(points, normals, self.poisson, self.edge)
-        mean = MeanSurface(voxel * self.edge, MeanOptions(reach=REACH, past=PAST))
-        for piece in pieces:
-            mean.add(piece)
-        return mean.surface(1)
 
     def _moved(self, t: int, pose: Pose) -> tuple[Points, Int32[np.ndarray, "F 3"]]:
         """Return a frame's vertices in a pose, and those of its faces that do not tear on the way."""
@@ -267,10 +266,6 @@ class Group:
         before, after = _lengths(source, edges[0]), _lengths(target, edges[0])
         far = np.maximum(before, after) > TORN * np.minimum(before, after) + self.spacing / 2
         return far[edges[1]].any(axis=1)
-
-    def _around(self, amounts: Float64[np.ndarray, " K"]) -> Float64[np.ndarray, " K"]:
-        """Sum amounts over each center's neighbourhood: surface passes between neighbours from frame to frame."""
-        return np.sum(amounts[self.kin.indices] * self.kin.affinities, axis=1)
 
 
 def _lengths(vertices: Points, edges: np.ndarray) -> Float64[np.ndarray, " E"]:

@@ -132,7 +132,8 @@ class _Affinities:
         i, j = np.concatenate(rows), np.concatenate(columns)
         self._i, self._j = i[i != j], j[i != j].astype(np.int32)
         self._offsets = _offsets(self._i, len(centers))
-        self._distance = _squared(centers[self._i] - centers[self._j])  # largest so far, squared
+        offsets = centers[self._i] - centers[self._j]
+        self._distance = np.einsum("ij,ij->i", offsets, offsets)  # largest so far, squared
         self._difference = np.zeros(len(self._i))  # of motion, largest so far, squared
 
     def learn(self, before: Pose, now: Pose, rotations: Matrices, points: Points, owners: Owners) -> None:
@@ -146,7 +147,8 @@ class _Affinities:
             self._offsets, self._j, rotations.reshape(-1, 9), shifts, means, covariances.reshape(-1, 9), difference
         )
         self._difference = np.maximum(self._difference, difference)
-        self._distance = np.maximum(self._distance, _squared(now[self._i] - now[self._j]))
+        offsets = now[self._i] - now[self._j]
+        self._distance = np.maximum(self._distance, np.einsum("ij,ij->i", offsets, offsets))
 
     def lists(self) -> tuple[Int32[np.ndarray, " K1"], Int32[np.ndarray, " P"], Float64[np.ndarray, " P"]]:
         """Return neighbour lists (offsets, indices, affinities) with the strongest neighbours of each center."""
@@ -161,10 +163,6 @@ class _Affinities:
 
 def _offsets(rows: Int64[np.ndarray, " P"], count: int) -> Int32[np.ndarray, " K1"]:
     return np.concatenate([[0], np.cumsum(np.bincount(rows, minlength=count))]).astype(np.int32)
-
-
-def _squared(differences: Points) -> Float64[np.ndarray, " N"]:
-    return np.einsum("ij,ij->i", differences, differences)
 
 
 def _moments(points: Points, owners: Owners, centers: Pose) -> tuple[Pose, Matrices]:

@@ -74,7 +74,12 @@ def fuse_still_depth(moments: Iterable[Moment], voxel: float) -> Mesh:
     fine = [picture.finer(FINER) for picture in usual]
     past = [_continued(picture).finer(FINER) for picture in usual]
     mesh = extract(integrate(fine, FINER_VOXEL * voxel, GRAZING if len(usual) > 1 else ALONE, past), SEEN)
-    whole = without_fragments(_facing(mesh, usual, FACING), FRAGMENT)
+    normals, middles = face_normals(mesh)[0], mesh.vertices[mesh.faces].mean(axis=1)
+    best = np.full(len(middles), -1.0)  # cosine between a face's normal and the ray of the camera that it faces most
+    for picture in usual:
+        rays = picture.camera.eye - middles
+        best = np.maximum(best, (rays * normals).sum(axis=1) / np.maximum(np.linalg.norm(rays, axis=1), 1e-12))
+    whole = without_fragments(part_of(mesh, best >= FACING), FRAGMENT)
     return close_holes(whole, HOLE, FreeSpace.of(usual).at)
 
 
@@ -90,7 +95,14 @@ def usual_pictures(moments: Iterable[Moment]) -> list[DepthPicture]:
                 stacks.setdefault(number, []).append(_still(picture, rays, moment))
     usual = list[DepthPicture]()
     for number, stack in sorted(stacks.items()):
-        depth = _medians(np.stack(stack))
+        # A door that soon opens is measured a few times only, and the surface behind it perhaps never.
+        depths = np.stack(stack)
+        ordered = np.sort(np.where(depths > 0, depths, np.inf), axis=0)
+        count = np.isfinite(ordered).sum(axis=0)
+        least = np.maximum(least_frames(len(stack)), OPEN * (depths >= 0).sum(axis=0))
+        places = (np.maximum(at, 0)[None] for at in ((count - 1) // 2, count // 2))
+        low, high = (np.take_along_axis(ordered, at, 0)[0] for at in places)
+        depth = np.where(count >= least, (low + high) / 2, 0).astype(np.float32)
         if depth.any():
             usual.append(DepthPicture(cameras[number].camera, depth, cameras[number].unit, cameras[number].far))
     return usual
@@ -102,18 +114,6 @@ def _still(picture: DepthPicture, rays: Rays, moment: Moment) -> np.ndarray:
     faces = rays.faces_in(picture.camera, moves)  # of the whole mesh: still faces may hide moving ones
     moves[moves] = (faces >= 0) & ~np.append(moment.still, True)[faces]
     return np.where(binary_dilation(moves, iterations=RIM), HIDDEN, picture.depth.astype(np.float32))
-
-
-def _medians(stack: Float32[np.ndarray, "T H W"]) -> Float32[np.ndarray, "H W"]:
-    """Return for each pixel the median of its depths above 0; 0 where there are too few.
-
-    A door that soon opens is measured a few times only, and the surface behind it perhaps never.
-    """
-    depths = np.sort(np.where(stack > 0, stack, np.inf), axis=0)
-    count = np.isfinite(depths).sum(axis=0)
-    least = np.maximum(least_frames(len(stack)), OPEN * (stack >= 0).sum(axis=0))
-    low, high = (np.take_along_axis(depths, np.maximum(at, 0)[None], 0)[0] for at in ((count - 1) // 2, count // 2))
-    return np.where(count >= least, (low + high) / 2, 0).astype(np.float32)
 
 
 def _smooth(picture: DepthPicture) -> DepthPicture:
@@ -158,15 +158,3 @@ def _noise(inverse: Float32[np.ndarray, "H W"]) -> float:
     measured = (inverse[:, :-2] > 0) & (inverse[:, 1:-1] > 0) & (inverse[:, 2:] > 0)
     shares = differences[measured] / inverse[:, 1:-1][measured]
     return float(np.median(shares)) / SECOND_MEDIAN if len(shares) else 0.0
-
-
-def _facing(mesh: Mesh, pictures: list[DepthPicture], least: float) -> Mesh:
-    """Drop the faces that no camera sees frontally, with at least this cosine between its ray and the normal."""
-    if mesh.is_empty:
-        return mesh
-    normals, middles = face_normals(mesh)[0], mesh.vertices[mesh.faces].mean(axis=1)
-    best = np.full(len(middles), -1.0)
-    for picture in pictures:
-        rays = picture.camera.eye - middles
-        best = np.maximum(best, (rays * normals).sum(axis=1) / np.maximum(np.linalg.norm(rays, axis=1), 1e-12))
-    return part_of(mesh, best >= least)

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float64, Int64
+from jaxtyping import Bool, Int64
 from scipy.spatial import cKDTree
 
 from ...geometry.closest_points import Surface
@@ -20,7 +20,6 @@ from ...geometry.topology import (
     connected_faces,
     face_normals,
     linked,
-    longest_edges,
     part_of,
     with_neighbours,
 )
@@ -64,7 +63,9 @@ def ring(mesh: Mesh, moves: Bool[np.ndarray, " F"], cell: float) -> Bool[np.ndar
     but other frames have only the floor there. Without these faces bodies would hover by a cell.
     """
     added = with_neighbours(mesh.faces, moves) & ~moves
-    added[added] = longest_edges(mesh.vertices, mesh.faces[added]) <= RING * cell
+    corners = mesh.vertices[mesh.faces[added]]
+    longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
+    added[added] = longest <= RING * cell
     return added
 
 
@@ -112,7 +113,13 @@ def find_bodies(moving: Sequence[Mesh], size: float, near: float = NEAR) -> Bodi
     Pieces of consecutive frames that are nearer than `near` cells are one.
     """
     lattice = _lattice(moving, near * size)
-    pieces = [piece for frame, mesh in enumerate(moving) for piece in _pieces(frame, mesh, lattice)]
+    pieces = list[_Piece]()
+    for frame, mesh in enumerate(moving):
+        labels = connected_faces(mesh.faces, len(mesh.vertices))
+        areas = np.bincount(labels, face_normals(mesh)[1])
+        for number in np.flatnonzero(np.bincount(labels)):
+            part = part_of(mesh, labels == number)
+            pieces.append(_Piece(frame, part, float(areas[number]), _cells(part, lattice)))
     label = _linked(pieces)
     clusters = [np.flatnonzero(label == number) for number in range(label.max(initial=-1) + 1)]
     large = [c for c in clusters if max(pieces[k].area for k in c) >= LEAST]
@@ -159,18 +166,6 @@ def _lattice(meshes: Sequence[Mesh], size: float) -> Lattice:
     return Lattice.near(next((mesh for mesh in meshes if not mesh.is_empty), Mesh.empty()), size)
 
 
-def _pieces(frame: int, mesh: Mesh, lattice: Lattice) -> list[_Piece]:
-    if mesh.is_empty:
-        return []
-    label = connected_faces(mesh.faces, len(mesh.vertices))
-    areas = np.bincount(label, face_normals(mesh)[1])
-    pieces = []
-    for number in np.flatnonzero(np.bincount(label)):
-        part = part_of(mesh, label == number)
-        pieces.append(_Piece(frame, part, float(areas[number]), _cells(part, lattice)))
-    return pieces
-
-
 def _cells(mesh: Mesh, lattice: Lattice) -> Int64[np.ndarray, " C"]:
     return distinct(lattice.keys(spread(mesh, lattice.size)[0]))
 
@@ -205,16 +200,14 @@ def _given(bodies: list[list[list[Mesh]]], bits: list[_Piece], frames: int, size
         return 0
     dropped = 0
     for bit in bits:
-        near = [(_gap(bit.mesh, body[bit.frame]), number) for number, body in enumerate(bodies) if body[bit.frame]]
+        near = list[tuple[float, int]]()  # smallest distances between vertices of the bit and of each body
+        for number, body in enumerate(bodies):
+            if body[bit.frame]:
+                points = np.concatenate([part.vertices for part in body[bit.frame]])
+                near.append((float(cKDTree(points).query(bit.mesh.vertices)[0].min()), number))
         gap, number = min(near, default=(np.inf, -1))
         if gap <= (BESIDE if present > 1 else TOUCHES * size):
             bodies[number][bit.frame].append(bit.mesh)
         else:
             dropped += len(bit.mesh.faces)
     return dropped
-
-
-def _gap(mesh: Mesh, body: list[Mesh]) -> float:
-    """Return the smallest distance between a vertex of `mesh` and one of `body`, m."""
-    points: Float64[np.ndarray, "N 3"] = np.concatenate([part.vertices for part in body])
-    return float(cKDTree(points).query(mesh.vertices)[0].min())

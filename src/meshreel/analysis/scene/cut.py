@@ -20,7 +20,7 @@ from scipy.spatial import cKDTree
 
 from ...geometry.strict import exp
 from ...geometry.topology import linked
-from .places import Mask, Places, Stay
+from .places import Mask, Places
 
 Ends = Int64[np.ndarray, " L"]  # of links, as indices into the chosen places
 Costs = Float64[np.ndarray, " C"]  # of the chosen places
@@ -231,7 +231,8 @@ def find_rest(
         (tally.after, frames, rest.since, NEVER),
         (tally.before, frames[::-1], rest.until, 0),
     ):
-        at = _settled(stay, len(order), _MOSTLY_THERE)
+        full = (stay.count >= _MOSTLY_THERE * (len(order) - stay.first)) & (stay.count >= _FEWEST_FRAMES)
+        at = np.where((stay.first >= 0) & full, stay.first, -1).astype(np.int64)  # first frame of each place's rest
         lasts = abs(order[-1] - order[at]) >= min(_REST, _SHORT_REST) * frame_rate
         for group in _together(places, moving & (at >= 0) & lasts, at, least):
             # Rest begins with the last place to come to rest: a slowing object reaches its last place before it stands.
@@ -240,7 +241,12 @@ def find_rest(
             if long or holds([group], order[last:].tolist(), _STANDS)[0]:
                 out[group] = order[last] if never else order[last] + 1
         _join(places, moving & (stay.first >= 0) & (stay.count >= _FEWEST_FRAMES), order, out, never, holds)
-    return _with_unknown(places, moving, rest)
+    free = places.tally.free > 0
+    seen_free, never_free = np.flatnonzero(moving & free), np.flatnonzero(moving & ~free)
+    if rest.changes and len(never_free):  # as under a chair's legs
+        nearest = seen_free[cKDTree(places.middles[seen_free]).query(places.middles[never_free])[1]]
+        rest.until[never_free], rest.since[never_free] = rest.until[nearest], rest.since[nearest]
+    return rest
 
 
 def _join(
@@ -265,24 +271,6 @@ def _join(
             after = order[order >= time] if never else order[order < time]
             for group, stands in zip(groups, holds(groups, after.tolist(), _STILL_BESIDE), strict=True):
                 out[group] = time if stands else never
-
-
-def _with_unknown(places: Places, moving: Mask, rest: Rest) -> Rest:
-    """Give moving places never seen free, as under a chair's legs, the rest of the nearest place that is seen free."""
-    free = places.tally.free > 0
-    seen_free, never_free = np.flatnonzero(moving & free), np.flatnonzero(moving & ~free)
-    if not rest.changes or not len(never_free):
-        return rest
-    nearest = seen_free[cKDTree(places.middles[seen_free]).query(places.middles[never_free])[1]]
-    until, since = rest.until.copy(), rest.since.copy()
-    until[never_free], since[never_free] = until[nearest], since[nearest]
-    return Rest(until, since)
-
-
-def _settled(stay: Stay, frames: int, least: float) -> Times:
-    """Return the index of the first inspected frame of each place's rest; -1 if too few have surface there."""
-    full = (stay.count >= least * (frames - stay.first)) & (stay.count >= _FEWEST_FRAMES)
-    return np.where((stay.first >= 0) & full, stay.first, -1).astype(np.int64)
 
 
 def _together(places: Places, chosen: Mask, at: Times, least: int) -> list[Int64[np.ndarray, " C"]]:

@@ -17,7 +17,7 @@ from jaxtyping import Bool, Int64
 from ...errors import InputError
 from ...geometry.cameras import Camera
 from ...geometry.closest_points import Surface, distances
-from ...geometry.derived_sequences import CapturedSequence, captured, picked, turned_over
+from ...geometry.derived_sequences import CapturedSequence, DerivedSequence, captured, picked, turned_over
 from ...geometry.topology import edge_lengths, face_normals
 from ...geometry.voxels import Lattice
 from ...types import Mesh, MeshSequence, evenly
@@ -50,8 +50,13 @@ def segment(frames: MeshSequence, cameras: Cameras = (), report: Report = lambda
         nothing = np.zeros(0, np.int64), np.zeros(0, bool), Rest.none(0)
         return ByPlace(1.0, Lattice(np.zeros(3), 1.0), *nothing, _ISLAND)
     places = _by_place(frames, chosen, cameras, report)
-    if not places.chosen.any() and _faces_away(frames[chosen[0]]):
-        reversed_places = _by_place(turned_over(frames), chosen, cameras, lambda _share: None)
+    if places.chosen.any():
+        return places
+    first = frames[chosen[0]]
+    normals, areas = face_normals(first)
+    away = first.vertices[first.faces].mean(axis=1) - first.middle
+    if (areas * (normals * away).sum(axis=1)).sum() > 0:  # a room's faces look inwards
+        reversed_places = _by_place(DerivedSequence(frames, turned_over), chosen, cameras, lambda _share: None)
         places = reversed_places if reversed_places.chosen.any() else places
     return places
 
@@ -79,14 +84,6 @@ def _by_place(frames: CapturedSequence, chosen: Sequence[int], cameras: Cameras,
     usual = [chosen[number] for number in evenly(len(chosen), MOMENTS)]
     colors = None if looks is None else ColorChange.of(frames, looks, usual, cell)
     return ByPlace(cell, lattice, places.keys, moving, rest, _ISLAND, colors)
-
-
-def _faces_away(mesh: Mesh) -> bool:
-    """Return whether most of the surface faces away from the middle of the mesh; a room's faces look inwards."""
-    normals, areas = face_normals(mesh)
-    middles = mesh.vertices[mesh.faces].mean(axis=1)
-    away = middles - mesh.middle
-    return bool((areas * (normals * away).sum(axis=1)).sum() > 0)
 
 
 def segment_by(masker: Masker, frames: MeshSequence, cameras: Cameras = ()) -> ByMasks:

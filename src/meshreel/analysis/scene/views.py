@@ -48,10 +48,17 @@ def place_views(
         raise InputError(f"none of the {len(chosen)} inspected frames has a surface; give a frame with faces")
     low = np.min([s.mesh.vertices[s.mesh.faces].min(axis=(0, 1)) for s in samples], axis=0)
     high = np.max([s.mesh.vertices[s.mesh.faces].max(axis=(0, 1)) for s in samples], axis=0)
-    places = _outside(_grid(low, high), samples)
+    step = float((high - low).max()) / _PLACES or 1.0
+    parts = [max(1, round(side / step)) for side in (high - low).tolist()]
+    cells = np.stack(np.meshgrid(*(np.arange(n) for n in parts), indexing="ij"), axis=-1).reshape(-1, 3)
+    places = _outside(list(low + (high - low) * (cells + 0.5) / parts), samples)
     focal = width / 2 / _ACROSS
     lens = Camera(width, height, (focal, focal), (width / 2, height / 2))
-    candidates = [_looking(eye, turn, lens) for eye, _ in places for turn in _turns(up)]
+    candidates = list[Camera]()
+    for eye, turn in itertools.product((eye for eye, _ in places), _turns(up)):
+        extrinsic = np.eye(4)
+        extrinsic[:3, :3], extrinsic[:3, 3] = turn, -products(turn, eye[:, None])[:, 0]
+        candidates.append(replace(lens, pose=CameraPose.of_world(extrinsic)))
     pixels = np.empty((len(candidates), sum(len(part.points) for part in samples)), np.float32)  # some 100 MB
     for number, (eye, sees) in enumerate(places):
         pixels[len(_WAYS) * number : len(_WAYS) * (number + 1)] = _pixels(eye, sees, samples, _turns(up), lens)
@@ -87,14 +94,6 @@ class _Samples:
         hit = self.rays.cast(np.broadcast_to(eye, ahead.shape), ahead)
         free = (hit.faces == self.faces) | (hit.distances > 1 - _TOUCHES)
         return free, free & ((self.normals * ahead).sum(axis=1) > 0)
-
-
-def _grid(low: np.ndarray, high: np.ndarray) -> list[Place]:
-    """Return the middles of equal cells of the box as candidate places."""
-    step = float((high - low).max()) / _PLACES or 1.0
-    parts = [max(1, round(side / step)) for side in (high - low).tolist()]
-    cells = np.stack(np.meshgrid(*(np.arange(n) for n in parts), indexing="ij"), axis=-1).reshape(-1, 3)
-    return list(low + (high - low) * (cells + 0.5) / parts)
 
 
 def _outside(eyes: list[Place], samples: list[_Samples]) -> list[tuple[Place, list[np.ndarray]]]:
@@ -136,13 +135,6 @@ def _greedy(candidates: list[Camera], pixels: Float32[np.ndarray, "C N"], count:
         unseen *= 1 - _SURE * pixels[best]
         pixels[best] = 0  # no view twice
     return tuple(chosen)
-
-
-def _looking(eye: Place, turn: Float64[np.ndarray, "3 3"], lens: Camera) -> Camera:
-    """Return a camera with this lens at `eye`, with the rotation `turn` from world to camera."""
-    extrinsic = np.eye(4)
-    extrinsic[:3, :3], extrinsic[:3, 3] = turn, -products(turn, eye[:, None])[:, 0]
-    return replace(lens, pose=CameraPose.of_world(extrinsic))
 
 
 @cache

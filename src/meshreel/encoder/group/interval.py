@@ -88,7 +88,8 @@ class NormalisedFrames(Frames):
     def only(self) -> NormalisedFrames:
         """Return the same frames, with nothing else of their sequence."""
         found = copy.copy(self)
-        found.sequence, found._seen = self.sequence.only(self._numbers), self._seen.without_frames()
+        found.sequence = self.sequence.only(self._numbers)
+        found._seen = replace(self._seen, diagonals=(), flattened=(), pieces=())  # normalising needs none of these
         return found
 
 
