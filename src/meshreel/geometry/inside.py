@@ -51,7 +51,14 @@ def interior_samples(mesh: Mesh, count: int, generator: np.random.Generator) -> 
     if parts.max() == 0 and len(points) >= SHEET * face_normals(solid)[1].sum() / spacing**2:
         return Samples(points, np.zeros(len(points), np.int64))
     labels = parts[Surface(solid).closest(points).faces] if len(points) else np.zeros(0, np.int64)
-    return _without_specks(*_with_sheets(solid, parts, points, labels, spacing))
+    points, labels = _with_sheets(solid, parts, points, labels, spacing)
+    sizes = np.bincount(labels)
+    order = np.argsort(-sizes, kind="stable")
+    large = order[: max(1, int((sizes > SPECK * len(points)).sum()))]
+    rank = np.full(len(sizes), -1)  # of specks
+    rank[large] = np.arange(len(large))
+    bodies = rank[labels]
+    return Samples(points[bodies >= 0], bodies[bodies >= 0])
 
 
 def winding_inside(mesh: Mesh, queries: Points) -> Bool[np.ndarray, " N"]:
@@ -147,30 +154,12 @@ def _with_sheets(
     count = int(weights.sum() / spacing**2)
     if count == 0 and len(points):
         return points, labels
-    more, faces = _on_surface(mesh, weights, max(count, 1))
-    return np.concatenate([points, more]), np.concatenate([labels, parts[faces]])
-
-
-def _on_surface(mesh: Mesh, weights: Float64[np.ndarray, " F"], count: int) -> tuple[Points, Labels]:
-    """Return points at equal steps of the summed face weights, and the face of each.
-
-    Inside a face, points follow a low-discrepancy pattern (R2, M. Roberts 2018).
-    """
-    total = np.cumsum(weights)
+    count, total = max(count, 1), np.cumsum(weights)
     faces = np.searchsorted(total, (np.arange(count) + 0.5) * total[-1] / count)
+    # Inside a face, points follow a low-discrepancy pattern (R2, M. Roberts 2018).
     u, v = np.mod(np.arange(1, count + 1)[:, None] * np.array([0.7548776662466927, 0.5698402909980532]), 1).T
     flip = u + v > 1
     u, v = np.where(flip, 1 - u, u), np.where(flip, 1 - v, v)
     a, b, c = np.moveaxis(mesh.vertices[mesh.faces[faces]], 1, 0)
-    return a + u[:, None] * (b - a) + v[:, None] * (c - a), faces
-
-
-def _without_specks(points: Points, labels: Labels) -> Samples:
-    """Drop the samples of specks and renumber the bodies, largest first."""
-    sizes = np.bincount(labels)
-    order = np.argsort(-sizes, kind="stable")
-    rank = np.full(len(sizes), -1)
-    large = order[: max(1, int((sizes > SPECK * len(points)).sum()))]
-    rank[large] = np.arange(len(large))
-    bodies = rank[labels]
-    return Samples(points[bodies >= 0], bodies[bodies >= 0])
+    more = a + u[:, None] * (b - a) + v[:, None] * (c - a)
+    return np.concatenate([points, more]), np.concatenate([labels, parts[faces]])

@@ -105,7 +105,7 @@ class Tracker:
         self._nodes_by_few = coarse.bind(self._graph.nodes, coarse.cells[nodes])
         self._all = self._graph.bind(self.mesh.vertices, self._graph.cells)
         self._poses = {key: Pose.at(self._graph.nodes)}
-        self._residuals = {key: 0.0}
+        self.residuals = {key: 0.0}  # RMS distances of the moved key mesh and registered frames, as by `step`
         self._paint = paint
         self._colored: ColoredPlaces | None = None
         self._body = RigidBody(self.mesh, noise) if noise > 0 else None  # bending costs clean bodies nothing
@@ -122,7 +122,7 @@ class Tracker:
             raise InputError(f"frame {frame} has coordinates that are not finite; repair it first")
         work.count("frames tracked")
         pose, residual = self._follow(frame, surface, paint)
-        self._poses[frame], self._residuals[frame] = pose, residual
+        self._poses[frame], self.residuals[frame] = pose, residual
         if self._body is not None and self._known(frame) in self._rigid:
             start = RigidMotion.between(self._graph.nodes, pose.positions)
             motion = self._body.brought(surface, start)
@@ -134,10 +134,6 @@ class Tracker:
         """Return the rigid motions from the key to registered frames; None if the body's motion is not rigid."""
         motions = [self._rigid.get(frame) for frame in frames]
         return None if None in motions else [motion for motion in motions if motion is not None]
-
-    def residual(self, frame: int) -> float | None:
-        """Return the RMS distance of the moved key mesh and a frame, the larger of both directions; None if unknown."""
-        return self._residuals.get(frame)
 
     def bound(self, mesh: Mesh) -> Binding:
         """Bind the vertices of a mesh on or near the key mesh, for `placed`."""
@@ -155,7 +151,7 @@ class Tracker:
             poses = [Pose(np.tile(step.turn, (count, 1, 1)), step.of(self._graph.nodes)) for step in rigid]
         rotations = np.stack([pose.rotations for pose in poses])
         positions = np.stack([pose.positions for pose in poses])
-        residuals = np.array([self._residuals[frame] for frame in frames])
+        residuals = np.array([self.residuals[frame] for frame in frames])
         return Motion(self.mesh, self._graph, rotations, positions, residuals)
 
     def _rest(self, graph: DeformationGraph) -> _Rest:
@@ -171,13 +167,13 @@ class Tracker:
     @property
     def _followed(self) -> list[int]:
         """Registered frames with a measured pose: the key, and all that are not empty."""
-        return [frame for frame, residual in self._residuals.items() if residual < np.inf]
+        return [frame for frame, residual in self.residuals.items() if residual < np.inf]
 
     def _follow(self, frame: int, surface: FrameSurface, paint: Painter | None) -> tuple[Pose, float]:
         """Register a frame from several starts until one is good enough; return the best pose and its residual."""
         o, last = self.options, self._known(frame)
         target = surface.sampled(o.samples)
-        usual = np.median([r for r in self._residuals.values() if 0 < r < np.inf] or [0.0])  # includes noise
+        usual = np.median([r for r in self.residuals.values() if 0 < r < np.inf] or [0.0])  # includes noise
         starts = self._starts(frame, target)
         best = self._poses[last], np.inf
         enough = max(self._doubt, UNUSUAL * float(usual))
@@ -195,8 +191,18 @@ class Tracker:
         return best if best[1] < stay[1] else stay
 
     def _from(self, start: Pose, target: _core.DeformTarget, torn: float, surface: FrameSurface) -> tuple[Pose, float]:
-        """Return the pose registered from a start, and its residual."""
-        pose = self._rounds(self._fine, self._carried(start, target, torn), target, self.options.fine, torn)
+        """Return the pose registered from a start, and its residual; a coarse graph at rest there moves it first."""
+        few, fine = self._few, self._fine
+        coarse = Pose(start.rotations[: len(few.nodes)], start.positions[: len(few.nodes)])
+        points, normals = moved(fine.points, fine.nodes, fine.binding, start), turned(fine.normals, fine.binding, start)
+        held = few.core.holds(coarse.rotations, coarse.positions, torn)
+        rest = _Rest(
+            coarse.positions, few.edges, points, normals, few.binding, held
+        )
+        carried = self._rounds(rest, Pose.at(coarse.positions), target, self.options.coarse, torn)
+        positions = moved(start.positions, coarse.positions, self._nodes_by_few, carried)
+        start = Pose(products(rotation(self._nodes_by_few, carried), start.rotations), positions)
+        pose = self._rounds(fine, start, target, self.options.fine, torn)
         return pose, self._measure(pose, surface)
 
     def _starts(self, frame: int, surface: _core.DeformTarget) -> list[Pose]:
@@ -228,17 +234,6 @@ class Tracker:
             offsets = self._colored.offsets(pose.positions, points, surface, self.options.samples, frame_paint)
             if offsets is not None:
                 yield Pose(pose.rotations, pose.positions + offsets)
-
-    def _carried(self, pose: Pose, surface: _core.DeformTarget, torn: float) -> Pose:
-        """Move a pose by a coarse graph at rest in that pose, which keeps its detail."""
-        few, fine = self._few, self._fine
-        coarse = Pose(pose.rotations[: len(few.nodes)], pose.positions[: len(few.nodes)])
-        points, normals = moved(fine.points, fine.nodes, fine.binding, pose), turned(fine.normals, fine.binding, pose)
-        held = few.core.holds(coarse.rotations, coarse.positions, torn)
-        rest = _Rest(coarse.positions, few.edges, points, normals, few.binding, held)
-        carried = self._rounds(rest, Pose.at(coarse.positions), surface, self.options.coarse, torn)
-        positions = moved(pose.positions, coarse.positions, self._nodes_by_few, carried)
-        return Pose(products(rotation(self._nodes_by_few, carried), pose.rotations), positions)
 
     def _rounds(self, rest: _Rest, pose: Pose, surface: _core.DeformTarget, stage: Stage, torn: float) -> Pose:
         gates, rigidity = np.array(stage.gates), np.array(stage.rigidity)

@@ -64,7 +64,16 @@ def reference_centers(distances: Pairs, pose: Pose) -> ReferenceCenters:
     """Find the pose of least stress (eq. 5), rotated, shifted and mirrored to agree best with a frame's `pose`."""
     if len(distances) < 4 or not distances.any():  # up to three points, or all in one place
         return ReferenceCenters(pose.copy(), _stress(distances, pose))
-    positions = _orient(_smacof(distances, _classical(distances)), pose, distances)
+    positions = _smacof(distances, _classical(distances))
+    # Mirrored if most small neighbourhoods are inside out: a limb may not be in the frame's place, so a global fit may
+    # prefer the mirror image.
+    near = np.argsort(distances, axis=1, kind="stable")[:, : min(12, len(pose))]
+    a, b = (each[near] - each[near].mean(axis=1, keepdims=True) for each in (positions, pose))
+    votes = np.sign(determinants(products(np.swapaxes(b, 1, 2), a)))
+    if votes.sum() < 0:
+        positions = positions * np.array([1.0, 1.0, -1.0])
+    rotation, translation = fit_rigid(positions[None], pose[None], np.ones((1, len(pose))))
+    positions = products(positions, rotation[0].T) + translation[0]
     return ReferenceCenters(positions, _stress(distances, positions))
 
 
@@ -134,21 +143,6 @@ def _guttman(distances: Pairs, x: Float32[np.ndarray, "K 3"]) -> tuple[Float32[n
     stress = float(np.square(current).sum())
     moved = (ratio.sum(axis=1)[:, None] * x - products(ratio, x).astype(np.float32)) / np.float32(len(x))
     return moved, stress
-
-
-def _orient(positions: Pose, pose: Pose, distances: Pairs) -> Pose:
-    """Align positions to a real pose, mirrored if most small neighbourhoods are inside out.
-
-    A limb may not be in the frame's place, so a global fit may prefer the mirror image; neighbourhoods do not.
-    """
-    count = min(12, len(pose))
-    near = np.argsort(distances, axis=1, kind="stable")[:, :count]
-    a, b = (each[near] - each[near].mean(axis=1, keepdims=True) for each in (positions, pose))
-    votes = np.sign(determinants(products(np.swapaxes(b, 1, 2), a)))
-    if votes.sum() < 0:
-        positions = positions * np.array([1.0, 1.0, -1.0])
-    rotation, translation = fit_rigid(positions[None], pose[None], np.ones((1, len(pose))))
-    return products(positions, rotation[0].T) + translation[0]
 
 
 def _stress(distances: Pairs, positions: Pose) -> float:

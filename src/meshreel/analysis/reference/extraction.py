@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float64, Int32, Int64
+from jaxtyping import Bool, Float64, Int64
 
 from ...geometry.closest_points import Surface
 from ...geometry.decimate import decimate
@@ -207,9 +207,14 @@ class Group:
         """
         covered, pieces = np.zeros(len(pose)), list[Mesh]()
         for t in sorted(range(len(self.frames)), key=lambda t: (abs(t - key), t)):
-            moved, faces = self._moved(t, pose)
-            nearest = self.bindings[t].nearest
-            thirds = np.repeat(face_normals(Mesh(self.frames[t].vertices, faces))[1] / 3, 3)
+            frame, binding = self.frames[t], self.bindings[t]
+            moved = move(frame.vertices, binding, center_motions(self.positions[t], pose, self.kin), self.kin)
+            spoiled = np.zeros(len(moved), bool)
+            spoiled[frame.faces[self.parting[t] | self._torn(frame.vertices, moved, self.edges[t])]] = True
+            faces = frame.faces[~spoiled[frame.faces].any(axis=1)]
+            faces = faces[large_pieces(faces, len(moved), SMALLEST)]  # else: bound to the wrong body's centers
+            nearest = binding.nearest
+            thirds = np.repeat(face_normals(Mesh(frame.vertices, faces))[1] / 3, 3)
             vertex_areas = np.bincount(faces.reshape(-1), thirds, len(nearest)).astype(np.float64)  # int if empty
             area = np.bincount(nearest, vertex_areas, len(pose))
             # Over neighbourhoods of centers, for surface passes between neighbours from frame to frame.
@@ -245,16 +250,6 @@ class Group:
         intact = drop_small(clean(Mesh.of(mesh.vertices, mesh.faces[~bad])), SMALLEST)
         return close_holes(intact, HOLE * mesh.diagonal)
 
-    def _moved(self, t: int, pose: Pose) -> tuple[Points, Int32[np.ndarray, "F 3"]]:
-        """Return a frame's vertices in a pose, and those of its faces that do not tear on the way."""
-        frame, binding = self.frames[t], self.bindings[t]
-        points = move(frame.vertices, binding, center_motions(self.positions[t], pose, self.kin), self.kin)
-        spoiled = np.zeros(len(points), bool)
-        spoiled[frame.faces[self.parting[t] | self._torn(frame.vertices, points, self.edges[t])]] = True
-        faces = frame.faces[~spoiled[frame.faces].any(axis=1)]
-        faces = faces[large_pieces(faces, len(points), SMALLEST)]  # else: bound to the wrong body's centers
-        return points, faces
-
     def _parting(self, edges: Edges, binding: Binding, pose: Pose) -> Bool[np.ndarray, " F"]:
         """Return the faces that join centers which are much farther from each other in some frame than in this pose."""
         i, j = binding.nearest[edges[0]].T
@@ -263,10 +258,7 @@ class Group:
 
     def _torn(self, source: Points, target: Points, edges: Edges) -> Bool[np.ndarray, " F"]:
         """Return the faces with an edge that is much longer in one pose than in the other."""
-        before, after = _lengths(source, edges[0]), _lengths(target, edges[0])
+        i, j = edges[0].T
+        before, after = (np.linalg.norm(points[i] - points[j], axis=1) for points in (source, target))
         far = np.maximum(before, after) > TORN * np.minimum(before, after) + self.spacing / 2
         return far[edges[1]].any(axis=1)
-
-
-def _lengths(vertices: Points, edges: np.ndarray) -> Float64[np.ndarray, " E"]:
-    return np.linalg.norm(vertices[edges[:, 0]] - vertices[edges[:, 1]], axis=1)

@@ -86,7 +86,10 @@ def _spread_over_bodies(samples: Samples, options: TrackOptions) -> tuple[Pose, 
     generator = np.random.default_rng((SEED, 0, 1))
     owners = np.zeros(len(samples.points), np.int32)
     places: list[Pose] = []
-    counts = _shares(np.bincount(samples.bodies), options.centers)
+    sizes = np.bincount(samples.bodies)
+    counts = np.maximum(np.floor(options.centers * sizes / sizes.sum()).astype(np.int64), FEWEST_CENTERS)
+    counts[0] = max(counts[0] + options.centers - counts.sum(), FEWEST_CENTERS)  # the largest takes the remainder
+    counts = np.minimum(counts, sizes)
     for body, count in enumerate(counts):
         mine = np.flatnonzero(samples.bodies == body)
         points = np.ascontiguousarray(samples.points[mine])
@@ -96,13 +99,6 @@ def _spread_over_bodies(samples: Samples, options: TrackOptions) -> tuple[Pose, 
         owners[mine] = owned + sum(len(c) for c in places)
         places.append(centers)
     return np.concatenate(places), np.repeat(np.arange(len(counts)), counts).astype(np.int32), owners
-
-
-def _shares(sizes: Int64[np.ndarray, " B"], centers: int) -> Int64[np.ndarray, " B"]:
-    """Return the number of centers of each body: by volume, at least `FEWEST_CENTERS`, at most its samples."""
-    counts = np.maximum(np.floor(centers * sizes / sizes.sum()).astype(np.int64), FEWEST_CENTERS)
-    counts[0] = max(counts[0] + centers - counts.sum(), FEWEST_CENTERS)  # the largest body takes the remainder
-    return np.minimum(counts, sizes)
 
 
 def _follow(track: list[Pose], samples: Samples, graph: _Affinities) -> tuple[Pose, Matrices, Owners]:

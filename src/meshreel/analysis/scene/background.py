@@ -13,7 +13,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Bool, Float32
+from jaxtyping import Bool
 from scipy.ndimage import binary_dilation
 
 from ...geometry.cameras import Rays, pixels_near
@@ -122,7 +122,11 @@ def _smooth(picture: DepthPicture) -> DepthPicture:
     Inverse depths are averaged, so that planes stay planes, with neighbours at a similar depth.
     """
     inverse = inverse_depths(picture.depth)
-    (height, width), similar = inverse.shape, np.float32(max(SIMILAR * _noise(inverse), 1e-6))
+    differences = np.abs(inverse[:, :-2] - 2 * inverse[:, 1:-1] + inverse[:, 2:])  # 0 on planes
+    measured = (inverse[:, :-2] > 0) & (inverse[:, 1:-1] > 0) & (inverse[:, 2:] > 0)
+    shares = differences[measured] / inverse[:, 1:-1][measured]
+    noise = float(np.median(shares)) / SECOND_MEDIAN if len(shares) else 0.0
+    (height, width), similar = inverse.shape, np.float32(max(SIMILAR * noise, 1e-6))
     places = range(-SMOOTH, SMOOTH + 1)
     for _ in range(ROUNDS):
         padded, around = np.pad(inverse, SMOOTH), np.maximum(inverse, np.float32(1e-9))
@@ -150,11 +154,3 @@ def _continued(picture: DepthPicture) -> DepthPicture:
         hidden = (depth > 0) & ((inverse == 0) | (guess < (1 - STEP) * inverse))
         farthest = np.maximum(farthest, np.where(hidden, guess, 0))  # the nearest of several
     return replace(picture, depth=inverse_depths(farthest[1:-1, 1:-1]))
-
-
-def _noise(inverse: Float32[np.ndarray, "H W"]) -> float:
-    """Return the typical noise of inverse depths, as a share of them, from second differences: 0 on planes."""
-    differences = np.abs(inverse[:, :-2] - 2 * inverse[:, 1:-1] + inverse[:, 2:])
-    measured = (inverse[:, :-2] > 0) & (inverse[:, 1:-1] > 0) & (inverse[:, 2:] > 0)
-    shares = differences[measured] / inverse[:, 1:-1][measured]
-    return float(np.median(shares)) / SECOND_MEDIAN if len(shares) else 0.0

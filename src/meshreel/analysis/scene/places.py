@@ -82,12 +82,14 @@ class Tally:
         self.frames = 0
         self.occupied, self.free = np.zeros(places, np.int32), np.zeros(places, np.int32)  # frames
         none = np.full(places, -1, np.int32)
-        self._after, self._before = (Stay(none.copy(), np.zeros(places, np.int32)) for _ in range(2))
+        # Stays until each place was first seen free, or until the end; `first` is the last frame with surface.
+        self.early = Stay(none.copy(), np.zeros(places, np.int32))
+        self._after = Stay(none, np.zeros(places, np.int32))
 
     def add(self, occupied: Mask, free: Mask) -> None:
         early = occupied & (self.free == 0)
-        self._before.first[early] = self.frames
-        self._before.count[early] += 1
+        self.early.first[early] = self.frames
+        self.early.count[early] += 1
         self._after.first[free] = -1
         self._after.count[free] = 0
         self._after.first[occupied & (self._after.first < 0)] = self.frames
@@ -103,15 +105,10 @@ class Tally:
         return Stay(np.where(left, self._after.first, -1).astype(np.int32), self._after.count)
 
     @property
-    def early(self) -> Stay:
-        """Stays until each place was first seen free, or until the end; `first` is the last frame with surface."""
-        return self._before
-
-    @property
     def before(self) -> Stay:
         """Stays until each place was first seen free; frames are numbered backwards from the last one."""
-        entered = (self.free > 0) & (self._before.first >= 0)
-        return Stay(np.where(entered, self.frames - 1 - self._before.first, -1).astype(np.int32), self._before.count)
+        entered = (self.free > 0) & (self.early.first >= 0)
+        return Stay(np.where(entered, self.frames - 1 - self.early.first, -1).astype(np.int32), self.early.count)
 
 
 @dataclass(frozen=True, slots=True)
@@ -199,7 +196,10 @@ def _states(frames: Sequence[_Observation], places: Places, views: Sequence[Came
             counts[inside[frame.depths[number].reshape(-1)[pixels] > limit]] += 1
     sensed = _sensed(frames, places, _PAST * size)
     for counts, frame, (doubtful, clear) in zip(seen_past, frames, sensed, strict=True):
-        occupied = _near(places.keys, places.beside, frame.cells)
+        own = np.zeros(len(places.keys), bool)
+        own[np.searchsorted(places.keys, frame.cells)] = True
+        occupied = own.copy()
+        occupied[places.beside[own].reshape(-1)] = True  # surface in the place or in a neighbouring one
         yield occupied, ((counts >= _VIEWS) & ~doubtful | clear) & ~occupied
 
 
@@ -276,12 +276,3 @@ def _stored(rays: Rays, view: Camera, unit: float) -> UInt16[np.ndarray, "H W"]:
     sight = rays.look(view)
     depth = np.where(np.isfinite(sight.depth) & ~rays.backs(view, sight), sight.depth, 0.0)
     return np.clip(np.rint(depth / unit), 0, _DEEPEST).astype(np.uint16)
-
-
-def _near(keys: Keys, beside: Int32[np.ndarray, "P 26"], own: Int64[np.ndarray, " C"]) -> Mask:
-    """Return True for each place that has surface of a frame (its cells are `own`) in it or in a neighbouring place."""
-    occupied = np.zeros(len(keys), bool)
-    occupied[np.searchsorted(keys, own)] = True
-    near = occupied.copy()
-    near[beside[occupied].reshape(-1)] = True
-    return near

@@ -20,7 +20,7 @@ from ...geometry.closest_points import Surface, distances
 from ...geometry.derived_sequences import CapturedSequence, DerivedSequence, captured, picked, turned_over
 from ...geometry.topology import edge_lengths, face_normals
 from ...geometry.voxels import Lattice
-from ...types import Mesh, MeshSequence, evenly
+from ...types import MeshSequence, evenly
 from .color_looks import CHANGE_SIDE, MOMENTS, SIDE, ColorChange, ColorLooks
 from .cut import Rest, find_rest, moving_places
 from .labelling import ByMasks, ByPlace, looks
@@ -63,8 +63,9 @@ def segment(frames: MeshSequence, cameras: Cameras = (), report: Report = lambda
 
 def _by_place(frames: CapturedSequence, chosen: Sequence[int], cameras: Cameras, report: Report) -> ByPlace:
     cell, views = edge_length(frames, chosen), _views(frames, chosen, cameras)
-    noise = _apart(frames[chosen[0]], frames[chosen[len(chosen) // 2]])
-    lattice = Lattice.near(frames[chosen[0]], max(cell, min(_WIDTH * noise, _WIDEST * cell)))
+    first, middle = frames[chosen[0]], frames[chosen[len(chosen) // 2]]
+    noise = float(np.median(distances(first.vertices[::_THINNED], middle)))  # more than half of a scene stands still
+    lattice = Lattice.near(first, max(cell, min(_WIDTH * noise, _WIDEST * cell)))
     frames_seen = picked(frames, chosen)
     pictures = None if frames_seen.depth is None else frames_seen.depth.__getitem__
     places = find_places(Observations(frames_seen, views, pictures, report), lattice)
@@ -164,15 +165,6 @@ def _stands(probes: Sequence[Surface], masks: Sequence[Bool[np.ndarray, " V"]], 
             if np.median(near) > limit:
                 return False
     return visible >= len(probes) / 2
-
-
-def _apart(first: Mesh, second: Mesh) -> float:
-    """Return the median distance from vertices of one frame to another frame, m.
-
-    For whole frames this is the noise: more than half of a scene stands still. Infinite without surface.
-    """
-    points = first.vertices[::_THINNED]
-    return float(np.median(distances(points, second))) if len(points) and not second.is_empty else np.inf
 
 
 def edge_length(frames: MeshSequence, chosen: Sequence[int]) -> float:

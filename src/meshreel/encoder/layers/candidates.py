@@ -193,7 +193,7 @@ class Candidate:
         for number in later if side == LATER else earlier:
             if number == self._ends.get(side):
                 return
-            residual = self._tracker.residual(number)
+            residual = self._tracker.residuals.get(number)
             if residual is None:
                 residual = self._tracker.step(number, ahead.at(number), ahead.painter(number))
             if residual > self._tracker.lost:
