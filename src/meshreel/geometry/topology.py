@@ -168,15 +168,11 @@ def large_pieces(faces: Int32[np.ndarray, "F 3"], count: int, share: float) -> B
 
 def drop_small(mesh: Mesh, share: float) -> Mesh:
     """Remove connected components that have less than this share of the faces of the largest one."""
-    if mesh.is_empty:
-        return mesh
     return part_of(mesh, large_pieces(mesh.faces, len(mesh.vertices), share))
 
 
 def without_fragments(mesh: Mesh, least: float) -> Mesh:
     """Remove connected components whose area is below `least`, in squared units of the vertices."""
-    if mesh.is_empty:
-        return mesh
     labels = connected_faces(mesh.faces, len(mesh.vertices))
     areas = np.bincount(labels, face_normals(mesh)[1])
     return part_of(mesh, areas[labels] >= least)

@@ -196,9 +196,7 @@ class Tracker:
         coarse = Pose(start.rotations[: len(few.nodes)], start.positions[: len(few.nodes)])
         points, normals = moved(fine.points, fine.nodes, fine.binding, start), turned(fine.normals, fine.binding, start)
         held = few.core.holds(coarse.rotations, coarse.positions, torn)
-        rest = _Rest(
-            coarse.positions, few.edges, points, normals, few.binding, held
-        )
+        rest = _Rest(coarse.positions, few.edges, points, normals, few.binding, held)
         carried = self._rounds(rest, Pose.at(coarse.positions), target, self.options.coarse, torn)
         positions = moved(start.positions, coarse.positions, self._nodes_by_few, carried)
         start = Pose(products(rotation(self._nodes_by_few, carried), start.rotations), positions)

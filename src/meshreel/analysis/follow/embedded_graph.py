@@ -50,23 +50,20 @@ class DeformationGraph:
 
     def bind(self, points: Points, cells: Cells) -> Binding:
         """Bind points to the nearest `NEIGHBOURS` nodes of their cells' hoods; weights fall to 0 at the next one."""
-        blocks = (slice(at, at + TOGETHER) for at in range(0, max(len(points), 1), TOGETHER))
-        bound = [self._bound(points[rows], cells[rows]) for rows in blocks]
+        count, bound = min(NEIGHBOURS, self.hood.shape[1]), list[tuple[np.ndarray, np.ndarray]]()
+        for at in range(0, max(len(points), 1), TOGETHER):
+            hood = self.hood[cells[at : at + TOGETHER]]
+            away = np.linalg.norm(self.nodes[hood] - points[at : at + TOGETHER, None], axis=2)
+            away[hood < 0] = np.inf
+            nearest = np.argsort(away, axis=1, kind="stable")[:, : count + 1]
+            away, indices = np.take_along_axis(away, nearest, axis=1), np.take_along_axis(hood, nearest, axis=1)
+            finite = np.where(np.isfinite(away), away, 0.0)
+            reach = np.where(np.isfinite(away[:, -1]), away[:, -1], 1.5 * finite.max(axis=1))
+            reach = np.maximum(reach, np.finfo(float).tiny)
+            weights = np.square(np.maximum(1 - away[:, :count] / reach[:, None], 0))
+            weights[:, 0] = np.maximum(weights[:, 0], 1e-12)
+            bound.append((np.maximum(indices[:, :count], 0), weights / weights.sum(axis=1, keepdims=True)))
         return Binding(*(np.concatenate(parts) for parts in zip(*bound, strict=True)))
-
-    def _bound(self, points: Points, cells: Cells) -> tuple[Int64[np.ndarray, "P k"], Float64[np.ndarray, "P k"]]:
-        hood = self.hood[cells]
-        away = np.linalg.norm(self.nodes[hood] - points[:, None], axis=2)
-        away[hood < 0] = np.inf
-        count = min(NEIGHBOURS, hood.shape[1])
-        nearest = np.argsort(away, axis=1, kind="stable")[:, : count + 1]
-        away, indices = np.take_along_axis(away, nearest, axis=1), np.take_along_axis(hood, nearest, axis=1)
-        finite = np.where(np.isfinite(away), away, 0.0)
-        reach = np.where(np.isfinite(away[:, -1]), away[:, -1], 1.5 * finite.max(axis=1))
-        reach = np.maximum(reach, np.finfo(float).tiny)
-        weights = np.square(np.maximum(1 - away[:, :count] / reach[:, None], 0))
-        weights[:, 0] = np.maximum(weights[:, 0], 1e-12)
-        return np.maximum(indices[:, :count], 0), weights / weights.sum(axis=1, keepdims=True)
 
 
 def farthest_first(mesh: Mesh, candidates: Int64[np.ndarray, " S"], count: int) -> Int64[np.ndarray, " N"]:

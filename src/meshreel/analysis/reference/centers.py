@@ -208,7 +208,15 @@ def bind(mesh: Mesh, source: Pose, neighbours: Neighbours) -> Binding:
     if choices > 1 and not mesh.is_empty:
         for _ in range(GUARD_ROUNDS):
             nearest = _guard(mesh, near, nearest, neighbours)
-    return Binding(nearest, _weights(mesh.vertices, nearest, source, neighbours))
+    rows, spacing = neighbours.indices[nearest], 1.0
+    square = np.sum(np.square(mesh.vertices[:, None] - source[rows]), axis=2)
+    square -= square.min(axis=1, keepdims=True)  # keeps weights from vanishing far from all centers
+    if neighbours.indices.shape[1] > 1:
+        away = np.linalg.norm(source[neighbours.indices[:, 1:]] - source[:, None], axis=2)
+        spacing = float(np.median(away.min(axis=1)))
+    falloff = exp(-square / max((FALLOFF * spacing) ** 2, np.finfo(float).tiny))
+    weights = neighbours.affinities[nearest] * falloff  # with the distance in this pose, and the affinity to k1
+    return Binding(nearest, weights / weights.sum(axis=1, keepdims=True))
 
 
 def move(points: Points, binding: Binding, motions: Float64[np.ndarray, "K 8"], neighbours: Neighbours) -> Points:
@@ -239,17 +247,3 @@ def _guard(
     best = np.argmax(kin >= 0.8 * kin.max(axis=1, keepdims=True), axis=1)  # the nearest of the good ones
     stranger = affinities < 0.5 * kin.max(axis=1)
     return np.where(stranger, near[np.arange(len(near)), best], nearest)
-
-
-def _weights(points: Points, nearest: Int64[np.ndarray, " V"], source: Pose, neighbours: Neighbours) -> Weights:
-    """Return weights that fall off with the distance to the point (in this pose) and with the affinity to k1."""
-    rows = neighbours.indices[nearest]
-    square = np.sum(np.square(points[:, None] - source[rows]), axis=2)
-    square -= square.min(axis=1, keepdims=True)  # keeps weights from vanishing far from all centers
-    spacing = 1.0
-    if neighbours.indices.shape[1] > 1:
-        away = np.linalg.norm(source[neighbours.indices[:, 1:]] - source[:, None], axis=2)
-        spacing = float(np.median(away.min(axis=1)))
-    width = FALLOFF * spacing
-    weights = neighbours.affinities[nearest] * exp(-square / max(width**2, np.finfo(float).tiny))
-    return weights / weights.sum(axis=1, keepdims=True)

@@ -121,13 +121,13 @@ def find_bodies(moving: Sequence[Mesh], size: float, near: float = NEAR) -> Bodi
             part = part_of(mesh, labels == number)
             pieces.append(_Piece(frame, part, float(areas[number]), _cells(part, lattice)))
     label = _linked(pieces)
-    clusters = [np.flatnonzero(label == number) for number in range(label.max(initial=-1) + 1)]
-    large = [c for c in clusters if max(pieces[k].area for k in c) >= LEAST]
+    clusters = [[pieces[k] for k in np.flatnonzero(label == number)] for number in range(label.max(initial=-1) + 1)]
+    large = [cluster for cluster in clusters if max(piece.area for piece in cluster) >= LEAST]
     bodies: list[list[list[Mesh]]] = [[[] for _ in moving] for _ in large]
     for body, cluster in zip(bodies, large, strict=True):
-        for k in cluster:
-            body[pieces[k].frame].append(pieces[k].mesh)
-    small = [[pieces[k] for k in c] for c in clusters if max(pieces[k].area for k in c) < LEAST]
+        for piece in cluster:
+            body[piece.frame].append(piece.mesh)
+    small = (cluster for cluster in clusters if max(piece.area for piece in cluster) < LEAST)
     dropped = sum(_given(bodies, bits, len(moving), size) for bits in small)
     return Bodies([[concatenate(meshes) for meshes in body] for body in bodies], dropped)
 
@@ -172,17 +172,14 @@ def _cells(mesh: Mesh, lattice: Lattice) -> Int64[np.ndarray, " C"]:
 
 def _linked(pieces: list[_Piece]) -> Int64[np.ndarray, " N"]:
     """Label the pieces: pieces that come near each other in consecutive frames have one label."""
-    links, start = list[tuple[int, int]](), 0
-    while start < len(pieces):
-        frame = pieces[start].frame
-        current = [k for k in range(start, len(pieces)) if pieces[k].frame == frame]
-        later = [k for k in range(start, len(pieces)) if pieces[k].frame == frame + 1]
+    links = list[tuple[int, int]]()
+    for frame in sorted({piece.frame for piece in pieces}):
+        current, later = ([k for k, piece in enumerate(pieces) if piece.frame == at] for at in (frame, frame + 1))
         keys = np.concatenate([pieces[k].cells for k in later] or [np.zeros(0, np.int64)])
         owner = np.repeat(later, [len(pieces[k].cells) for k in later])
         for k in current:
             near = np.isin(keys, around(pieces[k].cells))
             links += [(k, int(other)) for other in np.unique(owner[near])]
-        start = current[-1] + 1
     return linked(np.array(links, np.int64).reshape(-1, 2), len(pieces))
 
 

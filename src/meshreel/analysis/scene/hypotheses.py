@@ -18,13 +18,13 @@ from jaxtyping import Bool, Float32, Float64, Int32
 from scipy.ndimage import binary_opening, distance_transform_edt, label
 
 from ...geometry.cameras import Camera, Seen
+from ...geometry.depth import apart
 from ...geometry.strict import inverse, products
 
 Objects = Int32[np.ndarray, "T H W"]  # numbers of objects, from 1 on, over time or in several views; 0: none
 # Guesses, untried with real weights (decision 17):
 VARIATION = 0.1  # smallest variation over time of a moving object's mask
 OVERLAP = 0.3  # smallest intersection over union of two masks of one object
-APART = (0.06, 0.02)  # m, and share of the depth: a pixel whose depth varies by more sees motion; guesses
 SIDE = 160  # pixels along the longest side of a map of motion (guess)
 _FAR = 0.9  # quantile over time of a pixel's depth that is that of the background (guess)
 _LEAST = 5e-3  # share of a map's pixels below which a moving patch is noise, or a piece of a body (guess)
@@ -85,7 +85,10 @@ def moving_in_views(tracked: Tracked, moving: Hypotheses, frame: int, least: flo
     for number, kind in tracked.kinds.items():
         mask = tracked.objects[0] == number
         if mask.any():
-            numbers[number] = _match(mask, moving.objects[frame], least)
+            seen = moving.objects[frame]
+            shares = {int(other): overlap(mask, seen == other) for other in np.unique(seen[mask]) if other}
+            best = max(shares, key=lambda other: (shares[other], -other), default=0)
+            numbers[number] = best if shares.get(best, 0.0) >= least else 0
         elif kind in moving.kinds:
             numbers[number] = moving.elsewhere
     return numbers[tracked.objects]
@@ -121,15 +124,8 @@ def reference_view(moments: Sequence[Sequence[Seen]]) -> int:
         depths = np.stack([look.depth for look in looks])
         nearest, farthest = depths.min(axis=0), depths.max(axis=0)
         with np.errstate(invalid="ignore"):  # nothing is seen at any moment
-            changes.append(int((farthest - nearest > np.maximum(APART[0], APART[1] * nearest)).sum()))
+            changes.append(int((farthest - nearest > apart(nearest)).sum()))
     return int(np.argmax(changes))
-
-
-def _match(mask: np.ndarray, objects: Int32[np.ndarray, "H W"], least: float) -> int:
-    """Return the number of the object with the largest overlap with a mask; 0 if none reaches `least`."""
-    shares = {int(number): overlap(mask, objects == number) for number in np.unique(objects[mask]) if number}
-    best = max(shares, key=lambda number: (shares[number], -number), default=0)
-    return best if shares.get(best, 0.0) >= least else 0
 
 
 _INSIDE, _BESIDE = 3, 2  # points on an object and beside it, as many as in the paper's release
@@ -170,7 +166,7 @@ def _moving(depths: Float32[np.ndarray, "T h w"]) -> Bool[np.ndarray, "T h w"]:
     depths_or_nan = np.where(np.isfinite(depths) | ~covered, depths, np.nan)
     far = np.nanquantile(np.where(covered, depths_or_nan, 0), _FAR, axis=0)
     nearer = np.where(np.isfinite(depths), far - depths, 0)
-    return np.asarray(binary_opening(nearer > np.maximum(APART[0], APART[1] * far), np.ones((1, 3, 3))))
+    return np.asarray(binary_opening(nearer > apart(far), np.ones((1, 3, 3))))
 
 
 def _prompt(frame: int, patch: Bool[np.ndarray, "h w"], moving: Bool[np.ndarray, "h w"]) -> Prompt:

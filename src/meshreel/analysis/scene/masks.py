@@ -97,24 +97,21 @@ def label_colors(moving: Bool[np.ndarray, " F"], bodies: Integer[np.ndarray, " F
     return np.where(moving[:, None], colors, np.array(_RESTS, np.uint8))
 
 
-def colored_picture(seen: Seen, view: Camera, colors: UInt8[np.ndarray, "F 3"]) -> Picture:
-    """Render a view in the faces' colors under one light; white where nothing is seen."""
-    normals = normal_picture(seen, view).astype(np.float64) * (2 / 255) - 1
-    light = _AMBIENT + (1 - _AMBIENT) * np.abs(normals @ _LIGHT)
-    hit = seen.faces >= 0
-    picture = np.full((*hit.shape, 3), 255, np.uint8)
-    picture[hit] = np.rint(colors[seen.faces[hit]] * np.minimum(light[hit], 1)[:, None])
-    return picture
-
-
 def look_at_labels(
     mesh: Mesh, moving: Bool[np.ndarray, " F"], bodies: Integer[np.ndarray, " F"], views: Sequence[Camera]
 ) -> tuple[list[Picture], list[int]]:
     """Return each view's picture, and the number of moving faces that it sees."""
     rays, colors = Rays(mesh), label_colors(moving, bodies)
-    looks = [rays.look(view) for view in views]
-    pictures = [colored_picture(seen, view, colors) for seen, view in zip(looks, views, strict=True)]
-    return pictures, [int(moving[np.unique(seen.faces[seen.faces >= 0])].sum()) for seen in looks]
+    pictures, counts = list[Picture](), list[int]()
+    for view in views:
+        seen = rays.look(view)
+        normals = normal_picture(seen, view).astype(np.float64) * (2 / 255) - 1
+        light = _AMBIENT + (1 - _AMBIENT) * np.abs(normals @ _LIGHT)
+        hit = seen.faces >= 0
+        pictures.append(np.full((*hit.shape, 3), 255, np.uint8))  # white where nothing is seen
+        pictures[-1][hit] = np.rint(colors[seen.faces[hit]] * np.minimum(light[hit], 1)[:, None])
+        counts.append(int(moving[np.unique(seen.faces[hit])].sum()))
+    return pictures, counts
 
 
 @dataclass(frozen=True, slots=True)

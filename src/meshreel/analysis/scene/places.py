@@ -53,14 +53,13 @@ class Observations:
     pictures: Callable[[int], list[DepthPicture | None]] | None = None  # of a frame: one for each camera
     report: Report = lambda _share: None  # called with the progress of `find_places`
 
-    def observe(self, number: int, lattice: Lattice) -> _Observation:
-        points, _ = spread(mesh := self.frames[number], 1.5 * lattice.size)
-        return self.of_mesh(number, mesh, distinct(lattice.keys(points)), lattice)
-
-    def of_mesh(self, number: int, mesh: Mesh, cells: Int64[np.ndarray, " C"], lattice: Lattice) -> _Observation:
+    def observe(self, number: int, mesh: Mesh, cells: Int64[np.ndarray, " C"], lattice: Lattice) -> _Observation:
         """Return the observations of a frame, given its mesh and occupied cells."""
-        rays = Rays(mesh)
-        depths = [_stored(rays, view, lattice.size / _FINENESS) for view in self.views]
+        rays, unit, depths = Rays(mesh), lattice.size / _FINENESS, list[UInt16[np.ndarray, "H W"]]()
+        for view in self.views:
+            sight = rays.look(view)
+            depth = np.where(np.isfinite(sight.depth) & ~rays.backs(view, sight), sight.depth, 0.0)
+            depths.append(np.clip(np.rint(depth / unit), 0, _DEEPEST).astype(np.uint16))
         return _Observation(cells, depths, None if self.pictures is None else self.pictures(number))
 
 
@@ -146,7 +145,8 @@ class _Observation:
     """Observations of one frame: its occupied cells, the depths of the views, and the cameras' depth pictures."""
 
     cells: Int64[np.ndarray, " C"]  # sorted keys of the cells with surface
-    depths: list[UInt16[np.ndarray, "H W"]]  # for each view, in units of a cell / _FINENESS
+    # For each view, in units of a cell / _FINENESS; 0 where a ray hits nothing, or a face from behind.
+    depths: list[UInt16[np.ndarray, "H W"]]
     measured: list[DepthPicture | None] | None  # for each camera; None without cameras
 
 
@@ -158,10 +158,9 @@ def find_places(observed: Observations, lattice: Lattice) -> Places:
     passes = len(observed.frames) + max(0, len(observed.frames) - _TOGETHER)
     observations, cells, cameras = list[_Observation](), _Known(), dict[int, _Counted]()
     for number in range(len(observed.frames)):
-        occupied_cells, normals = _cells(mesh := observed.frames[number], lattice)
-        cells.add(occupied_cells, normals)
+        occupied_cells = cells.add(mesh := observed.frames[number], lattice)
         if number < _TOGETHER:
-            observations.append(observed.of_mesh(number, mesh, occupied_cells, lattice))
+            observations.append(observed.observe(number, mesh, occupied_cells, lattice))
             _count_depths(cameras, observations[-1].measured)
         elif observed.pictures is not None:
             _count_depths(cameras, observed.pictures(number))
@@ -180,9 +179,13 @@ def find_places(observed: Observations, lattice: Lattice) -> Places:
 
 def states(observed: Observations, numbers: range, places: Places) -> Iterator[tuple[Mask, Mask]]:
     """Yield for each frame in `numbers` two masks of places: occupied ones, and others that are seen free."""
+    lattice = places.lattice
     for start in range(0, len(numbers), _TOGETHER):
-        together = (observed.observe(number, places.lattice) for number in numbers[start : start + _TOGETHER])
-        yield from _states(list(together), places, observed.views)
+        together = list[_Observation]()
+        for number in numbers[start : start + _TOGETHER]:
+            points, _ = spread(mesh := observed.frames[number], 1.5 * lattice.size)
+            together.append(observed.observe(number, mesh, distinct(lattice.keys(points)), lattice))
+        yield from _states(together, places, observed.views)
 
 
 def _states(frames: Sequence[_Observation], places: Places, views: Sequence[Camera]) -> Iterator[tuple[Mask, Mask]]:
@@ -241,11 +244,16 @@ class _Known:
         self._keys, self._sums = np.zeros(0, np.int64), np.zeros((0, 3), np.float32)
         self._new = list[tuple[Int64[np.ndarray, " C"], Float32[np.ndarray, "C 3"]]]()
 
-    def add(self, cells: Int64[np.ndarray, " C"], normals: Float32[np.ndarray, "C 3"]) -> None:
-        """Add the cells of a frame and the sums of its normals in them."""
-        self._new.append((cells, normals))
+    def add(self, mesh: Mesh, lattice: Lattice) -> Int64[np.ndarray, " C"]:
+        """Add the cells in which a frame has surface, and the sums of its normals there; return the cells' keys."""
+        points, faces = spread(mesh, 1.5 * lattice.size)
+        keys, cell = np.unique(lattice.keys(points), return_inverse=True)
+        normals = face_normals(mesh)[0][faces]
+        sums = [np.bincount(cell.reshape(-1), normals[:, axis], len(keys)) for axis in range(3)]
+        self._new.append((keys, np.stack(sums, axis=1).astype(np.float32)))
         if len(self._new) == _TOGETHER:  # merging after every frame would sort all keys each time
             self._take()
+        return keys
 
     def places(self) -> tuple[Keys, Float64[np.ndarray, "P 3"]]:
         """Return the sorted keys of the cells, and the mean normals there, of unit length; 0 where they cancel."""
@@ -260,19 +268,3 @@ class _Known:
         for cells, normals in (before, *self._new):
             self._sums[np.searchsorted(self._keys, cells)] += normals
         self._new.clear()
-
-
-def _cells(mesh: Mesh, lattice: Lattice) -> tuple[Int64[np.ndarray, " C"], Float32[np.ndarray, "C 3"]]:
-    """Return the sorted keys of the cells in which a mesh has surface, and the sums of its normals there."""
-    points, faces = spread(mesh, 1.5 * lattice.size)
-    keys, cell = np.unique(lattice.keys(points), return_inverse=True)
-    normals = face_normals(mesh)[0][faces]
-    sums = [np.bincount(cell.reshape(-1), normals[:, axis], len(keys)) for axis in range(3)]
-    return keys, np.stack(sums, axis=1).astype(np.float32)
-
-
-def _stored(rays: Rays, view: Camera, unit: float) -> UInt16[np.ndarray, "H W"]:
-    """Return a view's depths in multiples of `unit` (m); 0 where a ray hits nothing, or a face from behind."""
-    sight = rays.look(view)
-    depth = np.where(np.isfinite(sight.depth) & ~rays.backs(view, sight), sight.depth, 0.0)
-    return np.clip(np.rint(depth / unit), 0, _DEEPEST).astype(np.uint16)

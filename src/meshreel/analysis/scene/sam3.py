@@ -93,7 +93,12 @@ class Sam3Masks(Masker):
 
     def objects(self, frame: int, seen: Sequence[Seen], views: Sequence[Camera]) -> Int32[np.ndarray, "X H W"]:
         """Return the number, the same in all frames, of the moving object that each pixel sees; 0: none."""
-        moving = self._hypotheses()
+        if self._moving is None:  # stage 1, at the first call
+            assert self._pictures, "observe the frames first"
+            over_time = self._tracker.over_time(self._pictures, self._depths)
+            self._moving = hypotheses(over_time, self._options.variation)
+            self._pictures, self._depths = [], []
+        moving = self._moving
         if not moving.objects.any():
             return np.zeros((len(views), views[0].height, views[0].width), np.int32)
         order = tour(views, self._reference(views))
@@ -101,15 +106,6 @@ class Sam3Masks(Masker):
         tracked = self._tracker.through_views(pictures, moving.objects[frame])
         objects = moving_in_views(tracked, moving, frame, self._options.overlap)
         return objects[np.argsort(order)]
-
-    def _hypotheses(self) -> Hypotheses:
-        """Run stage 1 at the first call and return its moving objects."""
-        if self._moving is None:
-            assert self._pictures, "observe the frames first"
-            tracked = self._tracker.over_time(self._pictures, self._depths)
-            self._moving = hypotheses(tracked, self._options.variation)
-            self._pictures, self._depths = [], []
-        return self._moving
 
     def _picture(self, frame: int, number: int, seen: Sequence[Seen], views: Sequence[Camera]) -> Picture:
         photo = None if self._colors is None else self._colors.at(frame, number)
