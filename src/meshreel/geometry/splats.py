@@ -96,8 +96,14 @@ def locate(
 
     Return the faces, the weights of their corners, and the derivatives of these by the second and third base weight.
     """
+    return located(faces, np.column_stack([1 - weights.sum(axis=1), weights]), levels)
+
+
+def located(
+    faces: Int32[np.ndarray, " N"] | Int64[np.ndarray, " N"], corner_weights: Float64[np.ndarray, "N 3"], levels: int
+) -> tuple[Int64[np.ndarray, " N"], Float64[np.ndarray, "N 3"], Float64[np.ndarray, "N 2 3"]]:
+    """Convert places as `locate` does, given the weights of all three corners."""
     finer, along = faces.astype(np.int64), np.tile(np.array([[-1.0, 1.0, 0.0], [-1.0, 0.0, 1.0]]), (len(faces), 1, 1))
-    corner_weights = np.column_stack([1 - weights.sum(axis=1), weights])
     for _ in range(levels):
         largest = corner_weights.argmax(axis=1)
         is_inner = corner_weights.max(axis=1, initial=0) < 0.5

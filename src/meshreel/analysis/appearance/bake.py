@@ -17,6 +17,7 @@ from jaxtyping import Bool, Float64, Int32, Int64, UInt8
 from ...errors import InputError
 from ...geometry.atlas import MOST_SIDE, Layout
 from ...geometry.color_views import ColorViews, Paint, spread_colors
+from ...geometry.splats import located
 from ...geometry.topology import blend, face_normals
 from ...types import GREY, Mesh
 
@@ -71,23 +72,8 @@ def texels_of(layout: Layout, levels: int) -> Texels:
         weights.append(np.stack([1 - v[inside] - w[inside], v[inside], w[inside]], axis=1))
     numbers, first = np.unique(np.concatenate([np.zeros(0, np.int64), *pixels]), return_index=True)
     base_faces = np.concatenate([np.zeros(0, np.int64), *faces])[first]
-    finer, barycentric = _finer(base_faces, np.concatenate([np.zeros((0, 3)), *weights])[first], levels)
+    finer, barycentric, _ = located(base_faces, np.concatenate([np.zeros((0, 3)), *weights])[first], levels)
     return Texels(layout.height, layout.width, numbers, finer.astype(np.int32), barycentric)
-
-
-def _finer(faces: Numbers, weights: Weights, levels: int) -> tuple[Numbers, Weights]:
-    """Convert places on faces to places on the faces after `levels` midpoint subdivisions."""
-    for _ in range(levels):
-        largest = weights.argmax(axis=1)
-        at_corner = weights[np.arange(len(weights)), largest] >= 0.5
-        finer = 2 * weights
-        rows = np.flatnonzero(at_corner)
-        finer[rows, largest[rows]] -= 1  # (a, ab, ca), (ab, b, bc), (ca, bc, c)
-        inner = ~at_corner
-        a, b, c = weights[inner].T
-        finer[inner] = np.stack([1 - 2 * c, 1 - 2 * a, 1 - 2 * b], axis=1)  # (ab, bc, ca)
-        faces, weights = 4 * faces + np.where(at_corner, largest, 3), finer
-    return faces, weights
 
 
 def bake(paint: Paint, mesh: Mesh, texels: Texels) -> tuple[Colors, Known]:

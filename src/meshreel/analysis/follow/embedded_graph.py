@@ -21,7 +21,6 @@ from ...types import Mesh
 
 Points = Float64[np.ndarray, "P 3"]
 Nodes = Float64[np.ndarray, "N 3"]
-Cells = Int64[np.ndarray, " P"]  # the node to which each point belongs
 TURN = 0.01  # diagonals, weight of a difference of unit normals, so that both sides of a thin part get nodes: a guess
 SEEDED = 0.25  # largest share of nodes that begin a component: a guess
 TOGETHER = 2048  # points that are bound together: bounds memory (guess)
@@ -48,7 +47,7 @@ class DeformationGraph:
     cells: Int64[np.ndarray, " V"]
     hood: Int64[np.ndarray, "N h"]  # each node and those at most two edges away, padded with -1
 
-    def bind(self, points: Points, cells: Cells) -> Binding:
+    def bind(self, points: Points, cells: Int64[np.ndarray, " P"]) -> Binding:
         """Bind points to the nearest `NEIGHBOURS` nodes of their cells' hoods; weights fall to 0 at the next one."""
         count, bound = min(NEIGHBOURS, self.hood.shape[1]), list[tuple[np.ndarray, np.ndarray]]()
         for at in range(0, max(len(points), 1), TOGETHER):

@@ -30,8 +30,6 @@ TOLERANCE = 2e-4  # stop when a round lowers the stress by less than this share 
 REACH = 2.0  # affinity is 1/2 at this many median distances to the nearest center (eq. 6's sigma; guess)
 SEED = 0  # seed of the eigenvector iteration's start
 Points = Float64[np.ndarray, "V 3"]
-Weights = Float64[np.ndarray, "V n"]
-Choices = Int64[np.ndarray, "V n"]  # centers near each vertex
 FRONT = 4.0  # factor on the distance by which a center lies in front of the surface: a guess
 HOOD = 8  # centers per neighbourhood (the paper's K_nbr), including the center itself
 FALLOFF = 1.0  # a weight falls to 1/e at this many center spacings beyond the point's nearest center (guess)
@@ -176,7 +174,7 @@ class Binding:
     """Centers that move each point, with their weights; valid for any target pose."""
 
     nearest: Int64[np.ndarray, " V"]  # k1, eq. 7
-    weights: Weights  # of the neighbours of k1; rows sum to 1
+    weights: Float64[np.ndarray, "V n"]  # of the neighbours of k1; rows sum to 1
 
 
 def neighbours(affinity: Float32[np.ndarray, "K K"]) -> Neighbours:
@@ -234,7 +232,7 @@ def moved_to(
 
 
 def _guard(
-    mesh: Mesh, near: Choices, nearest: Int64[np.ndarray, " V"], neighbours: Neighbours
+    mesh: Mesh, near: Int64[np.ndarray, "V n"], nearest: Int64[np.ndarray, " V"], neighbours: Neighbours
 ) -> Int64[np.ndarray, " V"]:
     """Replace k1 of a vertex if its affinity to the mesh neighbours' k1 is under half of the largest possible."""
     edges, _ = unique_edges(mesh.faces)

@@ -48,7 +48,6 @@ _STANDS = 1.5  # times the noise: surface that is farther off from one frame to 
 _STILL_BESIDE = 2.0  # the same beside a change, where cameras often see at grazing angles: a guess
 _SAME_TIME = 1  # largest difference, in inspected frames, between neighbours that change together: a guess
 FrameNumbers = Int32[np.ndarray, " P"]  # frame numbers
-Times = Int64[np.ndarray, " P"]  # indices of inspected frames
 Holds = Callable[[Sequence[Int64[np.ndarray, " C"]], list[int], float], Sequence[bool]]
 _REST = 10.0  # s of uninterrupted rest before or after the change: people do not stand still for as long (decision 18)
 _SHORT_REST = 0.8  # s of rest that suffice for surface that moves no more than noise, as a crate's (decision 28)
@@ -273,8 +272,8 @@ def _join(
                 out[group] = time if stands else never
 
 
-def _together(places: Places, chosen: Mask, at: Times, least: int) -> list[Int64[np.ndarray, " C"]]:
-    """Return the sets of at least `least` connected places that change at about the same time."""
+def _together(places: Places, chosen: Mask, at: Int64[np.ndarray, " P"], least: int) -> list[Int64[np.ndarray, " C"]]:
+    """Return the sets of at least `least` connected places that change at about the same time, inspected frame `at`."""
     numbers = np.flatnonzero(chosen)
     label = connected(places, numbers, lambda a, b: np.abs(at[numbers[a]] - at[numbers[b]]) <= _SAME_TIME)
     size = np.bincount(label, minlength=1)
