@@ -43,12 +43,12 @@ def interior_samples(mesh: Mesh, count: int, generator: np.random.Generator) -> 
     solid = Mesh(mesh.vertices, mesh.faces[face_normals(mesh)[1] > 0])  # zero areas break the winding number's tree
     if solid.is_empty:
         return Samples(mesh.vertices[np.unique(mesh.faces)], np.zeros(len(np.unique(mesh.faces)), np.int64))
-    spacing = _spacing(solid, count, generator)
-    points = _inside_grid(solid, spacing, generator) if spacing > 0 else np.zeros((0, 3))
-    if spacing <= 0:
-        spacing = float(np.sqrt(face_normals(solid)[1].sum() / count))
-    parts = _parts(solid)
-    if parts.max() == 0 and len(points) >= SHEET * face_normals(solid)[1].sum() / spacing**2:
+    area, parts = face_normals(solid)[1].sum(), _parts(solid)
+    if (spacing := _spacing(solid, count, generator)) > 0:
+        points = _inside_grid(solid, spacing, generator)
+    else:
+        points, spacing = np.zeros((0, 3)), float(np.sqrt(area / count))
+    if parts.max() == 0 and len(points) >= SHEET * area / spacing**2:
         return Samples(points, np.zeros(len(points), np.int64))
     labels = parts[Surface(solid).closest(points).faces] if len(points) else np.zeros(0, np.int64)
     points, labels = _with_sheets(solid, parts, points, labels, spacing)

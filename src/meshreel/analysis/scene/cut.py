@@ -67,8 +67,11 @@ def moving_places(places: Places) -> Mask:
     gaps = cKDTree(middles[seeds]).query(middles, distance_upper_bound=bound)[0]
     near = np.flatnonzero(gaps <= _REACH)
     moves = np.where(share >= _SHARE / 2, _EVIDENCE * share, 0.0)[near]
+    thin = max(1, np.count_nonzero(seeds) // 20_000)
+    seen_free, shares = middles[seeds][::thin], share[seeds][::thin]
+    nearest = cKDTree(seen_free).query(middles[near], k=np.arange(1, min(_AROUND, len(seen_free)) + 1))[1]
     always, around = _STILL
-    rests = always + around * _around(middles[near], middles[seeds], share[seeds])
+    rests = always + around * shares[nearest].mean(axis=1)
     first, second = _links(places, near)
     turn = _hollow(middles[near], places.normals[near], first, second)
     links = exp(-_HOLLOW * turn)
@@ -148,16 +151,6 @@ def _links(places: Places, chosen: Int64[np.ndarray, " C"]) -> tuple[Ends, Ends]
     second = number[places.beside[chosen]].reshape(-1)
     once = second > first
     return first[once], second[once]
-
-
-def _around(
-    points: Float64[np.ndarray, "N 3"], seeds: Float64[np.ndarray, "M 3"], share: Float64[np.ndarray, " M"]
-) -> Float64[np.ndarray, " N"]:
-    """Return the mean share of the seeds nearest to each point."""
-    thin = slice(None, None, max(1, len(seeds) // 20_000))
-    count = min(_AROUND, len(seeds[thin]))
-    nearest = cKDTree(seeds[thin]).query(points, k=np.arange(1, count + 1))[1]
-    return share[thin][nearest].mean(axis=1)
 
 
 def _hollow(
