@@ -1,8 +1,4 @@
-"""A rig's recording as a sequence of meshes, each frame fused when it is read.
-
-A rig's folder -> a MeshSequence and warnings for the user. A camera that moved is detected in its own data: the pixels
-of a camera that stands still measure mostly the same depths in all frames.
-"""
+"""A rig's recording as a sequence of meshes, each frame fused when it is read."""
 
 from __future__ import annotations
 
@@ -207,8 +203,7 @@ def open_recording(
     warnings = [*rig.remarks, *rig.missing()]
     for number, camera in enumerate(rig.cameras):
         seen = rig.looked_at(number)
-        blind = sum(not depth.any() for depth in seen)
-        if blind:
+        if blind := sum(not depth.any() for depth in seen):
             warnings.append(f"camera {camera.name} measures nothing in {blind} of {len(seen)} frames looked at")
         if (share := moved_share(seen)) > MOVED:
             text = f"{folder}: camera {camera.name} seems to move: {100 * share:.0f} % of its pixels see something else"

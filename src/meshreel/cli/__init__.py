@@ -110,16 +110,13 @@ def make_app(names: Sequence[str] = tuple(COMMANDS)) -> App:
     help = "Compression of time-varying meshes."
     app = App(name="meshreel", help=help, version=__version__, suppress_keyboard_interrupt=False)
     for name in names:
-        app.command(place_of(name), name=name, help=COMMANDS[name], help_epilogue=_epilogue(name))
+        examples = (f"    meshreel {name} {line}".rstrip() for line in EXAMPLES[name])
+        epilogue = "\n".join(["Examples:", "", *examples])  # Markdown
+        app.command(place_of(name), name=name, help=COMMANDS[name], help_epilogue=epilogue)
     added = {entry.name: entry.value for entry in entry_points(group=PLUGINS) if entry.name not in COMMANDS}
     for name, where in added.items():
         app.command(where, name=name, help=BENCH)
     return app
-
-
-def _epilogue(name: str) -> str:
-    """Return the end of a command's help, in Markdown."""
-    return "\n".join(["Examples:", "", *(f"    meshreel {name} {line}".rstrip() for line in EXAMPLES[name])])
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -98,7 +98,9 @@ def command(
     truth = None if knowing.truth is None else open_truth(knowing.truth, reading, len(sequence))
     try:
         with common.stages(len(sequence)) as progress:
-            row = _measured(sequence, other, _options(looking, sequence, other), progress)
+            row = compare_sequences(sequence, counted(other, progress), _options(looking, sequence, other)).to_row()
+            if captured(sequence).depth is not None:
+                row["depth"] = by_depth(captured(sequence), other, progress)
             if splats and isinstance(other, Video):
                 row |= compare_splats(sequence, other, progress)
             if truth is not None:
@@ -125,14 +127,6 @@ def _other(row: dict[str, Any], originals: str, decoded: str) -> Iterator[str]:
     if (share or 0.0) < ALIKE <= (own or 0.0):
         text = f"{decoded}: covers {100 * (share or 0.0):.0f} % of what the depth cameras of {originals} measured"
         yield f"{text}; is it of another recording, or of other frames (--frames)?"
-
-
-def _measured(
-    sequence: MeshSequence, other: MeshSequence, options: ComparisonOptions, progress: StageBars
-) -> dict[str, Any]:
-    """Compare the meshes of all frames, and judge those of a rig by its depth pictures."""
-    row = compare_sequences(sequence, counted(other, progress), options).to_row()
-    return row if captured(sequence).depth is None else row | {"depth": by_depth(captured(sequence), other, progress)}
 
 
 def _options(looking: Looking, sequence: MeshSequence, decoded: MeshSequence) -> ComparisonOptions:

@@ -1,7 +1,4 @@
-"""`meshreel demo`: record, capture, encode, decode and measure a room in which two people move.
-
-Everything is procedural. The output is the rig with its truth, the .reel file and a picture.
-"""
+"""`meshreel demo`: record, capture, encode, decode and measure a procedural room in which two people move."""
 
 from __future__ import annotations
 

@@ -48,8 +48,7 @@ def command(
     tables = [rate_table(row | _added_up(row) if is_long else row)]
     if row["background"] or len(row["tracks"]) > 1:
         tables += [_tracks(row, more), _states(row, more)]
-    recorded_line = f"recorded at encode: {recorded or 'nothing'}"
-    common.result(row, head, _looks(row), recorded_line, *tables, _groups(row, more))
+    common.result(row, head, _looks(row), f"recorded at encode: {recorded or 'nothing'}", *tables, _groups(row, more))
     common.warn(f"background: {state['error']}" for state in row["background"] if "error" in state)
     common.warn([f"audio: {row['audio']['error']}"] if "error" in (row["audio"] or {}) else [])
     common.warn(f"group {i}: {group['error']}" for i, group in enumerate(row["groups"]) if "error" in group)

@@ -8,7 +8,6 @@ from typing import Annotated, Any
 
 import numpy as np
 from cyclopts import Parameter
-from jaxtyping import UInt8
 
 from ..analysis.scene.labelling import Segmentation
 from ..analysis.scene.masks import CAMERAS, FrameViews, Masker, label_colors, look_at_labels, sheet, write_views
@@ -132,7 +131,10 @@ def _write_labels(scene: _Labelling, output: Path, previews: int, common: Common
     with replacing(output / CAMERAS) as file:
         file.write(pack_cameras(views))
     if chosen:
-        write_picture(_sheet(rows), output / SHEET)
+        most = np.sum([counts for _, counts in rows], axis=0)  # moving faces in each view
+        best = sorted(np.argsort(-most, kind="stable")[:COLUMNS].tolist())
+        cells = [FrameViews(row.frame, [row.pictures[view] for view in best]) for row, _ in rows]
+        write_picture(sheet(cells, best), output / SHEET)
     return _totals(moving, of_bodies) | {"views": len(views)}
 
 
@@ -148,13 +150,6 @@ def _totals(moving: list[int], of_bodies: list[list[int]]) -> dict[str, Any]:
     share = sum(moving) / max(sum(totals), 1)
     shares_row = {"moving_share": share, "moving_share_least": min(shares), "moving_share_most": max(shares)}
     return counted | shares_row | {"bodies": bodies}
-
-
-def _sheet(previews: list[tuple[FrameViews, list[int]]]) -> UInt8[np.ndarray, "Y X 3"]:
-    """Return a sheet with a row per frame of the views that show most moving faces, whose counts are given."""
-    counts = np.sum([moving_faces for _, moving_faces in previews], axis=0)
-    best = sorted(np.argsort(-counts, kind="stable")[:COLUMNS].tolist())
-    return sheet([FrameViews(row.frame, [row.pictures[view] for view in best]) for row, _ in previews], best)
 
 
 def _describe(row: dict[str, Any]) -> str:

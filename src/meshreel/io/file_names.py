@@ -1,8 +1,4 @@
-"""File names: the frame files of a sequence and their order, patterns, and names that are not Unicode text.
-
-In: a folder, a glob pattern, a file or a list of files, or URLs of these. Out: the files in the order of their frame
-numbers, and warnings.
-"""
+"""File names: the frame files of a sequence and their order, patterns, and names that are not Unicode text."""
 
 from __future__ import annotations
 

@@ -1,8 +1,7 @@
 """Files of inputs and outputs: on this machine, regular and of a bounded size, or behind URLs.
 
 A folder may hold pipes, devices and sparse files. URLs go through fsspec: s3://, gs://, https:// and others that it
-supports (extra `remote`). In: a path or a URL. Out: its bytes, the names in a folder, or a path to write to, whose file
-is uploaded when it is complete.
+supports (extra `remote`).
 """
 
 from __future__ import annotations

@@ -1,6 +1,5 @@
-"""Writer of GLB files (binary glTF 2.0): arrays and pictures one after the other, and the scene that refers to them.
+"""Writer of GLB files (binary glTF 2.0), whose binary chunk is never in memory as a whole.
 
-In: arrays. Out: numbers of accessors and materials, then the file, whose binary chunk is never in memory as a whole.
 Textures and colours of vertices are drawn unlit (KHR_materials_unlit); a face has one or the other, because glTF
 multiplies them: textured vertices keep their colours under a name that viewers ignore.
 """
@@ -128,15 +127,14 @@ class GlbFile:
             first, *targets = [{name: at for name, at in frame.items() if name != hidden} for frame in frames]
             if hidden == COLORS and COLORS in frames[0]:
                 first[PASSED_OVER] = frames[0][COLORS]
-            primitive = {"attributes": first, "indices": self._put_corners(faces.corners[chosen], what), "mode": 4}
+            corners = faces.corners[chosen].reshape(-1)
+            short = int(corners.max()) < _RESTART
+            self.open_view((TRIANGLES, 2 if short else 4, 0), target=_INDICES)
+            indices = self.put(corners.astype("<u2" if short else "<u4"), "SCALAR", what)
+            primitive = {"attributes": first, "indices": indices, "mode": 4}
             primitive |= {} if material is None else {"material": material}
             primitives.append(primitive | ({"targets": targets} if targets else {}))
         return primitives
-
-    def _put_corners(self, corners: Int32[np.ndarray, "F 3"], what: object) -> int:
-        short = int(corners.max()) < _RESTART
-        self.open_view((TRIANGLES, 2 if short else 4, 0), target=_INDICES)
-        return self.put(corners.reshape(-1).astype("<u2" if short else "<u4"), "SCALAR", what)
 
     def finish(self, file: BinaryIO | BytesIO, scene: dict[str, Any]) -> None:
         """Write the complete file: header, description, and the spooled arrays."""

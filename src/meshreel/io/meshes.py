@@ -1,8 +1,4 @@
-"""Reader of one mesh file of any supported format.
-
-In: a path. Out: a checked mesh, and the names of other data in the file, which are dropped. Raises InputError for files
-that cannot be used.
-"""
+"""Reader of one mesh file of any supported format."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Reader of .npz files with `vertices` (T x V x 3) and `faces` (F x 3), one frame at a time.
 
 They may have `colors` (V x 3, or T x V x 3), and `uv` (F x 3 x 2) with `texture` (H x W x 3, or T x H x W x 3).
-In: a path. Out: frames by number. A stream is read forward, with one frame in memory; going back restarts it.
+A stream is read forward, with one frame in memory; going back restarts it.
 """
 
 from __future__ import annotations
@@ -118,7 +118,11 @@ class Archive:
 
     def load(self, index: int, where: str) -> Loaded:
         with _reading(where):
-            return checked(self._polygons(index))
+            vertices = self._vertices.row(index).astype(np.float64)
+            colors = None if self._colors is None else eight_bits(self._colors.row(index))
+            texture = None if self._texture is None else Texture(partial(self._picture, index))
+            dropped = frozenset({"a texture (without uv)"} if self._uv is None and texture is not None else ())
+            return checked(Polygons(vertices, self._corners, self._sizes, dropped, colors, self._uv, texture))
 
     def _check_colors(self) -> None:
         """Raise InputError if colours or pictures do not match the vertices and frames."""
@@ -133,13 +137,6 @@ class Archive:
             raise InputError(f"{self.path}: {texture}; it must be uint8 H x W x 3, or T x H x W x 3")
         if texture is not None and texture.shape[0] * texture.shape[1] > MOST_PIXELS:
             raise InputError(f"{self.path}: {texture}, more than 8192 x 8192 pixels; make it smaller")
-
-    def _polygons(self, index: int) -> Polygons:
-        vertices = self._vertices.row(index).astype(np.float64)
-        colors = None if self._colors is None else eight_bits(self._colors.row(index))
-        texture = None if self._texture is None else Texture(partial(self._picture, index))
-        dropped = frozenset({"a texture (without uv)"} if self._uv is None and texture is not None else ())
-        return Polygons(vertices, self._corners, self._sizes, dropped, colors, self._uv, texture)
 
     def _picture(self, index: int) -> UInt8[np.ndarray, "H W 3"]:
         assert self._texture is not None

@@ -1,7 +1,4 @@
-"""Parser of Wavefront OBJ without a Python loop over lines, which would take ten times as long.
-
-In: the bytes of a file. Out: Polygons. Reads `v/vt/vn` corners, negative indices, continued lines and any newline.
-"""
+"""Parser of Wavefront OBJ without a Python loop over lines, which would take ten times as long."""
 
 from __future__ import annotations
 

@@ -1,14 +1,13 @@
 """Pictures: of textures and of colour cameras, as 8-bit sRGB, from any file that Pillow reads; of depth; and masks.
 
-In: a file, or the materials that an OBJ names. Out: an array H x W x 3, read on access and cached for a while. Depth is
-16-bit grayscale PNG, the usual recording of depth cameras, in the unit of the camera; 0 means no measurement. Masks are
-8-bit PNG of object numbers, 0 for still surface (gray or palette indices, as by DAVIS and most mask tools), one folder
-for each view.
+Depth is 16-bit grayscale PNG, in the unit of the camera; 0 means no measurement. Masks are 8-bit PNG of object numbers,
+0 for still surface (gray or palette indices, as by DAVIS and most mask tools), one folder for each view.
 """
 
 from __future__ import annotations
 
 import io
+import os
 import re
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
@@ -118,16 +117,9 @@ def texture_of_materials(mesh: Place, files: tuple[str, ...], used: tuple[str, .
     if not pictures or (picture := pictures.pop()) is None:
         return None, frozenset(dropped)
     place = _beside(mesh, picture)
-    if isinstance(place, Path) and not _exists(place):
+    if isinstance(place, Path) and not os.path.exists(place):  # noqa: PTH110  (no error for a name too long, or a null)
         return None, frozenset(dropped | {f"a texture ({picture} is not there)"})
     return Texture(partial(read_picture, place)), frozenset(dropped)  # read when its pixels are asked for
-
-
-def _exists(place: Path) -> bool:
-    try:
-        return place.exists()
-    except (OSError, ValueError):  # of a name too long, or with a null
-        return False
 
 
 def _beside(mesh: Place, name: str) -> Place:

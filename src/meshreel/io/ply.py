@@ -41,7 +41,7 @@ class _Property:
 class _Element:
     name: str
     rows: int
-    properties: tuple[_Property, ...]
+    properties: list[_Property]
 
 
 def parse_ply(data: bytes) -> Polygons:
@@ -86,11 +86,11 @@ def _header(lines: list[str]) -> tuple[str, list[_Element]]:
             case ["format", ("ascii" | "binary_little_endian" | "binary_big_endian") as encoding, _]:
                 pass
             case ["element", name, rows] if rows.isdecimal() and len(rows) <= _DIGITS:
-                elements.append(_Element(name, int(rows), ()))
+                elements.append(_Element(name, int(rows), []))
             case ["property", "list", count, kind, name] if count in _TYPES and kind in _TYPES and elements:
-                elements[-1] = _with(elements[-1], _Property(name, _dtype(kind, encoding), _dtype(count, encoding)))
+                elements[-1].properties.append(_Property(name, _dtype(kind, encoding), _dtype(count, encoding)))
             case ["property", kind, name] if kind in _TYPES and elements:
-                elements[-1] = _with(elements[-1], _Property(name, _dtype(kind, encoding), None))
+                elements[-1].properties.append(_Property(name, _dtype(kind, encoding), None))
             case [] | ["comment", *_] | ["obj_info", *_]:
                 pass
             case _:
@@ -98,10 +98,6 @@ def _header(lines: list[str]) -> tuple[str, list[_Element]]:
     if not encoding:
         raise Unreadable("PLY header names no format")
     return encoding, elements
-
-
-def _with(element: _Element, new: _Property) -> _Element:
-    return _Element(element.name, element.rows, (*element.properties, new))
 
 
 def _dtype(kind: str, encoding: str) -> np.dtype:
@@ -147,7 +143,8 @@ class _Text:
             if ((length < 0) | (place + length > ends)).any():
                 raise _short(element, int(np.argmax((length < 0) | (place + length > ends))))
             if field.name == wanted:
-                items, sizes = whole(padded[_ranges(place, length)], "PLY index"), length
+                listed = np.repeat(place - (np.cumsum(length) - length), length) + np.arange(int(length.sum()))
+                items, sizes = whole(padded[listed], "PLY index"), length
             place = place + length
         return columns, items, sizes
 
@@ -178,20 +175,15 @@ class _Binary:
     def _lengths_of_first_row(self, element: _Element) -> list[int]:
         at, lengths = self._at, []
         for field in element.properties:
-            length, at = self._length(field, at)
+            length = 1
+            if field.count is not None:
+                end, order = at + field.count.itemsize, "big" if field.count.byteorder == ">" else "little"
+                length, at = int.from_bytes(self._data[at:end], order), end  # type: ignore[arg-type]
             lengths.append(length)
             at += length * field.dtype.itemsize
             if at > len(self._data):
                 raise _short(element, 0)
         return lengths
-
-    def _length(self, field: _Property, at: int) -> tuple[int, int]:
-        """Return the number of items of a field in the row at `at`, and where they begin."""
-        if field.count is None:
-            return 1, at
-        end = at + field.count.itemsize
-        order = "big" if field.count.byteorder == ">" else "little"
-        return int.from_bytes(self._data[at:end], order), end  # type: ignore[arg-type]
 
     def _uneven_rows(self, element: _Element, wanted: str | None) -> tuple[Columns, np.ndarray, np.ndarray]:
         """Read rows of different lengths: where a row begins depends on the row before."""
@@ -222,11 +214,6 @@ def _even_rows(element: _Element, rows: np.ndarray, wanted: str | None) -> tuple
             block = rows[f"{k}"]
             items, sizes = whole(block.reshape(-1), "PLY index"), np.full(len(block), block.shape[1], dtype=np.int64)
     return columns, items, sizes
-
-
-def _ranges(begins: np.ndarray, lengths: np.ndarray) -> np.ndarray:
-    """Return begin, begin + 1, ... of each range, one range after the other."""
-    return np.repeat(begins - (np.cumsum(lengths) - lengths), lengths) + np.arange(int(lengths.sum()))
 
 
 def _short(element: _Element, row: int) -> Unreadable:

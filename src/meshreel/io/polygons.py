@@ -1,8 +1,4 @@
-"""Polygons of a mesh file, their triangulation, and lines of numbers in text files.
-
-In: vertices and the corners of all polygons. Out: triangles in the order of the file, with their orientation. Numbers
-of lines are parsed by the core.
-"""
+"""Polygons of a mesh file, their triangulation in the order of the file, and lines of numbers in text files."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Sequences of meshes from files, read lazily: one frame in memory at a time.
-
-In: a folder, a glob, a list of files, one file or an .npz, and SequenceOptions. Out: FileSequence (a MeshSequence).
-"""
+"""Sequences of meshes from files, read lazily: one frame in memory at a time."""
 
 from __future__ import annotations
 

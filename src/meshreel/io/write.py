@@ -1,9 +1,7 @@
 """Writer of PLY, OBJ, GLB and NPZ files, which appear complete or not at all.
 
-In: a mesh and a path, whose extension selects the format. Out: a file that `open_sequence` can read. Until it is
-complete, an output has a temporary name beside the final one, and a lock. The lock ends with its process, however that
-ends, and the name is the same in every run: the next run with the same output takes over the file of a killed run, and
-leaves that of a living run alone.
+Until it is complete, an output has a temporary name beside the final one, the same in every run, and a lock that ends
+with its process: the next run takes over the file of a killed run, and leaves that of a living run alone.
 """
 
 from __future__ import annotations
@@ -190,10 +188,8 @@ def _primitives(file: GlbFile, mesh: Mesh) -> list[dict[str, Any]]:
 
 
 def _fits_float32(mesh: Mesh) -> bool:
-    if len(mesh.vertices) == 0:
-        return True
     lost = np.abs(mesh.vertices - mesh.vertices.astype(np.float32))
-    return bool(lost.max() <= _TOLERANCE * mesh.diagonal)
+    return bool(lost.max(initial=0.0) <= _TOLERANCE * mesh.diagonal)
 
 
 _FORMATS: dict[str, Callable[[Mesh, Path], bytes]] = {

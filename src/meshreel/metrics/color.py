@@ -1,8 +1,7 @@
 """Errors of colours between two surfaces, point by point as MPEG's tools measure them, and in unlit renders on white.
 
-An original and a decoded mesh with colours -> ColorErrors: points are spread evenly over one surface and have their
-colours compared with those of the closest points of the other; the same the other way round, and the worse counts.
-With cameras -> RenderErrors. Luma and colour differences are those of ITU-R BT.709, full range.
+Points are spread evenly over one surface and have their colours compared with those of the closest points of the other;
+the same the other way round, and the worse counts. Luma and colour differences are those of ITU-R BT.709, full range.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
 """All metrics of a decoded sequence against its originals: a row per frame, aggregates, and the cameras.
 
-Two iterables of meshes -> Comparison. Frames are read one at a time, and once before for the bounding box if no cameras
-are given. Rate and times are measured elsewhere. Aggregates are the mean over frames (PSNR: mean of dB, an infinite
-value counts as `PSNR_CEILING`) and the worst frame; frames without surface on both sides are left out.
+Aggregates are the mean over frames (PSNR: mean of dB, an infinite value counts as `PSNR_CEILING`) and the worst frame;
+frames without surface on both sides are left out.
 """
 
 from __future__ import annotations

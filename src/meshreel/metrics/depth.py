@@ -1,10 +1,9 @@
 """Measures of a decoded scene by the depth pictures it was made from: surface covered, invented and lost, and flicker.
 
-Depth pictures of still cameras and decoded meshes -> a row of numbers. No truth is needed, so recordings are judged as
-simulated rigs are. A pixel shows still surface where its depth is the usual one, and a body where it is nearer. Pixels
-beside a step in depth or a hole do not count: a sensor mixes both sides there. For the flicker of a body, its motion is
-removed piece by piece: the points of a frame are registered to those of the next, first all together, then in blocks of
-half the size each time, point to plane. Real deformation within a block remains: compare with the flicker of the input.
+A pixel shows still surface where its depth is the usual one, and a body where it is nearer. Pixels beside a step in
+depth or a hole do not count: a sensor mixes both sides there. For the flicker of a body, its motion is removed piece by
+piece: the points of a frame are registered to those of the next, first all together, then in blocks of half the size
+each time, point to plane. Real deformation within a block remains: compare with the flicker of the input.
 """
 
 from __future__ import annotations
@@ -152,8 +151,7 @@ class DepthJudge:
         return int((heights < third).sum()), int(covered[heights < third].sum())
 
     def _body(self, camera: int, depth: Depths) -> Mask:
-        nearer = depth < self._usual.get(camera, 0.0) - apart(depth)
-        return _large((depth > 0) & nearer, SPECK)
+        return _large((depth > 0) & (depth < self._usual.get(camera, 0.0) - apart(depth)), SPECK)
 
     def _heights(self, pictures: Sequence[DepthPicture | None]) -> Float64[np.ndarray, " N"]:
         """Return the heights of a body's measured points in a frame, m."""

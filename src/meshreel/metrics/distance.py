@@ -1,8 +1,7 @@
 """Distances, PSNRs and normal errors between two surfaces, from one round of closest-point queries.
 
-An original and a decoded mesh in the same unit -> SurfaceErrors. Conventions: two empty meshes are equal (distances 0,
-PSNR inf, angle 0); one empty mesh is the worst case (distances inf, PSNR 0 dB, angle 180 degrees). Distances under
-2^-22 of the diagonal, the resolution of the float32 queries, count as 0, and a PSNR over PSNR_CEILING as infinite.
+Two empty meshes are equal (distances 0, PSNR inf, angle 0); one empty mesh is the worst case (distances inf, PSNR 0 dB,
+angle 180 degrees). Distances under 2^-22 of the diagonal, the resolution of the float32 queries, count as 0.
 """
 
 from __future__ import annotations
@@ -124,21 +123,16 @@ def surface_errors(original: Mesh | Original, decoded: Mesh) -> SurfaceErrors:
         return SurfaceErrors(original.diagonal, errors, errors)
     a, b = prepared.samples, sample(decoded, original.middle)
     if (unit := _unit(a.mesh, b.mesh)) != 1:  # in metres, squares of the queries' float32 would be inf or 0
-        smaller = surface_errors(_scaled(original, 1 / unit), _scaled(decoded, 1 / unit))
+        smaller = surface_errors(*(Mesh.of(mesh.vertices * (1 / unit), mesh.faces) for mesh in (original, decoded)))
         return SurfaceErrors(original.diagonal, smaller.forward.times(unit), smaller.backward.times(unit))
-    diagonal = original.diagonal
-    resolution = RESOLUTION * diagonal
-    return SurfaceErrors(diagonal, _one_way(a, match(a, b, resolution)), _one_way(b, match(b, a, resolution)))
+    ways = (_one_way(one, match(one, other, RESOLUTION * original.diagonal)) for one, other in ((a, b), (b, a)))
+    return SurfaceErrors(original.diagonal, *ways)
 
 
 def _unit(a: Mesh, b: Mesh) -> float:
     """Return a power of two near the extent of both centered meshes; 1 for the extents of usual scans, m."""
     extent = max(float(np.abs(mesh.vertices).max()) for mesh in (a, b))
     return 1.0 if _LEAST <= extent <= _MOST else 2.0 ** math.floor(math.log2(extent))
-
-
-def _scaled(mesh: Mesh, factor: float) -> Mesh:
-    return Mesh.of(mesh.vertices * factor, mesh.faces)
 
 
 _PERFECT = OneWayErrors(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)

@@ -1,8 +1,7 @@
 """Comparison sheet: original, decoded mesh and error heat map of chosen frames in one PNG.
 
-Two sequences -> PNG. The first two columns show the colours of frames that have some, else normals as colors (see
-`render`). The heat map shows, where a ray meets the original, the distance of that point from the decoded surface;
-pixels that only the decoded mesh covers (invented surface) are magenta. Drawn by matplotlib's Agg, without a display.
+The heat map shows, where a ray meets the original, the distance of that point from the decoded surface; pixels that
+only the decoded mesh covers (invented surface) are magenta.
 """
 
 from __future__ import annotations
@@ -63,8 +62,7 @@ class SheetRow:
 def write_sheet(originals: Frames, decoded: Frames, path: Path, options: SheetOptions | None = None) -> None:
     """Write the PNG, with a line for each chosen frame and camera."""
     options = options or SheetOptions()
-    rows = list(_rows(originals, decoded, options))
-    figure = _draw(rows, options)
+    figure = _draw(list(_rows(originals, decoded, options)), options)
     with replacing(path) as file:
         figure.savefig(file, format="png", dpi=_DPI)
 

@@ -1,9 +1,8 @@
 """MPEG's own measures of meshes, as its tool mmetric and the conditions of V-DMC define them: D1, D2 and IBSM.
 
-Two meshes and the box of all originals -> MpegErrors. Read from mmetric 1.1 (MPEGGroup/mpeg-pcc-mmetric) and the
-configurations of V-DMC's test model 4, for facts. D1 and D2 compare points where the lines of a grid meet each surface.
-IBSM compares pictures from sixteen sides. Both are limited to 99.99 dB, the value of equal meshes. Left out: the mean
-over points that are equally near, and mmetric's culling of back faces, which closed meshes hide anyway.
+Read from mmetric 1.1 (MPEGGroup/mpeg-pcc-mmetric) and the configurations of V-DMC's test model 4, for facts. D1 and D2
+compare points where the lines of a grid meet each surface, IBSM pictures from sixteen sides. Left out: the mean over
+points that are equally near, and mmetric's culling of back faces, which closed meshes hide anyway.
 """
 
 from __future__ import annotations
@@ -115,8 +114,7 @@ def _crossed(
     number = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
     lines = first[face_numbers] + np.stack(np.divmod(number, np.maximum(sizes[face_numbers, 1], 1)), axis=1)
     a, b, c = (flat[face_numbers, corner] for corner in range(3))
-    edges = [(b, c), (c, a), (a, b)]
-    barycentric = np.stack([_turn(end - start, lines - start) for start, end in edges], axis=1)
+    barycentric = np.stack([_turn(t - s, lines - s) for s, t in ((b, c), (c, a), (a, b))], axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):  # no line is inside a face that is seen edge-on
         barycentric /= _turn(b - a, c - a)[:, None]
     inside = (barycentric >= 0).all(axis=1)

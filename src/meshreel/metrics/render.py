@@ -70,13 +70,14 @@ class View:
 
 def crop_of(meshes: list[Mesh], camera: AnyCamera, border: int = 8) -> Crop:
     """Return the crop of all pixels that can see a mesh, widened by `border` pixels and clipped to the image."""
-    full = Crop(0, camera.height, 0, camera.width)
     vertices = np.concatenate([m.vertices for m in meshes])
     if len(vertices) == 0:
         return Crop(0, 0, 0, 0)
-    pixels = camera.project(_to_camera(vertices, camera))
+    rotation = camera.extrinsic[:3, :3]
+    eye = -np.linalg.solve(rotation, camera.extrinsic[:3, 3])
+    pixels = camera.project((vertices - eye) @ rotation.T)
     if not np.isfinite(pixels).all():  # something reaches behind the eye: no rectangle bounds it
-        return full
+        return Crop(0, camera.height, 0, camera.width)
     limits = np.array([camera.width, camera.height])
     low = np.clip(np.floor(pixels.min(axis=0)) - border, 0, limits).astype(int)
     high = np.clip(np.ceil(pixels.max(axis=0)) + border, 0, limits).astype(int)
@@ -132,12 +133,6 @@ class Visible:
         corners, weights = mesh.faces[answer.faces[hit]], answer.barycentric[hit]
         normals = interpolate(self._normals, corners, weights)
         return View(crop, hit.reshape(crop.shape), mesh, corners, weights, normals)
-
-
-def _to_camera(vertices: Float64[np.ndarray, "V 3"], camera: AnyCamera) -> Float64[np.ndarray, "V 3"]:
-    rotation = camera.extrinsic[:3, :3]
-    eye = -np.linalg.solve(rotation, camera.extrinsic[:3, 3])
-    return (vertices - eye) @ rotation.T
 
 
 _C1, _C2 = 0.01**2, 0.03**2  # Wang et al., at data range 1

@@ -1,18 +1,16 @@
 """Accuracy and coverage of a scene against the truth: of all surface, of moving people and of the still background.
 
-Two meshes of one frame with labelled faces, and the cameras that saw it -> a row of numbers. The truth is known only of
-simulated rigs; the noisy input may take its place. Accuracy is measured backward, from points spread evenly over the
-decoded area to the reference; coverage forward, of a truth from visible surface only: in a camera's picture and range,
-not hidden, not edge-on. The peak of PSNRs is the diagonal of the whole reference scene, for its parts too. Forward is
-the paper's way and serves for the noisy input; against a truth it measures only the size of holes. SSIM is that of
-normal renders from these cameras, over pixels where either mesh shows the part; flicker of people is the change of the
-normals in these renders between successive frames, beyond the truth's.
+Accuracy is measured backward, from points spread evenly over the decoded area to the reference; coverage forward, of a
+truth from visible surface only: in a camera's picture and range, not hidden, not edge-on. The peak of PSNRs is the
+diagonal of the whole reference scene, for its parts too. SSIM is that of normal renders from these cameras, over pixels
+where either mesh shows the part; flicker of people is the change of the normals in these renders between successive
+frames, beyond the truth's.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -98,7 +96,7 @@ class Scene:
         parts = (("people", self.dynamic, self.options.people), ("background", ~self.dynamic, self.options.background))
         samples = {name: scatter(self.mesh, chosen, count) for name, chosen, count in parts}
         if self.complete:
-            samples = {name: _only(points, visible(self, points)) for name, points in samples.items()}
+            samples = {name: points.only(visible(self, points)) for name, points in samples.items()}
         return samples
 
     @cached_property
@@ -223,8 +221,7 @@ class _Matched:
         people = np.repeat([name == "people" for name in parts], [len(points) for points in parts.values()])
         weights = np.concatenate([np.full(len(p), p.area / max(len(p), 1)) for p in parts.values()])
         if target.mesh.is_empty or len(weights) == 0:
-            worst = np.full(len(weights), np.inf), np.full(len(weights), WORST_ANGLE)
-            return _Matched(people, weights, *worst)
+            return _Matched(people, weights, np.full(len(weights), np.inf), np.full(len(weights), WORST_ANGLE))
         points = np.concatenate([p.points for p in parts.values()]) + (source.origin - target.origin)
         hits = target.surface.closest(points)
         distances = np.linalg.norm(hits.points - points, axis=1)
@@ -266,11 +263,6 @@ def _coverage(forward: _Matched, reference: Scene) -> Row:
     return {"coverage_rms_m": math.sqrt(square), "covered": within, "d2_psnr_forward": d2}
 
 
-def _only(points: Scatter, kept: Bool[np.ndarray, " N"]) -> Scatter:
-    share = float(kept.mean()) if len(kept) else 0.0
-    return Scatter(points.points[kept], points.faces[kept], points.barycentric[kept], points.area * share)
-
-
 def _picture(scene: Scene, camera: Camera) -> ScenePicture:
     shape = (camera.height, camera.width)
     colors = np.full((*shape, 3), BACKGROUND, np.float32)
@@ -290,16 +282,11 @@ def _ssim_row(reference: Sequence[ScenePicture], decoded: Sequence[ScenePicture]
     scores: dict[str, list[float]] = {part: [] for part in PARTS}
     for a, b in zip(reference, decoded, strict=True):
         scored = ssim_map(a.colors.astype(np.float64), b.colors.astype(np.float64))
-        for part, mask in _masks(a, b):
+        inside = np.zeros(a.covered.shape, bool)
+        inside[BORDER:-BORDER, BORDER:-BORDER] = True  # SSIM leaves the border out
+        covered, people = (a.covered | b.covered) & inside, (a.dynamic | b.dynamic) & inside
+        for part, mask in (("all", covered), ("people", people), ("background", covered & ~people)):
             if mask.any():
                 scores[part].append(float(scored[mask].mean()))
     names = {part: "ssim_masked" if part == "all" else f"{part}_ssim_masked" for part in PARTS}
     return {names[part]: float(np.mean(values)) if values else None for part, values in scores.items()}
-
-
-def _masks(a: ScenePicture, b: ScenePicture) -> Iterator[tuple[str, Bool[np.ndarray, "H W"]]]:
-    """Yield the pixels of each part, without the border that SSIM leaves out."""
-    inside = np.zeros(a.covered.shape, bool)
-    inside[BORDER:-BORDER, BORDER:-BORDER] = True
-    covered, people = (a.covered | b.covered) & inside, (a.dynamic | b.dynamic) & inside
-    yield from (("all", covered), ("people", people), ("background", covered & ~people))

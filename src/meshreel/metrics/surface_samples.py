@@ -1,10 +1,8 @@
 """Samples of surfaces, their closest points on another surface, and the angles between the normals there.
 
-Two meshes -> Samples -> Matches. Samples of a mesh are its vertices, in order, followed by a quadrature of its area, so
-that one round of queries serves both the vertex-based metrics and the area-weighted ones. Mesh -> Scatter: points for
-equal areas without random numbers; the same mesh gives the same points. Normals are area-weighted vertex normals,
-interpolated with barycentric weights; vertices at equal positions (UV seams) share one. Their error does not show in
-distance PSNR (57-63 dB can go with 11-17 degrees).
+Samples of a mesh are its vertices, in order, followed by a quadrature of its area, so that one round of queries serves
+both the vertex-based metrics and the area-weighted ones. Normals are area-weighted vertex normals, interpolated with
+barycentric weights; vertices at equal positions (UV seams) share one.
 """
 
 from __future__ import annotations
@@ -84,8 +82,7 @@ def match(source: Samples, target: Samples, resolution: float) -> Matches:
 
 def used_surface(mesh: Mesh) -> Mesh:
     """Remove zero-area faces and vertices that no face uses; the result may be empty."""
-    areas = face_normals(mesh)[1]
-    return drop_unreferenced(Mesh.of(mesh.vertices, mesh.faces[areas > 0]))
+    return drop_unreferenced(Mesh.of(mesh.vertices, mesh.faces[face_normals(mesh)[1] > 0]))
 
 
 def _centroids(values: Float64[np.ndarray, "V 3"], faces: Int32[np.ndarray, "F 3"]) -> Float64[np.ndarray, "F 3"]:
@@ -148,6 +145,10 @@ class Scatter:
 
     def __len__(self) -> int:
         return len(self.points)
+
+    def only(self, kept: Bool[np.ndarray, " N"]) -> Scatter:
+        share = float(kept.mean()) if len(kept) else 0.0
+        return Scatter(self.points[kept], self.faces[kept], self.barycentric[kept], self.area * share)
 
 
 def scatter(mesh: Mesh, chosen: Bool[np.ndarray, " F"], count: int) -> Scatter:

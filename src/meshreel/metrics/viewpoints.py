@@ -1,7 +1,4 @@
-"""Fixed views for renderings and SSIM, and their file (Open3D's pinhole camera JSON).
-
-A bounding box -> four cameras around it. Axes and pixels are those of `geometry.cameras`.
-"""
+"""Fixed views around a bounding box, for renderings and SSIM, and their file (Open3D's pinhole camera JSON)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,1 @@
-"""Web server of the player for `meshreel play` and `meshreel serve`. In: .reel files. Out: HTTP.
-
-Needs the extra `play` (starlette, uvicorn, trustme).
-"""
+"""Web server of the player for `meshreel play` and `meshreel serve`: needs the extra `play`."""

@@ -59,26 +59,20 @@ def make_app(
         Route("/gallery.{kind}", pages.own),
         Route("/player/{path:path}", pages.player, middleware=packed),
     ]
-    middleware = [Middleware(TrustedHostMiddleware, allowed_hosts=hosts, www_redirect=False), *_cors(cors)]
-    return Starlette(routes=routes, middleware=middleware, exception_handlers={OSError: _gone})
-
-
-def _cors(origins: Sequence[str]) -> list[Middleware]:
-    for origin in origins:
+    for origin in cors:
         if not _ORIGIN.fullmatch(origin):
             raise InputError(f"--cors {origin!r}: give scheme, host and port alone, as https://example.org, or *")
-    if not origins:
-        return []
-    return [
-        Middleware(
-            CORSMiddleware,
-            allow_origins=[origin.lower() for origin in origins],
-            allow_methods=("GET", "HEAD"),
-            allow_headers=("Range", "If-Range", "If-None-Match"),
-            allow_private_network=True,  # pages on the web may request files from the local network
-            expose_headers=EXPOSED,
-        )
-    ]
+    sharing = Middleware(
+        CORSMiddleware,
+        allow_origins=[origin.lower() for origin in cors],
+        allow_methods=("GET", "HEAD"),
+        allow_headers=("Range", "If-Range", "If-None-Match"),
+        allow_private_network=True,  # pages on the web may request files from the local network
+        expose_headers=EXPOSED,
+    )
+    middleware = [Middleware(TrustedHostMiddleware, allowed_hosts=hosts, www_redirect=False)]
+    middleware += [sharing] if cors else []
+    return Starlette(routes=routes, middleware=middleware, exception_handlers={OSError: _gone})
 
 
 class _Pages:
@@ -100,7 +94,6 @@ class _Pages:
         return _page(gallery_page(title, entries, f"/player/{self._edition}"), policy())
 
     async def watch(self, request: Request) -> Response:
-        """Return the page that plays one file."""
         name = request.path_params["name"]
         await self._path(name)
         return self._watch(name)

@@ -1,9 +1,4 @@
-"""Library of served .reel files: those in a folder and its subfolders, or one file.
-
-The folder is listed for each request.
-
-In: a folder. Out: names with slashes, and for each file its length and rate, or why it cannot be read.
-"""
+"""Library of served .reel files: those in a folder and its subfolders, listed for each request, or one file."""
 
 from __future__ import annotations
 

@@ -74,8 +74,7 @@ def gallery_page(title: str, entries: Sequence[Entry], player: str) -> str:
     head = _HEAD.format(title=escape(f"{title} · meshreel")) + '<link rel="stylesheet" href="/gallery.css">\n'
     for script in (f"{player}/meshreel-player.js", "/gallery.js") if entries else ():
         head += f'<script type="module" src="{script}"></script>\n'
-    tiles = "".join(map(_tile, entries))
-    body = f"<ul>\n{tiles}</ul>" if entries else "<p>This folder has no .reel files.</p>"
+    body = f"<ul>\n{''.join(map(_tile, entries))}</ul>" if entries else "<p>This folder has no .reel files.</p>"
     return f"{head}</head>\n<body>\n<main>\n<h1>{escape(title)}</h1>\n{body}\n</main>\n</body>\n</html>\n"
 
 

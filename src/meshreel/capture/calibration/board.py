@@ -1,7 +1,6 @@
 """Poses of colour cameras from a board of markers that is moved through their common view.
 
-In: colour pictures of a rig, and the board. Out: where the cameras stand, as far as some see the board in one frame.
-OpenCV finds the markers and the board's pose in each picture; the cameras' relative poses are means over frames.
+OpenCV finds the board's pose in each picture; the cameras' relative poses are means over frames.
 """
 
 from __future__ import annotations

@@ -1,11 +1,8 @@
 """Poses of a rig's depth cameras, refined on what they measure: all at once, on the surface that stands still.
 
-In: what each camera sees (`still_view`), with poses that are right to some degrees and centimetres. Out: poses with
-which the surfaces lie on each other, the distances of each pair, and what the surfaces leave open.
-
 Points of one camera meet the planes that another one sees at the pixels they project to (Chen and Medioni 1992); one
-least-squares problem has the motions of all cameras (Gauss-Newton). Of the motions that fit equally well it takes the
-smallest: the mean pose of cameras that see each other stays, and so does what no surface fixes.
+least-squares problem has the motions of all cameras (Gauss-Newton), from poses that are right to some degrees and
+centimetres. Of the motions that fit equally well it takes the smallest: what no surface fixes stays.
 """
 
 from __future__ import annotations
@@ -311,7 +308,6 @@ def write_calibration_sheet(calibration: Calibration, up: Up, path: Path) -> Non
 
 
 def _draw_distances(axis: Any, calibration: Calibration, when: str, limit: float) -> None:
-    """Draw the median distance of each pair, mm."""
     names = [camera.name for camera in calibration.cameras]
     table = np.full((len(names), len(names)), np.nan)
     for pair in calibration.pairs:

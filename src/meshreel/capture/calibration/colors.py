@@ -1,9 +1,7 @@
 """Gains and poses of colour cameras, solved from what several of them see of the same surface, and remembered.
 
-In: moments of a recording, each a mesh in metres and what the cameras took of it. Out: for each camera three gains and
-a rigid motion with which the cameras agree best. The meshes stay where they are: geometry says where the world is. A
-file beside `rig.json` keeps them, with the digest of what they were computed from: with other cameras, pictures or
-options they are found again.
+Moments of a recording -> for each camera three gains and a rigid motion with which the cameras agree best; the meshes
+stay where they are. A file beside `rig.json` keeps them, with the digest of what they were computed from.
 """
 
 from __future__ import annotations

@@ -1,8 +1,6 @@
 """Poses of cameras from other programs' files: COLMAP, OpenCV, caliscope, anipose, ROS and other rigs.
 
 A file -> camera names with 4 x 4 matrices from camera (x right, y down, z forward) to world, in the file's unit.
-Files that have the inverse, as most do, are inverted here. Poses -> a rig with them, and its description: a colour
-camera beside a depth camera goes with it, as how they stand to each other is known better than where they are.
 """
 
 from __future__ import annotations
@@ -79,8 +77,7 @@ def mean_pose(poses: Iterable[Matrix]) -> Matrix:
     stack = np.array(list(poses))
     if len(stack) > 2:
         apart = np.abs(stack[:, None] - stack[None]).sum(axis=(2, 3))
-        from_most = np.median(apart, axis=1)
-        middle = apart[int(from_most.argmin())]
+        middle = apart[int(np.median(apart, axis=1).argmin())]
         stack = stack[middle <= 3 * max(float(np.median(middle)), 1e-9)]  # guess
     mean = stack.mean(axis=0)
     mean[:3, :3] = strict.nearest_rotations(mean[None, :3, :3])[0][0]
@@ -256,8 +253,7 @@ def posed_by(rig: Rig, poses: Mapping[str, Matrix], kind: str, where: Path) -> t
         text = f"has poses of {', '.join(list(poses)[:8])} and of none of the {kind} cameras {', '.join(names)}"
         raise InputError(f"{where}: {text}; name them alike in {RIG}")
     lost = [name for name in names if name not in found]
-    warnings = [f"{where}: has no pose of {', '.join(lost)}, which stay where they were"] if lost else []
-    return posed, warnings
+    return posed, [f"{where}: has no pose of {', '.join(lost)}, which stay where they were"] if lost else []
 
 
 def described(rig: Rig) -> bytes:

@@ -1,7 +1,6 @@
 """Still surface in the view of a rig's camera: a small plane at each pixel.
 
-Depths of one camera in several frames -> their median, and planes fitted to it. Only the plane of a pixel whose window
-is flat up to the noise counts: edges, borders and what moves have none.
+Only the plane of a pixel whose window is flat up to the noise counts: edges, borders and what moves have none.
 """
 
 from __future__ import annotations

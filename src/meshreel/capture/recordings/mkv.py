@@ -1,8 +1,7 @@
 """Recordings of Azure Kinect and Orbbec Femto cameras: Matroska files with depth, colour and a calibration.
 
-Tracks are named by titles, depth is 16-bit big-endian (mm), `calibration.json` is attached:
-https://learn.microsoft.com/previous-versions/azure/kinect-dk/record-file-format. Its numbers are in shares of the
-sensor's picture, of which a mode takes a part.
+Their form: https://learn.microsoft.com/previous-versions/azure/kinect-dk/record-file-format. The numbers of
+`calibration.json` are in shares of the sensor's picture, of which a mode takes a part.
 """
 
 from __future__ import annotations
@@ -26,12 +25,10 @@ NARROW, ALL = ((192, 640), (180, 576)), ((0, 1024), (0, 1024))
 
 
 def fits(path: Path) -> bool:
-    """Return whether a file has the extension."""
     return path.suffix.lower() == ".mkv" and path.is_file()
 
 
 def read(path: Path) -> Take:
-    """Return the camera of a file."""
     import av
 
     with av.open(path) as video:

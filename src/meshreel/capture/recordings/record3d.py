@@ -26,12 +26,10 @@ FLIP = np.diag([1.0, -1.0, -1.0, 1.0])  # from x right, y down, z forward to ARK
 
 
 def fits(path: Path) -> bool:
-    """Return whether a file has the app's extension, or a folder what it exports."""
     return path.suffix.lower() == ".r3d" if path.is_file() else _folder(path) is not None
 
 
 def read(path: Path) -> Take:
-    """Return the camera of a recording."""
     if (folder := _folder(path)) is not None:
         names = sorted(f"{place}/{file.name}" for place in ("rgb", "depth") for file in (folder / place).glob("*.*"))
         load: Callable[[str], bytes] = partial(_stored, folder)

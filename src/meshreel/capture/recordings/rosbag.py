@@ -33,7 +33,6 @@ COMPRESSED = struct.Struct("<iff")  # before the PNG of compressedDepth: form, a
 
 
 def fits(path: Path) -> bool:
-    """Return whether a file has an extension of bags, or a folder what ROS 2 writes."""
     if path.is_file():
         return path.suffix.lower() in (".bag", ".mcap", ".db3")
     names = [one.name for one in path.iterdir()] if (path / "metadata.yaml").is_file() else []
@@ -41,7 +40,6 @@ def fits(path: Path) -> bool:
 
 
 def read(path: Path) -> Take:
-    """Return the cameras of a bag: one for each depth topic."""
     with _opened(path) as bag:
         topics = [topic for topic in bag.topics() if topic.deep is not None]
         named = [topic for topic in topics if topic.deep and "depth" in topic.name.lower()]
@@ -104,11 +102,9 @@ class _Bag:
         return next((message for _, message in self.messages(name)), None)
 
     def described(self) -> list[str]:
-        """Return a text for each topic."""
         return [f"{name} ({(kind.msgtype or '').split('/')[-1]})" for name, kind in sorted(self.reader.topics.items())]
 
     def topics(self) -> list[_Topic]:
-        """Return the topics with pictures."""
         found = []
         for name, kind in sorted(self.reader.topics.items()):
             if (kind.msgtype or "").endswith(("/Image", "/CompressedImage")):
@@ -232,7 +228,6 @@ def _lens(info: Any, straight: bool) -> Camera | None:
 
 
 def _pixels(message: Any) -> Picture:
-    """Return the picture in a message."""
     data = bytes(message.data)
     if not hasattr(message, "encoding"):
         return _unpacked(message.format, data)
@@ -248,7 +243,6 @@ def _pixels(message: Any) -> Picture:
 
 
 def _unpacked(form: str, data: bytes) -> Picture:
-    """Return the picture in a compressed message."""
     if "compressedDepth" in form:
         _, a, b = COMPRESSED.unpack_from(data)
         depth = parse_depth(data[COMPRESSED.size :], form)

@@ -23,12 +23,10 @@ RATE = 60.0  # 1/s, of ARKit's frames, where odometry.csv has no times
 
 
 def fits(path: Path) -> bool:
-    """Return whether a folder has what the app writes."""
     return (path / "odometry.csv").is_file() and (path / "depth").is_dir()
 
 
 def read(path: Path) -> Take:
-    """Return the camera of a folder."""
     with reading(path / "odometry.csv"):
         times, poses = _odometry(path)
     files = sorted((path / "depth").glob("*.png"))

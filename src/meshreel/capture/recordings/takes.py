@@ -1,7 +1,4 @@
-"""Takes: what one file or folder of a recorder holds, before it is a rig.
-
-A reader -> depth cameras, the colour cameras beside them, and their pictures in order, one in memory at a time.
-"""
+"""Takes: what one file or folder of a recorder holds, before it is a rig; one picture at a time is in memory."""
 
 from __future__ import annotations
 

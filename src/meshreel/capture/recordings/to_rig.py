@@ -84,7 +84,6 @@ class Clock:
 
     @property
     def rate(self) -> float:
-        """Frames a second."""
         return round(1 / self.period, 3) if self.period < 1000 else 1 / self.period
 
     def frames(self, times: Float64[np.ndarray, " P"]) -> dict[int, int]:
@@ -135,7 +134,6 @@ class _Part:
         self.camera(), self.beside()  # raise InputError for numbers that no camera has
 
     def camera(self) -> DepthCamera:
-        """Return the depth camera."""
         return self._as_camera(self.name, self.lens, self.pose)
 
     def beside(self) -> dict[str, Any] | None:

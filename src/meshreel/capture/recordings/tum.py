@@ -34,12 +34,10 @@ KNOWN = {
 
 
 def fits(path: Path) -> bool:
-    """Return whether a folder has a list of depth pictures."""
     return any((path / name).is_file() for name in ("depth.txt", *LISTS))
 
 
 def read(path: Path) -> Take:
-    """Return the camera of a folder."""
     depth, color = _lists(path)
     numbers = _numbers(path)
     seen, beside = _stream(depth, numbers, True), _stream(color, numbers, False) if color else None

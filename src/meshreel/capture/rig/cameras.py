@@ -6,7 +6,7 @@ In `rig.json` the middles of pixels are whole numbers: `cx` and `cy` are half a 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal, TypeVar
@@ -137,15 +137,6 @@ def pictures_in(folder: Path, name: str, kind: Literal["depth", "color"]) -> dic
     if not found:
         raise InputError(f"{folder}: camera {name} has no {kind} pictures (*{PICTURES[kind][0]}); record some")
     return found
-
-
-def check_frames(folder: Path, cameras: Sequence[ColorCamera], frames: Sequence[int]) -> None:
-    """Raise InputError where a camera has pictures of other frames than these, which depth cameras have."""
-    for camera in cameras:
-        if odd := set(camera.files) ^ set(frames):
-            counts = f"{len(camera.files)} color pictures for {len(frames)} frames of depth"
-            text = f"{folder}: camera {camera.name} has {counts}; only one of both has frame {min(odd)}"
-            raise InputError(f"{text}: give every frame a picture of its number, and no others")
 
 
 def distortion_of(entry: Mapping[str, Any]) -> tuple[float, ...]:

@@ -1,7 +1,7 @@
 """A rig: depth cameras that stand still around a scene, and the depth pictures that they recorded.
 
-A folder with `rig.json` <-> cameras and their depths, frame by frame. A folder with `camera.json` and `depth/` is a rig
-of one camera. Pictures of different cameras belong to one frame if their file names have the same number.
+A folder with `camera.json` and `depth/` is a rig of one camera. Pictures of different cameras belong to one frame if
+their file names have the same number.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from ...io.files import read_json
 from ...io.pictures import read_depth
 from ...io.write import replacing
 from ...types import UP_AXES, UPS, Up
-from .cameras import ColorCamera, DepthCamera, check_frames, check_size, distortion_of, pictures_in, placed
+from .cameras import ColorCamera, DepthCamera, check_size, distortion_of, pictures_in, placed
 
 RIG, SINGLE = "rig.json", "camera.json"
 LOOKED_AT = 12  # frames examined for movement and for what stands still, spread over the recording (guess)
@@ -79,13 +79,19 @@ class Rig:
 
     def missing(self) -> list[str]:
         """Return a warning for each camera that lacks frames, and one for frames that no camera has."""
-        frames, warnings = set(self.frames), []
+        frames, warnings = self.frames, []
         for camera, files in zip(self.cameras, self.files, strict=True):
-            lost = sorted(frames - set(files))
-            if lost:
+            if lost := sorted(set(frames) - set(files)):
                 text = f"camera {camera.name} lacks {len(lost)} of {len(frames)} frames, for example {lost[0]}"
                 warnings.append(f"{text}; they are fused without it")
-        return warnings + _gaps(self.frames)
+        pairs = list(pairwise(frames))
+        step = min((after - before for before, after in pairs), default=1)
+        gaps = [(before + step, (after - before - 1) // step) for before, after in pairs if after - before > step]
+        if gaps:
+            count = sum(many for _, many in gaps)
+            text = f"no camera has {count} of the frames {frames[0]} to {frames[-1]}, for example {gaps[0][0]}"
+            warnings.append(f"{text}; the frames after a gap are shown earlier")
+        return warnings
 
 
 def read_rig(folder: Path) -> Rig:
@@ -97,7 +103,11 @@ def read_rig(folder: Path) -> Rig:
     colors = [_color_camera(folder, entries[k]["color"], cameras[k].record(), k) for k in beside]
     colors += [_color_camera(folder, entry, {"name": f"color{number}"}) for number, entry in enumerate(alone)]
     rig = Rig(folder, cameras, files, rate, tuple(_unknown(folder, entries)), tuple(colors))
-    check_frames(folder, colors, rig.frames)
+    for camera in colors:
+        if odd := set(camera.files) ^ set(rig.frames):
+            counts = f"{len(camera.files)} color pictures for {len(rig.frames)} frames of depth"
+            text = f"{folder}: camera {camera.name} has {counts}; only one of both has frame {min(odd)}"
+            raise InputError(f"{text}: give every frame a picture of its number, and no others")
     return rig
 
 
@@ -203,18 +213,6 @@ def _unknown(folder: Path, entries: list[Any]) -> Iterator[str]:
     if near:
         keys = ", ".join(key + (f" (is {other[0]} meant?)" if other else "") for key, other in near)
         yield f"{folder}: unknown keys describe cameras and are ignored: {keys}"
-
-
-def _gaps(frames: list[int]) -> list[str]:
-    """Return a warning if frame numbers are missing in an otherwise even row."""
-    pairs = list(pairwise(frames))
-    step = min((after - before for before, after in pairs), default=1)
-    lost = [(before + step, (after - before - 1) // step) for before, after in pairs if after - before > step]
-    if not lost:
-        return []
-    count = sum(many for _, many in lost)
-    text = f"no camera has {count} of the frames {frames[0]} to {frames[-1]}, for example {lost[0][0]}"
-    return [f"{text}; the frames after a gap are shown earlier"]
 
 
 def _color_camera(folder: Path, entry: Any, beside: dict[str, Any], number: int | None = None) -> ColorCamera:

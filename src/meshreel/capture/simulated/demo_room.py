@@ -1,7 +1,6 @@
 """The demo's scene: a procedural furnished room in which two people move, for a simulated rig.
 
-Options -> the clean mesh of each frame with the faces that move, made when it is read, and the cameras. y is up, in
-metres; the floor is at height 0, and the front and right sides of the room are open.
+y is up, in metres; the floor is at height 0, and the front and right sides of the room are open.
 """
 
 from __future__ import annotations

@@ -65,13 +65,10 @@ def turn_about_y(angle: float) -> Float64[np.ndarray, "3 3"]:
     return np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
 
 
-def _chain(rows: list[Row], blend: float, join: float) -> Chain:
+def _chain(rows: list[Row], blend: float, join: float, by: Vector | float = 0.0) -> Chain:
+    """Return the chain of these parts, moved `by` metres."""
     starts, ends = np.array([row[0] for row in rows], float), np.array([row[1] for row in rows], float)
-    return Chain(starts, ends, np.array([row[2:] for row in rows], dtype=np.float64), blend, join)
-
-
-def _moved(chain: Chain, by: Vector) -> Chain:
-    return Chain(chain.starts + by, chain.ends + by, chain.radii, chain.blend, chain.join)
+    return Chain(starts + by, ends + by, np.array([row[2:] for row in rows], dtype=np.float64), blend, join)
 
 
 def _lean(points: np.ndarray, lift: Vector, lean: float) -> np.ndarray:
@@ -92,7 +89,7 @@ def _torso(lift: Vector, pose: Pose) -> Chain:
         ((-0.075, 0.96, -0.01), (0.075, 0.96, -0.01), 0.100 * g, 0.100 * g),  # hips
         ((-0.07, 0.93, -0.05), (0.07, 0.93, -0.05), 0.072 * g, 0.072 * g),  # seat
     ]
-    return _moved(_chain(rows, 0.09, 0.04), lift)
+    return _chain(rows, 0.09, 0.04, lift)
 
 
 def _head(lift: Vector) -> Chain:
@@ -104,7 +101,7 @@ def _head(lift: Vector) -> Chain:
         ((0.088, 1.655, 0.0), (0.090, 1.635, -0.004), 0.016, 0.012),  # ears
         ((-0.088, 1.655, 0.0), (-0.090, 1.635, -0.004), 0.016, 0.012),
     ]
-    return _moved(_chain(rows, 0.025, 0.05), lift + [0.0, -0.02, 0.0])
+    return _chain(rows, 0.025, 0.05, lift + [0.0, -0.02, 0.0])
 
 
 def _leg(lift: Vector, side: float, phase: float, stride: float) -> Chain:

@@ -1,7 +1,4 @@
-"""Soft shapes as the zero set of smoothly joined tapered capsules, and their meshes.
-
-Bodies, which are chains of parts -> the field at points, or a closed mesh whose vertices lie on the zero set.
-"""
+"""Soft shapes as the zero set of smoothly joined tapered capsules, and their meshes."""
 
 from __future__ import annotations
 
@@ -76,8 +73,7 @@ def polygonize(bodies: tuple[Body, ...], touch: float, grid: Grid) -> Mesh:
         values[box] = smooth_min(values[box], inner, touch)
     corners, faces, _, _ = marching_cubes(values, level=0.0)
     vertices = ((corners.astype(np.float64) + low + grid.shift) * grid.spacing) @ grid.turn.T
-    mesh = drop_unreferenced(Mesh.of(vertices, faces))
-    return _evened(mesh, lambda points: field(bodies, touch, points))
+    return _evened(drop_unreferenced(Mesh.of(vertices, faces)), lambda points: field(bodies, touch, points))
 
 
 def capsule(points: np.ndarray, start: np.ndarray, end: np.ndarray, radii: np.ndarray) -> np.ndarray:
@@ -128,17 +124,13 @@ def _sampled_body(body: Body, margin: float, spacing: float, low: np.ndarray) ->
         for start, end, radii in zip(chain.starts, chain.ends, chain.radii, strict=True):
             one = Chain(start[None], end[None], radii[None], chain.blend, chain.join)
             part_box, part_first = _box([one], margin, spacing, chain_first)
-            part = capsule(
-                _centers(part_box, part_first, spacing), *(x.astype(np.float32) for x in (start, end, radii))
-            )
+            sides = zip(part_box, part_first, strict=True)
+            axes = [np.arange(s.stop - s.start, dtype=np.float32) + f for s, f in sides]
+            centers = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1) * np.float32(spacing)
+            part = capsule(centers, *(x.astype(np.float32) for x in (start, end, radii)))
             inner[part_box] = smooth_min(inner[part_box], part, chain.blend)
         values[chain_box] = smooth_min(values[chain_box], inner, chain.join)
     return box, values
-
-
-def _centers(box: tuple[slice, ...], first: np.ndarray, spacing: float) -> np.ndarray:
-    axes = [np.arange(s.stop - s.start, dtype=np.float32) + f for s, f in zip(box, first, strict=True)]
-    return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1) * np.float32(spacing)
 
 
 def _evened(mesh: Mesh, distance: Callable[[Points], Distances]) -> Mesh:

@@ -1,7 +1,4 @@
-"""Procedural sequence: moving people for the demo.
-
-Options -> a MeshSequence. The people's connectivity changes every frame, and each frame is made when it is read.
-"""
+"""Procedural sequence: moving people, whose connectivity changes every frame."""
 
 from __future__ import annotations
 
@@ -66,8 +63,7 @@ class SoftBodies(MeshSequence):
 
     def __getitem__(self, index: int) -> Mesh:
         number = range(len(self))[operator.index(index)]
-        seconds = self.options.begin + number / self.options.frame_rate
-        moment = seconds / _STORY % 1.0
+        moment = (self.options.begin + number / self.options.frame_rate) / _STORY % 1.0
         grid = grid_of_frame(number, self.options.spacing, self.options.seed)
         return polygonize(cast(moment, self.options), _TOUCH, grid)
 

@@ -1,7 +1,6 @@
 """Simulation of a rig: depths and colours that cameras would see of known meshes, with sensor errors (paper, 4.1).
 
-Meshes of a scene frame by frame, and cameras -> a rig's folder, which `rig.py` reads, and beside it the truth: the
-clean mesh of each frame and which of its faces move, to be read on demand. Everything follows from the seed.
+Beside the rig's folder it writes the truth: the clean mesh of each frame and which of its faces move.
 """
 
 from __future__ import annotations

@@ -1,6 +1,5 @@
-"""Procedural colours that belong to the material: patterns in the frames of a person's parts, and in a room.
+"""Procedural colours, sRGB in 0 to 255, that belong to the material of a person's parts and of a room.
 
-In: the parts of a person, or of a room, and places on their surface. Out: colours, sRGB in 0 to 255, before any light.
 The same place of a moving part has the same colour in every frame, with detail of some millimetres.
 """
 
@@ -43,8 +42,7 @@ CHILD = Outfit((190, 60, 50), (235, 200, 90), (60, 90, 60), hair=(120, 80, 40), 
 
 def person_colors(pose: Pose, thinnest: float, outfit: Outfit, points: Points) -> Colors:
     """Return the colours of places on a person in a pose, whose parts are those of `figure`."""
-    turn = turn_about_y(pose.heading)
-    own = (points - pose.place) @ turn / pose.size
+    own = (points - pose.place) @ turn_about_y(pose.heading) / pose.size
     chain, row, local = _local(figure(pose, thinnest), pose, own)
     trunk = (chain == TORSO) | (chain == HEAD)
     local[trunk] = own[trunk][:, [1, 0, 2]]  # these do not bend: their height is along them
@@ -66,8 +64,7 @@ def room_colors(points: Points) -> Colors:
     x, y, z = points.T
     colors[:] = (150, 110, 75)
     floor = y < 0.01
-    plank = np.floor(x / 0.12)
-    shade = 1 + 0.12 * np.sin(12.9898 * plank)
+    shade = 1 + 0.12 * np.sin(12.9898 * np.floor(x / 0.12))  # of planks
     colors[floor] = np.array([172, 136, 96]) * shade[floor, None]
     wall = (z <= points[:, 2].min(initial=0.0) + 0.01) | (x <= points[:, 0].min(initial=0.0) + 0.01)
     wall &= ~floor
