@@ -1,9 +1,8 @@
 """Bjontegaard delta rate: the change of rate, in %, of a codec against an anchor at equal quality.
 
-Rate-distortion points of both -> BdRate. log rate is interpolated over quality by PCHIP and averaged over the range
-of quality that both curves reach (Bjontegaard, VCEG-M33; PCHIP as in the JCT-VC common test conditions, JCTVC-L1100).
-Several anchors are combined by their hull. GainEnd says where a gain ends, because a mean hides curves that cross
-(decision 22).
+log rate is interpolated over quality by PCHIP and averaged over the range of quality that both curves reach
+(Bjontegaard, VCEG-M33; PCHIP as in the JCT-VC common test conditions, JCTVC-L1100). GainEnd says where a gain ends,
+because a mean hides curves that cross (decision 22).
 """
 
 from __future__ import annotations

@@ -185,7 +185,12 @@ def report(
     output
         The folder to write into.
     """
-    joined = join_rows(_some_rows(path) for path in rows)
+    files = list[list[Row]]()
+    for path in rows:
+        files.append(read_rows(path))
+        if not files[-1]:
+            raise InputError(f"{path}: has no rows; make some with `meshreel-bench run`")
+    joined = join_rows(files)
     check_one_source(joined)
     common.warn(tuple(describe(row) for row in parted(joined)[1]))
     written = [str(path) for path in write_report(joined, output)]
@@ -223,13 +228,6 @@ def check_one_source(rows: Sequence[Row]) -> None:
         if sources.setdefault(row.point.sequence, row.source) != row.source:
             text = f"rows of {row.point.sequence} are of sequences of different content, or read in different ways"
             raise InputError(f"{text}; make a report of each, or delete the lines of one")
-
-
-def _some_rows(path: Path) -> list[Row]:
-    rows = read_rows(path)
-    if not rows:
-        raise InputError(f"{path}: has no rows; make some with `meshreel-bench run`")
-    return rows
 
 
 def describe(row: Row) -> str:

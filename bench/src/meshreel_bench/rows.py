@@ -95,7 +95,7 @@ class Encoding(msgspec.Struct, frozen=True, omit_defaults=True):
     s: float | None = None  # a frame
     stages_s: dict[str, float] = {}  # a frame
     peak_rss_mb: float | None = None  # of the process, points of a shared analysis included
-    reference_s: float | None = None  # `measure.clock.reference_s` meanwhile
+    reference_s: float | None = None  # `measure.worker.reference_s` meanwhile
     work: dict[str, float] = {}  # a frame, by kind (`meshreel.geometry.work`)
 
 
@@ -106,7 +106,7 @@ class Decoding(msgspec.Struct, frozen=True):
     frame_ms: float
     vertices: float  # of a frame, mean
     peak_rss_mb: float | None = None
-    reference_s: float | None = None  # `measure.clock.reference_s` after the passes
+    reference_s: float | None = None  # `measure.worker.reference_s` after the passes
 
 
 class Row(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True, forbid_unknown_fields=True):
@@ -248,7 +248,6 @@ def append_row(path: Path, row: Row) -> None:
         raise InputError(f"{text}; free space, or choose another file") from None
 
 
-def parted(rows: Iterable[Row]) -> tuple[list[Row], list[Row]]:
+def parted(rows: Sequence[Row]) -> tuple[list[Row], list[Row]]:
     """Return the rows of which something was measured, and those of which nothing was."""
-    every = list(rows)
-    return [row for row in every if row.failed is None], [row for row in every if row.failed is not None]
+    return [row for row in rows if row.failed is None], [row for row in rows if row.failed is not None]

@@ -4,8 +4,8 @@ import builtins
 import time
 
 import pytest
-from meshreel_bench.measure import clock
-from meshreel_bench.measure.clock import StageTimer, cost_of, reference_s
+from meshreel_bench.measure import worker as clock
+from meshreel_bench.measure.worker import StageTimer, cost_of, reference_s
 
 from meshreel.geometry import work
 

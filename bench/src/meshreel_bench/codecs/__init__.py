@@ -1,7 +1,4 @@
-"""Lookup of codecs among the plug-ins of the entry point group `meshreel.codecs`, which has the baselines here, too.
-
-In: the name of a codec and its operating point. Out: a Codec.
-"""
+"""Lookup of codecs among the plug-ins of the entry point group `meshreel.codecs`, which has the baselines here, too."""
 
 from __future__ import annotations
 

@@ -1,8 +1,7 @@
 """meshoptimizer per frame: its codecs of vertices and indices, as glTF's EXT_meshopt_compression has them.
 
 Places are 16-bit numbers on a lattice of `qp` bits, as its own packer quantises them; faces are in the order of its
-strips, vertices in that of their first use, as its manual advises. The data are compressed again (zlib, as a web server
-would). Needs the extra `meshoptimizer`. Streams are one msgpack record a frame.
+strips, vertices in that of their first use, as its manual advises. The data are compressed again by zlib.
 """
 
 from __future__ import annotations

@@ -1,15 +1,13 @@
 """Sequences by name: bodies, two or four of them side by side, scenes, recordings; or any folder.
 
-In: a name, the folder of the benchmark data, a folder to keep things in. Out: a Dataset. Benchmark data are compared
-with their checksums; other sequences have a digest, which rows carry. Sequences of files are welded: seams count as one
-surface.
+Benchmark data are compared with their checksums; other sequences have a digest, which rows carry.
 """
 
 from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -186,19 +184,16 @@ def _open_files(name: str, data: Path, frames: int | None, own: SequenceOptions 
 
 def _found(name: str, data: Path) -> Path:
     """Return the path of a sequence's file, folder or pattern of files."""
-    path = next((p for p in _places(name, data) if p.exists() or is_pattern(name)), None)
+    below = data / PERFORMERS
+    known = (below / name, below / f"{name}.npz", data / name, data / f"{name}.npz")
+    places = (Path(name), *known) if _is_path(name) else (*known, Path(name))
+    path = next((place for place in places if place.exists() or is_pattern(name)), None)
     if path is None:
         where = f"at that path or below {data}" if _is_path(name) else f"below {data}"
         raise InputError(
             f"no sequence {name!r} {where}; give its path, or the folder of the benchmark data with --data"
         )
     return path
-
-
-def _places(name: str, data: Path) -> Sequence[Path]:
-    below = data / PERFORMERS
-    known = (below / name, below / f"{name}.npz", data / name, data / f"{name}.npz")
-    return (Path(name), *known) if _is_path(name) else (*known, Path(name))
 
 
 def _is_path(name: str) -> bool:

@@ -1,7 +1,7 @@
 """Sequences with new connectivity in every frame, as captures have it, or side by side; shapes that move rigidly.
 
-Remeshing: frames on one list of faces -> frames that share nothing but their surface. Per frame, with its number as
-the seed: midpoint subdivision, vertices moved along the surface, QEM, vertices and faces in a random order.
+Remeshing, with the frame's number as the seed: midpoint subdivision, vertices moved along the surface, QEM, vertices
+and faces in a random order.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
 """The benchmark scenes, as rigs of four cameras: `room2` and `room2-standing` of captures, `room3` procedural.
 
-Two people are in a furnished room. In `room3` a crate is pushed and left, a door opens, a box is carried and set down;
-two people touch and pass, one sits down and stands up. y is up, in metres; the floor is at height 0. The truth of
-`room3` has each part by name: see `Parts`.
+In `room3` a crate is pushed and left, a door opens, a box is carried and set down; two people touch and pass, one sits
+down and stands up. y is up, in metres; the floor is at height 0.
 """
 
 from __future__ import annotations

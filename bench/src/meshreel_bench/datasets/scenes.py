@@ -1,8 +1,4 @@
-"""The benchmark scenes, captured: noisy fused meshes, the truth, and labels of the faces that move.
-
-What is made is kept: the rig (minutes), the fused meshes (a frame a second or two), labels, and the background that an
-anchor is given; labels that the encoder finds for as long as its code is the same.
-"""
+"""The benchmark scenes, captured: noisy fused meshes, the truth, and labels of the faces that move; all are kept."""
 
 from __future__ import annotations
 
@@ -137,19 +133,16 @@ def open_scene(name: str, data: Path, cache: Path, frames: int | None = None) ->
     folder = cache / (name if frames is None else f"{name}-{frames}")
     rig, meshes = folder / "rig", folder / "meshes"
     if not (rig / RIG).exists():
-        _simulate(name, rig, data, rooms.FRAMES if frames is None else frames)
+        count = rooms.FRAMES if frames is None else frames
+        if name == PROCEDURAL:
+            demo_room.record_room(rig, demo_room.RoomOptions(count))
+        elif name == ROOM3:
+            rooms.Room3(count).record(rig)
+        else:
+            rooms.simulate_room(rig, data, name, count)
     fusion = FusionOptions(demo_room.VOXEL) if name == PROCEDURAL else FusionOptions()
     recording, _ = open_recording(rig, fusion, keep=False)
     return SceneData(name, folder, Captured(recording, meshes), read_truth(rig / TRUTH), rooms.read_parts(rig))
-
-
-def _simulate(name: str, rig: Path, data: Path, frames: int) -> None:
-    if name == PROCEDURAL:
-        demo_room.record_room(rig, demo_room.RoomOptions(frames))
-    elif name == ROOM3:
-        rooms.Room3(frames).record(rig)
-    else:
-        rooms.simulate_room(rig, data, name, frames)
 
 
 @cache

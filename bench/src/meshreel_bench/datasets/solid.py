@@ -1,7 +1,7 @@
 """Bodies in the colours of a solid that they are cut from: the same place of a body has the same colour in all frames.
 
-In: a sequence by name. Out: its frames in colour. Bodies whose connectivity stays are coloured by their first frame; of
-others a template is tracked, at a quality above all that are compared, and carries the colours.
+Bodies whose connectivity stays are coloured by their first frame; of others a template is tracked, at a quality above
+all that are compared, and carries the colours.
 """
 
 from __future__ import annotations

@@ -1,7 +1,4 @@
-"""Panels of equal size for the documentation's pictures, meshes by ray casting, and the picture of docs/tutorial.md.
-
-That is the procedural room as it is captured, taken apart, coded and decoded.
-"""
+"""Panels of equal size for the documentation's pictures, meshes by ray casting, and the picture of docs/tutorial.md."""
 
 from __future__ import annotations
 

@@ -1,8 +1,7 @@
 """The moving picture of README.md: the room of `meshreel demo`, in the player.
 
 `python -m meshreel_bench.decisions.moving_picture [FOLDER [DEMO]]` writes moving.webp, and moving.json with the numbers
-of README.md, into docs/pictures. It runs the demo first, some twenty minutes, where it is not given the folder of one;
-pictures are drawn by Chromium (`scripts/setup web`).
+of README.md, into docs/pictures. It runs the demo first, some twenty minutes, unless it is given the folder of one.
 """
 
 from __future__ import annotations

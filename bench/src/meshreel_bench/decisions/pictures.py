@@ -62,12 +62,6 @@ class Stages:
     components: int
 
 
-def story() -> MeshList:
-    """Frames of the procedural story, in metres."""
-    people = soft_bodies(SoftBodiesOptions())
-    return MeshList(tuple(people[FIRST + t] for t in range(COUNT)), people.frame_rate)
-
-
 def compute(sequence: MeshList, options: PaperOptions) -> Stages:
     """The stages of a sequence that is one group."""
     seen = survey(sequence)
@@ -96,7 +90,8 @@ def main(folder: Path = Path("docs/pictures")) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     matplotlib.rcParams["font.family"] = "DejaVu Sans"  # comes with matplotlib: the same letters everywhere
     drawing.draw_room(folder / "room.png")
-    stages = compute(story(), PaperOptions())
+    people = soft_bodies(SoftBodiesOptions())
+    stages = compute(MeshList(tuple(people[FIRST + t] for t in range(COUNT)), people.frame_rate), PaperOptions())
     for name, draw in PICTURES.items():
         draw(stages, folder / f"{name}.png")
         print(folder / f"{name}.png")
@@ -111,7 +106,9 @@ def frames(stages: Stages, path: Path) -> None:
         title = f"frame {FIRST + t}: {len(mesh.vertices)} vertices, {_parts(mesh)}"
         sheet.image(panel, title, normal_colored(mesh, camera))
     for panel, t in ((3, CONTACT - 1), (4, CONTACT)):
-        spot = _around_hands(stages, t)
+        box, vertices = Box.of(stages.frames), stages.frames[t].vertices
+        middle = box.center + [0, 0.14 * box.size[1], 0]  # between the two people
+        spot = Mesh.of(vertices[np.linalg.norm(vertices[:, :2] - middle[:2], axis=1) < 0.08], [])
         draw_edges(sheet.axes[panel], stages.frames[t], camera_for([spot], 250), 0.5)
         sheet.axes[panel].set_title(f"frame {FIRST + t}, the hands", fontsize=9)
     sheet.write(path)
@@ -124,7 +121,9 @@ def centers(stages: Stages, path: Path) -> None:
     positions = stages.centers.positions
     draw_points(sheet.axes[0], positions[-1], camera, BODIES[stages.centers.bodies % 3])
     sheet.axes[0].set_title(f"{positions.shape[1]} centers by body", fontsize=9)
-    colors = _colors_by_place(stages)
+    low, high = positions[0].min(axis=0), positions[0].max(axis=0)
+    share = (positions[0] - low) / (high - low)
+    colors = matplotlib.colormaps["turbo"]((3.2 * share[:, 1] + 0.5 * share[:, 0]) % 1.0)[:, :3]
     for panel, t in ((1, 0), (2, len(positions) - 1)):
         draw_points(sheet.axes[panel], positions[t], camera, colors)
         sheet.axes[panel].set_title(f"frame {FIRST + t}: one color, one trajectory", fontsize=9)
@@ -247,24 +246,9 @@ PICTURES: dict[str, Callable[[Stages, Path], None]] = {
 }
 
 
-def _around_hands(stages: Stages, t: int) -> Mesh:
-    """Vertices within a tenth of the diagonal around the middle between the two people."""
-    box, vertices = Box.of(stages.frames), stages.frames[t].vertices
-    middle = box.center + [0, 0.14 * box.size[1], 0]
-    return Mesh.of(vertices[np.linalg.norm(vertices[:, :2] - middle[:2], axis=1) < 0.08], [])
-
-
 def _parts(mesh: Mesh) -> str:
     count = len(np.unique(connected(mesh.faces, len(mesh.vertices))))
     return f"{count} part" + "s" * (count != 1)
-
-
-def _colors_by_place(stages: Stages) -> np.ndarray:
-    """A color for each trajectory from where it is in the first frame."""
-    first = stages.centers.positions[0]
-    low, high = first.min(axis=0), first.max(axis=0)
-    share = (first - low) / (high - low)
-    return matplotlib.colormaps["turbo"]((3.2 * share[:, 1] + 0.5 * share[:, 0]) % 1.0)[:, :3]
 
 
 if __name__ == "__main__":

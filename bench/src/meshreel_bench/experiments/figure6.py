@@ -1,7 +1,4 @@
-"""Figure 6: rate-distortion curves of every system on every data set; tables 1 and 2 (paper, sections 4.4 and 4.5).
-
-SYSTEMS are the paper's, at operating points of their own, and the anchors that it lacks.
-"""
+"""Figure 6: rate-distortion curves of every system on every data set; tables 1 and 2 (paper, sections 4.4 and 4.5)."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Targets of the preset `best`: rates against the hull of per-frame anchors, on performers and shapes; and speed.
-
-Speed is processor time of one core at rest, memory and work of encodes, and the time of a decode.
-"""
+"""Targets of the preset `best`: rates against the hull of per-frame anchors, on performers and shapes; and speed."""
 
 from __future__ import annotations
 

@@ -1,7 +1,6 @@
 """Targets of scenes against the truth and the noisy input, four simulated depth cameras; and of a real recording.
 
-Anchor a is decimated Draco of whole frames, anchor b a background once and decimated people, both by true labels. The
-recording, a room with a person, has no truth: the depth pictures behind it judge.
+Anchor a is decimated Draco of whole frames, anchor b a background once and decimated people, both by true labels.
 """
 
 from __future__ import annotations

@@ -24,9 +24,7 @@ from ..datasets.walker import Truth
 from ..rows import ColorBytes
 
 BEFORE = 0.015  # of the depth: what is nearer than what stands by more is something else (guess)
-HALO = (
-    6  # pixels around what moves that do not count as standing: its depth goes so far beyond its picture (living_room)
-)
+HALO = 6  # pixels around what moves that do not count as standing: its depth goes beyond its picture (living_room)
 EDGE = 2  # pixels from silhouettes that do not count: pictures are registered to depth within as many (living_room)
 TEXELS = 60_000  # of a frame that are compared with the truth, at most (guess)
 PARTS = ("picture_y_psnr", "picture_still_y_psnr", "picture_moving_y_psnr")  # all that is seen, what stands, what moves

@@ -1,7 +1,6 @@
 """Cost of playing in a browser that is slowed down, in place of a headset; decoding for aarch64.
 
-In: a .reel file, a level, a display's rate, a throttle. Out: values of the player's `?bench` page in headless Chromium,
-by `web/headset.mjs`. The file is joined to itself, so that groups are decoded and uploaded while it plays.
+Values are those of the player's `?bench` page in headless Chromium, by `web/headset.mjs`.
 """
 
 from __future__ import annotations
@@ -48,8 +47,7 @@ def headset_values(data: bytes, level: int, throttle: float, rate: float) -> Val
             tries = [_values(json.loads(_output(command, WEB)), rate)]
             if tries[0]["shown_share"] < HOLDS:
                 tries.append(_values(json.loads(_output(command, WEB)), rate))
-    best = max(tries, key=lambda values: values["shown_share"])  # other jobs only take pictures away
-    return {**best}
+    return {**max(tries, key=lambda values: values["shown_share"])}  # other jobs only take pictures away
 
 
 def _values(found: dict[str, Any], rate: float) -> dict[str, float]:

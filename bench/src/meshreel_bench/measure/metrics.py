@@ -1,7 +1,4 @@
-"""Metrics of decoded frames: against the input, and where a scene is simulated, against the truth.
-
-Names that begin with `truth_` or `input_` are of whole scenes, people and background.
-"""
+"""Metrics of decoded frames: against the input (`input_`) and, of simulated scenes, against the truth (`truth_`)."""
 
 from __future__ import annotations
 

@@ -1,8 +1,7 @@
 """Measurement of a point: rate of all bytes, metrics of decoded frames, times of both directions.
 
 Bodies are judged by all frames, long ones and scenes by some. A codec is given all, or those of a sampled point; the
-rate is then theirs. In a codec's place `captured` is the truth itself, `segmentation` the encoder's labels of what
-moves, `tracker` centers of the volume, `headset` playing a file of `best`.
+rate is then theirs.
 """
 
 from __future__ import annotations
@@ -34,13 +33,12 @@ from ..experiments.study import FLOOR, HEADSET, TRACKER
 from ..experiments.study import FOUND as SEGMENTATION
 from ..names import FLOOR_RATIO, FOUND_NAME
 from ..rows import Encoding, Group, Point, Row, Stream, checked
-from .clock import StageTimer, cost_of, maker
 from .color import color_bytes
 from .headset import aarch64_values, headset_values
 from .metrics import Labels, Measured, measure_frames, score_labels
 from .splats import splat_values
 from .tracker import tracker_values
-from .worker import decoded_apart
+from .worker import StageTimer, cost_of, decode_timed, in_fresh_process, maker
 
 TRUTH_NAME, UNCOMPRESSED = "the truth itself", "uncompressed"
 LONG = 60  # frames: half as many of a longer sequence are compared by pictures
@@ -90,7 +88,7 @@ def _coded(case: _Case) -> Row:
     data, encoding = _encoded(codec, source, (point.sequence, point.frames, point.sampled))
     numbers = row.measured_frames
     wanted = list(range(len(case.some))) if point.sampled else numbers
-    decoding, meshes = decoded_apart(decoder, data, wanted, len(source))
+    decoding, *meshes = in_fresh_process(decode_timed, decoder, data, tuple(wanted), len(source))
     if case.painted is None:
         metrics, per_frame = measure_frames(Measured(known, numbers, meshes, data), point.metrics)
     else:
@@ -111,7 +109,10 @@ def _truth(case: _Case) -> Row:
     if known.scene is None and not known.cameras:
         raise InputError("the truth itself is known of simulated scenes, and what moves of those with cameras")
     if known.scene is None:
-        return msgspec.structs.replace(row, name=FOUND_NAME, metrics=_found_ratio(known.sequence))
+        found, frames = segment(known.sequence), known.sequence  # by what the encoder finds to move
+        meshes = ((number, frames[number]) for number in range(len(frames)))
+        ratio = dynamic_ratio((mesh, found.moving(number, mesh)) for number, mesh in meshes)
+        return msgspec.structs.replace(row, name=FOUND_NAME, metrics={FLOOR_RATIO: ratio})
     scene, numbers = known.scene, row.measured_frames
     clean = [scene.truth[number].mesh for number in numbers]
     metrics, per_frame = measure_frames(Measured(known, numbers, clean), row.point.metrics)
@@ -143,12 +144,6 @@ def dynamic_ratio(frames: Iterable[tuple[Mesh, Labels]]) -> float:
     counts = [(len(np.unique(mesh.faces[moves])), len(np.unique(mesh.faces))) for mesh, moves in frames]
     moving, every = (sum(numbers) for numbers in zip(*counts, strict=True))
     return moving / max(every, 1)
-
-
-def _found_ratio(frames: MeshSequence) -> dict[str, float | None]:
-    """Return the share of a recording whose truth nobody knows: by what the encoder finds to move."""
-    found, meshes = segment(frames), ((number, frames[number]) for number in range(len(frames)))
-    return {FLOOR_RATIO: dynamic_ratio((mesh, found.moving(number, mesh)) for number, mesh in meshes)}
 
 
 def empty_row(point: Point, store: Store, **known: Any) -> Row:

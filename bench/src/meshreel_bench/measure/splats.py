@@ -1,7 +1,7 @@
 """Table 3: splats on decoded meshes, judged by renders from cameras and in frames that they were not fitted to.
 
-In: a sequence, the bytes of its mesh and what they decode to. Out: PSNR and SSIM of held-out pictures, which are cut to
-the body, and the rate of the splats: a set for each chain of groups that share a base mesh, or for each frame.
+Pictures are cut to the body; the rate is that of a set of splats for each chain of groups that share a base mesh, or
+for each frame.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Accuracy of volume tracking (paper, section 3.1) where the motion is known: frames that keep their connectivity.
 
-In: a sequence, a tracker. Out: how far centers are from where the volume takes them. *published*: the forward pass
-of Dvorak et al. (2022) as they describe it, from our first frame's centers and with the same samples of the volume.
+*published*: the forward pass of Dvorak et al. (2022) as they describe it, from our first frame's centers and with the
+same samples of the volume.
 """
 
 from __future__ import annotations
@@ -89,10 +89,13 @@ def published_track(frames: Sequence[Mesh], first: Float64[np.ndarray, "K 3"], o
         np.fill_diagonal(affinity, 0)
         now = 2 * before - track[-2] if len(track) > 1 else before.copy()
         for _ in range(ROUNDS):
-            even, is_owner = _owned_means(following, now)
+            owners = cKDTree(now).query(following)[1]
+            counts = np.bincount(owners, minlength=len(now))
+            sums = np.stack([np.bincount(owners, following[:, a], len(now)) for a in range(3)], axis=1)
+            even = sums / np.maximum(counts, 1)[:, None]  # the mean of the points that are nearest to each center
             turns, shifts = _rigid(affinity, before, now)
             rigid = np.einsum("kab,kb->ka", turns, before) + shifts
-            moved = np.where(is_owner[:, None], (even + rigid) / 2, rigid)
+            moved = np.where(counts[:, None] > 0, (even + rigid) / 2, rigid)
             now, largest = moved, np.abs(moved - now).max()
             if largest < STILL:
                 break
@@ -101,14 +104,6 @@ def published_track(frames: Sequence[Mesh], first: Float64[np.ndarray, "K 3"], o
         track.append(now)
         points = following
     return np.stack(track)
-
-
-def _owned_means(points: np.ndarray, centers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the mean of the points that are nearest to each center, and which centers have some."""
-    owners = cKDTree(centers).query(points)[1]
-    counts = np.bincount(owners, minlength=len(centers))
-    sums = np.stack([np.bincount(owners, points[:, a], len(centers)) for a in range(3)], axis=1)
-    return sums / np.maximum(counts, 1)[:, None], counts > 0
 
 
 def _rigid(affinity: np.ndarray, before: np.ndarray, now: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -1,7 +1,4 @@
-"""Published numbers beside ours: bandwidth at an SSIM of .9, compression ratio, dynamic ratio, V-DMC's points.
-
-In: package data (each table with its source), rows of figure 6. Out: systems, V-DMC's points as rows, Markdown.
-"""
+"""Published numbers beside ours: bandwidth at an SSIM of .9, compression ratio, dynamic ratio, V-DMC's points."""
 
 from __future__ import annotations
 

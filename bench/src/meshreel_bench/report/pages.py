@@ -136,11 +136,15 @@ def _first_page(parts: Sequence[Part]) -> list[str]:
     paper = reproducing_page({OPEN: open_rows})
     every = [verdict for part in parts for verdict in verdicts(part.study, part.rows) if verdict.met is not None]
     missed = [verdict for verdict in every if not verdict.met]
+    kept = f"All {len(every)} targets that were measured are met." if every else "No target was measured."
+    if missed:
+        met = len(every) - len(missed)
+        kept = f"Of {len(every)} targets, {met} are met; [the others](#missed-targets) are listed at the end."
     made = {
         "{winners}": winners_table(open_rows, points) or ["No codec was measured beside `best`."],
         "{losses}": list(losses(open_rows, points)),
         "{beyond}": _section(BEYOND, beyond_table(open_rows)),
-        "{verdicts}": [_kept_promises(len(every), len(every) - len(missed))],
+        "{verdicts}": [kept],
         "{reproducing}": ["The paper's own numbers stand beside ours in [reproducing.md](reproducing.md)."]
         if paper
         else [],
@@ -186,13 +190,6 @@ def _doubts(parts: Sequence[Part]) -> dict[str, list[str]]:
     return {
         head: [f"- {tables.text(line)}" for line in lines] for head, lines in zip(DOUBTS, (points, data), strict=True)
     }
-
-
-def _kept_promises(decided: int, met: int) -> str:
-    """Return in a sentence how many targets are met."""
-    if met == decided:
-        return f"All {met} targets that were measured are met." if met else "No target was measured."
-    return f"Of {decided} targets, {met} are met; [the others](#missed-targets) are listed at the end."
 
 
 def _appendix(part: Part) -> Iterator[str]:

@@ -1,12 +1,8 @@
-"""Rate-distortion plots as PNG, 17 cm wide as a page, a line of panels for each sequence, a panel a measure.
-
-Same rows, same picture, whatever settings of matplotlib the user has.
-"""
+"""Rate-distortion plots as PNG, 17 cm wide as a page: same rows, same picture, whatever the user's settings."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -42,7 +38,11 @@ def plot_curves(
     rows: Sequence[Row], measures: Sequence[Measure], looks: Mapping[str, Look], path: Path, x: tuple[str, str] = RATE
 ) -> Path:
     """Write quality against `x`, a value and what it is, of each curve; a dotted line is what the truth reaches."""
-    with _settings():
+    import matplotlib
+
+    with matplotlib.rc_context():
+        matplotlib.rcdefaults()
+        matplotlib.rcParams.update(_SETTINGS)
         figure = curves_figure(rows, measures, looks, x)
         with replacing(path) as file:
             figure.savefig(file, format="png", dpi=DPI, metadata={"Software": None})
@@ -99,7 +99,9 @@ def _draw(panel: Any, rows: Sequence[Row], measure: Measure, looks: Mapping[str,
         points = sorted((mbps, quality) for mbps, quality in found if quality is not None)
         if points:
             style: dict[str, Any] = {"color": look.color, "marker": look.marker, "lw": look.width, "ms": look.size}
-            panel.plot(*zip(*points, strict=True), **style, label=_label(name), zorder=3 - place / len(looks))
+            label = title(name)
+            label = f" {label}" if label.startswith("_") else label  # matplotlib leaves those out
+            panel.plot(*zip(*points, strict=True), **style, label=label, zorder=3 - place / len(looks))
     if (floor := floors(rows).get(measure.key)) is not None:
         panel.axhline(floor, color="gray", linestyle=":", lw=1.2, label="the truth itself")
     panel.set(xlabel=x[1], ylabel=measure.label, xscale="log")
@@ -121,20 +123,3 @@ def set_rates(panel: Any, rates: Sequence[float]) -> None:
             break
     panel.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
     panel.minorticks_off()
-
-
-@contextmanager
-def _settings() -> Iterator[None]:
-    """Use the defaults of matplotlib with the fonts and lines of a paper."""
-    import matplotlib
-
-    with matplotlib.rc_context():
-        matplotlib.rcdefaults()
-        matplotlib.rcParams.update(_SETTINGS)
-        yield
-
-
-def _label(name: str) -> str:
-    """Return a curve's title as a label: matplotlib leaves those out that begin with an underscore."""
-    label = title(name)
-    return f" {label}" if label.startswith("_") else label

@@ -37,13 +37,14 @@ def point_table(rows: Sequence[Row], measures: Sequence[Measure]) -> list[str]:
     records = []
     for row in sorted(rows, key=lambda row: (order.index(curve_of(row)), row.mbps)):
         assert row.stream is not None
+        sizes = [str(group.frames) for group in row.stream.groups]
         stages, work = (row.encoding.stages_s, row.encoding.work) if row.encoding else ({}, {})
         record: dict[str, object] = {"codec": text(row.name), "operating point": text(operating_point(row))}
         record |= {"Mbps": row.mbps} | {measure.label: value(row, measure.key) for measure in measures}
         record |= {
             "worst frame (dB)": value(row, "d2_psnr_paper_worst"),
             "background (kB)": row.stream.background_bytes / 1000 or None,
-            "groups": _group_sizes(row),
+            "groups": "+".join(sizes) if len(sizes) < 8 else f"{len(sizes)} groups",
             "encode (s/frame)": value(row, "encode_s"),
             "by stage": text(", ".join(f"{stage} {s:.2g}" for stage, s in stages.items())),
             "at rest (s/frame)": value(row, "encode_s_at_rest"),
@@ -149,10 +150,3 @@ def operating_point(row: Row) -> str:
     coded = row.stream.coded_frames
     first = "" if row.point.frames is None else f"; first {row.frames} frames"
     return _listed(row.options) + (first if coded == row.frames else f"; {coded} of {row.frames} frames coded")
-
-
-def _group_sizes(row: Row) -> str:
-    """Return the frames of each group, as 5+5; how many where they are many."""
-    assert row.stream is not None
-    sizes = [str(group.frames) for group in row.stream.groups]
-    return "+".join(sizes) if len(sizes) < 8 else f"{len(sizes)} groups"

@@ -18,8 +18,8 @@ from ..rows import ColorBytes, Group, Row, Stream
 
 SECONDS = 10.0  # in which a background is sent once, for `mbps_background_10s`
 HALF = 30  # frames of each half of a long sequence
-# Time of `measure.clock.reference_s`, s, on the machine that rows of speed were first measured on, an AMD EPYC with two
-# cores that did nothing else: the fifth percentile of 300 runs.
+# Time of `worker.reference_s`, s, on the machine that rows of speed were first measured on, an AMD EPYC with two cores
+# that did nothing else: the fifth percentile of 300 runs.
 REST_S = 0.0233
 HOUR = 108_000  # frames
 VARIATION, DRAWS = 0.35, 20  # of an interval's time: its deviation over its mean (guess), and draws to average over

@@ -53,10 +53,8 @@ def _(promise: study.Reaches, rows: Sequence[Row]) -> list[Verdict]:
         return [Verdict(promise.text, limit)]
     bounds = [bound for bound in limits if bound is not None]
     good = [row for row in own if not any(_miss(row, bound) for bound in bounds)]
-    if good:
-        row = min(good, key=lambda row: value(row, "mbps") or 0.0)
-    else:
-        row = min(own, key=lambda row: sum(_miss(row, bound) for bound in bounds))
+    cheapest = min(good, key=lambda row: value(row, "mbps") or 0.0, default=None)
+    row = cheapest or min(own, key=lambda row: sum(_miss(row, bound) for bound in bounds))
     found = [_number(value(row, b.key), b.unit) + (" (short)" if _miss(row, b) else "") for b in bounds]
     return [Verdict(promise.text, limit, ", ".join(found) + _where(row), bool(good))]
 
@@ -103,19 +101,18 @@ def _(promise: study.Gains, rows: Sequence[Row]) -> list[Verdict]:
     names = set(map(curve_of, own))
     if promise.curve not in names or not names & set(promise.anchors):
         return [Verdict(text, bound)]
-    rates = {measure: _gain(promise, rows, measure.key) for measure in promise.measures}
+    rates = {measure: _gain(promise, rows, measure) for measure in promise.measures}
     found = [f"{m.name} {_percent(rate)} ({m.shown(rate.low)} to {m.shown(rate.high)})" for m, rate in rates.items()]
     met = all(rate.percent is not None and rate.percent <= promise.most for rate in rates.values())
     return [Verdict(text, bound, "; ".join(found), met), *_ends(promise, own)]
 
 
-def _gain(promise: study.Gains, rows: Sequence[Row], key: str) -> BdRate:
+def _gain(promise: study.Gains, rows: Sequence[Row], measure: study.Measure) -> BdRate:
     """Return the BD-rate by one measure; over all qualities where none of both is below the floor."""
     own = rated(rows, promise.sequence)
-    [measure] = [each for each in promise.measures if each.key == key]
     anchor, test = hull_of(own, promise.anchors, measure), curve(own, promise.curve, measure)
     known = floors(row for row in rows if row.point.sequence == promise.sequence)
-    highest = known.get(key, inf) if promise.below_floor else inf
+    highest = known.get(measure.key, inf) if promise.below_floor else inf
     rate = bd_bound(anchor, test, highest)
     return rate if rate.percent is not None else bd_bound(anchor, test)
 

@@ -3,9 +3,7 @@
 Each frame becomes signed distances on a sparse regular grid, `cells` along the diagonal of the sequence's box, and is
 coded by itself: the blocks of 8^3 cells that hold surface; for each the weights of `basis` principal components that
 were learned offline on procedural bodies and simple shapes, quantised at `step` and range coded; marching cubes at the
-decoder. Beyond truncation only a distance's sign and that it is large count. Signs are those of the decoded distances,
-so parts thinner than a voxel may close or vanish. The rate counts everything: the mean and the first `basis` components
-are in each stream, about 20 bytes per component.
+decoder. The rate counts everything: mean and components are in each stream, about 20 bytes per component.
 
 A group has each frame for itself and the entropy coder's models together: which blocks hold surface, their symbols,
 what is left out. Decoded surface that is not there in the original (past a border, where signs contradict each other,

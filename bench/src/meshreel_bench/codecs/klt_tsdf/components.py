@@ -1,10 +1,9 @@
 """The KLT of a block's distances: a mean and principal components, learned offline, and the weights of blocks.
 
 A vector is a sum of products of discrete Legendre (Gram) polynomials of total degree 8 at most, even or odd along each
-axis, for blocks were learned under all symmetries of the cube: it takes about twenty small integers. Beyond truncation
-only the sign and that the distance is large count (Tang et al. 2018). Weights are quantised in turn, each rounding made
-good by those to come. Decoded distances are in integers: the same on every platform. Voxels that blocks share get the
-mean of their values; marching cubes run over the cells of a frame's blocks alone.
+axis, for blocks were learned under all symmetries of the cube: it takes about twenty small integers. Weights are
+quantised in turn, each rounding made good by those to come. Decoded distances are in integers: the same on every
+platform. Voxels that blocks share get the mean of their values.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
-"""Signed distances of a mesh on a sparse grid of blocks. In -> out: a mesh in voxel units -> blocks that hold surface.
+"""Signed distances of a mesh on a sparse grid of blocks: 8^3 cells with the 9^3 voxels at their corners.
 
-A block is 8^3 cells with the 9^3 voxels at their corners. The sign is that of the closest feature's pseudonormal
-(Baerentzen and Aanaes 2005), right for every closed mesh. Past a mesh's border it is that of the border's plane, and
-soon unknown, unless the mesh is closed but for holes: then winding numbers tell.
+The sign is that of the closest feature's pseudonormal (Baerentzen and Aanaes 2005), right for every closed mesh. Past a
+mesh's border it is that of the border's plane, and soon unknown, unless the mesh is closed but for holes: then winding
+numbers tell.
 """
 
 from __future__ import annotations

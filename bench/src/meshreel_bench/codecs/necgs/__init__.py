@@ -1,9 +1,7 @@
 """NeCGS (Ren et al. 2025, "Neural Compression for 3D Geometry Sets"), a baseline of the paper (section 4.2).
 
-Each frame becomes a TSDF-Def volume, signed distances and deformations on a regular grid (`volumes`). One
-auto-decoder network, trained on all of them with rounded numbers (`network`), makes the volumes from small
-embedded features; features and network are entropy-coded (`stream`). The decoder extracts the surfaces by deformable
-marching cubes (`volumes`). Frames are a set: none is predicted from another.
+Each frame becomes a TSDF-Def volume (`volumes`). One auto-decoder network, trained on all of them with rounded numbers
+(`network`), makes the volumes from small embedded features; features and network are entropy-coded (`stream`).
 
 Differs from the publication:
 - The fit of a volume (eq. 1) measures distances between the two surfaces, both ways; the authors compare pictures of

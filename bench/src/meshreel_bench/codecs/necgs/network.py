@@ -223,7 +223,9 @@ def train(volumes: Sequence[np.ndarray], options: NecgsCodec, report: Report) ->
     for epoch in range(_resumed(recall(key), [features, *parameters], adam, generator), options.epochs):
         batches = torch.randperm(len(volumes), generator=generator).split(options.batch)
         for step, numbers in enumerate(batches):
-            adam.param_groups[0]["lr"] = options.rate * _pace((epoch + step / len(batches)) / options.epochs)
+            done = (epoch + step / len(batches)) / options.epochs
+            fall = 0.5 * (math.cos(math.pi * (done - _WARM) / (1 - _WARM)) + 1)  # half a cosine
+            adam.param_groups[0]["lr"] = options.rate * (0.1 + 0.9 * done / _WARM if done < _WARM else fall)
             truth = torch.from_numpy(np.stack([volumes[n] for n in numbers])).to(place).float().permute(0, 4, 1, 2, 3)
             chosen = rounded(features[numbers.to(place)], shape.bits)
             made = decode_volumes(chosen, [rounded(p, shape.bits) for p in parameters])
@@ -251,13 +253,6 @@ def _resumed(state: Any, tensors: Sequence[Tensor], adam: torch.optim.Adam, gene
     adam.load_state_dict(steps)
     generator.set_state(random)
     return int(epoch)
-
-
-def _pace(done: float) -> float:
-    """Return the factor of the learning rate after a share of the epochs: a rise from 0.1, then half a cosine."""
-    if done < _WARM:
-        return 0.1 + 0.9 * done / _WARM
-    return 0.5 * (math.cos(math.pi * (done - _WARM) / (1 - _WARM)) + 1)
 
 
 def _loss(made: Tensor, truth: Tensor, window: Tensor) -> tuple[Tensor, Tensor]:

@@ -1,7 +1,4 @@
-"""Sizes of the auto-decoder, quantization of its numbers (NeCGS, section 3.2 and appendix A.1), and the stream.
-
-A stream is a head, then integers. Only what measures a stream decodes it: no law is checked.
-"""
+"""Sizes of the auto-decoder, quantization of its numbers (NeCGS, section 3.2 and appendix A.1), and the stream."""
 
 from __future__ import annotations
 

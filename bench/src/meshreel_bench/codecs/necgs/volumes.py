@@ -1,9 +1,8 @@
 """TSDF-Def volumes (NeCGS, section 3.1): grids around frames, distances of a mesh, surfaces by marching cubes.
 
 Inside is where the winding number is above 1/2; close to a sheet, which has no inside on either side, such as the wall
-of a room, it is behind the sheet. The decoder trims the flips of sign past the border of a sheet. A vertex is the zero
-of the distance on an edge between two grid points that the deformation has moved. On a face with four crossings each
-inside corner is cut off alone, in both cubes of the face: the surface has no holes.
+of a room, it is behind the sheet. The decoder trims the flips of sign past the border of a sheet. On a face with four
+crossings each inside corner is cut off alone, in both cubes of the face: the surface has no holes.
 """
 
 from __future__ import annotations

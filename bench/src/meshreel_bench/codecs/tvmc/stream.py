@@ -1,8 +1,7 @@
-"""The bytes of a TVMC* stream and its decoder: a record, then a checksum. In: bytes. Out: frames, decoded on access.
+"""The bytes of a TVMC* stream and its decoder: a record, then a checksum.
 
 A tracked group is its reference as a Draco mesh, and the displacements of each frame as a Draco point cloud. Draco gets
-whole multiples of the step in a range that leaves them unchanged; clouds are sequential: these keep order. Only what
-measures a stream decodes it: no law is checked.
+whole multiples of the step in a range that leaves them unchanged; clouds are sequential: these keep order.
 """
 
 from __future__ import annotations
