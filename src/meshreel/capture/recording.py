@@ -63,9 +63,8 @@ def fuse_depths(depths: Sequence[tuple[DepthCamera, UInt16[np.ndarray, "H W"]]],
 class Recording(MeshSequence):
     """The frames of a rig as a MeshSequence, in world coordinates.
 
-    A frame is fused when it is first read, and kept in a temporary file as long as this object lives and the disk has
-    room (10 MB for half a million faces), since encoding a scene reads it several times. Pass `keep=False` to read each
-    frame once.
+    A frame is fused when it is first read, and, unless `keep` is false, kept in a temporary file as long as this object
+    lives and the disk has room (10 MB for half a million faces): encoding a scene reads it several times.
     """
 
     def __init__(self, rig: Rig, options: FusionOptions, frames: str = ":", keep: bool = True) -> None:
@@ -196,8 +195,7 @@ def open_recording(
 ) -> tuple[Recording, list[str]]:
     """Open the recording in a rig's folder; also return a warning for each problem that a user must know.
 
-    `frames` is a range A:B, with B excluded; `keep` is that of `Recording`. Raises InputError where the rig is wrong or
-    one of its cameras moves.
+    `frames` is a range A:B, with B excluded. Raises InputError where the rig is wrong or one of its cameras moves.
     """
     rig = read_rig(folder)
     warnings = [*rig.remarks, *rig.missing()]
@@ -215,8 +213,7 @@ def open_recording(
 def moved_share(depths: list[Float64[np.ndarray, "H W"]]) -> float:
     """Return the share of pixels whose depth (m) differs from their usual depth, in the median frame.
 
-    The usual depth is the median over frames; pixels without a measurement are ignored. Fewer than three usable frames
-    give 0.
+    Pixels without a measurement are ignored. Fewer than three usable frames give 0.
     """
     seen = [depth for depth in depths if (depth > 0).mean() >= LEAST]
     if len(seen) < 3:

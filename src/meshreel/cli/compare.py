@@ -209,10 +209,7 @@ def is_reel(path: str) -> bool:
 
 
 def metric_table(row: dict[str, Any]) -> Table:
-    """Return a table of metrics, one per line: mean over frames, worst frame, and mean without key frames.
-
-    Metrics that no frame has, and counts of 0 frames, are left out.
-    """
+    """Return a table of metrics that some frame has: mean over frames, worst frame, and mean without key frames."""
     columns = {"mean": "", "worst frame": "_worst"}
     if any(name.endswith("_without_keys") for name in row):
         columns["without key frames"] = "_without_keys"

@@ -49,8 +49,7 @@ class Source:
 def open_source(inputs: Sequence[str], reading: Reading, common: Common = Common(quiet=True)) -> Source:
     """Open mesh files, or the folder of a rig or recordings, whose frames are fused on access. Raises InputError.
 
-    `common` shows the progress of reading recordings. The truth of a simulated rig has a description of cameras, too,
-    but is opened as the mesh files that it holds.
+    The truth of a simulated rig has a description of cameras, too, but is opened as the mesh files that it holds.
     """
     folder = located(inputs[0])
     if isinstance(folder, Path) and is_take(folder):

@@ -64,10 +64,7 @@ class GlbFile:
         return len(self._tree[kind]) - 1
 
     def open_vertices(self, stride: int = 12, bits: int = 0) -> None:
-        """Begin a buffer view of vertex attributes of `stride` bytes each; each `put` extends it.
-
-        `bits`: in compressed files, floats are rounded to multiples of 2^-bits; 0 keeps them.
-        """
+        """Begin a view of vertex attributes of `stride` bytes; compressed floats are rounded to 2^-bits, if not 0."""
         self.open_view((ATTRIBUTES, stride, bits), byteStride=stride, target=_VERTICES)
 
     def open_view(self, coding: tuple[str, int, int] | None = (ATTRIBUTES, 4, 0), **others: int) -> None:

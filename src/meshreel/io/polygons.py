@@ -172,8 +172,7 @@ class Lines:
     ) -> tuple[Float64[np.ndarray, " M"], Int64[np.ndarray, " N"]]:
         """Return all numbers of the chosen lines, without their first `skip` bytes, and the count in each line.
 
-        A number ends at the letter `stop` in a word. A `field` above 0 selects the text behind this many of these
-        letters, NaN if that is no number.
+        A number ends at the letter `stop` in a word; a `field` above 0 selects what is behind so many of these, or NaN.
         """
         starts, ends = self.starts[chosen] + skip, self.ends[chosen]
         values, counts, bad = _core.read_numbers(self.text, starts, ends, stop or "\0", field)

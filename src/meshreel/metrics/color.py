@@ -42,10 +42,7 @@ class ColorErrors:
 
 
 def color_errors(original: Mesh, decoded: Mesh) -> ColorErrors:
-    """Measure the colours of two meshes; a mesh without colours counts as grey.
-
-    Two meshes without faces are equal; where one has none, PSNRs are 0.
-    """
+    """Measure the colours of two meshes, grey without any; two empty ones are equal, where one is empty PSNRs are 0."""
     if original.is_empty or decoded.is_empty:
         same = math.inf if original.is_empty and decoded.is_empty else 0.0
         return ColorErrors(same, same, same)

@@ -55,10 +55,7 @@ class Comparison:
     keys: tuple[int, ...]
 
     def to_row(self) -> Row:
-        """Return a JSON-ready record: means under the metrics' names, `_worst`, `_without_keys`, and every frame.
-
-        A value that is not finite becomes None.
-        """
+        """Return a JSON-ready record: means, `_worst`, `_without_keys`, every frame; None for what is not finite."""
         used = [i for i, empty in enumerate(self.empty) if not empty]
         row: Row = aggregate([self.frames[i] for i in used])
         if self.keys:

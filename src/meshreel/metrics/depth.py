@@ -264,10 +264,7 @@ def _large(pixels: Mask, least: int) -> Mask:
 
 
 def _usual(stack: Float64[np.ndarray, "T H W"]) -> Depths:
-    """Return each pixel's depth of the still scene, m; 0 where nothing was measured.
-
-    Infinite where only moving surface was measured: the scene behind it is too far or too dark.
-    """
+    """Return each pixel's depth of the still scene, m; 0 without measurements, infinite where only bodies were seen."""
     ordered = np.sort(np.where(stack > 0, stack, -1.0), axis=0)
     missing = (stack <= 0).sum(axis=0)
     last = len(stack) - 1

@@ -131,8 +131,7 @@ def visible(scene: Scene, points: Scatter) -> Bool[np.ndarray, " N"]:
 def scene_row(reference: Scene, decoded: Scene) -> Row:
     """Return the metrics of one frame by name: `median_m` of all, `people_median_m`, `background_median_m`, and so on.
 
-    The numbers of a part that neither mesh has are None. If only the decoded mesh lacks it, errors are infinite and
-    180 degrees.
+    Numbers of a part that neither mesh has are None; if only the decoded one lacks it, errors are infinite and 180 deg.
     """
     row: Row = {"diagonal_m": reference.mesh.diagonal}
     backward, forward = _Matched.of(decoded, reference), _Matched.of(reference, decoded)
@@ -144,10 +143,7 @@ def scene_row(reference: Scene, decoded: Scene) -> Row:
 
 
 def scene_means(rows: Sequence[Row]) -> Row:
-    """Return the mean of every number over frames, without those that are None; None where all are.
-
-    An infinite PSNR counts as `PSNR_CEILING`.
-    """
+    """Return means of the numbers that are not None, None if all are; an infinite PSNR counts as `PSNR_CEILING`."""
     means: Row = {}
     for name in rows[0] if rows else ():
         values = [row[name] for row in rows if row[name] is not None]
@@ -168,8 +164,7 @@ def compare_with_truth(
 
     Returns a JSON-ready row of means, and of each frame under `per_frame`; numbers that are not finite, or of a missing
     part, are None. `people_flicker_deg` compares a frame with the one before it, if that is among `numbers`. `progress`
-    gets the number of finished frames. Raises InputError for a clean frame without faces, since then it cannot label
-    other meshes.
+    gets the number of finished frames. Raises InputError for a clean frame without faces, which cannot label others.
     """
     frames: list[Row] = []
     before = dict[str, Scene]()

@@ -91,8 +91,7 @@ class Box:
 def views_around(box: Box, options: ViewOptions = ViewOptions()) -> list[Camera]:
     """Return perspective views of the box from its front, right, back and left, all at the same distance.
 
-    The viewer of the front is at +z if y is up and at -y if z is up; at -z and +y if -y and -z are up. The distance
-    lets the box fit in every view.
+    The viewer of the front is at +z if y is up and at -y if z is up; at -z and +y if -y and -z are up.
     """
     across, height = extent(box, options.up)
     tangent = math.tan(math.radians(options.fov) / 2)

@@ -47,11 +47,7 @@ def policy(styles: str = "") -> str:
 
 
 def player_page(name: str, player: str, styles: str) -> str:
-    """Return the page that plays one file in the whole window; its script reads the other parameters of the URL.
-
-    `player` is the address of the player's folder, and `styles` its page.css. What the player needs first is asked for
-    at once.
-    """
+    """Return the page that plays one file; `player` is the address of the player's folder, `styles` its page.css."""
     source = escape(f"/files/{quote(name)}")
     preloads = "".join(
         f'<link {how} href="{player}/{file}">\n'

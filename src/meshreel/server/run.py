@@ -6,8 +6,8 @@ import asyncio
 import logging
 import socket
 import ssl
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from typing import Annotated
@@ -53,9 +53,8 @@ class ServerOptions:
 
 
 def run(app: Starlette, options: ServerOptions, announce: Callable[[list[str]], None]) -> None:
-    """Serve until SIGINT, which is the regular end, or SIGTERM.
+    """Serve until SIGINT, which is the regular end, or SIGTERM; `announce` gets the addresses once it listens.
 
-    `announce` gets the addresses as soon as the server listens.
     Raises InputError if the host is unknown or the port is taken.
     """
     logging.getLogger("uvicorn.error").addFilter(_is_news)
@@ -98,8 +97,7 @@ def _bracketed(host: str) -> str:
     return f"[{host}]" if ":" in host else host
 
 
-@contextmanager
-def _listening(options: ServerOptions) -> Iterator[socket.socket]:
+def _listening(options: ServerOptions) -> socket.socket:
     place = f"{options.host}:{options.port}"
     try:
         found = socket.getaddrinfo(options.host, options.port, type=socket.SOCK_STREAM)[0]
@@ -107,12 +105,10 @@ def _listening(options: ServerOptions) -> Iterator[socket.socket]:
         raise InputError(f"cannot listen on {place}: {error}; give another --host, 0.0.0.0 for all") from error
     both = options.host == "::" and socket.has_dualstack_ipv6()
     try:
-        listener = socket.create_server(found[4], family=found[0], dualstack_ipv6=both)
+        return socket.create_server(found[4], family=found[0], dualstack_ipv6=both)
     except OSError as error:
         remedy = "give another --port, or 0 for any free port" if options.port else "give another --host"
         raise InputError(f"cannot listen on {place}: {error.strerror or error}; {remedy}") from error
-    with listener:
-        yield listener
 
 
 def _encryption(address: str) -> ssl.SSLContext:

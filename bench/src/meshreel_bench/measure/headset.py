@@ -47,7 +47,8 @@ def headset_values(data: bytes, level: int, throttle: float, rate: float) -> Val
             tries = [_values(json.loads(_output(command, WEB)), rate)]
             if tries[0]["shown_share"] < HOLDS:
                 tries.append(_values(json.loads(_output(command, WEB)), rate))
-    return {**max(tries, key=lambda values: values["shown_share"])}  # other jobs only take pictures away
+    best = max(tries, key=lambda values: values["shown_share"])  # other jobs only take pictures away
+    return {**best}
 
 
 def _values(found: dict[str, Any], rate: float) -> dict[str, float]:

@@ -110,8 +110,8 @@ def _truth(case: _Case) -> Row:
         raise InputError("the truth itself is known of simulated scenes, and what moves of those with cameras")
     if known.scene is None:
         found, frames = segment(known.sequence), known.sequence  # by what the encoder finds to move
-        meshes = ((number, frames[number]) for number in range(len(frames)))
-        ratio = dynamic_ratio((mesh, found.moving(number, mesh)) for number, mesh in meshes)
+        pairs = ((number, frames[number]) for number in range(len(frames)))
+        ratio = dynamic_ratio((mesh, found.moving(number, mesh)) for number, mesh in pairs)
         return msgspec.structs.replace(row, name=FOUND_NAME, metrics={FLOOR_RATIO: ratio})
     scene, numbers = known.scene, row.measured_frames
     clean = [scene.truth[number].mesh for number in numbers]

@@ -285,10 +285,7 @@ def _placed(pose: Float64[np.ndarray, "4 4"], points: Float64[np.ndarray, "N 3"]
 
 
 def write_calibration_sheet(calibration: Calibration, up: Up, path: Path) -> None:
-    """Write a PNG: the distance of each pair of cameras, and what each sees from above, before and after.
-
-    Walls seen by several cameras are single lines where the poses are right. Matplotlib's Agg needs no display.
-    """
+    """Write a PNG: the distance of each pair of cameras, and what each sees from above, before and after."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 

@@ -128,10 +128,7 @@ def calibrate(frames: Iterable[Moment], options: CalibrationOptions) -> list[Cor
 
 
 def fit_gains(colors: Colors, trust: Trust) -> Gains:
-    """Return by how much the channels of each camera are brighter than the others' mean, log2; their mean is 0.
-
-    Of a camera that shares no place with another it is 0.
-    """
+    """Return how much brighter than the mean each camera's channels are, log2; 0 if it shares no place with another."""
     logs, gains = strict.log2(np.maximum(colors, DARK)), np.zeros((len(colors), 3))
     trust = np.where(((colors > DARK) & (colors < BRIGHT)).all(axis=2), trust, 0.0)
     slopes = np.full((*trust.shape, 1, 1), -1.0)
@@ -313,8 +310,7 @@ def remembered(
 ) -> Corrections:
     """Return the corrections of a rig's colour cameras from its folder, or find them and try to write them there.
 
-    `looked_at` are the frames that they are found from, and `depends_on` is all else that they depend on beside the
-    cameras. A file that is damaged or of other pictures is replaced; a folder that cannot be written stays as it is.
+    They depend on the frames `looked_at`, the cameras and `depends_on`: a file of others, or damaged, is replaced.
     """
     digest = _digest(rig, looked_at, depends_on)
     with suppress(*_DAMAGED):

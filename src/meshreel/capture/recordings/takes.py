@@ -82,10 +82,7 @@ def check_size(lens: Camera, width: int, height: int) -> None:
 
 @contextmanager
 def reading(path: Path, where: Callable[[], str] = str) -> Iterator[None]:
-    """Turn what packages raise for a damaged file, each errors of its own, into an InputError that names the file.
-
-    `where` says in which place of the file, after a comma.
-    """
+    """Turn what packages raise for a damaged file into an InputError that names the file, and `where` in it."""
     try:
         yield
     except InputError as error:

@@ -254,10 +254,7 @@ def _still(take: Take, sensor: Sensor) -> Float64[np.ndarray, "4 4"]:
 
 
 def _straightened(lens: Camera, reach: float) -> tuple[tuple[np.ndarray, np.ndarray], Bool[np.ndarray, "H W"]] | None:
-    """Return for each pixel of a lens that does not bend which one of a picture it is, and whether there is one.
-
-    Depths are not blended: between two surfaces is none.
-    """
+    """Return for each pixel of a straight lens which of a picture's it is, not blended, and whether there is one."""
     if not any(lens.distortion):
         return None
     ahead = lens.ahead

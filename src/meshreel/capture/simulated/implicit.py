@@ -43,19 +43,16 @@ class Grid:
 
 def field(bodies: tuple[Body, ...], touch: float, points: Points) -> Distances:
     """Return the approximate signed distance of points to the surface, m, negative inside; bodies blend by `touch`."""
-    total = None
+    nowhere = np.full(len(points), np.inf)  # what is near nothing: the smaller of it and a distance is that distance
+    total = nowhere
     for body in bodies:
-        whole = None
+        whole = nowhere
         for chain in body:
-            distance = None
+            distance = nowhere
             for start, end, radii in zip(chain.starts, chain.ends, chain.radii, strict=True):
-                part = capsule(points, start, end, radii)
-                distance = part if distance is None else smooth_min(distance, part, chain.blend)
-            assert distance is not None, "a chain has parts"
-            whole = distance if whole is None else smooth_min(whole, distance, chain.join)
-        assert whole is not None, "a body has chains"
-        total = whole if total is None else smooth_min(total, whole, touch)
-    assert total is not None, "a field has bodies"
+                distance = smooth_min(distance, capsule(points, start, end, radii), chain.blend)
+            whole = smooth_min(whole, distance, chain.join)
+        total = smooth_min(total, whole, touch)
     return total
 
 
