@@ -7,7 +7,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from ..capture.recording import FusionOptions, Recording, open_recording
+from ..capture.recording import FusionOptions, open_recording
 from ..capture.rig.rig import RIG, read_cameras
 from ..capture.simulated.demo_room import VOXEL, WIDTH, RoomOptions, record_room, room_cameras
 from ..capture.simulated.simulated_rig import TRUTH, read_truth
@@ -18,7 +18,7 @@ from ..encoder.settings.settings import QUALITY, Settings
 from ..errors import InputError
 from ..metrics.error_sheet import SheetOptions, write_sheet
 from .compare import OF_BOTH, against_truth, both_table
-from .console import Common, StageBars, called_as
+from .console import Common, called_as
 from .encode import describe, summary_row
 from .info import rate_table
 from .workers import workers
@@ -57,7 +57,11 @@ def command(
     options, room = Settings(quality=quality).resolved(), RoomOptions(frames=frames, seed=seed)  # errors before work
     file, picture = output / "demo.reel", output / "demo.png"
     with common.stages(frames) as progress, workers(jobs) as executor:
-        capture = _captured(output / "rig", room, progress)
+        _forget(output / "rig", [camera.name for camera in room_cameras(WIDTH)])
+        record_room(output / "rig", room, WIDTH, lambda k: progress("simulate", k, frames))
+        capture, _ = open_recording(output / "rig", FusionOptions(VOXEL))
+        for number, _ in enumerate(capture, 1):  # the recording keeps fused frames
+            progress("fuse", number, len(capture))
         summary = encode(capture, file, options=options, executor=executor, progress=progress, resume=False)
         with open_video(file) as video:
             clean = read_truth(output / "rig" / TRUTH)
@@ -77,16 +81,6 @@ def command(
         f"play: {called_as()} play {file}",
         f"meshes: {called_as()} decode {file} -o {output / 'meshes'}",
     )
-
-
-def _captured(folder: Path, room: RoomOptions, progress: StageBars) -> Recording:
-    """Record the room with its cameras and fuse all frames."""
-    _forget(folder, [camera.name for camera in room_cameras(WIDTH)])
-    record_room(folder, room, WIDTH, lambda k: progress("simulate", k, room.frames))
-    recording, _ = open_recording(folder, FusionOptions(VOXEL))
-    for number, _ in enumerate(recording):  # the recording keeps fused frames
-        progress("fuse", number + 1, len(recording))
-    return recording
 
 
 def _forget(folder: Path, names: list[str]) -> None:

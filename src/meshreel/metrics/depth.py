@@ -151,7 +151,9 @@ class DepthJudge:
         return int((heights < third).sum()), int(covered[heights < third].sum())
 
     def _body(self, camera: int, depth: Depths) -> Mask:
-        return _large((depth > 0) & (depth < self._usual.get(camera, 0.0) - apart(depth)), SPECK)
+        nearer = (depth > 0) & (depth < self._usual.get(camera, 0.0) - apart(depth))
+        areas = label(nearer)[0]
+        return nearer & (np.bincount(areas.reshape(-1)) >= SPECK)[areas]
 
     def _heights(self, pictures: Sequence[DepthPicture | None]) -> Float64[np.ndarray, " N"]:
         """Return the heights of a body's measured points in a frame, m."""
@@ -255,12 +257,6 @@ def _points(camera: Camera, depth: Depths, pixels: Mask) -> Float64[np.ndarray, 
     homogeneous = np.stack([columns + 0.5, rows + 0.5, np.ones(len(rows))])
     local = np.linalg.inv(camera.intrinsic) @ homogeneous * depth[pixels]
     return (camera.extrinsic[:3, :3].T @ (local - camera.extrinsic[:3, 3:])).T
-
-
-def _large(pixels: Mask, least: int) -> Mask:
-    """Return the connected areas of at least so many pixels."""
-    areas = label(pixels)[0]
-    return pixels & (np.bincount(areas.reshape(-1)) >= least)[areas]
 
 
 def _usual(stack: Float64[np.ndarray, "T H W"]) -> Depths:

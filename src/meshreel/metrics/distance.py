@@ -122,17 +122,13 @@ def surface_errors(original: Mesh | Original, decoded: Mesh) -> SurfaceErrors:
         errors = _PERFECT if original.is_empty and decoded.is_empty else _WORST
         return SurfaceErrors(original.diagonal, errors, errors)
     a, b = prepared.samples, sample(decoded, original.middle)
-    if (unit := _unit(a.mesh, b.mesh)) != 1:  # in metres, squares of the queries' float32 would be inf or 0
+    extent = max(float(np.abs(mesh.vertices).max()) for mesh in (a.mesh, b.mesh))
+    if not _LEAST <= extent <= _MOST:  # in metres, squares of the queries' float32 would be inf or 0
+        unit = 2.0 ** math.floor(math.log2(extent))
         smaller = surface_errors(*(Mesh.of(mesh.vertices * (1 / unit), mesh.faces) for mesh in (original, decoded)))
         return SurfaceErrors(original.diagonal, smaller.forward.times(unit), smaller.backward.times(unit))
     ways = (_one_way(one, match(one, other, RESOLUTION * original.diagonal)) for one, other in ((a, b), (b, a)))
     return SurfaceErrors(original.diagonal, *ways)
-
-
-def _unit(a: Mesh, b: Mesh) -> float:
-    """Return a power of two near the extent of both centered meshes; 1 for the extents of usual scans, m."""
-    extent = max(float(np.abs(mesh.vertices).max()) for mesh in (a, b))
-    return 1.0 if _LEAST <= extent <= _MOST else 2.0 ** math.floor(math.log2(extent))
 
 
 _PERFECT = OneWayErrors(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)

@@ -96,16 +96,12 @@ def _rows(originals: Frames, decoded: Frames, options: SheetOptions) -> Iterator
         for camera in cameras:
             crop = Crop(0, camera.height, 0, camera.width)
             views = [look(mesh, camera, crop) for mesh in meshes]
-            pictures = _pictures(meshes, views, camera)
+            if all(mesh.is_colored for mesh in meshes):
+                pixels = Pixels(camera, crop)
+                pictures = [Colored(mesh).look(pixels).colors for mesh in meshes]
+            else:
+                pictures = [view.colors for view in views]  # of their normals
             yield SheetRow(label, views[0], views[1], pictures, factor * error_at_pixels(views[0], meshes[1]))
-
-
-def _pictures(meshes: list[Mesh], views: list[View], camera: Camera) -> list[np.ndarray]:
-    """Return pictures of both meshes in their colours if both have some, else of their normals."""
-    if not all(mesh.is_colored for mesh in meshes):
-        return [view.colors for view in views]
-    pixels = Pixels(camera, views[0].crop)
-    return [Colored(mesh).look(pixels).colors for mesh in meshes]
 
 
 def _cameras(meshes: list[Mesh], options: SheetOptions) -> list[Camera]:

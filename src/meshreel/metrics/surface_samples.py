@@ -93,9 +93,14 @@ def welded_normals(mesh: Mesh) -> Float64[np.ndarray, "V 3"]:
     """Return unit normals of the vertices of `mesh`, in order; vertices at exactly equal positions share one."""
     if len(mesh.vertices) == 0:
         return np.zeros((0, 3))
-    representative = _first_at_position(mesh.vertices)
-    if representative is None:
+    order = np.lexsort(mesh.vertices.T)
+    ordered = mesh.vertices[order]
+    new = np.ones(len(order), dtype=bool)
+    new[1:] = (ordered[1:] != ordered[:-1]).any(axis=1)
+    if new.all():
         return vertex_normals(mesh)
+    representative = np.empty(len(order), dtype=np.int64)  # of each vertex: one at its position
+    representative[order] = order[np.flatnonzero(new)[np.cumsum(new) - 1]]
     return vertex_normals(Mesh.of(mesh.vertices, representative[mesh.faces]))[representative]
 
 
@@ -119,19 +124,6 @@ def angles(a: Points, b: Points) -> Float64[np.ndarray, " N"]:
     sums = np.linalg.norm(a + b, axis=1)
     undefined = (~a.any(axis=1)) | (~b.any(axis=1))
     return np.where(undefined, WORST_ANGLE, np.degrees(2 * angle(differences, sums)))
-
-
-def _first_at_position(vertices: Float64[np.ndarray, "V 3"]) -> Int64[np.ndarray, " V"] | None:
-    """Return, for each vertex, the index of one vertex at its position; None if all positions differ."""
-    order = np.lexsort(vertices.T)
-    ordered = vertices[order]
-    new = np.ones(len(order), dtype=bool)
-    new[1:] = (ordered[1:] != ordered[:-1]).any(axis=1)
-    if new.all():
-        return None
-    representative = np.empty(len(order), dtype=np.int64)
-    representative[order] = order[np.flatnonzero(new)[np.cumsum(new) - 1]]
-    return representative
 
 
 @dataclass(frozen=True, slots=True)

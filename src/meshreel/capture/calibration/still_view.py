@@ -68,11 +68,7 @@ def still_view(camera: DepthCamera, depths: list[Picture]) -> StillView:
     flat = good.copy()
     for measure in (off, change):
         flat &= measure <= max(FLAT * float(np.median(measure[good])) if good.any() else 0.0, FINE)
-    return _planes(camera, np.where(flat, depth, np.nan), right, down)
-
-
-def _planes(camera: DepthCamera, depth: Picture, right: Picture, down: Picture) -> StillView:
-    """Return the planes of pixels, from depths and the changes of the inverse depth to the right and down, 1/m."""
+    depth = np.where(flat, depth, np.nan)
     (fx, fy), rays = camera.view.focal, camera.view.ahead
     a, b = right * fx, down * fy
     normals = -np.stack([a, b, 1 / depth - a * rays[..., 0] - b * rays[..., 1]], axis=2)

@@ -19,6 +19,7 @@ from .takes import Pictures, Sensor, Stream, Take, lens_of
 
 KIND = "an Azure Kinect or Femto recording (.mkv)"
 CALIBRATION = "calibration.json"
+TITLES = {"CALIBRATION_CameraLocationD0": "DEPTH", "CALIBRATION_CameraLocationPV0": "COLOR"}  # of tracks, by camera
 # Of the sensor's 1024 x 1024 pixels, in modes with pictures that are not square, and in others: left edge and width,
 # upper edge and height.
 NARROW, ALL = ((192, 640), (180, 576)), ((0, 1024), (0, 1024))
@@ -37,7 +38,9 @@ def read(path: Path) -> Take:
             raise ValueError(f"no track has the title DEPTH, only {', '.join(tracks) or 'none'}")
         start = int(video.metadata.get("K4A_START_OFFSET_NS", 0)) / 1e9
         attached = {one.metadata.get("filename"): one.data for one in video.streams.attachments}
-        cameras = _cameras(attached.get(CALIBRATION))
+        data = attached.get(CALIBRATION)
+        known = json.loads(data.rstrip(b"\0"))["CalibrationInformation"]["Cameras"] if data else []
+        cameras = {TITLES[one["Location"]]: one for one in known if one.get("Location") in TITLES}
         streams = {}
         for title in [title for title in ("DEPTH", "COLOR") if title in tracks]:
             track, seconds = tracks[title], (video.duration or 0) / 1e6
@@ -55,15 +58,6 @@ def read(path: Path) -> Take:
     sensor = Sensor("kinect", streams["DEPTH"], 0.001, streams.get("COLOR"), apart)
     remedy = f"the file has no {CALIBRATION} attached; record it with the camera's SDK"
     return Take(path, KIND, (sensor,), remedy, others)
-
-
-def _cameras(data: bytes | None) -> dict[str, dict[str, Any]]:
-    """Return the calibration of each camera, by the title of its track."""
-    if not data:
-        return {}
-    names = {"CALIBRATION_CameraLocationD0": "DEPTH", "CALIBRATION_CameraLocationPV0": "COLOR"}
-    cameras = json.loads(data.rstrip(b"\0"))["CalibrationInformation"]["Cameras"]
-    return {names[one["Location"]]: one for one in cameras if one.get("Location") in names}
 
 
 def _lens(camera: dict[str, Any], deep: bool, width: int, height: int) -> Camera:

@@ -39,7 +39,16 @@ class DepthCamera:
     depth_range: tuple[float, float] = (0.1, 10.0)  # m, nearest and farthest depth that counts
 
     def __post_init__(self) -> None:
-        _check(self.name, self.view)
+        name, view = self.name, self.view
+        (fx, fy), (cx, cy) = view.focal, view.center
+        sides, size = (view.width, view.height), f"{view.width} x {view.height}"
+        if not all(8 <= side <= MOST_PIXELS for side in sides):
+            raise InputError(f"camera {name}: pictures of {size}: give 8 to {MOST_PIXELS}")
+        if not all(FOCAL[0] * n <= f <= FOCAL[1] * n for f, n in zip(view.focal, sides, strict=True)) or not all(
+            -AWAY * n <= c <= (1 + AWAY) * n for c, n in zip(view.center, sides, strict=True)
+        ):
+            text = f"focal ({fx:g}, {fy:g}), center ({cx - 0.5:g}, {cy - 0.5:g}) for pictures of {size}"
+            raise InputError(f"camera {name}: {text}: give pixels, focal above 0; calibrate the camera again")
         near, far = self.depth_range
         if not (math.isfinite(self.depth_unit) and self.depth_unit > 0 and 0 <= near < far < math.inf):
             text = f"depth unit {self.depth_unit:g}, range {near:g} to {far:g}"
@@ -97,19 +106,6 @@ def placed(name: str, to_world: Matrix) -> CameraPose:
     if reason:
         raise InputError(f"camera {name}: camera_to_world {reason}; calibrate it again, or leave the camera out")
     return CameraPose.of_camera(to_world)
-
-
-def _check(name: str, view: Camera) -> None:
-    """Raise InputError for a picture or a lens that no camera has."""
-    sides, (fx, fy), (cx, cy) = (view.width, view.height), view.focal, view.center
-    size = f"{view.width} x {view.height}"
-    if not all(8 <= side <= MOST_PIXELS for side in sides):
-        raise InputError(f"camera {name}: pictures of {size}: give 8 to {MOST_PIXELS}")
-    if not all(FOCAL[0] * n <= f <= FOCAL[1] * n for f, n in zip(view.focal, sides, strict=True)) or not all(
-        -AWAY * n <= c <= (1 + AWAY) * n for c, n in zip(view.center, sides, strict=True)
-    ):
-        text = f"focal ({fx:g}, {fy:g}), center ({cx - 0.5:g}, {cy - 0.5:g}) for pictures of {size}"
-        raise InputError(f"camera {name}: {text}: give pixels, focal above 0; calibrate the camera again")
 
 
 def check_size(path: Path, pixels: np.ndarray, camera: DepthCamera | ColorCamera) -> None:
