@@ -77,7 +77,13 @@ def command(
     if len(inputs) > 1 or (inputs[0].exists() and not is_rig(inputs[0])):
         if (options, frames, format) != (_FUSION, ":", "ply"):
             raise InputError(f"{inputs[0]}: is no rig: make one of it without options of fusion, then capture that")
-        return _make_rig(inputs, output, common)
+        warnings = make_rig([open_take(path) for path in inputs], output, common)
+        rig = read_rig(output)
+        common.warn([*warnings, *rig.missing()])
+        row = {"output": str(output), "cameras": len(rig.cameras), "color_cameras": len(rig.color_cameras)}
+        row |= {"frames": len(rig.frames), "frame_rate": rig.frame_rate}
+        counted = f"{row['frames']} frames, depth cameras: {row['cameras']}, colour cameras: {row['color_cameras']}"
+        return common.result(row, f"{output}: a rig, {counted}, {rig.frame_rate:g} frames a second")
     return _fuse(inputs[0], output, options, frames, format, common)
 
 
@@ -114,16 +120,6 @@ def _rig_facts(rig: Rig) -> tuple[dict[str, Any], list[str]]:
         lines.append(f"  {camera['name']}: {camera['kind']} {size}, calibrated")
     about = {"path": str(rig.folder), "kind": "a rig", "frames": len(rig.frames), "frame_rate": rig.frame_rate}
     return about | {"cameras": cameras}, lines
-
-
-def _make_rig(inputs: list[Path], output: Path, common: Common) -> None:
-    warnings = make_rig([open_take(path) for path in inputs], output, common)
-    rig = read_rig(output)
-    common.warn([*warnings, *rig.missing()])
-    row = {"output": str(output), "cameras": len(rig.cameras), "color_cameras": len(rig.color_cameras)}
-    row |= {"frames": len(rig.frames), "frame_rate": rig.frame_rate}
-    counted = f"{row['frames']} frames, depth cameras: {row['cameras']}, colour cameras: {row['color_cameras']}"
-    common.result(row, f"{output}: a rig, {counted}, {rig.frame_rate:g} frames a second")
 
 
 def _fuse(rig: Path, output: Path, options: FusionOptions, frames: str, format: str, common: Common) -> None:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from jaxtyping import Float64
@@ -61,7 +62,11 @@ def polygonize(bodies: tuple[Body, ...], touch: float, grid: Grid) -> Mesh:
     from skimage.measure import marching_cubes
 
     margin = 2.5 * grid.spacing + max(touch, *(max(c.blend, c.join) for body in bodies for c in body))
-    lattice = [[_on_lattice(chain, grid) for chain in body] for body in bodies]
+    shift = grid.shift * grid.spacing
+    lattice = [  # the chains in the lattice's axes, m
+        [replace(c, starts=c.starts @ grid.turn - shift, ends=c.ends @ grid.turn - shift) for c in body]
+        for body in bodies
+    ]
     low, high = _bounds([chain for body in lattice for chain in body], margin, grid.spacing)
     low, high = np.floor(low).astype(int), np.ceil(high).astype(int) + 1
     values = np.full(high - low, margin, dtype=np.float32)
@@ -70,7 +75,7 @@ def polygonize(bodies: tuple[Body, ...], touch: float, grid: Grid) -> Mesh:
         values[box] = smooth_min(values[box], inner, touch)
     corners, faces, _, _ = marching_cubes(values, level=0.0)
     vertices = ((corners.astype(np.float64) + low + grid.shift) * grid.spacing) @ grid.turn.T
-    return _evened(drop_unreferenced(Mesh.of(vertices, faces)), lambda points: field(bodies, touch, points))
+    return _evened(drop_unreferenced(Mesh.of(vertices, faces)), partial(field, bodies, touch))
 
 
 def capsule(points: np.ndarray, start: np.ndarray, end: np.ndarray, radii: np.ndarray) -> np.ndarray:
@@ -86,13 +91,6 @@ def smooth_min(a: np.ndarray, b: np.ndarray, width: float) -> np.ndarray:
     """Return the smaller of two distances, blended quadratically where they differ by less than `width`."""
     near = np.maximum(width - np.abs(a - b), 0)
     return np.minimum(a, b) - near * near / (4 * width)
-
-
-def _on_lattice(chain: Chain, grid: Grid) -> Chain:
-    """Return the chain in the lattice's axes, m."""
-    shift = grid.shift * grid.spacing
-    starts, ends = chain.starts @ grid.turn - shift, chain.ends @ grid.turn - shift
-    return Chain(starts, ends, chain.radii, chain.blend, chain.join)
 
 
 def _bounds(chains: list[Chain], margin: float, spacing: float) -> tuple[np.ndarray, np.ndarray]:
