@@ -147,6 +147,10 @@ def test_a_flipped_byte_anywhere_is_found_and_costs_one_group_at_most():
         assert survivors(bytes(data)) == ({0, 1, 2, 3} - hit if hit else set()), place
 
 
+def test_more_layers_than_any_group_has_are_all_of_them():
+    assert digests(meshreel.open(MIXED).at(layers=10**30)) == WHOLE
+
+
 def test_a_missing_file_and_a_folder_are_input_errors(tmp_path):
     (tmp_path / "folder.reel").mkdir()
     for name in ("none", "folder"):

@@ -26,6 +26,7 @@ from .pictures import Decoders
 from .tracks import Background, Track, moving_of_frame
 
 BACKGROUND = "background"  # its name among the parts of a frame
+_MOST_LAYERS = 255  # beyond the first, more than any group has
 INLINE = 8_000_000  # bytes, largest file in a notebook's output (guess): saved notebooks hold 4/3 of it
 
 
@@ -90,7 +91,8 @@ class Video(Sequence[Mesh]):
         layers = None if layers is None else operator.index(layers)
         if layers is not None and layers < 0:
             raise InputError(f"layers must not be negative, got {layers}: give a number of layers, or None for all")
-        return Video(self.reader, layers, self._close, colors, self.path)
+        most = None if layers is None else min(layers, _MOST_LAYERS)
+        return Video(self.reader, most, self._close, colors, self.path)
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle the path or URL, with which another process opens the file again, or else the bytes."""

@@ -195,6 +195,8 @@ def _check_alike(path: Place, reader: ReelReader, other: ReelReader, first: Plac
     if reader.edit.rotation != other.edit.rotation:
         raise InputError(f"{path}: is rotated otherwise than {first}; transform both in the same way")
     check_known(path, reader.chunks)
+    if "interval" in reader.metadata:
+        raise InputError(f"{path}: is an interval of an encode that was stopped; finish that with --resume")
     try:
         ours, theirs = of_all_parts(other.metadata), of_all_parts(reader.metadata)
         joined_metadata(parts[-1:])

@@ -126,9 +126,11 @@ Place = Path | Remote
 
 
 def located(name: str | Place) -> Place:
-    """Return the place that a name refers to: a path on this machine, or a URL."""
+    """Return the place that a name refers to: a path on this machine, or a URL. Raises InputError for neither."""
     if not isinstance(name, str):
         return name
+    if "\0" in name:
+        raise InputError(f"{name!r}: no path has a null character; mend it")
     return Remote(name) if _URL.match(name) else Path(name)
 
 

@@ -236,12 +236,14 @@ def unfinished(path: Path, wait: float = 0.0, durable: bool = True) -> Iterator[
 
 @contextmanager
 def cannot_be_written(path: Path) -> Iterator[None]:
-    """Turn an OSError inside the block into an InputError with the output's name and a remedy."""
+    """Turn an OSError inside the block into an InputError with the output's name, the file in its way, and a remedy."""
     try:
         yield
     except OSError as error:
         remedy = "free space, or choose another folder" if error.errno in FULL else "choose another folder"
-        raise InputError(f"{path}: cannot be written ({error.strerror or error}); {remedy}") from error
+        inner = error.filename if isinstance(error.filename, str) else ""
+        where = f" at {inner}" if inner and Path(inner) not in (path, path.parent, part_of(path)) else ""
+        raise InputError(f"{path}: cannot be written ({error.strerror or error}{where}); {remedy}") from error
 
 
 def claim(name: Path, output: Path, wait: float = 0.0) -> BinaryIO:

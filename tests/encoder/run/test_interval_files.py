@@ -214,8 +214,9 @@ def test_an_interval_of_another_encode_or_of_other_frames_is_not_trusted(stopped
     with pytest.raises(Stopped):
         encode(stopped)
     shutil.copy(folder / interval(3), folder / interval(1))
-    with pytest.raises(InputError, match=r"00000001-000.reel: the interval of frame 1, track 0 is of another surface"):
+    with pytest.raises(InputError, match=r"00000001-000.reel: the interval of frame 1, .*another surface") as told:
         encode(stopped, resume=True)
+    assert not hasattr(told.value, "__notes__")  # which would say that --resume goes on
 
 
 @pytest.mark.parametrize(
@@ -354,6 +355,54 @@ def test_a_search_begins_again_and_keeps_nothing(fake, tmp_path):
     with pytest.raises(Stopped):
         encode_to(Encoder(BALLS), path, Goal(mbps=1.0), options_at)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_what_a_killed_search_left_is_in_the_way_of_nobody(fake, tmp_path, monkeypatch):
+    path, left = tmp_path / "a.reel", dict[str, bytes]()
+    fake()
+    whole, real = encode(path), Fake.__call__
+
+    def killed(self, *arguments):
+        left.update(kept(path) if self.calls == 4 else {})
+        yield from real(self, *arguments)
+
+    monkeypatch.setattr(Fake, "__call__", killed)
+    goal = Goal(mbps=8 * len(whole) / 0.7 / 1e6)  # of seven frames at 10 a second
+    fake()
+    encode_to(Encoder(BALLS), path, goal, lambda _: EACH_ALONE)
+    assert len(left) > 3
+    for again in (lambda: encode_to(Encoder(BALLS), path, goal, lambda _: EACH_ALONE), lambda: encode(path)):
+        path.with_name("a.reel.part").mkdir()
+        for name, data in left.items():
+            (tmp_path / "a.reel.part" / name).write_bytes(data)
+        again()
+        assert list(tmp_path.iterdir()) == [path] and path.read_bytes() == whole
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="the system has no named pipes")
+def test_a_pipe_in_place_of_what_tells_of_the_whole_does_not_stop_the_encode(stopped):
+    path = stopped.parent / "a.reel.part" / "whole.json"
+    path.unlink()
+    os.mkfifo(path)
+    with pytest.raises(InputError, match=r"a.reel: cannot be written .*pipe"):
+        encode(stopped, resume=True)
+
+
+def test_a_folder_that_is_no_encodes_keeps_a_file_called_lock(tmp_path, fake):
+    fake()
+    folder = tmp_path / "a.reel.part"
+    folder.mkdir()
+    (folder / "lock").write_text("mine")
+    (folder / "notes.txt").write_text("mine")
+    with pytest.raises(InputError, match=r"for it holds notes.txt"):
+        encode(tmp_path / "a.reel")
+    assert (folder / "lock").read_text() == "mine"
+
+
+def test_an_error_of_an_output_names_the_file_in_its_way(stopped):
+    (stopped.parent / "a.reel.part" / f".{interval(4)}").mkdir()
+    with pytest.raises(InputError, match=rf"a.reel: cannot be written \(.* at .*\.{interval(4)}\)"):
+        encode(stopped, resume=True)
 
 
 def test_a_frame_that_changes_after_the_survey_is_refused(fake, tmp_path, monkeypatch):

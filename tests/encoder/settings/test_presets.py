@@ -54,6 +54,10 @@ def test_every_setting_reaches_its_option():
         ({"effort": "lazy"}, "no effort is called 'lazy'; known: fast, normal, thorough"),
         ({"preset": "paper", "effort": "fast"}, "effort fast: preset `paper` has one effort"),
         ({"background_refresh": 0.0}, "background refresh"),
+        ({"preset": "paper", "centers": 10**12}, "centers .*at most 100000"),
+        *(({name: 1.5}, f"{name.replace('_', ' ')} 1.5: give a whole number") for name in ("group_size", "splats")),
+        ({"preset": "paper", "centers": NAN}, "centers nan: give a whole number"),
+        *(({name: "3"}, "'3': give a number") for name in ("quality", "key_interval", "background_refresh")),
         ({"background_refresh": 1.0, "dynamic_only": True}, "background refresh"),
     ],
 )

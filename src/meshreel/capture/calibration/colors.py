@@ -36,6 +36,7 @@ Slope = Float64[np.ndarray, "C D"]
 Trust = Float64[np.ndarray, "C N"]  # in a camera's colour of a place; 0: it does not see it
 
 DARK, BRIGHT = 8.0, 250.0  # levels beyond which a ratio says nothing: noise, and what is cut off (guess)
+MOST_GAIN, MOST_MOTION = 16.0, 100.0  # log2; rad and m: beyond these a file of corrections is damaged (guess)
 LEAST_GAIN, LEAST_COLOR = 0.02, 2.0  # log2, levels: deviations below are no outliers (guess)
 GAIN_ERROR, POSE_ERROR = 0.5, 0.02  # log2; rad and m: expected, where colours leave something open (guess)
 GAIN_ROUNDS = 6  # in which outliers lose their weight (guess)
@@ -330,16 +331,19 @@ def remembered(
 
 
 def _corrections(rig: Rig, entries: list[dict[str, Any]]) -> Corrections:
-    """Return corrections as they were written. Raises ValueError unless each is of its camera, and finite."""
+    """Return corrections as they were written. Raises ValueError unless each is of its camera, and possible."""
     if entries and [entry["name"] for entry in entries] != [camera.name for camera in rig.color_cameras]:
         raise ValueError("of other cameras")
-    return tuple(Correction(_numbers(entry["log2_gains"], 3), _numbers(entry["motion"], 6)) for entry in entries)
+    return tuple(
+        Correction(_numbers(entry["log2_gains"], 3, MOST_GAIN), _numbers(entry["motion"], 6, MOST_MOTION))
+        for entry in entries
+    )
 
 
-def _numbers(values: Any, count: int) -> Float64[np.ndarray, " n"]:
+def _numbers(values: Any, count: int, most: float) -> Float64[np.ndarray, " n"]:
     numbers = np.array(values, dtype=np.float64)
-    if numbers.shape != (count,) or not np.isfinite(numbers).all():
-        raise ValueError(f"{values!r:.40} are not {count} finite numbers")
+    if numbers.shape != (count,) or not (np.abs(numbers) <= most).all():
+        raise ValueError(f"{values!r:.40} are not {count} numbers up to {most:g}")
     return numbers
 
 

@@ -5,7 +5,6 @@ In `rig.json` the middles of pixels are whole numbers: `cx` and `cy` are half a 
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -24,6 +23,7 @@ PICTURES = {"depth": (".png",), "color": (".png", ".jpg", ".jpeg", ".webp", ".bm
 MOST_DISTORTION = 10.0  # of a coefficient: beyond, the picture would fold many times (guess)
 MOST_PIXELS = 16_384  # of a picture's side (guess)
 FARTHEST = 1e4  # m from the world's origin: fusion has 32-bit coordinates, which are 1 mm apart there (guess)
+_MOST_UNIT, _FARTHEST = 1e3, 1e4  # m, of a unit of depth, and of a range (guesses)
 FOCAL = (0.05, 100.0)  # in sides of the picture; a focal length outside is not in pixels (guess)
 AWAY = 10.0  # sides by which a cropped picture may lie beside its optical axis (guess)
 C = TypeVar("C", "DepthCamera", "ColorCamera")
@@ -50,9 +50,11 @@ class DepthCamera:
             text = f"focal ({fx:g}, {fy:g}), center ({cx - 0.5:g}, {cy - 0.5:g}) for pictures of {size}"
             raise InputError(f"camera {name}: {text}: give pixels, focal above 0; calibrate the camera again")
         near, far = self.depth_range
-        if not (math.isfinite(self.depth_unit) and self.depth_unit > 0 and 0 <= near < far < math.inf):
+        if not (0 < self.depth_unit <= _MOST_UNIT and 0 <= near < far <= _FARTHEST):
             text = f"depth unit {self.depth_unit:g}, range {near:g} to {far:g}"
-            raise InputError(f"camera {self.name}: {text}: give metres, unit above 0 and 0 <= nearest < farthest")
+            raise InputError(
+                f"camera {self.name}: {text}: give metres, a unit above 0 and 0 <= nearest < farthest <= {_FARTHEST:g}"
+            )
 
     def in_range(self, depth: UInt16[np.ndarray, "H W"]) -> UInt16[np.ndarray, "H W"]:
         """Return depths with those outside the camera's range set to 0, no measurement."""
@@ -119,8 +121,8 @@ def pictures_in(folder: Path, name: str, kind: Literal["depth", "color"]) -> dic
     """Return a camera's pictures by the last number in their names. Raises InputError where there is none."""
     try:
         paths = sorted(p for p in folder.iterdir() if p.suffix.lower() in PICTURES[kind] and not p.name.startswith("."))
-    except OSError as error:
-        text = f"{folder}: {kind} of camera {name} cannot be read ({error.strerror})"
+    except (OSError, ValueError) as error:  # of a name with a null
+        text = f"{folder}: {kind} of camera {name} cannot be read ({getattr(error, 'strerror', error)})"
         raise InputError(f"{text}; name its folder as `{kind}`, or leave it out") from None
     found: dict[int, Path] = {}
     for path in paths:

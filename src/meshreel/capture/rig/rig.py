@@ -138,7 +138,7 @@ def _described(folder: Path) -> tuple[list[Any], tuple[DepthCamera, ...], float,
     rate = record.get("frames_per_second")
     if isinstance(rate, bool) or not isinstance(rate, (int, float)) or not RATES[0] <= rate <= RATES[1]:
         raise InputError(f"{path}: frames_per_second is {rate!r:.40}; give a number from {RATES[0]:g} to {RATES[1]:g}")
-    cameras = tuple(_camera(path, number, entry) for number, entry in enumerate(entries))
+    cameras = tuple(_camera(path, f"number {number}", entry) for number, entry in enumerate(entries))
     names = [camera.name for camera in cameras]
     if len(set(names)) < len(names):
         raise InputError(f"{path}: two cameras have one name ({', '.join(names)}); name each differently")
@@ -159,7 +159,7 @@ def write_rig(
         file.write((json.dumps({"frames_per_second": frame_rate, "cameras": entries}, indent=1) + "\n").encode())
 
 
-def _camera(path: Path, number: int, entry: Any) -> DepthCamera:
+def _camera(path: Path, label: str, entry: Any) -> DepthCamera:
     try:
         if not isinstance(entry, dict):
             raise InputError(f"is {entry!r:.40} and not an object")
@@ -172,9 +172,9 @@ def _camera(path: Path, number: int, entry: Any) -> DepthCamera:
             raise InputError(f"pictures of {width:g} x {height:g}; give whole numbers of pixels")
         to_world = _matrix(given)
     except InputError as error:
-        raise InputError(f"{path}: camera number {number} is not described: {error}; {_SEE}") from None
+        raise InputError(f"{path}: camera {label} is not described: {error}; {_SEE}") from None
     try:
-        name = entry.get("name", f"camera{number}")
+        name = entry.get("name", label.replace("number ", "camera"))
         center, pose = (cx + 0.5, cy + 0.5), placed(name, to_world)
         return DepthCamera(name, Camera(int(width), int(height), (fx, fy), center, pose), unit, (near, far))
     except InputError as error:
@@ -221,8 +221,9 @@ def _color_camera(folder: Path, entry: Any, beside: dict[str, Any], number: int 
     if not isinstance(given, dict):
         raise InputError(f"{path}: color of camera {beside['name']} is {entry!r:.40}; give a folder or an object")
     one = beside | given
+    label = f"{beside['name']} of colour" if number is None else f"{number} of color_cameras"
+    camera = _camera(path, label, {key: one[key] for key in one if key not in ("folder", "distortion")})
     try:
-        camera = _camera(path, 0, {key: one[key] for key in one if key not in ("folder", "distortion")})
         place, distortion = one.get("folder"), distortion_of(one)
         if not isinstance(place, str):
             raise InputError(f"color camera {camera.name} has no folder; name that of its pictures")

@@ -28,7 +28,7 @@ from ...errors import FormatError, InputError
 from ...format.checks import COMPANIONS
 from ...format.layout import ChunkKind, Form, Header
 from ...geometry.derived_sequences import DerivedSequence
-from ...io.files import Place, first_difference, located, uploaded
+from ...io.files import Place, first_difference, located, read_file, uploaded
 from ...io.write import cannot_be_written, check_apart, claim, discard, part_of, sync, sync_folder, unfinished
 from ..group.digests import versions
 from ..group.forms import EncodedGroup, Fidelity
@@ -37,6 +37,7 @@ from ..settings.options import EncoderOptions
 
 LOCK, WHOLE, SCENE = "lock", "whole.json", "scene.npz"
 _INTERVAL = re.compile(r"\d{8,}-\d{3}\.reel")  # the number of its first frame, and its track
+_KNOWN = re.compile(rf"{WHOLE}|{_INTERVAL.pattern}")  # by which a folder is told from others
 _OWN = re.compile(rf"{LOCK}|\.?({WHOLE}|{SCENE}|{_INTERVAL.pattern})")  # with a dot: while it is written
 _MOST = 0xFFFF  # bytes of metadata (FORMAT.md)
 _OTHERWISE = "start over with --no-resume (resume=False)"
@@ -55,7 +56,7 @@ class IntervalFiles:
         self.continued = 0  # intervals that an earlier run had done
         self.lasting = lasting
         self.whole: dict[str, Any] | None = None  # what an earlier run, or this one, wrote of the whole
-        self._resume, self._begun = resume, False
+        self._resume, self._begun, self._refused = resume, False, False
         self._done = set[str]()  # names of intervals
 
     def __enter__(self) -> IntervalFiles:
@@ -79,7 +80,7 @@ class IntervalFiles:
         if not done:
             with suppress(OSError):
                 self._clear()
-        elif error is not None and self._begun:
+        elif error is not None and self._begun and not self._refused and self.path.is_dir():
             error.add_note(f"{self.path} has {done}: continue with --resume")
         self._leave()
 
@@ -112,7 +113,7 @@ class IntervalFiles:
         if self.whole is None or self.whole["scene"] is None:
             return None
         with suppress(OSError):
-            data = (self.path / SCENE).read_bytes()
+            data = read_file(self.path / SCENE)
             return data if hashlib.sha256(data).hexdigest() == self.whole["scene"] else None
         return None
 
@@ -140,17 +141,18 @@ class IntervalFiles:
             self._done.discard(name)
             return None
         if place != before:
+            self._refused = True
             text = f"{self.path / name}: {named(interval)} is of another surface: {first_difference(before, place)}"
-            raise InputError(f"{text}; have masks or depth changed? {_OTHERWISE.capitalize()}")
+            raise InputError(f"{text}; if masks or depth have changed, {_OTHERWISE}")
         self.continued += 1
         return groups
 
     def keep(self, interval: Interval, data: bytes) -> list[EncodedGroup]:
         """Write the file of an interval; return its groups with payloads that are read when they are needed."""
         name = _name(interval)
-        self._write(name, data)
+        place = self._write(name, data)
         self._done.add(name)
-        return _groups(self.path / name, ReelReader(BytesSource(data)))
+        return _groups(place, ReelReader(BytesSource(data)))
 
     def _claimed(self) -> BinaryIO:
         """Make the folder where it is missing, and lock it."""
@@ -159,6 +161,11 @@ class IntervalFiles:
                 text = "is no folder of an encode, as earlier versions of meshreel kept a file of this name"
                 raise InputError(f"{self.path}: {text}, and in the way of one; move it away")
             self.path.mkdir(exist_ok=True)
+            names = {path.name for path in self.path.iterdir()}
+            known, others = any(map(_KNOWN.fullmatch, names)), sorted(n for n in names if not _OWN.fullmatch(n))
+            if others and not known:
+                text = f"is no folder of an encode, for it holds {others[0]}, and in the way of one"
+                raise InputError(f"{self.path}: {text}; move it away")
             try:
                 return claim(self.path / LOCK, self.output)
             except FileNotFoundError:
@@ -172,9 +179,6 @@ class IntervalFiles:
         """Find what an earlier run left, and start over where that is nothing, or not wanted."""
         names = {path.name for path in self.path.iterdir()}
         self._done, self.whole = set(filter(_INTERVAL.fullmatch, names)), self._read_whole()
-        if not (self._done or WHOLE in names) and (others := sorted(n for n in names if not _OWN.fullmatch(n))):
-            text = f"is no folder of an encode, for it holds {others[0]}, and in the way of one"
-            raise InputError(f"{self.path}: {text}; move it away")
         if self._done and self.whole is None and self._resume is not False:
             text = f"{self.path / WHOLE}: is damaged, or missing, and tells what {len(self._done)} intervals are of"
             raise InputError(f"{text}; {_OTHERWISE}")
@@ -192,25 +196,31 @@ class IntervalFiles:
 
     def _read_whole(self) -> dict[str, Any] | None:
         """Return the facts in `whole.json`, or None if it is missing or damaged."""
-        with suppress(OSError, ValueError, RecursionError, KeyError, TypeError, AttributeError):
-            record: dict[str, Any] = json.loads((self.path / WHOLE).read_bytes())
+        with suppress(FileNotFoundError, ValueError, RecursionError, KeyError, TypeError, AttributeError):
+            record: dict[str, Any] = json.loads(read_file(self.path / WHOLE))
             is_ours = record.pop("digest") == _digest(record) and isinstance(record["made"], dict) and "scene" in record
             return record if is_ours else None
         return None
 
-    def _write(self, name: str, data: bytes) -> None:
-        """Write a file that is whole and on the disk when it has its name."""
+    def _write(self, name: str, data: bytes) -> Path:
+        """Write a file that is whole and on the disk when it has its name, and return its path.
+
+        Nothing continues from files that do not last, which keep the names of unfinished ones.
+        """
         temporary = self.path / f".{name}"
         with cannot_be_written(self.output):
             try:
                 with temporary.open("wb") as file:
                     file.write(data)
                     sync(file)
+                if not self.lasting:
+                    return temporary
                 temporary.replace(self.path / name)
             except BaseException:
                 temporary.unlink(missing_ok=True)
                 raise
         sync_folder(self.path)
+        return self.path / name
 
     def _clear(self) -> None:
         """Remove the files of an encode, and leave others alone."""

@@ -178,7 +178,12 @@ def _unpacked(record: dict[str, Any]) -> Survey:
     sizes = np.array([*low, *high, *diagonals])
     if not (len(low) == len(high) == 3 and len(pieces) in (0, len(diagonals))):
         raise ValueError("its parts are of different lengths")
-    if not (np.abs(sizes) <= LARGEST).all() or (low > high).any() or min(diagonals, default=-1.0) < 0:
+    if (
+        not (np.abs(sizes) <= LARGEST).all()
+        or (low > high).any()
+        or min(diagonals, default=-1.0) < 0
+        or not (scale is None or 0 < scale <= LARGEST)
+    ):
         raise ValueError("its numbers are impossible")
     return Survey(low, high, diagonals, flattened, scale, int(record["dropped"]), pieces)
 

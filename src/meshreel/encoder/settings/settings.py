@@ -7,11 +7,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from numbers import Integral, Real
 from typing import Literal, get_args
 
 from ...errors import InputError
 from .options import EncoderOptions, appearance_options, layers_options, paper_options, scene_options
 
+MOST_CENTERS = 100_000  # fifty times the paper's: tracking takes more than a minute a frame (guess)
 QUALITY = 50.0  # unless another is given (decision 9)
 Preset = Literal["best", "paper", "paper-literal"]
 Effort = Literal["fast", "normal", "thorough"]
@@ -67,6 +69,12 @@ class Settings:
     not given."""
 
     def __post_init__(self) -> None:
+        for name, kind in self.__annotations__.items():
+            value = getattr(self, name)
+            if value is not None and kind.startswith(("int", "TextureSize")) and not isinstance(value, Integral):
+                raise InputError(f"{name.replace('_', ' ')} {value!r}: give a whole number")
+            if value is not None and kind.startswith("float") and not isinstance(value, Real):
+                raise InputError(f"{name.replace('_', ' ')} {value!r}: give a number")
         for name, value, known in (
             ("preset", self.preset, PRESETS),
             ("effort", self.effort, EFFORTS),
@@ -77,6 +85,8 @@ class Settings:
         for name, percent in (("quality", self.quality), ("color quality", self.color_quality)):
             if percent is not None and not 0 <= percent <= 100:
                 raise InputError(f"{name} must be in 0 to 100, got {percent:g}")
+        if self.centers is not None and self.centers > MOST_CENTERS:
+            raise InputError(f"centers {self.centers}: give at most {MOST_CENTERS}")
         if self.background_refresh is not None and not 0 < self.background_refresh < math.inf:
             raise InputError(f"background refresh {self.background_refresh:g}: give seconds above 0")
         if self.dynamic_only and self.background_refresh is not None:
