@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Self
+from typing import TypeVar
 
 import numpy as np
 
@@ -164,6 +164,9 @@ def _reduced(frame: Mesh, fraction: float) -> Mesh:
     return frame if fraction >= 1 else decimate(frame, max(4, round(fraction * len(frame.vertices))))
 
 
+_T = TypeVar("_T", bound="Target")
+
+
 @dataclass(frozen=True, slots=True)
 class Target:
     """Errors that frames should not exceed; smaller is better."""
@@ -172,7 +175,7 @@ class Target:
     angle: float  # mean normal error over the frames, degrees
     worst: float  # the largest symmetric distance of a frame, normalised units
 
-    def scaled(self, factor: float) -> Self:
+    def scaled(self: _T, factor: float) -> _T:
         """Return the same with its distances multiplied by `factor`."""
         return replace(self, distance=self.distance * factor, worst=self.worst * factor)
 
