@@ -18,12 +18,11 @@ if TYPE_CHECKING:
     from .encoder.settings.options import EncoderOptions
     from .encoder.settings.settings import Settings
     from .io.sequence import SequenceOptions, open_sequence
-    from .types import Audio, Mesh, MeshList, MeshSequence, Texture, as_sequence
+    from .types import Mesh, MeshList, MeshSequence, as_sequence
 
 __version__ = "0.1.0"
 
 __all__ = [
-    "Audio",
     "EncoderOptions",
     "FormatError",
     "InputError",
@@ -33,7 +32,6 @@ __all__ = [
     "MeshreelError",
     "SequenceOptions",
     "Settings",
-    "Texture",
     "Video",
     "as_sequence",
     "edit",
@@ -45,7 +43,7 @@ __all__ = [
 # Imported on first use: decoding never imports the encoder, and Ctrl-C ends the command line before NumPy is loaded.
 _LATER = {
     **dict.fromkeys(("Video", "open"), ".decoder.video"),
-    **dict.fromkeys(("Audio", "Mesh", "MeshList", "MeshSequence", "Texture", "as_sequence"), ".types"),
+    **dict.fromkeys(("Mesh", "MeshList", "MeshSequence", "as_sequence"), ".types"),
     "EncoderOptions": ".encoder.settings.options",
     "SequenceOptions": ".io.sequence",
     "Settings": ".encoder.settings.settings",

@@ -42,7 +42,11 @@ class BytesSource:
     """A file in memory."""
 
     def __init__(self, data: bytes) -> None:
-        self._data, self.size = data, len(data)
+        self._data = data
+
+    @property
+    def size(self) -> int:
+        return len(self._data)
 
     def get_bytes(self, offset: int, length: int) -> bytes:
         return bytes(self._data[offset : offset + length])
