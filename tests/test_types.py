@@ -8,8 +8,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from meshreel.conversions import as_sequence
 from meshreel.errors import InputError
-from meshreel.types import UP_AXES, Mesh, MeshList, as_sequence, check_up, evenly, known_up
+from meshreel.io.write import write_mesh
+from meshreel.types import UP_AXES, Mesh, MeshList, Texture, check_up, evenly, known_up
 
 
 @pytest.mark.parametrize(
@@ -151,6 +153,37 @@ def test_meshes_of_other_libraries_come_back_as_they_went(convert, mesh: Mesh):
     assert (back.colors is None) == (mesh.colors is None)
     if mesh.colors is not None:
         assert np.array_equal(back.colors, mesh.colors) and back.colors.dtype == np.uint8
+
+
+PIXELS = np.arange(4 * 6 * 3, dtype=np.uint8).reshape(4, 6, 3) * 3
+PLACES = np.array([[[0, 0.25], [1, 0.5], [0.125, 1]]], np.float32)
+TEXTURED = replace(TRIANGLE, uv=PLACES, texture=Texture.of(PIXELS))
+
+
+@pytest.mark.parametrize("convert", [to_trimesh, to_scene, to_open3d])
+def test_textures_of_other_libraries_come_back_as_they_went(convert):
+    (back,) = as_sequence([convert(TEXTURED)])
+    assert np.array_equal(back.vertices[back.faces], TRIANGLE.vertices[TRIANGLE.faces])
+    assert np.array_equal(back.uv, PLACES) and np.array_equal(back.texture.pixels, PIXELS)
+
+
+def test_pictures_have_their_upper_row_where_other_libraries_have_it(tmp_path):
+    """Open3D reads what we write as we hand it over, and trimesh, too."""
+    open3d = pytest.importorskip("open3d", reason="needs the extra open3d")
+    trimesh = pytest.importorskip("trimesh")
+    write_mesh(TEXTURED, tmp_path / "m.obj")
+    (theirs,) = as_sequence([open3d.io.read_triangle_mesh(str(tmp_path / "m.obj"), True)])
+    assert np.array_equal(theirs.texture.pixels, PIXELS) and np.allclose(theirs.uv, PLACES)
+    (theirs,) = as_sequence([trimesh.load(tmp_path / "m.obj", process=False)])
+    assert np.array_equal(theirs.texture.pixels, PIXELS) and np.allclose(theirs.uv, PLACES)
+
+
+def test_colors_of_faces_are_those_of_their_vertices_in_the_mean():
+    trimesh = pytest.importorskip("trimesh")
+    square = trimesh.Trimesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]], [[0, 1, 2], [2, 1, 3]], process=False)
+    square.visual.face_colors = [[255, 0, 0, 255], [0, 0, 255, 255]]
+    (found,) = as_sequence([square])
+    assert found.colors.tolist() == [[255, 0, 0], [128, 0, 128], [128, 0, 128], [0, 0, 255]]
 
 
 @pytest.mark.parametrize("mesh", [TRIANGLE, COLORED])

@@ -13,12 +13,13 @@ from .errors import FormatError, InputError, MeshreelError
 
 if TYPE_CHECKING:
     from . import edit
+    from .conversions import as_sequence
     from .decoder.video import Video, open
     from .encoder.sequence import encode
     from .encoder.settings.options import EncoderOptions
     from .encoder.settings.settings import Settings
     from .io.sequence import SequenceOptions, open_sequence
-    from .types import Mesh, MeshList, MeshSequence, as_sequence
+    from .types import Mesh, MeshList, MeshSequence
 
 __version__ = "0.1.0"
 
@@ -43,10 +44,11 @@ __all__ = [
 # Imported on first use: decoding never imports the encoder, and Ctrl-C ends the command line before NumPy is loaded.
 _LATER = {
     **dict.fromkeys(("Video", "open"), ".decoder.video"),
-    **dict.fromkeys(("Mesh", "MeshList", "MeshSequence", "as_sequence"), ".types"),
+    **dict.fromkeys(("Mesh", "MeshList", "MeshSequence"), ".types"),
     "EncoderOptions": ".encoder.settings.options",
     "SequenceOptions": ".io.sequence",
     "Settings": ".encoder.settings.settings",
+    "as_sequence": ".conversions",
     "edit": ".edit",
     "encode": ".encoder.sequence",
     "open_sequence": ".io.sequence",

@@ -5,7 +5,7 @@ Coordinates are float64 in memory, so that geo-referenced captures (around 1e6) 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, Protocol, get_args, runtime_checkable
@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal, Protocol, get_args, ru
 import numpy as np
 
 from .errors import InputError
-from .shapes import Bool, Float32, Float64, Int32, UInt8
+from .shapes import Bool, Float32, Float64, Int32, Int64, UInt8
 
 if TYPE_CHECKING:
     import trimesh
@@ -155,31 +155,51 @@ class Mesh:
         return f"<meshreel.Mesh: {', '.join(facts)}>"
 
     def to_trimesh(self) -> trimesh.Trimesh:
-        """Return a copy as a `trimesh.Trimesh`, with the same vertices in the same order and their colours.
+        """Return a copy as a `trimesh.Trimesh` with its colours, or its texture.
 
-        Raises ImportError without trimesh.
+        It has the same vertices in the same order; with a texture, one for each place that a vertex has in it. Raises
+        ImportError without trimesh.
         """
         try:
             import trimesh
         except ImportError as error:
             raise ImportError("Mesh.to_trimesh needs the extra `encode`: pip install 'meshreel[encode]'") from error
         mesh = self.copy()
-        return trimesh.Trimesh(mesh.vertices, mesh.faces, vertex_colors=mesh.colors, process=False)
+        if mesh.uv is None or mesh.texture is None:
+            return trimesh.Trimesh(mesh.vertices, mesh.faces, vertex_colors=mesh.colors, process=False)
+        from PIL import Image
+
+        origins, faces, uv = cut_at_seams(mesh.faces, mesh.uv)
+        material = trimesh.visual.material.PBRMaterial(baseColorTexture=Image.fromarray(mesh.texture.pixels))
+        visual = trimesh.visual.TextureVisuals(uv=np.nan_to_num(uv), material=material)
+        return trimesh.Trimesh(mesh.vertices[origins], faces, visual=visual, process=False)
 
     def to_pyvista(self) -> Any:
-        """Return a copy as a `pyvista.PolyData`, its colours as the point data `RGB`. Raises ImportError without it."""
+        """Return a copy as a `pyvista.PolyData`: its colours as the point data `RGB`, or places in its texture.
+
+        The texture is `pyvista.Texture(mesh.texture.pixels)`; a vertex is then there for each of its places. Raises
+        ImportError without pyvista.
+        """
         try:
             import pyvista
         except ImportError as error:
             raise ImportError("Mesh.to_pyvista needs the package pyvista: pip install pyvista") from error
         mesh = self.copy()
+        if mesh.uv is not None and mesh.texture is not None:
+            origins, faces, uv = cut_at_seams(mesh.faces, mesh.uv)
+            surface = pyvista.PolyData.from_regular_faces(mesh.vertices[origins], faces)
+            surface.active_texture_coordinates = np.nan_to_num(uv)
+            return surface
         surface = pyvista.PolyData.from_regular_faces(mesh.vertices, mesh.faces)
         if mesh.colors is not None:
             surface.point_data["RGB"] = mesh.colors
         return surface
 
     def to_open3d(self) -> Any:
-        """Return a copy as an `open3d.geometry.TriangleMesh`. Raises ImportError without Open3D."""
+        """Return a copy as an `open3d.geometry.TriangleMesh` with its colours and texture.
+
+        Raises ImportError without Open3D.
+        """
         try:
             import open3d
         except ImportError as error:
@@ -190,7 +210,35 @@ class Mesh:
         )
         if mesh.colors is not None:
             surface.vertex_colors = utility.Vector3dVector(mesh.colors / 255.0)
+        if mesh.uv is not None and mesh.texture is not None:
+            surface.triangle_uvs = utility.Vector2dVector(np.nan_to_num(mesh.uv).astype(np.float64).reshape(-1, 2))
+            surface.triangle_material_ids = utility.IntVector(np.zeros(len(mesh.faces), np.int32))
+            # It has the lowest row of a picture first.
+            rows: Any = np.ascontiguousarray(mesh.texture.pixels[::-1])
+            surface.textures = [open3d.geometry.Image(rows)]
         return surface
+
+
+def distinct_places(
+    uv: Float32[np.ndarray, "F 3 2"],
+) -> tuple[Float32[np.ndarray, "P 2"], Int64[np.ndarray, "F 3"]]:
+    """Return the distinct places in a texture, and the number of each corner's place; NaN is a place, too."""
+    pairs = np.ascontiguousarray(uv).reshape(-1, 2).view(np.int64)  # places with equal bits are equal
+    places, numbers = np.unique(pairs, return_inverse=True)
+    return places.view(np.float32).reshape(-1, 2), numbers.reshape(-1, 3).astype(np.int64)
+
+
+def cut_at_seams(
+    faces: Int32[np.ndarray, "F 3"], uv: Float32[np.ndarray, "F 3 2"]
+) -> tuple[Int64[np.ndarray, " W"], Int32[np.ndarray, "F 3"], Float32[np.ndarray, "W 2"]]:
+    """Return vertices' numbers, faces, and one texture coordinate for each vertex, as GPUs need them.
+
+    A vertex is repeated for each place of its corners; a vertex without a face is left out.
+    """
+    places, numbers = distinct_places(uv)
+    codes, corners = np.unique(faces * np.int64(len(places)) + numbers, return_inverse=True)
+    origins, place = np.divmod(codes, max(len(places), 1))
+    return origins, corners.reshape(-1, 3).astype(np.int32), places[place]
 
 
 @dataclass(frozen=True, slots=True)
@@ -250,68 +298,6 @@ class MeshList(MeshSequence):
 
     def __getitem__(self, index: int) -> Mesh:
         return self.meshes[index]
-
-
-def as_sequence(value: object, frame_rate: float | None = None) -> MeshSequence:
-    """Return `value` if it is a MeshSequence, otherwise a MeshList of its items at `frame_rate` (1/s).
-
-    An item is a Mesh, a mesh or scene of trimesh, a mesh of Open3D, a frame of Open4D, or a pair of arrays (vertices,
-    faces). Colours of vertices are kept. The default of `frame_rate` is the attribute `fps` of `value`, which Open4D's
-    sequences have, or 30. Raises InputError for any other value; the message names the frame.
-    """
-    if isinstance(value, MeshSequence):
-        return value
-    if isinstance(value, str | bytes) or not isinstance(value, Iterable):
-        remedy = "give a list of meshes, or meshreel.open_sequence(path)"
-        raise InputError(f"{type(value).__name__} {str(value)[:60]!r} is no sequence of meshes; {remedy}")
-    rate = float(getattr(value, "fps", None) or 30.0) if frame_rate is None else frame_rate
-    return MeshList(tuple(_as_mesh(item, f"frame {number}") for number, item in enumerate(value)), rate)
-
-
-def _as_mesh(item: object, where: str) -> Mesh:
-    if isinstance(item, Mesh):
-        return item
-    if hasattr(item, "to_mesh"):  # a scene of trimesh: all its meshes, in their places
-        item = item.to_mesh()
-    item = getattr(item, "geometry", item)  # of a frame of Open4D
-    faces = getattr(item, "faces", getattr(item, "triangles", None))
-    vertices = getattr(item, "vertices", getattr(item, "positions", None))
-    pair = item if isinstance(item, tuple | list) else (vertices, faces)
-    if len(pair) != 2 or pair[0] is None or pair[1] is None:
-        remedy = "give a Mesh, a trimesh or Open3D mesh, or a pair (vertices, faces)"
-        raise InputError(f"{where}: {type(item).__name__} {str(item)[:60]!r} is no mesh; {remedy}")
-    vertices, corners = _rows_of_three(pair[0], f"{where}: vertices"), _rows_of_three(pair[1], f"{where}: faces")
-    if corners.size and corners.dtype.kind not in "iu":
-        raise InputError(f"{where}: faces are {corners.dtype}; give integers, the numbers of vertices")
-    if corners.size and not 0 <= corners.min() <= corners.max() < len(vertices):
-        wrong = corners.min() if corners.min() < 0 else corners.max()
-        raise InputError(f"{where}: a face refers to vertex {wrong}, but there are {len(vertices)} (from 0)")
-    return replace(Mesh.of(vertices, corners), colors=_colors_of(item, len(vertices), where))
-
-
-def _colors_of(item: object, count: int, where: str) -> UInt8[np.ndarray, "V 3"] | None:
-    """Return colours of vertices: those of trimesh are bytes, those of Open3D and Open4D fractions of 1."""
-    visual = getattr(item, "visual", None)
-    attribute = getattr(item, "vertex_colors", getattr(item, "colors", ()))
-    colors = np.asarray(attribute if visual is None else visual.vertex_colors if visual.kind == "vertex" else ())
-    if colors.size == 0 or colors.dtype == object:
-        return None
-    if colors.ndim != 2 or colors.shape[0] != count or colors.shape[1] not in (3, 4):
-        raise InputError(f"{where}: colours of shape {colors.shape}; give {count} x 3, one of each vertex")
-    colors, most = colors[:, :3], 1 if colors.dtype.kind == "f" else 255
-    if not (valid := (colors >= -most) & (colors <= 2 * most)).all():  # blended colours exceed the range a little
-        raise InputError(f"{where}: a colour has the value {colors[~valid][0]:g}; give fractions of 1, or bytes")
-    return np.ascontiguousarray((np.clip(colors, 0, most) * (255 / most)).round(), np.uint8)
-
-
-def _rows_of_three(values: object, what: str) -> np.ndarray:
-    try:
-        array = np.asarray(values)
-    except ValueError as error:
-        raise InputError(f"{what} are no array ({error}); give one of N x 3 numbers") from None
-    if array.size and (array.ndim != 2 or array.shape[1] != 3 or array.dtype.kind not in "fiu"):
-        raise InputError(f"{what} are {array.dtype} of shape {array.shape}; give N x 3 numbers")
-    return array.reshape(-1, 3)
 
 
 @dataclass(frozen=True, slots=True)

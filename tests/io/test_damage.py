@@ -26,11 +26,12 @@ def glb_of(text: str) -> bytes:
     return b"glTF" + sizes + b"JSON" + data
 
 
+SHOWN = '{"nodes": [{"mesh": 0}], "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}], '
 BAD_HEADERS = {
     "endless_number.ply": "ply\nformat ascii 1.0\nelement vertex " + "9" * 5000 + "\nend_header\n",
     "deep.glb": glb_of("[" * 100_000),
-    "word_for_a_count.glb": glb_of('{"meshes": [{}], "accessors": [{"count": "x"}]}'),
-    "number_for_a_list.glb": glb_of('{"meshes": [{}], "accessors": 5}'),
+    "word_for_a_count.glb": glb_of(SHOWN + '"accessors": [{"count": "x"}]}'),
+    "number_for_a_list.glb": glb_of(SHOWN + '"accessors": 5}'),
 }
 
 

@@ -178,7 +178,7 @@ def test_ply_is_read_in_its_three_encodings(tmp_path: Path, data: bytes) -> None
     loaded = read(tmp_path, "m.ply", data)
     assert loaded.mesh.faces.tolist() == [[0, 1, 2], [0, 1, 2], [0, 2, 3], [0, 1, 2], [0, 2, 4], [0, 4, 3]]
     assert loaded.mesh.vertices[0].tolist() == [1000000.00012, 0, 0]
-    assert loaded.dropped == frozenset() and loaded.mesh.colors is not None
+    assert loaded.dropped == {"property 'flags' of face"} and loaded.mesh.colors.tolist() == [[1, 2, 3]] * 5
 
 
 @pytest.mark.parametrize("data", [PLY_TEXT.encode(), binary_ply("<"), binary_ply(">")], ids=["text", "little", "big"])
@@ -269,7 +269,7 @@ def test_off_variants_are_read(tmp_path: Path) -> None:
     )
     loaded = read(tmp_path, "m.off", text)
     assert loaded.mesh.faces.tolist() == [[0, 1, 2], [0, 2, 3]]
-    assert loaded.dropped == {"vertex colors", "face colors"}
+    assert loaded.dropped == frozenset() and loaded.mesh.colors.tolist() == [[255, 0, 0]] * 4
     with pytest.raises(InputError, match=r"announces 4 corners but has 3"):
         read(tmp_path, "m.off", text.replace("4 0 1 2 3 255 0 0", "4 0 1 2"))
     with pytest.raises(InputError, match=r"OFF header expected, found b'hello'"):
@@ -319,14 +319,21 @@ def test_damaged_bytes_give_a_mesh_or_an_input_error_and_nothing_else(tmp_path: 
         assert mesh.is_empty or (mesh.faces.min() >= 0 and mesh.faces.max() < len(mesh.vertices))
 
 
-def test_a_glb_that_draco_would_have_to_decode_is_refused(tmp_path: Path) -> None:
-    data = trimesh.creation.box().export(file_type="glb", extension_draco=True)
-    with pytest.raises(InputError, match=r"compressed with Draco .*write it without"):
-        read(tmp_path, "m.glb", data)
+def test_a_glb_compressed_by_draco_is_read_unless_it_claims_more_than_it_says(tmp_path: Path) -> None:
+    box = trimesh.creation.box()
+    data = box.export(file_type="glb", extension_draco=True)
+    mesh = read(tmp_path, "m.glb", data).mesh
+    assert mesh.to_trimesh().volume == pytest.approx(box.volume, rel=1e-3) and len(mesh.faces) == 12
+    at = data.index(b"DRACO")
+    for claim in (b"\xff\xff\xff\x7f", b"\xff\xff\xff\xff\xff\x7f"):
+        bad = data[: at + 12] + claim + data[at + 12 + len(claim) :]
+        with pytest.raises(InputError, match="Draco stream"):
+            read(tmp_path, "m.glb", bad)
 
 
 def test_a_glb_of_absurd_size_is_refused_before_memory_is_taken(tmp_path: Path) -> None:
-    text = b'{"meshes":[{}],"accessors":[{"count":99999999999,"componentType":5126,"type":"VEC3"}]}  '
+    shown = b'{"nodes":[{"mesh":0}],"meshes":[{"primitives":[{"attributes":{"POSITION":0}}]}],'
+    text = shown + b'"accessors":[{"count":99999999999,"componentType":5126,"type":"VEC3"}]}  '
     words = np.array([2, 20 + len(text), len(text)], "<u4").tobytes()
     with pytest.raises(InputError, match=r"announces 99999999999 values in \d+ bytes"):
         read(tmp_path, "m.glb", b"glTF" + words + b"JSON" + text)

@@ -174,7 +174,8 @@ def test_what_is_dropped_is_said_once_for_the_sequence(tmp_path: Path) -> None:
     assert sequence.warnings == ()
     for mesh in sequence:
         assert mesh.faces.shape == (1, 3)
-    assert sequence.warnings == ("not kept: normals, texture coordinates (first in frame 1)",)
+    told = "not kept: normals, texture coordinates (first in frame 1, m_2.obj)"
+    assert sequence.warnings == (f"{told}; bake what should be seen into colours or one texture",)
 
 
 def test_frames_of_very_different_scale_are_read_and_pointed_out(tmp_path: Path) -> None:

@@ -5,10 +5,11 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from fractions import Fraction
 from pathlib import Path
 from typing import Annotated
 
-from cyclopts import Parameter
+from cyclopts import Parameter, Token
 
 from ..analysis.scene.masks import ImageMasks, Masker, read_view_file
 from ..analysis.scene.sam3 import PromptBy, Sam3Masks, Sam3Options
@@ -20,6 +21,7 @@ from ..capture.recordings.to_rig import write_takes
 from ..edit.audio import packed_audio
 from ..errors import InputError
 from ..geometry.topology import weld
+from ..io.file_names import Order
 from ..io.files import Remote, located
 from ..io.sequence import SequenceOptions, capture_record, open_sequence
 from ..metrics.comparison import ComparisonOptions
@@ -30,6 +32,12 @@ from .console import Common
 
 _READ = SequenceOptions()
 _VIEWS = ViewOptions()
+
+
+def as_rate(kind: object, tokens: Sequence[Token]) -> float:
+    """Return a rate that is written as a number or as a fraction. Raises ValueError for other words."""
+    del kind
+    return float(Fraction(tokens[0].value))
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,14 +71,14 @@ def open_source(inputs: Sequence[str], reading: Reading, common: Common = Common
     if isinstance(folder, Remote) or len(inputs) > 1 or not is_rig(folder) or any(folder.glob("frame_*.ply")):
         options, made = reading.options(), capture_record(folder) if len(inputs) == 1 else {}
         rate = made.get("frames_per_second")
-        if reading.fps == _READ.frame_rate and isinstance(rate, (int, float)) and rate > 0:
+        if reading.fps is None and isinstance(rate, (int, float)) and rate > 0:
             options = replace(options, frame_rate=float(rate))
         return Source(open_sequence(inputs[0] if len(inputs) == 1 else list(inputs), options))
     reading.options()  # raises InputError for invalid values
     if reading.scale != _READ.scale:
         raise InputError(f"--scale {reading.scale:g}: {folder} is a rig, whose poses are in metres; leave it out")
     recording, remarks = open_recording(folder, frames=reading.frames)
-    if reading.fps not in (_READ.frame_rate, recording.frame_rate):
+    if reading.fps not in (None, recording.frame_rate):
         text = f"--fps {reading.fps:g}: {folder} is a rig of {recording.frame_rate:g} frames a second"
         raise InputError(f"{text}; leave it out, or mend the rig's description")
     return Source(recording, tuple(remarks))
@@ -143,16 +151,20 @@ class Masking:
 class Reading:
     """Flags for reading mesh files as a sequence."""
 
-    fps: float = _READ.frame_rate
-    """Frames per second; by default 30, or the rate of the recording for a folder that `capture` wrote."""
+    fps: Annotated[float | None, Parameter(converter=as_rate)] = None
+    """Frames per second, as 25 or 30000/1001; by default 30, or the rate of the recording for a folder that `capture`
+    wrote."""
     frames: str = _READ.frames
     """Frames to use, as A:B with B excluded."""
     scale: float = _READ.scale
     """Factor from the unit of the files to metres."""
+    order: Order = _READ.order
+    """Order of files with several numbers in their names: by all of them, by the last one, or by letters (name). By
+    default the one that all readings of the names agree on."""
 
     def options(self) -> SequenceOptions:
         """Return the options of `open_sequence`, which welds vertices that repeat a position."""
-        return SequenceOptions(self.fps, self.frames, self.scale, weld)
+        return SequenceOptions(self.fps, self.frames, self.scale, self.order, weld)
 
 
 @Parameter(name="*")

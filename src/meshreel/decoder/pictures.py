@@ -89,12 +89,14 @@ class TrackPictures:
         if pictures is None:
             return None
         atlas = self._reader.chunks[pictures.depends_on[1]]
-        if self._layouts is None or self._layouts[0] != atlas.number:
+        layouts = self._layouts  # read once, and replaced as a whole: another thread may replace it, too
+        if layouts is None or layouts[0] != atlas.number:
             whole = None if chunk.frame_count == 0 else 1
             owner = self._reader.read_chunk(atlas.depends_on[0], whole)
             layout = _core.read_atlas(self._reader.read_chunk(atlas.number), owner)
-            self._layouts, self._sizes[atlas.number] = (atlas.number, layout), (layout.width, layout.height)
-        decoded.place(self._layouts[1])
+            self._sizes[atlas.number] = layout.width, layout.height
+            self._layouts = layouts = atlas.number, layout
+        decoded.place(layouts[1])
         return partial(self._texture, pictures)
 
     def shown(self, static: Chunk, mesh: Mesh, frame: int) -> Mesh:
@@ -103,9 +105,10 @@ class TrackPictures:
         if pictures is None or mesh.texture is None:
             return mesh
         at = self._at(pictures, frame - self._reader.shown_from[static.number])
-        if self._background is None or self._background[:2] != (static.number, at):
-            self._background = static.number, at, replace(mesh, texture=self._texture(pictures, at))
-        return self._background[2]
+        last = self._background
+        if last is None or last[:2] != (static.number, at):
+            self._background = last = static.number, at, replace(mesh, texture=self._texture(pictures, at))
+        return last[2]
 
     def planes(self, number: int, at: int) -> UInt8[np.ndarray, "R W"]:
         """Return the planes of picture `at` of chunk `number`.

@@ -266,12 +266,13 @@ class TrackSplats:
 
         Raises FormatError on damaged bytes.
         """
-        if self._splats is None or self._splats[0] != of.number:
+        splats = self._splats  # read once: another thread may replace it
+        if splats is None or splats[0] != of.number:
             whole = None if self._layers is None else self._layers + 1
             owner = self._reader.read_chunk(of.depends_on[0], 1)
             data = self._reader.read_chunk(of.number, whole)
             self._refusals.check(of)
             with self._refusals.of(of):
-                self._splats = of.number, _core.read_splats(data, owner)
-        bound = self._splats[1].bind(group, index, self._reader.header.scale)
+                self._splats = splats = of.number, _core.read_splats(data, owner)
+        bound = splats[1].bind(group, index, self._reader.header.scale)
         return None if bound is None else Bound(*bound)

@@ -21,6 +21,7 @@ from ..analysis.scene.segmentation import Cameras
 from ..analysis.survey import Survey, is_scene
 from ..coding.background import decode_background
 from ..container.writer import ReelWriter
+from ..conversions import as_sequence
 from ..edit.audio import Given, packed_audio
 from ..edit.metadata import rounded, upright
 from ..errors import InputError
@@ -28,7 +29,7 @@ from ..format.layout import Form
 from ..geometry.derived_sequences import captured, unchanging, welded
 from ..geometry.work import since, so_far
 from ..io.files import Place
-from ..types import MeshSequence, as_sequence, evenly
+from ..types import MeshSequence, evenly
 from .file.summary import (
     GroupSummary,
     SceneSummary,
@@ -87,7 +88,7 @@ def encode(
 ) -> Summary:
     """Encode meshes as a .reel file at `path`, also a URL (extra `remote`); it appears only when it is complete.
 
-    `sequence` is a MeshSequence or an iterable of meshes (`types.as_sequence`, which also takes a frame rate); vertices
+    `sequence` is a MeshSequence or an iterable of meshes (`as_sequence`, which also takes a frame rate); vertices
     at equal positions are welded. The keywords from `quality` to `background_refresh` are the fields of `Settings`,
     which say when to touch them; `options` replace them all. Most of a scene stands still: it becomes a background and
     bodies. Bodies that never touch are coded apart in any sequence. With an executor, intervals are encoded side by

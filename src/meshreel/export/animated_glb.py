@@ -20,9 +20,9 @@ from typing import IO, Any, BinaryIO
 import numpy as np
 
 from ..errors import InputError
-from ..io.glb_file import COLORS, PLACES, Faces, GlbFile, by_use, check_meshopt, cut_at_seams, light
+from ..io.glb_file import COLORS, PLACES, Faces, GlbFile, by_use, check_meshopt, light
 from ..io.write import replacing
-from ..types import Mesh
+from ..types import Mesh, cut_at_seams
 from .shapes import Animation, Shape, changes, unit_normals
 
 BITS = 14  # of positions along the longest side of a shape in a compressed file, gltfpack's default

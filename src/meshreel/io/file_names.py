@@ -5,15 +5,17 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Iterable, Sequence
+from fractions import Fraction
 from itertools import pairwise
 from pathlib import Path, PurePath, PurePosixPath
-from typing import TypeVar
+from typing import Literal, TypeVar
 
 from ..errors import InputError
 from .files import Place, Remote, located
 from .meshes import EXTENSIONS
 
 MESHES = "meshes"  # name of a folder of frames beside the files of their cameras
+Order = Literal["auto", "all", "last", "name"]  # of names: by all their numbers, by the last one, or by letters
 _MAGIC = re.compile(r"[*?\[]")
 _P = TypeVar("_P", bound=PurePath)
 
@@ -31,7 +33,9 @@ def is_pattern(name: str) -> bool:
     return _MAGIC.search(name) is not None
 
 
-def find_frames(source: str | Path | Iterable[str | Path]) -> tuple[tuple[Place, ...], tuple[str, ...]]:
+def find_frames(
+    source: str | Path | Iterable[str | Path], order: Order = "auto"
+) -> tuple[tuple[Place, ...], tuple[str, ...]]:
     """Return the frame files of a source and warnings about their order. A list keeps its order.
 
     For a folder without mesh files, use its subfolder `meshes`, as in the releases of TSMC's authors.
@@ -40,7 +44,7 @@ def find_frames(source: str | Path | Iterable[str | Path]) -> tuple[tuple[Place,
         return tuple(located(path) for path in source), ()
     path = located(source)
     if isinstance(path, Remote):
-        return _find_remote(path)
+        return _find_remote(path, order)
     try:
         is_folder = path.is_dir()
     except OSError as error:  # a name that is too long, or a folder without permission
@@ -50,18 +54,18 @@ def find_frames(source: str | Path | Iterable[str | Path]) -> tuple[tuple[Place,
         if not meshes and (path / MESHES).is_dir():
             folder, meshes = path / MESHES, _listed(path / MESHES)
         _check_kind(folder, meshes)
-        return _ordered(folder, folder, meshes)
+        return _ordered(folder, folder, meshes, order)
     if path.exists():
         return (path,), ()
     if is_pattern(str(source)):
         root, meshes = _globbed(path)
         if not meshes:
             raise InputError(f"{source}: no mesh file fits this pattern; check it, or name the folder")
-        return _ordered(root, root, meshes)
+        return _ordered(root, root, meshes, order)
     raise InputError(f"{source}: no such file or folder; check the path")
 
 
-def _find_remote(place: Remote) -> tuple[tuple[Remote, ...], tuple[str, ...]]:
+def _find_remote(place: Remote, order: Order) -> tuple[tuple[Remote, ...], tuple[str, ...]]:
     """Return the frame files of a folder behind a URL or of a pattern, or the single file."""
     wild = _MAGIC.search(place.url)
     if wild is None and place.suffix.lower() in EXTENSIONS:
@@ -75,12 +79,14 @@ def _find_remote(place: Remote) -> tuple[tuple[Remote, ...], tuple[str, ...]]:
     meshes = [path for path in map(PurePosixPath, names) if _has_mesh_name(path)]
     if wild is None or not meshes:
         _check_kind(place, meshes)
-    paths, remarks = _ordered(place, PurePosixPath(), meshes)
+    paths, remarks = _ordered(place, PurePosixPath(), meshes, order)
     return tuple(folder / str(path) for path in paths), remarks
 
 
 def _globbed(pattern: Path) -> tuple[Path, list[Path]]:
-    fixed = next(k for k, part in enumerate(pattern.parts) if _MAGIC.search(part))
+    parts = pattern.parts
+    there = [k for k in range(len(parts)) if Path(*parts[: k + 1]).is_dir()]  # a folder may have brackets in its name
+    fixed = next(k for k in range(len(there), len(parts)) if k == len(parts) - 1 or _MAGIC.search(parts[k]))
     root = Path(*pattern.parts[:fixed])
     try:
         paths = list(root.glob(str(Path(*pattern.parts[fixed:]))))
@@ -110,32 +116,114 @@ def _check_kind(folder: Place, files: Sequence[PurePath]) -> None:
         raise InputError(f"{folder}: holds several kinds of files ({counts}); choose one, as '{folder}/*{min(kinds)}'")
 
 
-def _ordered(source: Place, root: _P, paths: list[_P]) -> tuple[tuple[_P, ...], tuple[str, ...]]:
-    """Sort paths below `root` by frame number, the last number that differs between names of one pattern."""
-    names = {path: path.relative_to(root).with_suffix("").as_posix() for path in sorted(paths)}
+def _ordered(source: Place, root: _P, paths: list[_P], order: Order) -> tuple[tuple[_P, ...], tuple[str, ...]]:
+    """Sort paths below `root` by the numbers in their names; return warnings about these, too."""
+    names = {path.relative_to(root).with_suffix("").as_posix(): path for path in sorted(paths)}
     if len(paths) == 1:
         return tuple(paths), ()
-    numbers = {path: tuple(int(n) for n in re.findall(r"\d+", name)) for path, name in names.items()}
-    patterns = {re.sub(r"\d+", "#", name): name for name in names.values()}
-    if not any(numbers.values()):
-        return tuple(names), (f"{source}: the {len(paths)} file names have no numbers; taken in alphabetical order",)
+    if order == "auto" and not any(re.search(r"\d", name) for name in names):
+        remark = f"{source}: the {len(paths)} file names have no numbers; taken in alphabetical order"
+        return tuple(names.values()), (remark,)
+    found, numbers = in_order(source, list(names), order)
+    return tuple(names[name] for name in found), _gaps(source, numbers)
+
+
+def in_order(source: Place, names: list[str], order: Order = "auto") -> tuple[list[str], list[int]]:
+    """Return names in the order of the numbers in them, and the number of each, if one alone decides.
+
+    A fraction is one number. Raises InputError for names of several patterns, for two of equal numbers, and where
+    readings of the numbers disagree; it names `source`.
+    """
+    if order == "name":
+        return sorted(names), []
+    patterns = {re.sub(r"\d+", "#", name): name for name in names}
     if len(patterns) > 1:
         first, second = sorted(patterns.values())[:2]
         text = f"{source}: names follow {len(patterns)} patterns, as {first!r} and {second!r}"
-        raise InputError(f"{text}; give a glob that fits one of them")
-    columns = list(zip(*numbers.values(), strict=True))
-    varying = next((k for k in reversed(range(len(columns))) if len(set(columns[k])) > 1), 0)
-    key = {path: number[varying] for path, number in numbers.items()}
-    order = sorted(names, key=lambda path: key[path])
-    for before, after in pairwise(order):
-        if key[before] == key[after]:
-            text = f"{source}: {names[before]!r} and {names[after]!r} both have frame number {key[before]}"
-            raise InputError(f"{text}; give a glob that fits only one of them")
-    return tuple(order), _gaps(source, [key[path] for path in order])
+        raise InputError(f"{text}; give a glob that fits one of them, or --order name")
+    columns = _columns(names, next(iter(patterns)))
+    if not columns:
+        raise InputError(f"{source}: {names[0]!r} and {len(names) - 1} more names differ by no number; mend them")
+    by_all, by_last = (
+        _sorted(source, names, list(zip(*chosen, strict=True)), order) for chosen in (columns, columns[-1:])
+    )
+    if order == "last" or by_all == by_last:
+        return by_last or by_all, _whole(names, by_last or by_all, columns[-1])
+    if order == "all":
+        return by_all, []
+    if 2 * _evenness(columns[0]) > 1 and _evenness(columns[0]) > _evenness(columns[-1]):
+        return by_all, _whole(names, by_all, columns[0])  # what stands behind is a count, or a hash
+    if all(map(_wraps, columns[1:])):
+        return by_all, []
+    if not by_last:
+        _sorted(source, names, list(zip(*columns[-1:], strict=True)), "last", f", or --order all for {_first(by_all)}")
+    ways = f"{_first(by_all)} (--order all), or {_first(by_last)} (--order last)"
+    raise InputError(
+        f"{source}: the {len(names)} names have several numbers, and may be in the order {ways}; say which"
+    )
+
+
+def _first(names: list[str]) -> str:
+    return f"{', '.join(names[:3])} ..."
+
+
+Column = tuple[str, ...]  # a number of each name, as it is written
+
+
+def _columns(names: list[str], pattern: str) -> list[Column]:
+    """Return the numbers that differ, from left to right; two with a point between them are one fraction."""
+    columns, found = zip(*(re.findall(r"\d+", name) for name in names), strict=True), list[Column | None]()
+    for column, before in zip(columns, ["", *pattern.split("#")[1:]], strict=False):
+        if len({*map(int, column)}) == 1:
+            found.append(None)
+        elif before == "." and found and found[-1] is not None and "." not in found[-1][0]:
+            found[-1] = tuple(f"{whole}.{part}" for whole, part in zip(found[-1], column, strict=True))
+        else:
+            found.append(column)
+    return [column for column in found if column is not None]
+
+
+def _sorted(source: Place, names: list[str], keys: list[Column], order: Order, remedy: str = "") -> list[str]:
+    """Return names by their numbers; none where two have equal ones, which is an error if all numbers count."""
+    numbers = {name: tuple(map(Fraction, key)) for name, key in zip(names, keys, strict=True)}
+    found = sorted(names, key=numbers.__getitem__)
+    parts = {name: tuple(map(int, ".".join(key).split("."))) for name, key in zip(names, keys, strict=True)}
+    if order == "auto" and (other := sorted(names, key=parts.__getitem__)) != found:
+        ways = f"{', '.join(found[:3])} ... (--order all), or {', '.join(other[:3])} ... (name them so that these sort)"
+        raise InputError(f"{source}: the numbers of the {len(names)} names may be fractions: {ways}; say which")
+    for before, after in pairwise(found):
+        if numbers[before] == numbers[after]:
+            if len(keys[0]) == 1 and order != "last":
+                return []
+            text = f"{source}: {before!r} and {after!r} both have frame number {float(numbers[before][-1]):.12g}"
+            raise InputError(f"{text}; give a glob that fits only one of them{remedy}")
+    return found
+
+
+def _whole(names: list[str], found: list[str], column: Column) -> list[int]:
+    """Return the whole numbers of names in their order; none of fractions."""
+    return [] if "." in column[0] else [int(column[names.index(name)]) for name in found]
+
+
+def _evenness(column: Column) -> float:
+    """Return the share of equal steps, or nearly so, between numbers; 0 if two numbers are equal."""
+    values = sorted(map(float, column))
+    steps = sorted(after - before for before, after in pairwise(values))
+    usual = steps[len(steps) // 2]
+    return sum(abs(step - usual) <= 0.1 * usual for step in steps) / len(steps) if steps[0] > 0 else 0.0
+
+
+def _wraps(column: Column) -> bool:
+    """Return True if numbers run up to a limit of clocks: to 60 or 24, or through all digits behind a second."""
+    widths = {len(number) for number in column}
+    limit = {2: 60, 3: 1000, 6: 10**6, 9: 10**9}.get(widths.pop(), 0) if len(widths) == 1 else 0
+    return limit > max(map(float, column)) >= limit / 3
 
 
 def _gaps(source: Place, numbers: Sequence[int]) -> tuple[str, ...]:
     """Return a warning about missing frame numbers, if most numbers are one step apart."""
+    if len(numbers) < 2:
+        return ()
     steps = [after - before for before, after in pairwise(numbers)]
     usual, count = Counter(steps).most_common(1)[0]
     wide = [(before, step) for before, step in zip(numbers, steps, strict=False) if step >= 2 * usual]

@@ -23,6 +23,7 @@ from urllib.parse import urlsplit
 from ..errors import InputError
 
 _URL = re.compile(r"[a-zA-Z][a-zA-Z0-9+.-]+://")  # two letters at least: C:/ is a disk
+_POINTER = b"version https://git-lfs.github.com/spec/"
 _WEB = ("http://", "https://")
 MOST_BYTES = 1 << 30  # of a file: as binary PLY, 20 million vertices and 60 million faces (guess)
 _FLAGS = os.O_RDONLY | getattr(os, "O_BINARY", 0) | getattr(os, "O_NONBLOCK", 0)  # a pipe would wait for its writer
@@ -51,9 +52,12 @@ def read_file(path: Place) -> bytes:
 def read_input(path: Place, remedy: str = "check the path and its rights", where: str = "") -> bytes:
     """Return the bytes of a file. Raises InputError; its message begins with the file's name, or `where`."""
     try:
-        return read_file(path)
+        data = read_file(path)
     except OSError as error:
         raise InputError(f"{where or path}: cannot be read ({error.strerror or error}); {remedy}") from None
+    if data[:48].startswith(_POINTER):
+        raise InputError(f"{where or path}: is a pointer of Git LFS in place of the file; fetch it with `git lfs pull`")
+    return data
 
 
 def read_json(path: Place, remedy: str) -> dict[str, Any]:

@@ -1,164 +1,503 @@
-"""Parser of GLB (binary glTF 2), based on trimesh. In: bytes. Out: all triangle meshes, placed by their nodes."""
+"""Surfaces of GLB files (binary glTF 2): all triangles of a scene, placed by its nodes, at rest or at a time.
+
+In: the bytes of a file. Out: Polygons. Whatever would change surface or time and is not read is refused; whatever else
+is not read is named.
+"""
 
 from __future__ import annotations
 
-import io
-import json
-from base64 import b64decode
-from functools import partial
-from typing import Any
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import cache
+from typing import TypeVar
 
 import numpy as np
-from jaxtyping import Float32, UInt8
+from jaxtyping import Float32, Float64, Int64, UInt8
 
-from ..types import GREY, Texture
-from .glb_file import PASSED_OVER, from_linear
-from .pictures import parse_picture
-from .polygons import Dropped, Polygons, Unreadable
+from ..types import Texture
+from .glb_file import PASSED_OVER, from_linear, to_linear
+from .gltf import DRACO, QUANTIZED, Entry, Gltf
+from .looks import Look, with_looks
+from .polygons import Polygons, Unreadable, shares_of
 
-_DROPS = {"NORMAL": "normals", "JOINTS": "skinning"}
-# trimesh passes attributes that begin with _ on unchanged, but would read 16-bit colours by their lower byte.
-_COLORS, _HIDDEN = b'"COLOR_0"', b'"_OLOR_0"'
-_TRANSFORM, _FLOAT = "KHR_texture_transform", 5126
-_DRACO = "KHR_draco_mesh_compression"
-_DENSEST = 64  # values per byte (guess): no mesh compression comes near
+Matrix = Float64[np.ndarray, "4 4"]
+T = TypeVar("T")
+
+_KNOWN = {  # extensions, each of which is read, or changes neither surface nor time nor base colours
+    *(DRACO, QUANTIZED, "EXT_meshopt_compression", "KHR_meshopt_compression", "EXT_mesh_gpu_instancing"),
+    *("KHR_texture_transform", "EXT_texture_webp", "EXT_texture_avif", "KHR_materials_unlit", "KHR_node_visibility"),
+    "KHR_materials_pbrSpecularGlossiness",
+}
+_INSTANCES, _TRANSFORM, _SHINE = (
+    "EXT_mesh_gpu_instancing",
+    "KHR_texture_transform",
+    "KHR_materials_pbrSpecularGlossiness",
+)
+_STRIP, _FAN = 5, 6  # modes of primitives (glTF 2.0, section 5.24)
+_OTHER_MODES = {0: "points", 1: "lines", 2: "lines", 3: "lines"}
+_LIGHT = to_linear(np.repeat(np.arange(256, dtype=np.uint8)[:, None], 3, axis=1))[:, 0] / 65535  # of sRGB values
+_WORDS = {  # of entries that are not read, by the ends of their names
+    "attributes.NORMAL": "normals",
+    "attributes.TANGENT": "tangents",
+    "targets.NORMAL": "normals",
+    "targets.TANGENT": "tangents",
+    "attributes.TEXCOORD_0": "texture coordinates",
+    "nodes.camera": "cameras",
+    "materials.normalTexture": "normal maps",
+    "materials.alphaMode": "transparency",
+    "materials.alphaCutoff": "transparency",
+    "materials.emissiveFactor": "light (emissiveFactor)",
+    "materials.emissiveTexture": "light (emissiveTexture)",
+    "pbrMetallicRoughness.metallicFactor": "shine",
+    "pbrMetallicRoughness.roughnessFactor": "shine",
+    "pbrMetallicRoughness.metallicRoughnessTexture": "shine",
+}
 
 
 def parse_glb(data: bytes) -> Polygons:
-    """Return the surface of a GLB scene at rest, in world coordinates, without hidden nodes."""
-    tree = _json_chunk(data)
-    if not tree.get("meshes"):
-        return _joined([], _dropped(tree), None)
-    if f'"{_DRACO}":' in json.dumps(tree["meshes"]):  # a few bytes could claim any size, and Draco believes them
-        raise Unreadable(f"GLB is compressed with Draco ({_DRACO}); write it without, with `gltf-transform copy` or so")
-    import trimesh
+    """Return the surface of a GLB file that does not move."""
+    scene = Scene(data)
+    if scene.duration > 0:
+        text = f"GLB has an animation of {scene.duration:.3g} s, and is one of several files"
+        raise Unreadable(f"{text}; give it alone, to have its frames, or write each frame without animation")
+    return scene.at(0.0)
 
+
+@dataclass(frozen=True, slots=True)
+class _Part:
+    """The triangles of a primitive, where its node has them."""
+
+    vertices: Float64[np.ndarray, "V 3"]
+    faces: Int64[np.ndarray, "F 3"]
+    colors: UInt8[np.ndarray, "V 3"] | None
+    uv: Float32[np.ndarray, "V 2"] | None
+    look: Look
+
+
+class Scene:
+    """The scene of a GLB file."""
+
+    def __init__(self, data: bytes) -> None:
+        """Raises Unreadable if the file is damaged, or needs what is not read."""
+        self._named = set[str]()
+        self._tinted = cache(_tinted)  # the same texture in all frames
+        self._file = _guarded(lambda: Gltf(data))
+        self.duration = _guarded(self._begin)
+
+    def at(self, time: float) -> Polygons:
+        """Return the surface at a time, s."""
+        return _guarded(lambda: self._joined(list(self._parts(time))))
+
+    def count(self, frame_rate: float) -> int:
+        """Return the number of frames of the animation at a rate, 1/s: with its last moment, unless we wrote it.
+
+        The last time of an animation of ours is the end of its last frame.
+        """
+        steps = self.duration * frame_rate
+        return max(1, round(steps)) if self.is_ours else int(steps + 1e-3) + 1
+
+    def _begin(self) -> float:
+        """Check what the file needs; return the duration of its animation, s."""
+        tree = self._file.tree
+        asset = tree.get("asset", Entry({}, "asset"))
+        if str(asset.get("minVersion", "2.0")) > "2.0":
+            raise Unreadable(f"GLB needs glTF {asset.get('minVersion')}, and 2.0 is read")
+        asset.get("version")
+        self.is_ours = asset.get("generator") == "meshreel"
+        if unknown := [name for name in tree.get("extensionsRequired", []) if name not in _KNOWN]:
+            raise Unreadable(
+                f"GLB needs the extension {', '.join(map(str, unknown))}, which is not read; write it without"
+            )
+        animations = tree.get("animations", [])
+        if len(animations) > 1:
+            names = ", ".join(str(one.get("name", number))[:40] for number, one in enumerate(animations))
+            raise Unreadable(f"GLB has {len(animations)} animations ({names}); keep one of them")
+        self._moves = dict[tuple[int, str], Callable[[float], np.ndarray]]()
+        ends = (
+            [self._add_move(animations[0], channel) for channel in animations[0].get("channels", [])]
+            if animations
+            else []
+        )
+        self._order = list(self._tree_order())
+        return max(ends, default=0.0)
+
+    def _add_move(self, animation: Entry, channel: Entry) -> float:
+        """Learn how an animation moves a node; return when that ends, s."""
+        target = channel.get("target", Entry({}, ""))
+        node, path = target.get("node"), target.get("path")
+        if path not in ("translation", "rotation", "scale", "weights") or "extensions" in target:
+            self._named.add("animations of other than nodes")
+            animation.pass_over()
+            return 0.0
+        samplers, number = animation.get("samplers", []), channel.whole("sampler")
+        if number >= len(samplers):
+            raise Unreadable(f"GLB has an animation without sampler {number}")
+        sampler = samplers[number]
+        times = self._file.array(sampler.whole("input")).astype(np.float64).reshape(-1)
+        values = self._file.array(sampler.whole("output")).astype(np.float64)
+        how = sampler.get("interpolation", "LINEAR")
+        if node is None or not len(times):
+            return 0.0
+        if not (np.isfinite(times).all() and (np.diff(times) > 0).all()):
+            raise Unreadable("GLB has an animation whose times do not rise")
+        rows = values.reshape(len(times), 3 if how == "CUBICSPLINE" else 1, -1)
+        self._moves[node, path] = lambda time: _between(times, rows, how, time, path == "rotation")
+        return float(times[-1])
+
+    def _tree_order(self) -> Iterator[tuple[int, int]]:
+        """Yield the nodes of the scene and their parents, -1 for none, each parent before its children."""
+        tree = self._file.tree
+        scenes, nodes = tree.get("scenes", []), tree.get("nodes", [])
+        if len(scenes) > 1:
+            self._named.add("scenes beside the first")
+        if scenes:
+            roots = self._file.item("scenes", tree.whole("scene", 0)).get("nodes", [])
+        else:
+            inner = {child for node in nodes for child in node.get("children", [])}
+            roots = [number for number in range(len(nodes)) if number not in inner]
+        stack, seen = [(root, -1) for root in reversed(roots)], set[int]()
+        while stack:
+            number, parent = stack.pop()
+            if number in seen:
+                raise Unreadable(f"GLB has node {number} in two places of its tree")
+            seen.add(number)
+            yield number, parent
+            stack += [(child, number) for child in reversed(self._file.item("nodes", number).get("children", []))]
+
+    def _moved(self, node: int, path: str, time: float, rest: np.ndarray) -> np.ndarray:
+        move = self._moves.get((node, path))
+        return rest if move is None else move(time)
+
+    def _local(self, number: int, time: float) -> Matrix:
+        node = self._file.item("nodes", number)
+        if "matrix" in node:
+            return node.numbers("matrix", (0.0,) * 16).reshape(4, 4).T
+        rest = {"translation": (0.0, 0.0, 0.0), "rotation": (0.0, 0.0, 0.0, 1.0), "scale": (1.0, 1.0, 1.0)}
+        move, turn, size = (self._moved(number, path, time, node.numbers(path, none)) for path, none in rest.items())
+        return _placed(move, turn, size)
+
+    def _parts(self, time: float) -> Iterator[_Part]:
+        places, total = {-1: np.eye(4)}, 0
+        hidden = {-1: False}
+        for number, parent in self._order:
+            node = self._file.item("nodes", number)
+            places[number] = places[parent] @ self._local(number, time) if parent >= 0 else self._local(number, time)
+            visible = (
+                node.get("extensions", Entry({}, "")).get("KHR_node_visibility", Entry({}, "")).get("visible", True)
+            )
+            hidden[number] = hidden[parent] or not visible
+        for number, _ in self._order:
+            node = self._file.item("nodes", number)
+            # A scale of 0 hides a node until an animation shows it.
+            if hidden[number] or not places[number][:3, :3].any():
+                node.pass_over()
+            if "mesh" not in node or hidden[number] or not places[number][:3, :3].any():
+                continue
+            mesh = self._file.item("meshes", node.whole("mesh"))
+            shares = np.asarray(node.get("weights", mesh.get("weights", [])), np.float64)
+            shares = self._moved(number, "weights", time, shares).reshape(-1)
+            joints = self._joints(node, places)
+            matrices = [places[number] @ one for one in self._instances(node)]
+            for primitive in mesh.get("primitives", []):
+                found = self._primitive(primitive, shares, joints)
+                if found is None:
+                    continue
+                for matrix in matrices if joints is None else [np.eye(4)]:
+                    total += len(found.vertices)
+                    if total > self._file.most:
+                        raise Unreadable(
+                            f"GLB has more than {self._file.most} vertices, counted as often as they are shown"
+                        )
+                    yield _put(found, matrix)
+
+    def _instances(self, node: Entry) -> list[Matrix]:
+        """Return the places of a node's copies, relative to it (EXT_mesh_gpu_instancing)."""
+        extension = node.get("extensions", Entry({}, "")).get(_INSTANCES)
+        if extension is None:
+            return [np.eye(4)]
+        arrays = extension.get("attributes", Entry({}, ""))
+        known = {
+            name: self._file.array(arrays.whole(name))
+            for name in ("TRANSLATION", "ROTATION", "SCALE")
+            if name in arrays
+        }
+        count = min(map(len, known.values()), default=0)
+        rest = {"TRANSLATION": [0.0, 0, 0], "ROTATION": [0.0, 0, 0, 1], "SCALE": [1.0, 1, 1]}
+        columns = [np.asarray(known.get(name, np.tile(none, (count, 1))), np.float64) for name, none in rest.items()]
+        return [_placed(*row) for row in zip(*columns, strict=False)]
+
+    def _joints(self, node: Entry, places: dict[int, Matrix]) -> Float64[np.ndarray, "J 4 4"] | None:
+        """Return the matrices of the joints of a node's skin; None if it has no skin."""
+        if "skin" not in node:
+            return None
+        skin = self._file.item("skins", node.whole("skin"))
+        joints = skin.get("joints", [])
+        if lost := [joint for joint in joints if joint not in places]:
+            raise Unreadable(f"GLB has a skin with joint {str(lost[0])[:20]}, which is not in its scene")
+        matrices = np.stack([places[joint] for joint in joints])
+        if "inverseBindMatrices" in skin:
+            bound = self._file.array(skin.whole("inverseBindMatrices")).astype(np.float64)
+            matrices = matrices @ bound[: len(joints)].reshape(-1, 4, 4).transpose(0, 2, 1)
+        return matrices
+
+    def _primitive(self, primitive: Entry, shares: np.ndarray, joints: np.ndarray | None) -> _Part | None:
+        """Return a primitive's triangles in its node, deformed; None if it has none."""
+        mode = primitive.whole("mode", 4)
+        if mode in _OTHER_MODES:
+            self._named.add(_OTHER_MODES[mode])
+            primitive.pass_over()
+            return None
+        if mode > _FAN:
+            raise Unreadable(f"GLB has a primitive of mode {mode}")
+        attributes = primitive.get("attributes", Entry({}, "attributes"))
+        packed = primitive.get("extensions", Entry({}, "")).get(DRACO)
+        corners, arrays = None, dict[str, np.ndarray]()
+        if packed is not None:
+            corners, arrays = self._file.draco(packed, self._claimed(primitive, attributes))
+
+        def read(name: str) -> np.ndarray | None:
+            number = attributes.get(name)
+            return arrays[name] if name in arrays else None if number is None else self._file.array(number)
+
+        positions = read("POSITION")
+        if positions is None:
+            return None
+        if positions.shape[1] != 3:
+            raise Unreadable(f"GLB has positions of {positions.shape[1]} numbers")
+        vertices, light, own = positions.astype(np.float64), read("COLOR_0"), read(PASSED_OVER)
+        for values in (light, own):
+            if values is not None and (len(values) != len(vertices) or values.shape[1] < 3):
+                raise Unreadable(f"COLOR_0 of shape {values.shape} for {len(vertices)} vertices")
+        for share, target in zip(shares, primitive.get("targets", []), strict=False):
+            if share:
+                vertices, light = self._morphed(target, float(share), vertices, light)
+        if joints is not None:
+            vertices = _skinned(vertices, joints, read)
+        if corners is None:
+            number = primitive.get("indices")
+            corners = (
+                np.arange(len(vertices)) if number is None else self._file.array(number).reshape(-1).astype(np.int64)
+            )
+        look, uv, light = self._look(primitive, read, light)
+        light = own[:, :3] if light is None and own is not None else light
+        colors = None if light is None else from_linear(light)
+        return _used(_Part(vertices, _triangles(corners.astype(np.int64), mode), colors, uv, look))
+
+    def _claimed(self, primitive: Entry, attributes: Entry) -> int:
+        """Return how many vertices and indices the accessors of a compressed primitive announce."""
+        counts = [self._file.item("accessors", attributes.whole("POSITION")).whole("count")]
+        if "indices" in primitive:
+            counts.append(self._file.item("accessors", primitive.whole("indices")).whole("count"))
+        for number in [number for _, number in attributes.items()] + [primitive.get("indices", 0)]:
+            for key in ("componentType", "normalized", "byteOffset"):
+                self._file.item("accessors", number).get(key)
+        return min(max(counts), self._file.most)
+
+    def _morphed(
+        self, target: Entry, share: float, vertices: np.ndarray, light: np.ndarray | None
+    ) -> tuple[np.ndarray, np.ndarray | None]:
+        """Return vertices and light with a share of a morph target's differences."""
+        moved, lit = (
+            None if (n := target.get(name)) is None else self._file.array(n) for name in ("POSITION", "COLOR_0")
+        )
+        if moved is not None:
+            vertices = vertices + share * moved.astype(np.float64)
+        if lit is not None and light is not None:
+            light = np.clip(_fractions(light) + share * _fractions(lit)[:, : light.shape[1]], 0, 1)
+        return vertices, light
+
+    def _look(
+        self, primitive: Entry, read: Callable[[str], np.ndarray | None], light: np.ndarray | None
+    ) -> tuple[Look, np.ndarray | None, np.ndarray | None]:
+        """Return the look of a primitive, the places of its vertices in the picture, and their light."""
+        if "material" not in primitive:
+            return Look(), None, None if light is None else light[:, :3]
+        material = self._file.item("materials", primitive.whole("material"))
+        extensions = material.get("extensions", Entry({}, ""))
+        shine, paint = material.get("pbrMetallicRoughness", Entry({}, "")), extensions.get(_SHINE)
+        use, factor = shine.get("baseColorTexture"), shine.numbers("baseColorFactor", (1.0, 1.0, 1.0, 1.0))
+        if paint is not None:
+            self._named.add(f"shine ({_SHINE})")
+            if use is None:
+                use, factor = paint.get("diffuseTexture"), paint.numbers("diffuseFactor", (1.0, 1.0, 1.0, 1.0))
+            paint.pass_over()
+        if extensions.get("KHR_materials_unlit") is not None:
+            for name in ("metallicFactor", "roughnessFactor", "metallicRoughnessTexture"):
+                shine.get(name)
+        if material.get("alphaMode", "OPAQUE") != "OPAQUE":
+            self._named.add("transparency")
+        tint, is_tinted = factor[:3], bool((factor[:3] != 1.0).any())
+        if use is not None:
+            picture, sampler, why = self._file.texture(use.whole("index"))
+            uv = self._places(use, read)
+            if picture is not None and uv is not None:
+                return self._pictured(picture, sampler, uv, tint, light), uv, None
+            self._named.add(why or "a texture (without places)")
+        if light is not None:
+            shares = _fractions(light)[:, :3]
+            return Look(), None, shares * tint if is_tinted else light[:, :3]
+        return Look(_bytes(tint) if is_tinted else None), None, None
+
+    def _pictured(
+        self, picture: Texture, sampler: Entry, uv: np.ndarray, tint: np.ndarray, light: np.ndarray | None
+    ) -> Look:
+        """Return the look of a picture that colours multiply."""
+        if light is not None:
+            shares = _fractions(light)[:, :3]
+            if (shares == shares[:1]).all():
+                tint = tint * shares[0] if len(shares) else tint
+            else:
+                self._named.add("colours of vertices that multiply a texture")
+        wraps = {sampler.get(name, 10497) for name in ("wrapS", "wrapT")}
+        if wraps != {10497} and ((uv < 0) | (uv > 1)).any():
+            self._named.add("pictures that do not repeat beyond their borders (wrapS, wrapT)")
+        return Look(None, picture if (tint == 1).all() else self._tinted(picture, *map(float, tint)))
+
+    def _places(self, use: Entry, read: Callable[[str], np.ndarray | None]) -> Float32[np.ndarray, "V 2"] | None:
+        """Return the places of vertices in a picture, as `Mesh.uv`."""
+        moved = use.get("extensions", Entry({}, "")).get(_TRANSFORM)
+        number = use.whole("texCoord", 0) if moved is None else moved.whole("texCoord", use.whole("texCoord", 0))
+        found = read(f"TEXCOORD_{number}")
+        if found is None:
+            return None
+        uv = found[:, :2].astype(np.float64)
+        if moved is not None:
+            turn, size = float(moved.get("rotation", 0.0)), moved.numbers("scale", (1.0, 1.0))
+            c, s = np.cos(turn), np.sin(turn)
+            uv = (uv * size) @ np.array([[c, -s], [s, c]]) + moved.numbers("offset", (0.0, 0.0))
+        return np.stack([uv[:, 0], 1 - uv[:, 1]], axis=1).astype(np.float32)
+
+    def _joined(self, parts: list[_Part]) -> Polygons:
+        """Return all parts as one surface."""
+        counts = np.array([len(part.vertices) for part in parts], np.int64)
+        vertices = np.concatenate([np.zeros((0, 3)), *(part.vertices for part in parts)])
+        faces = [part.faces + begin for part, begin in zip(parts, np.cumsum(counts) - counts, strict=True)]
+        corners = np.concatenate([np.zeros((0, 3), np.int64), *faces]).reshape(-1)
+        # A vertex without colours beside others has none of its own; its look may have one.
+        colored = np.repeat(np.array([part.colors is not None for part in parts], bool), counts)
+        none = [np.zeros((len(part.vertices), 3), np.uint8) if part.colors is None else part.colors for part in parts]
+        colors = np.concatenate([np.zeros((0, 3), np.uint8), *none])
+        places = [np.full((len(p.vertices), 2), np.nan, np.float32) if p.uv is None else p.uv for p in parts]
+        uv = np.concatenate([np.zeros((0, 2), np.float32), *places])[corners]
+        which = np.repeat(np.arange(len(parts)), [len(part.faces) for part in parts])
+        surface = Polygons(
+            vertices, corners, np.full(len(corners) // 3, 3, np.int64), uv=uv if np.isfinite(uv).any() else None
+        )
+        found = with_looks(surface, [part.look for part in parts], which, colors, colored)
+        named = {_WORDS.get(".".join(name.split(".")[-2:]), _plain(name)) for name in self._file.tree.unread()}
+        return found.naming(named | self._named)
+
+
+def _plain(name: str) -> str:
+    """Return the name of an entry that is not read, with the list that it stands in."""
+    return " of ".join(reversed(name.replace("pbrMetallicRoughness.", "").replace("extensions.", "").rsplit(".", 1)))
+
+
+def _guarded(act: Callable[[], T]) -> T:
+    """Turn what damaged entries raise into Unreadable."""
     try:
-        hidden = data[: _text_end(data)].replace(_COLORS, _HIDDEN) + data[_text_end(data) :]
-        scene = trimesh.load_scene(io.BytesIO(hidden), file_type="glb", process=False)
-        placed = [(scene.graph[node][0], scene.geometry[scene.graph[node][1]]) for node in scene.graph.nodes_geometry]
-        # A scale of 0 hides a node until an animation shows it.
-        parts = [part for part in placed if isinstance(part[1], trimesh.Trimesh) and part[0][:3, :3].any()]
-        pictures, unknown = _pictures(tree)
-        picture = _picture(data, tree, min(pictures)) if len(pictures) == 1 and not unknown else None
-        why = unknown or ("several materials" if len(pictures) > 1 else "a texture (it is in another file)")
-        lost = frozenset({why} if (pictures or unknown) and picture is None else ())
-        return _joined(parts, _dropped(tree) | lost, picture)
+        return act()
     except Unreadable:
         raise
-    except Exception as error:  # a foreign parser may raise anything for a damaged file
+    except (TypeError, ValueError, AttributeError, LookupError, ArithmeticError, RuntimeError, MemoryError) as error:
         raise Unreadable(f"GLB cannot be read ({type(error).__name__}: {error})") from None
 
 
-def _text_end(data: bytes) -> int:
-    """Return the offset of the JSON chunk's end."""
-    return 20 + int.from_bytes(data[12:16], "little")
+def _fractions(values: np.ndarray) -> np.ndarray:
+    """Return colours as fractions of full light."""
+    return shares_of(values, np.iinfo(values.dtype).max if values.dtype.kind in "iu" else 1.0)
 
 
-def _json_chunk(data: bytes) -> dict[str, Any]:
-    """Return the scene description, after checking the lengths that the container announces."""
-    head = np.frombuffer(data[:20].ljust(20, b"\0"), dtype="<u4")
-    magic, version, total, length = data[:4], int(head[1]), int(head[2]), int(head[3])
-    if magic != b"glTF" or version != 2:
-        raise Unreadable(f"GLB 2 header expected, found {magic!r} version {version}")
-    if total > len(data) or 20 + length > len(data):
-        raise Unreadable(f"GLB announces {total} bytes but has {len(data)} (truncated?)")
-    try:
-        tree = json.loads(data[20 : 20 + length])
-    except (ValueError, RecursionError) as error:
-        raise Unreadable(f"GLB scene description is no JSON ({error})") from None
-    if not isinstance(tree, dict):
-        raise Unreadable("GLB scene description is no JSON object")
-    accessors = tree.get("accessors") or []
-    for accessor in accessors if isinstance(accessors, list) else [None]:
-        count = accessor.get("count", 0) if isinstance(accessor, dict) else None
-        if not isinstance(count, int):
-            raise Unreadable("GLB accessors are no list of objects with a whole count")
-        if not 0 <= count <= _DENSEST * len(data):
-            raise Unreadable(f"GLB announces {count} values in {len(data)} bytes")
-    return tree
+def _bytes(light: np.ndarray) -> tuple[int, int, int]:
+    red, green, blue = from_linear(light[None])[0].tolist()
+    return red, green, blue
 
 
-def _dropped(tree: dict[str, Any]) -> Dropped:
-    text = json.dumps([mesh.get("primitives", []) for mesh in tree.get("meshes", []) if isinstance(mesh, dict)])
-    dropped = {words for mark, words in _DROPS.items() if f'"{mark}' in text}
-    dropped |= {"animations"} if tree.get("animations") else set()
-    materials = json.dumps(tree.get("materials") or [])
-    dropped |= {"normal maps"} if '"normalTexture"' in materials else set()
-    dropped |= {"transparency"} if '"alphaMode"' in materials and '"OPAQUE"' not in materials else set()
-    return frozenset(dropped)
+def _tinted(picture: Texture, *tint: float) -> Texture:
+    """Return a picture times a colour in linear light."""
+    table = np.stack([from_linear(np.repeat(_LIGHT[:, None] * share, 3, axis=1))[:, 0] for share in tint])
+    return Texture(lambda: np.stack([table[k][picture.pixels[..., k]] for k in range(3)], axis=-1), picture.size)
 
 
-def _pictures(tree: dict[str, Any]) -> tuple[set[int], str]:
-    """Return the numbers of the images that are base colours of triangles, and the name of any unsupported use."""
-    images, unknown = set[int](), ""
-    for primitive in (one for mesh in tree["meshes"] for one in mesh.get("primitives", [])):
-        material = tree["materials"][primitive["material"]] if "material" in primitive else {}
-        shine = material.get("pbrMetallicRoughness", {})
-        if "baseColorTexture" not in shine:
-            continue
-        use, places = shine["baseColorTexture"], primitive.get("attributes", {}).get("TEXCOORD_0")
-        texture = tree["textures"][use["index"]]
-        source = texture.get("source", texture.get("extensions", {}).get("EXT_texture_webp", {}).get("source"))
-        if source is None:
-            unknown = "a texture (in a coding that is not read)"
-        elif use.get("texCoord", 0) or _TRANSFORM in use.get("extensions", {}):
-            unknown = "a texture (with places of its own)"
-        elif places is not None and tree["accessors"][places]["componentType"] != _FLOAT:
-            unknown = "a texture (with places that are no floats)"
-        else:
-            images.add(source)
-    return images, unknown
+def _triangles(corners: Int64[np.ndarray, " C"], mode: int) -> Int64[np.ndarray, "F 3"]:
+    """Return the triangles of a list, a strip or a fan of corners (glTF 2.0, section 3.7.2.1)."""
+    if mode == _STRIP:
+        strip = (
+            np.stack([corners[:-2], corners[1:-1], corners[2:]], axis=1)
+            if len(corners) > 2
+            else corners[:0].reshape(0, 3)
+        )
+        strip[1::2, :2] = strip[1::2, 1::-1]
+        return strip
+    if mode == _FAN:
+        return np.stack([np.repeat(corners[:1], max(0, len(corners) - 2)), corners[1:-1], corners[2:]], axis=1)
+    return corners[: len(corners) // 3 * 3].reshape(-1, 3)
 
 
-def _picture(data: bytes, tree: dict[str, Any], image: int) -> Texture | None:
-    """Return the texture of an image in the file; None for an image elsewhere."""
-    view, uri = tree["images"][image].get("bufferView"), tree["images"][image].get("uri", "")
-    if uri.startswith("data:"):
-        return Texture(partial(parse_picture, b64decode(uri.split(",", 1)[1]), "the texture of a GLB"))
-    if view is None:
-        return None
-    where = tree["bufferViews"][view]
-    begin = _text_end(data) + 8 + where.get("byteOffset", 0)
-    return Texture(partial(parse_picture, data[begin : begin + where["byteLength"]], "the texture of a GLB"))
-
-
-def _joined(parts: list[tuple[np.ndarray, Any]], dropped: Dropped, texture: Texture | None) -> Polygons:
-    """Return all parts as one surface; nodes without rotation or scale are added without a matrix product."""
-    vertices, faces, count = [np.zeros((0, 3))], [np.zeros((0, 3), np.int64)], 0
-    for matrix, part in parts:
-        local = np.asarray(part.vertices, dtype=np.float64)
-        turned = local if np.array_equal(matrix[:3, :3], np.eye(3)) else local @ matrix[:3, :3].T
-        vertices.append(turned + matrix[:3, 3])
-        triangles = np.asarray(part.faces, dtype=np.int64)
-        mirrored = np.linalg.det(matrix[:3, :3]) < 0
-        faces.append((triangles[:, ::-1] if mirrored else triangles) + count)
-        count += len(local)
-    corners, surfaces = np.concatenate(faces).reshape(-1), [part for _, part in parts]
-    sizes = np.full(len(corners) // 3, 3, np.int64)
-    uv = None if texture is None else np.concatenate([_places(part) for part in surfaces])[corners]
-    return Polygons(np.concatenate(vertices), corners, sizes, dropped, _colors(surfaces), uv, texture)
-
-
-def _places(part: Any) -> Float32[np.ndarray, "V 2"]:
-    """Return the texture coordinates of a part's vertices; NaN if it has none."""
-    uv = getattr(part.visual, "uv", None)
-    if uv is None or len(uv) != len(part.vertices):
-        return np.full((len(part.vertices), 2), np.nan, np.float32)
-    return np.asarray(uv, np.float32)[:, :2]
-
-
-def _colors(parts: list[Any]) -> UInt8[np.ndarray, "V 3"] | None:
-    """Return the colours of all vertices, grey for parts without; None if no part has any."""
-    names = (_HIDDEN.decode().strip('"'), PASSED_OVER)
-    given = [next((part.vertex_attributes[n] for n in names if n in part.vertex_attributes), None) for part in parts]
-    if all(values is None for values in given):
-        return None
-    for part, values in zip(parts, given, strict=True):
-        if values is not None and (np.ndim(values) != 2 or len(values) != len(part.vertices) or values.shape[1] < 3):
-            raise ValueError(f"COLOR_0 of shape {np.shape(values)} for {len(part.vertices)} vertices")
-    colors = [
-        np.full((len(part.vertices), 3), GREY, np.uint8) if values is None else from_linear(np.asarray(values)[:, :3])
-        for part, values in zip(parts, given, strict=True)
+def _placed(move: np.ndarray, turn: np.ndarray, size: np.ndarray) -> Matrix:
+    """Return the matrix of a translation, a rotation (a quaternion x, y, z, w) and a scale."""
+    x, y, z, w = turn / (np.linalg.norm(turn) or 1.0)
+    matrix = np.eye(4)
+    matrix[:3, 3] = move
+    matrix[:3, :3] = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
     ]
-    return np.concatenate(colors)
+    matrix[:3, :3] *= size
+    return matrix
+
+
+def _put(part: _Part, matrix: Matrix) -> _Part:
+    """Return a part in its place; one without rotation or scale is moved without a matrix product."""
+    turn = matrix[:3, :3]
+    local = part.vertices if np.array_equal(turn, np.eye(3)) else part.vertices @ turn.T
+    faces = part.faces[:, ::-1] if np.linalg.det(turn) < 0 else part.faces
+    return _Part(local + matrix[:3, 3], faces, part.colors, part.uv, part.look)
+
+
+def _used(part: _Part) -> _Part:
+    """Return a part without vertices that its faces do not use: those of primitives that share an array."""
+    count = len(part.vertices)
+    chosen = np.zeros(count, bool)
+    chosen[part.faces[(part.faces >= 0) & (part.faces < count)]] = True
+    if chosen.all() or not len(part.faces) or (part.faces >= count).any():  # which `checked` refuses
+        return part
+    colors, uv = (None if values is None else values[chosen] for values in (part.colors, part.uv))
+    return _Part(part.vertices[chosen], (np.cumsum(chosen) - 1)[part.faces], colors, uv, part.look)
+
+
+def _skinned(
+    vertices: Float64[np.ndarray, "V 3"], joints: Float64[np.ndarray, "J 4 4"], read: Callable[[str], np.ndarray | None]
+) -> Float64[np.ndarray, "V 3"]:
+    """Return vertices as their joints move them (glTF 2.0, section 3.7.3.3)."""
+    moved, total, number = np.zeros_like(vertices), np.zeros(len(vertices)), 0
+    whole = np.concatenate([vertices, np.ones((len(vertices), 1))], axis=1)
+    while (at := read(f"JOINTS_{number}")) is not None and (shares := read(f"WEIGHTS_{number}")) is not None:
+        for joint, share in zip(at.T.astype(np.int64), shares.T.astype(np.float64), strict=True):
+            total += share
+            moved += share[:, None] * np.einsum("vij,vj->vi", joints[joint, :3], whole)
+        number += 1
+    return np.where(total[:, None] > 0, moved / np.maximum(total, 1e-30)[:, None], vertices)
+
+
+def _between(times: np.ndarray, rows: np.ndarray, how: str, time: float, is_turn: bool) -> np.ndarray:
+    """Return the value of an animation at a time (glTF 2.0, appendix C)."""
+    time = float(np.float32(time))  # as times of keys are
+    k = int(np.clip(np.searchsorted(times, time, side="right") - 1, 0, len(times) - 1))
+    middle = rows.shape[1] // 2  # of a spline, between its tangents
+    if k == len(times) - 1 or time <= times[k] or how == "STEP":
+        return rows[k, middle]
+    step = times[k + 1] - times[k]
+    share = (time - times[k]) / step
+    before, after = rows[k, middle], rows[k + 1, middle]
+    if how == "CUBICSPLINE":
+        t, t2, t3 = share, share**2, share**3
+        value = (2 * t3 - 3 * t2 + 1) * before + (t3 - 2 * t2 + t) * step * rows[k, 2]
+        return value + (3 * t2 - 2 * t3) * after + (t3 - t2) * step * rows[k + 1, 0]
+    if is_turn:
+        cosine = float(before @ after)
+        after, angle = (after, np.arccos(min(cosine, 1.0))) if cosine >= 0 else (-after, np.arccos(min(-cosine, 1.0)))
+        if angle > 1e-6:
+            return (np.sin((1 - share) * angle) * before + np.sin(share * angle) * after) / np.sin(angle)
+    return before + share * (after - before)

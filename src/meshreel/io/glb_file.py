@@ -19,8 +19,6 @@ from ..errors import InputError
 from .pictures import pack_picture
 from .polygons import shares_of
 
-Corners = Float32[np.ndarray, "F 3 2"]  # as `Mesh.uv`
-
 MOST_BYTES = (1 << 32) - 1  # of a GLB file, whose header has 32 bits for its length (glTF 2.0, "GLB File Format")
 COLORS, PLACES = "COLOR_0", "TEXCOORD_0"
 PASSED_OVER = "_COLOR_0"  # a name that begins with _ is an application's own (glTF 2.0)
@@ -28,7 +26,8 @@ _COMPONENTS = {"f4": 5126, "i2": 5122, "u2": 5123, "u4": 5125}  # of accessors, 
 _VERTICES, _INDICES = 34962, 34963  # targets of a buffer view (glTF 2.0)
 _RESTART = 65535  # largest value of 16 bits: restarts a primitive, so it is no index (glTF 2.0)
 _UNLIT = "KHR_materials_unlit"
-_MESHOPT = ["EXT_meshopt_compression", "KHR_mesh_quantization"]
+MESHOPT = "EXT_meshopt_compression"
+_REQUIRED = [MESHOPT, "KHR_mesh_quantization"]
 ATTRIBUTES, TRIANGLES = "ATTRIBUTES", "TRIANGLES"  # modes of meshoptimizer's streams (EXT_meshopt_compression)
 _MATT = {"metallicFactor": 0.0, "roughnessFactor": 0.9}  # for viewers without KHR_materials_unlit
 
@@ -52,8 +51,8 @@ class GlbFile:
         """Write arrays to an empty `spool` first; `name` begins error messages, `remedy` ends that about its length."""
         self._spool, self._name, self._remedy = spool, name, remedy
         self._size = self._plain = 0  # bytes written, and those of the buffer that compressed views stand for
-        self._tree: dict[str, list[Any]] = {"extensionsRequired": _MESHOPT.copy()} if compressed else {}
-        self._used = {*_MESHOPT} if compressed else set[str]()
+        self._tree: dict[str, list[Any]] = {"extensionsRequired": _REQUIRED.copy()} if compressed else {}
+        self._used = {*_REQUIRED} if compressed else set[str]()
         self._loose = bytearray()  # of the newest view, until it is complete
         self._coding: tuple[str, int, int] | None = None  # of the newest view: mode, stride, bits of the filter
         self.compressed = compressed
@@ -138,7 +137,7 @@ class GlbFile:
         self._close()
         buffers: dict[str, Any] = {"buffers": [{"byteLength": self._size}]} if self._size else {}
         if self._plain:
-            buffers["buffers"].append({"byteLength": self._plain, "extensions": {_MESHOPT[0]: {"fallback": True}}})
+            buffers["buffers"].append({"byteLength": self._plain, "extensions": {MESHOPT: {"fallback": True}}})
         used = {"extensionsUsed": sorted(self._used)} if self._used else {}
         text = json.dumps(scene | self._tree | used | buffers, separators=(",", ":"), allow_nan=False).encode()
         text += b" " * (-len(text) % 4)
@@ -160,7 +159,7 @@ class GlbFile:
         stream = pack_stream(filtered, mode, stride)
         about = {"byteLength": len(stream), "byteStride": stride, "count": len(data) // stride, "mode": mode}
         about |= {"filter": "EXPONENTIAL"} if bits else {}
-        view["extensions"] = {_MESHOPT[0]: {"buffer": 0, "byteOffset": self._size} | about}
+        view["extensions"] = {MESHOPT: {"buffer": 0, "byteOffset": self._size} | about}
         view |= {"buffer": 1, "byteOffset": self._plain, "byteLength": len(data)}
         self._plain += len(data) + -len(data) % 4
         self._loose.clear()
@@ -185,26 +184,6 @@ class GlbFile:
         if size > MOST_BYTES:
             text = f"{self._name}: at {what} it has more than the {MOST_BYTES} bytes of a GLB file"
             raise InputError(f"{text}; {self._remedy}")
-
-
-def distinct_places(uv: Corners) -> tuple[Float32[np.ndarray, "P 2"], Int64[np.ndarray, "F 3"]]:
-    """Return the distinct places in a texture, and the number of each corner's place; NaN is a place, too."""
-    pairs = np.ascontiguousarray(uv).reshape(-1, 2).view(np.int64)  # places with equal bits are equal
-    places, numbers = np.unique(pairs, return_inverse=True)
-    return places.view(np.float32).reshape(-1, 2), numbers.reshape(-1, 3).astype(np.int64)
-
-
-def cut_at_seams(
-    faces: Int32[np.ndarray, "F 3"], uv: Corners
-) -> tuple[Int64[np.ndarray, " W"], Int32[np.ndarray, "F 3"], Float32[np.ndarray, "W 2"]]:
-    """Return vertices' numbers, faces, and one texture coordinate for each vertex, as GPUs need them.
-
-    A vertex is repeated for each place of its corners; a vertex without a face is left out.
-    """
-    places, numbers = distinct_places(uv)
-    codes, corners = np.unique(faces * np.int64(len(places)) + numbers, return_inverse=True)
-    origins, place = np.divmod(codes, max(len(places), 1))
-    return origins, corners.reshape(-1, 3).astype(np.int32), places[place]
 
 
 def to_linear(colors: UInt8[np.ndarray, "V 3"]) -> UInt16[np.ndarray, "V 3"]:

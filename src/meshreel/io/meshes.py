@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import lru_cache
+from pathlib import Path
 
 import numpy as np
+from jaxtyping import Bool
 
 from ..errors import InputError
 from ..types import Mesh
 from .files import Place, read_input
-from .glb import parse_glb
+from .glb import Scene, parse_glb
+from .materials import with_materials
 from .obj import parse_obj
-from .pictures import texture_of_materials
 from .ply import parse_ply
 from .polygons import Dropped, Polygons, Unreadable, triangulate
 from .stl_off import parse_off, parse_stl
@@ -25,6 +29,7 @@ _PARSERS: dict[str, Callable[[bytes], Polygons]] = {
     ".off": parse_off,
 }
 EXTENSIONS = tuple(_PARSERS)
+_MARK = b"\xef\xbb\xbf"  # of byte order, at the beginning of texts of some programs
 FARTHEST = 1e12  # m, largest coordinate: beyond it the spacing of float64 exceeds 0.1 mm (guess)
 
 
@@ -41,28 +46,77 @@ def read_mesh(path: Place, where: str | None = None) -> Loaded:
 
     A file without faces is an empty frame; its vertices are dropped and named. `where` begins each error message.
     """
-    where = where or str(path)
-    parse = _PARSERS.get(path.suffix.lower())
+    where, kind = where or str(path), path.suffix.lower()
+    parse = _PARSERS.get(kind)
     if parse is None:
         raise InputError(f"{where}: {path.suffix or 'no'} extension is not one of {', '.join(EXTENSIONS)}; convert it")
-    data = read_input(path, where=where)
-    if not data:
-        raise InputError(f"{where}: the file has 0 bytes; write it again, or leave it out with --frames")
+    data = _read(path, where)
+    with _reading(path, where):
+        polygons = parse(data.removeprefix(_MARK) if kind in (".obj", ".ply", ".off") else data)
+        return checked(with_materials(polygons, path) if polygons.has_looks else polygons)
+
+
+def frames_of_animation(path: Place, frame_rate: float) -> int:
+    """Return the number of frames of a GLB file at a frame rate; 1 if nothing moves, or if it cannot be read."""
     try:
-        polygons = parse(data)
-        if polygons.uv is not None and polygons.texture is None:
-            texture, dropped = texture_of_materials(path, polygons.materials, polygons.used)
-            polygons = replace(polygons, texture=texture, dropped=polygons.dropped | dropped)
-        return checked(polygons)
+        return _scene(path, str(path)).count(frame_rate)
+    except (Unreadable, InputError):  # which `read_mesh` raises with the frame
+        return 1
+
+
+def read_animated(path: Place, time: float, where: str) -> Loaded:
+    """Read the mesh in a GLB file as its animation has it at a time, s. Raises InputError as `read_mesh` does."""
+    with _reading(path, where):
+        return checked(_scene(path, where).at(time))
+
+
+@contextmanager
+def _reading(path: Place, where: str) -> Iterator[None]:
+    """Turn Unreadable into an InputError with a remedy."""
+    try:
+        yield
     except Unreadable as error:
         kind = path.suffix[1:].upper()
         raise InputError(f"{where}: {error}; re-export the {kind} file, or leave it out with --frames") from None
+
+
+def _read(path: Place, where: str) -> bytes:
+    data = read_input(path, where=where)
+    if not data:
+        raise InputError(f"{where}: the file has 0 bytes; write it again, or leave it out with --frames")
+    return data
+
+
+def _scene(path: Place, where: str) -> Scene:
+    state = path.stat() if isinstance(path, Path) and path.exists() else None
+    return _opened(path, where if state is None else str(path), state and (state.st_size, state.st_mtime_ns))
+
+
+@lru_cache(maxsize=2)  # scenes at a time (guess)
+def _opened(path: Place, where: str, state: object) -> Scene:
+    """Return the scene of a file, read again if the file has changed."""
+    del state
+    return Scene(_read(path, where))
+
+
+def _without(polygons: Polygons, gone: Bool[np.ndarray, " V"]) -> Polygons:
+    """Return polygons without some vertices that no face has."""
+    numbers, corners = np.cumsum(~gone) - 1, polygons.corners
+    valid = (corners >= 0) & (corners < len(gone))
+    colors = None if polygons.colors is None else polygons.colors[~gone]
+    corners = np.where(valid, numbers[np.where(valid, corners, 0)], corners)
+    return replace(polygons, vertices=polygons.vertices[~gone], corners=corners, colors=colors, colored=None)
 
 
 def checked(polygons: Polygons) -> Loaded:
     """Return the mesh of polygons after checking every number. Raises Unreadable for the first invalid one."""
     vertices, corners, sizes = polygons.vertices, polygons.corners, polygons.sizes
     near = np.abs(vertices) <= FARTHEST  # NaN is not <= anything
+    used = np.zeros(len(vertices), bool)
+    used[corners[(corners >= 0) & (corners < len(vertices))]] = True
+    if len(sizes) and not near[~used].all():  # programs mark points without a measurement so
+        kept = used | near.all(axis=1)
+        return checked(_without(polygons, ~kept))
     if not near.all():
         bad = np.flatnonzero(~near.all(axis=1))
         x, y, z = vertices[bad[0]]

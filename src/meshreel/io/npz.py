@@ -25,6 +25,7 @@ from .meshes import Loaded, checked
 from .pictures import MOST_PIXELS
 from .polygons import Polygons, Unreadable, eight_bits
 
+_ARRAYS = {"vertices", "faces", "colors", "uv", "texture"}
 _DAMAGED = (  # errors of NumPy and zipfile for damaged files; RuntimeError for encrypted ones
     *(OSError, ValueError, EOFError, SyntaxError, tokenize.TokenError, RecursionError),
     *(zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError),
@@ -81,6 +82,7 @@ class Archive:
             if not {"vertices", "faces"} <= names:
                 given = ", ".join(sorted(names)) or "nothing"
                 raise InputError(f"{path}: has {given}; save it as 'vertices' and 'faces'")
+            self._others = frozenset(f"array {name!r}" for name in names - _ARRAYS)
             self._vertices = _Stream(path, archive, "vertices", 2)
             self._colors = _Stream(path, archive, "colors", 2) if "colors" in names else None
             self._texture = _Stream(path, archive, "texture", 3) if "texture" in names else None
@@ -121,7 +123,7 @@ class Archive:
             vertices = self._vertices.row(index).astype(np.float64)
             colors = None if self._colors is None else eight_bits(self._colors.row(index))
             texture = None if self._texture is None else Texture(partial(self._picture, index))
-            dropped = frozenset({"a texture (without uv)"} if self._uv is None and texture is not None else ())
+            dropped = self._others | ({"a texture (without uv)"} if self._uv is None and texture is not None else set())
             return checked(Polygons(vertices, self._corners, self._sizes, dropped, colors, self._uv, texture))
 
     def _check_colors(self) -> None:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import numpy as np
-from jaxtyping import Float32, Float64, Int64, UInt8
+from jaxtyping import Bool, Float32, Float64, Int64, UInt8
 
 from .polygons import Dropped, Lines, Polygons, Unreadable, eight_bits
 
@@ -16,7 +17,9 @@ _KNOWN = (
     *("cstype", "deg", "bmat", "step", "curv", "curv2", "surf", "parm", "trim", "hole", "scrv", "sp", "end", "con"),
     *("c_interp", "d_interp", "shadow_obj", "trace_obj", "ctech", "stech", "call", "csh"),
 )
-_DROPS = {"vn": "normals", "l": "lines", "p": "points"}
+_DROPS = {"vn": "normals", "l": "lines", "p": "points"}  # words of what is not kept
+_DROPS |= {"curv": "curves", "curv2": "curves", "usemap": "texture maps", "maplib": "texture maps"}
+_REFUSED = {"surf": "a free-form surface", "call": "a call of another file", "csh": "a command"}
 
 
 def parse_obj(data: bytes) -> Polygons:
@@ -28,23 +31,32 @@ def parse_obj(data: bytes) -> Polygons:
     bare = (second == ord(" ")) | (second == ord("\t")) | (lines.ends == lines.starts + 1)
     is_vertex, is_face = bare & (first == ord("v")), bare & (first == ord("f"))
     is_place = (first == ord("v")) & (second == ord("t"))
-    vertices, colors = _vertices(lines, np.flatnonzero(is_vertex))
+    vertices, colors, colored = _vertices(lines, np.flatnonzero(is_vertex))
     faces = np.flatnonzero(is_face)
     corners, sizes = _faces(lines, faces, np.cumsum(is_vertex)[is_face], len(vertices))
     uv = _places(lines, np.flatnonzero(is_place), faces, np.repeat(np.cumsum(is_place)[is_face], sizes))
     others = np.flatnonzero(~(is_vertex | is_face | is_place | (lines.starts == lines.ends)))
-    dropped, materials, used = _others(lines, others)
-    return Polygons(vertices, corners, sizes, dropped, colors, uv, None, materials, used)
+    dropped, libraries, uses = _others(lines, others)
+    names = {name: number for number, name in enumerate(dict.fromkeys(uses.values()))}
+    numbers = np.array([-1, *(names[name] for name in uses.values())], np.int64)
+    material_of = numbers[np.searchsorted(np.array([*uses], np.int64), faces)]
+    surface = Polygons(vertices, corners, sizes, dropped, colors, uv, colored=colored, libraries=libraries)
+    return replace(surface, materials=tuple(names), material_of=material_of)
 
 
-def _vertices(lines: Lines, chosen: Numbers) -> tuple[Float64[np.ndarray, "N 3"], UInt8[np.ndarray, "N 3"] | None]:
-    """Return positions of vertices and, if all have them, colours: three numbers behind the position."""
+def _vertices(
+    lines: Lines, chosen: Numbers
+) -> tuple[Float64[np.ndarray, "N 3"], UInt8[np.ndarray, "N 3"] | None, Bool[np.ndarray, " N"] | None]:
+    """Return positions of vertices, and colours: three numbers behind the position; a mask if some have none."""
     values, counts = lines.values(chosen, skip=1)
     _check_counts(lines, chosen, counts, "coordinates instead of 3")
-    begins = np.cumsum(counts) - counts
-    colored = len(counts) > 0 and (counts >= 6).all()
-    colors = eight_bits(values[begins[:, None] + np.arange(3, 6)]) if colored else None
-    return values[begins[:, None] + np.arange(3)], colors
+    begins, colored = np.cumsum(counts) - counts, counts >= 6
+    positions = values[begins[:, None] + np.arange(3)]
+    if not colored.any():
+        return positions, None, None
+    colors = np.zeros((len(counts), 3), np.uint8)
+    colors[colored] = eight_bits(values[begins[colored, None] + np.arange(3, 6)])
+    return positions, colors, None if colored.all() else colored
 
 
 def _faces(lines: Lines, chosen: Numbers, defined: Numbers, count: int) -> tuple[Int64[np.ndarray, " C"], Numbers]:
@@ -86,19 +98,21 @@ def _places(
     return uv
 
 
-def _others(lines: Lines, chosen: Int64[np.ndarray, " N"]) -> tuple[Dropped, tuple[str, ...], tuple[str, ...]]:
-    """Return the kinds of dropped data in the other lines, the material files, and the materials of faces."""
+def _others(lines: Lines, chosen: Int64[np.ndarray, " N"]) -> tuple[Dropped, tuple[str, ...], dict[int, str]]:
+    """Return the kinds of dropped data in the other lines, material files, and the materials named, by line."""
     text, starts = lines.text, lines.starts
     is_normal = (text[starts[chosen]] == ord("v")) & (text[np.minimum(starts[chosen] + 1, len(text) - 1)] == ord("n"))
-    dropped, materials, used = {_DROPS["vn"]} if is_normal.any() else set(), list[str](), dict[str, None]()
+    dropped, libraries, uses = {_DROPS["vn"]} if is_normal.any() else set(), list[str](), dict[int, str]()
     for number in chosen[~is_normal]:  # no Python loop over normals: there may be one for each vertex
-        words = lines.whole(number).split(maxsplit=1)
+        words = lines.written(number).split(maxsplit=1)
         keyword, rest = words[0] if words else "", words[1].strip() if len(words) > 1 else ""
-        if keyword and keyword not in _KNOWN:
+        if keyword not in _KNOWN:
             raise Unreadable(f"line {number + 1} ({lines.line(number)!r}) begins with no OBJ keyword")
+        if keyword in _REFUSED:
+            raise Unreadable(f"line {number + 1} ({lines.line(number)!r}) is {_REFUSED[keyword]}, which is not read")
         dropped |= {_DROPS[keyword]} if keyword in _DROPS else set()
         if keyword == "mtllib":
-            materials.append(rest)
+            libraries.append(rest)
         elif keyword == "usemtl":
-            used[rest] = None
-    return frozenset(dropped), tuple(materials), tuple(used)
+            uses[int(number)] = rest
+    return frozenset(dropped), tuple(libraries), uses

@@ -7,11 +7,10 @@ Depth is 16-bit grayscale PNG, in the unit of the camera; 0 means no measurement
 from __future__ import annotations
 
 import io
-import os
 import re
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from functools import lru_cache, partial
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,9 +18,7 @@ import numpy as np
 from jaxtyping import UInt8, UInt16
 
 from ..errors import InputError
-from ..types import Texture
-from .files import Place, read_file, read_input
-from .polygons import Dropped
+from .files import Place, read_input
 
 if TYPE_CHECKING:
     from PIL import Image
@@ -99,50 +96,6 @@ def pack_picture(pixels: UInt8[np.ndarray, "H W *C"] | UInt16[np.ndarray, "H W"]
     packed = io.BytesIO()
     Image.fromarray(pixels).save(packed, format="PNG", compress_level=1)  # a quarter of the time for a tenth more
     return packed.getvalue()
-
-
-def texture_of_materials(mesh: Place, files: tuple[str, ...], used: tuple[str, ...]) -> tuple[Texture | None, Dropped]:
-    """Return the texture shared by all faces of an OBJ, and the kinds of dropped material data."""
-    picture_of, dropped = dict[str, str | None](), set[str]()
-    for name in files:
-        try:
-            text = read_file(_beside(mesh, name)).decode("utf-8-sig", "replace")  # some editors begin with a mark
-        except (OSError, ValueError):  # of a name with a null
-            dropped.add(f"materials ({name} cannot be read)")
-            continue
-        dropped |= _parse_materials(text, picture_of)
-    pictures = {picture_of.get(name) for name in used} if used else {*picture_of.values()}
-    if len(pictures) > 1:
-        return None, frozenset(dropped | {"several materials"})
-    if not pictures or (picture := pictures.pop()) is None:
-        return None, frozenset(dropped)
-    place = _beside(mesh, picture)
-    if isinstance(place, Path) and not os.path.exists(place):  # noqa: PTH110  (no error for a name too long, or a null)
-        return None, frozenset(dropped | {f"a texture ({picture} is not there)"})
-    return Texture(partial(read_picture, place)), frozenset(dropped)  # read when its pixels are asked for
-
-
-def _beside(mesh: Place, name: str) -> Place:
-    """Return the path of a file that a mesh names, relative to the mesh."""
-    name = name.replace("\\", "/")
-    return (mesh.parent if isinstance(mesh, Path) else type(mesh)(str(mesh).rsplit("/", 1)[0])) / name
-
-
-def _parse_materials(text: str, picture_of: dict[str, str | None]) -> Dropped:
-    """Add to `picture_of` the picture of each material in a text, None for one without; return what is dropped."""
-    name, dropped = "", set[str]()
-    for words in (line.split(maxsplit=1) for line in text.splitlines()):
-        keyword, rest = words[0].lower() if words else "", words[1].strip() if len(words) > 1 else ""
-        if keyword == "newmtl":
-            name = rest
-            picture_of[name] = None
-        elif keyword == "map_kd" and rest:
-            picture_of[name] = rest.split()[-1] if rest.startswith("-") else rest  # behind options
-        elif keyword == "map_d":
-            dropped.add("transparency")
-        elif keyword in ("norm", "bump", "map_bump", "map_kn"):
-            dropped.add("normal maps")
-    return frozenset(dropped)
 
 
 def read_depth(path: Path) -> UInt16[np.ndarray, "H W"]:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from collections.abc import Collection
+from dataclasses import dataclass, replace
 
 import numpy as np
+from jaxtyping import Int64
 
 from .. import _core
 from .polygons import Dropped, Lines, Polygons, Unreadable, eight_bits, shares_of, whole
@@ -22,11 +24,14 @@ _TYPES = {
 }
 _DIGITS = 18  # of a number of rows; longer ones do not fit 64-bit integers
 _INDICES = ("vertex_indices", "vertex_index")
+_STRIPS = "tristrips"  # of the Stanford scanning repository
 _COLORS = (("red", "green", "blue"), ("r", "g", "b"), ("diffuse_red", "diffuse_green", "diffuse_blue"))
-_DROPS = {
-    "normals": {"nx", "ny", "nz"},
-    "transparency": {"alpha"},
-    "texture coordinates": {"s", "t", "u", "v", "texture_u", "texture_v", "texcoord"},
+_PLACES = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"), ("texture_s", "texture_t"))
+_CORNER_PLACES, _PICTURE = "texcoord", "texnumber"  # of faces, as MeshLab writes them
+_WORDS = {
+    **dict.fromkeys(("nx", "ny", "nz"), "normals"),
+    **dict.fromkeys(("alpha", "a"), "transparency"),
+    **dict.fromkeys((*(name for pair in _PLACES for name in pair), _CORNER_PLACES), "texture coordinates"),
 }
 
 
@@ -41,42 +46,127 @@ class _Property:
 class _Element:
     name: str
     rows: int
-    properties: list[_Property]
+    properties: tuple[_Property, ...]
 
 
 def parse_ply(data: bytes) -> Polygons:
-    end = re.search(rb"end_header[ \t]*(\r\n|\n|\r)", data)
+    end = re.search(rb"[\r\n][ \t]*end_header[ \t]*(\r\n|\n|\r)", data)
     if not re.match(rb"ply\s", data) or end is None:
         raise Unreadable("PLY header does not run from 'ply' to 'end_header' (truncated?)")
-    encoding, elements = _header(data[: end.start()].decode("utf-8", "replace").splitlines()[1:])
+    lines = re.split(r"\r\n|\n|\r", data[: end.start()].decode("utf-8", "replace"))[1:]
+    encoding, elements = _header(lines)
     body = _Text(data[end.end() :]) if encoding == "ascii" else _Binary(data[end.end() :])
-    vertices, corners, sizes, colors = np.zeros((0, 3)), np.zeros(0, np.int64), np.zeros(0, np.int64), None
+    comments = (re.match(r"\s*comment\s+TextureFile\s+(.+)", line) for line in lines)
+    pictures = tuple(found[1].strip() for found in comments if found)
+    surface, kept = Polygons(np.zeros((0, 3)), np.zeros(0, np.int64), np.zeros(0, np.int64)), _Kept()
+    vertex_places = None
     for element in elements:
         if element.name == "vertex":
-            columns, _, _ = body.read(element, None)
-            if not {"x", "y", "z"} <= columns.keys():
-                raise Unreadable("PLY vertices have no x, y, z")
-            vertices = np.stack([columns[axis] for axis in "xyz"], axis=1).astype(np.float64)
-            names = next((group for group in _COLORS if {*group} <= columns.keys()), None)
-            if names is not None:
-                colors = eight_bits(_of_kind(element, np.stack([columns[name] for name in names], axis=1), names[0]))
+            surface, vertex_places = _vertices(body, element, surface, kept)
         elif element.name == "face":
-            name = next((p.name for p in element.properties if p.name in _INDICES and p.count), None)
-            if name is None and element.rows:
-                raise Unreadable(f"PLY faces have no list called {' or '.join(_INDICES)}")
-            _, corners, sizes = body.read(element, name)
+            surface = _faces(body, element, surface, kept)
+        elif element.name == _STRIPS:
+            surface = _strips(body, element, surface, kept)
         else:
-            body.read(element, None)
-    return Polygons(vertices, corners, sizes, _dropped(elements), colors)
+            body.read(element, ())
+    surface = _placed(surface, vertex_places, pictures, kept)
+    return surface.naming(_dropped(elements, kept))
 
 
-def _of_kind(element: _Element, values: np.ndarray, name: str) -> np.ndarray:
+_Kept = set[tuple[str, str]]  # element and property of what is read
+
+
+def _named(element: _Element, groups: tuple[tuple[str, ...], ...], kept: _Kept) -> tuple[str, ...]:
+    """Return the first group of properties that an element has as single values; they count as kept."""
+    single = {field.name for field in element.properties if field.count is None}
+    names = next((group for group in groups if {*group} <= single), ())
+    kept |= {(element.name, name) for name in names}
+    return names
+
+
+def _stacked(columns: Columns, names: tuple[str, ...]) -> np.ndarray:
+    return np.stack([columns[name] for name in names], axis=1)
+
+
+def _vertices(
+    body: _Text | _Binary, element: _Element, surface: Polygons, kept: _Kept
+) -> tuple[Polygons, np.ndarray | None]:
+    """Return the surface with its vertices and their colours, and the vertices' places in a picture."""
+    places, names = _named(element, (("x", "y", "z"),), kept), _named(element, _COLORS, kept)
+    uv = _named(element, _PLACES, set())
+    columns, _ = body.read(element, ())
+    if not places:
+        raise Unreadable("PLY vertices have no x, y, z")
+    colors = eight_bits(_of_kind(element, _stacked(columns, names), names[0])) if names else None
+    surface = replace(surface, vertices=_stacked(columns, places).astype(np.float64), colors=colors)
+    return surface, _stacked(columns, uv).astype(np.float32) if uv else None
+
+
+def _faces(body: _Text | _Binary, element: _Element, surface: Polygons, kept: _Kept) -> Polygons:
+    """Return the faces of vertices, with the colours, pictures and places that they have."""
+    lists = {field.name for field in element.properties if field.count is not None}
+    name = next((name for name in _INDICES if name in lists), None)
+    if name is None and element.rows:
+        raise Unreadable(f"PLY faces have no list called {' or '.join(_INDICES)}")
+    colors = _named(element, _COLORS, kept)
+    columns, items = body.read(element, lists & {name or "", _CORNER_PLACES})
+    corners, sizes = items.get(name or "", _NOTHING)
+    kept.add((element.name, name or ""))
+    surface = replace(surface, corners=whole(corners, "PLY index"), sizes=sizes)
+    if _CORNER_PLACES in items:
+        values, counts = items[_CORNER_PLACES]
+        if np.array_equal(counts, 2 * sizes):
+            surface = replace(surface, uv=values.reshape(-1, 2).astype(np.float32))
+    if _PICTURE in columns:
+        surface = replace(surface, material_of=whole(columns[_PICTURE], "PLY texnumber"))
+    if colors and len(sizes):
+        values = _of_kind(element, _stacked(columns, colors), colors[0], "face")
+        surface = replace(surface, face_colors=eight_bits(values, "face"))
+    return surface
+
+
+def _strips(body: _Text | _Binary, element: _Element, surface: Polygons, kept: _Kept) -> Polygons:
+    """Return the triangles of strips, which -1 separates."""
+    name = next((field.name for field in element.properties if field.name in _INDICES and field.count), None)
+    if name is None:
+        raise Unreadable(f"PLY strips of triangles have no list called {' or '.join(_INDICES)}")
+    _, items = body.read(element, {name})
+    kept.add((element.name, name))
+    values, sizes = items[name]
+    corners = whole(values, "PLY index")
+    # -1 also between the strips of two rows, so that no triangle has corners of both.
+    corners = np.insert(corners, np.cumsum(sizes)[:-1], -1) if len(sizes) > 1 else corners
+    rows = np.lib.stride_tricks.sliding_window_view(corners, 3) if len(corners) > 2 else np.zeros((0, 3), np.int64)
+    begins = np.maximum.accumulate(np.where(corners < 0, np.arange(len(corners)) + 1, 0))[: len(rows)]
+    is_odd = (np.arange(len(rows)) - begins) % 2 == 1
+    triangles = np.where(is_odd[:, None], rows[:, [1, 0, 2]], rows)[(rows >= 0).all(axis=1)]
+    corners = np.concatenate([surface.corners, triangles.reshape(-1)])
+    return replace(surface, corners=corners, sizes=np.concatenate([surface.sizes, np.full(len(triangles), 3)]))
+
+
+def _placed(surface: Polygons, places: np.ndarray | None, pictures: tuple[str, ...], kept: _Kept) -> Polygons:
+    """Return a surface with the pictures that the header names, where its corners or vertices have places in them."""
+    corners = surface.corners
+    if not pictures or (surface.uv is None and places is None) or len(corners) == 0:
+        return replace(surface, uv=None, material_of=None)
+    uv = surface.uv
+    if uv is None and places is not None:
+        if not 0 <= corners.min() <= corners.max() < len(places):  # which `checked` refuses
+            return surface
+        uv = places[corners]
+    kept |= {("vertex", name) for pair in _PLACES for name in pair} | {("face", _CORNER_PLACES), ("face", _PICTURE)}
+    numbers = np.zeros(len(surface.sizes), np.int64) if surface.material_of is None else surface.material_of
+    known = np.where((numbers >= 0) & (numbers < len(pictures)), numbers, -1)
+    return replace(surface, uv=uv, material_of=known, pictures=pictures)
+
+
+def _of_kind(element: _Element, values: np.ndarray, name: str, what: str = "vertex") -> np.ndarray:
     """Return the values of a property in the kind that the header names: text is read as float64."""
     dtype = next(field.dtype for field in element.properties if field.name == name)
     if dtype.kind not in "iu" or values.dtype == dtype:
         return values
     limits = np.iinfo(dtype)
-    return (shares_of(values, limits.max) * limits.max).round().astype(dtype)
+    return (shares_of(values, limits.max, what) * limits.max).round().astype(dtype)
 
 
 def _header(lines: list[str]) -> tuple[str, list[_Element]]:
@@ -86,11 +176,14 @@ def _header(lines: list[str]) -> tuple[str, list[_Element]]:
             case ["format", ("ascii" | "binary_little_endian" | "binary_big_endian") as encoding, _]:
                 pass
             case ["element", name, rows] if rows.isdecimal() and len(rows) <= _DIGITS:
-                elements.append(_Element(name, int(rows), []))
-            case ["property", "list", count, kind, name] if count in _TYPES and kind in _TYPES and elements:
-                elements[-1].properties.append(_Property(name, _dtype(kind, encoding), _dtype(count, encoding)))
-            case ["property", kind, name] if kind in _TYPES and elements:
-                elements[-1].properties.append(_Property(name, _dtype(kind, encoding), None))
+                elements.append(_Element(name, int(rows), ()))
+            # Without the first word as Unity's player of geometry sequences writes it.
+            case ["property", "list", count, kind, name] | ["list", count, kind, name] if (
+                count in _TYPES and kind in _TYPES and elements
+            ):
+                elements[-1] = _with(elements[-1], _Property(name, _dtype(kind, encoding), _dtype(count, encoding)))
+            case ["property", kind, name] | [kind, name] if kind in _TYPES and elements:
+                elements[-1] = _with(elements[-1], _Property(name, _dtype(kind, encoding), None))
             case [] | ["comment", *_] | ["obj_info", *_]:
                 pass
             case _:
@@ -100,19 +193,29 @@ def _header(lines: list[str]) -> tuple[str, list[_Element]]:
     return encoding, elements
 
 
+def _with(element: _Element, new: _Property) -> _Element:
+    return _Element(element.name, element.rows, (*element.properties, new))
+
+
 def _dtype(kind: str, encoding: str) -> np.dtype:
     return np.dtype((">" if encoding == "binary_big_endian" else "<") + _TYPES[kind])
 
 
-def _dropped(elements: list[_Element]) -> Dropped:
-    names = {p.name for e in elements if e.rows for p in e.properties}
-    faces = {p.name for e in elements if e.rows and e.name == "face" for p in e.properties}
-    others = {f"element {e.name!r}" for e in elements if e.rows and e.name not in ("vertex", "face")}
-    others |= {"colors of faces"} if faces & {name for group in _COLORS for name in group} else set()
-    return frozenset({words for words, fields in _DROPS.items() if fields & names} | others)
+def _dropped(elements: list[_Element], kept: _Kept) -> Dropped:
+    """Name the properties and elements that were not read."""
+    dropped = set[str]()
+    for element in elements:
+        left = [field.name for field in element.properties if (element.name, field.name) not in kept]
+        if element.rows and element.name not in ("vertex", "face", _STRIPS):
+            dropped.add(f"element {element.name!r}")
+        elif element.rows:
+            dropped |= {_WORDS.get(name, f"property {name!r} of {element.name}") for name in left}
+    return frozenset(dropped)
 
 
-Columns = dict[str, np.ndarray]
+Columns = dict[str, np.ndarray]  # single values
+Items = dict[str, tuple[np.ndarray, Int64[np.ndarray, " N"]]]  # items of lists, flat, and the length of each
+_NOTHING = np.zeros(0, np.int64), np.zeros(0, np.int64)
 
 
 class _Text:
@@ -122,15 +225,15 @@ class _Text:
         self._lines = Lines.of(data, comment="\0")  # PLY has comments in its header only
         self._filled = np.flatnonzero(self._lines.ends > self._lines.starts)
 
-    def read(self, element: _Element, wanted: str | None) -> tuple[Columns, np.ndarray, np.ndarray]:
-        """Return the single values of an element by name, and the items (flat) and lengths of the list `wanted`."""
+    def read(self, element: _Element, wanted: Collection[str]) -> tuple[Columns, Items]:
+        """Return the single values of an element, and the lists of these names."""
         chosen, self._filled = self._filled[: element.rows], self._filled[element.rows :]
         if len(chosen) < element.rows:
             raise Unreadable(f"PLY announces {element.rows} {element.name} rows but has {len(chosen)} (truncated?)")
         values, counts = self._lines.values(chosen)
         ends = np.cumsum(counts)
         place, padded = ends - counts, np.append(values, 0.0)  # place: the next unread value of each row
-        columns, items, sizes = Columns(), np.zeros(0, np.int64), np.zeros(0, np.int64)
+        columns, items = Columns(), Items()
         for field in element.properties:
             if (place >= ends).any():
                 raise _short(element, int(np.argmax(place >= ends)))
@@ -142,11 +245,10 @@ class _Text:
             length = whole(value, "PLY list length")
             if ((length < 0) | (place + length > ends)).any():
                 raise _short(element, int(np.argmax((length < 0) | (place + length > ends))))
-            if field.name == wanted:
-                listed = np.repeat(place - (np.cumsum(length) - length), length) + np.arange(int(length.sum()))
-                items, sizes = whole(padded[listed], "PLY index"), length
+            if field.name in wanted:
+                items[field.name] = padded[_ranges(place, length)], length
             place = place + length
-        return columns, items, sizes
+        return columns, items
 
 
 class _Binary:
@@ -155,12 +257,13 @@ class _Binary:
     def __init__(self, data: bytes) -> None:
         self._data, self._at = data, 0
 
-    def read(self, element: _Element, wanted: str | None) -> tuple[Columns, np.ndarray, np.ndarray]:
+    def read(self, element: _Element, wanted: Collection[str]) -> tuple[Columns, Items]:
+        """Return the single values of an element, and the lists of these names."""
         least = element.rows * sum((p.count or p.dtype).itemsize for p in element.properties)
         if self._at + least > len(self._data):
             raise Unreadable(f"PLY announces {element.rows} {element.name} rows but the file is too short (truncated?)")
         if element.rows == 0 or not element.properties:
-            return {p.name: np.zeros(0) for p in element.properties}, np.zeros(0, np.int64), np.zeros(0, np.int64)
+            return {p.name: np.zeros(0) for p in element.properties}, dict.fromkeys(wanted, _NOTHING)
         lengths = self._lengths_of_first_row(element)
         fields = [(f"{k}", p.dtype, (n,)) for k, (p, n) in enumerate(zip(element.properties, lengths, strict=True))]
         counts = [(f"n{k}", p.count or np.dtype("V0")) for k, p in enumerate(element.properties)]
@@ -175,45 +278,59 @@ class _Binary:
     def _lengths_of_first_row(self, element: _Element) -> list[int]:
         at, lengths = self._at, []
         for field in element.properties:
-            length = 1
-            if field.count is not None:
-                end, order = at + field.count.itemsize, "big" if field.count.byteorder == ">" else "little"
-                length, at = int.from_bytes(self._data[at:end], order), end  # type: ignore[arg-type]
+            length, at = self._length(field, at)
             lengths.append(length)
             at += length * field.dtype.itemsize
             if at > len(self._data):
                 raise _short(element, 0)
         return lengths
 
-    def _uneven_rows(self, element: _Element, wanted: str | None) -> tuple[Columns, np.ndarray, np.ndarray]:
+    def _length(self, field: _Property, at: int) -> tuple[int, int]:
+        """Return the number of items of a field in the row at `at`, and where they begin."""
+        if field.count is None:
+            return 1, at
+        end = at + field.count.itemsize
+        order = "big" if field.count.byteorder == ">" else "little"
+        return int.from_bytes(self._data[at:end], order), end  # type: ignore[arg-type]
+
+    def _uneven_rows(self, element: _Element, wanted: Collection[str]) -> tuple[Columns, Items]:
         """Read rows of different lengths: where a row begins depends on the row before."""
-        if wanted is None and element.name == "vertex":
-            raise Unreadable("PLY vertices with lists of different lengths are not read")
-        lists = [(p.name, p.count is not None) for p in element.properties]
-        number = 0 if wanted is None else lists.index((wanted, True))
         sizes = [(p.count.itemsize if p.count else 0, p.dtype.itemsize) for p in element.properties]
         fields = np.array(sizes, dtype=np.int64)
         is_big = any(p.count is not None and p.count.byteorder == ">" for p in element.properties)
         rest = np.frombuffer(self._data, dtype=np.uint8)[self._at :]
-        items, lengths, size, bad = _core.read_lists(rest, fields, element.rows, number, is_big)
-        if bad >= 0:
-            raise _short(element, bad)
-        self._at += size
-        if wanted is None:
-            return {}, np.zeros(0, np.int64), np.zeros(0, np.int64)
-        values = items.view(element.properties[number].dtype)
-        return {}, whole(values, "PLY index"), lengths.view(np.int64)  # of the same size, by its usual name
+        columns, items, end = Columns(), Items(), self._at
+        chosen = [k for k, field in enumerate(element.properties) if field.count is None or field.name in wanted]
+        for number in chosen or [0]:
+            values, lengths, size, bad = _core.read_lists(rest, fields, element.rows, number, is_big)
+            if bad >= 0:
+                raise _short(element, bad)
+            field, end = element.properties[number], self._at + size
+            if field.count is None:
+                columns[field.name] = values.view(field.dtype)
+            else:
+                items[field.name] = (
+                    values.view(field.dtype),
+                    lengths.view(np.int64),
+                )  # of the same size, by its usual name
+        self._at = end
+        return columns, items
 
 
-def _even_rows(element: _Element, rows: np.ndarray, wanted: str | None) -> tuple[Columns, np.ndarray, np.ndarray]:
-    columns, items, sizes = Columns(), np.zeros(0, np.int64), np.zeros(0, np.int64)
+def _even_rows(element: _Element, rows: np.ndarray, wanted: Collection[str]) -> tuple[Columns, Items]:
+    columns, items = Columns(), Items()
     for k, field in enumerate(element.properties):
+        block = rows[f"{k}"]
         if field.count is None:
-            columns[field.name] = rows[f"{k}"][:, 0]
-        elif field.name == wanted:
-            block = rows[f"{k}"]
-            items, sizes = whole(block.reshape(-1), "PLY index"), np.full(len(block), block.shape[1], dtype=np.int64)
-    return columns, items, sizes
+            columns[field.name] = block[:, 0]
+        elif field.name in wanted:
+            items[field.name] = block.reshape(-1), np.full(len(block), block.shape[1], dtype=np.int64)
+    return columns, items
+
+
+def _ranges(begins: np.ndarray, lengths: np.ndarray) -> np.ndarray:
+    """Return begin, begin + 1, ... of each range, one range after the other."""
+    return np.repeat(begins - (np.cumsum(lengths) - lengths), lengths) + np.arange(int(lengths.sum()))
 
 
 def _short(element: _Element, row: int) -> Unreadable:

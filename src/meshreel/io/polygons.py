@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float32, Float64, Int64, UInt8
@@ -30,11 +31,25 @@ class Polygons:
     colors: UInt8[np.ndarray, "V 3"] | None = None  # of the vertices, sRGB
     uv: Float32[np.ndarray, "C 2"] | None = None  # of the corners, as `Mesh.uv`; NaN where a corner has none
     texture: Texture | None = None
-    materials: tuple[str, ...] = ()  # names of an OBJ's material files
-    used: tuple[str, ...] = ()  # materials in these files that faces use
+    colored: Bool[np.ndarray, " V"] | None = None  # which vertices have a colour; None: all
+    face_colors: UInt8[np.ndarray, "P 3"] | None = None  # of polygons
+    libraries: tuple[str, ...] = ()  # files of an OBJ's materials
+    materials: tuple[str, ...] = ()  # names of materials in these files
+    pictures: tuple[str, ...] = ()  # files of a PLY's pictures, in place of materials
+    material_of: Int64[np.ndarray, " P"] | None = None  # number of each polygon's material or picture, -1 for none
+
+    @property
+    def has_looks(self) -> bool:
+        """True if colours or pictures of materials and faces are to be added to those of vertices."""
+        parts = self.libraries or self.pictures
+        return bool(parts) or self.face_colors is not None or self.colored is not None
+
+    def naming(self, dropped: Iterable[str]) -> Polygons:
+        """Return the same polygons with more names of data that are not kept."""
+        return replace(self, dropped=self.dropped | {*dropped})
 
 
-def eight_bits(values: np.ndarray) -> UInt8[np.ndarray, "..."]:
+def eight_bits(values: np.ndarray, what: str = "vertex") -> UInt8[np.ndarray, "..."]:
     """Convert colours to 8 bits: from unsigned 16-bit integers, from fractions of 1, or from 0 to 255.
 
     Floats beyond 2 count as 0 to 255, which some programs write as text. Raises Unreadable as `shares_of` does.
@@ -44,10 +59,10 @@ def eight_bits(values: np.ndarray) -> UInt8[np.ndarray, "..."]:
     else:
         finite = values[np.isfinite(values)]
         most = 1.0 if finite.max(initial=0.0) <= 2.0 else 255.0
-    return (shares_of(values, most) * 255.0).round().astype(np.uint8)
+    return (shares_of(values, most, what) * 255.0).round().astype(np.uint8)
 
 
-def shares_of(colors: np.ndarray, most: float) -> Float64[np.ndarray, "V 3"]:
+def shares_of(colors: np.ndarray, most: float, what: str = "vertex") -> Float64[np.ndarray, "V 3"]:
     """Return colours as shares, 0 to 1, of `most`; blended colours exceed the range a little.
 
     Raises Unreadable for values that are not finite, or far outside the range.
@@ -56,7 +71,7 @@ def shares_of(colors: np.ndarray, most: float) -> Float64[np.ndarray, "V 3"]:
     strange = np.flatnonzero(~((shares >= -1.0) & (shares <= 2.0)).all(axis=1))
     if len(strange):
         red, green, blue = colors[strange[0]]
-        text = f"vertex {strange[0]} has the colour ({red:g}, {green:g}, {blue:g})"
+        text = f"{what} {strange[0]} has the colour ({red:g}, {green:g}, {blue:g})"
         raise Unreadable(f"{text}, and {len(strange)} in all are not within 0 to {most:g}")
     return np.clip(shares, 0.0, 1.0)
 
@@ -161,6 +176,13 @@ class Lines:
     def whole(self, number: int | np.integer) -> str:
         """Return one line."""
         return self.text[self.starts[number] : self.ends[number]].tobytes().decode("utf-8", "replace").strip()
+
+    def written(self, number: int | np.integer) -> str:
+        """Return one line with what looks like a comment."""
+        begin = int(self.starts[number])
+        end = int(self.starts[number + 1]) if number + 1 < len(self) else len(self.text)
+        line = self.text[begin:end].tobytes().decode("utf-8", "replace")
+        return (line.splitlines() or [""])[0].strip()
 
     def line(self, number: int | np.integer) -> str:
         """Return one line, shortened for an error message."""

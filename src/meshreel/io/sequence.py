@@ -7,7 +7,7 @@ import json
 import operator
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,12 +15,13 @@ import numpy as np
 
 from ..errors import InputError
 from ..types import Mesh, MeshSequence, Up, known_up
-from .file_names import find_frames
+from .file_names import Order, find_frames
 from .files import Place, Remote, located, read_file
-from .meshes import Loaded, read_mesh
+from .meshes import Loaded, frames_of_animation, read_animated, read_mesh
 from .npz import Archive
 
 CAPTURED = "capture.json"  # record of the capture, in a folder that `meshreel capture` wrote
+RATE = 30.0  # frames a second, where neither the user nor the source says another
 _FRAMES = re.compile(r"(-?\d{1,18})?:(-?\d{1,18})?")
 _SIZES = 0.02, 100.0  # m, usual diagonals of recordings; outside this range the unit is doubtful (guess)
 _SUSPICIOUS_RATIO = 20.0  # of two frames' diagonals; a person who crouches or enters changes it less (guess)
@@ -30,14 +31,15 @@ _SUSPICIOUS_RATIO = 20.0  # of two frames' diagonals; a person who crouches or e
 class SequenceOptions:
     """Frame rate, range, unit and welding of a sequence from files."""
 
-    frame_rate: float = 30.0  # 1/s
+    frame_rate: float | None = None  # 1/s; None: that of the source, or 30
     frames: str = ":"  # frames to use, "a:b" as Python slices
     scale: float = 1.0  # multiplies every coordinate: 0.001 for files in millimetres
+    order: Order = "auto"  # of the files, by the numbers in their names
     weld: Callable[[Mesh], Mesh] | None = None  # merges equal positions (geometry.topology.weld); None: no welding
 
     def __post_init__(self) -> None:
         for name, value in (("frame rate", self.frame_rate), ("scale", self.scale)):
-            if not 1e-9 <= value <= 1e9:  # also refuses NaN
+            if value is not None and not 1e-9 <= value <= 1e9:  # also refuses NaN
                 raise InputError(f"{name} {value} is not between 1e-9 and 1e9; give such a number, as 30 or 0.001")
         if not _FRAMES.fullmatch(self.frames):
             raise InputError(f"frames {self.frames!r} is not a range; give A:B, A: or :B, as 0:10")
@@ -77,6 +79,34 @@ class Files:
         return read_mesh(self.named[index], where)
 
 
+@dataclass(frozen=True, slots=True)
+class Animation:
+    """Frames of one GLB file, whose animation is sampled at a frame rate."""
+
+    path: Place
+    frame_rate: float  # 1/s
+    count: int
+
+    @property
+    def paths(self) -> tuple[Path, ...]:
+        """The file, if it is on this machine."""
+        return (self.path,) if isinstance(self.path, Path) else ()
+
+    def __len__(self) -> int:
+        return self.count
+
+    def only(self, numbers: Sequence[int]) -> Animation:
+        """Return the animation with an absolute path: it is one file, whatever frames are read."""
+        del numbers
+        return replace(self, path=self.path.absolute())
+
+    def name(self, index: int) -> str:
+        return f"{self.path} at {index / self.frame_rate:.4g} s"
+
+    def load(self, index: int, where: str) -> Loaded:
+        return read_animated(self.path, index / self.frame_rate, where)
+
+
 @dataclass(slots=True)
 class _Seen:
     """Counts for warnings, from the frames read so far; a frame read twice counts once."""
@@ -103,7 +133,7 @@ class FileSequence(MeshSequence):
     """Frames read from files on access; only counts are kept of them."""
 
     def __init__(
-        self, frames: Files | Archive, options: SequenceOptions, remarks: tuple[str, ...] = (), up: Up = "y"
+        self, frames: Files | Archive | Animation, options: SequenceOptions, remarks: tuple[str, ...] = (), up: Up = "y"
     ) -> None:
         """Read `frames` with `options`; `remarks` are warnings known already, `up` is the axis that points up."""
         self._frames, self._options, self._remarks, self._seen = frames, options, remarks, _Seen()
@@ -112,12 +142,12 @@ class FileSequence(MeshSequence):
 
     @property
     def frame_rate(self) -> float:
-        return self._options.frame_rate
+        return RATE if self._options.frame_rate is None else self._options.frame_rate
 
     @property
     def warnings(self) -> tuple[str, ...]:
         """Warnings about the frames read so far, one line each; complete after the last frame."""
-        return tuple(_warnings(self._seen, self._remarks))
+        return tuple(_warnings(self._seen, self._remarks, self._frames))
 
     @property
     def files(self) -> tuple[Path, ...]:
@@ -167,6 +197,8 @@ class FileSequence(MeshSequence):
 def open_sequence(source: str | Path | Sequence[str | Path], options: SequenceOptions | None = None) -> FileSequence:
     """Return the frames of a folder, a glob pattern, a list of files, one file or an .npz; none is read yet.
 
+    An animated GLB file alone has a frame for each moment of its animation at the frame rate.
+
     All but an .npz may be URLs, such as s3:// and https:// (extra `remote`).
     The up axis is the one that `meshreel capture` recorded in the folder, otherwise y.
     """
@@ -179,9 +211,13 @@ def open_sequence(source: str | Path | Sequence[str | Path], options: SequenceOp
         if len(archive) == 0:
             raise InputError(f"{source}: has 0 frames; save at least one")
         return FileSequence(archive, options)
-    paths, remarks = find_frames(source)
+    paths, remarks = find_frames(source, options.order)
     if not paths:
         raise InputError("the list of files has 0 frames; give at least one")
+    if len(paths) == 1 and paths[0].suffix.lower() == ".glb":
+        rate = RATE if options.frame_rate is None else options.frame_rate
+        if (count := frames_of_animation(paths[0], rate)) > 1:
+            return FileSequence(Animation(paths[0], rate, count), options, remarks)
     up = "y" if place is None else known_up(capture_record(place).get("up"))
     return FileSequence(Files(paths), options, remarks, up)
 
@@ -195,14 +231,16 @@ def capture_record(folder: Place) -> dict[str, Any]:
     return record if isinstance(record, dict) else {}
 
 
-def _warnings(seen: _Seen, remarks: tuple[str, ...]) -> Iterator[str]:
+def _warnings(seen: _Seen, remarks: tuple[str, ...], frames: Files | Archive | Animation) -> Iterator[str]:
     yield from remarks
     loose = "vertices without faces"
     if loose in seen.dropped:
         yield f"frame {seen.dropped[loose]} has vertices but no faces: it counts as empty (a point cloud is no surface)"
     extras = {what: first for what, first in seen.dropped.items() if what != loose}
     if extras:
-        yield f"not kept: {', '.join(sorted(extras))} (first in frame {min(extras.values())})"
+        first = min(extras.values())
+        what = f"not kept: {', '.join(sorted(extras))} (first in frame {first}, {Path(frames.name(first)).name})"
+        yield f"{what}; bake what should be seen into colours or one texture"
     merged, positions, faces = np.array([*seen.merged.values()], dtype=np.int64).reshape(-1, 3).sum(axis=0).tolist()
     if merged:
         lost = f", and {faces} faces that collapsed with them" if faces else ""

@@ -23,8 +23,8 @@ import numpy as np
 from jaxtyping import UInt8, UInt16
 
 from ..errors import InputError
-from ..types import Mesh
-from .glb_file import COLORS, PLACES, Faces, GlbFile, cut_at_seams, distinct_places, light
+from ..types import Mesh, cut_at_seams, distinct_places
+from .glb_file import COLORS, PLACES, Faces, GlbFile, light
 from .pictures import pack_picture
 
 _LONGEST = 255  # bytes of a file's name, on the usual file systems
