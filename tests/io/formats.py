@@ -1,4 +1,7 @@
-"""What became of a feature of a mesh format when its file was read: it changed the mesh, was named, or refused."""
+"""What became of a feature of a mesh format when its file was read: it changed the mesh, was named, or refused.
+
+`python -m tests.io.formats` writes the tables of docs/formats.md.
+"""
 
 from __future__ import annotations
 
@@ -12,8 +15,9 @@ import numpy as np
 from meshreel.errors import InputError
 from meshreel.io.sequence import open_sequence
 from meshreel.types import Mesh
-from tests.io.specifications import Case, plain_cases
+from tests.io.specifications import Case, all_cases, plain_cases
 
+PAGE = Path(__file__).parents[2] / "docs" / "formats.md"
 KINDS = ("kept", "named", "refused", "silent")
 # Features that change neither surface nor base colours, with the words of the readers' own lists.
 SILENT = {
@@ -61,3 +65,22 @@ def fate(case: Case, folder: Path) -> Fate:
     if sequence.warnings:
         return Fate("named", "; ".join(sequence.warnings).replace(str(folder), ""))
     return Fate("kept") if len(found) > 1 or found[0] != _plain(case.format) else Fate("lost")
+
+
+def filled() -> str:
+    """The page of formats, with the tables as the readers are now."""
+    head, rows = PAGE.read_text(encoding="utf-8").split("<!-- tables -->")[0], dict[str, dict[str, list[str]]]()
+    for case in all_cases():
+        with TemporaryDirectory() as folder:
+            kind = fate(case, Path(folder)).kind
+        rows.setdefault(case.format, {kind: [] for kind in KINDS})[kind].append(case.feature)
+    titles = {"kept": "kept", "named": "named in a warning", "refused": "refused by name", "silent": "without effect"}
+    tables = ""
+    for name, fates in rows.items():
+        lines = [f"| {titles[kind]} | {'; '.join(fates[kind]) or '-'} |" for kind in KINDS]
+        tables += "\n".join([f"\n## {name}\n", "| | |", "| --- | --- |", *lines]) + "\n"
+    return f"{head}<!-- tables -->\n{tables}"
+
+
+if __name__ == "__main__":
+    PAGE.write_text(filled(), encoding="utf-8", newline="\n")

@@ -114,9 +114,7 @@ def _skin(glb: Glb) -> None:
 
 
 def _morph(glb: Glb, weights: bool = True) -> None:
-    glb.primitive["targets"] = [
-        {"POSITION": glb.add(POINTS + 1), "NORMAL": glb.add(POINTS), "TANGENT": glb.add(POINTS)}
-    ]
+    glb.primitive["targets"] = [{"POSITION": glb.add(POINTS + 1)}]
     if weights:
         glb.tree["meshes"][0]["weights"] = [0.5]
 
@@ -173,6 +171,7 @@ def _draco(glb: Glb) -> None:
     packed = {"bufferView": glb.view(bytes(data)), "attributes": names}
     _extension(lambda g: g.primitive, "KHR_draco_mesh_compression", **packed)(glb)
     glb.primitive["attributes"].pop("TEXCOORD_0")
+    glb.primitive.pop("material")
     for number in (0, 1):
         glb.tree["accessors"][number].pop("bufferView")
 
@@ -258,7 +257,11 @@ GLTF: dict[str, GltfChange] = {
         glb.tree["animations"].append(glb.tree["animations"][0]),
     ),
     "asset.minVersion": _set(lambda g: g.tree["asset"], minVersion="2.1"),
-    "attribute COLOR_0": lambda glb: (glb.primitive.pop("material"), _attribute("COLOR_0", LIGHT)(glb)),
+    "attribute COLOR_0": lambda glb: (
+        glb.primitive.pop("material"),
+        glb.primitive["attributes"].pop("TEXCOORD_0"),
+        _attribute("COLOR_0", LIGHT)(glb),
+    ),
     "attribute COLOR_0 with a texture": _attribute("COLOR_0", LIGHT),
     "attribute COLOR_0, of one colour, with a texture": _attribute("COLOR_0", np.tile(LIGHT[:1], (4, 1))),
     "attribute COLOR_1": _attribute("COLOR_1", LIGHT),
@@ -288,6 +291,10 @@ GLTF: dict[str, GltfChange] = {
     "pbrMetallicRoughness.metallicRoughnessTexture": _set(_shine, metallicRoughnessTexture=INDEX),
     "pbrMetallicRoughness.roughnessFactor": _set(_shine, roughnessFactor=0.5),
     "mesh.weights, primitive.targets": _morph,
+    "primitive.targets with normals": lambda glb: (
+        _morph(glb),
+        glb.primitive["targets"][0].update(NORMAL=glb.add(POINTS), TANGENT=glb.add(POINTS)),
+    ),
     "primitive.targets without weights": lambda glb: _morph(glb, weights=False),
     "node.matrix": _set(lambda g: g.tree["nodes"][0], matrix=[*np.diag([2.0, 2, 2, 1]).reshape(-1)]),
     "node.rotation": _set(lambda g: g.tree["nodes"][0], rotation=[0, 0, 1, 0]),
@@ -298,6 +305,7 @@ GLTF: dict[str, GltfChange] = {
     **{f"primitive.mode {k}": _mode(k) for k in range(7)},
     "primitive without indices": lambda glb: (
         glb.primitive.pop("indices"),
+        glb.primitive.pop("material"),
         glb.primitive["attributes"].pop("TEXCOORD_0"),
         glb.primitive["attributes"].update(POSITION=glb.add(np.concatenate([POINTS[:3], POINTS[:3] + 1]))),
     ),
@@ -308,6 +316,7 @@ GLTF: dict[str, GltfChange] = {
     "scenes, several": lambda glb: glb.tree["scenes"].append({"nodes": [0]}),
     "textureInfo.texCoord": lambda glb: (
         _attribute("TEXCOORD_1", np.ascontiguousarray(PLACES[::-1]))(glb),
+        glb.primitive["attributes"].pop("TEXCOORD_0"),
         _of_picture(glb).update(texCoord=1),
     ),
     "extras": _set(lambda g: g.tree["nodes"][0], extras={"a": 1}),
@@ -479,7 +488,8 @@ def all_cases() -> Iterator[Case]:
         yield _obj(feature, text + OBJ_FACES)
     for feature, line in MTL_LINES.items():
         yield _obj(feature, OBJ + OBJ_FACES, f"{MTL}{line}\n")
-    yield _obj("Kd without a picture", OBJ + OBJ_FACES, "newmtl a\nKd 1 0 0\n")
+    bare = OBJ.split("vt")[0] + "usemtl a\nf 1 2 3\nf 3 2 4\n"
+    yield _obj("Kd without a picture", bare, "newmtl a\nKd 1 0 0\n")
     for option in MTL_OPTIONS:
         yield _obj(f"map_Kd {option.split()[0]}", OBJ + OBJ_FACES, f"newmtl a\nmap_Kd {option} t.png\n")
     rgb = "".join(f"property uchar {name}\n" for name in ("red", "green", "blue"))
