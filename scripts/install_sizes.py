@@ -1,7 +1,7 @@
 """Installs the wheel of this checkout into new environments, bare and with extras, and prints how large they are.
 
-One JSON line for each: MB in site-packages (bytecode included), by package, and what lies elsewhere, as the programs
-and headers of DracoPy. `--row` stores what is promised.
+One JSON line for each: MB in site-packages (bytecode included), by package, and what lies elsewhere: programs,
+headers and a library of DracoPy, which decoding does not use. `--row` stores what is promised.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ def main() -> int:
             if "--row" in sys.argv:
                 promise = f"`pip install meshreel{extra}` takes at most {most:.0f} MB of site-packages {whose}"
                 counted, took = (round(measured, 1), "MB"), time.monotonic() - started
-                note = f"and {elsewhere:.0f} MB elsewhere, DracoPy's programs and headers"
+                note = f"and {elsewhere:.0f} MB elsewhere, programs, headers and a library of DracoPy"
                 add_row(promise, "python -m scripts.install_sizes --row", counted, int(measured > most), took, note)
     return int(large > 0)
 

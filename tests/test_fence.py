@@ -23,8 +23,9 @@ HEAVY = (
     "jaxtyping",
     "importlib.metadata",
     "unittest",
+    "DracoPy",
 )
-LATER = ("meshreel.coding.paper", "DracoPy", "html", *HEAVY)  # what some files need, or none
+LATER = ("meshreel.coding.paper", "html", *HEAVY)  # what some files need, or none
 MOST_OPENING = 2.0  # CPU times of importing NumPy that opening a file may take (guess; with jaxtyping it takes more)
 ENCODER_SIDE = ("analysis", "capture", "metrics", "encoder", "export", "server", "cli", "io")
 

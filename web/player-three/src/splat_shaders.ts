@@ -1,4 +1,4 @@
-// GLSL ES 3.00 of splats: binds them to the mesh of a frame (FORMAT.md, "Splats"; player-core/src/decode/splats.ts does the same) and projects
+// GLSL ES 3.00 of splats: binds them to the mesh of a frame (FORMAT.md, "Splats"; core/decoder/splats.cpp does the same) and projects
 // them by the local affine approximation (EWA), as analysis/appearance/splat_raster.py.
 
 import { SPLATS_WIDTH, SPLAT_WEIGHT } from "@meshreel/player-core/types";

@@ -25,7 +25,7 @@ def template_error(step: float) -> float:
 
 @dataclass(frozen=True, slots=True)
 class LayersOptions:
-    """Options of the recipe of layers (`layers.py`); the defaults are those of quality 50."""
+    """Options of `LayersRecipe` (`recipe.py`); the defaults are those of quality 50."""
 
     group_size: int = 16  # most frames in a group
     target: Target = Target(0.2 * STEP + 0.00005, 7.0, STEP)  # that every frame should reach, of its own diagonal

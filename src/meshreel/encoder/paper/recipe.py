@@ -51,7 +51,7 @@ PLAIN_OFFSETS = (0,)  # the same step for all components, as the paper has it
 
 @dataclass(frozen=True, slots=True)
 class PaperOptions:
-    """Options of the paper's recipe (`paper.py`); the defaults are those of quality 50.
+    """Options of `PaperRecipe`; the defaults are those of quality 50.
 
     The first three, and the offsets and dead zone of `displacements`, say where the recipe is better than the paper's
     words, or does as they say (preset `paper-literal`).
