@@ -86,17 +86,19 @@ class Survey:
         return intervals
 
 
-def survey(sequence: MeshSequence, report: Report = lambda *_: None, cleaned: bool = True) -> Survey:
+def survey_sequence(sequence: MeshSequence, report: Report = lambda *_: None, cleaned: bool = True) -> Survey:
     """Survey a sequence with one frame in memory at a time. Raises InputError if it is empty or a frame is invalid.
 
     Unless `cleaned`, faces without area count like any others, and pieces are not searched: scenes have too many faces
     for that.
     """
-    return joined([survey_of(sequence, range(len(sequence)), report, cleaned)])
+    return joined([survey_frames(sequence, range(len(sequence)), report, cleaned)])
 
 
-def survey_of(sequence: MeshSequence, numbers: range, report: Report = lambda *_: None, cleaned: bool = True) -> Survey:
-    """Survey the frames `numbers` of a sequence as `survey` does; `joined` combines such surveys."""
+def survey_frames(
+    sequence: MeshSequence, numbers: range, report: Report = lambda *_: None, cleaned: bool = True
+) -> Survey:
+    """Survey the frames `numbers` of a sequence as `survey_sequence` does; `joined` combines such surveys."""
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
     diagonals, flattened, dropped, pieces = list[float](), list[int](), 0, list[tuple[Piece, ...]]()
     for number in numbers:

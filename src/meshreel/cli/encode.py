@@ -73,13 +73,13 @@ class Part:
                 text = "needs the --survey that all parts share; meshreel survey writes it"
                 raise InputError(f"--part {self.part}: {text}")
             return None
-        surveyed, chosen = read_survey(located(self.survey)), SequenceOptions(frames=frames).chosen(len(sequence))
+        whole, chosen = read_survey(located(self.survey)), SequenceOptions(frames=frames).chosen(len(sequence))
         if self.part is None:
-            return Excerpt(surveyed, chosen)
+            return Excerpt(whole, chosen)
         numbers = _PART.fullmatch(self.part)
         if numbers is None or len(chosen) < len(sequence):
             raise InputError(f"--part {self.part}: give K/N, as 3/100, and leave --frames out")
-        return surveyed.part(int(numbers[1]), int(numbers[2]), options.recipe().longest(sequence.frame_rate))
+        return whole.part(int(numbers[1]), int(numbers[2]), options.recipe().longest(sequence.frame_rate))
 
     def check(self, goal: Goal | None, masking: Masking) -> None:
         """Raise InputError for flags that no part can have."""
@@ -304,8 +304,8 @@ def survey(
     sequence = upright(source.sequence, up)
     with uploaded(place) as path, common.stages(len(sequence)) as progress, workers(jobs, cluster) as executor:
         check_apart(path, sequence.files)
-        surveyed = Encoder(sequence, executor, progress).survey(path)
-    warnings = (*source.warnings, *warnings_of(surveyed))
+        facts = Encoder(sequence, executor, progress).survey(path)
+    warnings = (*source.warnings, *warnings_of(facts))
     common.warn(warnings)
     row = {"output": str(place), "frames": len(sequence), "warnings": warnings}
-    common.result(row, f"{place}: {len(sequence)} frames, {surveyed.diagonal:.3g} m large")
+    common.result(row, f"{place}: {len(sequence)} frames, {facts.diagonal:.3g} m large")

@@ -23,7 +23,7 @@ from ..io.sequence import SequenceOptions
 from ..types import Up, check_up
 from .audio import Given, joined_audio, packed_audio
 from .copies import Edited, Piece, check_known, opened, piece_of, silent, written
-from .metadata import HISTORY, MEANS, PART, joined_metadata, of_all_parts, place_of, scaled_metadata, upright
+from .metadata import HISTORY, MEANS, PART, joined_metadata, of_all_parts, place_in_whole, scaled_metadata, up_metadata
 
 Name = str | Place
 Numbers = Sequence[Any] | np.ndarray
@@ -84,7 +84,7 @@ def concat(sources: Sequence[Name], output: Name) -> Edited:
             later = _begin_of_last(heads) - reader.header.first_time
             audio = joined_audio(audio, path, reader.read_audio(), later)
     frames = sum(count for _, count in parts)
-    header, place = _timed(heads), place_of(parts[0][0])
+    header, place = _timed(heads), place_in_whole(parts[0][0])
     edit = Edit(hidden[0], hidden[0] + frames, heads[0].edit.rotation)
     metadata = joined_metadata(parts) | edit.item(frames + sum(hidden))
     if place is None and len(sources) > 1:
@@ -147,7 +147,7 @@ def transform(
         except (KeyError, TypeError, ValueError) as error:
             raise _unknown(path, error) from None
         if up is not None:
-            metadata = {name: value for name, value in metadata.items() if name != "up"} | upright(up)
+            metadata = {name: value for name, value in metadata.items() if name != "up"} | up_metadata(up)
         entry = f"transform by {scale:g}, {np.round(turn, 6).tolist()}, {move.tolist()}"
         edit = replace(reader.edit, rotation=rotated)
         return _relabelled(path, reader, output, header, metadata | _history(metadata, entry), edit)
@@ -200,7 +200,7 @@ def _check_alike(path: Place, reader: ReelReader, other: ReelReader, first: Plac
     try:
         ours, theirs = of_all_parts(other.metadata), of_all_parts(reader.metadata)
         joined_metadata(parts[-1:])
-        begin, own = place_of(parts[0][0]), place_of(parts[-1][0])
+        begin, own = place_in_whole(parts[0][0]), place_in_whole(parts[-1][0])
     except (KeyError, TypeError, ValueError) as error:
         raise _unknown(path, error) from None
     if ours != theirs:

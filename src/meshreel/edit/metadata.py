@@ -60,7 +60,7 @@ class Totals:
         """The means by their names, rounded."""
         root = (self.squares / self.frames) ** 0.5
         values = (root, self.worst, self.psnr / self.frames, self.angle / self.frames)
-        return {name: rounded(value) for name, value in zip(MEANS, values, strict=True)}
+        return {name: shortened(value) for name, value in zip(MEANS, values, strict=True)}
 
 
 def joined_metadata(parts: Sequence[tuple[dict[str, Any], int]]) -> dict[str, Any]:
@@ -90,7 +90,7 @@ def scaled_metadata(metadata: dict[str, Any], scale: float) -> dict[str, Any]:
     if scale == 1:
         return metadata
     found = {
-        name: rounded(value * scale) if name.endswith("_m") and type(value) in (int, float) else value
+        name: shortened(value * scale) if name.endswith("_m") and type(value) in (int, float) else value
         for name, value in metadata.items()
     }
     if PART in metadata:
@@ -109,7 +109,7 @@ def of_all_parts(metadata: dict[str, Any]) -> dict[str, Any]:
     return found | ({"options": metadata[PART]["options"], "frames": metadata[PART]["of"]} if PART in metadata else {})
 
 
-def place_of(metadata: dict[str, Any]) -> tuple[int, int] | None:
+def place_in_whole(metadata: dict[str, Any]) -> tuple[int, int] | None:
     """Return the first frame of a part, and how many frames its sequence has; None for a file that is no part.
 
     Raises KeyError, TypeError or ValueError for metadata that no encoder wrote.
@@ -118,12 +118,12 @@ def place_of(metadata: dict[str, Any]) -> tuple[int, int] | None:
     return None if part is None else (int(part["first_frame"]), int(part["of"]))
 
 
-def upright(up: Up) -> dict[str, Any]:
+def up_metadata(up: Up) -> dict[str, Any]:
     """Return the metadata that tells players which axis points up; none for y, their default."""
     return {} if up == "y" else {"up": up}
 
 
-def rounded(value: float) -> float | None:
+def shortened(value: float) -> float | None:
     """Round to four significant digits; None if JSON has no such number."""
     return float(f"{value:.4g}") if math.isfinite(value) else None
 

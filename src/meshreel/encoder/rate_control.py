@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from ..errors import InputError
 from ..io.files import Place, located
 from .file.summary import Summary
-from .run.interval_files import opened
+from .run.interval_files import opened_output
 from .sequence import Encoder
 from .settings.options import EncoderOptions
 
@@ -90,7 +90,7 @@ def encode_to(
     if resume:
         text = f"{path}: a search for a target begins again, it cannot continue"
         raise InputError(f"{text}; leave --resume (resume=True) out, or give the quality in place of the target")
-    with opened(path, encoder.sequence.files, resume, lasting=False) as (file, files):
+    with opened_output(path, encoder.sequence.files, resume, lasting=False) as (file, files):
         for _ in range(TRIALS):
             quality = search.next()
             if quality is None:

@@ -23,7 +23,7 @@ from ..coding.background import decode_background
 from ..container.writer import ReelWriter
 from ..conversions import as_sequence
 from ..edit.audio import Given, packed_audio
-from ..edit.metadata import rounded, upright
+from ..edit.metadata import shortened, up_metadata
 from ..errors import InputError
 from ..format.layout import Form
 from ..geometry.derived_sequences import captured, unchanging, welded
@@ -48,9 +48,9 @@ from .group.digests import WriteLines, note, noted
 from .group.interval import Interval
 from .group.progress import Progress, Stages
 from .paper.recipe import FindGroups, find_groups
-from .run.interval_files import IntervalFiles, made_of, opened
+from .run.interval_files import IntervalFiles, made_of, opened_output
 from .run.schedule import Job
-from .run.surveying import Excerpt, facts_of, known_survey, surveyed, write_survey
+from .run.surveying import Excerpt, facts_of, survey_from_facts, survey_job, write_survey
 from .scene.parts import Parts, pack_parts, take_apart, unpack_parts
 from .scene.scene import Tracks, encode_bodies, scene_intervals
 from .scene.static import colored_states, is_colored
@@ -158,8 +158,8 @@ class Encoder:
         """Yield the intervals that `encode` encodes, of all tracks of a scene."""
         job, parts = self._job(options), self.parts(options)
         if parts is None:
-            seen = surveyed(job)
-            return intervals_of(job, seen, tracked_bodies(job, seen)[0])
+            survey = survey_job(job)
+            return intervals_of(job, survey, tracked_bodies(job, survey)[0])
         return scene_intervals(job, parts, Tracks(parts.segmentation.cell, job.scene.near))
 
     def parts(self, options: EncoderOptions) -> Parts | None:
@@ -168,7 +168,7 @@ class Encoder:
 
     def encode(self, path: str | Place, options: EncoderOptions, resume: bool | None = None) -> Summary:
         """Encode the sequence as the function `encode` does, with the same errors."""
-        with opened(path, self.sequence.files, resume) as (file, files):
+        with opened_output(path, self.sequence.files, resume) as (file, files):
             return self.encode_into(file, options, files)
 
     @threadpool_limits.wrap(limits=1)  # idle threads of BLAS would take a third of the processor's time
@@ -182,20 +182,20 @@ class Encoder:
         if drawn and self.sequence.colors is None and not is_colored(self.sequence):
             raise InputError("splats need colours, and no frame has any: give colour cameras or coloured meshes")
         if excerpt is not None:
-            excerpt.surveyed.check(self.sequence)
+            excerpt.whole.check(self.sequence)
             if self._is_scene(options):
                 text = "a scene has one background for all frames, and is not encoded in parts"
                 raise InputError(f"{text}; encode it in one run, with --cluster perhaps, or with --dynamic-only")
         job, made = self._job(options), made_of(self.sequence, options, self._masker)
         files.check(made)
-        seen, parts = self._whole(job, files)
+        survey, parts = self._whole(job, files)
         made |= {"surfaces": self.sequence.digests} | ({} if excerpt is None else {"part": str(excerpt.frames)})
         lasts = files.lasting and excerpt is None
         scene = pack_parts(parts) if lasts and parts is not None and files.scene is None else None
-        encode = files.begin(made, facts_of(self.sequence, seen) if lasts else {}, scene)
-        job = replace(job, files=files, head=make_header(self.sequence.frame_rate, seen, {"encode": encode}))
+        encode = files.begin(made, facts_of(self.sequence, survey) if lasts else {}, scene)
+        job = replace(job, files=files, head=make_header(self.sequence.frame_rate, survey, {"encode": encode}))
         name = str(files.output)
-        encoded = partial(_encode_tracked, seen=seen) if parts is None else partial(_encode_scene, parts=parts)
+        encoded = partial(_encode_tracked, survey=survey) if parts is None else partial(_encode_scene, parts=parts)
         with noted(self.digests):
             summary = encoded(job, file, name, audio=self.audio)
         texts = summary.warnings + (lacking if any(group.colors for group in summary.groups) else ())
@@ -203,9 +203,9 @@ class Encoder:
 
     def survey(self, path: Path) -> Survey:
         """Survey the sequence, and write a file of it for encodes of its parts."""
-        seen = surveyed(self._job(EncoderOptions()))
-        write_survey(seen, self.sequence, path)
-        return seen
+        survey = survey_job(self._job(EncoderOptions()))
+        write_survey(survey, self.sequence, path)
+        return survey
 
     def _job(self, options: EncoderOptions) -> Job:
         stages = Stages(self.progress, len(self.sequence) if self._excerpt is None else len(self._excerpt.frames))
@@ -225,61 +225,61 @@ class Encoder:
         Raises InputError where it had others.
         """
         if self._excerpt is not None:
-            return self._excerpt.surveyed.seen, None
+            return self._excerpt.whole.survey, None
         is_scene = self._is_scene(job.options)
-        seen = None if files.whole is None else known_survey(self.sequence, files.whole)
+        survey = None if files.whole is None else survey_from_facts(self.sequence, files.whole)
         if is_scene:
-            parts = self._parts(job, files, seen)
-            return parts.seen, parts
-        return surveyed(job) if seen is None else seen, None
+            parts = self._parts(job, files, survey)
+            return parts.survey, parts
+        return survey_job(job) if survey is None else survey, None
 
-    def _parts(self, job: Job, files: IntervalFiles | None = None, seen: Survey | None = None) -> Parts:
+    def _parts(self, job: Job, files: IntervalFiles | None = None, survey: Survey | None = None) -> Parts:
         """Return the parts of the scene: those that an earlier encode of it had, here or in files, where it had any."""
         how = (job.scene.cameras, job.scene.from_depth)
         if self._scene is None or self._scene[:2] != how:
-            seen = surveyed(job, cleaned=False) if seen is None else seen
+            survey = survey_job(job, cleaned=False) if survey is None else survey
             parts = None
             if files is not None:
                 files.check({"surfaces": self.sequence.digests})
-                parts = None if files.scene is None else unpack_parts(files.scene, job.sequence, seen)
-            self._scene = (*how, parts or take_apart(job.sequence, seen, job.scene, job.stages, self._masker))
+                parts = None if files.scene is None else unpack_parts(files.scene, job.sequence, survey)
+            self._scene = (*how, parts or take_apart(job.sequence, survey, job.scene, job.stages, self._masker))
         return self._scene[2]
 
 
-def _encode_tracked(job: Job, file: BinaryIO, name: str, seen: Survey, audio: bytes) -> Summary:
+def _encode_tracked(job: Job, file: BinaryIO, name: str, survey: Survey, audio: bytes) -> Summary:
     """Encode a sequence in which everything may move; errors call the output `name`."""
     sequence, options = job.sequence, job.options
     groups: list[GroupSummary] = []
-    note("survey", seen.low, seen.high, seen.diagonals, seen.dropped, seen.pieces)
-    with ReelWriter(file, make_header(sequence.frame_rate, seen, {}), name, audio) as writer:
-        for encoded in encode_tracked(job, seen):
-            groups += [write_tracked(writer, each, [], seen.diagonal) for each in encoded]
+    note("survey", survey.low, survey.high, survey.diagonals, survey.dropped, survey.pieces)
+    with ReelWriter(file, make_header(sequence.frame_rate, survey, {}), name, audio) as writer:
+        for encoded in encode_tracked(job, survey):
+            groups += [write_tracked(writer, each, [], survey.diagonal) for each in encoded]
         part = None if job.chosen is None else (job.chosen.start, len(sequence))
         metadata = metadata_of(options, groups, sequence.up, part)
-        writer.header = make_header(sequence.frame_rate, seen, metadata)
-    texts = warnings_of(seen) if job.chosen is None else ()  # the survey told of them
+        writer.header = make_header(sequence.frame_rate, survey, metadata)
+    texts = warnings_of(survey) if job.chosen is None else ()  # the survey told of them
     return Summary(writer.size, tuple(groups), (*texts, *warnings_of_colors(groups)), audio=len(audio))
 
 
 def _encode_scene(job: Job, file: BinaryIO, name: str, parts: Parts, audio: bytes) -> Summary:
     """Encode a scene with a background; errors call the output `name`."""
-    sequence, options, seen = job.sequence, job.options, parts.seen
-    note("survey", seen.low, seen.high, seen.diagonals, seen.unit)
+    sequence, options, survey = job.sequence, job.options, parts.survey
+    note("survey", survey.low, survey.high, survey.diagonals, survey.unit)
     note("background and noise", parts.background.vertices, parts.background.faces, parts.noise, parts.deviation)
     job.stages.add("room", 0)
     states = colored_states(sequence, parts, job.scene, options.appearance)
     job.stages.reach("room", 1.0)
     note("background, coded", *(state.payload for state in states))
-    with ReelWriter(file, make_header(sequence.frame_rate, seen, {}), name, audio) as writer:
+    with ReelWriter(file, make_header(sequence.frame_rate, survey, {}), name, audio) as writer:
         coded = encode_bodies(job, parts)
-        groups = write_in_order(writer, coded.groups, states, seen)
-        metadata = {**chosen_options(options, groups), "noise_m": rounded(parts.noise), **upright(sequence.up)}
-        writer.header = make_header(sequence.frame_rate, seen, metadata)
+        groups = write_in_order(writer, coded.groups, states, survey)
+        metadata = {**chosen_options(options, groups), "noise_m": shortened(parts.noise), **up_metadata(sequence.up)}
+        writer.header = make_header(sequence.frame_rate, survey, metadata)
     measured = evenly(len(sequence), MEASURED)
-    psnr = mean_psnr(sequence, file, seen.diagonal, measured)
+    psnr = mean_psnr(sequence, file, survey.diagonal, measured)
     size, tracks = sum(map(len, states)), 1 + max(group.track for group in groups)
     faces = len(decode_background(states[0].payload).faces) if states else 0
     scene = SceneSummary(size, faces, parts.noise, psnr, tuple(measured), tracks)
     moves = any(group.form != Form.EMPTY for group in groups)
-    texts = (*warnings_of(seen), *warnings_of_scene(parts, moves, coded.dropped), *warnings_of_colors(groups, states))
+    texts = (*warnings_of(survey), *warnings_of_scene(parts, moves, coded.dropped), *warnings_of_colors(groups, states))
     return Summary(writer.size, tuple(groups), texts, scene, audio=len(audio))

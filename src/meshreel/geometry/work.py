@@ -28,18 +28,18 @@ _here = threading.local()
 def count(kind: Kind, number: int = 1) -> None:
     """Count work that this thread does."""
     _counts()[kind] += number
-    if (hear := getattr(_here, "hear", None)) is not None:
-        hear(kind, number)
+    if (report := getattr(_here, "report", None)) is not None:
+        report(kind, number)
 
 
 @contextmanager
-def heard(hear: Callable[[Kind, int], object]) -> Iterator[None]:
-    """Call `hear` with the work that this thread counts in the block."""
-    before, _here.hear = getattr(_here, "hear", None), hear
+def reporting(report: Callable[[Kind, int], object]) -> Iterator[None]:
+    """Call `report` with the work that this thread counts in the block."""
+    before, _here.report = getattr(_here, "report", None), report
     try:
         yield
     finally:
-        _here.hear = before
+        _here.report = before
 
 
 def so_far() -> Work:

@@ -13,7 +13,7 @@ from meshreel.analysis.scene.labelling import ByPlace
 from meshreel.analysis.scene.places import Places, Tally
 from meshreel.analysis.scene.segmentation import segment
 from meshreel.analysis.scene.views import place_views
-from meshreel.analysis.survey import survey
+from meshreel.analysis.survey import survey_sequence
 from meshreel.coding.background import decode_background, decode_change
 from meshreel.encoder.group.progress import Stages
 from meshreel.encoder.scene.parts import Parts, take_apart
@@ -80,7 +80,7 @@ def scene() -> MeshList:
 
 @pytest.fixture(scope="module")
 def parts(scene: MeshList) -> Parts:
-    return take_apart(captured(scene), survey(scene), OPTIONS, Stages(None, FRAMES))
+    return take_apart(captured(scene), survey_sequence(scene), OPTIONS, Stages(None, FRAMES))
 
 
 @pytest.fixture(scope="module")

@@ -241,10 +241,10 @@ def test_parts_of_a_sequence_are_joined_with_their_colors(tmp_path: Path) -> Non
     encoder = Encoder(welded(open_sequence(tmp_path)))
     encoder.encode(tmp_path / "whole.reel", options)
     encoder.survey(tmp_path / "survey.json")
-    surveyed = read_survey(tmp_path / "survey.json")
+    whole = read_survey(tmp_path / "survey.json")
     parts = [tmp_path / "a.reel", tmp_path / "b.reel"]
     for path, frames in zip(parts, (range(3), range(3, FRAMES)), strict=True):
-        Encoder(welded(open_sequence(tmp_path)), excerpt=Excerpt(surveyed, frames)).encode(path, options)
+        Encoder(welded(open_sequence(tmp_path)), excerpt=Excerpt(whole, frames)).encode(path, options)
     concat(parts, tmp_path / "joined.reel")
     with meshreel.open(tmp_path / "joined.reel") as joined, meshreel.open(tmp_path / "whole.reel") as whole:
         for one, other in zip(joined, whole, strict=True):

@@ -22,21 +22,21 @@ def test_work_on_a_group_counts_up_to_the_longest_group_and_again_from_the_next(
     stages, told = told
     interval = IntervalStages(stages, 30, 4)
     for _ in range(9):  # some frames twice: the group was cut
-        interval.hear("frames tracked", 1)
+        interval.add_work("frames tracked", 1)
     assert told == [("track", n, 40) for n in (1, 2, 3, 4)]
     interval.add("code", 3)
-    interval.hear("frames tracked", 1)  # the fourth frame again
-    interval.hear("frames tracked", 1)
+    interval.add_work("frames tracked", 1)  # the fourth frame again
+    interval.add_work("frames tracked", 1)
     assert told[-1] == ("track", 5, 40)
-    interval.hear("closest points", 100)
+    interval.add_work("closest points", 100)
     assert {stage for stage, *_ in told} == {"track", "code", "fit"}
 
 
 def test_what_is_fitted_is_tracked_though_a_key_is_not(told):
     stages, told = told
     interval = IntervalStages(stages, 4, 4)
-    interval.hear("frames tracked", 3)
-    interval.hear("frames fitted", 4)
+    interval.add_work("frames tracked", 3)
+    interval.add_work("frames fitted", 4)
     assert told == [("track", 3, 40), ("track", 4, 40), ("fit", 4, 40)]
 
 

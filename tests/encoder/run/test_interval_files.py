@@ -13,7 +13,7 @@ import fsspec
 import pytest
 
 import meshreel
-from meshreel.analysis.survey import survey
+from meshreel.analysis.survey import survey_sequence
 from meshreel.capture.recording import open_recording
 from meshreel.container.reader import ReelReader
 from meshreel.container.sources import FileSource
@@ -497,7 +497,7 @@ def test_a_scene_that_was_taken_apart_is_not_taken_apart_again_nor_are_its_frame
     for stop in (1, 3, 0):
         taken.clear()
         monkeypatch.setattr(sequence_module, "take_apart", lambda *given: taken.append(1) or take_apart(*given))
-        monkeypatch.setattr(surveying, "survey", lambda *given: taken.append(2) or survey(*given))
+        monkeypatch.setattr(surveying, "survey_sequence", lambda *given: taken.append(2) or survey_sequence(*given))
         calls.clear()
         encoder = Encoder(open_recording(recorded)[0])
         if stop:

@@ -13,7 +13,7 @@ import meshreel.encoder.scene.scene as scene
 from meshreel.analysis.scene.cut import Rest
 from meshreel.analysis.scene.labelling import ByPlace
 from meshreel.analysis.scene.segmentation import scene_views
-from meshreel.analysis.survey import survey
+from meshreel.analysis.survey import survey_sequence
 from meshreel.coding.background import decode_background
 from meshreel.coding.mesh import decode_intra, encode_empty, encode_intra
 from meshreel.encoder.group.forms import NO_ERROR, EncodedGroup, target_of
@@ -268,8 +268,8 @@ ALL = AllMoves(CELL, Lattice(np.zeros(3), CELL), np.zeros(0, np.int64), np.zeros
 def tracks(frames: list[Mesh], interval: int = 2) -> list[str]:
     """Return which frames of each track have a body, where key intervals have `interval` frames."""
     sequence = MeshList(tuple(frames), 1.0)
-    seen = replace(survey(sequence), scale=1.0)
-    parts = Parts(seen, ALL, NONE, [], 0.0, 0.0)
+    survey = replace(survey_sequence(sequence), scale=1.0)
+    parts = Parts(survey, ALL, NONE, [], 0.0, 0.0)
     options = replace(OPTIONS, key_interval=float(interval))
     coded = bodies_of(sequence, options, parts)
     assert coded.dropped == 0
@@ -344,8 +344,8 @@ def test_more_bodies_than_a_file_has_tracks_share_some():
     plate = plane(0.5, 1)
     many = concatenate([moved(plate, (k % 17, k // 17, 0)) for k in range(MOST_TRACKS + 20)])
     sequence = MeshList((many, many), 1.0)
-    seen = replace(survey(sequence), scale=1.0)
-    coded = bodies_of(sequence, OPTIONS, Parts(seen, ALL, NONE, [], CELL, 0.0, 0.0))
+    survey = replace(survey_sequence(sequence), scale=1.0)
+    coded = bodies_of(sequence, OPTIONS, Parts(survey, ALL, NONE, [], CELL, 0.0, 0.0))
     assert {each.track for each in coded.groups} == set(range(MOST_TRACKS)) and coded.dropped == 0
     faces = [len(decode_intra(each.group.payload)[0].faces) for each in coded.groups if each.first_frame == 0]
     assert sum(faces) == len(many.faces)
@@ -353,12 +353,12 @@ def test_more_bodies_than_a_file_has_tracks_share_some():
 
 @pytest.mark.usefixtures("plainly")
 def test_a_background_is_no_finer_than_its_noise_asks_for():
-    seen = replace(survey(MeshList((room(),))), scale=1.0)
+    survey = replace(survey_sequence(MeshList((room(),))), scale=1.0)
     sizes = []
     for noise in (0.0, 0.002, 0.01):
-        parts, options = Parts(seen, ALL, with_room([NONE], sigma=0.002)[0], [], CELL, noise, noise), SceneOptions()
+        parts, options = Parts(survey, ALL, with_room([NONE], sigma=0.002)[0], [], CELL, noise, noise), SceneOptions()
         payload = encode_static(parts, 1, 30.0, options)[0].payload
-        place = Placement(1.0, tuple(seen.center))
+        place = Placement(1.0, tuple(survey.center))
         away = rms(parts.background.vertices, place.of(decode_background(payload)))
         assert away <= max(options.coarse * noise, 1e-4)
         sizes.append(len(payload))

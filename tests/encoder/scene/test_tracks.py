@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import meshreel
-from meshreel.analysis.survey import survey
+from meshreel.analysis.survey import survey_sequence
 from meshreel.coding.mesh import encode_empty, encode_intra
 from meshreel.encoder.group.forms import NO_ERROR, EncodedGroup, Fidelity, target_of
 from meshreel.encoder.group.interval import BodyFrames, Interval, NormalisedFrames
@@ -154,12 +154,12 @@ def test_a_body_keeps_its_track_and_one_that_is_gone_for_an_interval_is_empty(tm
 def test_one_body_is_coded_as_whole_frames_are(tmp_path):
     sequence = sliding_sphere(7)
     video, _ = encoded(sequence, tmp_path / "a.reel")
-    seen = survey(sequence)
+    survey = survey_sequence(sequence)
     assert len(video.tracks) == 1
     wanted = [
         group.payload
-        for numbers in seen.intervals(round(OPTIONS.key_interval * sequence.frame_rate))
-        for group in OPTIONS.recipe().encode(Interval(NormalisedFrames(DerivedSequence(sequence), seen, numbers)))
+        for numbers in survey.intervals(round(OPTIONS.key_interval * sequence.frame_rate))
+        for group in OPTIONS.recipe().encode(Interval(NormalisedFrames(DerivedSequence(sequence), survey, numbers)))
     ]
     assert [video.reader.read_chunk(chunk.number) for chunk in video.reader.groups] == wanted
 
@@ -204,7 +204,8 @@ def test_a_stopped_encode_continues_with_the_bodies_that_are_missing(tmp_path, m
 
 
 def test_a_survey_that_has_other_pieces_of_a_frame_is_refused():
-    seen = replace(survey(TWO), pieces=tuple((*pieces, pieces[-1]) for pieces in survey(TWO).pieces))
-    frames = BodyFrames(DerivedSequence(TWO), seen, range(3), 0, ((0, 1, 1),) * 3)
+    survey = survey_sequence(TWO)
+    survey = replace(survey, pieces=tuple((*pieces, pieces[-1]) for pieces in survey.pieces))
+    frames = BodyFrames(DerivedSequence(TWO), survey, range(3), 0, ((0, 1, 1),) * 3)
     with pytest.raises(InputError, match="frame 1: has 2 large pieces, in its survey 3; write it again"):
         frames[1]

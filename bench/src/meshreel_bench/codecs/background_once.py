@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
-from meshreel.analysis.survey import is_scene, survey
+from meshreel.analysis.survey import is_scene, survey_sequence
 from meshreel.encoder.group.progress import Stages
 from meshreel.encoder.scene.parts import take_apart
 from meshreel.encoder.scene.static import Static, encode_static
@@ -47,18 +47,18 @@ class BackgroundOnceDracoCodec(TwoSteps):
         """Return the background and what moves. Raises InputError for frames that cannot be used."""
         stages, options = Stages(progress, len(sequence)), SceneOptions()
         if not (len(sequence) and is_scene(sequence)):
-            seen = survey(sequence, stages.add)
-            return Still((), Frames(sequence.frame_rate, seen, [seen.normalise(mesh) for mesh in sequence]))
-        parts = take_apart(captured(sequence), survey(sequence, stages.add, cleaned=False), options, stages)
+            survey = survey_sequence(sequence, stages.add)
+            return Still((), Frames(sequence.frame_rate, survey, [survey.normalise(mesh) for mesh in sequence]))
+        parts = take_apart(captured(sequence), survey_sequence(sequence, stages.add, cleaned=False), options, stages)
         states = encode_static(parts, len(sequence), sequence.frame_rate, options)
         moving = list[Mesh]()
         for number, mesh in enumerate(sequence):
-            moving.append(parts.seen.normalise(part_of(mesh, parts.segmentation.moving(number, mesh))))
+            moving.append(parts.survey.normalise(part_of(mesh, parts.segmentation.moving(number, mesh))))
             stages.add("split", 1)
-        return Still(states, Frames(sequence.frame_rate, parts.seen, moving))
+        return Still(states, Frames(sequence.frame_rate, parts.survey, moving))
 
     def code(self, analysis: Still, progress: Progress | None = None) -> bytes:
-        frame_rate, seen, meshes = analysis.moving
-        small = Frames(frame_rate, seen, (decimated(mesh, self.fraction) for mesh in meshes))
-        points = [(self.qp, self.levels)] * len(seen.diagonals)
+        frame_rate, survey, meshes = analysis.moving
+        small = Frames(frame_rate, survey, (decimated(mesh, self.fraction) for mesh in meshes))
+        points = [(self.qp, self.levels)] * len(survey.diagonals)
         return write_frames(small, points, progress, analysis.background)

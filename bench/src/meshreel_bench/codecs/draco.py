@@ -15,7 +15,7 @@ import DracoPy
 import msgspec
 import numpy as np
 
-from meshreel.analysis.survey import Survey, survey
+from meshreel.analysis.survey import Survey, survey_sequence
 from meshreel.coding.mesh import encode_empty, encode_intra
 from meshreel.container.writer import ReelWriter
 from meshreel.encoder.file.summary import make_header
@@ -54,8 +54,8 @@ class DracoCodec(Options):
     def encode(self, sequence: MeshSequence, progress: Progress | None = None) -> bytes:
         if self.level != LEVEL:
             return encode_alone(((mesh.vertices, mesh.faces) for mesh in sequence), self.qp, self.level)
-        seen = survey(sequence)
-        frames = Frames(sequence.frame_rate, seen, (seen.normalise(frame) for frame in sequence))
+        survey = survey_sequence(sequence)
+        frames = Frames(sequence.frame_rate, survey, (survey.normalise(frame) for frame in sequence))
         return write_frames(frames, [(self.qp, 0)] * len(sequence), progress)
 
     def decode(self, data: bytes) -> Sequence[Mesh]:
@@ -66,7 +66,7 @@ class Frames(NamedTuple):
     """Normalised frames of a file."""
 
     frame_rate: float  # 1/s
-    seen: Survey
+    survey: Survey
     meshes: Iterable[Mesh]
 
 
@@ -93,18 +93,18 @@ class DecimatedDracoCodec(TwoSteps):
         return f"decimated to {self.fraction!r}"
 
     def analyse(self, sequence: MeshSequence, progress: Progress | None = None) -> Frames:
-        seen, meshes = survey(sequence), list[Mesh]()
+        survey, meshes = survey_sequence(sequence), list[Mesh]()
         for frame in sequence:
-            meshes.append(decimated(seen.normalise(frame), self.fraction))
+            meshes.append(decimated(survey.normalise(frame), self.fraction))
             if progress is not None:
                 progress("decimate", len(meshes), len(sequence))
-        return Frames(sequence.frame_rate, seen, meshes)
+        return Frames(sequence.frame_rate, survey, meshes)
 
     def code(self, analysis: Frames, progress: Progress | None = None) -> bytes:
         if self.decoder:
-            unit, center = analysis.seen.unit, analysis.seen.center
+            unit, center = analysis.survey.unit, analysis.survey.center
             return encode_alone(((unit * mesh.vertices + center, mesh.faces) for mesh in analysis.meshes), self.qp)
-        points = [(self.qp, self.levels)] * len(analysis.seen.diagonals)
+        points = [(self.qp, self.levels)] * len(analysis.survey.diagonals)
         return write_frames(analysis, points, progress)
 
     def decode(self, data: bytes) -> Sequence[Mesh]:
@@ -161,12 +161,12 @@ def write_frames(
     states, shown_with = list(background), tuple[int, ...]()
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "anchor.reel"
-        with ReelWriter(path, make_header(frames.frame_rate, frames.seen, {})) as writer:
+        with ReelWriter(path, make_header(frames.frame_rate, frames.survey, {})) as writer:
             for number, (mesh, point) in enumerate(zip(frames.meshes, points, strict=True)):
                 while states and states[0].frame <= number:
                     state = states.pop(0)
                     shown_with = (writer.add_static(state.payload, depends_on=shown_with if state.is_patch else ()),)
-                depends_on = () if frames.seen.is_bare(number) else shown_with
+                depends_on = () if frames.survey.is_bare(number) else shown_with
                 writer.add_group(number, 1, encode_frame(mesh, point), (), depends_on)
                 if progress is not None:
                     progress("code", number + 1, len(points))

@@ -100,5 +100,5 @@ def _scene_frames(sequence: MeshSequence) -> SceneFrames:
 def _written(frame_rate: float, meshes: Sequence[Mesh], points: Sequence[Point], progress: Progress | None) -> bytes:
     """Return a .reel file of meshes in metres."""
     corners = np.concatenate([mesh.vertices for mesh in meshes if not mesh.is_empty])
-    seen = Survey(corners.min(axis=0), corners.max(axis=0), tuple(mesh.diagonal for mesh in meshes))
-    return write_frames(Frames(frame_rate, seen, map(seen.normalise, meshes)), points, progress)
+    survey = Survey(corners.min(axis=0), corners.max(axis=0), tuple(mesh.diagonal for mesh in meshes))
+    return write_frames(Frames(frame_rate, survey, map(survey.normalise, meshes)), points, progress)

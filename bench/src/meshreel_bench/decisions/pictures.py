@@ -25,7 +25,7 @@ from meshreel.analysis.reference.centers import (
 )
 from meshreel.analysis.reference.extraction import MDS, Reference, extract_reference, predict
 from meshreel.analysis.reference.track import track_centers
-from meshreel.analysis.survey import survey
+from meshreel.analysis.survey import survey_sequence
 from meshreel.capture.simulated.procedural import SoftBodiesOptions, soft_bodies
 from meshreel.coding import klt
 from meshreel.coding.group import decode_group, payload_bytes_by_purpose
@@ -64,8 +64,8 @@ class Stages:
 
 def compute(sequence: MeshList, options: PaperOptions) -> Stages:
     """The stages of a sequence that is one group."""
-    seen = survey(sequence)
-    frames = tuple(seen.normalise(mesh) for mesh in sequence)
+    survey = survey_sequence(sequence)
+    frames = tuple(survey.normalise(mesh) for mesh in sequence)
     centers = track_centers(frames, options.track)
     middle = centers.positions[len(frames) // 2]
     spread = reference_centers(largest_distances(centers), middle)

@@ -22,7 +22,7 @@ from meshreel.analysis.reference.track import (
     TrackOptions,
     track_centers,
 )
-from meshreel.analysis.survey import survey
+from meshreel.analysis.survey import survey_sequence
 from meshreel.errors import InputError
 from meshreel.geometry.inside import interior_samples
 from meshreel.geometry.rigid import fit_rigid
@@ -40,15 +40,15 @@ def tracker_values(sequence: MeshSequence, method: str) -> dict[str, float | Non
     """Return distances of centers from the true motion, and CPU s a frame. InputError where faces change."""
     if method not in (OURS, PUBLISHED):
         raise InputError(f"no tracker is called {method!r}; give {OURS} or {PUBLISHED}")
-    seen, options = survey(sequence), TrackOptions()
-    frames = [Mesh.of((mesh.vertices - seen.low) / seen.diagonal, mesh.faces) for mesh in sequence]
+    survey, options = survey_sequence(sequence), TrackOptions()
+    frames = [Mesh.of((mesh.vertices - survey.low) / survey.diagonal, mesh.faces) for mesh in sequence]
     if any(not np.array_equal(frame.faces, frames[0].faces) for frame in frames):
         raise InputError("true motion is known of frames that share their faces only")
     first, start = track_centers(frames[:1], options).positions[0], time.process_time()
     track = track_centers(frames, options).positions if method == OURS else published_track(frames, first, options)
     seconds = time.process_time() - start
     truth, other = (carried(frames, track[0], count) for count in BOUND)
-    errors, spread = (np.linalg.norm(a - truth, axis=2)[1:] * seen.diagonal * 1000 for a in (track, other))
+    errors, spread = (np.linalg.norm(a - truth, axis=2)[1:] * survey.diagonal * 1000 for a in (track, other))
     rms = lambda values: float(np.sqrt(np.mean(values**2)))  # noqa: E731
     return {
         "center_rms_mm": rms(errors),

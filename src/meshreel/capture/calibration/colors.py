@@ -38,7 +38,7 @@ Trust = Float64[np.ndarray, "C N"]  # in a camera's colour of a place; 0: it doe
 DARK, BRIGHT = 8.0, 250.0  # levels beyond which a ratio says nothing: noise, and what is cut off (guess)
 MOST_GAIN, MOST_MOTION = 16.0, 100.0  # log2; rad and m: beyond these a file of corrections is damaged (guess)
 LEAST_GAIN, LEAST_COLOR = 0.02, 2.0  # log2, levels: deviations below are no outliers (guess)
-GAIN_ERROR, POSE_ERROR = 0.5, 0.02  # log2; rad and m: expected, where colours leave something open (guess)
+GAIN_ERROR, POSE_ERROR = 0.5, 0.02  # deviations of the Gaussian prior on log2 gains, and on poses (rad, m) (guess)
 GAIN_ROUNDS = 6  # in which outliers lose their weight (guess)
 APART = 0.5  # pixels from a place to both sides, where the slopes of colours are measured
 STEP = 1e-5  # rad, m: for derivatives of positions in a picture
@@ -76,14 +76,14 @@ Corrections = tuple[Correction, ...]  # of each camera; none where they agree as
 
 
 class Corrected:
-    """Colour pictures of a recording, whose cameras are corrected; how is found when the first one is asked for."""
+    """Colour pictures of a recording, corrected for their cameras; `find` is called when the first one is asked for."""
 
     def __init__(self, colors: ColorFrames, find: Callable[[], Corrections]) -> None:
         self._colors, self._find = colors, find
 
     @cached_property
     def corrections(self) -> Corrections:
-        """The correction of each camera; none where nothing is to be mended."""
+        """The correction of each camera; empty if the cameras agree as they are."""
         return self._find()
 
     def __getitem__(self, index: int) -> list[ColorPicture | None]:

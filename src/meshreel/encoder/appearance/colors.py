@@ -178,7 +178,7 @@ class ChainSplats:
         self._frames, self._every, self._count = list[tuple[int, Carrier]](), 1, 0
 
     def add(self, form: Form, canvas: Canvas, meshes: Sequence[Mesh], numbers: Sequence[int]) -> None:
-        """Add the frames of a group, as decoded, with their numbers in the interval, where they are of one mesh."""
+        """Add a group's decoded frames if they share one mesh; `numbers` are their indices in the interval."""
         if form not in (Form.LAYERS, Form.LAPLACIAN):
             return
         for number, carrier in zip(numbers, canvas.carriers(meshes), strict=True):

@@ -18,7 +18,7 @@ import numpy as np
 from ...analysis.survey import Survey
 from ...container.writer import ReelWriter
 from ...decoder.video import open as open_video
-from ...edit.metadata import CANONICAL, KEYS, PART, Totals, rounded, upright
+from ...edit.metadata import CANONICAL, KEYS, PART, Totals, shortened, up_metadata
 from ...format.layout import Form, Header
 from ...geometry.closest_points import distances
 from ...geometry.topology import drop_unreferenced
@@ -71,7 +71,7 @@ class Summary:
     warnings: tuple[str, ...] = ()  # about surface that was not kept, a line each
     scene: SceneSummary | None = None  # of a scene with a background
     continued: int = 0  # intervals that an earlier run, which was stopped, had done
-    audio: int = 0  # bytes of what is heard
+    audio: int = 0  # bytes of the audio file
     work: Work = field(default_factory=dict)  # that this run did
 
     @property
@@ -90,13 +90,13 @@ class Summary:
 ASTRAY = 0.005  # of the surface: noise, and what a border of the background lacks, is less (guess)
 
 
-def warnings_of(seen: Survey) -> tuple[str, ...]:
+def warnings_of(survey: Survey) -> tuple[str, ...]:
     """Return warnings of surface that no file of the sequence has."""
     found = []
-    if seen.dropped:
-        found.append(f"{seen.dropped} faces without area or with the vertices of another face are not kept")
-    if seen.flattened:
-        count, first = len(seen.flattened), seen.flattened[0]
+    if survey.dropped:
+        found.append(f"{survey.dropped} faces without area or with the vertices of another face are not kept")
+    if survey.flattened:
+        count, first = len(survey.flattened), survey.flattened[0]
         text = f"{count} frames have faces, but none with an area: they count as empty (first frame {first} of these)"
         found.append(text)
     return tuple(found)
@@ -125,7 +125,7 @@ def warnings_of_colors(groups: Sequence[GroupSummary], states: Sequence[Static] 
 
 
 def write_in_order(
-    writer: ReelWriter, coded: Sequence[TrackGroup], states: Sequence[Static], seen: Survey
+    writer: ReelWriter, coded: Sequence[TrackGroup], states: Sequence[Static], survey: Survey
 ) -> list[GroupSummary]:
     """Write all groups, and each state of the background before the first group that is shown with it."""
     groups, waiting, static = list[GroupSummary](), deque(states), list[int]()
@@ -134,8 +134,8 @@ def write_in_order(
             state = waiting.popleft()
             static = [writer.add_static(state.payload, depends_on=static if state.is_patch else ())]
             write_companions(writer, static[0], state.companions, None)
-        with_static = each.track == 0 and not seen.is_bare(each.first_frame)
-        groups.append(write_tracked(writer, each, static if with_static else [], seen.unit))
+        with_static = each.track == 0 and not survey.is_bare(each.first_frame)
+        groups.append(write_tracked(writer, each, static if with_static else [], survey.unit))
     return groups
 
 
@@ -164,13 +164,13 @@ def mean_psnr(sequence: MeshSequence, file: BinaryIO, diagonal: float, numbers: 
     return float(np.mean(found))
 
 
-def make_header(frame_rate: float, seen: Survey, metadata: dict[str, Any]) -> Header:
+def make_header(frame_rate: float, survey: Survey, metadata: dict[str, Any]) -> Header:
     """Return the header of a file whose coordinates are normalised by a survey."""
-    low, high = ((corner - seen.center) / seen.unit for corner in (seen.low, seen.high))
+    low, high = ((corner - survey.center) / survey.unit for corner in (survey.low, survey.high))
     return Header(
         frame_rate=frame_rate,
-        origin=tuple(map(float, seen.center)),
-        scale=seen.unit,
+        origin=tuple(map(float, survey.center)),
+        scale=survey.unit,
         minimum=tuple(map(float, low)),
         maximum=tuple(map(float, high)),
         metadata=json.dumps(metadata, separators=(",", ":")),
@@ -196,13 +196,13 @@ def metadata_of(
     keys = sorted({group.key for group in groups if group.key is not None})
     found = {**chosen_options(options, groups), KEYS: keys, **totals.means}
     if part is None:
-        return found | upright(up)
+        return found | up_metadata(up)
     digest = hashlib.sha256(repr(asdict(options)).encode()).hexdigest()[:16]
     place = {"first_frame": part[0], "of": part[1]}
-    return found | upright(up) | {PART: place | {"totals": totals.exact, "options": digest}}
+    return found | up_metadata(up) | {PART: place | {"totals": totals.exact, "options": digest}}
 
 
 def chosen_options(options: EncoderOptions, groups: Sequence[GroupSummary]) -> dict[str, Any]:
     """Return the preset and the quality; of the paper's recipe also how many references lie in the pose of eq. 5."""
-    found = {"preset": options.preset, "quality": rounded(options.quality)}
+    found = {"preset": options.preset, "quality": shortened(options.quality)}
     return found | ({} if options.preset == "best" else {CANONICAL: sum(group.canonical for group in groups)})

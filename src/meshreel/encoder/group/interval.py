@@ -36,7 +36,7 @@ class Interval:
     sight: Sight | None = field(default=None, kw_only=True)  # of depth cameras
     weight: Fraction = field(default=Fraction(1), kw_only=True)  # of each frame in progress: bodies share a frame
     pictured: bool = field(default=False, kw_only=True)  # with textures or splats, which frames of Draco cannot have
-    larger: float = field(default=1.0, kw_only=True)  # times, the whole frames than the body: targets are of the former
+    larger: float = field(default=1.0, kw_only=True)  # diagonal of whole frames / of this body: targets are of frames
 
     @property
     def stop(self) -> int:
@@ -76,20 +76,20 @@ class Interval:
 class NormalisedFrames(Frames):
     """Frames of a sequence in normalised coordinates, computed on access."""
 
-    def __init__(self, sequence: DerivedSequence, seen: Survey, numbers: range) -> None:
-        self.sequence, self._seen, self._numbers = sequence, seen, numbers
+    def __init__(self, sequence: DerivedSequence, survey: Survey, numbers: range) -> None:
+        self.sequence, self._survey, self._numbers = sequence, survey, numbers
 
     def __len__(self) -> int:
         return len(self._numbers)
 
     def __getitem__(self, index: int) -> Mesh:
-        return self._seen.normalise(self.sequence[self._numbers[index]])
+        return self._survey.normalise(self.sequence[self._numbers[index]])
 
     def only(self) -> NormalisedFrames:
         """Return the same frames, with nothing else of their sequence."""
         found = copy.copy(self)
         found.sequence = self.sequence.only(self._numbers)
-        found._seen = replace(self._seen, diagonals=(), flattened=(), pieces=())  # normalising needs none of these
+        found._survey = replace(self._survey, diagonals=(), flattened=(), pieces=())  # normalising needs none of these
         return found
 
 
@@ -97,10 +97,10 @@ class BodyFrames(NormalisedFrames):
     """One body of frames of a sequence, cut out on access."""
 
     def __init__(
-        self, sequence: DerivedSequence, seen: Survey, numbers: range, body: int, bodies: tuple[tuple[int, ...], ...]
+        self, sequence: DerivedSequence, survey: Survey, numbers: range, body: int, bodies: tuple[tuple[int, ...], ...]
     ) -> None:
         """Take of each frame the pieces that are this body; `bodies` has the body of each piece of each frame."""
-        super().__init__(sequence, seen, numbers)
+        super().__init__(sequence, survey, numbers)
         self._body, self._bodies = body, bodies
 
     def __getitem__(self, index: int) -> Mesh:
@@ -110,7 +110,7 @@ class BodyFrames(NormalisedFrames):
         if (count := 1 + int(pieces.max(initial=0))) != len(bodies):
             text = f"{self.sequence.name(self._numbers[index])}: has {count} large pieces, in its survey {len(bodies)}"
             raise InputError(f"{text}; write it again with meshreel survey")
-        return self._seen.normalise(part_of(mesh, np.array(bodies)[pieces] == self._body))
+        return self._survey.normalise(part_of(mesh, np.array(bodies)[pieces] == self._body))
 
 
 def check_group_size(size: int) -> None:
@@ -128,10 +128,10 @@ class Views:
     place: Placement  # of the coordinates in which the cameras are asked
 
     @staticmethod
-    def of(sequence: CapturedSequence, seen: Survey) -> Views | None:
+    def of(sequence: CapturedSequence, survey: Survey) -> Views | None:
         """Return the views of a sequence, None where no colour cameras recorded it."""
         colors = sequence.colors
-        return None if colors is None else Views(colors, sequence, Placement(seen.unit, tuple(seen.center)))
+        return None if colors is None else Views(colors, sequence, Placement(survey.unit, tuple(survey.center)))
 
     def at(self, number: int, clear: bool = False, hides: Mesh | None = None) -> ColorViews:
         """Return the cameras' views of a frame; if `clear`, only away from steps in depth.

@@ -57,7 +57,7 @@ class IntervalStages(Stages):
             for earlier in STEPS.values():  # a key is not tracked, and some frames are not fitted
                 self.reach_frame(earlier, now)
 
-    def hear(self, kind: Any, number: int) -> None:
+    def add_work(self, kind: Any, number: int) -> None:
         """Count work on the next group, whose frames may be worked on more than once."""
         if (stage := STEPS.get(kind)) is not None:
             self._since_group[stage] = min(self._since_group.get(stage, 0) + number, self._group_size)

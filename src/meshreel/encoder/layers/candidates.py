@@ -29,7 +29,7 @@ from .options import LayersOptions
 
 LATTICE = 0.33  # spacing of the base's lattice, in steps: the motion codes what it rounds away (decision 14)
 LATTICE_ALONE = 0.8  # the same for a single frame, whose base need not move (decision 14)
-MOTIONS = 18.0  # 1/s: so many motions of a noisy body tell from noise (decision 28)
+MOTIONS = 18.0  # 1/s: components of a noisy body's motion that are kept; weaker ones are noise (decision 28)
 LATER, EARLIER = 1, -1  # sides of a key
 
 

@@ -34,7 +34,7 @@ class GroupCoder:
     target: Target  # that the frames should reach, normalised
     noise: float  # RMS distance of the frames from the truth, normalised
     options: LayersOptions
-    floor: bool = True  # Draco is tried in place of every group, not only where nothing else holds
+    tries_draco: bool = True  # Draco is tried in place of every group, not only where nothing else holds
     dearer: float = 0.0  # bytes a frame, for which Draco was tried and was no bargain
 
     @property
@@ -79,7 +79,7 @@ class GroupCoder:
             sharp = cheapest_intra(self.frames, self.target, most_bytes, self.options.intra)
             if sharp is not None:
                 return sharp, None
-        if self.floor and most_for(chosen) > self.dearer:
+        if self.tries_draco and most_for(chosen) > self.dearer:
             chosen = cheaper(self.frames, chosen, self.options.intra)
         return chosen, encoded.state if chosen.form == Form.LAYERS else None
 

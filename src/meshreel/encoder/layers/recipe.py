@@ -27,13 +27,13 @@ from .candidates import Ahead, Candidate, Followed
 from .group_coder import GroupCoder
 from .options import LayersOptions
 
-GOOD = 1.4  # targets: what leaves more is planned anew, though it stands still (guess)
+GOOD = 1.4  # targets: a template with a larger residual is replaced, even where the body stands still (guess)
 STILL = 1.1  # times its usual residual that a template may leave without a new fit (guess)
 BY_RATE = 1.33  # the squared error falls with this power of the rate: 4 dB a doubling (decision 13)
 ANGLE_BY_RATE = 0.36  # the normal error falls with this power of the rate (measured on four bodies: decision 24)
 PATCHED = 0.5  # share of the bytes of a predicted group from which on a template of its own is tried (guess)
 LEAST = 1e-30  # error: its logarithm is finite
-Coded = tuple[EncodedGroup, Followed | None]  # a group, and the template that the next may begin with
+Coded = tuple[EncodedGroup, Followed | None]  # a group, and the template that may predict the next
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +69,7 @@ class _Planner:
         self._colored = recipe.colored
         self._target = recipe.options.target.scaled(interval.larger)
         # A frame in the `draco` form has no pictures, and codes noise.
-        self._floor = recipe.options.floor and not (interval.noise or interval.pictured)
+        self._tries_draco = recipe.options.floor and not (interval.noise or interval.pictured)
         self._surfaces = dict[int, FrameSurface]()
         self._candidates, self._tried = list[Candidate](), set[int]()  # of key frames; their numbers
         self._before: Followed | None = None
@@ -193,7 +193,9 @@ class _Planner:
         return replace(group, key=key), candidate.followed(ahead, state, positions[len(numbers) - 1], numbers)
 
     def _coder(self, ahead: Ahead, some: slice) -> GroupCoder:
-        return GroupCoder(ahead.surfaces[some], ahead.target, ahead.noise, self._options, self._floor, self._dearer)
+        return GroupCoder(
+            ahead.surfaces[some], ahead.target, ahead.noise, self._options, self._tries_draco, self._dearer
+        )
 
 
 def _is_patched(group: EncodedGroup) -> bool:

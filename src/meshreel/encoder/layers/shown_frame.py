@@ -134,7 +134,7 @@ def _of_faces(squared: Float64[np.ndarray, " N"], faces: Int32[np.ndarray, "F 3"
 
 
 SHARD = 1e-5  # squared diagonals: half a square centimetre of a body that faces the wrong way shows (guess)
-HOLE = 0.002  # squared diagonals of surface, half a foot, missed where it lacks, seen where it is not (guess)
+HOLE = 0.002  # squared diagonals, half a foot: larger holes are patched, larger surplus dropped, at any price (guess)
 SELDOM = 0.25  # share of the frames in which cameras face surface, below which its measurements are noise (guess)
 OFTEN = 0.3  # share of the frames in which cameras must face it, for that to be said (guess)
 POOLED = 3  # rings of faces around each that are judged together, so that no crumbs are left (guess)

@@ -236,7 +236,7 @@ class IntervalFiles:
 
 
 @contextmanager
-def opened(
+def opened_output(
     output: str | Place, inputs: Iterable[Path], resume: bool | None, lasting: bool = True
 ) -> Iterator[tuple[BinaryIO, IntervalFiles]]:
     """Open an output, which appears when the block succeeds, and its folder, which does not last where it is a URL.

@@ -16,7 +16,7 @@ from threadpoolctl import threadpool_limits
 
 from ...format.layout import Header
 from ...geometry.derived_sequences import DerivedSequence
-from ...geometry.work import Work, add, heard, since, so_far
+from ...geometry.work import Work, add, reporting, since, so_far
 from ...types import evenly
 from ..appearance.colors import colored_groups, has_pictures
 from ..appearance.videos import AppearanceOptions
@@ -72,7 +72,7 @@ class Task:
         """Encode the interval; return its file and its lines of digests."""
         interval, lines = self.interval, list[str]()
         noting = noted(lines.append if self.noting else None, track=interval.track, frame=interval.first_frame)
-        with heard(stages.hear), noting:
+        with reporting(stages.add_work), noting:
             groups = list(encode_interval(interval, self.recipe, self.appearance, stages))
         return pack_interval(interval, groups, self.head), "".join(lines)
 
@@ -104,7 +104,7 @@ def _one_by_one(job: Job, files: IntervalFiles, intervals: Iterable[Interval]) -
 
 
 def _side_by_side(job: Job, files: IntervalFiles, intervals: Iterable[Interval]) -> Iterator[_Done]:
-    """Encode intervals in workers: which read their frames themselves, where frames are in files."""
+    """Encode intervals in worker processes; workers read file-backed frames themselves."""
     assert job.executor is not None
     ready, sent, next_one = dict[int, _Done](), dict[int, tuple[Interval, IntervalStages]](), 0
     told = getattr(job.executor, "told", None)  # workers of the command line tell of each frame

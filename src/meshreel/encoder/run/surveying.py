@@ -1,6 +1,6 @@
 """The survey of a whole sequence: made here or in workers, kept as JSON, and shared by encodes of some of its frames.
 
-In -> out: a job -> the Survey of its sequence; a file of `meshreel survey` -> a Surveyed. Parts that are encoded from
+In -> out: a job -> the Survey of its sequence; a file of `meshreel survey` -> a SurveyFile. Parts that are encoded from
 one survey join without being encoded again (`edit`), whatever machine encoded them.
 """
 
@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from ...analysis.survey import Piece, Survey, joined, survey, survey_of
+from ...analysis.survey import Piece, Survey, joined, survey_frames, survey_sequence
 from ...errors import InputError
 from ...format.checks import LARGEST
 from ...geometry.derived_sequences import DerivedSequence
@@ -28,38 +28,38 @@ from .worker import end_with_parent
 
 KIND = "meshreel survey 2"
 SLICE = 32  # frames that a worker surveys at once: some seconds (guess)
-_ODD = (KeyError, TypeError, ValueError, OverflowError, RecursionError)  # of a record that no encoder wrote
+_DAMAGED = (KeyError, TypeError, ValueError, OverflowError, RecursionError)  # of a record that no encoder wrote
 
 
-def surveyed(job: Job, cleaned: bool = True) -> Survey:
-    """Survey the sequence of a job as `survey` does, with its errors; with an executor, workers read the files."""
+def survey_job(job: Job, cleaned: bool = True) -> Survey:
+    """Survey the sequence of a job, with the errors of `survey_sequence`; an executor's workers read the files."""
     if job.executor is None or not job.sequence.is_stored:
-        return survey(job.sequence, job.stages.add, cleaned)
+        return survey_sequence(job.sequence, job.stages.add, cleaned)
     count, found = len(job.sequence), dict[int, Survey]()
 
     def calls() -> Iterator[Call]:
         for start in range(0, count, SLICE):
             numbers = range(start, min(start + SLICE, count))
-            yield start, _survey_apart, (job.sequence.only(numbers), numbers, cleaned)
+            yield start, _survey_in_worker, (job.sequence.only(numbers), numbers, cleaned)
 
-    for start, (seen, observed, work) in as_done(job.executor, calls()):
+    for start, (survey, observed, work) in as_done(job.executor, calls()):
         job.sequence.learn(observed)
         add(work)
-        found[start] = seen
-        job.stages.add("survey", len(seen.diagonals))
+        found[start] = survey
+        job.stages.add("survey", len(survey.diagonals))
     return joined([found[start] for start in sorted(found)])
 
 
-def _survey_apart(sequence: DerivedSequence, numbers: range, cleaned: bool) -> tuple[Survey, Any, Work]:
+def _survey_in_worker(sequence: DerivedSequence, numbers: range, cleaned: bool) -> tuple[Survey, Any, Work]:
     """Survey a slice in a worker process; also return what reading has shown, and the work."""
     end_with_parent()
     with threadpool_limits(1):
         before = so_far()
-        seen = survey_of(sequence, numbers, cleaned=cleaned)
-        return seen, sequence.observed, since(before)
+        survey = survey_frames(sequence, numbers, cleaned=cleaned)
+        return survey, sequence.observed, since(before)
 
 
-def known_survey(sequence: DerivedSequence, whole: dict[str, Any]) -> Survey | None:
+def survey_from_facts(sequence: DerivedSequence, whole: dict[str, Any]) -> Survey | None:
     """Return the survey in the facts of `facts_of`, without reading the frames; None where they may be others.
 
     Frames that are read later, and differ, raise InputError.
@@ -67,18 +67,18 @@ def known_survey(sequence: DerivedSequence, whole: dict[str, Any]) -> Survey | N
     if whole.get("inputs") is None or whole["inputs"] != _digest_of_inputs(sequence):
         return None
     try:
-        seen, digests = _unpacked(whole["survey"]), dict(enumerate(map(str, whole["made"]["surfaces"])))
-    except _ODD:
+        survey, digests = _unpacked(whole["survey"]), dict(enumerate(map(str, whole["made"]["surfaces"])))
+    except _DAMAGED:
         return None
-    if len(seen.diagonals) != len(digests) or any(digests[k] != now for k, now in sequence.observed[0].items()):
+    if len(survey.diagonals) != len(digests) or any(digests[k] != now for k, now in sequence.observed[0].items()):
         return None  # they are read with other options
     sequence.learn((digests, None))
-    return seen
+    return survey
 
 
-def facts_of(sequence: DerivedSequence, seen: Survey) -> dict[str, Any]:
-    """Return the survey of a sequence, and of which files it is, for `known_survey`."""
-    return {"inputs": _digest_of_inputs(sequence), "survey": _packed(seen)}
+def facts_of(sequence: DerivedSequence, survey: Survey) -> dict[str, Any]:
+    """Return the survey of a sequence, and of which files it is, for `survey_from_facts`."""
+    return {"inputs": _digest_of_inputs(sequence), "survey": _packed(survey)}
 
 
 def _digest_of_inputs(sequence: DerivedSequence) -> str | None:
@@ -96,16 +96,16 @@ def _digest_of_inputs(sequence: DerivedSequence) -> str | None:
 class Excerpt:
     """Frames of a surveyed sequence that become a file of their own."""
 
-    surveyed: Surveyed
+    whole: SurveyFile
     frames: range
 
 
 @dataclass(frozen=True, slots=True)
-class Surveyed:
+class SurveyFile:
     """The survey of a whole sequence, and the digest of each of its frames."""
 
     name: str  # in error messages
-    seen: Survey
+    survey: Survey
     about: dict[str, Any]  # number of frames, frame rate, up axis
     digests: list[str]
 
@@ -124,7 +124,7 @@ class Surveyed:
         """
         if not 1 <= number <= count:
             raise InputError(f"part {number}/{count}: give 1/{count} to {count}/{count}")
-        intervals = self.seen.intervals(longest)
+        intervals = self.survey.intervals(longest)
         if count > len(intervals):
             text = f"part {number}/{count}: the sequence has {len(intervals)} key intervals"
             raise InputError(f"{text}; give at most as many parts, or a shorter --key-interval")
@@ -132,14 +132,14 @@ class Surveyed:
         return Excerpt(self, range(intervals[ends[0]].start, intervals[ends[1] - 1].stop))
 
 
-def write_survey(seen: Survey, sequence: DerivedSequence, path: Path) -> None:
+def write_survey(survey: Survey, sequence: DerivedSequence, path: Path) -> None:
     """Write the survey of a sequence, each frame of which has been read, to a file of JSON."""
-    record = {"kind": KIND, **_about(sequence), **_packed(seen), "digests": sequence.digests}
+    record = {"kind": KIND, **_about(sequence), **_packed(survey), "digests": sequence.digests}
     with replacing(path) as file:
         file.write(json.dumps(record).encode())
 
 
-def read_survey(path: Place) -> Surveyed:
+def read_survey(path: Place) -> SurveyFile:
     """Read the file of a survey. Raises InputError for any other file."""
     data = read_input(path)
     try:
@@ -147,11 +147,11 @@ def read_survey(path: Place) -> Surveyed:
         if record["kind"] != KIND:
             raise ValueError(record["kind"])
         about, digests = {name: record[name] for name in _ABOUT}, [str(value) for value in record["digests"]]
-        seen = _unpacked(record)
-        if not len(seen.diagonals) == len(seen.pieces) == len(digests) == about["frames"]:
+        survey = _unpacked(record)
+        if not len(survey.diagonals) == len(survey.pieces) == len(digests) == about["frames"]:
             raise ValueError("its parts are of different lengths")
-        return Surveyed(str(path), seen, about, digests)
-    except _ODD as error:
+        return SurveyFile(str(path), survey, about, digests)
+    except _DAMAGED as error:
         text = f"{path}: is no survey that this version of meshreel wrote ({type(error).__name__}: {error})"
         raise InputError(f"{text}; write it again with meshreel survey") from None
 
@@ -164,12 +164,12 @@ def _about(sequence: DerivedSequence) -> dict[str, Any]:
     return dict(zip(_ABOUT, (len(sequence), sequence.frame_rate, sequence.up), strict=True))
 
 
-def _packed(seen: Survey) -> dict[str, Any]:
-    return asdict(seen) | {"low": seen.low.tolist(), "high": seen.high.tolist()}
+def _packed(survey: Survey) -> dict[str, Any]:
+    return asdict(survey) | {"low": survey.low.tolist(), "high": survey.high.tolist()}
 
 
 def _unpacked(record: dict[str, Any]) -> Survey:
-    """Return the survey in a record. Raises one of `_ODD` for numbers that are impossible."""
+    """Return the survey in a record. Raises one of `_DAMAGED` for numbers that are impossible."""
     low, high = (np.array([float(value) for value in record[corner]]) for corner in ("low", "high"))
     scale = None if record["scale"] is None else float(record["scale"])
     diagonals = tuple(float(value) for value in record["diagonals"])

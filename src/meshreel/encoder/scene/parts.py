@@ -37,7 +37,9 @@ from ..settings.options import SceneOptions
 
 PROBES = 12  # frames, at most, in which moving surface is measured (guess)
 LOST = 0.5  # share of a frame's faces that may stand still where no background was found (guess)
-SEEN_THROUGH = 2  # of the probed frames, in which a place must be free that something stands at for a while (guess)
+SEEN_THROUGH = (
+    2  # probed frames in which cameras must see through a place, if surface there is to count as moving (guess)
+)
 APART, LEAST_APART = 4.0, 0.03  # deviations, and m: what is farther from the room is not of it (guess)
 OUTLIER = 3.0  # times the segmentation's `noise`: still surface farther from the background is no noise (guess)
 TAIL = 4.0  # standard deviations, by the median, beyond which a distance is no noise (guess)
@@ -57,7 +59,7 @@ class Change:
 class Parts:
     """The parts of a scene, which all of its intervals share."""
 
-    seen: Survey  # of the scene; its unit is the diagonal of the largest body that moves, or its own where nothing does
+    survey: Survey  # its unit is the diagonal of the largest body that moves, or the scene's own where nothing does
     segmentation: Segmentation
     background: Mesh  # m, as in the first frame; empty where nothing stands still
     changes: list[Change]
@@ -85,13 +87,13 @@ class Parts:
 
 
 def take_apart(
-    sequence: CapturedSequence, seen: Survey, options: SceneOptions, stages: Stages, masker: Masker | None = None
+    sequence: CapturedSequence, survey: Survey, options: SceneOptions, stages: Stages, masker: Masker | None = None
 ) -> Parts:
     """Separate a scene into background and moving surface; by the masks of a masker where there is one.
 
     Raises InputError where frames are of different units, or of another than metres.
     """
-    check_one_unit(seen)
+    check_one_unit(survey)
     segmentation: Segmentation
     if masker is None:
         segmentation = segment(sequence, options.cameras, lambda share: stages.reach("segment", share))
@@ -105,8 +107,8 @@ def take_apart(
     changes = [_change(sequence, depth, segmentation, frame) for frame in segmentation.changes]
     stages.reach("background", 1.0)
     sizes, noise, deviation, astray = _measured(sequence, segmentation, background, changes, stages)
-    seen = replace(seen, scale=(float(np.median(sizes)) if sizes else 0.0) or seen.diagonal)
-    return Parts(seen, segmentation, background, changes, noise, deviation, astray, free_space(sequence))
+    survey = replace(survey, scale=(float(np.median(sizes)) if sizes else 0.0) or survey.diagonal)
+    return Parts(survey, segmentation, background, changes, noise, deviation, astray, free_space(sequence))
 
 
 def free_space(sequence: CapturedSequence) -> tuple[FreeSpace, ...]:
@@ -237,7 +239,7 @@ def _measured(
 
 
 _COLORS = ("depth", "hue", "limit")  # arrays of a ColorChange
-_ODD = (KeyError, ValueError, TypeError, IndexError, OSError, EOFError, zipfile.BadZipFile, zlib.error)
+_DAMAGED = (KeyError, ValueError, TypeError, IndexError, OSError, EOFError, zipfile.BadZipFile, zlib.error)
 
 
 def pack_parts(parts: Parts) -> bytes | None:
@@ -246,7 +248,7 @@ def pack_parts(parts: Parts) -> bytes | None:
     if not isinstance(by, ByPlace):
         return None
     arrays: dict[str, Any] = {
-        "numbers": [parts.seen.unit, parts.noise, parts.deviation, parts.astray, by.cell, by.lattice.size, by.island],
+        "numbers": [parts.survey.unit, parts.noise, parts.deviation, parts.astray, by.cell, by.lattice.size, by.island],
         "origin": by.lattice.origin,
         "keys": by.keys,
         "chosen": by.chosen,
@@ -265,7 +267,7 @@ def pack_parts(parts: Parts) -> bytes | None:
     return packed.getvalue()
 
 
-def unpack_parts(data: bytes, sequence: CapturedSequence, seen: Survey) -> Parts | None:
+def unpack_parts(data: bytes, sequence: CapturedSequence, survey: Survey) -> Parts | None:
     """Return the parts of a surveyed scene, or None where no encoder packed them."""
     try:
         with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
@@ -278,11 +280,11 @@ def unpack_parts(data: bytes, sequence: CapturedSequence, seen: Survey) -> Parts
                 Mesh(arrays[f"vertices {number}"], arrays[f"faces {number}"], arrays.get(f"colors {number}"))
                 for number in range(1 + len(frames))
             )
-    except _ODD:
+    except _DAMAGED:
         return None
     changes = [Change(frame, mesh) for frame, mesh in zip(frames, came, strict=True)]
-    seen = replace(seen, scale=unit)
-    return Parts(seen, by, background, changes, noise, deviation, astray, free_space(sequence))
+    survey = replace(survey, scale=unit)
+    return Parts(survey, by, background, changes, noise, deviation, astray, free_space(sequence))
 
 
 def _colors(arrays: Any, sequence: CapturedSequence) -> ColorChange | None:

@@ -71,20 +71,20 @@ def scene_intervals(job: Job, parts: Parts, tracks: Tracks) -> Iterator[Interval
     The moving surface of a key interval is assigned to tracks, and each track is cut where frames cannot share an
     interval: they can where all have a surface or none has, and where they are of about one scale.
     """
-    sequence, seen = job.sequence, parts.seen
-    depth, place = sequence.depth, Placement(seen.unit, tuple(seen.center))
+    sequence, survey = job.sequence, parts.survey
+    depth, place = sequence.depth, Placement(survey.unit, tuple(survey.center))
     sight = None if depth is None else Sight(depth, place)
     longest = job.recipe.longest(sequence.frame_rate)
-    noise = min(parts.noise / seen.unit, MOST_NOISE)  # of bodies: as noisy as the surface that stands still
+    noise = min(parts.noise / survey.unit, MOST_NOISE)  # of bodies: as noisy as the surface that stands still
     for frames in key_intervals(sequence, parts.segmentation, job.options):
         found = list[Interval]()
         for track, meshes in tracks.of([parts.moving(k, sequence[k]) for k in frames]):
-            normalised = [seen.normalise(mesh) for mesh in meshes]
-            for cut in _cut(normalised, frames, seen, longest):
+            normalised = [survey.normalise(mesh) for mesh in meshes]
+            for cut in _cut(normalised, frames, survey, longest):
                 some = normalised[cut.start : cut.stop]
                 one = Interval(some, noise, frames.start + cut.start, track, digest(some))
                 one = replace(one, up=sequence.up, frame_rate=sequence.frame_rate)
-                found.append(replace(one, views=Views.of(sequence, seen), sight=sight))
+                found.append(replace(one, views=Views.of(sequence, survey), sight=sight))
         weight = Fraction(len(frames), sum(len(interval.frames) for interval in found))
         yield from (replace(interval, weight=weight) for interval in found)
 
@@ -101,15 +101,15 @@ def key_intervals(sequence: MeshSequence, segmentation: Segmentation, options: E
         yield from (range(a, b) for a, b in pairwise(start + (stop - start) * k // pieces for k in range(pieces + 1)))
 
 
-def _cut(meshes: Sequence[Mesh], frames: range, seen: Survey, longest: int) -> list[range]:
+def _cut(meshes: Sequence[Mesh], frames: range, survey: Survey, longest: int) -> list[range]:
     """Cut a body's frames into intervals of at most `longest` frames.
 
     They are cut, too, where the scene begins or ends to have a surface: frames without are shown without background.
     """
-    cuts = [k for k in range(1, len(frames)) if seen.is_bare(frames[k]) != seen.is_bare(frames[k - 1])]
+    cuts = [k for k in range(1, len(frames)) if survey.is_bare(frames[k]) != survey.is_bare(frames[k - 1])]
     found = []
     for start, stop in pairwise([0, *cuts, len(frames)]):
-        sizes = replace(seen, diagonals=tuple(mesh.diagonal for mesh in meshes[start:stop]))
+        sizes = replace(survey, diagonals=tuple(mesh.diagonal for mesh in meshes[start:stop]))
         found += [range(start + some.start, start + some.stop) for some in sizes.intervals(longest)]
     return found
 

@@ -65,12 +65,12 @@ def encode_static(
     The first state is whole, as are those of a refresh; each change of the room is a patch of the state before, but for
     a background with pictures, whose atlas is of a whole state.
     """
-    seen = parts.seen
-    noise, place = max(parts.deviation / seen.unit, LEAST_NOISE), Placement(seen.unit, tuple(seen.center))
+    survey = parts.survey
+    noise, place = max(parts.deviation / survey.unit, LEAST_NOISE), Placement(survey.unit, tuple(survey.center))
     step, most = options.lattice * noise, options.coarse * noise
 
     def coded(mesh: Mesh) -> tuple[bytes, Mesh]:
-        return _coded(mesh.at((mesh.vertices - seen.center) / seen.unit), most, step)
+        return _coded(mesh.at((mesh.vertices - survey.center) / survey.unit), most, step)
 
     payload, state = coded(parts.background)
     found = [] if state.is_empty else [Static(0, payload, False)]
@@ -209,7 +209,7 @@ class _Looks:
     """Evidence of a scene's still surface from its frames, in normalised coordinates."""
 
     def __init__(self, sequence: CapturedSequence, parts: Parts) -> None:
-        self._sequence, self._parts, self._views = sequence, parts, Views.of(sequence, parts.seen)
+        self._sequence, self._parts, self._views = sequence, parts, Views.of(sequence, parts.survey)
         self.has_pictures = self._views is not None or sequence[0].texture is not None
         self.frame_rate = sequence.frame_rate
 
@@ -218,7 +218,7 @@ class _Looks:
     ) -> tuple[UInt8[np.ndarray, "N 3"], Bool[np.ndarray, " N"]]:
         """Return the usual colours of places over some frames, and which of them are known.
 
-        What some frame shows away from steps in depth is taken from such frames: at steps, who stands there shines in.
+        Prefer frames in which the point is away from a depth discontinuity; near one, foreground colour bleeds in.
         """
         some = [frames[number] for number in evenly(len(frames), STILL_FRAMES)]
         if self._views is None:
@@ -245,8 +245,8 @@ class _Looks:
     def _paint(self, number: int) -> Paint:
         if self._views is not None:
             return self._views.at(number)
-        seen = self._parts.seen
+        survey = self._parts.survey
         mesh = self._sequence[number]
         still = mesh.with_faces(~self._parts.segmentation.moving(number, mesh))
-        far = max(NEAR * self._parts.noise, LEAST_NEAR) / seen.unit
-        return Painted(still.at((still.vertices - seen.center) / seen.unit), far)
+        far = max(NEAR * self._parts.noise, LEAST_NEAR) / survey.unit
+        return Painted(still.at((still.vertices - survey.center) / survey.unit), far)

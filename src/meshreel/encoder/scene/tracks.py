@@ -47,15 +47,15 @@ class Body:
 Planned = list[tuple[range, list[Body]]]  # the key intervals of a sequence, each with its bodies
 
 
-def tracked_bodies(job: Job, seen: Survey) -> tuple[Planned, int]:
+def tracked_bodies(job: Job, survey: Survey) -> tuple[Planned, int]:
     """Return the key intervals with their bodies: one, in track 0, where the recipe codes none apart.
 
     Where some frames are chosen, these are the key intervals of the whole sequence as far as those frames go. Also
     return the number of tracks of the whole sequence.
     """
-    numbered = seen.intervals(job.recipe.longest(job.sequence.frame_rate))
+    numbered = survey.intervals(job.recipe.longest(job.sequence.frame_rate))
     if job.recipe.bodies_apart:
-        whole = list(zip(numbered, _tracked(seen, numbered), strict=True))
+        whole = list(zip(numbered, _tracked(survey, numbered), strict=True))
     else:
         whole = [(frames, [Body(0)]) for frames in numbered]
     tracks = 1 + max(body.track for _, bodies in whole for body in bodies)
@@ -70,32 +70,32 @@ def tracked_bodies(job: Job, seen: Survey) -> tuple[Planned, int]:
     return cut, tracks
 
 
-def intervals_of(job: Job, seen: Survey, planned: Planned) -> Iterator[Interval]:
+def intervals_of(job: Job, survey: Survey, planned: Planned) -> Iterator[Interval]:
     """Yield an interval for each body of each key interval, whose frames are read where it is encoded."""
-    views = Views.of(job.sequence, seen)
+    views = Views.of(job.sequence, survey)
     for frames, bodies in planned:
-        whole = NormalisedFrames(job.sequence, seen, frames)
+        whole = NormalisedFrames(job.sequence, survey, frames)
         interval = Interval(whole, first_frame=frames.start, up=job.sequence.up, views=views)
         for body in bodies:
             if not body.bodies:
                 yield interval
                 continue
-            some = BodyFrames(job.sequence, seen, frames, body.number, body.bodies)
-            larger = min(seen.diagonals[frames.start : frames.stop]) / min(body.diagonals)
+            some = BodyFrames(job.sequence, survey, frames, body.number, body.bodies)
+            larger = min(survey.diagonals[frames.start : frames.stop]) / min(body.diagonals)
             yield replace(interval, frames=some, track=body.track, weight=Fraction(1, len(bodies)), larger=larger)
 
 
-def encode_tracked(job: Job, seen: Survey) -> Iterator[list[TrackGroup]]:
+def encode_tracked(job: Job, survey: Survey) -> Iterator[list[TrackGroup]]:
     """Yield the groups of each key interval in the order of the file, whose first frame has number 0.
 
     All tracks have all frames, some of them empty. The PSNR of a group is that of its whole frames; its other measures
     are its body's own.
     """
-    (planned, count), first = tracked_bodies(job, seen), 0
-    coded = encode_intervals(job, intervals_of(job, seen, planned))
+    (planned, count), first = tracked_bodies(job, survey), 0
+    coded = encode_intervals(job, intervals_of(job, survey, planned))
     for frames, bodies in planned:
         found, groups = list[TrackGroup](), [next(coded) for _ in bodies]
-        psnrs = _psnrs(seen, frames, bodies, groups) if len(bodies) > 1 else None
+        psnrs = _psnrs(survey, frames, bodies, groups) if len(bodies) > 1 else None
         for body, some in zip(bodies, groups, strict=True):
             own = placed(body.track, first, some, body.share)
             found += own if psnrs is None else [_with_psnr(each, first, psnrs) for each in own]
@@ -120,25 +120,25 @@ def _with_psnr(each: TrackGroup, first: int, psnrs: Float64[np.ndarray, " T"]) -
 
 
 def _psnrs(
-    seen: Survey, frames: range, bodies: Sequence[Body], groups: Sequence[Sequence[EncodedGroup]]
+    survey: Survey, frames: range, bodies: Sequence[Body], groups: Sequence[Sequence[EncodedGroup]]
 ) -> Float64[np.ndarray, " T"]:
     """Return the d2_psnr_paper of frames from those of their bodies, dB, each relative to its own diagonal."""
     squares = np.zeros(len(frames))  # mean over the vertices, m^2
     for body, some in zip(bodies, groups, strict=True):
         of_peak = [rounded(10 ** (-group.fidelity.psnr / 10)) for group in some for _ in range(group.frame_count)]
         squares += body.share * np.array(of_peak) * np.square(body.diagonals)
-    peaks = seen.diagonals[frames.start : frames.stop]
+    peaks = survey.diagonals[frames.start : frames.stop]
     return np.array([min(psnr(*both), PSNR_CEILING) for both in zip(squares.tolist(), peaks, strict=True)])
 
 
-def _tracked(seen: Survey, numbered: Sequence[range]) -> Iterator[list[Body]]:
+def _tracked(survey: Survey, numbered: Sequence[range]) -> Iterator[list[Body]]:
     """Yield the bodies of each key interval, each in the track whose last surface was most like it.
 
     A body that is all of its frames is in track 0.
     """
     last = np.zeros((0, 6))  # the box of each track, where it had one last
     for frames in numbered:
-        pieces = seen.pieces[frames.start : frames.stop]
+        pieces = survey.pieces[frames.start : frames.stop]
         if (numbers := bodies_of(pieces)) is None:
             yield [Body(0)]
             continue

@@ -28,7 +28,7 @@ from typing import Annotated, ClassVar
 import numpy as np
 from jaxtyping import Bool, Float64, Int32, Int64
 
-from meshreel.analysis.survey import survey
+from meshreel.analysis.survey import survey_sequence
 from meshreel.coding.entropy import Neighbours, decode_weights, encode_weights
 from meshreel.errors import FormatError, InputError
 from meshreel.format.kinds import F64, Array, Blob, Bytes, Rest, Varint
@@ -99,19 +99,19 @@ class KltTsdfCodec(Options):
 
     def encode(self, sequence: MeshSequence, progress: Progress | None = None) -> bytes:
         """The stream. Raises InputError where frames take more blocks than memory is for."""
-        seen = survey(sequence)
-        voxel = seen.diagonal / self.cells
+        survey = survey_sequence(sequence)
+        voxel = survey.diagonal / self.cells
         symbols, energies = learned(self.basis)
         model = Model(basis_of(symbols), max(round(self.step * TRUNCATION * STEP_ONE), 1))
         groups = list[bytes]()
         for start in range(0, len(sequence), self.group):
             numbers = range(start, min(start + self.group, len(sequence)))
             meshes = (sequence[number] for number in numbers)
-            scaled = (Mesh.of((mesh.vertices - seen.low) / voxel, mesh.faces) for mesh in meshes)
+            scaled = (Mesh.of((mesh.vertices - survey.low) / voxel, mesh.faces) for mesh in meshes)
             groups.append(encode_group(scaled, model, energies))
             if progress is not None:
                 progress("code", numbers.stop, len(sequence))
-        low, table = tuple(map(float, seen.low)), encode_basis(symbols)
+        low, table = tuple(map(float, survey.low)), encode_basis(symbols)
         head = MAGIC, VERSION, len(sequence), self.group, self.basis, model.step
         data = pack(Stream(*head, deblocking=0, voxel=voxel, low=low, table=table, groups=join(groups)))
         return data + zlib.crc32(data).to_bytes(4, "little")

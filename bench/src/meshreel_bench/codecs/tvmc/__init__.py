@@ -22,7 +22,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float64
 
-from meshreel.analysis.survey import Survey, survey
+from meshreel.analysis.survey import Survey, survey_sequence
 from meshreel.coding.layers.patches import run_lengths
 from meshreel.coding.mesh import CodedReference
 from meshreel.encoder.group.forms import intra_only, target_of
@@ -96,13 +96,13 @@ class TvmcCodec(Prepared):
 
     def pack(self, tracking: Tracking) -> bytes:
         """Return the stream of tracked groups."""
-        seen, step = tracking.seen, self.step(tracking)
-        bare = np.array([seen.is_bare(frame) for frame in range(len(seen.diagonals))])
+        survey, step = tracking.survey, self.step(tracking)
+        bare = np.array([survey.is_bare(frame) for frame in range(len(survey.diagonals))])
         runs = tuple(run_lengths(bare).tolist()) if tracking.states and bare.any() else ()
         states = tuple(State(state.frame, state.payload) for state in tracking.states)
         groups = tuple(each.coded(step) if isinstance(each, Tracked) else each for each in tracking.groups)
-        origin = tuple(map(float, seen.center))
-        return pack_stream(Stream(MAGIC, VERSION, len(bare), origin, seen.unit, step, runs, states, groups))
+        origin = tuple(map(float, survey.center))
+        return pack_stream(Stream(MAGIC, VERSION, len(bare), origin, survey.unit, step, runs, states, groups))
 
     def step(self, tracking: Tracking) -> float:
         """Return the step of displacements, normalised; one for all groups, so that still vertices stay."""
@@ -136,7 +136,7 @@ class Tracked:
 class Tracking:
     """A tracked sequence."""
 
-    seen: Survey
+    survey: Survey
     states: list[Static]  # of the background; empty: everything may move
     groups: list[Tracked | Group]  # of frames with surface, in the order of their first frames; others as Draco
 
@@ -148,10 +148,10 @@ def track_sequence(encoder: Encoder, options: EncoderOptions) -> Tracking:
     for interval in encoder.intervals(options):
         if not interval.frames[0].is_empty:
             groups += _groups(interval, encoder.find(interval, options.method, None), options.method)
-    seen, states = survey(sequence) if parts is None else parts.seen, list[Static]()
+    survey, states = survey_sequence(sequence) if parts is None else parts.survey, list[Static]()
     if parts is not None and options.scene is not None:
         states = encode_static(parts, len(sequence), sequence.frame_rate, options.scene)
-    return Tracking(seen, states, sorted(groups, key=lambda group: group.first_frame))
+    return Tracking(survey, states, sorted(groups, key=lambda group: group.first_frame))
 
 
 def _groups(interval: Interval, found: Sequence[FoundGroup], options: PaperOptions) -> Iterator[Tracked | Group]:
