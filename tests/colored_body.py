@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from meshreel.encoder.sequence import Encoder
-from meshreel.encoder.settings.options import appearance_options
+from meshreel.encoder.settings.settings import Settings
 from meshreel.geometry.derived_sequences import welded
 from meshreel.types import Mesh, MeshList, Texture
 from tests.kept import kept
@@ -34,7 +34,7 @@ def textured(mesh: Mesh) -> Mesh:
 
 def written(meshes: list[Mesh], color: str = "auto", compatible: bool = False, **others: object) -> Path:
     """The path of their file, which is written once and never changed."""
-    appearance = appearance_options(50.0, color, compatible=compatible)
+    appearance = Settings(color=color, compatible=compatible).resolved().appearance
     options = replace(quick(**others), appearance=appearance, scene=None)  # type: ignore[arg-type]
 
     def write(path: Path) -> None:

@@ -180,7 +180,7 @@ def test_a_file_has_no_more_frames_than_its_bytes_may(tmp_path: Path):
 
 def test_a_group_that_readers_would_refuse_is_coded_as_shorter_ones(monkeypatch: pytest.MonkeyPatch):
     frames = [Mesh(points, ball(1).base.faces) for points in moving(ball(1), 2)]
-    options = replace(layers_options(50), tails=False)
+    options = replace(layers_options(50, "normal"), tails=False)
     [whole] = LayersRecipe(options).encode(Interval(frames))
     assert whole.form == Form.LAYERS
     head = read_layers(whole.payload).head

@@ -18,7 +18,7 @@ from threadpoolctl import threadpool_info
 import meshreel
 from meshreel.encoder.group.digests import line_of, listener, note, noted
 from meshreel.encoder.sequence import Encoder
-from meshreel.encoder.settings.options import appearance_options
+from meshreel.encoder.settings.settings import Settings
 from meshreel.format.layout import ChunkKind
 from meshreel.geometry.topology import concatenate
 from meshreel.types import Mesh, MeshList, Texture
@@ -53,7 +53,7 @@ def encode_all(jobs: int) -> str:
     with workers(jobs) as executor:
         for name, (frames, preset) in SEQUENCES.items():
             options = with_method(quick(preset, key_interval=0.4 if preset == "best" else None), group_size=2)
-            options = replace(options, appearance=appearance_options(50.0, texture=128, compatible=True))
+            options = replace(options, appearance=Settings(texture=128, compatible=True).resolved().appearance)
             path = Path(f"repeatable {os.getpid()}.reel")
             Encoder(MeshList(tuple(frames), 10.0), executor, digests=found.append).encode(path, options)
             with meshreel.open(path) as video:

@@ -14,7 +14,8 @@ from ..capture.simulated.simulated_rig import TRUTH, read_truth
 from ..decoder.describe import describe_file
 from ..decoder.video import open as open_video
 from ..encoder.sequence import encode
-from ..encoder.settings.settings import QUALITY, Settings
+from ..encoder.settings.options import QUALITY
+from ..encoder.settings.settings import Settings
 from ..errors import InputError
 from ..metrics.error_sheet import SheetOptions, write_sheet
 from .compare import OF_BOTH, against_truth, both_table

@@ -16,12 +16,11 @@ from ..encoder.file.summary import SceneSummary, Summary, warnings_of
 from ..encoder.group.digests import WriteLines, machine_line
 from ..encoder.rate_control import Goal, encode_to
 from ..encoder.run.surveying import Excerpt, read_survey
-from ..encoder.scene.static import is_colored
 from ..encoder.sequence import Encoder
-from ..encoder.settings.options import EncoderOptions, as_installed
-from ..encoder.settings.settings import QUALITY, Settings
+from ..encoder.settings.options import QUALITY, EncoderOptions, as_installed
+from ..encoder.settings.settings import Settings
 from ..errors import InputError
-from ..geometry.derived_sequences import upright
+from ..geometry.derived_sequences import is_colored, upright
 from ..io.files import Place, located, uploaded
 from ..io.sequence import SequenceOptions
 from ..io.write import check_apart, replacing

@@ -10,7 +10,6 @@ import warnings
 from collections.abc import Iterable, Iterator
 from concurrent.futures import Executor
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import BinaryIO
 
@@ -26,10 +25,11 @@ from ..edit.audio import Given, packed_audio
 from ..edit.metadata import shortened, up_metadata
 from ..errors import InputError
 from ..format.layout import Form
-from ..geometry.derived_sequences import captured, unchanging, welded
+from ..geometry.derived_sequences import captured, is_colored, unchanging, welded
 from ..geometry.work import since, so_far
 from ..io.files import Place
 from ..types import MeshSequence, evenly
+from .appearance.videos import TextureSize
 from .file.summary import (
     GroupSummary,
     SceneSummary,
@@ -53,10 +53,10 @@ from .run.schedule import Job
 from .run.surveying import Excerpt, facts_of, survey_from_facts, survey_job, write_survey
 from .scene.parts import Parts, pack_parts, take_apart, unpack_parts
 from .scene.scene import Tracks, encode_bodies, scene_intervals
-from .scene.static import colored_states, is_colored
+from .scene.static import colored_states
 from .scene.tracks import encode_tracked, intervals_of, tracked_bodies
 from .settings.options import EncoderOptions, as_installed
-from .settings.settings import Color, Effort, Preset, Settings, TextureSize
+from .settings.settings import Color, Effort, Preset, Settings
 
 MEASURED = 4  # frames of a scene that are compared with the decoded ones (guess)
 
@@ -120,9 +120,8 @@ def encode(
     )
     if options is not None and settings != Settings():
         raise InputError("options and settings: leave the settings out, or give Settings(...) as options")
-    heard = b"" if audio is None else packed_audio(audio, audio_start)
     encoder = Encoder(welded(as_sequence(sequence)), executor, progress)
-    encoder.audio = heard
+    encoder.audio = b"" if audio is None else packed_audio(audio, audio_start)
     chosen = options or settings
     summary = encoder.encode(path, chosen.resolved() if isinstance(chosen, Settings) else chosen, resume)
     for text in summary.warnings:
@@ -194,12 +193,11 @@ class Encoder:
         scene = pack_parts(parts) if lasts and parts is not None and files.scene is None else None
         encode = files.begin(made, facts_of(self.sequence, survey) if lasts else {}, scene)
         job = replace(job, files=files, head=make_header(self.sequence.frame_rate, survey, {"encode": encode}))
-        name = str(files.output)
-        encoded = partial(_encode_tracked, survey=survey) if parts is None else partial(_encode_scene, parts=parts)
+        writer = ReelWriter(file, make_header(self.sequence.frame_rate, survey, {}), str(files.output), self.audio)
         with noted(self.digests):
-            summary = encoded(job, file, name, audio=self.audio)
+            summary = _encode_tracked(job, writer, survey) if parts is None else _encode_scene(job, file, writer, parts)
         texts = summary.warnings + (lacking if any(group.colors for group in summary.groups) else ())
-        return replace(summary, work=since(before), warnings=texts, continued=files.continued)
+        return replace(summary, work=since(before), warnings=texts, continued=files.continued, audio=len(self.audio))
 
     def survey(self, path: Path) -> Survey:
         """Survey the sequence, and write a file of it for encodes of its parts."""
@@ -246,23 +244,23 @@ class Encoder:
         return self._scene[2]
 
 
-def _encode_tracked(job: Job, file: BinaryIO, name: str, survey: Survey, audio: bytes) -> Summary:
-    """Encode a sequence in which everything may move; errors call the output `name`."""
+def _encode_tracked(job: Job, writer: ReelWriter, survey: Survey) -> Summary:
+    """Encode a sequence in which everything may move."""
     sequence, options = job.sequence, job.options
     groups: list[GroupSummary] = []
     note("survey", survey.low, survey.high, survey.diagonals, survey.dropped, survey.pieces)
-    with ReelWriter(file, make_header(sequence.frame_rate, survey, {}), name, audio) as writer:
+    with writer:
         for encoded in encode_tracked(job, survey):
             groups += [write_tracked(writer, each, [], survey.diagonal) for each in encoded]
         part = None if job.chosen is None else (job.chosen.start, len(sequence))
         metadata = metadata_of(options, groups, sequence.up, part)
         writer.header = make_header(sequence.frame_rate, survey, metadata)
     texts = warnings_of(survey) if job.chosen is None else ()  # the survey told of them
-    return Summary(writer.size, tuple(groups), (*texts, *warnings_of_colors(groups)), audio=len(audio))
+    return Summary(writer.size, tuple(groups), (*texts, *warnings_of_colors(groups)))
 
 
-def _encode_scene(job: Job, file: BinaryIO, name: str, parts: Parts, audio: bytes) -> Summary:
-    """Encode a scene with a background; errors call the output `name`."""
+def _encode_scene(job: Job, file: BinaryIO, writer: ReelWriter, parts: Parts) -> Summary:
+    """Encode a scene with a background into the file of a writer."""
     sequence, options, survey = job.sequence, job.options, parts.survey
     note("survey", survey.low, survey.high, survey.diagonals, survey.unit)
     note("background and noise", parts.background.vertices, parts.background.faces, parts.noise, parts.deviation)
@@ -270,7 +268,7 @@ def _encode_scene(job: Job, file: BinaryIO, name: str, parts: Parts, audio: byte
     states = colored_states(sequence, parts, job.scene, options.appearance)
     job.stages.reach("room", 1.0)
     note("background, coded", *(state.payload for state in states))
-    with ReelWriter(file, make_header(sequence.frame_rate, survey, {}), name, audio) as writer:
+    with writer:
         coded = encode_bodies(job, parts)
         groups = write_in_order(writer, coded.groups, states, survey)
         metadata = {**chosen_options(options, groups), "noise_m": shortened(parts.noise), **up_metadata(sequence.up)}
@@ -282,4 +280,4 @@ def _encode_scene(job: Job, file: BinaryIO, name: str, parts: Parts, audio: byte
     scene = SceneSummary(size, faces, parts.noise, psnr, tuple(measured), tracks)
     moves = any(group.form != Form.EMPTY for group in groups)
     texts = (*warnings_of(survey), *warnings_of_scene(parts, moves, coded.dropped), *warnings_of_colors(groups, states))
-    return Summary(writer.size, tuple(groups), texts, scene, audio=len(audio))
+    return Summary(writer.size, tuple(groups), texts, scene)

@@ -19,7 +19,7 @@ import numpy as np
 from jaxtyping import Bool
 
 from ..errors import InputError
-from ..types import Mesh, MeshSequence, Up, check_up
+from ..types import Mesh, MeshSequence, Up, check_up, evenly
 from . import work
 from .color_views import ColorFrames
 from .depth import DepthFrames
@@ -215,6 +215,11 @@ class DerivedSequence(MeshSequence):
             memory.check(number, digest([mesh]), self.name(number))
             memory.keep(number, mesh)
         return mesh
+
+
+def is_colored(source: MeshSequence) -> bool:
+    """Return whether some frames of a sequence have colours."""
+    return any(source[number].is_colored for number in evenly(len(source), 3))
 
 
 def unchanging(source: MeshSequence) -> DerivedSequence:

@@ -61,7 +61,7 @@ def test_two_balls_that_touch_in_some_frames_are_separate_and_whole_in_the_refer
 
 def test_the_pose_of_mds_is_taken_where_it_is_asked_for(trials: list[Trial]) -> None:
     frames, centers = two_balls((0.2, 0.2, 0.25, 0.32))
-    reference = extract_reference(frames, centers, QUICK, canonical=True)
+    reference = extract_reference(frames, centers, QUICK, "mds")
     assert reference.frame == MDS and {trial.frame for trial in trials} == {MDS}
     assert parts(reference.mesh) == 2
 

@@ -15,7 +15,7 @@ from meshreel.container.writer import Companion, ReelWriter
 from meshreel.edit.edits import concat
 from meshreel.encoder.run.surveying import Excerpt, read_survey
 from meshreel.encoder.sequence import Encoder
-from meshreel.encoder.settings.options import appearance_options, as_installed
+from meshreel.encoder.settings.options import as_installed
 from meshreel.encoder.settings.settings import Settings
 from meshreel.errors import FormatError, InputError
 from meshreel.format import budget
@@ -93,7 +93,7 @@ def test_a_texture_that_cannot_be_read_ends_the_encoding_with_its_name(tmp_path:
         write_mesh(textured(mesh), tmp_path / f"frame_{number}.obj")
     whole = (tmp_path / "frame_1.png").read_bytes()
     (tmp_path / "frame_1.png").write_bytes(whole[: len(whole) // 2])
-    options = replace(quick(), appearance=appearance_options(50.0, "auto"))
+    options = replace(quick(), appearance=Settings().resolved().appearance)
     with pytest.raises(InputError, match=r"frame_1.png: cannot be read .*write it again, or encode with --color none"):
         Encoder(open_sequence(tmp_path)).encode(tmp_path / "a.reel", replace(options, scene=None))
     assert not (tmp_path / "a.reel").exists()
@@ -220,7 +220,7 @@ def test_light_that_moves_over_a_room_is_in_its_slow_video(tmp_path: Path, monke
     monkeypatch.setattr("meshreel.decoder.pictures.LAYER_PICTURES", 2)
     lights = np.linspace(0.6, 1, 10)
     frames = [lit(mesh, light) for mesh, light in zip(scene(10, moving=True), lights, strict=True)]
-    options = replace(quick(), appearance=appearance_options(50.0, "texture", 128))
+    options = replace(quick(), appearance=Settings(color="texture", texture=128).resolved().appearance)
     Encoder(welded(MeshList(tuple(frames), 16.0))).encode(tmp_path / "scene.reel", options)
     with meshreel.open(tmp_path / "scene.reel") as video:
         [pictures] = [c for c in video.reader.chunks if c.kind == ChunkKind.PICTURES and c.frame_count == 0]
@@ -237,7 +237,7 @@ def test_light_that_moves_over_a_room_is_in_its_slow_video(tmp_path: Path, monke
 def test_parts_of_a_sequence_are_joined_with_their_colors(tmp_path: Path) -> None:
     for number, mesh in enumerate(COLORED):
         write_mesh(mesh, tmp_path / f"frame_{number}.ply")
-    options = replace(quick(key_interval=0.1), appearance=appearance_options(), scene=None)
+    options = replace(quick(key_interval=0.1), appearance=Settings().resolved().appearance, scene=None)
     encoder = Encoder(welded(open_sequence(tmp_path)))
     encoder.encode(tmp_path / "whole.reel", options)
     encoder.survey(tmp_path / "survey.json")

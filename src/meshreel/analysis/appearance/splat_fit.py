@@ -46,6 +46,7 @@ AWAY = 1.6  # sizes of the mesh between its middle and a camera (guess)
 BORDER = 3  # pixels beside the mesh
 FINER = 2  # rays a pixel, along both sides
 HIDDEN = 0.01  # of the distance: surface that is nearer by more hides the mesh (guess)
+Contribution = Float64[np.ndarray, " N"]  # of each splat to the pictures
 Colors = Callable[[Hit, Float64[np.ndarray, "N 3"]], Float64[np.ndarray, "N 3"]]  # of hits at positions
 
 
@@ -65,9 +66,7 @@ class SplatFrame:
     views: tuple[SplatView, ...]
 
 
-def fit_splats(
-    frames: Sequence[SplatFrame], count: int, steps: int = STEPS, progress: Callable[[int], None] | None = None
-) -> tuple[Splats, Float64[np.ndarray, " N"]]:
+def fit_splats(frames: Sequence[SplatFrame], count: int, steps: int = STEPS) -> tuple[Splats, Contribution]:
     """Return `count` splats fitted to pictures of all frames in `steps` steps, and the contribution of each to these.
 
     Raises InputError if no camera sees the surface, and without torch.
@@ -81,15 +80,12 @@ def fit_splats(
     try:
         fit = _Fit(torch, frames, count)
         random = np.random.default_rng(SEED)
-        every = max(steps * 6 // 10 // (MOVES + 1), 1)
-        queue = list[int]()
+        every, queue = max(steps * 6 // 10 // (MOVES + 1), 1), list[int]()
         for step in range(steps):
             queue = queue or random.permutation(len(pictures)).tolist()
             fit.step(*pictures[queue.pop()], step / steps)
             if (step + 1) % every == 0 and (step + 1) // every <= MOVES:
                 fit.move(random)
-            if progress is not None:
-                progress(step + 1)
         return fit.result()
     finally:
         torch.set_num_threads(threads)
@@ -159,7 +155,7 @@ class _Fit:
                 self._own["scales"][halves] -= np.log(1.3)
         self.added[:], self._errors[:] = 0, 0
 
-    def result(self) -> tuple[Splats, Float64[np.ndarray, " N"]]:
+    def result(self) -> tuple[Splats, Contribution]:
         """Return the splats, and the contribution of each to the pictures since the last move."""
         arrays = {name: values.detach().numpy().astype(np.float64) for name, values in self._own.items()}
         scales, turns = np.exp(arrays["scales"]), arrays["turns"]

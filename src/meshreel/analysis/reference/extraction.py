@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from jaxtyping import Bool, Float64, Int64
@@ -59,6 +60,7 @@ CANONICAL_GAIN = 0.85  # the MDS pose must leave at most this share of the best 
 TRIAL_FRAMES = 4  # frames to which a trial is fitted (guess)
 TRIAL_VOXEL = 1.0  # of a trial, in mean edges of the frames' meshes (guess)
 TRIAL_VERTICES = 2000  # vertices of a trial's mesh, at most (guess)
+PoseChoice = Literal["fit", "mds"]  # the pose that fits best (decision 6); that of eq. 5
 Edges = tuple[Int64[np.ndarray, "E 2"], Int64[np.ndarray, "F 3"]]  # result of geometry.topology.unique_edges
 VOXEL = 0.5  # mean edges of the frames' meshes, of the grid on which surfaces are joined (guess)
 COVER = 0.3  # a frame adds surface where earlier ones have less than this share of its own (guess)
@@ -98,12 +100,12 @@ class Reference:
 
 
 def extract_reference(
-    frames: Sequence[Mesh], centers: Centers, options: ReferenceOptions, canonical: bool = False, again: bool = False
+    frames: Sequence[Mesh], centers: Centers, options: ReferenceOptions, pose: PoseChoice = "fit", again: bool = False
 ) -> Reference:
-    """Extract the reference of a group in the pose that fits best; its mesh is empty if all frames are.
+    """Extract the reference of a group in the chosen pose; its mesh is empty if all frames are.
 
-    If `canonical`, the pose is that of eq. 5; which frame's surface comes first is still chosen by the fit. Fewer
-    poses are tried `again`, of a part of a group that was tried as a whole.
+    Which frame's surface comes first is chosen by the fit in any pose. Fewer poses are tried `again`, of a part of a
+    group that was tried as a whole.
     """
     assert len(frames) == len(centers), "one pose of the centers for each frame"
     distances = largest_distances(centers)
@@ -112,7 +114,7 @@ def extract_reference(
     if not full:
         return Reference(Mesh.empty(), centers.positions[0], 0, 0, kin)
     group = Group([frames[t] for t in full], centers.positions[full], distances, kin, options.poisson)
-    best = min(_trials(group, options, canonical, again), key=_misfit)
+    best = min(_trials(group, options, pose, again), key=_misfit)
     mesh = group.fused(group.pose(best.frame), best.key, VOXEL, options.vertices)
     frame = MDS if best.frame == MDS else full[best.frame]
     return Reference(mesh, group.pose(best.frame), frame, full[best.key], kin)
@@ -123,14 +125,14 @@ def predict(reference: Reference, mesh: Mesh, centers: Centers) -> Float64[np.nd
     return moved_to(mesh, reference.pose, centers.positions, reference.neighbours)
 
 
-def _trials(group: Group, options: ReferenceOptions, alone: bool, again: bool) -> list[Trial]:
+def _trials(group: Group, options: ReferenceOptions, pose: PoseChoice, again: bool) -> list[Trial]:
     """Try the poses of some key frames, each with its own surface first, then the MDS pose with the best of these.
 
-    If `alone`, only the MDS pose is tried, with the surface of each of them first.
+    With `mds`, only that pose is tried, with the surface of each of them first.
     """
     count = min(max(1, KEYS - again), len(group.frames))
     keys = sorted({int(key) for key in (np.arange(count) + 0.5) * len(group.frames) / count})
-    if alone:
+    if pose == "mds":
         return [_trial(group, MDS, key, options) for key in keys]
     trials = [_trial(group, key, key, options) for key in keys]
     if len(group.frames) > 1:

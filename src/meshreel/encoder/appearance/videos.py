@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import accumulate
+from typing import Literal, get_args
 
 import numpy as np
 from jaxtyping import UInt8
@@ -18,7 +19,8 @@ from ...errors import InputError
 from ...format.layout import LAYER_PICTURES, ChunkKind, VideoCodec
 from ...geometry.atlas import Layout
 
-TEXTURE_SIZES = (128, 256, 512, 1024, 2048)
+TextureSize = Literal[128, 256, 512, 1024, 2048]  # texels
+TEXTURE_SIZES: tuple[int, ...] = get_args(TextureSize)
 MOST_SPLATS = 1 << 20  # of a chain (guess)
 
 

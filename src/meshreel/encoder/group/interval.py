@@ -113,6 +113,11 @@ class BodyFrames(NormalisedFrames):
         return self._survey.normalise(part_of(mesh, np.array(bodies)[pieces] == self._body))
 
 
+def frames_in(key_interval: float, frame_rate: float) -> int:
+    """Return the largest number of frames in a key interval, s."""
+    return max(1, round(key_interval * frame_rate))
+
+
 def check_group_size(size: int) -> None:
     """Raise InputError for a group that may hold no frame, or more than `MOST_FRAMES`."""
     if not 1 <= size <= MOST_FRAMES:

@@ -21,15 +21,15 @@ from ...coding.layers.coder import layers_bytes_by_purpose
 from ...format.layout import Form
 from ..group.digests import note
 from ..group.forms import EncodedGroup, empty_groups, most_for, target_of
-from ..group.interval import Interval
+from ..group.interval import Interval, frames_in
 from ..group.progress import Stages
 from .candidates import Ahead, Candidate, Followed
 from .group_coder import GroupCoder
 from .options import LayersOptions
+from .tails import EXCHANGE
 
 GOOD = 1.4  # targets: a template with a larger residual is replaced, even where the body stands still (guess)
 STILL = 1.1  # times its usual residual that a template may leave without a new fit (guess)
-BY_RATE = 1.33  # the squared error falls with this power of the rate: 4 dB a doubling (decision 13)
 ANGLE_BY_RATE = 0.36  # the normal error falls with this power of the rate (measured on four bodies: decision 24)
 PATCHED = 0.5  # share of the bytes of a predicted group from which on a template of its own is tried (guess)
 LEAST = 1e-30  # error: its logarithm is finite
@@ -49,7 +49,7 @@ class LayersRecipe:
 
     def longest(self, frame_rate: float) -> int:
         """Return the number of frames in a key interval."""
-        return max(1, round(self.key_interval * frame_rate))
+        return frames_in(self.key_interval, frame_rate)
 
     def encode(self, interval: Interval, stages: Stages | None = None) -> Iterator[EncodedGroup]:
         """Yield the groups of an interval; only the frames of one plan are in memory at a time."""
@@ -69,7 +69,7 @@ class _Planner:
         self._colored = recipe.colored
         self._target = recipe.options.target.scaled(interval.larger)
         # A frame in the `draco` form has no pictures, and codes noise.
-        self._tries_draco = recipe.options.floor and not (interval.noise or interval.pictured)
+        self._draco = recipe.options.floor and not (interval.noise or interval.pictured)
         self._surfaces = dict[int, FrameSurface]()
         self._candidates, self._tried = list[Candidate](), set[int]()  # of key frames; their numbers
         self._before: Followed | None = None
@@ -193,9 +193,7 @@ class _Planner:
         return replace(group, key=key), candidate.followed(ahead, state, positions[len(numbers) - 1], numbers)
 
     def _coder(self, ahead: Ahead, some: slice) -> GroupCoder:
-        return GroupCoder(
-            ahead.surfaces[some], ahead.target, ahead.noise, self._options, self._tries_draco, self._dearer
-        )
+        return GroupCoder(ahead.surfaces[some], ahead.target, ahead.noise, self._options, self._draco, self._dearer)
 
 
 def _is_patched(group: EncodedGroup) -> bool:
@@ -224,6 +222,6 @@ def _cost(coded: Sequence[Coded], frames: int, noisy: bool) -> float:
         return math.inf
     squared = sum(group.frame_count * group.fidelity.distance**2 for group in groups) / frames
     angle = sum(group.frame_count * group.fidelity.angle for group in groups) / frames
-    by_distance = math.log(max(squared, LEAST)) / BY_RATE
+    by_distance = math.log(max(squared, LEAST)) / EXCHANGE
     by_angle = by_distance if noisy else math.log(max(angle, LEAST)) / ANGLE_BY_RATE
     return math.log(sum(len(group.payload) for group in groups)) + (by_distance + by_angle) / 2

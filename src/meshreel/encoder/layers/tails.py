@@ -35,7 +35,7 @@ NOISY_REST = 1.0  # RMS noise that the rest of a noisy body may be off (guess)
 THRESHOLDS = (4.0, 6.0, 9.0)  # distances of the tails, in RMS distances of the rest (guess)
 SHARES = (0.1, 0.25, 0.5)  # of a patch's vertices that are kept (guess)
 LATTICE = 2.0  # spacing of the patches' lattice, in RMS distances of the rest (guess)
-EXCHANGE = 1.33  # relative fall of the squared error for a rise of the rate: 4 dB a doubling (decision 13)
+EXCHANGE = 1.33  # power of the rate with which the squared error falls: 4 dB a doubling (decision 13)
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,7 +19,7 @@ from jaxtyping import Float64
 from ... import _core
 from ...analysis.fit.surface_fit import FitOptions, Guides, fit_frames, snap_to_vertices
 from ...analysis.plan import cut_at
-from ...analysis.reference.extraction import MDS, ReferenceOptions, extract_reference, predict
+from ...analysis.reference.extraction import MDS, PoseChoice, ReferenceOptions, extract_reference, predict
 from ...analysis.reference.track import TrackOptions, track_centers
 from ...coding.mesh import CodedReference, code_reference
 from ...coding.paper.displacements import DisplacementOptions, encode_laplacian
@@ -57,7 +57,7 @@ class PaperOptions:
     words, or does as they say (preset `paper-literal`).
     """
 
-    pose: Literal["fit", "mds"] = "fit"  # of the reference: whichever fits best (decision 6); that of eq. 5
+    pose: PoseChoice = "fit"  # of the reference
     fit: Literal["surface", "nearest"] = "surface"  # of the reference: to the surface; to the frames' nearest vertices
     cuts: bool = True  # groups in two where a reference does not follow, then Draco; False: one group always
 
@@ -148,7 +148,7 @@ def analyze(
     Fewer poses are tried `again`, of a part of frames that were one group. Raises NoReferenceError where no surface can
     be made of the frames.
     """
-    reference = extract_reference(frames, centers, options.reference, options.pose == "mds", again)
+    reference = extract_reference(frames, centers, options.reference, options.pose, again)
     if reference.mesh.is_empty:
         raise NoReferenceError("no surface is common to the frames")
     stages.add("reference", len(frames))

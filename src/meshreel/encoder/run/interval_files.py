@@ -133,7 +133,7 @@ class IntervalFiles:
                 reader = ReelReader(source)
                 for chunk in reader.chunks:
                     reader.read_chunk(chunk.number)  # checks its sums
-                groups, before = _groups(self.path / name, reader), reader.metadata["interval"]
+                groups, before = unpack_interval(self.path / name, reader), reader.metadata["interval"]
                 is_ours = reader.metadata["encode"] == json.loads(head.metadata)["encode"]
         except (FormatError, InputError, OSError, KeyError, TypeError, ValueError, AttributeError):
             is_ours = False
@@ -152,7 +152,7 @@ class IntervalFiles:
         name = _name(interval)
         place = self._write(name, data)
         self._done.add(name)
-        return _groups(place, ReelReader(BytesSource(data)))
+        return unpack_interval(place, ReelReader(BytesSource(data)))
 
     def _claimed(self) -> BinaryIO:
         """Make the folder where it is missing, and lock it."""
@@ -291,6 +291,34 @@ def pack_interval(interval: Interval, groups: Sequence[EncodedGroup], head: Head
     return file.getvalue()
 
 
+def unpack_interval(path: Path, reader: ReelReader) -> list[EncodedGroup]:
+    """Return the groups of an interval's file. Raises KeyError, TypeError or ValueError where no encoder wrote it."""
+    found = list[EncodedGroup]()
+    facts = reader.metadata["groups"] or json.loads(reader.read_chunk(len(reader.chunks) - 1)[1:])
+    for chunk, (*values, key, canonical, lost_colors) in zip(reader.groups, facts, strict=True):
+        fidelity = Fidelity(*(math.inf if value is None else float(value) for value in values))
+        own = (one for one in reader.chunks if one.kind in COMPANIONS and one.depends_on[0] == chunk.number)
+        group = EncodedGroup(
+            Form(chunk.form),
+            chunk.frame_count,
+            b"",
+            _ends(chunk),
+            fidelity,
+            bool(chunk.depends_on),
+            None if key is None else int(key),
+            Stored(path, chunk.offset, chunk.size),
+            canonical=bool(canonical),
+            companions=tuple(Companion(ChunkKind(c.kind), Stored(path, c.offset, c.size), _ends(c)) for c in own),
+            lost_colors=bool(lost_colors),
+        )
+        found.append(group)
+    return found
+
+
+def _ends(chunk: Chunk) -> tuple[int, ...]:
+    return tuple(accumulate(layer.size for layer in chunk.layers))
+
+
 def write_group(
     writer: ReelWriter, first_frame: int, group: EncodedGroup, track: int = 0, static: Sequence[int] = ()
 ) -> int:
@@ -332,34 +360,6 @@ def named(interval: Interval) -> str:
 def _name(interval: Interval) -> str:
     """Return the name of the file of an interval."""
     return f"{interval.first_frame:08}-{interval.track:03}.reel"
-
-
-def _groups(path: Path, reader: ReelReader) -> list[EncodedGroup]:
-    """Return the groups of an interval's file. Raises KeyError, TypeError or ValueError where no encoder wrote it."""
-    found = list[EncodedGroup]()
-    facts = reader.metadata["groups"] or json.loads(reader.read_chunk(len(reader.chunks) - 1)[1:])
-    for chunk, (*values, key, canonical, lost_colors) in zip(reader.groups, facts, strict=True):
-        fidelity = Fidelity(*(math.inf if value is None else float(value) for value in values))
-        own = (one for one in reader.chunks if one.kind in COMPANIONS and one.depends_on[0] == chunk.number)
-        group = EncodedGroup(
-            Form(chunk.form),
-            chunk.frame_count,
-            b"",
-            _ends(chunk),
-            fidelity,
-            bool(chunk.depends_on),
-            None if key is None else int(key),
-            Stored(path, chunk.offset, chunk.size),
-            canonical=bool(canonical),
-            companions=tuple(Companion(ChunkKind(c.kind), Stored(path, c.offset, c.size), _ends(c)) for c in own),
-            lost_colors=bool(lost_colors),
-        )
-        found.append(group)
-    return found
-
-
-def _ends(chunk: Chunk) -> tuple[int, ...]:
-    return tuple(accumulate(layer.size for layer in chunk.layers))
 
 
 def _plain(made: dict[str, Any]) -> dict[str, Any]:

@@ -55,8 +55,7 @@ def _survey_in_worker(sequence: DerivedSequence, numbers: range, cleaned: bool) 
     end_with_parent()
     with threadpool_limits(1):
         before = so_far()
-        survey = survey_frames(sequence, numbers, cleaned=cleaned)
-        return survey, sequence.observed, since(before)
+        return survey_frames(sequence, numbers, cleaned=cleaned), sequence.observed, since(before)
 
 
 def survey_from_facts(sequence: DerivedSequence, whole: dict[str, Any]) -> Survey | None:

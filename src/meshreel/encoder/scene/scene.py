@@ -27,7 +27,7 @@ from ...geometry.derived_sequences import digest
 from ...geometry.topology import part_of
 from ...types import Mesh, MeshSequence, Placement
 from ..group.forms import empty_groups
-from ..group.interval import Interval, Sight, Views
+from ..group.interval import Interval, Sight, Views, frames_in
 from ..run.schedule import Job, encode_intervals
 from ..settings.options import EncoderOptions
 from .parts import Parts
@@ -92,7 +92,7 @@ def scene_intervals(job: Job, parts: Parts, tracks: Tracks) -> Iterator[Interval
 def key_intervals(sequence: MeshSequence, segmentation: Segmentation, options: EncoderOptions) -> Iterator[range]:
     """Yield the key intervals of a scene, of even lengths, cut also where the background changes or is sent again."""
     count, frame_rate = len(sequence), sequence.frame_rate
-    longest = max(1, round(options.key_interval * frame_rate))
+    longest = frames_in(options.key_interval, frame_rate)
     others = set(segmentation.changes)
     if options.scene is not None:
         others |= set(refreshes(count, frame_rate, options.scene))

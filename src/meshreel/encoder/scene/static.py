@@ -23,9 +23,9 @@ from ...geometry.atlas import Layout
 from ...geometry.closest_points import distances
 from ...geometry.color_views import Paint, Painted, spread_colors
 from ...geometry.decimate import decimate_faces
-from ...geometry.derived_sequences import CapturedSequence
+from ...geometry.derived_sequences import CapturedSequence, is_colored
 from ...geometry.topology import clean, face_normals, vertex_normals
-from ...types import Mesh, MeshSequence, Placement, evenly
+from ...types import Mesh, Placement, evenly
 from ..appearance.colors import fitting_size
 from ..appearance.videos import AppearanceOptions, TextureOptions, layered_pictures
 from ..group.interval import Views
@@ -168,11 +168,6 @@ def colored_states(
             companions += _pictured(surface, (colors[count:], seen[count:]), frames, looks, texture)
         found.append(replace(state, companions=tuple(companions)))
     return found
-
-
-def is_colored(sequence: MeshSequence) -> bool:
-    """Return whether some frames of a sequence have colours."""
-    return any(sequence[number].is_colored for number in evenly(len(sequence), 3))
 
 
 @dataclass(frozen=True, slots=True)

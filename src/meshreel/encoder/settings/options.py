@@ -26,6 +26,7 @@ from ..layers.options import LayersOptions, template_error
 from ..layers.recipe import LayersRecipe
 from ..paper.recipe import PLAIN_OFFSETS, PLAIN_ZONE, FindGroups, PaperOptions, PaperRecipe, find_groups
 
+QUALITY = 50.0  # unless another is given (decision 9)
 MOST_SECONDS = 600  # of a key interval: viewers who join late decode that much before the first picture (guess)
 LITERAL_DEPTH = 9  # of Poisson reconstruction (paper, section 3.3.2)
 KNEE = 85.0  # quality above which steps are halved every 8 points: the curve ended for want of steps (decision 33)
@@ -65,7 +66,7 @@ class EncoderOptions:
     scene: SceneOptions | None = field(default_factory=SceneOptions)  # None: no background is looked for
     appearance: AppearanceOptions | None = AppearanceOptions()  # None: colours are left out
     key_interval: float = 4.0  # s, at most, from one random-access point to the next; of a scene in both recipes
-    quality: float = 50.0  # 0 to 100, which the other options were made from; a file records it
+    quality: float = QUALITY  # 0 to 100, which the other options were made from; a file records it
 
     def __post_init__(self) -> None:
         if not 0 <= self.quality <= 100:
@@ -108,9 +109,7 @@ def as_installed(options: EncoderOptions) -> tuple[EncoderOptions, tuple[str, ..
     return replace(options, appearance=replace(appearance, texture=None)), (f"{text}; colours of vertices are kept",)
 
 
-def paper_options(
-    quality: float = 50.0, centers: int | None = None, basis_size: int | None = None, literal: bool = False
-) -> PaperOptions:
+def paper_options(quality: float, centers: int | None, basis_size: int | None, literal: bool) -> PaperOptions:
     """Return the options of the paper's recipe at a quality; `literal`: without what is better than the paper's words.
 
     What the paper leaves open is then as in its release: vertices are displaced to the nearest of a frame's.
@@ -135,7 +134,7 @@ def plain_displacements(options: DisplacementOptions) -> DisplacementOptions:
     return replace(options, offsets=PLAIN_OFFSETS, dead_zone=PLAIN_ZONE, anchor_count=LITERAL_ANCHORS)
 
 
-def layers_options(quality: float = 50.0, effort: str = "normal") -> LayersOptions:
+def layers_options(quality: float, effort: str) -> LayersOptions:
     """Return the options of the recipe of layers at a quality."""
     step, coarser = motion_step(quality), rounded(0.0018 * 2 ** ((50 - quality) / 25))  # the latter without a knee
     options = LayersOptions(
@@ -161,7 +160,7 @@ def tolerance(quality: float) -> float:
     return rounded(2 ** ((50 - quality) / 32))
 
 
-def scene_options(quality: float = 50.0) -> SceneOptions:
+def scene_options(quality: float) -> SceneOptions:
     """Return the options of a scene at a quality: its background is as near to the truth as the bodies."""
     usual, times = SceneOptions(), tolerance(quality)
     return replace(usual, coarse=rounded(usual.coarse * times), lattice=rounded(usual.lattice * times))
@@ -192,11 +191,7 @@ def motion_step(quality: float) -> float:
 
 
 def appearance_options(
-    quality: float = 50.0,
-    color: str = "auto",
-    texture: int | None = None,
-    compatible: bool = False,
-    splats: int | None = None,
+    quality: float, color: str, texture: int | None, compatible: bool, splats: int | None
 ) -> AppearanceOptions | None:
     """Return the options of colours at a quality; None for no colours."""
     if color == "none":

@@ -11,14 +11,13 @@ from numbers import Integral, Real
 from typing import Literal, get_args
 
 from ...errors import InputError
-from .options import EncoderOptions, appearance_options, layers_options, paper_options, scene_options
+from ..appearance.videos import TextureSize
+from .options import QUALITY, EncoderOptions, appearance_options, layers_options, paper_options, scene_options
 
 MOST_CENTERS = 100_000  # fifty times the paper's: tracking takes more than a minute a frame (guess)
-QUALITY = 50.0  # unless another is given (decision 9)
 Preset = Literal["best", "paper", "paper-literal"]
 Effort = Literal["fast", "normal", "thorough"]
 Color = Literal["auto", "texture", "vertices", "none"]
-TextureSize = Literal[128, 256, 512, 1024, 2048]
 PRESETS, EFFORTS, COLORS = get_args(Preset), get_args(Effort), get_args(Color)
 
 
