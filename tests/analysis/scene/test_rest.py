@@ -1,4 +1,4 @@
-"""Changes of a room: a box carried across it is background before, a body on the way, and background after."""
+"""Things at rest: a box carried across a room is background before, a body on the way, and background after."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -122,7 +122,7 @@ def test_changes_are_two_of_the_frames(found: ByPlace) -> None:
 def test_the_background_has_a_patch_for_each_change(parts: Parts) -> None:
     states = encode_static(parts, FRAMES, 4.0, OPTIONS)
     assert [state.is_patch for state in states] == [False, True, True]
-    place, rooms = Placement(parts.seen.unit, tuple(parts.seen.center)), [decode_background(states[0].payload)]
+    place, rooms = Placement(parts.survey.unit, tuple(parts.survey.center)), [decode_background(states[0].payload)]
     for state in states[1:]:
         rooms.append(decode_change(state.payload, rooms[-1]))
     first, between, last = (place.of(room) for room in rooms)
@@ -140,7 +140,7 @@ def test_a_change_that_costs_more_than_its_bytes_may_is_a_whole_background(parts
     monkeypatch.setattr("meshreel.encoder.scene.static.decode_change", costly)
     states = encode_static(parts, FRAMES, 4.0, OPTIONS)
     assert [state.is_patch for state in states] == [False, False, False]
-    place = Placement(parts.seen.unit, tuple(parts.seen.center))
+    place = Placement(parts.survey.unit, tuple(parts.survey.center))
     here, there = (np.array([x, 0.4, 1.0]) for x in (0.5, 1.8))
     _, between, last = (place.of(decode_background(state.payload)) for state in states)
     assert min(distance_to(between, here), distance_to(between, there)) > 0.15
@@ -153,7 +153,7 @@ def test_a_background_repeated_at_a_change_is_complete(parts: Parts, found: ByPl
     states = encode_static(parts, FRAMES, 4.0, replace(OPTIONS, refresh=gone / 4.0))
     whole = {frame: frame % gone == 0 for frame in sorted({*range(0, FRAMES, gone), came})}
     assert {state.frame: not state.is_patch for state in states} == whole
-    place, mesh = Placement(parts.seen.unit, tuple(parts.seen.center)), Mesh.empty()
+    place, mesh = Placement(parts.survey.unit, tuple(parts.survey.center)), Mesh.empty()
     here, there = (np.array([x, 0.4, 1.0]) for x in (0.5, 1.8))
     for state in states:
         mesh = decode_change(state.payload, mesh) if state.is_patch else decode_background(state.payload)
