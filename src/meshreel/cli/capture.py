@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import json
 import zlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from cyclopts import Parameter
+from cyclopts import Parameter, Token
 
 from ..capture.recording import FusionOptions, Recording, open_recording
 from ..capture.recordings import is_rig, open_take
 from ..capture.recordings.takes import Take
 from ..capture.rig.cameras import ColorCamera, DepthCamera
-from ..capture.rig.rig import Rig, read_rig
+from ..capture.rig.rig import RIG, Rig, read_rig
 from ..errors import InputError
 from ..io.files import first_difference, read_json
 from ..io.sequence import CAPTURED
@@ -24,6 +24,16 @@ from .console import Common
 from .sources import make_rig
 
 _FUSION = FusionOptions()
+
+
+def _as_unit(kind: object, tokens: Sequence[Token]) -> float:
+    """Return a unit in metres that is written as a number, or as mm, cm or m. Raises ValueError for other words."""
+    del kind
+    word = tokens[0].value
+    unit = {"mm": 0.001, "cm": 0.01, "m": 1.0}.get(word) or float(word)
+    if not 1e-6 <= unit <= 10:
+        raise ValueError(f"{word} is no unit in metres; 5000 steps a metre are 0.0002")
+    return unit
 
 
 def command(
@@ -36,6 +46,7 @@ def command(
     fragment: float = _FUSION.fragment,
     frames: str = ":",
     format: Literal["ply", "obj", "glb"] = "ply",
+    depth_unit: Annotated[float | None, Parameter(converter=_as_unit)] = None,
     show: Annotated[bool, Parameter(name="--list", negative="")] = False,
     common: Common = Common(),
 ) -> None:
@@ -65,6 +76,8 @@ def command(
         Frames to fuse, as A:B with B excluded.
     format
         Format of the mesh files.
+    depth_unit
+        Unit of depth in pictures of recordings, in metres, as 0.0002, or mm; in place of what the recordings say.
     show
         Show the streams of recordings or rigs, their sizes, rates and calibration, and write nothing.
     """
@@ -77,13 +90,15 @@ def command(
     if len(inputs) > 1 or (inputs[0].exists() and not is_rig(inputs[0])):
         if (options, frames, format) != (_FUSION, ":", "ply"):
             raise InputError(f"{inputs[0]}: is no rig: make one of it without options of fusion, then capture that")
-        warnings = make_rig([open_take(path) for path in inputs], output, common)
+        warnings = make_rig([open_take(path) for path in inputs], output, common, depth_unit)
         rig = read_rig(output)
         common.warn([*warnings, *rig.missing()])
         row = {"output": str(output), "cameras": len(rig.cameras), "color_cameras": len(rig.color_cameras)}
         row |= {"frames": len(rig.frames), "frame_rate": rig.frame_rate}
         counted = f"{row['frames']} frames, depth cameras: {row['cameras']}, colour cameras: {row['color_cameras']}"
         return common.result(row, f"{output}: a rig, {counted}, {rig.frame_rate:g} frames a second")
+    if depth_unit is not None:
+        raise InputError(f"--depth-unit: {inputs[0]} is a rig, whose {RIG} says it as depth_unit_m; mend that")
     return _fuse(inputs[0], output, options, frames, format, common)
 
 

@@ -100,7 +100,7 @@ def pack_picture(pixels: UInt8[np.ndarray, "H W *C"] | UInt16[np.ndarray, "H W"]
 
 def read_depth(path: Path) -> UInt16[np.ndarray, "H W"]:
     """Read a 16-bit grayscale PNG. Raises InputError if it cannot be read or has fewer bits."""
-    return parse_depth(read_input(path, _AGAIN), str(path))
+    return parse_depth(read_input(path), str(path))
 
 
 def parse_depth(data: bytes, where: str) -> UInt16[np.ndarray, "H W"]:
@@ -111,6 +111,15 @@ def parse_depth(data: bytes, where: str) -> UInt16[np.ndarray, "H W"]:
             kind = "8 bits a pixel" if image.mode in ("L", "P", "1") else f"mode {image.mode}"
             raise InputError(f"{where}: a depth picture of {kind}; {wanted}")
         return np.array(image, dtype=np.uint16)
+
+
+def is_deep(data: bytes) -> bool:
+    """Return True if the bytes of a file are a grey picture of 16 bits."""
+    try:
+        with opened(data, "", "", "") as image:
+            return image.mode in DEEP
+    except InputError:
+        return False
 
 
 def read_mask(path: Path) -> UInt8[np.ndarray, "H W"]:

@@ -217,10 +217,11 @@ def test_bent_depth_is_straightened_without_new_depths(tmp_path, made):
 def test_pictures_are_paired_within_half_a_frame_and_lost_ones_are_told(tmp_path, made):
     late = [TIMES[0] + 0.04, TIMES[1] - 0.04, TIMES[2] + 0.06, TIMES[3]]
     rig, remarks = made(files.tum(tmp_path / "desk", color_times=late))
-    assert rig.frames == [0, 1, 3] and len(remarks) == 1
-    assert (
-        "1 of 4 frames have no colour within half a frame (50 ms) and are left out, the first is frame 2" in remarks[0]
-    )
+    assert rig.frames == [0, 1, 2, 3] and len(remarks) == 1
+    text = "1 of 4 frames have no colour within half a frame (50 ms), and keep the last one; the first is frame 2"
+    assert text in remarks[0]
+    pictures = [rig.color_cameras[0].files[frame].read_bytes() for frame in range(4)]
+    assert pictures[2] == pictures[1] and pictures[3] != pictures[2]
 
 
 def test_a_dropped_frame_leaves_a_gap_and_times_that_go_back_are_sorted(tmp_path, made):

@@ -6,6 +6,7 @@ RealSense's files `tf/0`) their poses. Times are those of the pictures, not of t
 
 from __future__ import annotations
 
+import re
 import struct
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -16,20 +17,33 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from jaxtyping import UInt8, UInt16
 
 from ...errors import InputError
 from ...geometry.cameras import Camera, Matrix
-from ...io.pictures import parse_depth
+from ...io.pictures import MOST_PIXELS, is_deep, parse_depth
 from ..calibration.poses import pose_in_root, pose_of
 from .takes import Picture, Pictures, Sensor, Stream, Take, lens_of, picture_size
 
 KIND = "a ROS 1 or RealSense .bag, a ROS 2 bag, an .mcap"
-DEEP = {"16UC1": ("<u2", 0.001), "mono16": ("<u2", 0.001), "32FC1": ("<f4", 1.0)}  # type, and its unit in ROS, m
-# Order of red, green, blue.
+# Type of depth, and its unit in ROS, m.
+DEEP = dict.fromkeys(("16UC1", "mono16", "Z16", "z16"), ("<u2", 0.001))
+DEEP |= {"16SC1": ("<i2", 0.001), "32FC1": ("<f4", 1.0)}
+# Order of red, green, blue; OpenCV's bridge has blue first where an encoding does not say.
 COLOR = {"rgb8": [0, 1, 2], "bgr8": [2, 1, 0], "rgba8": [0, 1, 2, 3], "bgra8": [2, 1, 0, 3]}
+COLOR |= {"8UC3": [2, 1, 0], "8UC4": [2, 1, 0, 3]}
+GREY = ("mono8", "8UC1")
+YUV = {
+    "yuv422": (1, 0),
+    "uyvy": (1, 0),
+    "yuv422_yuy2": (0, 1),
+    "yuyv": (0, 1),
+}  # places of luma and chroma in two bytes
+BAYER = {f"bayer_{order}8": order for order in ("rggb", "bggr", "gbrg", "grbg")}
 MODELS = ("", "plumb_bob", "rational_polynomial", "none", "Brown Conrady", "Inverse Brown Conrady")
 POSES = "tf2_msgs/msg/TFMessage"
 COMPRESSED = struct.Struct("<iff")  # before the PNG of compressedDepth: form, and the two numbers of floats
+RVL = struct.Struct("<II")  # behind it, before a stream of RVL: columns and rows
 
 
 def fits(path: Path) -> bool:
@@ -46,10 +60,10 @@ def read(path: Path) -> Take:
         others = [topic for topic in topics if topic.deep and "infra" not in topic.name.lower()]
         deep = _distinct(named or others, "base")
         if not deep:
-            forms = f"no depth pictures ({', '.join(DEEP)}, or compressedDepth as PNG)"
+            forms = f"no depth pictures ({', '.join(DEEP)}, or compressed as PNG or RVL)"
             text = f"{forms}; its topics are {', '.join(bag.described()) or 'none'}"
             raise InputError(f"{path}: {text}; record a topic of depth")
-        colors = [topic for topic in topics if not topic.deep]
+        colors = [topic for topic in topics if not topic.deep and not re.search(r"infra|/ir\b", topic.name.lower())]
         tree = bag.tree()
         pairs = _paired(deep, colors, tree)
         used = {topic.name for pair in pairs for topic in pair if topic is not None}
@@ -97,9 +111,10 @@ class _Bag:
             header = 0.0 if stamp is None else stamp.sec + stamp.nanosec / 1e9
             yield header or recorded / 1e9, message
 
-    def first(self, name: str) -> Any:
-        """Return the first message of a topic, None without one."""
-        return next((message for _, message in self.messages(name)), None)
+    def first(self, name: str, good: Callable[[Any], bool] = lambda _: True) -> Any:
+        """Return the first good message of a topic, otherwise the first; None without one."""
+        first = next((message for _, message in self.messages(name)), None)
+        return next((message for _, message in self.messages(name) if good(message)), first)
 
     def described(self) -> list[str]:
         return [f"{name} ({(kind.msgtype or '').split('/')[-1]})" for name, kind in sorted(self.reader.topics.items())]
@@ -108,7 +123,7 @@ class _Bag:
         found = []
         for name, kind in sorted(self.reader.topics.items()):
             if (kind.msgtype or "").endswith(("/Image", "/CompressedImage")):
-                first = self.first(name)
+                first = self.first(name, _has_size)
                 found += [] if first is None else [_topic(name, kind.msgcount, first)]
         return found
 
@@ -131,15 +146,24 @@ def _opened(path: Path) -> Iterator[_Bag]:
         yield _Bag(path, reader, store.deserialize_ros1 if old else store.deserialize_cdr)
 
 
+def _has_size(message: Any) -> bool:
+    return _topic("", 0, message).width > 0
+
+
 def _topic(name: str, count: int, message: Any) -> _Topic:
     if hasattr(message, "encoding"):
-        encoding, size, readable = message.encoding, (message.width, message.height), message.encoding in COLOR
+        encoding, size = message.encoding, (message.width, message.height)
+        readable = encoding in (*COLOR, *GREY, *YUV, *BAYER)
     else:  # as `16UC1; compressedDepth png`, `rgb8; jpeg compressed bgr8`, `jpeg`
         encoding = message.format.split(";")[0].strip()
-        start = COMPRESSED.size if "compressedDepth" in message.format else 0
+        data = bytes(message.data)[COMPRESSED.size if "compressedDepth" in message.format else 0 :]
         try:
-            size, readable = picture_size(bytes(message.data)[start:], name), not encoding.startswith("mono")
-        except InputError:  # no PNG or JPEG, as RVL is none
+            if "rvl" in message.format.lower():
+                size, readable = RVL.unpack_from(data), False
+            else:
+                size, readable = picture_size(data, name), not encoding.startswith("mono")
+                encoding = "16UC1" if encoding == "png" and is_deep(data) else encoding
+        except (InputError, struct.error):
             encoding, size, readable = "", (0, 0), False
     deep = True if encoding in DEEP else False if readable else None
     unit = DEEP.get(encoding, ("", 1.0))[1]
@@ -161,7 +185,7 @@ def _paired(deep: list[_Topic], colors: list[_Topic], tree: dict[str, Any]) -> l
     def alike(depth: _Topic, color: _Topic) -> tuple[int, bool]:
         pairs = zip(depth.name.split("/")[1:], color.name.split("/")[1:], strict=False)
         shared = len(list(takewhile(lambda pair: pair[0] == pair[1], pairs)))
-        return shared, "image_rect" not in color.name  # a rectified picture was resampled
+        return shared, not _is_straight(color.name)  # a rectified picture was resampled
 
     near: dict[_Topic | None, list[_Topic]] = {}
     for depth in deep:
@@ -198,17 +222,24 @@ def _sensor(bag: _Bag, depth: _Topic, color: _Topic | None, tree: dict[str, Any]
 
 
 def _stream(bag: _Bag, topic: _Topic) -> Stream:
-    info = bag.first(f"{topic.base.rpartition('/')[0]}/camera_info") or bag.first(f"{topic.sdk}/info/camera_info")
-    lens = None if info is None else _lens(info, "image_rect" in topic.base)
+    names = f"{topic.base.rpartition('/')[0]}/camera_info", f"{topic.sdk}/info/camera_info"
+    infos = (bag.first(name, lambda info: info.width > 0 and _lens(info, False) is not None) for name in names)
+    info = next((info for info in infos if info is not None), None)
+    lens = None if info is None else _lens(info, _is_straight(topic.base))
 
     def pictures() -> Pictures:
         with _opened(bag.path) as again:
             for time, message in again.messages(topic.name):
-                yield time, _pixels(message)
+                yield time, partial(_pixels, message)
 
     seconds = (bag.reader.end_time - bag.reader.start_time) / 1e9
-    lens = None if lens is None else lens.resized(topic.width, topic.height)
+    lens = None if lens is None or not topic.width else lens.resized(topic.width, topic.height)
     return Stream(topic.width, topic.height, topic.count, seconds, lens, pictures)
+
+
+def _is_straight(name: str) -> bool:
+    """Return True if a topic's name says that its pictures are rectified."""
+    return "rect" in name.rpartition("/")[2].lower()
 
 
 def _lens(info: Any, straight: bool) -> Camera | None:
@@ -217,7 +248,7 @@ def _lens(info: Any, straight: bool) -> Camera | None:
         np.asarray(getattr(info, name, getattr(info, name.upper(), None)), np.float64) for name in ("k", "d", "p")
     )
     numbers = projection.reshape(3, 4) if straight and projection.any() else matrix.reshape(3, 3)
-    if not numbers.any():
+    if not numbers.any() or not info.width:
         return None
     if straight or not bends.any():
         bends = bends[:0]
@@ -231,7 +262,17 @@ def _pixels(message: Any) -> Picture:
     data = bytes(message.data)
     if not hasattr(message, "encoding"):
         return _unpacked(message.format, data)
-    channels = COLOR.get(message.encoding, [0])
+    if message.encoding in YUV:
+        return _from_yuv(_numbers(message, 2), *YUV[message.encoding])
+    numbers = _numbers(message)
+    if message.encoding in BAYER:
+        return _from_bayer(numbers, BAYER[message.encoding])
+    return np.repeat(numbers[..., None], 3, axis=2) if message.encoding in GREY else numbers
+
+
+def _numbers(message: Any, each: int = 1) -> np.ndarray:
+    """Return the numbers of a picture that is not compressed, `each` a pixel; colours as red, green, blue."""
+    data, channels = bytes(message.data), COLOR.get(message.encoding, [0] * each)
     kind = np.dtype(DEEP.get(message.encoding, ("u1",))[0]).newbyteorder(">" if message.is_bigendian else "<")
     wide = message.width * len(channels) * kind.itemsize
     if message.step < wide or len(data) < message.height * message.step:
@@ -239,18 +280,72 @@ def _pixels(message: Any) -> Picture:
         raise ValueError(f"{size} in {len(data)} bytes, {message.step} a row, are too few")
     rows = np.frombuffer(data, np.uint8, message.height * message.step).reshape(message.height, -1)
     values = np.ascontiguousarray(rows[:, :wide]).view(kind).reshape(message.height, message.width, -1)
-    return values[..., channels[:3]] if len(channels) > 1 else values[..., 0].astype(kind.newbyteorder("="))
+    if each > 1:
+        return values.reshape(message.height, -1)
+    if len(channels) > 1:
+        return values[..., channels[:3]]
+    found = values[..., 0].astype(kind.newbyteorder("="))
+    return np.maximum(found, 0).astype(np.uint16) if kind.kind == "i" else found
+
+
+def _from_yuv(pairs: UInt8[np.ndarray, "H N"], luma: int, chroma: int) -> UInt8[np.ndarray, "H W 3"]:
+    """Return colours of pairs of luma and chroma in limited range (ITU-R BT.601)."""
+    y = (pairs[:, luma::2].astype(np.float32) - 16) * 1.164
+    u, v = (np.repeat(pairs[:, chroma + at :: 4].astype(np.float32) - 128, 2, axis=1) for at in (0, 2))
+    channels = [y + 1.596 * v, y - 0.392 * u - 0.813 * v, y + 2.017 * u]
+    return np.clip(np.rint(np.stack(channels, axis=2)), 0, 255).astype(np.uint8)
+
+
+def _from_bayer(raw: UInt8[np.ndarray, "H W"], order: str) -> UInt8[np.ndarray, "H W 3"]:
+    """Return colours of a picture with one channel a pixel; `order` are the channels of its first two rows of two."""
+    from scipy.ndimage import convolve
+
+    weights = np.array([[1, 2, 1], [2, 4, 2], [1, 2, 1]], np.float32)
+    found = []
+    for name in "rgb":
+        mask = np.zeros(raw.shape, np.float32)
+        for at in (k for k in range(4) if order[k] == name):
+            mask[at // 2 :: 2, at % 2 :: 2] = 1
+        sums = convolve(raw * mask, weights, mode="mirror"), convolve(mask, weights, mode="mirror")
+        found.append(np.where(mask > 0, raw, np.rint(sums[0] / sums[1])))
+    return np.stack(found, axis=2).astype(np.uint8)
+
+
+def _from_rvl(data: bytes) -> UInt16[np.ndarray, "H W"]:
+    """Return the depth in a stream of RVL (Wilson 2017): runs of zeros, and differences of what is between them."""
+    columns, rows = RVL.unpack_from(data)
+    if not 0 < columns * rows <= MOST_PIXELS:
+        raise ValueError(f"a picture of {columns} x {rows}")
+    words = np.frombuffer(data[RVL.size :][: (len(data) - RVL.size) // 4 * 4], "<u4")
+    digits = (words[:, None] >> np.arange(28, -1, -4, dtype=np.uint32) & 15).reshape(-1).astype(np.int64)
+    ends = np.flatnonzero(digits < 8)  # of numbers, three bits a digit, the lowest first
+    begins = np.concatenate([[0], ends[:-1] + 1]) if len(ends) else ends
+    place = np.arange(len(digits)) - np.repeat(begins, ends - begins + 1) if len(ends) else digits[:0]
+    values = np.add.reduceat((digits[: len(place)] & 7) << np.minimum(3 * place, 60), begins) if len(ends) else begins
+    seen, steps, at, k = np.zeros(columns * rows, bool), list[np.ndarray](), 0, 0
+    while at < len(seen):
+        run, count = values[k : k + 2].tolist() if k + 1 < len(values) else (0, 0)
+        if run + count == 0 or at + run + count > len(seen) or k + 2 + count > len(values):
+            raise ValueError(f"RVL ends at pixel {at} of {len(seen)}")
+        seen[at + run : at + run + count] = True
+        steps.append(values[k + 2 : k + 2 + count])
+        at, k = at + run + count, k + 2 + count
+    changes = np.concatenate([values[:0], *steps])
+    depth = np.zeros(len(seen), np.uint16)
+    depth[seen] = np.cumsum((changes >> 1) ^ -(changes & 1)).astype(np.uint16)
+    return depth.reshape(rows, columns)
 
 
 def _unpacked(form: str, data: bytes) -> Picture:
     if "compressedDepth" in form:
         _, a, b = COMPRESSED.unpack_from(data)
-        depth = parse_depth(data[COMPRESSED.size :], form)
+        packed = data[COMPRESSED.size :]
+        depth = _from_rvl(packed) if "rvl" in form.lower() else parse_depth(packed, form)
         if not form.startswith("32FC1"):
             return depth
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.where(depth > 0, a / (depth - b), 0)
-    return parse_depth(data, form) if form.split(";")[0].strip() in DEEP else data
+    return parse_depth(data, form) if form.split(";")[0].strip() in DEEP or is_deep(data) else data
 
 
 def _matrix(transform: Any) -> Matrix:

@@ -6,6 +6,7 @@ right, y down, z forward: https://github.com/strayrobots/scanner. Depth is align
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -37,19 +38,22 @@ def read(path: Path) -> Take:
     if not stamps:
         raise ValueError("odometry.csv has no row of a picture in depth/")
     width, height = picture_size(read_input(files[0]), str(files[0]))
-    color = _video(path, min(times.values(), default=0.0)) if (path / VIDEO).is_file() else None
+    color = _video(path, times) if (path / VIDEO).is_file() else None
     lens = None if color is None or color.lens is None else color.lens.resized(width, height)
 
     def pictures() -> Pictures:
         for file, stamp in stamps.items():
-            depth, sure = read_depth(file), path / "confidence" / file.name
-            if sure.is_file():  # ARKit's confidence: 0 is low, as of pixels that mix two surfaces
-                trusted = read_picture(sure)[..., 0] > 0
-                if trusted.shape != depth.shape:
-                    text = f"{trusted.shape[1]} x {trusted.shape[0]} pixels where depth has"
-                    raise InputError(f"{sure}: {text} {depth.shape[1]} x {depth.shape[0]}; copy it again, or delete it")
-                depth = np.where(trusted, depth, 0)
-            yield stamp, depth
+            yield stamp, partial(measured, file)
+
+    def measured(file: Path) -> np.ndarray:
+        depth, sure = read_depth(file), path / "confidence" / file.name
+        if sure.is_file():  # ARKit's confidence: 0 is low, as of pixels that mix two surfaces
+            trusted = read_picture(sure)[..., 0] > 0
+            if trusted.shape != depth.shape:
+                text = f"{trusted.shape[1]} x {trusted.shape[0]} pixels where depth has"
+                raise InputError(f"{sure}: {text} {depth.shape[1]} x {depth.shape[0]}; copy it again, or delete it")
+            depth = np.where(trusted, depth, 0)
+        return depth
 
     depth = Stream(width, height, len(files), max(stamps.values()) - min(stamps.values()), lens, pictures)
     sensor = Sensor("phone", depth, 0.001, color, np.eye(4), poses)
@@ -71,7 +75,8 @@ def _odometry(path: Path) -> tuple[dict[int, float], Float64[np.ndarray, "T 4 4"
     return times, pose_of(turns, places) if len(table) else None
 
 
-def _video(path: Path, start: float) -> Stream:
+def _video(path: Path, times: dict[int, float]) -> Stream:
+    """Return the colours: picture n of the video belongs to depth picture n, whatever the video's clock says."""
     import av
 
     with reading(path / VIDEO), av.open(path / VIDEO) as video:
@@ -87,7 +92,8 @@ def _video(path: Path, start: float) -> Stream:
 
     def pictures() -> Pictures:
         with av.open(path / VIDEO) as video:
-            for frame in video.decode(video=0):
-                yield start + float(frame.time or 0), frame.to_ndarray(format="rgb24")
+            for number, frame in enumerate(video.decode(video=0)):
+                if number in times or not times:
+                    yield times.get(number, number / RATE), frame.to_ndarray(format="rgb24")
 
     return Stream(width, height, count, seconds * (count - 1) / max(count, 1), lens, pictures)

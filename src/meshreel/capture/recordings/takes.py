@@ -15,8 +15,9 @@ from ...geometry.cameras import Camera
 from ...io.pictures import opened
 
 Picture = np.ndarray | bytes  # depths H x W in the sensor's unit, integers or floats; colours H x W x 3; a PNG or JPEG
+Unread = Callable[[], Picture]  # reads one picture, which may be damaged
 Pair = tuple[float, float]  # along x and y
-Pictures = Iterator[tuple[float, Picture]]  # each with its time on the take's clock, s
+Pictures = Iterator[tuple[float, Picture | Unread]]  # each with its time on the take's clock, s
 
 
 @dataclass(frozen=True, slots=True)

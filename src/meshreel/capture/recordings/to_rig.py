@@ -9,6 +9,7 @@ from __future__ import annotations
 import io
 import re
 import shutil
+import struct
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
@@ -32,23 +33,27 @@ MOVES, TURNS = 0.05, 3.0  # m, degrees: a phone that tracks itself, on a tripod,
 CUT_OFF = 0.02  # of a stream's pictures: where more are missing than the file promises, it is told (guess)
 APART = (1e-4, 3600.0)  # s, between pictures: outside, time stamps are in another unit (guess)
 LONGEST_GAP = 1e9  # frames: one whose time stamp is damaged may be as far away as 64 bits reach (guess)
+NEAREST_ROOM = 0.7  # m: where depth ends before this, its unit may be wrong (guess)
 LONGEST_NAME = 100  # characters of a camera's name, and of its folder (guess)
 QUALITY = 95  # of JPEG, for colours that a package decoded: a third of a PNG's bytes
 Pack = Callable[[Picture, Camera], tuple[bytes, str]]  # a picture to the bytes of a file, and its extension
 Report = Callable[[int], None]  # how many pictures were read so far
 
 
-def write_takes(takes: Sequence[Take], folder: Path, report: Report = lambda _: None) -> list[str]:
+def write_takes(
+    takes: Sequence[Take], folder: Path, report: Report = lambda _: None, depth_unit: float | None = None
+) -> list[str]:
     """Write a rig's folder, which appears when it is complete; return warnings for the user.
 
+    `depth_unit` is what 1 means in pictures of depth, m, in place of what the recordings say.
     Raises InputError where a recording cannot be read, has no calibration, or moves; and where the folder has files.
     """
-    parts = _parts(takes)
+    parts = _parts(takes, depth_unit)
     with _appearing(folder) as place:
         pictures = count(1)
         for part in parts:
             part.read(place / part.name, lambda: report(next(pictures)))
-        clock = Clock.of(parts[0].depth.times())
+        clock = Clock.of(np.concatenate([parts[0].depth.times(), parts[0].depth.lost]))
         if not APART[0] <= clock.period <= APART[1]:
             text = f"its depth pictures are {clock.period:.3g} s apart by their time stamps"
             raise InputError(f"{parts[0].take.path}: {text}; give time stamps in seconds")
@@ -100,18 +105,27 @@ class _Written:
 
     files: list[tuple[float, Path]] = field(default_factory=list)
     by_frame: dict[int, int] = field(default_factory=dict)
+    lost: list[float] = field(default_factory=list)  # times of pictures that are damaged
 
     def times(self) -> Float64[np.ndarray, " P"]:
         return np.array([time for time, _ in self.files], dtype=np.float64)
 
+    def fill(self, frames: set[int]) -> set[int]:
+        """Show the last picture again in frames without one, the first before it; return these frames."""
+        known, bare = np.array(sorted(self.by_frame)), frames - self.by_frame.keys()
+        for frame in bare:
+            before = int(np.searchsorted(known, frame, side="right")) - 1
+            self.by_frame[frame] = self.by_frame[int(known[max(before, 0)])]
+        return bare
+
     def rename(self, frames: set[int]) -> None:
         """Name pictures by their frames, and delete those of no frame."""
-        kept = {index: frame for frame, index in self.by_frame.items() if frame in frames}
-        for index, (_, path) in enumerate(self.files):
-            if index in kept:
-                path.rename(path.with_name(f"frame_{kept[index]:05}{path.suffix}"))
-            else:
-                path.unlink()
+        for frame, index in sorted(self.by_frame.items()):
+            if frame in frames:
+                path = self.files[index][1]
+                shutil.copyfile(path, path.with_name(f"frame_{frame:05}{path.suffix}"))
+        for _, path in self.files:
+            path.unlink()
 
 
 class _Part:
@@ -122,7 +136,7 @@ class _Part:
             raise InputError(f"{take.path}: depth of {sensor.name} has no calibration: {take.calibrate}")
         self.take, self.sensor, self.name, self.lens = take, sensor, name, sensor.depth.lens
         self.pose, self.unit, self.remarks = _still(take, sensor), sensor.unit, list[str]()
-        self.depth = _Written()
+        self.depth, self._farthest = _Written(), list[float]()  # steps, of each picture
         self.color: _Written | None = None
         self.stream = sensor.color
         if self.stream is not None and self.stream.lens is None:
@@ -162,14 +176,18 @@ class _Part:
                 depth, self.unit = picture * (self.sensor.unit / MILLIMETRE), MILLIMETRE
                 with np.errstate(invalid="ignore"):  # what is none, or too far, is 0
                     picture = np.where((depth > 0) & (depth < 65535), np.rint(depth), 0).astype(np.uint16)
+            self._farthest.append(float(np.percentile(picture[picture > 0], 95)) if picture.any() else 0.0)
             return pack_picture(picture if pixels is None else picture[pixels[0]] * pixels[1]), ".png"
 
         self.depth = self._write(self.sensor.depth, folder / "depth", straight, report)
+        if 0 < (far := float(np.median(self._farthest)) * self.unit) < NEAREST_ROOM:
+            text = f"its depth reaches {far:.3g} m, with {self.unit:g} m a step"
+            self.remarks.append(f"{self.take.path}: {text}; if it should reach farther, say --depth-unit")
         if self.stream is not None:
             self.color = self._write(self.stream, folder / "color", _colored, report)
 
     def _write(self, stream: Stream, folder: Path, pack: Pack, report: Callable[[], None]) -> _Written:
-        written, name = _Written(), f"{folder.name} of {self.sensor.name}"
+        written, name, odd = _Written(), f"{folder.name} of {self.sensor.name}", list[str]()
         what = f"{self.take.path}: {name}"
         make_folder(folder)
         with reading(self.take.path, lambda: f", {name} from picture {len(written.files)} on"):
@@ -177,25 +195,30 @@ class _Part:
                 if not np.isfinite(time):
                     raise ValueError(f"picture {number} has the time {time}")
                 try:
-                    data, extension = pack(picture, stream.lens or self.lens)
-                except InputError as error:
-                    raise InputError(f"{what}: picture {number} ({time:.3f} s): {error}") from None
+                    data, extension = pack(picture() if callable(picture) else picture, stream.lens or self.lens)
+                except (InputError, ValueError, OSError, struct.error) as error:
+                    odd.append(f"picture {number} ({time:.3f} s): {error}")
+                    written.lost.append(time)
+                    continue
                 path = folder / f"read_{number}{extension}"
                 with cannot_be_written(path):
                     path.write_bytes(data)
                 written.files.append((time, path))
                 report()
         if not written.files:
-            raise InputError(f"{what} has no pictures; record it again")
+            raise InputError(f"{what}: {odd[0]}" if odd else f"{what} has no pictures; record it again")
+        if odd:
+            text = "1 picture is left out" if len(odd) == 1 else f"{len(odd)} pictures are left out, the first is"
+            self.remarks.append(f"{what}: {text}: {odd[0]}")
         if (back := int((np.diff(written.times()) < 0).sum())) > 0:
             self.remarks.append(f"{what}: time stamps go back {back} times; its pictures are sorted by them")
-        if stream.count - len(written.files) > max(1, CUT_OFF * stream.count):
+        if stream.count - len(written.files) - len(odd) > max(1, CUT_OFF * stream.count):
             text = f"{len(written.files)} of {stream.count} pictures can be read; was the file cut off?"
             self.remarks.append(f"{what}: {text}")
         return written
 
 
-def _parts(takes: Sequence[Take]) -> list[_Part]:
+def _parts(takes: Sequence[Take], depth_unit: float | None) -> list[_Part]:
     """Return the sensors of all takes, with names that differ, also as names of folders."""
     found: dict[str, _Part] = {}
     for take in takes:
@@ -203,12 +226,13 @@ def _parts(takes: Sequence[Take]) -> list[_Part]:
             name = re.sub(r"[^\w-]+", "-", f"{take.path.resolve().stem}-{sensor.name}").strip("-")[:LONGEST_NAME]
             others = (f"{name}-{number}" for number in count(2))
             name = next(one for one in chain([name], others) if one.lower() not in found)
+            sensor = sensor if depth_unit is None else replace(sensor, unit=depth_unit)
             found[name.lower()] = _Part(take, sensor, name)
     return list(found.values())
 
 
 def _common(parts: list[_Part], clock: Clock) -> tuple[set[int], list[str]]:
-    """Give pictures their frames; return the frames that all colour cameras have, and warnings about the others."""
+    """Give pictures their frames; return the frames that some depth camera has, and warnings."""
     remarks, first = list[str](), parts[0].take.path
     for part in parts:
         times, shift = part.depth.times(), 0.0
@@ -224,12 +248,13 @@ def _common(parts: list[_Part], clock: Clock) -> tuple[set[int], list[str]]:
             remarks.append(f"{part.take.path}: {part.sensor.name}: {text}")
     frames = set[int]().union(*(part.depth.by_frame for part in parts))
     for part in parts:
-        if part.color is not None and (bare := frames - part.color.by_frame.keys()):
+        if part.color is not None and part.color.by_frame and (bare := part.color.fill(frames)):
             half = f"half a frame ({500 * clock.period:.3g} ms)"
-            text = f"{len(bare)} of {len(frames)} frames have no colour within {half} and are left out"
-            remarks.append(f"{part.take.path}: {part.sensor.name}: {text}, the first is frame {min(bare)}")
-            frames -= bare
+            text = f"{len(bare)} of {len(frames)} frames have no colour within {half}, and keep the last one"
+            remarks.append(f"{part.take.path}: {part.sensor.name}: {text}; the first is frame {min(bare)}")
     for part in parts:
+        if part.color is not None and not part.color.by_frame:
+            frames = set()
         if not frames & part.depth.by_frame.keys():
             text = f"{part.sensor.name} has no frame in common with the others"
             raise InputError(f"{part.take.path}: {text}; do the clocks of depth and colour agree?")

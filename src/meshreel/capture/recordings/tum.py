@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,7 @@ from ...errors import InputError
 from ...io.files import read_input
 from ...io.pictures import read_depth
 from ..calibration.poses import pose_of
-from .takes import Picture, Pictures, Sensor, Stream, Take, lens_of, picture_size, reading
+from .takes import Pictures, Sensor, Stream, Take, lens_of, picture_size, reading
 
 KIND = "a TUM RGB-D folder (depth.txt, rgb.txt)"
 UNIT = 1 / 5000  # m
@@ -82,6 +83,9 @@ def _lines(path: Path) -> dict[int, list[str]]:
 def _rows(path: Path, columns: tuple[type, ...]) -> Iterator[list[Any]]:
     """Yield the first columns of each line. Raises InputError, which names a line that has others."""
     for number, words in _lines(path).items():
+        words = (
+            [words[0], " ".join(words[1:])] if columns == ROW and len(words) > 2 else words
+        )  # a name may have blanks
         try:
             row = [column(word) for column, word in zip(columns, words[: len(columns)], strict=True)]
         except ValueError:
@@ -95,13 +99,13 @@ def _rows(path: Path, columns: tuple[type, ...]) -> Iterator[list[Any]]:
 def _stream(rows: list[tuple[float, Path]], given: list[float], deep: bool) -> Stream:
     if not rows:
         raise ValueError("its list of pictures is empty")
-    width, height = picture_size(read_input(rows[0][1]), str(rows[0][1]))
+    first = next((file for _, file in rows if file.is_file()), rows[0][1])
+    width, height = picture_size(read_input(first, "mend the list that names it"), str(first))
     lens = lens_of(width, height, (given[0], given[1]), (given[2], given[3]), tuple(given[4:9])) if given else None
 
     def pictures() -> Pictures:
         for time, file in rows:
-            picture: Picture = read_depth(file) if deep else read_input(file)
-            yield time, picture
+            yield time, partial(read_depth if deep else read_input, file)
 
     times = [time for time, _ in rows]
     return Stream(width, height, len(rows), max(times) - min(times), lens, pictures)
