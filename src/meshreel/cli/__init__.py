@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import io
 import os
+import re
 import signal
 import sys
 import threading
@@ -29,6 +30,8 @@ INTERRUPTED = 130  # 128 + SIGINT, as shells report it
 TERMINATED = 143  # 128 + SIGTERM
 PIPE_CLOSED = 141  # 128 + SIGPIPE
 _STOPPED = {False: "interrupted", True: "terminated"}  # True: by SIGTERM
+
+_COMMANDS = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]")  # also of the direction of text
 
 COMMANDS = {
     "capture": "Fuse the depth of a rig into one mesh per frame, or make a rig of recordings of other programs.",
@@ -162,6 +165,11 @@ def _run(make: Callable[[], App], tokens: list[str], signals: _Signals) -> int:
         return _report(f"error: {one_line(error)}", FAILED)
 
 
+def shown(text: str) -> str:
+    """Return a text, which may be of a stranger's file, without characters that would command a terminal."""
+    return _COMMANDS.sub(lambda found: found[0].encode("unicode_escape").decode(), text)
+
+
 def one_line(error: Exception) -> str:
     """Return the message of an error, with its remedy, without line breaks."""
     return _noted(_text_of(error), error)
@@ -218,7 +226,7 @@ def _missing(error: MissingArgumentError, command: str) -> str:
 
 
 def _report(text: str, code: int) -> int:
-    print(f"{program()}: {text}", file=sys.stderr)
+    print(f"{program()}: {shown(text)}", file=sys.stderr)
     return code
 
 

@@ -28,7 +28,7 @@ from rich.progress import (
 )
 from rich.text import Text
 
-from . import program
+from . import program, shown
 
 EVERY = 10.0  # s, between two lines of progress outside a terminal
 
@@ -49,19 +49,19 @@ class Common:
         """Print warnings on standard error, one per line."""
         for text in texts:
             if not self.quiet:
-                print(f"{program()}: warning: {text}", file=sys.stderr)
+                print(f"{program()}: warning: {shown(text)}", file=sys.stderr)
 
     def note(self, text: str) -> None:
         """Print a line on standard error, above the progress bars."""
         if not self.quiet:
-            print(text, file=sys.stderr)
+            print(shown(text), file=sys.stderr)
 
     def result(self, row: dict[str, Any], *texts: object) -> None:
         """Print the result: `row` as JSON, or the texts and tables."""
         if self.json:
             print(json.dumps(row, allow_nan=False, default=str))
         elif not self.quiet:
-            console = Console(highlight=False, soft_wrap=True)
+            console = _Console(highlight=False, soft_wrap=True)
             for text in texts:
                 console.print(text, markup=False)
         if sys.stdout is not None:  # None if the caller closed it
@@ -96,6 +96,13 @@ def called_as() -> str:
         return "meshreel"  # another program uses it as a library
     on_path = shutil.which(called.name)
     return "meshreel" if on_path is not None and Path(on_path).resolve() == called.resolve() else str(called)
+
+
+class _Console(Console):
+    """A console on which texts command nothing, also in the cells of tables."""
+
+    def render_str(self, text: str, **others: Any) -> Text:
+        return super().render_str(shown(text), **others)
 
 
 class StageBars:
