@@ -15,6 +15,7 @@ from meshreel.container.reader import FIRST_REQUEST
 from meshreel.container.writer import ReelWriter
 from meshreel.errors import FormatError, InputError
 from meshreel.format.layout import Header
+from meshreel.io.files import Remote
 from tests.golden import GOLDEN, frame_record
 from tests.metrics.shapes import sphere
 
@@ -167,3 +168,36 @@ def test_a_url_of_another_file_or_without_a_server_names_the_url(serve):
         meshreel.open("http://[")
     with pytest.raises(InputError, match=r"127.0.0.1:1/a\.reel: cannot be read .*; check the address"):
         meshreel.open("http://127.0.0.1:1/a.reel")
+
+
+def test_an_answer_without_end_is_given_up_at_its_bytes(serve, monkeypatch):
+    monkeypatch.setattr("meshreel.container.http._MOST", 100_000)
+    with pytest.raises(InputError, match=r"sends the whole file, of more than 100000 bytes; copy it here"):
+        HttpSource(serve(LONG + bytes(100_000), ranges=False).url)
+
+
+def test_an_answer_that_drips_is_given_up_in_time(serve, monkeypatch):
+    monkeypatch.setattr("meshreel.container.http._PATIENCE", 0.05)
+
+    def drip(self: Handler) -> None:
+        self.send_response(206)
+        self.send_header("Content-Range", "bytes 0-99/100")
+        self.send_header("Content-Length", "100")
+        self.end_headers()
+        for _ in range(100):
+            self.wfile.write(b"x")
+            self.wfile.flush()
+            threading.Event().wait(0.02)
+
+    monkeypatch.setattr(Handler, "do_GET", drip)
+    with pytest.raises(InputError, match=r"cannot be read \(\d+ bytes in .* s are too slow\)"):
+        HttpSource(serve(LONG).url)
+
+
+def test_keys_in_a_url_are_in_no_message():
+    url = "http://user:word@127.0.0.1:1/a.reel?X-Amz-Signature=secret"
+    with pytest.raises(InputError, match=r"^http://127.0.0.1:1/a\.reel\?\.\.\.: cannot be read") as told:
+        meshreel.open(url)
+    assert "secret" not in str(told.value) and "word" not in str(told.value)
+    assert (str(Remote(url)), Remote(url).url) == ("http://127.0.0.1:1/a.reel?...", url)
+    assert "secret" not in repr(Remote(url))

@@ -132,6 +132,24 @@ def test_polygons_are_cut_without_folding(outline: list, axis: int) -> None:
     assert signed.sum() / 2 == pytest.approx(shoelace)
 
 
+def test_a_polygon_of_thousands_of_corners_is_cut_and_one_of_more_is_refused(tmp_path: Path) -> None:
+    def spiral(corners: int) -> str:
+        turns = 6 * np.pi * np.arange(corners // 2) / (corners // 2)
+        inner, outer = (np.stack([np.cos(turns), np.sin(turns)], axis=1) * (turns + r)[:, None] for r in (1, 1.5))
+        points = np.concatenate([inner, outer[::-1]])
+        text = "".join(f"v {x} {y} 0\n" for x, y in points)
+        return f"{text}f {' '.join(str(k + 1) for k in range(len(points)))}\n"
+
+    mesh = read(tmp_path, "m.obj", spiral(1000)).mesh
+    a, b, c = (mesh.vertices[mesh.faces[:, k], :2] for k in range(3))
+    areas = ((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]) / 2
+    x, y = mesh.vertices[:, 0], mesh.vertices[:, 1]
+    assert len(mesh.faces) == 998 and (areas <= 1e-9).all()
+    assert areas.sum() == pytest.approx((x * np.roll(y, -1) - y * np.roll(x, -1)).sum() / 2)
+    with pytest.raises(InputError, match="not convex has 5000 corners, of at most 4096"):
+        read(tmp_path, "m.obj", spiral(5000))
+
+
 def test_polygons_of_many_sizes_keep_the_order_of_the_file() -> None:
     vertices = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0.5, 1.5, 0]])
     corners = np.array([0, 1, 2, 0, 1, 2, 4, 3, 0, 1, 2, 3, 2, 4, 3])

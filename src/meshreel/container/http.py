@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import re
+import time
 from http import HTTPStatus
-from http.client import HTTPException
+from http.client import HTTPException, HTTPResponse
 from urllib.error import URLError
 from urllib.request import Request, urlopen
 
-from ..errors import InputError
+from ..errors import InputError, without_secret
 from .reader import FIRST_REQUEST
 
 _TIMEOUT = 30.0  # s without an answer (guess)
+_PATIENCE, _SLOWEST = 60.0, 8192  # s, and bytes a second that an answer must have had after them (guess)
+_MOST = 1 << 29  # bytes of an answer without ranges, which is kept in memory (guess)
+_BLOCK = 1 << 20  # bytes
 _RANGE = re.compile(r"bytes (\d{1,18})-\d{1,18}/(\d{1,18})", re.ASCII)
 
 
@@ -54,10 +58,11 @@ class StoreSource(_UrlSource):
             data: bytes = system.cat_file(path, start=offset, end=min(offset + length, size))
         except ImportError as error:
             text = "a URL needs the extra `remote`, pip install 'meshreel[remote]', and some protocols a package more"
-            raise InputError(f"{self._url}: {error}; {text}") from error
+            raise InputError(f"{without_secret(self._url)}: {error}; {text}") from error
         except Exception as error:  # each file system has errors of its own
             reason = " ".join(f"{type(error).__name__}: {error}".split())
-            raise InputError(f"{self._url}: cannot be read ({reason}); check the URL and your rights") from error
+            text = f"{without_secret(self._url)}: cannot be read ({reason.replace(self._url, '')})"
+            raise InputError(f"{text}; check the URL and your rights") from error
         return data, size
 
 
@@ -73,13 +78,28 @@ class HttpSource(_UrlSource):
             request = Request(self._url, headers={"Range": f"bytes={offset}-{offset + length - 1}"})
             with urlopen(request, timeout=_TIMEOUT) as answer:
                 is_whole = answer.status == HTTPStatus.OK
-                data: bytes = answer.read(None if is_whole else length + 1)  # a server's answer may be endless
+                data = _read(answer, _MOST if is_whole else length)
                 span = _RANGE.fullmatch(answer.headers.get("Content-Range", ""))
         except (URLError, HTTPException, OSError, ValueError) as error:
             reason = getattr(error, "reason", None) or error
-            raise InputError(f"{self._url}: cannot be read ({reason}); check the address") from error
+            raise InputError(f"{without_secret(self._url)}: cannot be read ({reason}); check the address") from error
+        if is_whole and len(data) > _MOST:
+            text = f"the server sends the whole file, of more than {_MOST} bytes"
+            raise InputError(f"{without_secret(self._url)}: {text}; copy it here, or serve ranges of it")
         if is_whole and offset == 0:
             return data, len(data)
         if span is None or int(span[1]) != offset or len(data) > length:
-            raise InputError(f"{self._url}: the server answered without bytes {offset} ...; open it again")
+            text = f"the server answered without bytes {offset} ..."
+            raise InputError(f"{without_secret(self._url)}: {text}; open it again")
         return data, int(span[2])
+
+
+def _read(answer: HTTPResponse, most: int) -> bytes:
+    """Return an answer, or its first `most` + 1 bytes. Raises TimeoutError where it takes for ever."""
+    parts, size, begin = list[bytes](), 0, time.monotonic()
+    while size <= most and (part := answer.read1(min(_BLOCK, most + 1 - size))):
+        parts.append(part)
+        size += len(part)
+        if (took := time.monotonic() - begin) > _PATIENCE and size < _SLOWEST * took:
+            raise TimeoutError(f"{size} bytes in {took:.0f} s are too slow")
+    return b"".join(parts)

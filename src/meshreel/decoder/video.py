@@ -16,7 +16,7 @@ import numpy as np
 
 from ..container.reader import Chunk, ReelReader
 from ..container.sources import BytesSource, FileSource, Source, Stream, StreamSource, source_at
-from ..errors import FormatError, InputError
+from ..errors import FormatError, InputError, without_secret
 from ..format.layout import MEDIA_TYPES, Form
 from ..geometry.splats import Bound
 from ..geometry.topology import concatenate
@@ -284,7 +284,7 @@ class Video(Sequence[Mesh]):
     @property
     def name(self) -> str:
         """Name of the file, without folders; "recording" for bytes and objects."""
-        return "recording" if self.path is None else Path(self.path).name
+        return "recording" if self.path is None else Path(without_secret(str(self.path))).name
 
     def _frame_of_page(self) -> str:
         from .page import in_frame

@@ -20,7 +20,7 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 from urllib.parse import urlsplit
 
-from ..errors import InputError
+from ..errors import InputError, without_secret
 
 _URL = re.compile(r"[a-zA-Z][a-zA-Z0-9+.-]+://")  # two letters at least: C:/ is a disk
 _POINTER = b"version https://git-lfs.github.com/spec/"
@@ -91,7 +91,10 @@ class Remote:
     url: str
 
     def __str__(self) -> str:
-        return self.url
+        """Return the URL as messages show it, without keys."""
+        return without_secret(self.url)
+
+    __repr__ = __str__
 
     def __truediv__(self, name: str) -> Remote:
         return Remote(f"{self.url.rstrip('/')}/{name}")
@@ -175,7 +178,7 @@ def _system(url: str) -> tuple[Any, str]:
         system, path = url_to_fs(url)
     except ImportError as error:
         text = "a URL needs the extra `remote`, pip install 'meshreel[remote]', and some protocols a package more"
-        raise InputError(f"{url}: {error}; {text}") from error
+        raise InputError(f"{without_secret(url)}: {error}; {text}") from error
     return system, path
 
 

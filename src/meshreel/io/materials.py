@@ -17,7 +17,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..types import Texture
-from .files import Place, read_file
+from .files import Place, Remote, read_file
 from .looks import Look, with_face_colors, with_looks
 from .pictures import read_picture
 from .polygons import Polygons
@@ -230,7 +230,7 @@ def _spellings(name: str) -> tuple[str, ...]:
 
 
 def _folder(place: Place) -> Place:
-    return place.parent if isinstance(place, Path) else type(place)(str(place).rsplit("/", 1)[0])
+    return place.parent if isinstance(place, Path) else Remote(place.url.rsplit("/", 1)[0])
 
 
 def _is_absolute(name: str) -> bool:

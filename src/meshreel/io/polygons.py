@@ -16,6 +16,10 @@ Corners = Int64[np.ndarray, "P N"]
 Dropped = frozenset[str]  # names of data in a file other than geometry
 
 
+_MOST_CORNERS = 4096  # of a concave polygon, whose cutting takes quadratic time: seconds for so many (guess)
+_SEARCHES = 64  # of all corners of a polygon for an ear, in which few are found (guess)
+
+
 class Unreadable(ValueError):
     """The content of a file breaks the rules of its format; the caller adds file, frame and remedy to the message."""
 
@@ -133,11 +137,21 @@ def _clip_ears(points: Float64[np.ndarray, "N 3"], names: Int64[np.ndarray, " N"
     drop = int(np.argmax(np.abs(normal)))  # projection along the largest axis keeps the orientation
     flat = np.delete(points - points[0], drop, axis=1) * np.array([1.0, -1.0 if drop == 1 else 1.0])
     flat = flat if normal[drop] > 0 else flat * np.array([1.0, -1.0])
-    ring, faces = list(range(len(names))), []
+    if len(names) > _MOST_CORNERS:
+        raise Unreadable(f"a polygon that is not convex has {len(names)} corners, of at most {_MOST_CORNERS}")
+    ring, faces, searches = list(range(len(names))), [], 0
+    ears = [_is_ear(flat, ring, k) for k in ring]
     while len(ring) > 3:
-        ear = next((k for k in range(len(ring)) if _is_ear(flat, ring, k)), 1)
-        faces.append((ring[ear - 1], ring[ear], ring[(ear + 1) % len(ring)]))
-        ring.pop(ear)
+        at = next((k for k, corner in enumerate(ring) if ears[corner]), -1)
+        if at < 0 and (searches := searches + 1) <= _SEARCHES:  # a corner may be one that was none before
+            for k, corner in enumerate(ring):
+                ears[corner] = _is_ear(flat, ring, k)
+            at = next((k for k, corner in enumerate(ring) if ears[corner]), -1)
+        at = at if at >= 0 else 1
+        faces.append((ring[at - 1], ring[at], ring[(at + 1) % len(ring)]))
+        ring.pop(at)
+        for k in (at - 1, at % len(ring)):
+            ears[ring[k]] = _is_ear(flat, ring, k % len(ring))
     return names[np.array([*faces, tuple(ring)])]
 
 
@@ -146,9 +160,12 @@ def _is_ear(flat: Float64[np.ndarray, "N 2"], ring: list[int], k: int) -> bool:
     corners = flat[[a, b, c]]
     if _turn(corners[0], corners[1], corners[2]) <= 0:
         return False
-    others = flat[[i for i in ring if i not in (a, b, c)]]
-    sides = [_turn(corners[i], corners[(i + 1) % 3], others) >= 0 for i in range(3)]
-    return not (sides[0] & sides[1] & sides[2]).any()
+    others = flat[ring]
+    inside = np.ones(len(ring), bool)
+    for i in range(3):
+        inside &= _turn(corners[i], corners[(i + 1) % 3], others) >= 0
+    inside[[k - 1, k, (k + 1) % len(ring)]] = False
+    return not inside.any()
 
 
 def _turn(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray | np.floating:
