@@ -5,7 +5,7 @@ import time
 import pytest
 from rich.progress import Progress
 
-from meshreel.cli import console
+from meshreel.cli import console, shown
 from meshreel.cli.console import Common, StageBars, left, line_of
 
 
@@ -74,3 +74,27 @@ def test_outside_a_terminal_lines_come_as_long_as_it_lasts(monkeypatch, capsys, 
     assert capsys.readouterr().err == ""
     assert (len(lines) > 2 and lines[0].startswith("meshreel: code 3 of 8 frames; ")) != quiet
     assert not quiet or not lines
+
+
+@pytest.mark.parametrize(
+    ("text", "wanted"),
+    [
+        ("a\x1b[2Jb", r"a\x1b[2Jb"),
+        ("\x07\x00\x9b", r"\x07\x00\x9b"),
+        ("\u202eply", r"\u202eply"),
+        ("né\t北\n", "né\t北\n"),
+    ],
+)
+def test_texts_of_strangers_command_no_terminal(text, wanted):
+    assert shown(text) == wanted
+
+
+def test_tables_and_warnings_show_the_commands_of_strangers(capsys):
+    from rich.table import Table
+
+    table = Table("name")
+    table.add_row("a\x1b[2J")
+    Common().result({}, table, "b\x1b]0;c")
+    Common().warn(["d\x1b[m"])
+    said = capsys.readouterr()
+    assert "\x1b" not in said.out + said.err and r"a\x1b" in said.out and r"d\x1b" in said.err

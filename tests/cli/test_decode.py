@@ -163,3 +163,12 @@ def test_damaged_colors_cost_colors_and_the_exit_code(run, tmp_path, colored, ki
     found, wanted = open_sequence(tmp_path / "out"), meshreel.open(colored)
     assert len(found) == len(wanted)
     assert found[0].texture is None and len(found[0].faces) == len(wanted[0].faces)
+
+
+@pytest.mark.parametrize("name", ["splats", "audio"])
+def test_what_meshes_do_not_hold_is_named_with_the_flag_that_writes_it(run, tmp_path, name):
+    file = GOLDEN / name / f"{name}.reel"
+    said = run("decode", file, "-o", tmp_path)
+    assert said.code == 0 and f"{name} of it: not written; meshreel decode --{name} writes this" in said.err
+    said = run("export", file, "-o", tmp_path / "a.glb")
+    assert said.code == 0 and f"{name} of it: not written" in said.err

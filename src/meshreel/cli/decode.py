@@ -79,6 +79,7 @@ def decode(
     }
     parts = every[only]
     lost = _not_kept(video.reader, format)
+    common.warn(_beside(file, video.reader))
     pictured = video.background if video.reader.has_textures and not lost else lambda _: None
     written = _changes(video.reader, pictured) if only == "background" else range(len(video))
     common.warn(lost)
@@ -143,6 +144,12 @@ def _write_splats(file: Path, video: Video, output: Path, format: str, common: C
     _write(file, output, frame_names(len(video), format), (video.splats, write_splats), common)
     row = {"output": str(output), "frames": len(video), "format": format, "frame_rate": video.frame_rate}
     common.result(row, f"{output}: splats of {len(video)} frames, {format} files")
+
+
+def _beside(file: Path, reader: ReelReader) -> list[str]:
+    """Return a warning for each thing that a file has and meshes do not hold."""
+    found = [("splats", reader.has_splats), ("audio", reader.audio is not None)]
+    return [f"{file}: {name} of it: not written; meshreel decode --{name} writes this" for name, has in found if has]
 
 
 def _not_kept(reader: ReelReader, format: str) -> tuple[str, ...]:
@@ -233,6 +240,9 @@ def export(
                 count = export_animated(video.reader, target, chosen, options, progress)
         except FormatError as error:
             raise FormatError(f"{file}: {error}; nothing is written, copy the file again") from error
+    common.warn(_beside(file, video.reader))
+    if not texture and video.reader.has_textures:
+        common.warn([f"{file}: its textures are not written, but colours of vertices: --texture writes them"])
     if count == 0:
         common.warn([f"{target}: no frame has a surface, so it shows nothing"])
     if texture and not video.reader.has_textures:
