@@ -140,3 +140,11 @@ def test_a_gallery_of_500_files_reads_the_heads_of_changed_files_alone(folder, o
     changed = {entry.name: entry for entry in facts.entries()}
     assert opened == ["7.reel", "renamed.reel"] and "truncated" in changed["7.reel"].error
     assert "8.reel" not in changed and len(changed) == 503
+
+
+def test_a_head_that_takes_long_is_not_read_for_the_gallery_and_the_file_still_plays(folder, player, monkeypatch):
+    monkeypatch.setattr(library, "MOST_HEAD", 64)
+    entry = Library(folder).entry("walk.reel")
+    assert (entry.size, entry.frames, entry.error) == ((folder / "walk.reel").stat().st_size, 0, "")
+    page = TestClient(make_app(Library(folder), player)).get("/").text
+    assert '<a href="/watch/walk.reel">' in page and "not a .reel file" in page

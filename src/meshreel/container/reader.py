@@ -63,12 +63,17 @@ class Chunk:
         return f"chunk {self.number} ({what}{track}frames {self.first_frame} to {last})"
 
 
+class LargeHeadError(FormatError):
+    """The head of a file has more bytes than the caller takes the time to read."""
+
+
 class ReelReader:
     """Checked head of a file, and access to its chunks; does not close the source."""
 
-    def __init__(self, source: Source) -> None:
+    def __init__(self, source: Source, most_head: int | None = None) -> None:
+        """Read the head of a file. Raises FormatError if it is damaged, LargeHeadError over `most_head` bytes."""
         self.source, self._bytes_read = source, 0
-        self.header, self.index, self.head_size, flags = _read_head(source)
+        self.header, self.index, self.head_size, flags = _read_head(source, most_head)
         # `size`: bytes of the whole file, even if it is truncated.
         self.metadata, self.edit, self.size = check_file(self.header, self.index, flags, self.head_size)
         self.chunks = _chunks(self.index, self.head_size, -self.edit.first)
@@ -229,7 +234,7 @@ class ReelReader:
         return payload
 
 
-def _read_head(source: Source) -> tuple[Header, Index, int, int]:
+def _read_head(source: Source, most: int | None) -> tuple[Header, Index, int, int]:
     """Return header, index, size and flags; a short head takes one request, within the size of the source."""
     data = source.get_bytes(0, min(FIRST_REQUEST, source.size))
     if data[: len(MAGIC)] != MAGIC:
@@ -244,6 +249,8 @@ def _read_head(source: Source) -> tuple[Header, Index, int, int]:
     if not start <= end or size > source.size:
         raise FormatError(f"head of {size} bytes in a file of {source.size}: truncated or damaged")
     check_head(size)
+    if most is not None and size > most:
+        raise LargeHeadError(f"a head of {size} bytes, over {most}")
     data = data[:size] + (source.get_bytes(len(data), size - len(data)) if size > len(data) else b"")
     if len(data) != size or unpack_all(Checksum, data[end:]).crc != zlib.crc32(data[:end]):
         raise FormatError("the head is damaged: its checksum does not match")

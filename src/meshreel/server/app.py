@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from hashlib import blake2b
 from pathlib import Path
 
+from anyio import CapacityLimiter, to_thread
 from starlette.applications import Starlette
 from starlette.concurrency import run_in_threadpool
 from starlette.exceptions import HTTPException
@@ -84,13 +85,14 @@ class _Pages:
         self._names = set(built)
         self._edition = blake2b(b"".join(built.values()), digest_size=SUM).hexdigest()
         self._styles = built.get("page.css", b"").decode()
+        self._galleries = CapacityLimiter(1)  # one at a time: it reads every file of the folder
 
     async def home(self, _: Request) -> Response:
         """Return the player of the only file, or the gallery."""
         if self._library.only is not None:
             return self._watch(self._library.only)
         title = as_text(self._library.folder.resolve().name) or "meshreel"
-        entries = await run_in_threadpool(self._library.entries)
+        entries = await to_thread.run_sync(self._library.entries, limiter=self._galleries)
         return _page(gallery_page(title, entries, f"/player/{self._edition}"), policy())
 
     async def watch(self, request: Request) -> Response:

@@ -7,19 +7,23 @@ from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
-from ..container.reader import ReelReader
+from ..container.reader import LargeHeadError, ReelReader
 from ..container.sources import FileSource
 from ..errors import FormatError, InputError, MeshreelError
 from ..io.file_names import is_text
 
 SUFFIX = ".reel"
+MOST_HEAD = 1 << 20  # bytes, which take a second to read: an hour of a scene has fewer (guess)
 HIDDEN = "."  # first character of hidden names
 Version = tuple[int, int, int]  # of a file, which changes with its contents: size in bytes; mtime and ctime in ns
 
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """Facts of a file for the gallery; for a file that cannot be read, numbers are 0 and `error` says why."""
+    """Facts of a file for the gallery; for a file that cannot be read, numbers are 0 and `error` says why.
+
+    A file whose head takes long to read has its size alone.
+    """
 
     name: str  # relative to the folder, with slashes
     size: int = 0  # bytes
@@ -95,7 +99,9 @@ def _facts(name: str, path: Path, _version: Version) -> Entry:
     """Read the facts of a version of a file, once. Raises MeshreelError if it cannot be read now."""
     try:
         with FileSource(path) as source:
-            reader = ReelReader(source)
+            reader = ReelReader(source, MOST_HEAD)
+    except LargeHeadError:
+        return Entry(name, path.stat().st_size)
     except FormatError as error:
         return Entry(name, error=_without_path(error, path))
     lost, whole = len(reader.missing), len(reader.chunks)

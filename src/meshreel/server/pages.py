@@ -79,9 +79,11 @@ def _tile(entry: Entry) -> str:
     address = quote(entry.name)
     size = f"{entry.size / 1e6:.3g} MB" if entry.size >= 1e6 else f"{entry.size / 1e3:.3g} kB"
     facts = f"{entry.mbps:.3g} Mbps, {entry.duration:.1f} s, {entry.frames} frames, {size}"
-    lines = f'<div class="facts">{facts}</div>' if entry.frames else ""
+    facts = facts if entry.frames else size
+    lines = f'<div class="facts">{facts}</div>' if not entry.error or entry.frames else ""
     lines += f'<div class="error">{escape(entry.error)}</div>' if entry.error else ""
     picture = f'<img src="{_PLAIN}" data-file="/files/{address}" alt="">'
-    poster = picture if entry.frames else '<div class="blank"></div>'
+    plays = entry.frames > 0 or not entry.error
+    poster = picture if plays else '<div class="blank"></div>'
     inside = f'{poster}<div class="facts-box"><div class="name">{name}</div>{lines}</div>'
-    return f'<li><a href="/watch/{address}">{inside}</a></li>\n' if entry.frames else f"<li>{inside}</li>\n"
+    return f'<li><a href="/watch/{address}">{inside}</a></li>\n' if plays else f"<li>{inside}</li>\n"
