@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 import meshreel
+from meshreel.decoder.cache import CachedGroups
 from meshreel.decoder.pictures import TrackPictures
 from meshreel.decoder.tracks import Background, Track, TrackSplats
 from meshreel.decoder.video import Video
@@ -15,7 +16,7 @@ from tests.golden import GOLDEN
 
 THREADS, READS = 4, 40
 FILES = sorted(GOLDEN.rglob("*.reel"))
-CACHES = [(Track, "_group"), (Track, "_states"), (Background, "_last"), (TrackSplats, "_splats")]
+CACHES = [(CachedGroups, "by_track"), (Track, "_states"), (Background, "_last"), (TrackSplats, "_splats")]
 CACHES += [(TrackPictures, "_layouts"), (TrackPictures, "_background")]
 
 

@@ -14,7 +14,7 @@ from meshreel.coding.background import decode_background, decode_change, encode_
 from meshreel.coding.layers.coder import encode_layers
 from meshreel.coding.mesh import decode_intra, encode_empty, encode_intra
 from meshreel.container.writer import ReelWriter
-from meshreel.decoder import tracks
+from meshreel.decoder import cache, tracks
 from meshreel.errors import FormatError
 from meshreel.format.layout import ChunkKind
 from meshreel.geometry.topology import concatenate
@@ -297,16 +297,28 @@ def test_all_tracks_together_keep_no_more_than_one_alone_would(monkeypatch: pyte
         assert most > 0 or [len(track._states.known) for track in video.tracks] == [1, 1, 1]
 
 
+def test_tracks_read_one_by_one_keep_no_more_groups_than_a_frame_may_have(monkeypatch: pytest.MonkeyPatch):
+    video = meshreel.open(chains(3))
+    size = video.tracks[0].frame_and_group(0)[1].nbytes
+    monkeypatch.setattr(cache, "MOST_TOGETHER", 2 * size)
+    for track in video.tracks:
+        assert len(track[0].vertices) == len(ball().base.vertices)
+    assert [track._group is None for track in video.tracks] == [True, False, False]  # the oldest goes
+    monkeypatch.setattr(cache, "MOST_TOGETHER", 0)
+    assert len(video.tracks[0][3].vertices) > 0
+    assert [track._group is None for track in video.tracks] == [False, True, True]
+
+
 def test_groups_that_together_are_too_large_are_refused_and_each_is_still_there(monkeypatch: pytest.MonkeyPatch):
     video = meshreel.open(chains(3))
-    _, size = video.tracks[0].frame_and_memory(0)
+    size = video.tracks[0].frame_and_group(0)[1].nbytes
     first, second = video.tracks[0][0], video.tracks[0][1]
     assert size == first.vertices.nbytes + second.vertices.nbytes + first.faces.nbytes  # which both share
-    monkeypatch.setattr(tracks, "MOST_TOGETHER", 3 * size)
+    monkeypatch.setattr(cache, "MOST_TOGETHER", 3 * size)
     assert len(video[0].vertices) == 3 * len(ball().base.vertices)
-    monkeypatch.setattr(tracks, "MOST_TOGETHER", 3 * size - 1)
+    monkeypatch.setattr(cache, "MOST_TOGETHER", 3 * size - 1)
     with pytest.raises(FormatError, match="frame 0: its groups of tracks 0 to 2 take"):
         video[0]
-    monkeypatch.setattr(tracks, "MOST_TOGETHER", 0)
+    monkeypatch.setattr(cache, "MOST_TOGETHER", 0)
     assert [len(track[0].vertices) for track in video.tracks] == [len(ball().base.vertices)] * 3
     assert len(meshreel.open(GOLDEN / "layers.reel")[0].vertices) > 0  # one track may be as large as its group may

@@ -1,4 +1,4 @@
-"""Cache of one track: the last group decoded, and the states from which the next groups of its chain continue.
+"""Caches of tracks: the last group that each decoded, and the states from which the next groups of its chain continue.
 
 In: decoded meshes and states, and refused chunks. Out: the same, within a bound on memory. Values are replaced and
 never changed, except for the refusals, which only grow; so threads can share a track without a lock.
@@ -6,6 +6,7 @@ never changed, except for the refusals, which only grow; so threads can share a 
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -13,11 +14,13 @@ from dataclasses import dataclass
 from .. import _core
 from ..container.reader import Chunk
 from ..errors import FormatError
+from ..format.budget import LIMITS, together
 from ..types import Mesh
 
 # Bytes of states that all tracks of a video keep (guess): a few bytes of a file can describe groups that each take as
 # much memory as a group may.
 MOST_KEPT = 1 << 25
+MOST_TOGETHER = 8 * LIMITS.numbers  # bytes: the groups of one frame take no more memory than the largest legal group
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,7 +30,36 @@ class CachedGroup:
     number: int  # of its chunk
     frames: list[Mesh]
     nbytes: int  # memory of all frames
+    size: int  # bytes of its chunk
     core: _core.Group
+
+
+class CachedGroups:
+    """The groups that all tracks of a file keep: no more memory than the groups of one frame may take.
+
+    A file of some kilobytes may have a hundred tracks, each with a group of tens of megabytes.
+    """
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self.by_track = dict[int, CachedGroup]()  # the newest last; replaced as a whole
+
+    def keep(self, track: int, group: CachedGroup) -> None:
+        """Keep a group in place of the track's last one, and drop the oldest ones that are then too much."""
+        with self._lock:
+            kept = {number: known for number, known in self.by_track.items() if number != track} | {track: group}
+            taken, size = (
+                sum(column) for column in zip(*((one.nbytes, one.size) for one in kept.values()), strict=True)
+            )
+            while len(kept) > 1 and taken > most_together(size):
+                oldest = kept.pop(next(iter(kept)))
+                taken, size = taken - oldest.nbytes, size - oldest.size
+            self.by_track = kept
+
+
+def most_together(size: int) -> int:
+    """Return the memory that groups may take together whose chunks have `size` bytes."""
+    return min(together(size), MOST_TOGETHER)
 
 
 @dataclass(frozen=True, slots=True)

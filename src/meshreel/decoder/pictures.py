@@ -23,6 +23,7 @@ from ..format.budget import are_costly
 from ..format.layout import LAYER_PICTURES, ChunkKind, Pictures, VideoCodec
 from ..shapes import UInt8
 from ..types import Mesh, Texture
+from .cache import CachedGroups
 
 CODECS = {ChunkKind.PICTURES: VideoCodec.AV1, ChunkKind.COMPATIBLE: VideoCodec.H264}
 
@@ -40,9 +41,10 @@ class _Place:
 
 
 class Decoders:
-    """Decoders of the videos of a file, each at the picture that it decoded last, within a bound on memory."""
+    """What all tracks of a file share: decoders of its videos, each at its last picture, and the groups they keep."""
 
     def __init__(self) -> None:
+        self.groups = CachedGroups()
         self.lock = threading.Lock()
         self.refused = dict[tuple[int, int], tuple[int, str]]()  # valid pictures and error, by chunk and layer
         self.places = dict[tuple[int, int], _Place]()  # by a chain's first chunk and layer, least recently used first

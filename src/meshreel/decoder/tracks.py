@@ -14,14 +14,12 @@ import numpy as np
 from .. import _core
 from ..container.reader import Chunk, ReelReader
 from ..errors import FormatError
-from ..format.budget import LIMITS, Chain, together
+from ..format.budget import Chain
 from ..format.layout import ChunkKind, Form
 from ..geometry.splats import Bound
 from ..types import Frames, Mesh, Texture
-from .cache import MOST_KEPT, CachedGroup, CachedStates, Refusals
+from .cache import MOST_KEPT, CachedGroup, CachedStates, Refusals, most_together
 from .pictures import Decoders, TrackPictures
-
-MOST_TOGETHER = 8 * LIMITS.numbers  # bytes: the groups of one frame take no more memory than the largest legal group
 
 
 class Track(Frames):
@@ -44,7 +42,7 @@ class Track(Frames):
         self.number = number
         self.layers = layers
         self._place = placement(reader)
-        self._group: CachedGroup | None = None
+        self._groups = decoders.groups
         self._states = CachedStates({})
         self._pictures = TrackPictures(reader, decoders)
         self._splats = TrackSplats(reader, layers)
@@ -56,13 +54,18 @@ class Track(Frames):
 
     def __getitem__(self, index: int) -> Mesh:
         """Return frame `index` in metres. Raises IndexError out of range and FormatError if its group is damaged."""
-        return self.frame_and_memory(index)[0]
+        return self.frame_and_group(index)[0]
 
-    def frame_and_memory(self, index: int) -> tuple[Mesh, int]:
-        """Return frame `index` and the memory of all frames of its group in bytes."""
+    def frame_and_group(self, index: int) -> tuple[Mesh, CachedGroup]:
+        """Return frame `index` and its group. Raises as indexing does."""
         chunk = self.reader.chunk_of_frame(index, self.number)
         group = self._decoded(chunk)
-        return group.frames[index - chunk.first_frame], group.nbytes
+        return group.frames[index - chunk.first_frame], group
+
+    @property
+    def _group(self) -> CachedGroup | None:
+        """The group decoded last, while all tracks keep it."""
+        return self._groups.by_track.get(self.number)
 
     def splats(self, index: int) -> Bound | None:
         """Return the splats of frame `index` in metres; None if its groups have none. Raises as indexing does."""
@@ -88,7 +91,8 @@ class Track(Frames):
             decoded.turn(self.reader.edit.rotation, self.reader.header.origin)
         meshes = _meshes(decoded.frames(), texture)
         self._states = states.add(chunk.number, decoded.state, state, self._most)
-        self._group = group = CachedGroup(chunk.number, meshes, decoded.nbytes, decoded)
+        group = CachedGroup(chunk.number, meshes, decoded.nbytes, chunk.size, decoded)
+        self._groups.keep(self.number, group)
         return group
 
     def _state_before(self, chunk: Chunk) -> tuple[_core.GroupState | None, CachedStates]:
@@ -229,17 +233,13 @@ def turned(mesh: Mesh, reader: ReelReader) -> Mesh:
 
 def moving_of_frame(tracks: Sequence[Track], frame: int) -> list[Mesh]:
     """Return a frame of each track. Raises FormatError if their groups take more memory than their bytes may."""
-    meshes: list[Mesh] = []
-    taken = size = 0
+    meshes, taken, size = list[Mesh](), 0, 0
     for track in tracks:
-        mesh, nbytes = track.frame_and_memory(frame)
-        taken += nbytes
-        size += track.reader.chunk_of_frame(frame, track.number).size
-        most = min(together(size), MOST_TOGETHER)
-        if meshes and taken > most:
-            raise FormatError(
-                f"frame {frame}: its groups of tracks 0 to {track.number} take {taken} bytes, over {most}"
-            )
+        mesh, group = track.frame_and_group(frame)
+        taken, size = taken + group.nbytes, size + group.size
+        if meshes and taken > (most := most_together(size)):
+            text = f"its groups of tracks 0 to {track.number} take {taken} bytes, over {most}"
+            raise FormatError(f"frame {frame}: {text}")
         meshes.append(mesh)
     return meshes
 
