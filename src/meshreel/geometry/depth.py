@@ -22,7 +22,7 @@ WORLD = Placement(1.0, (0.0, 0.0, 0.0))
 STEP = 0.03  # of the depth, between neighbours: pixels that differ by more are of two surfaces (guess)
 
 
-def apart(depth: Float64[np.ndarray, "..."]) -> Float64[np.ndarray, "..."]:
+def apart(depth: Float[np.ndarray, "..."]) -> Float[np.ndarray, "..."]:
     """Return by how much two measurements at a depth must differ to be of different surfaces, m."""
     return np.maximum(APART[0], APART[1] * depth)
 
