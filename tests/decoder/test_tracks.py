@@ -299,7 +299,7 @@ def test_all_tracks_together_keep_no_more_than_one_alone_would(monkeypatch: pyte
 
 def test_tracks_read_one_by_one_keep_no_more_groups_than_a_frame_may_have(monkeypatch: pytest.MonkeyPatch):
     video = meshreel.open(chains(3))
-    size = video.tracks[0].frame_and_group(0)[1].nbytes
+    size = video.tracks[0].memory(0)
     monkeypatch.setattr(cache, "MOST_TOGETHER", 2 * size)
     for track in video.tracks:
         assert len(track[0].vertices) == len(ball().base.vertices)
@@ -311,7 +311,7 @@ def test_tracks_read_one_by_one_keep_no_more_groups_than_a_frame_may_have(monkey
 
 def test_groups_that_together_are_too_large_are_refused_and_each_is_still_there(monkeypatch: pytest.MonkeyPatch):
     video = meshreel.open(chains(3))
-    size = video.tracks[0].frame_and_group(0)[1].nbytes
+    size = video.tracks[0].memory(0)
     first, second = video.tracks[0][0], video.tracks[0][1]
     assert size == first.vertices.nbytes + second.vertices.nbytes + first.faces.nbytes  # which both share
     monkeypatch.setattr(cache, "MOST_TOGETHER", 3 * size)

@@ -43,10 +43,12 @@ class CachedGroups:
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self.by_track = dict[int, CachedGroup]()  # the newest last; replaced as a whole
+        self.memory = dict[int, int]()  # of all groups that were decoded, bytes, by the number of their chunk
 
     def keep(self, track: int, group: CachedGroup) -> None:
         """Keep a group in place of the track's last one, and drop the oldest ones that are then too much."""
         with self._lock:
+            self.memory[group.number] = group.nbytes
             kept = {number: known for number, known in self.by_track.items() if number != track} | {track: group}
             taken, size = (
                 sum(column) for column in zip(*((one.nbytes, one.size) for one in kept.values()), strict=True)

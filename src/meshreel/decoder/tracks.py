@@ -54,13 +54,14 @@ class Track(Frames):
 
     def __getitem__(self, index: int) -> Mesh:
         """Return frame `index` in metres. Raises IndexError out of range and FormatError if its group is damaged."""
-        return self.frame_and_group(index)[0]
-
-    def frame_and_group(self, index: int) -> tuple[Mesh, CachedGroup]:
-        """Return frame `index` and its group. Raises as indexing does."""
         chunk = self.reader.chunk_of_frame(index, self.number)
-        group = self._decoded(chunk)
-        return group.frames[index - chunk.first_frame], group
+        return self._decoded(chunk).frames[index - chunk.first_frame]
+
+    def memory(self, index: int) -> int:
+        """Return the memory of all frames of the group of frame `index`, bytes; decoded once. Raises as indexing."""
+        chunk = self.reader.chunk_of_frame(index, self.number)
+        known = self._groups.memory.get(chunk.number)
+        return self._decoded(chunk).nbytes if known is None else known
 
     @property
     def _group(self) -> CachedGroup | None:
@@ -233,15 +234,13 @@ def turned(mesh: Mesh, reader: ReelReader) -> Mesh:
 
 def moving_of_frame(tracks: Sequence[Track], frame: int) -> list[Mesh]:
     """Return a frame of each track. Raises FormatError if their groups take more memory than their bytes may."""
-    meshes, taken, size = list[Mesh](), 0, 0
-    for track in tracks:
-        mesh, group = track.frame_and_group(frame)
-        taken, size = taken + group.nbytes, size + group.size
-        if meshes and taken > (most := most_together(size)):
+    taken = size = 0
+    for number, track in enumerate(tracks):
+        taken, size = taken + track.memory(frame), size + track.reader.chunk_of_frame(frame, track.number).size
+        if number and taken > (most := most_together(size)):
             text = f"its groups of tracks 0 to {track.number} take {taken} bytes, over {most}"
             raise FormatError(f"frame {frame}: {text}")
-        meshes.append(mesh)
-    return meshes
+    return [track[frame] for track in tracks]
 
 
 class TrackSplats:
