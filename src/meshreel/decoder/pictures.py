@@ -41,7 +41,7 @@ class _Place:
 
 
 class Decoders:
-    """What all tracks of a file share: decoders of its videos, each at its last picture, and the groups they keep."""
+    """Decoders of a file's videos, each at its last picture, and the groups that its tracks keep, shared by these."""
 
     def __init__(self) -> None:
         self.groups = CachedGroups()
