@@ -59,6 +59,7 @@ def test_opening_loads_nothing_that_only_some_files_need():
     assert subprocess.run(command, capture_output=True, text=True, check=True).stdout == "[]\n"
 
 
+@pytest.mark.clock
 def test_opening_takes_hardly_longer_than_importing_numpy():
     opening, numpy = least_seconds(f"import meshreel; meshreel.open({str(GOLDEN / 'layers.reel')!r})", "import numpy")
     assert opening <= MOST_OPENING * numpy
