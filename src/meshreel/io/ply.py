@@ -46,7 +46,7 @@ class _Property:
 class _Element:
     name: str
     rows: int
-    properties: tuple[_Property, ...]
+    properties: list[_Property]
 
 
 def parse_ply(data: bytes) -> Polygons:
@@ -94,7 +94,7 @@ def _vertices(
     """Return the surface with its vertices and their colours, and the vertices' places in a picture."""
     places, names = _named(element, (("x", "y", "z"),), kept), _named(element, _COLORS, kept)
     uv = _named(element, _PLACES, set())
-    columns, _ = body.read(element, ())
+    columns, _ = body.read(element, {*places, *names, *uv})
     if not places:
         raise Unreadable("PLY vertices have no x, y, z")
     colors = eight_bits(_of_kind(element, _stacked(columns, names), names[0])) if names else None
@@ -109,7 +109,8 @@ def _faces(body: _Text | _Binary, element: _Element, surface: Polygons, kept: _K
     if name is None and element.rows:
         raise Unreadable(f"PLY faces have no list called {' or '.join(_INDICES)}")
     colors = _named(element, _COLORS, kept)
-    columns, items = body.read(element, lists & {name or "", _CORNER_PLACES})
+    wanted = {name or "", _CORNER_PLACES} & lists | {*colors, _PICTURE} - lists
+    columns, items = body.read(element, wanted)
     corners, sizes = items.get(name or "", _NOTHING)
     kept.add((element.name, name or ""))
     surface = replace(surface, corners=whole(corners, "PLY index"), sizes=sizes)
@@ -176,14 +177,14 @@ def _header(lines: list[str]) -> tuple[str, list[_Element]]:
             case ["format", ("ascii" | "binary_little_endian" | "binary_big_endian") as encoding, _]:
                 pass
             case ["element", name, rows] if rows.isdecimal() and len(rows) <= _DIGITS:
-                elements.append(_Element(name, int(rows), ()))
+                elements.append(_Element(name, int(rows), []))
             # Without the first word as Unity's player of geometry sequences writes it.
             case ["property", "list", count, kind, name] | ["list", count, kind, name] if (
                 count in _TYPES and kind in _TYPES and elements
             ):
-                elements[-1] = _with(elements[-1], _Property(name, _dtype(kind, encoding), _dtype(count, encoding)))
+                elements[-1].properties.append(_Property(name, _dtype(kind, encoding), _dtype(count, encoding)))
             case ["property", kind, name] | [kind, name] if kind in _TYPES and elements:
-                elements[-1] = _with(elements[-1], _Property(name, _dtype(kind, encoding), None))
+                elements[-1].properties.append(_Property(name, _dtype(kind, encoding), None))
             case [] | ["comment", *_] | ["obj_info", *_]:
                 pass
             case _:
@@ -191,10 +192,6 @@ def _header(lines: list[str]) -> tuple[str, list[_Element]]:
     if not encoding:
         raise Unreadable("PLY header names no format")
     return encoding, elements
-
-
-def _with(element: _Element, new: _Property) -> _Element:
-    return _Element(element.name, element.rows, (*element.properties, new))
 
 
 def _dtype(kind: str, encoding: str) -> np.dtype:
@@ -226,7 +223,7 @@ class _Text:
         self._filled = np.flatnonzero(self._lines.ends > self._lines.starts)
 
     def read(self, element: _Element, wanted: Collection[str]) -> tuple[Columns, Items]:
-        """Return the single values of an element, and the lists of these names."""
+        """Return the single values and the lists of an element that have these names."""
         chosen, self._filled = self._filled[: element.rows], self._filled[element.rows :]
         if len(chosen) < element.rows:
             raise Unreadable(f"PLY announces {element.rows} {element.name} rows but has {len(chosen)} (truncated?)")
@@ -240,13 +237,15 @@ class _Text:
             value = padded[place]
             place = place + 1
             if field.count is None:
-                columns[field.name] = value
+                if field.name in wanted:
+                    columns[field.name] = value
                 continue
             length = whole(value, "PLY list length")
             if ((length < 0) | (place + length > ends)).any():
                 raise _short(element, int(np.argmax((length < 0) | (place + length > ends))))
             if field.name in wanted:
-                items[field.name] = padded[_ranges(place, length)], length
+                within = np.arange(int(length.sum())) - np.repeat(np.cumsum(length) - length, length)
+                items[field.name] = padded[np.repeat(place, length) + within], length
             place = place + length
         return columns, items
 
@@ -258,12 +257,12 @@ class _Binary:
         self._data, self._at = data, 0
 
     def read(self, element: _Element, wanted: Collection[str]) -> tuple[Columns, Items]:
-        """Return the single values of an element, and the lists of these names."""
+        """Return the single values and the lists of an element that have these names."""
         least = element.rows * sum((p.count or p.dtype).itemsize for p in element.properties)
         if self._at + least > len(self._data):
             raise Unreadable(f"PLY announces {element.rows} {element.name} rows but the file is too short (truncated?)")
         if element.rows == 0 or not element.properties:
-            return {p.name: np.zeros(0) for p in element.properties}, dict.fromkeys(wanted, _NOTHING)
+            return {name: np.zeros(0) for name in wanted}, dict.fromkeys(wanted, _NOTHING)
         lengths = self._lengths_of_first_row(element)
         fields = [(f"{k}", p.dtype, (n,)) for k, (p, n) in enumerate(zip(element.properties, lengths, strict=True))]
         counts = [(f"n{k}", p.count or np.dtype("V0")) for k, p in enumerate(element.properties)]
@@ -276,22 +275,17 @@ class _Binary:
         return self._uneven_rows(element, wanted)
 
     def _lengths_of_first_row(self, element: _Element) -> list[int]:
-        at, lengths = self._at, []
+        at, lengths = self._at, list[int]()
         for field in element.properties:
-            length, at = self._length(field, at)
+            length = 1
+            if field.count is not None:
+                count, at = self._data[at : at + field.count.itemsize], at + field.count.itemsize
+                length = int.from_bytes(count, "big" if field.count.byteorder == ">" else "little")
             lengths.append(length)
             at += length * field.dtype.itemsize
             if at > len(self._data):
                 raise _short(element, 0)
         return lengths
-
-    def _length(self, field: _Property, at: int) -> tuple[int, int]:
-        """Return the number of items of a field in the row at `at`, and where they begin."""
-        if field.count is None:
-            return 1, at
-        end = at + field.count.itemsize
-        order = "big" if field.count.byteorder == ">" else "little"
-        return int.from_bytes(self._data[at:end], order), end  # type: ignore[arg-type]
 
     def _uneven_rows(self, element: _Element, wanted: Collection[str]) -> tuple[Columns, Items]:
         """Read rows of different lengths: where a row begins depends on the row before."""
@@ -300,7 +294,7 @@ class _Binary:
         is_big = any(p.count is not None and p.count.byteorder == ">" for p in element.properties)
         rest = np.frombuffer(self._data, dtype=np.uint8)[self._at :]
         columns, items, end = Columns(), Items(), self._at
-        chosen = [k for k, field in enumerate(element.properties) if field.count is None or field.name in wanted]
+        chosen = [k for k, field in enumerate(element.properties) if field.name in wanted]
         for number in chosen or [0]:
             values, lengths, size, bad = _core.read_lists(rest, fields, element.rows, number, is_big)
             if bad >= 0:
@@ -309,10 +303,8 @@ class _Binary:
             if field.count is None:
                 columns[field.name] = values.view(field.dtype)
             else:
-                items[field.name] = (
-                    values.view(field.dtype),
-                    lengths.view(np.int64),
-                )  # of the same size, by its usual name
+                # Lengths of the same size, by their usual name.
+                items[field.name] = values.view(field.dtype), lengths.view(np.int64)
         self._at = end
         return columns, items
 
@@ -321,16 +313,13 @@ def _even_rows(element: _Element, rows: np.ndarray, wanted: Collection[str]) -> 
     columns, items = Columns(), Items()
     for k, field in enumerate(element.properties):
         block = rows[f"{k}"]
+        if field.name not in wanted:
+            continue
         if field.count is None:
             columns[field.name] = block[:, 0]
-        elif field.name in wanted:
+        else:
             items[field.name] = block.reshape(-1), np.full(len(block), block.shape[1], dtype=np.int64)
     return columns, items
-
-
-def _ranges(begins: np.ndarray, lengths: np.ndarray) -> np.ndarray:
-    """Return begin, begin + 1, ... of each range, one range after the other."""
-    return np.repeat(begins - (np.cumsum(lengths) - lengths), lengths) + np.arange(int(lengths.sum()))
 
 
 def _short(element: _Element, row: int) -> Unreadable:
