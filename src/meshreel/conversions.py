@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from .errors import InputError
-from .io.looks import Look, with_face_colors, with_looks
+from .io.looks import Look, with_looks
 from .io.polygons import Polygons
 from .shapes import Float32, Int64, UInt8
 from .types import Mesh, MeshList, MeshSequence, Texture
@@ -58,15 +58,13 @@ def _as_mesh(item: Any, where: str) -> Mesh:
         raise InputError(f"{where}: a face refers to vertex {wrong}, but there are {len(vertices)} (from 0)")
     mesh = Mesh.of(vertices, corners)
     uv, looks, which = _looks_of(item, mesh)
-    triangles = Polygons(mesh.vertices, mesh.faces.reshape(-1).astype(np.int64), np.full(len(mesh.faces), 3), uv=uv)
-    colors = _colors_of(item, mesh, where)
-    if (visual := getattr(item, "visual", None)) is not None and visual.kind == "face":
-        found = _bytes(visual.face_colors, len(mesh.faces), "face", where)
-        faces, none = np.zeros(0) if found is None else found.astype(np.float64), np.zeros(len(mesh.vertices), bool)
-        colors = None if found is None else with_face_colors(triangles, faces, np.ones(len(faces), bool), None, none)
-    if not looks:
-        return replace(mesh, colors=colors)
-    known = with_looks(triangles, looks, which, colors, None if colors is None else np.ones(len(colors), bool))
+    visual, faces = getattr(item, "visual", None), None
+    if visual is not None and visual.kind == "face":
+        faces = _bytes(visual.face_colors, len(mesh.faces), "face", where)
+    sizes, colors = np.full(len(mesh.faces), 3), _colors_of(item, mesh, where)
+    corners = mesh.faces.reshape(-1).astype(np.int64)
+    triangles = Polygons(mesh.vertices, corners, sizes, colors=colors, face_colors=faces, uv=uv)
+    known = with_looks(triangles, looks, which)
     uv = None if known.uv is None else known.uv.reshape(-1, 3, 2)
     return replace(mesh, colors=known.colors, uv=uv, texture=known.texture)
 

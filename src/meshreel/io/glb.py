@@ -28,11 +28,8 @@ _KNOWN = {  # extensions, each of which is read, or changes neither surface nor 
     *("KHR_texture_transform", "EXT_texture_webp", "EXT_texture_avif", "KHR_materials_unlit", "KHR_node_visibility"),
     "KHR_materials_pbrSpecularGlossiness",
 }
-_INSTANCES, _TRANSFORM, _SHINE = (
-    "EXT_mesh_gpu_instancing",
-    "KHR_texture_transform",
-    "KHR_materials_pbrSpecularGlossiness",
-)
+_INSTANCES, _TRANSFORM = "EXT_mesh_gpu_instancing", "KHR_texture_transform"
+_SHINE = "KHR_materials_pbrSpecularGlossiness"
 _STRIP, _FAN = 5, 6  # modes of primitives (glTF 2.0, section 5.24)
 _OTHER_MODES = {0: "points", 1: "lines", 2: "lines", 3: "lines"}
 _LIGHT = to_linear(np.repeat(np.arange(256, dtype=np.uint8)[:, None], 3, axis=1))[:, 0] / 65535  # of sRGB values
@@ -105,19 +102,14 @@ class Scene:
         asset.get("version")
         self.is_ours = asset.get("generator") == "meshreel"
         if unknown := [name for name in tree.get("extensionsRequired", []) if name not in _KNOWN]:
-            raise Unreadable(
-                f"GLB needs the extension {', '.join(map(str, unknown))}, which is not read; write it without"
-            )
+            names = ", ".join(map(str, unknown))
+            raise Unreadable(f"GLB needs the extension {names}, which is not read; write it without")
         animations = tree.get("animations", [])
         if len(animations) > 1:
             names = ", ".join(str(one.get("name", number))[:40] for number, one in enumerate(animations))
             raise Unreadable(f"GLB has {len(animations)} animations ({names}); keep one of them")
         self._moves = dict[tuple[int, str], Callable[[float], np.ndarray]]()
-        ends = (
-            [self._add_move(animations[0], channel) for channel in animations[0].get("channels", [])]
-            if animations
-            else []
-        )
+        ends = [self._add_move(one, channel) for one in animations for channel in one.get("channels", [])]
         self._order = list(self._tree_order())
         return max(ends, default=0.0)
 
@@ -182,16 +174,15 @@ class Scene:
         for number, parent in self._order:
             node = self._file.item("nodes", number)
             places[number] = places[parent] @ self._local(number, time) if parent >= 0 else self._local(number, time)
-            visible = (
-                node.get("extensions", Entry({}, "")).get("KHR_node_visibility", Entry({}, "")).get("visible", True)
-            )
-            hidden[number] = hidden[parent] or not visible
+            shown = node.get("extensions", Entry({}, "")).get("KHR_node_visibility", Entry({}, ""))
+            hidden[number] = hidden[parent] or not shown.get("visible", True)
         for number, _ in self._order:
             node = self._file.item("nodes", number)
             # A scale of 0 hides a node until an animation shows it.
             if hidden[number] or not places[number][:3, :3].any():
                 node.pass_over()
-            if "mesh" not in node or hidden[number] or not places[number][:3, :3].any():
+                continue
+            if "mesh" not in node:
                 continue
             mesh = self._file.item("meshes", node.whole("mesh"))
             shares = np.asarray(node.get("weights", mesh.get("weights", [])), np.float64)
@@ -205,9 +196,8 @@ class Scene:
                 for matrix in matrices if joints is None else [np.eye(4)]:
                     total += len(found.vertices)
                     if total > self._file.most:
-                        raise Unreadable(
-                            f"GLB has more than {self._file.most} vertices, counted as often as they are shown"
-                        )
+                        text = "counted as often as they are shown"
+                        raise Unreadable(f"GLB has more than {self._file.most} vertices, {text}")
                     yield _put(found, matrix)
 
     def _instances(self, node: Entry) -> list[Matrix]:
@@ -275,9 +265,7 @@ class Scene:
             vertices = _skinned(vertices, joints, read)
         if corners is None:
             number = primitive.get("indices")
-            corners = (
-                np.arange(len(vertices)) if number is None else self._file.array(number).reshape(-1).astype(np.int64)
-            )
+            corners = np.arange(len(vertices)) if number is None else self._file.array(number).reshape(-1)
         look, uv, light = self._look(primitive, read, light)
         light = own[:, :3] if light is None and own is not None else light
         colors = None if light is None else from_linear(light)
@@ -380,10 +368,10 @@ class Scene:
         places = [np.full((len(p.vertices), 2), np.nan, np.float32) if p.uv is None else p.uv for p in parts]
         uv = np.concatenate([np.zeros((0, 2), np.float32), *places])[corners]
         which = np.repeat(np.arange(len(parts)), [len(part.faces) for part in parts])
-        surface = Polygons(
-            vertices, corners, np.full(len(corners) // 3, 3, np.int64), uv=uv if np.isfinite(uv).any() else None
-        )
-        found = with_looks(surface, [part.look for part in parts], which, colors, colored)
+        uv = uv if np.isfinite(uv).any() else None
+        sizes = np.full(len(corners) // 3, 3, np.int64)
+        surface = Polygons(vertices, corners, sizes, colors=colors, colored=colored, uv=uv)
+        found = with_looks(surface, [part.look for part in parts], which)
         named = {_WORDS.get(".".join(name.split(".")[-2:]), _plain(name)) for name in self._file.tree.unread()}
         return found.naming(named | self._named)
 
@@ -422,11 +410,8 @@ def _tinted(picture: Texture, *tint: float) -> Texture:
 def _triangles(corners: Int64[np.ndarray, " C"], mode: int) -> Int64[np.ndarray, "F 3"]:
     """Return the triangles of a list, a strip or a fan of corners (glTF 2.0, section 3.7.2.1)."""
     if mode == _STRIP:
-        strip = (
-            np.stack([corners[:-2], corners[1:-1], corners[2:]], axis=1)
-            if len(corners) > 2
-            else corners[:0].reshape(0, 3)
-        )
+        count = max(0, len(corners) - 2)
+        strip = np.stack([corners[k : k + count] for k in range(3)], axis=1)
         strip[1::2, :2] = strip[1::2, 1::-1]
         return strip
     if mode == _FAN:

@@ -22,27 +22,13 @@ DRACO, QUANTIZED = "KHR_draco_mesh_compression", "KHR_mesh_quantization"
 _MESHOPTS = (MESHOPT, "KHR_meshopt_compression")
 _COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
-_FREE, _DENSEST, _MOST = (
-    1 << 20,
-    64,
-    1 << 26,
-)  # values that a file may claim: some, and more for each of its bytes (guess)
+# Values that a file may claim: some, more for each of its bytes, and in all (guess).
+_FREE, _DENSEST, _MOST = 1 << 20, 64, 1 << 26
 # Members that say nothing of surface, colours or time (glTF 2.0, section 5).
 _SILENT = {"name", "extras", "generator", "copyright", "min", "max", "target", "byteLength", "mimeType", "doubleSided"}
 _SILENT |= {"skeleton", "magFilter", "minFilter", "extensionsUsed", "type"}
-
-_LISTS = {
-    "accessors",
-    "bufferViews",
-    "buffers",
-    "images",
-    "materials",
-    "meshes",
-    "nodes",
-    "samplers",
-    "skins",
-    "textures",
-}
+_LISTS = {"accessors", "bufferViews", "buffers", "images", "materials", "meshes", "nodes", "samplers", "skins"}
+_LISTS |= {"textures"}
 
 
 class Entry:
@@ -175,11 +161,9 @@ class Gltf:
         stride = stride or dtype.itemsize * width
         if count and offset + (count - 1) * stride + dtype.itemsize * width > len(data):
             raise Unreadable(f"GLB has an array of {count} rows beyond the {len(data)} bytes of its buffer view {view}")
-        return (
-            np.ndarray((count, width), dtype, data, offset, (stride, dtype.itemsize))
-            if count
-            else np.zeros((0, width), dtype)
-        )
+        if not count:
+            return np.zeros((0, width), dtype)
+        return np.ndarray((count, width), dtype, data, offset, (stride, dtype.itemsize))
 
     def _read_view(self, number: int) -> tuple[memoryview, int]:
         """Return the bytes of a buffer view, and the distance of its rows; 0: they follow one another."""
@@ -236,11 +220,8 @@ class Gltf:
             if source is None and name in others:
                 source = others.get(name).get("source")
         if source is None:
-            return (
-                None,
-                sampler,
-                f"a texture (in a coding that is not read: {', '.join(name for name, _ in others.items()) or 'none'})",
-            )
+            codings = ", ".join(name for name, _ in others.items()) or "none"
+            return None, sampler, f"a texture (in a coding that is not read: {codings})"
         image = self.item("images", source)
         uri, view = image.get("uri"), image.get("bufferView")
         if isinstance(uri, str) and uri.startswith("data:"):

@@ -25,52 +25,50 @@ class Look:
     picture: Texture | None = None
 
 
-def with_looks(
-    polygons: Polygons,
-    looks: Sequence[Look],
-    which: Int64[np.ndarray, " P"],
-    colors: UInt8[np.ndarray, "V 3"] | None = None,
-    colored: Bool[np.ndarray, " V"] | None = None,
-) -> Polygons:
-    """Return polygons with their looks, whose numbers are `which`, -1 for none.
+def with_looks(polygons: Polygons, looks: Sequence[Look], which: Int64[np.ndarray, " P"]) -> Polygons:
+    """Return polygons with their looks, whose numbers are `which`, -1 for none, as colours of vertices and a picture.
 
-    A vertex without a colour of its own (`colors`, `colored`) has the mean of its faces' colours. Several pictures
-    become one.
+    A vertex without a colour of its own has the mean of its faces' own colours, or else of the colours of their looks.
+    Several pictures become one.
     """
+    if polygons.face_colors is not None:
+        count = len(polygons.sizes)
+        polygons = _with_means(polygons, polygons.face_colors.astype(np.float64), np.ones(count, bool))
     stated = [look.color for look in looks if look.color is not None]
     face_colors = np.array([look.color or (0, 0, 0) for look in looks] + [(0, 0, 0)], np.float64)[which]
     has_color = np.array([look.color is not None for look in looks] + [False], bool)[which]
     named = set[str]()
-    is_colored = np.zeros(len(polygons.vertices), bool) if colored is None else colored
-    if len({*stated}) == 1 and has_color.all() and len({*stated[0]}) == 1 and not is_colored.any():
+    if len({*stated}) == 1 and has_color.all() and len({*stated[0]}) == 1 and not _colored(polygons).any():
         named.add("the one grey of all faces")  # how programs draw surfaces that have no colours
-        colors = None
+        polygons = replace(polygons, colors=None, colored=None)
     else:
-        colors = with_face_colors(polygons, face_colors, has_color, colors, is_colored)
+        polygons = _with_means(polygons, face_colors, has_color)
     pictures = list(dict.fromkeys(look.picture for look in looks if look.picture is not None))
     if polygons.uv is None or not pictures:
         lost = {"texture coordinates"} if polygons.uv is not None and np.isfinite(polygons.uv).any() else set[str]()
-        return replace(polygons, colors=colors, uv=None).naming(named | lost)
+        return replace(polygons, uv=None).naming(named | lost)
     numbers = np.array([-1 if look.picture is None else pictures.index(look.picture) for look in looks] + [-1])[which]
     numbers = np.repeat(numbers, polygons.sizes)
     uv = np.where((numbers >= 0)[:, None], polygons.uv, np.float32(np.nan))
     if len(pictures) == 1:
-        return replace(polygons, colors=colors, uv=uv, texture=pictures[0]).naming(named)
+        return replace(polygons, uv=uv, texture=pictures[0]).naming(named)
     uv, beyond = _in_cells(uv, numbers, polygons.sizes, len(pictures))
     named |= {"pictures that repeat within a face, of several"} if beyond else set()
-    return replace(polygons, colors=colors, uv=uv, texture=Texture(partial(_sheet, tuple(pictures)))).naming(named)
+    return replace(polygons, uv=uv, texture=Texture(partial(_sheet, tuple(pictures)))).naming(named)
 
 
-def with_face_colors(
-    polygons: Polygons,
-    face_colors: np.ndarray,
-    has_color: Bool[np.ndarray, " P"],
-    colors: UInt8[np.ndarray, "V 3"] | None,
-    colored: Bool[np.ndarray, " V"],
-) -> UInt8[np.ndarray, "V 3"] | None:
-    """Return colours of vertices: their own, or the mean of their faces' colours, or grey; None if there are none."""
+def _colored(polygons: Polygons) -> Bool[np.ndarray, " V"]:
+    """Return which vertices have a colour of their own."""
+    if polygons.colored is not None:
+        return polygons.colored
+    return np.full(len(polygons.vertices), polygons.colors is not None)
+
+
+def _with_means(polygons: Polygons, face_colors: np.ndarray, has_color: Bool[np.ndarray, " P"]) -> Polygons:
+    """Return polygons whose other vertices have the mean of their faces' colours, or grey; none if there are none."""
+    colored, colors = _colored(polygons), polygons.colors
     if not colored.any() and not has_color.any():
-        return None
+        return replace(polygons, colors=None, colored=None, face_colors=None)
     corners, chosen = polygons.corners, np.repeat(has_color, polygons.sizes)
     corners = np.where((corners >= 0) & (corners < len(polygons.vertices)), corners, 0)  # checked later
     values = np.repeat(face_colors, polygons.sizes, axis=0)[chosen]
@@ -78,7 +76,8 @@ def with_face_colors(
     sums = [np.bincount(corners[chosen], values[:, k], len(polygons.vertices)) for k in range(3)]
     means = np.rint(np.stack(sums, axis=1) / np.maximum(counts, 1)[:, None])
     found = np.where((counts > 0)[:, None], means, GREY).astype(np.uint8)
-    return found if colors is None else np.where(colored[:, None], colors, found)
+    found = found if colors is None else np.where(colored[:, None], colors, found)
+    return replace(polygons, colors=found, colored=None, face_colors=None)
 
 
 def _grid(count: int) -> tuple[int, int]:

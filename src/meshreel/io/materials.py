@@ -18,7 +18,7 @@ import numpy as np
 from ..errors import InputError
 from ..types import Texture
 from .files import Place, Remote, read_file
-from .looks import Look, with_face_colors, with_looks
+from .looks import Look, with_looks
 from .pictures import read_picture
 from .polygons import Polygons
 
@@ -71,14 +71,7 @@ def with_materials(polygons: Polygons, mesh: Place) -> Polygons:
             if uv is not None and (scale != (1.0, 1.0) or offset != (0.0, 0.0)):
                 chosen = np.repeat(which == number, polygons.sizes)[:, None]
                 uv = np.where(chosen, uv * np.array(scale) + np.array(offset), uv).astype(np.float32)
-    colors, colored, faces = polygons.colors, polygons.colored, polygons.face_colors
-    if colors is not None and colored is None:
-        colored = np.ones(len(polygons.vertices), bool)
-    if faces is not None:  # of their own, before those of materials
-        known = np.zeros(len(polygons.vertices), bool) if colored is None else colored
-        colors = with_face_colors(polygons, faces.astype(np.float64), np.ones(count, bool), colors, known)
-        colored = None if colors is None else np.ones(len(colors), bool)
-    return with_looks(replace(polygons, uv=uv), looks, which, colors, colored).naming(named)
+    return with_looks(replace(polygons, uv=uv), looks, which).naming(named)
 
 
 def _of_pictures(mesh: Place, names: tuple[str, ...]) -> tuple[list[Look], set[str]]:
