@@ -72,6 +72,17 @@ def test_a_picture_is_looked_for_beside_its_library_first(tmp_path: Path) -> Non
     assert shown(put(tmp_path, library="mat/s.mtl"))
 
 
+@pytest.mark.parametrize("folder", ["mat", ".mat"])
+def test_a_mesh_of_the_working_directory_has_pictures_beside_its_library(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, folder: str
+) -> None:
+    (tmp_path / folder).mkdir()
+    (tmp_path / folder / "s.mtl").write_text("newmtl a\nmap_Kd skin.png\n")
+    (tmp_path / folder / "skin.png").write_bytes(png())
+    monkeypatch.chdir(tmp_path)
+    assert shown(put(Path(), library=f"{folder}/s.mtl"))
+
+
 @pytest.mark.parametrize("library", ["m.mtl b.mtl", "M.MTL", '"m.mtl"', "c:\\x\\m.mtl", "m.mtl # by hand"])
 def test_libraries_are_found_one_or_several(tmp_path: Path, library: str) -> None:
     (tmp_path / "b.mtl").write_text("newmtl b\n")

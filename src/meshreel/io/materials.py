@@ -238,11 +238,11 @@ def _is_outside(mesh: Place, folder: Place, name: str) -> bool:
 
 def _inside(mesh: Place, folder: Place, name: str) -> PurePosixPath | None:
     """Return the path below the mesh's folder of a file that a file in `folder` names; None if it is not below it."""
-    begin = (
-        ""
-        if str(folder) == str(_folder(mesh))
-        else str(folder)[len(str(_folder(mesh))) :].replace("\\", "/").strip("/")
-    )
+    root = _folder(mesh)
+    if isinstance(folder, Path) and isinstance(root, Path):
+        begin = folder.relative_to(root).as_posix()
+    else:
+        begin = str(folder).removeprefix(str(root)).strip("/")
     path = posixpath.normpath(posixpath.join(begin, name))
     return None if path.startswith(("..", "/")) else PurePosixPath(path)
 
