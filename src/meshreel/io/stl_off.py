@@ -90,10 +90,8 @@ def parse_off(data: bytes) -> Polygons:
     vertices = values[begins[:, None] + np.arange(3)]
     colors, read = None, first_color
     if has_colors and (counts >= first_color + 3).all():
-        colors, read = (
-            eight_bits(_counted(values[begins[:, None] + np.arange(first_color, first_color + 3)])),
-            first_color + 4,
-        )
+        own = values[begins[:, None] + np.arange(first_color, first_color + 3)]
+        colors, read = eight_bits(_counted(own)), first_color + 4
     dropped = {"normals"} if has_normals else set()
     dropped |= {"texture coordinates"} if has_places else set()
     if not has_places and (counts > read).any():

@@ -33,12 +33,8 @@ DEEP |= {"16SC1": ("<i2", 0.001), "32FC1": ("<f4", 1.0)}
 COLOR = {"rgb8": [0, 1, 2], "bgr8": [2, 1, 0], "rgba8": [0, 1, 2, 3], "bgra8": [2, 1, 0, 3]}
 COLOR |= {"8UC3": [2, 1, 0], "8UC4": [2, 1, 0, 3]}
 GREY = ("mono8", "8UC1")
-YUV = {
-    "yuv422": (1, 0),
-    "uyvy": (1, 0),
-    "yuv422_yuy2": (0, 1),
-    "yuyv": (0, 1),
-}  # places of luma and chroma in two bytes
+# Places of luma and chroma in two bytes.
+YUV = {"yuv422": (1, 0), "uyvy": (1, 0), "yuv422_yuy2": (0, 1), "yuyv": (0, 1)}
 BAYER = {f"bayer_{order}8": order for order in ("rggb", "bggr", "gbrg", "grbg")}
 MODELS = ("", "plumb_bob", "rational_polynomial", "none", "Brown Conrady", "Inverse Brown Conrady")
 POSES = "tf2_msgs/msg/TFMessage"
