@@ -34,7 +34,7 @@ FORMAT = (Path(__file__).resolve().parents[2] / "FORMAT.md").read_text(encoding=
 MEMORY, MEMORY_PER_BYTE = 384 << 20, 16 << 10  # bytes, of FORMAT.md
 WITH_COLORS, WITH_TEXTURES = 96 << 20, 320 << 20  # and more, of FORMAT.md
 SECONDS_PER_CHUNK, SECONDS_PER_BYTE = 2.0, 250e-6  # of FORMAT.md
-SLOWER = 3  # times, at most, that a machine which runs tests beside others may take
+SLOWER = 2  # times, at most: the peer takes a second of a core at 3 GHz, but what else runs disturbs the two unequally
 
 SMALL = {
     "draco": partial(worst.draco, 3000),
@@ -83,7 +83,7 @@ def test_the_worst_legal_file_costs_what_is_promised(make: Callable[[], bytes], 
     cost = measured(tmp_path / "worst.reel", data)
     chunks = len(ReelReader(BytesSource(data)).chunks)
     assert cost.memory <= promised(data)
-    assert cost.seconds <= SLOWER * (SECONDS_PER_CHUNK * chunks + SECONDS_PER_BYTE * len(data))
+    assert cost.seconds / cost.peer <= SLOWER * (SECONDS_PER_CHUNK * chunks + SECONDS_PER_BYTE * len(data))
     assert all("its groups of tracks" in message for message in cost.refused)  # all else is legal
 
 

@@ -49,7 +49,7 @@ def written(frames: int, group_size: int) -> bytes:
     """The file."""
     meshes = body(1, frames)
     sequence = welded(MeshList(tuple(textured(mesh, meshes[0], t, frames) for t, mesh in enumerate(meshes))))
-    appearance = appearance_options(50.0, "auto", compatible=True)
+    appearance = appearance_options(50.0, "auto", None, compatible=True, splats=None)
     return encoded(sequence, replace(quick(group_size=group_size), appearance=appearance, scene=None))
 
 
@@ -59,7 +59,7 @@ def room(frames: int) -> bytes:
     colors = [120 + 100 * np.tanh(mesh.vertices) for mesh in scene(frames, moving=True)]
     pairs = zip(scene(frames, moving=True), colors, lights, strict=True)
     meshes = tuple(replace(mesh, colors=(light * color).astype(np.uint8)) for mesh, color, light in pairs)
-    options = replace(quick(), appearance=appearance_options(50.0, "texture", 128))
+    options = replace(quick(), appearance=appearance_options(50.0, "texture", 128, compatible=False, splats=None))
     return encoded(welded(MeshList(meshes, 16.0)), options)
 
 
