@@ -59,6 +59,10 @@ def test_two_files_with_one_frame_number_are_refused(tmp_path: Path) -> None:
     put(tmp_path, "a1_003.obj", "a2_003.obj", "a2_004.obj")
     with pytest.raises(InputError, match=r"'a1_003' and 'a2_003' both have frame number 3; give a glob"):
         open_sequence(tmp_path)
+    put(tmp_path / "padded", "b_3.obj", "b_03.obj", "b_4.obj")
+    for order in ("auto", "all", "last"):
+        with pytest.raises(InputError, match=r"'b_03' and 'b_3' both have frame number 3; give a glob"):
+            open_sequence(tmp_path / "padded", SequenceOptions(order=order))
 
 
 def test_names_of_two_patterns_are_refused(tmp_path: Path) -> None:
@@ -298,7 +302,7 @@ def test_gaps_in_the_numbers_and_empty_frames_are_pointed_out(tmp_path):
         ([0, 3, 6, 10, 13], 0),
         ([0, 3, 6, 9], 0),
         ([0, 1, 5, 6, 12], 0),  # no step is the usual one
-        ([0, 2, 4, 6, 10], 1),
+        ([0, 2, 4, 6, 12], 2),
     ],
 )
 def test_only_steps_of_twice_the_usual_one_are_gaps(tmp_path, names, lost):

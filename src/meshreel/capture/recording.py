@@ -19,6 +19,7 @@ from ..geometry.color_views import ColorPicture, ColorViews, spread_colors
 from ..geometry.depth import DepthPicture, apart
 from ..geometry.reconstruct import GRAZING, SEEN, TRUNCATION, extract, integrate
 from ..geometry.topology import vertex_normals, without_fragments
+from ..io.file_names import Order
 from ..io.sequence import SequenceOptions
 from ..types import Mesh, MeshSequence, Up, evenly
 from .calibration.colors import CalibrationOptions, Corrected, Corrections, corrections_of, remembered
@@ -191,13 +192,14 @@ class Kept:
 
 
 def open_recording(
-    folder: Path, options: FusionOptions = FusionOptions(), frames: str = ":", keep: bool = True
+    folder: Path, options: FusionOptions = FusionOptions(), frames: str = ":", keep: bool = True, order: Order = "auto"
 ) -> tuple[Recording, list[str]]:
     """Open the recording in a rig's folder; also return a warning for each problem that a user must know.
 
-    `frames` is a range A:B, with B excluded. Raises InputError where the rig is wrong or one of its cameras moves.
+    `frames` is a range A:B, with B excluded; `order` is that of the pictures' names. Raises InputError where the rig is
+    wrong or one of its cameras moves.
     """
-    rig = read_rig(folder)
+    rig = read_rig(folder, order)
     warnings = [*rig.remarks, *rig.missing()]
     for number, camera in enumerate(rig.cameras):
         seen = rig.looked_at(number)

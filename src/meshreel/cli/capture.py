@@ -17,6 +17,7 @@ from ..capture.recordings.takes import Take
 from ..capture.rig.cameras import ColorCamera, DepthCamera
 from ..capture.rig.rig import RIG, Rig, read_rig
 from ..errors import InputError
+from ..io.file_names import Order
 from ..io.files import first_difference, read_json
 from ..io.sequence import CAPTURED
 from ..io.write import frame_names, make_folder, replacing, write_mesh
@@ -46,6 +47,7 @@ def command(
     fragment: float = _FUSION.fragment,
     frames: str = ":",
     format: Literal["ply", "obj", "glb"] = "ply",
+    order: Order = "auto",
     depth_unit: Annotated[float | None, Parameter(converter=_as_unit)] = None,
     show: Annotated[bool, Parameter(name="--list", negative="")] = False,
     common: Common = Common(),
@@ -60,7 +62,7 @@ def command(
         A folder with rig.json: {"frames_per_second": 30, "cameras": [{"name": "left", "width": 640, "height": 576,
         "fx": 504, "fy": 504, "cx": 320, "cy": 288, "camera_to_world": 4 x 4 rows in metres, "depth_unit_m": 0.001,
         "depth_min_m": 0.1, "depth_max_m": 5, "depth": "left/depth"}]}, each `depth` a folder of 16-bit PNG whose names
-        end in the frame's number. Cameras look along +z, x right, y down. Or a folder with camera.json (one such
+        have the frame's number. Cameras look along +z, x right, y down. Or a folder with camera.json (one such
         camera, with frames_per_second), depth/ and, for colours, color/. A camera's `color` is a folder of pictures
         aligned with its depth, or an object with a folder and what differs; `color_cameras` lists others. Or recordings
         of other programs, together one rig: TUM RGB-D, Stray Scanner and Record3D folders, .r3d, .bag, .mcap, .mkv.
@@ -76,6 +78,9 @@ def command(
         Frames to fuse, as A:B with B excluded.
     format
         Format of the mesh files.
+    order
+        Order of a rig's pictures with several numbers in their names: by all of them, by the last one, or by letters.
+        By default the one that all readings of the names agree on.
     depth_unit
         Unit of depth in pictures of recordings, in metres, as 0.0002, or mm; in place of what the recordings say.
     show
@@ -83,12 +88,12 @@ def command(
     """
     options = FusionOptions(voxel, truncation, fragment)
     if show:  # reads no picture
-        facts = [_rig_facts(read_rig(path)) if is_rig(path) else _take_facts(open_take(path)) for path in inputs]
+        facts = [_rig_facts(read_rig(path, order)) if is_rig(path) else _take_facts(open_take(path)) for path in inputs]
         return common.result({"recordings": [row for row, _ in facts]}, *(line for _, of in facts for line in of))
     if output is None:
         raise InputError("--output is missing: a folder for meshes, or for the rig of recordings; or give --list")
     if len(inputs) > 1 or (inputs[0].exists() and not is_rig(inputs[0])):
-        if (options, frames, format) != (_FUSION, ":", "ply"):
+        if (options, frames, format, order) != (_FUSION, ":", "ply", "auto"):
             raise InputError(f"{inputs[0]}: is no rig: make one of it without options of fusion, then capture that")
         warnings = make_rig([open_take(path) for path in inputs], output, common, depth_unit)
         rig = read_rig(output)
@@ -99,7 +104,9 @@ def command(
         return common.result(row, f"{output}: a rig, {counted}, {rig.frame_rate:g} frames a second")
     if depth_unit is not None:
         raise InputError(f"--depth-unit: {inputs[0]} is a rig, whose {RIG} says it as depth_unit_m; mend that")
-    return _fuse(inputs[0], output, options, frames, format, common)
+    recording, warnings = open_recording(inputs[0], options, frames, keep=False, order=order)
+    common.warn(warnings)
+    return _fuse(recording, output, format, common)
 
 
 def _take_facts(take: Take) -> tuple[dict[str, Any], list[str]]:
@@ -137,11 +144,9 @@ def _rig_facts(rig: Rig) -> tuple[dict[str, Any], list[str]]:
     return about | {"cameras": cameras}, lines
 
 
-def _fuse(rig: Path, output: Path, options: FusionOptions, frames: str, format: str, common: Common) -> None:
-    recording, warnings = open_recording(rig, options, frames, keep=False)
-    common.warn(warnings)
+def _fuse(recording: Recording, output: Path, format: str, common: Common) -> None:
     names = frame_names(len(recording), format)
-    missing = _started(output, _made(rig, recording), names)
+    missing = _started(output, _made(recording), names)
     bare = []
     with common.stages(len(recording)) as progress:
         for index, name in enumerate(names):
@@ -158,12 +163,12 @@ def _fuse(rig: Path, output: Path, options: FusionOptions, frames: str, format: 
     common.result(row | {"format": format}, text)
 
 
-def _made(rig: Path, recording: Recording) -> dict[str, Any]:
+def _made(recording: Recording) -> dict[str, Any]:
     """Return everything that the frames depend on; the files of pictures are told apart by their sizes."""
     cameras = [camera.record() for camera in recording.rig.cameras]
     sizes = [[_size(files[n]) if n in files else -1 for n in recording.numbers] for files in recording.rig.files]
     return {
-        "rig": str(rig.resolve()),
+        "rig": str(recording.rig.folder.resolve()),
         "frames_per_second": recording.frame_rate,
         "up": recording.rig.up,
         "frames": recording.numbers,

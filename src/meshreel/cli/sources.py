@@ -77,7 +77,7 @@ def open_source(inputs: Sequence[str], reading: Reading, common: Common = Common
     reading.options()  # raises InputError for invalid values
     if reading.scale != _READ.scale:
         raise InputError(f"--scale {reading.scale:g}: {folder} is a rig, whose poses are in metres; leave it out")
-    recording, remarks = open_recording(folder, frames=reading.frames)
+    recording, remarks = open_recording(folder, frames=reading.frames, order=reading.order)
     if reading.fps not in (None, recording.frame_rate):
         text = f"--fps {reading.fps:g}: {folder} is a rig of {recording.frame_rate:g} frames a second"
         raise InputError(f"{text}; leave it out, or mend the rig's description")

@@ -125,7 +125,7 @@ def _ordered(source: Place, root: _P, paths: list[_P], order: Order) -> tuple[tu
         remark = f"{source}: the {len(paths)} file names have no numbers; taken in alphabetical order"
         return tuple(names.values()), (remark,)
     found, numbers = in_order(source, list(names), order)
-    return tuple(names[name] for name in found), _gaps(source, numbers)
+    return tuple(names[name] for name in found), gaps(source, numbers)
 
 
 def in_order(source: Place, names: list[str], order: Order = "auto") -> tuple[list[str], list[int]]:
@@ -136,25 +136,42 @@ def in_order(source: Place, names: list[str], order: Order = "auto") -> tuple[li
     """
     if order == "name":
         return sorted(names), []
+    found, columns = _decided(source, names, order)
+    whole = len(columns) == 1 and "." not in columns[0][0]
+    return found, [int(columns[0][names.index(name)]) for name in found] if whole else []
+
+
+def frame_keys(source: Place, names: list[str], order: Order = "auto") -> dict[str, tuple[str | Fraction, ...]]:
+    """Return the key that each name is sorted by, equal in folders of pictures of one moment. Raises as `in_order`."""
+    if order == "name":
+        return {name: (name,) for name in names}
+    if len(names) == 1:
+        return {names[0]: (Fraction(re.findall(r"\d+", names[0])[-1]),)}
+    _, columns = _decided(source, names, order, of_time=True)
+    return {name: tuple(map(Fraction, key)) for name, key in zip(names, zip(*columns, strict=True), strict=True)}
+
+
+def _decided(source: Place, names: list[str], order: Order, of_time: bool = False) -> tuple[list[str], list[Column]]:
+    """Return names in order and the numbers that decide it; `of_time` as `_columns` has it."""
     patterns = {re.sub(r"\d+", "#", name): name for name in names}
     if len(patterns) > 1:
         first, second = sorted(patterns.values())[:2]
         text = f"{source}: names follow {len(patterns)} patterns, as {first!r} and {second!r}"
-        raise InputError(f"{text}; give a glob that fits one of them, or --order name")
-    columns = _columns(names, next(iter(patterns)))
+        raise InputError(f"{text}; give a glob that fits one of them, move the others away, or --order name")
+    columns = _columns(names, next(iter(patterns)), of_time)
     if not columns:
         raise InputError(f"{source}: {names[0]!r} and {len(names) - 1} more names differ by no number; mend them")
     by_all, by_last = (
         _sorted(source, names, list(zip(*chosen, strict=True)), order) for chosen in (columns, columns[-1:])
     )
+    if not by_all:  # two names share the one number
+        _sorted(source, names, list(zip(*columns, strict=True)), "last")
     if order == "last" or by_all == by_last:
-        return by_last or by_all, _whole(names, by_last or by_all, columns[-1])
-    if order == "all":
-        return by_all, []
-    if 2 * _evenness(columns[0]) > 1 and _evenness(columns[0]) > _evenness(columns[-1]):
-        return by_all, _whole(names, by_all, columns[0])  # what stands behind is a count, or a hash
-    if all(map(_wraps, columns[1:])):
-        return by_all, []
+        return by_last or by_all, columns[-1:]
+    if order != "all" and _evenness(columns[0]) > max(0.5, _evenness(columns[-1])):
+        return by_all, columns[:1]  # what stands behind is a count, or a hash
+    if order == "all" or all(map(_wraps, columns[1:])):
+        return by_all, columns
     if not by_last:
         _sorted(source, names, list(zip(*columns[-1:], strict=True)), "last", f", or --order all for {_first(by_all)}")
     ways = f"{_first(by_all)} (--order all), or {_first(by_last)} (--order last)"
@@ -170,14 +187,20 @@ def _first(names: list[str]) -> str:
 Column = tuple[str, ...]  # a number of each name, as it is written
 
 
-def _columns(names: list[str], pattern: str) -> list[Column]:
-    """Return the numbers that differ, from left to right; two with a point between them are one fraction."""
+def _columns(names: list[str], pattern: str, of_time: bool) -> list[Column]:
+    """Return the numbers that differ, from left to right; two with a point between them are one fraction.
+
+    Of a time they are one, too, where the whole number does not differ.
+    """
     columns, found = zip(*(re.findall(r"\d+", name) for name in names), strict=True), list[Column | None]()
-    for column, before in zip(columns, ["", *pattern.split("#")[1:]], strict=False):
+    before: Column | None = None
+    for column, text in zip(columns, ["", *pattern.split("#")[1:]], strict=False):
+        whole = before if of_time and len({*map(len, column)}) == 1 else found[-1] if found else None
+        before = column
         if len({*map(int, column)}) == 1:
             found.append(None)
-        elif before == "." and found and found[-1] is not None and "." not in found[-1][0]:
-            found[-1] = tuple(f"{whole}.{part}" for whole, part in zip(found[-1], column, strict=True))
+        elif text == "." and whole is not None and "." not in whole[0]:
+            found[-1] = before = tuple(f"{one}.{part}" for one, part in zip(whole, column, strict=True))
         else:
             found.append(column)
     return [column for column in found if column is not None]
@@ -200,11 +223,6 @@ def _sorted(source: Place, names: list[str], keys: list[Column], order: Order, r
     return found
 
 
-def _whole(names: list[str], found: list[str], column: Column) -> list[int]:
-    """Return the whole numbers of names in their order; none of fractions."""
-    return [] if "." in column[0] else [int(column[names.index(name)]) for name in found]
-
-
 def _evenness(column: Column) -> float:
     """Return the share of equal steps, or nearly so, between numbers; 0 if two numbers are equal."""
     values = sorted(map(float, column))
@@ -220,7 +238,7 @@ def _wraps(column: Column) -> bool:
     return limit > max(map(float, column)) >= limit / 3
 
 
-def _gaps(source: Place, numbers: Sequence[int]) -> tuple[str, ...]:
+def gaps(source: Place, numbers: Sequence[int]) -> tuple[str, ...]:
     """Return a warning about missing frame numbers, if most numbers are one step apart."""
     if len(numbers) < 2:
         return ()
@@ -230,5 +248,6 @@ def _gaps(source: Place, numbers: Sequence[int]) -> tuple[str, ...]:
     if not wide or 2 * count <= len(steps):  # timestamps in place of numbers have uneven steps
         return ()
     lost, (first, step) = sum(step // usual - 1 for _, step in wide), wide[0]
-    text = f"{lost} frames are missing between the file names, the first between {first} and {first + step}"
+    place = f"missing between the file names, the {'one' if lost == 1 else 'first'} between {first} and {first + step}"
+    text = f"1 frame is {place}" if lost == 1 else f"{lost} frames are {place}"
     return (f"{source}: {text}; the others follow one another without a pause",)

@@ -144,9 +144,8 @@ def test_frames_that_no_camera_has_are_reported(folder):
     for name in ("front", "side"):
         for number in (3, 4, 6):
             write_picture(measured(camera()), folder / name / "depth" / f"depth_{number:05}.png")
-    assert read_rig(folder).missing() == [
-        "no camera has 1 of the frames 0 to 6, for example 5; the frames after a gap are shown earlier"
-    ]
+    [missing] = read_rig(folder).missing()
+    assert "1 frame is missing between the file names, the one between 4 and 6" in missing
     for name in ("front", "side"):
         for number in (1, 3):
             (folder / name / "depth" / f"depth_{number:05}.png").unlink()
@@ -227,15 +226,72 @@ def test_colour_cameras_that_are_wrong_are_refused(folder, change, words):
 
 
 @pytest.mark.parametrize(
-    ("name", "words"), [("still.png", "no frame number"), ("again_1.png", "is frame 1, as"), ("x_00007.png", None)]
+    ("name", "words"),
+    [
+        ("still.png", "no frame number"),
+        ("depth_1.png", "'depth_1' and 'depth_00001' both have frame number 1|'depth_00001' and 'depth_1' both have"),
+        ("x_00007.png", "names follow 2 patterns, as 'depth_00002' and 'x_00007'"),
+    ],
 )
 def test_names_must_number_frames(folder, name, words):
     write_picture(measured(camera()), folder / "front" / "depth" / name)
-    if words is None:
-        assert read_rig(folder).frames == [0, 1, 2, 7]
-        return
     with pytest.raises(InputError, match=words):
         read_rig(folder)
+
+
+def renamed(folder, names):
+    """Rename the pictures of both cameras, in their order."""
+    for name in ("front", "side"):
+        pictures = sorted((folder / name / "depth").iterdir())
+        for path, stem in zip(pictures, names, strict=True):
+            path.rename(path.with_name(f"new_{stem}.png"))
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        ("1305031102.933333", "1305031102.966667", "1305031103.000000"),  # seconds
+        ("12-30-59_966", "12-31-00_000", "12-31-00_033"),  # a clock
+        ("100_0", "133_0", "166_1"),  # milliseconds, and a count that starts anew
+        ("9", "10", "11"),
+    ],
+)
+def test_pictures_sort_by_all_numbers_in_their_names(folder, names):
+    renamed(folder, names)
+    rig = read_rig(folder)
+    assert [rig.files[0][frame].stem for frame in rig.frames] == [f"new_{name}" for name in names]
+    assert [len(rig.depths(frame)) for frame in rig.frames] == [2, 2, 2] and rig.missing() == []
+
+
+def test_a_camera_that_stopped_within_a_second_keeps_its_frames(folder):
+    renamed(folder, ("7.50", "7.90", "8.30"))
+    (folder / "side" / "depth" / "new_8.30.png").unlink()
+    assert [[*files] for files in read_rig(folder).files] == [[0, 1, 2], [0, 1]]
+
+
+def test_where_numbers_of_pictures_disagree_the_order_is_asked_for(folder):
+    renamed(folder, ("1_300", "2_100", "5_200"))
+    with pytest.raises(InputError, match=r"new_1_300, .*--order all.*new_2_100, .*--order last"):
+        read_rig(folder)
+    orders = {order: read_rig(folder, order) for order in ("all", "last", "name")}
+    names = {order: [rig.files[1][frame].stem[4:] for frame in rig.frames] for order, rig in orders.items()}
+    assert names["all"] == names["name"] == ["1_300", "2_100", "5_200"]
+    assert names["last"] == ["2_100", "5_200", "1_300"]
+
+
+def test_a_colour_of_another_time_is_refused(folder):
+    renamed(folder, ("7.5", "7.6", "7.7"))
+    for name in ("7.5", "7.6", "7.8"):
+        (folder / "colors").mkdir(exist_ok=True)
+        Image.new("RGB", (96, 96)).save(folder / "colors" / f"{name}.png")
+    changed(folder, lambda rig: rig["cameras"][0].update(color="colors"))
+    with pytest.raises(
+        InputError,
+        match=r"3 color pictures for 3 frames of depth; only one of both has frame 2: .*new_7\.7\.png stands alone",
+    ):
+        read_rig(folder)
+    (folder / "colors" / "7.8.png").rename(folder / "colors" / "7.7.png")
+    assert [path.stem for path in read_rig(folder).color_cameras[0].files.values()] == ["7.5", "7.6", "7.7"]
 
 
 def test_a_camera_without_pictures_is_refused(folder):

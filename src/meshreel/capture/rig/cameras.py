@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from fractions import Fraction
 from pathlib import Path
 from typing import Any, Literal, TypeVar
 
@@ -17,7 +18,8 @@ from ...errors import InputError
 from ...geometry.cameras import Camera, CameraPose, Matrix, broken
 from ...geometry.color_views import ColorPicture
 from ...geometry.depth import DepthPicture
-from ...io.pictures import last_number, read_picture
+from ...io.file_names import Order, frame_keys
+from ...io.pictures import read_picture
 
 PICTURES = {"depth": (".png",), "color": (".png", ".jpg", ".jpeg", ".webp", ".bmp")}
 MOST_DISTORTION = 10.0  # of a coefficient: beyond, the picture would fold many times (guess)
@@ -27,6 +29,7 @@ _MOST_UNIT, _FARTHEST = 1e3, 1e4  # m, of a unit of depth, and of a range (guess
 FOCAL = (0.05, 100.0)  # in sides of the picture; a focal length outside is not in pixels (guess)
 AWAY = 10.0  # sides by which a cropped picture may lie beside its optical axis (guess)
 C = TypeVar("C", "DepthCamera", "ColorCamera")
+Key = tuple[str | Fraction, ...]  # of a frame, equal in all folders of a rig
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,24 +120,23 @@ def check_size(path: Path, pixels: np.ndarray, camera: DepthCamera | ColorCamera
         raise InputError(f"{path}: {size} pixels where camera {camera.name} has {wanted}; mend either")
 
 
-def pictures_in(folder: Path, name: str, kind: Literal["depth", "color"]) -> dict[int, Path]:
-    """Return a camera's pictures by the last number in their names. Raises InputError where there is none."""
+def pictures_in(folder: Path, name: str, kind: Literal["depth", "color"], order: Order) -> dict[Key, Path]:
+    """Return a camera's pictures by the numbers in their names. Raises InputError where there is none."""
     try:
         paths = sorted(p for p in folder.iterdir() if p.suffix.lower() in PICTURES[kind] and not p.name.startswith("."))
     except (OSError, ValueError) as error:  # of a name with a null
         text = f"{folder}: {kind} of camera {name} cannot be read ({getattr(error, 'strerror', error)})"
         raise InputError(f"{text}; name its folder as `{kind}`, or leave it out") from None
-    found: dict[int, Path] = {}
-    for path in paths:
-        number = last_number(path.stem)
-        if number is None:
-            raise InputError(f"{path}: has no frame number in its name; name it as {kind}_00012.png")
-        if number in found:
-            raise InputError(f"{path}: is frame {number}, as {found[number].name} is; keep one of them")
-        found[number] = path
-    if not found:
+    if not paths:
         raise InputError(f"{folder}: camera {name} has no {kind} pictures (*{PICTURES[kind][0]}); record some")
-    return found
+    found: dict[str, Path] = {}
+    for path in paths:
+        if not any(map(str.isdecimal, path.stem)):
+            raise InputError(f"{path}: has no frame number in its name; name it as {kind}_00012.png")
+        if path.stem in found:
+            raise InputError(f"{path}: has the frame number of {found[path.stem].name}; keep one of them")
+        found[path.stem] = path
+    return {key: found[stem] for stem, key in frame_keys(folder, list(found), order).items()}
 
 
 def distortion_of(entry: Mapping[str, Any]) -> tuple[float, ...]:

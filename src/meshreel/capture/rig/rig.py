@@ -1,7 +1,7 @@
 """A rig: depth cameras that stand still around a scene, and the depth pictures that they recorded.
 
 A folder with `camera.json` and `depth/` is a rig of one camera. Pictures of different cameras belong to one frame if
-their file names have the same number.
+their file names have the same number, or numbers.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import json
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -20,11 +20,12 @@ from jaxtyping import Float64, UInt16
 
 from ...errors import InputError
 from ...geometry.cameras import Camera, Matrix
+from ...io.file_names import Order, gaps
 from ...io.files import read_json
 from ...io.pictures import read_depth
 from ...io.write import replacing
 from ...types import UP_AXES, UPS, Up
-from .cameras import ColorCamera, DepthCamera, check_size, distortion_of, pictures_in, placed
+from .cameras import ColorCamera, DepthCamera, Key, check_size, distortion_of, pictures_in, placed
 
 RIG, SINGLE = "rig.json", "camera.json"
 LOOKED_AT = 12  # frames examined for movement and for what stands still, spread over the recording (guess)
@@ -84,31 +85,46 @@ class Rig:
             if lost := sorted(set(frames) - set(files)):
                 text = f"camera {camera.name} lacks {len(lost)} of {len(frames)} frames, for example {lost[0]}"
                 warnings.append(f"{text}; they are fused without it")
-        pairs = list(pairwise(frames))
-        step = min((after - before for before, after in pairs), default=1)
-        gaps = [(before + step, (after - before - 1) // step) for before, after in pairs if after - before > step]
-        if gaps:
-            count = sum(many for _, many in gaps)
-            text = f"no camera has {count} of the frames {frames[0]} to {frames[-1]}, for example {gaps[0][0]}"
-            warnings.append(f"{text}; the frames after a gap are shown earlier")
-        return warnings
+        return [*warnings, *gaps(self.folder, frames)]
 
 
-def read_rig(folder: Path) -> Rig:
-    """Read the rig in a folder. Raises InputError where its description or a camera's pictures are missing or wrong."""
+def read_rig(folder: Path, order: Order = "auto") -> Rig:
+    """Read the rig in a folder, with pictures in the order of their names.
+
+    Raises InputError where its description or a camera's pictures are missing or wrong.
+    """
     entries, cameras, rate, alone = _described(folder)
     folders = [folder / str(e.get("depth", f"{c.name}/depth")) for e, c in zip(entries, cameras, strict=True)]
-    files = tuple(pictures_in(place, camera.name, "depth") for place, camera in zip(folders, cameras, strict=True))
+    keyed = [pictures_in(place, camera.name, "depth", order) for place, camera in zip(folders, cameras, strict=True)]
     beside = [number for number, entry in enumerate(entries) if "color" in entry]
     colors = [_color_camera(folder, entries[k]["color"], cameras[k].record(), k) for k in beside]
     colors += [_color_camera(folder, entry, {"name": f"color{number}"}) for number, entry in enumerate(alone)]
-    rig = Rig(folder, cameras, files, rate, tuple(_unknown(folder, entries)), tuple(colors))
-    for camera in colors:
+    keyed += [pictures_in(place, camera.name, "color", order) for camera, place in colors]
+    files = _numbered(folder, keyed)
+    seen = tuple(replace(each, files=of) for (each, _), of in zip(colors, files[len(cameras) :], strict=True))
+    rig = Rig(folder, cameras, files[: len(cameras)], rate, tuple(_unknown(folder, entries)), seen)
+    for camera in seen:
+        camera.picture(min(camera.files))  # an error of its size is told before anything else is done
         if odd := set(camera.files) ^ set(rig.frames):
             counts = f"{len(camera.files)} color pictures for {len(rig.frames)} frames of depth"
+            one = next(files[min(odd)] for files in (*rig.files, camera.files) if min(odd) in files)
             text = f"{folder}: camera {camera.name} has {counts}; only one of both has frame {min(odd)}"
-            raise InputError(f"{text}: give every frame a picture of its number, and no others")
+            raise InputError(f"{text}: {one} stands alone; give every frame a picture of its number, and no others")
     return rig
+
+
+def _numbered(folder: Path, keyed: list[dict[Key, Path]]) -> tuple[dict[int, Path], ...]:
+    """Return pictures by the number that is their key, or else by the place of their key among those of all folders."""
+    keys = sorted(set[Key]().union(*keyed))
+    if len({len(key) for key in keys}) > 1:
+        by_length = sorted(keyed, key=lambda files: len(next(iter(files))))
+        names = " and ".join(
+            str(next(iter(files.values())).relative_to(folder)) for files in (by_length[-1], by_length[0])
+        )
+        raise InputError(f"{folder}: pictures sort by several numbers and by one, as {names}; name them alike")
+    whole = all(isinstance(key[0], Fraction) and key[0].denominator == len(key) == 1 for key in keys)
+    numbers = {key: int(key[0]) if whole else place for place, key in enumerate(keys)}
+    return tuple({numbers[key]: path for key, path in files.items()} for files in keyed)
 
 
 def read_cameras(folder: Path) -> tuple[tuple[DepthCamera, ...], float]:
@@ -215,8 +231,13 @@ def _unknown(folder: Path, entries: list[Any]) -> Iterator[str]:
         yield f"{folder}: unknown keys describe cameras and are ignored: {keys}"
 
 
-def _color_camera(folder: Path, entry: Any, beside: dict[str, Any], number: int | None = None) -> ColorCamera:
-    """Return the colour camera of an entry, a folder or an object; what it does not say is as `beside` has it."""
+def _color_camera(
+    folder: Path, entry: Any, beside: dict[str, Any], number: int | None = None
+) -> tuple[ColorCamera, Path]:
+    """Return the colour camera of an entry, a folder or an object, without pictures, and the folder of these.
+
+    What the entry does not say is as `beside` has it.
+    """
     path, given = folder / RIG, {"folder": entry} if isinstance(entry, str) else entry
     if not isinstance(given, dict):
         raise InputError(f"{path}: color of camera {beside['name']} is {entry!r:.40}; give a folder or an object")
@@ -229,7 +250,4 @@ def _color_camera(folder: Path, entry: Any, beside: dict[str, Any], number: int 
             raise InputError(f"color camera {camera.name} has no folder; name that of its pictures")
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
-    files = pictures_in(folder / place, camera.name, "color")
-    found = ColorCamera(camera.name, replace(camera.view, distortion=distortion), files, number)
-    found.picture(min(files))  # an error of its size is told before anything else is done
-    return found
+    return ColorCamera(camera.name, replace(camera.view, distortion=distortion), {}, number), folder / place
