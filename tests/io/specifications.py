@@ -263,6 +263,10 @@ GLTF: dict[str, GltfChange] = {
         _attribute("COLOR_0", LIGHT)(glb),
     ),
     "attribute COLOR_0 with a texture": _attribute("COLOR_0", LIGHT),
+    "attribute COLOR_0 with a texture whose texels faces share": lambda glb: (
+        _attribute("TEXCOORD_0", np.zeros((4, 2), F4))(glb),
+        _attribute("COLOR_0", LIGHT)(glb),
+    ),
     "attribute COLOR_0, of one colour, with a texture": _attribute("COLOR_0", np.tile(LIGHT[:1], (4, 1))),
     "attribute COLOR_1": _attribute("COLOR_1", LIGHT),
     "attribute NORMAL": _attribute("NORMAL", LIGHT),

@@ -9,6 +9,7 @@ import pytest
 
 import meshreel
 from meshreel.errors import InputError
+from meshreel.io.looks import light_in_picture
 from meshreel.io.meshes import read_mesh
 from meshreel.io.sequence import SequenceOptions, open_sequence
 from meshreel.types import Mesh, MeshList
@@ -88,6 +89,43 @@ def test_a_factor_and_one_colour_of_vertices_multiply_the_picture_in_linear_ligh
     red = 255 * np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
     np.testing.assert_allclose(found[..., 0], red, atol=0.51)
     assert (found[..., 1] == 0).all() and (found[..., 2] == PIXELS[..., 2]).all()
+
+
+def from_light(light: np.ndarray) -> np.ndarray:
+    return 255 * np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
+
+
+def test_colours_of_vertices_multiply_the_picture_texel_by_texel(tmp_path: Path) -> None:
+    glb = Glb()
+    glb.tree["images"][0] = {"bufferView": glb.view(png(np.full((300, 700, 3), 255, np.uint8)))}
+    glb.material["pbrMetallicRoughness"]["baseColorFactor"] = [1, 0.5, 1, 1]
+    mesh = read(tmp_path, glb, GLTF["attribute COLOR_0 with a texture"])
+    pixels, light = mesh.texture.pixels, LIGHT * [1, 0.5, 1]
+    assert pixels.shape == (300, 700, 3)
+    for shares in ([1 / 3, 1 / 3, 1 / 3], [0.8, 0.1, 0.1], [0.1, 0.2, 0.7]):
+        for face, places in zip(FACES, mesh.uv, strict=True):
+            u, v = shares @ places
+            row, column = int((1 - v) * 300), int(u * 700)
+            np.testing.assert_allclose(pixels[row, column], from_light(shares @ light[face]), atol=2.5)
+
+
+def test_light_beside_faces_is_that_of_the_nearest_texel_and_no_picture_has_two_lights() -> None:
+    places, white = np.array([[[0, 0], [0.5, 0], [0, 0.5]]], F4), np.ones((1, 3, 3))
+    light = light_in_picture(places, white * 0.25, 8, 8)
+    assert (light == 0.25).all()
+    twice = np.repeat(places, 2, axis=0)
+    assert light_in_picture(twice, np.concatenate([white, white]), 8, 8) is not None
+    assert light_in_picture(twice, np.concatenate([white, 0.5 * white]), 8, 8) is None
+    moved = twice + np.array([[[0, 0]], [[3, -1]]], F4)  # repeated, but within one copy
+    assert light_in_picture(moved, np.concatenate([white, white]), 8, 8) is not None
+    for odd in (places * 3, places * np.nan, places[:0], np.zeros((1, 3, 2), F4), np.repeat(places * 2, 64, axis=0)):
+        assert light_in_picture(odd, np.ones((len(odd), 3, 3)), 8, 8) is None
+
+
+def test_colours_of_vertices_on_texels_of_several_faces_are_named(tmp_path: Path) -> None:
+    glb = Glb()
+    read(tmp_path, glb, GLTF["attribute COLOR_0 with a texture whose texels faces share"])
+    assert any("multiply a texture" in name for name in read_mesh(tmp_path / "m.glb").dropped)
 
 
 def test_factors_of_materials_are_colours_of_vertices_and_multiply_them(tmp_path: Path) -> None:

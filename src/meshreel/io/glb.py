@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cache
+from hashlib import sha256
 from typing import TypeVar
 
 import numpy as np
@@ -17,7 +18,7 @@ from jaxtyping import Float32, Float64, Int64, UInt8
 from ..types import Texture
 from .glb_file import PASSED_OVER, from_linear, to_linear
 from .gltf import DRACO, QUANTIZED, Entry, Gltf
-from .looks import Look, with_looks
+from .looks import Look, light_in_picture, with_looks
 from .polygons import Polygons, Unreadable, shares_of
 
 Matrix = Float64[np.ndarray, "4 4"]
@@ -30,6 +31,7 @@ _KNOWN = {  # extensions, each of which is read, or changes neither surface nor 
 }
 _INSTANCES, _TRANSFORM = "EXT_mesh_gpu_instancing", "KHR_texture_transform"
 _SHINE = "KHR_materials_pbrSpecularGlossiness"
+_FINE = 512  # texels of a side: light within a texel is lost in a picture that is smaller (guess)
 _STRIP, _FAN = 5, 6  # modes of primitives (glTF 2.0, section 5.24)
 _OTHER_MODES = {0: "points", 1: "lines", 2: "lines", 3: "lines"}
 _LIGHT = to_linear(np.repeat(np.arange(256, dtype=np.uint8)[:, None], 3, axis=1))[:, 0] / 65535  # of sRGB values
@@ -77,7 +79,10 @@ class Scene:
     def __init__(self, data: bytes) -> None:
         """Raises Unreadable if the file is damaged, or needs what is not read."""
         self._named = set[str]()
-        self._tinted = cache(_tinted)  # the same texture in all frames
+        self._tinted, self._shaded = (
+            cache(_tinted),
+            dict[tuple[Texture, bytes], Texture | None](),
+        )  # the same texture in all frames
         self._file = _guarded(lambda: Gltf(data))
         self.duration = _guarded(self._begin)
 
@@ -266,10 +271,11 @@ class Scene:
         if corners is None:
             number = primitive.get("indices")
             corners = np.arange(len(vertices)) if number is None else self._file.array(number).reshape(-1)
-        look, uv, light = self._look(primitive, read, light)
+        faces = _triangles(corners.astype(np.int64), mode)
+        look, uv, light = self._look(primitive, read, light, faces)
         light = own[:, :3] if light is None and own is not None else light
         colors = None if light is None else from_linear(light)
-        return _used(_Part(vertices, _triangles(corners.astype(np.int64), mode), colors, uv, look))
+        return _used(_Part(vertices, faces, colors, uv, look))
 
     def _claimed(self, primitive: Entry, attributes: Entry) -> int:
         """Return how many vertices and indices the accessors of a compressed primitive announce."""
@@ -295,7 +301,7 @@ class Scene:
         return vertices, light
 
     def _look(
-        self, primitive: Entry, read: Callable[[str], np.ndarray | None], light: np.ndarray | None
+        self, primitive: Entry, read: Callable[[str], np.ndarray | None], light: np.ndarray | None, faces: np.ndarray
     ) -> tuple[Look, np.ndarray | None, np.ndarray | None]:
         """Return the look of a primitive, the places of its vertices in the picture, and their light."""
         if "material" not in primitive:
@@ -319,7 +325,7 @@ class Scene:
             picture, sampler, why = self._file.texture(use.whole("index"))
             uv = self._places(use, read)
             if picture is not None and uv is not None:
-                return self._pictured(picture, sampler, uv, tint, light), uv, None
+                return self._pictured(picture, sampler, uv, tint, light, faces), uv, None
             self._named.add(why or "a texture (without places)")
         if light is not None:
             shares = _fractions(light)[:, :3]
@@ -327,15 +333,27 @@ class Scene:
         return Look(_bytes(tint) if is_tinted else None), None, None
 
     def _pictured(
-        self, picture: Texture, sampler: Entry, uv: np.ndarray, tint: np.ndarray, light: np.ndarray | None
+        self,
+        picture: Texture,
+        sampler: Entry,
+        uv: np.ndarray,
+        tint: np.ndarray,
+        light: np.ndarray | None,
+        faces: np.ndarray,
     ) -> Look:
         """Return the look of a picture that colours multiply."""
-        if light is not None:
-            shares = _fractions(light)[:, :3]
-            if (shares == shares[:1]).all():
-                tint = tint * shares[0] if len(shares) else tint
+        shares = np.ones((0, 3)) if light is None else _fractions(light)[:, :3]
+        if (shares == shares[:1]).all():
+            tint = tint * shares[0] if len(shares) else tint
+        elif len(faces) and faces.min() >= 0 and faces.max() < len(uv):  # checked later
+            places, shares = uv[faces], shares[faces] * tint
+            key = picture, sha256(places.tobytes() + shares.tobytes()).digest()
+            if key not in self._shaded:
+                self._shaded[key] = _shaded(picture, places, shares)
+            if (shaded := self._shaded[key]) is None:
+                self._named.add("colours of vertices that multiply a texture, whose texels several faces share")
             else:
-                self._named.add("colours of vertices that multiply a texture")
+                picture, tint = shaded, np.ones(3)
         wraps = {sampler.get(name, 10497) for name in ("wrapS", "wrapT")}
         if wraps != {10497} and ((uv < 0) | (uv > 1)).any():
             self._named.add("pictures that do not repeat beyond their borders (wrapS, wrapT)")
@@ -405,6 +423,24 @@ def _tinted(picture: Texture, *tint: float) -> Texture:
     """Return a picture times a colour in linear light."""
     table = np.stack([from_linear(np.repeat(_LIGHT[:, None] * share, 3, axis=1))[:, 0] for share in tint])
     return Texture(lambda: np.stack([table[k][picture.pixels[..., k]] for k in range(3)], axis=-1), picture.size)
+
+
+def _shaded(
+    picture: Texture, places: Float32[np.ndarray, "F 3 2"], light: Float64[np.ndarray, "F 3 3"]
+) -> Texture | None:
+    """Return a picture times the light of corners; None where faces of other light share its texels."""
+    from PIL import Image
+
+    height, width = (side * max(1, _FINE // max(picture.shape)) for side in picture.shape)
+    shade = light_in_picture(places, light, height, width)
+    if shade is None:
+        return None
+
+    def pixels() -> UInt8[np.ndarray, "H W 3"]:
+        image = Image.fromarray(np.ascontiguousarray(picture.pixels)).resize((width, height), Image.Resampling.BILINEAR)
+        return np.stack([from_linear(_LIGHT[row] * lit) for row, lit in zip(np.asarray(image), shade, strict=True)])
+
+    return Texture(pixels, (height, width))
 
 
 def _triangles(corners: Int64[np.ndarray, " C"], mode: int) -> Int64[np.ndarray, "F 3"]:

@@ -10,11 +10,15 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from jaxtyping import Bool, Float32, Int64, UInt8
+from jaxtyping import Bool, Float32, Float64, Int64, UInt8
 
 from ..types import GREY, Texture
 from .pictures import MOST_PIXELS
 from .polygons import Polygons
+
+_TRIED = 16  # times the texels of a picture may be looked at: faces that cover it so often overlap (guess)
+_AT_ONCE = 1 << 20  # texels, some 200 MB
+_CLASH = 0.02  # of full light: two lights at one texel that differ by more are two (guess)
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,6 +82,54 @@ def _with_means(polygons: Polygons, face_colors: np.ndarray, has_color: Bool[np.
     found = np.where((counts > 0)[:, None], means, GREY).astype(np.uint8)
     found = found if colors is None else np.where(colored[:, None], colors, found)
     return replace(polygons, colors=found, colored=None, face_colors=None)
+
+
+def light_in_picture(
+    places: Float32[np.ndarray, "F 3 2"], light: Float64[np.ndarray, "F 3 3"], height: int, width: int
+) -> Float32[np.ndarray, "{height} {width} 3"] | None:
+    """Return the light that falls on each texel of a picture, of corners with places in it, as `Mesh.uv`.
+
+    Between corners it is interpolated, and beside faces it is that of the nearest texel. None where there is no such
+    picture: faces of other light share its texels, or repeat it.
+    """
+    from scipy.ndimage import distance_transform_edt
+
+    local = places.astype(np.float64)
+    if not len(local) or not np.isfinite(local).all():
+        return None
+    local -= np.floor(local.min(axis=1, keepdims=True) + 1e-4)
+    x, y = local[..., 0] * width, (1 - local[..., 1]) * height
+    first = [np.ceil(np.clip(c.min(axis=1) - 0.5, 0, n)).astype(int) for c, n in ((x, width), (y, height))]
+    last = [np.floor(np.clip(c.max(axis=1) - 0.5, -1, n - 1)).astype(int) for c, n in ((x, width), (y, height))]
+    columns, rows = (np.maximum(end - begin + 1, 0) for begin, end in zip(first, last, strict=True))
+    ends = np.cumsum(columns * rows)
+    if not (local <= 1 + 1e-4).all() or ends[-1] > _TRIED * height * width:
+        return None
+    corners = np.stack([x - 0.5, y - 0.5, np.ones(x.shape)], axis=1)  # column k: a corner, in texels
+    has_area = np.abs(np.linalg.det(corners)) > 1e-9
+    planes = np.zeros(corners.shape)  # what gives the shares of the corners at a texel (column, row, 1)
+    planes[has_area], planes[~has_area, :, 2] = np.linalg.inv(corners[has_area]), -1
+    found, clashes = np.full((height * width, 3), np.nan, np.float32), 0
+    for begin in range(0, int(ends[-1]), _AT_ONCE):
+        number = np.arange(begin, min(begin + _AT_ONCE, ends[-1]))
+        face = np.searchsorted(ends, number, side="right")
+        row, column = np.divmod(number - (ends - columns * rows)[face], columns[face])
+        column, row = column + first[0][face], row + first[1][face]
+        shares = np.einsum("nkc,nc->nk", planes[face], np.stack([column, row, np.ones(len(row))], axis=1))
+        inside = shares.min(axis=1) >= -1e-9
+        texels = (row * width + column)[inside]
+        lit = np.einsum("nk,nkc->nc", shares[inside], light[face[inside]]).astype(np.float32)
+        for again in (False, True):
+            clashes += int((np.abs(found[texels] - lit) > _CLASH).any(axis=1).sum())
+            if not again:
+                found[texels] = lit
+    known = np.isfinite(found[:, 0]).reshape(height, width)
+    if clashes > 1e-3 * known.sum() or not known.any():
+        return None
+    if known.all():
+        return found.reshape(height, width, 3)
+    nearest = distance_transform_edt(~known, return_distances=False, return_indices=True)
+    return found.reshape(height, width, 3)[tuple(nearest)]
 
 
 def _grid(count: int) -> tuple[int, int]:
