@@ -281,6 +281,28 @@ def test_stl_text_is_read(tmp_path: Path) -> None:
         read(tmp_path, "m.stl", text.replace("1e0", "x"))
 
 
+@pytest.mark.parametrize("extension", ["obj", "ply", "stl", "off", "glb"])
+@pytest.mark.parametrize(
+    ("data", "kind"),
+    [
+        (b"\x89PNG\r\n\x1a\n" + bytes(range(200)), "a PNG picture"),
+        (b"PK\x03\x04" + bytes(range(200)), "a ZIP archive"),
+        (b"\x1f\x8b\x08" + bytes(range(200)), "compressed by gzip"),
+        (b"\n<!DOCTYPE html><html>" + b" 404" * 60, "HTML or XML"),
+        (b'{"asset": {"version": "2.0"}, "meshes": []}' + b" " * 99, "JSON"),
+        (b"Kaydara FBX Binary  \0" + bytes(range(200)), "an FBX file"),
+    ],
+)
+def test_a_file_of_another_kind_is_called_so(tmp_path: Path, extension: str, data: bytes, kind: str) -> None:
+    with pytest.raises(InputError, match=rf"m.{extension}: is {kind}.*put a {extension.upper()} file there"):
+        read(tmp_path, f"m.{extension}", data)
+
+
+def test_no_stl_file_is_blamed_for_triangles_that_other_bytes_seem_to_announce(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"no text \('solid'\) of STL.*it was cut, or is no STL file"):
+        read(tmp_path, "m.stl", b"LFSsomething" * 10)
+
+
 def test_off_variants_are_read(tmp_path: Path) -> None:
     text = (
         "# c\nCOFF\n4 1 0 # counts\n0 0 0 1 0 0 1\n1 0 0 1 0 0 1\n\n1 1 0 1 0 0 1\n0 1 0 1 0 0 1\n4 0 1 2 3 255 0 0\n"

@@ -30,6 +30,23 @@ _PARSERS: dict[str, Callable[[bytes], Polygons]] = {
 }
 EXTENSIONS = tuple(_PARSERS)
 _MARK = b"\xef\xbb\xbf"  # of byte order, at the beginning of texts of some programs
+_BEGINNINGS = {  # of files of other kinds, in small letters
+    b"\x89png": "a PNG picture",
+    b"\xff\xd8\xff": "a JPEG picture",
+    b"pk\x03\x04": "a ZIP archive",
+    b"\x1f\x8b": "compressed by gzip",
+    b"<": "HTML or XML",
+    b"{": "JSON",
+    b"\x93numpy": "an array of NumPy",
+    b"reel\r\n": "a .reel file",
+    b"kaydara fbx": "an FBX file",
+    b"pxr-usdc": "a USD file",
+    b"#usda": "a USD file",
+    b"gltf": "a GLB file",
+    b"ply": "a PLY file",
+    b"off": "an OFF file",
+    b"solid": "an STL file",
+}
 FARTHEST = 1e12  # m, largest coordinate: beyond it the spacing of float64 exceeds 0.1 mm (guess)
 
 
@@ -76,7 +93,10 @@ def _reading(path: Place, where: str) -> Iterator[None]:
     try:
         yield
     except Unreadable as error:
-        kind = path.suffix[1:].upper()
+        kind, begins = path.suffix[1:].upper(), _read(path, where)[:256].removeprefix(_MARK).lstrip().lower()
+        for beginning, name in _BEGINNINGS.items():
+            if begins.startswith(beginning) and kind not in name:
+                raise InputError(f"{where}: is {name}, whatever its name says; put a {kind} file there") from None
         raise InputError(f"{where}: {error}; re-export the {kind} file, or leave it out with --frames") from None
 
 

@@ -25,7 +25,8 @@ def parse_stl(data: bytes) -> Polygons:
         return _parse_text(text)
     have = len(body) // _FACET.itemsize
     if len(data) < _HEADER + _COUNT or have < count:
-        raise Unreadable(f"binary STL announces {count} triangles but its {len(data)} bytes hold {have} (truncated?)")
+        held = f"its {len(data)} bytes hold {have} triangles where bytes 80 to 83, their count, say {count}"
+        raise Unreadable(f"no text ('solid') of STL, and {held}: it was cut, or is no STL file")
     behind = body[count * _FACET.itemsize :].strip(b"\r\n\t \0")
     return _binary(data, count).naming({f"{len(behind)} bytes behind the triangles"} if behind else set())
 
