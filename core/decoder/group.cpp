@@ -95,10 +95,15 @@ void check_frames(size_t frames, const Context& context) {
                           std::to_string(context.frames));
 }
 
-double State::memory() const {
-    size_t numbers = base.size() + colors.size();
+double State::memory_beyond(const State* before) const {
+    size_t numbers = base.size() + colors.size(), indices = faces->size();
     for (const std::vector<double>& level : scalars) numbers += level.size();
-    return 8 * count_of(numbers);
+    for (size_t k = 0; k < finer.size(); ++k) {
+        const Connectivity& near = *finer[k];
+        if (before && k < before->finer.size() && before->finer[k] == finer[k]) continue;
+        indices += near.edges.size() + near.faces->size() + near.near.size(), numbers += near.starts.size();
+    }
+    return 8 * count_of(numbers) + 4 * count_of(indices);
 }
 
 double Group::memory() const {

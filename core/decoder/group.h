@@ -43,7 +43,7 @@ struct State {
     std::vector<std::shared_ptr<const Connectivity>> finer;
     std::vector<double> colors;  // of the last frame, three for each vertex that was decoded; or empty
 
-    double memory() const;  // bytes, without what the groups of a chain share
+    double memory_beyond(const State* before) const;  // bytes that it does not share with the one it is predicted from
 };
 
 // A mesh whose vertices, after `levels` subdivisions, have colours in `frames` frames.

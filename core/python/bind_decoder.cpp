@@ -220,18 +220,6 @@ nb::object bound(const CoreSplats& splats, const CoreGroup& of, size_t t, double
                           rows_of(found.colors, 3));
 }
 
-// Bytes of a state that it does not share with the one from which it was predicted.
-size_t bytes_beyond(const State& state, const State* before) {
-    size_t bytes = 4 * state.faces->size() + static_cast<size_t>(state.memory());
-    for (size_t k = 0; k < state.finer.size(); ++k) {
-        const Connectivity& near = *state.finer[k];
-        const bool is_shared = before && k < before->finer.size() && before->finer[k] == state.finer[k];
-        if (!is_shared)
-            bytes += 4 * (near.edges.size() + near.faces->size() + near.near.size()) + 8 * near.starts.size();
-    }
-    return bytes;
-}
-
 // FormatError of the decoder as that of Python.
 void translate(const std::exception_ptr& thrown, void*) {
     try {
@@ -247,7 +235,10 @@ void translate(const std::exception_ptr& thrown, void*) {
 void bind_decoder(nb::module_& m) {
     nb::register_exception_translator(translate, nullptr);
     nb::class_<State>(m, "GroupState")
-        .def("nbytes_beyond", &bytes_beyond, "before"_a.none())
+        .def(
+            "nbytes_beyond",
+            [](const State& state, const State* before) { return static_cast<size_t>(state.memory_beyond(before)); },
+            "before"_a.none())
         .def_prop_ro("levels", [](const State& state) { return state.scalars.size(); });
     nb::class_<Layout>(m, "AtlasLayout").def_ro("width", &Layout::width).def_ro("height", &Layout::height);
     nb::class_<CoreGroup>(m, "Group")

@@ -73,6 +73,38 @@ void decode(const File& file, std::mt19937& random, Tally& tally) {
     meshreel_close(video);
 }
 
+constexpr int32_t kTracks = 6;
+constexpr uint8_t kFrames = 3;  // of draco.reel
+
+// Index entry of a group of one layer: kind, form, frames, track, dependencies, layers. Checksums are ignored.
+File entry_of(uint8_t frames, uint8_t track, size_t size) {
+    File entry = {2, 3, frames, 0, track, 0, 1, 0};
+    for (; size > 127; size >>= 7) entry.push_back(static_cast<uint8_t>(size | 0x80));
+    entry.push_back(static_cast<uint8_t>(size));
+    entry.insert(entry.end(), 4, 0);
+    return entry;
+}
+
+// The only group of a file, subdivided more often, as a group of each of so many tracks.
+File with_tracks(const File& one, int32_t tracks, uint8_t levels) {
+    uint32_t head = 0;
+    std::memcpy(&head, one.data() + 10, sizeof head);
+    File payload(one.begin() + head, one.end());
+    payload[1] = levels;
+    const size_t before = head - 4 - entry_of(kFrames, 0, payload.size()).size();  // the entry is the last of the head
+    File file(one.begin(), one.begin() + static_cast<ptrdiff_t>(before));
+    file[before - 4] = static_cast<uint8_t>(tracks);
+    for (int32_t track = 0; track < tracks; ++track) {
+        const File entry = entry_of(kFrames, static_cast<uint8_t>(track), payload.size());
+        file.insert(file.end(), entry.begin(), entry.end());
+    }
+    const uint32_t size = static_cast<uint32_t>(file.size()) + 4;
+    std::memcpy(file.data() + 10, &size, sizeof size);
+    file.insert(file.end(), 4, 0);
+    for (int32_t track = 0; track < tracks; ++track) file.insert(file.end(), payload.begin(), payload.end());
+    return file;
+}
+
 }  // namespace
 
 TEST(whole_golden_files_decode) {
@@ -131,6 +163,29 @@ TEST(a_longer_file_and_one_of_another_version_are_refused_in_words) {
     CHECK(meshreel_open_memory(file.data(), file.size(), &video) == MESHREEL_DAMAGED);
     CHECK(std::strstr(meshreel_last_error(video), "version 2"));
     meshreel_close(video);
+}
+
+TEST(of_many_tracks_the_newest_groups_are_kept_while_their_bytes_may_have_as_much) {
+    constexpr uint8_t kLevels = 7;
+    const File one = load("draco");
+    for (const bool is_small : {true, false}) {
+        const File file = with_tracks(one, kTracks, is_small ? uint8_t{0} : kLevels);
+        meshreel_video* video = nullptr;
+        meshreel_mesh mesh;
+        CHECK(meshreel_open_memory(file.data(), file.size(), &video) == MESHREEL_OK);
+        uint64_t identities[kTracks];
+        const auto identity = [&](int32_t track) {
+            CHECK(meshreel_decode(video, 0, track, &mesh) == MESHREEL_OK && mesh.vertex_count > 0);
+            return mesh.identity;
+        };
+        for (int32_t track = 0; track < kTracks; ++track) identities[track] = identity(track);
+        CHECK(identity(kTracks - 1) == identities[kTracks - 1] && identity(kTracks - 2) == identities[kTracks - 2]);
+        CHECK((identity(0) == identities[0]) == is_small);
+        const int32_t status = meshreel_decode(video, 0, MESHREEL_WHOLE, &mesh);
+        CHECK(status == (is_small ? MESHREEL_OK : MESHREEL_DAMAGED));
+        CHECK(is_small || std::strstr(meshreel_last_error(video), "more memory together"));
+        meshreel_close(video);
+    }
 }
 
 TEST(arguments_that_are_not_there_are_refused) {

@@ -36,6 +36,41 @@ print(json.dumps([memory, end - start, time.process_time() - end, refused]))
 """
 
 
+# Reads each track of each frame, its splats, and the whole frame, by Python or by the C library.
+BY_TRACKS = """
+import json, sys
+from contextlib import suppress
+from pathlib import Path
+import meshreel
+from tests.decoder.c_abi import CError, CVideo
+def peak():
+    return next(int(line.split()[1]) for line in open("/proc/self/status") if line.startswith("VmHWM")) << 10
+def read(path):
+    video = CVideo(Path(path).read_bytes()) if sys.argv[1] == "C" else meshreel.open(path)
+    tracks = range(video.info.tracks if sys.argv[1] == "C" else len(video.tracks))
+    for track in tracks:
+        if sys.argv[1] == "C":
+            shown, splats = video.decode(0, track), video.splats(0, track)
+        else:
+            shown, splats = video.tracks[track][0], video.tracks[track].splats(0)
+    with suppress(meshreel.FormatError, CError):
+        video.decode(0) if sys.argv[1] == "C" else video[0]
+read(sys.argv[2])
+idle = peak()
+read(sys.argv[3])
+print(json.dumps(peak() - idle))
+"""
+
+
+def memory_by_tracks(way: str, path: Path, data: bytes) -> int:
+    """Return the bytes that reading the tracks of a file one by one takes, by Python or by the "C" library."""
+    path.write_bytes(data)
+    arguments = [sys.executable, "-c", BY_TRACKS, way, str(GOLDEN / "splats/splats.reel"), str(path)]
+    root = Path(__file__).resolve().parents[2]
+    done = subprocess.run(arguments, capture_output=True, text=True, timeout=300, check=True, cwd=root)
+    return int(json.loads(done.stdout))
+
+
 @dataclass(frozen=True, slots=True)
 class Cost:
     """What a file cost."""

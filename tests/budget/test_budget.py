@@ -5,6 +5,7 @@ from collections.abc import Callable
 from dataclasses import asdict, replace
 from functools import partial
 from pathlib import Path
+from shutil import which
 
 import numpy as np
 import pytest
@@ -32,7 +33,7 @@ from tests.container.files import HEADER
 
 FORMAT = (Path(__file__).resolve().parents[2] / "FORMAT.md").read_text(encoding="utf-8")
 MEMORY, MEMORY_PER_BYTE = 384 << 20, 16 << 10  # bytes, of FORMAT.md
-WITH_COLORS, WITH_TEXTURES = 96 << 20, 320 << 20  # and more, of FORMAT.md
+WITH_COLORS, WITH_TEXTURES, WITH_SPLATS = 96 << 20, 320 << 20, 192 << 20  # and more, of FORMAT.md
 SECONDS_PER_CHUNK, SECONDS_PER_BYTE = 2.0, 250e-6  # of FORMAT.md
 SLOWER = 2  # times, at most: the peer takes a second of a core at 3 GHz, but what else runs disturbs the two unequally
 
@@ -71,6 +72,7 @@ def promised(data: bytes) -> int:
     """Bytes of memory that a file may cost."""
     kinds = {chunk.kind for chunk in ReelReader(BytesSource(data)).chunks}
     more = WITH_COLORS * (ChunkKind.COLORS in kinds) + WITH_TEXTURES * (ChunkKind.PICTURES in kinds)
+    more += WITH_SPLATS * (ChunkKind.SPLATS in kinds)
     return MEMORY + more + MEMORY_PER_BYTE * len(data)
 
 
@@ -85,6 +87,24 @@ def test_the_worst_legal_file_costs_what_is_promised(make: Callable[[], bytes], 
     assert cost.memory <= promised(data)
     assert cost.seconds / cost.peer <= SLOWER * (SECONDS_PER_CHUNK * chunks + SECONDS_PER_BYTE * len(data))
     assert all("its groups of tracks" in message for message in cost.refused)  # all else is legal
+
+
+@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="peak memory is measured on Linux")
+@pytest.mark.parametrize("way", ["Python", pytest.param("C", marks=pytest.mark.skipif(not which("cmake"), reason=""))])
+@pytest.mark.parametrize(
+    "make",
+    [
+        partial(worst.moving_tracks, 11_000),
+        pytest.param(lambda: worst.moving_tracks(30_000, worst.cheap_splats()), marks=pytest.mark.slow),
+        pytest.param(partial(worst.crowded, 40_000), marks=pytest.mark.slow),
+    ],
+    ids=["states", "splats", "groups"],
+)
+def test_tracks_read_one_by_one_cost_what_is_promised(make: Callable[[], bytes], way: str, tmp_path: Path):
+    from tests.budget.measure import memory_by_tracks
+
+    data = make()
+    assert memory_by_tracks(way, tmp_path / "tracks.reel", data) <= promised(data)
 
 
 def test_the_promise_is_that_of_the_document():

@@ -30,6 +30,8 @@ from meshreel.format.layout import (
     DisplacementHead,
     DracoGroup,
     Form,
+    Gaussians,
+    GaussiansLayer,
     Header,
     LaplacianGroup,
     LayersGroup,
@@ -275,6 +277,27 @@ def crowded(size: int) -> bytes:
         for track in range(max(1, min(MOST_TRACKS, size // (len(payload) + 15)))):
             writer.add_group(0, 1, payload, track=track)
     return file.getvalue()
+
+
+def moving_tracks(size: int, splats: bytes = b"") -> bytes:
+    """As many tracks, each with a state that takes more memory than its frame; and splats, if they are given."""
+    data, levels = base_of(0, lambda shape: budget.layers_cost(shape, 1), 5)
+    payload, file = layers(data, levels, 1), io.BytesIO()
+    with ReelWriter(file, HEADER) as writer:
+        for track in range(size // (len(payload) + len(splats) + 40)):
+            number = writer.add_group(0, 1, payload, track=track)
+            if splats:
+                writer.add_companion(Companion(ChunkKind.SPLATS, splats), (number,))
+    return file.getvalue()
+
+
+def cheap_splats() -> bytes:
+    """As many splats as a chunk of few bytes may have."""
+    count = LIMITS.free // LIMITS.splat
+    columns = {"faces": 1, "places": 2, "offsets": 1, "turns": 1, "scales": 2, "opacities": 1, "colors": 3}
+    streams = {name: entropy.encode_integers(np.zeros(n * count, np.int32)) for name, n in columns.items()}
+    head = Gaussians(Form.GAUSSIANS, 7, 6, 6, 7, 106, 48, count)
+    return pack(head) + pack(GaussiansLayer(count, **streams))
 
 
 def empty(size: int) -> bytes:

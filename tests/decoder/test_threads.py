@@ -9,14 +9,14 @@ import pytest
 
 import meshreel
 from meshreel.decoder.cache import CachedGroups
-from meshreel.decoder.pictures import TrackPictures
-from meshreel.decoder.tracks import Background, Track, TrackSplats
+from meshreel.decoder.pictures import Decoders, TrackPictures
+from meshreel.decoder.tracks import Background
 from meshreel.decoder.video import Video
 from tests.golden import GOLDEN
 
 THREADS, READS = 4, 40
 FILES = sorted(GOLDEN.rglob("*.reel"))
-CACHES = [(CachedGroups, "by_track"), (Track, "_states"), (Background, "_last"), (TrackSplats, "_splats")]
+CACHES = [(CachedGroups, "by_track"), (Background, "_last"), (Decoders, "splats")]
 CACHES += [(TrackPictures, "_layouts"), (TrackPictures, "_background")]
 
 

@@ -18,7 +18,7 @@ struct meshreel_video {
     Picture picture;  // of the last call
     Bound splats;     // of the last call
     struct Known {
-        Faces faces;
+        std::weak_ptr<const std::vector<int32_t>> faces;  // of a group that may have been dropped
         uint64_t identity;
     };
     std::map<int32_t, Known> known;  // by part, what was handed out last
@@ -124,7 +124,7 @@ const char* fault_of(const Head& head, uint64_t frame, int32_t part) {
 void show(meshreel_video& handle, int32_t part, meshreel_mesh& out) {
     const Mesh& mesh = handle.mesh;
     meshreel_video::Known& known = handle.known[part];
-    if (known.faces != mesh.faces) known = {mesh.faces, ++handle.identities};
+    if (known.faces.lock() != mesh.faces) known = {mesh.faces, ++handle.identities};
     out.vertex_count = mesh.vertex_count(), out.face_count = mesh.face_count();
     out.positions = mesh.vertices.data(), out.faces = mesh.faces->data();
     out.colors = mesh.colors.empty() ? nullptr : mesh.colors.data();

@@ -11,6 +11,9 @@ namespace {
 constexpr double kMostKept = 1 << 25;
 constexpr double kMostTogether = 8 * limits::kNumbers;
 
+// Memory that groups may take together whose chunks have so many bytes.
+double most_together(double size) { return std::min(limits::kTogether + limits::kPerByte * size, kMostTogether); }
+
 }  // namespace
 
 void Refusals::check(uint32_t chunk, const std::vector<uint32_t>& dependents) {
@@ -25,6 +28,7 @@ void Video::set_layers(int64_t layers) {
     if (layers == layers_) return;
     layers_ = layers;
     tracks_ = std::vector<Cached>(head.tracks.size());
+    memory_.clear();
     splats_ = {};
     refused_ = lost_ = Refusals();  // other layers of a chunk may be whole
 }
@@ -41,30 +45,23 @@ std::vector<uint8_t> Video::read(uint32_t chunk, int64_t layers) const {
 
 Mesh Video::track(uint64_t frame, size_t number) {
     const Group& group = group_of(frame, number);
-    double taken = 0, size = 0;
-    for (size_t other = 0; other < tracks_.size(); ++other) {
-        if (tracks_[other].chunk == kNoChunk) continue;
-        taken += tracks_[other].group.memory();
-        size += static_cast<double>(head.chunks[tracks_[other].chunk].size());
-    }
-    if (taken > limits::kTogether + limits::kPerByte * size)
-        for (size_t other = 0; other < tracks_.size(); ++other)
-            if (other != number) tracks_[other].chunk = kNoChunk, tracks_[other].group = Group();
     lacking = tracks_[number].lacking;
     return group.frame(static_cast<size_t>(frame - head.chunks[tracks_[number].chunk].first_frame));
 }
 
 Mesh Video::whole(uint64_t frame) {
+    double taken = 0, size = 0;
+    for (size_t number = 0; number < tracks_.size(); ++number) {
+        taken += memory_of(frame, number), size += count_of(head.chunks[head.chunk_of_frame(frame, number)].size());
+        require(number == 0 || taken <= most_together(size),
+                "tracks whose groups take more memory together than their bytes may");
+    }
     Mesh mesh = background(frame);
     std::string left_out = lacking;
     mesh.places.clear();
-    double taken = 0, size = 0;
     for (size_t number = 0; number < tracks_.size(); ++number) {
         const Group& group = group_of(frame, number);
         const Cached& cached = tracks_[number];
-        taken += group.memory(), size += static_cast<double>(head.chunks[cached.chunk].size());
-        require(number == 0 || taken <= std::min(limits::kTogether + limits::kPerByte * size, kMostTogether),
-                "tracks whose groups take more memory together than their bytes may");
         append(mesh, group.frame(static_cast<size_t>(frame - head.chunks[cached.chunk].first_frame)));
         if (left_out.empty()) left_out = cached.lacking;
     }
@@ -80,15 +77,36 @@ const Group& Video::group_of(uint64_t frame, size_t track) {
     return cached.group;
 }
 
+double Video::memory_of(uint64_t frame, size_t track) {
+    const auto known = memory_.find(head.chunk_of_frame(frame, track));
+    return known == memory_.end() ? group_of(frame, track).memory() : known->second;
+}
+
+// What all tracks keep takes no more than the groups of one frame may: the oldest goes, but never the newest.
+void Video::make_room() {
+    for (;;) {
+        Cached* oldest = nullptr;
+        double taken = 0, size = 0;
+        for (Cached& cached : tracks_) {
+            if (cached.turn == 0) continue;
+            taken += cached.taken + cached.kept, size += cached.size;
+            if (!oldest || cached.turn < oldest->turn) oldest = &cached;
+        }
+        if (!oldest || oldest->turn == turns_ || taken <= most_together(size)) return;
+        *oldest = Cached();
+    }
+}
+
 Context Video::context_of(uint32_t chunk, const State* previous) const {
     const std::array<double, 3>& origin = head.header.origin;
     return {head.chunks[chunk].frames, layers_, previous, {head.header.scale, {origin[0], origin[1], origin[2]}}};
 }
 
 void Video::decode(uint32_t chunk, Cached& cached) {
+    cached.turn = ++turns_, cached.size = count_of(head.chunks[chunk].size());
     const std::shared_ptr<State> before = state_before(chunk, cached);
     const std::vector<uint8_t> payload = read(chunk, layers_);
-    cached.chunk = kNoChunk, cached.group = Group();
+    cached.chunk = kNoChunk, cached.group = Group(), cached.taken = 0;
     const Context context = context_of(chunk, before.get());
     Continued made = refused_.of(head, chunk, [&] { return continue_group(view(payload), context); });
     const int64_t layers = head.chunks[chunk].form == Form::LAYERS ? layers_ : kAllLayers;
@@ -96,6 +114,7 @@ void Video::decode(uint32_t chunk, Cached& cached) {
     const unsigned levels = made.canvas.empty() ? 0 : made.canvas[0].levels;
     const std::string more = put_on_texture(chunk, levels, made.group.faces, made.group.places);
     if (cached.lacking.empty()) cached.lacking = more;
+    cached.taken = memory_[chunk] = made.group.memory();
     keep(chunk, made.state, cached);
     turn(made.group.positions.data(), made.group.positions.size());
     for (Mesh& mesh : made.group.added) turn(mesh.vertices.data(), mesh.vertices.size());
@@ -134,12 +153,18 @@ std::shared_ptr<State> Video::state_before(uint32_t chunk, Cached& cached) {
     return state;
 }
 
-void Video::keep(uint32_t chunk, const std::shared_ptr<State>& state, Cached& cached) const {
-    if (cached.states.count(chunk) > 0) return;
-    const double size = state ? state->memory() : 0;
-    if (cached.kept + size > kMostKept / count_of(tracks_.size())) cached.states.clear(), cached.kept = 0;
-    cached.states[chunk] = state;
-    cached.kept += size;
+void Video::keep(uint32_t chunk, const std::shared_ptr<State>& state, Cached& cached) {
+    if (cached.states.count(chunk) == 0) {
+        const State* before = cached.states.empty() ? nullptr : cached.states.rbegin()->second.get();
+        double size = state ? state->memory_beyond(before) : 0;
+        if (cached.kept + size > kMostKept / count_of(tracks_.size())) {
+            cached.states.clear(), cached.kept = 0;
+            size = state ? state->memory_beyond(nullptr) : 0;
+        }
+        cached.states[chunk] = state;
+        cached.kept += size;
+    }
+    make_room();
 }
 
 // Returns why there are no colours, where they are damaged: the surface is shown without them.

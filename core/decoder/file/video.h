@@ -60,13 +60,17 @@ private:
         Group group;
         std::string lacking;
         std::map<uint32_t, std::shared_ptr<State>> states;  // by chunk; null where nothing can be predicted from it
-        double kept = 0;                                    // bytes of states
+        double kept = 0, taken = 0;                         // bytes of states and of the group
+        double size = 0;                                    // bytes of the chunk that was decoded last
+        uint64_t turn = 0;                                  // when that was; 0: nothing is kept
     };
 
     const Group& group_of(uint64_t frame, size_t track);
+    double memory_of(uint64_t frame, size_t track);
+    void make_room();
     void decode(uint32_t chunk, Cached& cached);
     std::shared_ptr<State> state_before(uint32_t chunk, Cached& cached);
-    void keep(uint32_t chunk, const std::shared_ptr<State>& state, Cached& cached) const;
+    void keep(uint32_t chunk, const std::shared_ptr<State>& state, Cached& cached);
     Context context_of(uint32_t chunk, const State* previous) const;
     template <class Paint>
     std::string paint_with(uint32_t chunk, int64_t layers, Paint paint);
@@ -88,6 +92,8 @@ public:
 private:
     int64_t layers_ = kAllLayers;
     std::vector<Cached> tracks_;
+    uint64_t turns_ = 0;
+    std::map<uint32_t, double> memory_;  // of all groups that were decoded, by their chunks
     Refusals refused_,
         lost_;  // of frames, and of states, which may be whole where frames of the same group are damaged
     struct {

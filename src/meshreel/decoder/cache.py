@@ -32,12 +32,13 @@ class CachedGroup:
     nbytes: int  # memory of all frames
     size: int  # bytes of its chunk
     core: _core.Group
+    states: CachedStates  # of its chain
 
 
 class CachedGroups:
-    """The groups that all tracks of a file keep: no more memory than the groups of one frame may take.
+    """The groups and states that all tracks of a file keep: no more memory than the groups of one frame may take.
 
-    A file of some kilobytes may have a hundred tracks, each with a group of tens of megabytes.
+    A file of some kilobytes may have a hundred tracks, each with a group or a state of tens of megabytes.
     """
 
     def __init__(self) -> None:
@@ -50,13 +51,13 @@ class CachedGroups:
         with self._lock:
             self.memory[group.number] = group.nbytes
             kept = {number: known for number, known in self.by_track.items() if number != track} | {track: group}
-            taken, size = (
-                sum(column) for column in zip(*((one.nbytes, one.size) for one in kept.values()), strict=True)
-            )
-            while len(kept) > 1 and taken > most_together(size):
-                oldest = kept.pop(next(iter(kept)))
-                taken, size = taken - oldest.nbytes, size - oldest.size
+            while len(kept) > 1 and _taken(kept) > most_together(sum(one.size for one in kept.values())):
+                del kept[next(iter(kept))]
             self.by_track = kept
+
+
+def _taken(kept: dict[int, CachedGroup]) -> int:
+    return sum(one.nbytes + one.states.nbytes for one in kept.values())
 
 
 def most_together(size: int) -> int:

@@ -41,10 +41,11 @@ class _Place:
 
 
 class Decoders:
-    """Decoders of a file's videos, each at its last picture, and the groups that its tracks keep, shared by these."""
+    """Decoders of a file's videos, each at its last picture; the groups and the splats that its tracks keep."""
 
     def __init__(self) -> None:
         self.groups = CachedGroups()
+        self.splats = dict[int, _core.Splats]()  # decoded last, by their chunk; replaced as a whole
         self.lock = threading.Lock()
         self.refused = dict[tuple[int, int], tuple[int, str]]()  # valid pictures and error, by chunk and layer
         self.places = dict[tuple[int, int], _Place]()  # by a chain's first chunk and layer, least recently used first

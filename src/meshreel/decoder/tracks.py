@@ -21,6 +21,8 @@ from ..types import Frames, Mesh, Texture
 from .cache import MOST_KEPT, CachedGroup, CachedStates, Refusals, most_together
 from .pictures import Decoders, TrackPictures
 
+MOST_SPLATS = 4  # chunks of splats that all tracks keep (guess): each may take some 24 MB
+
 
 class Track(Frames):
     """Moving body over the whole file: a mesh for each frame, empty in frames without the body."""
@@ -43,9 +45,8 @@ class Track(Frames):
         self.layers = layers
         self._place = placement(reader)
         self._groups = decoders.groups
-        self._states = CachedStates({})
         self._pictures = TrackPictures(reader, decoders)
-        self._splats = TrackSplats(reader, layers)
+        self._splats = TrackSplats(reader, decoders, layers)
         self._refusals = Refusals()  # of frames
         self._lost = Refusals()  # of states, which may be valid if frames of the same group are damaged
 
@@ -67,6 +68,11 @@ class Track(Frames):
     def _group(self) -> CachedGroup | None:
         """The group decoded last, while all tracks keep it."""
         return self._groups.by_track.get(self.number)
+
+    @property
+    def _states(self) -> CachedStates:
+        group = self._group
+        return CachedStates({}) if group is None else group.states
 
     def splats(self, index: int) -> Bound | None:
         """Return the splats of frame `index` in metres; None if its groups have none. Raises as indexing does."""
@@ -91,8 +97,8 @@ class Track(Frames):
         if self.reader.edit.rotation:
             decoded.turn(self.reader.edit.rotation, self.reader.header.origin)
         meshes = _meshes(decoded.frames(), texture)
-        self._states = states.add(chunk.number, decoded.state, state, self._most)
-        group = CachedGroup(chunk.number, meshes, decoded.nbytes, chunk.size, decoded)
+        states = states.add(chunk.number, decoded.state, state, self._most)
+        group = CachedGroup(chunk.number, meshes, decoded.nbytes, chunk.size, decoded, states)
         self._groups.keep(self.number, group)
         return group
 
@@ -246,10 +252,9 @@ def moving_of_frame(tracks: Sequence[Track], frame: int) -> list[Mesh]:
 class TrackSplats:
     """Splats of one track, from at most `layers` layers beyond the first; None: from all."""
 
-    def __init__(self, reader: ReelReader, layers: int | None) -> None:
-        self._reader, self._layers = reader, layers
+    def __init__(self, reader: ReelReader, decoders: Decoders, layers: int | None) -> None:
+        self._reader, self._decoders, self._layers = reader, decoders, layers
         self._refusals = Refusals()
-        self._splats: tuple[int, _core.Splats] | None = None  # of the chunk used last
 
     def of(self, chunk: Chunk) -> Chunk | None:
         """Return the chunk of a group's splats: its own, or that of the group before it, and so on; None: no splats."""
@@ -265,13 +270,14 @@ class TrackSplats:
 
         Raises FormatError on damaged bytes.
         """
-        splats = self._splats  # read once: another thread may replace it
-        if splats is None or splats[0] != of.number:
+        kept = self._decoders.splats  # read once: another thread may replace it
+        if (splats := kept.get(of.number)) is None:
             whole = None if self._layers is None else self._layers + 1
             owner = self._reader.read_chunk(of.depends_on[0], 1)
             data = self._reader.read_chunk(of.number, whole)
             self._refusals.check(of)
             with self._refusals.of(of):
-                self._splats = splats = of.number, _core.read_splats(data, owner)
-        bound = splats[1].bind(group, index, self._reader.header.scale)
+                splats = _core.read_splats(data, owner)
+            self._decoders.splats = dict([*kept.items(), (of.number, splats)][-MOST_SPLATS:])
+        bound = splats.bind(group, index, self._reader.header.scale)
         return None if bound is None else Bound(*bound)
