@@ -8,13 +8,14 @@ from dataclasses import asdict
 from enum import IntEnum
 
 from meshreel.format.budget import LIMITS
-from meshreel.format.kinds import Array, Blob, Bytes, Choice, Kind, List, Number, Rest, Text, Varint
+from meshreel.format.checks import LARGEST, MOST_CHANGES, MOST_NESTED, MOST_TRACKS, SMALLEST
+from meshreel.format.kinds import EXACT, Array, Blob, Bytes, Choice, Kind, List, Number, Rest, Text, Varint
 from meshreel.format.layout import EDITED, LAYER_PICTURES, MAGIC, VERSION
 from meshreel.format.records import Nested, least_size, record_fields
 
 CPP_HEAD = """\
 // clang-format off
-// Made from src/meshreel/format/layout.py and budget.py by scripts/generate. Do not edit.
+// Made from src/meshreel/format/layout.py, budget.py and checks.py by scripts/generate. Do not edit.
 #pragma once
 
 #include <array>
@@ -28,7 +29,7 @@ namespace meshreel {
 """
 CPP_TYPES = {"f32": "double", "f64": "double", "u8": "uint8_t", "u16": "uint16_t", "u32": "uint32_t", "i64": "int64_t"}
 TYPESCRIPT_HEAD = """\
-// Made from src/meshreel/format/layout.py and budget.py by scripts/generate. Do not edit.
+// Made from src/meshreel/format/layout.py, budget.py and checks.py by scripts/generate. Do not edit.
 
 import {
   array, blob, bytes, choice, f32, f64, i64, list, nested, record, rest, text, u8, u16, u32, varint,
@@ -66,7 +67,10 @@ def cpp(records: Sequence[type]) -> str:
     constants = [
         f"constexpr uint8_t kMagic[{len(MAGIC)}] = {{{magic}}};",
         f"constexpr uint8_t kVersion = {VERSION}, kEdited = {EDITED};",
-        f"constexpr uint64_t kLayerPictures = {LAYER_PICTURES};",
+        f"constexpr uint64_t kLayerPictures = {LAYER_PICTURES}, kMostTracks = {MOST_TRACKS};",
+        f"constexpr int kMostChanges = {MOST_CHANGES}, kMostNested = {MOST_NESTED};",
+        f"constexpr int64_t kExact = {EXACT};  // beyond it whole numbers are no doubles",
+        f"constexpr double kLargest = {LARGEST:g}, kSmallest = {SMALLEST:g};  // of the numbers in a header",
         f"constexpr size_t k{records[0].__name__}Size = {least_size(records[0])};  // bytes\n",
     ]
     limits = [f"constexpr double {_limit(name)} = {value};" for name, value in asdict(LIMITS).items()]
@@ -158,7 +162,10 @@ def typescript(records: Sequence[type]) -> str:
     parts = [
         TYPESCRIPT_HEAD,
         f"export const MAGIC = [{magic}] as const;\n",
-        f"export const VERSION = {VERSION};\nexport const EDITED = {EDITED};\n",
+        f"export const VERSION = {VERSION};\nexport const EDITED = {EDITED};",
+        f"export const MOST_TRACKS = {MOST_TRACKS};\nexport const MOST_CHANGES = {MOST_CHANGES};",
+        f"export const MOST_NESTED = {MOST_NESTED};\nexport const LARGEST = {LARGEST:g};",
+        f"export const SMALLEST = {SMALLEST:g};\n",
     ]
     parts.append(_constants("LIMITS", {_camel(name): value for name, value in asdict(LIMITS).items()}))
     parts += [_constants(values.__name__, {value.name: value.value for value in values}) for values in enumerations]

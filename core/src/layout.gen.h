@@ -1,5 +1,5 @@
 // clang-format off
-// Made from src/meshreel/format/layout.py and budget.py by scripts/generate. Do not edit.
+// Made from src/meshreel/format/layout.py, budget.py and checks.py by scripts/generate. Do not edit.
 #pragma once
 
 #include <array>
@@ -13,7 +13,10 @@ namespace meshreel {
 
 constexpr uint8_t kMagic[8] = {0x52, 0x45, 0x45, 0x4c, 0x0d, 0x0a, 0x1a, 0x0a};
 constexpr uint8_t kVersion = 1, kEdited = 1;
-constexpr uint64_t kLayerPictures = 64;
+constexpr uint64_t kLayerPictures = 64, kMostTracks = 256;
+constexpr int kMostChanges = 255, kMostNested = 100;
+constexpr int64_t kExact = 9007199254740991;  // beyond it whole numbers are no doubles
+constexpr double kLargest = 1e+15, kSmallest = 1e-15;  // of the numbers in a header
 constexpr size_t kPreambleSize = 14;  // bytes
 
 // Numbers of the law of costs: src/meshreel/format/budget.py has their meaning.

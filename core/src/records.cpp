@@ -76,12 +76,12 @@ double Records::f64() {
 
 uint64_t Records::varint() {
     uint64_t value = 0;
-    for (int shift = 0; shift < 70; shift += 7) {
+    for (int shift = 0; shift < 56; shift += 7) {
         const uint8_t byte = u8();
-        if (shift == 63 && byte > 1) refuse("a varint beyond 64 bits or longer than it needs to be");
+        if (shift == 49 && byte > 15) refuse("a varint beyond 53 bits or longer than it needs to be");
         value |= static_cast<uint64_t>(byte & 0x7F) << shift;
         if (byte & 0x80) continue;
-        if (shift > 0 && byte == 0) refuse("a varint beyond 64 bits or longer than it needs to be");
+        if (shift > 0 && byte == 0) refuse("a varint beyond 53 bits or longer than it needs to be");
         break;
     }
     return value;

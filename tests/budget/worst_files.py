@@ -20,7 +20,7 @@ from meshreel.coding.paper import laplacian
 from meshreel.container.writer import Companion, ReelWriter
 from meshreel.format import budget
 from meshreel.format.budget import LIMITS, Size
-from meshreel.format.checks import MOST_CHANGES, MOST_TRACKS
+from meshreel.format.checks import MOST_CHANGES, MOST_NESTED, MOST_TRACKS
 from meshreel.format.layout import (
     AnchorRule,
     ChunkKind,
@@ -314,7 +314,7 @@ def empty(size: int) -> bytes:
 
 def headed(size: int) -> bytes:
     """As many chunks, layers, times and nested metadata as so many bytes hold."""
-    text = '{"a": ' + "[" * 900 + "]" * 900 + "}"
+    text = '{"a": ' + "[" * (MOST_NESTED - 1) + "]" * (MOST_NESTED - 1) + "}"
     count = size // 20
     header = replace(HEADER, metadata=text, intervals=(1,) * (count - 1))
     file = io.BytesIO()

@@ -111,7 +111,7 @@ def test_a_source_that_gives_less_than_it_promised_is_refused():
         ReelReader(Shrinking(DATA[:-1])).read_chunk(3)
 
 
-GROUP = IndexEntry(ChunkKind.GROUP, Form.DRACO, 65_535, 0, (), (Layer((1 << 64) - 1, 0),))
+GROUP = IndexEntry(ChunkKind.GROUP, Form.DRACO, 65_535, 0, (), (Layer((1 << 53) - 1, 0),))
 
 
 PATCH = replace(GROUP, kind=ChunkKind.STATIC, form=Form.PATCH, frames=0, depends_on=(0,))
@@ -133,8 +133,8 @@ def with_head(body: bytes, head_size: int | None = None) -> bytes:
         with_head(pack(HEADER)[:-1] + b"\xff\xff\xff\xff\x0f" + bytes(100)),
         with_head(pack(HEADER) + b"\x01\0\0\0" + pack(replace(GROUP, layers=()))[:-2] + b"\xff\xff" + bytes(100)),
         pack_head(HEADER, Index((GROUP,) * 100)),
-        pack_head(HEADER, Index((replace(GROUP, depends_on=(1 << 63,)),))),
-        pack_head(HEADER, Index((replace(GROUP, track=(1 << 64) - 1),))),
+        pack_head(HEADER, Index((replace(GROUP, depends_on=(1 << 52,)),))),
+        pack_head(HEADER, Index((replace(GROUP, track=(1 << 53) - 1),))),
         pack_head(HEADER, Index(tuple(replace(GROUP, track=track) for track in range(300)))),
         pack_head(HEADER, Index((replace(PATCH, depends_on=(1,)), PATCH, GROUP))),
         pack_head(HEADER, Index((replace(GROUP, depends_on=(0,) * 255),))),

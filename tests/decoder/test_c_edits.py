@@ -76,6 +76,7 @@ GOOD = [
     '{"frames":[0,3]}',
     ' {"frames" : [ 1 , 3 ] , "rotation":[]} ',
     '{"frames":[-0,1]}',
+    '{"frames":[0.0,2e0]}',
     f'{{"rotation":{ROTATION}}}',
     f'{{"frames":[1,2],"rotation":{ROTATION}}}',
     '{"rotation":[1,0,0,0,1,0,0,0,1]}',
@@ -94,8 +95,7 @@ BAD = [
     '{"frames":[2,1]}',
     '{"frames":[0]}',
     '{"frames":[0,1,2]}',
-    '{"frames":[0,2.0]}',
-    '{"frames":[0,2e0]}',
+    '{"frames":[0,2.5]}',
     '{"frames":[0,"2"]}',
     '{"frames":[false,true]}',
     '{"frames":[0,99999999999999999999999999]}',
@@ -183,7 +183,7 @@ NOT_WRITTEN += [
     '{"a":}',
     "{a:1}",
 ]
-NOT_WRITTEN += [f'{{"a":{"[" * 2000}{"]" * 2000}}}', f'{{"a":{"1" * 4301}}}', '{"a":[1 2]}', '{"a":{"b"}}', '{"a":[1}}']
+NOT_WRITTEN += [f'{{"a":{"[" * 2000}{"]" * 2000}}}', f'{{"a":{"1" * 310}}}', '{"a":[1 2]}', '{"a":{"b"}}', '{"a":[1}}']
 
 
 def is_refused(data: bytes) -> bool:
@@ -208,7 +208,7 @@ def test_metadata_that_are_no_json_are_refused_without_an_edit_too(text: str):
 def test_metadata_with_other_bytes_are_refused_where_python_refuses_them():
     numbers, text = np.random.default_rng(5), JSON.encode()
     assert not is_refused(of_metadata(text, flags=0))
-    assert not is_refused(of_metadata(f'{{"a":{"1" * 4300},"\\u0075p":"\\u007a"}}', flags=0))
+    assert not is_refused(of_metadata(f'{{"a":{"1" * 308},"\\u0075p":"\\u007a"}}', flags=0))
     verdicts = list[bool]()
     for _ in range(1500):
         changed = bytearray(text)

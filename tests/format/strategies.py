@@ -17,7 +17,7 @@ def values(kind: kinds.Kind) -> st.SearchStrategy:
         case kinds.Number():
             return numbers(kind)
         case kinds.Varint():
-            return st.one_of(st.integers(0, 300), st.integers(0, 2**64 - 1))
+            return st.one_of(st.integers(0, 300), st.integers(0, 2**53 - 1))
         case kinds.Choice():
             return st.sampled_from(kind.values)
         case kinds.Bytes():

@@ -7,7 +7,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from meshreel.errors import FormatError
-from meshreel.format.checks import MOST_CHANGES, MOST_TRACKS, check_header, check_index, parse_metadata
+from meshreel.format.checks import (
+    MOST_CHANGES,
+    MOST_NESTED,
+    MOST_TRACKS,
+    check_file,
+    check_header,
+    check_index,
+    parse_metadata,
+)
+from meshreel.format.kinds import EXACT
 from meshreel.format.layout import ChunkKind, Form, Header, Index, IndexEntry, Layer
 from tests.format.strategies import records
 
@@ -165,9 +174,27 @@ def test_any_index_passes_or_is_refused_and_what_passes_leads_somewhere(index):
         assert all(other < number for other in entry.depends_on)
 
 
-@pytest.mark.parametrize(
-    "text", ["", "[]", "{", "NaN", '{"a": Infinity}', '{"a": 1e999}', '{"a": "\\ud800"}', "[" * 60000, "1" * 60000]
-)
+DEEPEST = '{"a":' + "[" * (MOST_NESTED - 1) + '"[["' + "]" * (MOST_NESTED - 1) + "}"
+NO_OBJECTS = ["", "[]", "{", "NaN", '{"a": Infinity}', '{"a": 1e999}', '{"a": "\\ud800"}', "[" * 60000, "1" * 60000]
+NO_OBJECTS += [DEEPEST.replace('"[["', "[]"), '{"a":["\\ud800"],"a":1}', '{"a":1e999,"a":1}', f'{{"a":{"1" * 310}}}']
+
+
+def test_metadata_may_have_as_many_lists_in_each_other_as_every_reader_reads():
+    assert parse_metadata(DEEPEST).keys() == {"a"}
+
+
+def test_times_and_sizes_that_are_no_doubles_are_refused():
+    header = Header(30.0, (0.0, 0.0, 0.0), 1.0, (-1.0,) * 3, (1.0,) * 3, "{}", EXACT - 5, (5,))
+    two = replace(GROUP, frames=2)
+    check_file(header, Index((two,)), 0, 100)
+    for wrong in (replace(header, first_time=EXACT - 4), replace(header, first_time=-EXACT - 1)):
+        with pytest.raises(FormatError, match=r"Header\.first_time: times .* are beyond 53 bits"):
+            check_file(wrong, Index((two,)), 0, 100)
+    with pytest.raises(FormatError, match=r"Index\.chunks: a file of \d+ bytes, beyond 53 bits"):
+        check_file(header, Index((replace(two, layers=(Layer(EXACT, 0),)),)), 0, 100)
+
+
+@pytest.mark.parametrize("text", NO_OBJECTS)
 def test_metadata_that_is_no_json_object_is_refused(text):
     with pytest.raises(FormatError, match=r"Header\.metadata"):
         parse_metadata(text)

@@ -123,7 +123,7 @@ def test_a_lying_count_allocates_nothing():
     ("field", "value"),
     [
         ("number", -1),
-        ("number", 1 << 64),
+        ("number", 1 << 53),
         ("number", 1.5),
         ("float64", float("nan")),
         ("float64", float("inf")),
@@ -148,8 +148,8 @@ def test_a_value_that_does_not_fit_is_an_input_error_naming_the_field(field, val
     ("record_type", "data", "message"),
     [
         (Layer, b"\x80\x00" + bytes(4), "longer than it needs"),
-        (Layer, b"\xff" * 10 + bytes(4), "beyond 64 bits"),
-        (Layer, b"\xff" * 9 + b"\x02" + bytes(4), "beyond 64 bits"),
+        (Layer, b"\xff" * 10 + bytes(4), "beyond 53 bits"),
+        (Layer, b"\xff" * 9 + b"\x02" + bytes(4), "beyond 53 bits"),
         (One, b"\x00" + b"\x00" * 6 + b"\xf0\x7f", "not finite"),
         (One, bytes(9) + b"\x01\xff", "UTF-8"),
         (One, bytes(10) + b"\x02", "none of the known"),

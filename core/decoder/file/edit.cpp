@@ -8,15 +8,13 @@
 namespace meshreel {
 namespace {
 
-constexpr double kClose = 1e-6;     // to a rotation
-constexpr double kMost = 2;         // of the numbers that may be one's
-constexpr size_t kMostDigits = 18;  // of a number of frames, which int64_t holds
+constexpr double kClose = 1e-6;  // to a rotation
+constexpr double kMost = 2;      // of the numbers that may be one's
 
 uint64_t frame_of(const std::string& number) {
-    require(number.find_first_of(".eE") == std::string::npos, "Header.metadata: edit.frames are no whole numbers");
-    require(number.size() <= kMostDigits, "Header.metadata: edit.frames are beyond all frames");
-    const int64_t frame = std::stoll(number);
-    require(frame >= 0, "Header.metadata: edit.frames are below 0");
+    const double frame = double_of(number);
+    require(frame >= 0 && frame <= kExact, "Header.metadata: edit.frames are beyond all frames");
+    require(frame == std::floor(frame), "Header.metadata: edit.frames are no whole numbers");
     return static_cast<uint64_t>(frame);
 }
 

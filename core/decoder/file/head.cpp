@@ -10,7 +10,6 @@ namespace meshreel {
 namespace {
 
 constexpr size_t kFlagsAt = 9, kChecksum = 4;
-constexpr double kLargest = 1e15, kSmallest = 1e-15;  // of the numbers in a header
 
 Header read_header(Records& in) {
     Header header = Header::read(in);
@@ -18,20 +17,21 @@ Header read_header(Records& in) {
         for (const double value : triple) require(std::fabs(value) <= kLargest, "Header: a number that is too large");
     for (const double value : {header.frame_rate, header.scale})
         require(value >= kSmallest && value <= kLargest, "Header: a rate or a scale that is out of range");
+    require(header.first_time >= -kExact, "Header.first_time: beyond 53 bits");
     for (int k = 0; k < 3; ++k) require(header.minimum[k] <= header.maximum[k], "Header: a minimum above its maximum");
     return header;
 }
 
 void read_times(Head& head) {
     const std::vector<uint64_t>& intervals = head.header.intervals;
+    require(head.header.first_time <= kExact, "Header.first_time: beyond 53 bits");
     if (intervals.empty()) return;
     require(intervals.size() == head.frames - 1, "Header.intervals: not one between each two frames");
     head.times.assign(1, head.header.first_time);
     for (const uint64_t interval : intervals) {
         const int64_t last = head.times.back();
-        require(interval > 0 && interval <= static_cast<uint64_t>(INT64_MAX) &&
-                    last <= INT64_MAX - static_cast<int64_t>(interval),
-                "Header.intervals: one that is 0, or beyond all times");
+        require(interval > 0 && static_cast<int64_t>(interval) <= kExact - last,
+                "Header.intervals: one that is 0, or a time beyond 53 bits");
         head.times.push_back(last + static_cast<int64_t>(interval));
     }
 }
@@ -76,7 +76,7 @@ Head parse_head(const std::vector<uint8_t>& data, uint64_t file_size) {
         static_cast<IndexEntry&>(chunk) = IndexEntry::read(in);
         chunk.offset = offset;
         for (const Layer& layer : chunk.layers) {
-            require(layer.size <= INT64_MAX - offset, "Index: chunks beyond all files");
+            require(layer.size <= kExact - offset, "Index: chunks of more bytes than 53 bits count");
             offset += layer.size;
         }
     }

@@ -7,8 +7,6 @@
 namespace meshreel {
 namespace {
 
-constexpr size_t kMostTracks = 256;
-constexpr int kMostChanges = 255;                                       // patches on one background
 constexpr uint64_t kMostAudio = static_cast<uint64_t>(limits::kAudio);  // bytes of a chunk
 constexpr Form kCompanionForms[] = {Form::VERTEX_COLORS, Form::PLACES, Form::VIDEO, Form::VIDEO,
                                     Form::GAUSSIANS};  // from COLORS on

@@ -10,9 +10,6 @@
 namespace meshreel {
 namespace {
 
-constexpr int kDeepest = 900;         // lists and objects in each other, about what Python reads
-constexpr size_t kMostDigits = 4300;  // of a whole number, as in Python
-
 size_t skip_digits(const std::string& text, size_t at) {
     while (at < text.size() && text[at] >= '0' && text[at] <= '9') ++at;
     return at;
@@ -24,7 +21,6 @@ bool is_number(const std::string& text) {
     const size_t begin = is_at(text, 0, '-') ? 1 : 0;
     size_t at = skip_digits(text, begin);
     if (at == begin || (text[begin] == '0' && at > begin + 1)) return false;
-    if (at == text.size()) return at - begin <= kMostDigits;
     if (is_at(text, at, '.')) {
         const size_t point = at + 1;
         at = skip_digits(text, point);
@@ -103,9 +99,10 @@ private:
     void skip_blanks() { at_ = std::min(text_.find_first_not_of(" \t\r\n", at_), text_.size()); }
 
     void skip(int depth) {
-        need(depth <= kDeepest);
-        if (has('{')) list('}', [&] { name(), skip(depth + 1); });
-        else if (has('[')) list(']', [&] { skip(depth + 1); });
+        const bool is_object = has('{'), is_list = !is_object && has('[');
+        need(depth < kMostNested || !(is_object || is_list));
+        if (is_object) list('}', [&] { name(), skip(depth + 1); });
+        else if (is_list) list(']', [&] { skip(depth + 1); });
         else if (has('"')) string();
         else skip_word();
     }

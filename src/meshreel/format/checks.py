@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 import json
+import math
+import re
+from itertools import accumulate
 from typing import Any, NoReturn
 
 from ..errors import FormatError
 from .budget import LIMITS, CostlyError, check_frames
 from .edit import Edit, parse_edit
+from .kinds import EXACT
 from .layout import AudioFile, ChunkKind, Form, Header, Index, IndexEntry
 from .records import unpack_all
 
-# Limits of the format, stated in FORMAT.md, with room to spare.
+# Limits of the format, stated in FORMAT.md, with room to spare; scripts/generate copies them to C++ and TypeScript.
 LARGEST = 1e15  # of the numbers in a header: keeps everything computed from them finite (guess)
 SMALLEST = 1e-15  # of a rate or scale (guess)
 MOST_TRACKS = 256  # a frame needs a group of each track (guess)
+MOST_CHANGES = 255  # patches on one background: random access decodes all of them (guess)
+MOST_NESTED = 100  # objects and lists in each other, the metadata among them, so that no stack ends (guess)
 # Kinds of chunks that belong to a group or a background, with their forms.
 COMPANIONS = {
     ChunkKind.COLORS: Form.VERTEX_COLORS,
@@ -24,7 +30,8 @@ COMPANIONS = {
     ChunkKind.SPLATS: Form.GAUSSIANS,
 }
 GROUP_FORMS = (Form.LAPLACIAN, Form.LAYERS, Form.DRACO, Form.EMPTY)
-MOST_CHANGES = 255  # patches on one background: random access decodes all of them (guess)
+_TOKENS = re.compile(r'"(?:[^"\\]|\\.)*"|[\[\]{}]')  # strings and brackets of JSON
+_DEEPER = {"[": 1, "{": 1, "]": -1, "}": -1}
 
 
 def check_header(header: Header, frame_count: int) -> None:
@@ -43,6 +50,9 @@ def check_header(header: Header, frame_count: int) -> None:
         raise FormatError(f"Header.intervals: {len(header.intervals)} for {frame_count} frames")
     if 0 in header.intervals:
         raise FormatError("Header.intervals: one is 0, two frames at the same time")
+    last = header.first_time + sum(header.intervals)
+    if header.first_time < -EXACT or last > EXACT:
+        raise FormatError(f"Header.first_time: times {header.first_time} to {last} are beyond 53 bits")
 
 
 class IndexChecks:
@@ -201,6 +211,8 @@ def check_file(header: Header, index: Index, flags: int, head_size: int) -> tupl
     edit = parse_edit(metadata, flags, sum(entry.frames for entry in groups if entry.track == 0))
     check_header(header, edit.end - edit.first)
     size = head_size + sum(layer.size for entry in index.chunks for layer in entry.layers)
+    if size > EXACT:
+        raise FormatError(f"Index.chunks: a file of {size} bytes, beyond 53 bits")
     check_frames(sum(entry.frames for entry in groups), size)
     return metadata, edit, size
 
@@ -216,9 +228,9 @@ def unpack_audio(payload: bytes) -> AudioFile:
 def parse_metadata(text: str) -> dict[str, Any]:
     """Parse Header.metadata, which must be a JSON object."""
     try:
-        metadata = json.loads(text, parse_constant=_refuse)
-        # 1e999 and half a surrogate can be read, but not written.
-        json.dumps(metadata, allow_nan=False, ensure_ascii=False).encode()
+        if max(accumulate(_DEEPER.get(token, 0) for token in _TOKENS.findall(text)), default=0) > MOST_NESTED:
+            raise ValueError(f"over {MOST_NESTED} lists and objects in each other")
+        metadata = json.loads(text, parse_constant=_refuse, parse_int=_whole, object_pairs_hook=_object)
     except (ValueError, RecursionError) as error:
         raise FormatError(f"Header.metadata: not JSON: {text!r:.40}") from error
     if not isinstance(metadata, dict):
@@ -226,5 +238,17 @@ def parse_metadata(text: str) -> dict[str, Any]:
     return metadata
 
 
+def _object(members: list[tuple[str, Any]]) -> dict[str, Any]:
+    """Return an object, of whose equal names the last counts; 1e999 and half a surrogate cannot be written."""
+    json.dumps(members, allow_nan=False, ensure_ascii=False).encode()
+    return dict(members)
+
+
+def _whole(digits: str) -> int:
+    if math.isinf(float(digits)):
+        _refuse(digits)
+    return int(digits)
+
+
 def _refuse(constant: str) -> NoReturn:
-    raise ValueError(constant)  # NaN and Infinity, which are not JSON
+    raise ValueError(constant)  # NaN and Infinity, which are not JSON, and numbers beyond doubles

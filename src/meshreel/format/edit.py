@@ -39,13 +39,17 @@ def parse_edit(metadata: dict[str, Any], flags: int, frames: int) -> Edit:
     if not isinstance(item, dict) or item.keys() - {"frames", "rotation"}:
         raise FormatError(f"Header.metadata: edit {item!r:.80} is none that this reader knows, update meshreel")
     shown_frames, rotation = item.get("frames", [0, frames]), item.get("rotation", [])
-    if not isinstance(shown_frames, list) or [type(number) for number in shown_frames] != [int, int]:
+    if not isinstance(shown_frames, list) or len(shown_frames) != 2 or not all(map(_is_whole, shown_frames)):
         raise FormatError(f"Header.metadata: edit.frames {shown_frames!r:.80} are no two numbers of frames")
     if not 0 <= shown_frames[0] < shown_frames[1] <= frames:
         raise FormatError(f"Header.metadata: edit.frames {shown_frames} of {frames} frames")
     if not isinstance(rotation, list) or not (rotation == [] or is_rotation(rotation)):
         raise FormatError(f"Header.metadata: edit.rotation {rotation!r:.80} is no rotation of nine numbers")
-    return Edit(shown_frames[0], shown_frames[1], tuple(map(float, rotation)))
+    return Edit(int(shown_frames[0]), int(shown_frames[1]), tuple(map(float, rotation)))
+
+
+def _is_whole(number: Any) -> bool:
+    return type(number) in (int, float) and number == int(number)  # 3.0 is 3 in JSON
 
 
 def nearest_rotation(matrix: np.ndarray) -> np.ndarray:

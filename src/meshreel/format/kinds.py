@@ -15,6 +15,8 @@ from typing import Any, Protocol, runtime_checkable
 
 from ..errors import FormatError
 
+EXACT = (1 << 53) - 1  # whole numbers up to this one are doubles, too, which is what a page counts in
+
 
 @runtime_checkable
 class Kind(Protocol):
@@ -83,15 +85,15 @@ F64 = Number("f64", "d")
 
 @dataclass(frozen=True, slots=True)
 class Varint:
-    """An unsigned number below 2^64 in the fewest bytes: 7 bits per byte, low bits first (LEB128)."""
+    """An unsigned number below 2^53 in the fewest bytes: 7 bits per byte, low bits first (LEB128)."""
 
     label: str = "varint"
     least: int = 1
 
     def pack(self, value: int) -> bytes:
         number = int(value)
-        if number != value or not 0 <= number < 1 << 64:
-            raise ValueError("not a whole number in 0 .. 2^64 - 1")
+        if number != value or not 0 <= number <= EXACT:
+            raise ValueError("not a whole number in 0 .. 2^53 - 1")
         data = bytearray()
         while number >= 0x80:
             data.append(number & 0x7F | 0x80)
@@ -103,13 +105,13 @@ class Varint:
         if offset < len(data) and data[offset] < 0x80:  # as nearly always
             return data[offset], offset + 1
         value = 0
-        for shift in range(0, 70, 7):
+        for shift in range(0, 56, 7):
             chunk, offset = _take(data, offset, 1)
             value |= (chunk[0] & 0x7F) << shift
             if chunk[0] < 0x80:
                 break
-        if chunk[0] >= 0x80 or value >> 64 or (shift and not chunk[0]):
-            raise FormatError("a varint beyond 64 bits or longer than it needs to be")
+        if chunk[0] >= 0x80 or value > EXACT or (shift and not chunk[0]):
+            raise FormatError("a varint beyond 53 bits or longer than it needs to be")
         return value, offset
 
 

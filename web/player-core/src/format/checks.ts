@@ -1,13 +1,9 @@
 // Rules that the records of a head obey beyond their layout; breaking one throws FormatError. Beside format/checks.py.
 
 import { FormatError } from "../errors.ts";
-import { ChunkKind, Form, LIMITS } from "./layout.gen.ts";
+import { ChunkKind, Form, LARGEST, LIMITS, MOST_CHANGES, MOST_NESTED, MOST_TRACKS, SMALLEST } from "./layout.gen.ts";
 import type { Header, Index, IndexEntry } from "./layout.gen.ts";
 
-const LARGEST = 1e15;
-const SMALLEST = 1e-15;
-const MOST_TRACKS = 256;
-const MOST_CHANGES = 255;
 /** Kinds of chunks that belong to a group or a background, with their forms. */
 const COMPANIONS: ReadonlyMap<number, number> = new Map([
   [ChunkKind.COLORS, Form.VERTEX_COLORS],
@@ -36,6 +32,29 @@ export function checkHeader(header: Header, frameCount: number): void {
   const intervals = header.intervals;
   require(intervals.length === 0 || intervals.length === frameCount - 1, `Header.intervals: ${intervals.length} for ${frameCount} frames`);
   require(!intervals.includes(0), "Header.intervals: one is 0, two frames at the same time");
+  const last = intervals.reduce((time, interval) => time + interval, header.firstTime);
+  require(last <= Number.MAX_SAFE_INTEGER, `Header.firstTime: times ${header.firstTime} to ${last} are beyond 53 bits`);
+}
+
+/** Strings, brackets and numbers of JSON. */
+const TOKENS = /"(?:[^"\\]|\\.)*"|[[\]{}]|-?\d[^\s,\]}]*/g;
+
+/** The JSON object of a header. FormatError for other text, for numbers beyond doubles, and for half a surrogate, as in Python. */
+export function metadataOf(text: string): Record<string, unknown> {
+  let value: unknown = null;
+  let depth = 0;
+  try {
+    for (const token of text.match(TOKENS) ?? []) {
+      depth += "[{".includes(token) ? 1 : "]}".includes(token) ? -1 : 0;
+      const part: unknown = "[]{}".includes(token) ? depth : JSON.parse(token);
+      if (depth > MOST_NESTED || part === Infinity || part === -Infinity || /\p{Surrogate}/u.test(String(part))) throw new SyntaxError(token);
+    }
+    value = JSON.parse(text);
+  } catch {
+    throw new FormatError(`Header.metadata: not JSON: ${text.slice(0, 40)}`);
+  }
+  require(typeof value === "object" && value !== null && !Array.isArray(value), "Header.metadata: not a JSON object");
+  return value as Record<string, unknown>;
 }
 
 /** The laws of an index. FormatError, naming the chunk, where an entry breaks one. */

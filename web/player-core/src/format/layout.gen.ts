@@ -1,4 +1,4 @@
-// Made from src/meshreel/format/layout.py and budget.py by scripts/generate. Do not edit.
+// Made from src/meshreel/format/layout.py, budget.py and checks.py by scripts/generate. Do not edit.
 
 import {
   array, blob, bytes, choice, f32, f64, i64, list, nested, record, rest, text, u8, u16, u32, varint,
@@ -9,6 +9,11 @@ export const MAGIC = [82, 69, 69, 76, 13, 10, 26, 10] as const;
 
 export const VERSION = 1;
 export const EDITED = 1;
+export const MOST_TRACKS = 256;
+export const MOST_CHANGES = 255;
+export const MOST_NESTED = 100;
+export const LARGEST = 1e+15;
+export const SMALLEST = 1e-15;
 
 export const LIMITS = {
   free: 201326592,

@@ -1,7 +1,7 @@
 // The head of a .reel file, checked, and where everything else lies. Beside container/reader.py.
 // In: the first bytes of a file. Out: chunks by number, by frame and by what they need. Fetches nothing itself.
 
-import { checkHeader, checkIndex } from "./checks.ts";
+import { checkHeader, checkIndex, metadataOf } from "./checks.ts";
 import { crc32 } from "./crc.ts";
 import { checkFrames } from "./budget.ts";
 import { editOf } from "./edit.ts";
@@ -59,6 +59,7 @@ export class Head {
     const frameCount = edit.end - edit.first;
     checkHeader(header, frameCount);
     const end = chunks[chunks.length - 1];
+    if (end.offset + end.size > Number.MAX_SAFE_INTEGER) throw new FormatError(`a file of ${end.offset + end.size} bytes, beyond 53 bits`);
     checkFrames(codedFrames(chunks) * this.tracks.length, end.offset + end.size);
     this.times = timesOf(header.intervals);
     this.info = infoOf(header, chunks, metadata, edit.rotation, this.tracks.length, frameCount, this.timestampOf(frameCount - 1));
@@ -302,20 +303,4 @@ function boxOf({ minimum, maximum, scale }: Header, rotation: readonly number[])
   });
   const [[x, right], [y, top], [z, front]] = ends;
   return { minimum: [x, y, z], size: [right - x, top - y, front - z] };
-}
-
-/** The JSON object of a header. FormatError for other text, for numbers beyond doubles, and for half a surrogate, as in Python. */
-function metadataOf(text: string): Record<string, unknown> {
-  let value: unknown = null;
-  try {
-    value = JSON.parse(text, (key, part: unknown) => {
-      const words = typeof part === "string" ? key + part : key;
-      if (/\p{Surrogate}/u.test(words) || part === Infinity || part === -Infinity) throw new SyntaxError(key);
-      return part;
-    });
-  } catch {
-    throw new FormatError(`Header.metadata: not JSON: ${text.slice(0, 40)}`);
-  }
-  if (typeof value !== "object" || value === null || Array.isArray(value)) throw new FormatError("Header.metadata: not a JSON object");
-  return value as Record<string, unknown>;
 }
