@@ -26,7 +26,9 @@ from scripts.server_attacks import (
     changed,
     connected,
     crowd,
+    gallery,
     get,
+    heads,
     make_big,
     nonsense,
     path,
@@ -65,7 +67,7 @@ async def ended(folder: Path, number: int) -> list[str]:
     """Send SIGTERM at a random moment to a busy server; return a fault if its end takes more than 2 s."""
     served = begin(folder)
     make_big(folder / "big.reel")
-    kinds = [nonsense, crowd, ranges, changed]
+    kinds = [nonsense, crowd, ranges, changed, gallery]
     tasks = [asyncio.create_task(kind(served, number * 100 + k)) for k in range(4) for kind in kinds]
     await asyncio.sleep(random.Random(number).uniform(0, 2))
     began = time.monotonic()
@@ -82,6 +84,8 @@ async def ended(folder: Path, number: int) -> list[str]:
 def make_folder(root: Path) -> Path:
     folder = root / "videos"
     (folder / "sub").mkdir(parents=True)
+    for number in range(300):
+        shutil.copy(GOLDEN / "layers.reel", folder / "sub" / f"{number}.reel")
     shutil.copy(GOLDEN / "layers.reel", folder / "walk.reel")
     (root / "outside.reel").write_bytes(SECRET)
     (folder / "secret.txt").write_bytes(SECRET)
@@ -124,6 +128,8 @@ async def attack(folder: Path, connections: int, report: Report) -> None:
             (path, 10 * connections, 20),
             (ranges, 10 * connections, 20),
             (changed, max(connections // 4, 3), 5),
+            (gallery, 2 * connections, 4),
+            (heads, max(connections // 4, 3), 2),
         ):
             began, tracebacks = time.monotonic(), len(told(served))
             faults = await trials(served, kind, count, side)

@@ -20,9 +20,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from meshreel.server.run import IDLE
+from tests.server.conftest import with_long_head
 
 GRACE = 5.0  # s beyond a limit, on a busy machine
 BIG = 32 * 2**20  # bytes, more than a connection buffers
+MOST_GROWTH = 64  # MB
 SECRET = b"nobody may read this"
 HOST = b"Host: localhost\r\n"
 
@@ -194,6 +196,29 @@ async def changed(served: Served, number: int) -> str:
     is_true = (status, body) == (404, body) if change == 2 else (status, body) == (200, file.read_bytes())
     file.unlink(missing_ok=True)
     return "" if is_true else f"then {status}"
+
+
+async def gallery(served: Served, number: int) -> str:
+    """Clients that ask for the gallery of 300 files, and leave or stay, delay no other."""
+    async with connected(served) as (reader, writer):
+        writer.write(get("/", "Connection: close"))
+        if number % 2:
+            await asyncio.sleep(random.Random(number).uniform(0, 0.2))
+            return ""
+        received = await rest(reader, 60)
+    return "no end" if received is None else "" if b"walk" in received else f"answered {received[:60]!r}"
+
+
+async def heads(served: Served, number: int) -> str:
+    """Files with heads of 1 and 64 MiB of nothing end no gallery, and take none of the server's memory."""
+    before, file = served.count("memory"), served.folder / f"head{number}.reel"
+    with_long_head(file, 64 if number % 2 else 0.999)
+    try:
+        fault = await gallery(served, 0)
+    finally:
+        file.unlink()
+    grown = (served.count("memory") - before) / 1e3
+    return fault or (f"{grown:.0f} MB more" if grown > MOST_GROWTH else "")
 
 
 async def crowd(served: Served, number: int) -> str:

@@ -1,7 +1,9 @@
 """A folder of .reel files, and a player's folder that stands for the built one."""
 
 import shutil
+import struct
 import threading
+import zlib
 
 import pytest
 
@@ -16,6 +18,20 @@ from meshreel.server.run import ServerOptions, run
 from tests.golden import GOLDEN
 
 ODD = 'a "b" <i> ü#%.reel'
+
+
+def with_long_head(file, mib):
+    """Write a legal file of one empty frame whose head has so many MiB of chunks of an unknown kind."""
+    golden = (GOLDEN / "layers.reel").read_bytes()
+
+    def entry(kind, form, frames, size, crc):
+        return struct.pack("<BBHBBHBI", kind, form, frames, 0, 0, 1, size, crc)
+
+    group, other = entry(2, 4, 1, 1, zlib.crc32(b"\4")), entry(200, 1, 0, 1, 0)
+    count = int((mib * 2**20 - 200) // len(other))
+    body = golden[14:78] + struct.pack("<H2sqBI", 2, b"{}", 0, 0, count + 1) + group + count * other
+    head = golden[:9] + bytes([0]) + struct.pack("<I", len(body) + 18) + body
+    file.write_bytes(head + struct.pack("<I", zlib.crc32(head)) + b"\4" + bytes(count))
 
 
 @pytest.fixture

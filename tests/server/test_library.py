@@ -2,16 +2,17 @@
 
 import os
 import sys
+from pathlib import Path
 
 import pytest
 from starlette.testclient import TestClient
 
-from meshreel.container.sources import FileSource
 from meshreel.errors import InputError
-from meshreel.server import library
+from meshreel.server import heads
 from meshreel.server.app import make_app
+from meshreel.server.heads import Heads
 from meshreel.server.library import Library
-from tests.server.conftest import ODD
+from tests.server.conftest import ODD, with_long_head
 
 BYTES_AS_NAMES = sys.platform == "linux"
 
@@ -95,18 +96,24 @@ def test_a_pipe_is_no_file_to_wait_for(folder):
     assert Library(folder).path_of("pipe.reel") is None
 
 
+def facts_of(library):
+    return {entry.name: entry for entry in library.entries()}
+
+
 def test_errors_in_the_gallery_have_no_path_of_this_machine(folder, monkeypatch):
-    def refused(path):
+    def refused(_, path):
         raise InputError(f"{path}: cannot be opened: Permission denied")
 
-    monkeypatch.setattr("meshreel.server.library.FileSource", refused)
-    assert Library(folder).entry("walk.reel").error == "cannot be opened: Permission denied"
+    monkeypatch.setattr(Heads, "read", refused)
+    assert facts_of(Library(folder))["walk.reel"].error == "cannot be opened: Permission denied"
 
 
-def test_a_file_that_went_away_is_reported(folder):
-    (folder / "walk.reel").unlink()
-    entry = Library(folder).entry("walk.reel")
+def test_a_file_that_went_away_is_reported(folder, monkeypatch):
+    monkeypatch.setattr(Library, "names", lambda _: ["gone.reel"])
+    (entry,) = Library(folder).entries()
     assert (entry.frames, entry.error) == (0, "is not there any more")
+    with Heads() as process, pytest.raises(InputError, match=r"gone\.reel: cannot be opened: No such file"):
+        process.read(folder / "gone.reel")
 
 
 def test_one_file_is_served_whatever_its_suffix(folder, player):
@@ -120,7 +127,8 @@ def test_one_file_is_served_whatever_its_suffix(folder, player):
 def opened(monkeypatch):
     """Names of the files whose heads were read."""
     names: list[str] = []
-    monkeypatch.setattr(library, "FileSource", lambda path: names.append(path.name) or FileSource(path))
+    read = Heads.read
+    monkeypatch.setattr(Heads, "read", lambda self, path: names.append(path.name) or read(self, path))
     return names
 
 
@@ -142,9 +150,55 @@ def test_a_gallery_of_500_files_reads_the_heads_of_changed_files_alone(folder, o
     assert "8.reel" not in changed and len(changed) == 503
 
 
-def test_a_head_that_takes_long_is_not_read_for_the_gallery_and_the_file_still_plays(folder, player, monkeypatch):
-    monkeypatch.setattr(library, "MOST_HEAD", 64)
-    entry = Library(folder).entry("walk.reel")
-    assert (entry.size, entry.frames, entry.error) == ((folder / "walk.reel").stat().st_size, 0, "")
+def test_a_folder_of_more_files_than_any_memory_of_them_is_read_once(folder, opened):
+    for number in range(5000):
+        (folder / f"{number}.reel").symlink_to("none.reel")
+    facts = Library(folder)
+    assert len(facts.entries()) == 5004 and len(opened) == 4
+    assert len(facts.entries()) == 5004 and len(opened) == 4
+
+
+def test_a_head_of_64_mib_is_not_read_for_the_gallery_and_the_file_still_plays(folder, player):
+    with_long_head(folder / "long.reel", 64)
+    entry = facts_of(Library(folder))["long.reel"]
+    assert (entry.size, entry.frames, entry.error) == ((folder / "long.reel").stat().st_size, 0, "")
     page = TestClient(make_app(Library(folder), player)).get("/").text
-    assert '<a href="/watch/walk.reel">' in page and "not a .reel file" in page
+    assert '<a href="/watch/long.reel">' in page and "not a .reel file" in page
+
+
+def test_a_head_that_takes_too_long_or_too_much_memory_costs_its_file_alone_and_once(folder, monkeypatch):
+    with_long_head(folder / "bomb.reel", 1 - 1e-3)
+    monkeypatch.setattr(heads, "PATIENCE", 1e-3)
+    library = Library(folder)
+    assert "its head takes more than 0.001 s or 2 GiB to read" in facts_of(library)["bomb.reel"].error
+    monkeypatch.undo()
+    monkeypatch.setattr(Heads, "read", lambda *_: pytest.fail("read again"))
+    assert "takes more than" in facts_of(library)["bomb.reel"].error
+    monkeypatch.undo()
+    (folder / "walk.reel").touch()
+    assert facts_of(library)["walk.reel"].frames > 0
+
+
+def test_files_beyond_the_time_of_a_gallery_are_read_by_the_next_one(folder, monkeypatch):
+    library = Library(folder)
+    monkeypatch.setattr(heads, "SHARE", -1.0)
+    late = facts_of(library)["walk.reel"]
+    assert (late.size, late.frames, late.error) == ((folder / "walk.reel").stat().st_size, 0, "")
+    monkeypatch.undo()
+    assert facts_of(library)["walk.reel"].frames > 0
+
+
+def test_no_head_is_read_in_the_process_of_the_server(folder, monkeypatch):
+    monkeypatch.setattr("meshreel.container.reader.ReelReader.__init__", lambda *_: pytest.fail("read here"))
+    assert facts_of(Library(folder))["walk.reel"].frames > 0
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="limits of memory are those of Linux")
+def test_the_process_that_reads_heads_has_a_limit_of_memory_and_ends_with_the_gallery(folder):
+    with Heads() as process:
+        process.read(folder / "walk.reel")
+        began = process._process
+        assert began is not None
+        limits = Path(f"/proc/{began.pid}/limits").read_text()
+        assert f"Max address space         {heads.MOST_MEMORY}" in limits
+    assert began.returncode is not None

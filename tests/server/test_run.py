@@ -4,6 +4,7 @@ import re
 import socket
 import ssl
 import sys
+import threading
 import time
 import urllib.request
 from datetime import timedelta
@@ -18,6 +19,7 @@ from starlette.testclient import TestClient
 from meshreel.cli import one_line
 from meshreel.errors import InputError
 from meshreel.server.app import make_app
+from meshreel.server.heads import MOST_MEMORY, PATIENCE, SHARE
 from meshreel.server.library import Library
 from meshreel.server.run import IDLE, MOST_CONNECTIONS, ServerOptions, addresses, run
 
@@ -99,4 +101,46 @@ def test_the_limits_are_those_that_the_documentation_states():
     page = (ROOT / "docs/player.md").read_text(encoding="utf-8")
     rows = [line for line in page[page.index("### Limits") :].splitlines() if line.startswith("| ")]
     stated = [[int(number) for number in re.findall(r"\d+", row)] for row in rows[2:]]
-    assert stated == [[MOST_CONNECTIONS, 503], [IDLE], [2]]
+    assert stated == [[MOST_CONNECTIONS, 503], [IDLE], [2], [PATIENCE, MOST_MEMORY >> 30], [SHARE]]
+
+
+def waited_for(condition):
+    for _ in range(6000):
+        if condition():
+            return
+        time.sleep(0.01)
+    pytest.fail("not within a minute")
+
+
+def test_clients_that_wait_share_a_gallery_and_those_that_leave_take_no_place(folder, player, live, monkeypatch):
+    begun, told, entries = list[int](), threading.Event(), Library.entries
+
+    def slow(self):
+        begun.append(1)
+        assert told.wait(60)
+        return entries(self)
+
+    monkeypatch.setattr(Library, "entries", slow)
+    address = live(make_app(Library(folder), player))
+    port = urlsplit(address).port
+    asking = [socket.create_connection(("127.0.0.1", port), timeout=60) for _ in range(20)]
+    for line in asking:
+        line.sendall(b"GET / HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n")
+    tasks = live.servers[0].server_state.tasks
+    waited_for(lambda: len(tasks) == 20)
+    for line in asking[1:]:
+        line.close()
+    waited_for(lambda: len(tasks) == 1)
+    with urllib.request.urlopen(f"{address}files/walk.reel", timeout=60) as answer:
+        assert answer.read() == (folder / "walk.reel").read_bytes()
+    told.set()
+    assert asking[0].recv(12) == b"HTTP/1.1 200" and len(begun) == 1
+    asking[0].close()
+
+
+def test_a_gallery_that_cannot_be_made_is_an_error_of_its_request_alone(folder, player, monkeypatch):
+    client = TestClient(make_app(Library(folder), player), raise_server_exceptions=False)
+    with monkeypatch.context() as broken:
+        broken.setattr(Library, "entries", lambda _: 1 / 0)
+        assert client.get("/").status_code == 500
+    assert client.get("/").status_code == 200

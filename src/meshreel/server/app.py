@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import asyncio
 import os
 import re
 from collections.abc import Mapping, Sequence
+from concurrent import futures
 from hashlib import blake2b
 from pathlib import Path
+from threading import Thread
 
-from anyio import CapacityLimiter, to_thread
 from starlette.applications import Starlette
 from starlette.concurrency import run_in_threadpool
 from starlette.exceptions import HTTPException
@@ -85,15 +87,32 @@ class _Pages:
         self._names = set(built)
         self._edition = blake2b(b"".join(built.values()), digest_size=SUM).hexdigest()
         self._styles = built.get("page.css", b"").decode()
-        self._galleries = CapacityLimiter(1)  # one at a time: it reads every file of the folder
+        self._gallery: asyncio.Future[str] | None = None
 
-    async def home(self, _: Request) -> Response:
-        """Return the player of the only file, or the gallery."""
+    async def home(self, request: Request) -> Response:
+        """Return the player of the only file, or the gallery.
+
+        It takes all files of the folder: one is made at a time, for all clients that wait, and those that leave do not.
+        """
         if self._library.only is not None:
             return self._watch(self._library.only)
-        title = as_text(self._library.folder.resolve().name) or "meshreel"
-        entries = await to_thread.run_sync(self._library.entries, limiter=self._galleries)
-        return _page(gallery_page(title, entries, f"/player/{self._edition}"), policy())
+        if self._gallery is None or self._gallery.done():
+            drawn = futures.Future[str]()
+            Thread(target=self._draw, args=(drawn,), daemon=True).start()  # the server's end does not wait for it
+            self._gallery = asyncio.wrap_future(drawn)
+        made, left = self._gallery, asyncio.ensure_future(_has_left(request))
+        try:
+            await asyncio.wait((made, left), return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            left.cancel()
+        return _page(made.result(), policy()) if made.done() else Response()
+
+    def _draw(self, drawn: futures.Future[str]) -> None:
+        try:
+            title = as_text(self._library.folder.resolve().name) or "meshreel"
+            drawn.set_result(gallery_page(title, self._library.entries(), f"/player/{self._edition}"))
+        except Exception as error:
+            drawn.set_exception(error)
 
     async def watch(self, request: Request) -> Response:
         name = request.path_params["name"]
@@ -135,6 +154,12 @@ class _Pages:
 
     def _watch(self, name: str) -> Response:
         return _page(player_page(name, f"/player/{self._edition}", self._styles), policy(self._styles))
+
+
+async def _has_left(request: Request) -> None:
+    """Wait until the client has left."""
+    while (await request.receive())["type"] != "http.disconnect":
+        pass
 
 
 def _page(text: str, rules: str) -> Response:

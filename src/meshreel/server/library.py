@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
-from functools import lru_cache
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from ..container.reader import LargeHeadError, ReelReader
-from ..container.sources import FileSource
-from ..errors import FormatError, InputError, MeshreelError
+from ..errors import InputError, MeshreelError
 from ..io.file_names import is_text
+from .heads import Heads
 
 SUFFIX = ".reel"
-MOST_HEAD = 1 << 20  # bytes, which take a second to read: an hour of a scene has fewer (guess)
 HIDDEN = "."  # first character of hidden names
 Version = tuple[int, int, int]  # of a file, which changes with its contents: size in bytes; mtime and ctime in ns
 
@@ -22,7 +19,7 @@ Version = tuple[int, int, int]  # of a file, which changes with its contents: si
 class Entry:
     """Facts of a file for the gallery; for a file that cannot be read, numbers are 0 and `error` says why.
 
-    A file whose head takes long to read has its size alone.
+    A file whose head is long, or was not read in the time of a gallery, has its size alone.
     """
 
     name: str  # relative to the folder, with slashes
@@ -43,6 +40,8 @@ class Library:
 
     folder: Path
     only: str | None = None
+    known: dict[tuple[Path, Version], Entry] = field(default_factory=dict, repr=False, compare=False)
+    """Facts of the files of the last gallery: a head is read once."""
 
     @staticmethod
     def of_file(file: Path) -> Library:
@@ -76,7 +75,14 @@ class Library:
         except (OSError, ValueError, RuntimeError):
             return None  # a name too long, a NUL, or links in a circle, which are a RuntimeError before Python 3.13
 
-    def entry(self, name: str) -> Entry:
+    def entries(self) -> list[Entry]:
+        """Return the facts of the files that exist now, in the order of their names; one thread at a time."""
+        before = dict(self.known)
+        self.known.clear()
+        with Heads() as heads:
+            return [self._entry(name, before, heads) for name in self.names()]
+
+    def _entry(self, name: str, before: dict[tuple[Path, Version], Entry], heads: Heads) -> Entry:
         """Return the facts of a file; damage and absence are part of them and not raised."""
         if not is_text(name):
             return Entry(as_text(name), error="the name is no Unicode text, which no address can have: rename the file")
@@ -85,28 +91,14 @@ class Library:
             return Entry(name, error="is not there any more")
         try:
             found = path.stat()
-            return _facts(name, path, (found.st_size, found.st_mtime_ns, found.st_ctime_ns))
+            key = path, (found.st_size, found.st_mtime_ns, found.st_ctime_ns)
+            if key not in before and heads.is_late:
+                return Entry(name, found.st_size)
+            facts = before.get(key) or Entry(name, **heads.read(path))
         except (MeshreelError, OSError) as error:
             return Entry(name, error=_without_path(error, path))
-
-    def entries(self) -> list[Entry]:
-        """Return the facts of the files that exist now, in the order of their names."""
-        return [self.entry(name) for name in self.names()]
-
-
-@lru_cache(maxsize=4096)
-def _facts(name: str, path: Path, _version: Version) -> Entry:
-    """Read the facts of a version of a file, once. Raises MeshreelError if it cannot be read now."""
-    try:
-        with FileSource(path) as source:
-            reader = ReelReader(source, MOST_HEAD)
-    except LargeHeadError:
-        return Entry(name, path.stat().st_size)
-    except FormatError as error:
-        return Entry(name, error=_without_path(error, path))
-    lost, whole = len(reader.missing), len(reader.chunks)
-    cut = f"{lost} of {whole} chunks are missing: the file is truncated" if lost else ""
-    return Entry(name, reader.size, reader.frame_count, reader.duration, cut)
+        before[key] = self.known[key] = facts
+        return replace(facts, name=name)  # links have one path
 
 
 def _without_path(error: MeshreelError | OSError, path: Path) -> str:
