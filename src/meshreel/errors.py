@@ -4,7 +4,10 @@ import re
 
 
 class MeshreelError(Exception):
-    """Base of all errors raised on purpose; the message is one line, fit for a terminal."""
+    """Base of all errors raised on purpose; the message is one line, fit for a terminal, without keys of URLs."""
+
+    def __init__(self, *texts: object) -> None:
+        super().__init__(*(without_secret(text) if isinstance(text, str) else text for text in texts))
 
 
 class InputError(MeshreelError):
@@ -19,8 +22,12 @@ class NoReferenceError(MeshreelError):
     """No reference surface can be made from these frames; the encoder then codes them one by one."""
 
 
-def without_secret(url: str) -> str:
-    """Return a URL without its query and its user, which may be keys, for messages and pages."""
-    place, *query = url.split("?", 1)
-    place = re.sub(r"^([\w+.-]+://)[^/@]*@", r"\1", place)
-    return f"{place}?..." if query else place
+_URL = r"(?<![\w+.-])([\w+.-]{2,}:)(//?)"  # as a Path, with one slash
+_USER = re.compile(rf"{_URL}(?:[^\s/?#]*|[^\s/?#:]+:(?!\d+/)\S*)@")  # keys of stores may have slashes
+_END = r"(?=[:;,.)\]'\"]*(?:\s|$))"
+_FURTHER = re.compile(rf"{_URL}([^\s?#]*|[^?#\n]*(?=[?#][\w.%-]+=))[?#](?:\.\.\.{_END}|\S*?{_END})")
+
+
+def without_secret(text: str) -> str:
+    """Return a text whose URLs lack users, queries and fragments, which may be keys: for messages and pages."""
+    return _FURTHER.sub(r"\1\2\3?...", _USER.sub(r"\1\2", text)) if ":/" in text else text

@@ -254,7 +254,8 @@ class Video(Sequence[Mesh]):
 
         facts = self._facts().items()
         if self.reader.size > INLINE:
-            play = f"play it with video.show(), or in a terminal: meshreel play {self.path or 'FILE'}"
+            place = without_secret(str(self.path or "FILE"))
+            play = f"play it with video.show(), or in a terminal: meshreel play {place}"
             note = f"{self.name} is larger than {INLINE / 1e6:g} MB: {play}"
             return table(facts, note)
         try:

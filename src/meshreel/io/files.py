@@ -1,7 +1,7 @@
 """Files of inputs and outputs: on this machine, regular and of a bounded size, or behind URLs.
 
-A folder may hold pipes, devices and sparse files. URLs go through fsspec: s3://, gs://, https:// and others that it
-supports (extra `remote`).
+A folder may hold pipes, devices and sparse files. URLs but of web servers go through fsspec: s3://, gs:// and others
+that it supports (extra `remote`), as do folders of web servers.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from ..errors import InputError, without_secret
+from .web import LONGEST, WEB, fetch, in_store, time_for
 
 _URL = re.compile(r"[a-zA-Z][a-zA-Z0-9+.-]+://")  # two letters at least: C:/ is a disk
 _POINTER = b"version https://git-lfs.github.com/spec/"
-_WEB = ("http://", "https://")
 MOST_BYTES = 1 << 30  # of a file: as binary PLY, 20 million vertices and 60 million faces (guess)
 _FLAGS = os.O_RDONLY | getattr(os, "O_BINARY", 0) | getattr(os, "O_NONBLOCK", 0)  # a pipe would wait for its writer
 
@@ -102,7 +102,7 @@ class Remote:
     @property
     def path(self) -> PurePosixPath:
         """Its path; of a web address, without the query."""
-        return PurePosixPath(urlsplit(self.url).path if self.url.startswith(_WEB) else self.url)
+        return PurePosixPath(urlsplit(self.url).path if self.url.startswith(WEB) else self.url)
 
     @property
     def suffix(self) -> str:
@@ -114,19 +114,22 @@ class Remote:
 
     def read(self, most: int) -> bytes:
         """Return its bytes, by one request. Raises OSError, also if there are more than `most`."""
-        with _as_os_error():
-            system, path = _system(self.url)
-            data: bytes = system.cat_file(path, start=0, end=most + 1)
+        if self.url.startswith(WEB):
+            data, _ = fetch(self.url, 0, most + 1, most + 1)
+        else:
+            data = in_store(self.url, lambda fs, path: fs.cat_file(path, start=0, end=most + 1), time_for(most))
         if len(data) > most:
             raise OSError(f"it has more than the {most} bytes that an input file may have")
         return data
 
     def names(self, pattern: str) -> list[str]:
         """Return the names in this folder, or relative paths that match a non-empty pattern. Raises OSError."""
-        with _as_os_error():
-            system, root = _system(self.url)
+
+        def act(system: Any, root: str) -> list[str]:
             paths = system.glob(f"{root.rstrip('/')}/{pattern}") if pattern else system.ls(root, detail=False)
             return [name.removeprefix(root).lstrip("/") for name in paths]
+
+        return in_store(self.url, act)
 
 
 Place = Path | Remote
@@ -150,44 +153,19 @@ def uploaded(output: Place) -> Iterator[Path]:
     if isinstance(output, Path):
         yield output
         return
-    if output.url.startswith(_WEB):
+    if output.url.startswith(WEB):
         raise InputError(f"{output}: a web server takes no output; give a path, or the URL of a store, as s3://")
     try:
-        with _as_os_error():
-            system, path = _system(output.url)
+        in_store(output.url, lambda *_: None)
     except OSError as error:
-        raise InputError(f"{output}: cannot be written ({error}); check the URL") from error
+        raise InputError(f"{output}: cannot be written ({error}); check the URL") from None
     with ExitStack() as stack:
         folder = tempfile.mkdtemp(prefix="meshreel-")
         stack.callback(shutil.rmtree, folder)
         local = Path(folder, output.path.name)
         yield local
         try:
-            with _as_os_error():
-                system.put_file(str(local), path)
+            in_store(output.url, lambda system, path: system.put_file(str(local), path), 24 * LONGEST)
         except OSError as error:
             stack.pop_all()
-            raise InputError(f"{output}: cannot be written ({error}); {local} is complete: copy it there") from error
-
-
-def _system(url: str) -> tuple[Any, str]:
-    """Return the file system of a URL, and its path there. Raises InputError if a package is missing."""
-    try:
-        from fsspec.core import url_to_fs
-
-        system, path = url_to_fs(url)
-    except ImportError as error:
-        text = "a URL needs the extra `remote`, pip install 'meshreel[remote]', and some protocols a package more"
-        raise InputError(f"{without_secret(url)}: {error}; {text}") from error
-    return system, path
-
-
-@contextmanager
-def _as_os_error() -> Iterator[None]:
-    """Turn the various errors of file systems into OSErrors of one line."""
-    try:
-        yield
-    except InputError:
-        raise
-    except Exception as error:
-        raise OSError(" ".join(f"{type(error).__name__}: {error}".split())) from error
+            raise InputError(f"{output}: cannot be written ({error}); {local} is complete: copy it there") from None

@@ -6,10 +6,8 @@ import asyncio
 import os
 import re
 from collections.abc import Mapping, Sequence
-from concurrent import futures
 from hashlib import blake2b
 from pathlib import Path
-from threading import Thread
 
 from starlette.applications import Starlette
 from starlette.concurrency import run_in_threadpool
@@ -24,6 +22,7 @@ from starlette.routing import Route
 from starlette.staticfiles import NotModifiedResponse, StaticFiles
 
 from ..errors import InputError
+from ..io.web import begun
 from .library import Library, as_text
 from .pages import gallery_page, player_page, policy
 
@@ -97,9 +96,7 @@ class _Pages:
         if self._library.only is not None:
             return self._watch(self._library.only)
         if self._gallery is None or self._gallery.done():
-            drawn = futures.Future[str]()
-            Thread(target=self._draw, args=(drawn,), daemon=True).start()  # the server's end does not wait for it
-            self._gallery = asyncio.wrap_future(drawn)
+            self._gallery = asyncio.wrap_future(begun(self._drawn))
         made, left = self._gallery, asyncio.ensure_future(_has_left(request))
         try:
             await asyncio.wait((made, left), return_when=asyncio.FIRST_COMPLETED)
@@ -107,12 +104,9 @@ class _Pages:
             left.cancel()
         return _page(made.result(), policy()) if made.done() else Response()
 
-    def _draw(self, drawn: futures.Future[str]) -> None:
-        try:
-            title = as_text(self._library.folder.resolve().name) or "meshreel"
-            drawn.set_result(gallery_page(title, self._library.entries(), f"/player/{self._edition}"))
-        except Exception as error:
-            drawn.set_exception(error)
+    def _drawn(self) -> str:
+        title = as_text(self._library.folder.resolve().name) or "meshreel"
+        return gallery_page(title, self._library.entries(), f"/player/{self._edition}")
 
     async def watch(self, request: Request) -> Response:
         name = request.path_params["name"]
