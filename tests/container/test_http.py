@@ -172,13 +172,13 @@ def test_a_url_of_another_file_or_without_a_server_names_the_url(serve):
 
 
 def test_an_answer_without_end_is_given_up_at_its_bytes(serve, monkeypatch):
-    monkeypatch.setattr("meshreel.io.web.MOST", 100_000)
+    monkeypatch.setattr("meshreel.web.MOST", 100_000)
     with pytest.raises(InputError, match=r"sends the whole file, of more than 100000 bytes; copy it here"):
         HttpSource(serve(LONG + bytes(100_000), ranges=False).url)
 
 
 def test_an_answer_that_drips_is_given_up_in_time(serve, monkeypatch):
-    monkeypatch.setattr("meshreel.io.web._PATIENCE", 0.05)
+    monkeypatch.setattr("meshreel.web._PATIENCE", 0.05)
 
     def drip(self: Handler) -> None:
         self.send_response(206)
@@ -197,7 +197,7 @@ def test_an_answer_that_drips_is_given_up_in_time(serve, monkeypatch):
 
 def test_headers_that_drip_are_given_up_in_time(serve, monkeypatch):
     ended = threading.Event()
-    monkeypatch.setattr("meshreel.io.web.LONGEST", 0.2)
+    monkeypatch.setattr("meshreel.web.LONGEST", 0.2)
     monkeypatch.setattr(Handler, "do_GET", lambda _: ended.wait(60))
     with pytest.raises(InputError, match=r"cannot be read \(TimeoutError\)"):
         HttpSource(serve(LONG).url)
@@ -207,7 +207,7 @@ def test_headers_that_drip_are_given_up_in_time(serve, monkeypatch):
 def test_a_store_that_hangs_is_given_up_in_time(monkeypatch):
     system, ended = pytest.importorskip("fsspec").filesystem("memory"), threading.Event()
     system.pipe("/reels/a.reel", LARGE)
-    monkeypatch.setattr("meshreel.io.web.LONGEST", 0.2)
+    monkeypatch.setattr("meshreel.web.LONGEST", 0.2)
     monkeypatch.setattr(type(system), "cat_file", lambda *_, **__: ended.wait(60))
     for act in (lambda: meshreel.open("memory://reels/a.reel"), lambda: Remote("memory://reels/a.reel").read(9)):
         with pytest.raises((InputError, OSError), match="TimeoutError"):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from typing import Annotated, Any
 
 import numpy as np
@@ -12,6 +11,7 @@ from .. import edit
 from ..edit.edits import Edited
 from ..errors import InputError
 from ..io.files import Place, located
+from ..texts import json_of
 from ..types import Up
 from .console import Common
 
@@ -151,7 +151,7 @@ def tag(
         if not sign:
             raise InputError(f"{value!r}: give NAME=VALUE, as title=Walk")
         try:
-            tags[name] = json.loads(text) if text else None
+            tags[name] = json_of(text) if text else None
         except ValueError:
             tags[name] = text
     sound = b"" if no_audio else audio

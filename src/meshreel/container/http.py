@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from .. import web
 from ..errors import InputError
-from ..io import web
 from .reader import FIRST_REQUEST
 
 

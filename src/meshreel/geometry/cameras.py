@@ -21,6 +21,7 @@ from jaxtyping import Bool, Float32, Float64, Int32, Int64
 
 from .. import _core
 from ..errors import InputError
+from ..texts import json_of
 from ..types import Mesh
 from .strict import inverse, products
 from .topology import face_normals
@@ -196,12 +197,13 @@ def unpack_cameras(data: bytes, name: str) -> list[Camera]:
     """Unpack an Open3D PinholeCameraParameters or PinholeCameraTrajectory; errors name the data `name`."""
     cameras: list[Camera] = []
     try:
-        record = json.loads(data)
+        try:
+            record = json_of(data)
+        except ValueError as error:
+            raise InputError(f"{name}: cannot read cameras ({error}); give Open3D pinhole camera JSON") from error
         for entry in record.get("parameters", [record]):
             cameras.append(_camera(entry))
         return cameras
-    except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
-        raise InputError(f"{name}: cannot read cameras ({error}); give Open3D pinhole camera JSON") from error
     except (KeyError, TypeError, ValueError, AttributeError, OverflowError, np.linalg.LinAlgError) as error:
         text = f"{name}: not Open3D pinhole camera JSON (camera number {len(cameras)}: {error!r})"
         raise InputError(f"{text}; mend it or leave it out") from error

@@ -21,7 +21,8 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from ..errors import InputError, without_secret
-from .web import LONGEST, WEB, fetch, in_store, time_for
+from ..texts import json_of
+from ..web import LONGEST, WEB, fetch, in_store, time_for
 
 _URL = re.compile(r"[a-zA-Z][a-zA-Z0-9+.-]+://")  # two letters at least: C:/ is a disk
 _POINTER = b"version https://git-lfs.github.com/spec/"
@@ -63,9 +64,8 @@ def read_input(path: Place, remedy: str = "check the path and its rights", where
 def read_json(path: Place, remedy: str) -> dict[str, Any]:
     """Return the object in a JSON file. Raises InputError with the `remedy`."""
     try:
-        # Some editors write a byte order mark.
-        record = json.loads(read_input(path, "check it and its rights").decode("utf-8-sig"))
-    except (ValueError, RecursionError) as error:
+        record = json_of(read_input(path, "check it and its rights"))
+    except ValueError as error:
         raise InputError(f"{path}: cannot be read ({error}); {remedy}") from None
     if not isinstance(record, dict):
         raise InputError(f"{path}: is not a JSON object; {remedy}")

@@ -5,7 +5,6 @@ In: the bytes of a GLB file. Out: entries, arrays, pictures, and the names of th
 
 from __future__ import annotations
 
-import json
 from base64 import b64decode
 from collections.abc import Iterator
 from functools import cache, partial
@@ -13,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from ..texts import json_of
 from ..types import Texture
 from .glb_file import MESHOPT, TRIANGLES, check_meshopt
 from .pictures import parse_picture
@@ -100,8 +100,8 @@ class Gltf:
         if total > len(data) or 20 + length > len(data):
             raise Unreadable(f"GLB announces {total} bytes but has {len(data)} (truncated?)")
         try:
-            tree = json.loads(data[20 : 20 + length])
-        except (ValueError, RecursionError) as error:
+            tree = json_of(data[20 : 20 + length])
+        except ValueError as error:
             raise Unreadable(f"GLB scene description is no JSON ({error})") from None
         if not isinstance(tree, dict):
             raise Unreadable("GLB scene description is no JSON object")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import json
 import operator
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -14,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
+from ..texts import json_of
 from ..types import Mesh, MeshSequence, Up, known_up
 from .file_names import Order, find_frames
 from .files import Place, Remote, located, read_file
@@ -225,7 +225,7 @@ def open_sequence(source: str | Path | Sequence[str | Path], options: SequenceOp
 def capture_record(folder: Place) -> dict[str, Any]:
     """Return the record that `meshreel capture` wrote beside its meshes; empty for other folders and files."""
     try:
-        record = json.loads(read_file(folder / CAPTURED))
+        record = json_of(read_file(folder / CAPTURED))
     except (OSError, ValueError):
         return {}
     return record if isinstance(record, dict) else {}

@@ -22,7 +22,7 @@ from starlette.routing import Route
 from starlette.staticfiles import NotModifiedResponse, StaticFiles
 
 from ..errors import InputError
-from ..io.web import begun
+from ..web import begun
 from .library import Library, as_text
 from .pages import gallery_page, player_page, policy
 

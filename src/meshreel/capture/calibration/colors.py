@@ -24,6 +24,7 @@ from ...geometry.cameras import CameraPose
 from ...geometry.color_views import ColorFrames, ColorPicture, ColorViews, sampled
 from ...geometry.topology import face_normals, subdivide_midpoint
 from ...io.write import replacing
+from ...texts import json_of
 from ...types import Frames, Mesh, evenly
 from ..rig.rig import Rig
 
@@ -43,7 +44,7 @@ GAIN_ROUNDS = 6  # in which outliers lose their weight (guess)
 APART = 0.5  # pixels from a place to both sides, where the slopes of colours are measured
 STEP = 1e-5  # rad, m: for derivatives of positions in a picture
 REMEMBERED = "color_calibration.json"
-_DAMAGED = (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError)
+_DAMAGED = (OSError, ValueError, LookupError, TypeError, AttributeError)
 LN2 = math.log(2)
 SMALL = np.finfo(np.float64).tiny
 
@@ -315,7 +316,7 @@ def remembered(
     """
     digest = _digest(rig, looked_at, depends_on)
     with suppress(*_DAMAGED):
-        record = json.loads((rig.folder / REMEMBERED).read_bytes())
+        record = json_of((rig.folder / REMEMBERED).read_bytes())
         if record["of"] == digest:
             return _corrections(rig, record["cameras"])
     found = find()

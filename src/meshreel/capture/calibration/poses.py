@@ -8,7 +8,6 @@ from __future__ import annotations
 import json
 import re
 import struct
-import tomllib
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
@@ -23,13 +22,14 @@ from ...geometry import strict
 from ...geometry.cameras import Matrix
 from ...io.files import read_input, read_json
 from ...io.pictures import last_number
+from ...texts import json_of, toml_of, yaml_of
 from ..rig.cameras import posed
 from ..rig.rig import RIG, Rig
 
 _OTHERS = "caliscope's .toml, tf_static as .yaml or .json, or a rig.json"
 FORMS = f"COLMAP's images.txt or images.bin, OpenCV's .yml, {_OTHERS}"
 _TURNS, _SHIFTS = ("Rot", "R", "rvec"), ("T", "t", "tvec")  # OpenCV's names of matrices, before `_` and a camera's name
-_DAMAGED = (ValueError, LookupError, TypeError, AttributeError, ArithmeticError, struct.error, RecursionError)
+_DAMAGED = (ValueError, LookupError, TypeError, AttributeError, ArithmeticError, struct.error)
 
 
 def read_poses(path: Path) -> dict[str, Matrix]:
@@ -146,7 +146,7 @@ def _colmap(images: Iterable[tuple[str, list[float]]]) -> dict[str, Matrix]:
 
 def _toml(data: bytes) -> dict[str, Matrix]:
     """Parse caliscope's [cameras.0], or anipose's [cam_0] with a name."""
-    record = tomllib.loads(data.decode())
+    record = toml_of(data)
     tables = {name: table for name, table in record.get("cameras", record).items() if isinstance(table, dict)}
     posed = {name: table for name, table in tables.items() if {"rotation", "translation"} <= table.keys()}
     return {t.get("name", name): _seen_from(t["rotation"], t["translation"]) for name, t in posed.items()}
@@ -155,19 +155,9 @@ def _toml(data: bytes) -> dict[str, Matrix]:
 def _yaml(data: bytes) -> dict[str, Matrix]:
     """Parse YAML of OpenCV's FileStorage, or of `ros2 topic echo /tf_static`."""
     try:
-        import yaml
+        records = [record for record in yaml_of(data) if isinstance(record, dict)]
     except ImportError:
         raise InputError("YAML needs the extra `calibrate`: pip install 'meshreel[calibrate]'") from None
-
-    class Loader(yaml.SafeLoader):
-        """YAML with OpenCV's matrices as mappings."""
-
-    Loader.add_multi_constructor("", lambda loader, _, node: loader.construct_mapping(node, deep=True))
-    text = re.sub(r"^%YAML:.*", "", data.decode("utf-8-sig"))  # OpenCV's first line is no YAML
-    try:
-        records = [record for record in yaml.load_all(text, Loader) if isinstance(record, dict)]
-    except yaml.YAMLError as error:
-        raise ValueError(" ".join(str(error).split())[:80]) from None
     if any("transforms" in record for record in records):
         return _transforms([one for record in records for one in record.get("transforms", [])])
     return _opencv({key: value for record in records for key, value in record.items()})
@@ -191,7 +181,7 @@ def _opencv(record: dict[str, Any]) -> dict[str, Matrix]:
 
 
 def _json(data: bytes) -> dict[str, Any]:
-    record = json.loads(data.decode("utf-8-sig"))
+    record = json_of(data)
     if "transforms" in record:
         return _transforms(record["transforms"])
     return {camera["name"]: camera["camera_to_world"] for camera in record["cameras"]}

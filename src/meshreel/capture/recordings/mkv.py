@@ -6,7 +6,6 @@ Their form: https://learn.microsoft.com/previous-versions/azure/kinect-dk/record
 
 from __future__ import annotations
 
-import json
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -14,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from ...geometry.cameras import Camera
+from ...texts import json_of
 from ..calibration.poses import pose_of
 from .takes import Pictures, Sensor, Stream, Take, lens_of
 
@@ -39,7 +39,7 @@ def read(path: Path) -> Take:
         start = int(video.metadata.get("K4A_START_OFFSET_NS", 0)) / 1e9
         attached = {one.metadata.get("filename"): one.data for one in video.streams.attachments}
         data = attached.get(CALIBRATION)
-        known = json.loads(data.rstrip(b"\0"))["CalibrationInformation"]["Cameras"] if data else []
+        known = json_of(data.rstrip(b"\0"))["CalibrationInformation"]["Cameras"] if data else []
         cameras = {TITLES[one["Location"]]: one for one in known if one.get("Location") in TITLES}
         streams = {}
         for title in [title for title in ("DEPTH", "COLOR") if title in tracks]:

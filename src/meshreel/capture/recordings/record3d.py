@@ -6,7 +6,6 @@ coarser than colour and aligned with it. Depth of `.r3d` is compressed by LZFSE,
 
 from __future__ import annotations
 
-import json
 import zipfile
 from collections.abc import Callable
 from functools import partial
@@ -17,6 +16,7 @@ import numpy as np
 from ...errors import InputError
 from ...io.files import MOST_BYTES, read_file
 from ...io.pictures import last_number
+from ...texts import json_of
 from ..calibration.poses import pose_of
 from .takes import Picture, Pictures, Sensor, Stream, Take, lens_of, picture_size, reading
 
@@ -33,11 +33,11 @@ def read(path: Path) -> Take:
     if (folder := _folder(path)) is not None:
         names = sorted(f"{place}/{file.name}" for place in ("rgb", "depth") for file in (folder / place).glob("*.*"))
         load: Callable[[str], bytes] = partial(_stored, folder)
-        about, decode = json.loads(load("metadata.json")), partial(_exr, folder)
+        about, decode = json_of(load("metadata.json")), partial(_exr, folder)
     else:
         archive = zipfile.ZipFile(path)  # open as long as its pictures may be asked for
         names, load = archive.namelist(), partial(_unpacked, archive)
-        about = json.loads(load("metadata"))
+        about = json_of(load("metadata"))
         decode = partial(_lzfse, load, float(about["w"]) / max(1.0, float(about["h"])))
     deep, color = _by_number(names, (".exr", ".depth")), _by_number(names, (".jpg",))
     if not deep:

@@ -30,6 +30,7 @@ from ...format.layout import ChunkKind, Form, Header
 from ...geometry.derived_sequences import DerivedSequence
 from ...io.files import Place, first_difference, located, read_file, uploaded
 from ...io.write import cannot_be_written, check_apart, claim, discard, part_of, sync, sync_folder, unfinished
+from ...texts import json_of
 from ..group.digests import versions
 from ..group.forms import EncodedGroup, Fidelity
 from ..group.interval import Interval
@@ -134,7 +135,7 @@ class IntervalFiles:
                 for chunk in reader.chunks:
                     reader.read_chunk(chunk.number)  # checks its sums
                 groups, before = unpack_interval(self.path / name, reader), reader.metadata["interval"]
-                is_ours = reader.metadata["encode"] == json.loads(head.metadata)["encode"]
+                is_ours = reader.metadata["encode"] == json_of(head.metadata)["encode"]
         except (FormatError, InputError, OSError, KeyError, TypeError, ValueError, AttributeError):
             is_ours = False
         if not is_ours:
@@ -196,8 +197,8 @@ class IntervalFiles:
 
     def _read_whole(self) -> dict[str, Any] | None:
         """Return the facts in `whole.json`, or None if it is missing or damaged."""
-        with suppress(FileNotFoundError, ValueError, RecursionError, KeyError, TypeError, AttributeError):
-            record: dict[str, Any] = json.loads(read_file(self.path / WHOLE))
+        with suppress(FileNotFoundError, ValueError, KeyError, TypeError, AttributeError):
+            record: dict[str, Any] = json_of(read_file(self.path / WHOLE))
             is_ours = record.pop("digest") == _digest(record) and isinstance(record["made"], dict) and "scene" in record
             return record if is_ours else None
         return None
@@ -278,7 +279,7 @@ def pack_interval(interval: Interval, groups: Sequence[EncodedGroup], head: Head
         values = [value if math.isfinite(value) else None for value in map(float, astuple(group.fidelity))]
         key = None if group.key is None else int(group.key)
         facts.append([*values, key, group.canonical, group.lost_colors])
-    metadata = json.loads(head.metadata) | {"interval": place_of(interval), "groups": facts}
+    metadata = json_of(head.metadata) | {"interval": place_of(interval), "groups": facts}
     is_long = len(json.dumps(metadata)) > _MOST
     metadata |= {"groups": None} if is_long else {}
     file, first = io.BytesIO(), 0
@@ -294,7 +295,7 @@ def pack_interval(interval: Interval, groups: Sequence[EncodedGroup], head: Head
 def unpack_interval(path: Path, reader: ReelReader) -> list[EncodedGroup]:
     """Return the groups of an interval's file. Raises KeyError, TypeError or ValueError where no encoder wrote it."""
     found = list[EncodedGroup]()
-    facts = reader.metadata["groups"] or json.loads(reader.read_chunk(len(reader.chunks) - 1)[1:])
+    facts = reader.metadata["groups"] or json_of(reader.read_chunk(len(reader.chunks) - 1)[1:])
     for chunk, (*values, key, canonical, lost_colors) in zip(reader.groups, facts, strict=True):
         fidelity = Fidelity(*(math.inf if value is None else float(value) for value in values))
         own = (one for one in reader.chunks if one.kind in COMPANIONS and one.depends_on[0] == chunk.number)

@@ -23,12 +23,13 @@ from ...geometry.derived_sequences import DerivedSequence
 from ...geometry.work import Work, add, since, so_far
 from ...io.files import Place, read_input
 from ...io.write import replacing
+from ...texts import json_of
 from .schedule import Call, Job, as_done
 from .worker import end_with_parent
 
 KIND = "meshreel survey 2"
 SLICE = 32  # frames that a worker surveys at once: some seconds (guess)
-_DAMAGED = (KeyError, TypeError, ValueError, OverflowError, RecursionError)  # of a record that no encoder wrote
+_DAMAGED = (KeyError, TypeError, ValueError, OverflowError)  # of a record that no encoder wrote
 
 
 def survey_job(job: Job, cleaned: bool = True) -> Survey:
@@ -142,7 +143,7 @@ def read_survey(path: Place) -> SurveyFile:
     """Read the file of a survey. Raises InputError for any other file."""
     data = read_input(path)
     try:
-        record = json.loads(data)
+        record = json_of(data)
         if record["kind"] != KIND:
             raise ValueError(record["kind"])
         about, digests = {name: record[name] for name in _ABOUT}, [str(value) for value in record["digests"]]

@@ -17,7 +17,7 @@ from urllib.error import HTTPError
 from urllib.parse import unquote, urlsplit, urlunsplit
 from urllib.request import Request, urlopen
 
-from ..errors import InputError, without_secret
+from .errors import InputError, without_secret
 
 WEB = ("http://", "https://")
 MOST = 1 << 29  # bytes of an answer without ranges, which is kept in memory (guess)
