@@ -44,7 +44,7 @@ def begun(call: Callable[[], T]) -> Future[T]:
 
 
 def in_store(url: str, act: Callable[[Any, str], T], seconds: float = LONGEST) -> T:
-    """Return what `act` returns for the file system of a URL and the path there.
+    """Return the result of `act` for the file system of a URL and the path there.
 
     Raises OSError of one line, also after some seconds, and InputError if a package is missing.
     """

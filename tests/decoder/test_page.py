@@ -1,17 +1,23 @@
 """What a notebook shows of a video and of a mesh, and videos in other processes."""
 
+import gc
 import io
 import multiprocessing
 import os
 import pickle
 import re
 import struct
+import subprocess
+import sys
+import threading
 import zlib
 from base64 import b64decode
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from html import unescape
 from pathlib import Path
+from urllib.parse import urlsplit
+from urllib.request import url2pathname
 
 import numpy as np
 import pytest
@@ -62,16 +68,80 @@ def test_a_closed_file_is_a_table_that_says_so_and_short_reads_are_continued(mon
     assert "it is closed; open it again" in video._repr_html_() and "<table>" in video._repr_html_()
 
 
-def test_show_opens_a_page_that_is_whole(monkeypatch, tmp_path):
-    opened: list[str] = []
-    monkeypatch.setattr("webbrowser.open", lambda *named: opened.extend(named) or True)
-    monkeypatch.setattr("tempfile.mkdtemp", lambda **_: str(tmp_path))
+@pytest.fixture
+def shown(monkeypatch, tmp_path):
+    """Pages that a browser was asked for, all of which lie in `tmp_path`."""
+    opened: list[Path] = []
+    monkeypatch.setattr("webbrowser.open", lambda url: opened.append(Path(url2pathname(urlsplit(url).path))) or True)
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    monkeypatch.setattr("meshreel.decoder.video.LOADED", 0.0)
+    return opened
+
+
+def test_show_opens_a_page_that_is_whole(shown):
+    video = meshreel.open(SCENE)
+    video.show()
+    assert [page.name for page in shown] == ["scene.html"] and shown[0].read_text() == video._page()
+
+
+@pytest.mark.parametrize("end", ["close", "with", "collected", "again", "at"])
+def test_what_show_wrote_is_removed_with_the_video(shown, tmp_path, end):
+    video = meshreel.open(SCENE)
+    threads = threading.active_count()
+    video.show()
+    assert shown[0].exists()
+    if end == "close":
+        video.close()
+        video.close()
+    elif end == "with":
+        with video:
+            pass
+    elif end == "again":
+        video.show()
+        assert shown[1].exists() and len(list(tmp_path.iterdir())) == 1
+        video.close()
+    else:
+        other = video.at(0) if end == "at" else None
+        del video
+        gc.collect()
+        if other is not None:
+            other.show()
+            other.close()
+    assert not list(tmp_path.iterdir()) and threading.active_count() == threads
+
+
+def test_a_page_lasts_until_a_browser_has_had_time_to_load_it(shown, monkeypatch, tmp_path):
+    slept = list[float]()
+    monkeypatch.setattr("meshreel.decoder.video.LOADED", 7.0)
+    monkeypatch.setattr("time.sleep", lambda seconds: slept.append(seconds) or shown[0].read_bytes())
     meshreel.open(SCENE).show()
-    assert opened == [(tmp_path / "scene.html").as_uri()]
-    assert (tmp_path / "scene.html").read_text() == meshreel.open(SCENE)._page()
+    gc.collect()
+    assert len(slept) == 1 and 0 < slept[0] <= 7 and not list(tmp_path.iterdir())
+
+
+def test_the_end_of_a_process_removes_what_show_wrote(tmp_path):
+    code = "import meshreel, sys; from meshreel.decoder import video; video.LOADED = 0; import webbrowser, tempfile\n"
+    code += "tempfile.tempdir = sys.argv[2]; webbrowser.open = lambda url: not print(url)\n"
+    code += "v = meshreel.open(sys.argv[1]); v.show()"
+    told = subprocess.run([sys.executable, "-c", code, SCENE, tmp_path], capture_output=True, text=True, check=False)
+    assert "scene.html" in told.stdout and not list(tmp_path.iterdir())
+
+
+@pytest.mark.usefixtures("shown")
+def test_without_a_browser_the_page_stays_for_its_reader(monkeypatch, tmp_path):
     monkeypatch.setattr("webbrowser.open", lambda _: False)
     with pytest.raises(InputError, match=r"no browser was found: open .*recording.html"):
         meshreel.open(SCENE.read_bytes()).show()
+    gc.collect()
+    assert len(list(tmp_path.rglob("recording.html"))) == 1
+
+
+def test_show_of_a_closed_file_writes_nothing(shown, tmp_path):
+    video = meshreel.open(SCENE)
+    video.close()
+    with pytest.raises(InputError, match="it is closed; open it again"):
+        video.show()
+    assert not shown and not list(tmp_path.iterdir())
 
 
 def pixels_of(data: bytes) -> np.ndarray:

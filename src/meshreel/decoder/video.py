@@ -7,7 +7,10 @@ core, and PyAV when a picture is asked for.
 from __future__ import annotations
 
 import operator
+import shutil
 import sys
+import time
+import weakref
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, overload
@@ -27,6 +30,7 @@ from .tracks import Background, Track, moving_of_frame
 
 BACKGROUND = "background"  # its name among the parts of a frame
 _MOST_LAYERS = 255  # beyond the first, more than any group has
+LOADED = 10.0  # s in which a browser has loaded a page (guess)
 INLINE = 8_000_000  # bytes, largest file in a notebook's output (guess): saved notebooks hold 4/3 of it
 
 
@@ -80,6 +84,7 @@ class Video(Sequence[Mesh]):
         self.tracks = tuple(Track(reader, number, decoders, layers, colored) for number in numbers)
         self._background = Background(reader, decoders, colored)
         self._close = close
+        self._hide: weakref.finalize[..., Video] | Callable[[], None] = lambda: None  # removes the page of `show`
 
     def at(self, layers: int | None = None, colors: bool = True) -> Video:
         """Return the same video decoded from at most `layers` layers of each group beyond its first; None: from all.
@@ -105,6 +110,7 @@ class Video(Sequence[Mesh]):
 
     def close(self) -> None:
         """Close the file. Afterwards only frames of the last decoded groups can be read."""
+        self._hide()
         if self._close is not None:
             self._close()
 
@@ -266,7 +272,8 @@ class Video(Sequence[Mesh]):
     def show(self) -> None:
         """Play the video: in a notebook below the cell; elsewhere in the browser, as a page in a temporary folder.
 
-        The page contains the whole file and needs no server; `meshreel play` streams a large file.
+        The page contains the whole file and needs no server; `meshreel play` streams a large file. It is removed with
+        the video, by `close` and by the next call, which wait until a browser has had `LOADED` seconds to load it.
         """
         shell = sys.modules.get("IPython") and sys.modules["IPython"].get_ipython()
         if shell is not None and hasattr(shell, "kernel"):
@@ -277,9 +284,14 @@ class Video(Sequence[Mesh]):
         import tempfile
         import webbrowser
 
-        page = Path(tempfile.mkdtemp(prefix="meshreel-"), f"{Path(self.name).stem}.html")
-        page.write_text(self._page(), encoding="utf-8")
+        text = self._page()
+        self._hide()
+        folder = tempfile.mkdtemp(prefix="meshreel-")
+        self._hide = weakref.finalize(self, _remove, folder, time.monotonic() + LOADED)
+        page = Path(folder, f"{Path(self.name).stem}.html")
+        page.write_text(text, encoding="utf-8")
         if not webbrowser.open(page.as_uri()):
+            self._hide.detach()
             raise InputError(f"no browser was found: open {page}")
 
     @property
@@ -314,6 +326,14 @@ class Video(Sequence[Mesh]):
         if not 0 <= frame < len(self):
             raise IndexError(f"frame {index} of a video of {len(self)} frames")
         return frame
+
+
+def _remove(folder: str, when: float) -> None:
+    """Remove a folder, not before a time of the monotonic clock."""
+    try:
+        time.sleep(max(when - time.monotonic(), 0))
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
 
 
 def _counted(count: int, what: str) -> str:
