@@ -111,12 +111,13 @@ int mr_decode_field(const mr_bytes* record, const mr_graph* graph, size_t width,
 
 int mr_decode_motion(const mr_bytes* record, const mr_mesh* base, size_t frames, double* rows) {
     LayersGroup group;
-    if (!parse(*record, group) || group.frames != frames) return MR_BAD_RECORD;
+    if (!parse(*record, group) || group.form != Form::LAYERS || group.frames != frames) return MR_BAD_RECORD;
     return guarded(MR_NO_MEMORY, [&] { return decode_motion(group, *base, 0, rows); });
 }
 
 int mr_decode_last_places(const mr_bytes* record, const mr_mesh* base, size_t frames, double* positions) {
     LayersGroup group;
-    if (!parse(*record, group) || group.frames != frames || frames == 0) return MR_BAD_RECORD;
+    if (!parse(*record, group) || group.form != Form::LAYERS || group.frames != frames || frames == 0)
+        return MR_BAD_RECORD;
     return guarded(MR_NO_MEMORY, [&] { return decode_motion(group, *base, frames - 1, positions); });
 }
