@@ -11,7 +11,7 @@ import pytest
 
 import meshreel
 from meshreel.coding.mesh import encode_intra
-from meshreel.container.http import HttpSource
+from meshreel.container.http import UrlSource
 from meshreel.container.reader import FIRST_REQUEST
 from meshreel.container.writer import ReelWriter
 from meshreel.errors import FormatError, InputError
@@ -97,7 +97,7 @@ def test_a_url_opens_the_same_video_as_the_file(serve, ranges):
 
 def test_the_first_request_has_the_head_and_each_range_behind_it_is_one_request(serve):
     server = serve(LONG)
-    source = HttpSource(server.url)
+    source = UrlSource(server.url)
     assert source.size == len(LONG)
     assert source.get_bytes(100, 50) == LONG[100:150] and len(server.asked) == 1
     assert source.get_bytes(FIRST_REQUEST, 1000) == LONG[FIRST_REQUEST : FIRST_REQUEST + 1000]
@@ -110,7 +110,7 @@ def test_the_first_request_has_the_head_and_each_range_behind_it_is_one_request(
 
 def test_a_server_without_ranges_is_asked_once(serve):
     server = serve(LONG, ranges=False)
-    source = HttpSource(server.url)
+    source = UrlSource(server.url)
     assert source.get_bytes(FIRST_REQUEST, 1000) == LONG[FIRST_REQUEST : FIRST_REQUEST + 1000]
     assert len(server.asked) == 1
 
@@ -148,7 +148,7 @@ def test_a_store_without_fsspec_names_the_extra(monkeypatch):
 
 def test_a_server_that_stops_answering_by_range_is_an_input_error(serve):
     server = serve(LONG)
-    source = HttpSource(server.url)
+    source = UrlSource(server.url)
     server.ranges = False
     with pytest.raises(InputError, match=f"without bytes {FIRST_REQUEST}"):
         source.get_bytes(FIRST_REQUEST, 10)
@@ -156,7 +156,7 @@ def test_a_server_that_stops_answering_by_range_is_an_input_error(serve):
 
 def test_a_server_that_sends_more_than_the_range_is_an_input_error(serve):
     server = serve(LONG)
-    source = HttpSource(server.url)
+    source = UrlSource(server.url)
     server.extra = b"more"
     with pytest.raises(InputError, match="11 of 10 bytes came"):
         source.get_bytes(FIRST_REQUEST, 10)
@@ -174,7 +174,7 @@ def test_a_url_of_another_file_or_without_a_server_names_the_url(serve):
 def test_an_answer_without_end_is_given_up_at_its_bytes(serve, monkeypatch):
     monkeypatch.setattr("meshreel.web.MOST", 100_000)
     with pytest.raises(InputError, match=r"sends the whole file, of more than 100000 bytes; copy it here"):
-        HttpSource(serve(LONG + bytes(100_000), ranges=False).url)
+        UrlSource(serve(LONG + bytes(100_000), ranges=False).url)
 
 
 def test_an_answer_that_drips_is_given_up_in_time(serve, monkeypatch):
@@ -192,7 +192,7 @@ def test_an_answer_that_drips_is_given_up_in_time(serve, monkeypatch):
 
     monkeypatch.setattr(Handler, "do_GET", drip)
     with pytest.raises(InputError, match=r"cannot be read \(\d+ bytes in .* s are too slow\)"):
-        HttpSource(serve(LONG).url)
+        UrlSource(serve(LONG).url)
 
 
 def test_headers_that_drip_are_given_up_in_time(serve, monkeypatch):
@@ -200,7 +200,7 @@ def test_headers_that_drip_are_given_up_in_time(serve, monkeypatch):
     monkeypatch.setattr("meshreel.web.LONGEST", 0.2)
     monkeypatch.setattr(Handler, "do_GET", lambda _: ended.wait(60))
     with pytest.raises(InputError, match=r"cannot be read \(TimeoutError\)"):
-        HttpSource(serve(LONG).url)
+        UrlSource(serve(LONG).url)
     ended.set()
 
 
@@ -234,11 +234,11 @@ def test_half_an_answer_is_an_input_error(serve, monkeypatch):
 
     monkeypatch.setattr(Handler, "do_GET", half)
     with pytest.raises(InputError, match="50 of 100 bytes came; open it again"):
-        HttpSource(server.url)
+        UrlSource(server.url)
 
 
 def test_a_user_in_an_address_is_sent_as_a_header(serve, monkeypatch):
     asked, do_get = list[str](), Handler.do_GET
     monkeypatch.setattr(Handler, "do_GET", lambda self: asked.append(self.headers["Authorization"]) or do_get(self))
-    HttpSource(serve(LONG).url.replace("://", "://us%20er:w@rd@"))
+    UrlSource(serve(LONG).url.replace("://", "://us%20er:w@rd@"))
     assert asked == ["Basic " + b64encode(b"us er:w@rd").decode()]

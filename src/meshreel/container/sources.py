@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 from ..errors import InputError
 
 if TYPE_CHECKING:
-    from .http import HttpSource, StoreSource
+    from .http import UrlSource
 
 
 @runtime_checkable
@@ -112,12 +112,12 @@ class FileSource(StreamSource):
         self.close()
 
 
-def source_at(place: str | Path) -> FileSource | HttpSource | StoreSource:
+def source_at(place: str | Path) -> FileSource | UrlSource:
     """Open a file on disk or behind a URL. Raises InputError if it cannot be read."""
     if isinstance(place, str) and "://" in place:
-        from .http import HttpSource, StoreSource
+        from .http import UrlSource
 
-        return HttpSource(place) if place.startswith(("http://", "https://")) else StoreSource(place)
+        return UrlSource(place)
     return FileSource(place)
 
 
