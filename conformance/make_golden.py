@@ -13,6 +13,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -30,6 +31,7 @@ from meshreel.container.writer import Companion, ReelWriter
 from meshreel.decoder.video import Video
 from meshreel.decoder.video import open as open_video
 from meshreel.edit.audio import packed_audio
+from meshreel.edit.edits import concat, cut
 from meshreel.encoder.appearance.videos import TextureOptions, Videos, layered_pictures
 from meshreel.format.layout import ChunkKind, Header
 from meshreel.format.records import pack
@@ -67,6 +69,7 @@ def main(folder: Path) -> None:
                 add(writer, group)
     with golden(folder, "scene", header()) as writer:
         add_scene(writer)
+    add_joined(folder)
     (folder / "audio").mkdir(exist_ok=True)
     heard = packed_audio(tone(0.3), -0.04, 500_000)
     with golden(folder, "audio/audio", header(intervals=(40_000, 20_000)), heard) as writer:
@@ -90,6 +93,19 @@ def main(folder: Path) -> None:
             add(writer, group)
             if number in (0, 2):
                 add_splats(writer, group[1])
+
+
+def add_joined(folder: Path) -> None:
+    """Cuts of the scene, the later one first: frames are hidden in the middle of the file that joins them."""
+    path = folder / "joined.reel"
+    if path.exists():
+        return
+    with TemporaryDirectory() as place:
+        cuts = [f"{place}/{frames.replace(':', '_')}.reel" for frames in ("8:13", "2:12")]
+        for name, frames in zip(cuts, ("8:13", "2:12"), strict=True):
+            cut(folder / "scene.reel", name, frames)
+        concat(cuts, path)
+    path.with_suffix(".json").write_text(json.dumps(record(open_video(path)), indent=1) + "\n")
 
 
 @contextmanager

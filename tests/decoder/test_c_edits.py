@@ -33,6 +33,17 @@ def edited(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
     return tmp_path / "edited.reel"
 
 
+def joined(path: Path, folder: Path) -> Path:
+    """Return a golden file of which two cuts are joined the other way round, without audio, and cut again."""
+    count = len(meshreel.open(path))
+    edit.tag(path, folder / "plain.reel", audio=b"")
+    for name, frames in (("a", f"{count // 2}:"), ("b", f":{max(count // 2, 1)}")):
+        edit.cut(folder / "plain.reel", folder / f"{name}.reel", frames)
+    edit.concat([folder / "a.reel", folder / "b.reel", folder / "a.reel"], folder / "joined.reel")
+    edit.cut(folder / "joined.reel", folder / "again.reel", "1:-1" if count > 2 else ":")
+    return folder / "again.reel"
+
+
 def test_every_part_of_every_frame_is_cut_and_turned_as_by_python(edited: Path):
     known = meshreel.open(edited)
     assert known.reader.edit.rotation
@@ -58,13 +69,34 @@ def test_splats_are_turned_with_their_axes(tmp_path: Path):
                 np.testing.assert_allclose(array, getattr(wanted, name), rtol=0, atol=1e-9)
 
 
+@pytest.mark.parametrize("path", FILES, ids=lambda path: f"{path.parent.stem}-{path.stem}")
+def test_a_joined_file_with_hidden_frames_in_its_middle_is_shown_as_by_python(path: Path, tmp_path: Path):
+    known = meshreel.open(joined(path, tmp_path))
+    with CVideo((tmp_path / "again.reel").read_bytes()) as video:
+        assert [video.time(frame) for frame in range(video.info.frames)] == known.timestamps
+        for frame in range(len(known)):
+            for name, mesh in known.parts(frame).items():
+                check_same(mesh, video.decode(frame, BACKGROUND if name == "background" else int(name.split()[1])))
+
+
+@pytest.mark.parametrize(("name", "part"), [("textures", 0), ("scene", BACKGROUND)])
+def test_pictures_of_a_joined_file_are_those_of_its_frames(name: str, part: int, tmp_path: Path):
+    path = GOLDEN / f"colored/{name}.reel"
+    count = len(meshreel.open(path))
+    wanted = [*range(count // 2, count), *range(count // 2), *range(count // 2, count)][1:-1]
+    with CVideo(path.read_bytes()) as whole, CVideo(joined(path, tmp_path).read_bytes()) as video:
+        before = [picture and picture[0] for picture in (whole.picture(k, part, AV1) for k in range(count))]
+        after = [picture and picture[0] for picture in (video.picture(k, part, AV1) for k in range(len(wanted)))]
+        assert any(before) and after == [before[frame] for frame in wanted]
+
+
 @pytest.mark.parametrize(("name", "part"), [("textures", 0), ("scene", BACKGROUND)])
 def test_pictures_are_those_of_the_frames_that_are_shown(name: str, part: int, tmp_path: Path):
     path = GOLDEN / f"colored/{name}.reel"
     frames = len(meshreel.open(path))
     edit.cut(path, tmp_path / "cut.reel", f"1:{frames}")
     with CVideo(path.read_bytes()) as whole, CVideo((tmp_path / "cut.reel").read_bytes()) as cut:
-        assert meshreel.open(tmp_path / "cut.reel").reader.edit.first == 1
+        assert meshreel.open(tmp_path / "cut.reel").reader.edit.shown[0].start == 1
         wanted = [picture and picture[0] for picture in (whole.picture(k, part, AV1) for k in range(1, frames))]
         assert any(wanted)
         assert [picture and picture[0] for picture in (cut.picture(k, part, AV1) for k in range(frames - 1))] == wanted
@@ -96,6 +128,10 @@ BAD = [
     '{"frames":[0]}',
     '{"frames":[0,1,2]}',
     '{"frames":[0,2.5]}',
+    '{"frames":[0,1,2,3]}',
+    '{"frames":[0,1,1,3]}',
+    '{"frames":[2,3,0,1]}',
+    '{"frames":[0,1,2,4]}',
     '{"frames":[0,"2"]}',
     '{"frames":[false,true]}',
     '{"frames":[0,99999999999999999999999999]}',

@@ -3,7 +3,7 @@
 import io
 import json
 import time
-from dataclasses import replace
+from dataclasses import astuple, replace
 from pathlib import Path
 
 import numpy as np
@@ -23,7 +23,8 @@ from tests.decoder.test_chains import DATA
 from tests.golden import GOLDEN, colored_record, frame_record
 from tests.metrics.shapes import sphere
 
-FILES = [GOLDEN / f"{name}.reel" for name in ("scene", "mixed", "layers", "laplacian", "cut")]
+FILES = [GOLDEN / f"{name}.reel" for name in ("scene", "mixed", "layers", "laplacian", "cut", "joined")]
+ALL = sorted(GOLDEN.rglob("*.reel"))
 COLORED = sorted(GOLDEN.glob("colored/*.reel"))
 TURN = np.array([[0.0, 0.6, 0.8], [1.0, 0.0, 0.0], [0.0, 0.8, -0.6]])
 
@@ -127,16 +128,54 @@ def known(data: bytes, metadata: dict[str, object] | None = None) -> bytes:
     return pack_head(header, reader.index) + data[reader.head_size :]
 
 
-def test_hidden_frames_are_not_joined_into_the_middle(tmp_path):
+def test_hidden_frames_stay_hidden_in_the_middle_of_a_joined_file(tmp_path):
     (tmp_path / "known.reel").write_bytes(known(DATA))
-    parts = [tmp_path / "a.reel", tmp_path / "b.reel"]
-    for part, frames in zip(parts, ["1:4", "6:9"], strict=True):
-        assert cut(tmp_path / "known.reel", part, frames).hidden > 0
-    with pytest.raises(InputError, match=r"[ab]\.reel: hides .* cut it with --keys"):
-        concat(parts, tmp_path / "c.reel")
-    assert not (tmp_path / "c.reel").exists()
-    alone = concat(parts[:1], tmp_path / "d.reel")
-    assert alone.frames == 3 and records(meshreel.open(tmp_path / "d.reel")) == records(meshreel.open(parts[0]))
+    before, parts = records(meshreel.open(tmp_path / "known.reel")), [tmp_path / "a.reel", tmp_path / "b.reel"]
+    hidden = sum(
+        cut(tmp_path / "known.reel", part, frames).hidden for part, frames in zip(parts, ["6:9", "1:4"], strict=True)
+    )
+    joined = concat(parts, tmp_path / "c.reel")
+    assert joined.hidden == hidden > 0 and joined.frames == 6 and flags_of(tmp_path / "c.reel") == 1
+    assert records(meshreel.open(tmp_path / "c.reel")) == before[6:9] + before[1:4]
+    cut(tmp_path / "c.reel", tmp_path / "d.reel", "2:5")
+    assert records(meshreel.open(tmp_path / "d.reel")) == [before[8], *before[1:3]]
+    cut(tmp_path / "c.reel", tmp_path / "e.reel", "3:5", at_keys=True)  # and no frame that the file hides
+    assert [record for record in records(meshreel.open(tmp_path / "e.reel")) if record not in before[1:4]] == []
+
+
+@pytest.mark.parametrize("path", ALL, ids=lambda path: f"{path.parent.stem}-{path.stem}")
+@pytest.mark.parametrize("seed", range(2))
+def test_cuts_at_random_frames_join_to_the_frames_that_were_cut(tmp_path, path, seed):
+    pytest.importorskip("av", reason="textures need the extra color")
+    before, random = meshreel.open(path), np.random.default_rng(seed)
+    count = len(before)
+    ends = [0, *sorted(random.choice(np.arange(1, count), min(3, count - 1), replace=False)), count]
+    pieces = [tmp_path / f"{k}.reel" for k in range(len(ends) - 1)]
+    for piece, first, end in zip(pieces, ends[:-1], ends[1:], strict=True):
+        cut(path, piece, f"{first}:{end}")
+        tag(piece, piece.with_suffix(".tagged.reel"), {"title": "one"})
+    concat([piece.with_suffix(".tagged.reel") for piece in pieces], tmp_path / "whole.reel")
+    check_same_frames(meshreel.open(tmp_path / "whole.reel"), before, range(count))
+    for order in ([2, 0], [1, 1, 0]):
+        chosen = [pieces[k % len(pieces)] for k in order]
+        frames = [frame for k in order for frame in range(ends[k % len(pieces)], ends[k % len(pieces) + 1])]
+        if before.audio is None:  # of which a file has one, at one time
+            concat(chosen, tmp_path / "other.reel")
+            check_same_frames(meshreel.open(tmp_path / "other.reel"), before, frames, False)
+
+
+def check_same_frames(after: meshreel.Video, before: meshreel.Video, frames, timed: bool = True) -> None:
+    assert len(after) == len(frames) and after.audio == before.audio
+    if timed:
+        assert after.timestamps == pytest.approx(before.timestamps, abs=2e-6 * len(frames))
+    for k, frame in enumerate(frames):
+        assert colored_record(after, k) == colored_record(before, frame), (k, frame)
+        for one, other in zip(after.parts(k).values(), before.parts(frame).values(), strict=True):
+            assert (one.texture is None) == (other.texture is None)
+            assert one.texture is None or np.array_equal(one.texture.pixels, other.texture.pixels)
+        one, other = after.splats(k), before.splats(frame)
+        assert (one is None) == (other is None)
+        assert one is None or all(np.array_equal(a, b) for a, b in zip(astuple(one), astuple(other), strict=True))
 
 
 def test_six_hundred_frames_are_joined_within_a_second(tmp_path):

@@ -1,6 +1,7 @@
 // Edits of a file: which of its coded frames are shown, and how they are turned. Beside src/meshreel/format/edit.py.
 #include <algorithm>
 #include <cmath>
+#include <functional>
 
 #include "../../src/format_error.h"
 #include "head.h"
@@ -52,7 +53,7 @@ Edit parse_edit(const std::string& metadata, uint64_t frames) {
     const auto item = all.find("edit");
     require(item != all.end(), "Header.metadata: the file is edited, and no edit is told");
     Edit edit;
-    edit.end = frames;
+    edit.ends = {0, frames};
     for (const auto& [name, value] : members_of(item->second)) {
         const bool is_frames = name == "frames";
         require(is_frames || name == "rotation",
@@ -62,11 +63,25 @@ Edit parse_edit(const std::string& metadata, uint64_t frames) {
             read_rotation(numbers, edit);
             continue;
         }
-        require(numbers.size() == 2, "Header.metadata: edit.frames are no two numbers");
-        edit.first = frame_of(numbers[0]), edit.end = frame_of(numbers[1]);
-        require(edit.first < edit.end && edit.end <= frames, "Header.metadata: edit.frames are not those of the file");
+        require(!numbers.empty() && numbers.size() % 2 == 0, "Header.metadata: edit.frames are no pairs of numbers");
+        edit.ends.resize(numbers.size());
+        std::transform(numbers.begin(), numbers.end(), edit.ends.begin(), frame_of);
+        const auto falls = std::adjacent_find(edit.ends.begin(), edit.ends.end(), std::greater_equal<uint64_t>());
+        require(falls == edit.ends.end() && edit.ends.back() <= frames, "Header.metadata: edit.frames are not those of the file");
     }
     return edit;
+}
+
+// Of the ranges, the next behind the one that a group begins in or before must not reach into the group.
+void check_shown(const Head& head) {
+    const std::vector<uint64_t>& ends = head.edit.ends;
+    for (const Chunk& chunk : head.chunks) {
+        if (chunk.kind != ChunkKind::GROUP) continue;
+        const auto behind = std::upper_bound(ends.begin(), ends.end(), chunk.first_frame);
+        const size_t next = (static_cast<size_t>(behind - ends.begin()) / 2 + 1) * 2;
+        require(next >= ends.size() || ends[next] >= chunk.first_frame + chunk.frames,
+                "Header.metadata: edit.frames have two ranges with frames of one group");
+    }
 }
 
 }  // namespace meshreel

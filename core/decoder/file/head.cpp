@@ -84,9 +84,11 @@ Head parse_head(const std::vector<uint8_t>& data, uint64_t file_size) {
     head.size = offset;
     check_index(head);
     members_of(head.header.metadata);  // is one JSON object, whether or not an edit is read from it
-    head.edit.end = head.frames;
+    head.edit.ends = {0, head.frames};
     if (data[kFlagsAt] & kEdited) head.edit = parse_edit(head.header.metadata, head.frames);
-    head.frames = head.edit.end - head.edit.first;
+    check_shown(head);
+    head.frames = 0;
+    for (size_t k = 0; k < head.edit.ends.size(); k += 2) head.frames += head.edit.ends[k + 1] - head.edit.ends[k];
     read_times(head);
     double frames = 0;
     for (const Chunk& chunk : head.chunks) frames += chunk.kind == ChunkKind::GROUP ? chunk.frames : 0;
@@ -94,6 +96,13 @@ Head parse_head(const std::vector<uint8_t>& data, uint64_t file_size) {
             "more frames than so many bytes may have");
     require(file_size <= head.size, "bytes behind the last chunk, copy the file again");
     return head;
+}
+
+uint64_t Head::coded(uint64_t frame) const {
+    const std::vector<uint64_t>& ends = edit.ends;
+    uint64_t coded = ends[0] + frame;
+    for (size_t k = 2; k < ends.size() && coded >= ends[k - 1]; k += 2) coded += ends[k] - ends[k - 1];
+    return coded;
 }
 
 uint32_t Head::companion_of(uint32_t chunk, ChunkKind kind) const {
@@ -133,7 +142,9 @@ std::string describe(const Head& head, uint32_t number) {
     const std::string name = "chunk " + std::to_string(number);
     if (chunk.frames == 0) return name + " (static)";
     const std::string track = head.tracks.size() == 1 ? "" : "track " + std::to_string(chunk.track) + ", ";
-    const int64_t first = static_cast<int64_t>(chunk.first_frame) - static_cast<int64_t>(head.edit.first);
+    int64_t first = static_cast<int64_t>(chunk.first_frame) - static_cast<int64_t>(head.edit.ends[0]);
+    for (size_t k = 2; k < head.edit.ends.size() && chunk.first_frame >= head.edit.ends[k - 1]; k += 2)
+        first -= static_cast<int64_t>(head.edit.ends[k] - head.edit.ends[k - 1]);
     return name + " (" + track + "frames " + std::to_string(first) + " to " + std::to_string(first + chunk.frames - 1) +
            ")";
 }

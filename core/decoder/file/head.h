@@ -17,7 +17,7 @@ constexpr uint32_t kNoChunk = ~0u;
 
 // What of the coded frames is shown, and how it is turned.
 struct Edit {
-    uint64_t first = 0, end = 0;
+    std::vector<uint64_t> ends;  // first and end of each range of coded frames that is shown, in order
     bool is_turned = false;
     double rotation[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};  // about the origin, row by row
 };
@@ -41,7 +41,7 @@ struct Head {
     uint64_t size = 0;                        // bytes of the whole file
 
     // The number that a frame shown has among the coded ones, by which chunks are found.
-    uint64_t coded(uint64_t frame) const { return edit.first + frame; }
+    uint64_t coded(uint64_t frame) const;
     uint32_t companion_of(uint32_t chunk, ChunkKind kind) const;
     uint32_t chunk_of_frame(uint64_t frame, size_t track) const;
     // The newest static chunk that a group of the frame names, or kNoChunk.
@@ -78,5 +78,7 @@ double double_of(const std::string& number);
 
 // The edit that the metadata of a file of so many coded frames tells of. Throws FormatError.
 Edit parse_edit(const std::string& metadata, uint64_t frames);
+// Throws FormatError where a group has frames of two ranges that are shown.
+void check_shown(const Head& head);
 
 }  // namespace meshreel

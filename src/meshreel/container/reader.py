@@ -15,6 +15,7 @@ import numpy as np
 from ..errors import FormatError
 from ..format.budget import check_head
 from ..format.checks import COMPANIONS, check_file, unpack_audio
+from ..format.edit import Edit
 from ..format.layout import EDITED, MAGIC, VERSION, AudioFile, Checksum, ChunkKind, Form, Header, Index, Layer, Preamble
 from ..format.records import least_size, unpack, unpack_all
 from ..shapes import Float64
@@ -31,13 +32,15 @@ class Chunk:
     number: int
     kind: int  # a ChunkKind, or one that this version does not know
     form: int
-    first_frame: int  # 0 for STATIC
+    first_frame: int  # 0 for STATIC; of a group, numbered as the frames that it shows
     frame_count: int  # 0 for STATIC
     depends_on: tuple[int, ...]  # numbers of the chunks that it needs
     offset: int  # bytes from the start of the file
     layers: tuple[Layer, ...]
     track: int = 0  # 0 for STATIC
     is_alone: bool = True  # whether the file has no other track
+    coded: int = 0  # of a group, the number of its first frame among the coded ones
+    shown: range = range(0)  # of a group, the frames that are shown
 
     @property
     def form_name(self) -> str:
@@ -76,22 +79,22 @@ class ReelReader:
         self.header, self.index, self.head_size, flags = _read_head(source, most_head)
         # `size`: bytes of the whole file, even if it is truncated.
         self.metadata, self.edit, self.size = check_file(self.header, self.index, flags, self.head_size)
-        self.chunks = _chunks(self.index, self.head_size, -self.edit.first)
+        self.chunks = _chunks(self.index, self.head_size, self.edit)
         self._static = {chunk.number for chunk in self.chunks if chunk.kind == ChunkKind.STATIC}
         self.groups = tuple(chunk for chunk in self.chunks if chunk.kind == ChunkKind.GROUP)
         tracks: list[list[Chunk]] = [[] for _ in {group.track for group in self.groups}]
-        self.shown_from = dict[int, int]()  # of each STATIC, the first frame shown with it: its pictures begin there
+        self.shown_from = dict[int, int]()  # of each STATIC, the first coded frame with it: its pictures begin there
         for group in self.groups:
             tracks[group.track].append(group)
             for number in group.depends_on:
-                self.shown_from.setdefault(number, group.first_frame)
+                self.shown_from.setdefault(number, group.coded)
         self.tracks = tuple(map(tuple, tracks))  # the groups of each
-        self.frame_count = self.edit.end - self.edit.first
+        self.frame_count = self.edit.frame_count
         self.coded_count = sum(group.frame_count for group in self.tracks[0])  # frames, hidden ones included
         if source.size > self.size:
             raise FormatError(f"{source.size - self.size} bytes behind the last chunk, copy the file again")
         self._companions = {(c.depends_on[0], c.kind): c for c in self.chunks if c.kind in COMPANIONS}
-        self._first_frames = [[group.first_frame for group in groups] for groups in self.tracks]
+        self._shown = [[group for group in groups if group.shown] for groups in self.tracks]
         self._times = list(accumulate(self.header.intervals, initial=self.header.first_time))
 
     @property
@@ -179,7 +182,8 @@ class ReelReader:
         """Return the GROUP chunk of a track that holds a frame. Raises IndexError outside 0 .. frame_count - 1."""
         if not 0 <= frame < self.frame_count:
             raise IndexError(f"frame {frame}: the file has frames 0 to {self.frame_count - 1}")
-        return self.tracks[track][bisect_right(self._first_frames[track], frame) - 1]
+        groups = self._shown[track]
+        return groups[bisect_right(groups, frame, key=lambda group: group.shown.start) - 1]
 
     def chunks_of_frame(self, frame: int) -> tuple[Chunk, ...]:
         """Return the GROUP chunks that hold a frame, by track. Raises IndexError as chunk_of_frame does."""
@@ -193,7 +197,8 @@ class ReelReader:
     def static_ranges(self, frames: range) -> dict[int, list[tuple[int, int]]]:
         """Return the ranges within `frames` (end excluded) that show each STATIC chunk, by its number."""
         ranges = dict[int, list[tuple[int, int]]]()
-        starts = sorted({frames.start, *(group.first_frame for group in self.groups if group.first_frame in frames)})
+        begins = {group.shown.start for group in self.groups if group.shown}
+        starts = sorted({frames.start, *begins.intersection(frames)})
         for start, end in pairwise([*starts, frames.stop]):  # the background changes only with a group
             if (chunk := self.static_of_frame(start)) is not None:
                 shown = ranges.setdefault(chunk.number, [])
@@ -258,19 +263,26 @@ def _read_head(source: Source, most: int | None) -> tuple[Header, Index, int, in
     return header, unpack_all(Index, data[start:end]), size, preamble.flags
 
 
-def _chunks(index: Index, offset: int, first_frame: int) -> tuple[Chunk, ...]:
-    """Return the chunks of an index, with positions from `offset` on and frames of each track from `first_frame` on."""
+def _chunks(index: Index, offset: int, edit: Edit) -> tuple[Chunk, ...]:
+    """Return the chunks of an index, with positions from `offset` on."""
     chunks: list[Chunk] = []
     tracks = (entry.track for entry in index.chunks if entry.kind == ChunkKind.GROUP)
-    frames = [first_frame] * (1 + max(tracks, default=0))
+    frames = [0] * (1 + max(tracks, default=0))
+    ends, befores = [run.stop for run in edit.shown], [0, *accumulate(map(len, edit.shown))]
     for number, entry in enumerate(index.chunks):
         is_group = entry.kind == ChunkKind.GROUP
         of = chunks[entry.depends_on[0]] if entry.kind in COMPANIONS else None
-        first = frames[entry.track] if is_group else of.first_frame if of is not None else 0
+        first, coded, shown = 0 if of is None else of.first_frame, 0, range(0)
+        if is_group:  # only groups have checked tracks: an unknown kind may have any
+            coded = frames[entry.track]
+            frames[entry.track] += entry.frames
+            at = min(bisect_right(ends, coded), len(ends) - 1)  # the range that it ends in, or is before
+            low, high = befores[at : at + 2]
+            first = low + coded - edit.shown[at].start
+            start = min(max(first, low), high)
+            shown = range(start, max(min(first + entry.frames, high), start))
         place = (number, entry.kind, entry.form, first, entry.frames, entry.depends_on, offset, entry.layers)
-        chunk = Chunk(*place, entry.track, len(frames) == 1)
+        chunk = Chunk(*place, entry.track, len(frames) == 1, coded, shown)
         chunks.append(chunk)
         offset = chunk.end
-        if is_group:  # only groups have checked tracks: an unknown kind may have any
-            frames[entry.track] += entry.frames
     return tuple(chunks)

@@ -115,17 +115,10 @@ def megabits(size: int, reader: ReelReader) -> float:
 def _describe_group(reader: ReelReader, chunk: Chunk, length: int) -> dict[str, Any]:
     """Describe a group of a file of which the first `length` bytes exist."""
     row: dict[str, Any] = {"chunk": chunk.number, "track": chunk.track}
-    first, end = _shown(reader, chunk)
-    row |= {"first_frame": first, "frames": end - first}
+    row |= {"first_frame": chunk.shown.start, "frames": len(chunk.shown)}
     row |= {"form": chunk.form_name, "bytes": _size_of(reader, chunk), "layers": len(chunk.layers) - 1}
     row["predicted"] = reader.group_before(chunk) is not None
     return row | _contents(reader, chunk, length, payload_bytes_by_purpose)
-
-
-def _shown(reader: ReelReader, chunk: Chunk) -> tuple[int, int]:
-    """Return the range of a group's shown frames, end excluded."""
-    first = min(max(chunk.first_frame, 0), reader.frame_count)
-    return first, max(min(chunk.first_frame + chunk.frame_count, reader.frame_count), first)
 
 
 def _size_of(reader: ReelReader, chunk: Chunk) -> int:
@@ -150,8 +143,8 @@ def _describe_state(reader: ReelReader, chunk: Chunk, length: int, shown: Iterab
 def _describe_track(reader: ReelReader, number: int, groups: list[dict[str, Any]]) -> dict[str, Any]:
     """Describe a track: the frames in which its body appears, and the bytes of its contents."""
     track_groups = [group for group in groups if group["track"] == number]
-    spans = [_shown(reader, group) for group in reader.tracks[number] if group.form != Form.EMPTY]
-    spans = [span for span in spans if span[0] < span[1]]
+    groups_shown = [group.shown for group in reader.tracks[number] if group.shown and group.form != Form.EMPTY]
+    spans = [(shown.start, shown.stop) for shown in groups_shown]
     size = sum(group["bytes"] for group in track_groups)
     row: dict[str, Any] = {"track": number, "ranges": _merged(spans), "groups": len(track_groups), "bytes": size}
     return row | {

@@ -107,7 +107,7 @@ class TrackPictures:
         pictures = self._pictures_of(static)
         if pictures is None or mesh.texture is None:
             return mesh
-        at = self._at(pictures, frame - self._reader.shown_from[static.number])
+        at = self._at(pictures, self._reader.edit.coded(frame) - self._reader.shown_from[static.number])
         last = self._background
         if last is None or last[:2] != (static.number, at):
             self._background = last = static.number, at, replace(mesh, texture=self._texture(pictures, at))
@@ -137,7 +137,7 @@ class TrackPictures:
         )
 
     def _at(self, pictures: Chunk, frame: int) -> int:
-        """Return the number of a background's picture in `frame`, counted from the first frame that shows it."""
+        """Return the number of a background's picture in a frame, counted from the first that is coded with it."""
         last = len(pictures.layers) - 1
         at = frame // self._sizes_of(pictures.number, 0)[0]
         if at < last * LAYER_PICTURES:

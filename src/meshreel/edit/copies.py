@@ -109,7 +109,7 @@ def written(
             payloads = _payloads(pieces)
             for payload in chain(islice(payloads, place_of_audio), (audio,), payloads):
                 file.write(payload)
-    return Edited(edit.end - edit.first, size, coded - (edit.end - edit.first))
+    return Edited(edit.frame_count, size, coded - edit.frame_count)
 
 
 def _payloads(pieces: Sequence[Piece]) -> Iterator[bytes]:

@@ -6,8 +6,9 @@ What was edited is kept in the metadata. Needs nothing of the extra `encode`.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from itertools import accumulate
 from typing import Any
 
 import numpy as np
@@ -23,12 +24,22 @@ from ..io.sequence import SequenceOptions
 from ..types import Up, check_up
 from .audio import Given, joined_audio, packed_audio
 from .copies import Edited, Piece, check_known, opened, piece_of, silent, written
-from .metadata import HISTORY, MEANS, PART, joined_metadata, of_all_parts, place_in_whole, scaled_metadata, up_metadata
+from .metadata import (
+    HISTORY,
+    LAST,
+    MEANS,
+    PART,
+    joined_metadata,
+    of_all_parts,
+    place_in_whole,
+    scaled_metadata,
+    up_metadata,
+)
 
 Name = str | Place
 Numbers = Sequence[Any] | np.ndarray
 Part = tuple[dict[str, Any], int]  # the metadata of a file, and its number of frames
-_OWN = ("key_frames", PART, HISTORY, ITEM, "up")  # metadata that `tag` does not change: others depend on them
+_OWN = ("key_frames", PART, HISTORY, ITEM, LAST, "up")  # metadata that `tag` does not change: others depend on them
 
 
 def cut(source: Name, output: Name, frames: str, at_keys: bool = False) -> Edited:
@@ -40,18 +51,24 @@ def cut(source: Name, output: Name, frames: str, at_keys: bool = False) -> Edite
     """
     with opened(located(source)) as (path, reader):
         count = reader.frame_count
-        shown = SequenceOptions(frames=frames).chosen(count)
+        asked = SequenceOptions(frames=frames).chosen(count)
         if any(abs(int(number)) > count for number in frames.split(":") if number):
             raise InputError(f"{path}: frames {frames} of {count} frames; give numbers from 0 to {count}")
-        whole = interval_of(reader, shown)
-        shown = range(max(whole.start, 0), min(whole.stop, count)) if at_keys else shown
+        coded = range(reader.edit.coded(asked.start), reader.edit.coded(asked.stop - 1) + 1)
+        whole = interval_of(reader, coded)
         numbers = kept_chunks(reader, whole)
         check_known(path, (reader.chunks[number] for number in numbers))
-        edit = Edit(shown.start - whole.start, shown.stop - whole.start, reader.edit.rotation)
+        coded = whole if at_keys else coded
+        kept = [range(max(run.start, coded.start), min(run.stop, coded.stop)) for run in reader.edit.shown]
+        edit = Edit(_joined([(-whole.start, kept)]), reader.edit.rotation)
+        first = sum(len(range(run.start, min(run.stop, coded.start))) for run in reader.edit.shown)
+        shown = range(first, first + edit.frame_count)
         intervals = reader.header.intervals[shown.start : shown.stop - 1]
         header = replace(reader.header, first_time=round(1e6 * reader.timestamp(shown.start)), intervals=intervals)
         lost = (ITEM, PART) if len(shown) == count else (ITEM, PART, *MEANS)  # means are over all frames
         metadata = {name: value for name, value in reader.metadata.items() if name not in lost}
+        if behind := reader.header.intervals[shown.stop - 1 : shown.stop]:
+            metadata[LAST] = behind[0]
         keys = metadata.get("key_frames")
         if isinstance(keys, list):
             metadata["key_frames"] = [key - shown.start for key in keys if isinstance(key, int) and key in shown]
@@ -68,25 +85,21 @@ def concat(sources: Sequence[Name], output: Name) -> Edited:
     """
     if not sources:
         raise InputError("no files to join; give at least one")
-    pieces, parts, heads, hidden, audio = list[Piece](), list[Part](), list[ReelReader](), [0, 0], None
+    pieces, parts, heads, audio = list[Piece](), list[Part](), list[ReelReader](), None
     for source in sources:
         with opened(located(source)) as (path, reader):
             first = heads[0] if heads else reader
             parts.append((reader.metadata, reader.frame_count))
             _check_alike(path, reader, first, located(sources[0]), parts)
-            ends = (reader.edit.first, reader.coded_count - reader.edit.end)
-            if (ends[0] and heads) or (ends[1] and len(heads) < len(sources) - 1):
-                text = f"{path}: hides {ends[0]} frames at its begin and {ends[1]} at its end, and would show them"
-                raise InputError(f"{text}; cut it with --keys")
-            hidden = [hidden[0] or ends[0], ends[1]]
             pieces.append(piece_of(path, reader, silent(reader), sum(len(piece.numbers) for piece in pieces)))
             heads.append(reader)
             later = _begin_of_last(heads) - reader.header.first_time
             audio = joined_audio(audio, path, reader.read_audio(), later)
     frames = sum(count for _, count in parts)
     header, place = _timed(heads), place_in_whole(parts[0][0])
-    edit = Edit(hidden[0], hidden[0] + frames, heads[0].edit.rotation)
-    metadata = joined_metadata(parts) | edit.item(frames + sum(hidden))
+    befores = [*accumulate((head.coded_count for head in heads), initial=0)]
+    edit = Edit(_joined(zip(befores, (head.edit.shown for head in heads), strict=False)), heads[0].edit.rotation)
+    metadata = joined_metadata(parts) | edit.item(befores[-1])
     if place is None and len(sources) > 1:
         before = [entry for of, _ in parts for entry in _history(of)[HISTORY]]
         metadata |= _history({HISTORY: [*dict.fromkeys(before)]}, f"concat of {len(sources)} files")
@@ -110,6 +123,8 @@ def retime(source: Name, output: Name, frame_rate: float | None = None, speed: f
             header = replace(head, frame_rate=head.frame_rate * speed, intervals=intervals)
             entry = f"retime by {speed:g}"
         silent, metadata = None if reader.audio is None else b"", reader.metadata | _history(reader.metadata, entry)
+        if isinstance(last := metadata.pop(LAST, None), int) and speed is not None:
+            metadata[LAST] = max(round(last / speed), 1)
         done = _relabelled(path, reader, output, header, metadata, audio=silent)
         return replace(done, lost_audio=silent is not None)
 
@@ -231,13 +246,23 @@ def _numbers(name: str, given: Numbers, shape: tuple[int, ...]) -> np.ndarray:
 def _timed(readers: Sequence[ReelReader]) -> Header:
     """Return the header of files one after the other, with the times of their frames."""
     first = readers[0].header
-    if not any(reader.header.intervals for reader in readers):
+    if not any(reader.header.intervals or LAST in reader.metadata for reader in readers):
         return first
     steps = list[int]()
     for reader in readers:
-        even = [round(1e6 / reader.frame_rate)]
-        steps += [*(reader.header.intervals or even * (reader.frame_count - 1)), *even]
+        even, last = round(1e6 / reader.frame_rate), reader.metadata.get(LAST)
+        steps += reader.header.intervals or [even] * (reader.frame_count - 1)
+        steps.append(last if isinstance(last, int) and 0 < last < 1e15 else even)
     return replace(first, intervals=tuple(steps[:-1]))
+
+
+def _joined(moved: Iterable[tuple[int, Iterable[range]]]) -> tuple[range, ...]:
+    """Return ranges that are not empty, moved by numbers of frames; those with nothing between are one."""
+    joined = list[range]()
+    for by, run in ((by, run) for by, runs in moved for run in runs if run):
+        start = joined.pop().start if joined and joined[-1].stop == run.start + by else run.start + by
+        joined.append(range(start, run.stop + by))
+    return tuple(joined)
 
 
 def _history(metadata: dict[str, Any], *edits: str) -> dict[str, Any]:
@@ -279,13 +304,13 @@ def interval_of(reader: ReelReader, frames: range) -> range:
     """Return the shortest interval that contains given frames, and begins and ends with groups of all tracks.
 
     It begins with groups that name no group before. Pictures of a background are counted from the first frame that it
-    is shown in, which an interval then begins with. Hidden frames have numbers below 0, or from `frame_count` on.
+    is shown in, which an interval then begins with. Frames have the numbers of coded ones.
     """
     start, end = frames.start, frames.stop
     while True:
         groups = [_group_at(own, start) for own in reader.tracks]
-        earlier = min(_stands_alone(reader, group).first_frame for group in groups)
-        later = max(own.first_frame + own.frame_count for own in (_group_at(of, end - 1) for of in reader.tracks))
+        earlier = min(_stands_alone(reader, group).coded for group in groups)
+        later = max(own.coded + own.frame_count for own in (_group_at(of, end - 1) for of in reader.tracks))
         counted = [reader.shown_from[state.number] for state in _timed_states(reader, range(start, end))]
         if (found := (min([earlier, *counted]), later)) == (start, end):
             return range(start, end)
@@ -294,7 +319,7 @@ def interval_of(reader: ReelReader, frames: range) -> range:
 
 def kept_chunks(reader: ReelReader, interval: range) -> list[int]:
     """Return the numbers of the chunks that an interval needs, and of audio, in the order of the file."""
-    kept = {group.number for group in reader.groups if group.first_frame in interval}
+    kept = {group.number for group in reader.groups if group.coded in interval}
     waiting = list(kept)
     while waiting:
         new = set(reader.chunks[waiting.pop()].depends_on) - kept
@@ -305,7 +330,7 @@ def kept_chunks(reader: ReelReader, interval: range) -> list[int]:
 
 
 def _group_at(groups: tuple[Chunk, ...], frame: int) -> Chunk:
-    return next(group for group in reversed(groups) if group.first_frame <= frame)
+    return next(group for group in reversed(groups) if group.coded <= frame)
 
 
 def _stands_alone(reader: ReelReader, group: Chunk) -> Chunk:
@@ -317,7 +342,7 @@ def _stands_alone(reader: ReelReader, group: Chunk) -> Chunk:
 
 def _timed_states(reader: ReelReader, frames: range) -> list[Chunk]:
     """Return the states of the background that are shown in some of the frames and have pictures."""
-    some = [g for g in reader.groups if g.first_frame < frames.stop and g.first_frame + g.frame_count > frames.start]
+    some = [g for g in reader.groups if g.coded < frames.stop and g.coded + g.frame_count > frames.start]
     named = [reader.chunks[number] for number in {number for group in some for number in group.depends_on}]
     kinds = (ChunkKind.PICTURES, ChunkKind.COMPATIBLE)
     return [c for c in named if c.kind == ChunkKind.STATIC and any(reader.companion_of(c, kind) for kind in kinds)]

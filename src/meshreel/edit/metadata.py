@@ -17,6 +17,7 @@ from ..types import Up
 
 HISTORY = "history"  # of an edited file: its edits, in words
 PART = "part"  # of a part: its place in the sequence, its exact totals, and a digest of its options
+LAST = "last_interval"  # of a cut whose frames are not even: microseconds from its last frame to what came next
 KEYS = "key_frames"
 CANONICAL = "canonical_references"
 MEANS = ("rms_m", "worst_rms_m", "d2_psnr_paper", "normal_error_deg")
@@ -69,7 +70,7 @@ def joined_metadata(parts: Sequence[tuple[dict[str, Any], int]]) -> dict[str, An
     Key frames and means are joined where all parts have them: scenes have none, and cuts no means. Raises KeyError,
     TypeError or ValueError for metadata that no encoder wrote.
     """
-    dropped = {PART, ITEM} | {name for name in _OF_GROUPS if not all(name in metadata for metadata, _ in parts)}
+    dropped = {PART, ITEM, LAST} | {name for name in _OF_GROUPS if not all(name in metadata for metadata, _ in parts)}
     found = {name: value for name, value in parts[0][0].items() if name not in dropped}
     if KEYS in found:
         firsts = accumulate((frames for _, frames in parts), initial=0)
@@ -79,7 +80,7 @@ def joined_metadata(parts: Sequence[tuple[dict[str, Any], int]]) -> dict[str, An
         found[CANONICAL] = sum(metadata[CANONICAL] for metadata, _ in parts)
     if all(name in found for name in MEANS):
         found |= Totals.added([Totals.from_metadata(metadata, frames) for metadata, frames in parts]).means
-    return found
+    return found | {name: value for name, value in parts[-1][0].items() if name == LAST}
 
 
 def scaled_metadata(metadata: dict[str, Any], scale: float) -> dict[str, Any]:
@@ -105,7 +106,7 @@ def of_all_parts(metadata: dict[str, Any]) -> dict[str, Any]:
 
     Raises KeyError or TypeError for metadata that no encoder wrote.
     """
-    found = {name: value for name, value in metadata.items() if name not in (PART, ITEM, HISTORY, *_OF_GROUPS)}
+    found = {name: value for name, value in metadata.items() if name not in (PART, ITEM, HISTORY, LAST, *_OF_GROUPS)}
     return found | ({"options": metadata[PART]["options"], "frames": metadata[PART]["of"]} if PART in metadata else {})
 
 

@@ -125,8 +125,7 @@ def _moving(source: _Source, progress: Progress | None) -> Iterator[Shape]:
     frames = source.frames
     for number, groups in enumerate(source.reader.tracks):
         for group in groups:
-            end = min(group.first_frame + group.frame_count, frames.stop)
-            exported = range(max(group.first_frame, frames.start), end)
+            exported = range(max(group.shown.start, frames.start), min(group.shown.stop, frames.stop))
             if exported:
                 yield from _group_shapes(source, group, exported)
                 if progress is not None:

@@ -1,4 +1,4 @@
-"""Edits of a file: the range of its coded frames that is shown, and their rotation.
+"""Edits of a file: the ranges of its coded frames that are shown, and their rotation.
 
 In: metadata, whose item `edit` is valid if the preamble has the flag EDITED. Out: an Edit. Older readers refuse a file
 with the flag, rather than show hidden frames or a wrong position.
@@ -6,7 +6,9 @@ with the flag, rather than show hidden frames or a wrong position.
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from dataclasses import dataclass
+from itertools import accumulate, pairwise
 from typing import Any
 
 import numpy as np
@@ -20,15 +22,27 @@ _CLOSE = 1e-6  # largest error of a rotation: far above the rounding of products
 
 @dataclass(frozen=True, slots=True)
 class Edit:
-    """Frames shown, as coded frames `first` to `end` - 1, and a rotation about the header's origin."""
+    """Ranges of coded frames that are shown, with hidden ones between, and a rotation about the header's origin."""
 
-    first: int
-    end: int
+    shown: tuple[range, ...]
     rotation: tuple[float, ...] = ()  # nine numbers, row by row; none: not turned
+
+    @property
+    def frame_count(self) -> int:
+        """Number of frames shown."""
+        return sum(map(len, self.shown))
+
+    def coded(self, frame: int) -> int:
+        """Return the number that a shown frame has among the coded ones."""
+        ends = [*accumulate(map(len, self.shown))]
+        at = bisect_right(ends, frame)
+        return self.shown[at].stop - (ends[at] - frame)
 
     def item(self, frames: int) -> dict[str, Any]:
         """Return the metadata of a file of `frames` coded frames: the item `edit`, or nothing if nothing is edited."""
-        edit: dict[str, Any] = {} if (self.first, self.end) == (0, frames) else {"frames": [self.first, self.end]}
+        edit: dict[str, Any] = {}
+        if self.shown != (range(frames),):
+            edit = {"frames": [number for run in self.shown for number in (run.start, run.stop)]}
         edit |= {"rotation": list(self.rotation)} if self.rotation else {}
         return {ITEM: edit} if edit else {}
 
@@ -38,14 +52,15 @@ def parse_edit(metadata: dict[str, Any], flags: int, frames: int) -> Edit:
     item = metadata.get(ITEM) if flags & EDITED else {}
     if not isinstance(item, dict) or item.keys() - {"frames", "rotation"}:
         raise FormatError(f"Header.metadata: edit {item!r:.80} is none that this reader knows, update meshreel")
-    shown_frames, rotation = item.get("frames", [0, frames]), item.get("rotation", [])
-    if not isinstance(shown_frames, list) or len(shown_frames) != 2 or not all(map(_is_whole, shown_frames)):
-        raise FormatError(f"Header.metadata: edit.frames {shown_frames!r:.80} are no two numbers of frames")
-    if not 0 <= shown_frames[0] < shown_frames[1] <= frames:
-        raise FormatError(f"Header.metadata: edit.frames {shown_frames} of {frames} frames")
+    ends, rotation = item.get("frames", [0, frames]), item.get("rotation", [])
+    if not isinstance(ends, list) or not all(map(_is_whole, ends)) or len(ends) % 2 or not ends:
+        raise FormatError(f"Header.metadata: edit.frames {ends!r:.80} are no pairs of numbers of frames")
+    if any(a >= b for a, b in pairwise([-1, *ends, frames + 1])):
+        raise FormatError(f"Header.metadata: edit.frames {ends!r:.80} of {frames} frames")
     if not isinstance(rotation, list) or not (rotation == [] or is_rotation(rotation)):
         raise FormatError(f"Header.metadata: edit.rotation {rotation!r:.80} is no rotation of nine numbers")
-    return Edit(int(shown_frames[0]), int(shown_frames[1]), tuple(map(float, rotation)))
+    ends = [int(end) for end in ends]
+    return Edit(tuple(map(range, ends[::2], ends[1::2])), tuple(map(float, rotation)))
 
 
 def _is_whole(number: Any) -> bool:

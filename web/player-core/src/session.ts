@@ -258,7 +258,7 @@ export class Session {
     let border = this.timeline.frameCount;
     for (let track = 0; track < this.head.tracks.length; track++) {
       const group = this.head.chunkOfFrame(frame, track);
-      border = Math.min(border, group.firstFrame + group.frameCount);
+      border = Math.min(border, group.shownEnd);
     }
     return border;
   }

@@ -36,9 +36,9 @@ test.skipIf(!hasPython)("a cut and turned file has Python's frames and box", () 
 });
 
 test.each([
-  null, [], 1, { frames: [0] }, { frames: [0, 15] }, { frames: [3, 3] }, { frames: [-1, 3] }, { frames: [0.5, 3] }, { frames: "0:3" }, { rotation: [1, 1, 1, 1, 1, 1, 1, 1, 1] },
+  null, [], 1, { frames: [0] }, { frames: [0, 15] }, { frames: [3, 3] }, { frames: [-1, 3] }, { frames: [0.5, 3] }, { frames: [] }, { frames: [0, 3, 5] }, { frames: [0, 3, 3, 5] }, { frames: [4, 6, 1, 3] }, { frames: "0:3" }, { rotation: [1, 1, 1, 1, 1, 1, 1, 1, 1] },
   { rotation: [1, 0, 0, 0, 1, 0, 0, 0, -1] }, { rotation: [1, 0, 0, 0, 1, 0, 0, 0, "1"] }, { rotation: [1, 0, 0, 0, 1, 0, 0, 0] }, { rotation: { x: 1 } }, { mirror: true },
 ])("an edit that cannot be followed is refused: %j", (edit) => {
   expect(() => editOf({ edit }, 1, 14)).toThrow(FormatError);
-  expect(editOf({ edit }, 0, 14)).toEqual({ first: 0, end: 14, rotation: null });
+  expect(editOf({ edit }, 0, 14)).toEqual({ shown: [[0, 14]], rotation: null });
 });

@@ -4,8 +4,7 @@ import { FormatError } from "../errors.ts";
 import { EDITED } from "./layout.gen.ts";
 
 export interface Edit {
-  readonly first: number; // coded frames `first` to `end` - 1 are shown
-  readonly end: number;
+  readonly shown: readonly (readonly [number, number])[]; // ranges of coded frames that are shown, end excluded, in order
   readonly rotation: readonly number[] | null; // about the header's origin, nine numbers, row by row
 }
 
@@ -15,13 +14,34 @@ const CLOSE = 1e-6; // to a rotation
 export function editOf(metadata: Readonly<Record<string, unknown>>, flags: number, frames: number): Edit {
   const item = flags & EDITED ? metadata.edit : {};
   if (typeof item !== "object" || item === null || Array.isArray(item)) throw new FormatError("Header.metadata: no edit");
-  const { frames: shown = [0, frames], rotation = [], ...others } = item as Record<string, unknown>;
+  const { frames: ends = [0, frames], rotation = [], ...others } = item as Record<string, unknown>;
   if (Object.keys(others).length > 0) throw new FormatError("Header.metadata: an edit that this player does not know, update it", "newer");
-  if (!Array.isArray(shown) || shown.length !== 2 || !shown.every(Number.isInteger)) throw new FormatError("Header.metadata: edit.frames are no two numbers of frames");
-  const [first, end] = shown as [number, number];
-  if (!(first >= 0 && first < end && end <= frames)) throw new FormatError(`Header.metadata: edit.frames ${first} to ${end} of ${frames} frames`);
+  const isPaired = Array.isArray(ends) && ends.length > 0 && ends.length % 2 === 0 && ends.every(Number.isInteger);
+  if (!isPaired) throw new FormatError("Header.metadata: edit.frames are no pairs of numbers of frames");
+  const rising = [-1, ...(ends as number[]), frames + 1];
+  if (rising.some((end, k) => k > 0 && end <= rising[k - 1])) throw new FormatError(`Header.metadata: edit.frames ${String(ends).slice(0, 80)} of ${frames} frames`);
+  const shown = (ends as number[]).flatMap((end, k): [number, number][] => (k % 2 === 0 ? [[end, (ends as number[])[k + 1]]] : []));
   if (!Array.isArray(rotation) || !(rotation.length === 0 || isRotation(rotation))) throw new FormatError("Header.metadata: edit.rotation is no rotation of nine numbers");
-  return { first, end, rotation: rotation.length === 0 ? null : (rotation as number[]) };
+  return { shown, rotation: rotation.length === 0 ? null : (rotation as number[]) };
+}
+
+/** The number that a frame shown has among the coded ones; those before and behind all are counted on. */
+export function codedFrame({ shown }: Edit, frame: number): number {
+  let coded = shown[0][0] + frame;
+  for (let k = 1; k < shown.length && coded >= shown[k - 1][1]; k++) coded += shown[k][0] - shown[k - 1][1];
+  return coded;
+}
+
+/** Of a group of `count` coded frames from `coded` on: the number of its first frame, as the frames that it shows are numbered, and these, end excluded. FormatError where they are in two ranges. */
+export function placed({ shown }: Edit, coded: number, count: number): { firstFrame: number; shownFirst: number; shownEnd: number } {
+  let low = 0;
+  let at = 0;
+  for (; at < shown.length - 1 && shown[at][1] <= coded; at++) low += shown[at][1] - shown[at][0];
+  if (at + 1 < shown.length && shown[at + 1][0] < coded + count) throw new FormatError("Header.metadata: edit.frames have two ranges with frames of one group");
+  const firstFrame = low + coded - shown[at][0];
+  const high = low + shown[at][1] - shown[at][0];
+  const shownFirst = Math.min(Math.max(firstFrame, low), high);
+  return { firstFrame, shownFirst, shownEnd: Math.max(Math.min(firstFrame + count, high), shownFirst) };
 }
 
 function isRotation(numbers: readonly unknown[]): boolean {

@@ -4,7 +4,7 @@
 import { checkHeader, checkIndex, metadataOf } from "./checks.ts";
 import { crc32 } from "./crc.ts";
 import { checkFrames } from "./budget.ts";
-import { editOf } from "./edit.ts";
+import { codedFrame, editOf, placed } from "./edit.ts";
 import type { Edit } from "./edit.ts";
 import { FormatError } from "../errors.ts";
 import { Checksum, ChunkKind, EDITED, Form, Header, Index, LIMITS, MAGIC, Preamble, VERSION } from "./layout.gen.ts";
@@ -24,8 +24,11 @@ export interface Chunk {
   readonly kind: "static" | "group" | CompanionKind | "audio" | "unknown";
   readonly form: number;
   readonly track: number; // 0 for static
-  readonly firstFrame: number; // of a group and of its companions
+  readonly firstFrame: number; // of a group and of its companions; numbered as the frames that it shows
   readonly frameCount: number; // of a group and of its companions
+  readonly coded: number; // of a group, the number of its first frame among the coded ones
+  readonly shownFirst: number; // of a group, the first frame of it that is shown
+  readonly shownEnd: number; // and the frame behind the last
   readonly dependsOn: readonly number[]; // of a static chunk, and where it is predicted of the group before it; of a companion, as FORMAT.md says
   readonly offset: number; // bytes from the start of the file
   readonly size: number; // bytes of all layers
@@ -38,25 +41,27 @@ export type CompanionChunk = Chunk & { readonly kind: CompanionKind };
 export class Head {
   readonly info: Info;
   readonly tracks: readonly (readonly Chunk[])[]; // the groups of each
+  private readonly shownGroups: readonly (readonly Chunk[])[]; // of each track, those of which frames are shown
   /** Unit of fetching, in the order of the file: a chunk, or a layer of a background's pictures, which is a separate video. */
   readonly pieces: readonly Chunk[];
   readonly audio: Chunk | null; // the audio file
   private readonly companions = new Map<number, readonly CompanionChunk[]>(); // by the chunk that they add to
-  private readonly shown = new Map<number, number>(); // of each static chunk, the first frame of the first group that names it
+  private readonly shown = new Map<number, Chunk>(); // of each static chunk, the first group that names it
   private readonly times: Float64Array; // s from the first frame; empty where they follow from the rate
 
   private constructor(
     readonly header: Header,
     readonly chunks: readonly Chunk[],
     metadata: Record<string, unknown>,
-    edit: Edit,
+    private readonly edit: Edit,
   ) {
     this.tracks = byTrack(chunks);
+    this.shownGroups = this.tracks.map((groups) => groups.filter(({ shownFirst, shownEnd }) => shownFirst < shownEnd));
     this.audio = chunks.find(({ kind }) => kind === "audio") ?? null;
     for (const chunk of chunks) if (isCompanion(chunk)) this.companions.set(chunk.dependsOn[0], [...this.companionsOf(chunks[chunk.dependsOn[0]]), chunk]);
     this.pieces = chunks.flatMap((chunk) => (isVideo(chunk) && chunk.frameCount === 0 ? layersOf(chunk) : [chunk]));
-    for (const { kind, dependsOn, firstFrame } of chunks) if (kind === "group") for (const other of dependsOn) if (!this.shown.has(other)) this.shown.set(other, firstFrame);
-    const frameCount = edit.end - edit.first;
+    for (const chunk of chunks) if (chunk.kind === "group") for (const other of chunk.dependsOn) if (!this.shown.has(other)) this.shown.set(other, chunk);
+    const frameCount = edit.shown.reduce((sum, [first, end]) => sum + end - first, 0);
     checkHeader(header, frameCount);
     const end = chunks[chunks.length - 1];
     if (end.offset + end.size > Number.MAX_SAFE_INTEGER) throw new FormatError(`a file of ${end.offset + end.size} bytes, beyond 53 bits`);
@@ -93,7 +98,7 @@ export class Head {
     const metadata = metadataOf(header.metadata);
     const frames = index.chunks.reduce((sum, entry) => sum + (entry.kind === ChunkKind.GROUP && entry.track === 0 ? entry.frames : 0), 0);
     const edit = editOf(metadata, unpack(Preamble, data)[0].flags, frames);
-    return new Head(header, chunksOf(index, size, 0 - edit.first), metadata, edit);
+    return new Head(header, chunksOf(index, size, edit), metadata, edit);
   }
 
   /** Bytes of the whole file. */
@@ -114,11 +119,11 @@ export class Head {
   /** The group of a track that holds a frame. RangeError outside 0 .. frameCount - 1. */
   chunkOfFrame(frame: number, track: number): Chunk {
     this.checkFrame(frame);
-    const groups = this.tracks[track];
+    const groups = this.shownGroups[track];
     let [low, high] = [0, groups.length - 1];
     while (low < high) {
       const middle = (low + high + 1) >> 1;
-      if (groups[middle].firstFrame <= frame) low = middle;
+      if (groups[middle].shownFirst <= frame) low = middle;
       else high = middle - 1;
     }
     return groups[low];
@@ -158,7 +163,7 @@ export class Head {
 
   /** The first frame that is shown with a static chunk; the number of frames where none is. */
   shownFrom({ number }: Chunk): number {
-    return this.shown.get(number) ?? this.frameCount;
+    return this.shown.get(number)?.firstFrame ?? this.frameCount;
   }
 
   /** The companion that one is predicted from, or that has the colours of what a change of the background keeps; of the first pictures, their atlas. */
@@ -167,6 +172,11 @@ export class Head {
     const changed = this.changedFrom(of);
     if (changed !== null) return this.companionsOf(changed).find(({ kind }) => kind === chunk.kind) ?? null;
     return chunk.dependsOn.length > 1 ? this.chunks[chunk.dependsOn[chunk.dependsOn.length - 1]] : null;
+  }
+
+  /** Coded frames from the first that is coded with a static chunk to a frame that is shown with it. */
+  framesWith({ number }: Chunk, frame: number): number {
+    return codedFrame(this.edit, frame) - (this.shown.get(number)?.coded ?? 0);
   }
 
   private checkFrame(frame: number): void {
@@ -208,8 +218,8 @@ export function describe(chunk: Pick<Chunk, "number" | "kind" | "track" | "first
   return `chunk ${number} (${what}track ${track}, frames ${firstFrame} to ${firstFrame + frameCount - 1})`;
 }
 
-/** The chunks of a file, which lie behind each other from `start`; the first group of each track begins with frame `first`, below 0 where some are hidden. */
-function chunksOf(index: Index, start: number, first: number): Chunk[] {
+/** The chunks of a file, which lie behind each other from `start`. */
+function chunksOf(index: Index, start: number, edit: Edit): Chunk[] {
   const frames: number[] = [];
   const chunks: Chunk[] = [];
   let offset = start;
@@ -217,12 +227,13 @@ function chunksOf(index: Index, start: number, first: number): Chunk[] {
     const kind = kindOf(entry.kind);
     const size = entry.layers.reduce((sum, layer) => sum + layer.size, 0);
     const { form, track, dependsOn, layers } = entry;
-    let firstFrame = isCompanionKind(kind) ? chunks[dependsOn[0]].firstFrame : 0;
+    let place = { firstFrame: isCompanionKind(kind) ? chunks[dependsOn[0]].firstFrame : 0, shownFirst: 0, shownEnd: 0 };
+    const coded = kind === "group" ? (frames[track] ?? 0) : 0;
     if (kind === "group") {
-      firstFrame = frames[track] ?? first;
-      frames[track] = firstFrame + entry.frames;
+      place = placed(edit, coded, entry.frames);
+      frames[track] = coded + entry.frames;
     }
-    chunks.push({ number, kind, form, track, firstFrame, frameCount: entry.frames, dependsOn, offset, size, layers });
+    chunks.push({ number, kind, form, track, coded, ...place, frameCount: entry.frames, dependsOn, offset, size, layers });
     offset += size;
   });
   return chunks;

@@ -292,7 +292,7 @@ export class Decoding implements Holdings {
     if (chunk.kind === "static") return null;
     let size = chunk.size;
     for (let track = 0; track < this.#head.tracks.length; track++) {
-      const other = this.#head.chunkOfFrame(Math.max(chunk.firstFrame, 0), track);
+      const other = this.#head.chunkOfFrame(chunk.shownFirst, track);
       const decoded = other === chunk ? undefined : this.#decoded.get(other.number);
       if (decoded === undefined) continue;
       bytes += decoded.bytes;

@@ -157,10 +157,9 @@ export class Picture {
 
   /** True if a shown group has the next frame, too. */
   #goesOn({ frame, frames, groups }: Mutable): boolean {
-    if (frame + 1 >= this.#head.frameCount) return false; // later frames are hidden
     for (let track = 0; track < groups.length; track++) {
       const group = groups[track];
-      if (group !== null && frames[track] === frame && frame + 1 < group.firstFrame + group.frameCount) return true;
+      if (group !== null && frames[track] === frame && frame + 1 < this.#head.chunks[group.chunk].shownEnd) return true; // later ones are hidden
     }
     return false;
   }

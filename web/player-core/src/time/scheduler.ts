@@ -76,7 +76,7 @@ export function plan(head: Head, links: Links, timeline: Timeline, outlook: Outl
   const most = Math.max(FEWEST_GROUPS, Math.floor(MOST_GROUPS / head.tracks.length));
   for (const [first, last] of framesAhead(timeline, outlook)) {
     for (const group of groupsBetween(head, first, last, most)) {
-      const frame = Math.max(group.firstFrame, first);
+      const frame = Math.max(group.shownFirst, first);
       const ahead = timeline.startOf(frame) - time + (frame < now ? timeline.duration : 0);
       planner.addGroup(group, frame, frame === now ? 0 : ahead, ahead <= decodeSeconds);
     }
@@ -102,7 +102,7 @@ export function groupsBetween(head: Head, first: number, last: number, most = In
     for (let [frame, count] = [first, 0]; frame <= last && count < most; count++) {
       const group = head.chunkOfFrame(frame, track);
       groups.push(group);
-      frame = group.firstFrame + group.frameCount;
+      frame = group.shownEnd;
     }
   }
   return groups.sort((a, b) => a.number - b.number);

@@ -10,13 +10,13 @@ export class SlowVideo {
   interval = 0; // frames from one picture to the next; 0: not known, before one layer was read
   #last = LAYER_PICTURES; // pictures of the last layer, at most
   readonly #layers: readonly CompanionChunk[];
-  readonly #first: number;
+  readonly #codedUntil: (frame: number) => number;
   readonly #frames: number;
 
-  /** Of these layers, shown for a number of frames from a first one on. */
-  constructor(layers: readonly CompanionChunk[], first: number, frames: number) {
+  /** Of these layers, shown for a number of frames; `codedUntil`: coded frames from the first with it to one that is shown. */
+  constructor(layers: readonly CompanionChunk[], codedUntil: (frame: number) => number, frames: number) {
     this.#layers = layers;
-    this.#first = first;
+    this.#codedUntil = codedUntil;
     this.#frames = frames;
   }
 
@@ -32,7 +32,7 @@ export class SlowVideo {
 
   /** The picture of a frame; before one layer was read, the first of the layer that it is most likely in. */
   placeOf(frame: number): Place {
-    const at = frame - this.#first;
+    const at = this.#codedUntil(frame);
     const last = this.#layers.length - 1;
     if (this.interval === 0) return { pictures: this.#layers[Math.min(last, Math.floor((at * (last + 1)) / this.#frames))], index: 0 };
     const picture = Math.floor(at / this.interval);

@@ -236,10 +236,11 @@ export class Textures implements LaneHost {
   }
 
   #linkSlow(chunk: CompanionChunk): void {
-    const first = this.#head.shownFrom(this.#head.chunks[chunk.dependsOn[0]]);
-    const others = this.#head.chunks.filter(({ kind }) => kind === "static").map((state) => this.#head.shownFrom(state));
+    const state = this.#head.chunks[chunk.dependsOn[0]];
+    const first = this.#head.shownFrom(state);
+    const others = this.#head.chunks.filter(({ kind }) => kind === "static").map((other) => this.#head.shownFrom(other));
     const end = Math.min(this.#head.frameCount, ...others.filter((other) => other > first));
-    this.#slow.set(chunk.number, new SlowVideo(this.#head.piecesOf(chunk), first, Math.max(1, end - first)));
+    this.#slow.set(chunk.number, new SlowVideo(this.#head.piecesOf(chunk), (frame) => this.#head.framesWith(state, frame), Math.max(1, end - first)));
   }
 
   /** Appearance shown in place of textures, or that textures are shown. */
