@@ -178,6 +178,29 @@ def check_same_frames(after: meshreel.Video, before: meshreel.Video, frames, tim
         assert one is None or all(np.array_equal(a, b) for a, b in zip(astuple(one), astuple(other), strict=True))
 
 
+def test_of_tags_that_differ_the_first_is_kept_and_they_are_named(tmp_path):
+    (tmp_path / "a.reel").write_bytes(known(DATA))
+    tag(tmp_path / "a.reel", tmp_path / "b.reel", {"title": "b", "take": 1})
+    tag(tmp_path / "a.reel", tmp_path / "c.reel", {"title": "c", "take": 1})
+    done = concat([tmp_path / f"{name}.reel" for name in "abc"], tmp_path / "d.reel")
+    metadata = meshreel.open(tmp_path / "d.reel").metadata
+    assert (metadata["title"], metadata["take"], done.differing) == ("b", 1, ("title",))
+
+
+def test_uneven_times_of_cuts_are_joined_as_they_were(tmp_path):
+    before = meshreel.open(path := GOLDEN / "mixed.reel")
+    pieces = [tmp_path / f"{frame}.reel" for frame in range(len(before))]
+    for frame, piece in enumerate(pieces):
+        cut(path, piece, f"{frame}:{frame + 1}")
+    concat(pieces, tmp_path / "all.reel")
+    assert meshreel.open(tmp_path / "all.reel").timestamps == before.timestamps
+    for piece in pieces:
+        retime(piece, piece.with_suffix(".slow.reel"), speed=0.5)
+    concat([piece.with_suffix(".slow.reel") for piece in pieces], tmp_path / "slow.reel")
+    steps = np.diff(meshreel.open(tmp_path / "slow.reel").timestamps)
+    np.testing.assert_allclose(steps, 2 * np.diff(before.timestamps), atol=2e-6)
+
+
 def test_six_hundred_frames_are_joined_within_a_second(tmp_path):
     header = Header(30.0, (0.0, 0.0, 0.0), 1.0, (-0.5,) * 3, (0.5,) * 3, "{}")
     payload, file = encode_intra([sphere(0.4)] * 20, 1e-4, 0), io.BytesIO()

@@ -60,6 +60,9 @@ def concat(inputs: list[str], /, *, output: Output, common: Common = Common()) -
     if joined.missing:
         total = joined.frames + joined.missing
         common.warn((f"{place}: {joined.missing} of the sequence's {total} frames are in none of the files",))
+    if joined.differing:
+        text = "differ among the files; those of the first that has them are kept, and meshreel tag gives others"
+        common.warn([f"{place}: tags {', '.join(joined.differing)} {text}"])
     row = {"output": str(place), "frames": joined.frames, "bytes": joined.size, "files": len(inputs)}
     common.result(row, f"{place}: {joined.frames} frames of {len(inputs)} files, {joined.size} bytes")
 

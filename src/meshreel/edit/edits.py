@@ -29,6 +29,7 @@ from .metadata import (
     LAST,
     MEANS,
     PART,
+    differing_tags,
     joined_metadata,
     of_all_parts,
     place_in_whole,
@@ -80,7 +81,8 @@ def cut(source: Name, output: Name, frames: str, at_keys: bool = False) -> Edite
 def concat(sources: Sequence[Name], output: Name) -> Edited:
     """Join files one after the other: parts of a sequence, or cuts of one file.
 
-    One file is open at a time. Where some have audio, it must be the same at the same time, as in cuts of one file.
+    One file is open at a time. Frames that a file hides stay hidden. Of tags that differ, the first file's are kept,
+    and the result names them. Where some have audio, it must be the same at the same time, as in cuts of one file.
     Raises InputError where files are not of one sequence, and FormatError for a damaged file.
     """
     if not sources:
@@ -104,7 +106,8 @@ def concat(sources: Sequence[Name], output: Name) -> Edited:
         before = [entry for of, _ in parts for entry in _history(of)[HISTORY]]
         metadata |= _history({HISTORY: [*dict.fromkeys(before)]}, f"concat of {len(sources)} files")
     done = written(located(output), header, metadata, pieces, b"" if audio is None else pack(audio))
-    return replace(done, missing=max(place[1] - frames, 0) if place else 0)
+    missing = max(place[1] - frames, 0) if place else 0
+    return replace(done, missing=missing, differing=tuple(differing_tags(parts)))
 
 
 def retime(source: Name, output: Name, frame_rate: float | None = None, speed: float | None = None) -> Edited:

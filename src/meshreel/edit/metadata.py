@@ -22,6 +22,7 @@ KEYS = "key_frames"
 CANONICAL = "canonical_references"
 MEANS = ("rms_m", "worst_rms_m", "d2_psnr_paper", "normal_error_deg")
 _OF_GROUPS = (KEYS, CANONICAL, *MEANS)
+_SHARED = ("preset", "quality", "noise_m", "up")  # that files are joined by
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +72,8 @@ def joined_metadata(parts: Sequence[tuple[dict[str, Any], int]]) -> dict[str, An
     TypeError or ValueError for metadata that no encoder wrote.
     """
     dropped = {PART, ITEM, LAST} | {name for name in _OF_GROUPS if not all(name in metadata for metadata, _ in parts)}
-    found = {name: value for name, value in parts[0][0].items() if name not in dropped}
+    every = (item for metadata, _ in reversed(parts) for item in metadata.items())  # of several tags the first counts
+    found = {name: value for name, value in every if name not in dropped}
     if KEYS in found:
         firsts = accumulate((frames for _, frames in parts), initial=0)
         pairs = zip(firsts, parts, strict=False)  # the last of `firsts` is the number of all frames
@@ -81,6 +83,12 @@ def joined_metadata(parts: Sequence[tuple[dict[str, Any], int]]) -> dict[str, An
     if all(name in found for name in MEANS):
         found |= Totals.added([Totals.from_metadata(metadata, frames) for metadata, frames in parts]).means
     return found | {name: value for name, value in parts[-1][0].items() if name == LAST}
+
+
+def differing_tags(parts: Sequence[tuple[dict[str, Any], int]]) -> list[str]:
+    """Return the names of tags that parts have with other values than the first part that has them."""
+    own, tags = {PART, ITEM, HISTORY, LAST, *_OF_GROUPS, *_SHARED}, joined_metadata(parts)
+    return sorted({name for of, _ in parts for name in of.keys() - own if of[name] != tags[name]})
 
 
 def scaled_metadata(metadata: dict[str, Any], scale: float) -> dict[str, Any]:
@@ -106,7 +114,7 @@ def of_all_parts(metadata: dict[str, Any]) -> dict[str, Any]:
 
     Raises KeyError or TypeError for metadata that no encoder wrote.
     """
-    found = {name: value for name, value in metadata.items() if name not in (PART, ITEM, HISTORY, LAST, *_OF_GROUPS)}
+    found = {name: value for name, value in metadata.items() if name in _SHARED}
     return found | ({"options": metadata[PART]["options"], "frames": metadata[PART]["of"]} if PART in metadata else {})
 
 
