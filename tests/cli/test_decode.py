@@ -1,9 +1,14 @@
 """`meshreel decode`: a file becomes meshes, whole or as far as it can be read."""
 
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 import meshreel
+from meshreel.cli.decode import CONTENTS, UNKNOWN, unwritten
+from meshreel.edit import tag
 from meshreel.format.layout import ChunkKind
 from meshreel.io.sequence import open_sequence
 from tests.cli.conftest import FILE, SCENE, failed
@@ -96,7 +101,7 @@ def test_damage_of_a_body_leaves_the_frames_without_it_and_the_background(run, t
     assert run("decode", tmp_path / "a.reel", "-o", tmp_path / "still", "--only", "background").code == 0
     data[meshreel.open(SCENE).reader.chunks[3].offset + 9] ^= 4
     (tmp_path / "a.reel").write_bytes(data)
-    said = run("decode", tmp_path / "a.reel", "-o", tmp_path / "still", "--only", "background")
+    said = run("decode", tmp_path / "a.reel", "-o", tmp_path / "still", "--only", "background", "--force")
     assert failed(said, "background of frame 4: chunk 3 (static)", "1 of 2 frames are lost")
 
 
@@ -166,9 +171,28 @@ def test_damaged_colors_cost_colors_and_the_exit_code(run, tmp_path, colored, ki
 
 
 @pytest.mark.parametrize("name", ["splats", "audio"])
-def test_what_meshes_do_not_hold_is_named_with_the_flag_that_writes_it(run, tmp_path, name):
-    file = GOLDEN / name / f"{name}.reel"
-    said = run("decode", file, "-o", tmp_path)
-    assert said.code == 0 and f"{name} of it: not written; meshreel decode --{name} writes this" in said.err
-    said = run("export", file, "-o", tmp_path / "a.glb")
-    assert said.code == 0 and f"{name} of it: not written" in said.err
+@pytest.mark.parametrize("to", ["ply", "obj", "glb", "npz", "a.glb", "a.usda", "a.usdc", "a.usdz"])
+def test_what_an_output_lacks_is_named_in_one_line_with_the_remedy(run, tmp_path, name, to):
+    if "usd" in to:
+        pytest.importorskip("pxr")
+    tag(GOLDEN / name / f"{name}.reel", file := tmp_path / "a.reel", {"title": "Walk"})
+    how = ("export", "-o", tmp_path / to) if to[1] == "." else ("decode", "-o", tmp_path / "out", "--format", to)
+    said = run(how[0], file, *how[1:])
+    assert said.code == 0 and said.err.count("\n") == 1
+    assert f"not written: {name} (meshreel decode --{name}" in said.err and "tags (meshreel info" in said.err
+    assert ("uneven times" in said.err) == (name == "audio" and to[1] != ".")
+
+
+@pytest.mark.parametrize("kind", [*ChunkKind, 200])
+def test_each_kind_of_chunk_is_in_an_output_or_named(kind):
+    reader = meshreel.open(GOLDEN / "draco.reel").reader
+    reader.chunks = (replace(reader.chunks[0], kind=kind),)
+    said = unwritten(Path("a.reel"), reader, (), "--texture writes them")
+    name = UNKNOWN if kind == 200 else CONTENTS[kind]
+    assert said == [] if name in ("meshes", "colours") else f"{name} (" in said[0]
+
+
+def test_splats_of_a_scene_are_written_with_a_word_about_the_rest(run, tmp_path):
+    tag(GOLDEN / "splats/splats.reel", tmp_path / "a.reel", {"title": "Walk"})
+    said = run("decode", tmp_path / "a.reel", "-o", tmp_path / "out", "--splats")
+    assert said.code == 0 and "not written: tags" in said.err and "splats (" not in said.err

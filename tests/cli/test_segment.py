@@ -84,14 +84,14 @@ def test_masks_that_were_painted_in_place_are_not_replaced_by_pictures(run, scan
 def test_what_is_left_of_a_run_before_is_reported(run, scan, tmp_path):
     out = tmp_path / "out"
     assert run("segment", scan, "-o", out, "--previews", "2").err == ""
-    assert run("segment", scan, "-o", out, "--previews", "2").err == ""  # the same again
-    said = run("segment", scan, "-o", out, "--previews", "1", "--frames", "1:3", "--json")
+    assert failed(run("segment", scan, "-o", out, "--previews", "2"), "there already", "--force")  # the same again
+    said = run("segment", scan, "-o", out, "--previews", "1", "--frames", "1:3", "--json", "--force")
     assert [line.split("; ")[0].removeprefix(str(out)) for line in said.row["warnings"]] == [
         "/labels holds 2 other frame files, as frame_00002.npz",
         "/colored holds 1 other frame files, as frame_00003.ply",
     ]
     assert run("segment", scan, "-o", tmp_path / "views", "--views-only").err == ""
-    said = run("segment", scan, "-o", tmp_path / "views", "--views-only", "--frames", ":3", "--json")
+    said = run("segment", scan, "-o", tmp_path / "views", "--views-only", "--frames", ":3", "--json", "--force")
     assert len(said.row["warnings"]) == 6 and "view00 holds 1 other frame files" in said.row["warnings"][0]
 
 

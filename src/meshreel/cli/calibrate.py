@@ -17,8 +17,8 @@ from ..capture.calibration.poses import described, posed_by, read_poses, with_po
 from ..capture.recording import open_recording
 from ..capture.rig.rig import RIG, SINGLE
 from ..errors import InputError
-from ..io.write import check_apart, replacing
-from .console import Common
+from ..io.write import check_apart, check_free, replacing
+from .console import Common, Force
 
 BEFORE = "rig.before.json"  # copy of the file that --in-place replaced
 
@@ -34,6 +34,7 @@ def command(
     scale: float = 1.0,
     board: Annotated[BoardOptions, Parameter(name="*")] = BoardOptions(),
     refine: bool = True,
+    force: Force = False,
     common: Common = Common(),
 ) -> None:
     """Find the poses of a rig's cameras: coarse from a file or a board, fine from the depth of still surface.
@@ -60,6 +61,8 @@ def command(
         Refine the poses on depth.
     """
     path = _output(rig, output, in_place)
+    picture = path.with_name("calibration.png") if in_place else path.with_suffix(".png")
+    check_free([*([picture] if refine else []), *([rig / BEFORE] if in_place else [])], force)
     if not (math.isfinite(scale) and scale > 0):
         raise InputError(f"--scale {scale:g}: give a factor above 0")
     if poses is None and (scale, poses_of) != (1.0, "depth"):
@@ -85,7 +88,6 @@ def command(
             calibration = refined(posed, progress)
         posed = with_poses(posed, {camera.name: camera.view.pose.to_world for camera in calibration.cameras}, {})
         warnings += calibration.warnings
-        picture = path.with_name("calibration.png") if in_place else path.with_suffix(".png")
         write_calibration_sheet(calibration, posed.up, picture)
     new = described(posed)
     if in_place:

@@ -30,6 +30,7 @@ from rich.text import Text
 
 from . import program, shown
 
+Force = Annotated[bool, Parameter(help="Replace files that are there and that were not named.", negative="")]
 EVERY = 10.0  # s, between two lines of progress outside a terminal
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
@@ -14,16 +14,28 @@ from ..container.reader import ReelReader
 from ..decoder.tracks import moving_of_frame
 from ..decoder.video import Video
 from ..decoder.video import open as open_video
+from ..edit.metadata import tags_of
 from ..errors import FormatError, InputError
 from ..export.animated_file import ExportOptions
 from ..export.animated_file import export as export_animated
 from ..export.animated_usd import EXTENSIONS
 from ..export.frames import Part, check_part, check_splats, write_frames, write_splats
+from ..format.layout import ChunkKind
 from ..geometry.topology import concatenate
 from ..io.sequence import SequenceOptions
-from ..io.write import check_apart, frame_names, left_over, make_folder, replacing, write_mesh
+from ..io.write import check_apart, check_free, frame_names, left_over, make_folder, replacing, write_mesh
 from ..types import Mesh, Texture, Up
-from .console import Common
+from .console import Common, Force
+
+UNKNOWN = "chunks of kinds that this version does not know"
+CONTENTS: dict[int, str] = {  # of chunks, by their kind; meshes and colours are in all outputs, or not asked for
+    ChunkKind.STATIC: "background",
+    ChunkKind.GROUP: "meshes",
+    ChunkKind.COLORS: "colours",
+    **dict.fromkeys((ChunkKind.ATLAS, ChunkKind.PICTURES, ChunkKind.COMPATIBLE), "textures"),
+    ChunkKind.SPLATS: "splats",
+    ChunkKind.AUDIO: "audio",
+}
 
 
 def decode(
@@ -36,6 +48,7 @@ def decode(
     only: Part = "all",
     splats: Annotated[bool, Parameter(negative="")] = False,
     audio: Annotated[bool, Parameter(negative="")] = False,
+    force: Force = False,
     common: Common = Common(),
 ) -> None:
     """Decode a .reel file into a directory of meshes.
@@ -68,6 +81,8 @@ def decode(
         return
     check_part(file, video.reader, only)
     if splats:
+        check_free((output / name for name in frame_names(len(video), format)), force)
+        common.warn(unwritten(file, video.reader, ("splats",)))
         _write_splats(file, video, output, format, common)
         return
     if format == "spz":
@@ -79,10 +94,8 @@ def decode(
     }
     parts = every[only]
     lost = _not_kept(video.reader, format)
-    common.warn(_beside(file, video.reader))
     pictured = video.background if video.reader.has_textures and not lost else lambda _: None
     written = _changes(video.reader, pictured) if only == "background" else range(len(video))
-    common.warn(lost)
     bare, pale = video.at(layers, colors=False), list[FormatError]()
 
     def decoded(frame: int) -> Mesh:
@@ -98,6 +111,9 @@ def decode(
 
     every_name = frame_names(len(video), format)
     names = [every_name[frame] for frame in written]
+    kinds = (f".{format}", *((".png", ".mtl") if format == "obj" and video.reader.has_textures else ()))
+    check_free(((output / name).with_suffix(kind) for name in names for kind in kinds), force)
+    common.warn(unwritten(file, video.reader, ("background",), lost))
     _write(file, output, names, (lambda at: decoded(written[at]), write_mesh), common)
     if pale:
         text = f"{file}: {pale[0]}; {len(pale)} of {len(names)} frames are written without their colours"
@@ -146,21 +162,36 @@ def _write_splats(file: Path, video: Video, output: Path, format: str, common: C
     common.result(row, f"{output}: splats of {len(video)} frames, {format} files")
 
 
-def _beside(file: Path, reader: ReelReader) -> list[str]:
-    """Return a warning for each thing that a file has and meshes do not hold."""
-    found = [("splats", reader.has_splats), ("audio", reader.audio is not None)]
-    return [f"{file}: {name} of it: not written; meshreel decode --{name} writes this" for name, has in found if has]
+def unwritten(file: Path, reader: ReelReader, kept: Collection[str], textures: str = "") -> list[str]:
+    """Return one warning, which names everything of a file that an output lacks, but for what is `kept`.
+
+    `textures` is the remedy for these if they are not kept.
+    """
+    remedies = {
+        "textures": textures,
+        "background": "meshreel decode without --splats writes it",
+        "splats": "meshreel decode --splats writes them",
+        "audio": "meshreel decode --audio writes it",
+        "uneven times of frames": "meshreel export keeps them",
+        "tags": "meshreel info --json shows them",
+        UNKNOWN: "update meshreel",
+    }
+    has = {CONTENTS.get(chunk.kind, UNKNOWN) for chunk in reader.chunks}
+    has |= {"tags"} if tags_of(reader.metadata) else set()
+    has |= {"uneven times of frames"} if reader.header.intervals else set()
+    lost = [f"{name} ({text})" for name, text in remedies.items() if text and name in has and name not in kept]
+    return [f"{file}: not written: {', '.join(lost)}"] if lost else []
 
 
-def _not_kept(reader: ReelReader, format: str) -> tuple[str, ...]:
-    """Return a warning if files of a format cannot keep a video's textures."""
+def _not_kept(reader: ReelReader, format: str) -> str:
+    """Return a remedy if files of a format cannot keep a video's textures."""
     if not reader.has_textures:
-        return ()
+        return ""
     if format == "ply":
-        return ("PLY has no textures, colours of vertices are kept: give --format obj or glb for textures",)
+        return "PLY has no textures, colours of vertices are kept: give --format obj or glb for textures"
     if find_spec("av") and find_spec("PIL"):
-        return ()
-    return ("no textures, colours of vertices are kept: textures need the extra color: pip install 'meshreel[color]'",)
+        return ""
+    return "colours of vertices are kept: textures need the extra color: pip install 'meshreel[color]'"
 
 
 def _write(
@@ -195,6 +226,7 @@ def export(
     up: Annotated[Up | None, Parameter(allow_leading_hyphen=True)] = None,
     texture: Annotated[bool, Parameter(negative="")] = False,
     compress: Annotated[bool, Parameter(negative="")] = False,
+    force: Force = False,
     common: Common = Common(),
 ) -> None:
     """Write a .reel file as one animated file: GLB for viewers and engines, USD for film tools.
@@ -233,6 +265,9 @@ def export(
     with open_video(file) as video:
         if target.exists() and target.samefile(file):  # also through links and under other names
             raise InputError(f"{target}: is the recording itself, which would be lost; give another name with -o")
+        has_folder = texture and target.suffix.lower() not in (".glb", ".usdz")
+        pictures = sorted(target.with_name(f"{target.stem}_textures").glob("*")) if has_folder else []
+        check_free([*([] if output else [target]), *pictures], force)
         check_part(file, video.reader, only)
         chosen = wanted.chosen(len(video))
         try:
@@ -240,9 +275,8 @@ def export(
                 count = export_animated(video.reader, target, chosen, options, progress)
         except FormatError as error:
             raise FormatError(f"{file}: {error}; nothing is written, copy the file again") from error
-    common.warn(_beside(file, video.reader))
-    if not texture and video.reader.has_textures:
-        common.warn([f"{file}: its textures are not written, but colours of vertices: --texture writes them"])
+    pale = "" if texture else "colours of vertices are: --texture writes them"
+    common.warn(unwritten(file, video.reader, ("background", "uneven times of frames"), pale))
     if count == 0:
         common.warn([f"{target}: no frame has a surface, so it shows nothing"])
     if texture and not video.reader.has_textures:

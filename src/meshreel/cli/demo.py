@@ -17,9 +17,10 @@ from ..encoder.sequence import encode
 from ..encoder.settings.options import QUALITY
 from ..encoder.settings.settings import Settings
 from ..errors import InputError
+from ..io.write import check_free
 from ..metrics.error_sheet import SheetOptions, write_sheet
 from .compare import OF_BOTH, against_truth, both_table
-from .console import Common, called_as
+from .console import Common, Force, called_as
 from .encode import describe, summary_row
 from .info import rate_table
 from .workers import workers
@@ -34,6 +35,7 @@ def command(
     quality: float = QUALITY,
     seed: int = 0,
     jobs: int = 1,
+    force: Force = False,
     common: Common = Common(),
 ) -> None:
     """Simulate depth cameras in a room where two people move, capture and encode it, and measure the result.
@@ -57,6 +59,7 @@ def command(
         raise InputError(f"--seed must not be negative, got {seed}")
     options, room = Settings(quality=quality).resolved(), RoomOptions(frames=frames, seed=seed)  # errors before work
     file, picture = output / "demo.reel", output / "demo.png"
+    check_free([file, picture], force or (output / "rig" / TRUTH).is_dir())  # of an earlier demo
     with common.stages(frames) as progress, workers(jobs) as executor:
         _forget(output / "rig", [camera.name for camera in room_cameras(WIDTH)])
         record_room(output / "rig", room, WIDTH, lambda k: progress("simulate", k, frames))

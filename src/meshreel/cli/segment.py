@@ -18,9 +18,9 @@ from ..errors import InputError
 from ..geometry.cameras import pack_cameras
 from ..geometry.derived_sequences import upright
 from ..io.pictures import is_mask
-from ..io.write import frame_names, left_over, make_folder, replacing, write_colored, write_picture
+from ..io.write import check_free, frame_names, left_over, make_folder, replacing, write_colored, write_picture
 from ..types import MeshSequence, evenly
-from .console import Common
+from .console import Common, Force
 from .sources import Masking, Reading, open_source
 
 COLUMNS = 4  # views in the sheet (guess)
@@ -37,6 +37,7 @@ def command(
     masking: Masking = Masking(),
     views_only: Annotated[bool, Parameter(negative="")] = False,
     previews: int = 4,
+    force: Force = False,
     common: Common = Common(),
 ) -> None:
     """Label which faces of a scene move, and with which body.
@@ -64,6 +65,8 @@ def command(
     scene, sequence = SceneOptions(masking.cameras), upright(source.sequence, masking.up)
     masker = masking.masker(len(source.sequence))
     left = _left_over(output, len(source.sequence), views_only, previews)
+    kept = ("view*/frame_*.png",) if views_only else (f"{LABELS}/frame_*.npz", f"{COLORED}/frame_*.ply", SHEET)
+    check_free((path for name in (*kept, CAMERAS) for path in sorted(output.glob(name))), force)
     if views_only:
         views, colors = mask_views(sequence, scene.cameras)
         with common.stages(len(sequence)) as progress:

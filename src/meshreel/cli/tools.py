@@ -16,9 +16,9 @@ from rich.table import Table
 
 from .. import __version__
 from ..errors import InputError
-from ..io.write import make_folder, replacing
+from ..io.write import check_free, make_folder, replacing
 from . import COMMANDS, make_app, place_of
-from .console import Common
+from .console import Common, Force
 
 _NEEDS = re.compile(r"([A-Za-z0-9._-]+)[^;]*(?:;.*extra == [\"']([a-z0-9]+)[\"'])?")
 _CODECS = {"AV1 decoded": "libdav1d", "AV1 encoded": "libsvtav1", "H.264 encoded": "libx264"}
@@ -89,13 +89,13 @@ def _gpu() -> str | None:
     return str(torch.cuda.get_device_name()) if torch.cuda.is_available() else None
 
 
-def player(*, copy_to: Path | None = None, common: Common = Common()) -> None:
+def player(*, copy_to: Path | None = None, force: Force = False, common: Common = Common()) -> None:
     """Copy the player's files for a web server, or print the folder where they are.
 
     Parameters
     ----------
     copy_to
-        The folder to copy them to, made if needed; files of the same names are replaced. The files stay together.
+        The folder to copy them to, made if needed. The files stay together.
     """
     with as_file(files("meshreel") / "player") as folder:
         built = sorted(path for path in folder.iterdir() if path.is_file())
@@ -104,6 +104,7 @@ def player(*, copy_to: Path | None = None, common: Common = Common()) -> None:
         if copy_to is None:
             common.result({"folder": str(folder), "files": [path.name for path in built]}, str(folder))
             return
+        check_free((copy_to / path.name for path in built), force)
         make_folder(copy_to)
         for path in built:
             with replacing(copy_to / path.name) as file:

@@ -87,8 +87,13 @@ def joined_metadata(parts: Sequence[tuple[dict[str, Any], int]]) -> dict[str, An
 
 def differing_tags(parts: Sequence[tuple[dict[str, Any], int]]) -> list[str]:
     """Return the names of tags that parts have with other values than the first part that has them."""
-    own, tags = {PART, ITEM, HISTORY, LAST, *_OF_GROUPS, *_SHARED}, joined_metadata(parts)
-    return sorted({name for of, _ in parts for name in of.keys() - own if of[name] != tags[name]})
+    tags = joined_metadata(parts)
+    return sorted({name for of, _ in parts for name in tags_of(of) if of[name] != tags[name]})
+
+
+def tags_of(metadata: dict[str, Any]) -> set[str]:
+    """Return the names of metadata that users gave."""
+    return metadata.keys() - {PART, ITEM, HISTORY, LAST, *_OF_GROUPS, *_SHARED}
 
 
 def scaled_metadata(metadata: dict[str, Any], scale: float) -> dict[str, Any]:

@@ -66,6 +66,14 @@ def check_apart(output: Path, inputs: Iterable[Path]) -> None:
             raise InputError(f"{output}: is the input {path}, which the output would replace; choose another name")
 
 
+def check_free(paths: Iterable[Path], force: bool) -> None:
+    """Raise InputError if files are there that a user did not name and a run would replace, unless `force`."""
+    if there := [] if force else [path for path in paths if os.path.lexists(path)]:
+        more = f" and {len(there) - 1} other files" if there[1:] else ""
+        text = f"{there[0]}{more}: there already, and named by no argument"
+        raise InputError(f"{text}; give another name for the output, or --force, which replaces them")
+
+
 def write_mesh(mesh: Mesh, path: Path) -> None:
     """Write a mesh to a .ply, .obj, .glb or .npz file, which appears when it is complete.
 
