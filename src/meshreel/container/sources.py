@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 from ..errors import InputError
+from ..io.files import Remote, located
 
 if TYPE_CHECKING:
     from .http import UrlSource
@@ -41,8 +42,11 @@ class Stream(Protocol):
 class BytesSource:
     """A file in memory."""
 
-    def __init__(self, data: bytes) -> None:
+    def __init__(self, data: bytes | memoryview) -> None:
         self._data = data
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return BytesSource, (bytes(self._data),)
 
     @property
     def size(self) -> int:
@@ -112,12 +116,12 @@ class FileSource(StreamSource):
         self.close()
 
 
-def source_at(place: str | Path) -> FileSource | UrlSource:
+def source_at(name: object) -> FileSource | UrlSource:
     """Open a file on disk or behind a URL. Raises InputError if it cannot be read."""
-    if isinstance(place, str) and "://" in place:
+    if isinstance(place := located(name), Remote):
         from .http import UrlSource
 
-        return UrlSource(place)
+        return UrlSource(place.url)
     return FileSource(place)
 
 

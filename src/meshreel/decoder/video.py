@@ -12,6 +12,7 @@ import sys
 import time
 import weakref
 from collections.abc import Callable, Iterator, Sequence
+from mmap import mmap
 from pathlib import Path
 from typing import Any, overload
 
@@ -23,6 +24,7 @@ from ..errors import FormatError, InputError, without_secret
 from ..format.layout import MEDIA_TYPES, Form
 from ..geometry.splats import Bound
 from ..geometry.topology import concatenate
+from ..io.files import on_disk, viewed
 from ..shapes import Float, Float64
 from ..types import Audio, Mesh, Up
 from .pictures import Decoders
@@ -34,24 +36,25 @@ LOADED = 10.0  # s in which a browser has loaded a page (guess)
 INLINE = 8_000_000  # bytes, largest file in a notebook's output (guess): saved notebooks hold 4/3 of it
 
 
-def open(source: str | Path | bytes | Stream | Source) -> Video:
-    """Open the video in a .reel file: a path, a URL, bytes, a binary file object, or a source of byte ranges.
+def open(source: str | Path | bytes | bytearray | memoryview | mmap | Stream | Source) -> Video:
+    """Open the video in a .reel file: a path, a URL, bytes, an mmap, a binary file object, or a source of byte ranges.
 
     A URL is http(s)://, or of a store that fsspec supports, such as s3:// (extra `remote`); only chunks that are
     decoded are fetched.
     Raises InputError if it cannot be read, and FormatError if the header or the index are damaged or of a version that
     this reader does not know.
     """
-    if isinstance(source, bytes):
-        source = BytesSource(source)
-    if not isinstance(source, str | Path):
+    if (data := viewed(source)) is not None:
+        source = BytesSource(data)
+    if isinstance(source, Source | Stream):
         return Video(ReelReader(source if isinstance(source, Source) else StreamSource(source)))
-    ranges = source_at(source)
+    path = source if isinstance(source, str | Path) else on_disk(source)
+    ranges = source_at(path)
     try:
-        return Video(ReelReader(ranges), close=ranges.close, path=source)
+        return Video(ReelReader(ranges), close=ranges.close, path=path)
     except FormatError as error:
         ranges.close()
-        raise FormatError(f"{source}: {error}") from error
+        raise FormatError(f"{path}: {error}") from error
 
 
 def _reopened(source: str | Path | Source, layers: int | None, colored: bool) -> Video:

@@ -14,7 +14,7 @@ from ..errors import InputError
 from ..format.budget import LIMITS
 from ..format.layout import AudioFile, AudioType, Form
 from ..format.records import pack
-from ..io.files import Place, located, read_input
+from ..io.files import Place, located, read_input, viewed
 
 _START = 1 << 16  # bytes at the start within which Ogg and WebM name their tracks (guess)
 _PICTURES = re.compile(rb"hdlr.{8}vide|V_(VP[89]|AV1|MPEG)", re.DOTALL)  # marks of a video track in MP4 and in WebM
@@ -38,8 +38,9 @@ def packed_audio(audio: Given, start: float, first_time: int = 0) -> bytes:
     """
     if not abs(start) <= _MOST:  # also NaN
         raise InputError(f"audio start {start}: give seconds after the first frame, as 0.5; or before it, as -2")
-    data = audio if isinstance(audio, bytes) else read_input(located(audio))
-    kind = audio_type(data, "the audio" if isinstance(audio, bytes) else str(audio))
+    held = viewed(audio)
+    data = read_input(located(audio)) if held is None else bytes(held)
+    kind = audio_type(data, str(audio) if held is None else "the audio")
     return pack(AudioFile(Form.AUDIO_FILE, kind, first_time + round(1e6 * start), data))
 
 

@@ -19,7 +19,7 @@ from ..format.checks import COMPANIONS
 from ..format.edit import ITEM, Edit, is_rotation, nearest_rotation
 from ..format.layout import ChunkKind, Header
 from ..format.records import pack
-from ..io.files import Place, first_difference, located
+from ..io.files import Place, first_difference, located, located_all
 from ..io.sequence import SequenceOptions
 from ..types import Up, check_up
 from .audio import Given, joined_audio, packed_audio
@@ -85,28 +85,29 @@ def concat(sources: Sequence[Name], output: Name) -> Edited:
     and the result names them. Where some have audio, it must be the same at the same time, as in cuts of one file.
     Raises InputError where files are not of one sequence, and FormatError for a damaged file.
     """
-    if not sources:
+    places = located_all(sources)
+    if not places:
         raise InputError("no files to join; give at least one")
     pieces, parts, heads, audio = list[Piece](), list[Part](), list[ReelReader](), None
-    for source in sources:
-        with opened(located(source)) as (path, reader):
+    for place in places:
+        with opened(place) as (path, reader):
             first = heads[0] if heads else reader
             parts.append((reader.metadata, reader.frame_count))
-            _check_alike(path, reader, first, located(sources[0]), parts)
+            _check_alike(path, reader, first, places[0], parts)
             pieces.append(piece_of(path, reader, silent(reader), sum(len(piece.numbers) for piece in pieces)))
             heads.append(reader)
             later = _begin_of_last(heads) - reader.header.first_time
             audio = joined_audio(audio, path, reader.read_audio(), later)
     frames = sum(count for _, count in parts)
-    header, place = _timed(heads), place_in_whole(parts[0][0])
+    header, whole = _timed(heads), place_in_whole(parts[0][0])
     befores = [*accumulate((head.coded_count for head in heads), initial=0)]
     edit = Edit(_joined(zip(befores, (head.edit.shown for head in heads), strict=False)), heads[0].edit.rotation)
     metadata = joined_metadata(parts) | edit.item(befores[-1])
-    if place is None and len(sources) > 1:
+    if whole is None and len(places) > 1:
         before = [entry for of, _ in parts for entry in _history(of)[HISTORY]]
-        metadata |= _history({HISTORY: [*dict.fromkeys(before)]}, f"concat of {len(sources)} files")
+        metadata |= _history({HISTORY: [*dict.fromkeys(before)]}, f"concat of {len(places)} files")
     done = written(located(output), header, metadata, pieces, b"" if audio is None else pack(audio))
-    missing = max(place[1] - frames, 0) if place else 0
+    missing = max(whole[1] - frames, 0) if whole else 0
     return replace(done, missing=missing, differing=tuple(differing_tags(parts)))
 
 

@@ -27,7 +27,7 @@ from ..errors import InputError
 from ..format.layout import Form
 from ..geometry.derived_sequences import captured, is_colored, unchanging, welded
 from ..geometry.work import since, so_far
-from ..io.files import Place
+from ..io.files import Place, located
 from ..types import MeshSequence, evenly
 from .appearance.videos import TextureSize
 from .file.summary import (
@@ -120,10 +120,10 @@ def encode(
     )
     if options is not None and settings != Settings():
         raise InputError("options and settings: leave the settings out, or give Settings(...) as options")
-    encoder = Encoder(welded(as_sequence(sequence)), executor, progress)
+    encoder, output = Encoder(welded(as_sequence(sequence)), executor, progress), located(path)
     encoder.audio = b"" if audio is None else packed_audio(audio, audio_start)
     chosen = options or settings
-    summary = encoder.encode(path, chosen.resolved() if isinstance(chosen, Settings) else chosen, resume)
+    summary = encoder.encode(output, chosen.resolved() if isinstance(chosen, Settings) else chosen, resume)
     for text in summary.warnings:
         warnings.warn(text, stacklevel=2)
     return summary

@@ -21,6 +21,7 @@ from ..decoder.video import Video
 from ..errors import FormatError, InputError
 from ..geometry.rigid import quaternions
 from ..geometry.splats import Bound
+from ..io.files import on_disk
 from ..io.write import replacing, write_mesh
 from ..shapes import Float64, UInt8
 
@@ -69,6 +70,7 @@ def check_splats(video: Video, name: str) -> None:
 def write_splats(bound: Bound | None, path: Path) -> None:
     """Write Gaussians, which may be none, to a .ply or .spz file, which appears when it is complete."""
     rows = np.zeros((0, len(NAMES.split()))) if bound is None else _rows(bound)
+    path = on_disk(path)
     data = _spz(rows) if path.suffix == ".spz" else _ply(rows)
     with replacing(path) as file:
         file.write(data)

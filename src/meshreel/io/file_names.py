@@ -11,7 +11,7 @@ from pathlib import Path, PurePath, PurePosixPath
 from typing import Literal, TypeVar
 
 from ..errors import InputError
-from .files import Place, Remote, located
+from .files import Place, Remote, located, located_all
 from .meshes import EXTENSIONS
 
 MESHES = "meshes"  # name of a folder of frames beside the files of their cameras
@@ -41,7 +41,7 @@ def find_frames(
     For a folder without mesh files, use its subfolder `meshes`, as in the releases of TSMC's authors.
     """
     if not isinstance(source, str | Path):
-        return tuple(located(path) for path in source), ()
+        return tuple(located_all(source)), ()
     path = located(source)
     if isinstance(path, Remote):
         return _find_remote(path, order)

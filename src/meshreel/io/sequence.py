@@ -41,7 +41,7 @@ class SequenceOptions:
         for name, value in (("frame rate", self.frame_rate), ("scale", self.scale)):
             if value is not None and not 1e-9 <= value <= 1e9:  # also refuses NaN
                 raise InputError(f"{name} {value} is not between 1e-9 and 1e9; give such a number, as 30 or 0.001")
-        if not _FRAMES.fullmatch(self.frames):
+        if not _FRAMES.fullmatch(str(self.frames)):
             raise InputError(f"frames {self.frames!r} is not a range; give A:B, A: or :B, as 0:10")
 
     def chosen(self, count: int) -> range:
