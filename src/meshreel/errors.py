@@ -1,6 +1,8 @@
 """Errors that meshreel raises on purpose. Messages say what is wrong, the value, and what to do."""
 
+import os
 import re
+from pathlib import Path
 
 
 class MeshreelError(Exception):
@@ -31,3 +33,13 @@ _FURTHER = re.compile(rf"{_URL}([^\s?#]*|[^?#\n]*(?=[?#][\w.%-]+=))[?#](?:\.\.\.
 def without_secret(text: str) -> str:
     """Return a text whose URLs lack users, queries and fragments, which may be keys: for messages and pages."""
     return _FURTHER.sub(r"\1\2\3?...", _USER.sub(r"\1\2", text)) if ":/" in text else text
+
+
+def path_of(name: object) -> str | Path:
+    """Return a path or a URL that an object names. Raises InputError for anything else."""
+    path = Path(name) if isinstance(name, os.PathLike) and isinstance(os.fspath(name), str) else name
+    if not isinstance(path, str | Path):
+        raise InputError(f"{type(name).__name__} {name!r:.60}: is no path; give a str, a pathlib.Path or a URL")
+    if "\0" in str(path):
+        raise InputError(f"{name!r}: no path has a null character; mend it")
+    return path

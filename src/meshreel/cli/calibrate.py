@@ -17,6 +17,7 @@ from ..capture.calibration.poses import described, posed_by, read_poses, with_po
 from ..capture.recording import open_recording
 from ..capture.rig.rig import RIG, SINGLE
 from ..errors import InputError
+from ..export.shapes import check_output
 from ..io.write import check_apart, check_free, replacing
 from .console import Common, Force
 
@@ -110,9 +111,7 @@ def _output(rig: Path, output: Path | None, in_place: bool) -> Path:
         raise InputError(f"{path}: the output must end in .json")
     if not in_place:
         check_apart(path, [rig / RIG])
-        if path.is_dir() or not path.parent.is_dir():  # an error before anything is computed
-            text = "is a folder" if path.is_dir() else f"there is no folder {path.parent}"
-            raise InputError(f"{path}: {text}; name a file in a folder that is there")
+        check_output(path)
     return path
 
 

@@ -22,6 +22,7 @@ from ..decoder.video import open as open_video
 from ..encoder.group.progress import Progress
 from ..errors import FormatError, InputError
 from ..export.frames import check_splats
+from ..export.shapes import check_output
 from ..format.layout import MAGIC, ChunkKind
 from ..geometry.cameras import Camera
 from ..geometry.derived_sequences import CapturedSequence, captured, picked
@@ -78,9 +79,8 @@ def command(
         Compare pictures of the splats of a .reel file, too: with renders of coloured originals from cameras that were
         not fitted to, or with the pictures of a rig. PSNR and SSIM are of pictures that are cut to the bodies.
     """
-    if sheet is not None and not sheet.parent.is_dir():
-        raise InputError(f"{sheet}: there is no folder {sheet.parent}; make it or choose another")
     if sheet is not None:
+        check_output(sheet)
         import_module("matplotlib")  # if it is missing, fail before minutes of measuring
     source = open_source([originals], reading, common)
     sequence, as_read = source.sequence, SequenceOptions(reading.fps, weld=weld)

@@ -27,14 +27,13 @@ from ..io.write import check_apart, check_free, frame_names, left_over, make_fol
 from ..types import Mesh, Texture, Up
 from .console import Common, Force
 
-UNKNOWN = "chunks of kinds that this version does not know"
-CONTENTS: dict[int, str] = {  # of chunks, by their kind; meshes and colours are in all outputs, or not asked for
-    ChunkKind.STATIC: "background",
-    ChunkKind.GROUP: "meshes",
-    ChunkKind.COLORS: "colours",
+UNKNOWN = "chunks of kinds that this version does not know (update meshreel)"
+CONTENTS: dict[int, str] = {  # of chunks, by their kind, and how else they are written; "": in all outputs
+    ChunkKind.STATIC: "background (meshreel decode without --splats)",
+    **dict.fromkeys((ChunkKind.GROUP, ChunkKind.COLORS), ""),
     **dict.fromkeys((ChunkKind.ATLAS, ChunkKind.PICTURES, ChunkKind.COMPATIBLE), "textures"),
-    ChunkKind.SPLATS: "splats",
-    ChunkKind.AUDIO: "audio",
+    ChunkKind.SPLATS: "splats (meshreel decode --splats)",
+    ChunkKind.AUDIO: "audio (meshreel decode --audio)",
 }
 
 
@@ -163,23 +162,12 @@ def _write_splats(file: Path, video: Video, output: Path, format: str, common: C
 
 
 def unwritten(file: Path, reader: ReelReader, kept: Collection[str], textures: str = "") -> list[str]:
-    """Return one warning, which names everything of a file that an output lacks, but for what is `kept`.
-
-    `textures` is the remedy for these if they are not kept.
-    """
-    remedies = {
-        "textures": textures,
-        "background": "meshreel decode without --splats writes it",
-        "splats": "meshreel decode --splats writes them",
-        "audio": "meshreel decode --audio writes it",
-        "uneven times of frames": "meshreel export keeps them",
-        "tags": "meshreel info --json shows them",
-        UNKNOWN: "update meshreel",
-    }
-    has = {CONTENTS.get(chunk.kind, UNKNOWN) for chunk in reader.chunks}
-    has |= {"tags"} if tags_of(reader.metadata) else set()
-    has |= {"uneven times of frames"} if reader.header.intervals else set()
-    lost = [f"{name} ({text})" for name, text in remedies.items() if text and name in has and name not in kept]
+    """Return a warning that names all that an output lacks, but what is `kept`; `textures` is the remedy for these."""
+    found = [CONTENTS.get(chunk.kind, UNKNOWN) for chunk in reader.chunks]
+    found += ["uneven times of frames (meshreel export)"] if reader.header.intervals else []
+    found += ["tags (meshreel info --json)"] if tags_of(reader.metadata) else []
+    lost = [name for name in dict.fromkeys(found) if name.split(" (")[0] not in ("", "textures", *kept)]
+    lost += [f"textures ({textures})"] if textures and "textures" in found else []
     return [f"{file}: not written: {', '.join(lost)}"] if lost else []
 
 

@@ -277,6 +277,8 @@ def _chunks(index: Index, offset: int, edit: Edit) -> tuple[Chunk, ...]:
             coded = frames[entry.track]
             frames[entry.track] += entry.frames
             at = min(bisect_right(ends, coded), len(ends) - 1)  # the range that it ends in, or is before
+            if at + 1 < len(ends) and edit.shown[at + 1].start < frames[entry.track]:
+                raise FormatError(f"Header.metadata: edit.frames have two ranges with frames of chunk {number}")
             low, high = befores[at : at + 2]
             first = low + coded - edit.shown[at].start
             start = min(max(first, low), high)

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 from ..errors import InputError
-from ..io.files import Remote, located
 
 if TYPE_CHECKING:
     from .http import UrlSource
@@ -37,6 +36,14 @@ class Stream(Protocol):
     def seekable(self) -> bool: ...
 
     def close(self) -> object: ...
+
+
+def viewed(given: Any) -> memoryview | None:
+    """Return the bytes that an object holds, not copied, as of bytes, an array or an mmap; None for other objects."""
+    try:
+        return memoryview(given).cast("B")
+    except (TypeError, ValueError):  # no buffer, a closed or a scattered one
+        return None
 
 
 class BytesSource:
@@ -116,12 +123,12 @@ class FileSource(StreamSource):
         self.close()
 
 
-def source_at(name: object) -> FileSource | UrlSource:
+def source_at(place: str | Path) -> FileSource | UrlSource:
     """Open a file on disk or behind a URL. Raises InputError if it cannot be read."""
-    if isinstance(place := located(name), Remote):
+    if isinstance(place, str) and "://" in place:
         from .http import UrlSource
 
-        return UrlSource(place.url)
+        return UrlSource(place)
     return FileSource(place)
 
 

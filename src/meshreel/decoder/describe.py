@@ -143,8 +143,7 @@ def _describe_state(reader: ReelReader, chunk: Chunk, length: int, shown: Iterab
 def _describe_track(reader: ReelReader, number: int, groups: list[dict[str, Any]]) -> dict[str, Any]:
     """Describe a track: the frames in which its body appears, and the bytes of its contents."""
     track_groups = [group for group in groups if group["track"] == number]
-    groups_shown = [group.shown for group in reader.tracks[number] if group.shown and group.form != Form.EMPTY]
-    spans = [(shown.start, shown.stop) for shown in groups_shown]
+    spans = [(g.shown.start, g.shown.stop) for g in reader.tracks[number] if g.shown and g.form != Form.EMPTY]
     size = sum(group["bytes"] for group in track_groups)
     row: dict[str, Any] = {"track": number, "ranges": _merged(spans), "groups": len(track_groups), "bytes": size}
     return row | {

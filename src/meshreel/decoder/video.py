@@ -19,12 +19,11 @@ from typing import Any, overload
 import numpy as np
 
 from ..container.reader import Chunk, ReelReader
-from ..container.sources import BytesSource, FileSource, Source, Stream, StreamSource, source_at
-from ..errors import FormatError, InputError, without_secret
+from ..container.sources import BytesSource, FileSource, Source, Stream, StreamSource, source_at, viewed
+from ..errors import FormatError, InputError, path_of, without_secret
 from ..format.layout import MEDIA_TYPES, Form
 from ..geometry.splats import Bound
 from ..geometry.topology import concatenate
-from ..io.files import on_disk, viewed
 from ..shapes import Float, Float64
 from ..types import Audio, Mesh, Up
 from .pictures import Decoders
@@ -48,7 +47,7 @@ def open(source: str | Path | bytes | bytearray | memoryview | mmap | Stream | S
         source = BytesSource(data)
     if isinstance(source, Source | Stream):
         return Video(ReelReader(source if isinstance(source, Source) else StreamSource(source)))
-    path = source if isinstance(source, str | Path) else on_disk(source)
+    path = path_of(source)
     ranges = source_at(path)
     try:
         return Video(ReelReader(ranges), close=ranges.close, path=path)

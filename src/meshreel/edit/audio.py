@@ -10,11 +10,12 @@ import re
 from collections.abc import Iterator
 from dataclasses import replace
 
+from ..container.sources import viewed
 from ..errors import InputError
 from ..format.budget import LIMITS
 from ..format.layout import AudioFile, AudioType, Form
 from ..format.records import pack
-from ..io.files import Place, located, read_input, viewed
+from ..io.files import Place, located, read_input
 
 _START = 1 << 16  # bytes at the start within which Ogg and WebM name their tracks (guess)
 _PICTURES = re.compile(rb"hdlr.{8}vide|V_(VP[89]|AV1|MPEG)", re.DOTALL)  # marks of a video track in MP4 and in WebM

@@ -47,7 +47,7 @@ class Piece:
 @contextmanager
 def opened(path: Place) -> Iterator[tuple[Place, ReelReader]]:
     """Open a file for the block; from a URL, only the head and the chunks that are copied are fetched."""
-    source = source_at(path)
+    source = source_at(path if isinstance(path, Path) else path.url)
     try:
         yield path, ReelReader(source)
     except FormatError as error:

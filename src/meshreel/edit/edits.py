@@ -24,18 +24,7 @@ from ..io.sequence import SequenceOptions
 from ..types import Up, check_up
 from .audio import Given, joined_audio, packed_audio
 from .copies import Edited, Piece, check_known, opened, piece_of, silent, written
-from .metadata import (
-    HISTORY,
-    LAST,
-    MEANS,
-    PART,
-    differing_tags,
-    joined_metadata,
-    of_all_parts,
-    place_in_whole,
-    scaled_metadata,
-    up_metadata,
-)
+from .metadata import HISTORY, LAST, MEANS, PART, joined_metadata, place_in_whole, scaled_metadata, shared, up_metadata
 
 Name = str | Place
 Numbers = Sequence[Any] | np.ndarray
@@ -102,13 +91,14 @@ def concat(sources: Sequence[Name], output: Name) -> Edited:
     header, whole = _timed(heads), place_in_whole(parts[0][0])
     befores = [*accumulate((head.coded_count for head in heads), initial=0)]
     edit = Edit(_joined(zip(befores, (head.edit.shown for head in heads), strict=False)), heads[0].edit.rotation)
-    metadata = joined_metadata(parts) | edit.item(befores[-1])
+    joined, differing = joined_metadata(parts)
+    metadata = joined | edit.item(befores[-1])
     if whole is None and len(places) > 1:
         before = [entry for of, _ in parts for entry in _history(of)[HISTORY]]
         metadata |= _history({HISTORY: [*dict.fromkeys(before)]}, f"concat of {len(places)} files")
     done = written(located(output), header, metadata, pieces, b"" if audio is None else pack(audio))
     missing = max(whole[1] - frames, 0) if whole else 0
-    return replace(done, missing=missing, differing=tuple(differing_tags(parts)))
+    return replace(done, missing=missing, differing=differing)
 
 
 def retime(source: Name, output: Name, frame_rate: float | None = None, speed: float | None = None) -> Edited:
@@ -217,7 +207,7 @@ def _check_alike(path: Place, reader: ReelReader, other: ReelReader, first: Plac
     if "interval" in reader.metadata:
         raise InputError(f"{path}: is an interval of an encode that was stopped; finish that with --resume")
     try:
-        ours, theirs = of_all_parts(other.metadata), of_all_parts(reader.metadata)
+        ours, theirs = shared(other.metadata), shared(reader.metadata)
         joined_metadata(parts[-1:])
         begin, own = place_in_whole(parts[0][0]), place_in_whole(parts[-1][0])
     except (KeyError, TypeError, ValueError) as error:

@@ -65,8 +65,8 @@ class Totals:
         return {name: shortened(value) for name, value in zip(MEANS, values, strict=True)}
 
 
-def joined_metadata(parts: Sequence[tuple[dict[str, Any], int]]) -> dict[str, Any]:
-    """Return the metadata of a whole from those of its parts and their numbers of frames, in order.
+def joined_metadata(parts: Sequence[tuple[dict[str, Any], int]]) -> tuple[dict[str, Any], tuple[str, ...]]:
+    """Return the metadata of a whole from those of its parts and their numbers of frames; and tags that differ.
 
     Key frames and means are joined where all parts have them: scenes have none, and cuts no means. Raises KeyError,
     TypeError or ValueError for metadata that no encoder wrote.
@@ -82,13 +82,8 @@ def joined_metadata(parts: Sequence[tuple[dict[str, Any], int]]) -> dict[str, An
         found[CANONICAL] = sum(metadata[CANONICAL] for metadata, _ in parts)
     if all(name in found for name in MEANS):
         found |= Totals.added([Totals.from_metadata(metadata, frames) for metadata, frames in parts]).means
-    return found | {name: value for name, value in parts[-1][0].items() if name == LAST}
-
-
-def differing_tags(parts: Sequence[tuple[dict[str, Any], int]]) -> list[str]:
-    """Return the names of tags that parts have with other values than the first part that has them."""
-    tags = joined_metadata(parts)
-    return sorted({name for of, _ in parts for name in tags_of(of) if of[name] != tags[name]})
+    differing = {name for metadata, _ in parts for name in tags_of(metadata) if metadata[name] != found[name]}
+    return found | {name: value for name, value in parts[-1][0].items() if name == LAST}, tuple(sorted(differing))
 
 
 def tags_of(metadata: dict[str, Any]) -> set[str]:
@@ -114,7 +109,7 @@ def scaled_metadata(metadata: dict[str, Any], scale: float) -> dict[str, Any]:
     return found
 
 
-def of_all_parts(metadata: dict[str, Any]) -> dict[str, Any]:
+def shared(metadata: dict[str, Any]) -> dict[str, Any]:
     """Return the metadata that all parts of a sequence share, the digest of their options among them.
 
     Raises KeyError or TypeError for metadata that no encoder wrote.

@@ -18,9 +18,8 @@ from jaxtyping import Float32
 from ..container.reader import Chunk, ReelReader
 from ..decoder.pictures import Decoders
 from ..decoder.tracks import Background, Track
-from ..errors import InputError
+from ..errors import InputError, path_of
 from ..format.layout import Form
-from ..io.files import on_disk
 from ..types import Mesh, Up
 from .animated_glb import GlbWriter, animated_glb
 from .animated_usd import EXTENSIONS, UsdWriter, animated_usd
@@ -71,7 +70,7 @@ def export(
     The file appears when it is complete. At most two groups are in memory. Raises InputError if the format cannot hold
     the frames or the file cannot be written, and FormatError if a chunk is damaged.
     """
-    path, frames = on_disk(path), range(reader.frame_count) if frames is None else frames
+    path, frames = Path(path_of(path)), range(reader.frame_count) if frames is None else frames
     decoders, numbers = Decoders(), range(len(reader.tracks))
     tracks = tuple(Track(reader, number, decoders, options.layers) for number in numbers)
     source = _Source(reader, tracks, Background(reader, decoders), frames, options.texture)

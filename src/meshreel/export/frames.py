@@ -18,10 +18,9 @@ import numpy as np
 
 from ..container.reader import ReelReader
 from ..decoder.video import Video
-from ..errors import FormatError, InputError
+from ..errors import FormatError, InputError, path_of
 from ..geometry.rigid import quaternions
 from ..geometry.splats import Bound
-from ..io.files import on_disk
 from ..io.write import replacing, write_mesh
 from ..shapes import Float64, UInt8
 
@@ -70,7 +69,7 @@ def check_splats(video: Video, name: str) -> None:
 def write_splats(bound: Bound | None, path: Path) -> None:
     """Write Gaussians, which may be none, to a .ply or .spz file, which appears when it is complete."""
     rows = np.zeros((0, len(NAMES.split()))) if bound is None else _rows(bound)
-    path = on_disk(path)
+    path = Path(path_of(path))
     data = _spz(rows) if path.suffix == ".spz" else _ply(rows)
     with replacing(path) as file:
         file.write(data)

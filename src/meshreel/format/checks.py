@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 import re
-from bisect import bisect_right
 from itertools import accumulate
 from typing import Any, NoReturn
 
@@ -210,25 +209,12 @@ def check_file(header: Header, index: Index, flags: int, head_size: int) -> tupl
     metadata = parse_metadata(header.metadata)
     groups = [entry for entry in index.chunks if entry.kind == ChunkKind.GROUP]
     edit = parse_edit(metadata, flags, sum(entry.frames for entry in groups if entry.track == 0))
-    _check_shown(edit, index)
     check_header(header, edit.frame_count)
     size = head_size + sum(layer.size for entry in index.chunks for layer in entry.layers)
     if size > EXACT:
         raise FormatError(f"Index.chunks: a file of {size} bytes, beyond 53 bits")
     check_frames(sum(entry.frames for entry in groups), size)
     return metadata, edit, size
-
-
-def _check_shown(edit: Edit, index: Index) -> None:
-    """Check that no group has frames of two ranges that are shown."""
-    ends, begins = [run.stop for run in edit.shown], dict[int, int]()
-    for number, entry in enumerate(index.chunks):
-        if entry.kind == ChunkKind.GROUP:
-            begin = begins.get(entry.track, 0)
-            begins[entry.track] = begin + entry.frames
-            behind = edit.shown[bisect_right(ends, begin) + 1 :][:1]
-            if behind and behind[0].start < begin + entry.frames:
-                raise FormatError(f"Header.metadata: edit.frames have two ranges with frames of chunk {number}")
 
 
 def unpack_audio(payload: bytes) -> AudioFile:

@@ -40,9 +40,8 @@ class Edit:
 
     def item(self, frames: int) -> dict[str, Any]:
         """Return the metadata of a file of `frames` coded frames: the item `edit`, or nothing if nothing is edited."""
-        edit: dict[str, Any] = {}
-        if self.shown != (range(frames),):
-            edit = {"frames": [number for run in self.shown for number in (run.start, run.stop)]}
+        ends = [number for run in self.shown for number in (run.start, run.stop)]
+        edit: dict[str, Any] = {} if ends == [0, frames] else {"frames": ends}
         edit |= {"rotation": list(self.rotation)} if self.rotation else {}
         return {ITEM: edit} if edit else {}
 

@@ -20,7 +20,7 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 from urllib.parse import urlsplit
 
-from ..errors import InputError, without_secret
+from ..errors import InputError, path_of, without_secret
 from ..texts import json_of
 from ..web import LONGEST, WEB, fetch, in_store, time_for
 
@@ -139,34 +139,15 @@ def located(name: object) -> Place:
     """Return the place that a name refers to: a path on this machine, or a URL. Raises InputError for neither."""
     if isinstance(name, Remote):
         return name
-    text = os.fspath(name) if isinstance(name, os.PathLike) else name
-    if not isinstance(text, str):
-        raise InputError(f"{type(name).__name__} {name!r:.60}: is no path; give a str, a pathlib.Path or a URL")
-    if "\0" in text:
-        raise InputError(f"{text!r}: no path has a null character; mend it")
-    return Remote(text) if isinstance(name, str) and _URL.match(text) else Path(text)
-
-
-def on_disk(name: object) -> Path:
-    """Return a path on this machine. Raises InputError for anything else."""
-    if isinstance(place := located(name), Remote):
-        raise InputError(f"{place}: is a URL; give a path on this machine, and copy the file there")
-    return place
+    path = path_of(name)
+    return Remote(path) if isinstance(path, str) and _URL.match(path) else Path(path)
 
 
 def located_all(names: object) -> list[Place]:
     """Return the places that several names refer to, or one name. Raises InputError for other objects."""
-    if isinstance(names, str | Place) or viewed(names) is not None or not isinstance(names, Iterable):
+    if isinstance(names, str | bytes | Place) or not isinstance(names, Iterable):
         return [located(names)]
     return [located(name) for name in names]
-
-
-def viewed(given: Any) -> memoryview | None:
-    """Return the bytes that an object holds, not copied, as of bytes, an array or an mmap; None for other objects."""
-    try:
-        return memoryview(given).cast("B")
-    except (TypeError, ValueError):  # no buffer, a closed or a scattered one
-        return None
 
 
 @contextmanager

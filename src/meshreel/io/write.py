@@ -22,9 +22,8 @@ from typing import Any, BinaryIO
 import numpy as np
 from jaxtyping import UInt8, UInt16
 
-from ..errors import InputError
+from ..errors import InputError, path_of
 from ..types import Mesh, cut_at_seams, distinct_places
-from .files import on_disk
 from .glb_file import COLORS, PLACES, Faces, GlbFile, light
 from .pictures import pack_picture
 
@@ -80,7 +79,7 @@ def write_mesh(mesh: Mesh, path: Path) -> None:
 
     A .ply has no texture; the texture of an .obj is in a .mtl and a .png of its name.
     """
-    path = on_disk(path)
+    path = Path(path_of(path))
     extension = path.suffix.lower()
     pack = _FORMATS.get(extension)
     if pack is None:
