@@ -74,7 +74,9 @@ def test_parts_have_the_tracks_of_the_whole(run, slide, surveyed, tmp_path):
     with FileSource(parts[2]) as source:
         assert [group.form == Form.EMPTY for group in ReelReader(source).groups] == [False, True]
     other = part(run, slide, surveyed, "other.reel", "--part", "1/1")
-    assert failed(run("concat", parts[0], other, *joined), "other.reel: 1 tracks, and", "1.reel has 2", "--survey FILE")
+    assert failed(
+        run("concat", parts[0], other, *joined), "other.reel: number of tracks 1, and of", "1.reel 2", "--survey FILE"
+    )
 
 
 def test_frames_that_end_inside_an_interval_join_too_to_other_groups(run, slide, surveyed, tmp_path):

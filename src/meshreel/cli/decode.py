@@ -173,13 +173,11 @@ def unwritten(file: Path, reader: ReelReader, kept: Collection[str], textures: s
 
 def _not_kept(reader: ReelReader, format: str) -> str:
     """Return a remedy if files of a format cannot keep a video's textures."""
-    if not reader.has_textures:
-        return ""
-    if format == "ply":
+    if reader.has_textures and format == "ply":
         return "PLY has no textures, colours of vertices are kept: give --format obj or glb for textures"
-    if find_spec("av") and find_spec("PIL"):
-        return ""
-    return "colours of vertices are kept: textures need the extra color: pip install 'meshreel[color]'"
+    if reader.has_textures and not (find_spec("av") and find_spec("PIL")):
+        return "colours of vertices are kept: textures need the extra color: pip install 'meshreel[color]'"
+    return ""
 
 
 def _write(

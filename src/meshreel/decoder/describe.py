@@ -15,6 +15,7 @@ from ..coding.group import payload_bytes_by_purpose
 from ..container.reader import Chunk, ReelReader
 from ..container.sources import FileSource
 from ..errors import FormatError
+from ..format.edit import joined
 from ..format.layout import ChunkKind, Form
 from .video import Video
 
@@ -136,14 +137,14 @@ def _describe_state(reader: ReelReader, chunk: Chunk, length: int, shown: Iterab
     """Describe a state of the background: the state that it changes, if any, and the frames that show it."""
     row: dict[str, Any] = {"chunk": chunk.number, "form": chunk.form_name, "bytes": _size_of(reader, chunk)}
     row["changes"] = chunk.depends_on[0] if chunk.depends_on else None
-    row["ranges"] = _merged(shown)
+    row["ranges"] = _merged(range(*ends) for ends in shown)
     return row | _contents(reader, chunk, length, lambda payload: {"background": len(payload)})
 
 
 def _describe_track(reader: ReelReader, number: int, groups: list[dict[str, Any]]) -> dict[str, Any]:
     """Describe a track: the frames in which its body appears, and the bytes of its contents."""
     track_groups = [group for group in groups if group["track"] == number]
-    spans = [(g.shown.start, g.shown.stop) for g in reader.tracks[number] if g.shown and g.form != Form.EMPTY]
+    spans = (group.shown for group in reader.tracks[number] if group.form != Form.EMPTY)
     size = sum(group["bytes"] for group in track_groups)
     row: dict[str, Any] = {"track": number, "ranges": _merged(spans), "groups": len(track_groups), "bytes": size}
     return row | {
@@ -183,12 +184,6 @@ def _renamed(track: dict[str, Any], several: bool) -> dict[str, int]:
     return {name if name in unnamed else prefix + name: size for name, size in track["bytes_by_content"].items()}
 
 
-def _merged(ranges: Iterable[tuple[int, int]]) -> list[list[int]]:
-    """Return first and last frames of ranges (end excluded, in order), adjacent ones merged."""
-    merged: list[list[int]] = []
-    for start, end in ranges:
-        if merged and merged[-1][1] == start - 1:
-            merged[-1][1] = end - 1
-        else:
-            merged.append([start, end - 1])
-    return merged
+def _merged(ranges: Iterable[range]) -> list[list[int]]:
+    """Return first and last frames of ranges in order, adjacent ones merged."""
+    return [[run.start, run.stop - 1] for run in joined(ranges)]

@@ -6,18 +6,18 @@ What was edited is kept in the metadata. Needs nothing of the extra `encode`.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import accumulate
 from typing import Any
 
 import numpy as np
 
-from ..container.reader import Chunk, ReelReader
+from ..container.reader import ReelReader
 from ..errors import InputError
 from ..format.checks import COMPANIONS
-from ..format.edit import ITEM, Edit, is_rotation, nearest_rotation
-from ..format.layout import ChunkKind, Header
+from ..format.edit import ITEM, Edit, is_rotation, joined, nearest_rotation
+from ..format.layout import Form, Header
 from ..format.records import pack
 from ..io.files import Place, first_difference, located, located_all
 from ..io.sequence import SequenceOptions
@@ -48,10 +48,10 @@ def cut(source: Name, output: Name, frames: str, at_keys: bool = False) -> Edite
         whole = interval_of(reader, coded)
         numbers = kept_chunks(reader, whole)
         check_known(path, (reader.chunks[number] for number in numbers))
-        coded = whole if at_keys else coded
-        kept = [range(max(run.start, coded.start), min(run.stop, coded.stop)) for run in reader.edit.shown]
-        edit = Edit(_joined([(-whole.start, kept)]), reader.edit.rotation)
-        first = sum(len(range(run.start, min(run.stop, coded.start))) for run in reader.edit.shown)
+        low, high = (whole.start, whole.stop) if at_keys else (coded.start, coded.stop)
+        kept = ((max(run.start, low) - whole.start, min(run.stop, high) - whole.start) for run in reader.edit.shown)
+        edit = Edit(joined(range(*ends) for ends in kept), reader.edit.rotation)
+        first = sum(len(range(run.start, min(run.stop, low))) for run in reader.edit.shown)
         shown = range(first, first + edit.frame_count)
         intervals = reader.header.intervals[shown.start : shown.stop - 1]
         header = replace(reader.header, first_time=round(1e6 * reader.timestamp(shown.start)), intervals=intervals)
@@ -90,15 +90,15 @@ def concat(sources: Sequence[Name], output: Name) -> Edited:
     frames = sum(count for _, count in parts)
     header, whole = _timed(heads), place_in_whole(parts[0][0])
     befores = [*accumulate((head.coded_count for head in heads), initial=0)]
-    edit = Edit(_joined(zip(befores, (head.edit.shown for head in heads), strict=False)), heads[0].edit.rotation)
-    joined, differing = joined_metadata(parts)
-    metadata = joined | edit.item(befores[-1])
+    moved = ((run, before) for head, before in zip(heads, befores, strict=False) for run in head.edit.shown)
+    shown = joined(range(run.start + before, run.stop + before) for run, before in moved)
+    edit, (metadata, differing) = Edit(shown, heads[0].edit.rotation), joined_metadata(parts)
+    metadata |= edit.item(befores[-1])
     if whole is None and len(places) > 1:
         before = [entry for of, _ in parts for entry in _history(of)[HISTORY]]
         metadata |= _history({HISTORY: [*dict.fromkeys(before)]}, f"concat of {len(places)} files")
     done = written(located(output), header, metadata, pieces, b"" if audio is None else pack(audio))
-    missing = max(whole[1] - frames, 0) if whole else 0
-    return replace(done, missing=missing, differing=differing)
+    return replace(done, missing=max(whole[1] - frames, 0) if whole else 0, differing=differing)
 
 
 def retime(source: Name, output: Name, frame_rate: float | None = None, speed: float | None = None) -> Edited:
@@ -193,11 +193,9 @@ def tag(
 
 def _check_alike(path: Place, reader: ReelReader, other: ReelReader, first: Place, parts: Sequence[Part]) -> None:
     """Raise InputError if the last of the parts is of another sequence than the first, or not the next part."""
-    if len(reader.tracks) != len(other.tracks):
-        text = f"{path}: {len(reader.tracks)} tracks, and {first} has {len(other.tracks)}"
-        raise InputError(f"{text}; encode both with --survey FILE, which meshreel survey writes")
-    for name in ("frame_rate", "origin", "scale", "minimum", "maximum"):
-        ours, theirs = getattr(other.header, name), getattr(reader.header, name)
+    names = ("frame_rate", "origin", "scale", "minimum", "maximum")
+    pairs = [(name, getattr(other.header, name), getattr(reader.header, name)) for name in names]
+    for name, ours, theirs in [("number of tracks", len(other.tracks), len(reader.tracks)), *pairs]:
         if ours != theirs:
             text = f"{path}: {name} {theirs}, and of {first} {ours}: they are not encoded from one survey"
             raise InputError(f"{text}; encode both with --survey FILE, which meshreel survey writes")
@@ -250,15 +248,6 @@ def _timed(readers: Sequence[ReelReader]) -> Header:
     return replace(first, intervals=tuple(steps[:-1]))
 
 
-def _joined(moved: Iterable[tuple[int, Iterable[range]]]) -> tuple[range, ...]:
-    """Return ranges that are not empty, moved by numbers of frames; those with nothing between are one."""
-    joined = list[range]()
-    for by, run in ((by, run) for by, runs in moved for run in runs if run):
-        start = joined.pop().start if joined and joined[-1].stop == run.start + by else run.start + by
-        joined.append(range(start, run.stop + by))
-    return tuple(joined)
-
-
 def _history(metadata: dict[str, Any], *edits: str) -> dict[str, Any]:
     """Return the history of a file as metadata, with these edits added."""
     before = metadata.get(HISTORY)
@@ -302,18 +291,19 @@ def interval_of(reader: ReelReader, frames: range) -> range:
     """
     start, end = frames.start, frames.stop
     while True:
-        groups = [_group_at(own, start) for own in reader.tracks]
-        earlier = min(_stands_alone(reader, group).coded for group in groups)
-        later = max(own.coded + own.frame_count for own in (_group_at(of, end - 1) for of in reader.tracks))
-        counted = [reader.shown_from[state.number] for state in _timed_states(reader, range(start, end))]
-        if (found := (min([earlier, *counted]), later)) == (start, end):
+        kept = set(kept_chunks(reader, range(start, end)))
+        groups = [group for group in reader.groups if group.number in kept]
+        named = {number for group in groups for number in group.depends_on}
+        timed = [c.depends_on[0] for c in reader.chunks if c.form == Form.VIDEO and not c.frame_count]  # states
+        begins = [*(group.coded for group in groups), *(reader.shown_from[n] for n in timed if n in named)]
+        if (found := (min(begins), max(group.coded + group.frame_count for group in groups))) == (start, end):
             return range(start, end)
         start, end = found
 
 
-def kept_chunks(reader: ReelReader, interval: range) -> list[int]:
-    """Return the numbers of the chunks that an interval needs, and of audio, in the order of the file."""
-    kept = {group.number for group in reader.groups if group.coded in interval}
+def kept_chunks(reader: ReelReader, frames: range) -> list[int]:
+    """Return the numbers of the chunks that coded frames need, and of audio, in the order of the file."""
+    kept = {g.number for g in reader.groups if g.coded < frames.stop and g.coded + g.frame_count > frames.start}
     waiting = list(kept)
     while waiting:
         new = set(reader.chunks[waiting.pop()].depends_on) - kept
@@ -321,22 +311,3 @@ def kept_chunks(reader: ReelReader, interval: range) -> list[int]:
         waiting += new
     kept |= {c.number for c in reader.chunks if c.kind in COMPANIONS and c.depends_on[0] in kept}
     return sorted(kept | ({reader.audio.number} if reader.audio else set()))
-
-
-def _group_at(groups: tuple[Chunk, ...], frame: int) -> Chunk:
-    return next(group for group in reversed(groups) if group.coded <= frame)
-
-
-def _stands_alone(reader: ReelReader, group: Chunk) -> Chunk:
-    """Return the first group of a group's chain of predictions."""
-    while (before := reader.group_before(group)) is not None:
-        group = before
-    return group
-
-
-def _timed_states(reader: ReelReader, frames: range) -> list[Chunk]:
-    """Return the states of the background that are shown in some of the frames and have pictures."""
-    some = [g for g in reader.groups if g.coded < frames.stop and g.coded + g.frame_count > frames.start]
-    named = [reader.chunks[number] for number in {number for group in some for number in group.depends_on}]
-    kinds = (ChunkKind.PICTURES, ChunkKind.COMPATIBLE)
-    return [c for c in named if c.kind == ChunkKind.STATIC and any(reader.companion_of(c, kind) for kind in kinds)]

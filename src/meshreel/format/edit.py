@@ -7,6 +7,7 @@ with the flag, rather than show hidden frames or a wrong position.
 from __future__ import annotations
 
 from bisect import bisect_right
+from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import accumulate, pairwise
 from typing import Any
@@ -64,6 +65,15 @@ def parse_edit(metadata: dict[str, Any], flags: int, frames: int) -> Edit:
 
 def _is_whole(number: Any) -> bool:
     return type(number) in (int, float) and number == int(number)  # 3.0 is 3 in JSON
+
+
+def joined(runs: Iterable[range]) -> tuple[range, ...]:
+    """Return the ranges that are not empty; those with nothing between are one."""
+    found = list[range]()
+    for run in filter(len, runs):
+        start = found.pop().start if found and found[-1].stop == run.start else run.start
+        found.append(range(start, run.stop))
+    return tuple(found)
 
 
 def nearest_rotation(matrix: np.ndarray) -> np.ndarray:
