@@ -70,8 +70,7 @@ def check_free(paths: Iterable[Path], force: bool) -> None:
     """Raise InputError if files are there that a user did not name and a run would replace, unless `force`."""
     if there := [] if force else [path for path in paths if os.path.lexists(path)]:
         more = f" and {len(there) - 1} other files" if there[1:] else ""
-        text = f"{there[0]}{more}: there already, and named by no argument"
-        raise InputError(f"{text}; give another name for the output, or --force, which replaces them")
+        raise InputError(f"{there[0]}{more}: there already, and not named; choose another output, or give --force")
 
 
 def write_mesh(mesh: Mesh, path: Path) -> None:
