@@ -1,11 +1,9 @@
 """The fit against surfaces with known answers."""
 
 import numpy as np
-import pytest
 
 from meshreel.analysis.fit.frame import border_sides
-from meshreel.analysis.fit.surface_fit import FitOptions, Guides, fit_frames, snap_to_vertices, strongest_components
-from meshreel.errors import InputError
+from meshreel.analysis.fit.surface_fit import FitOptions, fit_frames, snap_to_vertices, strongest_components
 from meshreel.geometry.topology import drop_unreferenced, face_normals
 from meshreel.types import Mesh
 from tests.metrics.shapes import moved, plane, sphere
@@ -99,7 +97,7 @@ def test_the_second_fit_is_nearer_to_few_components() -> None:
 
     def tail(components: int) -> float:
         options = FitOptions(components=components, pull=0.3)
-        positions = fit_frames(template.faces, predictions, frames, options, Guides(key=0)).positions
+        positions = fit_frames(template.faces, predictions, frames, options, key=0).positions
         return float(np.linalg.norm(positions - strongest_components(positions, 0, 2)))
 
     assert tail(2) < 0.7 * tail(0)
@@ -126,14 +124,6 @@ def test_vertices_that_no_face_uses_keep_their_prediction() -> None:
     loose = np.concatenate([template.vertices, [[0.4, 0.4, 0.4]]])
     fit = fit_frames(template.faces, loose[None], [ball(3)], QUICK)
     assert np.allclose(fit.positions[0][-1], 0.4)
-
-
-def test_a_key_outside_the_frames_and_missing_predictions_are_refused() -> None:
-    template = ball(1)
-    with pytest.raises(InputError, match="key 3"):
-        fit_frames(template.faces, template.vertices[None], [ball(1)], FitOptions(), Guides(key=3))
-    with pytest.raises(InputError, match="1 predictions for 2 frames"):
-        fit_frames(template.faces, template.vertices[None], [ball(1)] * 2, FitOptions())
 
 
 def test_snapped_vertices_are_those_of_the_frame_and_an_empty_frame_keeps_the_prediction() -> None:

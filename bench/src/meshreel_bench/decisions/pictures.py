@@ -14,7 +14,7 @@ import matplotlib
 import numpy as np
 from jaxtyping import Float64
 
-from meshreel.analysis.fit.surface_fit import Fit, FitOptions, Guides, fit_frames
+from meshreel.analysis.fit.surface_fit import Fit, FitOptions, fit_frames
 from meshreel.analysis.reference.centers import (
     ReferenceCenters,
     bind,
@@ -72,7 +72,7 @@ def compute(sequence: MeshList, options: PaperOptions) -> Stages:
     reference = extract_reference(frames, centers, options.reference)
     coded = code_reference(reference.mesh, REFERENCE_BITS, LEVELS)
     predictions = predict(reference, coded.base, centers)
-    fit = fit_frames(coded.base.faces, predictions, frames, FitOptions(), Guides(key=reference.key))
+    fit = fit_frames(coded.base.faces, predictions, frames, FitOptions(), reference.key)
     field = np.moveaxis(fit.positions, 0, 1) - coded.base.vertices[:, None]
     payload, layers = encode_laplacian(coded, field, options.displacements)
     moved = list[tuple[Mesh, np.ndarray]]()

@@ -9,7 +9,7 @@ coder represents cheaply: the first fit's strongest components (decision 10), or
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,7 +17,6 @@ from jaxtyping import Float64, Int32
 from scipy.spatial import cKDTree
 
 from ... import _core
-from ...errors import InputError
 from ...geometry import work
 from ...geometry.closest_points import Surface
 from ...geometry.strict import eigen, products
@@ -31,7 +30,6 @@ MANY = 5000  # smallest number of a template's vertices for which strides apply 
 Faces = Int32[np.ndarray, "F 3"]
 Points = Float64[np.ndarray, "V 3"]  # positions of the template in one frame
 Positions = Float64[np.ndarray, "T V 3"]  # in every frame
-Coherence = Callable[[Positions], Positions]
 AGREEMENT = 0.3  # smallest cosine between the normals of a pair (guess)
 ANCHOR = 0.02  # row weight of the offset from the prediction (guess)
 
@@ -80,16 +78,6 @@ class Rounds:
 
 
 @dataclass(frozen=True, slots=True)
-class Guides:
-    """Optional priors of a fit that a caller supplies."""
-
-    rest: Points | None = None  # the template's shape; None: that of the key frame's fit
-    coherence: Coherence | None = None  # first fit -> positions that attract the second fit; None: `components`
-    key: int | None = None  # frame that is fitted first; None: the middle one
-    noise: float = 0.0  # RMS distance of the frames from the truth; 0: a clean capture
-
-
-@dataclass(frozen=True, slots=True)
 class Fit:
     """Positions of a template on every frame, with their residuals."""
 
@@ -98,22 +86,17 @@ class Fit:
 
 
 def fit_frames(
-    faces: Faces, predictions: Positions, frames: Sequence[Mesh], options: FitOptions, guides: Guides = Guides()
+    faces: Faces, predictions: Positions, frames: Sequence[Mesh], options: FitOptions, key: int | None = None
 ) -> Fit:
-    """Fit a template to each frame, starting from its predicted positions.
+    """Fit a template to each frame, starting from its predicted positions; `key` is as in `fit_surfaces`.
 
     Where a frame has no surface nearby, the template follows its prediction smoothly; an empty frame keeps the
-    prediction and has an infinite residual. Raises InputError if numbers of frames or the key do not agree.
+    prediction and has an infinite residual.
     """
-    count = len(frames)
-    if len(predictions) != count:
-        raise InputError(f"{len(predictions)} predictions for {count} frames: give one for each")
-    if guides.key is not None and not 0 <= guides.key < count:
-        raise InputError(f"key {guides.key} is not one of {count} frames: give 0 to {count - 1}")
-    if len(faces) == 0 or count == 0:
-        return Fit(predictions.copy(), np.full(count, np.inf))
+    if len(faces) == 0 or len(frames) == 0:
+        return Fit(predictions.copy(), np.full(len(frames), np.inf))
     surfaces = [None if mesh.is_empty else FrameSurface(mesh) for mesh in frames]
-    positions = fit_surfaces(faces, predictions, surfaces, options, guides)
+    positions = fit_surfaces(faces, predictions, surfaces, options, key)
     pairs = zip(positions, surfaces, strict=True)
     return Fit(positions, np.array([_residual(Mesh.of(fitted, faces), surface) for fitted, surface in pairs]))
 
@@ -141,30 +124,21 @@ def _residual(fitted: Mesh, frame: FrameSurface | None) -> float:
 
 
 def fit_surfaces(
-    faces: Faces,
-    predictions: Positions,
-    surfaces: Sequence[FrameSurface | None],
-    options: FitOptions,
-    guides: Guides = Guides(),
+    faces: Faces, predictions: Positions, surfaces: Sequence[FrameSurface | None], options: FitOptions, key: int | None
 ) -> Positions:
-    """Fit a template to prepared frames (None: an empty one); return its positions without residuals."""
-    positions = predictions.copy()
-    fitting = Fitting(faces, predictions.shape[1], options, guides.noise)
-    middle = len(surfaces) // 2 if guides.key is None else guides.key
+    """Fit a template to prepared frames (None: an empty one), first to the frame `key`, by default the middle one."""
+    positions, fitting = predictions.copy(), Fitting(faces, predictions.shape[1], options)
+    middle = len(surfaces) // 2 if key is None else key
     present = [t for t, surface in enumerate(surfaces) if surface is not None]
     key = min(present, key=lambda t: (abs(t - middle), t), default=middle)  # the nearest to the middle
     for number in [key] + [t for t in range(len(surfaces)) if t != key]:
-        shapes = predictions if number == key else positions  # until the key is fitted, its prediction
-        rest = shapes[key] if guides.rest is None else guides.rest
+        rest = (predictions if number == key else positions)[key]  # until the key is fitted, its prediction
         positions[number] = fitting.first(surfaces[number], rest, predictions[number])
     if options.components and len(surfaces) > 1:
-        if guides.coherence is None:
-            coherent = strongest_components(positions, key, options.components)
-        else:
-            coherent = guides.coherence(positions)
-        for number in range(len(surfaces)):
+        coherent = strongest_components(positions, key, options.components)
+        for number, surface in enumerate(surfaces):
             if not (number == key and options.restart):
-                positions[number] = fitting.second(surfaces[number], coherent[number], positions[number])
+                positions[number] = fitting.second(surface, coherent[number], positions[number])
     return positions
 
 

@@ -33,7 +33,7 @@ from ...geometry.topology import (
 )
 from ...types import Centers, Mesh
 from ..fit.frame import FrameSurface
-from ..fit.surface_fit import FitOptions, Guides, fit_surfaces
+from ..fit.surface_fit import FitOptions, fit_surfaces
 from .centers import (
     Binding,
     Neighbours,
@@ -151,7 +151,7 @@ def _trial(group: Group, frame: int, key: int, options: ReferenceOptions) -> Tri
         return Trial(frame, key, np.inf)
     tried = sorted({key, *np.linspace(0, len(surfaces) - 1, TRIAL_FRAMES).round().astype(int).tolist()})
     frames = [surfaces[t] for t in tried]
-    fitted = fit_surfaces(mesh.faces, group.sent(mesh, pose)[tried], frames, TRIAL_FIT, Guides(key=tried.index(key)))
+    fitted = fit_surfaces(mesh.faces, group.sent(mesh, pose)[tried], frames, TRIAL_FIT, tried.index(key))
     rms = []
     for frame_surface, moved in zip(frames, fitted, strict=True):
         original = frame_surface.mesh.vertices

@@ -17,7 +17,7 @@ import numpy as np
 from jaxtyping import Float64
 
 from ... import _core
-from ...analysis.fit.surface_fit import FitOptions, Guides, fit_frames, snap_to_vertices
+from ...analysis.fit.surface_fit import FitOptions, fit_frames, snap_to_vertices
 from ...analysis.plan import cut_at
 from ...analysis.reference.extraction import MDS, PoseChoice, ReferenceOptions, extract_reference, predict
 from ...analysis.reference.track import TrackOptions, track_centers
@@ -159,7 +159,7 @@ def analyze(
     if options.fit == "nearest":
         fit = snap_to_vertices(coded.base.faces, predictions, frames)
     else:
-        fit = fit_frames(coded.base.faces, predictions, frames, FitOptions(), Guides(key=reference.key))
+        fit = fit_frames(coded.base.faces, predictions, frames, FitOptions(), reference.key)
     stages.add("fit", len(frames))
     return Fitted(coded, fit.positions, reference.frame == MDS), fit.residuals
 
