@@ -10,7 +10,7 @@ import numpy as np
 from cyclopts import Parameter
 
 from ..analysis.scene.labelling import Segmentation
-from ..analysis.scene.masks import CAMERAS, FrameViews, Masker, label_colors, look_at_labels, sheet, write_views
+from ..analysis.scene.masks import CAMERAS, Masker, Picture, label_colors, look_at_labels, sheet, write_views
 from ..analysis.scene.segmentation import mask_views, scene_views, segment, segment_by
 from ..encoder.scene.scene import label_frames
 from ..encoder.settings.options import EncoderOptions, SceneOptions
@@ -107,7 +107,7 @@ def _write_labels(scene: _Labelling, output: Path, previews: int, common: Common
     frames, count, options = scene.frames, len(scene.frames), scene.options
     chosen = evenly(count, previews)
     names = [Path(name).stem for name in frame_names(count, "npz")]
-    moving, of_bodies, rows = list[int](), list[list[int]](), list[tuple[FrameViews, list[int]]]()
+    moving, of_bodies, rows = list[int](), list[list[int]](), list[tuple[int, list[Picture], list[int]]]()
     with common.stages(count) as progress:
         by: Segmentation
         if scene.masker is None:
@@ -128,15 +128,14 @@ def _write_labels(scene: _Labelling, output: Path, previews: int, common: Common
                 mesh = frames[number]
                 colors = label_colors(labels.moving, labels.bodies)
                 write_colored(mesh, colors, output / COLORED / f"{names[number]}.ply")
-                pictures, counts = look_at_labels(mesh, labels.moving, labels.bodies, views)
-                rows.append((FrameViews(number, pictures), counts))
+                rows.append((number, *look_at_labels(mesh, labels.moving, labels.bodies, views)))
             progress("label", number + 1, count)
     with replacing(output / CAMERAS) as file:
         file.write(pack_cameras(views))
     if chosen:
-        most = np.sum([counts for _, counts in rows], axis=0)  # moving faces in each view
+        most = np.sum([counts for *_, counts in rows], axis=0)  # moving faces in each view
         best = sorted(np.argsort(-most, kind="stable")[:COLUMNS].tolist())
-        cells = [FrameViews(row.frame, [row.pictures[view] for view in best]) for row, _ in rows]
+        cells = [(number, [pictures[view] for view in best]) for number, pictures, _ in rows]
         write_picture(sheet(cells, best), output / SHEET)
     return _totals(moving, of_bodies) | {"views": len(views)}
 

@@ -15,14 +15,7 @@ from jaxtyping import Bool, Int64
 from scipy.spatial import cKDTree
 
 from ...geometry.closest_points import Surface
-from ...geometry.topology import (
-    concatenate,
-    connected_faces,
-    face_normals,
-    linked,
-    part_of,
-    with_neighbours,
-)
+from ...geometry.topology import concatenate, connected_faces, face_normals, linked, part_of, with_neighbours
 from ...geometry.voxels import Lattice, around, distinct, spread
 from ...types import Mesh
 

@@ -191,10 +191,9 @@ class ByMasks:
             return np.zeros(0, bool)
         sights = looks(mesh, self.views)
         masks = self.masker.masks(frame, sights, self.views)
-        votes = Votes.of(np.stack([s.faces for s in sights]), masks, len(mesh.faces))
-        moves = votes.score >= self.threshold
-        moves = _filled(mesh, moves, votes.seen > 0)
-        return without_islands(mesh, moves, self.island)
+        dynamic, seen = votes(np.stack([s.faces for s in sights]), masks, len(mesh.faces))
+        moves = dynamic / np.maximum(seen, 1) >= self.threshold  # eq. 4
+        return without_islands(mesh, _filled(mesh, moves, seen > 0), self.island)
 
 
 Segmentation = ByPlace | ByMasks  # labels of a scene's frames
@@ -255,22 +254,12 @@ def _filled(mesh: Mesh, moves: Bool[np.ndarray, " F"], labelled: Bool[np.ndarray
         labelled |= reached
 
 
-@dataclass(frozen=True, slots=True)
-class Votes:
-    """Numbers of pixels, over all views, that see each face (U) and that see it as moving (V)."""
+def votes(
+    ids: Int32[np.ndarray, "X H W"], masks: Bool[np.ndarray, "X H W"], faces: int
+) -> tuple[Int64[np.ndarray, " F"], Int64[np.ndarray, " F"]]:
+    """Return how many pixels of all views see each of `faces` faces as moving (V), and how many see it at all (U).
 
-    dynamic: Int64[np.ndarray, " F"]  # eq. 2; at most `seen`
-    seen: Int64[np.ndarray, " F"]  # eq. 3; 0: no view sees the face
-
-    @staticmethod
-    def of(ids: Int32[np.ndarray, "X H W"], masks: Bool[np.ndarray, "X H W"], faces: int) -> Votes:
-        """Count the votes on `faces` faces; `ids`: the face that each pixel sees, -1: none; `masks`: moving pixels."""
-        assert ids.shape == masks.shape, "one mask per view"
-        hit = ids >= 0
-        dynamic = np.bincount(ids[hit & masks], minlength=faces)  # eq. 2
-        return Votes(dynamic, np.bincount(ids[hit], minlength=faces))  # eq. 3
-
-    @property
-    def score(self) -> Float64[np.ndarray, " F"]:
-        """Share of the pixels seeing a face that call it moving, 0 to 1; 0 for a face that no view sees."""
-        return self.dynamic / np.maximum(self.seen, 1)  # eq. 4
+    `ids`: the face that each pixel sees, -1: none; `masks`: moving pixels.
+    """
+    hit = ids >= 0
+    return np.bincount(ids[hit & masks], minlength=faces), np.bincount(ids[hit], minlength=faces)  # eqs. 2 and 3

@@ -8,7 +8,6 @@ as `ImageMasks` reads them; and sheets of pictures of a segmentation, in the col
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol, runtime_checkable
 
@@ -114,28 +113,20 @@ def look_at_labels(
     return pictures, counts
 
 
-@dataclass(frozen=True, slots=True)
-class FrameViews:
-    """Pictures of one frame, one for each view."""
-
-    frame: int
-    pictures: Sequence[Picture]
-
-
-def sheet(rows: Sequence[FrameViews], views: Sequence[int]) -> UInt8[np.ndarray, "Y X 3"]:
+def sheet(rows: Sequence[tuple[int, Sequence[Picture]]], views: Sequence[int]) -> UInt8[np.ndarray, "Y X 3"]:
     """Draw pictures of one size on a sheet: a row per frame, a column per view, with their numbers and a legend."""
     from PIL import Image, ImageDraw, ImageFont
 
-    height, width, _ = rows[0].pictures[0].shape
+    height, width, _ = rows[0][1][0].shape
     size = (_LEFT + len(views) * (width + _GAP), _TOP + len(rows) * (height + _GAP) + _TOP)
     image = Image.new("RGB", size, "white")
     draw, font = ImageDraw.Draw(image), ImageFont.load_default(_TEXT)
     for k, view in enumerate(views):
         draw.text((_LEFT + k * (width + _GAP), _GAP), f"view {view}", "black", font)
-    for i, row in enumerate(rows):
+    for i, (frame, pictures) in enumerate(rows):
         top = _TOP + i * (height + _GAP)
-        draw.text((_GAP, top), f"frame\n{row.frame}", "black", font)
-        for k, picture in enumerate(row.pictures):
+        draw.text((_GAP, top), f"frame\n{frame}", "black", font)
+        for k, picture in enumerate(pictures):
             image.paste(Image.fromarray(picture), (_LEFT + k * (width + _GAP), top))
     draw.text((_LEFT, size[1] - _TOP + _GAP), _LEGEND, "black", font)
     return np.asarray(image)
