@@ -86,7 +86,7 @@ def test_faces_without_a_place_in_the_texture_have_the_colors_of_their_vertices(
     uv[:7] = np.nan
     frames = [Mesh(BALL.vertices + t, BALL.faces, colors, uv, Texture.of(CHECKS)) for t in range(2)]
     with writer(tmp_path / f"a.{extension}", Animation(np.arange(2) / 10, 10.0)) as file:
-        file.add(Shape("part", "name", BALL.faces, 0, 2, frames, ((0, 2),), uv))
+        file.add(Shape("part", "name", BALL.faces, 0, frames, ((0, 2),), uv))
     [(mesh, _)] = play(tmp_path / f"a.{extension}").shown(0.1)["part"]
     order = [*range(7, len(uv)), *range(7)] if extension == "glb" else range(len(uv))
     np.testing.assert_allclose(mesh.uv, uv[order], atol=1e-6)

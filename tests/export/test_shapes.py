@@ -30,7 +30,7 @@ def shape(
     """A triangle that rises by 1 from frame to frame."""
     faces = np.array([[0, 1, 2]], np.int32)
     frames = [Mesh(vertices + [0, 0, number], faces) for number in range(count)]
-    return Shape("part", "name", faces, first, count, frames, shown)
+    return Shape("part", "name", faces, first, frames, shown)
 
 
 @pytest.fixture(params=WRITERS)
@@ -135,7 +135,7 @@ def test_usd_is_saved_piece_by_piece_and_whole_all_the_same(tmp_path, monkeypatc
 
 
 def _rest(made: Shape) -> tuple[object, ...]:
-    return made.faces, made.first, made.count, made.frames, made.shown
+    return made.faces, made.first, made.frames, made.shown
 
 
 def test_a_still_shape_comes_and_goes_in_a_glb(tmp_path):
@@ -153,7 +153,7 @@ def test_indices_have_16_bits_where_that_is_enough(tmp_path, count, dtype):
     faces = np.array([[0, 1, count - 1]], np.int32)
     points = Mesh(np.arange(3.0 * count).reshape(-1, 3) / count, faces)
     with animated_glb(tmp_path / "a.glb", animation(1)) as writer:
-        writer.add(Shape("part", "name", faces, 0, 1, [points], ((0, 1),)))
+        writer.add(Shape("part", "name", faces, 0, [points], ((0, 1),)))
     played = PlayedGlb(tmp_path / "a.glb")
     assert (
         played.tree["accessors"][-1]["componentType"] == dtype or played.tree["accessors"][0]["componentType"] == dtype

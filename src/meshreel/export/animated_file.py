@@ -118,7 +118,7 @@ def _states(source: _Source) -> Iterator[Shape]:
         if mesh is not None and not mesh.is_empty:
             visible = tuple((first - frames.start, end - frames.start) for first, end in spans)
             uv = _uv(source, mesh)
-            yield Shape("background", f"state_{number}", mesh.faces, visible[0][0], 1, [mesh], visible, uv)
+            yield Shape("background", f"state_{number}", mesh.faces, visible[0][0], [mesh], visible, uv)
 
 
 def _moving(source: _Source, progress: Progress | None) -> Iterator[Shape]:
@@ -146,7 +146,7 @@ def _group_shapes(source: _Source, group: Chunk, own: range) -> Iterator[Shape]:
             first, name = own[a] - source.frames.start, f"frames_{own[a]}_to_{own[b - 1]}"
             span = (first, first + b - a)
             part, uv = f"track_{group.track}", _uv(source, meshes[a])
-            yield Shape(part, name, meshes[a].faces, first, len(moving), moving, (span,), uv)
+            yield Shape(part, name, meshes[a].faces, first, moving, (span,), uv)
 
 
 def _shape_ranges(meshes: Sequence[Mesh]) -> Iterator[tuple[int, int]]:

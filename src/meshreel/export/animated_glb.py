@@ -13,7 +13,6 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
-from itertools import chain
 from pathlib import Path
 from typing import IO, Any, BinaryIO
 
@@ -22,7 +21,7 @@ import numpy as np
 from ..errors import InputError
 from ..io.glb_file import COLORS, PLACES, Faces, GlbFile, by_use, check_meshopt, light
 from ..io.write import replacing
-from ..types import Mesh, cut_at_seams
+from ..types import cut_at_seams
 from .shapes import Animation, Shape, changes, unit_normals
 
 BITS = 14  # of positions along the longest side of a shape in a compressed file, gltfpack's default
@@ -88,8 +87,7 @@ class GlbWriter:
 
     def _primitives(self, shape: Shape) -> tuple[list[dict[str, Any]], _Lattice]:
         """Write vertices and faces of the first frame, and the difference of each other frame from it."""
-        file, points = self._file, iter(shape.frames)
-        first = next(points)
+        file, first = self._file, shape.frames[0]
         origins, corners, picture = np.arange(len(first.vertices)), shape.faces, None
         places = dict[str, int]()
         if shape.uv is not None and first.texture is not None:
@@ -97,7 +95,7 @@ class GlbWriter:
             picture, places = file.put_picture(first.texture.pixels, shape), {PLACES: file.put_places(uv, shape)}
         elif file.compressed:
             origins, corners = by_use(shape.faces, len(first.vertices))
-        rows, lattice = self._rows(shape, chain([first], points), origins), _Lattice(np.zeros(3), 1.0)
+        rows, lattice = self._rows(shape, origins), _Lattice(np.zeros(3), 1.0)
         if file.compressed:
             stored = list(rows)
             lattice = _Lattice.around([row["POSITION"] for row in stored])
@@ -107,9 +105,9 @@ class GlbWriter:
         material = None if shape.pictured.all() else self._material(first.colors is not None)
         return file.put_faces(Faces(corners, shape.pictured, picture, material), frames, shape), lattice
 
-    def _rows(self, shape: Shape, frames: Iterable[Mesh], origins: np.ndarray) -> Iterator[dict[str, np.ndarray]]:
+    def _rows(self, shape: Shape, origins: np.ndarray) -> Iterator[dict[str, np.ndarray]]:
         """Yield the attributes of each frame."""
-        for frame in frames:
+        for frame in shape.frames:
             row = {"POSITION": self._animation.local(shape, frame.vertices), "NORMAL": unit_normals(frame)}
             row |= {} if frame.colors is None or shape.pictured.all() else {COLORS: light(frame.colors)}
             if self._file.compressed and frame.colors is not None:
@@ -138,8 +136,8 @@ class GlbWriter:
 
     def _animate(self, shape: Shape, node: int, size: float) -> None:
         """Write the channels that show, hide and move a shape; a still shape that is always shown has none."""
-        count = len(self._animation.times)
-        if shape.count == 1 and shape.shown == ((0, count),):
+        count, frames = len(self._animation.times), len(shape.frames)
+        if frames == 1 and shape.shown == ((0, count),):
             return
         put = partial(self._file.put, what=shape)
         self._file.open_view()
@@ -149,9 +147,9 @@ class GlbWriter:
         values = np.repeat(np.float32(size) * states[:, None], 3, axis=1)
         times = put(keys, "SCALAR", bounded=True)
         self._channel(node, "scale", (times, put(values, "VEC3")), "STEP")
-        if shape.count > 1:
-            times = put(self._times[shape.first : shape.first + shape.count], "SCALAR", bounded=True)
-            weights = np.eye(shape.count, dtype=np.float32)[:, 1:].reshape(-1)
+        if frames > 1:
+            times = put(self._times[shape.first : shape.first + frames], "SCALAR", bounded=True)
+            weights = np.eye(frames, dtype=np.float32)[:, 1:].reshape(-1)
             self._channel(node, "weights", (times, put(weights, "SCALAR")), "LINEAR")
 
     def _channel(self, node: int, path: str, accessors: tuple[int, int], interpolation: str) -> None:

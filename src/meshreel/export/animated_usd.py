@@ -134,7 +134,7 @@ class UsdWriter:
         colors = mesh.CreateDisplayColorPrimvar()
         picture = None if shape.uv is None else self._picture(mesh, shape, shape.uv)
         for number, frame in enumerate(shape.frames):
-            code = Usd.TimeCode.Default() if shape.count == 1 else Usd.TimeCode(self._codes[shape.first + number])
+            code = Usd.TimeCode.Default() if len(shape.frames) == 1 else Usd.TimeCode(self._codes[shape.first + number])
             local = self._animation.local(shape, frame.vertices)
             points.Set(Vt.Vec3fArray.FromNumpy(local), code)
             normals.Set(Vt.Vec3fArray.FromNumpy(unit_normals(frame)), code)

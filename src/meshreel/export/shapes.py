@@ -1,12 +1,11 @@
 """Shapes: surfaces over time, the input of the writers of animated files (`animated_glb`, `animated_usd`).
 
-In: an Animation, which all shapes of a file share, and shapes one by one. Out: one file that other programs play. The
-frames of a shape are computed while they are written, so that a long file needs little memory.
+In: an Animation, which all shapes of a file share, and shapes one by one. Out: one file that other programs play.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -33,8 +32,7 @@ class Shape:
     name: str
     faces: Int32[np.ndarray, "F 3"]  # at least one
     first: int  # number of its first frame
-    count: int  # number of its frames, which are consecutive
-    frames: Iterable[Mesh]  # `count` of them, m; all have colours, or none has
+    frames: Sequence[Mesh]  # consecutive, m; all have colours, or none has
     shown: tuple[tuple[int, int], ...]  # ranges of frames that show it: end excluded, in order, with gaps between
     # Texture coordinates of the faces' corners in all frames, as `Mesh.uv`: all of a face's are NaN, or none is.
     uv: Float32[np.ndarray, "F 3 2"] | None = None
