@@ -142,12 +142,6 @@ def test_means_leave_out_none_and_cap_infinite_psnrs():
     assert scene_means([]) == {}
 
 
-def test_impossible_labels_are_refused():
-    mesh, dynamic = parts()
-    with pytest.raises(InputError, match="labels for"):
-        Scene(mesh, dynamic[:-1], [])
-
-
 def test_a_clean_frame_without_faces_cannot_label_others():
     nothing = Scene(Mesh.empty(), np.zeros(0, bool), [sight()], complete=True)
     with pytest.raises(InputError, match="frame 3 of the truth has no faces"):

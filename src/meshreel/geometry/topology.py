@@ -117,13 +117,7 @@ def concatenate(meshes: Sequence[Mesh]) -> Mesh:
     meshes = [mesh for mesh in meshes if len(mesh.vertices)] or list(meshes[:1])
     if len(meshes) <= 1:
         return meshes[0] if meshes else Mesh.empty()
-    vertices = np.empty((sum(len(mesh.vertices) for mesh in meshes), 3))
-    faces = np.empty((sum(len(mesh.faces) for mesh in meshes), 3), np.int32)
-    v = f = 0
-    for mesh in meshes:
-        vertices[v : v + len(mesh.vertices)] = mesh.vertices
-        np.add(mesh.faces, np.int32(v), out=faces[f : f + len(mesh.faces)])
-        v, f = v + len(mesh.vertices), f + len(mesh.faces)
+    starts = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes[:-1])], dtype=np.int32)
     colors = [np.full(mesh.vertices.shape, GREY, np.uint8) if mesh.colors is None else mesh.colors for mesh in meshes]
     textures = [*dict.fromkeys(mesh.texture for mesh in meshes if mesh.uv is not None and mesh.texture is not None)]
     texture, places = None, list[np.ndarray]()
@@ -136,8 +130,8 @@ def concatenate(meshes: Sequence[Mesh]) -> Mesh:
         ]
         texture, places = side_by_side(textures, pairs)
     return Mesh(
-        vertices,
-        faces,
+        np.concatenate([mesh.vertices for mesh in meshes]),
+        np.concatenate([mesh.faces + start for mesh, start in zip(meshes, starts, strict=True)]),
         None if all(mesh.colors is None for mesh in meshes) else np.concatenate(colors),
         np.concatenate(places) if places else None,
         texture,

@@ -115,7 +115,6 @@ def _cameras(meshes: list[Mesh], options: SheetOptions) -> list[Camera]:
 
 
 def _draw(rows: list[SheetRow], options: SheetOptions) -> Any:
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     height, width = rows[0].original.crop.shape
@@ -123,7 +122,6 @@ def _draw(rows: list[SheetRow], options: SheetOptions) -> Any:
     errors = np.concatenate([row.errors[np.isfinite(row.errors)] for row in rows])
     limit = max(float(np.quantile(errors, 0.99)), _LEAST_LIMIT) if len(errors) else 1.0
     figure = Figure(figsize=tuple(size / _DPI), dpi=_DPI)
-    FigureCanvasAgg(figure)
 
     def axes_at(left: int, top: int, wide: int, high: int) -> Any:  # pixels, so that pictures are not resampled
         return figure.add_axes((left / size[0], 1 - (top + high) / size[1], wide / size[0], high / size[1]))

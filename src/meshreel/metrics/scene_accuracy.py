@@ -71,8 +71,6 @@ class Scene:
         options: SightOptions = SightOptions(),
         complete: bool = False,
     ) -> None:
-        if dynamic.shape != (len(mesh.faces),):
-            raise InputError(f"{len(dynamic)} labels for {len(mesh.faces)} faces: give one a face")
         self.origin = mesh.middle  # closest points are found in float32
         self.mesh, self.dynamic = Mesh.of(mesh.vertices - self.origin, mesh.faces), dynamic
         self.sights, self.options, self.complete = tuple(sights), options, complete

@@ -1,13 +1,11 @@
 """Embedded deformation against motions with known answers."""
 
 import numpy as np
-import pytest
 
 from meshreel.analysis.fit.frame import FrameSurface
 from meshreel.analysis.follow.embedded import EmbeddedOptions, Stage, Tracker
 from meshreel.analysis.follow.embedded_graph import Motion, Pose
 from meshreel.analysis.follow.embedded_graph import moved as moved_by
-from meshreel.errors import InputError
 from meshreel.geometry.topology import concatenate, drop_unreferenced
 from meshreel.types import Mesh
 from tests.analysis.fit.test_surface_fit import ball, sheet
@@ -178,14 +176,3 @@ def test_normals_keep_a_point_off_a_near_sheet_that_faces_away() -> None:
     up = np.array([[0.0, 0.0, 1.0]])
     motion = register(frames[0], frames, 0, SMALL)
     assert abs(move(motion, asked, -up)[1, 0, 2] - move(motion, asked, up)[1, 0, 2] - 0.01) < 0.002
-
-
-def test_keys_and_frames_that_cannot_be_are_refused() -> None:
-    mesh = ellipsoid(2)
-    with pytest.raises(InputError, match="is empty"):
-        Tracker(Mesh.empty(), 0, SMALL)
-    tracker = Tracker(mesh, 0, SMALL)
-    with pytest.raises(InputError, match="is the key"):
-        tracker.step(0, FrameSurface(mesh))
-    with pytest.raises(InputError, match="not finite"):
-        tracker.step(1, FrameSurface(Mesh(mesh.vertices * np.nan, mesh.faces)))

@@ -11,6 +11,7 @@ from meshreel.geometry.topology import subdivide_midpoint
 from meshreel.types import Mesh
 
 NOISE = 0.003
+STILL = RigidMotion(np.eye(3), np.zeros(3))
 BOX = subdivide_midpoint(box(((-0.4, -0.25, -0.05), (0.4, 0.25, 0.05))), 4)
 
 
@@ -31,14 +32,14 @@ def test_a_box_that_moves_is_found_where_it_is(degrees, shift):
     true = RigidMotion(turn(degrees), np.array([shift, 0.0, shift]))
     frame = seen(Mesh(true.of(BOX.vertices), BOX.faces), 1)
     body = RigidBody(seen(BOX, 0).mesh, NOISE)
-    found = body.brought(frame, RigidMotion.none())
+    found = body.brought(frame, STILL)
     assert np.abs(found.of(BOX.vertices) - true.of(BOX.vertices)).max() < NOISE
     assert body.holds(frame, found, NOISE)
 
 
 def test_a_body_noisier_than_told_is_rigid_where_bending_leaves_hardly_less():
     frame, body = seen(BOX, 1), RigidBody(seen(BOX, 0).mesh, NOISE / 2)
-    motion = body.brought(frame, RigidMotion.none())
+    motion = body.brought(frame, STILL)
     left, _ = body.residual(frame, motion)
     assert body.holds(frame, motion, left / 1.2)
     assert not body.holds(frame, motion, left / 2.5)
@@ -47,11 +48,11 @@ def test_a_body_noisier_than_told_is_rigid_where_bending_leaves_hardly_less():
 def test_a_plate_that_bends_is_no_rigid_body():
     bent = BOX.vertices + [0.0, 0.0, 0.1] * np.maximum(BOX.vertices[:, :1], 0) ** 2 / 0.16
     frame, body = seen(Mesh(bent, BOX.faces), 1), RigidBody(seen(BOX, 0).mesh, NOISE)
-    motion = body.brought(frame, RigidMotion.none())
+    motion = body.brought(frame, STILL)
     assert not body.holds(frame, motion, NOISE)
 
 
 def test_a_body_far_from_a_frame_does_not_hold():
     away = Mesh(BOX.vertices + [5.0, 0, 0], BOX.faces)
     body = RigidBody(BOX, NOISE)
-    assert not body.holds(FrameSurface(away), body.brought(FrameSurface(away), RigidMotion.none()), NOISE)
+    assert not body.holds(FrameSurface(away), body.brought(FrameSurface(away), STILL), NOISE)

@@ -18,7 +18,6 @@ from jaxtyping import Float64, Int64
 from scipy.spatial import cKDTree
 
 from ... import _core
-from ...errors import InputError
 from ...geometry import work
 from ...geometry.closest_points import Surface, area_samples
 from ...geometry.color_views import Paint
@@ -81,21 +80,12 @@ class Tracker:
     """Tracker of a key frame's mesh: registers one frame at a time, outward from the key in either direction."""
 
     def __init__(
-        self,
-        key_mesh: Mesh,
-        key: int,
-        options: EmbeddedOptions | None = None,
-        noise: float = 0.0,
-        paint: Painter | None = None,
+        self, key_mesh: Mesh, key: int, options: EmbeddedOptions, noise: float = 0.0, paint: Painter | None = None
     ) -> None:
-        """Take the key's mesh; `paint` opens its colour source, used only if shape alone misleads."""
-        self.options, self.key = options or EmbeddedOptions(), key
+        """Take the key's mesh, which has faces; `paint` opens its colour source, used only if shape alone misleads."""
+        self.options, self.key = options, key
         self._noise, self._doubt, self.lost = noise, math.hypot(DOUBT, noise), math.hypot(LOST, NOISY_LOST * noise)
         self.mesh = clean(key_mesh)
-        if self.mesh.is_empty:
-            raise InputError(f"the key frame {key} is empty; choose one that has a surface")
-        if not np.isfinite(self.mesh.vertices).all():
-            raise InputError(f"the key frame {key} has coordinates that are not finite; repair it first")
         o = self.options
         self._samples = area_samples(self.mesh, o.samples)
         self._moved = Surface(self.mesh)
@@ -109,17 +99,14 @@ class Tracker:
         self._paint = paint
         self._colored: ColoredPlaces | None = None
         self._body = RigidBody(self.mesh, noise) if noise > 0 else None  # bending costs clean bodies nothing
-        self._rigid = {} if self._body is None else {key: RigidMotion.none()}
+        self._rigid = {} if self._body is None else {key: RigidMotion(np.eye(3), np.zeros(3))}
 
     def step(self, frame: int, surface: FrameSurface, paint: Painter | None = None) -> float:
         """Register a frame, starting from the nearest registered frame between it and the key; return its residual.
 
         A frame may be registered again. `paint` opens the frame's colour source.
         """
-        if frame == self.key:
-            raise InputError(f"frame {frame} is the key: it needs no registration; step to another")
-        if not np.isfinite(surface.mesh.vertices).all():
-            raise InputError(f"frame {frame} has coordinates that are not finite; repair it first")
+        assert frame != self.key, "the key needs no registration"
         work.count("frames tracked")
         pose, residual = self._follow(frame, surface, paint)
         self._poses[frame], self.residuals[frame] = pose, residual

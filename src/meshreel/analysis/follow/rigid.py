@@ -40,11 +40,6 @@ class RigidMotion:
     shift: Float64[np.ndarray, "3"]
 
     @staticmethod
-    def none() -> RigidMotion:
-        """Return the identity."""
-        return RigidMotion(np.eye(3), np.zeros(3))
-
-    @staticmethod
     def between(source: Float64[np.ndarray, "N 3"], target: Float64[np.ndarray, "N 3"]) -> RigidMotion:
         """Return the rigid motion nearest to that of the points (Kabsch)."""
         turns, shifts = fit_rigid(source[None], target[None], np.ones((1, len(source))))

@@ -286,11 +286,9 @@ def _placed(pose: Float64[np.ndarray, "4 4"], points: Float64[np.ndarray, "N 3"]
 
 def write_calibration_sheet(calibration: Calibration, up: Up, path: Path) -> None:
     """Write a PNG: the distance of each pair of cameras, and what each sees from above, before and after."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(15, 11), dpi=100, layout="constrained")
-    FigureCanvasAgg(figure)
     axes = figure.subplots(2, 2, width_ratios=(2, 3))
     before = [view.camera.view.pose.to_world for view in calibration.views]
     after = [camera.view.pose.to_world for camera in calibration.cameras]

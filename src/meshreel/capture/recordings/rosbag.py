@@ -119,7 +119,7 @@ class _Bag:
         found = []
         for name, kind in sorted(self.reader.topics.items()):
             if (kind.msgtype or "").endswith(("/Image", "/CompressedImage")):
-                first = self.first(name, _has_size)
+                first = self.first(name, lambda message: _topic("", 0, message).width > 0)
                 found += [] if first is None else [_topic(name, kind.msgcount, first)]
         return found
 
@@ -140,10 +140,6 @@ def _opened(path: Path) -> Iterator[_Bag]:
     store.register(get_types_from_msg("geometry_msgs/TransformStamped[] transforms", POSES))  # ROS 1 has it elsewhere
     with (rosbag1.Reader if old else rosbag2.Reader)(path) as reader:
         yield _Bag(path, reader, store.deserialize_ros1 if old else store.deserialize_cdr)
-
-
-def _has_size(message: Any) -> bool:
-    return _topic("", 0, message).width > 0
 
 
 def _topic(name: str, count: int, message: Any) -> _Topic:

@@ -83,9 +83,8 @@ def _lines(path: Path) -> dict[int, list[str]]:
 def _rows(path: Path, columns: tuple[type, ...]) -> Iterator[list[Any]]:
     """Yield the first columns of each line. Raises InputError, which names a line that has others."""
     for number, words in _lines(path).items():
-        words = (
-            [words[0], " ".join(words[1:])] if columns == ROW and len(words) > 2 else words
-        )  # a name may have blanks
+        if columns == ROW and len(words) > 2:  # a name may have blanks
+            words = [words[0], " ".join(words[1:])]
         try:
             row = [column(word) for column, word in zip(columns, words[: len(columns)], strict=True)]
         except ValueError:
