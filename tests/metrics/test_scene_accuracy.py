@@ -50,7 +50,7 @@ def truth(offset=(0, 0, 0), options=OPTIONS, **changed):
 
 
 def row(clean, **changed):
-    return scene_row(clean, clean.labelled(moved(parts(**changed)[0], clean.origin - truth().origin)))
+    return scene_row(clean, clean.labelled(moved(parts(**changed)[0], clean.mesh.middle - truth().mesh.middle)))
 
 
 def test_the_truth_itself_has_no_error():
@@ -104,12 +104,12 @@ def test_visible_surface_is_in_the_picture_in_range_not_hidden_and_not_edge_on()
     clean = truth()
     points = Scene(clean.mesh, clean.dynamic, (), OPTIONS).points  # of all that is there
     ball, wall = points["people"], points["background"]
-    towards = np.array([0, 0, 3.0]) - clean.origin - ball.points
+    towards = np.array([0, 0, 3.0]) - ball.points
     lengths = BALL * np.linalg.norm(towards, axis=1)
-    over = ((ball.points + clean.origin) * towards).sum(axis=1) / lengths - math.cos(math.radians(OPTIONS.grazing))
+    over = (ball.points * towards).sum(axis=1) / lengths - math.cos(math.radians(OPTIONS.grazing))
     sure = np.abs(over) > 0.08  # the ball has flat faces
     assert sure.mean() > 0.9 and np.array_equal(visible(clean, ball)[sure], over[sure] > 0)
-    away = np.abs((wall.points + clean.origin)[:, :2])
+    away = np.abs(wall.points[:, :2])
     seen = visible(clean, wall)
     radius = np.linalg.norm(away, axis=1)
     shadow = 4 * BALL / math.sqrt(9 - BALL**2)  # of the ball on the wall

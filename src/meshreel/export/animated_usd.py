@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float32, Float64, UInt8
+from jaxtyping import Float32, Float64
 
 from ..errors import InputError
 from ..io.file_names import is_text
@@ -127,7 +127,7 @@ class UsdWriter:
 
     def _move(self, mesh: Any, shape: Shape) -> int:
         """Write points, normals and colours, which USD interpolates linearly between samples; return their bytes."""
-        from pxr import Usd, UsdGeom, Vt
+        from pxr import Sdf, Usd, UsdGeom, Vt
 
         size = 0
         points, normals, extent = mesh.CreatePointsAttr(), mesh.CreateNormalsAttr(), mesh.CreateExtentAttr()
@@ -143,7 +143,10 @@ class UsdWriter:
             if frame.colors is not None:
                 colors.Set(Vt.Vec3fArray.FromNumpy(light(frame.colors)), code)
             if picture is not None and frame.texture is not None and shape.first + number < shape.shown[0][1]:
-                picture.Set(self._put_picture(f"{shape.part}_{shape.first + number:05}", frame.texture.pixels), code)
+                name = f"{_identifier(f'{shape.part}_{shape.first + number:05}')}.png"
+                self._textures.mkdir(exist_ok=True)
+                (self._textures / name).write_bytes(pack_picture(frame.texture.pixels))
+                picture.Set(Sdf.AssetPath(f"./{self._textures.name}/{name}"), code)  # relative to the stage
         if frame.colors is None:
             colors.Set([_GREY])
         else:
@@ -176,14 +179,6 @@ class UsdWriter:
             bound = UsdShade.MaterialBindingAPI.Apply(subset.GetPrim())
         bound.Bind(material)
         return picture.CreateInput("file", types.Asset)
-
-    def _put_picture(self, name: str, pixels: UInt8[np.ndarray, "H W 3"]) -> Any:
-        """Write a picture and return its path relative to the stage."""
-        from pxr import Sdf
-
-        self._textures.mkdir(exist_ok=True)
-        (self._textures / f"{_identifier(name)}.png").write_bytes(pack_picture(pixels))
-        return Sdf.AssetPath(f"./{self._textures.name}/{_identifier(name)}.png")
 
 
 def _codes(animation: Animation) -> list[float]:

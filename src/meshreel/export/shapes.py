@@ -13,6 +13,7 @@ import numpy as np
 from jaxtyping import Bool, Float32, Float64, Int32
 
 from ..errors import InputError
+from ..geometry.cameras import matrix_of
 from ..geometry.topology import vertex_normals
 from ..types import Mesh, Up
 
@@ -63,10 +64,8 @@ class Animation:
     @property
     def root(self) -> Float64[np.ndarray, "4 4"]:
         """Matrix from coordinates relative to `origin` to the coordinates of the file, in which +y is up."""
-        matrix = np.eye(4)
-        matrix[:3, :3] = _TURNS[self.up]
-        matrix[:3, 3] = matrix[:3, :3] @ np.asarray(self.origin)
-        return matrix
+        turn = np.array(_TURNS[self.up], np.float64)
+        return matrix_of(turn, turn @ np.asarray(self.origin))
 
     def local(self, shape: Shape, vertices: Float64[np.ndarray, "V 3"]) -> Float32[np.ndarray, "V 3"]:
         """Return coordinates relative to the origin. Raises InputError if float32 cannot hold them."""

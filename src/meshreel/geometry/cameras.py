@@ -35,16 +35,20 @@ _VERSION = {"version_major": 1, "version_minor": 0}  # of Open3D's JSON
 _LARGEST = 1e9  # largest number of a matrix: keeps everything computed from it finite (guess)
 
 
+def matrix_of(turn: Float64[np.ndarray, "3 3"], shift: Float64[np.ndarray, "3"]) -> Matrix:
+    """Return the matrix of a rotation followed by a translation."""
+    matrix = np.eye(4)
+    matrix[:3, :3], matrix[:3, 3] = turn, shift
+    return matrix
+
+
 def looking_at(eye: Float64[np.ndarray, "3"], target: Float64[np.ndarray, "3"], up: int = 1) -> Matrix:
     """Return the matrix from camera to world of a camera at a place that looks at another; axis `up` points up."""
     forward = target - eye
     forward /= np.linalg.norm(forward)
     right = np.cross(forward, np.eye(3)[up])
     right /= np.linalg.norm(right)
-    pose = np.eye(4)
-    pose[:3, :3] = np.stack([right, np.cross(forward, right), forward], axis=1)
-    pose[:3, 3] = eye
-    return pose
+    return matrix_of(np.stack([right, np.cross(forward, right), forward], axis=1), eye)
 
 
 def broken(matrix: Matrix) -> str:

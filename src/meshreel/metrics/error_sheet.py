@@ -70,13 +70,7 @@ def write_sheet(originals: Frames, decoded: Frames, path: Path, options: SheetOp
 def error_at_pixels(view: View, decoded: Mesh) -> Float64[np.ndarray, " N"]:
     """Return the distances from the visible points of the original to the decoded surface, m; inf if it is empty."""
     decoded = used_surface(decoded)
-    if decoded.is_empty:
-        return np.full(len(view.points), np.inf)
-    center = decoded.middle
-    points = view.points - center
-    if len(points) == 0:
-        return np.zeros(0)
-    return Surface(Mesh.of(decoded.vertices - center, decoded.faces)).distances(points)
+    return np.full(len(view.points), np.inf) if decoded.is_empty else Surface(decoded).distances(view.points)
 
 
 def _rows(originals: Frames, decoded: Frames, options: SheetOptions) -> Iterator[SheetRow]:

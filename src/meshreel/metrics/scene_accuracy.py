@@ -71,14 +71,12 @@ class Scene:
         options: SightOptions = SightOptions(),
         complete: bool = False,
     ) -> None:
-        self.origin = mesh.middle  # closest points are found in float32
-        self.mesh, self.dynamic = Mesh.of(mesh.vertices - self.origin, mesh.faces), dynamic
+        self.mesh, self.dynamic = mesh, dynamic
         self.sights, self.options, self.complete = tuple(sights), options, complete
 
     def labelled(self, mesh: Mesh) -> Scene:
         """Prepare another mesh of the same frame; each face takes the label of this scene's nearest face."""
-        local = Mesh.of(mesh.vertices - self.origin, mesh.faces)
-        return Scene(mesh, carried_labels(self.surface, self.dynamic, local), self.sights, self.options)
+        return Scene(mesh, carried_labels(self.surface, self.dynamic, mesh), self.sights, self.options)
 
     @cached_property
     def surface(self) -> Surface:
@@ -90,7 +88,7 @@ class Scene:
 
     @cached_property
     def points(self) -> dict[str, Scatter]:
-        """Points on both parts, about `origin`; a complete scene has only points that a camera can see."""
+        """Points on both parts; a complete scene has only points that a camera can see."""
         parts = (("people", self.dynamic, self.options.people), ("background", ~self.dynamic, self.options.background))
         samples = {name: scatter(self.mesh, chosen, count) for name, chosen, count in parts}
         if self.complete:
@@ -112,7 +110,7 @@ def visible(scene: Scene, points: Scatter) -> Bool[np.ndarray, " N"]:
     normals = face_normals(scene.mesh)[0][points.faces]
     for sight in scene.sights:
         camera, options = sight.camera, scene.options
-        offsets = points.points + scene.origin - camera.eye
+        offsets = points.points - camera.eye
         local = offsets @ camera.extrinsic[:3, :3].T
         pixels = camera.project(local)
         inside = ((pixels >= 0) & (pixels < (camera.width, camera.height))).all(axis=1)  # not a number: behind the eye
@@ -120,8 +118,7 @@ def visible(scene: Scene, points: Scatter) -> Bool[np.ndarray, " N"]:
         lengths = np.linalg.norm(offsets, axis=1)
         facing = np.abs(np.einsum("nd,nd->n", normals, offsets))
         candidates = np.flatnonzero(inside & ~measured & (facing >= math.cos(math.radians(options.grazing)) * lengths))
-        eye = np.broadcast_to(camera.eye - scene.origin, (len(candidates), 3))
-        hit_distances = scene.rays.cast(eye, offsets[candidates]).distances
+        hit_distances = scene.rays.cast(camera.eye[None], offsets[candidates]).distances
         measured[candidates] = hit_distances * lengths[candidates] >= lengths[candidates] - options.slack
     return measured
 
@@ -215,7 +212,7 @@ class _Matched:
         weights = np.concatenate([np.full(len(p), p.area / max(len(p), 1)) for p in parts.values()])
         if target.mesh.is_empty or len(weights) == 0:
             return _Matched(people, weights, np.full(len(weights), np.inf), np.full(len(weights), WORST_ANGLE))
-        points = np.concatenate([p.points for p in parts.values()]) + (source.origin - target.origin)
+        points = np.concatenate([p.points for p in parts.values()])
         hits = target.surface.closest(points)
         distances = np.linalg.norm(hits.points - points, axis=1)
         corners = source.mesh.faces[np.concatenate([p.faces for p in parts.values()])]
@@ -262,8 +259,7 @@ def _picture(scene: Scene, camera: Camera) -> ScenePicture:
     covered, dynamic = np.zeros(shape, bool), np.zeros(shape, bool)
     if not scene.mesh.is_empty:
         _, ahead = Pixels(camera, Crop(0, camera.height, 0, camera.width)).rays
-        eye = np.broadcast_to(camera.eye - scene.origin, ahead.shape)
-        hit = scene.rays.cast(eye, ahead @ np.linalg.inv(camera.extrinsic[:3, :3]).T)
+        hit = scene.rays.cast(camera.eye[None], ahead @ np.linalg.inv(camera.extrinsic[:3, :3]).T)
         covered = (hit.faces >= 0).reshape(shape)
         faces, weights = hit.faces[covered.ravel()], hit.barycentric[covered.ravel()]
         colors[covered] = (interpolate(scene.normals, scene.mesh.faces[faces], weights) + 1) / 2

@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Float64
 
 from ..errors import InputError
-from ..geometry.cameras import Camera, CameraPose, unpack_cameras
+from ..geometry.cameras import Camera, CameraPose, matrix_of, unpack_cameras
 from ..io.files import read_input
 from ..types import UP_AXES, Mesh, check_up
 
@@ -124,7 +124,4 @@ def sides(up: str) -> list[np.ndarray]:
 
 def looking(target: np.ndarray, axes: np.ndarray, distance: float) -> Float64[np.ndarray, "4 4"]:
     """Return the pose, world to camera, that looks at a target from a distance along the last of these axes."""
-    extrinsic = np.eye(4)
-    extrinsic[:3, :3] = axes
-    extrinsic[:3, 3] = -axes @ (target - distance * axes[2])
-    return extrinsic
+    return matrix_of(axes, -axes @ (target - distance * axes[2]))

@@ -14,7 +14,7 @@ RADIUS = float(np.linalg.norm(BALL.vertices[0]))
 
 def closeness(template: Mesh, frame: Mesh, noise: float = 0.0) -> float:
     """Of a template that lies well on another frame before."""
-    measure = Closeness(template.faces, template.vertices, 5e-4, noise)
+    measure = Closeness(template, 5e-4, noise)
     assert measure.of(template.vertices, FrameSurface(template)) < 1e-6
     return measure.of(template.vertices, FrameSurface(frame))
 
@@ -35,7 +35,7 @@ def test_a_template_turned_inside_out_is_wrong_though_it_is_near():
     thin = BALL.vertices * [1, 1, 0.004]  # a disc, 2 mm thick for a diagonal of 1 m
     swapped = thin * [1, 1, -1]  # its upper side below
     disc = Mesh.of(thin, BALL.faces)
-    measure = Closeness(BALL.faces, thin, 5e-4)
+    measure = Closeness(Mesh(thin, BALL.faces), 5e-4)
     assert measure.of(thin, FrameSurface(disc)) < 1e-6
     assert np.abs(swapped - thin).max() < 0.003 and measure.of(swapped, FrameSurface(disc)) == np.inf
 
@@ -44,7 +44,7 @@ def test_surfaces_that_face_each_other_in_every_frame_are_not_wrong():
     inner = Mesh.of(0.999 * BALL.vertices, BALL.faces[:, ::-1])  # a shell: each side is nearest to the other
     shell = concatenate([BALL, inner])
     moved = concatenate([BALL, Mesh.of(0.9985 * BALL.vertices, BALL.faces[:, ::-1])])
-    measure = Closeness(shell.faces, moved.vertices, 5e-4)
+    measure = Closeness(Mesh(moved.vertices, shell.faces), 5e-4)
     first = measure.of(moved.vertices, FrameSurface(shell))
     assert first < 0.001 and measure.of(moved.vertices * 1.0001, FrameSurface(shell)) < 0.001
 
@@ -57,7 +57,7 @@ def test_holes_and_strays_of_noisy_frames_do_not_count():
 def test_what_a_coarse_target_allows_is_not_wrong():
     wavy = Mesh.of(BALL.vertices * (1 + 0.03 * np.sin(9 * BALL.vertices[:, :1] / RADIUS)), BALL.faces)
     for target, is_wrong in ((5e-4, True), (3e-3, False)):
-        measure = Closeness(BALL.faces, BALL.vertices, target)
+        measure = Closeness(BALL, target)
         measure.of(BALL.vertices, FrameSurface(BALL))
         assert (measure.of(BALL.vertices, FrameSurface(wavy)) == np.inf) == is_wrong
 

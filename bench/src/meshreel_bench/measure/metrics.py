@@ -195,7 +195,7 @@ SAMPLES = 500  # points on a thing
 
 def missed(clean: Scene, decoded: Mesh) -> float:
     """Return the share of people's visible surface that the decoded mesh misses."""
-    away = _away(clean.points["people"].points + clean.origin, decoded)
+    away = _away(clean.points["people"].points, decoded)
     return float((away > FAR).mean()) if len(away) else 0.0
 
 
@@ -215,7 +215,7 @@ def _part_bytes(true: Callable[[int], Scene], parts: Parts, video: Video) -> dic
         shares = np.zeros(len(NAMES))
         for frame in {chunk.first_frame + k for k in (0, chunk.frame_count // 2, chunk.frame_count - 1)}:
             clean, mesh = true(frame), video.tracks[chunk.track][frame]
-            faces = clean.surface.closest(mesh.vertices[mesh.faces].mean(axis=1) - clean.origin).faces
+            faces = clean.surface.closest(mesh.vertices[mesh.faces].mean(axis=1)).faces
             shares += np.bincount(parts.of_faces(frame)[faces], minlength=len(NAMES))
         sizes += chunk.size * shares / max(shares.sum(), 1)
     return dict(zip(NAMES, sizes.tolist(), strict=True))
@@ -232,7 +232,7 @@ def _room_after_s(true: Callable[[int], Scene], parts: Parts, video: Video, name
 
 def _is_room(clean: Scene, own: Bool[np.ndarray, " F"], video: Video, frame: int) -> bool:
     points = scatter(clean.mesh, own, SAMPLES)
-    places = points.points[visible(clean, points)] + clean.origin
+    places = points.points[visible(clean, points)]
     still, moving = (_away(places, mesh) for mesh in (video.background(frame), video.moving(frame)))
     return bool(((still <= FAR) & (still <= moving)).mean() >= SHOWN) if len(places) else True
 

@@ -121,15 +121,12 @@ def shared_distance(
 class Closeness:
     """A template prepared for measuring its distance from frames."""
 
-    def __init__(
-        self, faces: Int32[np.ndarray, "F 3"], rest: Float64[np.ndarray, "V 3"], target: float, noise: float = 0.0
-    ) -> None:
+    def __init__(self, template: Mesh, target: float, noise: float = 0.0) -> None:
         """`target` is the distance to reach, `noise` the RMS distance of the frames from the truth.
 
         With noise, holes of the frames do not count.
         """
-        mesh = Mesh(rest, faces)
-        self._surface, self._samples, self._noise = Surface(mesh), area_samples(mesh, SAMPLES), noise
+        self._surface, self._samples, self._noise = Surface(template), area_samples(template, SAMPLES), noise
         self._far = max(FAR, FAR_OFF * target)
         self._usual = 1.0  # share without counterpart in the best fit: gear wheels in mesh face each other
 

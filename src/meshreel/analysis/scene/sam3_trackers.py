@@ -111,7 +111,11 @@ class _Model:
     """A model of transformers on a device, with conversions of its inputs and outputs."""
 
     def __init__(self, path: Path, name: str, device: str) -> None:
-        _check_files(path)
+        names = {child.name for child in path.iterdir()} if path.is_dir() else set()
+        weights = any(name.endswith(".safetensors") for name in names)
+        words = "tokenizer.json" in names or {"vocab.json", "merges.txt"} <= names
+        if not ("config.json" in names and weights and words):
+            raise InputError(f"{path}: holds no weights of SAM3; the folder must hold {_NEEDED}")
         torch, transformers = _libraries()
         try:
             self._device = torch.device(device)
@@ -224,11 +228,3 @@ def _libraries() -> tuple[Any, Any]:
     modeling: Any = modeling_sam3_video  # its own type for this name is the kernel that is not installed
     modeling.cv_utils_kernel = CleanUp
     return torch, transformers
-
-
-def _check_files(path: Path) -> None:
-    names = {child.name for child in path.iterdir()} if path.is_dir() else set()
-    weights = any(name.endswith(".safetensors") for name in names)
-    words = "tokenizer.json" in names or {"vocab.json", "merges.txt"} <= names
-    if not ("config.json" in names and weights and words):
-        raise InputError(f"{path}: holds no weights of SAM3; the folder must hold {_NEEDED}")

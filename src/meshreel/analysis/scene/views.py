@@ -18,7 +18,7 @@ import numpy as np
 from jaxtyping import Float32, Float64, Int64
 
 from ...errors import InputError
-from ...geometry.cameras import Camera, CameraPose, Rays
+from ...geometry.cameras import Camera, CameraPose, Rays, matrix_of
 from ...geometry.strict import dot, norm, products, rounded
 from ...geometry.topology import face_normals
 from ...types import UP_AXES, Frames, Mesh, Up
@@ -56,9 +56,8 @@ def place_views(
     lens = Camera(width, height, (focal, focal), (width / 2, height / 2))
     candidates = list[Camera]()
     for eye, turn in itertools.product((eye for eye, _ in places), _turns(up)):
-        extrinsic = np.eye(4)
-        extrinsic[:3, :3], extrinsic[:3, 3] = turn, -products(turn, eye[:, None])[:, 0]
-        candidates.append(replace(lens, pose=CameraPose.of_world(extrinsic)))
+        pose = CameraPose.of_world(matrix_of(turn, -products(turn, eye[:, None])[:, 0]))
+        candidates.append(replace(lens, pose=pose))
     pixels = np.empty((len(candidates), sum(len(part.points) for part in samples)), np.float32)  # some 100 MB
     for number, (eye, sees) in enumerate(places):
         pixels[len(_WAYS) * number : len(_WAYS) * (number + 1)] = _pixels(eye, sees, samples, _turns(up), lens)

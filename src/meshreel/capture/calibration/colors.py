@@ -20,7 +20,7 @@ from jaxtyping import Float64, Int64
 
 from ...errors import InputError
 from ...geometry import strict
-from ...geometry.cameras import CameraPose
+from ...geometry.cameras import CameraPose, matrix_of
 from ...geometry.color_views import ColorFrames, ColorPicture, ColorViews, sampled
 from ...geometry.topology import face_normals, subdivide_midpoint
 from ...io.write import replacing
@@ -239,9 +239,7 @@ def _joined(looks: Sequence[_Look], poses: Poses) -> tuple[Colors, Trust]:
 
 def _moved(picture: ColorPicture, pose: Float64[np.ndarray, " 6"]) -> ColorPicture:
     """Return a picture whose camera has moved in its own frame."""
-    motion = np.eye(4)
-    motion[:3, :3] = strict.rotations_of(np.concatenate([[1.0], pose[:3] / 2])[None])[0]
-    motion[:3, 3] = pose[3:]
+    motion = matrix_of(strict.rotations_of(np.concatenate([[1.0], pose[:3] / 2])[None])[0], pose[3:])
     camera = picture.camera
     return replace(picture, camera=replace(camera, pose=CameraPose.of_world(strict.products(motion, camera.extrinsic))))
 

@@ -240,7 +240,7 @@ class Candidate:
         faces = reference.base.faces
         self.reference, self._points, self._binding = reference, points, self._tracker.bound(Mesh(points, faces))
         self._fitting = Fitting(faces, len(points), self._options.fit, self._tolerated)
-        self._closeness = closeness or Closeness(faces, points, self._target, self._noise)
+        self._closeness = closeness or Closeness(Mesh(points, faces), self._target, self._noise)
 
     def _fit(self, ahead: Ahead, number: int) -> None:
         prediction = self._tracker.placed(number, self._points, self._binding)
