@@ -96,7 +96,11 @@ FINE = FusionOptions(voxel=0.02)
 
 
 def views(cameras, **scene):
-    return [(one, measured(one, **scene)) for one in cameras]
+    return [taken(one, measured(one, **scene)) for one in cameras]
+
+
+def taken(camera, depth):
+    return camera.picture(camera.in_range(depth))
 
 
 def test_a_ball_seen_from_all_sides_is_a_closed_ball_of_its_size():
@@ -119,9 +123,9 @@ def test_another_camera_carves_away_flying_pixels():
     depth = measured(AROUND[0])
     depth[44:52, 8:16] = 1500  # a piece that is not there, beside the ball
     beside, everything = camera("beside", 20), replace(FINE, fragment=0.0)
-    flying = [(AROUND[0], depth)]
+    flying = [taken(AROUND[0], depth)]
     alone = fuse_depths(flying, everything)
-    both = fuse_depths([*flying, (beside, measured(beside))], everything)  # who sees the wall through it
+    both = fuse_depths([*flying, *views([beside])], everything)  # who sees the wall through it
 
     def piece(mesh):
         away = mesh.vertices[np.linalg.norm(mesh.vertices, axis=1) > RADIUS + 0.1]
@@ -139,9 +143,9 @@ def test_neither_the_order_of_cameras_nor_a_second_run_changes_the_mesh():
 
 def test_depths_out_of_range_or_missing_are_no_surface():
     near = camera(depth_range=(0.2, 2.5))
-    mesh = fuse_depths([(near, measured(near))], FINE)
+    mesh = fuse_depths(views([near]), FINE)
     assert mesh.vertices[:, 2].max() < 0.6  # the wall is 3.2 m away
-    assert fuse_depths([(near, np.zeros((96, 96), np.uint16))], FINE).is_empty and fuse_depths([], FINE).is_empty
+    assert fuse_depths([taken(near, np.zeros((96, 96), np.uint16))], FINE).is_empty and fuse_depths([], FINE).is_empty
 
 
 def test_fragments_are_dropped_by_their_area():
@@ -166,6 +170,6 @@ def test_options_out_of_range_are_refused(wrong):
 @pytest.mark.parametrize("side", [-50.0, 50.0])
 def test_a_slanted_wall_is_fused_at_its_place(side):
     slanted = camera(side=side, size=192)
-    mesh = fuse_depths([(slanted, measured(slanted, ball=(0.0, 50.0, 0.0)))], FusionOptions(voxel=0.02))
+    mesh = fuse_depths(views([slanted], ball=(0.0, 50.0, 0.0)), FusionOptions(voxel=0.02))
     seen = mesh.vertices[np.abs(mesh.vertices[:, :2]).max(axis=1) < 0.5]
     assert len(seen) > 500 and abs(np.median(seen[:, 2]) - WALL) < 1e-3  # half a pixel would be several mm

@@ -92,12 +92,10 @@ def survey_sequence(sequence: MeshSequence, report: Report = lambda *_: None, cl
     Unless `cleaned`, faces without area count like any others, and pieces are not searched: scenes have too many faces
     for that.
     """
-    return joined([survey_frames(sequence, range(len(sequence)), report, cleaned)])
+    return joined([survey_frames(sequence, range(len(sequence)), cleaned, report)])
 
 
-def survey_frames(
-    sequence: MeshSequence, numbers: range, report: Report = lambda *_: None, cleaned: bool = True
-) -> Survey:
+def survey_frames(sequence: MeshSequence, numbers: range, cleaned: bool, report: Report = lambda *_: None) -> Survey:
     """Survey the frames `numbers` of a sequence as `survey_sequence` does; `joined` combines such surveys."""
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
     diagonals, flattened, dropped, pieces = list[float](), list[int](), 0, list[tuple[Piece, ...]]()

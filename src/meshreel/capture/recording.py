@@ -12,19 +12,19 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float64, UInt16
+from jaxtyping import Float64
 
 from ..errors import InputError
-from ..geometry.color_views import ColorPicture, ColorViews, spread_colors
+from ..geometry.color_views import ColorViews, spread_colors
 from ..geometry.depth import DepthPicture, apart
+from ..geometry.derived_sequences import ChosenPictures
 from ..geometry.reconstruct import GRAZING, SEEN, TRUNCATION, extract, integrate
 from ..geometry.topology import vertex_normals, without_fragments
 from ..io.file_names import Order
 from ..io.sequence import SequenceOptions
 from ..types import Mesh, MeshSequence, Up, evenly
 from .calibration.colors import CalibrationOptions, Corrected, Corrections, corrections_of, remembered
-from .rig.cameras import ColorCamera
-from .rig.rig import RIG, SINGLE, DepthCamera, Rig, read_rig
+from .rig.rig import RIG, SINGLE, Rig, read_rig
 
 MOVED = 0.5  # share of pixels that differ from their usual depth, in the median frame, of a camera that moves (guess)
 LEAST = 0.3  # share of pixels with a measurement below which a frame is ignored: it may show no background (guess)
@@ -47,17 +47,16 @@ class FusionOptions:
             raise InputError(f"{text}: give 1 to 20 voxels and an area from 0 on")
 
 
-def fuse_depths(depths: Sequence[tuple[DepthCamera, UInt16[np.ndarray, "H W"]]], options: FusionOptions) -> Mesh:
-    """Fuse the cameras' depths into a mesh, which is empty where no camera measured anything in its range.
+def fuse_depths(pictures: Sequence[DepthPicture], options: FusionOptions) -> Mesh:
+    """Fuse depth pictures into a mesh, which is empty where no camera measured anything.
 
     Raises InputError where the surface takes more blocks of voxels than `reconstruct.MOST_BLOCKS`.
     """
-    pictures = [camera.picture(inside) for camera, depth in depths if (inside := camera.in_range(depth)).any()]
-    if not pictures:
+    fine = [picture.finer(FINER) for picture in pictures if picture.depth.any()]
+    if not fine:
         return Mesh.empty()
-    fine = [picture.finer(FINER) for picture in pictures]
     # Surface seen at a grazing angle needs more voxels, limbs that are seen from both sides bear fewer.
-    truncation = options.truncation or (GRAZING if len(depths) == 1 else TRUNCATION)
+    truncation = options.truncation or (GRAZING if len(pictures) == 1 else TRUNCATION)
     return without_fragments(extract(integrate(fine, options.voxel, truncation), SEEN), options.fragment)
 
 
@@ -86,9 +85,9 @@ class Recording(MeshSequence):
         number = self.numbers[index]
         if self._kept is not None and (kept := self._kept.get(number)) is not None:
             return kept
-        depths = self.rig.depths(number)
+        pictures = [picture for picture in self.rig.depth_pictures(number) if picture is not None]
         try:
-            mesh = self._colored(fuse_depths(depths, self.options), number)
+            mesh = self._colored(fuse_depths(pictures, self.options), number)
         except InputError as error:
             raise InputError(f"{self.rig.folder}: frame {number}: {error}") from None
         if self._kept is not None:
@@ -97,8 +96,7 @@ class Recording(MeshSequence):
 
     def _colored(self, mesh: Mesh, number: int) -> Mesh:
         """Return a fused mesh with colours of its vertices, where the rig has colour cameras."""
-        found = [camera.picture(number) for camera in self.rig.color_cameras]
-        pictures = [picture for picture in found if picture is not None]
+        pictures = [picture for picture in self.rig.color_pictures(number) if picture is not None]
         if not pictures or mesh.is_empty:
             return mesh
         colors, seen = ColorViews(pictures, mesh).at(mesh.vertices, vertex_normals(mesh))
@@ -117,9 +115,9 @@ class Recording(MeshSequence):
         return self.rig.up
 
     @property
-    def pictures(self) -> RigColors:
+    def pictures(self) -> ChosenPictures:
         """The colour pictures of the frames as they were recorded; vertices have their colours."""
-        return RigColors(self.rig.color_cameras, tuple(self.numbers))
+        return ChosenPictures(self.rig.color_pictures, tuple(self.numbers))
 
     @cached_property
     def colors(self) -> Corrected | None:
@@ -137,33 +135,9 @@ class Recording(MeshSequence):
         return remembered(self.rig, looked_at, depends_on, lambda: corrections_of(whole, whole.pictures, options))
 
     @property
-    def depth(self) -> RigDepth:
+    def depth(self) -> ChosenPictures:
         """The depth pictures that the frames are fused from."""
-        return RigDepth(self.rig, tuple(self.numbers))
-
-
-@dataclass(frozen=True, slots=True)
-class RigDepth:
-    """The depth pictures of some frames of a rig's recording (`geometry.depth.DepthFrames`)."""
-
-    rig: Rig
-    numbers: tuple[int, ...]  # of the frames, in the files' names
-
-    def __getitem__(self, index: int) -> list[DepthPicture | None]:
-        frame, files = self.numbers[index], self.rig.files
-        cameras = enumerate(self.rig.cameras)
-        return [camera.picture(self.rig.depth(k, frame)) if frame in files[k] else None for k, camera in cameras]
-
-
-@dataclass(frozen=True, slots=True)
-class RigColors:
-    """The colour pictures of some frames of a rig's recording (`geometry.color_views.ColorFrames`)."""
-
-    cameras: tuple[ColorCamera, ...]
-    numbers: tuple[int, ...]  # of the frames, in the files' names
-
-    def __getitem__(self, index: int) -> list[ColorPicture | None]:
-        return [camera.picture(self.numbers[index]) for camera in self.cameras]
+        return ChosenPictures(self.rig.depth_pictures, tuple(self.numbers))
 
 
 class Kept:

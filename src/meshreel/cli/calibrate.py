@@ -18,7 +18,7 @@ from ..capture.recording import open_recording
 from ..capture.rig.rig import RIG, SINGLE
 from ..errors import InputError
 from ..export.shapes import check_output
-from ..io.write import check_apart, check_free, replacing
+from ..io.write import check_apart, check_free, write_file
 from .console import Common, Force
 
 BEFORE = "rig.before.json"  # copy of the file that --in-place replaced
@@ -92,10 +92,8 @@ def command(
         write_calibration_sheet(calibration, posed.up, picture)
     new = described(posed)
     if in_place:
-        with replacing(rig / BEFORE) as file:
-            file.write((rig / RIG).read_bytes())
-    with replacing(path) as file:
-        file.write(new)
+        write_file(rig / BEFORE, (rig / RIG).read_bytes())
+    write_file(path, new)
     common.warn(warnings)
     _tell(path, calibration, warnings, common)
 

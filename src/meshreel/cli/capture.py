@@ -20,7 +20,7 @@ from ..errors import InputError
 from ..io.file_names import Order
 from ..io.files import first_difference, read_json
 from ..io.sequence import CAPTURED
-from ..io.write import frame_names, make_folder, replacing, write_mesh
+from ..io.write import frame_names, make_folder, write_file, write_mesh
 from .console import Common
 from .sources import make_rig
 
@@ -199,6 +199,5 @@ def _started(output: Path, made: dict[str, Any], names: list[str]) -> set[str]:
     elif any(output.glob("frame_*")):
         raise InputError(f"{output}: holds frames without a {CAPTURED}; choose another folder")
     else:
-        with replacing(path) as file:
-            file.write((json.dumps(made, indent=1) + "\n").encode())
+        write_file(path, (json.dumps(made, indent=1) + "\n").encode())
     return set(names) - existing

@@ -23,7 +23,7 @@ from ..export.frames import Part, check_part, check_splats, write_frames, write_
 from ..format.layout import ChunkKind
 from ..geometry.topology import concatenate
 from ..io.sequence import SequenceOptions
-from ..io.write import check_apart, check_free, frame_names, left_over, make_folder, replacing, write_mesh
+from ..io.write import check_apart, check_free, frame_names, left_over, make_folder, write_file, write_mesh
 from ..types import Mesh, Texture, Up
 from .console import Common, Force
 
@@ -145,8 +145,7 @@ def _write_audio(file: Path, video: Video, output: Path, common: Common) -> None
     if clip is None:
         raise InputError(f"{file}: has no audio; meshreel tag --audio adds one")
     check_apart(output, [file])
-    with replacing(output) as sink:
-        sink.write(clip.data)
+    write_file(output, clip.data)
     row = {"output": str(output), "bytes": len(clip.data), "type": clip.media_type, "start_s": clip.start}
     common.result(row, f"{output}: {len(clip.data)} bytes of {clip.media_type}")
 

@@ -18,7 +18,16 @@ from ..errors import InputError
 from ..geometry.cameras import pack_cameras
 from ..geometry.derived_sequences import upright
 from ..io.pictures import is_mask
-from ..io.write import check_free, frame_names, left_over, make_folder, replacing, write_colored, write_picture
+from ..io.write import (
+    check_free,
+    frame_names,
+    left_over,
+    make_folder,
+    replacing,
+    write_colored,
+    write_file,
+    write_picture,
+)
 from ..types import MeshSequence, evenly
 from .console import Common, Force
 from .sources import Masking, Reading, open_source
@@ -130,8 +139,7 @@ def _write_labels(scene: _Labelling, output: Path, previews: int, common: Common
                 write_colored(mesh, colors, output / COLORED / f"{names[number]}.ply")
                 rows.append((number, *look_at_labels(mesh, labels.moving, labels.bodies, views)))
             progress("label", number + 1, count)
-    with replacing(output / CAMERAS) as file:
-        file.write(pack_cameras(views))
+    write_file(output / CAMERAS, pack_cameras(views))
     if chosen:
         most = np.sum([counts for *_, counts in rows], axis=0)  # moving faces in each view
         best = sorted(np.argsort(-most, kind="stable")[:COLUMNS].tolist())

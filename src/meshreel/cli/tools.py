@@ -16,7 +16,7 @@ from rich.table import Table
 
 from .. import __version__
 from ..errors import InputError
-from ..io.write import check_free, make_folder, replacing
+from ..io.write import check_free, make_folder, write_file
 from . import COMMANDS, make_app, place_of
 from .console import Common, Force
 
@@ -107,8 +107,7 @@ def player(*, copy_to: Path | None = None, force: Force = False, common: Common 
         check_free((copy_to / path.name for path in built), force)
         make_folder(copy_to)
         for path in built:
-            with replacing(copy_to / path.name) as file:
-                file.write(path.read_bytes())
+            write_file(copy_to / path.name, path.read_bytes())
     embed = EMBED.format(folder=copy_to.resolve().name)  # "." has no name
     text = f"{copy_to}: {len(built)} files; in a page beside that folder:\n{embed}"
     common.result({"folder": str(copy_to), "files": [path.name for path in built]}, text)

@@ -21,7 +21,7 @@ from ..decoder.video import Video
 from ..errors import FormatError, InputError, path_of
 from ..geometry.rigid import quaternions
 from ..geometry.splats import Bound
-from ..io.write import replacing, write_mesh
+from ..io.write import write_file, write_mesh
 from ..shapes import Float64, UInt8
 
 Part = Literal["all", "background", "moving"]
@@ -70,9 +70,7 @@ def write_splats(bound: Bound | None, path: Path) -> None:
     """Write Gaussians, which may be none, to a .ply or .spz file, which appears when it is complete."""
     rows = np.zeros((0, len(NAMES.split()))) if bound is None else _rows(bound)
     path = Path(path_of(path))
-    data = _spz(rows) if path.suffix == ".spz" else _ply(rows)
-    with replacing(path) as file:
-        file.write(data)
+    write_file(path, _spz(rows) if path.suffix == ".spz" else _ply(rows))
 
 
 def _ply(rows: Float64[np.ndarray, "N 17"]) -> bytes:

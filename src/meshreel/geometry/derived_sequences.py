@@ -153,7 +153,9 @@ class DerivedSequence(MeshSequence):
         return self._of_frames(getattr(self.source, "colors", None))
 
     def _of_frames(self, pictures: Any) -> Any:
-        return pictures if pictures is None or self.numbers is None else _ChosenPictures(pictures, self.numbers)
+        if pictures is None or self.numbers is None:
+            return pictures
+        return ChosenPictures(pictures.__getitem__, self.numbers)
 
     @property
     def files(self) -> tuple[Path, ...]:
@@ -281,11 +283,11 @@ def turned_over(source: MeshSequence, number: int) -> Mesh:
 
 
 @dataclass(frozen=True, slots=True)
-class _ChosenPictures:
-    """The depth or colour pictures of some frames, by their numbers."""
+class ChosenPictures:
+    """The depth or colour pictures of some frames (`DepthFrames`, `ColorFrames`), by their numbers."""
 
-    source: Any  # DepthFrames or ColorFrames
+    read: Callable[[int], Any]  # reads those of a frame, one for each camera
     numbers: tuple[int, ...]
 
     def __getitem__(self, index: int) -> Any:
-        return self.source[self.numbers[index]]
+        return self.read(self.numbers[index])

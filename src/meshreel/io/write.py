@@ -85,11 +85,8 @@ def write_mesh(mesh: Mesh, path: Path) -> None:
         raise InputError(f"{path}: {path.suffix or 'no'} extension is not one of {', '.join(_FORMATS)}; choose one")
     if extension == ".obj" and mesh.uv is not None and mesh.texture is not None:
         write_picture(mesh.texture.pixels, path.with_suffix(".png"))
-        with replacing(path.with_suffix(".mtl")) as file:
-            file.write(f"newmtl {_MATERIAL}\nKd 1 1 1\nmap_Kd {path.stem}.png\n".encode())
-    data = pack(mesh, path)
-    with replacing(path) as file:
-        file.write(data)
+        write_file(path.with_suffix(".mtl"), f"newmtl {_MATERIAL}\nKd 1 1 1\nmap_Kd {path.stem}.png\n".encode())
+    write_file(path, pack(mesh, path))
 
 
 def write_colored(mesh: Mesh, colors: UInt8[np.ndarray, "F 3"], path: Path) -> None:
@@ -114,10 +111,14 @@ def replacing(path: Path) -> Iterator[BinaryIO]:
         yield file
 
 
-def write_picture(pixels: UInt8[np.ndarray, "H W *C"] | UInt16[np.ndarray, "H W"], path: Path) -> None:
-    data = pack_picture(pixels)
+def write_file(path: Path, data: bytes) -> None:
+    """Write a file, which appears when it is complete."""
     with replacing(path) as file:
         file.write(data)
+
+
+def write_picture(pixels: UInt8[np.ndarray, "H W *C"] | UInt16[np.ndarray, "H W"], path: Path) -> None:
+    write_file(path, pack_picture(pixels))
 
 
 def _pack_ply(mesh: Mesh, _: Path) -> bytes:

@@ -26,7 +26,7 @@ def moments(depths: list[np.ndarray], moves: float | None = None):
     """Frames with their meshes; what is nearer than `moves` along z, m, is not still."""
     found = []
     for depth in depths:
-        mesh = fuse_depths([(AHEAD, depth)], FusionOptions(voxel=VOXEL))
+        mesh = fuse_depths([AHEAD.picture(AHEAD.in_range(depth))], FusionOptions(voxel=VOXEL))
         still = np.ones(len(mesh.faces), bool)
         if moves is not None:
             still = mesh.vertices[mesh.faces].mean(axis=1)[:, 2] > moves

@@ -32,8 +32,8 @@ def test_a_written_rig_is_read_back(folder):
     assert rig.frames == [0, 1, 2] and rig.frame_rate == 15 and rig.missing() == []
     for found, wanted in zip(rig.cameras, (camera(), camera("side", 90)), strict=True):
         assert found.record() == wanted.record()
-    for one, depth in rig.depths(1):
-        assert np.array_equal(depth, one.in_range(measured(one)))
+    for one, picture in zip(rig.cameras, rig.depth_pictures(1), strict=True):
+        assert np.array_equal(picture.depth, one.in_range(measured(one)))
 
 
 def turned(*rows):
@@ -70,7 +70,11 @@ def test_a_folder_with_one_camera_is_a_rig(tmp_path):
 def test_frames_that_one_camera_lacks_are_reported_and_fused_without_it(folder):
     (folder / "side" / "depth" / "depth_00001.png").unlink()
     rig = read_rig(folder)
-    assert [len(rig.depths(frame)) for frame in rig.frames] == [2, 1, 2]
+    assert [[picture is None for picture in rig.depth_pictures(frame)] for frame in rig.frames] == [
+        [False, False],
+        [False, True],
+        [False, False],
+    ]
     assert rig.missing() == ["camera side lacks 1 of 3 frames, for example 1; they are fused without it"]
 
 
@@ -260,7 +264,7 @@ def test_pictures_sort_by_all_numbers_in_their_names(folder, names):
     renamed(folder, names)
     rig = read_rig(folder)
     assert [rig.files[0][frame].stem for frame in rig.frames] == [f"new_{name}" for name in names]
-    assert [len(rig.depths(frame)) for frame in rig.frames] == [2, 2, 2] and rig.missing() == []
+    assert all(None not in rig.depth_pictures(frame) for frame in rig.frames) and rig.missing() == []
 
 
 def test_a_camera_that_stopped_within_a_second_keeps_its_frames(folder):
@@ -314,7 +318,7 @@ def test_a_camera_without_pictures_is_refused(folder):
 def test_pictures_that_hold_no_depth_are_refused(folder, made, words):
     made(folder / "front" / "depth" / "depth_00001.png")
     with pytest.raises(InputError, match=words):
-        read_rig(folder).depths(1)
+        read_rig(folder).depth_pictures(1)
 
 
 def bomb(path):
@@ -327,7 +331,7 @@ def bomb(path):
 def test_a_picture_that_claims_an_enormous_size_is_refused(folder):
     bomb(folder / "front" / "depth" / "depth_00001.png")
     with pytest.raises(InputError, match="more than 8192 x 8192"):
-        read_rig(folder).depths(1)
+        read_rig(folder).depth_pictures(1)
 
 
 def test_depth_pictures_keep_every_bit(tmp_path):

@@ -93,7 +93,7 @@ def test_the_truth_has_clean_meshes_and_labels_that_fused_faces_take(tmp_path):
     with np.load(tmp_path / TRUTH / "dynamic.npz") as labels:
         found = np.unpackbits(labels["frame_00000"])[: len(SCENE.dynamic)].astype(bool)
     assert np.array_equal(found, SCENE.dynamic) and found.sum() == len(BALL.faces)
-    fused = fuse_depths(read_rig(tmp_path).depths(0), FusionOptions())
+    fused = fuse_depths(read_rig(tmp_path).depth_pictures(0), FusionOptions())
     dynamic = carried_labels(Surface(SCENE.mesh), SCENE.dynamic, fused)
     middles = fused.vertices[fused.faces].mean(axis=1)
     assert np.array_equal(dynamic, np.linalg.norm(middles, axis=1) < RADIUS + 0.2) and 0 < dynamic.mean() < 1

@@ -18,7 +18,7 @@ from ...errors import InputError
 from ...geometry.cameras import Camera, Rays, Seen, pack_cameras, unpack_cameras
 from ...io.files import read_input
 from ...io.pictures import find_masks, last_number, read_mask
-from ...io.write import frame_names, make_folder, replacing, write_picture
+from ...io.write import frame_names, make_folder, write_file, write_picture
 from ...types import Frames, Mesh
 from .color_looks import ColorLooks
 
@@ -72,8 +72,7 @@ def write_views(
             picture = normal_picture(rays.look(views[view]), views[view]) if photo is None else photo
             write_picture(picture, place / name)
         report(number + 1)
-    with replacing(folder / CAMERAS) as file:
-        file.write(pack_cameras(views))
+    write_file(folder / CAMERAS, pack_cameras(views))
 
 
 def _step(points: Float64[np.ndarray, "H W 3"], axis: int) -> Float64[np.ndarray, "H W 3"]:

@@ -23,7 +23,7 @@ from ...geometry import strict
 from ...geometry.cameras import CameraPose, matrix_of
 from ...geometry.color_views import ColorFrames, ColorPicture, ColorViews, sampled
 from ...geometry.topology import face_normals, subdivide_midpoint
-from ...io.write import replacing
+from ...io.write import write_file
 from ...texts import json_of
 from ...types import Frames, Mesh, evenly
 from ..rig.rig import Rig
@@ -324,8 +324,8 @@ def remembered(
     ]
     with suppress(OSError, InputError):
         if rig.folder.stat().st_mode & 0o222:  # root could write where nobody is meant to
-            with replacing(rig.folder / REMEMBERED) as file:
-                file.write((json.dumps({"of": digest, "cameras": entries}, indent=1) + "\n").encode())
+            text = json.dumps({"of": digest, "cameras": entries}, indent=1) + "\n"
+            write_file(rig.folder / REMEMBERED, text.encode())
     return found
 
 

@@ -20,10 +20,12 @@ from jaxtyping import Float64, UInt16
 
 from ...errors import InputError
 from ...geometry.cameras import Camera, Matrix
+from ...geometry.color_views import ColorPicture
+from ...geometry.depth import DepthPicture
 from ...io.file_names import Order, gaps
 from ...io.files import read_json
 from ...io.pictures import read_depth
-from ...io.write import replacing
+from ...io.write import write_file
 from ...types import UP_AXES, UPS, Up
 from .cameras import ColorCamera, DepthCamera, Key, check_size, distortion_of, pictures_in, placed
 
@@ -60,10 +62,14 @@ class Rig:
         """Sorted numbers of the frames that at least one camera has."""
         return sorted(set().union(*self.files))
 
-    def depths(self, frame: int) -> list[tuple[DepthCamera, UInt16[np.ndarray, "H W"]]]:
-        """Read a frame's depths of all cameras that have it. Raises InputError where a picture has another size."""
-        there = [number for number, files in enumerate(self.files) if frame in files]
-        return [(self.cameras[number], self.depth(number, frame)) for number in there]
+    def depth_pictures(self, frame: int) -> list[DepthPicture | None]:
+        """Read a frame's depths; None for a camera without it. Raises InputError where a picture has another size."""
+        cameras = enumerate(self.cameras)
+        return [camera.picture(self.depth(k, frame)) if frame in self.files[k] else None for k, camera in cameras]
+
+    def color_pictures(self, frame: int) -> list[ColorPicture | None]:
+        """Read a frame's pictures of the colour cameras, as `depth_pictures` does those of depth."""
+        return [camera.picture(frame) for camera in self.color_cameras]
 
     def depth(self, number: int, frame: int) -> UInt16[np.ndarray, "H W"]:
         """Read the depths of one camera, by its number, in a frame that it has; depths out of its range are 0."""
@@ -117,10 +123,8 @@ def _numbered(folder: Path, keyed: list[dict[Key, Path]]) -> tuple[dict[int, Pat
     """Return pictures by the number that is their key, or else by the place of their key among those of all folders."""
     keys = sorted(set[Key]().union(*keyed))
     if len({len(key) for key in keys}) > 1:
-        by_length = sorted(keyed, key=lambda files: len(next(iter(files))))
-        names = " and ".join(
-            str(next(iter(files.values())).relative_to(folder)) for files in (by_length[-1], by_length[0])
-        )
+        ordered = sorted(keyed, key=lambda files: len(next(iter(files))))
+        names = " and ".join(str(next(iter(each.values())).relative_to(folder)) for each in (ordered[-1], ordered[0]))
         raise InputError(f"{folder}: pictures sort by several numbers and by one, as {names}; name them alike")
     whole = all(isinstance(key[0], Fraction) and key[0].denominator == len(key) == 1 for key in keys)
     numbers = {key: int(key[0]) if whole else place for place, key in enumerate(keys)}
@@ -171,8 +175,8 @@ def write_rig(
     entries = [camera.record() | {"depth": f"{camera.name}/depth"} for camera in cameras]
     for entry, color in zip(entries, colors, strict=False):
         entry |= {} if color is None else {"color": color}
-    with replacing(folder / RIG) as file:
-        file.write((json.dumps({"frames_per_second": frame_rate, "cameras": entries}, indent=1) + "\n").encode())
+    text = json.dumps({"frames_per_second": frame_rate, "cameras": entries}, indent=1) + "\n"
+    write_file(folder / RIG, text.encode())
 
 
 def _camera(path: Path, label: str, entry: Any) -> DepthCamera:

@@ -26,7 +26,7 @@ from ...geometry.strict import products
 from ...geometry.topology import concatenate, face_normals
 from ...io.files import read_file
 from ...io.meshes import read_mesh
-from ...io.write import make_folder, replacing, write_mesh, write_picture
+from ...io.write import make_folder, replacing, write_file, write_mesh, write_picture
 from ...types import Mesh
 from ..rig.cameras import DepthCamera, posed
 from ..rig.rig import RIG, read_cameras, write_rig
@@ -137,9 +137,8 @@ def simulate_rig(
         progress(count)
     with replacing(folder / TRUTH / LABELS) as file:
         np.savez_compressed(file, **labels)  # type: ignore[arg-type]  # NumPy 2.1 stores `allow_pickle=` as an array
-    with replacing(folder / TRUTH / RIG) as file:
-        record = {"frames_per_second": frame_rate, "cameras": [camera.record() for camera in cameras]}
-        file.write((json.dumps(record, indent=1) + "\n").encode())
+    record = {"frames_per_second": frame_rate, "cameras": [camera.record() for camera in cameras]}
+    write_file(folder / TRUTH / RIG, (json.dumps(record, indent=1) + "\n").encode())
     random = np.random.default_rng([sensor.seed, 1 << 30])
     wrong = tuple(_mistaken(camera, sensor, random) for camera in cameras)
     described = [eye.record(f"{camera.name}/color", random) for camera, eye in zip(cameras, eyes, strict=False)]
@@ -223,20 +222,15 @@ def read_truth(folder: Path) -> Truth:
     paths = {path.stem: path for path in sorted(folder.glob("frame_*.ply"))}
     if not paths:
         raise InputError(f"{folder}: has no clean meshes (frame_00000.ply); give the folder `truth` of a simulated rig")
-    labels = _labels(folder / LABELS)
+    try:
+        with np.load(BytesIO(read_file(folder / LABELS)), allow_pickle=False) as archive:
+            labels = {name: archive[name] for name in archive.files}
+    except _DAMAGED as error:
+        raise InputError(f"{folder / LABELS}: labels cannot be read ({error}); simulate the rig again") from None
     if unlike := sorted(labels.keys() ^ paths.keys()):
         text = f"{len(paths)} clean meshes and labels of {len(labels)} frames, unlike in {unlike[0]}"
         raise InputError(f"{folder}: {text}; simulate the rig again")
     return Truth(tuple(paths.values()), tuple(labels[name] for name in paths), cameras, rate)
-
-
-def _labels(path: Path) -> dict[str, np.ndarray]:
-    """Return packed labels by frame name."""
-    try:
-        with np.load(BytesIO(read_file(path)), allow_pickle=False) as archive:
-            return {name: archive[name] for name in archive.files}
-    except _DAMAGED as error:
-        raise InputError(f"{path}: labels cannot be read ({error}); simulate the rig again") from None
 
 
 @dataclass(frozen=True, slots=True)

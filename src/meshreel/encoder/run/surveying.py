@@ -22,7 +22,7 @@ from ...format.checks import LARGEST
 from ...geometry.derived_sequences import DerivedSequence
 from ...geometry.work import Work, add, since, so_far
 from ...io.files import Place, read_input
-from ...io.write import replacing
+from ...io.write import write_file
 from ...texts import json_of
 from .schedule import Call, Job, as_done
 from .worker import end_with_parent
@@ -56,7 +56,7 @@ def _survey_in_worker(sequence: DerivedSequence, numbers: range, cleaned: bool) 
     end_with_parent()
     with threadpool_limits(1):
         before = so_far()
-        return survey_frames(sequence, numbers, cleaned=cleaned), sequence.observed, since(before)
+        return survey_frames(sequence, numbers, cleaned), sequence.observed, since(before)
 
 
 def survey_from_facts(sequence: DerivedSequence, whole: dict[str, Any]) -> Survey | None:
@@ -135,8 +135,7 @@ class SurveyFile:
 def write_survey(survey: Survey, sequence: DerivedSequence, path: Path) -> None:
     """Write the survey of a sequence, each frame of which has been read, to a file of JSON."""
     record = {"kind": KIND, **_about(sequence), **_packed(survey), "digests": sequence.digests}
-    with replacing(path) as file:
-        file.write(json.dumps(record).encode())
+    write_file(path, json.dumps(record).encode())
 
 
 def read_survey(path: Place) -> SurveyFile:
