@@ -96,18 +96,18 @@ def from_template(mesh: Mesh, frame: FrameSurface, gate: float, least: float) ->
 
 def from_borders(mesh: Mesh, frame: FrameSurface, gate: float, least: float) -> Rows:
     faces, starts = (np.repeat(of_sides, EDGE_SAMPLES) for of_sides in border_sides(mesh.faces))
-    mine, theirs = sample_border(mesh), sample_border(frame.mesh)
+    (mine, own, out), (theirs, normals, outward) = sample_border(mesh), sample_border(frame.mesh)
     share = np.tile((np.arange(EDGE_SAMPLES) + 0.5) / EDGE_SAMPLES, len(faces) // EDGE_SAMPLES)
     corners = np.zeros((len(faces), 3))
     corners[np.arange(len(faces)), starts], corners[np.arange(len(faces)), (starts + 1) % 3] = 1 - share, share
-    ahead, back = cKDTree(theirs.points).query(mine.points)[1], cKDTree(mine.points).query(theirs.points)[1]
+    ahead, back = cKDTree(theirs).query(mine)[1], cKDTree(mine).query(theirs)[1]
     a, b = np.concatenate([np.arange(len(ahead)), back]), np.concatenate([ahead, np.arange(len(back))])
-    weights = pair_weights(mine.points[a] - theirs.points[b], mine.normals[a], theirs.normals[b], gate, least)
-    weights *= np.einsum("nd,nd->n", mine.outward[a], theirs.outward[b]) > least
+    weights = pair_weights(mine[a] - theirs[b], own[a], normals[b], gate, least)
+    weights *= np.einsum("nd,nd->n", out[a], outward[b]) > least
     weights *= np.where(np.arange(len(a)) < len(ahead), 1.0, len(ahead) / len(back)) / EDGE_SAMPLES
     rows = [
-        Rows(faces[a], corners[a], direction, np.einsum("nd,nd->n", direction, theirs.points[b]), weights)
-        for direction in (theirs.outward[b], theirs.normals[b])
+        Rows(faces[a], corners[a], direction, np.einsum("nd,nd->n", direction, theirs[b]), weights)
+        for direction in (outward[b], normals[b])
     ]
     return rows[0] + rows[1]
 

@@ -119,16 +119,6 @@ def test_a_group_of_one_frame_takes_that_frames_pose() -> None:
     assert rms_gap(frame, reference.mesh) < 0.003
 
 
-def test_empty_frames_are_passed_over_and_a_group_of_them_is_empty(trials: list[Trial]) -> None:
-    frame, first = ball((0, 0, 0)), inside((0, 0, 0))
-    centers = Centers(np.stack([first] * 3), np.zeros(len(first), np.int32))
-    reference = extract_reference([Mesh.empty(), frame, frame], centers, QUICK)
-    assert not reference.mesh.is_empty
-    assert reference.key in (1, 2)
-    assert {trial.frame for trial in trials} == {0, 1, MDS}
-    assert extract_reference([Mesh.empty()] * 3, centers, QUICK).mesh.is_empty
-
-
 def test_any_mesh_in_the_reference_pose_can_be_sent_back() -> None:
     frames, centers = two_balls((0.2, 0.3))
     reference: Reference = extract_reference(frames, centers, QUICK)

@@ -8,7 +8,6 @@ from scipy.spatial import cKDTree
 
 from meshreel import _core
 from meshreel.analysis.reference.track import TrackOptions, track_centers
-from meshreel.errors import InputError
 from meshreel.geometry.inside import interior_samples
 from meshreel.geometry.topology import concatenate
 from meshreel.types import Mesh
@@ -110,13 +109,6 @@ def test_frames_of_other_connectivity_are_followed() -> None:
 def test_fewer_samples_than_centers_reduce_the_centers() -> None:
     track = track_centers([Mesh.of(bean().vertices, [[0, 0, 1]])], OPTIONS)
     assert track.positions.shape == (1, 2, 3)
-
-
-def test_no_frames_an_empty_frame_and_bad_coordinates_are_refused() -> None:
-    broken = Mesh.of(bean().vertices * np.nan, bean().faces)
-    for frames, word in (([], "no frames"), ([bean(), Mesh.empty()], "frame 1 is empty"), ([broken], "finite")):
-        with pytest.raises(InputError, match=word):
-            track_centers(frames, OPTIONS)
 
 
 def test_core_refuses_indices_out_of_range_and_values_that_are_not_finite() -> None:

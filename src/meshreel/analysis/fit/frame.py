@@ -9,7 +9,6 @@ a clean frame than usual has no counterpart, or one that faces away (folds, shar
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -21,6 +20,7 @@ from ...geometry.depth import FreeSpace
 from ...geometry.topology import border_edges, border_mask, face_normals, unique_edges, vertex_normals
 from ...types import Mesh
 
+Points = Float64[np.ndarray, "N 3"]
 ON_BORDER = 1e-6  # points of a surface with an interpolated `inside` up to this lie on an open border: rounding
 EDGE_SAMPLES = 8  # per border edge: a guess; sliding along the border is free, so a finer search gains nothing
 SAMPLES = 4000  # of each surface: as many as tracking matches
@@ -65,18 +65,8 @@ class FrameSurface:
 
     @cached_property
     def target(self) -> _core.FitTarget:
-        rim = sample_border(self.mesh)
         whole = (self.surface.tree, self.mesh.vertices, self.mesh.faces, self.normals, self.inside.view(np.uint8))
-        return _core.FitTarget(*whole, rim.points, rim.normals, rim.outward)
-
-
-@dataclass(frozen=True, slots=True)
-class Border:
-    """Points along the open borders of a mesh, each with its local frame."""
-
-    points: Float64[np.ndarray, "N 3"]
-    normals: Float64[np.ndarray, "N 3"]  # of the face
-    outward: Float64[np.ndarray, "N 3"]  # in the face's plane, away from the surface
+        return _core.FitTarget(*whole, *sample_border(self.mesh))
 
 
 def border_sides(faces: Int32[np.ndarray, "F 3"]) -> tuple[Int64[np.ndarray, " E"], Int64[np.ndarray, " E"]]:
@@ -86,8 +76,11 @@ def border_sides(faces: Int32[np.ndarray, "F 3"]) -> tuple[Int64[np.ndarray, " E
     return face_numbers, sides
 
 
-def sample_border(mesh: Mesh) -> Border:
-    """Place `EDGE_SAMPLES` evenly spaced points on each border edge, in order."""
+def sample_border(mesh: Mesh) -> tuple[Points, Points, Points]:
+    """Place `EDGE_SAMPLES` evenly spaced points on each border edge, in order.
+
+    Return them, the normals of their faces, and the directions in the faces' planes away from the surface.
+    """
     faces, sides = border_sides(mesh.faces)
     ends = mesh.vertices[mesh.faces[faces]]
     pick = np.arange(len(faces))
@@ -98,7 +91,7 @@ def sample_border(mesh: Mesh) -> Border:
     outward = np.cross(along, normals)  # counter-clockwise faces lie to the left of their edges
     share = (np.arange(EDGE_SAMPLES) + 0.5) / EDGE_SAMPLES
     points = start[:, None] + share[:, None] * (end - start)[:, None]
-    return Border(points.reshape(-1, 3), normals.repeat(EDGE_SAMPLES, axis=0), outward.repeat(EDGE_SAMPLES, axis=0))
+    return points.reshape(-1, 3), normals.repeat(EDGE_SAMPLES, axis=0), outward.repeat(EDGE_SAMPLES, axis=0)
 
 
 def shared_distance(

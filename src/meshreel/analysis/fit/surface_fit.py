@@ -82,7 +82,7 @@ class Fit:
     """Positions of a template on every frame, with their residuals."""
 
     positions: Positions
-    residuals: Float64[np.ndarray, " T"]  # symmetric RMS distance; infinite for an empty frame
+    residuals: Float64[np.ndarray, " T"]  # symmetric RMS distance
 
 
 def fit_frames(
@@ -90,12 +90,9 @@ def fit_frames(
 ) -> Fit:
     """Fit a template to each frame, starting from its predicted positions; `key` is as in `fit_surfaces`.
 
-    Where a frame has no surface nearby, the template follows its prediction smoothly; an empty frame keeps the
-    prediction and has an infinite residual.
+    Each frame has a surface; where none is nearby, the template follows its prediction smoothly.
     """
-    if len(faces) == 0 or len(frames) == 0:
-        return Fit(predictions.copy(), np.full(len(frames), np.inf))
-    surfaces = [None if mesh.is_empty else FrameSurface(mesh) for mesh in frames]
+    surfaces = [FrameSurface(mesh) for mesh in frames]
     positions = fit_surfaces(faces, predictions, surfaces, options, key)
     pairs = zip(positions, surfaces, strict=True)
     return Fit(positions, np.array([_residual(Mesh.of(fitted, faces), surface) for fitted, surface in pairs]))
@@ -104,33 +101,28 @@ def fit_frames(
 def snap_to_vertices(faces: Faces, predictions: Positions, frames: Sequence[Mesh]) -> Fit:
     """Move each predicted vertex to the nearest vertex of its frame, as the paper's released code does.
 
-    Neighbours may fall on one vertex. An empty frame keeps the prediction and has an infinite residual.
+    Neighbours may fall on one vertex. Each frame has a surface.
     """
-    positions, residuals = predictions.copy(), np.full(len(frames), np.inf)
+    positions, residuals = predictions.copy(), np.zeros(len(frames))
     for number, frame in enumerate(frames):
-        if not frame.is_empty:
-            used = frame.vertices[np.unique(frame.faces)]
-            positions[number] = used[cKDTree(used).query(predictions[number])[1]]
-            residuals[number] = _residual(Mesh(positions[number], faces), FrameSurface(frame))
+        used = frame.vertices[np.unique(frame.faces)]
+        positions[number] = used[cKDTree(used).query(predictions[number])[1]]
+        residuals[number] = _residual(Mesh(positions[number], faces), FrameSurface(frame))
     return Fit(positions, residuals)
 
 
-def _residual(fitted: Mesh, frame: FrameSurface | None) -> float:
+def _residual(fitted: Mesh, frame: FrameSurface) -> float:
     """Return the RMS distance of vertices from the other surface, the larger of both directions."""
-    if frame is None:
-        return np.inf
     to_fit, to_frame = Surface(fitted).distances(frame.mesh.vertices), frame.surface.distances(fitted.vertices)
     return float(np.sqrt(max(np.mean(to_fit**2), np.mean(to_frame**2))))
 
 
 def fit_surfaces(
-    faces: Faces, predictions: Positions, surfaces: Sequence[FrameSurface | None], options: FitOptions, key: int | None
+    faces: Faces, predictions: Positions, surfaces: Sequence[FrameSurface], options: FitOptions, key: int | None
 ) -> Positions:
-    """Fit a template to prepared frames (None: an empty one), first to the frame `key`, by default the middle one."""
+    """Fit a template to prepared frames, first to the frame `key`, by default the middle one."""
     positions, fitting = predictions.copy(), Fitting(faces, predictions.shape[1], options)
-    middle = len(surfaces) // 2 if key is None else key
-    present = [t for t, surface in enumerate(surfaces) if surface is not None]
-    key = min(present, key=lambda t: (abs(t - middle), t), default=middle)  # the nearest to the middle
+    key = len(surfaces) // 2 if key is None else key
     for number in [key] + [t for t in range(len(surfaces)) if t != key]:
         rest = (predictions if number == key else positions)[key]  # until the key is fitted, its prediction
         positions[number] = fitting.first(surfaces[number], rest, predictions[number])
@@ -163,22 +155,18 @@ class Fitting:
         chosen = options if vertices >= MANY else replace(options, strides=None)  # few: match all
         self._first, self._second = chosen.rounds(noise)
 
-    def first(self, surface: FrameSurface | None, rest: Points, prediction: Points) -> Points:
+    def first(self, surface: FrameSurface, rest: Points, prediction: Points) -> Points:
         """Fit a frame from its prediction, keeping the shape `rest` where the frame has no surface nearby."""
         work.count("frames fitted")
         return self._fitted(surface, rest, prediction, prediction, self._first)
 
-    def second(self, surface: FrameSurface | None, coherent: Points, first: Points) -> Points:
+    def second(self, surface: FrameSurface, coherent: Points, first: Points) -> Points:
         """Fit a frame again, near coherent positions made from the first fit."""
         work.count("frames fitted again")
         return self._fitted(surface, coherent, coherent, coherent if self._options.restart else first, self._second)
 
-    def _fitted(
-        self, surface: FrameSurface | None, rest: Points, place: Points, start: Points, rounds: Rounds
-    ) -> Points:
-        """Fit a frame in the core; an empty frame keeps its start."""
-        if surface is None:
-            return start
+    def _fitted(self, surface: FrameSurface, rest: Points, place: Points, start: Points, rounds: Rounds) -> Points:
+        """Fit a frame in the core."""
         gates, smoothing = np.array(rounds.gates), np.array(rounds.smoothing)
         strides, options = np.array(rounds.strides, np.int32), self._options
         limits = (AGREEMENT, rounds.anchor, options.tolerance, options.iterations, rounds.turn)

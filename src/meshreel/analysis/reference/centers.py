@@ -197,15 +197,13 @@ def bind(mesh: Mesh, source: Pose, neighbours: Neighbours) -> Binding:
     choices = min(GUARD_CHOICES, len(source))
     reach, near = cKDTree(source).query(mesh.vertices, k=choices)
     reach, near = reach.reshape(-1, choices), near.reshape(-1, choices).astype(np.int64)
-    if choices > 1 and not mesh.is_empty:  # centers in front of the surface, outside a body, are farther
-        offset = source[near] - mesh.vertices[:, None]
-        front = np.maximum(np.einsum("vnd,vd->vn", offset, vertex_normals(mesh)), 0)
-        order = np.argsort(np.square(reach) + np.square(FRONT * front), axis=1, kind="stable")
-        near = np.take_along_axis(near, order, axis=1)
+    offset = source[near] - mesh.vertices[:, None]
+    front = np.maximum(np.einsum("vnd,vd->vn", offset, vertex_normals(mesh)), 0)  # outside a body, centers are farther
+    order = np.argsort(np.square(reach) + np.square(FRONT * front), axis=1, kind="stable")
+    near = np.take_along_axis(near, order, axis=1)
     nearest = near[:, 0]  # eq. 7
-    if choices > 1 and not mesh.is_empty:
-        for _ in range(GUARD_ROUNDS):
-            nearest = _guard(mesh, near, nearest, neighbours)
+    for _ in range(GUARD_ROUNDS):
+        nearest = _guard(mesh, near, nearest, neighbours)
     rows, spacing = neighbours.indices[nearest], 1.0
     square = np.sum(np.square(mesh.vertices[:, None] - source[rows]), axis=2)
     square -= square.min(axis=1, keepdims=True)  # keeps weights from vanishing far from all centers

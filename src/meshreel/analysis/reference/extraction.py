@@ -37,7 +37,6 @@ from ..fit.surface_fit import FitOptions, fit_surfaces
 from .centers import (
     Binding,
     Neighbours,
-    Pairs,
     Points,
     Pose,
     affinity,
@@ -102,22 +101,16 @@ class Reference:
 def extract_reference(
     frames: Sequence[Mesh], centers: Centers, options: ReferenceOptions, pose: PoseChoice = "fit", again: bool = False
 ) -> Reference:
-    """Extract the reference of a group in the chosen pose; its mesh is empty if all frames are.
+    """Extract the reference of a group, each frame of which has a surface, in the chosen pose.
 
     Which frame's surface comes first is chosen by the fit in any pose. Fewer poses are tried `again`, of a part of a
     group that was tried as a whole.
     """
     assert len(frames) == len(centers), "one pose of the centers for each frame"
-    distances = largest_distances(centers)
-    kin = neighbours(affinity(distances))
-    full = [t for t, frame in enumerate(frames) if not frame.is_empty]
-    if not full:
-        return Reference(Mesh.empty(), centers.positions[0], 0, 0, kin)
-    group = Group([frames[t] for t in full], centers.positions[full], distances, kin, options.poisson)
+    group = Group(frames, centers, options.poisson)
     best = min(_trials(group, options, pose, again), key=_misfit)
     mesh = group.fused(group.pose(best.frame), best.key, VOXEL, options.vertices)
-    frame = MDS if best.frame == MDS else full[best.frame]
-    return Reference(mesh, group.pose(best.frame), frame, full[best.key], kin)
+    return Reference(mesh, group.pose(best.frame), best.frame, best.key, group.kin)
 
 
 def predict(reference: Reference, mesh: Mesh, centers: Centers) -> Float64[np.ndarray, "T V 3"]:
@@ -173,26 +166,17 @@ def _misfit(trial: Trial) -> float:
 class Group:
     """Frames with data that hold in every pose: neighbourhoods of centers, bindings, faces that join separate parts."""
 
-    def __init__(
-        self,
-        frames: Sequence[Mesh],
-        positions: Float64[np.ndarray, "T K 3"],
-        distances: Pairs,
-        kin: Neighbours,
-        poisson: int | None = None,
-    ) -> None:
-        """Bind non-empty frames to their centers; `poisson` is the depth of the paper's reconstruction, if it joins.
-
-        The largest distances (eq. 5's d) and the neighbourhoods are those over all frames of the group.
-        """
-        self.frames, self.positions, self.kin, self.poisson = frames, positions, kin, poisson
-        self.distances, self.spacing = distances, center_spacing(distances)
-        self.canonical = reference_centers(distances, positions[len(frames) // 2]).positions
+    def __init__(self, frames: Sequence[Mesh], centers: Centers, poisson: int | None) -> None:
+        """Bind frames to their centers; `poisson` is the depth of the paper's reconstruction, if it joins."""
+        self.frames, self.positions, self.poisson = frames, centers.positions, poisson
+        self.distances = largest_distances(centers)  # eq. 5's d
+        self.kin, self.spacing = neighbours(affinity(self.distances)), center_spacing(self.distances)
+        self.canonical = reference_centers(self.distances, self.positions[len(frames) // 2]).positions
         self.surfaces = [FrameSurface(frame) for frame in frames]
         self.edges = [unique_edges(frame.faces) for frame in frames]
         self.edge = float(np.mean([edge_lengths(frame).mean() for frame in frames]))
-        self.bindings = [bind(frame, pose, kin) for frame, pose in zip(frames, positions, strict=True)]
-        self.parting = [self._parting(*each) for each in zip(self.edges, self.bindings, positions, strict=True)]
+        self.bindings = [bind(frame, pose, self.kin) for frame, pose in zip(frames, self.positions, strict=True)]
+        self.parting = [self._parting(*each) for each in zip(self.edges, self.bindings, self.positions, strict=True)]
 
     def pose(self, frame: int) -> Pose:
         """Return the pose of the centers in a frame, or that of eq. 5 for `MDS`."""

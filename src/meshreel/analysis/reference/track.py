@@ -55,10 +55,8 @@ def track_centers(frames: Sequence[Mesh], options: TrackOptions) -> Centers:
     """Track about `options.centers` volume centers through normalised frames, none of which may be empty.
 
     Bodies are the connected components of the first frame, without specks; each gets centers in proportion to its
-    volume, at least four, at most one per sample. Raises InputError for an empty frame.
+    volume, at least four, at most one per sample.
     """
-    if len(frames) == 0:
-        raise InputError("no frames to track; give at least one")
     samples = _samples(frames, 0, options)
     first, bodies, owners = _spread_over_bodies(samples, options)
     graph = _Affinities(first, bodies)
@@ -73,12 +71,7 @@ def track_centers(frames: Sequence[Mesh], options: TrackOptions) -> Centers:
 
 
 def _samples(frames: Sequence[Mesh], t: int, options: TrackOptions) -> Samples:
-    frame = frames[t]
-    if frame.is_empty:
-        raise InputError(f"frame {t} is empty; code it separately and track the frames around it")
-    if not np.isfinite(frame.vertices).all():
-        raise InputError(f"frame {t} has coordinates that are not finite; repair it first")
-    return interior_samples(frame, options.samples, np.random.default_rng((SEED, t)))
+    return interior_samples(frames[t], options.samples, np.random.default_rng((SEED, t)))
 
 
 def _spread_over_bodies(samples: Samples, options: TrackOptions) -> tuple[Pose, Int32[np.ndarray, " K"], Owners]:
