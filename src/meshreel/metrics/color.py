@@ -87,7 +87,7 @@ class Colored:
 
     def look(self, pixels: Pixels) -> ColorView:
         shape, image = pixels.crop.shape, np.ones((*pixels.crop.shape, 3), np.float32)
-        if self._surface is None or 0 in shape:
+        if self._surface is None:
             return ColorView(np.zeros(shape, bool), image, np.full(shape, -1, np.int32))
         rays, painted = self._surface
         hit = rays.cast(*pixels.world_rays)

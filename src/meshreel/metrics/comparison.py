@@ -90,13 +90,12 @@ class OriginalFrame:
 
 
 def compare_sequences(
-    originals: Iterable[Mesh | OriginalFrame], decoded: Iterable[Mesh], options: ComparisonOptions | None = None
+    originals: Iterable[Mesh | OriginalFrame], decoded: Iterable[Mesh], options: ComparisonOptions
 ) -> Comparison:
     """Measure `decoded` against `originals`, frame by frame (two sequences of equal length).
 
     Samples and pictures that an `OriginalFrame` has prepared are reused in later comparisons from the same cameras.
     """
-    options = options or ComparisonOptions()
     cameras = _cameras(originals, options) if options.ssim else ()
     box = Box.of(_prepared(original).mesh for original in originals) if options.mpeg is not None else Box.of(())
     rows: list[Row] = []

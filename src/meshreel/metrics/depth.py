@@ -253,10 +253,8 @@ def _share(part: float, whole: float) -> float | None:
 
 def _points(camera: Camera, depth: Depths, pixels: Mask) -> Float64[np.ndarray, "N 3"]:
     """Return the measured places of some pixels in world coordinates, m."""
-    rows, columns = np.nonzero(pixels)
-    homogeneous = np.stack([columns + 0.5, rows + 0.5, np.ones(len(rows))])
-    local = np.linalg.inv(camera.intrinsic) @ homogeneous * depth[pixels]
-    return (camera.extrinsic[:3, :3].T @ (local - camera.extrinsic[:3, 3:])).T
+    local = camera.ahead[pixels] * depth[pixels][:, None]
+    return (local - camera.extrinsic[:3, 3]) @ camera.extrinsic[:3, :3]
 
 
 def _usual(stack: Float64[np.ndarray, "T H W"]) -> Depths:

@@ -15,7 +15,7 @@ from jaxtyping import Float64
 
 from ..geometry.strict import dot
 from ..types import Mesh
-from .surface_samples import RESOLUTION, WORST_ANGLE, Matches, Samples, angles, match, sample, used_surface
+from .surface_samples import RESOLUTION, WORST_ANGLE, Samples, angles, interpolate, sample, used_surface
 
 _LEAST, _MOST = 1e-3, 1e6  # m, extents of meshes that are measured in metres; others are scaled (guess)
 PSNR_CEILING = -20 * math.log10(RESOLUTION)  # dB, about 132; stands for an infinite PSNR in a mean over frames
@@ -127,7 +127,7 @@ def surface_errors(original: Mesh | Original, decoded: Mesh) -> SurfaceErrors:
         unit = 2.0 ** math.floor(math.log2(extent))
         smaller = surface_errors(*(Mesh.of(mesh.vertices * (1 / unit), mesh.faces) for mesh in (original, decoded)))
         return SurfaceErrors(original.diagonal, smaller.forward.times(unit), smaller.backward.times(unit))
-    ways = (_one_way(one, match(one, other, RESOLUTION * original.diagonal)) for one, other in ((a, b), (b, a)))
+    ways = (_one_way(one, other, RESOLUTION * original.diagonal) for one, other in ((a, b), (b, a)))
     return SurfaceErrors(original.diagonal, *ways)
 
 
@@ -135,17 +135,23 @@ _PERFECT = OneWayErrors(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 _WORST = OneWayErrors(math.inf, math.inf, math.inf, math.inf, WORST_ANGLE, WORST_ANGLE)
 
 
-def _one_way(source: Samples, matches: Matches) -> OneWayErrors:
-    vertices = len(source.mesh.vertices)
-    squared = matches.distances**2
-    along = np.einsum("nd,nd->n", matches.offsets, matches.normals) ** 2
-    along = np.where(matches.normals.any(axis=1), along, squared)  # without a normal the whole distance counts
-    normal_angles = angles(source.normals, matches.normals)
+def _one_way(source: Samples, target: Samples, resolution: float) -> OneWayErrors:
+    """Measure from the samples of one mesh to the surface of the other; distances below `resolution`, m, become 0."""
+    hits, vertices = target.surface.closest(source.points), len(source.mesh.vertices)
+    offsets = hits.points - source.points
+    distances = np.sqrt(np.einsum("nd,nd->n", offsets, offsets))
+    noise = distances < resolution
+    offsets[noise], distances[noise] = 0, 0
+    normals = interpolate(target.vertex_normals, target.mesh.faces[hits.faces], hits.barycentric)
+    squared = distances**2
+    along = np.einsum("nd,nd->n", offsets, normals) ** 2
+    along = np.where(normals.any(axis=1), along, squared)  # without a normal the whole distance counts
+    normal_angles = angles(source.normals, normals)
     return OneWayErrors(
         point_mse=float(squared[:vertices].mean()),
         plane_mse=float(along[:vertices].mean()),
         rms=float(np.sqrt(dot(source.weights, squared))),
-        hausdorff95=quantile(matches.distances, source.weights, 0.95),
+        hausdorff95=quantile(distances, source.weights, 0.95),
         angle=dot(source.weights, normal_angles),
         vertex_angle=float(normal_angles[:vertices].mean()),
     )

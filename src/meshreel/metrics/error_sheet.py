@@ -18,12 +18,12 @@ from ..errors import InputError
 from ..geometry.cameras import Camera
 from ..geometry.closest_points import Surface
 from ..io.write import replacing
-from ..types import UP_AXES, Frames, Mesh
+from ..types import Frames, Mesh
 from .color import Colored
 from .distance import surface_errors
 from .render import Crop, Pixels, View, look
 from .surface_samples import used_surface
-from .viewpoints import Box, ViewOptions, views_around
+from .viewpoints import Box, ViewOptions, extent, views_around
 
 _COLUMNS = ("original", "decoded", "error (magenta: only decoded)")
 _LEFT, _RIGHT, _TOP, _GAP = 64, 100, 32, 8  # pixels around and between the pictures
@@ -59,9 +59,8 @@ class SheetRow:
     errors: Float64[np.ndarray, " N"]  # in the sheet's unit, one for each covered pixel of the original
 
 
-def write_sheet(originals: Frames, decoded: Frames, path: Path, options: SheetOptions | None = None) -> None:
+def write_sheet(originals: Frames, decoded: Frames, path: Path, options: SheetOptions = SheetOptions()) -> None:
     """Write the PNG, with a line for each chosen frame and camera."""
-    options = options or SheetOptions()
     figure = _draw(list(_rows(originals, decoded, options)), options)
     with replacing(path) as file:
         figure.savefig(file, format="png", dpi=_DPI)
@@ -102,9 +101,8 @@ def _cameras(meshes: list[Mesh], options: SheetOptions) -> list[Camera]:
     if options.cameras:
         return list(options.cameras)
     box = Box.of(meshes)
-    vertical = int(np.abs(UP_AXES[options.up]).argmax())
-    aspect = float(np.delete(box.size, vertical).max()) / max(float(box.size[vertical]), 1e-9)
-    width = int(options.height * min(max(aspect, 0.5), 3.0))
+    across, height = extent(box, options.up)
+    width = int(options.height * min(max(across / height, 0.5), 3.0))
     return views_around(box, ViewOptions(width, options.height, fov=30.0, up=options.up))[:1]
 
 

@@ -133,31 +133,28 @@ def _picture_squares(original: Mesh, decoded: Mesh, pixels: int) -> tuple[float,
     """Return mean squared differences of depth (radii) and luma, over pixels of all views that see both meshes."""
     box = Box.of([original, decoded])
     radius = BORDER * float(np.linalg.norm(box.size)) / 2
-    drawn, sums, count = [_Drawn(mesh) for mesh in (original, decoded)], np.zeros(2), 0
+    drawn = [(Rays(mesh), Painted(mesh) if mesh.is_colored else None) for mesh in (original, decoded)]
+    sums, count = np.zeros(2), 0
     for way in directions():
         rays = _rays(way, np.concatenate([original.vertices, decoded.vertices]) - box.center, radius, pixels)
         starts = rays + box.center + radius * way
-        a, b = (each.seen(starts, -way) for each in drawn)
+        a, b = (_seen(*each, starts, -way) for each in drawn)
         both = a[0] & b[0]
         count += int(both.sum())
         sums += [np.square((a[1] - b[1])[both] / radius).sum(), np.square((a[2] - b[2])[both]).sum()]
     return (float(sums[0]) / count, float(sums[1]) / count) if count else (math.inf, math.inf)
 
 
-class _Drawn:
-    """A mesh prepared for views along parallel rays."""
-
-    def __init__(self, mesh: Mesh) -> None:
-        self._rays, self._painted = Rays(mesh), Painted(mesh) if mesh.is_colored else None
-
-    def seen(self, starts: Points, way: Way) -> tuple[Bool[np.ndarray, " N"], Values, Values]:
-        """Return a mask of the rays that meet the mesh, their lengths, and the luma there."""
-        hit = self._rays.cast(starts, np.broadcast_to(way, starts.shape))
-        hits, luma = hit.faces >= 0, np.zeros(len(starts))
-        if self._painted is not None:
-            colors = np.clip(np.rint(self._painted.on(hit.faces[hits], hit.barycentric[hits])), 0, PEAK)
-            luma[hits] = np.rint(colors @ TO_YUV[0])
-        return hits, np.where(hits, hit.distances, 0.0), luma
+def _seen(
+    rays: Rays, painted: Painted | None, starts: Points, way: Way
+) -> tuple[Bool[np.ndarray, " N"], Values, Values]:
+    """Return a mask of the parallel rays that meet a mesh, their lengths, and the luma there."""
+    hit = rays.cast(starts, np.broadcast_to(way, starts.shape))
+    hits, luma = hit.faces >= 0, np.zeros(len(starts))
+    if painted is not None:
+        colors = np.clip(np.rint(painted.on(hit.faces[hits], hit.barycentric[hits])), 0, PEAK)
+        luma[hits] = np.rint(colors @ TO_YUV[0])
+    return hits, np.where(hits, hit.distances, 0.0), luma
 
 
 def directions() -> Iterator[Way]:

@@ -73,9 +73,7 @@ def crop_of(meshes: list[Mesh], camera: AnyCamera, border: int = 8) -> Crop:
     vertices = np.concatenate([m.vertices for m in meshes])
     if len(vertices) == 0:
         return Crop(0, 0, 0, 0)
-    rotation = camera.extrinsic[:3, :3]
-    eye = -np.linalg.solve(rotation, camera.extrinsic[:3, 3])
-    pixels = camera.project((vertices - eye) @ rotation.T)
+    pixels = camera.project(vertices @ camera.extrinsic[:3, :3].T + camera.extrinsic[:3, 3])
     if not np.isfinite(pixels).all():  # something reaches behind the eye: no rectangle bounds it
         return Crop(0, camera.height, 0, camera.width)
     limits = np.array([camera.width, camera.height])
@@ -124,11 +122,7 @@ class Visible:
         self._normals, self._rays = welded_normals(self.mesh), Rays(self.mesh)
 
     def look(self, pixels: Pixels) -> View:
-        mesh, crop = self.mesh, pixels.crop
-        if mesh.is_empty or 0 in crop.shape:
-            covered, nothing = np.zeros(crop.shape, dtype=bool), np.zeros((0, 3))
-            return View(crop, covered, mesh, nothing.astype(np.int32), nothing, nothing)
-        answer = self._rays.cast(*pixels.world_rays)
+        mesh, crop, answer = self.mesh, pixels.crop, self._rays.cast(*pixels.world_rays)
         hit = answer.faces >= 0
         corners, weights = mesh.faces[answer.faces[hit]], answer.barycentric[hit]
         normals = interpolate(self._normals, corners, weights)

@@ -258,8 +258,7 @@ def _picture(scene: Scene, camera: Camera) -> ScenePicture:
     colors = np.full((*shape, 3), BACKGROUND, np.float32)
     covered, dynamic = np.zeros(shape, bool), np.zeros(shape, bool)
     if not scene.mesh.is_empty:
-        _, ahead = Pixels(camera, Crop(0, camera.height, 0, camera.width)).rays
-        hit = scene.rays.cast(camera.eye[None], ahead @ np.linalg.inv(camera.extrinsic[:3, :3]).T)
+        hit = scene.rays.cast(*Pixels(camera, Crop(0, camera.height, 0, camera.width)).world_rays)
         covered = (hit.faces >= 0).reshape(shape)
         faces, weights = hit.faces[covered.ravel()], hit.barycentric[covered.ravel()]
         colors[covered] = (interpolate(scene.normals, scene.mesh.faces[faces], weights) + 1) / 2

@@ -1,4 +1,4 @@
-"""Samples of surfaces, their closest points on another surface, and the angles between the normals there.
+"""Samples of surfaces, and the angles between normals.
 
 Samples of a mesh are its vertices, in order, followed by a quadrature of its area, so that one round of queries serves
 both the vertex-based metrics and the area-weighted ones. Normals are area-weighted vertex normals, interpolated with
@@ -41,15 +41,6 @@ class Samples:
         return Surface(self.mesh)
 
 
-@dataclass(frozen=True, slots=True)
-class Matches:
-    """Closest points of one mesh to the samples of the other."""
-
-    distances: Float64[np.ndarray, " N"]  # m, to the closest point
-    offsets: Points  # m, from the sample to its closest point
-    normals: Points  # interpolated at the closest point
-
-
 def sample(mesh: Mesh, center: Float64[np.ndarray, " 3"]) -> Samples:
     """Move a result of `used_surface` so that `center` is the origin, and sample it."""
     mesh = Mesh.of(mesh.vertices - center, mesh.faces)
@@ -68,18 +59,6 @@ def sample(mesh: Mesh, center: Float64[np.ndarray, " 3"]) -> Samples:
     return Samples(mesh, normals, points, unit(directions), weights / weights.sum())
 
 
-def match(source: Samples, target: Samples, resolution: float) -> Matches:
-    """Find the closest points of the target to the source's samples; distances below `resolution` (m) become 0."""
-    hits = target.surface.closest(source.points)
-    offsets = hits.points - source.points
-    distances = np.sqrt(np.einsum("nd,nd->n", offsets, offsets))
-    noise = distances < resolution
-    offsets[noise] = 0
-    distances[noise] = 0
-    corners = target.mesh.faces[hits.faces]
-    return Matches(distances, offsets, interpolate(target.vertex_normals, corners, hits.barycentric))
-
-
 def used_surface(mesh: Mesh) -> Mesh:
     """Remove zero-area faces and vertices that no face uses; the result may be empty."""
     return drop_unreferenced(Mesh.of(mesh.vertices, mesh.faces[face_normals(mesh)[1] > 0]))
@@ -91,8 +70,6 @@ def _centroids(values: Float64[np.ndarray, "V 3"], faces: Int32[np.ndarray, "F 3
 
 def welded_normals(mesh: Mesh) -> Float64[np.ndarray, "V 3"]:
     """Return unit normals of the vertices of `mesh`, in order; vertices at exactly equal positions share one."""
-    if len(mesh.vertices) == 0:
-        return np.zeros((0, 3))
     order = np.lexsort(mesh.vertices.T)
     ordered = mesh.vertices[order]
     new = np.ones(len(order), dtype=bool)
