@@ -14,6 +14,7 @@ from itertools import groupby
 import numpy as np
 from jaxtyping import Float64
 
+Residuals = Float64[np.ndarray, "C T"]  # of each template on each frame
 NOBODY = -1  # in place of a template: its frames are coded one by one
 CODED = 0.7  # squared targets that coding adds to a residual (measured on bodies at quality 50)
 USUAL = 2.0  # squared targets, largest residual of a good template (guess)
@@ -68,7 +69,7 @@ class Plan:
         return np.maximum(self.squares - min(usual, USUAL), 0.0)
 
 
-def best_plan(residuals: Float64[np.ndarray, "C T"], onward: Sequence[bool], options: PlanOptions) -> Plan:
+def best_plan(residuals: Residuals, onward: Sequence[bool], options: PlanOptions) -> Plan:
     """Return the plan of least cost (dynamic programming); residuals of frames that a template does not follow are inf.
 
     The cost is the sum of the squared residuals, the prices of the groups' templates, and the prices of steps of the
@@ -101,9 +102,7 @@ def best_plan(residuals: Float64[np.ndarray, "C T"], onward: Sequence[bool], opt
     return Plan(tuple(groups), float(best[last]), squares[path, np.arange(frames)])
 
 
-def rival(
-    plan: Plan, residuals: Float64[np.ndarray, "C T"], onward: Sequence[bool], options: PlanOptions
-) -> Plan | None:
+def rival(plan: Plan, residuals: Residuals, onward: Sequence[bool], options: PlanOptions) -> Plan | None:
     """Return a different plan that is best at a higher or lower price of templates; None if there is none."""
     for price in (options.worth * CLOSE, options.worth / CLOSE):
         other = best_plan(residuals, onward, replace(options, worth=price))

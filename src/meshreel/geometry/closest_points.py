@@ -98,6 +98,4 @@ def distances(points: Float64[np.ndarray, "N 3"], mesh: Mesh) -> Float64[np.ndar
 
 def carried_labels(surface: Surface, labels: Bool[np.ndarray, " F"], mesh: Mesh) -> Bool[np.ndarray, " G"]:
     """Transfer face labels to another mesh: each face takes the label of the face nearest to its middle."""
-    if mesh.is_empty:
-        return np.zeros(0, bool)
     return labels[surface.closest(mesh.vertices[mesh.faces].mean(axis=1)).faces]

@@ -188,9 +188,8 @@ def unwrap(base: Mesh, size: int) -> Layout:
             break
         density = atlas.texels_per_unit * MARGIN * size / max(widest, 1)
     else:
-        raise InputError(
-            f"a base of {len(base.faces)} faces does not fit a texture of {size} texels; give a larger one"
-        )
+        text = f"a base of {len(base.faces)} faces does not fit a texture of {size} texels"
+        raise InputError(f"{text}; give a larger one")
     _, corners, uv = atlas[0]
     places = np.rint(uv.astype(np.float64) * [atlas.width, atlas.height]).astype(np.int32)[corners]
     height = -(-int(places[..., 1].max(initial=1)) // BLOCK) * BLOCK

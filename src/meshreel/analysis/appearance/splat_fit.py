@@ -47,7 +47,8 @@ BORDER = 3  # pixels beside the mesh
 FINER = 2  # rays a pixel, along both sides
 HIDDEN = 0.01  # of the distance: surface that is nearer by more hides the mesh (guess)
 Contribution = Float64[np.ndarray, " N"]  # of each splat to the pictures
-Colors = Callable[[Hit, Float64[np.ndarray, "N 3"]], Float64[np.ndarray, "N 3"]]  # of hits at positions
+Points = Float64[np.ndarray, "N 3"]  # or their colours
+Colors = Callable[[Hit, Points], Points]  # of hits at positions
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,7 +75,10 @@ def fit_splats(frames: Sequence[SplatFrame], count: int, steps: int = STEPS) -> 
     pictures = [(frame.carrier, view) for frame in frames for view in frame.views]
     if not any((view.pixels < 1).any() for _, view in pictures):
         raise InputError(f"no splats: none of {len(pictures)} pictures shows the surface; check the cameras")
-    torch = _torch()
+    try:
+        import torch
+    except ImportError:
+        raise InputError("splats are fitted by torch: pip install 'meshreel[splats]'") from None
     threads = torch.get_num_threads()
     torch.set_num_threads(1)  # sums have an order
     try:
@@ -174,9 +178,8 @@ class _Fit:
         moved = (weights - weights.detach())[:, :, None] * _tensor(torch, along)
         corners = _tensor(torch, carrier.vertices[carrier.faces[finer]])
         lengths = own["offsets"], own["turns"], own["scales"].exp(), 1.0
-        means, axes, scales = pose(
-            torch, corners, _tensor(torch, now) + moved.sum(dim=1), _tensor(torch, along), lengths
-        )
+        places = _tensor(torch, now) + moved.sum(dim=1)
+        means, axes, scales = pose(torch, corners, places, _tensor(torch, along), lengths)
         matrices = _tensor(torch, camera.extrinsic[:3]), _tensor(torch, camera.intrinsic)
         flat = project(torch, means, axes, scales, matrices)
         opacities = torch.sigmoid(own["opacities"])
@@ -240,14 +243,6 @@ def _tensor(torch: Any, values: np.ndarray) -> Any:
     return torch.from_numpy(np.ascontiguousarray(values, dtype=np.float32))
 
 
-def _torch() -> Any:
-    try:
-        import torch
-    except ImportError:
-        raise InputError("splats are fitted by torch: pip install 'meshreel[splats]'") from None
-    return torch
-
-
 def ring(mesh: Mesh, count: int, size: int, turn: float, up: Up = "y") -> list[Camera]:
     """Return cameras around a mesh, which fills pictures of `size` pixels; `turn`: the first one's angle, turns."""
     extent, cameras = mesh.diagonal, list[Camera]()
@@ -305,9 +300,7 @@ def taken(pictures: Sequence[ColorPicture], body: Mesh, whole: Mesh, size: int) 
     return tuple(views)
 
 
-def _pictured(
-    picture: ColorPicture, hides: Rays, _hit: Hit, points: Float64[np.ndarray, "N 3"]
-) -> Float64[np.ndarray, "N 3"]:
+def _pictured(picture: ColorPicture, hides: Rays, _hit: Hit, points: Points) -> Points:
     eye = picture.camera.eye
     first = hides.cast(np.broadcast_to(eye, points.shape), points - eye).distances  # the points are at 1
     positions, _ = picture.project(points)

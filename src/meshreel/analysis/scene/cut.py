@@ -204,13 +204,7 @@ class Rest:
         return sorted(set(self.until[self.until > 0].tolist()) | set(self.since[self.since < NEVER].tolist()))
 
 
-def find_rest(
-    places: Places,
-    moving: Mask,
-    numbers: Sequence[int],
-    frame_rate: float,
-    holds: Holds = lambda groups, _numbers, _times: [False] * len(groups),
-) -> Rest:
+def find_rest(places: Places, moving: Mask, numbers: Sequence[int], frame_rate: float, holds: Holds) -> Rest:
     """Find the frames in which moving places rest; `numbers` are those of the inspected frames.
 
     `holds(sets of places, frame numbers, factor)` returns for each set whether surface there stays in place in these

@@ -111,14 +111,6 @@ class Tally:
 
 
 @dataclass(frozen=True, slots=True)
-class Eye:
-    """A depth camera that does not move, and the pixels in which it usually measures a depth."""
-
-    camera: Camera
-    sees: Bool[np.ndarray, "H W"]  # pixels with a depth in at least half of the frames
-
-
-@dataclass(frozen=True, slots=True)
 class Places:
     """Cells of a scene that have surface in any inspected frame, and the counts of observations there."""
 
@@ -127,7 +119,8 @@ class Places:
     beside: Int32[np.ndarray, "P 26"]  # numbers of the neighbouring places; a place's own number where there is none
     normals: Float64[np.ndarray, "P 3"]  # mean normal of the surface there, unit length; 0 where normals cancel
     tally: Tally
-    eyes: dict[int, Eye] = field(default_factory=dict)  # by the number of the camera
+    # By number, depth cameras that stand still, and the pixels in which each has a depth in half of the frames or more.
+    eyes: dict[int, tuple[Camera, Bool[np.ndarray, "H W"]]] = field(default_factory=dict)
 
     @property
     def free_share(self) -> Float64[np.ndarray, " P"]:
@@ -166,7 +159,7 @@ def find_places(observed: Observations, lattice: Lattice) -> Places:
             _count_depths(cameras, observed.pictures(number))
         observed.report((number + 1) / passes)
     keys, normals = cells.places()
-    eyes = {number: Eye(camera, 2 * count >= len(observed.frames)) for number, (camera, count) in cameras.items()}
+    eyes = {number: (camera, 2 * count >= len(observed.frames)) for number, (camera, count) in cameras.items()}
     places = Places(lattice, keys, neighbours(keys), normals, Tally(len(keys)), eyes)
     for occupied, free in _states(observations, places, observed.views):
         places.tally.add(occupied, free)
@@ -213,12 +206,12 @@ def _sensed(frames: Sequence[_Observation], places: Places, reach: float) -> Ite
     camera measured more than that in all nine pixels around the place.
     """
     middles = places.middles
-    at = {number: eye.camera.seen(middles) for number, eye in places.eyes.items()}
+    at = {number: camera.seen(middles) for number, (camera, _) in places.eyes.items()}
     for frame in frames:
         expected, past, clear = np.zeros((3, len(middles)), bool)
-        for number, eye in places.eyes.items():
+        for number, (_, sees) in places.eyes.items():
             pixels, inside, depth = at[number]
-            expected[inside[eye.sees.reshape(-1)[pixels]]] = True
+            expected[inside[sees.reshape(-1)[pixels]]] = True
             if frame.measured and (picture := frame.measured[number]) is not None:
                 depths = picture.depth.reshape(-1)[pixels] * picture.unit
                 expected[inside[depths > 0]] = True

@@ -55,9 +55,8 @@ class DepthCamera:
         near, far = self.depth_range
         if not (0 < self.depth_unit <= _MOST_UNIT and 0 <= near < far <= _FARTHEST):
             text = f"depth unit {self.depth_unit:g}, range {near:g} to {far:g}"
-            raise InputError(
-                f"camera {self.name}: {text}: give metres, a unit above 0 and 0 <= nearest < farthest <= {_FARTHEST:g}"
-            )
+            remedy = f"give metres, a unit above 0 and 0 <= nearest < farthest <= {_FARTHEST:g}"
+            raise InputError(f"camera {name}: {text}: {remedy}")
 
     def in_range(self, depth: UInt16[np.ndarray, "H W"]) -> UInt16[np.ndarray, "H W"]:
         """Return depths with those outside the camera's range set to 0, no measurement."""

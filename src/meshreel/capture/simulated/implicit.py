@@ -68,7 +68,6 @@ def polygonize(bodies: tuple[Body, ...], touch: float, grid: Grid) -> Mesh:
         for body in bodies
     ]
     low, high = _bounds([chain for body in lattice for chain in body], margin, grid.spacing)
-    low, high = np.floor(low).astype(int), np.ceil(high).astype(int) + 1
     values = np.full(high - low, margin, dtype=np.float32)
     for body in lattice:
         box, inner = _sampled_body(tuple(body), margin, grid.spacing, low)
@@ -94,18 +93,17 @@ def smooth_min(a: np.ndarray, b: np.ndarray, width: float) -> np.ndarray:
 
 
 def _bounds(chains: list[Chain], margin: float, spacing: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return the bounding box of chains, widened by `margin`, in cells."""
+    """Return the first cell of the box around chains, widened by `margin`, and the cell behind its last."""
     reach = np.concatenate([c.radii.max(axis=1) for c in chains])[:, None] + margin
     starts, ends = np.concatenate([c.starts for c in chains]), np.concatenate([c.ends for c in chains])
     low = (np.minimum(starts, ends) - reach).min(axis=0)
     high = (np.maximum(starts, ends) + reach).max(axis=0)
-    return low / spacing, high / spacing
+    return np.floor(low / spacing).astype(int), np.ceil(high / spacing).astype(int) + 1
 
 
 def _box(chains: list[Chain], margin: float, spacing: float, low: np.ndarray) -> tuple[tuple[slice, ...], np.ndarray]:
     """Return the slices that chains occupy in an array whose first cell is `low`, and the first cell of the slices."""
-    begin, end = _bounds(chains, margin, spacing)
-    first, last = np.floor(begin).astype(int), np.ceil(end).astype(int) + 1
+    first, last = _bounds(chains, margin, spacing)
     return tuple(slice(a, b) for a, b in zip(first - low, last - low, strict=True)), first
 
 
