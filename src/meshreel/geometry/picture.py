@@ -29,7 +29,7 @@ def picture(mesh: Mesh) -> bytes:
     scale = 0.94 * min(WIDTH / size[0], HEIGHT / size[1])
     shown = Mesh((turned - (low + high) / 2) * scale, mesh.faces)  # pixels, from the middle of the picture
     across, up = np.meshgrid(np.arange(WIDTH) + 0.5 - WIDTH / 2, HEIGHT / 2 - 0.5 - np.arange(HEIGHT))
-    starts = np.stack([across, up, np.full(up.shape, scale * size[2])], axis=2).reshape(-1, 3)
+    starts = np.stack([across, up, np.full(up.shape, scale * size[2] + 1)], axis=2).reshape(-1, 3)
     hit = Rays(shown).cast(starts, np.broadcast_to([0.0, 0.0, -1.0], starts.shape))
     seen = hit.faces >= 0
     faces, weights = hit.faces[seen], hit.barycentric[seen]
