@@ -24,7 +24,7 @@ from ..types import Mesh, Up
 from .animated_glb import GlbWriter, animated_glb
 from .animated_usd import EXTENSIONS, UsdWriter, animated_usd
 from .frames import Part
-from .shapes import Animation, Shape
+from .shapes import Animation, Shape, check_output
 
 MOST_FRAMES = 64  # of a shape, all in memory together; viewers limit the morph targets of a mesh (guess)
 _FAR = 8.0  # diagonals; coordinates farther from the origin are stored relative to the center (guess)
@@ -85,10 +85,7 @@ def export(
 
 
 def _writer(path: Path, animation: Animation, compressed: bool) -> AbstractContextManager[GlbWriter | UsdWriter]:
-    if path.is_dir():  # told before minutes of work
-        raise InputError(f"{path}: is a folder, name a file")
-    if not path.parent.is_dir():
-        raise InputError(f"{path}: there is no folder {path.parent}; make it, or choose another")
+    check_output(path)
     extension = path.suffix.lower()
     if extension == ".glb":
         return animated_glb(path, animation, compressed)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from jaxtyping import Bool, Float32, Float64, Int32
@@ -90,3 +91,11 @@ def unit_normals(frame: Mesh) -> Float32[np.ndarray, "V 3"]:
     normals = vertex_normals(frame)
     normals[~normals.any(axis=1)] = (0, 1, 0)
     return normals.astype(np.float32)
+
+
+def check_output(path: Path) -> None:
+    """Raise InputError if a file of this name cannot be written, before minutes of work."""
+    if path.is_dir():
+        raise InputError(f"{path}: is a folder, name a file")
+    if not path.parent.is_dir():
+        raise InputError(f"{path}: there is no folder {path.parent}; make it, or choose another")
