@@ -9,8 +9,8 @@ import pytest
 
 import meshreel
 from meshreel.analysis.scene.masks import read_view_file
-from meshreel.capture.rig.rig import read_rig
-from meshreel.capture.simulated.simulated_rig import _labels
+from meshreel.capture.rig.rig import read_rig, write_rig
+from meshreel.capture.simulated.simulated_rig import read_truth
 from meshreel.encoder.run.interval_files import IntervalFiles
 from meshreel.errors import InputError
 from meshreel.io import files
@@ -18,6 +18,7 @@ from meshreel.io.files import read_file
 from meshreel.io.pictures import read_depth, read_mask
 from meshreel.io.sequence import open_sequence
 from meshreel.io.write import replacing
+from tests.capture.depth_scenes import camera
 
 posix = pytest.mark.skipif(sys.platform == "win32", reason="POSIX files")
 
@@ -64,13 +65,20 @@ def test_what_is_no_description_of_a_rig_ends_at_once(tmp_path, make):
         read_rig(tmp_path)
 
 
+def truth(folder):
+    """The folder as the truth of a simulated rig, but for its labels."""
+    write_rig(folder, (camera(),), 30.0)
+    (folder / "frame_00000.ply").touch()
+    return folder
+
+
 @posix
 @pytest.mark.parametrize("make", [os.mkfifo, zeros, sparse])
 @pytest.mark.parametrize(
     ("name", "of"),
     [
         ("cameras.json", lambda folder: read_view_file(folder / "cameras.json")),
-        ("labels.npz", lambda folder: _labels(folder / "labels.npz")),
+        ("dynamic.npz", lambda folder: read_truth(truth(folder))),
     ],
 )
 def test_what_are_no_cameras_or_labels_ends_at_once(tmp_path, make, name, of):
