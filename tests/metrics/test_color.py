@@ -27,10 +27,10 @@ def yuv(r: float, g: float, b: float) -> np.ndarray:
 def test_constant_colors_differ_as_the_formula_says(one, two) -> None:
     found = color_errors(painted(one), painted(two))
     apart = np.abs(yuv(*one) - yuv(*two))
-    for value, difference in zip((found.y, found.u, found.v), apart, strict=True):
+    for value, difference in zip((found["y_psnr"], found["u_psnr"], found["v_psnr"]), apart, strict=True):
         wanted = math.inf if difference < 1e-9 else 20 * math.log10(255 / difference)
         assert value == wanted or abs(value - wanted) < 1e-6
-    assert found.yuv == (6 * found.y + found.u + found.v) / 8
+    assert found["yuv_psnr"] == (6 * found["y_psnr"] + found["u_psnr"] + found["v_psnr"]) / 8
 
 
 def test_the_worse_direction_counts() -> None:
@@ -39,14 +39,14 @@ def test_the_worse_direction_counts() -> None:
     colors = painted((100, 100, 100)).colors.copy()
     colors[BALL.vertices[:, 0] < -0.1] = 200  # what the part lacks has another colour
     found = color_errors(replace(BALL, colors=colors), part)
-    assert found.y < 15 and color_errors(part, part).y == math.inf
-    assert found.y == color_errors(part, replace(BALL, colors=colors)).y
+    assert found["y_psnr"] < 15 and color_errors(part, part)["y_psnr"] == math.inf
+    assert found["y_psnr"] == color_errors(part, replace(BALL, colors=colors))["y_psnr"]
 
 
 def test_meshes_without_faces_or_colors() -> None:
-    assert color_errors(Mesh.empty(), Mesh.empty()).y == math.inf
-    assert color_errors(painted((1, 2, 3)), Mesh.empty()).yuv == 0
-    assert color_errors(painted((128, 128, 128)), BALL).y == math.inf  # none is grey
+    assert color_errors(Mesh.empty(), Mesh.empty())["y_psnr"] == math.inf
+    assert color_errors(painted((1, 2, 3)), Mesh.empty())["yuv_psnr"] == 0
+    assert color_errors(painted((128, 128, 128)), BALL)["y_psnr"] == math.inf  # none is grey
 
 
 def test_frames_with_colors_have_their_errors_in_the_row() -> None:

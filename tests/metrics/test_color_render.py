@@ -42,22 +42,22 @@ def test_a_picture_shows_the_texture_the_right_way_up() -> None:
 
 def test_luma_that_differs_by_a_constant_has_the_psnr_of_the_formula() -> None:
     found = render_errors(painted(100), painted(110), VIEWS)
-    assert found.y_union == pytest.approx(20 * math.log10(25.5)) == found.y_inside
-    assert 0.9 < found.ssim < 1
+    assert found["view_y_psnr"] == pytest.approx(20 * math.log10(25.5)) == found["view_y_psnr_inside"]
+    assert 0.9 < found["view_ssim"] < 1
 
 
 def test_equal_meshes_are_perfect_and_so_is_nothing() -> None:
     for mesh in (painted(7), Mesh.empty()):
         found = render_errors(mesh, mesh, VIEWS)
-        assert (found.y_union, found.y_inside, found.ssim) == (math.inf, math.inf, 1.0)
+        assert (found["view_y_psnr"], found["view_y_psnr_inside"], found["view_ssim"]) == (math.inf, math.inf, 1.0)
 
 
 def test_silhouettes_count_in_the_union_alone() -> None:
     moved = painted(60, BALL.at(BALL.vertices + [0.1, 0.0, 0.0]))
     found = render_errors(painted(60), moved, VIEWS)
-    assert found.y_inside == math.inf and 10 < found.y_union < 25
+    assert found["view_y_psnr_inside"] == math.inf and 10 < found["view_y_psnr"] < 25
     lost = render_errors(painted(55), Mesh.empty(), VIEWS)
-    assert lost.y_union == pytest.approx(20 * math.log10(255 / 200)) and lost.y_inside == math.inf
+    assert lost["view_y_psnr"] == pytest.approx(20 * math.log10(255 / 200)) and lost["view_y_psnr_inside"] == math.inf
 
 
 def test_a_comparison_with_views_has_them_where_both_have_colours() -> None:

@@ -23,32 +23,24 @@ from .viewpoints import AnyCamera
 POINTS = 60_000  # on each surface: a seventh of the texels of a person's texture of 1024 x 1024 (guess)
 PEAK = 255.0
 LEAST = 1e-12  # squared difference; smaller ones are rounding of equal colours
+COLORS = ("y_psnr", "u_psnr", "v_psnr", "yuv_psnr")  # the last one: (6 Y + U + V) / 8
+RENDERS = ("view_y_psnr", "view_y_psnr_inside", "view_ssim")
 SHARES = np.array([6.0, 1.0, 1.0]) / 8  # of luma and of colour differences in one number, as MPEG weighs PSNRs
 TO_YUV = np.array([LUMA, (-LUMA[0] / 1.8556, -LUMA[1] / 1.8556, 0.5), (0.5, -LUMA[1] / 1.5748, -LUMA[2] / 1.5748)])
 
 
-@dataclass(frozen=True, slots=True)
-class ColorErrors:
-    """PSNRs of colours, dB, the worse of both directions each; infinite for equal colours."""
+def color_errors(original: Mesh, decoded: Mesh) -> dict[str, float]:
+    """Return PSNRs of the colours of two meshes, dB, by name, the worse of both directions each.
 
-    y: float
-    u: float
-    v: float
-
-    @property
-    def yuv(self) -> float:
-        """(6 Y + U + V) / 8."""
-        return float(SHARES @ [self.y, self.u, self.v])
-
-
-def color_errors(original: Mesh, decoded: Mesh) -> ColorErrors:
-    """Measure the colours of two meshes, grey without any; two empty ones are equal, where one is empty PSNRs are 0."""
+    They are infinite for equal colours. A mesh without colours is grey; two empty ones are equal, where one is empty
+    PSNRs are 0.
+    """
     if original.is_empty or decoded.is_empty:
-        same = math.inf if original.is_empty and decoded.is_empty else 0.0
-        return ColorErrors(same, same, same)
-    pair = Painted(original), Painted(decoded)
-    squares = np.maximum(_squares(original, *pair), _squares(decoded, *pair[::-1]))
-    return ColorErrors(*map(psnr, squares.tolist()))
+        found = [math.inf if original.is_empty and decoded.is_empty else 0.0] * 3
+    else:
+        pair = Painted(original), Painted(decoded)
+        found = [psnr(s) for s in np.maximum(_squares(original, *pair), _squares(decoded, *pair[::-1])).tolist()]
+    return dict(zip(COLORS, (*found, float(SHARES @ found)), strict=True))
 
 
 def psnr(square: float) -> float:
@@ -61,15 +53,6 @@ def _squares(mesh: Mesh, own: Painted, other: Painted) -> Float64[np.ndarray, " 
     sample = scatter(mesh, np.ones(len(mesh.faces), bool), POINTS)
     errors = own.on(sample.faces.astype(np.int32), sample.barycentric) - other.at(sample.points, sample.points)[0]
     return np.square(errors @ TO_YUV.T).mean(axis=0)
-
-
-@dataclass(frozen=True, slots=True)
-class RenderErrors:
-    """Errors of coloured pictures, over all views; PSNRs are those of luma, dB, infinite for equal pictures."""
-
-    y_union: float  # over pixels that either mesh covers: silhouettes count
-    y_inside: float  # over those that both cover
-    ssim: float  # masked, as `NormalSsim.masked`
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,8 +80,12 @@ class Colored:
         return ColorView(covered.reshape(shape), image, hit.faces.reshape(shape))
 
 
-def render_errors(original: Mesh, decoded: Mesh, cameras: Sequence[AnyCamera]) -> RenderErrors:
-    """Compare pictures of two meshes in their colours; meshes that no view sees are equal."""
+def render_errors(original: Mesh, decoded: Mesh, cameras: Sequence[AnyCamera]) -> dict[str, float]:
+    """Return errors of pictures of two meshes in their colours over all views, by name.
+
+    The PSNR of luma, dB, is over pixels that either mesh covers, so that silhouettes count, and over those that both
+    cover; SSIM is masked, as in `ssim_normals`. Meshes that no view sees are equal.
+    """
     pair, scores = (Colored(original), Colored(decoded)), list[float]()
     squares, counts = np.zeros(2), np.zeros(2)
     for camera in cameras:
@@ -111,4 +98,5 @@ def render_errors(original: Mesh, decoded: Mesh, cameras: Sequence[AnyCamera]) -
         masked = ssim_view(a, b, pixels)[1]
         scores += [] if masked is None else [masked]
     union, inside = (squares / np.maximum(counts, 1)).tolist()
-    return RenderErrors(psnr(union), psnr(inside), float(np.mean(scores)) if scores else 1.0)
+    found = psnr(union), psnr(inside), float(np.mean(scores)) if scores else 1.0
+    return dict(zip(RENDERS, found, strict=True))

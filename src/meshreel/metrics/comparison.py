@@ -17,17 +17,15 @@ import numpy as np
 
 from ..errors import InputError
 from ..types import Mesh
-from .color import color_errors, render_errors
+from .color import COLORS, RENDERS, color_errors, render_errors
 from .distance import PSNR_CEILING, Original, SurfaceErrors, surface_errors
-from .mpeg import MpegOptions, mpeg_errors
+from .mpeg import MEASURES, MpegOptions, mpeg_errors
 from .render import Remembered, ssim_normals
 from .viewpoints import AnyCamera, Box, ViewOptions, read_cameras, views_around
 
 Row = dict[str, Any]
-_COLORS = ("y_psnr", "u_psnr", "v_psnr", "yuv_psnr", "view_y_psnr", "view_y_psnr_inside")
-_MPEG = ("mpeg_d1_psnr", "mpeg_d2_psnr", "ibsm_geometry_psnr", "ibsm_luma_psnr")
-_PSNRS = ("d2_psnr_paper", "d1_psnr", "d2_psnr", "symmetric_psnr", *_COLORS, *_MPEG)
-_LARGER_IS_BETTER = (*_PSNRS, "ssim", "ssim_masked", "view_ssim")
+_PSNRS = ("d2_psnr_paper", "d1_psnr", "d2_psnr", "symmetric_psnr", *COLORS, *RENDERS[:2], *MEASURES)
+_LARGER_IS_BETTER = (*_PSNRS, "ssim", "ssim_masked", *RENDERS[2:])
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,10 +105,7 @@ def compare_sequences(
             raise InputError(f"the decoded sequence ends after {len(rows)} frames and the original does not")
         rows.append(frame_row(original, mesh, cameras))
         if options.mpeg is not None:
-            mpeg = mpeg_errors(original.mesh, mesh, box, options.mpeg)
-            rows[-1] |= dict(zip(_MPEG, (mpeg.d1, mpeg.d2, mpeg.geometry, mpeg.luma), strict=True))
-            if mpeg.luma is None:
-                rows[-1].pop(_MPEG[-1])
+            rows[-1] |= mpeg_errors(original.mesh, mesh, box, options.mpeg)
         # Vertices alone and faces without area are no surface.
         empty.append(bool(rows[-1]["diagonal_m"] == rows[-1]["rms_forward_m"] == 0))
     if next(others, None) is not None:
@@ -125,15 +120,8 @@ def frame_row(original: Mesh | OriginalFrame, decoded: Mesh, cameras: Sequence[A
     prepared = _prepared(original)
     mesh, row = prepared.mesh, _distance_row(surface_errors(prepared.surface, decoded))
     if mesh.is_colored and decoded.is_colored:
-        colors = color_errors(mesh, decoded)
-        row |= {"y_psnr": colors.y, "u_psnr": colors.u, "v_psnr": colors.v, "yuv_psnr": colors.yuv}
-        if cameras:
-            views = render_errors(mesh, decoded, cameras)
-            row |= {"view_y_psnr": views.y_union, "view_y_psnr_inside": views.y_inside, "view_ssim": views.ssim}
-    if cameras:
-        ssim = ssim_normals(prepared.pictures, decoded, cameras)
-        row |= {"ssim": ssim.whole, "ssim_masked": ssim.masked}
-    return row
+        row |= color_errors(mesh, decoded) | (render_errors(mesh, decoded, cameras) if cameras else {})
+    return row | (ssim_normals(prepared.pictures, decoded, cameras) if cameras else {})
 
 
 def aggregate(frames: Sequence[Row]) -> Row:

@@ -27,6 +27,7 @@ from .viewpoints import Box
 Points = Float64[np.ndarray, "N 3"]
 Values = Float64[np.ndarray, " N"]
 Way = Float64[np.ndarray, " 3"]  # a direction, or a place
+MEASURES = ("mpeg_d1_psnr", "mpeg_d2_psnr", "ibsm_geometry_psnr", "ibsm_luma_psnr")
 CEILING = 99.99  # dB
 VIEWS = 16  # on a Fibonacci sphere
 DEPTH_PEAK = 3.0  # radii: mmetric's depth buffer ends there, though surface lies within two of the camera
@@ -45,28 +46,22 @@ class MpegOptions:
             raise InputError(f"pictures of {self.pixels} pixels, a grid of {self.grid} lines: give at least 8 of each")
 
 
-@dataclass(frozen=True, slots=True)
-class MpegErrors:
-    """PSNRs of one frame, dB; larger is better."""
+def mpeg_errors(original: Mesh, decoded: Mesh, box: Box, options: MpegOptions = MpegOptions()) -> dict[str, float]:
+    """Return the PSNRs of a decoded frame, dB, by name; `box` is that of all original frames.
 
-    d1: float  # point to point, the worse of both directions; the peak is three squares of the box's longest edge
-    d2: float  # point to plane, the same
-    geometry: float  # IBSM of depth
-    luma: float | None  # IBSM of luma (BT.709, full range); None for meshes without colours
-
-
-def mpeg_errors(original: Mesh, decoded: Mesh, box: Box, options: MpegOptions = MpegOptions()) -> MpegErrors:
-    """Measure a decoded frame; `box` is that of all original frames. If only one of the meshes is empty: 0 dB."""
-    colored = original.is_colored and decoded.is_colored
+    D1 (point to point) and D2 (point to plane) are the worse of both directions, whose peak is three squares of the
+    box's longest edge; IBSM is of depth and, for meshes with colours, of luma. Where one mesh alone is empty: 0 dB.
+    """
+    names = MEASURES if original.is_colored and decoded.is_colored else MEASURES[:3]
     pair = original, decoded
     if any(used_surface(mesh).is_empty for mesh in pair):
         worst = CEILING if all(used_surface(mesh).is_empty for mesh in pair) else 0.0
-        return MpegErrors(worst, worst, worst, worst if colored else None)
+        return dict.fromkeys(names, worst)
     clouds = [Cloud.of(mesh, box, options.grid) for mesh in pair]
     ways = np.maximum(clouds[0].squares(clouds[1]), clouds[1].squares(clouds[0]))
     d1, d2 = (_psnr(square / 3, float(box.size.max())) for square in ways.tolist())
     depth, luma = _picture_squares(original, decoded, options.pixels)
-    return MpegErrors(d1, d2, _psnr(depth, DEPTH_PEAK), _psnr(luma, PEAK) if colored else None)
+    return dict(zip(names, (d1, d2, _psnr(depth, DEPTH_PEAK), _psnr(luma, PEAK)), strict=False))
 
 
 @dataclass(frozen=True, slots=True)

@@ -132,14 +132,6 @@ class Visible:
 _C1, _C2 = 0.01**2, 0.03**2  # Wang et al., at data range 1
 
 
-@dataclass(frozen=True, slots=True)
-class NormalSsim:
-    """SSIM of one frame, averaged over the views; 1 is identical."""
-
-    whole: float  # over the whole picture
-    masked: float  # over pixels that either mesh covers, views that see neither left out
-
-
 class Remembered:
     """A mesh that keeps its normal-colored pictures, for comparisons with several meshes from the same cameras."""
 
@@ -157,13 +149,17 @@ class Remembered:
         return self._drawn[-1][-1]
 
 
-def ssim_normals(original: Mesh | Remembered, decoded: Mesh, cameras: Sequence[AnyCamera]) -> NormalSsim:
-    """Compute SSIM between the normal-colored renderings of two meshes (paper, section 4: four views)."""
+def ssim_normals(original: Mesh | Remembered, decoded: Mesh, cameras: Sequence[AnyCamera]) -> dict[str, float]:
+    """Return SSIM between the normal-colored renderings of two meshes (paper, section 4: four views); 1 is identical.
+
+    `ssim` is over whole pictures, `ssim_masked` over pixels that either mesh covers, without views that see neither.
+    """
     pair = original if isinstance(original, Remembered) else Remembered(original), Visible(decoded)
     views = [Pixels(camera, crop_of([pair[0].mesh, decoded], camera, MARGIN)) for camera in cameras]
     scores = [ssim_view(pair[0].look(pixels), pair[1].look(pixels), pixels) for pixels in views]
     counted = [masked for _, masked in scores if masked is not None]
-    return NormalSsim(float(np.mean([whole for whole, _ in scores])), float(np.mean(counted)) if counted else 1.0)
+    whole, masked = float(np.mean([whole for whole, _ in scores])), float(np.mean(counted)) if counted else 1.0
+    return {"ssim": whole, "ssim_masked": masked}
 
 
 def ssim_view(a: Picture | View, b: Picture | View, pixels: Pixels) -> tuple[float, float | None]:

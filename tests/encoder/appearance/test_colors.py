@@ -56,7 +56,7 @@ def test_colors_of_vertices_are_near_those_of_the_frames(files: dict[str, bytes]
     video = meshreel.open(files["vertices"])
     for mesh, shown in zip(COLORED, video, strict=True):
         assert shown.colors is not None and shown.texture is None and shown.colors.flags.writeable
-        assert color_errors(mesh, shown).y > 28
+        assert color_errors(mesh, shown)["y_psnr"] > 28
     bare = video.at(colors=False)[0]
     assert bare.colors is None
     np.testing.assert_array_equal(bare.vertices, video[0].vertices)
@@ -72,7 +72,7 @@ def test_textures_may_have_another_size_in_each_frame() -> None:
     video = meshreel.open(written(meshes))
     for mesh, shown in zip(meshes, video, strict=True):
         assert shown.texture is not None and shown.texture.pixels.shape == video[0].texture.pixels.shape
-        assert color_errors(mesh, shown).y > 28
+        assert color_errors(mesh, shown)["y_psnr"] > 28
 
 
 @pytest.mark.parametrize("colored", [True, False])
@@ -85,7 +85,7 @@ def test_faces_without_places_are_encoded_beside_faces_with(colored: bool) -> No
         flat = Texture.of(np.full((8, 8, 3), 90, np.uint8))
         meshes.append(replace(painted_mesh if colored else mesh, uv=uv, texture=flat))
     for mesh, shown in zip(meshes, meshreel.open(written(meshes)), strict=True):
-        assert shown.texture is not None and color_errors(mesh, shown).y > 25
+        assert shown.texture is not None and color_errors(mesh, shown)["y_psnr"] > 25
 
 
 def test_a_texture_that_cannot_be_read_ends_the_encoding_with_its_name(tmp_path: Path) -> None:
@@ -122,7 +122,7 @@ def test_all_forms_have_colors(preset: str) -> None:
     video = meshreel.open(path)
     assert len({group.form for group in video.reader.groups}) > 1
     for number, mesh in enumerate([*COLORED[:2], *unlike[:3]]):
-        assert color_errors(mesh, video[number]).y > 22, number
+        assert color_errors(mesh, video[number])["y_psnr"] > 22, number
     assert video[5].is_empty
 
 
@@ -133,7 +133,7 @@ def test_a_chain_has_one_atlas_and_pictures_of_each_frame(files: dict[str, bytes
         shown, wanted = video[number], textured(BODY[number])
         assert shown.texture is not None and shown.uv.shape == (len(shown.faces), 3, 2)
         bare = replace(shown, texture=None, uv=None)
-        assert color_errors(wanted, shown).y > color_errors(wanted, bare).y + 2
+        assert color_errors(wanted, shown)["y_psnr"] > color_errors(wanted, bare)["y_psnr"] + 2
     np.testing.assert_array_equal(meshreel.open(files["texture"])[4].texture.pixels, video[4].texture.pixels)
     coarse = video.at(0)[2]
     assert len(coarse.uv) == len(coarse.faces)
@@ -194,7 +194,7 @@ def test_a_scene_has_colors_of_its_room_and_its_bodies(tmp_path: Path) -> None:
     with meshreel.open(tmp_path / "scene.reel") as video:
         assert video.reader.has_background
         for number in (0, 5):
-            assert color_errors(colors[number], video[number]).y > 20
+            assert color_errors(colors[number], video[number])["y_psnr"] > 20
         assert video.background(0).colors is not None
 
 
