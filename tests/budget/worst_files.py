@@ -122,7 +122,7 @@ def field(graph: Graph, columns: int, width: int, head: int = 0) -> CodedField:
 def layers(data: bytes, levels: int, frames: int, patched: bool = False, predicted: bool = False) -> bytes:
     """A group with as many columns as there can be, and faces dropped and added in every second frame."""
     base = decode_mesh(data, STEP)
-    motion = field(hierarchy(base).graph, 3 * frames, 3 * frames, head=1 + 6 * frames)
+    motion = field(hierarchy(base)[1], 3 * frames, 3 * frames, head=1 + 6 * frames)
     origin = Origin.PREVIOUS if predicted else Origin.ALONE
     head = LayersGroup(
         Form.LAYERS, origin, frames, levels, STEP, b"" if predicted else data, SharedMotion.POSES, motion
@@ -227,7 +227,7 @@ def painted(size: int, frames: int = 16, levels: int = 2, side: int = 0) -> byte
     data, levels = base_of(size, lambda shape: budget.layers_cost(shape, frames), levels)
     base, colors, pictures = decode_mesh(data, STEP), list[Companion](), list[bytes]()
     parts, faces, count = [pack(VertexColors(Form.VERTEX_COLORS, Origin.ALONE, 64))], base.faces, len(base.vertices)
-    parts.append(pack(field(hierarchy(base).graph, 3 * frames, 3 * frames)))
+    parts.append(pack(field(hierarchy(base)[1], 3 * frames, 3 * frames)))
     for _ in range(levels):
         near = connectivity(faces, count)
         parts.append(pack(ColorsLevel(24, field(near.siblings.graph(24), 3 * frames, 3 * frames))))

@@ -128,16 +128,15 @@ def _write_labels(scene: _Labelling, output: Path, previews: int, common: Common
         progress("segment", count, count)
         for folder in (LABELS, *([COLORED] if chosen else [])):
             make_folder(output / folder)
-        for number, labels in enumerate(label_frames(frames, by, EncoderOptions(scene=options))):
+        for number, (moves, body_of) in enumerate(label_frames(frames, by, EncoderOptions(scene=options))):
             with replacing(output / LABELS / f"{names[number]}.npz") as file:
-                np.savez_compressed(file, moving=labels.moving, bodies=labels.bodies)
-            moving.append(int(labels.moving.sum()))
-            of_bodies.append(np.bincount(labels.bodies).tolist())
+                np.savez_compressed(file, moving=moves, bodies=body_of)
+            moving.append(int(moves.sum()))
+            of_bodies.append(np.bincount(body_of).tolist())
             if number in chosen:
                 mesh = frames[number]
-                colors = label_colors(labels.moving, labels.bodies)
-                write_colored(mesh, colors, output / COLORED / f"{names[number]}.ply")
-                rows.append((number, *look_at_labels(mesh, labels.moving, labels.bodies, views)))
+                write_colored(mesh, label_colors(moves, body_of), output / COLORED / f"{names[number]}.ply")
+                rows.append((number, *look_at_labels(mesh, moves, body_of, views)))
             progress("label", number + 1, count)
     write_file(output / CAMERAS, pack_cameras(views))
     if chosen:

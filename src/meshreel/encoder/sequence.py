@@ -269,8 +269,8 @@ def _encode_scene(job: Job, file: BinaryIO, writer: ReelWriter, parts: Parts) ->
     job.stages.reach("room", 1.0)
     note("background, coded", *(state.payload for state in states))
     with writer:
-        coded = encode_bodies(job, parts)
-        groups = write_in_order(writer, coded.groups, states, survey)
+        coded, dropped = encode_bodies(job, parts)
+        groups = write_in_order(writer, coded, states, survey)
         metadata = {**chosen_options(options, groups), "noise_m": shortened(parts.noise), **up_metadata(sequence.up)}
         writer.header = make_header(sequence.frame_rate, survey, metadata)
     measured = evenly(len(sequence), MEASURED)
@@ -279,5 +279,5 @@ def _encode_scene(job: Job, file: BinaryIO, writer: ReelWriter, parts: Parts) ->
     faces = len(decode_background(states[0].payload).faces) if states else 0
     scene = SceneSummary(size, faces, parts.noise, psnr, tuple(measured), tracks)
     moves = any(group.form != Form.EMPTY for group in groups)
-    texts = (*warnings_of(survey), *warnings_of_scene(parts, moves, coded.dropped), *warnings_of_colors(groups, states))
+    texts = (*warnings_of(survey), *warnings_of_scene(parts, moves, dropped), *warnings_of_colors(groups, states))
     return Summary(writer.size, tuple(groups), texts, scene)

@@ -54,18 +54,18 @@ def test_surface_that_is_not_there_any_more_is_dropped() -> None:
     frames = [template] * 3 + [BALL] * 3
     found = find_tails(frames, meshes(noisy(template), template.faces), SIZE, noise=0.0)
     assert found is not None
-    for t, frame in enumerate(found.frames):
+    for t, frame in enumerate(found[1]):
         assert len(frame.faces) == (len(template.faces) if t < 3 else len(BALL.faces))
-    assert len(pack(found.record)) < 40 and not found.record.mesh
+    assert len(pack(found[0])) < 40 and not found[0].mesh
 
 
 def test_surface_that_is_new_is_added() -> None:
     frames = [BALL] * 5 + [concatenate([BALL, knob()])]
     found = find_tails(frames, meshes(noisy(BALL), BALL.faces), SIZE, noise=0.0)
     assert found is not None
-    assert [len(frame.faces) > len(BALL.faces) for frame in found.frames] == [False] * 5 + [True]
+    assert [len(frame.faces) > len(BALL.faces) for frame in found[1]] == [False] * 5 + [True]
     plain = [Mesh(places, BALL.faces) for places in noisy(BALL)]
-    assert measure(frames, found.frames).distance < 0.3 * measure(frames, plain).distance
+    assert measure(frames, found[1]).distance < 0.3 * measure(frames, plain).distance
 
 
 def test_without_shares_nothing_is_added(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -99,7 +99,7 @@ def test_patches_on_an_almost_exact_template_are_close_to_the_frame(noise: float
     found = find_tails(frames, meshes(places, flat.faces), SIZE, noise=0.0)
     assert (found is None) == (noise == 1e-9)  # there a byte is worth nothing
     if found is not None:
-        decoded = decode_patches(found.record, 4, len(flat.faces)).apply(places, flat.faces)
+        decoded = decode_patches(found[0], 4, len(flat.faces)).apply(places, flat.faces)
         assert measure(frames[3:], decoded[3:]).distance < 0.005 and len(decoded[0].faces) == len(flat.faces)
 
 
@@ -109,7 +109,7 @@ def test_a_mask_that_pays_is_kept_where_a_patch_beside_it_does_not(monkeypatch: 
     places = noisy(template, 3)
     monkeypatch.setattr(tails._Search, "holds", lambda _, tried: all(mesh.is_empty for mesh in tried.parts.meshes))
     found = find_tails(frames, meshes(places, template.faces), SIZE, noise=0.0)
-    assert found is not None and found.record.dropped and not found.record.mesh
+    assert found is not None and found[0].dropped and not found[0].mesh
 
 
 @pytest.mark.parametrize("size", [300, 30_000])
@@ -121,10 +121,10 @@ def test_tails_remove_the_error_that_their_bytes_are_worth(size: int, scale: flo
     found = find_tails(frames, meshes(places, template.faces), size, noise=0.0)
     assert found is not None
     before = measure(frames, [Mesh(p, template.faces) for p in places]).distance ** 2
-    after = measure(frames, found.frames).distance ** 2
+    after = measure(frames, found[1]).distance ** 2
     body = 6 * measure([BALL] * 6, [Mesh(p, BALL.faces) for p in noisy(BALL)]).distance ** 2
     assert (
-        6 * (before - after) > 0.5 * body * len(pack(found.record)) / size
+        6 * (before - after) > 0.5 * body * len(pack(found[0])) / size
     )  # half: the search counts the body a little less
 
 
@@ -133,12 +133,12 @@ def test_the_frames_are_those_that_the_record_decodes_to() -> None:
     frames = [concatenate([BALL, knob(at=-0.4)]), template, BALL]
     places = noisy(template, 3)
     found = find_tails(frames, meshes(places, template.faces), SIZE, noise=0.0)
-    assert found is not None and found.record.mesh and found.record.dropped
-    decoded = decode_patches(found.record, 3, len(template.faces)).apply(places, template.faces)
-    for mine, theirs in zip(decoded, found.frames, strict=True):
+    assert found is not None and found[0].mesh and found[0].dropped
+    decoded = decode_patches(found[0], 3, len(template.faces)).apply(places, template.faces)
+    for mine, theirs in zip(decoded, found[1], strict=True):
         np.testing.assert_array_equal(mine.vertices, theirs.vertices)
         np.testing.assert_array_equal(mine.faces, theirs.faces)
-    assert find_tails(frames, meshes(places, template.faces), SIZE, noise=0.0).record == found.record  # type: ignore[union-attr]
+    assert find_tails(frames, meshes(places, template.faces), SIZE, noise=0.0)[0] == found[0]  # type: ignore[index]
 
 
 def meshes(positions: np.ndarray, faces: np.ndarray) -> list[Mesh]:
@@ -186,7 +186,7 @@ def test_surface_that_a_frame_lacks_stays_unless_a_camera_saw_through_it():
     frames, shown = [Mesh(BALL.vertices + NOISE[0], BALL.faces)] * 2, [more] * 2
     seen, blind = FreeSpace.of([away], place), FreeSpace.of([], place)
     dropped = find_tails(frames, shown, SIZE, noise=1e-3, free=[seen] * 2)
-    assert dropped is not None and all(len(mesh.faces) < len(more.faces) for mesh in dropped.frames)
+    assert dropped is not None and all(len(mesh.faces) < len(more.faces) for mesh in dropped[1])
     assert find_tails(frames, shown, SIZE, noise=1e-3, free=[blind] * 2) is None
 
 
@@ -198,11 +198,11 @@ def test_surface_that_cameras_face_and_hardly_ever_measure_goes(measured: int, s
     free = [FreeSpace.of([dark], Placement(1.0, (0.0, 0.0, 3.0)))] * 4
     frames = [concatenate([bare, knob()])] * measured + [bare] * (4 - measured)
     found = find_tails(frames, [more] * 4, SIZE, noise=1e-3, free=free)
-    faces = len(more.faces) if found is None else len(found.frames[-1].faces)
+    faces = len(more.faces) if found is None else len(found[1][-1].faces)
     assert (faces == len(more.faces)) == stays
 
 
 def test_holes_of_noisy_bodies_are_patched_at_any_price():
     frame = concatenate([Mesh(BALL.vertices + NOISE[0], BALL.faces), knob()])
     found = find_tails([frame] * 2, [BALL] * 2, 10, noise=1e-3)  # a byte costs more than the knob
-    assert found is not None and all(len(mesh.faces) > len(BALL.faces) for mesh in found.frames)
+    assert found is not None and all(len(mesh.faces) > len(BALL.faces) for mesh in found[1])

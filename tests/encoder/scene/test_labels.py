@@ -16,9 +16,9 @@ COUNT = len(SMALL.faces)
 def labels(*frames: Mesh) -> list[list[int]]:
     """The numbers of the pieces of each frame, which are as large as `SMALL`; key intervals have two frames."""
     found = []
-    for mesh, label in zip(frames, label_frames(MeshList(frames, 1.0), ALL, OPTIONS), strict=True):
-        assert label.moving.all() and len(label.moving) == len(label.bodies) == len(mesh.faces)
-        found.append([np.unique(piece).item() for piece in label.bodies.reshape(-1, COUNT)])  # one number each
+    for mesh, (moving, bodies) in zip(frames, label_frames(MeshList(frames, 1.0), ALL, OPTIONS), strict=True):
+        assert moving.all() and len(moving) == len(bodies) == len(mesh.faces)
+        found.append([np.unique(piece).item() for piece in bodies.reshape(-1, COUNT)])  # one number each
     return found
 
 

@@ -21,7 +21,7 @@ from meshreel.encoder.group.progress import Stages
 from meshreel.encoder.run.interval_files import IntervalFiles
 from meshreel.encoder.run.schedule import Job
 from meshreel.encoder.scene.parts import Parts, take_apart
-from meshreel.encoder.scene.scene import CodedBodies, encode_bodies
+from meshreel.encoder.scene.scene import encode_bodies
 from meshreel.encoder.scene.static import encode_static
 from meshreel.encoder.scene.tracks import TrackGroup
 from meshreel.encoder.sequence import Encoder, encode
@@ -271,22 +271,20 @@ def tracks(frames: list[Mesh], interval: int = 2) -> list[str]:
     survey = replace(survey_sequence(sequence), scale=1.0)
     parts = Parts(survey, ALL, NONE, [], 0.0, 0.0)
     options = replace(OPTIONS, key_interval=float(interval))
-    coded = bodies_of(sequence, options, parts)
-    assert coded.dropped == 0
-    assert coded.groups == sorted(coded.groups, key=lambda each: (each.first_frame, each.track))
-    count = max(each.track for each in coded.groups) + 1
-    return [shown(coded.groups, track, len(frames)) for track in range(count)]
+    groups, dropped = bodies_of(sequence, options, parts)
+    assert dropped == 0
+    assert groups == sorted(groups, key=lambda each: (each.first_frame, each.track))
+    count = max(each.track for each in groups) + 1
+    return [shown(groups, track, len(frames)) for track in range(count)]
 
 
-def bodies_of(sequence: MeshList, options: EncoderOptions, parts: Parts) -> CodedBodies:
-    """Return the bodies of a scene as encoded, with their payloads in memory."""
+def bodies_of(sequence: MeshList, options: EncoderOptions, parts: Parts) -> tuple[list[TrackGroup], int]:
+    """Return the groups of a scene as encoded, with their payloads in memory, and the faces that are in none."""
     stages, recipe = Stages(None, len(sequence)), options.recipe()
     with TemporaryDirectory() as folder, IntervalFiles(Path(folder, "a.reel")) as files:
-        coded = encode_bodies(Job(captured(sequence), options, None, stages, recipe, files), parts)
-        loaded = [
-            (each, each.group.stored.read() if each.group.stored else each.group.payload) for each in coded.groups
-        ]
-        return replace(coded, groups=[replace(e, group=replace(e.group, payload=data)) for e, data in loaded])
+        groups, dropped = encode_bodies(Job(captured(sequence), options, None, stages, recipe, files), parts)
+        loaded = [(e, e.group.stored.read() if e.group.stored else e.group.payload) for e in groups]
+        return [replace(e, group=replace(e.group, payload=data)) for e, data in loaded], dropped
 
 
 def shown(groups: list[TrackGroup], track: int, frames: int) -> str:
@@ -345,9 +343,9 @@ def test_more_bodies_than_a_file_has_tracks_share_some():
     many = concatenate([moved(plate, (k % 17, k // 17, 0)) for k in range(MOST_TRACKS + 20)])
     sequence = MeshList((many, many), 1.0)
     survey = replace(survey_sequence(sequence), scale=1.0)
-    coded = bodies_of(sequence, OPTIONS, Parts(survey, ALL, NONE, [], CELL, 0.0, 0.0))
-    assert {each.track for each in coded.groups} == set(range(MOST_TRACKS)) and coded.dropped == 0
-    faces = [len(decode_intra(each.group.payload)[0].faces) for each in coded.groups if each.first_frame == 0]
+    groups, dropped = bodies_of(sequence, OPTIONS, Parts(survey, ALL, NONE, [], CELL, 0.0, 0.0))
+    assert {each.track for each in groups} == set(range(MOST_TRACKS)) and dropped == 0
+    faces = [len(decode_intra(each.group.payload)[0].faces) for each in groups if each.first_frame == 0]
     assert sum(faces) == len(many.faces)
 
 

@@ -16,7 +16,6 @@ from jaxtyping import Float64
 
 from meshreel.analysis.fit.surface_fit import Fit, FitOptions, fit_frames
 from meshreel.analysis.reference.centers import (
-    ReferenceCenters,
     bind,
     center_motions,
     largest_distances,
@@ -51,7 +50,7 @@ class Stages:
 
     frames: tuple[Mesh, ...]
     centers: Centers
-    spread: ReferenceCenters  # of eq. 5
+    spread: Float64[np.ndarray, "K 3"]  # centers in the pose of eq. 5
     reference: Reference
     moved: list[tuple[Mesh, Float64[np.ndarray, "V 3"]]]  # the frames in the pose of eq. 5, RGB by their own normals
     coded: CodedReference
@@ -78,7 +77,7 @@ def compute(sequence: MeshList, options: PaperOptions) -> Stages:
     moved = list[tuple[Mesh, np.ndarray]]()
     for frame, own in zip(frames, centers.positions, strict=True):
         binding = bind(frame, own, reference.neighbours)
-        motions = center_motions(own, spread.positions, reference.neighbours)
+        motions = center_motions(own, spread, reference.neighbours)
         vertices = move(frame.vertices, binding, motions, reference.neighbours)
         moved.append((Mesh(vertices, frame.faces), (vertex_normals(frame) + 1) / 2))
     sent = klt.fit(field), payload, len(layers) - 1
@@ -136,9 +135,12 @@ def centers(stages: Stages, path: Path) -> None:
 def spread_centers(stages: Stages, path: Path) -> None:
     """A frame's centers beside those of eq. 5, from the front and from the side."""
     sheet = Sheet(4, 300)
-    poses = (stages.centers.positions[CONTACT], stages.spread.positions)
+    poses = (stages.centers.positions[CONTACT], stages.spread)
     box = [Mesh.of(pose, np.zeros((0, 3))) for pose in poses]
-    names = (f"frame {FIRST + CONTACT}", f"reference (stress {stages.spread.stress:.3f})")
+    distances = largest_distances(stages.centers)  # of eq. 5, whose two sums count every pair twice
+    current = np.linalg.norm(stages.spread[:, None] - stages.spread[None], axis=2)
+    stress = np.linalg.norm(distances - current) / np.linalg.norm(distances)
+    names = (f"frame {FIRST + CONTACT}", f"reference (stress {stress:.3f})")
     for panel in range(4):
         pose, view = poses[panel % 2], panel // 2
         draw_points(sheet.axes[panel], pose, camera_for(box, 300, view), BODIES[stages.centers.bodies % 3])

@@ -37,14 +37,6 @@ GUARD_CHOICES = 6  # nearest centers that a vertex may take in place of an unrel
 GUARD_ROUNDS = 2  # passes over the mesh that replace unrelated centers (guess)
 
 
-@dataclass(frozen=True, slots=True)
-class ReferenceCenters:
-    """Pose that keeps the largest distances best, with its stress."""
-
-    positions: Pose  # aligned to a real frame's pose
-    stress: float  # eq. 5; 0 is perfect
-
-
 def largest_distances(centers: Centers) -> Pairs:
     """Return the largest distance of each pair of centers over all frames (eq. 5's d), in units of the centers.
 
@@ -58,10 +50,10 @@ def largest_distances(centers: Centers) -> Pairs:
     return largest
 
 
-def reference_centers(distances: Pairs, pose: Pose) -> ReferenceCenters:
+def reference_centers(distances: Pairs, pose: Pose) -> Pose:
     """Find the pose of least stress (eq. 5), rotated, shifted and mirrored to agree best with a frame's `pose`."""
     if len(distances) < 4 or not distances.any():  # up to three points, or all in one place
-        return ReferenceCenters(pose.copy(), _stress(distances, pose))
+        return pose.copy()
     positions = _smacof(distances, _classical(distances))
     # Mirrored if most small neighbourhoods are inside out: a limb may not be in the frame's place, so a global fit may
     # prefer the mirror image.
@@ -71,8 +63,7 @@ def reference_centers(distances: Pairs, pose: Pose) -> ReferenceCenters:
     if votes.sum() < 0:
         positions = positions * np.array([1.0, 1.0, -1.0])
     rotation, translation = fit_rigid(positions[None], pose[None], np.ones((1, len(pose))))
-    positions = products(positions, rotation[0].T) + translation[0]
-    return ReferenceCenters(positions, _stress(distances, positions))
+    return products(positions, rotation[0].T) + translation[0]
 
 
 def affinity(distances: Pairs) -> Pairs:
@@ -141,14 +132,6 @@ def _guttman(distances: Pairs, x: Float32[np.ndarray, "K 3"]) -> tuple[Float32[n
     stress = float(np.square(current).sum())
     moved = (ratio.sum(axis=1)[:, None] * x - products(ratio, x).astype(np.float32)) / np.float32(len(x))
     return moved, stress
-
-
-def _stress(distances: Pairs, positions: Pose) -> float:
-    """Return Kruskal's stress (eq. 5); both of its sums count every pair twice, which cancels."""
-    current = np.sqrt(_squared_distances(positions))
-    np.fill_diagonal(current, 0)
-    size = norm(distances)
-    return norm(distances - current) / size if size > 0 else 0.0
 
 
 def _squared_distances(pose: Pose | Float32[np.ndarray, "K 3"]) -> Pairs:

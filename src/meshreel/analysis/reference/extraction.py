@@ -171,7 +171,7 @@ class Group:
         self.frames, self.positions, self.poisson = frames, centers.positions, poisson
         self.distances = largest_distances(centers)  # eq. 5's d
         self.kin, self.spacing = neighbours(affinity(self.distances)), center_spacing(self.distances)
-        self.canonical = reference_centers(self.distances, self.positions[len(frames) // 2]).positions
+        self.canonical = reference_centers(self.distances, self.positions[len(frames) // 2])
         self.surfaces = [FrameSurface(frame) for frame in frames]
         self.edges = [unique_edges(frame.faces) for frame in frames]
         self.edge = float(np.mean([edge_lengths(frame).mean() for frame in frames]))

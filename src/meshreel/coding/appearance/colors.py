@@ -117,10 +117,10 @@ def _encode_mesh(
     rows = np.moveaxis(values.reshape(frames, -1, 3), 0, 2).reshape(mesh.vertices, 3 * frames)
     prediction = np.zeros((mesh.vertices, 3)) if before is None else before
     start = np.repeat(prediction, frames, axis=1)  # luma of all frames, then one difference, then the other
-    places, base = hierarchy(mesh.base), Rate(rung_of(step * FINER), PRICE)
-    field = encode_field((rows[:count] - start[:count])[places.order], places.graph, base)
+    order, graph = hierarchy(mesh.base)
+    field = encode_field((rows[:count] - start[:count])[order], graph, Rate(rung_of(step * FINER), PRICE))
     decoded = np.empty((count, 3 * frames))
-    decoded[places.order] = field.decoded
+    decoded[order] = field.decoded
     decoded += start[:count]
     records = [pack(field.record)]
     for _ in range(mesh.levels):

@@ -32,14 +32,6 @@ class Graph:
 
 
 @dataclass(frozen=True, slots=True)
-class Hierarchy:
-    """Order of a base mesh's vertices from the coarsest shape to the finest detail, with their predictors."""
-
-    order: Int32[np.ndarray, " V"]  # the vertex at each place of the order
-    graph: Graph  # between places of the order
-
-
-@dataclass(frozen=True, slots=True)
 class Siblings:
     """Siblings of each new vertex of a level: earlier new vertices on the same face of the coarser level."""
 
@@ -71,13 +63,16 @@ def connectivity(faces: Int32[np.ndarray, "F 3"], vertices: int) -> Connectivity
     return Connectivity(level, siblings(level))
 
 
-def hierarchy(base: Mesh) -> Hierarchy:
-    """Build the hierarchy of a base mesh's vertices. Raises FormatError if a face refers to a missing vertex."""
+def hierarchy(base: Mesh) -> tuple[Int32[np.ndarray, " V"], Graph]:
+    """Return the vertices of a base mesh from the coarsest shape to the finest detail, and the graph of their places.
+
+    Raises FormatError if a face refers to a missing vertex.
+    """
     try:
         order, starts, near, weights = _core.hierarchy(base.vertices, base.faces)
     except ValueError as error:
         raise FormatError(f"a face that names none of {len(base.vertices)} vertices") from error
-    return Hierarchy(order, Graph(starts.view(np.int64), near, weights))  # the core's int64 may be NumPy's longlong
+    return order, Graph(starts.view(np.int64), near, weights)  # the core's int64 may be NumPy's longlong
 
 
 def siblings(level: Level) -> Siblings:

@@ -43,16 +43,16 @@ def encode_trajectories(
 
     `tangential` is the weight of a squared error along the surface, where sliding hardly shows.
     """
-    places = hierarchy(base)
+    order, graph = hierarchy(base)
     frames = [vertex_normals(Mesh(np.ascontiguousarray(frame), base.faces)) for frame in positions]
-    normals = np.stack(frames, axis=1)[places.order].reshape(len(base.vertices), -1)
+    normals = np.stack(frames, axis=1)[order].reshape(len(base.vertices), -1)
     surface, coded = SurfaceWeight(np.ascontiguousarray(normals), tangential), list[tuple[SharedMotion, CodedField]]()
     # Shared motion is rounded to a sixteenth of a step.
     bits = min(max(strict.ceil_log2(8.0 / rate.step), 0), MOST_BITS)
     for alike in (_shifts(positions, base, rate, bits), _poses(positions, base, bits)):
         if alike is not None:
-            offsets = np.moveaxis(positions - alike.places, 0, 1)[places.order].reshape(normals.shape)
-            coded.append((alike.kind, encode_field(offsets, places.graph, rate, surface, alike.head).record))
+            offsets = np.moveaxis(positions - alike.places, 0, 1)[order].reshape(normals.shape)
+            coded.append((alike.kind, encode_field(offsets, graph, rate, surface, alike.head).record))
     return min(coded, key=lambda pair: len(pair[1].basis) + len(pair[1].symbols))
 
 

@@ -63,18 +63,13 @@ def cost(distortion: float, size: int, options: DisplacementOptions) -> float:
     return distortion + WORTH * options.step**2 * 8 * size
 
 
-@dataclass(frozen=True, slots=True)
-class Allocation:
-    """Choices of the encoder: the basis as transmitted, and the rung of each component's step."""
-
-    basis: klt.BasisSymbols
-    rungs: Int64[np.ndarray, " M"]  # each component's
-
-
 def allocate(
     field: Float64[np.ndarray, "V T 3"], system: System, neighbours: entropy.Neighbours, options: DisplacementOptions
-) -> Allocation:
-    """Choose the components and steps that minimise distortion + price * rate."""
+) -> tuple[klt.BasisSymbols, Int64[np.ndarray, " M"]]:
+    """Choose the components and steps that minimise distortion + price * rate.
+
+    Return the basis as transmitted, and the rung of each component's step.
+    """
     basis = klt.fit(field)
     if options.basis_size is not None:
         chosen = np.arange(len(basis.energies)) < options.basis_size
@@ -91,7 +86,7 @@ def allocate(
     if not pays.all():
         chosen[chosen] = pays
         coded, rungs = _Components(field, basis.only(chosen), system, options), rungs[pays]
-    return Allocation(coded.basis, rungs)
+    return coded.basis, rungs
 
 
 def round_deltas(

@@ -23,7 +23,7 @@ from .. import entropy, klt
 from ..mesh import CodedReference, check_growth, check_step, decode_mesh
 from ..steps import RUNGS
 from . import laplacian, quantize
-from .allocation import Allocation, DisplacementOptions, allocate, alternatives, cost, round_deltas, steps_of
+from .allocation import DisplacementOptions, allocate, alternatives, cost, round_deltas, steps_of
 
 ANCHORS = AnchorRule.FARTHEST  # where they lie (decision 5)
 MOST_FRAMES = 65_535  # of a group: a uint16 in the head
@@ -83,35 +83,29 @@ def _encode(field: Float64[np.ndarray, "V T 3"], base: Mesh, options: Displaceme
     anchors = laplacian.anchors(ANCHORS, options.anchor_count or 0, base.faces, vertices)
     system = laplacian.System(base, anchors, options.anchor_weight)
     neighbours = entropy.causal_neighbours(base.faces, vertices)
-    choice = allocate(field, system, neighbours, options)
-    basis, steps = klt.dequantize(choice.basis), steps_of(choice.rungs)
+    sent, rungs = allocate(field, system, neighbours, options)
+    basis, steps = klt.dequantize(sent), steps_of(rungs)
 
     weights = klt.forward(field, basis)  # eq. 8
     deltas = system.forward(weights)  # eq. 12
-    symbols = round_deltas(deltas, choice.rungs, system, options)
+    symbols = round_deltas(deltas, rungs, system, options)
     rounded, fixed = symbols[:vertices], symbols[vertices:]
     anchor_streams = [entropy.encode_integers(column) for column in fixed.T]
     streams = list(zip(anchor_streams, entropy.encode_weights(rounded, neighbours), strict=True))
 
     error = klt.inverse(system.inverse(quantize.inverse(symbols, steps)), basis) - field
-    payload = records.pack(_head(field.shape[1], choice, streams, options)) + b"".join(map(b"".join, streams))
-    return payload, float((error**2).sum())
-
-
-def _head(
-    frames: int, choice: Allocation, streams: list[tuple[bytes, bytes]], options: DisplacementOptions
-) -> DisplacementHead:
-    """Return the head of the streams of each component's anchors and deltas."""
-    coded = zip(choice.basis.bits[1:].tolist(), choice.rungs.tolist(), streams, strict=True)
-    return DisplacementHead(
-        frames=frames,
+    coded = zip(sent.bits[1:].tolist(), rungs.tolist(), streams, strict=True)
+    head = DisplacementHead(
+        frames=field.shape[1],
         anchor_rule=ANCHORS,
         anchor_count=options.anchor_count or 0,
         anchor_weight=options.anchor_weight,
-        mean_bits=int(choice.basis.bits[0]),
+        mean_bits=int(sent.bits[0]),
         components=tuple(Component(bits, rung, len(fixed), len(deltas)) for bits, rung, (fixed, deltas) in coded),
-        basis=entropy.encode_integers(np.append(choice.basis.mean, choice.basis.vectors).astype(np.int32)),
+        basis=entropy.encode_integers(np.append(sent.mean, sent.vectors).astype(np.int32)),
     )
+    payload = records.pack(head) + b"".join(map(b"".join, streams))
+    return payload, float((error**2).sum())
 
 
 def _read_head(data: bytes) -> tuple[DisplacementHead, int]:

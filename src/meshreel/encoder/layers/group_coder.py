@@ -95,5 +95,6 @@ class GroupCoder:
         found = find_tails(known, decoded, len(payload), noise=self.noise, free=free)
         if found is None:
             return payload, layers, decoded
-        payload += pack(found.record)
-        return payload, (*layers, len(payload)), found.frames
+        record, frames = found
+        payload += pack(record)
+        return payload, (*layers, len(payload)), frames

@@ -38,14 +38,6 @@ LATTICE = 2.0  # spacing of the patches' lattice, in RMS distances of the rest (
 EXCHANGE = 1.33  # power of the rate with which the squared error falls: 4 dB a doubling (decision 13)
 
 
-@dataclass(frozen=True, slots=True)
-class Tails:
-    """A layer of patches, and the frames as decoded with it."""
-
-    record: LayersPatches
-    frames: list[Mesh]
-
-
 def find_tails(
     frames: Sequence[Mesh | Surface],
     decoded: Sequence[Mesh],
@@ -53,14 +45,14 @@ def find_tails(
     *,
     noise: float,
     free: Sequence[FreeSpace | None] = (),
-) -> Tails | None:
-    """Find the layer of patches that lowers squared error + price x bytes most; None where none does.
+) -> tuple[LayersPatches, list[Mesh]] | None:
+    """Return the layer of patches that lowers squared error + price x bytes most, and the frames as decoded with it.
 
-    The `decoded` meshes of a group have the same faces; `size` is that of their layers, bytes. `noise` is the RMS
-    distance of the frames from the truth: thresholds count from there where the rest is nearer. `free` is what cameras
-    saw through in each frame: surface that a frame lacks stays unless one saw through it. Neither the mean nor the
-    larger of both directions' errors rises by more than the layer's bytes are worth; but holes are patched at any
-    price.
+    None where no layer does. The `decoded` meshes of a group have the same faces; `size` is that of their layers,
+    bytes. `noise` is the RMS distance of the frames from the truth: thresholds count from there where the rest is
+    nearer. `free` is what cameras saw through in each frame: surface that a frame lacks stays unless one saw through
+    it. Neither the mean nor the larger of both directions' errors rises by more than the layer's bytes are worth; but
+    holes are patched at any price.
     """
     surfaces = [frame if isinstance(frame, Surface) else Surface(frame) for frame in frames]
     shown = [ShownFrame(*each) for each in zip_longest(surfaces, decoded, free)]
@@ -94,7 +86,7 @@ def find_tails(
     chosen = next((tried for tried in reversed(better) if torn or search.holds(tried)), least_of_all)
     if chosen is None:
         return None
-    return Tails(chosen.record, chosen.parts.apply(np.stack([mesh.vertices for mesh in decoded]), faces))
+    return chosen.record, chosen.parts.apply(np.stack([mesh.vertices for mesh in decoded]), faces)
 
 
 @dataclass(frozen=True, slots=True)

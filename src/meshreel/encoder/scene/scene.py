@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from fractions import Fraction
 from itertools import pairwise
 
@@ -37,18 +37,12 @@ from .tracks import TrackGroup, placed
 MOST_NOISE = 0.05  # RMS, of the diagonal of a body: beyond, nothing is left of a hand (guess)
 
 
-@dataclass(frozen=True, slots=True)
-class CodedBodies:
-    """The moving bodies as encoded."""
-
-    groups: list[TrackGroup]  # in the order of the file
-    dropped: int  # faces of pieces that were there for a moment only, and are in none of the groups
-
-
-def encode_bodies(job: Job, parts: Parts) -> CodedBodies:
+def encode_bodies(job: Job, parts: Parts) -> tuple[list[TrackGroup], int]:
     """Encode the groups of all tracks; each track has all frames, and no group has frames with surface and without.
 
-    The intervals of the whole scene are one stream: workers need not wait for the last body of a key interval.
+    Return them in the order of the file, and the number of faces of pieces that were there for a moment only, and are
+    in none of the groups. The intervals of the whole scene are one stream: workers need not wait for the last body of a
+    key interval.
     """
     tracks, found = Tracks(parts.segmentation.cell, job.scene.near), list[TrackGroup]()
     places = deque[tuple[int, int]]()  # track and first frame of intervals that are not encoded yet
@@ -62,7 +56,7 @@ def encode_bodies(job: Job, parts: Parts) -> CodedBodies:
         found += placed(*places.popleft(), groups)
     for track, began in enumerate(tracks.began):
         found += placed(track, 0, empty_groups(began))
-    return CodedBodies(sorted(found, key=lambda each: (each.first_frame, each.track)), tracks.dropped)
+    return sorted(found, key=lambda each: (each.first_frame, each.track)), tracks.dropped
 
 
 def scene_intervals(job: Job, parts: Parts, tracks: Tracks) -> Iterator[Interval]:
@@ -132,8 +126,7 @@ class Tracks:
         free = [number for number in range(len(self._last) + len(bodies) + 1) if number not in before]
         numbers = [free.pop(0) if old < 0 else old for old in before]
         count = max([len(self._last), 1, *(number + 1 for number in numbers)])
-        empty = [Mesh.empty()] * len(moving)
-        found = [empty] * count
+        found = [[Mesh.empty()] * len(moving)] * count
         for number, body in zip(numbers, bodies, strict=True):
             found[number] = body
         self.began += [self._frames] * (count - len(self.began))
@@ -142,16 +135,10 @@ class Tracks:
         return list(enumerate(found))
 
 
-@dataclass(frozen=True, slots=True)
-class FrameLabels:
-    """Labels of the faces of one frame."""
-
-    moving: Bool[np.ndarray, " F"]
-    bodies: UInt16[np.ndarray, " F"]  # 1 + the track that has the face; 0: it stands still, or belongs to no body
-
-
-def label_frames(sequence: MeshSequence, segmentation: Segmentation, options: EncoderOptions) -> Iterator[FrameLabels]:
-    """Yield the labels of each frame; a body has the same number in all frames."""
+def label_frames(
+    sequence: MeshSequence, segmentation: Segmentation, options: EncoderOptions
+) -> Iterator[tuple[Bool[np.ndarray, " F"], UInt16[np.ndarray, " F"]]]:
+    """Yield which faces of each frame move, and the body of each: 1 + its track; 0: it stands still, or is of none."""
     cell = segmentation.cell
     tracks = Tracks(cell, options.scene.near if options.scene else NEAR)
     for frames in key_intervals(sequence, segmentation, options):
@@ -166,7 +153,7 @@ def label_frames(sequence: MeshSequence, segmentation: Segmentation, options: En
         for place, (chosen, part) in enumerate(zip(moving, parts, strict=True)):
             labels = np.zeros(len(chosen), np.uint16)
             labels[chosen] = _numbers(part, [(track + 1, meshes[place]) for track, meshes in bodies])
-            yield FrameLabels(chosen, labels)
+            yield chosen, labels
 
 
 def _numbers(part: Mesh, bodies: list[tuple[int, Mesh]]) -> UInt16[np.ndarray, " F"]:
