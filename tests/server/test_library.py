@@ -10,7 +10,7 @@ from starlette.testclient import TestClient
 from meshreel.errors import InputError
 from meshreel.server import heads
 from meshreel.server.app import make_app
-from meshreel.server.heads import Heads
+from meshreel.server.heads import HeadReader
 from meshreel.server.library import Library
 from tests.server.conftest import ODD, with_long_head
 
@@ -104,7 +104,7 @@ def test_errors_in_the_gallery_have_no_path_of_this_machine(folder, monkeypatch)
     def refused(_, path):
         raise InputError(f"{path}: cannot be opened: Permission denied")
 
-    monkeypatch.setattr(Heads, "read", refused)
+    monkeypatch.setattr(HeadReader, "read", refused)
     assert facts_of(Library(folder))["walk.reel"].error == "cannot be opened: Permission denied"
 
 
@@ -112,7 +112,7 @@ def test_a_file_that_went_away_is_reported(folder, monkeypatch):
     monkeypatch.setattr(Library, "names", lambda _: ["gone.reel"])
     (entry,) = Library(folder).entries()
     assert (entry.frames, entry.error) == (0, "is not there any more")
-    with Heads() as process, pytest.raises(InputError, match=r"gone\.reel: cannot be opened: No such file"):
+    with HeadReader() as process, pytest.raises(InputError, match=r"gone\.reel: cannot be opened: No such file"):
         process.read(folder / "gone.reel")
 
 
@@ -127,8 +127,8 @@ def test_one_file_is_served_whatever_its_suffix(folder, player):
 def opened(monkeypatch):
     """Names of the files whose heads were read."""
     names: list[str] = []
-    read = Heads.read
-    monkeypatch.setattr(Heads, "read", lambda self, path: names.append(path.name) or read(self, path))
+    read = HeadReader.read
+    monkeypatch.setattr(HeadReader, "read", lambda self, path: names.append(path.name) or read(self, path))
     return names
 
 
@@ -172,7 +172,7 @@ def test_a_head_that_takes_too_long_or_too_much_memory_costs_its_file_alone_and_
     library = Library(folder)
     assert "its head takes more than 0.001 s or 2 GiB to read" in facts_of(library)["bomb.reel"].error
     monkeypatch.undo()
-    monkeypatch.setattr(Heads, "read", lambda *_: pytest.fail("read again"))
+    monkeypatch.setattr(HeadReader, "read", lambda *_: pytest.fail("read again"))
     assert "takes more than" in facts_of(library)["bomb.reel"].error
     monkeypatch.undo()
     (folder / "walk.reel").touch()
@@ -195,7 +195,7 @@ def test_no_head_is_read_in_the_process_of_the_server(folder, monkeypatch):
 
 @pytest.mark.skipif(sys.platform != "linux", reason="limits of memory are those of Linux")
 def test_the_process_that_reads_heads_has_a_limit_of_memory_and_ends_with_the_gallery(folder):
-    with Heads() as process:
+    with HeadReader() as process:
         process.read(folder / "walk.reel")
         began = process._process
         assert began is not None

@@ -25,14 +25,14 @@ PATIENCE = 10.0  # s for one file, the start of the process included (guess)
 SHARE = 10.0  # s for the files of one gallery; the next one reads the others (guess)
 
 
-class Heads:
+class HeadReader:
     """The process, for one gallery: it begins with the first file, and again after a file that ended it."""
 
     def __init__(self) -> None:
         self._process: subprocess.Popen[bytes] | None = None
-        self._end = time.monotonic() + SHARE
+        self.until = time.monotonic() + SHARE  # when the time of the gallery ends
 
-    def __enter__(self) -> Heads:
+    def __enter__(self) -> HeadReader:
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -40,11 +40,6 @@ class Heads:
             self._process.kill()
             self._process.communicate()
             self._process = None
-
-    @property
-    def is_late(self) -> bool:
-        """True after the time of a gallery."""
-        return time.monotonic() > self._end
 
     def read(self, path: Path) -> dict[str, Any]:
         """Return size, frames, duration and error of a file, as far as it has them.

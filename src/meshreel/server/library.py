@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import os
+import time
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from ..errors import InputError, MeshreelError
 from ..io.file_names import is_text
-from .heads import Heads
+from .heads import HeadReader
 
 SUFFIX = ".reel"
 HIDDEN = "."  # first character of hidden names
@@ -79,10 +80,10 @@ class Library:
         """Return the facts of the files that exist now, in the order of their names; one thread at a time."""
         before = dict(self.known)
         self.known.clear()
-        with Heads() as heads:
+        with HeadReader() as heads:
             return [self._entry(name, before, heads) for name in self.names()]
 
-    def _entry(self, name: str, before: dict[tuple[Path, Version], Entry], heads: Heads) -> Entry:
+    def _entry(self, name: str, before: dict[tuple[Path, Version], Entry], heads: HeadReader) -> Entry:
         """Return the facts of a file; damage and absence are part of them and not raised."""
         if not is_text(name):
             return Entry(as_text(name), error="the name is no Unicode text, which no address can have: rename the file")
@@ -92,7 +93,7 @@ class Library:
         try:
             found = path.stat()
             key = path, (found.st_size, found.st_mtime_ns, found.st_ctime_ns)
-            if key not in before and heads.is_late:
+            if key not in before and time.monotonic() > heads.until:
                 return Entry(name, found.st_size)
             facts = before.get(key) or Entry(name, **heads.read(path))
         except (MeshreelError, OSError) as error:
