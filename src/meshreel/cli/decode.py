@@ -11,7 +11,6 @@ from typing import Annotated, Any, Literal
 from cyclopts import Parameter
 
 from ..container.reader import ReelReader
-from ..decoder.tracks import moving_of_frame
 from ..decoder.video import Video
 from ..decoder.video import open as open_video
 from ..edit.metadata import tags_of
@@ -21,7 +20,6 @@ from ..export.animated_file import export as export_animated
 from ..export.animated_usd import EXTENSIONS
 from ..export.frames import Part, check_part, check_splats, write_frames, write_splats
 from ..format.layout import ChunkKind
-from ..geometry.topology import concatenate
 from ..io.sequence import SequenceOptions
 from ..io.write import check_apart, check_free, frame_names, left_over, make_folder, write_file, write_mesh
 from ..types import Mesh, Texture, Up
@@ -86,12 +84,8 @@ def decode(
         return
     if format == "spz":
         raise InputError("--format spz: has splats and no meshes; add --splats, or give ply, obj, glb or npz")
-    every: dict[Part, Callable[[Video, int], list[Mesh]]] = {
-        "all": lambda of, frame: [*of.parts(frame).values()],
-        "background": lambda of, frame: [of.background(frame)],
-        "moving": lambda of, frame: moving_of_frame(of.tracks, frame),
-    }
-    parts = every[only]
+    looks: dict[Part, Callable[[Video, int], Mesh]]
+    looks = {"all": Video.__getitem__, "background": Video.background, "moving": Video.moving}
     lost = _not_kept(video.reader, format)
     pictured = video.background if video.reader.has_textures and not lost else lambda _: None
     written = _changes(video.reader, pictured) if only == "background" else range(len(video))
@@ -99,12 +93,12 @@ def decode(
 
     def decoded(frame: int) -> Mesh:
         try:
-            mesh = concatenate(parts(video, frame))
+            mesh = looks[only](video, frame)
             if mesh.texture is None or lost:
                 return replace(mesh, uv=None, texture=None)
             return replace(mesh, texture=Texture.of(mesh.texture.pixels))
         except FormatError as error:
-            mesh = concatenate(parts(bare, frame))  # raises if the surface is damaged
+            mesh = looks[only](bare, frame)  # raises if the surface is damaged
             pale.append(error)
             return mesh
 
