@@ -19,6 +19,7 @@ from ..encoder.settings.settings import Settings
 from ..errors import InputError
 from ..io.write import check_free
 from ..metrics.error_sheet import SheetOptions, write_sheet
+from ..types import evenly
 from .compare import OF_BOTH, against_truth, both_table
 from .console import Common, Force, called_as
 from .encode import describe, summary_row
@@ -69,8 +70,8 @@ def command(
         summary = encode(capture, file, options=options, executor=executor, progress=progress, resume=False)
         with open_video(file) as video:
             clean = read_truth(output / "rig" / TRUTH)
-            truth = against_truth(capture, video, clean, _spread(frames, _JUDGED), progress)
-            write_sheet(capture, video, picture, SheetOptions(frames=_spread(frames, 3), height=360, unit="mm"))
+            truth = against_truth(capture, video, clean, evenly(frames, _JUDGED), progress)
+            write_sheet(capture, video, picture, SheetOptions(height=360, unit="mm"))
     described = describe_file(file)
     sizes = {name: described[name] for name in ("bytes_by_content", "mbps_by_content")}
     row = summary_row(summary, capture.frame_rate) | sizes | {"truth": truth}
@@ -96,8 +97,3 @@ def _forget(folder: Path, names: list[str]) -> None:
     for pattern in ("rig.json", "corner*/depth/depth_*.png", "corner*/color/color_*.png", f"{TRUTH}/frame_*.ply"):
         for path in folder.glob(pattern):
             path.unlink()
-
-
-def _spread(count: int, most: int) -> tuple[int, ...]:
-    """Return `most` frame numbers, evenly spread from the first to the last."""
-    return tuple(sorted({k * (count - 1) // (most - 1) for k in range(most)}))
