@@ -90,16 +90,13 @@ class Summary:
 ASTRAY = 0.005  # of the surface: noise, and what a border of the background lacks, is less (guess)
 
 
-def warnings_of(survey: Survey) -> tuple[str, ...]:
-    """Return warnings of surface that no file of the sequence has."""
-    found = []
+def warnings_of(survey: Survey) -> Iterator[str]:
+    """Yield warnings of surface that no file of the sequence has."""
     if survey.dropped:
-        found.append(f"{survey.dropped} faces without area or with the vertices of another face are not kept")
+        yield f"{survey.dropped} faces without area or with the vertices of another face are not kept"
     if survey.flattened:
         count, first = len(survey.flattened), survey.flattened[0]
-        text = f"{count} frames have faces, but none with an area: they count as empty (first frame {first} of these)"
-        found.append(text)
-    return tuple(found)
+        yield f"{count} frames have faces, but none with an area: they count as empty (first frame {first} of these)"
 
 
 def warnings_of_scene(parts: Parts, moves: bool, dropped: int) -> Iterator[str]:
