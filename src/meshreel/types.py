@@ -219,9 +219,7 @@ class Mesh:
         return surface
 
 
-def distinct_places(
-    uv: Float32[np.ndarray, "F 3 2"],
-) -> tuple[Float32[np.ndarray, "P 2"], Int64[np.ndarray, "F 3"]]:
+def distinct_places(uv: Float32[np.ndarray, "F 3 2"]) -> tuple[Float32[np.ndarray, "P 2"], Int64[np.ndarray, "F 3"]]:
     """Return the distinct places in a texture, and the number of each corner's place; NaN is a place, too."""
     pairs = np.ascontiguousarray(uv).reshape(-1, 2).view(np.int64)  # places with equal bits are equal
     places, numbers = np.unique(pairs, return_inverse=True)

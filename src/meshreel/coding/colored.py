@@ -112,10 +112,7 @@ def canvas_of(
 
 
 def encode_group_colors(
-    canvas: Canvas,
-    colors: Sequence[UInt8[np.ndarray, "_ 3"]],
-    step: float,
-    before: Float64[np.ndarray, "V 3"] | None,
+    canvas: Canvas, colors: Sequence[UInt8[np.ndarray, "_ 3"]], step: float, before: Float64[np.ndarray, "V 3"] | None
 ) -> EncodedColors:
     """Encode the colours of the vertices of each frame of a group; CostlyError if a reader would refuse them."""
     encoded = encode_colors(canvas.meshes, canvas.by_mesh(colors), step, before, canvas.is_layered)

@@ -28,12 +28,7 @@ class Track(Frames):
     """Moving body over the whole file: a mesh for each frame, empty in frames without the body."""
 
     def __init__(
-        self,
-        reader: ReelReader,
-        number: int,
-        decoders: Decoders,
-        layers: int | None = None,
-        colored: bool = True,
+        self, reader: ReelReader, number: int, decoders: Decoders, layers: int | None = None, colored: bool = True
     ) -> None:
         """Decode track `number` from at most `layers` layers of each group beyond its first; None: from all.
 

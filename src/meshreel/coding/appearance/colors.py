@@ -106,10 +106,7 @@ def decode_colors(
 
 
 def _encode_mesh(
-    mesh: ColoredMesh,
-    colors: UInt8[np.ndarray, "T V 3"],
-    step: float,
-    before: Float64[np.ndarray, "V 3"] | None,
+    mesh: ColoredMesh, colors: UInt8[np.ndarray, "T V 3"], step: float, before: Float64[np.ndarray, "V 3"] | None
 ) -> list[bytes]:
     """Return the records of a mesh: one for its base, and one for each level."""
     frames, count, faces = mesh.frames, len(mesh.base.vertices), mesh.base.faces

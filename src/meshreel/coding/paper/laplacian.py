@@ -54,10 +54,7 @@ class System:
         return self._core.inverse(np.ascontiguousarray(deltas))
 
     def quantize(
-        self,
-        deltas: Float64[np.ndarray, "R M"],
-        steps: Float64[np.ndarray, " M"],
-        prices: Float64[np.ndarray, " M"],
+        self, deltas: Float64[np.ndarray, "R M"], steps: Float64[np.ndarray, " M"], prices: Float64[np.ndarray, " M"]
     ) -> Int32[np.ndarray, "R M"]:
         """Choose symbols such that `inverse(symbols * steps)` is near the weights of the deltas (decision 5).
 

@@ -81,10 +81,7 @@ class Videos:
 
 
 def layered_pictures(
-    layout: Layout,
-    frames: range,
-    picture_of: Callable[[int], UInt8[np.ndarray, "H W 3"]],
-    options: TextureOptions,
+    layout: Layout, frames: range, picture_of: Callable[[int], UInt8[np.ndarray, "H W 3"]], options: TextureOptions
 ) -> list[Companion]:
     """Return the pictures of a background in some frames, each shown until the next; a layer is a video of its own."""
     layers = list[list[Companion]]()

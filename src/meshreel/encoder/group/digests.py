@@ -70,12 +70,7 @@ def machine_line() -> str:
     pools = [{k: pool.get(k) for k in ("internal_api", "version", "architecture")} for pool in threadpool_info()]
     pools.sort(key=str)  # they are found in any order
     found: dict[str, Any] = {"stage": "machine", "python": platform.python_version(), "system": platform.platform()}
-    found |= {
-        "processor": processor(),
-        "cores": os.cpu_count(),
-        "meshreel": __version__,
-        "libraries": versions(),
-    }
+    found |= {"processor": processor(), "cores": os.cpu_count(), "meshreel": __version__, "libraries": versions()}
     return json.dumps(found | {"pools": pools}) + "\n"
 
 
