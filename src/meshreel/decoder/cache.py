@@ -51,13 +51,12 @@ class CachedGroups:
         with self._lock:
             self.memory[group.number] = group.nbytes
             kept = {number: known for number, known in self.by_track.items() if number != track} | {track: group}
-            while len(kept) > 1 and _taken(kept) > most_together(sum(one.size for one in kept.values())):
+            while len(kept) > 1:
+                taken = sum(one.nbytes + one.states.nbytes for one in kept.values())
+                if taken <= most_together(sum(one.size for one in kept.values())):
+                    break
                 del kept[next(iter(kept))]
             self.by_track = kept
-
-
-def _taken(kept: dict[int, CachedGroup]) -> int:
-    return sum(one.nbytes + one.states.nbytes for one in kept.values())
 
 
 def most_together(size: int) -> int:

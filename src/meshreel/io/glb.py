@@ -79,10 +79,8 @@ class Scene:
     def __init__(self, data: bytes) -> None:
         """Raises Unreadable if the file is damaged, or needs what is not read."""
         self._named = set[str]()
-        self._tinted, self._shaded = (
-            cache(_tinted),
-            dict[tuple[Texture, bytes], Texture | None](),
-        )  # the same texture in all frames
+        self._tinted = cache(_tinted)  # the same texture in all frames, as those that are shaded
+        self._shaded = dict[tuple[Texture, bytes], Texture | None]()
         self._file = _guarded(lambda: Gltf(data))
         self.duration = _guarded(self._begin)
 
@@ -174,8 +172,7 @@ class Scene:
         return _placed(move, turn, size)
 
     def _parts(self, time: float) -> Iterator[_Part]:
-        places, total = {-1: np.eye(4)}, 0
-        hidden = {-1: False}
+        places, hidden, total = {-1: np.eye(4)}, {-1: False}, 0
         for number, parent in self._order:
             node = self._file.item("nodes", number)
             places[number] = places[parent] @ self._local(number, time) if parent >= 0 else self._local(number, time)
@@ -211,13 +208,9 @@ class Scene:
         if extension is None:
             return [np.eye(4)]
         arrays = extension.get("attributes", Entry({}, ""))
-        known = {
-            name: self._file.array(arrays.whole(name))
-            for name in ("TRANSLATION", "ROTATION", "SCALE")
-            if name in arrays
-        }
-        count = min(map(len, known.values()), default=0)
         rest = {"TRANSLATION": [0.0, 0, 0], "ROTATION": [0.0, 0, 0, 1], "SCALE": [1.0, 1, 1]}
+        known = {name: self._file.array(arrays.whole(name)) for name in rest if name in arrays}
+        count = min(map(len, known.values()), default=0)
         columns = [np.asarray(known.get(name, np.tile(none, (count, 1))), np.float64) for name, none in rest.items()]
         return [_placed(*row) for row in zip(*columns, strict=False)]
 

@@ -82,10 +82,12 @@ def _of_pictures(mesh: Place, names: tuple[str, ...]) -> tuple[list[Look], set[s
 
 def _picture(mesh: Place, folder: Place, name: str) -> tuple[Texture | None, str]:
     """Return the texture in a file that a file in `folder` names, or the name of what is not kept."""
-    place = next((p for one in _spellings(name) if (p := find_beside(mesh, folder, one)) is not None), None)
+    spellings = name, name.strip('"'), _bare(name)
+    place = next((p for one in spellings if (p := find_beside(mesh, folder, one)) is not None), None)
     if place is not None:
         return Texture(partial(read_picture, place)), ""
-    if _is_outside(mesh, folder, name):
+    path = spellings[1].replace("\\", "/")
+    if _is_absolute(path) or _inside(mesh, folder, path) is None:
         return Texture(partial(_refuse, str(mesh), name)), ""
     return None, f"a texture ({name} is not there)"
 
@@ -217,23 +219,12 @@ def _options(rest: str) -> tuple[str, dict[str, list[str]]]:
     return rest.strip(), options
 
 
-def _spellings(name: str) -> tuple[str, ...]:
-    """Return a name as it is written, without quotes, and without a comment."""
-    return name, name.strip('"'), _bare(name)
-
-
 def _folder(place: Place) -> Place:
     return place.parent if isinstance(place, Path) else Remote(place.url.rsplit("/", 1)[0])
 
 
 def _is_absolute(name: str) -> bool:
     return name.startswith("/") or re.match(r"[a-zA-Z]:", name) is not None
-
-
-def _is_outside(mesh: Place, folder: Place, name: str) -> bool:
-    """Return True if a name leads out of the mesh's folder."""
-    name = name.strip('"').replace("\\", "/")
-    return _is_absolute(name) or _inside(mesh, folder, name) is None
 
 
 def _inside(mesh: Place, folder: Place, name: str) -> PurePosixPath | None:

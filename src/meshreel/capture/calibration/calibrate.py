@@ -94,7 +94,13 @@ def refine_views(views: Sequence[StillView], report: Report = lambda *_: None) -
         PairDistance((names[i], names[j]), share, first.get((i, j), (0.0, math.nan))[1], after)
         for (i, j), (share, after) in last.items()
     )
-    warnings = (*_strangers(names, list(last)), *_sliding(names, unfixed), *_unlike(pairs))
+    unlike = (
+        f"cameras {' and '.join(pair.cameras)} see surfaces {1000 * pair.after:.0f} mm apart; begin with better poses "
+        "(--poses, --board), and check the cameras' own numbers"
+        for pair in pairs
+        if pair.after > APART
+    )
+    warnings = (*_strangers(names, list(last)), *_sliding(names, unfixed), *unlike)
     return Calibration(tuple(views), cameras, pairs, warnings)
 
 
@@ -252,14 +258,6 @@ def _sliding(names: Sequence[str], unfixed: Directions) -> Iterator[str]:
         shown = ", ".join(name for name, size in zip(names, sizes, strict=True) if size >= sizes.max() / 2)
         text = f"what others see too does not fix {shown}: it is one plane, or so"
         yield f"{text}; along it the poses are as they were given: put boxes where several cameras see them"
-
-
-def _unlike(pairs: Sequence[PairDistance]) -> Iterator[str]:
-    """Yield a warning for each pair of cameras that end far apart."""
-    for pair in pairs:
-        if pair.after > APART:
-            text = f"cameras {' and '.join(pair.cameras)} see surfaces {1000 * pair.after:.0f} mm apart"
-            yield f"{text}; begin with better poses (--poses, --board), and check the cameras' own numbers"
 
 
 def _ahead(step: Step, before: tuple[Step, Step] | None) -> Step:

@@ -37,9 +37,7 @@ from ..settings.options import SceneOptions
 
 PROBES = 12  # frames, at most, in which moving surface is measured (guess)
 LOST = 0.5  # share of a frame's faces that may stand still where no background was found (guess)
-SEEN_THROUGH = (
-    2  # probed frames in which cameras must see through a place, if surface there is to count as moving (guess)
-)
+SEEN_THROUGH = 2  # probed frames in which cameras see through a place whose surface counts as moving (guess)
 APART, LEAST_APART = 4.0, 0.03  # deviations, and m: what is farther from the room is not of it (guess)
 OUTLIER = 3.0  # times the segmentation's `noise`: still surface farther from the background is no noise (guess)
 TAIL = 4.0  # standard deviations, by the median, beyond which a distance is no noise (guess)
