@@ -183,8 +183,7 @@ def by_depth(sequence: CapturedSequence, decoded: MeshSequence, progress: StageB
     refreshes = {chunk.first_frame for chunk in chunks if chunk.kind == ChunkKind.STATIC}
     rows = dict[str, Any]()
     for name, frames, changed in (("originals", sequence, set[int]()), ("decoded", decoded, refreshes)):
-        numbers = counted(range(len(sequence)), progress, f"depth of {name}")
-        rows[name] = judge(judged, frames, numbers, changed)
+        rows[name] = judge(judged, frames, counted(range(len(sequence)), progress, f"depth of {name}"), changed)
     return {"frames": list(range(len(sequence)))} | rows
 
 

@@ -67,8 +67,7 @@ def decode_change(data: bytes, before: Mesh) -> Mesh:
 
 def changed(before: Mesh, dropped: Bool[np.ndarray, " F"], added: Mesh) -> Mesh:
     """Return a background without its dropped faces and the vertices that only they use, then the added mesh."""
-    remaining = part_of(before, ~dropped) if dropped.any() else before
-    return concatenate([remaining, added])
+    return concatenate([part_of(before, ~dropped) if dropped.any() else before, added])
 
 
 def _dropped(record: StaticPatch, faces: int) -> Bool[np.ndarray, " F"]:

@@ -40,18 +40,11 @@ class Canvas:
 
         `unit` is that of normalised coordinates in the frames.
         """
-        template, lacking = self.meshes[0], self.dropped
-        faces = finest_faces(template.base, template.levels)
-        return [
-            Carrier(
-                np.ascontiguousarray(mesh.vertices[: template.vertices]),
-                faces,
-                template.levels,
-                None if lacking is None else lacking[number],
-                unit,
-            )
-            for number, mesh in enumerate(frames)
-        ]
+        template, levels = self.meshes[0], self.meshes[0].levels
+        faces = finest_faces(template.base, levels)
+        places = [np.ascontiguousarray(mesh.vertices[: template.vertices]) for mesh in frames]
+        lacking = [None] * len(frames) if self.dropped is None else list(self.dropped)
+        return [Carrier(at, faces, levels, gone, unit) for at, gone in zip(places, lacking, strict=True)]
 
     def by_frame(self, colors: Sequence[UInt8[np.ndarray, "_ _ 3"]]) -> list[UInt8[np.ndarray, "_ 3"]]:
         """Regroup colours of vertices from meshes to frames."""
@@ -145,8 +138,7 @@ def paint_background(mesh: Mesh, data: bytes, colors: bytes) -> Mesh:
         return replace(mesh, colors=added)
     if mesh.colors is None or len(added) > len(mesh.vertices):
         raise FormatError(f"colours of {len(added)} of {len(mesh.vertices)} vertices of a background")
-    remaining = mesh.colors[: len(mesh.vertices) - len(added)]
-    return replace(mesh, colors=np.concatenate([remaining, added]))
+    return replace(mesh, colors=np.concatenate([mesh.colors[: len(mesh.vertices) - len(added)], added]))
 
 
 def background_canvas(data: bytes) -> Canvas:

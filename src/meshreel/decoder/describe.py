@@ -47,8 +47,7 @@ def describe_file(file: Path) -> dict[str, Any]:
         audio = _describe_audio(reader, length)
         states = [_describe_state(reader, chunk, length, ranges.get(chunk.number, [])) for chunk in static]
     tracks = [_describe_track(reader, number, groups) for number in range(len(reader.tracks))]
-    several = len(tracks) > 1
-    of_tracks = [_renamed(track, several) for track in tracks]
+    of_tracks = [_renamed(track, len(tracks) > 1) for track in tracks]
     audio_sizes = [] if audio is None else [audio["bytes_by_content"]]
     head = {"header and index": reader.head_size}
     sizes = _sum([head, *(state["bytes_by_content"] for state in states), *of_tracks, *audio_sizes])
@@ -99,9 +98,8 @@ def _describe_audio(reader: ReelReader, length: int) -> dict[str, Any] | None:
     """Describe the audio file, and its start after the first frame; None if there is none."""
     if reader.audio is None:
         return None
-    row = {"bytes": reader.audio.size} | _contents(
-        reader, reader.audio, length, lambda payload: {"audio": len(payload)}
-    )
+    row: dict[str, Any] = {"bytes": reader.audio.size}
+    row |= _contents(reader, reader.audio, length, lambda payload: {"audio": len(payload)})
     with suppress(FormatError):
         if (clip := Video(reader).audio) is not None:
             row |= {"type": clip.media_type, "start_s": clip.start}

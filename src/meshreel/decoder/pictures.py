@@ -132,9 +132,7 @@ class TrackPictures:
         return Texture(_Shown(self, pictures.number, at), (height, width))
 
     def _pictures_of(self, chunk: Chunk) -> Chunk | None:
-        return self._reader.companion_of(chunk, ChunkKind.PICTURES) or self._reader.companion_of(
-            chunk, ChunkKind.COMPATIBLE
-        )
+        return next(filter(None, (self._reader.companion_of(chunk, kind) for kind in CODECS)), None)
 
     def _at(self, pictures: Chunk, frame: int) -> int:
         """Return the number of a background's picture in a frame, counted from the first that is coded with it."""

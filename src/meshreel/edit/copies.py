@@ -51,8 +51,7 @@ def opened(path: Place) -> Iterator[tuple[Place, ReelReader]]:
     try:
         yield path, ReelReader(source)
     except FormatError as error:
-        known = str(error).startswith(str(path))
-        raise error if known else FormatError(f"{path}: {error}") from error
+        raise error if str(error).startswith(str(path)) else FormatError(f"{path}: {error}") from error
     finally:
         source.close()
 

@@ -115,8 +115,7 @@ class Memory:
 
 
 def _nbytes(mesh: Mesh) -> int:
-    arrays = (mesh.vertices, mesh.faces, mesh.colors, mesh.uv)
-    return sum(array.nbytes for array in arrays if array is not None)
+    return sum(array.nbytes for array in (mesh.vertices, mesh.faces, mesh.colors, mesh.uv) if array is not None)
 
 
 @dataclass(eq=False, repr=False)

@@ -168,8 +168,7 @@ def drop_small(mesh: Mesh, share: float) -> Mesh:
 def without_fragments(mesh: Mesh, least: float) -> Mesh:
     """Remove connected components whose area is below `least`, in squared units of the vertices."""
     labels = connected_faces(mesh.faces, len(mesh.vertices))
-    areas = np.bincount(labels, face_normals(mesh)[1])
-    return part_of(mesh, areas[labels] >= least)
+    return part_of(mesh, np.bincount(labels, face_normals(mesh)[1])[labels] >= least)
 
 
 @dataclass(frozen=True, slots=True)

@@ -267,8 +267,7 @@ class Scene:
         faces = _triangles(corners.astype(np.int64), mode)
         look, uv, light = self._look(primitive, read, light, faces)
         light = own[:, :3] if light is None and own is not None else light
-        colors = None if light is None else from_linear(light)
-        return _used(_Part(vertices, faces, colors, uv, look))
+        return _used(_Part(vertices, faces, None if light is None else from_linear(light), uv, look))
 
     def _claimed(self, primitive: Entry, attributes: Entry) -> int:
         """Return how many vertices and indices the accessors of a compressed primitive announce."""

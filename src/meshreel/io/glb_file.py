@@ -198,8 +198,7 @@ def from_linear(light: np.ndarray) -> UInt8[np.ndarray, "V 3"]:
 
     Raises Unreadable for values that are not finite, or far outside these limits.
     """
-    most = np.iinfo(light.dtype).max if light.dtype.kind in "iu" else 1.0
-    shares = shares_of(light, most)
+    shares = shares_of(light, np.iinfo(light.dtype).max if light.dtype.kind in "iu" else 1.0)
     s = np.where(shares <= 0.0031308, 12.92 * shares, 1.055 * shares ** (1 / 2.4) - 0.055)
     return np.rint(255 * s).astype(np.uint8)
 

@@ -138,8 +138,7 @@ class Gltf:
         if isinstance(sparse, Entry):
             values = self._replaced(values, sparse)
         if entry.get("normalized") is True and values.dtype.kind in "iu":
-            limits = np.iinfo(values.dtype)
-            return np.maximum(values.astype(np.float64) / limits.max, -1.0)
+            return np.maximum(values.astype(np.float64) / np.iinfo(values.dtype).max, -1.0)
         return values
 
     def _replaced(self, values: np.ndarray, sparse: Entry) -> np.ndarray:

@@ -45,8 +45,7 @@ class Polygons:
     @property
     def has_looks(self) -> bool:
         """True if colours or pictures of materials and faces are to be added to those of vertices."""
-        parts = self.libraries or self.pictures
-        return bool(parts) or self.face_colors is not None or self.colored is not None
+        return bool(self.libraries or self.pictures) or self.face_colors is not None or self.colored is not None
 
     def naming(self, dropped: Iterable[str]) -> Polygons:
         """Return the same polygons with more names of data that are not kept."""

@@ -115,8 +115,7 @@ def _faces(lines: Lines, chosen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         face = int(np.argmax(sizes + 1 > counts))
         raise Unreadable(f"OFF face {face} announces {sizes[face]} corners but has {counts[face] - 1} (truncated?)")
     place = np.arange(len(values)) - np.repeat(begins, counts)  # within its line
-    corners = values[(place > 0) & (place <= np.repeat(sizes, counts))]
-    return whole(corners, "OFF index"), sizes
+    return whole(values[(place > 0) & (place <= np.repeat(sizes, counts))], "OFF index"), sizes
 
 
 def _with_face_colors(surface: Polygons, lines: Lines, chosen: np.ndarray) -> Polygons:

@@ -70,14 +70,9 @@ class Box:
     @staticmethod
     def of(sequence: Iterable[Mesh]) -> Box:
         """Return the box around all frames, read one at a time; a unit box around 0 if no frame has a vertex."""
-        low, high = np.full(3, np.inf), np.full(3, -np.inf)
-        for mesh in sequence:
-            if len(mesh.vertices):
-                lower, upper = mesh.box
-                low, high = np.minimum(low, lower), np.maximum(high, upper)
-        if not np.isfinite(low).all():
-            return Box(np.full(3, -0.5), np.full(3, 0.5))
-        return Box(low, high)
+        boxes = [mesh.box for mesh in sequence if len(mesh.vertices)] or [(np.full(3, -0.5), np.full(3, 0.5))]
+        lows, highs = zip(*boxes, strict=True)
+        return Box(np.min(lows, axis=0), np.max(highs, axis=0))
 
     @property
     def center(self) -> Float64[np.ndarray, " 3"]:

@@ -229,8 +229,7 @@ def _composite_function(torch: Any) -> Any:
 def _spread(carrier: Carrier, count: int) -> tuple[Int32[np.ndarray, " N"], Float64[np.ndarray, "N 2"], float]:
     """Return base faces and places on them, evenly spread over the surface, and its area."""
     a, b, c = np.moveaxis(carrier.vertices[carrier.faces], 1, 0)
-    areas = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
-    ends = np.cumsum(areas)
+    ends = np.cumsum(np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2)
     finer = np.searchsorted(ends, (np.arange(count) + 0.5) / count * ends[-1])
     cut = finer_places(np.array([[[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]]), carrier.levels)
     random = np.random.default_rng(count)  # places inside the finest faces
@@ -323,7 +322,6 @@ def _view(mesh: Mesh, rays: Rays, camera: Camera, colors: Colors) -> SplatView:
     met = hit.faces >= 0
     met_hit = Hit(hit.faces[met], hit.distances[met], hit.barycentric[met])
     picture = np.full((fine.height, fine.width, 3), 255.0)
-    points = fine.eye + hit.distances[met, None] * directions[met]
-    picture[rows[met], columns[met]] = colors(met_hit, points)
+    picture[rows[met], columns[met]] = colors(met_hit, fine.eye + hit.distances[met, None] * directions[met])
     parts = picture.reshape(camera.height, FINER, camera.width, FINER, 3)
     return SplatView(camera, (parts.mean(axis=(1, 3)) / 255).astype(np.float32))

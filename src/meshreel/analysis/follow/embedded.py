@@ -111,8 +111,7 @@ class Tracker:
         pose, residual = self._follow(frame, surface, paint)
         self._poses[frame], self.residuals[frame] = pose, residual
         if self._body is not None and self._known(frame) in self._rigid:
-            start = RigidMotion.between(self._graph.nodes, pose.positions)
-            motion = self._body.brought(surface, start)
+            motion = self._body.brought(surface, RigidMotion.between(self._graph.nodes, pose.positions))
             if self._body.holds(surface, motion, residual):
                 self._rigid[frame] = motion
         return residual

@@ -100,8 +100,7 @@ class Tally:
     @property
     def after(self) -> Stay:
         """Stays since each place was last seen free."""
-        left = self.free > 0
-        return Stay(np.where(left, self._after.first, -1).astype(np.int32), self._after.count)
+        return Stay(np.where(self.free > 0, self._after.first, -1).astype(np.int32), self._after.count)
 
     @property
     def before(self) -> Stay:

@@ -104,8 +104,7 @@ class Sam3Masks(Masker):
         order = tour(views, self._reference(views))
         pictures = [self._picture(frame, number, seen, views) for number in order]
         tracked = self._tracker.through_views(pictures, moving.objects[frame])
-        objects = moving_in_views(tracked, moving, frame, self._options.overlap)
-        return objects[np.argsort(order)]
+        return moving_in_views(tracked, moving, frame, self._options.overlap)[np.argsort(order)]
 
     def _picture(self, frame: int, number: int, seen: Sequence[Seen], views: Sequence[Camera]) -> Picture:
         photo = None if self._colors is None else self._colors.at(frame, number)

@@ -95,8 +95,7 @@ def encode_layers(
     )
     origin = Origin.ALONE if previous is None else Origin.PREVIOUS
     data = reference.data if previous is None else b""
-    head = LayersGroup(Form.LAYERS, origin, frames, levels, reference.step, data, shared, motion)
-    layers = [pack(head)]
+    layers = [pack(LayersGroup(Form.LAYERS, origin, frames, levels, reference.step, data, shared, motion))]
     decoded = np.ascontiguousarray(np.moveaxis(decode_trajectories(layers[0], base, frames), 2, 0))
     scalars: list[Float64[np.ndarray, "T _"]] = []
     faces = base.faces

@@ -70,13 +70,11 @@ class GroupCoder:
         some = [(2 * k + 1) * count // (2 * most) for k in range(most)]
         fidelity = measure([self.surfaces[k].mesh for k in some], [shown[k] for k in some])
         note("fidelity", fidelity)
-        is_predicted = previous is not None
-        chosen = EncodedGroup(Form.LAYERS, len(self.surfaces), payload, ends, fidelity, is_predicted)
+        chosen = EncodedGroup(Form.LAYERS, len(self.surfaces), payload, ends, fidelity, previous is not None)
         if not np.isfinite(chosen.fidelity.distance) or any(mesh.is_empty for mesh in shown):
             return self.alone(), None  # the template has collapsed: nothing is comparable
         if fidelity.angle > self.options.flat * self.target.angle:  # edges are lost, as those of few, large faces
-            most_bytes = MOST_FOR_EDGES * len(payload)
-            sharp = cheapest_intra(self.frames, self.target, most_bytes, self.options.intra)
+            sharp = cheapest_intra(self.frames, self.target, MOST_FOR_EDGES * len(payload), self.options.intra)
             if sharp is not None:
                 return sharp, None
         if self.tries_draco and most_for(chosen) > self.dearer:

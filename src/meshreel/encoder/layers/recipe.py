@@ -121,8 +121,7 @@ class _Planner:
         note("plans", plan.groups, other and other.groups)
         if other is not None:
             tried = [(self._all(ahead, one.groups, candidates, done), one) for one in (plan, other)]
-            noisy = ahead.noise > 0
-            plan = min(tried, key=lambda pair: _cost(pair[0], len(ahead), noisy))[1]
+            plan = min(tried, key=lambda pair: _cost(pair[0], len(ahead), ahead.noise > 0))[1]
         goes_on = not is_last and len(plan.groups) > 1
         self._candidates = [candidates[each.template] for each in plan.groups[-1:] if goes_on and not each.is_alone]
         return self._all(ahead, plan.groups[:-1] if goes_on else plan.groups, candidates, done)

@@ -299,20 +299,10 @@ def unpack_interval(path: Path, reader: ReelReader) -> list[EncodedGroup]:
     for chunk, (*values, key, canonical, lost_colors) in zip(reader.groups, facts, strict=True):
         fidelity = Fidelity(*(math.inf if value is None else float(value) for value in values))
         own = (one for one in reader.chunks if one.kind in COMPANIONS and one.depends_on[0] == chunk.number)
-        group = EncodedGroup(
-            Form(chunk.form),
-            chunk.frame_count,
-            b"",
-            _ends(chunk),
-            fidelity,
-            bool(chunk.depends_on),
-            None if key is None else int(key),
-            Stored(path, chunk.offset, chunk.size),
-            canonical=bool(canonical),
-            companions=tuple(Companion(ChunkKind(c.kind), Stored(path, c.offset, c.size), _ends(c)) for c in own),
-            lost_colors=bool(lost_colors),
-        )
-        found.append(group)
+        companions = tuple(Companion(ChunkKind(c.kind), Stored(path, c.offset, c.size), _ends(c)) for c in own)
+        coded = (Form(chunk.form), chunk.frame_count, b"", _ends(chunk), fidelity, bool(chunk.depends_on))
+        group = EncodedGroup(*coded, None if key is None else int(key), Stored(path, chunk.offset, chunk.size))
+        found.append(replace(group, canonical=bool(canonical), companions=companions, lost_colors=bool(lost_colors)))
     return found
 
 
