@@ -70,9 +70,9 @@ def cut(source: Name, output: Name, frames: str, at_keys: bool = False) -> Edite
 def concat(sources: Sequence[Name], output: Name) -> Edited:
     """Join files one after the other: parts of a sequence, or cuts of one file.
 
-    One file is open at a time. Frames that a file hides stay hidden. Of tags that differ, the first file's are kept,
-    and the result names them. Where some have audio, it must be the same at the same time, as in cuts of one file.
-    Raises InputError where files are not of one sequence, and FormatError for a damaged file.
+    One file is open at a time. Frames that a file hides stay hidden. Of tags that differ, those of the first file that
+    has them are kept, and the result names them. Where some have audio, it must be the same at the same time, as in
+    cuts of one file. Raises InputError where files are not of one sequence, and FormatError for a damaged file.
     """
     places = located_all(sources)
     if not places:
