@@ -31,9 +31,7 @@ class Edited:
     size: int  # bytes
     hidden: int = 0  # frames of the file that are not shown: the first or last shown ones are predicted from them
     missing: int = 0  # frames of the sequence that no file has, if the files are parts of one
-    differing: tuple[
-        str, ...
-    ] = ()  # names of tags that differ among joined files: those of the first that has them are kept
+    differing: tuple[str, ...] = ()  # names of tags that differ among joined files; the first that has one counts
     lost_audio: bool = False  # the audio was removed: it would be out of step
 
 
