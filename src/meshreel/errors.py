@@ -24,15 +24,25 @@ class NoReferenceError(MeshreelError):
     """No reference surface can be made from these frames; the encoder then codes them one by one."""
 
 
-_URL = r"(?<![\w+.-])([\w+.-]{2,}:)(//?)"  # as a Path, with one slash
-_USER = re.compile(rf"{_URL}(?:[^\s/?#]*|[^\s/?#:]+:(?!\d+/)\S*)@")  # keys of stores may have slashes
-_END = r"(?=[:;,.)\]'\"]*(?:\s|$))"
-_FURTHER = re.compile(rf"{_URL}([^\s?#]*|[^?#\n]*(?=[?#][\w.%-]+=))[?#](?:\.\.\.{_END}|\S*?{_END})")
+_SCHEME = re.compile(r"(?<![\w+.-])[\w+.-]{2,}://?")  # as a Path, with one slash
+_USER = re.compile(r"(?:[^\s/?#]*|[^\s/?#:]+:(?!\d+/)\S*)@")  # keys of stores may have slashes
+_FURTHER = re.compile(r"([^\s?#]*|[^?#\n]*(?=[?#][\w.%-]+=))[?#](?:\.\.\.(?=\W|$))?(\S*)")
+_MOST = 4096  # characters of a message: more is no line for a terminal (guess)
 
 
 def without_secret(text: str) -> str:
     """Return a text whose URLs lack users, queries and fragments, which may be keys: for messages and pages."""
-    return _FURTHER.sub(r"\1\2\3?...", _USER.sub(r"\1\2", text)) if ":/" in text else text
+    if ":/" not in text:
+        return text
+    text, found, at = text if len(text) <= _MOST else f"{text[:_MOST]} ...", "", 0
+    for scheme in _SCHEME.finditer(text):
+        if scheme.start() >= at:
+            found, at = found + text[at : scheme.end()], scheme.end()
+            if user := _USER.match(text, at):
+                at = user.end()
+            if further := _FURTHER.match(text, at):
+                found, at = f"{found}{further[1]}?...", further.start(2) + len(further[2].rstrip(":;,.)]'\""))
+    return found + text[at:]
 
 
 def path_of(name: object) -> str | Path:

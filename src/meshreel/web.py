@@ -5,9 +5,8 @@ from __future__ import annotations
 import re
 import time
 from base64 import b64encode
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import Future
-from contextlib import contextmanager
 from functools import partial
 from http import HTTPStatus
 from http.client import HTTPResponse
@@ -52,9 +51,8 @@ def in_store(url: str, act: Callable[[Any, str], T], seconds: float = LONGEST) -
     try:
         from fsspec.core import url_to_fs
 
-        with _one_line(url):
-            place = url_to_fs(url)  # here: fsspec keeps file systems for each thread
-            return begun(partial(act, *place)).result(seconds)
+        # The place is found here, not in the other thread: fsspec keeps file systems for each.
+        return _asked(url, lambda: begun(partial(act, *url_to_fs(url))), seconds)
     except ImportError as error:
         text = "a URL needs the extra `remote`, pip install 'meshreel[remote]', and some protocols a package more"
         raise InputError(f"{url}: {error}; {text}") from None
@@ -65,8 +63,7 @@ def fetch(url: str, offset: int, length: int, most: int) -> tuple[bytes, int]:
 
     Raises OSError of one line, also for more than `most` bytes, and after some time.
     """
-    with _one_line(url):
-        return begun(partial(_fetch, url, offset, length, most)).result(LONGEST)
+    return _asked(url, lambda: begun(partial(_fetch, url, offset, length, most)), LONGEST)
 
 
 def time_for(length: int) -> float:
@@ -74,17 +71,21 @@ def time_for(length: int) -> float:
     return min(_PATIENCE + length / _SLOWEST, LONGEST)
 
 
-@contextmanager
-def _one_line(url: str) -> Iterator[None]:
-    """Turn errors into OSErrors of one line, with no more than their kind if the URL has secrets."""
+def _asked(url: str, ask: Callable[[], Future[T]], seconds: float) -> T:
+    """Return an answer within some seconds. Raises OSError of one line, with no more if the URL has secrets.
+
+    It has no context: errors of libraries have addresses, and open files, which cannot be sent to another process.
+    """
     try:
-        yield
-    except (ImportError, _RefusedError):
+        return ask().result(seconds)
+    except ImportError:
         raise
+    except _RefusedError as error:
+        text = str(error)
     except Exception as error:  # each file system has errors of its own
         kind = type(error).__name__
         text = f"{kind}: {error}" if str(error) and without_secret(url) == url else kind
-        raise OSError(" ".join(text.split())) from None
+    raise OSError(" ".join(text.split()))
 
 
 class _RefusedError(OSError):

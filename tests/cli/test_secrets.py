@@ -7,6 +7,7 @@ import logging
 import pickle
 import shutil
 import threading
+import time
 import traceback
 
 import fsspec
@@ -152,3 +153,10 @@ def test_messages_have_addresses_without_keys(url, shown):
     assert without_secret(url) == without_secret(shown) == str(InputError(url)) == shown
     if "://" in url and " " not in url and "::" not in url:
         assert str(located(url)) == shown
+
+
+@pytest.mark.parametrize("text", ["ab:/" * 25_000, "http://h/?" + ":" * 100_000 + "x", "ab:/ " * 20_000])
+def test_a_long_message_takes_no_time(text):
+    begin = time.process_time()
+    assert len(str(InputError(text))) < 5000
+    assert time.process_time() - begin < 5

@@ -78,7 +78,7 @@ def decode(
         return
     check_part(file, video.reader, only)
     if splats:
-        check_free((output / name for name in frame_names(len(video), format)), force)
+        check_free((output / name for name in frame_names(len(video), format)), force, [file])
         common.warn(unwritten(file, video.reader, ("splats",)))
         _write_splats(file, video, output, format, common)
         return
@@ -105,7 +105,7 @@ def decode(
     every_name = frame_names(len(video), format)
     names = [every_name[frame] for frame in written]
     kinds = (f".{format}", *((".png", ".mtl") if format == "obj" and video.reader.has_textures else ()))
-    check_free(((output / name).with_suffix(kind) for name in names for kind in kinds), force)
+    check_free(((output / name).with_suffix(kind) for name in names for kind in kinds), force, [file])
     common.warn(unwritten(file, video.reader, ("background",), lost))
     _write(file, output, names, (lambda at: decoded(written[at]), write_mesh), common)
     if pale:

@@ -7,6 +7,7 @@ core, and PyAV when a picture is asked for.
 from __future__ import annotations
 
 import operator
+import os
 import shutil
 import sys
 import time
@@ -289,7 +290,7 @@ class Video(Sequence[Mesh]):
         text = self._page()
         self._hide()
         folder = tempfile.mkdtemp(prefix="meshreel-")
-        self._hide = weakref.finalize(self, _remove, folder, time.monotonic() + LOADED)
+        self._hide = weakref.finalize(self, _remove, folder, time.monotonic() + LOADED, os.getpid())
         page = Path(folder, f"{Path(self.name).stem}.html")
         page.write_text(text, encoding="utf-8")
         if not webbrowser.open(page.as_uri()):
@@ -330,8 +331,10 @@ class Video(Sequence[Mesh]):
         return frame
 
 
-def _remove(folder: str, when: float) -> None:
-    """Remove a folder, not before a time of the monotonic clock."""
+def _remove(folder: str, when: float, process: int) -> None:
+    """Remove a folder of a process, not before a time of the monotonic clock."""
+    if os.getpid() != process:  # a fork of it
+        return
     try:
         time.sleep(max(when - time.monotonic(), 0))
     finally:

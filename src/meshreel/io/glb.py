@@ -31,7 +31,7 @@ _KNOWN = {  # extensions, each of which is read, or changes neither surface nor 
 }
 _INSTANCES, _TRANSFORM = "EXT_mesh_gpu_instancing", "KHR_texture_transform"
 _SHINE = "KHR_materials_pbrSpecularGlossiness"
-_FINE = 512  # texels of a side: light within a texel is lost in a picture that is smaller (guess)
+_FINE, _COARSE = 512, 2048  # texels of a side: light has at least, and at most, so many (guesses)
 _STRIP, _FAN = 5, 6  # modes of primitives (glTF 2.0, section 5.24)
 _OTHER_MODES = {0: "points", 1: "lines", 2: "lines", 3: "lines"}
 _LIGHT = to_linear(np.repeat(np.arange(256, dtype=np.uint8)[:, None], 3, axis=1))[:, 0] / 65535  # of sRGB values
@@ -424,13 +424,15 @@ def _shaded(
     from PIL import Image
 
     height, width = (side * max(1, _FINE // max(picture.shape)) for side in picture.shape)
-    shade = light_in_picture(places, light, height, width)
+    rows, columns = min(height, _COARSE), min(width, _COARSE)
+    shade = light_in_picture(places, light, rows, columns)
     if shade is None:
         return None
 
     def pixels() -> UInt8[np.ndarray, "H W 3"]:
         image = Image.fromarray(np.ascontiguousarray(picture.pixels)).resize((width, height), Image.Resampling.BILINEAR)
-        return np.stack([from_linear(_LIGHT[row] * lit) for row, lit in zip(np.asarray(image), shade, strict=True)])
+        lit = shade[:, np.arange(width) * columns // width]
+        return np.stack([from_linear(_LIGHT[row] * lit[k * rows // height]) for k, row in enumerate(np.asarray(image))])
 
     return Texture(pixels, (height, width))
 

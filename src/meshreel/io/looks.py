@@ -16,7 +16,7 @@ from ..types import GREY, Texture
 from .pictures import MOST_PIXELS
 from .polygons import Polygons
 
-_TRIED = 16  # times the texels of a picture may be looked at: faces that cover it so often overlap (guess)
+_TRIED = 8  # times the texels of a picture may be looked at: faces that cover it so often overlap (guess)
 _AT_ONCE = 1 << 20  # texels, some 200 MB
 _CLASH = 0.02  # of full light: two lights at one texel that differ by more are two (guess)
 

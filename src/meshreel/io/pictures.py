@@ -33,8 +33,8 @@ _LIKE = "name folders view00, view01 ... and files frame_00000.png ..."
 
 def last_number(name: str) -> int | None:
     """Return the last whole number in a name; None if it has no number."""
-    match = re.search(r"(\d+)(?!.*\d)", name)
-    return None if match is None else int(match[1])
+    numbers = re.findall(r"\d+", name)
+    return int(numbers[-1][-18:]) if numbers else None
 
 
 def read_picture(place: Place) -> UInt8[np.ndarray, "H W 3"]:

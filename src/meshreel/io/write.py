@@ -13,7 +13,7 @@ import stat
 import sys
 import time
 import zlib
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
@@ -66,9 +66,15 @@ def check_apart(output: Path, inputs: Iterable[Path]) -> None:
             raise InputError(f"{output}: is the input {path}, which the output would replace; choose another name")
 
 
-def check_free(paths: Iterable[Path], force: bool) -> None:
-    """Raise InputError if files are there that a user did not name and a run would replace, unless `force`."""
-    if there := [] if force else [path for path in paths if os.path.lexists(path)]:
+def check_free(paths: Iterable[Path], force: bool, inputs: Sequence[Path] = ()) -> None:
+    """Raise InputError if files are there that a user did not name and a run would replace, unless `force`.
+
+    That does not replace an input.
+    """
+    there = [path for path in paths if os.path.lexists(path)]
+    for path in there if force else ():
+        check_apart(path, inputs)
+    if there and not force:
         more = f" and {len(there) - 1} other files" if there[1:] else ""
         raise InputError(f"{there[0]}{more}: there already, and not named; choose another output, or give --force")
 

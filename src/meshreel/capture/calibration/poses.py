@@ -66,7 +66,7 @@ def pose_for(name: str, poses: Mapping[str, Matrix], kind: str) -> Matrix | None
         return poses[name]
     found = [key for key in poses if re.match(re.escape(name) + r"[/_.\-]", key)]
     found = [key for key in found if kind in key] or found
-    found = found or [key for key in poses if key.isdigit() and last_number(name) == int(key)]
+    found = found or [key for key in poses if key.isdecimal() and last_number(name) == last_number(key)]
     if len(found) > 1:
         raise InputError(f"several poses may be of camera {name}: {', '.join(found)}; leave one of them in the file")
     return poses[found[0]] if found else None
