@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from meshreel.conversions import as_sequence
 from meshreel.errors import InputError
@@ -235,3 +236,36 @@ def test_the_box_of_a_mesh_has_its_diagonal_and_middle():
     assert low.tolist() == [-1, 0, 2] and high.tolist() == [1, 4, 6]
     assert mesh.diagonal == 6 and mesh.middle.tolist() == [0, 2, 4]
     assert Mesh.empty().diagonal == 0 and Mesh.empty().middle.tolist() == [0, 0, 0]
+
+
+def textured_box(material, with_places=True):
+    trimesh = pytest.importorskip("trimesh")
+    box = trimesh.creation.box()
+    places = np.linspace(0, 1, 16).reshape(8, 2) if with_places else None
+    box.visual = trimesh.visual.TextureVisuals(uv=places, material=material)
+    return box
+
+
+def test_factors_and_materials_of_trimesh_are_kept():
+    material = pytest.importorskip("trimesh").visual.material
+    picture = Image.new("RGB", (4, 4), (255, 255, 255))
+    red = [material.PBRMaterial(baseColorFactor=[255, 0, 0, 255]), material.SimpleMaterial(diffuse=[255, 0, 0, 255])]
+    for one in red:
+        assert (as_sequence([textured_box(one, False)])[0].colors == [255, 0, 0]).all()
+    dark = material.PBRMaterial(baseColorTexture=picture, baseColorFactor=[128, 128, 128, 255])
+    assert (as_sequence([textured_box(dark)])[0].texture.pixels == 188).all()  # linear light
+    assert (as_sequence([textured_box(material.SimpleMaterial(image=picture))])[0].texture.pixels == 255).all()
+    assert as_sequence([textured_box(material.PBRMaterial(), False)])[0].colors is None
+
+
+def test_a_scene_of_trimesh_keeps_pictures_and_colours_apart():
+    trimesh = pytest.importorskip("trimesh")
+    picture = Image.new("RGB", (4, 4), (0, 0, 255))
+    pictured = textured_box(trimesh.visual.material.PBRMaterial(baseColorTexture=picture))
+    red = trimesh.creation.box().apply_translation([3, 0, 0])
+    red.visual.vertex_colors = [[255, 0, 0, 255]] * 8
+    mesh = as_sequence([trimesh.Scene([pictured, red])])[0]
+    is_red = mesh.vertices[:, 0] > 2
+    assert (mesh.colors[is_red] == [255, 0, 0]).all() and (mesh.texture.pixels == [0, 0, 255]).all()
+    assert np.isfinite(mesh.uv[~is_red[mesh.faces].any(axis=1)]).all()
+    assert np.isnan(mesh.uv[is_red[mesh.faces].all(axis=1)]).all()

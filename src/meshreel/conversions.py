@@ -13,7 +13,10 @@ from typing import Any
 import numpy as np
 
 from .errors import InputError
+from .io.glb import parse_glb, tinted
+from .io.glb_file import from_linear
 from .io.looks import Look, with_looks
+from .io.meshes import checked
 from .io.polygons import Polygons
 from .shapes import Float32, Int64, UInt8
 from .types import Mesh, MeshList, MeshSequence, Texture
@@ -42,6 +45,8 @@ def _as_mesh(item: Any, where: str) -> Mesh:
     if isinstance(item, Mesh):
         return item
     if hasattr(item, "to_mesh"):  # a scene of trimesh: all its meshes, in their places
+        if len({one.visual.kind for one in item.geometry.values() if hasattr(one, "visual")}) > 1:  # it would mix them
+            return checked(parse_glb(item.export(file_type="glb"))).mesh
         item = item.to_mesh()
     item = getattr(item, "geometry", item)  # of a frame of Open4D
     faces = getattr(item, "regular_faces", getattr(item, "faces", getattr(item, "triangles", None)))
@@ -94,14 +99,17 @@ def _bytes(values: Any, count: int, what: str, where: str) -> Colors | None:
 
 
 def _looks_of(item: Any, mesh: Mesh) -> tuple[Float32[np.ndarray, "C 2"] | None, list[Look], Int64[np.ndarray, " F"]]:
-    """Return the places of corners in pictures, the pictures, and which each face has, of trimesh or Open3D."""
+    """Return the places of corners in pictures, the looks, and which each face has, of trimesh or Open3D."""
     visual: Any = getattr(item, "visual", None)
-    images = list(getattr(item, "textures", ()))
-    material, which = getattr(visual, "material", None), np.zeros(len(mesh.faces), np.int64)
-    image = getattr(material, "baseColorTexture", None) or getattr(material, "image", None)
-    if image is not None and getattr(visual, "uv", None) is not None and len(visual.uv) == len(mesh.vertices):
-        uv, pictures = np.asarray(visual.uv)[mesh.faces], [image.convert("RGB")]
-    elif images and len(item.triangle_uvs) == mesh.faces.size:
+    images, which = list(getattr(item, "textures", ())), np.zeros(len(mesh.faces), np.int64)
+    if visual is not None and visual.kind == "texture":
+        materials, chosen = getattr(visual.material, "materials", [visual.material]), visual.face_materials
+        which = np.asarray(chosen, np.int64) if chosen is not None and len(chosen) == len(which) else which
+        if visual.uv is None or len(visual.uv) != len(mesh.vertices):
+            return None, [_look_of(one, False) for one in materials], which
+        uv = np.asarray(visual.uv)[mesh.faces].reshape(-1, 2)
+        return np.ascontiguousarray(uv, np.float32), [_look_of(one, True) for one in materials], which
+    if images and len(item.triangle_uvs) == mesh.faces.size:
         uv, ids = np.asarray(item.triangle_uvs), np.asarray(item.triangle_material_ids, np.int64)
         which = np.where(ids < len(images), ids, -1) if len(ids) == len(which) else which
         pictures = [np.asarray(one)[::-1, :, :3] for one in images]  # it has the lowest row of a picture first
@@ -109,6 +117,20 @@ def _looks_of(item: Any, mesh: Mesh) -> tuple[Float32[np.ndarray, "C 2"] | None,
         return None, [], which
     looks = [Look(None, Texture(partial(np.ascontiguousarray, one, np.uint8))) for one in pictures]
     return np.ascontiguousarray(uv.reshape(-1, 2), np.float32), looks, which
+
+
+def _look_of(material: Any, has_places: bool) -> Look:
+    """Return the look of a material of trimesh; a factor is linear light, and multiplies the picture."""
+    image = getattr(material, "baseColorTexture", None) or getattr(material, "image", None)
+    factor = getattr(material, "baseColorFactor", None)
+    share = (
+        np.ones(3) if factor is None else np.asarray(factor)[:3] / (255 if np.asarray(factor).dtype.kind in "iu" else 1)
+    )
+    if image is not None and has_places:
+        picture = Texture(partial(np.ascontiguousarray, image.convert("RGB"), np.uint8))
+        return Look(None, picture if (share == 1).all() else tinted(picture, *share))
+    color = getattr(material, "diffuse", None) if factor is None else from_linear(share[None])[0]
+    return Look() if color is None else Look(tuple(np.asarray(color)[:3].tolist()))
 
 
 def _rows_of_three(values: object, what: str) -> np.ndarray:

@@ -82,11 +82,14 @@ def test_the_worst_legal_file_costs_what_is_promised(make: Callable[[], bytes], 
     from tests.budget.measure import measured
 
     data = make()
-    cost = measured(tmp_path / "worst.reel", data)
-    chunks = len(ReelReader(BytesSource(data)).chunks)
-    assert cost.memory <= promised(data)
-    assert cost.seconds / cost.peer <= SLOWER * (SECONDS_PER_CHUNK * chunks + SECONDS_PER_BYTE * len(data))
-    assert all("its groups of tracks" in message for message in cost.refused)  # all else is legal
+    most = SLOWER * (SECONDS_PER_CHUNK * len(ReelReader(BytesSource(data)).chunks) + SECONDS_PER_BYTE * len(data))
+    times = list[float]()
+    while len(times) < 5 and (not times or times[-1] > most):  # again, where others took the caches meanwhile
+        cost = measured(tmp_path / "worst.reel", data)
+        assert cost.memory <= promised(data)
+        assert all("its groups of tracks" in message for message in cost.refused)  # all else is legal
+        times.append(cost.seconds / cost.peer)
+    assert min(times) <= most, times
 
 
 @pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="peak memory is measured on Linux")

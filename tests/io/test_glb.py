@@ -139,6 +139,15 @@ def test_factors_of_materials_are_colours_of_vertices_and_multiply_them(tmp_path
     assert colors[4:].tolist() == [[188, 0, 0], [0, 188, 0], [0, 0, 255], [188, 188, 0]]
 
 
+def test_a_part_without_a_material_is_white_beside_colours(tmp_path: Path) -> None:
+    glb = Glb(pictured=False)
+    glb.tree["materials"] = [{"pbrMetallicRoughness": {"baseColorFactor": [1, 0, 0, 1]}}]
+    glb.primitive |= {"material": 0}
+    plain = {key: value for key, value in glb.primitive.items() if key != "material"}
+    glb.tree["meshes"][0]["primitives"].append(plain)
+    assert read(tmp_path, glb).colors.tolist() == [[255, 0, 0]] * 4 + [[255, 255, 255]] * 4
+
+
 def test_one_grey_of_all_faces_is_no_colour_and_is_named(tmp_path: Path) -> None:
     glb = Glb(pictured=False)
     glb.tree["materials"] = [{"pbrMetallicRoughness": {"baseColorFactor": [0.8, 0.8, 0.8, 1]}}]

@@ -10,6 +10,7 @@ import pytest
 from meshreel.errors import InputError
 from meshreel.geometry.topology import weld
 from meshreel.io import meshes
+from meshreel.io.file_names import in_order
 from meshreel.io.sequence import CAPTURED, SequenceOptions, open_sequence
 from meshreel.io.write import write_mesh
 from meshreel.types import Mesh
@@ -63,6 +64,25 @@ def test_two_files_with_one_frame_number_are_refused(tmp_path: Path) -> None:
     for order in ("auto", "all", "last"):
         with pytest.raises(InputError, match=r"'b_03' and 'b_3' both have frame number 3; give a glob"):
             open_sequence(tmp_path / "padded", SequenceOptions(order=order))
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        ("30-01-2024", "31-01-2024", "01-02-2024", "02-02-2024"),  # days first
+        ("02_28_2023", "03_01_2023", "01_01_2024"),  # months first
+        ("t0_0", "t0_033", "t0_067", "t0_1", "t0_133"),  # a point written as _
+    ],
+)
+def test_names_that_may_be_dates_or_decimals_are_asked_about(tmp_path: Path, names: tuple[str, ...]) -> None:
+    put(tmp_path, *(f"{name}.obj" for name in names))
+    with pytest.raises(InputError, match=rf"may be .*{names[0]}, {names[1]}.*(--order|name them)"):
+        open_sequence(tmp_path)
+
+
+def test_of_a_count_and_a_time_the_count_is_the_frame_number() -> None:
+    names = ["000_1700000000123", "001_1700000000156", "003_1700000000223"]
+    assert in_order(Path("folder"), names) == (names, [0, 1, 3])
 
 
 def test_names_of_two_patterns_are_refused(tmp_path: Path) -> None:
@@ -178,7 +198,7 @@ def test_what_is_dropped_is_said_once_for_the_sequence(tmp_path: Path) -> None:
     assert sequence.warnings == ()
     for mesh in sequence:
         assert mesh.faces.shape == (1, 3)
-    told = "not kept: normals, texture coordinates (first in frame 1, m_2.obj)"
+    told = "not kept: material 'skin' (no file describes it), normals (first in frame 1, m_2.obj)"
     assert sequence.warnings == (f"{told}; bake what should be seen into colours or one texture",)
 
 

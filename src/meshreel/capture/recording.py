@@ -176,10 +176,7 @@ def open_recording(
     rig = read_rig(folder, order)
     warnings = [*rig.remarks, *rig.missing()]
     for number, camera in enumerate(rig.cameras):
-        seen = rig.looked_at(number)
-        if blind := sum(not depth.any() for depth in seen):
-            warnings.append(f"camera {camera.name} measures nothing in {blind} of {len(seen)} frames looked at")
-        if (share := moved_share(seen)) > MOVED:
+        if (share := moved_share(rig.looked_at(number))) > MOVED:
             text = f"{folder}: camera {camera.name} seems to move: {100 * share:.0f} % of its pixels see something else"
             remedy = "record with cameras that stand still, or cut the recording where it was moved"
             raise InputError(f"{text} than usual; {remedy}")

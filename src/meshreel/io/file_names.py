@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from fractions import Fraction
 from itertools import pairwise
 from pathlib import Path, PurePath, PurePosixPath
-from typing import Literal, TypeVar
+from typing import Any, Literal, TypeVar
 
 from ..errors import InputError
 from .files import Place, Remote, located, located_all
@@ -167,7 +167,9 @@ def _decided(source: Place, names: list[str], order: Order, of_time: bool = Fals
     if not by_all:  # two names share the one number
         _sorted(source, names, list(zip(*columns, strict=True)), "last")
     if order == "last" or by_all == by_last:
-        return by_last or by_all, columns[-1:]
+        return by_last or by_all, [
+            max(columns, key=lambda column: (_evenness(column), -max(map(len, column))))
+        ]  # not a time
     if order != "all" and _evenness(columns[0]) > max(0.5, _evenness(columns[-1])):
         return by_all, columns[:1]  # what stands behind is a count, or a hash
     if order == "all" or all(map(_wraps, columns[1:])):
@@ -210,17 +212,33 @@ def _sorted(source: Place, names: list[str], keys: list[Column], order: Order, r
     """Return names by their numbers; none where two have equal ones, which is an error if all numbers count."""
     numbers = {name: tuple(map(Fraction, key)) for name, key in zip(names, keys, strict=True)}
     found = sorted(names, key=numbers.__getitem__)
-    parts = {name: tuple(map(int, ".".join(key).split("."))) for name, key in zip(names, keys, strict=True)}
-    if order == "auto" and (other := sorted(names, key=parts.__getitem__)) != found:
-        ways = f"{', '.join(found[:3])} ... (--order all), or {', '.join(other[:3])} ... (name them so that these sort)"
-        raise InputError(f"{source}: the numbers of the {len(names)} names may be fractions: {ways}; say which")
     for before, after in pairwise(found):
         if numbers[before] == numbers[after]:
             if len(keys[0]) == 1 and order != "last":
                 return []
             text = f"{source}: {before!r} and {after!r} both have frame number {float(numbers[before][-1]):.12g}"
             raise InputError(f"{text}; give a glob that fits only one of them{remedy}")
+    for others in _other_readings(names, keys) if order == "auto" else ():
+        if (other := sorted(names, key=dict(zip(names, others, strict=True)).__getitem__)) != found:
+            ways = f"{_first(found)} (--order all), or {_first(other)} (name them so that these sort)"
+            raise InputError(
+                f"{source}: numbers of the {len(names)} names may be fractions, or dates: {ways}; say which"
+            )
     return found
+
+
+def _other_readings(names: list[str], keys: list[Column]) -> Iterator[list[tuple[Any, ...]]]:
+    """Yield keys of names by other readings of their numbers: as versions, as decimals, as dates that end in a year."""
+    yield [tuple(map(int, ".".join(key).split("."))) for key in keys]
+    columns = list(zip(*keys, strict=True))
+    if any(one[0] == "0" and len(one) > min(map(len, column)) for column in columns for one in column):  # 033 beside 1
+        yield [tuple(Fraction(one if "." in one else f"0.{one}") for one in key) for key in keys]
+    dates = [re.search(r"(?<!\d)(\d\d)\D(\d\d)\D((?:19|20)\d\d)(?!\d)", name) for name in names]
+    for parts in ((3, 2, 1), (3, 1, 2)) if all(dates) else ():
+        yield [
+            (*(date and date[part] for part in parts), *map(Fraction, key))
+            for date, key in zip(dates, keys, strict=True)
+        ]
 
 
 def _evenness(column: Column) -> float:

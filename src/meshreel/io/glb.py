@@ -79,7 +79,7 @@ class Scene:
     def __init__(self, data: bytes) -> None:
         """Raises Unreadable if the file is damaged, or needs what is not read."""
         self._named = set[str]()
-        self._tinted = cache(_tinted)  # the same texture in all frames, as those that are shaded
+        self._tinted = cache(tinted)  # the same texture in all frames, as those that are shaded
         self._shaded = dict[tuple[Texture, bytes], Texture | None]()
         self._file = _guarded(lambda: Gltf(data))
         self.duration = _guarded(self._begin)
@@ -144,7 +144,7 @@ class Scene:
         tree = self._file.tree
         scenes, nodes = tree.get("scenes", []), tree.get("nodes", [])
         if len(scenes) > 1:
-            self._named.add("scenes beside the first")
+            self._named.add("other scenes")
         if scenes:
             roots = self._file.item("scenes", tree.whole("scene", 0)).get("nodes", [])
         else:
@@ -381,7 +381,12 @@ class Scene:
         uv = uv if np.isfinite(uv).any() else None
         sizes = np.full(len(corners) // 3, 3, np.int64)
         surface = Polygons(vertices, corners, sizes, colors=colors, colored=colored, uv=uv)
-        found = with_looks(surface, [part.look for part in parts], which)
+        looks = [part.look for part in parts]
+        if colored.any() or any(
+            look.color is not None for look in looks
+        ):  # then what has no colour is white, not unknown
+            looks = [look if look != Look() else Look((255, 255, 255)) for look in looks]
+        found = with_looks(surface, looks, which)
         named = {_WORDS.get(".".join(name.split(".")[-2:]), _plain(name)) for name in self._file.tree.unread()}
         return found.naming(named | self._named)
 
@@ -411,7 +416,7 @@ def _bytes(light: np.ndarray) -> tuple[int, int, int]:
     return red, green, blue
 
 
-def _tinted(picture: Texture, *tint: float) -> Texture:
+def tinted(picture: Texture, *tint: float) -> Texture:
     """Return a picture times a colour in linear light."""
     table = np.stack([from_linear(np.repeat(_LIGHT[:, None] * share, 3, axis=1))[:, 0] for share in tint])
     return Texture(lambda: np.stack([table[k][picture.pixels[..., k]] for k in range(3)], axis=-1), picture.size)

@@ -64,7 +64,7 @@ def with_materials(polygons: Polygons, mesh: Place) -> Polygons:
         for number in np.unique(which[which >= 0]):
             name = next((key for key in (names[number], _bare(names[number])) if key in terms), None)
             if name is None:
-                named |= {f"material {names[number]!r} (no file describes it)"} if polygons.libraries else set()
+                named.add(f"material {names[number]!r} (no file describes it)")
                 continue
             looks[number], scale, offset, words = _look(mesh, *terms[name], has_places)
             named |= words
@@ -147,7 +147,8 @@ def _look(
         if keyword == "kd":
             values = _numbers(rest)
             if len(values) in (1, 3):
-                red, green, blue = (round(255 * min(max(value, 0.0), 1.0)) for value in (values * 3)[:3])
+                full = 255 if max(values) <= 1.5 else 1  # fractions, blended ones a little above 1, or bytes
+                red, green, blue = (round(min(max(full * value, 0.0), 255.0)) for value in (values * 3)[:3])
                 color = red, green, blue
             else:
                 named.add("a colour (Kd of another kind than red, green, blue)")

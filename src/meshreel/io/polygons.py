@@ -45,7 +45,8 @@ class Polygons:
     @property
     def has_looks(self) -> bool:
         """True if colours or pictures of materials and faces are to be added to those of vertices."""
-        return bool(self.libraries or self.pictures) or self.face_colors is not None or self.colored is not None
+        parts = (self.material_of, self.face_colors, self.colored)
+        return bool(self.libraries or self.pictures) or any(part is not None for part in parts)
 
     def naming(self, dropped: Iterable[str]) -> Polygons:
         """Return the same polygons with more names of data that are not kept."""

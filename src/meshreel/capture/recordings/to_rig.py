@@ -63,6 +63,8 @@ def write_takes(
             if part.color is not None:
                 part.color.rename(frames)
         write_rig(place, tuple(part.camera() for part in parts), clock.rate, [part.beside() for part in parts])
+    unread = {take.path: ", ".join(other for other in take.others if "Image" in other) for take in takes}
+    remarks += [f"{path}: not read: {topics}" for path, topics in unread.items() if topics]
     unknown = sum(part.sensor.poses is None for part in parts)
     if len(parts) > 1 and (unknown or len(takes) > 1):
         text = f"how its {len(parts)} cameras stand to each other is not known; meshreel calibrate finds it"

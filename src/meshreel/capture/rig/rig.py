@@ -85,9 +85,12 @@ class Rig:
         return [self.depth(number, frame) * self.cameras[number].depth_unit for frame in chosen]
 
     def missing(self) -> list[str]:
-        """Return a warning for each camera that lacks frames, and one for frames that no camera has."""
+        """Return warnings for cameras that lack frames or measure nothing, and one for frames that no camera has."""
         frames, warnings = self.frames, []
-        for camera, files in zip(self.cameras, self.files, strict=True):
+        for number, (camera, files) in enumerate(zip(self.cameras, self.files, strict=True)):
+            seen = self.looked_at(number)
+            if blind := sum(not depth.any() for depth in seen):
+                warnings.append(f"camera {camera.name} measures nothing in {blind} of {len(seen)} frames looked at")
             if lost := sorted(set(frames) - set(files)):
                 text = f"camera {camera.name} lacks {len(lost)} of {len(frames)} frames, for example {lost[0]}"
                 warnings.append(f"{text}; they are fused without it")
