@@ -11,7 +11,7 @@ import tomllib
 from typing import Any
 
 MOST_TOML = 1 << 16  # bytes: keys of many parts take time by their square, so many 16 s (guess)
-MOST_YAML = 1 << 23  # bytes, which take a minute (guess)
+MOST_YAML = 1 << 23  # bytes, which take minutes (guess)
 
 
 def json_of(data: str | bytes) -> Any:

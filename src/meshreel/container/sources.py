@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import threading
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
@@ -100,7 +101,9 @@ class FileSource(StreamSource):
         try:
             file = open(self.path, "rb", opener=_open_at_once)  # noqa: SIM115 (open until `close`)
         except OSError as error:
-            raise InputError(f"{self.path}: cannot be opened: {error.strerror}; give a .reel file") from error
+            is_url = re.match(r"[\w+.-]{2,}:/", str(path))
+            remedy = "no URL is taken here, copy the file" if is_url else "give a .reel file"
+            raise InputError(f"{self.path}: cannot be opened: {error.strerror}; {remedy}") from error
         self._disk = file
         super().__init__(file, str(self.path))
 
