@@ -67,7 +67,8 @@ Edit parse_edit(const std::string& metadata, uint64_t frames) {
         edit.ends.resize(numbers.size());
         std::transform(numbers.begin(), numbers.end(), edit.ends.begin(), frame_of);
         const auto falls = std::adjacent_find(edit.ends.begin(), edit.ends.end(), std::greater_equal<uint64_t>());
-        require(falls == edit.ends.end() && edit.ends.back() <= frames, "Header.metadata: edit.frames are not those of the file");
+        require(falls == edit.ends.end() && edit.ends.back() <= frames,
+                "Header.metadata: edit.frames are not those of the file");
     }
     return edit;
 }
