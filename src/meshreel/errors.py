@@ -24,7 +24,7 @@ class NoReferenceError(MeshreelError):
     """No reference surface can be made from these frames; the encoder then codes them one by one."""
 
 
-_SCHEME = re.compile(r"(?<![\w+.-])[\w+.-]{2,}://?")  # as a Path, with one slash
+SCHEME = re.compile(r"(?<![\w+.-])[\w+.-]{2,}://?")  # as a Path, with one slash
 _USER = re.compile(r"(?:[^\s/?#]*|[^\s/?#:]+:(?!\d+/)\S*)@")  # keys of stores may have slashes
 _FURTHER = re.compile(r"([^\s?#]*|[^?#\n]*(?=[?#][\w.%-]+=))[?#](?:\.\.\.(?=\W|$))?(\S*)")
 _MOST = 4096  # characters of a message: more is no line for a terminal (guess)
@@ -35,7 +35,7 @@ def without_secret(text: str) -> str:
     if ":/" not in text:
         return text
     text, found, at = text if len(text) <= _MOST else f"{text[:_MOST]} ...", "", 0
-    for scheme in _SCHEME.finditer(text):
+    for scheme in SCHEME.finditer(text):
         if scheme.start() >= at:
             found, at = found + text[at : scheme.end()], scheme.end()
             if user := _USER.match(text, at):

@@ -62,3 +62,12 @@ def test_labels_that_are_there_are_kept(run, scan, tmp_path, name):
 def test_files_of_a_folder_that_is_of_no_demo_are_kept(run, tmp_path):
     (tmp_path / "demo.png").write_bytes(b"mine")
     assert failed(run("demo", "-o", tmp_path, "--frames", "2"), "demo.png", "--force")
+
+
+@pytest.mark.parametrize("splats", [(), ("--splats",)])
+def test_force_does_not_replace_the_input(run, tmp_path, splats):
+    (tmp_path / "out").mkdir()
+    recording = tmp_path / "out" / "frame_00000.ply"
+    recording.write_bytes(SPLATS.read_bytes())
+    assert failed(run("decode", recording, "-o", tmp_path / "out", "--force", *splats), "frame_00000.ply", "the input")
+    assert recording.read_bytes() == SPLATS.read_bytes()

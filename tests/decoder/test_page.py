@@ -220,3 +220,16 @@ def test_a_mesh_with_a_texture_is_pickled_as_it_is_shown():
         again = pickle.loads(pickle.dumps(mesh))
         assert np.array_equal(again.vertices, mesh.vertices) and again.texture.shape == mesh.texture.shape
         assert np.array_equal(again.texture.pixels, mesh.texture.pixels)
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="forks are of POSIX")
+def test_a_fork_leaves_the_page_of_its_parent(shown):
+    video = meshreel.open(SCENE)
+    video.show()
+    if (child := os.fork()) == 0:
+        video.close()
+        os._exit(0)
+    os.waitpid(child, 0)
+    assert shown[0].exists()
+    video.close()
+    assert not shown[0].exists()

@@ -122,6 +122,14 @@ def test_light_beside_faces_is_that_of_the_nearest_texel_and_no_picture_has_two_
         assert light_in_picture(odd, np.ones((len(odd), 3, 3)), 8, 8) is None
 
 
+def test_a_large_picture_is_lit_by_few_texels(tmp_path: Path) -> None:
+    glb = Glb()
+    glb.tree["images"][0] = {"bufferView": glb.view(png(np.full((2, 9000, 3), 255, np.uint8)))}
+    pixels = read(tmp_path, glb, GLTF["attribute COLOR_0 with a texture"]).texture.pixels
+    assert pixels.shape == (2, 9000, 3)
+    assert (np.diff(pixels[1].astype(int), axis=0).any(axis=1)).sum() < 2048  # light has 2048 columns at most
+
+
 def test_colours_of_vertices_on_texels_of_several_faces_are_named(tmp_path: Path) -> None:
     glb = Glb()
     read(tmp_path, glb, GLTF["attribute COLOR_0 with a texture whose texels faces share"])

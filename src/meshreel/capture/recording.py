@@ -176,7 +176,9 @@ def open_recording(
     rig = read_rig(folder, order)
     warnings = [*rig.remarks, *rig.missing()]
     for number, camera in enumerate(rig.cameras):
-        if (share := moved_share(rig.looked_at(number))) > MOVED:
+        seen = rig.looked_at(number)
+        warnings += rig.blind(number, seen)
+        if (share := moved_share(seen)) > MOVED:
             text = f"{folder}: camera {camera.name} seems to move: {100 * share:.0f} % of its pixels see something else"
             remedy = "record with cameras that stand still, or cut the recording where it was moved"
             raise InputError(f"{text} than usual; {remedy}")

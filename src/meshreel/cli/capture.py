@@ -97,7 +97,8 @@ def command(
             raise InputError(f"{inputs[0]}: is no rig: make one of it without options of fusion, then capture that")
         warnings = make_rig([open_take(path) for path in inputs], output, common, depth_unit)
         rig = read_rig(output)
-        common.warn([*warnings, *rig.missing()])
+        blind = [text for number in range(len(rig.cameras)) for text in rig.blind(number, rig.looked_at(number))]
+        common.warn([*warnings, *rig.missing(), *blind])
         row = {"output": str(output), "cameras": len(rig.cameras), "color_cameras": len(rig.color_cameras)}
         row |= {"frames": len(rig.frames), "frame_rate": rig.frame_rate}
         counted = f"{row['frames']} frames, depth cameras: {row['cameras']}, colour cameras: {row['color_cameras']}"

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import os
-import re
 import threading
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
-from ..errors import InputError
+from ..errors import SCHEME, InputError
 
 if TYPE_CHECKING:
     from .http import UrlSource
@@ -101,8 +100,7 @@ class FileSource(StreamSource):
         try:
             file = open(self.path, "rb", opener=_open_at_once)  # noqa: SIM115 (open until `close`)
         except OSError as error:
-            is_url = re.match(r"[\w+.-]{2,}:/", str(path))
-            remedy = "no URL is taken here, copy the file" if is_url else "give a .reel file"
+            remedy = "no URL is taken here, copy the file" if SCHEME.match(str(path)) else "give a .reel file"
             raise InputError(f"{self.path}: cannot be opened: {error.strerror}; {remedy}") from error
         self._disk = file
         super().__init__(file, str(self.path))

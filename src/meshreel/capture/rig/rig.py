@@ -84,13 +84,15 @@ class Rig:
         chosen = sorted({frames[int(k)] for k in np.linspace(0, len(frames) - 1, LOOKED_AT)})
         return [self.depth(number, frame) * self.cameras[number].depth_unit for frame in chosen]
 
+    def blind(self, number: int, seen: Sequence[Float64[np.ndarray, "H W"]]) -> list[str]:
+        """Return a warning if a camera measures nothing in some of the depths `looked_at`."""
+        blind, name = sum(not depth.any() for depth in seen), self.cameras[number].name
+        return [f"camera {name} measures nothing in {blind} of {len(seen)} frames looked at"] if blind else []
+
     def missing(self) -> list[str]:
-        """Return warnings for cameras that lack frames or measure nothing, and one for frames that no camera has."""
+        """Return a warning for each camera that lacks frames, and one for frames that no camera has."""
         frames, warnings = self.frames, []
-        for number, (camera, files) in enumerate(zip(self.cameras, self.files, strict=True)):
-            seen = self.looked_at(number)
-            if blind := sum(not depth.any() for depth in seen):
-                warnings.append(f"camera {camera.name} measures nothing in {blind} of {len(seen)} frames looked at")
+        for camera, files in zip(self.cameras, self.files, strict=True):
             if lost := sorted(set(frames) - set(files)):
                 text = f"camera {camera.name} lacks {len(lost)} of {len(frames)} frames, for example {lost[0]}"
                 warnings.append(f"{text}; they are fused without it")
