@@ -17,7 +17,15 @@ from meshreel.types import UP_AXES, Mesh, MeshList, Texture, check_up, evenly, k
 
 @pytest.mark.parametrize(
     ("count", "most", "wanted"),
-    [(9, 3, [0, 4, 8]), (60, 2, [0, 59]), (3, 10, [0, 1, 2]), (5, 1, [0]), (5, 0, []), (0, 4, [])],
+    [
+        (9, 3, [0, 4, 8]),
+        (6, 4, [0, 2, 3, 5]),
+        (60, 2, [0, 59]),
+        (3, 10, [0, 1, 2]),
+        (5, 1, [0]),
+        (5, 0, []),
+        (0, 4, []),
+    ],
 )
 def test_some_frames_are_evenly_spread_from_the_first_to_the_last(count, most, wanted):
     assert evenly(count, most) == wanted

@@ -35,7 +35,7 @@ FORMAT = (Path(__file__).resolve().parents[2] / "FORMAT.md").read_text(encoding=
 MEMORY, MEMORY_PER_BYTE = 384 << 20, 16 << 10  # bytes, of FORMAT.md
 WITH_COLORS, WITH_TEXTURES, WITH_SPLATS = 96 << 20, 320 << 20, 192 << 20  # and more, of FORMAT.md
 SECONDS_PER_CHUNK, SECONDS_PER_BYTE = 2.0, 250e-6  # of FORMAT.md
-SLOWER = 6  # times: the peer takes a second of a core at 3 GHz; on a busy machine a file took 4.5 more
+SLOWER = 6  # times: the peer takes a second of a core at 3 GHz; on another machine a file took 4.4 times what it may
 
 SMALL = {
     "draco": partial(worst.draco, 3000),
