@@ -105,19 +105,37 @@ async def answer(reader: asyncio.StreamReader) -> tuple[int, dict[str, str], byt
     return int(head[0].split()[1]), headers, await reader.readexactly(int(headers.get("content-length", "0")))
 
 
-async def bystander(served: Served) -> None:
-    """Fetch a file again and again over one connection, and note what is wrong or late."""
-    wanted = (served.folder / "walk.reel").read_bytes()
-    async with connected(served) as (reader, writer):
+@dataclass
+class Lateness:
+    """The time by which a task that sleeps for 10 ms again and again has woken too late, all in all."""
+
+    seconds: float = 0.0
+
+    async def tick(self) -> None:
         while True:
             began = time.monotonic()
+            await asyncio.sleep(0.01)
+            self.seconds += time.monotonic() - began - 0.01
+
+
+async def bystander(served: Served) -> None:
+    """Fetch a file again and again over one connection, and note what is wrong or late.
+
+    What this process itself was held up by, on a busy machine, is no wait for the server.
+    """
+    wanted = (served.folder / "walk.reel").read_bytes()
+    async with connected(served) as (reader, writer), asyncio.TaskGroup() as group:
+        lateness = Lateness()
+        group.create_task(lateness.tick())
+        while True:
+            began, late = time.monotonic(), lateness.seconds
             writer.write(get("/files/walk.reel"))
             try:
                 status, _, body = await answer(reader)
             except (OSError, EOFError) as error:
                 served.faults.append(f"the connection of another client ended: {error}")
                 return
-            served.worst = max(served.worst, time.monotonic() - began)
+            served.worst = max(served.worst, time.monotonic() - began - (lateness.seconds - late))
             if (status, body) != (200, wanted):
                 served.faults.append(f"another client got {status}")
             await asyncio.sleep(0.05)
@@ -212,7 +230,7 @@ async def gallery(served: Served, number: int) -> str:
 async def heads(served: Served, number: int) -> str:
     """Files with heads of 1 and 64 MiB of nothing end no gallery, and take none of the server's memory."""
     before, file = served.count("memory"), served.folder / f"head{number}.reel"
-    with_long_head(file, 64 if number % 2 else 0.999)
+    await asyncio.to_thread(with_long_head, file, 64 if number % 2 else 0.999)
     try:
         fault = await gallery(served, 0)
     finally:
