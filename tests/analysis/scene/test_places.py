@@ -131,7 +131,7 @@ def test_memory_does_not_grow_with_the_number_of_frames(views, monkeypatch):
         tracemalloc.stop()
         return size
 
-    assert peak(72) < 1.2 * peak(24)  # what Python has not freed yet differs by 2 %; a frame that stays takes 7 % more
+    assert peak(72) < 1.02 * peak(24)
 
 
 class Again(Frames):

@@ -41,7 +41,8 @@ class FrameSurface:
         self.normals = vertex_normals(mesh)
         self.inside = np.ones(len(mesh.vertices), bool)
         self.inside[border_edges(mesh).reshape(-1)] = False
-        self._samples, self._sampled = dict[int, Int64[np.ndarray, " S"]](), dict[int, _core.DeformTarget]()
+        self._samples: dict[int, Int64[np.ndarray, " S"]] = {}
+        self._sampled = dict[int, _core.DeformTarget]()
 
     def inside_at(self, hits: Hits) -> Float64[np.ndarray, " N"]:
         """Interpolate 1 for vertices inside and 0 for those on open borders at points of the surface."""

@@ -55,7 +55,9 @@ class Observations:
 
     def observe(self, number: int, mesh: Mesh, cells: Int64[np.ndarray, " C"], lattice: Lattice) -> _Observation:
         """Return the observations of a frame, given its mesh and occupied cells."""
-        rays, unit, depths = Rays(mesh), lattice.size / _FINENESS, list[UInt16[np.ndarray, "H W"]]()
+        rays, unit = Rays(mesh), lattice.size / _FINENESS
+        # Only an annotation: to call the type would make a class for each frame, which stays until all garbage goes.
+        depths: list[UInt16[np.ndarray, "H W"]] = []
         for view in self.views:
             sight = rays.look(view)
             depth = np.where(np.isfinite(sight.depth) & ~rays.backs(view, sight), sight.depth, 0.0)

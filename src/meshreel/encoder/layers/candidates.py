@@ -84,7 +84,8 @@ class Candidate:
         self.key, self.before, self._options, self._noise = key, before, options, ahead.noise
         self._tolerated = options.tolerance * ahead.noise
         self._target, self._tracker = ahead.target.distance, tracker
-        self._fits, self._residuals = dict[int, Float64[np.ndarray, "V 3"]](), dict[int, float]()
+        self._fits: dict[int, Float64[np.ndarray, "V 3"]] = {}
+        self._residuals = dict[int, float]()
         self.slide: Slide | None = None
         self._ends = dict[int, int]()  # by side, the frame where the template is lost
 
