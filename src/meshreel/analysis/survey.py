@@ -18,9 +18,8 @@ from jaxtyping import Float64, Int64
 from ..errors import InputError
 from ..format.checks import MOST_TRACKS
 from ..geometry.strict import norm
-from ..geometry.topology import border_edges, clean, components, drop_unreferenced, edge_lengths, face_normals, linked
-from ..geometry.voxels import Lattice, around, distinct, spread
-from ..types import Frames, Mesh, MeshSequence, evenly
+from ..geometry.topology import clean, components, drop_unreferenced, face_normals, linked
+from ..types import Mesh, MeshSequence
 
 UNLIKE = 30.0  # times the median size: a larger frame of a room must be in another unit; a guess
 LARGEST_RATIO = 10.0  # largest ratio of the diagonals of two frames in one interval: a guess
@@ -28,12 +27,6 @@ Report = Callable[[str, int], object]  # takes a stage, and the number of furthe
 LEAST = 0.05  # share of the area of the frame's largest piece: smaller pieces are bits (guess)
 LEAST_FACES = 500  # smaller pieces are bits: a separate track would cost more than they do (guess)
 Box = tuple[float, ...]  # m, six: the lower and the upper corner, along the axes
-# Set between captured rooms and captured bodies.
-PROBES = 4  # frames inspected, spread over the sequence (guess)
-SHARE = 0.6  # smallest share of a frame's surface that stands still in a scene (guess)
-CELLS = 200  # cells along a frame's diagonal: 4 cm in a room (guess)
-BORDER = 1.0  # diagonals, least length of the borders of an open surface; holes of a captured body have less (guess)
-COARSEST = 32  # smallest number of median edge lengths along the diagonal of a captured room (guess)
 
 
 @dataclass(frozen=True, slots=True)
@@ -241,27 +234,3 @@ def unlike(boxes: Float64[np.ndarray, "P 6"], others: Float64[np.ndarray, "Q 6"]
 
 def box_around(boxes: Float64[np.ndarray, "P 6"]) -> Float64[np.ndarray, "6"]:
     return np.concatenate([boxes[:, :3].min(axis=0), boxes[:, 3:].max(axis=0)])
-
-
-def is_scene(frames: Frames) -> bool:
-    """Return whether a sequence has a background; False for empty sequences and single frames.
-
-    Raises InputError if one of the few inspected frames is invalid.
-    """
-    numbers = evenly(len(frames), PROBES)
-    meshes = []
-    for number in numbers:
-        check(mesh := frames[number], f"frame {number}")
-        meshes += [] if mesh.is_empty else [drop_unreferenced(mesh)]
-    sizes = [mesh.diagonal for mesh in meshes]
-    if len(meshes) < 2 or sizes[0] == 0 or max(sizes) > UNLIKE * min(sizes):
-        return False
-    ends = meshes[0].vertices[border_edges(meshes[0])]
-    is_open = np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1).sum() > BORDER * sizes[0]
-    if not is_open or np.median(edge_lengths(meshes[0])) * COARSEST > sizes[0]:
-        return False
-    lattice = Lattice.near(meshes[0], sizes[0] / CELLS)
-    cells = [distinct(lattice.keys(spread(mesh, lattice.size)[0])) for mesh in meshes]
-    wide = [around(occupied) for occupied in cells]
-    still = [np.mean([np.isin(occupied, other).mean() for other in wide]) for occupied in cells]
-    return float(np.median(still)) >= SHARE

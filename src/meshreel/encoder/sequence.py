@@ -17,7 +17,8 @@ from threadpoolctl import threadpool_limits
 
 from ..analysis.scene.masks import Masker
 from ..analysis.scene.segmentation import Cameras
-from ..analysis.survey import Survey, is_scene
+from ..analysis.scene.standing import Standing, scene_standing
+from ..analysis.survey import Survey
 from ..coding.background import decode_background
 from ..container.writer import ReelWriter
 from ..conversions import as_sequence
@@ -51,7 +52,7 @@ from .paper.recipe import FindGroups, find_groups
 from .run.interval_files import IntervalFiles, made_of, opened_output
 from .run.schedule import Job
 from .run.surveying import Excerpt, facts_of, survey_from_facts, survey_job, write_survey
-from .scene.parts import Parts, pack_parts, take_apart, unpack_parts
+from .scene.parts import NoRoom, Parts, pack_parts, take_apart, unpack_parts
 from .scene.scene import Tracks, encode_bodies, scene_intervals
 from .scene.static import colored_states
 from .scene.tracks import encode_tracked, intervals_of, tracked_bodies
@@ -152,6 +153,8 @@ class Encoder:
         self.audio = b""  # payload of `packed_audio` that files get
         self._scene: tuple[Cameras, bool, Parts] | None = None
         self._stands: bool | None = masker is not None or None  # most stands still; None: unknown yet
+        self._standing: Standing | None = None
+        self._moves: tuple[str, ...] = ()  # why a sequence that seemed to be a scene is none
 
     def intervals(self, options: EncoderOptions) -> Iterator[Interval]:
         """Yield the intervals that `encode` encodes, of all tracks of a scene."""
@@ -196,7 +199,8 @@ class Encoder:
         writer = ReelWriter(file, make_header(self.sequence.frame_rate, survey, {}), str(files.output), self.audio)
         with noted(self.digests):
             summary = _encode_tracked(job, writer, survey) if parts is None else _encode_scene(job, file, writer, parts)
-        texts = summary.warnings + (lacking if any(group.colors for group in summary.groups) else ())
+        texts = (*(self._moves if options.scene is not None else ()), *summary.warnings)
+        texts += lacking if any(group.colors for group in summary.groups) else ()
         return replace(summary, work=since(before), warnings=texts, continued=files.continued, audio=len(self.audio))
 
     def survey(self, path: Path) -> Survey:
@@ -214,7 +218,8 @@ class Encoder:
         if options.scene is None or not len(self.sequence):
             return False
         if self._stands is None:
-            self._stands = is_scene(self.sequence)
+            self._standing = scene_standing(self.sequence)
+            self._stands = self._standing is not None
         return self._stands
 
     def _whole(self, job: Job, files: IntervalFiles) -> tuple[Survey, Parts | None]:
@@ -224,15 +229,16 @@ class Encoder:
         """
         if self._excerpt is not None:
             return self._excerpt.whole.survey, None
-        is_scene = self._is_scene(job.options)
         survey = None if files.whole is None else survey_from_facts(self.sequence, files.whole)
-        if is_scene:
-            parts = self._parts(job, files, survey)
+        if self._is_scene(job.options) and (parts := self._parts(job, files, survey)) is not None:
             return parts.survey, parts
-        return survey_job(job) if survey is None else survey, None
+        return survey_job(job) if survey is None or not survey.pieces else survey, None
 
-    def _parts(self, job: Job, files: IntervalFiles | None = None, survey: Survey | None = None) -> Parts:
-        """Return the parts of the scene: those that an earlier encode of it had, here or in files, where it had any."""
+    def _parts(self, job: Job, files: IntervalFiles | None = None, survey: Survey | None = None) -> Parts | None:
+        """Return the parts of the scene: those that an earlier encode of it had, here or in files, where it had any.
+
+        None where its background does not hold, so that it is none after all.
+        """
         how = (job.scene.cameras, job.scene.from_depth)
         if self._scene is None or self._scene[:2] != how:
             survey = survey_job(job, cleaned=False) if survey is None else survey
@@ -240,7 +246,12 @@ class Encoder:
             if files is not None:
                 files.check({"surfaces": self.sequence.digests})
                 parts = None if files.scene is None else unpack_parts(files.scene, job.sequence, survey)
-            self._scene = (*how, parts or take_apart(job.sequence, survey, job.scene, job.stages, self._masker))
+            try:
+                made = job.sequence, survey, job.scene, job.stages, self._masker, self._standing
+                self._scene = (*how, parts or take_apart(*made))
+            except NoRoom as reason:
+                self._stands, self._moves = False, (f"{reason}: encoded as bodies, without a background",)
+                return None
         return self._scene[2]
 
 
@@ -263,7 +274,13 @@ def _encode_scene(job: Job, file: BinaryIO, writer: ReelWriter, parts: Parts) ->
     """Encode a scene with a background into the file of a writer."""
     sequence, options, survey = job.sequence, job.options, parts.survey
     note("survey", survey.low, survey.high, survey.diagonals, survey.unit)
-    note("background and noise", parts.background.vertices, parts.background.faces, parts.noise, parts.deviation)
+    note(
+        "background and noise",
+        parts.background.vertices,
+        parts.background.faces,
+        parts.noise.rms,
+        parts.noise.deviation,
+    )
     job.stages.add("room", 0)
     states = colored_states(sequence, parts, job.scene, options.appearance)
     job.stages.reach("room", 1.0)
@@ -271,13 +288,17 @@ def _encode_scene(job: Job, file: BinaryIO, writer: ReelWriter, parts: Parts) ->
     with writer:
         coded, dropped = encode_bodies(job, parts)
         groups = write_in_order(writer, coded, states, survey)
-        metadata = {**chosen_options(options, groups), "noise_m": shortened(parts.noise), **up_metadata(sequence.up)}
+        metadata = {
+            **chosen_options(options, groups),
+            "noise_m": shortened(parts.noise.mean),
+            **up_metadata(sequence.up),
+        }
         writer.header = make_header(sequence.frame_rate, survey, metadata)
     measured = evenly(len(sequence), MEASURED)
     psnr = mean_psnr(sequence, file, survey.diagonal, measured)
     size, tracks = sum(map(len, states)), 1 + max(group.track for group in groups)
     faces = len(decode_background(states[0].payload).faces) if states else 0
-    scene = SceneSummary(size, faces, parts.noise, psnr, tuple(measured), tracks)
+    scene = SceneSummary(size, faces, parts.noise.mean, psnr, tuple(measured), tracks)
     moves = any(group.form != Form.EMPTY for group in groups)
     texts = (*warnings_of(survey), *warnings_of_scene(parts, moves, dropped), *warnings_of_colors(groups, states))
     return Summary(writer.size, tuple(groups), texts, scene)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from meshreel.analysis.survey import is_scene
+from meshreel.analysis.scene.standing import is_scene
 from meshreel.errors import InputError
 from meshreel.types import Mesh
 from tests.metrics.shapes import moved, plane, sphere

@@ -13,6 +13,7 @@ import meshreel.encoder.scene.scene as scene
 from meshreel.analysis.scene.cut import Rest
 from meshreel.analysis.scene.labelling import ByPlace
 from meshreel.analysis.scene.segmentation import scene_views
+from meshreel.analysis.scene.standing import LocalNoise
 from meshreel.analysis.survey import survey_sequence
 from meshreel.coding.background import decode_background
 from meshreel.coding.mesh import decode_intra, encode_empty, encode_intra
@@ -101,6 +102,11 @@ def rolling(tmp_path_factory):
     return path, *encoded(ROLLING, path)
 
 
+def noise_of(deviation: float) -> LocalNoise:
+    """The same noise everywhere, m."""
+    return LocalNoise(np.zeros((1, 3)), *np.full((3, 1), deviation))
+
+
 def test_a_scene_comes_back_as_it_was_without_its_noise(rolling):
     _, video, summary = rolling
     assert_rolls(video)
@@ -177,7 +183,7 @@ def test_bodies_need_not_be_nearer_to_noisy_frames_than_the_truth_is(preset, mon
 
 
 def test_where_everything_may_move_no_background_is_looked_for(tmp_path, monkeypatch):
-    monkeypatch.setattr("meshreel.encoder.sequence.is_scene", None)
+    monkeypatch.setattr("meshreel.encoder.sequence.scene_standing", None)
     small = [Mesh.of(plane(1.0, 6).vertices, plane(1.0, 6).faces)] * 2
     options = replace(quick(preset="paper", group_size=1), scene=None)
     video, summary = encoded(small, tmp_path / "a.reel", options)
@@ -269,7 +275,7 @@ def tracks(frames: list[Mesh], interval: int = 2) -> list[str]:
     """Return which frames of each track have a body, where key intervals have `interval` frames."""
     sequence = MeshList(tuple(frames), 1.0)
     survey = replace(survey_sequence(sequence), scale=1.0)
-    parts = Parts(survey, ALL, NONE, [], 0.0, 0.0)
+    parts = Parts(survey, ALL, NONE, [], noise_of(0.0))
     options = replace(OPTIONS, key_interval=float(interval))
     groups, dropped = bodies_of(sequence, options, parts)
     assert dropped == 0
@@ -343,7 +349,7 @@ def test_more_bodies_than_a_file_has_tracks_share_some():
     many = concatenate([moved(plate, (k % 17, k // 17, 0)) for k in range(MOST_TRACKS + 20)])
     sequence = MeshList((many, many), 1.0)
     survey = replace(survey_sequence(sequence), scale=1.0)
-    groups, dropped = bodies_of(sequence, OPTIONS, Parts(survey, ALL, NONE, [], CELL, 0.0, 0.0))
+    groups, dropped = bodies_of(sequence, OPTIONS, Parts(survey, ALL, NONE, [], noise_of(CELL)))
     assert {each.track for each in groups} == set(range(MOST_TRACKS)) and dropped == 0
     faces = [len(decode_intra(each.group.payload)[0].faces) for each in groups if each.first_frame == 0]
     assert sum(faces) == len(many.faces)
@@ -354,7 +360,7 @@ def test_a_background_is_no_finer_than_its_noise_asks_for():
     survey = replace(survey_sequence(MeshList((room(),))), scale=1.0)
     sizes = []
     for noise in (0.0, 0.002, 0.01):
-        parts, options = Parts(survey, ALL, with_room([NONE], sigma=0.002)[0], [], CELL, noise, noise), SceneOptions()
+        parts, options = Parts(survey, ALL, with_room([NONE], sigma=0.002)[0], [], noise_of(noise)), SceneOptions()
         payload = encode_static(parts, 1, 30.0, options)[0].payload
         place = Placement(1.0, tuple(survey.center))
         away = rms(parts.background.vertices, place.of(decode_background(payload)))
@@ -383,11 +389,11 @@ def test_still_surface_that_is_in_no_part_of_the_file_gives_a_warning(tmp_path):
     assert warning.startswith(f"{100 * areas[0] / areas[1]:.1f} % of the surface") and "--dynamic-only" in warning
 
 
-def test_a_scene_that_is_not_in_metres_is_refused_with_its_size(tmp_path):
+def test_a_scene_that_is_not_in_metres_is_encoded_as_bodies_and_says_so(tmp_path):
     small = MeshList(tuple(Mesh(mesh.vertices * 1e-3, mesh.faces) for mesh in small_scene.scene(4)), 10.0)
-    with pytest.raises(InputError, match=r"frame 0: \d+ of \d+ faces stand still.*is 0\.00\d+ m large.*--scale"):
-        encode(small, tmp_path / "a.reel", options=quick())
-    assert list(tmp_path.iterdir()) == []
+    with pytest.warns(UserWarning, match=r"faces of frame 0, which is 0\.00\d+ m large.*too small.*encoded as bodies"):
+        summary = encode(small, tmp_path / "a.reel", options=quick())
+    assert summary.scene is None
 
 
 def test_a_frame_in_another_unit_is_refused_by_its_number(tmp_path):

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
-from meshreel.analysis.survey import is_scene, survey_sequence
+from meshreel.analysis.scene.standing import is_scene
+from meshreel.analysis.survey import survey_sequence
 from meshreel.encoder.group.progress import Stages
 from meshreel.encoder.scene.parts import take_apart
 from meshreel.encoder.scene.static import Static, encode_static

@@ -7,11 +7,11 @@ that follows a person does not follow an object at their side; other small piece
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Int64
+from jaxtyping import Bool, Float64, Int64
 from scipy.spatial import cKDTree
 
 from ...geometry.closest_points import Surface
@@ -80,8 +80,13 @@ def with_ring(mesh: Mesh, moves: Bool[np.ndarray, " F"], cell: float, background
     return part_of(mesh, cut)
 
 
-def beyond(mesh: Mesh, moves: Bool[np.ndarray, " F"], room: Surface, far: float) -> Bool[np.ndarray, " F"]:
-    """Return the moving faces, and those near them that are farther than `far` (m) from the room.
+def beyond(
+    mesh: Mesh,
+    moves: Bool[np.ndarray, " F"],
+    room: Surface,
+    far: Callable[[Float64[np.ndarray, "N 3"]], Float64[np.ndarray, " N"]],
+) -> Bool[np.ndarray, " F"]:
+    """Return the moving faces, and those near them that are farther from the room than `far` tells of places, m.
 
     A foot stands so long and so near to the floor that it seems to belong to the room, but the floor has no such
     surface.
@@ -93,7 +98,7 @@ def beyond(mesh: Mesh, moves: Bool[np.ndarray, " F"], room: Surface, far: float)
     near = ((mesh.vertices >= low) & (mesh.vertices <= high)).all(axis=1)[mesh.faces].all(axis=1) & ~moves
     off = np.zeros(len(mesh.vertices), bool)
     vertices = np.unique(mesh.faces[near])
-    off[vertices] = room.distances(mesh.vertices[vertices]) > far
+    off[vertices] = room.distances(mesh.vertices[vertices]) > far(mesh.vertices[vertices])
     body = moves | (near & off[mesh.faces].all(axis=1))
     pieces = connected_faces(mesh.faces[body], len(mesh.vertices))
     body[body] = (np.bincount(pieces, face_normals(part_of(mesh, body))[1]) >= SPECK)[pieces]

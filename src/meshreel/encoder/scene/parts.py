@@ -6,7 +6,6 @@ In: the frames of a scene, options. Out: Parts, which the encoding of every inte
 from __future__ import annotations
 
 import io
-import math
 import zipfile
 import zlib
 from collections.abc import Callable, Sequence
@@ -24,10 +23,10 @@ from ...analysis.scene.cut import Rest
 from ...analysis.scene.labelling import ByPlace, Segmentation
 from ...analysis.scene.masks import Masker
 from ...analysis.scene.segmentation import segment, segment_by
+from ...analysis.scene.standing import REGION, LocalNoise, Standing
 from ...analysis.survey import Survey, check_one_unit
-from ...errors import InputError
-from ...geometry.closest_points import Surface
-from ...geometry.depth import DepthFrames, DepthPicture, FreeSpace
+from ...geometry.closest_points import Surface, area_samples
+from ...geometry.depth import DepthFrames, FreeSpace
 from ...geometry.derived_sequences import CapturedSequence, picked
 from ...geometry.topology import components, concatenate, face_normals, part_of
 from ...geometry.voxels import Lattice
@@ -40,9 +39,10 @@ LOST = 0.5  # share of a frame's faces that may stand still where no background 
 SEEN_THROUGH = 2  # probed frames in which cameras see through a place whose surface counts as moving (guess)
 APART, LEAST_APART = 4.0, 0.03  # deviations, and m: what is farther from the room is not of it (guess)
 OUTLIER = 3.0  # times the segmentation's `noise`: still surface farther from the background is no noise (guess)
-TAIL = 4.0  # standard deviations, by the median, beyond which a distance is no noise (guess)
-AS_FAR, FEWEST = 0.25, 1000  # share of the range, and vertices at least, from which the noise of bodies is told (guess)
-NORMAL_MEDIAN = 0.6745  # of the absolute value of what is normally distributed, in standard deviations
+SAMPLES = 20_000  # vertices of a frame at which noise is measured (guess)
+LOOKED_AT = 4  # frames in which surface that is called still is asked whether it rests (guess)
+MOVED = 0.02  # share of the still surface that may be elsewhere at other times: rooms have less than .001
+MOVED_SENSED = 0.2  # the same in a recording, whose sensors' errors may drift: rooms have up to .055
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,8 +61,7 @@ class Parts:
     segmentation: Segmentation
     background: Mesh  # m, as in the first frame; empty where nothing stands still
     changes: list[Change]
-    noise: float  # m, RMS distance of still surface, as far off as bodies, from the background: what bodies have
-    deviation: float  # m, the same by the median, as a standard deviation: without its tails
+    noise: LocalNoise  # distances of still surface from the background: what bodies near it have
     astray: float = 0.0  # share of the frames' surface that stands still, but is not in the background
     free: tuple[FreeSpace, ...] = ()  # of some frames; none where no depth is known
 
@@ -75,7 +74,7 @@ class Parts:
         """Cut the surface that moves out of a frame, with what the room does not have there."""
         by, moves = self.segmentation, self.segmentation.moving(frame, mesh)
         if (room := self.room(sum(change.frame <= frame for change in self.changes))) is not None:
-            more = beyond(mesh, moves, room, max(APART * self.deviation, LEAST_APART)) & ~moves
+            more = beyond(mesh, moves, room, self._far) & ~moves
             if self.free:  # room that is measured now and then was not seen through in other frames
                 middles = mesh.vertices[mesh.faces[more]].mean(axis=1)
                 seen = sum(free.at(middles).astype(np.int64) for free in self.free)
@@ -83,13 +82,26 @@ class Parts:
             moves |= more
         return with_ring(mesh, moves, by.cell, self.room(0))
 
+    def _far(self, points: Float64[np.ndarray, "N 3"]) -> Float64[np.ndarray, " N"]:
+        """Return the distance from the room, m, beyond which surface is not of it."""
+        return np.maximum(APART * self.noise.at(points)[2], LEAST_APART)
+
+
+class NoRoom(Exception):
+    """A sequence that seemed to be a scene has no background that holds in every frame: its text says why."""
+
 
 def take_apart(
-    sequence: CapturedSequence, survey: Survey, options: SceneOptions, stages: Stages, masker: Masker | None = None
+    sequence: CapturedSequence,
+    survey: Survey,
+    options: SceneOptions,
+    stages: Stages,
+    masker: Masker | None = None,
+    standing: Standing | None = None,
 ) -> Parts:
     """Separate a scene into background and moving surface; by the masks of a masker where there is one.
 
-    Raises InputError where frames are of different units, or of another than metres.
+    Raises InputError where frames are of different units, and NoRoom where surface that is called still is not.
     """
     check_one_unit(survey)
     segmentation: Segmentation
@@ -98,15 +110,17 @@ def take_apart(
     else:
         segmentation = segment_by(masker, sequence, options.cameras)
     stages.reach("segment", 1.0)
+    if standing is not None:
+        _check_it_rests(sequence, segmentation, standing)
     depth = sequence.depth if options.from_depth else None
     background = _background(sequence, depth, segmentation, stages)
     if background.is_empty:
         _check_nothing_lost(sequence, segmentation)
     changes = [_change(sequence, depth, segmentation, frame) for frame in segmentation.changes]
     stages.reach("background", 1.0)
-    sizes, noise, deviation, astray = _measured(sequence, segmentation, background, changes, stages)
+    sizes, noise, astray = _measured(sequence, segmentation, background, changes, stages)
     survey = replace(survey, scale=(float(np.median(sizes)) if sizes else 0.0) or survey.diagonal)
-    return Parts(survey, segmentation, background, changes, noise, deviation, astray, free_space(sequence))
+    return Parts(survey, segmentation, background, changes, noise, astray, free_space(sequence))
 
 
 def free_space(sequence: CapturedSequence) -> tuple[FreeSpace, ...]:
@@ -115,15 +129,25 @@ def free_space(sequence: CapturedSequence) -> tuple[FreeSpace, ...]:
     return () if depth is None else tuple(FreeSpace.of(depth[number]) for number in some)
 
 
+def _check_it_rests(sequence: MeshSequence, segmentation: Segmentation, standing: Standing) -> None:
+    """Raise NoRoom where too much of the surface that is called still is elsewhere at other times."""
+    still, moved = 0.0, 0.0
+    for number in evenly(len(sequence), LOOKED_AT):
+        mesh = sequence[number]
+        areas = np.where(segmentation.moving(number, mesh), 0, face_normals(mesh)[1])
+        still, moved = still + float(areas.sum()), moved + float(areas[standing.moves(mesh)].sum())
+    if moved > (MOVED_SENSED if standing.sensed else MOVED) * still:
+        raise NoRoom(f"{100 * moved / still:.0f} % of what seems to stand still moves by more than its noise")
+
+
 def _check_nothing_lost(sequence: MeshSequence, segmentation: Segmentation) -> None:
-    """Raise InputError where there is no background, but much of a frame stands still: the file would lack it."""
+    """Raise NoRoom where there is no background, but much of a frame stands still: the file would lack it."""
     for number in evenly(len(sequence), FRAMES):
         mesh = sequence[number]
         still = segmentation.still_at_first(number, mesh)
         if still.sum() > LOST * len(mesh.faces):
-            text = f"frame {number}: {still.sum()} of {len(mesh.faces)} faces stand still, but are too small for a room"
-            size = f"the frame is {mesh.diagonal:.3g} m large; is it in metres? If not, give --scale"
-            raise InputError(f"{text}: {size}; if so, encode with --dynamic-only")
+            text = f"{still.sum()} of {len(mesh.faces)} faces of frame {number}, which is {mesh.diagonal:.3g} m large,"
+            raise NoRoom(f"{text} stand still, but are too small for a room")
 
 
 def _background(
@@ -178,33 +202,15 @@ def _rooms(background: Mesh, changes: Sequence[Change]) -> Callable[[int], Surfa
     return after
 
 
-def _as_far(
-    points: Float64[np.ndarray, "N 3"], bodies: Float64[np.ndarray, "M 3"], cameras: list[DepthPicture | None]
-) -> Bool[np.ndarray, " N"]:
-    """Return which points are about as far from the nearest camera as bodies are: a sensor's noise grows with range."""
-    eyes = [picture.camera.eye for picture in cameras if picture is not None]
-    if not eyes or not len(bodies):
-        return np.ones(len(points), bool)
-    own, theirs = (np.min([np.linalg.norm(some - eye, axis=1) for eye in eyes], axis=0) for some in (points, bodies))
-    near = np.abs(own / max(float(np.median(theirs)), 1e-9) - 1) <= AS_FAR
-    return near if near.sum() >= FEWEST else np.ones(len(points), bool)
-
-
-def _mean_square(gaps: Float64[np.ndarray, " N"]) -> float:
-    """Return the mean square of distances that are noise: far beyond the usual one, surface is another."""
-    usual = gaps[gaps <= TAIL / NORMAL_MEDIAN * float(np.median(gaps))] if len(gaps) else gaps
-    return float((usual**2).mean()) if len(usual) else 0.0
-
-
 def _measured(
     sequence: CapturedSequence, segmentation: Segmentation, background: Mesh, changes: Sequence[Change], stages: Stages
-) -> tuple[list[float], float, float, float]:
+) -> tuple[list[float], LocalNoise, float]:
     """Measure bodies and noise in some frames; still surface that is far from the background is no noise.
 
-    Return the diagonals of the largest body of each frame, m, and noise, deviation and astray as in `Parts`.
+    Return the diagonals of the largest body of each frame, m, and noise and astray as in `Parts`.
     """
-    far, depth = OUTLIER * segmentation.noise, sequence.depth
-    squares, deviations, sizes, lost, whole = [], [], list[float](), 0.0, 0.0
+    far, sizes, lost, whole = OUTLIER * segmentation.noise, list[float](), 0.0, 0.0
+    places, distances = list[Float64[np.ndarray, "N 3"]](), list[Float64[np.ndarray, " N"]]()
     room_after = _rooms(background, changes)
     for number in evenly(len(sequence), PROBES):
         stages.reach("noise", number / len(sequence))
@@ -222,18 +228,18 @@ def _measured(
         if room is None:
             lost += float(areas.sum())
         elif not still.is_empty:
-            gaps = room.distances(still.vertices)
-            deviations.append(float(np.median(gaps)) / NORMAL_MEDIAN)
-            inside = gaps < far
-            if depth is not None:
-                inside &= _as_far(still.vertices, moving.vertices, depth[number])
-            squares.append(_mean_square(gaps[inside]))
+            hits = room.closest(still.vertices)
+            ways = still.vertices - hits.points
+            gaps, chosen = np.linalg.norm(ways, axis=1), area_samples(still, SAMPLES)
+            chosen = chosen[gaps[chosen] < far]
+            places.append(still.vertices[chosen])
+            ahead = (ways * room.normals[hits.faces]).sum(axis=1)
+            distances.append(np.copysign(gaps, ahead)[chosen])
             lost += float(areas[(gaps[still.faces] >= far).all(axis=1)].sum())
     stages.reach("noise", 1.0)
-    astray = lost / whole if whole else 0.0
-    if not squares:
-        return sizes, 0.0, 0.0, astray
-    return sizes, math.sqrt(float(np.mean(squares))), float(np.mean(deviations)), astray
+    fine = REGION * segmentation.cell
+    noise = LocalNoise.of(places, distances, fine, max(fine, float(np.median(sizes or [0.0])) / 2))
+    return sizes, noise, lost / whole if whole else 0.0
 
 
 _COLORS = ("depth", "hue", "limit")  # arrays of a ColorChange
@@ -246,7 +252,9 @@ def pack_parts(parts: Parts) -> bytes | None:
     if not isinstance(by, ByPlace):
         return None
     arrays: dict[str, Any] = {
-        "numbers": [parts.survey.unit, parts.noise, parts.deviation, parts.astray, by.cell, by.lattice.size, by.island],
+        "numbers": [parts.survey.unit, parts.astray, by.cell, by.lattice.size, by.island],
+        "noise places": parts.noise.places,
+        "noise": np.stack([parts.noise.rms, parts.noise.deviation, parts.noise.off]),
         "origin": by.lattice.origin,
         "keys": by.keys,
         "chosen": by.chosen,
@@ -269,7 +277,8 @@ def unpack_parts(data: bytes, sequence: CapturedSequence, survey: Survey) -> Par
     """Return the parts of a surveyed scene, or None where no encoder packed them."""
     try:
         with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
-            unit, noise, deviation, astray, cell, size, island = arrays["numbers"].tolist()
+            unit, astray, cell, size, island = arrays["numbers"].tolist()
+            noise = LocalNoise(arrays["noise places"], *arrays["noise"])
             rest = Rest(arrays["until"], arrays["since"])
             places = Lattice(arrays["origin"], size), arrays["keys"], arrays["chosen"]
             by = ByPlace(cell, *places, rest, island, _colors(arrays, sequence))
@@ -282,7 +291,7 @@ def unpack_parts(data: bytes, sequence: CapturedSequence, survey: Survey) -> Par
         return None
     changes = [Change(frame, mesh) for frame, mesh in zip(frames, came, strict=True)]
     survey = replace(survey, scale=unit)
-    return Parts(survey, by, background, changes, noise, deviation, astray, free_space(sequence))
+    return Parts(survey, by, background, changes, noise, astray, free_space(sequence))
 
 
 def _colors(arrays: Any, sequence: CapturedSequence) -> ColorChange | None:

@@ -23,9 +23,10 @@ from ...analysis.scene.bodies import NEAR, at_most, find_bodies, same_bodies, wi
 from ...analysis.scene.labelling import Segmentation
 from ...analysis.survey import Survey
 from ...format.checks import MOST_TRACKS
+from ...geometry.closest_points import area_samples
 from ...geometry.derived_sequences import digest
 from ...geometry.topology import part_of
-from ...types import Mesh, MeshSequence, Placement
+from ...types import Mesh, MeshSequence, Placement, evenly
 from ..group.forms import empty_groups
 from ..group.interval import Interval, Sight, Views, frames_in
 from ..run.schedule import Job, encode_intervals
@@ -34,6 +35,7 @@ from .parts import Parts
 from .static import refreshes
 from .tracks import TrackGroup, placed
 
+MEASURED, SAMPLES = 4, 1000  # frames of a body, and vertices of each, at whose places its noise is taken (guess)
 MOST_NOISE = 0.05  # RMS, of the diagonal of a body: beyond, nothing is left of a hand (guess)
 
 
@@ -69,18 +71,26 @@ def scene_intervals(job: Job, parts: Parts, tracks: Tracks) -> Iterator[Interval
     depth, place = sequence.depth, Placement(survey.unit, tuple(survey.center))
     sight = None if depth is None else Sight(depth, place)
     longest = job.recipe.longest(sequence.frame_rate)
-    noise = min(parts.noise / survey.unit, MOST_NOISE)  # of bodies: as noisy as the surface that stands still
     for frames in key_intervals(sequence, parts.segmentation, job.options):
         found = list[Interval]()
         for track, meshes in tracks.of([parts.moving(k, sequence[k]) for k in frames]):
             normalised = [survey.normalise(mesh) for mesh in meshes]
             for cut in _cut(normalised, frames, survey, longest):
                 some = normalised[cut.start : cut.stop]
+                noise = _noise(meshes[cut.start : cut.stop], parts)
                 one = Interval(some, noise, frames.start + cut.start, track, digest(some))
                 one = replace(one, up=sequence.up, frame_rate=sequence.frame_rate)
                 found.append(replace(one, views=Views.of(sequence, survey), sight=sight))
         weight = Fraction(len(frames), sum(len(interval.frames) for interval in found))
         yield from (replace(interval, weight=weight) for interval in found)
+
+
+def _noise(meshes: Sequence[Mesh], parts: Parts) -> float:
+    """Return the noise of a body, normalised: as much as the surface has that stands still around it."""
+    some = [meshes[number] for number in evenly(len(meshes), MEASURED)]
+    points = np.concatenate([mesh.vertices[area_samples(mesh, SAMPLES)] for mesh in some])
+    rms = float(np.sqrt((parts.noise.at(points)[0] ** 2).mean())) if len(points) else 0.0
+    return min(rms / parts.survey.unit, MOST_NOISE)
 
 
 def key_intervals(sequence: MeshSequence, segmentation: Segmentation, options: EncoderOptions) -> Iterator[range]:

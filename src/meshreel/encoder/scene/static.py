@@ -66,10 +66,12 @@ def encode_static(
     a background with pictures, whose atlas is of a whole state.
     """
     survey = parts.survey
-    noise, place = max(parts.deviation / survey.unit, LEAST_NOISE), Placement(survey.unit, tuple(survey.center))
-    step, most = options.lattice * noise, options.coarse * noise
+    place = Placement(survey.unit, tuple(survey.center))
+    usual = float(np.median(parts.noise.deviation)) if len(parts.noise.deviation) else 0.0
+    step = options.lattice * max(usual / survey.unit, LEAST_NOISE)
 
     def coded(mesh: Mesh) -> tuple[bytes, Mesh]:
+        most = options.coarse * np.maximum(parts.noise.at(mesh.vertices)[1] / survey.unit, LEAST_NOISE)
         return _coded(mesh.at((mesh.vertices - survey.center) / survey.unit), most, step)
 
     payload, state = coded(parts.background)
@@ -101,8 +103,11 @@ def refreshes(count: int, frame_rate: float, options: SceneOptions) -> range:
     return range(0, count, count if options.refresh is None else max(1, round(options.refresh * frame_rate)))
 
 
-def _coded(mesh: Mesh, most: float, step: float) -> tuple[bytes, Mesh]:
-    """Encode a mesh with the fewest vertices that stay within an RMS distance; return payload and decoded mesh."""
+def _coded(mesh: Mesh, most: Float64[np.ndarray, " V"], step: float) -> tuple[bytes, Mesh]:
+    """Encode a mesh with the fewest vertices that keep it near; return payload and decoded mesh.
+
+    The RMS of its vertices' distances, in units of what is allowed at each, is at most 1.
+    """
     if mesh.is_empty:
         return b"", mesh
 
@@ -110,7 +115,7 @@ def _coded(mesh: Mesh, most: float, step: float) -> tuple[bytes, Mesh]:
         """Return the payload of a simplified mesh, the decoded mesh, and whether this is near enough."""
         payload = encode_background(small, step)
         decoded = decode_background(payload)
-        near = not decoded.is_empty and float(np.sqrt((distances(mesh.vertices, decoded) ** 2).mean())) <= most
+        near = not decoded.is_empty and float(((distances(mesh.vertices, decoded) / most) ** 2).mean()) <= 1
         return payload, decoded, near
 
     steps = [clean(mesh)]  # each from the one before: these are nearer to the mesh than what is made from it at once
@@ -243,5 +248,5 @@ class _Looks:
         survey = self._parts.survey
         mesh = self._sequence[number]
         still = mesh.with_faces(~self._parts.segmentation.moving(number, mesh))
-        far = max(NEAR * self._parts.noise, LEAST_NEAR) / survey.unit
+        far = max(NEAR * self._parts.noise.mean, LEAST_NEAR) / survey.unit
         return Painted(still.at((still.vertices - survey.center) / survey.unit), far)

@@ -1,0 +1,252 @@
+"""Tell surface that rests from surface that moves slowly, and measure the noise of what rests, place by place.
+
+In: frames. Out: whether they are a scene, and the `Standing` of its regions. Noise is new in every frame: surface that
+rests is as far from its place in the next frame as in the last one. Motion goes on: a surface that moves slowly is near
+its place in the next frame, and far from it later. So noise is told from the second differences of three successive
+frames, in which steady motion cancels, and surface rests where frames far apart differ hardly more than that.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float64, Int64
+from scipy.spatial import cKDTree
+
+from ...geometry.closest_points import Surface, area_samples
+from ...geometry.derived_sequences import CapturedSequence
+from ...geometry.topology import border_edges, drop_unreferenced, edge_lengths, face_normals, vertex_normals
+from ...geometry.voxels import Lattice, around, distinct, spread
+from ...types import Frames, Mesh, evenly
+from ..survey import UNLIKE, check
+
+PROBES = 4  # frames inspected, spread over the sequence, and the frames before and after each (guess)
+SHARE = 0.6  # smallest share of a frame's surface that stands still in a scene (guess)
+CELLS = 200  # cells along a frame's diagonal: 4 cm in a room (guess)
+BORDER = 1.0  # diagonals, least length of the borders of an open surface; holes of a captured body have less (guess)
+COARSEST = 32  # smallest number of median edge lengths along the diagonal of a captured room (guess)
+SAMPLES = 20_000  # vertices of a frame that are measured (guess)
+REGION = 8.0  # edge lengths, or distances of samples, along a region, in which a median says something (guess)
+FEWEST = 20  # measurements in a region that is judged (guess)
+RESTS = 3.0  # times the noise of its region: rooms have 1 to 1.5, 2.6 at most in nine of ten regions; motion 5 to 30
+SMOOTH = 8.0  # the same over noise from which what a region does as a whole is left out, where no sensor is known
+AROUND, ROUGHER = 16, 3.0  # regions around one, and times their usual noise that its own may be (guess)
+TAIL = 4.0  # standard deviations, by the median, beyond which a distance is no noise (guess)
+NEAREST = 8  # cells whose noise a place has (guess)
+EXACT = 1e-6  # diagonals: the noise of frames that are equal (guess)
+SECOND, MEDIAN = 6**0.5, 0.6745  # deviation of a second difference, and median of an absolute value, in deviations
+
+
+@dataclass(frozen=True, slots=True)
+class Standing:
+    """Regions of a sequence's surface: their noise, and by how much they differ from one time to another."""
+
+    lattice: Lattice  # whose cells are the regions
+    keys: Int64[np.ndarray, " R"]  # sorted
+    noise: Float64[np.ndarray, " R"]  # m, standard deviation
+    change: Float64[np.ndarray, " R"]  # m, the same of the surface at other times
+    area: Float64[np.ndarray, " R"]  # m^2, in a frame
+    sensed: bool  # by sensors that are known
+
+    @property
+    def rests(self) -> Bool[np.ndarray, " R"]:
+        return self.change <= RESTS * self.noise
+
+    def moves(self, mesh: Mesh) -> Bool[np.ndarray, " F"]:
+        """Return True for each face of a mesh in a region that does not rest."""
+        cells = self.lattice.keys(mesh.vertices[mesh.faces].mean(axis=1))
+        at = np.minimum(np.searchsorted(self.keys, cells), max(len(self.keys) - 1, 0))
+        return (self.keys[at] == cells) & ~self.rests[at] if len(self.keys) else np.zeros(len(cells), bool)
+
+
+def is_scene(frames: Frames) -> bool:
+    """Return whether a sequence has a background, as `scene_standing` tells."""
+    return scene_standing(frames) is not None
+
+
+def scene_standing(frames: Frames) -> Standing | None:
+    """Measure what stands still in a sequence that has a background; None for others, empty ones and single frames.
+
+    Raises InputError if one of the few inspected frames is invalid.
+    """
+    numbers, meshes = evenly(len(frames), PROBES), list[Mesh]()
+    for number in numbers:
+        check(mesh := frames[number], f"frame {number}")
+        meshes += [] if mesh.is_empty else [drop_unreferenced(mesh)]
+    sizes = [mesh.diagonal for mesh in meshes]
+    if len(meshes) < 2 or sizes[0] == 0 or max(sizes) > UNLIKE * min(sizes):
+        return None
+    ends = meshes[0].vertices[border_edges(meshes[0])]
+    is_open = np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1).sum() > BORDER * sizes[0]
+    if not is_open or np.median(edge_lengths(meshes[0])) * COARSEST > sizes[0]:
+        return None
+    lattice = Lattice.near(meshes[0], sizes[0] / CELLS)
+    cells = [distinct(lattice.keys(spread(mesh, lattice.size)[0])) for mesh in meshes]
+    wide = [around(occupied) for occupied in cells]
+    still = [np.mean([np.isin(occupied, other).mean() for other in wide]) for occupied in cells]
+    if float(np.median(still)) < SHARE:
+        return None
+    found = standing(frames)
+    return found if found.area[found.rests].sum() >= SHARE * found.area.sum() else None
+
+
+def standing(frames: Frames) -> Standing:
+    """Measure the regions of a sequence's surface in `PROBES` frames, and in the frames before and after each."""
+    last = len(frames) - 1
+    middles = sorted({min(max(number, 1), max(last - 1, 0)) for number in evenly(len(frames), PROBES)})
+    probes = {number: _Probe.of(frames[number]) for number in middles if not frames[number].is_empty}
+    asked = dict[int, list[tuple[_Probe, bool]]]()  # by frame: probes whose samples are looked for, as at another time
+    for middle, probe in probes.items():
+        for number in sorted({max(middle - 1, 0), min(middle + 1, last)} - {middle}):
+            asked.setdefault(number, []).append((probe, False))
+        for number in probes.keys() - {middle}:
+            asked.setdefault(number, []).append((probe, True))
+    for number, those in sorted(asked.items()):
+        if not (mesh := frames[number]).is_empty:
+            surface = Surface(mesh)
+            for probe, is_far in those:
+                (probe.far if is_far else probe.beside).append(probe.offsets(surface))
+    return _regions(list(probes.values()), isinstance(frames, CapturedSequence) and frames.depth is not None)
+
+
+@dataclass(frozen=True, slots=True)
+class _Probe:
+    """Samples of a frame, and how far the surface of other frames is from them, NaN where these have none there."""
+
+    points: Float64[np.ndarray, "N 3"]
+    normals: Float64[np.ndarray, "N 3"]
+    area: float  # m^2, of a sample
+    size: float  # m, of regions in which there are enough samples
+    diagonal: float  # m
+    beside: list[Float64[np.ndarray, " N"]]  # in the frames before and after, m, positive along the normal
+    far: list[Float64[np.ndarray, " N"]]  # in frames at other times
+
+    @staticmethod
+    def of(mesh: Mesh) -> _Probe:
+        mesh = drop_unreferenced(mesh)
+        chosen, lengths = area_samples(mesh, SAMPLES), edge_lengths(mesh)
+        usual = float(np.median(lengths[lengths > 0])) if lengths.any() else 1.0
+        size, area = REGION * usual * max(1.0, len(mesh.vertices) / len(chosen)) ** 0.5, face_normals(mesh)[1].sum()
+        return _Probe(
+            mesh.vertices[chosen], vertex_normals(mesh)[chosen], area / len(chosen), size, mesh.diagonal, [], []
+        )
+
+    def offsets(self, surface: Surface) -> Float64[np.ndarray, " N"]:
+        hits = surface.closest(self.points)
+        ways = hits.points - self.points
+        found = np.copysign(np.linalg.norm(ways, axis=1), (ways * self.normals).sum(axis=1))
+        found[surface.past_border(hits)] = np.nan
+        return found
+
+
+def _regions(probes: list[_Probe], sensed: bool) -> Standing:
+    """Return the regions of some frames; where sensors are known, noise may be what a region does as a whole."""
+    if not probes:
+        none = np.zeros(0)
+        return Standing(Lattice(np.zeros(3), 1.0), np.zeros(0, np.int64), none, none, none, sensed)
+    points, exact = np.concatenate([probe.points for probe in probes]), EXACT * max(p.diagonal for p in probes)
+    lattice = Lattice(np.round(points[0], 6), max(probe.size for probe in probes))
+    keys, region = np.unique(lattice.keys(points), return_inverse=True)
+    count = len(keys)
+    area = np.bincount(region, np.concatenate([np.full(len(p.points), p.area) for p in probes]), count) / len(probes)
+    each = np.split(region, np.cumsum([len(p.points) for p in probes])[:-1])
+    # Where there is one neighbour in time only, as in a sequence of two frames, its offset counts.
+    seconds = [sum(p.beside, np.zeros(len(p.points))) * (3**0.5 if len(p.beside) == 1 else 1.0) for p in probes]
+    second, far = np.concatenate(seconds), np.concatenate([np.zeros(0), *(one for p in probes for one in p.far)])
+    noise, known = _deviations(second, region, count, SECOND)
+    again = np.concatenate([np.zeros(0, np.int64), *(own for p, own in zip(probes, each, strict=True) for _ in p.far)])
+    change, seen = _deviations(far, again, count, 2**0.5)
+    keep = np.flatnonzero(known & seen)
+    if not sensed:
+        window = np.repeat(np.arange(len(probes)), [len(p.points) for p in probes])
+        own = second - _as_a_whole(points, second, region * len(probes) + window, count * len(probes))
+        noise = np.minimum(noise, _deviations(own, region, count, SECOND)[0] * SMOOTH / RESTS)
+        if len(keep):
+            middles = lattice.centers(keys[keep])
+            near = cKDTree(middles).query(middles, k=np.arange(1, min(AROUND, len(keep)) + 1))[1]
+            noise[keep] = np.minimum(noise[keep], ROUGHER * np.median(noise[keep][near], axis=1))
+    return Standing(lattice, keys[keep], np.maximum(noise, exact)[keep], change[keep], area[keep], sensed)
+
+
+def _deviations(
+    values: Float64[np.ndarray, " N"], region: Int64[np.ndarray, " N"], count: int, times: float
+) -> tuple[Float64[np.ndarray, " R"], Bool[np.ndarray, " R"]]:
+    """Return the deviation of each region's values, by the median, over `times`, and which regions have enough."""
+    known = np.isfinite(values)
+    found, size = np.zeros(count), np.bincount(region[known], minlength=count)
+    order = np.lexsort((np.abs(values[known]), region[known]))
+    ends = np.cumsum(size)
+    enough = size >= FEWEST
+    found[enough] = np.abs(values[known])[order][(ends - size + size // 2)[enough]]
+    return found / (MEDIAN * times), enough
+
+
+def _as_a_whole(
+    points: Float64[np.ndarray, "N 3"], values: Float64[np.ndarray, " N"], group: Int64[np.ndarray, " N"], count: int
+) -> Float64[np.ndarray, " N"]:
+    """Return the values of the linear function of place that fits those of each group best, damped a little."""
+    known = np.isfinite(values)
+    weight = np.maximum(np.bincount(group[known], minlength=count), 1)
+
+    def mean(some: Iterable[float] | Float64[np.ndarray, " N"]) -> Float64[np.ndarray, " G"]:
+        return np.bincount(group[known], np.asarray(some)[known], count) / weight
+
+    offset = points - np.stack([mean(points[:, axis]) for axis in range(3)], axis=1)[group]
+    rest = values - mean(values)[group]
+    moments = np.array([[mean(offset[:, i] * offset[:, j]) for j in range(3)] for i in range(3)]).transpose(2, 0, 1)
+    damped = moments + (1e-3 * np.trace(moments, axis1=1, axis2=2) + 1e-30)[:, None, None] * np.eye(3)
+    right = np.stack([mean(offset[:, i] * np.where(known, rest, 0)) for i in range(3)], axis=1)
+    slopes = np.linalg.solve(damped, right[..., None])[..., 0]
+    return mean(values)[group] + (offset * slopes[group]).sum(axis=1)
+
+
+@dataclass(frozen=True, slots=True)
+class LocalNoise:
+    """Distances of surface from the truth, by place: measured where surface rests, and as near to that elsewhere.
+
+    What a frame is off as a whole is no noise of a shape: a sensor may measure everything 2 cm too far in one frame and
+    too near in the next, and each to a millimetre.
+    """
+
+    places: Float64[np.ndarray, "C 3"]  # m
+    rms: Float64[np.ndarray, " C"]  # m, of a shape, without its tails
+    deviation: Float64[np.ndarray, " C"]  # m, the same by the median, as a standard deviation
+    off: Float64[np.ndarray, " C"]  # m, deviation from the place, with what a frame is off as a whole
+
+    @staticmethod
+    def of(
+        places: list[Float64[np.ndarray, "N 3"]], gaps: list[Float64[np.ndarray, " N"]], fine: float, wide: float
+    ) -> LocalNoise:
+        """Measure cells of size `fine` (m), from the signed distances of frames from where their surface rests.
+
+        A frame is off as a whole in cells of size `wide` (m). Far beyond the usual distance, surface is another.
+        """
+        points, gap = np.concatenate([np.zeros((0, 3)), *places]), np.concatenate([np.zeros(0), *gaps])
+        if not len(points):
+            return LocalNoise(points, gap, gap, gap)
+        frame = np.repeat(np.arange(len(places)), [len(some) for some in places])
+        around = np.unique(Lattice(np.round(points[0], 6), wide).keys(points), return_inverse=True)[1]
+        group = around * len(places) + frame
+        shape = gap - _as_a_whole(points, gap, group, int(group.max()) + 1)
+        lattice = Lattice(np.round(points[0], 6), fine)
+        keys, cell = np.unique(lattice.keys(points), return_inverse=True)
+        off, enough = _deviations(gap, cell, len(keys), 1.0)
+        deviation, _ = _deviations(shape, cell, len(keys), 1.0)
+        usual = np.abs(shape) <= TAIL * deviation[cell]
+        squares = np.bincount(cell[usual], shape[usual] ** 2, len(keys))
+        rms = np.sqrt(squares / np.maximum(np.bincount(cell[usual], minlength=len(keys)), 1))
+        return LocalNoise(lattice.centers(keys)[enough], rms[enough], deviation[enough], off[enough])
+
+    @property
+    def mean(self) -> float:
+        """RMS over all places, m."""
+        return float(np.sqrt((self.rms**2).mean())) if len(self.rms) else 0.0
+
+    def at(self, points: Float64[np.ndarray, "N 3"]) -> Float64[np.ndarray, "3 N"]:
+        """Return RMS, deviation and `off` at points, m: the means of the places around each."""
+        if not len(self.rms):
+            return np.zeros((3, len(points)))
+        near = cKDTree(self.places).query(points, k=np.arange(1, min(NEAREST, len(self.rms)) + 1))[1]
+        return np.stack([(some[near] ** 2).mean(axis=1) ** 0.5 for some in (self.rms, self.deviation, self.off)])
