@@ -25,9 +25,11 @@ from ..io.sequence import SequenceOptions
 from ..types import Mesh, MeshSequence, Up, evenly
 from .calibration.colors import CalibrationOptions, Corrected, Corrections, corrections_of, remembered
 from .rig.rig import RIG, SINGLE, Rig, read_rig
+from .rig.steady import SteadyDepth
 
 MOVED = 0.5  # share of pixels that differ from their usual depth, in the median frame, of a camera that moves (guess)
 LEAST = 0.3  # share of pixels with a measurement below which a frame is ignored: it may show no background (guess)
+LOOKED_AT = 12  # frames examined for what a sensor is off as a whole (guess)
 FINER = 2  # times the rows and columns of the pictures, interpolated, that are fused (decision 28)
 
 
@@ -73,6 +75,7 @@ class Recording(MeshSequence):
         self.rig, self.options = rig, options
         self.numbers = [numbers[index] for index in chosen]  # of the frames, in the files' names
         self._kept = Kept() if keep else None
+        self.steady = SteadyDepth(rig)
 
     @property
     def frame_rate(self) -> float:
@@ -85,7 +88,7 @@ class Recording(MeshSequence):
         number = self.numbers[index]
         if self._kept is not None and (kept := self._kept.get(number)) is not None:
             return kept
-        pictures = [picture for picture in self.rig.depth_pictures(number) if picture is not None]
+        pictures = [picture for picture in self.steady.pictures(number) if picture is not None]
         try:
             mesh = self._colored(fuse_depths(pictures, self.options), number)
         except InputError as error:
@@ -137,7 +140,7 @@ class Recording(MeshSequence):
     @property
     def depth(self) -> ChosenPictures:
         """The depth pictures that the frames are fused from."""
-        return ChosenPictures(self.rig.depth_pictures, tuple(self.numbers))
+        return ChosenPictures(self.steady.pictures, tuple(self.numbers))
 
 
 class Kept:
@@ -182,7 +185,20 @@ def open_recording(
             text = f"{folder}: camera {camera.name} seems to move: {100 * share:.0f} % of its pixels see something else"
             remedy = "record with cameras that stand still, or cut the recording where it was moved"
             raise InputError(f"{text} than usual; {remedy}")
-    return Recording(rig, options, frames, keep), warnings
+    recording = Recording(rig, options, frames, keep)
+    return recording, warnings + unsteady(recording)
+
+
+def unsteady(recording: Recording) -> list[str]:
+    """Return a warning for each camera whose sensor is off in some frames as a whole, which is corrected."""
+    numbers, found = recording.numbers, list[str]()
+    looked_at = [numbers[index] for index in evenly(len(numbers), LOOKED_AT)]
+    for camera, errors in zip(recording.rig.cameras, recording.steady.errors(looked_at), strict=True):
+        if worst := max(map(abs, errors), default=0.0):
+            off = sum(map(bool, errors))
+            text = f"camera {camera.name} measures {off} of {len(looked_at)} frames looked at too far or too near"
+            found.append(f"{text} as a whole, by up to {100 * worst:.1f} % of the depth: that is corrected")
+    return found
 
 
 def moved_share(depths: list[Float64[np.ndarray, "H W"]]) -> float:

@@ -209,6 +209,9 @@ def summary_row(summary: Summary, frame_rate: float) -> dict[str, Any]:
                 "rms_m": group.fidelity.distance,
                 "worst_rms_m": group.fidelity.worst,
                 "normal_error_deg": group.fidelity.angle,
+                "least_covered": group.fidelity.covered,
+                "least_covered_frame": round(group.fidelity.least),
+                "encoded_again": group.mended,
             }
             for group in summary.groups
         ],

@@ -41,6 +41,7 @@ from .file.summary import (
     metadata_of,
     warnings_of,
     warnings_of_colors,
+    warnings_of_groups,
     warnings_of_scene,
     write_in_order,
     write_tracked,
@@ -267,7 +268,7 @@ def _encode_tracked(job: Job, writer: ReelWriter, survey: Survey) -> Summary:
         metadata = metadata_of(options, groups, sequence.up, part)
         writer.header = make_header(sequence.frame_rate, survey, metadata)
     texts = warnings_of(survey) if job.chosen is None else ()  # the survey told of them
-    return Summary(writer.size, tuple(groups), (*texts, *warnings_of_colors(groups)))
+    return Summary(writer.size, tuple(groups), (*texts, *warnings_of_groups(groups), *warnings_of_colors(groups)))
 
 
 def _encode_scene(job: Job, file: BinaryIO, writer: ReelWriter, parts: Parts) -> Summary:
@@ -300,5 +301,6 @@ def _encode_scene(job: Job, file: BinaryIO, writer: ReelWriter, parts: Parts) ->
     faces = len(decode_background(states[0].payload).faces) if states else 0
     scene = SceneSummary(size, faces, parts.noise.mean, psnr, tuple(measured), tracks)
     moves = any(group.form != Form.EMPTY for group in groups)
-    texts = (*warnings_of(survey), *warnings_of_scene(parts, moves, dropped), *warnings_of_colors(groups, states))
+    lost = (*warnings_of_scene(parts, moves, dropped), *warnings_of_groups(groups))
+    texts = (*warnings_of(survey), *lost, *warnings_of_colors(groups, states))
     return Summary(writer.size, tuple(groups), texts, scene)

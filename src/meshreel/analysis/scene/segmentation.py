@@ -16,7 +16,7 @@ from jaxtyping import Bool, Int64
 
 from ...errors import InputError
 from ...geometry.cameras import Camera
-from ...geometry.closest_points import Surface, distances
+from ...geometry.closest_points import Surface
 from ...geometry.derived_sequences import CapturedSequence, DerivedSequence, captured, picked, turned_over
 from ...geometry.topology import edge_lengths, face_normals
 from ...geometry.voxels import Lattice
@@ -26,20 +26,25 @@ from .cut import Rest, find_rest, moving_places
 from .labelling import ByMasks, ByPlace, looks
 from .masks import Masker
 from .places import Observations, Report, find_places, inspected
+from .standing import Standing, standing
 from .views import place_views
 
 _PROBES = 3  # frames used to place the views: a guess
 _WIDTH = 4.75  # smallest width of a cell, in median distances between two frames: decision 18
 _WIDEST = 4.0  # largest width of a cell, in edge lengths: decision 18
 _LOOKS = 5  # frames that are compared to decide if surface stands still: a guess
-_THINNED = 7  # one vertex in this many is measured when two frames are compared: a guess, for speed
 _THRESHOLD = 0.3  # the paper's tau: a low one followed by clean-up misses less than a high one (guess)
 _ISLAND = 0.01  # m^2: connected faces with less area take the label of the faces around them (guess)
 Cameras = tuple[Camera, ...]
 
 
-def segment(frames: MeshSequence, cameras: Cameras = (), report: Report = lambda _share: None) -> ByPlace:
-    """Segment a scene by geometric change over the whole sequence.
+def segment(
+    frames: MeshSequence,
+    cameras: Cameras = (),
+    report: Report = lambda _share: None,
+    stands: Standing | None = None,
+) -> ByPlace:
+    """Segment a scene by geometric change over the whole sequence, whose `standing` is measured if it is not given.
 
     It is looked at by the given cameras, which are of one size, or by placed ones. If nothing moves and the faces turn
     their backs to the inside of the scene, it is segmented again with all faces reversed.
@@ -49,23 +54,25 @@ def segment(frames: MeshSequence, cameras: Cameras = (), report: Report = lambda
     if not chosen:
         nothing = np.zeros(0, np.int64), np.zeros(0, bool), Rest.none(0)
         return ByPlace(1.0, Lattice(np.zeros(3), 1.0), *nothing, _ISLAND)
-    places = _by_place(frames, chosen, cameras, report)
+    change = (stands or standing(frames)).usual_change
+    places = _by_place(frames, chosen, cameras, change, report)
     if places.chosen.any():
         return places
     first = frames[chosen[0]]
     normals, areas = face_normals(first)
     away = first.vertices[first.faces].mean(axis=1) - first.middle
     if (areas * (normals * away).sum(axis=1)).sum() > 0:  # a room's faces look inwards
-        reversed_places = _by_place(DerivedSequence(frames, turned_over), chosen, cameras, lambda _share: None)
+        reversed_places = _by_place(DerivedSequence(frames, turned_over), chosen, cameras, change, lambda _: None)
         places = reversed_places if reversed_places.chosen.any() else places
     return places
 
 
-def _by_place(frames: CapturedSequence, chosen: Sequence[int], cameras: Cameras, report: Report) -> ByPlace:
+def _by_place(
+    frames: CapturedSequence, chosen: Sequence[int], cameras: Cameras, noise: float, report: Report
+) -> ByPlace:
+    """Segment a scene in which surface at rest is `noise` (m) from where it is in another frame."""
     cell, views = edge_length(frames, chosen), _views(frames, chosen, cameras)
-    first, middle = frames[chosen[0]], frames[chosen[len(chosen) // 2]]
-    noise = float(np.median(distances(first.vertices[::_THINNED], middle)))  # more than half of a scene stands still
-    lattice = Lattice.near(first, max(cell, min(_WIDTH * noise, _WIDEST * cell)))
+    lattice = Lattice.near(frames[chosen[0]], max(cell, min(_WIDTH * noise, _WIDEST * cell)))
     frames_seen = picked(frames, chosen)
     pictures = None if frames_seen.depth is None else frames_seen.depth.__getitem__
     places = find_places(Observations(frames_seen, views, pictures, report), lattice)

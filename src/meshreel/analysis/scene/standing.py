@@ -15,6 +15,7 @@ import numpy as np
 from jaxtyping import Bool, Float64, Int64
 from scipy.spatial import cKDTree
 
+from ...geometry.cameras import Camera
 from ...geometry.closest_points import Surface, area_samples
 from ...geometry.derived_sequences import CapturedSequence
 from ...geometry.topology import border_edges, drop_unreferenced, edge_lengths, face_normals, vertex_normals
@@ -35,6 +36,7 @@ SMOOTH = 8.0  # the same over noise from which what a region does as a whole is 
 AROUND, ROUGHER = 16, 3.0  # regions around one, and times their usual noise that its own may be (guess)
 TAIL = 4.0  # standard deviations, by the median, beyond which a distance is no noise (guess)
 NEAREST = 8  # cells whose noise a place has (guess)
+BY_RANGE, ELSEWHERE = 0.5, 100.0  # rad, as unlike as e times the range is, and as another camera (guess)
 EXACT = 1e-6  # diagonals: the noise of frames that are equal (guess)
 SECOND, MEDIAN = 6**0.5, 0.6745  # deviation of a second difference, and median of an absolute value, in deviations
 
@@ -53,6 +55,12 @@ class Standing:
     @property
     def rests(self) -> Bool[np.ndarray, " R"]:
         return self.change <= RESTS * self.noise
+
+    @property
+    def usual_change(self) -> float:
+        """Median distance, m, of surface that rests from where it is in another frame, in the median region."""
+        change = self.change[self.rests] if self.rests.any() else self.change
+        return 2**0.5 * MEDIAN * float(np.median(change)) if len(change) else 0.0
 
     def moves(self, mesh: Mesh) -> Bool[np.ndarray, " F"]:
         """Return True for each face of a mesh in a region that does not rest."""
@@ -214,10 +222,15 @@ class LocalNoise:
     rms: Float64[np.ndarray, " C"]  # m, of a shape, without its tails
     deviation: Float64[np.ndarray, " C"]  # m, the same by the median, as a standard deviation
     off: Float64[np.ndarray, " C"]  # m, deviation from the place, with what a frame is off as a whole
+    cameras: tuple[Camera, ...] = ()  # depth cameras that stand still; without them, near places are alike
 
     @staticmethod
     def of(
-        places: list[Float64[np.ndarray, "N 3"]], gaps: list[Float64[np.ndarray, " N"]], fine: float, wide: float
+        places: list[Float64[np.ndarray, "N 3"]],
+        gaps: list[Float64[np.ndarray, " N"]],
+        fine: float,
+        wide: float,
+        cameras: tuple[Camera, ...] = (),
     ) -> LocalNoise:
         """Measure cells of size `fine` (m), from the signed distances of frames from where their surface rests.
 
@@ -237,7 +250,7 @@ class LocalNoise:
         usual = np.abs(shape) <= TAIL * deviation[cell]
         squares = np.bincount(cell[usual], shape[usual] ** 2, len(keys))
         rms = np.sqrt(squares / np.maximum(np.bincount(cell[usual], minlength=len(keys)), 1))
-        return LocalNoise(lattice.centers(keys)[enough], rms[enough], deviation[enough], off[enough])
+        return LocalNoise(lattice.centers(keys)[enough], rms[enough], deviation[enough], off[enough], cameras)
 
     @property
     def mean(self) -> float:
@@ -245,8 +258,19 @@ class LocalNoise:
         return float(np.sqrt((self.rms**2).mean())) if len(self.rms) else 0.0
 
     def at(self, points: Float64[np.ndarray, "N 3"]) -> Float64[np.ndarray, "3 N"]:
-        """Return RMS, deviation and `off` at points, m: the means of the places around each."""
+        """Return RMS, deviation and `off` at points, m: the medians of the places most like each."""
         if not len(self.rms):
             return np.zeros((3, len(points)))
-        near = cKDTree(self.places).query(points, k=np.arange(1, min(NEAREST, len(self.rms)) + 1))[1]
-        return np.stack([(some[near] ** 2).mean(axis=1) ** 0.5 for some in (self.rms, self.deviation, self.off)])
+        tree = cKDTree(self._conditions(self.places))
+        near = tree.query(self._conditions(points), k=np.arange(1, min(NEAREST, len(self.rms)) + 1))[1]
+        return np.stack([np.median(some[near], axis=1) for some in (self.rms, self.deviation, self.off)])
+
+    def _conditions(self, points: Float64[np.ndarray, "N 3"]) -> Float64[np.ndarray, "N D"]:
+        """Return on what the noise of a place depends: where in a picture it is, and how far from the camera."""
+        if not self.cameras:
+            return points
+        own = np.stack([camera.local(points) for camera in self.cameras])
+        ranges = np.maximum(np.linalg.norm(own, axis=2), 1e-9)
+        nearest, each = ranges.argmin(axis=0), np.arange(len(points))
+        ranges, own = ranges[nearest, each], own[nearest, each]
+        return np.column_stack([own / ranges[:, None], BY_RANGE * np.log(ranges), ELSEWHERE * nearest])

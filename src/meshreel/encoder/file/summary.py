@@ -48,6 +48,7 @@ class GroupSummary:
     colors: int = 0  # bytes of its colours and pictures, beyond `size`
     lost_colors: bool = False  # its frames have colours that a reader would refuse
     canonical: bool = False  # its reference lies in the pose of eq. 5
+    mended: bool = False  # what was tried first did not hold
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,6 +114,25 @@ def warnings_of_scene(parts: Parts, moves: bool, dropped: int) -> Iterator[str]:
         yield f"{dropped} faces of bits that move, far from all bodies and there only for a moment, are not kept"
 
 
+LEAST_COVERED = "least_covered"  # in the metadata: a share of a frame's surface, the track, and the frame
+
+
+def least_covered(groups: Sequence[GroupSummary]) -> GroupSummary | None:
+    """Return the group with the frame of whose surface the least share is decoded; None if no frame has any."""
+    shown = [group for group in groups if group.form != Form.EMPTY]
+    return min(shown, key=lambda group: group.fidelity.covered, default=None)
+
+
+def warnings_of_groups(groups: Sequence[GroupSummary]) -> Iterator[str]:
+    """Yield a warning of the frames that were encoded again, because what was made first did not show them."""
+    again = [group for group in groups if group.mended]
+    if again:
+        count = sum(group.frame_count for group in again)
+        forms = " and ".join(sorted({group.form.name.lower() for group in again}))
+        text = f"{count} frames, the least covered of which is frame {round(again[0].fidelity.least)} of track"
+        yield f"{text} {again[0].track}, were lost by what was tried first, and are encoded again, as {forms}"
+
+
 def warnings_of_colors(groups: Sequence[GroupSummary], states: Sequence[Static] = ()) -> Iterator[str]:
     """Yield a warning of what has colours that the file has not."""
     frames = sum(group.frame_count for group in groups if group.lost_colors)
@@ -144,7 +164,7 @@ def write_tracked(writer: ReelWriter, each: TrackGroup, static: list[int], unit:
     fidelity = group.fidelity.scaled(unit)
     colors = sum(map(len, group.companions))
     facts = (group.form, group.frame_count, len(group.stored or group.payload), fidelity, group.predicted)
-    return GroupSummary(*facts, key, each.track, each.share, colors, group.lost_colors, group.canonical)
+    return GroupSummary(*facts, key, each.track, each.share, colors, group.lost_colors, group.canonical, group.mended)
 
 
 def mean_psnr(sequence: MeshSequence, file: BinaryIO, diagonal: float, numbers: Sequence[int]) -> float:
@@ -201,5 +221,7 @@ def metadata_of(
 
 def chosen_options(options: EncoderOptions, groups: Sequence[GroupSummary]) -> dict[str, Any]:
     """Return the preset and the quality; of the paper's recipe also how many references lie in the pose of eq. 5."""
-    found = {"preset": options.preset, "quality": shortened(options.quality)}
+    found: dict[str, Any] = {"preset": options.preset, "quality": shortened(options.quality)}
+    if (worst := least_covered(groups)) is not None:
+        found[LEAST_COVERED] = [shortened(worst.fidelity.covered), worst.track, round(worst.fidelity.least)]
     return found | ({} if options.preset == "best" else {CANONICAL: sum(group.canonical for group in groups)})

@@ -43,6 +43,7 @@ class EncodedGroup:
     canonical: bool = field(default=False, kw_only=True)  # its reference lies in the pose of eq. 5
     companions: tuple[Companion, ...] = field(default=(), kw_only=True)  # its colours, an atlas, pictures
     lost_colors: bool = field(default=False, kw_only=True)  # its frames have colours that a reader would refuse
+    mended: bool = field(default=False, kw_only=True)  # what was tried first did not hold
     stored: Stored | None = None  # where the payload is, in place of `payload`, of a group whose interval has a file
 
 
@@ -185,6 +186,8 @@ class Fidelity(Target):
     """Error measures of decoded frames against the originals."""
 
     psnr: float = 0.0  # d2_psnr_paper, mean over the frames, dB; larger is better
+    covered: float = 1.0  # share of the surface of its least covered frame
+    least: float = 0.0  # the number of that frame
 
     def reaches(self, target: Target) -> bool:
         """True where neither the distance nor the normal error is larger than the target's."""

@@ -32,6 +32,7 @@ GOOD = 1.4  # targets: a template with a larger residual is replaced, even where
 STILL = 1.1  # times its usual residual that a template may leave without a new fit (guess)
 ANGLE_BY_RATE = 0.36  # the normal error falls with this power of the rate (measured on four bodies: decision 24)
 PATCHED = 0.5  # share of the bytes of a predicted group from which on a template of its own is tried (guess)
+FINER = 4  # times a template is nearer to its key where one did not hold (guess)
 LEAST = 1e-30  # error: its logarithm is finite
 Coded = tuple[EncodedGroup, Followed | None]  # a group, and the template that may predict the next
 
@@ -46,10 +47,17 @@ class LayersRecipe:
 
     name: ClassVar[str] = "best"
     bodies_apart: ClassVar[bool] = True  # bodies that never touch become separate tracks
+    judged: ClassVar[bool] = True  # what does not hold is encoded again
 
     def longest(self, frame_rate: float) -> int:
         """Return the number of frames in a key interval."""
         return frames_in(self.key_interval, frame_rate)
+
+    def finer(self) -> LayersRecipe:
+        """Return the same with templates that are nearer to their keys, each for fewer frames."""
+        o = self.options
+        small = max(1, o.group_size // FINER)
+        return replace(self, options=replace(o, template_error=o.template_error / FINER, group_size=small, errors=()))
 
     def encode(self, interval: Interval, stages: Stages | None = None) -> Iterator[EncodedGroup]:
         """Yield the groups of an interval; only the frames of one plan are in memory at a time."""

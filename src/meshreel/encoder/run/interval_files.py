@@ -278,7 +278,7 @@ def pack_interval(interval: Interval, groups: Sequence[EncodedGroup], head: Head
     for group in groups:  # what its chunk lacks, for JSON, in which null is an infinite number
         values = [value if math.isfinite(value) else None for value in map(float, astuple(group.fidelity))]
         key = None if group.key is None else int(group.key)
-        facts.append([*values, key, group.canonical, group.lost_colors])
+        facts.append([*values, key, group.canonical, group.lost_colors, group.mended])
     metadata = json_of(head.metadata) | {"interval": place_of(interval), "groups": facts}
     is_long = len(json.dumps(metadata)) > _MOST
     metadata |= {"groups": None} if is_long else {}
@@ -296,13 +296,14 @@ def unpack_interval(path: Path, reader: ReelReader) -> list[EncodedGroup]:
     """Return the groups of an interval's file. Raises KeyError, TypeError or ValueError where no encoder wrote it."""
     found = list[EncodedGroup]()
     facts = reader.metadata["groups"] or json_of(reader.read_chunk(len(reader.chunks) - 1)[1:])
-    for chunk, (*values, key, canonical, lost_colors) in zip(reader.groups, facts, strict=True):
+    for chunk, (*values, key, canonical, lost_colors, mended) in zip(reader.groups, facts, strict=True):
         fidelity = Fidelity(*(math.inf if value is None else float(value) for value in values))
         own = (one for one in reader.chunks if one.kind in COMPANIONS and one.depends_on[0] == chunk.number)
         companions = tuple(Companion(ChunkKind(c.kind), Stored(path, c.offset, c.size), _ends(c)) for c in own)
         coded = (Form(chunk.form), chunk.frame_count, b"", _ends(chunk), fidelity, bool(chunk.depends_on))
         group = EncodedGroup(*coded, None if key is None else int(key), Stored(path, chunk.offset, chunk.size))
         found.append(replace(group, canonical=bool(canonical), companions=companions, lost_colors=bool(lost_colors)))
+        found[-1] = replace(found[-1], mended=bool(mended))
     return found
 
 

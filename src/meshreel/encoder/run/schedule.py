@@ -26,6 +26,7 @@ from ..group.interval import Interval
 from ..group.progress import IntervalStages, Stages
 from ..settings.options import EncoderOptions, Recipe, SceneOptions
 from .interval_files import IntervalFiles, pack_interval
+from .judge import judged
 from .worker import end_with_parent, tell
 
 AHEAD = 2  # calls for each worker, so that none waits for its next (guess)
@@ -143,7 +144,7 @@ def encode_interval(
     sample = (interval.frames[number] for number in evenly(count, LOOKED_AT))
     splats = appearance is not None and appearance.splats is not None
     interval = replace(interval, pictured=splats or has_pictures(interval, sample, appearance))
-    for group in colored_groups(recipe.encode(interval, stages), interval, appearance, stages):
+    for group in colored_groups(judged(interval, recipe, stages), interval, appearance, stages):
         note("payload", group.form.name, group.payload, *(one.read() for one in group.companions))
         yield group
 

@@ -25,6 +25,7 @@ from ...analysis.scene.masks import Masker
 from ...analysis.scene.segmentation import segment, segment_by
 from ...analysis.scene.standing import REGION, LocalNoise, Standing
 from ...analysis.survey import Survey, check_one_unit
+from ...geometry.cameras import Camera
 from ...geometry.closest_points import Surface, area_samples
 from ...geometry.depth import DepthFrames, FreeSpace
 from ...geometry.derived_sequences import CapturedSequence, picked
@@ -106,7 +107,7 @@ def take_apart(
     check_one_unit(survey)
     segmentation: Segmentation
     if masker is None:
-        segmentation = segment(sequence, options.cameras, lambda share: stages.reach("segment", share))
+        segmentation = segment(sequence, options.cameras, lambda share: stages.reach("segment", share), standing)
     else:
         segmentation = segment_by(masker, sequence, options.cameras)
     stages.reach("segment", 1.0)
@@ -127,6 +128,15 @@ def free_space(sequence: CapturedSequence) -> tuple[FreeSpace, ...]:
     """Return the space that depth cameras saw through in some frames; none if no depth is known."""
     depth, some = sequence.depth, evenly(len(sequence), PROBES)
     return () if depth is None else tuple(FreeSpace.of(depth[number]) for number in some)
+
+
+def _cameras(sequence: CapturedSequence) -> tuple[Camera, ...]:
+    """Return the depth cameras of a sequence."""
+    found = dict[int, Camera]()
+    if (depth := sequence.depth) is not None:
+        for number in evenly(len(sequence), PROBES):
+            found |= {at: each.camera for at, each in enumerate(depth[number]) if each is not None}
+    return tuple(found[at] for at in sorted(found))
 
 
 def _check_it_rests(sequence: MeshSequence, segmentation: Segmentation, standing: Standing) -> None:
@@ -238,7 +248,8 @@ def _measured(
             lost += float(areas[(gaps[still.faces] >= far).all(axis=1)].sum())
     stages.reach("noise", 1.0)
     fine = REGION * segmentation.cell
-    noise = LocalNoise.of(places, distances, fine, max(fine, float(np.median(sizes or [0.0])) / 2))
+    wide = max(fine, float(np.median(sizes or [0.0])) / 2)
+    noise = LocalNoise.of(places, distances, fine, wide, _cameras(sequence))
     return sizes, noise, lost / whole if whole else 0.0
 
 
@@ -278,7 +289,8 @@ def unpack_parts(data: bytes, sequence: CapturedSequence, survey: Survey) -> Par
     try:
         with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
             unit, astray, cell, size, island = arrays["numbers"].tolist()
-            noise = LocalNoise(arrays["noise places"], *arrays["noise"])
+            rms, spread, off = arrays["noise"]
+            noise = LocalNoise(arrays["noise places"], rms, spread, off, _cameras(sequence))
             rest = Rest(arrays["until"], arrays["since"])
             places = Lattice(arrays["origin"], size), arrays["keys"], arrays["chosen"]
             by = ByPlace(cell, *places, rest, island, _colors(arrays, sequence))

@@ -1,0 +1,159 @@
+"""Judge the groups of an interval before they are kept, and encode again what does not hold.
+
+In: an interval, its recipe. Out: its groups, each as good as the quality asks for. A group is decoded as a reader does
+it, and compared with the frames as a stranger would, without the correspondences that made it: samples of each surface
+look for the other one. Where a frame is lost, the frames of its group get a template of their own, then a finer one,
+and then each a mesh of its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Float64
+
+from ... import _core
+from ...errors import InputError
+from ...geometry.closest_points import Surface, area_samples
+from ...geometry.topology import connected_faces, face_normals
+from ...types import Frames, Mesh
+from ..group.forms import NORMALISED, EncodedGroup, intra_only, target_of
+from ..group.interval import Interval
+from ..group.progress import Stages
+from ..settings.options import Recipe
+
+SAMPLES = 4000  # vertices of a surface that look for the other one (guess)
+NEAR = (0.006, 4.0)  # diagonals, and times the noise, within which surface is covered: 1 cm on a body
+# Shares of the surface, of clean frames and of noisy ones. Measured at qualities 10 to 95: clean ones lose .001 at
+# most, noisy ones .07, of which .016 in one piece.
+LOST, PIECE, INVENTED = (0.02, 0.2), (0.01, 0.05), (0.02, 0.6)
+DISTANCE = 4.0  # times the distance to reach that a clean frame may have: 1.5 at most was seen
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """How well a frame is shown; shares of its surface."""
+
+    lost: float = 0.0  # without decoded surface near it
+    piece: float = 0.0  # the largest connected area of that
+    invented: float = 0.0  # of the decoded surface, that without surface of the frame near it
+    distance: float = 0.0  # normalised, RMS of the samples of the side that is farther off
+
+    def holds(self, noise: float, target: float) -> bool:
+        """Return whether that is what a quality promises: distances up to `target`, of frames without noise."""
+        lost, piece, invented = (limits[noise > 0] for limits in (LOST, PIECE, INVENTED))
+        near = noise > 0 or self.distance <= DISTANCE * target
+        return near and self.lost <= lost and self.piece <= piece and self.invented <= invented
+
+
+def judged(interval: Interval, recipe: Recipe, stages: Stages | None) -> Iterator[EncodedGroup]:
+    """Yield the groups of an interval, each of which holds. Raises InputError for frames that nothing shows."""
+    at, count = 0, len(interval.frames)
+    while at < count:
+        state = None
+        for group in recipe.encode(_from(interval, at, count), stages):
+            some = _from(interval, at, at + group.frame_count)
+            group, state, holds = _judged(some, recipe, group, state)
+            at += group.frame_count
+            if not holds:
+                yield from _again(some, recipe)
+                break  # the groups that follow were predicted from it
+            yield group
+
+
+def _judged(
+    interval: Interval, recipe: Recipe, group: EncodedGroup, state: _core.GroupState | None
+) -> tuple[EncodedGroup, _core.GroupState | None, bool]:
+    """Return a group with its least covered frame, the state after it, and whether it holds; `state` is that before."""
+    if not recipe.judged or interval.frames[0].is_empty:
+        return group, None, True
+    frames = list(interval.frames)
+    found = _core.Group(group.payload, len(frames), None, state if group.predicted else None, NORMALISED)
+    shown = [Mesh(*arrays[:2]) for arrays in found.frames()]
+    target = target_of(frames, recipe.options.target.scaled(interval.larger), interval.noise).distance
+    verdicts = [_verdict(interval, number, *both) for number, both in enumerate(zip(frames, shown, strict=True))]
+    covered = 1 - max(verdict.lost for verdict in verdicts)
+    worst = max(range(len(frames)), key=lambda number: verdicts[number].lost)
+    fidelity = replace(group.fidelity, covered=covered, least=interval.first_frame + worst)
+    holds = all(verdict.holds(interval.noise, target) for verdict in verdicts)
+    return replace(group, fidelity=fidelity), found.state, holds
+
+
+def _again(interval: Interval, recipe: Recipe) -> Iterator[EncodedGroup]:
+    """Yield groups of the frames of one that does not hold, by the first way by which all hold."""
+    for way in (recipe, recipe.finer(), None):
+        groups, at = list[EncodedGroup](), 0
+        state, holds = None, True
+        for group in _alone(interval, recipe) if way is None else way.encode(interval, Stages(None, 1)):
+            some = _from(interval, at, at + group.frame_count)
+            group, state, held = _judged(some, recipe, group, state)
+            groups.append(replace(group, mended=True))
+            holds, at = holds and held, at + group.frame_count
+        if holds:
+            yield from groups
+            return
+    where = f"frames {interval.first_frame} to {interval.stop - 1}"
+    text = f"{where} of track {interval.track}: neither a template nor a mesh for each shows them as they are"
+    raise InputError(f"{text}; raise --quality, or look whether these frames are damaged")
+
+
+def _alone(interval: Interval, recipe: Recipe) -> Iterator[EncodedGroup]:
+    """Yield the frames as meshes of their own."""
+    frames, target = list(interval.frames), recipe.options.target.scaled(interval.larger)
+    while frames:
+        group = intra_only(frames, target_of(frames, target, interval.noise), recipe.options.intra)
+        frames = frames[group.frame_count :]
+        yield group
+
+
+def _verdict(interval: Interval, number: int, frame: Mesh, mesh: Mesh) -> Verdict:
+    if mesh.is_empty:
+        return Verdict(1.0, 1.0, 0.0, np.inf)
+    near, surface = max(NEAR[0] * frame.diagonal, NEAR[1] * interval.noise), Surface(mesh)
+    gaps = surface.distances(frame.vertices[area_samples(frame, SAMPLES)])
+    points = mesh.vertices[area_samples(mesh, SAMPLES)]
+    back = Surface(frame).distances(points)
+    beyond = back > near
+    if beyond.any() and (free := interval.free(number)) is not None:  # what no camera saw through may be there
+        beyond[beyond] = free.at(points[beyond])
+    lost = float((gaps > near).mean())
+    piece = _largest(frame, surface, near) if lost else 0.0
+    return Verdict(lost, piece, float(beyond.mean()), max(_rms(gaps), _rms(back)))
+
+
+def _rms(gaps: Float64[np.ndarray, " N"]) -> float:
+    return float(np.sqrt((gaps**2).mean()))
+
+
+def _largest(frame: Mesh, surface: Surface, near: float) -> float:
+    """Return the share of a frame's surface in its largest connected area that is farther than `near`."""
+    far = (surface.distances(frame.vertices) > near)[frame.faces].all(axis=1)
+    if not far.any():
+        return 0.0
+    areas = face_normals(frame)[1]
+    pieces = np.bincount(connected_faces(frame.faces[far], len(frame.vertices)), areas[far])
+    return float(pieces.max() / areas.sum())
+
+
+class _Some(Frames):
+    """Successive frames of an interval."""
+
+    def __init__(self, frames: Frames | Sequence[Mesh], numbers: range) -> None:
+        self._frames, self._numbers = frames, numbers
+
+    def __len__(self) -> int:
+        return len(self._numbers)
+
+    def __getitem__(self, index: int) -> Mesh:
+        return self._frames[self._numbers[index]]
+
+
+def _from(interval: Interval, start: int, stop: int) -> Interval:
+    """Return the frames `start` to `stop`, counted from the first, as an interval."""
+    if stop - start == len(interval.frames):
+        return interval
+    return replace(
+        interval, frames=_Some(interval.frames, range(start, stop)), first_frame=interval.first_frame + start
+    )
