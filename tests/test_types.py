@@ -12,7 +12,7 @@ from PIL import Image
 from meshreel.conversions import as_sequence
 from meshreel.errors import InputError
 from meshreel.io.write import write_mesh
-from meshreel.types import UP_AXES, Mesh, MeshList, Texture, check_up, evenly, known_up
+from meshreel.types import UP_AXES, Mesh, MeshList, Texture, check_up, evenly, known_up, offset
 
 
 @pytest.mark.parametrize(
@@ -277,3 +277,10 @@ def test_a_scene_of_trimesh_keeps_pictures_and_colours_apart():
     assert (mesh.colors[is_red] == [255, 0, 0]).all() and (mesh.texture.pixels == [0, 0, 255]).all()
     assert np.isfinite(mesh.uv[~is_red[mesh.faces].any(axis=1)]).all()
     assert np.isnan(mesh.uv[is_red[mesh.faces].all(axis=1)]).all()
+
+
+def test_a_frame_outside_a_range_has_no_offset():
+    assert [offset(number, range(3, 6)) for number in (3, 5)] == [0, 2]
+    for number in (2, 6, -1):
+        with pytest.raises(IndexError, match=f"frame {number}: there are frames 3 to 5"):
+            offset(number, range(3, 6))

@@ -266,6 +266,13 @@ class Frames(Protocol):
         return (self[index] for index in range(len(self)))
 
 
+def offset(number: int, numbers: range) -> int:
+    """Return the offset of a frame in a range. Raises IndexError outside it, where a list would take -1 as its last."""
+    if not numbers.start <= number < numbers.stop:
+        raise IndexError(f"frame {number}: there are frames {numbers.start} to {numbers.stop - 1}")
+    return number - numbers.start
+
+
 def evenly(count: int, most: int) -> list[int]:
     """Return at most `most` of the frame numbers 0 to `count` - 1, in order, evenly spread from first to last."""
     return sorted({round(k) for k in np.linspace(0, count - 1, min(count, most))})

@@ -19,7 +19,7 @@ from ..errors import InputError
 from ..format.checks import MOST_TRACKS
 from ..geometry.strict import norm
 from ..geometry.topology import clean, components, drop_unreferenced, face_normals, linked
-from ..types import Mesh, MeshSequence
+from ..types import Mesh, MeshSequence, offset
 
 UNLIKE = 30.0  # times the median size: a larger frame of a room must be in another unit; a guess
 LARGEST_RATIO = 10.0  # largest ratio of the diagonals of two frames in one interval: a guess
@@ -56,7 +56,7 @@ class Survey:
         return self.diagonal if self.scale is None else self.scale
 
     def is_bare(self, frame: int) -> bool:
-        return self.diagonals[frame] == 0
+        return self.diagonals[offset(frame, range(len(self.diagonals)))] == 0
 
     def normalise(self, mesh: Mesh) -> Mesh:
         """Return the mesh cleaned and in normalised coordinates: centered, in multiples of `unit`."""

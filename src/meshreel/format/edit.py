@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import FormatError
+from ..types import offset
 from .layout import EDITED
 
 ITEM = "edit"  # of the metadata
@@ -34,9 +35,9 @@ class Edit:
         return sum(map(len, self.shown))
 
     def coded(self, frame: int) -> int:
-        """Return the number that a shown frame has among the coded ones."""
+        """Return the number that a shown frame has among the coded ones. Raises IndexError for others."""
         ends = [*accumulate(map(len, self.shown))]
-        at = bisect_right(ends, frame)
+        at = bisect_right(ends, offset(frame, range(self.frame_count)))
         return self.shown[at].stop - (ends[at] - frame)
 
     def item(self, frames: int) -> dict[str, Any]:

@@ -19,7 +19,7 @@ import numpy as np
 from jaxtyping import Bool
 
 from ..errors import InputError
-from ..types import Mesh, MeshSequence, Up, check_up, evenly
+from ..types import Mesh, MeshSequence, Up, check_up, evenly, offset
 from . import work
 from .color_views import ColorFrames
 from .depth import DepthFrames
@@ -201,7 +201,8 @@ class DerivedSequence(MeshSequence):
         return f"frame {number}" if named is None else named(number)
 
     def _number(self, index: int) -> int:
-        return index if self.numbers is None else self.numbers[index]
+        number = offset(index, range(len(self)))
+        return number if self.numbers is None else self.numbers[number]
 
     def __len__(self) -> int:
         return len(self.source) if self.numbers is None else len(self.numbers)
@@ -289,4 +290,4 @@ class ChosenPictures:
     numbers: tuple[int, ...]
 
     def __getitem__(self, index: int) -> Any:
-        return self.read(self.numbers[index])
+        return self.read(self.numbers[offset(index, range(len(self.numbers)))])

@@ -45,6 +45,9 @@ def test_painted_pictures_find_the_faces_they_were_painted_on(masks: Path):
     assert isinstance(given, Masker)
     found = given.masks(1, SEEN, given.views)
     assert found.shape == (3, 60, 80) and found.dtype == bool and set(np.unique(given.objects(0))) == {0, 3}
+    for frame in (-1, 2):
+        with pytest.raises(IndexError, match=f"frame {frame}: there are frames 0 to 1"):
+            given.objects(frame)
     moving, seen = votes(np.stack([each.faces for each in SEEN]), found, len(ROOM.faces))
     dynamic = moving >= 0.5 * np.maximum(seen, 1)
     assert dynamic[-BALL:][seen[-BALL:] > 0].all() and not dynamic[:-BALL].any() and dynamic.sum() > 10

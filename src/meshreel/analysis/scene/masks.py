@@ -19,7 +19,7 @@ from ...geometry.cameras import Camera, Rays, Seen, pack_cameras, unpack_cameras
 from ...io.files import read_input
 from ...io.pictures import find_masks, last_number, read_mask
 from ...io.write import frame_names, make_folder, write_file, write_picture
-from ...types import Frames, Mesh
+from ...types import Frames, Mesh, offset
 from .color_looks import ColorLooks
 
 _BODIES = ((214, 39, 40), (31, 119, 180), (44, 160, 44), (255, 127, 14), (148, 103, 189), (23, 190, 207))
@@ -182,7 +182,7 @@ class ImageMasks(Masker):
 
     def objects(self, frame: int) -> UInt8[np.ndarray, "X H W"]:
         """Return the number of the moving object that each pixel of each view sees; 0: none."""
-        return np.stack([read_mask(files[frame]) for files in self._files])
+        return np.stack([read_mask(files[offset(frame, range(len(files)))]) for files in self._files])
 
 
 def read_view_file(path: Path, wanted: str = "Open3D pinhole camera JSON") -> tuple[Camera, ...]:

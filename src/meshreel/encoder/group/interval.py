@@ -15,7 +15,7 @@ from ...geometry.color_views import MARGIN, ColorFrames, ColorPicture, ColorView
 from ...geometry.depth import DepthFrames, FreeSpace
 from ...geometry.derived_sequences import CapturedSequence, DerivedSequence, only
 from ...geometry.topology import clean, part_of
-from ...types import Frames, Mesh, MeshSequence, Placement, Up
+from ...types import Frames, Mesh, MeshSequence, Placement, Up, offset
 
 MOST_FRAMES = 64  # in a group: the tracker's distances and the basis grow with it (guess)
 
@@ -54,13 +54,16 @@ class Interval:
         """Return the colour source of frame `number`, counted from the first, with this mesh; None: no colours."""
         if mesh.is_empty or not (mesh.is_colored or self.views is not None):
             return None
-        return Painted(mesh) if self.views is None else self.views.at(self.first_frame + number)
+        return Painted(mesh) if self.views is None else self.views.at(self._of_sequence(number))
 
     def free(self, number: int) -> FreeSpace | None:
         """Return the space that cameras saw through in frame `number`, counted from the first; None if unknown."""
         if self.sight is None:
             return None
-        return FreeSpace.of(self.sight.depth[self.first_frame + number], self.sight.place)
+        return FreeSpace.of(self.sight.depth[self._of_sequence(number)], self.sight.place)
+
+    def _of_sequence(self, number: int) -> int:
+        return self.first_frame + offset(number, range(len(self.frames)))
 
     @property
     def observed(self) -> Any:
@@ -83,7 +86,7 @@ class NormalisedFrames(Frames):
         return len(self._numbers)
 
     def __getitem__(self, index: int) -> Mesh:
-        return self._survey.normalise(self.sequence[self._numbers[index]])
+        return self._survey.normalise(self.sequence[self._numbers[offset(index, range(len(self)))]])
 
     def only(self) -> NormalisedFrames:
         """Return the same frames, with nothing else of their sequence."""
@@ -105,7 +108,7 @@ class BodyFrames(NormalisedFrames):
 
     def __getitem__(self, index: int) -> Mesh:
         """Return the body in a frame. Raises InputError for a survey that has other pieces of the frame."""
-        mesh, bodies = clean(self.sequence[self._numbers[index]]), self._bodies[index]
+        mesh, bodies = clean(self.sequence[self._numbers[offset(index, range(len(self)))]]), self._bodies[index]
         pieces = piece_of_faces(mesh)
         if (count := 1 + int(pieces.max(initial=0))) != len(bodies):
             text = f"{self.sequence.name(self._numbers[index])}: has {count} large pieces, in its survey {len(bodies)}"

@@ -22,7 +22,7 @@ from ...analysis.follow.template import LEVELS, base_mesh, fused_mesh, shared_de
 from ...coding.layers.coder import LayersState
 from ...coding.mesh import CodedReference, code_on_lattice
 from ...geometry.color_views import Paint
-from ...types import Mesh
+from ...types import Mesh, offset
 from ..group.digests import note
 from ..group.forms import Target
 from .options import LayersOptions
@@ -53,8 +53,8 @@ class Ahead:
         return range(self.first, self.first + len(self))
 
     def at(self, number: int) -> FrameSurface:
-        """Return the frame with a number."""
-        return self.surfaces[number - self.first]
+        """Return the frame with a number. Raises IndexError for a frame that is not ahead."""
+        return self.surfaces[offset(number, self.numbers)]
 
     def painter(self, number: int) -> Painter:
         """Return a callable that opens the colour source of frame `number`."""
@@ -71,7 +71,7 @@ class Followed:
     closeness: Closeness
     residual: float  # usual residual of its fits, RMS
     slide: Slide | None = None  # to where its colours were; None: it has none
-    paint: Painter | None = None  # finds what knows the colours of the last frame
+    paint: Painter | None = None  # opens the colour source of the last frame
 
 
 class Candidate:
@@ -82,6 +82,7 @@ class Candidate:
     ) -> None:
         """Follow the surface of a tracker that begins at the key; `of_key` and `of_group` also give it a template."""
         self.key, self.before, self._options, self._noise = key, before, options, ahead.noise
+        self._paint = before.paint if before else ahead.painter(key)  # later frames ahead do not have the key
         self._tolerated = options.tolerance * ahead.noise
         self._target, self._tracker = ahead.target.distance, tracker
         self._fits: dict[int, Float64[np.ndarray, "V 3"]] = {}
@@ -107,12 +108,13 @@ class Candidate:
         found = cls(ahead, key, options, tracker, before)
         found._take(before.reference, before.positions, before.closeness)
         found._rest, found._usual, found.slide = before.positions, before.residual, before.slide
+        found._fits[key] = before.positions
         return found
 
     def others(self, ahead: Ahead) -> list[Candidate]:
         """Return templates of the same key with other errors, already followed, where these are tried."""
-        if self.before is not None:
-            return []
+        if self.key not in ahead.numbers:
+            return []  # of an earlier frame, or of the group before
         o, found = self._options, list[Candidate]()
         for error in o.errors:
             options = replace(o, template_error=error * o.template_error, errors=())
@@ -139,7 +141,8 @@ class Candidate:
 
     def follows(self, ahead: Ahead, numbers: range) -> bool:
         """Return whether none of these frames is lost."""
-        return bool(np.isfinite(self.residuals(ahead)[numbers.start - ahead.first : numbers.stop - ahead.first]).all())
+        first = offset(numbers.start, ahead.numbers)
+        return bool(np.isfinite(self.residuals(ahead)[first : first + len(numbers)]).all())
 
     def fit(self, ahead: Ahead, numbers: range) -> Float64[np.ndarray, "T V 3"]:
         """Return the final fits to successive frames that it follows: near what one shape explains."""
@@ -161,15 +164,17 @@ class Candidate:
     def _slid(
         self, ahead: Ahead, numbers: range, positions: Float64[np.ndarray, "T V 3"]
     ) -> Float64[np.ndarray, "T V 3"]:
-        """Return fits to frames, slid to where these have the colours of the key frame, if they have colours."""
-        faces = self.reference.base.faces
-        if self.slide is None and (paint := ahead.paint(self.key, ahead.at(self.key).mesh)) is not None:
-            self.slide = Slide(faces, self._fits[self.key], paint)
+        """Return fits to frames, slid to where these have the colours of the key, or of the first that has colours."""
+        paints = {number: ahead.painter(number)() for number in numbers if number != self.key}
+        if self.slide is None:
+            starts = {self.key: self._paint() if self._paint else None, **paints}.items()
+            faces = self.reference.base.faces
+            slides = (Slide(faces, self._fits[number], paint) for number, paint in starts if paint is not None)
+            self.slide = next(slides, None)
         if self.slide is None:
             return positions
-        pairs = [(number, ahead.paint(number, ahead.at(number).mesh)) for number in numbers if number != self.key]
         found = positions.copy()
-        for number, paint in pairs:
+        for number, paint in paints.items():
             if paint is not None:
                 found[number - numbers.start] = self.slide.to(positions[number - numbers.start], paint)
         return found
