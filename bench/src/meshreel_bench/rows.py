@@ -87,6 +87,7 @@ class Stream(msgspec.Struct, frozen=True, omit_defaults=True):
     groups: list[Group] = []
     colors: ColorBytes | None = None
     canonical: int = 0  # groups whose reference lies in the pose of eq. 5
+    tracks: int = 0
 
 
 class Encoding(msgspec.Struct, frozen=True, omit_defaults=True):

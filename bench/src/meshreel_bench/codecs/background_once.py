@@ -6,15 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
-from meshreel.analysis.scene.standing import is_scene
 from meshreel.analysis.survey import survey_sequence
-from meshreel.encoder.group.progress import Stages
-from meshreel.encoder.scene.parts import take_apart
 from meshreel.encoder.scene.static import Static, encode_static
-from meshreel.encoder.settings.options import SceneOptions
-from meshreel.geometry.derived_sequences import captured
+from meshreel.encoder.sequence import Encoder
+from meshreel.encoder.settings.options import EncoderOptions, SceneOptions
 from meshreel.geometry.topology import part_of
-from meshreel.types import Mesh, MeshSequence
+from meshreel.types import MeshSequence
 
 from ..codec import Progress, TwoSteps
 from .draco import Frames, check_point, decimated, write_frames
@@ -46,16 +43,12 @@ class BackgroundOnceDracoCodec(TwoSteps):
 
     def analyse(self, sequence: MeshSequence, progress: Progress | None = None) -> Still:
         """Return the background and what moves. Raises InputError for frames that cannot be used."""
-        stages, options = Stages(progress, len(sequence)), SceneOptions()
-        if not (len(sequence) and is_scene(sequence)):
-            survey = survey_sequence(sequence, stages.add)
+        if (parts := Encoder(sequence, progress=progress).parts(EncoderOptions())) is None:
+            survey = survey_sequence(sequence)
             return Still((), Frames(sequence.frame_rate, survey, [survey.normalise(mesh) for mesh in sequence]))
-        parts = take_apart(captured(sequence), survey_sequence(sequence, stages.add, cleaned=False), options, stages)
-        states = encode_static(parts, len(sequence), sequence.frame_rate, options)
-        moving = list[Mesh]()
-        for number, mesh in enumerate(sequence):
-            moving.append(parts.survey.normalise(part_of(mesh, parts.segmentation.moving(number, mesh))))
-            stages.add("split", 1)
+        states = encode_static(parts, len(sequence), sequence.frame_rate, SceneOptions())
+        pairs = ((mesh, parts.segmentation.moving(number, mesh)) for number, mesh in enumerate(sequence))
+        moving = [parts.survey.normalise(part_of(mesh, moves)) for mesh, moves in pairs]
         return Still(states, Frames(sequence.frame_rate, parts.survey, moving))
 
     def code(self, analysis: Still, progress: Progress | None = None) -> bytes:

@@ -26,13 +26,15 @@ from meshreel.io.sequence import FileSequence, SequenceOptions, open_sequence
 from meshreel.types import MeshSequence
 
 from .checksums import check_source, checksum, known_checksums
+from .long_room import LongRoom
 from .remesh import Place, RemeshOptions, SideBySide, gears, prism, remeshed
 from .rooms import ROOM, WALKERS
 from .scenes import PROCEDURAL, ROOM3, SCENES, Captured, SceneData, open_scene
 from .walker import FRAMES, Truth, Walker
 
 DEMO = "demo"  # procedural bodies: needs no benchmark data
-SHAPES: dict[str, Callable[..., MeshSequence]] = {"gears": gears, "prism": prism}  # neither do these
+# Neither do these.
+SHAPES: dict[str, Callable[..., MeshSequence]] = {"gears": gears, "prism": prism, "long_room": LongRoom}
 SYNTHETIC = "synthetic4"
 BODIES: dict[str, Place] = {  # of SYNTHETIC, m: on one floor, 30 cm apart
     "dancer": (-1.39, 0.48, 0.0),

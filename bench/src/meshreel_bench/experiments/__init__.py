@@ -22,6 +22,7 @@ EXPERIMENTS: dict[str, Study] = {
     "ablation_scene": ablations.SCENE,
     "scenes": scenes.STUDY,
     "recordings": scenes.RECORDINGS,
+    "long_takes": scenes.LONG_TAKES,
     "layers": layers.STUDY,
     "speed": layers.SPEED,
     "tracker": ablations.TRACKERS,

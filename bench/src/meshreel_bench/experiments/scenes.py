@@ -5,7 +5,7 @@ Anchor a is decimated Draco of whole frames, anchor b a background once and deci
 
 from __future__ import annotations
 
-from ..names import BEST, TEXTURED
+from ..names import BEST, PAINTED, TEXTURED
 from .study import (
     D2,
     Always,
@@ -221,4 +221,28 @@ RECORDINGS = Study(
         "cracks the share of measured pixels, those beside steps, too, in slits where nothing is decoded.",
         "Flicker: RMS change of normals on bodies from a frame to the next, after motion is taken out.",
     ),
+)
+
+
+LONG_ROOM, TAKES = "long_room", (300, 900, 1800)  # frames
+LONG_TAKES = Study(
+    title="Long takes of a room: drift, changing light, moved furniture, and visitors who come and go",
+    sequences=(LONG_ROOM,),
+    sweeps=tuple(
+        Sweep("meshreel", {}, {"preset": "best", "quality": 50.0, "color": "vertices"}, frames=count) for count in TAKES
+    ),
+    metrics="distances",
+    measures=(
+        D2,
+        Measure("tracks", "tracks", sign=-1),
+        Measure("encode_mb", "memory", " MB", -1),
+        Measure("background_mbps", "background with its colours", " Mbps", -1),
+        Measure("bodies_mbps", "bodies with their colours", " Mbps", -1),
+        Measure("color_mbps", "colours", " Mbps", -1),
+    ),
+    promises=(
+        *(Flat(Which(LONG_ROOM, PAINTED), key=key) for key in ("encode_mb", "encode_s_at_rest")),
+        Always(f"{LONG_ROOM}: a track for each visit and move", Which(LONG_ROOM, PAINTED), at_most("tracks", 21)),
+    ),
+    notes=("Every 120 frames somebody comes in for 90; every 600 a stool and a crate are moved; .5 % of drift.",),
 )

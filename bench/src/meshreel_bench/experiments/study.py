@@ -132,10 +132,11 @@ class Rises:
 
 @dataclass(frozen=True, slots=True)
 class Flat:
-    """Promise that the longest encode needs no more memory than the shortest."""
+    """Promise that the longest encode needs no more memory, or time a frame, than the shortest."""
 
     which: Which
     within: float = 0.1
+    key: str = "encode_mb"  # of what is measured
 
 
 @dataclass(frozen=True, slots=True)

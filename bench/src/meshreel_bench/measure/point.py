@@ -41,7 +41,7 @@ from .tracker import tracker_values
 from .worker import StageTimer, cost_of, decode_timed, in_fresh_process, maker
 
 TRUTH_NAME, UNCOMPRESSED = "the truth itself", "uncompressed"
-LONG = 60  # frames: half as many of a longer sequence are compared by pictures
+LONG = 60  # frames: half as many of a longer sequence are compared
 SOME = 10  # frames of a scene that a sampled point has; of all other points every second of these is measured
 KEYS = "key_frames"  # of a file's metadata: numbers of the frames that others are predicted from
 
@@ -69,7 +69,7 @@ def measure_point(point: Point, store: Store) -> Row:
     if painted is not None:  # colours tell where the surface slides
         known = replace(known, sequence=in_colours(known.sequence, painted))
     count = len(known.sequence)
-    is_long = count > LONG and point.metrics == "views"
+    is_long = count > LONG and point.metrics in ("views", "distances")
     some = evenly(count, SOME if known.cameras else LONG // 2 if is_long else count)
     whole = not known.cameras or point.sampled or point.metrics == "regions"
     numbers = list(range(count)) if point.metrics == "depth" else some if whole else some[::2]
@@ -199,7 +199,8 @@ def _stream(codec: Codec, data: bytes, frames: int) -> Stream:
         form = chunk.form_name
         groups.append(Group(chunk.first_frame, chunk.frame_count, form, chunk.size, min(own, default=None)))
     once = once or sum(chunk.size for chunk in reader.chunks if chunk.kind == ChunkKind.STATIC)
-    return Stream(len(data), frames, once, groups, color_bytes(reader), reader.metadata.get("canonical_references", 0))
+    canonical = reader.metadata.get("canonical_references", 0)
+    return Stream(len(data), frames, once, groups, color_bytes(reader), canonical, len(reader.tracks))
 
 
 def _segmented(case: _Case) -> Row:

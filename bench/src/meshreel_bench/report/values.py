@@ -152,6 +152,8 @@ DERIVED: dict[str, Callable[[Row], float | None]] = {
     "color_mbps": lambda row: _color_mbps(row, lambda known: known.all),
     "background_color_mbps": lambda row: _color_mbps(row, lambda known: known.background),
     "color_share": lambda row: found / row.mbps if (found := _color_mbps(row, lambda known: known.all)) else None,
+    "bodies_mbps": lambda row: row.mbps * (1 - _of_background(row.stream) / row.stream.bytes) if row.stream else None,
+    "tracks": lambda row: row.stream.tracks if row.stream else None,
     "background_bytes": lambda row: row.stream.background_bytes if row.stream else None,
     "background_mbps": lambda row: row.mbps * _of_background(row.stream) / row.stream.bytes if row.stream else None,
     "border_step_db": _border_step,

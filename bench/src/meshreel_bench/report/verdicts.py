@@ -176,14 +176,16 @@ def _(promise: study.Rises, rows: Sequence[Row]) -> list[Verdict]:
 
 @_judged.register
 def _(promise: study.Flat, rows: Sequence[Row]) -> list[Verdict]:
-    text = f"{promise.which.sequence}: memory of an encode does not grow with the number of frames"
+    kind, unit = ("memory", "MB") if promise.key == "encode_mb" else ("time a frame", "s")
+    text = f"{promise.which.sequence}: {kind} of an encode does not grow with the number of frames"
     bound = f"within {100 * promise.within:g} %"
-    own = [row for row in _chosen(rows, promise.which) if row.point.frames and value(row, "encode_mb") is not None]
+    own = [row for row in _chosen(rows, promise.which) if row.point.frames and value(row, promise.key) is not None]
     if len(own) < 2:
         return [Verdict(text, bound)]
     few, many = (pick(own, key=lambda row: row.frames) for pick in (min, max))
-    before, after = value(few, "encode_mb") or 0.0, value(many, "encode_mb") or 0.0
-    found = f"{before:.0f} MB at {few.frames} frames, {after:.0f} at {many.frames}: {100 * (after / before - 1):+.1f} %"
+    before, after = value(few, promise.key) or 0.0, value(many, promise.key) or 0.0
+    shown = f"{before:.4g} {unit} at {few.frames} frames, {after:.4g} at {many.frames}"
+    found = f"{shown}: {100 * (after / before - 1):+.1f} %"
     return [Verdict(text, bound, found, after / before - 1 <= promise.within)]
 
 
