@@ -47,6 +47,7 @@ class LongRoom(MeshSequence):
             x, z = (1 - share) * np.array(first) + share * np.array(second)
             pieces.append(_painted(mesh.at(mesh.vertices + [x, 0, z]), room_colors(mesh.vertices)))
         whole = concatenate(pieces + ([_visitor(number)] if number % VISIT < STAY else []))
+        assert whole.colors is not None, "each piece is painted"
         noise = NOISE * np.random.default_rng(number).standard_normal(whole.vertices.shape)
         light = (0.85 + 0.15 * math.cos(math.tau * number / 900)) * (0.8 if number // 450 % 2 else 1.0)  # and a lamp
         return _painted(whole.at(EYE + (1 + DRIFT * number) * (whole.vertices + noise - EYE)), light * whole.colors)
