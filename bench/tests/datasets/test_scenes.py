@@ -18,7 +18,8 @@ from meshreel_bench.rows import Point
 
 from meshreel.capture.recording import open_recording
 from meshreel.capture.simulated.procedural import soft_bodies
-from meshreel.capture.simulated.simulated_rig import SceneFrame, SensorOptions, simulate_rig
+from meshreel.capture.simulated.sensors import SensorOptions
+from meshreel.capture.simulated.simulated_rig import SceneFrame, simulate_rig
 from meshreel.decoder.video import Video
 from meshreel.errors import InputError
 from meshreel.geometry.closest_points import Surface, distances

@@ -10,7 +10,8 @@ from meshreel.capture.calibration.still_view import still_view
 from meshreel.capture.rig.cameras import posed
 from meshreel.capture.rig.rig import read_rig
 from meshreel.capture.simulated.demo_room import RoomOptions, furnished_room, room_cameras
-from meshreel.capture.simulated.simulated_rig import SensorOptions, simulate_rig
+from meshreel.capture.simulated.sensors import SensorOptions
+from meshreel.capture.simulated.simulated_rig import simulate_rig
 from meshreel.errors import InputError
 from meshreel.io.pictures import read_picture
 from tests.capture.depth_scenes import WALL, camera, measured

@@ -18,7 +18,8 @@ from PIL import Image
 from meshreel.analysis.scene.segmentation import segment
 from meshreel.capture.recording import FusionOptions, open_recording
 from meshreel.capture.simulated.demo_room import RoomOptions, furnished_room, room_cameras
-from meshreel.capture.simulated.simulated_rig import SensorOptions, simulate_rig
+from meshreel.capture.simulated.sensors import SensorOptions
+from meshreel.capture.simulated.simulated_rig import simulate_rig
 from meshreel.decoder.video import open as open_video
 from meshreel.encoder.sequence import encode
 from meshreel.geometry.cameras import looking_at

@@ -17,11 +17,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jaxtyping import Bool, Float64, Int64, UInt8, UInt16
+from jaxtyping import Bool, Float64, Int64, UInt8
 
 from ...errors import InputError
 from ...geometry.cameras import Camera, CameraPose, Rays, looking_at
-from ...geometry.depth import depth_noise
 from ...geometry.strict import products
 from ...geometry.topology import concatenate, face_normals
 from ...io.files import read_file
@@ -30,8 +29,8 @@ from ...io.write import make_folder, replacing, write_file, write_mesh, write_pi
 from ...types import Mesh
 from ..rig.cameras import DepthCamera, posed
 from ..rig.rig import RIG, read_cameras, write_rig
+from .sensors import Depth, SensorOptions, measured
 
-Depth = Float64[np.ndarray, "H W"]  # m
 Pixels = UInt8[np.ndarray, "H W 3"]
 # Colours, 0 to 255, of places and the faces that they are on.
 Painter = Callable[[Float64[np.ndarray, "N 3"], Int64[np.ndarray, " N"]], Float64[np.ndarray, "N 3"]]
@@ -39,28 +38,9 @@ Painter = Callable[[Float64[np.ndarray, "N 3"], Int64[np.ndarray, " N"]], Float6
 TRUTH = "truth"  # folder of the clean meshes
 LABELS = "dynamic.npz"  # file in that folder: for each frame, a bit per face of its mesh
 _DAMAGED = (OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError)
-DEEPEST = 65_535  # units, largest value of a 16-bit depth picture
 AMBIENT = 0.8  # of the light that comes from everywhere (guess)
 LIGHT = (0.3, 0.9, 0.3)  # where the rest comes from, at first; it turns about the second axis (guess)
 TURNS = 0.02  # of the light a frame, rad (guess)
-JUMP = 0.05  # m between neighbouring pixels: where they are farther apart, flying pixels come up (guess)
-
-
-@dataclass(frozen=True, slots=True)
-class SensorOptions:
-    """Errors of a depth camera."""
-
-    noise: float = 0.4  # times `depth_noise`, standard deviation
-    grazing: float = 80.0  # degrees between ray and normal above which nothing is measured
-    holes: float = 0.002  # share of the pixels that measure nothing
-    flying: float = 0.3  # share of the pixels beside a jump that measure a depth between both sides
-    pose_error: tuple[float, float] = (0.0, 0.0)  # m, degrees: standard deviations of the errors in the rig's file
-    seed: int = 0
-
-    def __post_init__(self) -> None:
-        good = all(math.isfinite(value) and value >= 0 for value in (self.noise, *self.pose_error))
-        if not (good and 0 < self.grazing <= 90 and 0 <= self.holes <= 1 and 0 <= self.flying <= 1):
-            raise InputError(f"{self}: give numbers from 0 on, degrees up to 90 and shares up to 1")
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,24 +59,49 @@ class SceneFrame:
         return SceneFrame(concatenate(parts), np.repeat(np.arange(len(parts)) >= len(still), faces))
 
 
+@dataclass(frozen=True, slots=True)
+class Mount:
+    """Places of cameras around a box, and what they look at: its middle."""
+
+    height: float = 0.9  # of the box's, where they stand
+    away: float = math.sqrt(2)  # of half its sides, from its middle axis; the default: through its vertical edges
+    target: float = 0.4  # of its height, where they look
+
+
+CORNERS, OVERHEAD, LOW = Mount(), Mount(1.0, 0.5, 0.0), Mount(0.15)
+
+
 def corner_cameras(
     low: Float64[np.ndarray, " 3"], high: Float64[np.ndarray, " 3"], width: int = 640, count: int = 4
 ) -> tuple[DepthCamera, ...]:
     """Return cameras with the paper's field of view (75 x 65 degrees) high up around a box, looking down at its middle.
 
-    Pictures are 0.9 times as high as wide; those of the paper have 640 x 576 pixels. `low` and `high` are the box's
-    corners, m; the cameras stand on an ellipse through its vertical edges, the first at 45 degrees; y is up.
+    Pictures are 0.9 times as high as wide; those of the paper have 640 x 576 pixels.
+    """
+    view = Camera(640, 576, (417.0, 452.0), (320.0, 288.0)).resized(width, round(0.9 * width))
+    return mounted(DepthCamera("corner", view, depth_range=(0.25, 8.0)), low, high, count)
+
+
+def mounted(
+    camera: DepthCamera,
+    low: Float64[np.ndarray, " 3"],
+    high: Float64[np.ndarray, " 3"],
+    count: int = 4,
+    mount: Mount = CORNERS,
+) -> tuple[DepthCamera, ...]:
+    """Return copies of a camera around a box whose corners are `low` and `high`, m; y is up.
+
+    They stand on an ellipse, the first at 45 degrees.
     """
     middle, half = (low + high) / 2, (high - low) / 2
-    target = np.array([middle[0], low[1] + 0.4 * (high[1] - low[1]), middle[2]])
+    heights = [low[1] + share * (high[1] - low[1]) for share in (mount.height, mount.target)]
     cameras = []
     for number in range(count):
         angle = math.pi / 4 + 2 * math.pi * number / count
-        across = math.sqrt(2) * half * (math.sin(angle), 0.0, math.cos(angle))
-        eye = np.array([middle[0], low[1] + 0.9 * (high[1] - low[1]), middle[2]]) + across
-        view = Camera(640, 576, (417.0, 452.0), (320.0, 288.0), CameraPose.of_camera(looking_at(eye, target)))
-        resized = view.resized(width, round(0.9 * width))
-        cameras.append(DepthCamera(f"corner{number}", resized, depth_range=(0.25, 8.0)))
+        across = mount.away * half * (math.sin(angle), 0.0, math.cos(angle))
+        eye, target = (np.array([middle[0], height, middle[2]]) for height in heights)
+        pose = CameraPose.of_camera(looking_at(eye + across, target))
+        cameras.append(replace(camera, name=f"{camera.name}{number}", view=replace(camera.view, pose=pose)))
     return tuple(cameras)
 
 
@@ -126,8 +131,8 @@ def simulate_rig(
         rays, normals = Rays(frame.mesh), face_normals(frame.mesh)[0]
         for which, (camera, place) in enumerate(zip(cameras, places, strict=True)):
             random = np.random.default_rng([sensor.seed, number, which])
-            clean = _flown(_cut_grazing(rays, normals, camera.view, sensor.grazing), sensor.flying, random)
-            write_picture(_measured(clean, camera, sensor, random), place / f"depth_{number:05}.png")
+            clean = _cut_grazing(rays, normals, camera.view, sensor.grazing)
+            write_picture(measured(clean, camera, sensor, random), place / f"depth_{number:05}.png")
             if which < len(eyes) and frame.paint is not None:
                 picture = eyes[which].picture(frame.mesh, frame.paint, number, random)
                 write_picture(picture, folder / camera.name / "color" / f"color_{number:05}.png")
@@ -156,30 +161,6 @@ def _cut_grazing(rays: Rays, normals: Float64[np.ndarray, "F 3"], camera: Camera
     along = directions[hit] / np.linalg.norm(directions[hit], axis=1)[:, None]
     cosines[hit] = np.abs((normals[faces] * along).sum(axis=1))
     return np.where(cosines >= math.cos(math.radians(grazing)), depth, np.inf)
-
-
-def _measured(
-    depth: Depth, camera: DepthCamera, sensor: SensorOptions, random: np.random.Generator
-) -> UInt16[np.ndarray, "H W"]:
-    seen = np.isfinite(depth) & (random.random(depth.shape) >= sensor.holes)
-    depth = np.where(seen, depth, 0.0)
-    depth += sensor.noise * depth_noise(depth) * random.standard_normal(depth.shape)
-    units = np.rint(depth / camera.depth_unit)
-    return camera.in_range(np.where(seen & (units > 0) & (units <= DEEPEST), units, 0).astype(np.uint16))
-
-
-def _flown(depth: Depth, flying: float, random: np.random.Generator) -> Depth:
-    """Mix the depths of both sides at some pixels beside a jump (flying pixels)."""
-    found = depth.copy()
-    for axis in (0, 1):
-        beside = np.roll(depth, 1, axis=axis)
-        with np.errstate(invalid="ignore"):  # two misses side by side
-            jumps = np.isfinite(depth) & np.isfinite(beside) & (np.abs(depth - beside) > JUMP)
-        np.moveaxis(jumps, axis, 0)[0] = False  # the first row has no neighbour
-        mixed = jumps & (random.random(depth.shape) < flying)
-        share = random.random(depth.shape)
-        found[mixed] = share[mixed] * depth[mixed] + (1 - share[mixed]) * beside[mixed]
-    return found
 
 
 def _mistaken(camera: DepthCamera, sensor: SensorOptions, random: np.random.Generator) -> DepthCamera:
