@@ -1,15 +1,28 @@
 """Scenes: captured once, labels, anchors, and what is measured of people, background and parts, on small ones."""
 
 import json
+from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from meshreel_bench.codecs import make_codec
+from meshreel_bench.datasets import NAMES as STORED
 from meshreel_bench.datasets import Dataset, Store
 from meshreel_bench.datasets import scenes as module
 from meshreel_bench.datasets.rooms import FRAMES as ROOM3_FRAMES
-from meshreel_bench.datasets.rooms import NAMES, PEOPLE, THINGS, Parts, Room3, moving_parts, thing_poses
+from meshreel_bench.datasets.rooms import (
+    NAMES,
+    PEOPLE,
+    SENSED,
+    SETTINGS,
+    THINGS,
+    Parts,
+    Room3,
+    Setting,
+    moving_parts,
+    thing_poses,
+)
 from meshreel_bench.datasets.scenes import TRUE, Captured, SceneFrames, open_scene, true_scene
 from meshreel_bench.measure.metrics import Measured, _flicker, measure_frames, missed, part_values
 from meshreel_bench.measure.point import measure_point
@@ -18,8 +31,8 @@ from meshreel_bench.rows import Point
 
 from meshreel.capture.recording import open_recording
 from meshreel.capture.simulated.procedural import soft_bodies
-from meshreel.capture.simulated.sensors import SensorOptions
-from meshreel.capture.simulated.simulated_rig import SceneFrame, simulate_rig
+from meshreel.capture.simulated.sensors import SENSORS, SensorOptions
+from meshreel.capture.simulated.simulated_rig import SceneFrame, corner_cameras, simulate_rig
 from meshreel.decoder.video import Video
 from meshreel.errors import InputError
 from meshreel.geometry.closest_points import Surface, distances
@@ -161,7 +174,7 @@ def test_a_body_has_no_truth_and_no_regions(tmp_path):
 def room3(tmp_path_factory):
     """Two frames, coarse."""
     cache = tmp_path_factory.mktemp("room3.cache")
-    Room3(2, 0.05).record(cache / "room3-2" / "rig", width=160)
+    Room3(2, 0.05, Setting(partial(corner_cameras, width=160))).record(cache / "room3-2" / "rig")
     return open_scene("room3", cache, cache, 2)
 
 
@@ -239,3 +252,28 @@ def test_a_thing_is_room_from_when_the_background_has_it(room_from, after):
     assert values["crate_room_s"] == pytest.approx(after)
     assert values["crate_bytes"] == 700 and values["room_bytes"] == values["people_bytes"] == 0
     assert values["door_bytes_of_people"] is None and values["door_room_s"] == 0.0
+
+
+def test_at_twice_the_rate_every_second_frame_is_the_same_moment():
+    slow, fast = Room3(14, 0.08), Room3(27, 0.08, SETTINGS["d435-corners"])
+    parts = [room.parts(number) for room, number in ((slow, 12), (fast, 24), (fast, 25), (slow, 13))]
+    for name, one, same in zip(NAMES, *parts[:2], strict=True):
+        assert name in PEOPLE or np.array_equal(one.vertices, same.vertices)  # people have a grid each frame
+        boxes = [np.stack([mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)]) for mesh in (one, same)]
+        assert np.allclose(*boxes, atol=0.05)
+    before, between, after = (frame[NAMES.index("crate")].vertices for frame in (parts[0], *parts[2:]))
+    assert np.allclose(between, (before + after) / 2) and (before != after).any()
+
+
+def test_there_are_seven_settings_of_sensors_in_three_rooms():
+    assert len(SENSED) == 21 and {setting.rate for setting in SETTINGS.values()} == {5.0, 15.0, 30.0, 60.0}
+    assert {setting.errors for setting in SETTINGS.values()} == {errors for _, errors in SENSORS.values()}
+    assert set(SENSED) <= set(STORED)
+
+
+def test_a_room_is_recorded_by_a_sensor(tmp_path):
+    name = "sensors/iphone_lidar-corners/procedural_room"
+    known = Store(tmp_path, tmp_path).open(name, 1)
+    assert known.sequence.frame_rate == 60.0 and known.cameras[0].width == 256
+    row = measure_point(Point(name, "captured", {}, 1, metrics="regions"), Store(tmp_path, tmp_path))
+    assert row.metrics["truth_people_median_m"] < 0.02 and row.metrics["truth_people_covered"] > 0.5

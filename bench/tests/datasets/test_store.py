@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from meshreel_bench.datasets import BODIES, DEMO, SYNTHETIC, Store, checksums, forth_and_back
 from meshreel_bench.datasets.remesh import SideBySide
-from meshreel_bench.datasets.scenes import PROCEDURAL
+from meshreel_bench.datasets.rooms import PROCEDURAL
 
 from meshreel.capture.calibration.colors import REMEMBERED
 from meshreel.errors import InputError

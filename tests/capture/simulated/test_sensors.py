@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from meshreel.capture.simulated.sensors import SENSORS, SensorOptions, measured
-from meshreel.capture.simulated.simulated_rig import CORNERS, LOW, OVERHEAD, mounted
+from meshreel.capture.simulated.sensors import CORNERS, LOW_DOWN, OVERHEAD, SENSORS, SensorOptions, measured, mounted
 from meshreel.errors import InputError
 
 EXACT = SensorOptions(noise=0.0, holes=0.0, flying=0.0)
@@ -108,7 +107,7 @@ def test_a_seed_gives_equal_bits(name):
 
 def test_cameras_look_from_corners_from_above_or_from_low_down():
     low, high = np.array([-2.0, 0.0, -1.5]), np.array([2.0, 2.5, 1.5])
-    for mount, height, steep in ((CORNERS, 2.25, 0.4), (OVERHEAD, 2.5, 0.9), (LOW, 0.375, -0.3)):
+    for mount, height, steep in ((CORNERS, 2.25, 0.4), (OVERHEAD, 2.5, 0.9), (LOW_DOWN, 0.375, -0.3)):
         poses = [one.view.pose.to_world for one in mounted(STEREO, low, high, mount=mount)]
         assert [pose[1, 3] for pose in poses] == pytest.approx([height] * 4)
         assert all(-pose[1, 2] >= steep for pose in poses)  # of the optical axis, downwards

@@ -6,17 +6,20 @@ down and stands up. y is up, in metres; the floor is at height 0.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 from jaxtyping import Bool, Float64, Int64
 
+from meshreel.capture.rig.cameras import DepthCamera
 from meshreel.capture.simulated.demo_room import Box, box
 from meshreel.capture.simulated.figure import Pose, figure, turn_about_y
 from meshreel.capture.simulated.implicit import polygonize
 from meshreel.capture.simulated.procedural import grid_of_frame
+from meshreel.capture.simulated.sensors import CORNERS, LOW_DOWN, OVERHEAD, SENSORS, Mount, SensorOptions, mounted
 from meshreel.capture.simulated.simulated_rig import TRUTH, SceneFrame, corner_cameras, simulate_rig
 from meshreel.errors import InputError
 from meshreel.geometry.topology import concatenate, subdivide_midpoint
@@ -27,16 +30,47 @@ from meshreel.types import Mesh
 ROOM = Path("rooms/lr_kt2.obj")  # its y axis points down
 WALKERS = {"crane": (0.2, 0.0, 3.0), "samba": (-0.9, 0.0, 2.85)}  # m: where there is room to walk
 SPEEDS = {"room2": 1.0, "room2-standing": 0.4}  # of the people
-CAMERAS = 4
 WALLS = (0.35, 0.0, 0.35)  # m from the walls to the cameras
+RATE = 30.0  # 1/s
+Vector = Float64[np.ndarray, "3"]
 
 
-def simulate_room(folder: Path, data: Path, name: str, frames: int) -> None:
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """Depth cameras that record a room; the paper's, where nothing else is said."""
+
+    cameras: Callable[[Vector, Vector], tuple[DepthCamera, ...]] = corner_cameras  # of a box's corners
+    errors: SensorOptions = SensorOptions()
+    rate: float = RATE  # 1/s
+
+
+PAPER = Setting()
+
+
+def _setting(sensor: str, mount: Mount, rate: float) -> Setting:
+    camera, errors = SENSORS[sensor]
+    return Setting(partial(mounted, camera, mount=mount), errors, rate)
+
+
+SETTINGS = {  # of the depth cameras of the market, 5 to 60 frames a second
+    "azure_kinect-slow": _setting("azure_kinect", CORNERS, 5.0),
+    "kinect_v1-corners": _setting("kinect_v1", CORNERS, 30.0),
+    "kinect_v2-overhead": _setting("kinect_v2", OVERHEAD, 30.0),
+    "d435-corners": _setting("d435", CORNERS, 60.0),
+    "d455-low": _setting("d455", LOW_DOWN, 15.0),
+    "l515-corners": _setting("l515", CORNERS, 30.0),
+    "iphone_lidar-corners": _setting("iphone_lidar", CORNERS, 60.0),
+}
+ROOM2, ROOM3, PROCEDURAL = ROOMS = ("room2", "room3", "procedural_room")  # the last two need no benchmark data
+SENSED = {f"sensors/{name}/{room}": (setting, room) for name, setting in SETTINGS.items() for room in ROOMS}
+
+
+def simulate_room(folder: Path, data: Path, name: str, frames: int, setting: Setting = PAPER) -> None:
     """Write a scene's rig and its truth into a folder. Some five minutes for 60 frames."""
     room = furnished(data)
-    low, high = room.vertices.min(axis=0), room.vertices.max(axis=0)
-    cameras = corner_cameras(low + WALLS, high - np.array(WALLS), count=CAMERAS)
-    simulate_rig(folder, scene(room, data, SPEEDS[name], frames), cameras, RATE)
+    cameras = setting.cameras(room.vertices.min(axis=0) + WALLS, room.vertices.max(axis=0) - np.array(WALLS))
+    moments = scene(room, data, SPEEDS[name] * RATE / setting.rate, frames)
+    simulate_rig(folder, moments, cameras, setting.rate, setting.errors)
 
 
 def furnished(data: Path) -> Mesh:
@@ -65,13 +99,14 @@ def scene(room: Mesh, data: Path, speed: float, count: int) -> Iterator[SceneFra
         yield SceneFrame.of([room], moving)
 
 
-def _at(vertices: Float64[np.ndarray, "T V 3"], time: float) -> Float64[np.ndarray, "V 3"]:
-    before = min(int(time), len(vertices) - 2)
+def _at(frames: Float64[np.ndarray, "T ..."], time: float) -> Float64[np.ndarray, "..."]:
+    """Return what is between two frames."""
+    before = min(int(time), len(frames) - 2)
     share = min(time - before, 1.0)
-    return (1 - share) * vertices[before] + share * vertices[before + 1]
+    return (1 - share) * frames[before] + share * frames[before + 1]
 
 
-FRAMES, RATE, LEFT = 60, 30.0, 28  # frames, 1/s; the frame from which on the crate stands
+FRAMES, LEFT = 60, 28  # at `RATE`; the one from which on the crate stands
 THINGS, PEOPLE = ("crate", "door", "box"), ("person 0", "person 1", "person 2")  # carrier, pusher, sitter
 NAMES = ("room", *THINGS, *PEOPLE)  # in the order of their faces in a frame
 LOW, HIGH = np.array([-1.9, 0.0, -1.75]), np.array([1.9, 2.5, 1.75])  # of the cameras
@@ -107,9 +142,8 @@ ON_TABLE = (1.24, 0.841, -0.08)  # m: the box, set down
 TURNED = -np.pi / 2  # rad: heading to the left, -x
 TO_LEFT, TO_RIGHT = turn_about_y(TURNED), turn_about_y(-TURNED)
 
-Vector = Float64[np.ndarray, "3"]
 PerFrame = Float64[np.ndarray, " T"]
-_Walk = list[tuple[Vector, float, float, float]]  # what a `Pose` begins with, in each frame
+_Walk = Float64[np.ndarray, "T 6"]  # what a `Pose` begins with, in each frame
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,19 +171,26 @@ class Room3:
 
     frames: int = FRAMES  # the first ones
     spacing: float = 0.012  # m, of the grid of people's surface
+    setting: Setting = PAPER
+
+    @property
+    def times(self) -> PerFrame:
+        """Return when the frames are, in frames of the story."""
+        return np.arange(self.frames) * (RATE / self.setting.rate)
 
     def parts(self, number: int) -> list[Mesh]:
         """Return the mesh of each part of a frame in the order of `NAMES`; people and things are closed."""
         still = concatenate([box(corners) for corners in STILL])
-        poses, grid = thing_poses()[number], grid_of_frame(number, self.spacing, 0)
+        time = float(self.times[number])
+        [poses], grid = thing_poses([time]), grid_of_frame(number, self.spacing, 0)
         boxes = ((box(BOXES[name]), pose) for name, pose in zip(THINGS, poses, strict=True))
         things = [Mesh.of(mesh.vertices @ pose[:3, :3].T + pose[:3, 3], mesh.faces) for mesh, pose in boxes]
-        people = [polygonize((figure(pose, 0.7 * self.spacing),), 0.01, grid) for pose in _people(number)]
+        people = [polygonize((figure(pose, 0.7 * self.spacing),), 0.01, grid) for pose in _people(time)]
         return [*(subdivide_midpoint(mesh) for mesh in (still, *things)), *people]
 
-    def record(self, folder: Path, width: int = 640) -> None:
+    def record(self, folder: Path) -> None:
         """Write the rig and its truth, with `parts.npz`; three minutes for 60 frames."""
-        counts, poses = list[list[int]](), thing_poses()[: self.frames]
+        counts, poses = list[list[int]](), thing_poses(self.times)
 
         def frames() -> Iterator[SceneFrame]:
             for number in range(self.frames):
@@ -157,8 +198,7 @@ class Room3:
                 counts.append([len(part.faces) for part in parts])
                 yield SceneFrame(concatenate(parts), np.repeat(moving_parts(poses)[number], counts[-1]))
 
-        cameras = corner_cameras(LOW, HIGH, width)
-        simulate_rig(folder, frames(), cameras, RATE)
+        simulate_rig(folder, frames(), self.setting.cameras(LOW, HIGH), self.setting.rate, self.setting.errors)
         with replacing(folder / TRUTH / PARTS) as file:
             np.savez_compressed(file, allow_pickle=False, faces=np.array(counts), poses=poses)
 
@@ -171,31 +211,31 @@ def read_parts(rig: Path) -> Parts | None:
         return Parts(archive["faces"], archive["poses"])
 
 
-def thing_poses() -> Float64[np.ndarray, "T K 4 4"]:
-    """Return the poses of crate, door and box in all frames."""
+def thing_poses(times: Sequence[float] | PerFrame = range(FRAMES)) -> Float64[np.ndarray, "T K 4 4"]:
+    """Return the poses of crate, door and box at some times, in frames."""
     carrier, pusher = _walks()
-    poses, down = np.tile(np.eye(4), (FRAMES, len(THINGS), 1, 1)), _eased(45, 56)[:, None]
-    poses[:, 0, :3, 3] = [pusher[min(number, LEFT)][0] + TO_LEFT @ ARM for number in range(FRAMES)]
+    poses, down = np.tile(np.eye(4), (len(times), len(THINGS), 1, 1)), _eased(45, 56, times)[:, None]
+    poses[:, 0, :3, 3] = [_at(pusher, min(time, LEFT))[:3] + TO_LEFT @ ARM for time in times]
     poses[:, 1, :3, 3] = HINGE
-    poses[:, 1, :3, :3] = [turn_about_y(OPEN * share) for share in _eased(3, 27)]
-    poses[:, 2, :3, 3] = (1 - down) * [place + TO_RIGHT @ HELD for place, *_ in carrier] + down * ON_TABLE
+    poses[:, 1, :3, :3] = [turn_about_y(OPEN * share) for share in _eased(3, 27, times)]
+    poses[:, 2, :3, 3] = (1 - down) * [_at(carrier, time)[:3] + TO_RIGHT @ HELD for time in times] + down * ON_TABLE
     poses[:, 2, :3, :3] = TO_RIGHT
     return poses
 
 
-def _people(number: int) -> tuple[Pose, Pose, Pose]:
+def _people(time: float) -> tuple[Pose, Pose, Pose]:
     """Return the poses of the carrier, the pusher and the sitter."""
-    carrier, pusher = _walks()
-    held, seat = thing_poses()[number, 2, :3, 3], np.array([1.38, SOLE, 1.15])
+    carrier, pusher = ((row[:3], row[3], row[4], row[5]) for row in (_at(walk, time) for walk in _walks()))
+    held, seat = thing_poses([time])[0, 2, :3, 3], np.array([1.38, SOLE, 1.15])
     hands = _both(held, TO_RIGHT, (0.17, 0.0, -0.1))
-    grips = _both(pusher[number][0], TO_LEFT, (0.12, 0.84, 0.33))
+    grips = _both(pusher[0], TO_LEFT, (0.12, 0.84, 0.33))
     knees = _both(seat, TO_LEFT, (0.12, 0.6, 0.06))
-    bow, on = 0.15 * _eased(45, 56)[number], 1 - _eased(27, 35)[number]
-    down = _eased(4, 24)[number] * (1 - _eased(34, 57)[number])
+    bow, on, sits, rises = (_eased(*span, [time])[0] for span in ((45, 56), (27, 35), (4, 24), (34, 57)))
+    on, down = 1 - on, sits * (1 - rises)
     hips, lean = (-0.4 * down, -0.36 * down), 0.55 * np.sin(np.pi * down)
     return (
-        Pose(*carrier[number], wrists=hands, reach=(1.0, 1.0), lean=bow),
-        Pose(*pusher[number], wrists=grips, reach=(on, on), lean=0.5 * on, girth=1.1),
+        Pose(*carrier, wrists=hands, reach=(1.0, 1.0), lean=0.15 * bow),
+        Pose(*pusher, wrists=grips, reach=(on, on), lean=0.5 * on, girth=1.1),
         Pose(seat, TURNED, 0.25, 0.0, knees, (down, down), hips=hips, lean=lean, size=0.98, girth=0.92),
     )
 
@@ -217,10 +257,10 @@ def _walked(start: tuple[float, float, float], speeds: PerFrame, headings: PerFr
     ways = np.stack([np.sin(headings), np.zeros(FRAMES), np.cos(headings)], axis=1)
     steps = np.concatenate([[0.0], speeds[:-1] / RATE])
     places = start + np.cumsum(steps[:, None] * np.roll(ways, 1, axis=0), axis=0)
-    return list(zip(places, headings, np.cumsum(steps) / CYCLE, STRIDE * np.minimum(speeds, 1.0), strict=True))
+    return np.column_stack([places, headings, np.cumsum(steps) / CYCLE, STRIDE * np.minimum(speeds, 1.0)])
 
 
-def _eased(first: int, last: int) -> PerFrame:
-    """Return a smooth step over the frames: 0 up to `first`, 1 from `last` on."""
-    share = np.clip((np.arange(FRAMES) - first) / (last - first), 0, 1)
+def _eased(first: int, last: int, times: Sequence[float] | PerFrame = range(FRAMES)) -> PerFrame:
+    """Return a smooth step over times, in frames: 0 up to `first`, 1 from `last` on."""
+    share = np.clip((np.asarray(times) - first) / (last - first), 0, 1)
     return share * share * (3 - 2 * share)

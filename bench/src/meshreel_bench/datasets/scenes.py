@@ -18,7 +18,7 @@ from meshreel.analysis.scene.segmentation import segment
 from meshreel.capture.recording import FusionOptions, Recording, open_recording
 from meshreel.capture.rig.rig import RIG
 from meshreel.capture.simulated import demo_room
-from meshreel.capture.simulated.simulated_rig import TRUTH, Truth, read_truth
+from meshreel.capture.simulated.simulated_rig import TRUTH, Truth, read_truth, simulate_rig
 from meshreel.geometry.closest_points import Surface, carried_labels
 from meshreel.geometry.decimate import decimate_faces
 from meshreel.geometry.derived_sequences import DerivedSequence
@@ -29,6 +29,7 @@ from meshreel.metrics.scene_accuracy import Scene, Sight
 from meshreel.types import Mesh, MeshSequence, evenly
 
 from . import rooms
+from .rooms import PROCEDURAL, ROOM3, SENSED
 
 
 class Captured(DerivedSequence):
@@ -48,10 +49,9 @@ class Captured(DerivedSequence):
 
 
 SCENES = tuple(rooms.SPEEDS)
-ROOM3 = "room3"  # needs no benchmark data
 TRUE = "truth"  # labels: those of the nearest clean faces
+SPACING = 0.015  # m, of the grid of people in the procedural room, where sensors of full size see it
 FOUND = "found"  # labels: those that the encoder finds
-PROCEDURAL = "procedural_room"  # the room of `meshreel demo`: needs no benchmark data
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -134,12 +134,16 @@ def open_scene(name: str, data: Path, cache: Path, frames: int | None = None) ->
     rig, meshes = folder / "rig", folder / "meshes"
     if not (rig / RIG).exists():
         count = rooms.FRAMES if frames is None else frames
+        setting, room = SENSED.get(name, (rooms.PAPER, name))
         if name == PROCEDURAL:
             demo_room.record_room(rig, demo_room.RoomOptions(count))
-        elif name == ROOM3:
-            rooms.Room3(count).record(rig)
+        elif room == PROCEDURAL:
+            moments = demo_room.furnished_room(demo_room.RoomOptions(count, setting.rate, SPACING))
+            simulate_rig(rig, moments, setting.cameras(*demo_room.BOX), setting.rate, setting.errors)
+        elif room == ROOM3:
+            rooms.Room3(count, setting=setting).record(rig)
         else:
-            rooms.simulate_room(rig, data, name, count)
+            rooms.simulate_room(rig, data, room, count, setting)
     fusion = FusionOptions(demo_room.VOXEL) if name == PROCEDURAL else FusionOptions()
     recording, _ = open_recording(rig, fusion, keep=False)
     return SceneData(name, folder, Captured(recording, meshes), read_truth(rig / TRUTH), rooms.read_parts(rig))

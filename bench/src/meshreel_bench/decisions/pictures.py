@@ -15,13 +15,7 @@ import numpy as np
 from jaxtyping import Float64
 
 from meshreel.analysis.fit.surface_fit import Fit, FitOptions, fit_frames
-from meshreel.analysis.reference.centers import (
-    bind,
-    center_motions,
-    largest_distances,
-    move,
-    reference_centers,
-)
+from meshreel.analysis.reference.centers import bind, center_motions, largest_distances, move, reference_centers
 from meshreel.analysis.reference.extraction import MDS, Reference, extract_reference, predict
 from meshreel.analysis.reference.track import track_centers
 from meshreel.analysis.survey import survey_sequence

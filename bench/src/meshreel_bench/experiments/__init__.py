@@ -21,6 +21,7 @@ EXPERIMENTS: dict[str, Study] = {
     "ablation_stages": ablations.STAGES,
     "ablation_scene": ablations.SCENE,
     "scenes": scenes.STUDY,
+    "sensors": scenes.SENSORS,
     "recordings": scenes.RECORDINGS,
     "long_takes": scenes.LONG_TAKES,
     "layers": layers.STUDY,

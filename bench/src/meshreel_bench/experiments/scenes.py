@@ -5,6 +5,7 @@ Anchor a is decimated Draco of whole frames, anchor b a background once and deci
 
 from __future__ import annotations
 
+from ..datasets.rooms import SENSED
 from ..names import BEST, PAINTED, TEXTURED
 from .study import (
     D2,
@@ -154,6 +155,27 @@ STUDY = Study(
     promises=PROMISES,
     floors=(ROOM, STANDING, ROOM3),
     notes=NOTES,
+)
+SENSORS = Study(
+    title="Sensors against the truth",
+    sequences=tuple(SENSED),
+    sweeps=(Sweep("meshreel", {}, {"preset": "best", "quality": 50.0}),),
+    metrics="regions",
+    measures=MEASURES,
+    promises=tuple(
+        Reaches(
+            f"{name}: people to the truth against the noisy input: median distance, coverage",
+            Which(name, BEST),
+            (_over_input("truth_people_median_m", 0.0, "m"), _over_input("truth_people_covered", -0.005, least=True)),
+        )
+        for name in SENSED
+    ),
+    floors=tuple(SENSED),
+    frames={name: max(10, min(30, round(2 * setting.rate))) for name, (setting, _) in SENSED.items()},
+    notes=(
+        "Four cameras with the errors that are published of them see a room from corners, from overhead or from low",
+        "down, 5 to 60 times a second: at most 30 frames, or two seconds.",
+    ),
 )
 
 

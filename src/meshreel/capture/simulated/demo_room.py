@@ -32,7 +32,7 @@ VOXEL = 0.03  # m, for the fusion of such pictures (guess)
 SIZE = (3.0, 1.7, 2.6)  # m, of the room; its origin is the middle of the floor (guess)
 _FACE = 0.1  # m, about the side length of the room's faces (guess)
 # m, box of the cameras: inside the walls, outside the open sides (guess).
-_LOW, _HIGH = (-1.4, 0.0, -1.2), (1.7, 2.3, 1.6)
+BOX = np.array([[-1.4, 0.0, -1.2], [1.7, 2.3, 1.6]])
 _CIRCLE, _SPEED = 0.8, 0.8  # m and m/s, of the walk around the middle (guess)
 _CYCLE, _STRIDE = 0.9, 0.42  # m walked in a step cycle, m of a step (guess)
 _SOLE = 0.01  # m by which feet would sink into the floor (guess)
@@ -130,7 +130,7 @@ def record_room(
 
 def room_cameras(width: int = 320) -> tuple[DepthCamera, ...]:
     """Return depth cameras in the corners that look down at the middle; pictures of `width` x 0.9 `width` pixels."""
-    return corner_cameras(np.array(_LOW), np.array(_HIGH), width)
+    return corner_cameras(BOX[0], BOX[1], width)
 
 
 def _walker(seconds: float) -> Pose:

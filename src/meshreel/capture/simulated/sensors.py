@@ -1,15 +1,15 @@
-"""Models of depth sensors: what one measures of a clean depth picture, and the errors of those on the market."""
+"""Models of depth sensors: where they stand, what one measures of a clean depth picture, and seven of the market."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float64, UInt16
 
 from ...errors import InputError
-from ...geometry.cameras import Camera
+from ...geometry.cameras import Camera, CameraPose, looking_at
 from ..rig.cameras import DepthCamera
 
 Depth = Float64[np.ndarray, "H W"]  # m
@@ -97,6 +97,41 @@ SENSORS = {
         SensorOptions(1.0, 80.0, 0.002, 0.3, deviation=(0.01, 0.0, 0.0), window=9, smooth=1.0, trusted=0.05),
     ),
 }
+
+
+@dataclass(frozen=True, slots=True)
+class Mount:
+    """Places of cameras around a box, and what they look at: its middle."""
+
+    height: float = 0.9  # of the box's, where they stand
+    away: float = math.sqrt(2)  # of half its sides, from its middle axis; the default: through its vertical edges
+    target: float = 0.4  # of its height, where they look
+
+
+CORNERS, OVERHEAD, LOW_DOWN = Mount(), Mount(1.0, 0.5, 0.0), Mount(0.15)
+
+
+def mounted(
+    camera: DepthCamera,
+    low: Float64[np.ndarray, " 3"],
+    high: Float64[np.ndarray, " 3"],
+    count: int = 4,
+    mount: Mount = CORNERS,
+) -> tuple[DepthCamera, ...]:
+    """Return copies of a camera around a box whose corners are `low` and `high`, m; y is up.
+
+    They stand on an ellipse, the first at 45 degrees.
+    """
+    middle, half = (low + high) / 2, (high - low) / 2
+    heights = [low[1] + share * (high[1] - low[1]) for share in (mount.height, mount.target)]
+    cameras = []
+    for number in range(count):
+        angle = math.pi / 4 + 2 * math.pi * number / count
+        across = mount.away * half * (math.sin(angle), 0.0, math.cos(angle))
+        eye, target = (np.array([middle[0], height, middle[2]]) for height in heights)
+        pose = CameraPose.of_camera(looking_at(eye + across, target))
+        cameras.append(replace(camera, name=f"{camera.name}{number}", view=replace(camera.view, pose=pose)))
+    return tuple(cameras)
 
 
 def measured(

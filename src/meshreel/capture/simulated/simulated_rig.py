@@ -20,7 +20,7 @@ import numpy as np
 from jaxtyping import Bool, Float64, Int64, UInt8
 
 from ...errors import InputError
-from ...geometry.cameras import Camera, CameraPose, Rays, looking_at
+from ...geometry.cameras import Camera, Rays
 from ...geometry.strict import products
 from ...geometry.topology import concatenate, face_normals
 from ...io.files import read_file
@@ -29,7 +29,7 @@ from ...io.write import make_folder, replacing, write_file, write_mesh, write_pi
 from ...types import Mesh
 from ..rig.cameras import DepthCamera, posed
 from ..rig.rig import RIG, read_cameras, write_rig
-from .sensors import Depth, SensorOptions, measured
+from .sensors import Depth, SensorOptions, measured, mounted
 
 Pixels = UInt8[np.ndarray, "H W 3"]
 # Colours, 0 to 255, of places and the faces that they are on.
@@ -59,18 +59,6 @@ class SceneFrame:
         return SceneFrame(concatenate(parts), np.repeat(np.arange(len(parts)) >= len(still), faces))
 
 
-@dataclass(frozen=True, slots=True)
-class Mount:
-    """Places of cameras around a box, and what they look at: its middle."""
-
-    height: float = 0.9  # of the box's, where they stand
-    away: float = math.sqrt(2)  # of half its sides, from its middle axis; the default: through its vertical edges
-    target: float = 0.4  # of its height, where they look
-
-
-CORNERS, OVERHEAD, LOW = Mount(), Mount(1.0, 0.5, 0.0), Mount(0.15)
-
-
 def corner_cameras(
     low: Float64[np.ndarray, " 3"], high: Float64[np.ndarray, " 3"], width: int = 640, count: int = 4
 ) -> tuple[DepthCamera, ...]:
@@ -80,29 +68,6 @@ def corner_cameras(
     """
     view = Camera(640, 576, (417.0, 452.0), (320.0, 288.0)).resized(width, round(0.9 * width))
     return mounted(DepthCamera("corner", view, depth_range=(0.25, 8.0)), low, high, count)
-
-
-def mounted(
-    camera: DepthCamera,
-    low: Float64[np.ndarray, " 3"],
-    high: Float64[np.ndarray, " 3"],
-    count: int = 4,
-    mount: Mount = CORNERS,
-) -> tuple[DepthCamera, ...]:
-    """Return copies of a camera around a box whose corners are `low` and `high`, m; y is up.
-
-    They stand on an ellipse, the first at 45 degrees.
-    """
-    middle, half = (low + high) / 2, (high - low) / 2
-    heights = [low[1] + share * (high[1] - low[1]) for share in (mount.height, mount.target)]
-    cameras = []
-    for number in range(count):
-        angle = math.pi / 4 + 2 * math.pi * number / count
-        across = mount.away * half * (math.sin(angle), 0.0, math.cos(angle))
-        eye, target = (np.array([middle[0], height, middle[2]]) for height in heights)
-        pose = CameraPose.of_camera(looking_at(eye + across, target))
-        cameras.append(replace(camera, name=f"{camera.name}{number}", view=replace(camera.view, pose=pose)))
-    return tuple(cameras)
 
 
 def simulate_rig(
