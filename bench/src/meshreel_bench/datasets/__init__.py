@@ -29,7 +29,7 @@ from .checksums import check_source, checksum, known_checksums
 from .long_room import LongRoom
 from .remesh import Place, RemeshOptions, SideBySide, gears, prism, remeshed
 from .rooms import PROCEDURAL, ROOM, ROOM2, ROOM3, SENSED, WALKERS
-from .scenes import SCENES, Captured, SceneData, open_scene
+from .scenes import PEOPLE, SCENES, Captured, SceneData, open_scene
 from .walker import FRAMES, Truth, Walker
 
 DEMO = "demo"  # procedural bodies: needs no benchmark data
@@ -57,7 +57,7 @@ REMESHED = {  # new connectivity in every frame: of a body, its first frames
 RELEASED = ("answering", "drinking", "arena", "sitting", "synthetic")  # folders of the data of TSMC's authors
 LONG, LONG_FRAMES = "synthetic2x150", 150  # crane150, and samba150 that passes close by
 FAR, NEAR = 2.2, 0.5  # m, of the second body's way: surfaces are 1.2 m apart first, 0.06 in the middle, 0.7 last
-NAMES = (DEMO, *SHAPES, SYNTHETIC, LONG, *SCENES, ROOM3, PROCEDURAL, WALKER, *RECORDINGS, *REMESHED, *SENSED)
+NAMES = (DEMO, *SHAPES, SYNTHETIC, LONG, *SCENES, ROOM3, PROCEDURAL, WALKER, *RECORDINGS, *REMESHED, *SENSED, PEOPLE)
 # Endings of names: the same sequence in another order, of the wanted length.
 PLAYED: dict[str, Callable[[MeshSequence, int], MeshSequence]] = {
     "-backwards": lambda sequence, count: picked(sequence, range(len(sequence))[::-1][:count]),
@@ -94,7 +94,7 @@ class Store:
             return Dataset(soft_bodies(SoftBodiesOptions(frames=frames or SoftBodiesOptions().frames)))
         if name in SHAPES:
             return Dataset(SHAPES[name](*([frames] if frames else [])))
-        if name in (*SCENES, ROOM3, PROCEDURAL, *SENSED):
+        if name in (*SCENES, ROOM3, PROCEDURAL, *SENSED, PEOPLE):
             return _scene(name, self.data, frames, self.cache)
         if name in RECORDINGS:
             return _recording(name, self.data, frames, self.cache)

@@ -100,7 +100,7 @@ def scene(room: Mesh, data: Path, speed: float, count: int) -> Iterator[SceneFra
 
 
 def _at(frames: Float64[np.ndarray, "T ..."], time: float) -> Float64[np.ndarray, "..."]:
-    """Return what is between two frames."""
+    """Interpolate values, of which there is one a frame, at a time in frames."""
     before = min(int(time), len(frames) - 2)
     share = min(time - before, 1.0)
     return (1 - share) * frames[before] + share * frames[before + 1]

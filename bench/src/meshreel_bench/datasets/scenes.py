@@ -28,7 +28,7 @@ from meshreel.io.write import frame_names, make_folder, replacing, write_mesh
 from meshreel.metrics.scene_accuracy import Scene, Sight
 from meshreel.types import Mesh, MeshSequence, evenly
 
-from . import rooms
+from . import people, rooms
 from .rooms import PROCEDURAL, ROOM3, SENSED
 
 
@@ -51,6 +51,7 @@ class Captured(DerivedSequence):
 SCENES = tuple(rooms.SPEEDS)
 TRUE = "truth"  # labels: those of the nearest clean faces
 SPACING = 0.015  # m, of the grid of people in the procedural room, where sensors of full size see it
+PEOPLE = "people"  # needs the extra of that name, and no benchmark data
 FOUND = "found"  # labels: those that the encoder finds
 
 
@@ -133,10 +134,12 @@ def open_scene(name: str, data: Path, cache: Path, frames: int | None = None) ->
     folder = cache / (name if frames is None else f"{name}-{frames}")
     rig, meshes = folder / "rig", folder / "meshes"
     if not (rig / RIG).exists():
-        count = rooms.FRAMES if frames is None else frames
+        count = (people.FRAMES if name == PEOPLE else rooms.FRAMES) if frames is None else frames
         setting, room = SENSED.get(name, (rooms.PAPER, name))
         if name == PROCEDURAL:
             demo_room.record_room(rig, demo_room.RoomOptions(count))
+        elif name == PEOPLE:
+            people.People(count).record(rig)
         elif room == PROCEDURAL:
             moments = demo_room.furnished_room(demo_room.RoomOptions(count, setting.rate, SPACING))
             simulate_rig(rig, moments, setting.cameras(*demo_room.BOX), setting.rate, setting.errors)

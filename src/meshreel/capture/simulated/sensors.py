@@ -1,4 +1,4 @@
-"""Models of depth sensors: where they stand, what one measures of a clean depth picture, and seven of the market."""
+"""Models of depth sensors: their places, their measurements of clean depths, and seven of the market."""
 
 from __future__ import annotations
 
@@ -137,7 +137,7 @@ def mounted(
 def measured(
     clean: Depth, camera: DepthCamera, sensor: SensorOptions, random: np.random.Generator
 ) -> UInt16[np.ndarray, "H W"]:
-    """Return what a sensor measures of clean depths, infinite where there is no surface, in units; 0 is nothing."""
+    """Measure clean depths, infinite where there is no surface, by a sensor, in units of its camera; 0 is nothing."""
     from scipy.ndimage import gaussian_filter, uniform_filter
 
     strength = camera.view.focal[0] * sensor.baseline  # m pixels: depth times disparity
@@ -165,7 +165,7 @@ def measured(
 
 
 def _matched(depth: Depth, strength: float, window: int) -> Depth:
-    """Return what both lenses of a pair see: without shadows, near surface wider by half of the window."""
+    """Return the depths that both lenses of a pair see: without shadows, near surface wider by half of the window."""
     if not strength:
         return depth
     from scipy.ndimage import minimum_filter
