@@ -7,19 +7,12 @@ import pytest
 
 import meshreel
 from meshreel.encoder.sequence import encode
-from meshreel.errors import InputError
 from meshreel.geometry.closest_points import distances
 from meshreel.types import MeshList
-from tests.metrics.shapes import moved
 from tests.scales import SCALES, Scale, room
 from tests.small_options import quick
 
-REFUSED = pytest.mark.xfail(strict=True, raises=InputError, reason="refused as too small for a room")
-STOPS = pytest.mark.xfail(strict=True, raises=AssertionError, reason="taken for a scene, and what moves for still")
-ODD_UNIT = pytest.mark.xfail(strict=True, raises=InputError, reason="refused as of two units")
 MARKS = {
-    **dict.fromkeys(("a scan of 12 cm", "a scan of 4 cm"), REFUSED),
-    **dict.fromkeys(("a head in m", "a head in mm", "a tree"), STOPS),
     "a town": pytest.mark.xfail(strict=True, raises=AssertionError, reason="a lorry is smaller than a cell of a town"),
 }
 
@@ -42,16 +35,8 @@ def test_what_moves_is_where_it_was(name: str, tmp_path: Path):
 
 
 @pytest.mark.slow
-@REFUSED
 @pytest.mark.filterwarnings("ignore::UserWarning")
 def test_a_scan_that_is_too_small_for_a_room_is_encoded_as_bodies_and_one_line_says_so(tmp_path: Path):
     small = room().times(0.03)
     summary = encode(MeshList(tuple(small.frames)), tmp_path / "a.reel", options=quick())
     assert summary.scene is None and len([line for line in summary.warnings if "bodies" in line]) == 1
-
-
-@ODD_UNIT
-def test_a_room_with_a_frame_in_another_unit_is_encoded_as_bodies(tmp_path: Path):
-    frames = room().frames
-    frames[1] = moved(frames[1], scale=1000.0)
-    assert encode(MeshList(tuple(frames)), tmp_path / "a.reel", options=quick()).scene is None

@@ -371,10 +371,15 @@ def test_a_background_is_no_finer_than_its_noise_asks_for():
 
 @pytest.mark.usefixtures("plainly")
 def test_a_scene_in_which_nothing_is_found_to_move_gives_a_warning(tmp_path):
-    """Two frames of balls that move by less than two cells."""
-    _, summary = encoded(small_scene.scene(2), tmp_path / "a.reel")
+    _, summary = encoded(small_scene.scene(4, moving=False), tmp_path / "a.reel")
     (warning,) = summary.warnings
     assert warning.startswith("nothing moves by more than 0.16 m") and "--dynamic-only" in warning
+
+
+def test_a_scene_in_which_something_moves_by_less_than_two_cells_is_encoded_as_bodies(tmp_path):
+    _, summary = encoded(small_scene.scene(2), tmp_path / "a.reel")
+    (warning,) = summary.warnings
+    assert "seems to stand still moves" in warning and summary.scene is None
 
 
 @pytest.mark.usefixtures("plainly")

@@ -106,6 +106,7 @@ def test_targets_are_relative_to_the_whole_frame(monkeypatch, tmp_path):
         return iter([EncodedGroup(Form.EMPTY, len(interval.frames), encode_empty(), (), NO_ERROR)])
 
     monkeypatch.setattr(LayersRecipe, "encode", encode)
+    monkeypatch.setattr(LayersRecipe, "judged", False)
     encoded(frames_of([BALL] * 3, [at(4 + t) for t in range(3)]), tmp_path / "a.reel")
     wanted = np.linalg.norm([6, 2, 2]) / np.linalg.norm([8, 2, 2])  # the first frame and the box of all
     assert seen == pytest.approx([wanted, wanted])

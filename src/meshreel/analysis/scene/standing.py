@@ -30,6 +30,7 @@ BORDER = 1.0  # diagonals, least length of the borders of an open surface; holes
 COARSEST = 32  # smallest number of median edge lengths along the diagonal of a captured room (guess)
 SAMPLES = 20_000  # vertices of a frame that are measured (guess)
 REGION = 8.0  # edge lengths, or distances of samples, along a region, in which a median says something (guess)
+KNOWN = 0.5  # least share of the surface of which it is known whether it rests (guess)
 FEWEST = 20  # measurements in a region that is judged (guess)
 RESTS = 3.0  # times the noise of its region: rooms have 1 to 1.5, 2.6 at most in nine of ten regions; motion 5 to 30
 SMOOTH = 8.0  # the same over noise from which what a region does as a whole is left out, where no sensor is known
@@ -96,14 +97,15 @@ def scene_standing(frames: Frames) -> Standing | None:
     still = [np.mean([np.isin(occupied, other).mean() for other in wide]) for occupied in cells]
     if float(np.median(still)) < SHARE:
         return None
-    found = standing(frames)
-    return found if found.area[found.rests].sum() >= SHARE * found.area.sum() else None
+    found, whole = standing(frames), float(np.mean([face_normals(mesh)[1].sum() for mesh in meshes]))
+    rests, known = float(found.area[found.rests].sum()), float(found.area.sum())
+    return found if rests >= SHARE * known and known >= KNOWN * whole else None
 
 
 def standing(frames: Frames) -> Standing:
     """Measure the regions of a sequence's surface in `PROBES` frames, and in the frames before and after each."""
-    last = len(frames) - 1
-    middles = sorted({min(max(number, 1), max(last - 1, 0)) for number in evenly(len(frames), PROBES)})
+    last, some = len(frames) - 1, evenly(len(frames), PROBES)
+    middles = sorted({min(max(number, 1), last - 1) for number in some} if last > 2 else some)
     probes = {number: _Probe.of(frames[number]) for number in middles if not frames[number].is_empty}
     asked = dict[int, list[tuple[_Probe, bool]]]()  # by frame: probes whose samples are looked for, as at another time
     for middle, probe in probes.items():
@@ -145,7 +147,7 @@ class _Probe:
         hits = surface.closest(self.points)
         ways = hits.points - self.points
         found = np.copysign(np.linalg.norm(ways, axis=1), (ways * self.normals).sum(axis=1))
-        found[surface.past_border(hits)] = np.nan
+        found[surface.past_border(hits) & (np.abs(found) > EXACT * self.diagonal)] = np.nan
         return found
 
 

@@ -26,9 +26,9 @@ from ..settings.options import Recipe
 
 SAMPLES = 4000  # vertices of a surface that look for the other one (guess)
 NEAR = (0.006, 4.0)  # diagonals, and times the noise, within which surface is covered: 1 cm on a body
-# Shares of the surface, of clean frames and of noisy ones. Measured at qualities 10 to 95: clean ones lose .001 at
+# Shares of the surface, of clean frames and of noisy ones. Measured at qualities 10 to 95: clean bodies lose .001 at
 # most, noisy ones .07, of which .016 in one piece.
-LOST, PIECE, INVENTED = (0.02, 0.2), (0.01, 0.05), (0.02, 0.6)
+LOST, PIECE, INVENTED = (0.05, 0.2), (0.01, 0.05), (0.02, 0.6)
 DISTANCE = 4.0  # times the distance to reach that a clean frame may have: 1.5 at most was seen
 
 
