@@ -228,8 +228,8 @@ class LocalNoise:
 
     @staticmethod
     def of(
-        places: list[Float64[np.ndarray, "N 3"]],
-        gaps: list[Float64[np.ndarray, " N"]],
+        places: list[Float64[np.ndarray, "_ 3"]],
+        gaps: list[Float64[np.ndarray, " _"]],
         fine: float,
         wide: float,
         cameras: tuple[Camera, ...] = (),

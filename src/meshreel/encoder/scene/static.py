@@ -67,11 +67,11 @@ def encode_static(
     """
     survey = parts.survey
     place = Placement(survey.unit, tuple(survey.center))
-    usual = float(np.median(parts.noise.deviation)) if len(parts.noise.deviation) else 0.0
+    usual = float(np.median(parts.noise.off)) if len(parts.noise.off) else 0.0
     step = options.lattice * max(usual / survey.unit, LEAST_NOISE)
 
     def coded(mesh: Mesh) -> tuple[bytes, Mesh]:
-        most = options.coarse * np.maximum(parts.noise.at(mesh.vertices)[1] / survey.unit, LEAST_NOISE)
+        most = options.coarse * np.maximum(parts.noise.at(mesh.vertices)[2] / survey.unit, LEAST_NOISE)
         return _coded(mesh.at((mesh.vertices - survey.center) / survey.unit), most, step)
 
     payload, state = coded(parts.background)
