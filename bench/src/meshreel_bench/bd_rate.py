@@ -41,8 +41,6 @@ class Curve:
 class BdRate:
     """BD-rate of a test curve against an anchor, or the reason why there is none."""
 
-    anchor: str
-    test: str
     percent: float | None  # mean change of rate against the anchor; negative is a saving
     low: float  # quality range that both curves reach
     high: float
@@ -58,17 +56,17 @@ def bd_rate(anchor: Curve, test: Curve, highest: float = math.inf) -> BdRate:
     """
     a, b = _front(anchor), _front(test)
     counts = (len(a), len(b))
-    for curve, points in ((anchor, a), (test, b)):
-        if len(points) < 2:
-            reason = f"{curve.name} has {len(points)} usable points; at least 2 are needed"
-            return BdRate(anchor.name, test.name, None, math.nan, math.nan, counts, reason)
+    for curve, count in zip((anchor, test), counts, strict=True):
+        if count < 2:
+            reason = f"{curve.name} has {count} usable points; at least 2 are needed"
+            return BdRate(None, math.nan, math.nan, counts, reason)
     low, high = float(max(a[0, 0], b[0, 0])), float(min(a[-1, 0], b[-1, 0], highest))
     if low >= high:
         below = "" if math.isinf(highest) else f" below {highest:.4g}"
         reason = f"no common quality{below}: {_range(anchor.name, a)}, {_range(test.name, b)}"
-        return BdRate(anchor.name, test.name, None, low, high, counts, reason)
+        return BdRate(None, low, high, counts, reason)
     mean = float(_log_rate(b).integrate(low, high) - _log_rate(a).integrate(low, high)) / (high - low)
-    return BdRate(anchor.name, test.name, 100 * math.expm1(mean), low, high, counts)
+    return BdRate(100 * math.expm1(mean), low, high, counts)
 
 
 def bd_bound(anchor: Curve, test: Curve, highest: float = math.inf) -> BdRate:
@@ -84,7 +82,7 @@ def bd_bound(anchor: Curve, test: Curve, highest: float = math.inf) -> BdRate:
     if not low < high <= b[0, 0]:
         return found
     mean = float(b[0, 1]) - float(_log_rate(a).integrate(low, high)) / (high - low)
-    return BdRate(anchor.name, test.name, 100 * math.expm1(mean), low, high, found.points, at_most=True)
+    return BdRate(100 * math.expm1(mean), low, high, found.points, at_most=True)
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,8 +113,7 @@ def reach(curve: Curve) -> tuple[tuple[float, float], tuple[float, float]] | Non
 class GainEnd:
     """Highest quality at which a codec needs less rate than its anchor, within the range that both reach."""
 
-    quality: float | None = None  # where the curves cross; None: no gain, or no overlap
-    reached: bool = False  # False: the gain lasts to the end of the overlap, and `quality` is that end
+    quality: float | None = None  # where the curves cross, or the end of the overlap; None: no gain, or no overlap
     where: str = "no gain at any common quality"  # or what ends the gain, without numbers
     share: float = 0.0  # of the overlap, in quality, over which there is a gain
 
@@ -148,8 +145,8 @@ def gain_end(anchor: Curve, test: Curve) -> GainEnd:
     if len(gains) == 0:
         return GainEnd()
     end = "the codec's best point, still a gain" if b[-1, 0] <= a[-1, 0] else "the anchors' best point"
-    reached = bool(gains[-1] < _GRID - 1)
-    return GainEnd(float(at[gains[-1]]), reached, "the curves cross" if reached else end, len(gains) / _GRID)
+    where = "the curves cross" if gains[-1] < _GRID - 1 else end
+    return GainEnd(float(at[gains[-1]]), where, len(gains) / _GRID)
 
 
 def beats(test: Curve, anchor: Curve, least: float = 0.0) -> bool | None:

@@ -31,6 +31,7 @@ HELP = "Measure codecs against each other, and make tables and plots of the rows
 CACHE = ".cache"  # ending of the folder beside the rows where sequences are kept
 DATA = Path("../shared/data")
 LONGEST = 1e6  # s, of a point: eleven days
+Output = Annotated[Path, Parameter(name=["--output", "-o"])]
 command = App(name="bench", help=HELP)  # of `meshreel bench`
 
 
@@ -81,8 +82,7 @@ class Selection:
                 raise InputError(f"--on {each!r}: the name is not UTF-8, which rows are; rename it")
         added = [Sweep(codec, {}, options) for codec, options in map(operating_point, self.add)]
         wider = replace(study, sequences=on if others else study.sequences, sweeps=(*study.sweeps, *added))
-        every = wider.points(self.small)
-        points = list({point.key: point for point in every}.values())  # what is added may be there already
+        points = list({point.key: point for point in wider.points(self.small)}.values())  # added ones may be there
         points = [point for point in points if point.codec in (self.only or [point.codec])]
         points = [point for point in points if point.sequence in (on or [point.sequence])]
         if not points:
@@ -121,7 +121,7 @@ def run(
     experiment: str,
     /,
     *,
-    output: Annotated[Path, Parameter(name=["--output", "-o"])],
+    output: Output,
     selection: Selection = Selection(),
     running: Running = Running(),
     reading: Reading = Reading(),
@@ -170,9 +170,7 @@ def run(
 
 
 @command.command
-def report(
-    rows: list[Path], /, *, output: Annotated[Path, Parameter(name=["--output", "-o"])], common: Common = Common()
-) -> None:
+def report(rows: list[Path], /, *, output: Output, common: Common = Common()) -> None:
     """Write pages, plots and tables from measured rows alone.
 
     `results.md` is the first page; `results/` beside it has an appendix and a plot for each experiment; rows on the
@@ -185,13 +183,14 @@ def report(
     output
         The folder to write into.
     """
-    files = list[list[Row]]()
-    for path in rows:
-        files.append(read_rows(path))
-        if not files[-1]:
-            raise InputError(f"{path}: has no rows; make some with `meshreel-bench run`")
-    joined = join_rows(files)
-    check_one_source(joined)
+    files = {path: read_rows(path) for path in rows}
+    if empty := [path for path, found in files.items() if not found]:
+        raise InputError(f"{empty[0]}: has no rows; make some with `meshreel-bench run`")
+    joined, sources = join_rows(files.values()), dict[str, str | None]()
+    for row in joined:
+        if sources.setdefault(row.point.sequence, row.source) != row.source:
+            text = f"rows of {row.point.sequence} are of sequences of different content, or read in different ways"
+            raise InputError(f"{text}; make a report of each, or delete the lines of one")
     common.warn(tuple(describe(row) for row in parted(joined)[1]))
     written = [str(path) for path in write_report(joined, output)]
     found = [verdict for part in parts_of(joined) for verdict in verdicts(part.study, part.rows)]
@@ -221,30 +220,16 @@ def codecs(*, common: Common = Common()) -> None:
     common.result({"codecs": found}, table)
 
 
-def check_one_source(rows: Sequence[Row]) -> None:
-    """Raise InputError if rows under one name were measured on sequences of different content."""
-    sources: dict[str, str | None] = {}
-    for row in rows:
-        if sources.setdefault(row.point.sequence, row.source) != row.source:
-            text = f"rows of {row.point.sequence} are of sequences of different content, or read in different ways"
-            raise InputError(f"{text}; make a report of each, or delete the lines of one")
-
-
 def describe(row: Row) -> str:
-    """Return a row in one line."""
+    """Return a row in one line: rate, quality and time of a point, or the reason of its failure."""
     options = " ".join(f"{name} {option}" for name, option in row.options.items() if option is not None)
-    line = f"{row.point.sequence} {row.name} {options}: {_measured(row)}"
-    return "".join(sign if sign.isprintable() else "?" for sign in " ".join(line.split()))
-
-
-def _measured(row: Row) -> str:
-    """Return rate, quality and time of a point, or the reason of its failure."""
-    if row.failed:
-        return f"failed: {row.failed}"
+    units = {"d2_psnr_paper": "dB", "truth_d2_psnr_backward": "dB to the truth", "encode_s": "s/frame"}
+    found = [(value(row, key), unit) for key, unit in (units | {"iou_mean": "IoU"}).items()]
     parts = [f"{row.mbps:.3f} Mbps"] if row.stream else []
-    shown = (("d2_psnr_paper", "dB"), ("truth_d2_psnr_backward", "dB to the truth"), ("encode_s", "s/frame"))
-    found = [(value(row, key), unit) for key, unit in (*shown, ("iou_mean", "IoU"))]
-    return ", ".join([*parts, *(f"{number:.2f} {unit}" for number, unit in found if number is not None)])
+    parts += [f"{number:.2f} {unit}" for number, unit in found if number is not None]
+    measured = f"failed: {row.failed}" if row.failed else ", ".join(parts)
+    line = f"{row.point.sequence} {row.name} {options}: {measured}"
+    return "".join(sign if sign.isprintable() else "?" for sign in " ".join(line.split()))
 
 
 def verdict_table(found: Sequence[Verdict]) -> Table | str:

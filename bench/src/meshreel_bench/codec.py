@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import asdict
-from typing import Any, Protocol, cast, runtime_checkable
+from typing import Any, Protocol, TypeVar, cast, runtime_checkable
 
 from meshreel.decoder.video import open as open_video
 from meshreel.types import Mesh, MeshSequence
@@ -12,6 +12,15 @@ from meshreel.types import Mesh, MeshSequence
 from .rows import ColorBytes
 
 Progress = Callable[[str, int, int], None]  # stage, frames done, frames of the sequence
+Item = TypeVar("Item")
+
+
+def reported(items: Iterable[Item], progress: Progress | None, stage: str, count: int) -> Iterator[Item]:
+    """Yield items, of which there are `count`, and report each when the next one is asked for."""
+    for number, item in enumerate(items, 1):
+        yield item
+        if progress is not None:
+            progress(stage, number, count)
 
 
 @runtime_checkable

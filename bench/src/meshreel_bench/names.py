@@ -45,11 +45,8 @@ def title(name: str) -> str:
     begin, end = f"{TUNED}, ", TSMC.removeprefix(TUNED)  # of a variant of which m is varied
     if name.startswith(begin) and name.endswith(end):
         return f"{_TITLES[TSMC]}, {name.removeprefix(begin).removesuffix(end)}"
-    known = [base for base in _TITLES if name == base or name.startswith(f"{base}, ")]
-    if not known:
-        return name
-    base = max(known, key=len)
-    return _TITLES[base] + name[len(base) :]
+    base = max((base for base in _TITLES if name == base or name.startswith(f"{base}, ")), key=len, default="")
+    return _TITLES.get(base, "") + name[len(base) :]
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,12 +86,9 @@ KNOWN: dict[str, Look] = {
     "b: background once, decimated Draco": Look("#000000", "<"),
     "b: background once, decimated Draco, subdivided": Look("#777777", "H"),
     "b: background once, decimated Draco, labels found": Look("#8F8F1F", "x", size=4.2),
-    **{
-        f"level {level}, {rate} Hz": Look(color, marker)
-        for rate, color in ((24, "#009E73"), (30, "#0072B2"), (72, "#D55E00"))
-        for level, marker in enumerate("vos")
-    },
 }
+for _rate, _color in ((24, "#009E73"), (30, "#0072B2"), (72, "#D55E00")):
+    KNOWN |= {f"level {level}, {_rate} Hz": Look(_color, marker) for level, marker in enumerate("vos")}
 # For all others, by their place among the sorted names: 8 colors and 5 markers make 40 pairs.
 _COLORS = ("#882255", "#6699CC", "#999933", "#332288", "#AA4499", "#661100", "#44AA99", "#66A61E")
 _MARKERS = (">", "p", "<", "H", "d")

@@ -42,7 +42,5 @@ def parallel_views_around(box: Box, size: int = 512) -> list[OrthographicCamera]
     ViewOptions(size, size)
     across, height = extent(box, "y")
     pixel = MARGIN * max(across, height) / size
-    return [
-        OrthographicCamera(size, size, pixel, looking(box.center, axes, 0.0), back=2 * (across + height))
-        for axes in sides("y")
-    ]
+    ways, back = (looking(box.center, axes, 0.0) for axes in sides("y")), 2 * (across + height)
+    return [OrthographicCamera(size, size, pixel, way, back) for way in ways]

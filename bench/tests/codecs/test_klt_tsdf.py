@@ -8,22 +8,22 @@ from jaxtyping import TypeCheckError
 from meshreel_bench.codecs import make_codec
 from meshreel_bench.codecs.klt_tsdf import (
     KltTsdfCodec,
+    Video,
     decode_bits,
     decode_places,
     encode_bits,
     encode_places,
-    open_video,
 )
 from meshreel_bench.codecs.klt_tsdf.components import (
     MOST,
     ONE,
     Field,
-    basis_of,
     cells_at,
     crossed,
     decode_basis,
     encode_basis,
     learned,
+    model_of,
     polygonize,
 )
 from meshreel_bench.codecs.klt_tsdf.grid import VOLUME, prepared, sample, voxel_index
@@ -189,12 +189,12 @@ def test_the_basis_is_in_the_stream_orthonormal_to_its_rounding_and_survives_cod
     table = encode_basis(learned(SMALL.basis)[0])
     assert table in stream and 0 < len(table) < 30 * SMALL.basis
     symbols, energies = learned(MOST)
-    basis = basis_of(symbols)
+    basis = model_of(symbols, 1)
     gram = basis.vectors.T @ basis.vectors / ONE**2 / VOLUME
     assert np.abs(gram - np.eye(MOST)).max() < 0.02
     assert (np.diff(energies) <= 0).all()
     again = decode_basis(encode_basis(symbols), MOST)
-    assert np.array_equal(basis_of(again).vectors, basis.vectors)
+    assert np.array_equal(model_of(again, 1).vectors, basis.vectors)
     assert (basis.vectors == np.rint(basis.vectors)).all()
 
 
@@ -236,7 +236,7 @@ def test_every_truncation_every_extra_byte_and_a_byte_that_is_wrong_is_refused(s
     for place in range(0, len(stream), 37):
         assert outcome(stream[:place] + bytes([stream[place] ^ 1]) + stream[place + 1 :]) == "refused"
     with pytest.raises(FormatError, match="no stream of klt_tsdf"):
-        open_video(b"MREL" + bytes(40))
+        Video(b"MREL" + bytes(40))
 
 
 def test_a_box_of_more_blocks_than_memory_is_for_is_refused():

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from meshreel_bench.datasets import NAMES, Store
 from meshreel_bench.datasets import people as module
-from meshreel_bench.datasets.people import CAST, FRAMES, People
+from meshreel_bench.datasets.people import CAST, FRAMES, bodies, record_people
 
 from meshreel.capture.rig.rig import read_rig
 from meshreel.capture.simulated.simulated_rig import TRUTH, read_truth
@@ -22,14 +22,14 @@ SITTER, WOMAN, MAN, DANCER, CHILD, TODDLER = range(len(CAST))
 @pytest.fixture(scope="module")
 def moments():
     """Bodies of some frames: apart, seated, in arms, and the one after."""
-    return {number: People().bodies(number) for number in (0, 75, 90, 91)}
+    return {number: bodies(number) for number in (0, 75, 90, 91)}
 
 
 @anny_only
 def test_bodies_are_finite_and_stand_on_the_floor(moments):
-    for number, bodies in moments.items():
-        assert len(bodies) == len(CAST) == 6
-        for which, body in enumerate(bodies):
+    for number, people in moments.items():
+        assert len(people) == len(CAST) == 6
+        for which, body in enumerate(people):
             assert np.isfinite(body.vertices).all() and 0 <= body.faces.min() <= body.faces.max() < len(body.vertices)
             assert np.array_equal(body.faces, moments[0][which].faces)
             assert body.vertices[:, 1].min() == pytest.approx(CAST[which].motion(number / 30).lift, abs=1e-9)
@@ -42,25 +42,25 @@ def test_there_are_children_and_large_people_who_sit_and_hug(moments):
     high = [body.vertices[:, 1].max() for body in moments[0]]
     assert high[TODDLER] < 1.0 < high[CHILD] < 1.45 < min(high[WOMAN], high[DANCER]) and max(high) < 2.0
     assert moments[90][SITTER].vertices[:, 1].max() < high[SITTER] - 0.3
-    gaps = [distances(bodies[WOMAN].vertices, bodies[MAN]).min() for bodies in (moments[0], moments[75])]
+    gaps = [distances(people[WOMAN].vertices, people[MAN]).min() for people in (moments[0], moments[75])]
     assert gaps[0] > 0.2 and gaps[1] < 0.01
 
 
 @anny_only
 def test_the_same_frame_has_equal_bits(moments):
-    again = People().bodies(75)
+    again = bodies(75)
     assert all(np.array_equal(a.vertices, b.vertices) for a, b in zip(moments[75], again, strict=True))
 
 
 @anny_only
 def test_a_rig_has_people_as_what_moves_in_its_truth(tmp_path, monkeypatch):
     monkeypatch.setattr(module, "corner_cameras", partial(module.corner_cameras, width=96, count=1))
-    People(1).record(tmp_path)
-    truth, bodies = read_truth(tmp_path / TRUTH), People().bodies(0)
+    record_people(tmp_path, 1)
+    truth, people = read_truth(tmp_path / TRUTH), bodies(0)
     assert len(read_rig(tmp_path).frames) == len(truth) == 1
-    assert truth[0].dynamic.sum() == sum(len(body.faces) for body in bodies)
+    assert truth[0].dynamic.sum() == sum(len(body.faces) for body in people)
     moving = truth[0].mesh.faces[truth[0].dynamic]
-    assert np.allclose(truth[0].mesh.vertices[moving[-1]], bodies[-1].vertices[bodies[-1].faces[-1]], atol=1e-5)
+    assert np.allclose(truth[0].mesh.vertices[moving[-1]], people[-1].vertices[people[-1].faces[-1]], atol=1e-5)
 
 
 def test_without_the_package_the_extra_is_named(tmp_path, monkeypatch):

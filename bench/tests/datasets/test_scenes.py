@@ -23,7 +23,7 @@ from meshreel_bench.datasets.rooms import (
     moving_parts,
     thing_poses,
 )
-from meshreel_bench.datasets.scenes import TRUE, Captured, SceneFrames, open_scene, true_scene
+from meshreel_bench.datasets.scenes import TRUE, Captured, SceneFrames, open_scene
 from meshreel_bench.measure.metrics import Measured, _flicker, measure_frames, missed, part_values
 from meshreel_bench.measure.point import measure_point
 from meshreel_bench.report.values import value
@@ -113,7 +113,7 @@ def test_an_anchor_decodes_to_the_scene(scene, name, options):
     data = codec.encode(SceneFrames(scene, (0, 2)))
     decoded = codec.decode(data)
     assert len(decoded) == 2
-    row = compare_with_truth(SceneFrames(scene, (0, 2)), decoded, lambda k: true_scene(scene.truth, 2 * k), [0, 1])
+    row = compare_with_truth(SceneFrames(scene, (0, 2)), decoded, lambda k: scene.true(2 * k), [0, 1])
     assert row["decoded"]["people_median_m"] < 0.005 and row["decoded"]["background_median_m"] < 0.005
     assert row["decoded"]["covered"] > 0.9 and row["decoded"]["people_covered"] > 0.9
     if not options.get("levels"):  # decimation denoises

@@ -19,7 +19,22 @@ def codec_names() -> list[str]:
 
 def make_codec(name: str, options: dict[str, Any]) -> Codec:
     """Return the codec of that name at the operating point `options`. Raises InputError where there is none."""
-    made = _called(name, _loaded(name), options)
+    if (entry := _entry(name)) is None:
+        raise InputError(f"no codec is called {name!r}; known: {', '.join(codec_names())}")
+    try:
+        make = entry.load()
+    except (Exception, SystemExit) as error:  # importing a package may raise anything
+        reason = error if isinstance(error, ImportError) else f"{type(error).__name__}: {error}"
+        raise InputError(f"codec {name!r} cannot be loaded ({reason}); install what its package needs") from error
+    if not callable(make):
+        raise InputError(f"codec {name!r} is a {type(make).__name__}; its entry point must name a class or a function")
+    try:
+        made = make(**options)
+    except InputError:
+        raise  # its message says which value is wrong
+    except (Exception, SystemExit) as error:  # a constructor may raise anything
+        reason = error if isinstance(error, TypeError) else f"{type(error).__name__}: {error}"
+        raise InputError(f"codec {name!r} does not take {options}: {reason}") from error
     try:
         whole = isinstance(made, Codec)  # evaluates properties
     except (Exception, SystemExit) as error:
@@ -45,26 +60,3 @@ def _entry(name: str) -> Any:  # a class of its own with `importlib_metadata`, w
         owners = " and ".join(entry.dist.name if entry.dist else entry.value for entry in found)
         raise InputError(f"{owners} both bring a codec {name!r}; uninstall one, or give its codec another name")
     return found[0] if found else None
-
-
-def _loaded(name: str) -> Any:
-    entry = _entry(name)
-    if entry is None:
-        raise InputError(f"no codec is called {name!r}; known: {', '.join(codec_names())}")
-    try:
-        return entry.load()
-    except (Exception, SystemExit) as error:  # importing a package may raise anything
-        reason = error if isinstance(error, ImportError) else f"{type(error).__name__}: {error}"
-        raise InputError(f"codec {name!r} cannot be loaded ({reason}); install what its package needs") from error
-
-
-def _called(name: str, make: Any, options: dict[str, Any]) -> Any:
-    if not callable(make):
-        raise InputError(f"codec {name!r} is a {type(make).__name__}; its entry point must name a class or a function")
-    try:
-        return make(**options)
-    except InputError:
-        raise  # its message says which value is wrong
-    except (Exception, SystemExit) as error:  # a constructor may raise anything
-        reason = error if isinstance(error, TypeError) else f"{type(error).__name__}: {error}"
-        raise InputError(f"codec {name!r} does not take {options}: {reason}") from error

@@ -16,13 +16,7 @@ from meshreel.types import MeshSequence
 from ..codec import Progress, TwoSteps
 from .draco import Frames, check_point, decimated, write_frames
 
-
-@dataclass(frozen=True, slots=True)
-class Still:
-    """States of the background of a scene, and its moving faces by frame."""
-
-    background: Sequence[Static]
-    moving: Frames
+Still = tuple[Sequence[Static], Frames]  # states of the background of a scene, and its moving faces by frame
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,14 +39,14 @@ class BackgroundOnceDracoCodec(TwoSteps):
         """Return the background and what moves. Raises InputError for frames that cannot be used."""
         if (parts := Encoder(sequence, progress=progress).parts(EncoderOptions())) is None:
             survey = survey_sequence(sequence)
-            return Still((), Frames(sequence.frame_rate, survey, [survey.normalise(mesh) for mesh in sequence]))
+            return (), Frames(sequence.frame_rate, survey, [survey.normalise(mesh) for mesh in sequence])
         states = encode_static(parts, len(sequence), sequence.frame_rate, SceneOptions())
         pairs = ((mesh, parts.segmentation.moving(number, mesh)) for number, mesh in enumerate(sequence))
         moving = [parts.survey.normalise(part_of(mesh, moves)) for mesh, moves in pairs]
-        return Still(states, Frames(sequence.frame_rate, parts.survey, moving))
+        return states, Frames(sequence.frame_rate, parts.survey, moving)
 
     def code(self, analysis: Still, progress: Progress | None = None) -> bytes:
-        frame_rate, survey, meshes = analysis.moving
+        background, (frame_rate, survey, meshes) = analysis
         small = Frames(frame_rate, survey, (decimated(mesh, self.fraction) for mesh in meshes))
         points = [(self.qp, self.levels)] * len(survey.diagonals)
-        return write_frames(small, points, progress, analysis.background)
+        return write_frames(small, points, progress, background)

@@ -10,7 +10,6 @@ from typing import Any
 import DracoPy
 import msgspec
 import numpy as np
-from jaxtyping import UInt8
 from PIL import Image
 
 from meshreel.analysis.appearance.bake import vertex_colors
@@ -61,7 +60,9 @@ class ColoredDracoCodec(Options):
         for number, mesh in enumerate(sequence):
             points, faces, colors = mesh.vertices, mesh.faces, dict[str, Any](colors=None)
             if self.color == "vertices":
-                colors["colors"] = self._vertices(mesh)
+                own = mesh.colors if mesh.uv is None else None  # those of a texture as it is seen best
+                own = vertex_colors(Painted(mesh), mesh) if own is None else own
+                colors["colors"] = np.rint(own * ((2**self.bits - 1) / 255)).astype(np.uint8)
             else:
                 points, faces, places, picture = self._textured(mesh, number)
                 colors |= {"tex_coord": places, "tex_coord_quantization_bits": self.bits}
@@ -84,12 +85,6 @@ class ColoredDracoCodec(Options):
         """Return the sizes of the pictures; None where there are none."""
         sizes = [len(picture) for picture in msgspec.msgpack.decode(data, type=Frames).pictures]
         return ColorBytes(pictures=sizes) if sizes else None
-
-    def _vertices(self, mesh: Mesh) -> UInt8[np.ndarray, "V 3"]:
-        """Return the colours of vertices in so many bits, those of a texture as it is seen best."""
-        colors = mesh.colors if mesh.uv is None else None
-        colors = vertex_colors(Painted(mesh), mesh) if colors is None else colors
-        return np.rint(colors * ((2**self.bits - 1) / 255)).astype(np.uint8)
 
     def _textured(self, mesh: Mesh, number: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Return vertices, faces and places, one place a vertex, and the picture. InputError without a texture."""

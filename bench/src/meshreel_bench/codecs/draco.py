@@ -24,14 +24,12 @@ from meshreel.errors import InputError
 from meshreel.geometry.decimate import decimate, decimate_faces
 from meshreel.types import Mesh, MeshSequence
 
-from ..codec import Options, Progress, TwoSteps
+from ..codec import Options, Progress, TwoSteps, reported
 
 LARGE = 100_000  # faces; a larger mesh is decimated in two steps, as QEM to a number of vertices takes some rounds
 LEVEL = 7  # of compression, that of this project's own streams
 ALONE = "DracoPy"  # in place of this project's own decoder
 ON_THE_WAY = 3  # vertices after the first step, in those that are wanted
-
-
 Point = tuple[int, int]  # of a frame: bits along its longest side, and midpoint subdivisions in the decoder
 
 
@@ -93,11 +91,8 @@ class DecimatedDracoCodec(TwoSteps):
         return f"decimated to {self.fraction!r}"
 
     def analyse(self, sequence: MeshSequence, progress: Progress | None = None) -> Frames:
-        survey, meshes = survey_sequence(sequence), list[Mesh]()
-        for frame in sequence:
-            meshes.append(decimated(survey.normalise(frame), self.fraction))
-            if progress is not None:
-                progress("decimate", len(meshes), len(sequence))
+        survey, frames = survey_sequence(sequence), reported(sequence, progress, "decimate", len(sequence))
+        meshes = [decimated(survey.normalise(frame), self.fraction) for frame in frames]
         return Frames(sequence.frame_rate, survey, meshes)
 
     def code(self, analysis: Frames, progress: Progress | None = None) -> bytes:
@@ -146,12 +141,11 @@ def decimated(mesh: Mesh, fraction: float) -> Mesh:
     return decimate(mesh, vertices)
 
 
-def encode_frame(mesh: Mesh, point: Point) -> bytes:
-    """Return the payload of a group of one frame."""
+def _encoded(mesh: Mesh, qp: int, levels: int) -> bytes:
     if mesh.is_empty:
         return encode_empty()
-    (qp, levels), extent = point, float((mesh.vertices.max(axis=0) - mesh.vertices.min(axis=0)).max())
-    return encode_intra([mesh], max(extent, 1e-12) / (2**qp - 3), levels)  # wherever the lattice's origin lies
+    extent = max(float(np.ptp(mesh.vertices, axis=0).max()), 1e-12)
+    return encode_intra([mesh], extent / (2**qp - 3), levels)  # wherever the lattice's origin lies
 
 
 def write_frames(
@@ -162,12 +156,11 @@ def write_frames(
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "anchor.reel"
         with ReelWriter(path, make_header(frames.frame_rate, frames.survey, {})) as writer:
-            for number, (mesh, point) in enumerate(zip(frames.meshes, points, strict=True)):
+            pairs = reported(zip(frames.meshes, points, strict=True), progress, "code", len(points))
+            for number, (mesh, point) in enumerate(pairs):
                 while states and states[0].frame <= number:
                     state = states.pop(0)
                     shown_with = (writer.add_static(state.payload, depends_on=shown_with if state.is_patch else ()),)
                 depends_on = () if frames.survey.is_bare(number) else shown_with
-                writer.add_group(number, 1, encode_frame(mesh, point), (), depends_on)
-                if progress is not None:
-                    progress("code", number + 1, len(points))
+                writer.add_group(number, 1, _encoded(mesh, *point), (), depends_on)
         return path.read_bytes()

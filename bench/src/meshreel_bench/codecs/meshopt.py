@@ -17,7 +17,7 @@ import numpy as np
 from meshreel.errors import InputError
 from meshreel.types import Mesh, MeshSequence
 
-from ..codec import Options, Progress
+from ..codec import Options, Progress, reported
 from ..names import MESHOPT
 from .draco import check_qp
 
@@ -44,12 +44,8 @@ class MeshoptCodec(Options):
             raise InputError(f"qp {self.qp}: meshoptimizer's places have 16 bits; give 2 to 16")
 
     def encode(self, sequence: MeshSequence, progress: Progress | None = None) -> bytes:
-        found = list[bytes]()
-        for number, mesh in enumerate(sequence, 1):
-            found.append(zlib.compress(msgspec.msgpack.encode(self._frame(mesh)), 9))
-            if progress is not None:
-                progress("code", number, len(sequence))
-        return msgspec.msgpack.encode(found)
+        frames = map(self._frame, reported(sequence, progress, "code", len(sequence)))
+        return msgspec.msgpack.encode([zlib.compress(msgspec.msgpack.encode(frame), 9) for frame in frames])
 
     def _frame(self, mesh: Mesh) -> _Frame:
         if mesh.is_empty:
@@ -71,11 +67,11 @@ class MeshoptCodec(Options):
         return _Frame(len(order), len(mesh.faces), tuple(low.tolist()), step, vertices, indices)
 
     def decode(self, data: bytes) -> Sequence[Mesh]:
-        return [_mesh(zlib.decompress(each)) for each in msgspec.msgpack.decode(data, type=list[bytes])]
+        each = map(zlib.decompress, msgspec.msgpack.decode(data, type=list[bytes]))
+        return [_mesh(msgspec.msgpack.decode(frame, type=_Frame)) for frame in each]
 
 
-def _mesh(data: bytes) -> Mesh:
-    frame = msgspec.msgpack.decode(data, type=_Frame)
+def _mesh(frame: _Frame) -> Mesh:
     if not frame.faces:
         return Mesh.empty()
     package = _package()

@@ -6,6 +6,7 @@ import hashlib
 import tempfile
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
+from itertools import islice
 from pathlib import Path
 from typing import TypeVar
 
@@ -103,11 +104,8 @@ class GroupStore:
         if (key := _key(interval, options)) not in self._known:
             found = find_groups(interval, options, stages)
             self._known[key] = tuple((len(group.frames), group.fitted) for group in found)
-        frames, groups, first = list(interval.frames), list[FoundGroup](), 0
-        for count, fitted in self._known[key]:
-            groups.append(FoundGroup(frames[first : first + count], fitted))
-            first += count
-        return groups
+        frames = iter(interval.frames)
+        return [FoundGroup(list(islice(frames, count)), fitted) for count, fitted in self._known[key]]
 
 
 @threadpool_limits.wrap(limits=1)

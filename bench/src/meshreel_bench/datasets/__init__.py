@@ -9,6 +9,7 @@ import hashlib
 import os
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
+from itertools import cycle, islice
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +20,7 @@ from meshreel.capture.simulated.procedural import SoftBodiesOptions, soft_bodies
 from meshreel.errors import InputError
 from meshreel.geometry.cameras import Camera
 from meshreel.geometry.color_views import ColorFrames
-from meshreel.geometry.derived_sequences import DerivedSequence, picked
+from meshreel.geometry.derived_sequences import picked
 from meshreel.geometry.topology import weld
 from meshreel.io.file_names import MESHES, is_pattern
 from meshreel.io.sequence import FileSequence, SequenceOptions, open_sequence
@@ -58,10 +59,9 @@ RELEASED = ("answering", "drinking", "arena", "sitting", "synthetic")  # folders
 LONG, LONG_FRAMES = "synthetic2x150", 150  # crane150, and samba150 that passes close by
 FAR, NEAR = 2.2, 0.5  # m, of the second body's way: surfaces are 1.2 m apart first, 0.06 in the middle, 0.7 last
 NAMES = (DEMO, *SHAPES, SYNTHETIC, LONG, *SCENES, ROOM3, PROCEDURAL, WALKER, *RECORDINGS, *REMESHED, *SENSED, PEOPLE)
-# Endings of names: the same sequence in another order, of the wanted length.
-PLAYED: dict[str, Callable[[MeshSequence, int], MeshSequence]] = {
-    "-backwards": lambda sequence, count: picked(sequence, range(len(sequence))[::-1][:count]),
-    "-forth-and-back": lambda sequence, count: forth_and_back(sequence, count),
+PLAYED: dict[str, Callable[[int], Iterable[int]]] = {  # endings of names: the order of so many frames
+    "-backwards": lambda count: reversed(range(count)),
+    "-forth-and-back": lambda count: cycle([*range(count), *range(count - 2, 0, -1)]),  # ends are not repeated
 }
 
 
@@ -89,7 +89,8 @@ class Store:
         for ending, played in PLAYED.items():
             if name.endswith(ending):
                 known = self.open(name.removesuffix(ending), None)
-                return Dataset(played(known.sequence, frames or len(known.sequence)), known.cameras)
+                numbers = tuple(islice(played(len(known.sequence)), frames or len(known.sequence)))
+                return Dataset(picked(known.sequence, numbers), known.cameras)
         if name == DEMO:
             return Dataset(soft_bodies(SoftBodiesOptions(frames=frames or SoftBodiesOptions().frames)))
         if name in SHAPES:
@@ -97,7 +98,12 @@ class Store:
         if name in (*SCENES, ROOM3, PROCEDURAL, *SENSED, PEOPLE):
             return _scene(name, self.data, frames, self.cache)
         if name in RECORDINGS:
-            return _recording(name, self.data, frames, self.cache)
+            source = Path(RECORDED, name)
+            check_source(self.data / source, source)
+            chosen = ":" if frames is None else f":{frames}"
+            recording, _ = open_recording(self.data / source, frames=chosen, keep=False)
+            captured = Captured(recording, _kept(name, self.cache) / name / "meshes")
+            return Dataset(captured, captured.cameras, pictures=captured.colors)
         if name == WALKER:
             count = frames or FRAMES
             return Dataset(Walker(_kept(name, self.cache) / f"{name}-{count}", count), truth=Truth())
@@ -142,12 +148,6 @@ def views_missing(data: Path, names: Iterable[str]) -> tuple[str, ...]:
     return tuple(f"{data / name}: no {VIEW_FILES}; pictures are seen from views around the meshes" for name in lacking)
 
 
-def forth_and_back(source: MeshSequence, count: int) -> DerivedSequence:
-    """Return `count` frames of a sequence that is played forth and back, over and over; ends are not repeated."""
-    once = [*range(len(source)), *range(len(source) - 2, 0, -1)]
-    return picked(source, [once[number % len(once)] for number in range(count)])
-
-
 def _scene(name: str, data: Path, frames: int | None, cache: Path | None) -> Dataset:
     if name in SCENES or name.endswith(ROOM2):
         for source in (ROOM, *(Path(PERFORMERS, f"{body}.npz") for body in WALKERS)):
@@ -159,14 +159,6 @@ def _scene(name: str, data: Path, frames: int | None, cache: Path | None) -> Dat
             error.add_note("--data is the folder of the benchmark's data, or of answering/meshes ... of TSMC's authors")
         raise
     return Dataset(scene.meshes, scene.meshes.cameras, scene, scene.meshes.colors)
-
-
-def _recording(name: str, data: Path, frames: int | None, cache: Path | None) -> Dataset:
-    source = Path(RECORDED, name)
-    check_source(data / source, source)
-    recording, _ = open_recording(data / source, frames=":" if frames is None else f":{frames}", keep=False)
-    captured = Captured(recording, _kept(name, cache) / name / "meshes")
-    return Dataset(captured, captured.cameras, pictures=captured.colors)
 
 
 def _kept(name: str, cache: Path | None) -> Path:
@@ -191,10 +183,8 @@ def _found(name: str, data: Path) -> Path:
     places = (Path(name), *known) if _is_path(name) else (*known, Path(name))
     path = next((place for place in places if place.exists() or is_pattern(name)), None)
     if path is None:
-        where = f"at that path or below {data}" if _is_path(name) else f"below {data}"
-        raise InputError(
-            f"no sequence {name!r} {where}; give its path, or the folder of the benchmark data with --data"
-        )
+        text = f"no sequence {name!r} {'at that path or ' * _is_path(name)}below {data}"
+        raise InputError(f"{text}; give its path, or the folder of the benchmark data with --data")
     return path
 
 

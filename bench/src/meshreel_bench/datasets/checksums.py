@@ -46,17 +46,15 @@ def checksum(path: Path) -> str:
         stamps = [(file, file.stat()) for file in listed]
         return _checksum(path, tuple((file, stat.st_size, stat.st_mtime_ns) for file, stat in stamps))
     except OSError as error:
-        raise InputError(
-            f"{error.filename}: cannot be read ({error.strerror}); check the path and its rights"
-        ) from None
+        text = f"{error.filename}: cannot be read ({error.strerror})"
+        raise InputError(f"{text}; check the path and its rights") from None
 
 
 @cache
 def _checksum(path: Path, stamps: tuple[tuple[Path, int, int], ...]) -> str:
-    digest = hashlib.sha256()
     if path.is_file():
-        digest.update(path.read_bytes())
-        return digest.hexdigest()
+        return hashlib.sha256(path.read_bytes()).hexdigest()
+    digest = hashlib.sha256()
     for file, _, _ in stamps:
         data = file.read_bytes()
         digest.update(f"{file.relative_to(path).as_posix()} {len(data)}\n".encode())

@@ -106,53 +106,44 @@ CAST = (
 )
 
 
-@dataclass(frozen=True, slots=True)
-class People:
-    """Clean frames, made when they are read."""
+def bodies(number: int) -> list[Mesh]:
+    """Return the people of a frame, in the order of `CAST`; vertices and faces stay from frame to frame."""
+    model, moments = _model(), [person.motion(number / RATE) for person in CAST]
+    import torch  # which comes with the package
 
-    frames: int = FRAMES
+    turns = {bone: np.tile(np.eye(4), (len(CAST), 1, 1)) for moment in moments for bone in moment.turns}
+    for which, moment in enumerate(moments):
+        for bone, vector in moment.turns.items():
+            turns[bone][which, :3, :3] = Rotation.from_rotvec(vector, degrees=True).as_matrix()
+    shapes = {name: [person.shape.get(name, 0.5) for person in CAST] for name in model.phenotype_labels}
+    with torch.no_grad():
+        pose = {bone: torch.from_numpy(turn) for bone, turn in turns.items()}
+        shape = {name: torch.tensor(values, dtype=torch.float64) for name, values in shapes.items()}
+        found = model(pose_parameters=pose, phenotype_kwargs=shape)
+    feet, meshes = [model.bone_labels.index(f"foot.{side}") for side in "LR"], list[Mesh]()
+    made = zip(CAST, moments, found["vertices"].numpy(), found["bone_poses"].numpy(), strict=True)
+    for person, moment, vertices, bones in made:
+        middle, turn = bones[feet, :3, 3].mean(axis=0), turn_about_y(person.heading + moment.heading)
+        placed = (vertices - [*middle[:2], vertices[:, 2].min()]) @ TO_Y_UP.T + [0.0, moment.lift, moment.ahead]
+        x, z = person.place
+        faces = model.faces.numpy().astype(np.int32)
+        meshes.append(Mesh(placed @ turn.T + [x, 0.0, z], faces, _colors(person.skin)))
+    return meshes
 
-    def bodies(self, number: int) -> list[Mesh]:
-        """Return the people of a frame, in the order of `CAST`; vertices and faces stay from frame to frame."""
-        import torch
 
-        model, colors = _model(), _skins()
-        moments = [person.motion(number / RATE) for person in CAST]
-        turns = {bone: np.tile(np.eye(4), (len(CAST), 1, 1)) for moment in moments for bone in moment.turns}
-        for which, moment in enumerate(moments):
-            for bone, vector in moment.turns.items():
-                turns[bone][which, :3, :3] = Rotation.from_rotvec(vector, degrees=True).as_matrix()
-        shapes = {name: [person.shape.get(name, 0.5) for person in CAST] for name in model.phenotype_labels}
-        with torch.no_grad():
-            found = model(
-                pose_parameters={bone: torch.from_numpy(turn) for bone, turn in turns.items()},
-                phenotype_kwargs={name: torch.tensor(values, dtype=torch.float64) for name, values in shapes.items()},
-            )
-        feet = [model.bone_labels.index(f"foot.{side}") for side in "LR"]
-        meshes = []
-        for person, moment, vertices, bones, own in zip(
-            CAST, moments, found["vertices"].numpy(), found["bone_poses"].numpy(), colors, strict=True
-        ):
-            middle = bones[feet, :3, 3].mean(axis=0)
-            turn = turn_about_y(person.heading + moment.heading)
-            placed = (vertices - [*middle[:2], vertices[:, 2].min()]) @ TO_Y_UP.T + [0.0, moment.lift, moment.ahead]
-            x, z = person.place
-            meshes.append(Mesh(placed @ turn.T + [x, 0.0, z], model.faces.numpy().astype(np.int32), own))
-        return meshes
+def record_people(folder: Path, count: int) -> None:
+    """Write the rig and its truth: a quarter of an hour for 300 frames."""
+    still = subdivide_midpoint(concatenate([box(corners) for corners in STILL]))
 
-    def record(self, folder: Path) -> None:
-        """Write the rig and its truth: a quarter of an hour for 300 frames."""
-        still = subdivide_midpoint(concatenate([box(corners) for corners in STILL]))
+    def frames() -> Iterator[SceneFrame]:
+        for number in range(count):
+            frame = SceneFrame.of([still], bodies(number))
+            painted = Painted(frame.mesh)
+            paint = lambda points, _, painted=painted: painted.at(points, points)[0]  # noqa: E731
+            yield SceneFrame(frame.mesh, frame.dynamic, paint)
 
-        def frames() -> Iterator[SceneFrame]:
-            for number in range(self.frames):
-                frame = SceneFrame.of([still], self.bodies(number))
-                painted = Painted(frame.mesh)
-                paint = lambda points, _, painted=painted: painted.at(points, points)[0]  # noqa: E731
-                yield SceneFrame(frame.mesh, frame.dynamic, paint)
-
-        color = None if _skins()[0] is None else ColorSensorOptions(scale=1.0)
-        simulate_rig(folder, frames(), corner_cameras(LOW, HIGH), RATE, color=color)
+    color = None if _colors(CAST[0].skin) is None else ColorSensorOptions(scale=1.0)
+    simulate_rig(folder, frames(), corner_cameras(LOW, HIGH), RATE, color=color)
 
 
 @cache
@@ -168,18 +159,15 @@ def _model() -> Any:
 
 
 @cache
-def _skins() -> tuple[np.ndarray | None, ...]:
-    """Return the colours of each person's vertices, None where the skins are not there."""
-    model, found = _model(), list[np.ndarray | None]()
+def _colors(skin: str) -> np.ndarray | None:
+    """Return the colours of a skin's vertices, None where it is not there."""
+    files = sorted((SKINS / skin / "textures").glob("*_diffuse*.png"))
+    if not files:
+        return None
+    model, pixels = _model(), np.asarray(Image.open(files[0]).convert("RGB"))
     places = np.zeros((len(model.template_vertices), 2))
     places[model.faces.numpy()] = model.texture_coordinates.numpy()[model.face_texture_coordinate_indices.numpy()]
-    for person in CAST:
-        files = sorted((SKINS / person.skin / "textures").glob("*_diffuse*.png"))
-        if not files:
-            found.append(None)
-            continue
-        pixels = np.asarray(Image.open(files[0]).convert("RGB"))
-        high, wide = pixels.shape[:2]
-        columns, rows = np.clip((places * (1, -1) + (0, 1)) * (wide, high), 0, (wide - 1, high - 1)).astype(int).T
-        found.append(pixels[rows, columns])
-    return tuple(found)
+    high, wide = pixels.shape[:2]
+    columns, rows = np.clip((places * (1, -1) + (0, 1)) * (wide, high), 0, (wide - 1, high - 1)).astype(int).T
+    colors: np.ndarray = pixels[rows, columns]
+    return colors

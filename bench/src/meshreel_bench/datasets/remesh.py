@@ -6,7 +6,6 @@ and faces in a random order.
 
 from __future__ import annotations
 
-import operator
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,7 +16,7 @@ from jaxtyping import Float64, Int64
 from meshreel.geometry.closest_points import Surface
 from meshreel.geometry.decimate import decimate
 from meshreel.geometry.derived_sequences import DerivedSequence
-from meshreel.geometry.topology import concatenate, subdivide_midpoint, unique_edges, vertex_normals
+from meshreel.geometry.topology import concatenate, edge_lengths, subdivide_midpoint, unique_edges, vertex_normals
 from meshreel.io.meshes import read_mesh
 from meshreel.io.write import write_mesh
 from meshreel.types import Frames, Mesh, MeshList, MeshSequence
@@ -40,8 +39,7 @@ def remeshed(source: MeshSequence, folder: Path | None, options: RemeshOptions) 
     if folder is not None:
         folder.mkdir(parents=True, exist_ok=True)
 
-    def frame(frames: MeshSequence, index: int) -> Mesh:
-        number = range(len(frames))[operator.index(index)]
+    def frame(frames: MeshSequence, number: int) -> Mesh:
         if folder is None:
             return remesh(frames[number], number, options)
         path = folder / f"{options.vertices}-{options.levels}-{options.jitter:g}-{number:05}.ply"
@@ -85,11 +83,9 @@ def remesh(mesh: Mesh, seed: int, options: RemeshOptions) -> Mesh:
 
 def _tangential(mesh: Mesh, random: np.random.Generator) -> Float64[np.ndarray, "V 3"]:
     """A random vector in the tangent plane of each vertex, as long as its shortest edge at most."""
-    edges, _ = unique_edges(mesh.faces)
-    lengths = np.linalg.norm(mesh.vertices[edges[:, 0]] - mesh.vertices[edges[:, 1]], axis=1)
+    edges, lengths = unique_edges(mesh.faces)[0], edge_lengths(mesh)
     shortest = np.full(len(mesh.vertices), np.inf)
-    for end in range(2):
-        np.minimum.at(shortest, edges[:, end], lengths)
+    np.minimum.at(shortest, edges.ravel(), np.repeat(lengths, 2))
     shortest[np.isinf(shortest)] = 0  # no face uses it
     offsets = random.uniform(-1, 1, (len(mesh.vertices), 3))
     normals = vertex_normals(mesh)
@@ -100,9 +96,7 @@ def _tangential(mesh: Mesh, random: np.random.Generator) -> Float64[np.ndarray, 
 def _shuffled(mesh: Mesh, random: np.random.Generator) -> Mesh:
     """Vertices, faces and each face's first corner in a random order; faces keep their orientation."""
     order = random.permutation(len(mesh.vertices))
-    rank = np.empty_like(order)
-    rank[order] = np.arange(len(order))
-    faces = rank[mesh.faces][random.permutation(len(mesh.faces))]
+    faces = np.argsort(order)[mesh.faces][random.permutation(len(mesh.faces))]
     first = random.integers(0, 3, (len(faces), 1))
     return Mesh.of(mesh.vertices[order], np.take_along_axis(faces, (first + np.arange(3)) % 3, axis=1))
 

@@ -173,15 +173,10 @@ class Room3:
     spacing: float = 0.012  # m, of the grid of people's surface
     setting: Setting = PAPER
 
-    @property
-    def times(self) -> PerFrame:
-        """Return when the frames are, in frames of the story."""
-        return np.arange(self.frames) * (RATE / self.setting.rate)
-
     def parts(self, number: int) -> list[Mesh]:
         """Return the mesh of each part of a frame in the order of `NAMES`; people and things are closed."""
         still = concatenate([box(corners) for corners in STILL])
-        time = float(self.times[number])
+        time = number * (RATE / self.setting.rate)  # in frames of the story
         [poses], grid = thing_poses([time]), grid_of_frame(number, self.spacing, 0)
         boxes = ((box(BOXES[name]), pose) for name, pose in zip(THINGS, poses, strict=True))
         things = [Mesh.of(mesh.vertices @ pose[:3, :3].T + pose[:3, 3], mesh.faces) for mesh, pose in boxes]
@@ -190,7 +185,7 @@ class Room3:
 
     def record(self, folder: Path) -> None:
         """Write the rig and its truth, with `parts.npz`; three minutes for 60 frames."""
-        counts, poses = list[list[int]](), thing_poses(self.times)
+        counts, poses = list[list[int]](), thing_poses(np.arange(self.frames) * (RATE / self.setting.rate))
 
         def frames() -> Iterator[SceneFrame]:
             for number in range(self.frames):

@@ -26,7 +26,7 @@ from meshreel.io.meshes import read_mesh
 from meshreel.io.sequence import open_sequence
 from meshreel.io.write import frame_names, make_folder, replacing, write_mesh
 from meshreel.metrics.scene_accuracy import Scene, Sight
-from meshreel.types import Mesh, MeshSequence, evenly
+from meshreel.types import Mesh, evenly
 
 from . import people, rooms
 from .rooms import PROCEDURAL, ROOM3, SENSED
@@ -49,10 +49,9 @@ class Captured(DerivedSequence):
 
 
 SCENES = tuple(rooms.SPEEDS)
-TRUE = "truth"  # labels: those of the nearest clean faces
-SPACING = 0.015  # m, of the grid of people in the procedural room, where sensors of full size see it
 PEOPLE = "people"  # needs the extra of that name, and no benchmark data
-FOUND = "found"  # labels: those that the encoder finds
+TRUE, FOUND = "truth", "found"  # labels: those of the nearest clean faces, and those that the encoder finds
+SPACING = 0.015  # m, of the grid of people in the procedural room, where sensors of full size see it
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -66,9 +65,10 @@ class SceneData:
     parts: rooms.Parts | None = None  # of the truth, where it has them by name
 
     def true(self, number: int) -> Scene:
-        """Prepare a clean frame for measurements; where parts have names, things that move are no people."""
+        """Prepare a clean frame for measurements of other meshes; people are what moves, but for things with a name."""
         people = None if self.parts is None else self.parts.of_faces(number) > len(rooms.THINGS)
-        return true_scene(self.truth, number, people)
+        frame, sights = self.truth[number], [Sight(c.view, *c.depth_range) for c in self.truth.cameras]
+        return Scene(frame.mesh, frame.dynamic if people is None else people, sights, complete=True)
 
     def judged(self, number: int, source: str) -> Bool[np.ndarray, " F"]:
         """Return the labels of a frame without those of things at rest, which may be room already, or not yet."""
@@ -86,7 +86,11 @@ class SceneData:
             return self._kept_labels(f"{TRUE}-{number:05}", clean.mesh, clean.dynamic, number)
         path = self.folder / "labels" / f"{_kept_as(source)}.npz"
         if not path.exists():
-            _find_labels(self.meshes, path)
+            found = segment(self.meshes)
+            moving = {f"frame_{k:05}": np.packbits(found.moving(k, mesh)) for k, mesh in enumerate(self.meshes)}
+            make_folder(path.parent)
+            with replacing(path) as file:
+                np.savez_compressed(file, allow_pickle=False, **moving)  # a bit a face
         with np.load(path, allow_pickle=False) as archive:
             bits = archive[f"frame_{number:05}"]
         return np.unpackbits(bits, count=len(self.meshes[number].faces)).astype(bool)
@@ -115,9 +119,9 @@ class SceneData:
         return _kept_mesh(path, lambda: decimate_faces(mesh, round(share * len(mesh.faces))))
 
     def _fused(self, source: str) -> Mesh:
-        depth, meshes = self.meshes.depth, ((k, self.meshes[k]) for k in evenly(len(self.meshes), FRAMES))
+        depth, numbers = self.meshes.depth, evenly(len(self.meshes), FRAMES)
         assert depth is not None, "recordings have depth pictures"
-        moments = (Moment(depth[k], mesh, ~self.labels(k, source)) for k, mesh in meshes)
+        moments = (Moment(depth[k], self.meshes[k], ~self.labels(k, source)) for k in numbers)
         return fuse_still_depth(moments, FusionOptions().voxel)
 
 
@@ -139,7 +143,7 @@ def open_scene(name: str, data: Path, cache: Path, frames: int | None = None) ->
         if name == PROCEDURAL:
             demo_room.record_room(rig, demo_room.RoomOptions(count))
         elif name == PEOPLE:
-            people.People(count).record(rig)
+            people.record_people(rig, count)
         elif room == PROCEDURAL:
             moments = demo_room.furnished_room(demo_room.RoomOptions(count, setting.rate, SPACING))
             simulate_rig(rig, moments, setting.cameras(*demo_room.BOX), setting.rate, setting.errors)
@@ -162,21 +166,6 @@ def _kept_as(source: str) -> str:
         for path in sorted(path for folder in package.__path__ for path in Path(folder).glob("*.py")):
             digest.update(path.read_bytes())
     return f"{FOUND}-{digest.hexdigest()[:12]}"
-
-
-def _find_labels(meshes: MeshSequence, path: Path) -> None:
-    """Write the encoder's labels of moving faces, a bit a face, by frame."""
-    found = segment(meshes)
-    labels = {f"frame_{k:05}": np.packbits(found.moving(k, meshes[k])) for k in range(len(meshes))}
-    make_folder(path.parent)
-    with replacing(path) as file:
-        np.savez_compressed(file, allow_pickle=False, **labels)
-
-
-def true_scene(truth: Truth, number: int, people: Bool[np.ndarray, " F"] | None = None) -> Scene:
-    """Prepare a clean frame for measurements of other meshes; people are what moves where they are not given."""
-    frame, sights = truth[number], [Sight(camera.view, *camera.depth_range) for camera in truth.cameras]
-    return Scene(frame.mesh, frame.dynamic if people is None else people, sights, complete=True)
 
 
 def _kept_mesh(path: Path, make: Callable[[], Mesh]) -> Mesh:

@@ -83,12 +83,9 @@ def coloured(name: str, store: Store, frames: int | None) -> Callable[[int], Mes
         colors = solid_colors(rest.vertices)
         return lambda number: Mesh(subdivide_midpoint(source[number], FINER).vertices, rest.faces, colors)
     sequence = store.open(name, frames).sequence
-    return (lambda number: sequence[number]) if sequence[0].is_colored else _carried(sequence)
-
-
-def _carried(sequence: MeshSequence) -> Callable[[int], Mesh]:
-    """Return the frames in the colours that a tracked template carries."""
-    template = cache(lambda: _tracked(sequence))
+    if sequence[0].is_colored:
+        return lambda number: sequence[number]
+    template = cache(lambda: _tracked(sequence))  # which carries the colours
 
     def painted(number: int) -> Mesh:
         mesh, carrier, rest = subdivide_midpoint(sequence[number], 1), template()[number], template()[0]
@@ -101,11 +98,9 @@ def _carried(sequence: MeshSequence) -> Callable[[int], Mesh]:
 def _tracked(sequence: MeshSequence) -> list[Mesh]:
     """Return a template in all frames: that of the first chain of groups, which must be the only one."""
     with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder, "template.reel")
-        options = Settings(
-            quality=TRACKED, color="none", group_size=min(len(sequence), 64), dynamic_only=True
-        ).resolved()
-        Encoder(sequence).encode(path, options)
+        path, size = Path(folder, "template.reel"), min(len(sequence), 64)
+        options = Settings(quality=TRACKED, color="none", group_size=size, dynamic_only=True)
+        Encoder(sequence).encode(path, options.resolved())
         chains = chains_of(path.read_bytes())
     if len(chains) > 1:
         raise InputError(f"a template cannot be tracked: {len(chains)} chains; give fewer frames")

@@ -32,10 +32,9 @@ from meshreel.types import Mesh
 from ..parallel_views import OrthographicCamera, parallel_views_around
 
 DPI = 100
-TOP, GAP, RIGHT = 26, 6, 80  # pixels over, between and, for a color bar, right of the panels
+TOP, GAP, RIGHT, BOTTOM = 26, 6, 80, 8  # pixels over, between, right (for a color bar) and under the panels
 LIGHT = np.array([0.3, 0.5, 0.8]) / np.linalg.norm([0.3, 0.5, 0.8])
 GREY = 0.82
-BOTTOM = 8  # pixels under them
 FINE = 3  # rays a pixel and axis, averaged
 COLORS = 256  # of a picture's palette
 BODIES = np.array([[0.87, 0.45, 0.20], [0.20, 0.45, 0.70], [0.35, 0.65, 0.35]])  # RGB of three bodies
@@ -63,10 +62,6 @@ class Sheet:
         bar = self._axes(len(self.axes) * (self.size + GAP), 12)
         self.figure.colorbar(image, cax=bar, extend="max").set_label(label, fontsize=8)
         bar.tick_params(labelsize=7)
-
-    def write(self, path: Path) -> None:
-        """The PNG."""
-        write_figure(self.figure, path)
 
     def _axes(self, left: int, width: int) -> Any:
         wide, high = self.shape
@@ -143,29 +138,33 @@ def placed(points: Float64[np.ndarray, "K 3"], camera: OrthographicCamera) -> Fl
     return points @ camera.extrinsic[:3, :3].T + camera.extrinsic[:3, 3]
 
 
-def draw_edges(axes: Any, mesh: Mesh, camera: OrthographicCamera, line: float = 0.3) -> None:
+def draw_edges(axes: Any, title: str, mesh: Mesh, camera: OrthographicCamera, line: float) -> None:
     """The mesh's faces with their edges, nearest last."""
     points = placed(mesh.vertices, camera)
     flat, normals = camera.project(points)[mesh.faces], face_normals(Mesh(points, mesh.faces))[0]
     order = np.argsort(-points[mesh.faces][:, :, 2].mean(axis=1), kind="stable")
     order = order[normals[order, 2] < 0]  # the front
     light = 0.45 + 0.55 * np.abs((normals * [1, -1, -1]) @ LIGHT)
-    grey = np.repeat((0.85 * light)[:, None], 3, axis=1)
-    axes.add_collection(
-        PolyCollection(flat[order], facecolors=grey[order], edgecolors=(0.1, 0.2, 0.4), linewidths=line)
-    )
-    axes.set(xlim=(0, camera.width), ylim=(camera.height, 0))
+    grey = np.repeat((0.85 * light)[order, None], 3, axis=1)
+    axes.add_collection(PolyCollection(flat[order], facecolors=grey, edgecolors=(0.1, 0.2, 0.4), linewidths=line))
+    _finish(axes, title, camera)
 
 
 def draw_points(
-    axes: Any, points: np.ndarray, camera: OrthographicCamera, colors: np.ndarray, size: float = 7.0, rim: float = 0.2
+    axes: Any, title: str, points: np.ndarray, camera: OrthographicCamera, colors: np.ndarray, size: float = 7.0
 ) -> None:
-    """Points as dots, nearest last."""
+    """Points as dots, nearest last; small ones have no rim."""
     local = placed(points, camera)
     order = np.argsort(-local[:, 2], kind="stable")
     flat = camera.project(local)
+    rim = 0.2 if size > 1 else 0.0
     axes.scatter(*flat[order].T, s=size, c=colors[order], linewidths=rim, edgecolors="black")
+    _finish(axes, title, camera)
+
+
+def _finish(axes: Any, title: str, camera: OrthographicCamera) -> None:
     axes.set(xlim=(0, camera.width), ylim=(camera.height, 0))
+    axes.set_title(title, fontsize=9)
 
 
 def _finer(camera: OrthographicCamera) -> OrthographicCamera:
@@ -194,18 +193,13 @@ def draw_room(path: Path) -> None:
         with open_video(Path(folder) / "room.reel") as video:
             background, decoded = video.background(SHOWN), video[SHOWN]
     sheet, camera = Sheet(4, PANEL), oblique([background], FROM, (PANEL, PANEL), 1.03)
-    colored, colors = _colored(frame, moves)
+    still, moving = (part_of(frame, chosen) for chosen in (~moves, moves))
+    label = components(moving.faces, len(moving.vertices))
+    rank = np.argsort(np.argsort(-np.bincount(label), kind="stable"), kind="stable")[label]  # the largest body first
+    colors = np.concatenate([np.full((len(still.vertices), 3), GREY), BODIES[rank % len(BODIES)]])
     sheet.image(0, f"fused: {len(frame.faces)} faces", shaded(frame, camera))
-    sheet.image(1, f"moving: {100 * moves.mean():.0f} % of the faces", shaded(colored, camera, colors))
+    colored = shaded(concatenate([still, moving]), camera, colors)
+    sheet.image(1, f"moving: {100 * moves.mean():.0f} % of the faces", colored)
     sheet.image(2, f"background, once: {len(background.faces)} faces", shaded(background, camera))
     sheet.image(3, f"decoded: {len(decoded.faces)} faces", shaded(decoded, camera))
-    sheet.write(path)
-
-
-def _colored(mesh: Mesh, moves: np.ndarray) -> tuple[Mesh, Float64[np.ndarray, "V 3"]]:
-    """The mesh with what moves split off, and a color for each of its vertices: one a body, the largest first."""
-    still, moving = (part_of(mesh, chosen) for chosen in (~moves, moves))
-    label = components(moving.faces, len(moving.vertices))
-    rank = np.argsort(np.argsort(-np.bincount(label), kind="stable"), kind="stable")[label]
-    colors = np.concatenate([np.full((len(still.vertices), 3), GREY), BODIES[rank % len(BODIES)]])
-    return concatenate([still, moving]), colors
+    write_figure(sheet.figure, path)

@@ -37,13 +37,10 @@ def main(folder: Path = Path("docs/pictures"), demo: Path | None = None) -> None
         with meshreel.open(file) as video:
             frames, rate = len(video), video.frame_rate
         pictures = played(file, range(frames), Path(temporary))
-    duration = round(1000 / rate)  # ms
-    others = pictures[1:]
-    pictures[0].save(
-        folder / "moving.webp", save_all=True, append_images=others, duration=duration, quality=QUALITY, method=6
-    )
-    facts = {"frames": frames, "frame_rate": rate, "cameras": len(read_cameras(demo / "rig")[0])}
-    facts |= {"bytes": file.stat().st_size}
+    path, ms = folder / "moving.webp", round(1000 / rate)
+    pictures[0].save(path, save_all=True, append_images=pictures[1:], duration=ms, quality=QUALITY, method=6)
+    cameras = len(read_cameras(demo / "rig")[0])
+    facts = {"frames": frames, "frame_rate": rate, "cameras": cameras, "bytes": file.stat().st_size}
     (folder / "moving.json").write_text(json.dumps(facts) + "\n", encoding="utf-8")
 
 

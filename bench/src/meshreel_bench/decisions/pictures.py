@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,7 +14,8 @@ import numpy as np
 from jaxtyping import Float64
 
 from meshreel.analysis.fit.surface_fit import Fit, FitOptions, fit_frames
-from meshreel.analysis.reference.centers import bind, center_motions, largest_distances, move, reference_centers
+from meshreel.analysis.reference.centers import bind, center_motions, largest_distances, move
+from meshreel.analysis.reference.centers import reference_centers as spread_apart
 from meshreel.analysis.reference.extraction import MDS, Reference, extract_reference, predict
 from meshreel.analysis.reference.track import track_centers
 from meshreel.analysis.survey import survey_sequence
@@ -61,7 +61,7 @@ def compute(sequence: MeshList, options: PaperOptions) -> Stages:
     frames = tuple(survey.normalise(mesh) for mesh in sequence)
     centers = track_centers(frames, options.track)
     middle = centers.positions[len(frames) // 2]
-    spread = reference_centers(largest_distances(centers), middle)
+    spread = spread_apart(largest_distances(centers), middle)
     reference = extract_reference(frames, centers, options.reference)
     coded = code_reference(reference.mesh, REFERENCE_BITS, LEVELS)
     predictions = predict(reference, coded.base, centers)
@@ -85,9 +85,9 @@ def main(folder: Path = Path("docs/pictures")) -> None:
     drawing.draw_room(folder / "room.png")
     people = soft_bodies(SoftBodiesOptions())
     stages = compute(MeshList(tuple(people[FIRST + t] for t in range(COUNT)), people.frame_rate), PaperOptions())
-    for name, draw in PICTURES.items():
-        draw(stages, folder / f"{name}.png")
-        print(folder / f"{name}.png")
+    for draw in PICTURES:
+        draw(stages, path := folder / f"{draw.__name__.replace('_', '-')}.png")
+        print(path)
 
 
 def frames(stages: Stages, path: Path) -> None:
@@ -102,9 +102,9 @@ def frames(stages: Stages, path: Path) -> None:
         box, vertices = Box.of(stages.frames), stages.frames[t].vertices
         middle = box.center + [0, 0.14 * box.size[1], 0]  # between the two people
         spot = Mesh.of(vertices[np.linalg.norm(vertices[:, :2] - middle[:2], axis=1) < 0.08], [])
-        draw_edges(sheet.axes[panel], stages.frames[t], camera_for([spot], 250), 0.5)
-        sheet.axes[panel].set_title(f"frame {FIRST + t}, the hands", fontsize=9)
-    sheet.write(path)
+        title = f"frame {FIRST + t}, the hands"
+        draw_edges(sheet.axes[panel], title, stages.frames[t], camera_for([spot], 250), 0.5)
+    drawing.write_figure(sheet.figure, path)
 
 
 def centers(stages: Stages, path: Path) -> None:
@@ -112,21 +112,20 @@ def centers(stages: Stages, path: Path) -> None:
     sheet = Sheet(3, 320)
     camera = camera_for(list(stages.frames), 320)
     positions = stages.centers.positions
-    draw_points(sheet.axes[0], positions[-1], camera, BODIES[stages.centers.bodies % 3])
-    sheet.axes[0].set_title(f"{positions.shape[1]} centers by body", fontsize=9)
+    by_body = f"{positions.shape[1]} centers by body"
+    draw_points(sheet.axes[0], by_body, positions[-1], camera, BODIES[stages.centers.bodies % 3])
     low, high = positions[0].min(axis=0), positions[0].max(axis=0)
     share = (positions[0] - low) / (high - low)
     colors = matplotlib.colormaps["turbo"]((3.2 * share[:, 1] + 0.5 * share[:, 0]) % 1.0)[:, :3]
     for panel, t in ((1, 0), (2, len(positions) - 1)):
-        draw_points(sheet.axes[panel], positions[t], camera, colors)
-        sheet.axes[panel].set_title(f"frame {FIRST + t}: one color, one trajectory", fontsize=9)
+        draw_points(sheet.axes[panel], f"frame {FIRST + t}: one color, one trajectory", positions[t], camera, colors)
     tracks = np.stack([camera.project(drawing.placed(p, camera)) for p in positions])
     for k in range(0, tracks.shape[1], 3):
         sheet.axes[2].plot(*tracks[:, k].T, color=colors[k], linewidth=0.7, zorder=0)
-    sheet.write(path)
+    drawing.write_figure(sheet.figure, path)
 
 
-def spread_centers(stages: Stages, path: Path) -> None:
+def reference_centers(stages: Stages, path: Path) -> None:
     """A frame's centers beside those of eq. 5, from the front and from the side."""
     sheet = Sheet(4, 300)
     poses = (stages.centers.positions[CONTACT], stages.spread)
@@ -137,9 +136,9 @@ def spread_centers(stages: Stages, path: Path) -> None:
     names = (f"frame {FIRST + CONTACT}", f"reference (stress {stress:.3f})")
     for panel in range(4):
         pose, view = poses[panel % 2], panel // 2
-        draw_points(sheet.axes[panel], pose, camera_for(box, 300, view), BODIES[stages.centers.bodies % 3])
-        sheet.axes[panel].set_title(f"{names[panel % 2]}, {('front', 'right')[view]}", fontsize=9)
-    sheet.write(path)
+        title, colors = f"{names[panel % 2]}, {('front', 'right')[view]}", BODIES[stages.centers.bodies % 3]
+        draw_points(sheet.axes[panel], title, pose, camera_for(box, 300, view), colors)
+    drawing.write_figure(sheet.figure, path)
 
 
 def deformed(stages: Stages, path: Path) -> None:
@@ -152,9 +151,9 @@ def deformed(stages: Stages, path: Path) -> None:
         sheet.image(panel, f"frame {FIRST + t}, moved", shaded(mesh, camera, normals))
     together = [stages.moved[t][0].vertices for t in (0, CONTACT, last)]
     colors = np.repeat(BODIES, [len(points) for points in together], axis=0)
-    draw_points(sheet.axes[3], np.concatenate(together), camera, colors, 1.0, 0.0)
-    sheet.axes[3].set_title("points of the three, laid together", fontsize=9)
-    sheet.write(path)
+    title = "points of the three, laid together"
+    draw_points(sheet.axes[3], title, np.concatenate(together), camera, colors, 1.0)
+    drawing.write_figure(sheet.figure, path)
 
 
 def reference(stages: Stages, path: Path) -> None:
@@ -169,9 +168,8 @@ def reference(stages: Stages, path: Path) -> None:
     for panel, (mesh, name) in enumerate(((coarse, "before subdivision"), (base, "after it")), 1):
         inside = (mesh.vertices >= size * [0, 0.68, 0] + low) & (mesh.vertices <= size * [0.45, 1, 1] + low)
         top = Mesh.of(mesh.vertices[inside.all(axis=1)], [])
-        draw_edges(sheet.axes[panel], mesh, camera_for([top], 340), 0.4)
-        sheet.axes[panel].set_title(f"{name}: {len(mesh.faces)} faces", fontsize=9)
-    sheet.write(path)
+        draw_edges(sheet.axes[panel], f"{name}: {len(mesh.faces)} faces", mesh, camera_for([top], 340), 0.4)
+    drawing.write_figure(sheet.figure, path)
 
 
 def fit(stages: Stages, path: Path) -> None:
@@ -189,7 +187,7 @@ def fit(stages: Stages, path: Path) -> None:
         rms = float(np.sqrt(np.mean(np.square(errors.compressed()))))
         sheet.axes[2 * panel + 1].set_title(f"RMS {rms:.3f} %", fontsize=9)
     sheet.bar(image, f"distance of frame {FIRST + last}, % of the diagonal")
-    sheet.write(path)
+    drawing.write_figure(sheet.figure, path)
 
 
 def components(stages: Stages, path: Path) -> None:
@@ -202,9 +200,8 @@ def components(stages: Stages, path: Path) -> None:
     axes.bar(numbers[~kept], deviations[~kept], color="lightgrey", label="the others")
     step = 100 * PaperOptions().displacements.step
     axes.axhline(step, color=BODIES[0], linewidth=1, label=f"base step of the quantiser: {step:.2f} %")
-    axes.set(
-        yscale="log", xlabel="component", ylabel="RMS of its weights,\n% of the diagonal", xlim=(0, len(numbers) + 1)
-    )
+    axes.set(yscale="log", xlabel="component", ylabel="RMS of its weights,\n% of the diagonal")
+    axes.set_xlim(0, len(numbers) + 1)
     axes.legend(frameon=False, fontsize=8)
     drawing.write_figure(figure, path)
 
@@ -229,17 +226,7 @@ def parts(stages: Stages, path: Path) -> None:
     drawing.write_figure(figure, path)
 
 
-PICTURES: dict[str, Callable[[Stages, Path], None]] = {
-    "frames": frames,
-    "centers": centers,
-    "reference-centers": spread_centers,
-    "deformed": deformed,
-    "reference": reference,
-    "fit": fit,
-    "components": components,
-    "decoded": decoded,
-    "parts": parts,
-}
+PICTURES = (frames, centers, reference_centers, deformed, reference, fit, components, decoded, parts)  # by their names
 
 
 def _parts(mesh: Mesh) -> str:

@@ -135,11 +135,8 @@ COLUMNS: dict[str, Columns] = {
 
 def _plain(columns: Columns, rows: Sequence[Row]) -> Table:
     """One line for each row; a row with a note, such as a BD-rate, has its note in the last lines."""
-    cells = [
-        [cell(row) if callable(cell) else cell.format_map(row) for cell in columns.values()]
-        for row in rows
-        if "note" not in row
-    ]
+    plain = (row for row in rows if "note" not in row)
+    cells = [[c(row) if callable(c) else c.format_map(row) for c in columns.values()] for row in plain]
     notes = [[row["body"], f"{row['way']}: {row['note']}"] + [""] * (len(columns) - 2) for row in rows if "note" in row]
     return [head.rstrip() for head in columns], [*cells, *notes]
 

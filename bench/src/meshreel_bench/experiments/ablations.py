@@ -11,26 +11,23 @@ from .study import D2, MASKED, NORMALS, SYMMETRIC, TRACKER, Bound, Measure, Need
 LITERAL_PRESET = "paper-literal"
 POSES = (Measure("canonical_groups", "groups in the MDS pose"), Measure("draco_frames", "frames of Draco", sign=-1))
 M = {"basis_size": (2, 5, 10)}
+IN_TENS: Options = {"preset": "paper", "centers": 2000, "group_size": 10}
 CENTERS = Study(
     title="Number of volume centers, TSMC",
     sequences=("dancer", "mitch"),
-    sweeps=[
-        Sweep("meshreel", M, {"preset": "paper", "centers": k, "group_size": 10}) for k in (1000, 2000, 3000, 4000)
-    ],
+    sweeps=[Sweep("meshreel", M, IN_TENS | {"centers": k}) for k in (1000, 2000, 3000, 4000)],
     anchor=TSMC,
 )
 GOF = Study(
     title="Frames of a group, TSMC",
     sequences=("crane60", "samba60"),
-    sweeps=[
-        Sweep("meshreel", {"basis_size": (2, 3, 5)}, {"preset": "paper", "centers": 2000, "group_size": size})
-        for size in (5, 10, 15)
-    ],
+    sweeps=[Sweep("meshreel", {"basis_size": (2, 3, 5)}, IN_TENS | {"group_size": size}) for size in (5, 10, 15)],
     frames={"crane60": 30, "samba60": 30},
     anchor=TSMC,
 )
 RELEASE = {3: (2.23, 51.87), 5: (3.29, 54.35), 10: (5.78, 56.40), 30: (15.46, 59.02)}  # its Mbps and D2, dB, by m
 AT_10: Options = {"preset": "paper", "basis_size": 10}
+FINEST: Options = {"preset": LITERAL_PRESET, "variant": RELEASED, "centers": MORE_CENTERS}
 M_IS_10 = {name: {"basis_size": (10,)} for name in ("crane60", "procedural_room")}
 PAPER = Study(
     title="The paper as written: preset `paper` put back step by step",
@@ -40,12 +37,7 @@ PAPER = Study(
         *(Sweep("meshreel", {}, AT_10 | {"variant": name}) for name in (UNIFORM, IN_MDS_POSE, BOTH)),
         Sweep("meshreel", {"basis_size": (3, 5, 10, 30)}, {"preset": LITERAL_PRESET}, M_IS_10),
         Sweep("meshreel", {}, {"preset": LITERAL_PRESET, "basis_size": 10, "variant": RELEASED}),
-        Sweep(
-            "meshreel",
-            {"basis_size": (10, 30)},
-            {"preset": LITERAL_PRESET, "variant": RELEASED, "centers": MORE_CENTERS},
-            only=("dancer",),
-        ),
+        Sweep("meshreel", {"basis_size": (10, 30)}, FINEST, only=("dancer",)),
     ),
     measures=(D2, MASKED, SYMMETRIC, NORMALS, *POSES),
     frames={"crane60": 30, "procedural_room": 30},

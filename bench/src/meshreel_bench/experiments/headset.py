@@ -15,13 +15,11 @@ FILM, MORE = 24, (2, 10)  # Hz, and throttles at that rate alone: up to where it
 HOLDS = 0.95  # of the pictures that a display asks for; the rest may be lost to neighbours on the machine (guess)
 CASES = [(level, k, rate) for level, rate, k in product(LEVELS, RATES, THROTTLES)]
 CASES += [(level, k, FILM) for level, k in product(LEVELS, MORE)]
+VARIED = dict(zip(("level", "throttle", "rate"), zip(*CASES, strict=True), strict=True))
 STUDY = Study(
     title="Playing in a browser that is slowed down",
     sequences=SEQUENCES,
-    sweeps=(
-        Sweep(HEADSET, dict(zip(("level", "throttle", "rate"), zip(*CASES, strict=True), strict=True))),
-        Sweep(HEADSET, {}, {"machine": AARCH64}),
-    ),
+    sweeps=(Sweep(HEADSET, VARIED), Sweep(HEADSET, {}, {"machine": AARCH64})),
     measures=(
         Measure("main_ms", "main thread a picture", " ms", -1),
         Measure("fps", "pictures shown a second"),

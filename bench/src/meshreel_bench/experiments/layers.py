@@ -5,6 +5,7 @@ from __future__ import annotations
 from math import log2
 
 from ..names import BEST, DECIMATED, DRACO, SUBDIVIDED
+from ..rows import Options
 from .study import (
     D2,
     KEYLESS,
@@ -58,6 +59,9 @@ FINE_ON = {
 FEW = ("mitch", "crane60", "samba60")  # one point each of Draco and of plain decimation, which are off the hull there
 JUDGED = (SYMMETRIC, NORMALS, KEYLESS)
 ANCHORS = (DRACO, DECIMATED, SUBDIVIDED)
+USUAL: Options = {"preset": "best", "quality": 50.0}
+COLLISION = Which("collision", BEST)
+NO_MORE, PAST = at_most("second_half_over_first", 1.0), Bound(SYMMETRIC.key, 70.0, "dB")
 
 
 def _bounds(mbps: float, db: float, degrees: float, *more: Bound) -> tuple[Bound, ...]:
@@ -81,25 +85,14 @@ PROMISES: tuple[Promise, ...] = (
     Reaches("mitch: rate, D2, normals", Which("mitch", BEST), _bounds(0.27, 70.0, 3.4)),
     *(Gains(body, BEST, ANCHORS, JUDGED, -70.0) for body in REMESHED),
     *(
-        Always(
-            f"{body}: bytes of frames 31 to 60 over those of 1 to 30",
-            Which(body, BEST),
-            at_most("second_half_over_first", 1.0),
-        )
+        Always(f"{body}: bytes of frames 31 to 60 over those of 1 to 30", Which(body, BEST), NO_MORE)
         for body in (*REMESHED, *BACKWARDS)
     ),
-    Always(
-        "collision: decoded triangles that bridge the bodies once they are apart",
-        Which("collision", BEST),
-        at_most("bridges", 0),
-    ),
-    *(
-        Gains(body, BEST, ANCHORS, JUDGED, -60.0, ends_past=Bound(SYMMETRIC.key, 70.0, "dB"))
-        for body in ("dancer", "basketball_player")
-    ),
+    Always("collision: decoded triangles that bridge the bodies once they are apart", COLLISION, at_most("bridges", 0)),
+    *(Gains(body, BEST, ANCHORS, JUDGED, -60.0, ends_past=PAST) for body in BODIES[:2]),
     Always("bodies: step of PSNR at a border of groups", Which("", BEST), at_most("border_step_db", 1.5, "dB")),
     Always("encode, dancer", Which("dancer", BEST), at_most("encode_s", 4.0, "CPU s/frame")),
-    Flat(Which("collision", BEST)),
+    Flat(COLLISION),
     Always("decode, dancer", Which("dancer", BEST), at_most("decode_ms", 1.5, "ms")),
 )
 STUDY = Study(
@@ -111,17 +104,13 @@ STUDY = Study(
         Sweep("draco", {"qp": (9, 10, 11)}, on={body: {"qp": (9,)} for body in FEW}, only=BODIES),
         Sweep("decimated_draco", FINE, {"levels": 1}, on=FINE_ON, only=BODIES),
         Sweep("decimated_draco", PLAIN, {"levels": 0}, on=dict.fromkeys(FEW, PLAIN_ONE), only=BODIES),
-        *(
-            Sweep("meshreel", {}, {"preset": "best", "quality": 50.0}, only=("collision",), frames=frames)
-            for frames in (20, 60)
-        ),
+        *(Sweep("meshreel", {}, USUAL, only=("collision",), frames=frames) for frames in (20, 60)),
     ),
     metrics="parallel views",
     measures=(SYMMETRIC, KEYLESS, D2, NORMALS),
     anchor=SUBDIVIDED,
     promises=PROMISES,
 )
-
 
 DEFAULT = 50.0  # quality
 # CPU s a frame of an encode at the default quality: at most, and the aim.
@@ -146,6 +135,8 @@ def _which(sequence: str, quality: float = DEFAULT) -> Which:
     return Which(sequence, BEST, {"quality": quality})
 
 
+EACH: dict[str, Values] = {body: {"quality": (quality,)} for body, quality in ALONE.items()}
+DANCER, PLAIN_DRACO, DECODE = _which("dancer"), Which("dancer", f"{DECIMATED}, DracoPy"), "decode_ms_at_rest"
 APART = tuple(_which(body, quality) for body, quality in ALONE.items())
 SPEED_PROMISES: tuple[Promise, ...] = (
     *(
@@ -166,21 +157,15 @@ SPEED_PROMISES: tuple[Promise, ...] = (
     *(
         Reaches(
             f"dancer: efficiency of 8, 32 and 100 workers, an hour in intervals of {frames} frames (model)",
-            _which("dancer"),
+            DANCER,
             tuple(Bound(f"efficiency.{workers}.{frames}", least) for workers, least in EFFICIENCY.items()),
         )
         for frames in (60, 120)
     ),
     Reaches("dancer, fast: encode", FAST, (at_most("encode_s_at_rest", 0.5, "CPU s/frame"),), "0.25"),
     Gains("dancer", FAST.curve, (BEST,), (D2, NORMALS), 3.0),
-    Reaches("dancer: decode", _which("dancer"), (at_most("decode_ms_at_rest", 0.35, "ms"),), "0.2"),
-    NoMore(
-        "dancer: decode against decimated Draco that is no better in D2",
-        _which("dancer"),
-        "decode_ms_at_rest",
-        1.0,
-        (Which("dancer", f"{DECIMATED}, DracoPy"),),
-    ),
+    Reaches("dancer: decode", DANCER, (at_most(DECODE, 0.35, "ms"),), "0.2"),
+    NoMore("dancer: decode against decimated Draco that is no better in D2", DANCER, DECODE, 1.0, (PLAIN_DRACO,)),
 )
 SPEED = Study(
     title="Speed",
@@ -188,10 +173,7 @@ SPEED = Study(
     sweeps=(
         Sweep("meshreel", {"quality": (DEFAULT,)}, {"preset": "best"}, OTHERS),
         Sweep("meshreel", {"quality": AROUND}, {"preset": "best", "variant": "fast"}, only=("dancer",)),
-        *(
-            Sweep("meshreel", {}, {"preset": "best", "quality": q}, only=(body,), small={"quality": DEFAULT}, frames=10)
-            for body, q in ALONE.items()
-        ),
+        Sweep("meshreel", {"quality": (DEFAULT,)}, {"preset": "best"}, EACH, tuple(ALONE), frames=10),
         Sweep("decimated_draco", {}, WORSE, sampled=("living_room", "room2")),
         Sweep("decimated_draco", {}, WORSE | {"decoder": "DracoPy"}, only=("dancer",)),
     ),

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from ..datasets.rooms import SENSED
 from ..names import BEST, PAINTED, TEXTURED
+from ..rows import Options
 from .study import (
     D2,
     Always,
@@ -30,12 +31,12 @@ WHOLE = {"share": (0.2, 0.1, 0.05, 0.02, 0.01), "qp": (12, 11, 11, 10, 9)}  # an
 WHOLE_SUBDIVIDED = {"share": (0.05, 0.02), "qp": (11, 10)}
 PEOPLE = {"share": (0.5, 0.25, 0.1, 0.05, 0.02), "qp": (11, 11, 10, 10, 9)}  # anchor b, of what moves
 PEOPLE_SUBDIVIDED = {"share": (0.1, 0.02), "qp": (10, 9)}
-ANCHORS = {"a": "a: decimated Draco", "b": "b: background once, decimated Draco"}  # each with and without subdivision
-D2_INPUT = Measure("input_d2_psnr_forward", "D2 to the input", " dB")
-SSIM_INPUT = Measure("input_ssim_masked", "SSIM to the input")
+# Each with and without subdivision, and the change of rate against it, %.
+ANCHORS = (("a: decimated Draco", -85.0), ("b: background once, decimated Draco", -20.0))
+INPUT = (Measure("input_d2_psnr_forward", "D2 to the input", " dB"), Measure("input_ssim_masked", "SSIM to the input"))
+SMALL, ALIKE = at_most("background_bytes", 60_000, "bytes"), Bound("truth_ssim_masked", 0.76, "SSIM")
 MEASURES = (
-    D2_INPUT,
-    SSIM_INPUT,
+    *INPUT,
     Measure("truth_d2_psnr_backward", "D2 to the truth", " dB"),
     Measure("truth_ssim_masked", "SSIM to the truth"),
     Measure("truth_people_ssim_masked", "SSIM of people to the truth"),
@@ -43,7 +44,13 @@ MEASURES = (
     Measure("truth_people_normal_error_deg", "normals of people", " degrees", -1),
 )
 DEFAULT = Which(ROOM, BEST, {"quality": 50.0, "variant": None}, metrics="regions")
+IN_ROOM3 = Which(ROOM3, BEST, DEFAULT.options, "regions")
 SYSTEM = Which(ROOM, BEST, metrics="regions")
+USUAL: Options = {"preset": "best", "quality": 50.0}
+
+
+def _overlaps(room: str, *bounds: Bound, aim: str = "") -> Reaches:
+    return Reaches(f"{room}: segmentation, IoU of the dynamic faces", Which(room, "segmentation"), bounds, aim)
 
 
 def _over_input(key: str, limit: float, unit: str = "", least: bool = False) -> Bound:
@@ -57,30 +64,17 @@ PROMISES: tuple[Promise, ...] = (
         (Bound("iou_mean", 0.95), Bound("iou_worst", 0.9), at_most("static_called_dynamic", 0.002)),
         "0.98, 0.96, 0.0005",
     ),
-    Reaches(
-        f"{STANDING}: segmentation, IoU of the dynamic faces",
-        Which(STANDING, "segmentation"),
-        (Bound("iou_mean", 0.85),),
-        "0.94",
-    ),
+    _overlaps(STANDING, Bound("iou_mean", 0.85), aim="0.94"),
     Reaches(
         f"{ROOM}: background: median error to the clean room, share covered within 20 mm, bytes",
         DEFAULT,
-        (
-            at_most("truth_background_median_m", 1.2e-3, "m"),
-            Bound("truth_background_covered", 0.99),
-            at_most("background_bytes", 60_000, "bytes"),
-        ),
+        (at_most("truth_background_median_m", 1.2e-3, "m"), Bound("truth_background_covered", 0.99), SMALL),
         "0.8 mm, 99.5 %, 40 kB",
     ),
     Reaches(
         f"{ROOM}: rate with the background once in 10 s, D2 and SSIM to the truth",
         SYSTEM,
-        (
-            at_most("mbps_background_10s", 0.8, "Mbps"),
-            Bound("truth_d2_psnr_backward", 62.5, "dB"),
-            Bound("truth_ssim_masked", 0.76, "SSIM"),
-        ),
+        (at_most("mbps_background_10s", 0.8, "Mbps"), Bound("truth_d2_psnr_backward", 62.5, "dB"), ALIKE),
         "0.5 Mbps",
     ),
     Reaches(
@@ -94,14 +88,10 @@ PROMISES: tuple[Promise, ...] = (
         ),
         "2.2 mm, 16 degrees, no loss of coverage",
     ),
-    Reaches(
-        f"{ROOM3}: segmentation, IoU of the dynamic faces",
-        Which(ROOM3, "segmentation"),
-        (Bound("iou_mean", 0.95), Bound("iou_worst", 0.92)),
-    ),
+    _overlaps(ROOM3, Bound("iou_mean", 0.95), Bound("iou_worst", 0.92)),
     Reaches(
         f"{ROOM3}: people to the truth, share missed by 30 mm, door's bytes over theirs, until things are room",
-        Which(ROOM3, BEST, DEFAULT.options, "regions"),
+        IN_ROOM3,
         (
             at_most("truth_people_rms_backward_m", 4.5e-3, "m"),
             at_most("truth_people_missed", 0.02),
@@ -111,21 +101,14 @@ PROMISES: tuple[Promise, ...] = (
         ),
     ),
     *(
-        Reaches(
-            f"{room}: flicker of people over the input's",
-            Which(room, BEST, DEFAULT.options, "regions"),
-            (at_most("people_flicker_of_input", 0.5),),
-        )
-        for room in (ROOM, ROOM3)
+        Reaches(f"{own.sequence}: flicker of people over the input's", own, (at_most("people_flicker_of_input", 0.5),))
+        for own in (DEFAULT, IN_ROOM3)
     ),
     Always(f"{ROOM}: encode", SYSTEM, at_most("encode_s", 6.0, "CPU s/frame")),
     Always(f"{ROOM}: decode", SYSTEM, at_most("decode_ms", 5.0, "ms")),
     Always(f"{ROOM}: first frame", SYSTEM, at_most("first_frame_ms", 200.0, "ms")),
     Flat(Which(LOOPED, BEST)),
-    *(
-        Gains(ROOM, BEST, (name, f"{name}, subdivided"), (D2_INPUT, SSIM_INPUT), most, below_floor=True)
-        for name, most in zip(ANCHORS.values(), (-85.0, -20.0), strict=True)
-    ),
+    *(Gains(ROOM, BEST, (name, f"{name}, subdivided"), INPUT, most, below_floor=True) for name, most in ANCHORS),
 )
 NOTES = (
     "Anchors are given the frames that are measured, and their rate is that of these. Anchor b has true labels.",
@@ -146,8 +129,7 @@ STUDY = Study(
         Sweep("labelled_draco", {}, {"share": 0.1, "qp": 10, "labels": "found"}, only=(ROOM,), sampled=(ROOM,)),
         Sweep("scene_draco", WHOLE, only=(ROOM,), sampled=(ROOM,)),
         Sweep("scene_draco", WHOLE_SUBDIVIDED, {"levels": 1}, only=(ROOM,), sampled=(ROOM,)),
-        Sweep("meshreel", {}, {"preset": "best", "quality": 50.0}, only=(LOOPED,), frames=60, metrics="distances"),
-        Sweep("meshreel", {}, {"preset": "best", "quality": 50.0}, only=(LOOPED,), frames=240, metrics="distances"),
+        *(Sweep("meshreel", {}, USUAL, only=(LOOPED,), frames=k, metrics="distances") for k in (60, 240)),
     ),
     metrics="regions",
     measures=MEASURES,
@@ -178,10 +160,10 @@ SENSORS = Study(
     ),
 )
 
-
 LIVING_ROOM = "living_room"
+RECORDED = (Which(LIVING_ROOM, BEST), Which(LIVING_ROOM, TEXTURED))
 DIAL = {10.0: 1.0, 50.0: 1.5, 90.0: 2.5}  # quality: least rate over that of the first
-COVERED = Measure("body_covered", "body covered")
+COVERED, STEP = Measure("body_covered", "body covered"), at_most("border_step_db", 1.5, "dB")
 DEPTH_MEASURES = (
     COVERED,
     Measure("still_covered", "still covered"),
@@ -197,7 +179,7 @@ DEPTH_MEASURES = (
 
 
 def _reaches(text: str, *bounds: Bound) -> Reaches:
-    return Reaches(f"{LIVING_ROOM}: {text}", Which(LIVING_ROOM, TEXTURED), bounds)
+    return Reaches(f"{LIVING_ROOM}: {text}", RECORDED[1], bounds)
 
 
 def _dial(quality: float) -> Which:
@@ -211,19 +193,10 @@ DEPTH_PROMISES: tuple[Promise, ...] = (
     _reaches("groups of bodies, those of Draco", Bound("group_frames", 8, "frames"), at_most("draco_groups", 0)),
     _reaches("rate, the background's share", at_most("mbps", 0.12, "Mbps"), at_most("background_mbps", 0.12, "Mbps")),
     _reaches("change of still surface between refreshes", at_most("still_flicker_m", 0, "m")),
+    *(Always(f"{LIVING_ROOM}: step of PSNR at a border of groups", which, STEP) for which in RECORDED),
     *(
-        Always(
-            f"{LIVING_ROOM}: step of PSNR at a border of groups",
-            Which(LIVING_ROOM, curve),
-            at_most("border_step_db", 1.5, "dB"),
-        )
-        for curve in (BEST, TEXTURED)
-    ),
-    *(
-        NoMore(
-            f"{LIVING_ROOM}: rate at quality 10 and at {quality:g}", _dial(10.0), "mbps", 1 / factor, (_dial(quality),)
-        )
-        for quality, factor in list(DIAL.items())[1:]
+        NoMore(f"{LIVING_ROOM}: rate at quality 10 and at {high:g}", _dial(10.0), "mbps", 1 / factor, (_dial(high),))
+        for high, factor in list(DIAL.items())[1:]
     ),
     *(Rises(BEST, measure) for measure in (COVERED, D2)),
 )
@@ -232,7 +205,7 @@ RECORDINGS = Study(
     sequences=(LIVING_ROOM,),
     sweeps=(
         Sweep("meshreel", {"quality": tuple(DIAL)}, {"preset": "best"}),
-        Sweep("meshreel", {}, {"preset": "best", "quality": 50.0, "color": "texture"}),
+        Sweep("meshreel", {}, USUAL | {"color": "texture"}),
     ),
     metrics="depth",
     measures=DEPTH_MEASURES,
@@ -245,14 +218,11 @@ RECORDINGS = Study(
     ),
 )
 
-
 LONG_ROOM, TAKES = "long_room", (300, 900, 1800)  # frames
 LONG_TAKES = Study(
     title="Long takes of a room: drift, changing light, moved furniture, and visitors who come and go",
     sequences=(LONG_ROOM,),
-    sweeps=tuple(
-        Sweep("meshreel", {}, {"preset": "best", "quality": 50.0, "color": "vertices"}, frames=count) for count in TAKES
-    ),
+    sweeps=tuple(Sweep("meshreel", {}, USUAL | {"color": "vertices"}, frames=count) for count in TAKES),
     metrics="distances",
     measures=(
         D2,

@@ -171,12 +171,10 @@ class Sweep:
         """Yield its points on a sequence."""
         if self.only and sequence not in self.only:
             return
-        values = self.on.get(sequence, self.values)
+        values, sampled = self.on.get(sequence, self.values), sequence in self.sampled
         for point in zip(*values.values(), strict=True) if values else [()]:
             options = {**self.fixed, **dict(zip(values, point, strict=True))}
-            yield Point(
-                sequence, self.codec, options, self.frames or frames, sequence in self.sampled, self.metrics or metrics
-            )
+            yield Point(sequence, self.codec, options, self.frames or frames, sampled, self.metrics or metrics)
 
     def small_point(self) -> Point:
         """Return the point in the middle, as `--small` has it."""

@@ -44,8 +44,8 @@ def headset_values(data: bytes, level: int, throttle: float, rate: float) -> Val
         with playing(long) as address:
             numbers = (SECONDS, throttle, rate)
             command = ["node", "headset.mjs", f"{address}?layers={level}&controls=0", *map(str, numbers)]
-            tries = [_values(json.loads(_output(command, WEB)), rate)]
-            if tries[0]["shown_share"] < HOLDS:
+            tries = list[dict[str, float]]()
+            while len(tries) < 2 and not (tries and tries[0]["shown_share"] >= HOLDS):
                 tries.append(_values(json.loads(_output(command, WEB)), rate))
     best = max(tries, key=lambda values: values["shown_share"])  # other jobs only take pictures away
     return {**best}
@@ -78,16 +78,14 @@ def aarch64_values(data: bytes) -> Values:
 
 
 def _output(command: list[str], folder: Path, **environment: str) -> str:
+    environment = {**os.environ, **environment}
     try:
-        done = subprocess.run(
-            command, cwd=folder, env={**os.environ, **environment}, capture_output=True, text=True, check=True
-        )
+        done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=True)
     except FileNotFoundError as error:
         raise InputError(f"{command[0]}: {error.strerror}; run in a checkout, after `scripts/setup web`") from None
     except subprocess.CalledProcessError as error:
-        raise InputError(
-            f"{command[0]} failed: {(error.stderr or error.stdout)[-200:]}; `scripts/setup web` brings what it needs"
-        ) from None
+        text = f"{command[0]} failed: {(error.stderr or error.stdout)[-200:]}"
+        raise InputError(f"{text}; `scripts/setup web` brings what it needs") from None
     return done.stdout
 
 

@@ -161,8 +161,7 @@ def _true(scene: SceneData, number: int) -> Scene:
 
 @lru_cache(maxsize=10)
 def _noisy(scene: SceneData, number: int) -> Scene:
-    clean = _true(scene, number)
-    mesh = scene.meshes[number]
+    clean, mesh = _true(scene, number), scene.meshes[number]
     if scene.parts is not None:
         return clean.labelled(mesh)
     return Scene(mesh, scene.labels(number), clean.sights, clean.options)

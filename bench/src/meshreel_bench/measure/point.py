@@ -109,9 +109,8 @@ def _truth(case: _Case) -> Row:
     if known.scene is None and not known.cameras:
         raise InputError("the truth itself is known of simulated scenes, and what moves of those with cameras")
     if known.scene is None:
-        found, frames = segment(known.sequence), known.sequence  # by what the encoder finds to move
-        pairs = ((number, frames[number]) for number in range(len(frames)))
-        ratio = dynamic_ratio((mesh, found.moving(number, mesh)) for number, mesh in pairs)
+        found = segment(known.sequence)  # by what the encoder finds to move
+        ratio = dynamic_ratio((mesh, found.moving(number, mesh)) for number, mesh in enumerate(known.sequence))
         return msgspec.structs.replace(row, name=FOUND_NAME, metrics={FLOOR_RATIO: ratio})
     scene, numbers = known.scene, row.measured_frames
     clean = [scene.truth[number].mesh for number in numbers]
@@ -121,8 +120,8 @@ def _truth(case: _Case) -> Row:
 
 
 def _tracked(case: _Case) -> Row:
-    values = tracker_values(case.known.sequence, str(case.row.point.options["method"]))
-    return msgspec.structs.replace(case.row, metrics=values)
+    method = str(case.row.point.options["method"])
+    return msgspec.structs.replace(case.row, metrics=tracker_values(case.known.sequence, method))
 
 
 def _played(case: _Case) -> Row:
@@ -179,9 +178,8 @@ def _encoded(codec: Codec, source: MeshSequence, what: object) -> tuple[bytes, E
     with StageTimer() as timer:
         data = codec.code(analysis, timer) if isinstance(codec, TwoStepCodec) else codec.encode(source, timer)
     if type(data) is not bytes or not data:
-        raise InputError(
-            f"{codec.name} encodes to {'no byte' if data == b'' else type(data).__name__}; give bytes, one at least"
-        )
+        found = "no byte" if data == b"" else type(data).__name__
+        raise InputError(f"{codec.name} encodes to {found}; give bytes, one at least")
     return data, cost_of([*before, timer], len(source))
 
 
@@ -196,8 +194,7 @@ def _stream(codec: Codec, data: bytes, frames: int) -> Stream:
     groups = list[Group]()
     for chunk in reader.groups:
         own = keys & set(range(chunk.first_frame, chunk.first_frame + chunk.frame_count))
-        form = chunk.form_name
-        groups.append(Group(chunk.first_frame, chunk.frame_count, form, chunk.size, min(own, default=None)))
+        groups.append(Group(chunk.first_frame, chunk.frame_count, chunk.form_name, chunk.size, min(own, default=None)))
     once = once or sum(chunk.size for chunk in reader.chunks if chunk.kind == ChunkKind.STATIC)
     canonical = reader.metadata.get("canonical_references", 0)
     return Stream(len(data), frames, once, groups, color_bytes(reader), canonical, len(reader.tracks))

@@ -36,8 +36,6 @@ JUDGED = 4  # frames of those that were fitted to, and as many between these
 HELD = 4  # cameras of each
 PATH = "splat-transform"  # of npm: PlayCanvas' converter, which writes SPZ and SOG
 FLOATS = 14  # numbers of a splat with harmonics of degree 0: place 3, scale 3, rotation 4, opacity, colour 3
-
-
 # Squared errors of pictures against the originals, scores, and sizes, counts and times of sets of splats, by name.
 _Found = defaultdict[str, list[float]]
 
@@ -47,11 +45,8 @@ def splat_values(
 ) -> dict[str, float]:
     """Return quality and rate of splats on decoded frames; `painted` returns a frame in colour."""
     count, unit = len(known.sequence), known.sequence[0].diagonal  # splats are in units of it, as in a file
-    chains = (
-        chains_of(data)
-        if data.startswith(MAGIC)
-        else [[(k, Carrier(mesh.vertices, mesh.faces, 0))] for k, mesh in zip(numbers, decoded, strict=True)]
-    )
+    alone = ([(k, Carrier(mesh.vertices, mesh.faces, 0))] for k, mesh in zip(numbers, decoded, strict=True))
+    chains = chains_of(data) if data.startswith(MAGIC) else list(alone)
     chains = [[(k, replace(c, vertices=c.vertices / unit)) for k, c in chain] for chain in chains]
     of_frame = {number: chain for chain in chains for number, _ in chain}
     wanted = [k for k in evenly(count, JUDGED) if k in of_frame]

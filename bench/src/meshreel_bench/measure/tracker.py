@@ -12,6 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float64
 from scipy.spatial import cKDTree
+from scipy.spatial.distance import cdist
 
 from meshreel.analysis.reference.track import (
     AGREEMENT,
@@ -81,7 +82,7 @@ def published_track(frames: Sequence[Mesh], first: Float64[np.ndarray, "K 3"], o
     """Return centers that balance an even spread and rigidity, round by round, by affinities of all pairs so far."""
     draw = lambda t: interior_samples(frames[t], options.samples, np.random.default_rng((SEED, t))).points  # noqa: E731
     track, points = [first], draw(0)
-    distance, difference = _squared(first), np.zeros((len(first), len(first)))
+    distance, difference = cdist(first, first, "sqeuclidean"), np.zeros((len(first), len(first)))
     for t in range(1, len(frames)):
         before, following = track[-1], draw(t)
         affinity = np.exp2(-distance / REACH**2 - difference / AGREEMENT**2)
@@ -99,7 +100,7 @@ def published_track(frames: Sequence[Mesh], first: Float64[np.ndarray, "K 3"], o
             now, largest = moved, np.abs(moved - now).max()
             if largest < STILL:
                 break
-        distance = np.maximum(distance, _squared(now))
+        distance = np.maximum(distance, cdist(now, now, "sqeuclidean"))
         difference = np.maximum(difference, _differences(points, before, *_rigid(affinity, before, now)))
         track.append(now)
         points = following
@@ -129,8 +130,3 @@ def _differences(points: np.ndarray, centers: np.ndarray, turns: np.ndarray, shi
     own = np.einsum("kab,kab->k", moved, motions)[:, None]
     others = moments.reshape(count, 16) @ (np.swapaxes(motions, 1, 2) @ motions).reshape(count, 16).T
     return np.maximum(own + others - 2 * moved.reshape(count, 12) @ motions.reshape(count, 12).T, 0)
-
-
-def _squared(centers: np.ndarray) -> np.ndarray:
-    norms = np.einsum("kd,kd->k", centers, centers)
-    return np.maximum(norms[:, None] + norms - 2 * centers @ centers.T, 0)

@@ -130,8 +130,7 @@ def decode_timed(decoder: bytes, data: bytes, numbers: Sequence[int], frames: in
         passes.append(_pass_ms(decode, data))
     peak_mb, vertices, kept = peak_rss_mb(), list[int](), dict[int, Mesh]()
     reference = min(reference_s() for _ in range(PASSES))  # the best, as of the passes
-    shown = decode(data)
-    for number, mesh in enumerate(shown):
+    for number, mesh in enumerate(decode(data)):
         vertices.append(len(_checked(mesh, number).vertices))
         if number in numbers:  # textures are decoded when they are asked for: here
             kept[number] = mesh if mesh.texture is None else replace(mesh, texture=Texture.of(mesh.texture.pixels))
@@ -260,16 +259,16 @@ def maker() -> Maker:
 
 def _commit() -> str:
     """Return the commit of the checkout that this package runs from, with + where files differ."""
-    here = Path(__file__).resolve().parent
     try:
-        head = _git(here, "rev-parse", "HEAD")
-        _git(here, "ls-files", "--error-unmatch", Path(__file__).name)
-        changed = _git(here, "status", "--porcelain", "--", ":(top)src", ":(top)bench/src", ":(top)core")
+        head = _git("rev-parse", "HEAD")
+        _git("ls-files", "--error-unmatch", Path(__file__).name)
+        changed = _git("status", "--porcelain", "--", ":(top)src", ":(top)bench/src", ":(top)core")
     except (OSError, subprocess.SubprocessError):  # no git, or the package is installed
         return "none: installed"
     return head[:_DIGITS] + ("+" if changed else "")
 
 
-def _git(folder: Path, *words: str) -> str:
+def _git(*words: str) -> str:
+    folder = Path(__file__).resolve().parent
     answer = subprocess.run(["git", *words], cwd=folder, capture_output=True, text=True, check=True, timeout=10)
     return answer.stdout.strip()

@@ -34,14 +34,11 @@ def winners_table(rows: Sequence[Row], points: Sequence[Row]) -> list[str]:
     for codec in in_order(map(curve_of, rated(usual))):
         if codec == BEST or sum(codec in own for own in curves.values()) < min(2, len(every)):
             continue  # variants that are measured on one sequence are in the appendix
-        cells = {
-            f"{group}, equal {measure.name}": _range(
-                [_ratio(rated(usual, name), codec, BEST, measure) for name in names if codec in curves[name]]
-            )
-            for group, names in groups.items()
-            for measure in EQUAL[:2]
-        }
-        records.append({HEAD: text(title(codec))} | cells)
+        record = {HEAD: text(title(codec))}
+        for group, names in groups.items():
+            own = [rated(usual, name) for name in names if codec in curves[name]]
+            record |= {f"{group}, equal {m.name}": _range([_ratio(r, codec, BEST, m) for r in own]) for m in EQUAL[:2]}
+        records.append(record)
     vdmc = {measure: vdmc_ratios(points, measure) for measure in EQUAL[:2]}
     if records and any(vdmc.values()):
         cells = {f"bodies, equal {m.name}": _range([RateAt(ratio) for *_, ratio in own]) for m, own in vdmc.items()}
@@ -120,11 +117,9 @@ def rate_table(rows: Sequence[Row], best: str, measures: Sequence[Measure]) -> l
     if len(records[0]) == 1:
         return []
     lines = markdown(records)
-    notes = {
-        "≤ ": "≤: the rate of its cheapest point, which is better still.",
-        "- (": "-: even its best point, which is shown, is not as good.",
-    }
-    used = [note for sign, note in notes.items() if sign in "".join(lines)]
+    shown = "".join(lines)
+    used = ["≤: the rate of its cheapest point, which is better still."] if "≤ " in shown else []
+    used += ["-: even its best point, which is shown, is not as good."] if "- (" in shown else []
     rule = f"×: how many times the rate of {text(best)}. The quality is the median of its points."
     return [*lines, "", f"Rates are interpolated on each codec's own curve, as for BD-rates; {rule}", *used]
 
@@ -173,11 +168,10 @@ def headline(studies: Mapping[str, Sequence[Row]]) -> dict[str, Any]:
     people = [_person(row) for row in best if row.point.sequence in PEOPLE]
     usual = _usual(studies.get("figure6", ()))
     bodies = [name for name in sequences(usual) if name not in SCENES]
-    table = {
-        title(codec): {body: rate_ratio(rated(usual, body), codec, BEST, D2) for body in bodies} for codec in OTHERS
-    }
-    known = {codec: {body: round(ratio, 2) for body, ratio in own.items() if ratio} for codec, own in table.items()}
-    ratios = {codec: own | {"median": round(median(own.values()), 1)} for codec, own in known.items() if own}
+    own = {body: rated(usual, body) for body in bodies}
+    table = {title(codec): {body: rate_ratio(own[body], codec, BEST, D2) for body in bodies} for codec in OTHERS}
+    known = {codec: {body: round(ratio, 2) for body, ratio in each.items() if ratio} for codec, each in table.items()}
+    ratios = {codec: each | {"median": round(median(each.values()), 1)} for codec, each in known.items() if each}
     if not people or not ratios:
         return {}
     size = round(mean(person["kilobytes"] for person in people))

@@ -32,6 +32,7 @@ SHOWN = ("synthetic4", "dancer", "room2")  # sequences whose curves are on the f
 TEXT = "results.md"  # package data: the first page, with a line {NAME} for each part that is made
 BEYOND = "Other codecs go beyond the best measured point of `best`; the furthest of them:"
 MISSED = "## Missed targets"
+PAPER = "The paper's own numbers stand beside ours in [reproducing.md](reproducing.md)."
 DOUBTS = (
     "## Rows to measure again: bytes differ between two experiments, as the encoder changed",
     "## Rows to measure again: the scene was made anew, and its diagonal differs from most",
@@ -62,8 +63,7 @@ class Part:
 def parts_of(rows: Sequence[Row]) -> list[Part]:
     """Return the experiments that have rows; a point of several experiments is in each of them."""
     declared = {name: {point.key for point in study.points()} for name, study in EXPERIMENTS.items()}
-    every = set[str]().union(*declared.values())
-    others = {row.point.key for row in rows} - every
+    others = {row.point.key for row in rows}.difference(*declared.values())
     homes = (name for name, study in EXPERIMENTS.items() if others <= {point.key for point in study.points(small=True)})
     home, parts = next(homes, OPEN), []
     for name, study in EXPERIMENTS.items():
@@ -133,29 +133,22 @@ def _first_page(parts: Sequence[Part]) -> list[str]:
     """Return the lines of `results.md`: a comparison on one screen, then plots, BD-rates and what is missed."""
     rows = {part.name: part.rows for part in parts}
     open_rows, points = rows.get(OPEN, []), [row for name in WITH_VDMC for row in rows.get(name, ())]
-    paper = reproducing_page({OPEN: open_rows})
     every = [verdict for part in parts for verdict in verdicts(part.study, part.rows) if verdict.met is not None]
     missed = [verdict for verdict in every if not verdict.met]
     kept = f"All {len(every)} targets that were measured are met." if every else "No target was measured."
     if missed:
         met = len(every) - len(missed)
         kept = f"Of {len(every)} targets, {met} are met; [the others](#missed-targets) are listed at the end."
+    shown = ((tables.text(name), _plot_name(part, name)) for part, name in _shown(parts))
+    images = [f"![{name}: quality against rate]({FOLDER}/{file})" for name, file in shown]
     made = {
         "{winners}": winners_table(open_rows, points) or ["No codec was measured beside `best`."],
         "{losses}": list(losses(open_rows, points)),
         "{beyond}": _section(BEYOND, beyond_table(open_rows)),
         "{verdicts}": [kept],
-        "{reproducing}": ["The paper's own numbers stand beside ours in [reproducing.md](reproducing.md)."]
-        if paper
-        else [],
-        "{plots}": [
-            line
-            for part, name in _shown(parts)
-            for line in (f"![{tables.text(name)}: quality against rate]({FOLDER}/{_plot_name(part, name)})", "")
-        ],
-        "{table}": [
-            line for p in parts if p.name == OPEN for line in tables.summary_table(p.rows, p.study.best or "", D2)
-        ],
+        "{reproducing}": [PAPER] if reproducing_page({OPEN: open_rows}) else [],
+        "{plots}": [line for image in images for line in (image, "")],
+        "{table}": tables.summary_table(open_rows, EXPERIMENTS[OPEN].best or "", D2),
         "{appendices}": [
             f"- [{p.study.title}]({FOLDER}/appendix-{p.name}.md), {len(p.rows) + len(p.failed)} points"
             + (f", {len(p.failed)} of them failed" if p.failed else "")
@@ -187,9 +180,8 @@ def _doubts(parts: Sequence[Part]) -> dict[str, list[str]]:
         for most, *others in mixtures(rows)
         for other in others
     ]
-    return {
-        head: [f"- {tables.text(line)}" for line in lines] for head, lines in zip(DOUBTS, (points, data), strict=True)
-    }
+    pairs = zip(DOUBTS, (points, data), strict=True)
+    return {head: [f"- {tables.text(line)}" for line in lines] for head, lines in pairs}
 
 
 def _appendix(part: Part) -> Iterator[str]:

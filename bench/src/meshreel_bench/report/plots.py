@@ -15,7 +15,9 @@ from ..names import BEST, Look, title
 from ..rows import Row
 from .values import curve_of, floors, rated, value
 
-RATE = ("mbps", "rate (Mbps)")
+Axis = tuple[str, str]  # a value, and what it is
+RATE: Axis = ("mbps", "rate (Mbps)")
+Looks = Mapping[str, Look]
 WIDTH = 17 / 2.54  # inches
 DPI = 130
 LONG = 24  # letters of a sequence's title that have room beside another (guess)
@@ -34,10 +36,8 @@ _SETTINGS: dict[Any, Any] = {
 _BETTER = {1: "↑ higher is better", -1: "↓ lower is better"}
 
 
-def plot_curves(
-    rows: Sequence[Row], measures: Sequence[Measure], looks: Mapping[str, Look], path: Path, x: tuple[str, str] = RATE
-) -> Path:
-    """Write quality against `x`, a value and what it is, of each curve; a dotted line is what the truth reaches."""
+def plot_curves(rows: Sequence[Row], measures: Sequence[Measure], looks: Looks, path: Path, x: Axis = RATE) -> Path:
+    """Write quality against `x` of each curve; a dotted line is what the truth reaches."""
     import matplotlib
 
     with matplotlib.rc_context():
@@ -54,9 +54,7 @@ def drawable(rows: Sequence[Row], measures: Sequence[Measure]) -> bool:
     return any(value(row, measure.key) is not None for row in rated(rows) for measure in measures)
 
 
-def curves_figure(
-    rows: Sequence[Row], measures: Sequence[Measure], looks: Mapping[str, Look], x: tuple[str, str] = RATE
-) -> Any:
+def curves_figure(rows: Sequence[Row], measures: Sequence[Measure], looks: Looks, x: Axis = RATE) -> Any:
     """Return the figure of `plot_curves`."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -78,19 +76,16 @@ def curves_figure(
         name = f"{sequence}, {rated(own)[0].frames} frames"
         name += "\n" * (len(name) > LONG)  # over what stands at the right
         panels[0].set_title(name, loc="left", fontweight="bold")
-    handles = {
-        name: line for panel in lines.flat for line, name in zip(*panel.get_legend_handles_labels(), strict=True)
-    }
-    legend = figure.legend(
-        list(handles.values()), list(handles), loc="outside lower center", ncols=columns, frameon=False
-    )
+    known = [panel.get_legend_handles_labels() for panel in lines.flat]
+    handles = {name: line for drawn, labels in known for line, name in zip(drawn, labels, strict=True)}
+    legend = figure.legend([*handles.values()], [*handles], loc="outside lower center", ncols=columns, frameon=False)
     for label in legend.get_texts():
         if label.get_text() == title(BEST):
             label.set_fontweight("bold")
     return figure
 
 
-def _draw(panel: Any, rows: Sequence[Row], measure: Measure, looks: Mapping[str, Look], x: tuple[str, str]) -> None:
+def _draw(panel: Any, rows: Sequence[Row], measure: Measure, looks: Looks, x: Axis) -> None:
     """Draw one panel: the first look last, over the others."""
     own, rates = rated(rows), [value(row, x[0]) or row.mbps for row in rated(rows)]
     for place, (name, look) in enumerate(looks.items()):

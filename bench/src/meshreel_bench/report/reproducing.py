@@ -17,6 +17,7 @@ WRITTEN = (LITERAL, LITERAL_FINEST)  # the second where the first does not reach
 *AUTHORS, AUTHORS_FOUR = DATA_OF_AUTHORS
 SCENES = ("room2", "living_room", "procedural_room", *AUTHORS)
 FOUR_AND_TWO = ("synthetic4", "synthetic2x150", AUTHORS_FOUR)  # people
+Cell = Callable[[Sequence[Row], str, Published | None], str]  # of a codec's rows on a sequence beside a system
 SLACK_DB, SHORT = 0.1, " †"  # a point that is worse by more is marked
 PAPER_3 = (("TSMC", 6.13, 25.35, 0.9462), ("uncompressed", 357.6, 26.46, 0.9594))  # LMG of 2026: name, Mbps, dB, SSIM
 TEXT = "reproducing.md"  # package data: the page, with a line {NAME} for each table, and {canonical} within one
@@ -34,10 +35,8 @@ def reproducing_page(studies: Mapping[str, Sequence[Row]]) -> list[str]:
     canonical = f"{sum(each.canonical for each in streams)} of {sum(len(each.groups) for each in streams)} groups"
     page = (files(__package__) / TEXT).read_text(encoding="utf-8").replace("{canonical}", canonical)  # in the MDS pose
     lines = {
-        "{table_1}": _beside(own, SCENES, TABLE_1, lambda rows, codec, _system: _near_best(rows, codec)),
-        "{table_2}": _beside(
-            own, FOUR_AND_TWO, TABLE_2, lambda rows, codec, system: _as_good(rows, codec, _wanted(system or TABLE_2[0]))
-        ),
+        "{table_1}": _beside(own, SCENES, TABLE_1, _near_best),
+        "{table_2}": _beside(own, FOUR_AND_TWO, TABLE_2, _as_published),
         "{table_3}": _table_3(rated(studies.get("table3", ()))),
         "{headline}": headline_table(every),
         "{vdmc}": vdmc_table([*own, *studies.get("mpeg", ())]),
@@ -49,12 +48,7 @@ def reproducing_page(studies: Mapping[str, Sequence[Row]]) -> list[str]:
     return [line for text in page.splitlines() for line in lines.get(text, [text])]
 
 
-def _beside(
-    rows: Sequence[Row],
-    names: Sequence[str],
-    systems: Sequence[Published],
-    found: Callable[[Sequence[Row], str, Published | None], str],
-) -> Iterator[str]:
+def _beside(rows: Sequence[Row], names: Sequence[str], systems: Sequence[Published], found: Cell) -> Iterator[str]:
     """Yield published systems, and `best`, each beside what is found of its codec on every sequence."""
     names = [name for name in names if rated(rows, name)] or names[:1]
     yield f"| {' | '.join(['system', 'paper', *(f'here, {name}' for name in names)])} |"
@@ -85,10 +79,9 @@ def _table_3(rows: Sequence[Row]) -> Iterator[str]:
     yield from (f"| dancer (paper) | {name} | {mesh} | {db}, {ssim} | 719.8 | | |" for name, mesh, db, ssim in PAPER_3)
     for row in rows:
         cells: list[str | None] = [row.point.sequence, f"{curve_of(row)}{_setting(row)}", f"{row.mbps:.3g}"]
-        known = {
-            name: None if (found := value(row, f"splats_{name}")) is None else f"{found:.4g}"
-            for name in ("psnr", "ssim", "mbps", "per_frame_mbps", "own_psnr", "own_ssim")
-        }
+        names = ("psnr", "ssim", "mbps", "per_frame_mbps", "own_psnr", "own_ssim")
+        values = ((name, value(row, f"splats_{name}")) for name in names)
+        known = {name: None if found is None else f"{found:.4g}" for name, found in values}
         here = f"{known['psnr']}, {known['ssim']}"
         if value(row, "splats_between_psnr") is None:  # no two frames share a base mesh
             cells += [here, known["mbps"], "", ""]
@@ -163,10 +156,14 @@ def _of(rows: Sequence[Row], codec: str) -> list[Row]:
     return sorted((row for row in rows if curve_of(row) == codec), key=lambda row: row.mbps)
 
 
-def _near_best(rows: Sequence[Row], codec: str) -> str:
+def _near_best(rows: Sequence[Row], codec: str, _system: Published | None) -> str:
     """Return the cheapest point of a codec that is as good in D2, but for `SLACK_DB`, as all of `best`; or its best."""
     best = [_d2(row) for row in _of(rows, BEST)]
     return _as_good(rows, codec, max(best) - SLACK_DB) if best else _shown(None)
+
+
+def _as_published(rows: Sequence[Row], codec: str, system: Published | None) -> str:
+    return _as_good(rows, codec, _wanted(system or TABLE_2[0]))
 
 
 def _as_good(rows: Sequence[Row], codec: str, db: float) -> str:

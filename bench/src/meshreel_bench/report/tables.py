@@ -75,13 +75,9 @@ def bd_table(rows: Sequence[Row], one: str, measures: Sequence[Measure], is_anch
     if one not in names or len(names) < 2:
         return []
     head = f"against {text(one)}" if is_anchor else f"{text(one)} against"
-    records = []
-    for other in names:
-        if other != one:
-            pair = (other, one) if is_anchor else (one, other)
-            cells = {f"rate at equal {m.name} ↓": bd_cell(rows, *pair, m) for m in measures}
-            records.append({head: text(other)} | cells)
-    return markdown(records)
+    pairs = {other: (other, one) if is_anchor else (one, other) for other in names if other != one}
+    cells = {o: {f"rate at equal {m.name} ↓": bd_cell(rows, *pair, m) for m in measures} for o, pair in pairs.items()}
+    return markdown([{head: text(other)} | own for other, own in cells.items()])
 
 
 def summary_table(rows: Sequence[Row], one: str, measure: Measure) -> list[str]:
@@ -118,12 +114,9 @@ def verdict_table(found: Sequence[Verdict]) -> list[str]:
 
 def failure_table(rows: Sequence[Row]) -> list[str]:
     """Return points of which nothing was measured, and why."""
-    records = [
-        {"sequence": text(row.point.sequence), "codec": text(row.name)}
-        | {"operating point": text(_listed(row.options)), "reason": text(row.failed)}
-        for row in rows
-    ]
-    return markdown(records)
+    heads = ("sequence", "codec", "operating point", "reason")
+    found = ((row.point.sequence, row.name, _listed(row.options), row.failed) for row in rows)
+    return markdown([dict(zip(heads, map(text, cells), strict=True)) for cells in found])
 
 
 def maker_table(rows: Sequence[Row]) -> list[str]:

@@ -14,7 +14,7 @@ from meshreel.encoder.run.surveying import SLICE
 from ..bd_rate import Curve, hull
 from ..experiments.study import D2, FLOOR, Measure
 from ..names import ONCE_SUBDIVIDED, SUBDIVIDED, USUAL
-from ..rows import ColorBytes, Group, Row, Stream
+from ..rows import ColorBytes, Row, Stream
 
 SECONDS = 10.0  # in which a background is sent once, for `mbps_background_10s`
 HALF = 30  # frames of each half of a long sequence
@@ -50,15 +50,10 @@ def _without_keys(row: Row) -> float | None:
     if row.stream is None or not row.stream.groups or not found or len(found) != row.frames:
         return None
     values = np.array([1.0 if each is None else each for each in found])
-    keys = [_key(group, values) for group in row.stream.groups]
+    groups = [(group, values[group.first_frame : group.first_frame + group.frames]) for group in row.stream.groups]
+    keys = [g.first_frame + int(np.argmax(own)) if g.key is None else g.key for g, own in groups]
     others = np.setdiff1d(np.arange(len(values)), keys)
     return float(np.mean(values[others] if len(others) else values))
-
-
-def _key(group: Group, values: np.ndarray) -> int:
-    if group.key is not None:
-        return group.key
-    return group.first_frame + int(np.argmax(values[group.first_frame : group.first_frame + group.frames]))
 
 
 def _second_half_over_first(row: Row) -> float | None:
@@ -117,10 +112,8 @@ def _of_key(row: Row, what: str, frames: int) -> float | None:
     if row.stream is None or known is None or known.chains > 1:
         return row.mbps if row.stream and what == "all" else None
     first, *others = known.pictures or [0]
-    sizes = {
-        "vertices": known.vertices,
-        "texture": known.atlas + first + (frames - 1) * sum(others) / max(len(others), 1),
-    }
+    texture = known.atlas + first + (frames - 1) * sum(others) / max(len(others), 1)
+    sizes = {"vertices": known.vertices, "texture": texture}
     rest = row.stream.bytes - known.all - known.base
     sizes["all"] = sum(sizes.values()) + known.base + rest * frames / row.stream.coded_frames
     return 8 * sizes[what] * row.frame_rate / frames / 1e6

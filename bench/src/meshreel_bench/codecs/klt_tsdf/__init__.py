@@ -22,7 +22,8 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from itertools import islice
 from typing import Annotated, ClassVar
 
 import numpy as np
@@ -37,7 +38,7 @@ from meshreel.geometry.closest_points import Surface
 from meshreel.geometry.topology import drop_unreferenced
 from meshreel.types import Mesh, MeshSequence
 
-from ...codec import DecodedFrames, Options, Progress
+from ...codec import DecodedFrames, Options, Progress, reported
 from .components import (
     MOST,
     STEP_ONE,
@@ -45,7 +46,6 @@ from .components import (
     VOXELS,
     Field,
     Model,
-    basis_of,
     cells_at,
     crossed,
     decode_basis,
@@ -54,6 +54,7 @@ from .components import (
     forward,
     join,
     learned,
+    model_of,
     polygonize,
     split,
 )
@@ -102,32 +103,35 @@ class KltTsdfCodec(Options):
         survey = survey_sequence(sequence)
         voxel = survey.diagonal / self.cells
         symbols, energies = learned(self.basis)
-        model = Model(basis_of(symbols), max(round(self.step * TRUNCATION * STEP_ONE), 1))
-        groups = list[bytes]()
-        for start in range(0, len(sequence), self.group):
-            numbers = range(start, min(start + self.group, len(sequence)))
-            meshes = (sequence[number] for number in numbers)
-            scaled = (Mesh.of((mesh.vertices - survey.low) / voxel, mesh.faces) for mesh in meshes)
-            groups.append(encode_group(scaled, model, energies))
-            if progress is not None:
-                progress("code", numbers.stop, len(sequence))
+        model = model_of(symbols, max(round(self.step * TRUNCATION * STEP_ONE), 1))
+        scaled = (Mesh.of((mesh.vertices - survey.low) / voxel, mesh.faces) for mesh in sequence)
+        starts = range(0, len(sequence), self.group)
+        each = reported(starts, progress, "code", len(starts))
+        groups = [encode_group(islice(scaled, self.group), model, energies) for _ in each]
         low, table = tuple(map(float, survey.low)), encode_basis(symbols)
         head = MAGIC, VERSION, len(sequence), self.group, self.basis, model.step
         data = pack(Stream(*head, deblocking=0, voxel=voxel, low=low, table=table, groups=join(groups)))
         return data + zlib.crc32(data).to_bytes(4, "little")
 
     def decode(self, data: bytes) -> Sequence[Mesh]:
-        return open_video(data)
+        return Video(data)
 
 
-@dataclass(slots=True)
 class Video(DecodedFrames):
-    """The frames of a stream; the group of the last one is kept."""
+    """The frames of a stream, decoded when asked for; the group of the last one is kept."""
 
-    stream: Stream
-    model: Model
-    groups: list[bytes]
-    _last: tuple[int, Group] | None = field(default=None)
+    def __init__(self, data: bytes) -> None:
+        """Raises FormatError where the stream's head is not one."""
+        if data[:4] != MAGIC:
+            raise FormatError(f"begins with {data[:4]!r}, not {MAGIC!r}: no stream of klt_tsdf")
+        if zlib.crc32(data[:-4]).to_bytes(4, "little") != data[-4:]:
+            raise FormatError(f"checksum of {len(data)} bytes is wrong; the stream is damaged")
+        self.stream = stream = unpack_all(Stream, data[:-4])
+        if stream.version != VERSION:
+            raise FormatError(f"version {stream.version} of klt_tsdf; this one reads {VERSION}")
+        self._model = model_of(decode_basis(stream.table, stream.basis), stream.step)
+        self._groups = split(stream.groups, -(-stream.frames // stream.group))
+        self._last: tuple[int, list[Frame]] | None = None
 
     def __len__(self) -> int:
         return self.stream.frames
@@ -136,72 +140,44 @@ class Video(DecodedFrames):
         which, inside = divmod(number, self.stream.group)
         if self._last is None or self._last[0] != which:
             count = min(self.stream.group, len(self) - which * self.stream.group)
-            self._last = which, decode_group(self.groups[which], count, self.stream.basis)
-        mesh = decode_frame(self._last[1], inside, self.model)
+            self._last = which, decode_group(self._groups[which], count, self.stream.basis)
+        places, symbols, left_out = self._last[1][inside]
+        field = field_of(places, symbols, self._model)
+        (mesh, cells), omitted = polygonize(field), _decode_omitted(left_out, field)
+        if len(omitted):
+            mesh = drop_unreferenced(Mesh(mesh.vertices, mesh.faces[~np.isin(cells, omitted)]))
         return Mesh.of(mesh.vertices * self.stream.voxel + self.stream.low, mesh.faces)
-
-
-def open_video(data: bytes) -> Video:
-    """The frames of a stream, decoded when asked for. Raises FormatError where its head is not one."""
-    if data[:4] != MAGIC:
-        raise FormatError(f"begins with {data[:4]!r}, not {MAGIC!r}: no stream of klt_tsdf")
-    if zlib.crc32(data[:-4]).to_bytes(4, "little") != data[-4:]:
-        raise FormatError(f"checksum of {len(data)} bytes is wrong; the stream is damaged")
-    stream = unpack_all(Stream, data[:-4])
-    if stream.version != VERSION:
-        raise FormatError(f"version {stream.version} of klt_tsdf; this one reads {VERSION}")
-    symbols = decode_basis(stream.table, stream.basis)
-    groups = split(stream.groups, -(-stream.frames // stream.group))
-    return Video(stream, Model(basis_of(symbols), stream.step), groups)
 
 
 _FAR = 1.5  # voxels from the surface beyond which decoded surface is left out
 _PAST = 0.5  # voxels past a border
 
 
-@dataclass(frozen=True, slots=True)
-class Group:
-    """The frames of a group as they travel."""
-
-    places: list[Int64[np.ndarray, "_ 3"]]  # of each frame
-    symbols: list[Int32[np.ndarray, "_ _"]]
-    omitted: list[bytes]
+# Frame of a group as it travels: the places of its blocks, their symbols, and what is left out.
+Frame = tuple[Int64[np.ndarray, "_ 3"], Int32[np.ndarray, "_ _"], bytes]
 
 
 def encode_group(meshes: Iterable[Mesh], model: Model, energies: Float64[np.ndarray, " M"]) -> bytes:
     """Return the bytes of frames in voxel units; `energies` are the expected mean squares of the weights."""
-    group = Group([], [], [])
-    for mesh in meshes:
-        mesh = prepared(mesh)
+    frames = list[Frame]()
+    for mesh in map(prepared, meshes):
         blocks = sample(mesh)
         symbols = forward(blocks, model, energies)
-        group.places.append(blocks.places)
-        group.symbols.append(symbols)
-        group.omitted.append(_encode_omitted(mesh, field_of(blocks.places, symbols, model)))
-    symbols = np.concatenate(group.symbols)
-    coded = join(encode_weights(symbols, neighbours(group.places, 1))) if len(symbols) else b""  # one a component
-    return join([encode_places(group.places), coded, *group.omitted])
+        frames.append((blocks.places, symbols, _encode_omitted(mesh, field_of(blocks.places, symbols, model))))
+    places, each, omitted = (list(column) for column in zip(*frames, strict=True))
+    every = np.concatenate(each)
+    coded = join(encode_weights(every, neighbours(places, 1))) if len(every) else b""  # one a component
+    return join([encode_places(places), coded, *omitted])
 
 
-def decode_group(data: bytes, count: int, width: int) -> Group:
+def decode_group(data: bytes, count: int, width: int) -> list[Frame]:
     """The group of `count` frames."""
     first, second, *omitted = split(data, 2 + count)
     places = decode_places(first, count)
     ends, symbols = np.cumsum([len(each) for each in places]), np.zeros((0, width), np.int32)
     if ends[-1]:
         symbols = decode_weights(split(second, width), int(ends[-1]), neighbours(places, 1))
-    return Group(places, np.split(symbols, ends[:-1]), omitted)
-
-
-def decode_frame(group: Group, number: int, model: Model) -> Mesh:
-    """A frame of a group, in voxel units."""
-    field = field_of(group.places[number], group.symbols[number], model)
-    (mesh, cells), omitted = polygonize(field), _decode_omitted(group.omitted[number], field)
-    if not len(omitted):
-        return mesh
-    kept = np.ones(VOXELS * len(field.places), bool)
-    kept[omitted] = False
-    return drop_unreferenced(Mesh(mesh.vertices, mesh.faces[kept[cells]]))
+    return list(zip(places, np.split(symbols, ends[:-1]), omitted, strict=True))
 
 
 def _encode_omitted(mesh: Mesh, field: Field) -> bytes:

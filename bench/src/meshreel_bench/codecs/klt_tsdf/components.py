@@ -44,11 +44,12 @@ class BasisSymbols:
 
 
 @dataclass(frozen=True, slots=True)
-class Basis:
-    """A basis at a block's voxels: integers in units of 1 / ONE, float64 so that products of them are exact."""
+class Model:
+    """Basis at a block's voxels, in units of 1 / ONE, and step: integers, float64 so that products are exact."""
 
     mean: Float64[np.ndarray, " N"]  # voxels
     vectors: Float64[np.ndarray, "N M"]  # root mean square 1, strongest first
+    step: int  # of the weights, in units of 1 / STEP_ONE voxels
 
 
 @cache
@@ -76,12 +77,12 @@ def members(kind: int) -> Int64[np.ndarray, " K"]:
     return np.flatnonzero(degrees() % 2 @ [4, 2, 1] == kind)
 
 
-def basis_of(symbols: BasisSymbols) -> Basis:
-    """The basis at the voxels; exact: all numbers are integers below 2^53."""
+def model_of(symbols: BasisSymbols, step: int) -> Model:
+    """The model of a basis and a step; exact: all numbers are integers below 2^53."""
     kinds = [0, *symbols.classes.tolist()]
     columns = [polynomials()[:, members(k)] @ c for k, c in zip(kinds, symbols.coefficients, strict=True)]
     values = np.stack([np.floor(column / COEFFICIENT + 0.5) for column in columns], axis=1)
-    return Basis(values[:, 0].copy(), np.ascontiguousarray(values[:, 1:]))
+    return Model(values[:, 0].copy(), np.ascontiguousarray(values[:, 1:]), step)
 
 
 def encode_basis(symbols: BasisSymbols) -> bytes:
@@ -115,7 +116,7 @@ def join(blobs: Iterable[bytes]) -> bytes:
 def split(data: bytes, count: int) -> list[bytes]:
     """Return the `count` blobs of `data`. Raises FormatError where it holds fewer, or more."""
     blobs, offset = list[bytes](), 0
-    for _ in range(count):
+    while len(blobs) < count:
         blob, offset = _BLOB.unpack(data, offset)
         blobs.append(blob)
     if offset != len(data):
@@ -132,14 +133,6 @@ _CHUNK = 400  # blocks whose systems are in memory at once
 LARGEST = 1 << 20  # of a weight in units of 1 / STEP_ONE: sums stay exact
 
 
-@dataclass(frozen=True, slots=True)
-class Model:
-    """Basis and step that encoder and decoder share."""
-
-    basis: Basis
-    step: int  # of the weights, in units of 1 / STEP_ONE voxels
-
-
 def beyond(values: Float64[np.ndarray, "B N"], fitted: Float64[np.ndarray, "B N"]) -> Float64[np.ndarray, "B N"]:
     """The distances to fit: beyond truncation what is fitted already, if it is beyond truncation on that side, too."""
     side = np.where(values < 0, -1.0, 1.0)
@@ -148,43 +141,27 @@ def beyond(values: Float64[np.ndarray, "B N"], fitted: Float64[np.ndarray, "B N"
 
 def forward(blocks: Blocks, model: Model, energies: Float64[np.ndarray, " M"]) -> Int32[np.ndarray, "B M"]:
     """The symbols of the weights; `energies` are the mean squares to expect, voxels squared."""
-    symbols = np.zeros((len(blocks.places), model.basis.vectors.shape[1]), np.int32)
-    counts = np.where(blocks.near, 1.0, np.where(blocks.known, _FAR, 0.0))  # weights of voxels in the fit
+    vectors, mean = model.vectors / ONE, model.mean / ONE
+    noise, most = _NOISE + (model.step / STEP_ONE) ** 2 / 12, 2 * TRUNCATION
+    symbols = np.zeros((len(blocks.places), vectors.shape[1]), np.int32)
+    every = np.where(blocks.near, 1.0, np.where(blocks.known, _FAR, 0.0))  # weights of voxels in the fit
     for start in range(0, len(symbols), _CHUNK):
         part = slice(start, start + _CHUNK)
-        symbols[part] = _quantised(*_fit(blocks.values[part], counts[part], model, energies), model.step)
+        values, counts = blocks.values[part], every[part]
+        inverse = np.linalg.inv(np.matmul(vectors.T, counts[:, :, None] * vectors) + np.diag(noise / energies))
+        weights = np.zeros((len(values), vectors.shape[1]))
+        for number in range(_ROUNDS):
+            target = beyond(values, mean + weights @ vectors.T) if number else np.clip(values, -most, most)
+            weights = np.einsum("bij,bj->bi", inverse, (counts * (target - mean)) @ vectors)
+        symbols[part] = _quantised(weights, inverse, model.step / STEP_ONE)
     return symbols
 
 
-def _fit(
-    values: Float64[np.ndarray, "B N"],
-    counts: Float64[np.ndarray, "B N"],
-    model: Model,
-    energies: Float64[np.ndarray, " M"],
-) -> tuple[Float64[np.ndarray, "B M"], Float64[np.ndarray, "B M M"]]:
-    """Weights in voxels, and the matrix of the squared error that each leaves."""
-    vectors, mean = model.basis.vectors / ONE, model.basis.mean / ONE
-    noise = _NOISE + (model.step / STEP_ONE) ** 2 / 12
-    gram = np.matmul(vectors.T, counts[:, :, None] * vectors) + np.diag(noise / energies)
-    inverse = np.linalg.inv(gram)
-    weights = np.zeros((len(values), vectors.shape[1]))
-    for round_ in range(_ROUNDS):
-        target = (
-            beyond(values, mean + weights @ vectors.T) if round_ else np.clip(values, -2 * TRUNCATION, 2 * TRUNCATION)
-        )
-        weights = np.einsum("bij,bj->bi", inverse, (counts * (target - mean)) @ vectors)
-    return weights, inverse
-
-
-def _quantised(
-    weights: Float64[np.ndarray, "B M"], inverse: Float64[np.ndarray, "B M M"], step: int
-) -> Int32[np.ndarray, "B M"]:
-    """Return symbols; the rounding error of a weight is spread over the following ones by least squares."""
-    unit = step / STEP_ONE
-    symbols = np.zeros(weights.shape, np.int32)
+def _quantised(rest: Float64[np.ndarray, "B M"], inverse: Float64[np.ndarray, "B M M"], unit: float) -> np.ndarray:
+    """Return symbols of weights; the rounding error of one is spread over the following ones by least squares."""
+    symbols = np.zeros(rest.shape, np.int32)
     upper = np.swapaxes(np.linalg.cholesky(inverse), 1, 2)
-    rest = weights.copy()
-    for k in range(weights.shape[1]):
+    for k in range(rest.shape[1]):
         symbols[:, k] = np.rint(rest[:, k] / unit)
         error = (rest[:, k] - symbols[:, k] * unit) / upper[:, k, k]
         rest[:, k:] -= error[:, None] * upper[:, k, k:]
@@ -197,6 +174,8 @@ _MOST = 1 << 27  # of a distance, 8 voxels: eight of these fit in 32 bits
 _NEAR = ONE * STEP_ONE  # a voxel: what is farther from the zero level shows nowhere
 _HIGH = np.indices((2, 2, 2)).reshape(3, -1).T  # from a block to those that have some of its voxels as their first ones
 VOXELS = SIDE**3  # voxels of a block that are no other's
+Keys = Int64[np.ndarray, " _"]  # of blocks, sorted
+Values = Int32[np.ndarray, "O S S S"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -211,7 +190,7 @@ class Field:
 def field_of(places: Int64[np.ndarray, "B 3"], symbols: Int32[np.ndarray, "B M"], model: Model) -> Field:
     """The distances that the symbols of some sorted blocks stand for."""
     weights = np.clip(symbols.astype(np.float64) * model.step, -LARGEST, LARGEST)
-    whole = weights @ model.basis.vectors.T + STEP_ONE * model.basis.mean  # integers below 2^53: exact in any order
+    whole = weights @ model.vectors.T + STEP_ONE * model.mean  # integers below 2^53: exact in any order
     values = np.clip(whole, -_MOST, _MOST, out=whole).astype(np.int32).reshape(-1, POINTS, POINTS, POINTS)
     keys = block_keys(places)
     owners = distinct(np.concatenate([moved(keys, high) for high in _HIGH]))  # blocks that voxels are first ones of
@@ -235,12 +214,7 @@ def _first(high: Int64[np.ndarray, " 3"]) -> tuple[slice, slice, slice]:
     return x, y, z
 
 
-def _closed(
-    keys: Int64[np.ndarray, " B"],
-    owners: Int64[np.ndarray, " O"],
-    values: Int32[np.ndarray, "O S S S"],
-    known: Bool[np.ndarray, "O S S S"],
-) -> Int32[np.ndarray, "O S S S"]:
+def _closed(keys: Keys, owners: Keys, values: Values, known: Bool[np.ndarray, "O S S S"]) -> Values:
     """Return distances without surface that leaves the blocks by less than a voxel, which would end there in a hole.
 
     A block that is not there is on one side, that of its known voxels; others, if near, are put on this one.

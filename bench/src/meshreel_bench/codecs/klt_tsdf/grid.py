@@ -28,6 +28,8 @@ _CROSSED = 1.2  # distances at an edge's ends sum up to at most its length where
 _ASIDE = 1.0  # voxels past a border beyond which nothing is known
 _ASKED, _ALIKE = 4000, 0.98  # voxels whose winding numbers are looked at; the share of them that must agree
 _CHUNK = 1 << 20  # voxels whose distances are looked for at once
+_Values = Float64[np.ndarray, " N"]
+_Mask = Bool[np.ndarray, "B N"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,8 +38,8 @@ class Blocks:
 
     places: Int64[np.ndarray, "B 3"]  # in blocks, sorted by place
     values: Float64[np.ndarray, "B N"]  # voxels, positive outside
-    known: Bool[np.ndarray, "B N"]  # false past a border, and where signs contradict each other
-    near: Bool[np.ndarray, "B N"]  # ends of an edge that the surface crosses
+    known: _Mask  # false past a border, and where signs contradict each other
+    near: _Mask  # ends of an edge that the surface crosses
 
 
 def prepared(mesh: Mesh) -> Mesh:
@@ -72,9 +74,7 @@ def block_keys(places: Int64[np.ndarray, "B 3"]) -> Int64[np.ndarray, " B"]:
     return _CELLS.keys(places + 0.5)
 
 
-def signed_distances(
-    mesh: Mesh, points: Float64[np.ndarray, "N 3"]
-) -> tuple[Float64[np.ndarray, " N"], Bool[np.ndarray, " N"]]:
+def signed_distances(mesh: Mesh, points: Float64[np.ndarray, "N 3"]) -> tuple[_Values, Bool[np.ndarray, " N"]]:
     """Return distances in the unit of the mesh, positive outside, and a mask of those whose sign is known."""
     surface, normals = Surface(mesh), _Normals(mesh)
     values, known, past = np.empty(len(points)), np.ones(len(points), bool), np.zeros(len(points), bool)
@@ -96,12 +96,11 @@ def signed_distances(
     return values, known
 
 
-def _is_nearly_closed(mesh: Mesh, points: Float64[np.ndarray, "N 3"], values: Float64[np.ndarray, " N"]) -> bool:
+def _is_nearly_closed(mesh: Mesh, points: Float64[np.ndarray, "N 3"], values: _Values) -> bool:
     """Return whether winding numbers agree with the signs near the surface."""
     near = np.flatnonzero(np.abs(values) < 1)
     some = near[:: max(len(near) // _ASKED, 1)]
-    alike = winding_inside(mesh, points[some]) == (values[some] < 0)
-    return len(some) > 0 and bool(np.mean(alike) > _ALIKE)
+    return bool((winding_inside(mesh, points[some]) == (values[some] < 0)).sum() > _ALIKE * len(some))
 
 
 class _Normals:
@@ -110,11 +109,12 @@ class _Normals:
     def __init__(self, mesh: Mesh) -> None:
         self._mesh, (edges, self._edges) = mesh, unique_edges(mesh.faces)
         corners = mesh.vertices[mesh.faces]
-        a, b, c = (corners[:, k] for k in range(3))
-        cross = np.cross(b - a, c - a)
-        self._faces = cross / np.linalg.norm(cross, axis=1)[:, None]
+        onward = np.roll(corners, -1, axis=1) - corners
+        back = -np.roll(onward, 1, axis=1)
+        turns, dots = np.cross(onward, back), np.einsum("fkd,fkd->fk", onward, back)
+        lengths = np.linalg.norm(turns, axis=2)
+        self._faces, angles = turns[:, 0] / lengths[:, :1], np.arctan2(lengths, dots)
         self._at_edges = _summed(self._edges, np.repeat(self._faces[:, None], 3, axis=1), len(edges))
-        angles = np.stack([_angles(corners, k) for k in range(3)], axis=1)
         self._at_vertices = _summed(mesh.faces, self._faces[:, None] * angles[:, :, None], len(mesh.vertices))
 
     def at(self, hits: Hits) -> Float64[np.ndarray, "N 3"]:
@@ -129,20 +129,12 @@ class _Normals:
         return found
 
 
-def _angles(corners: Float64[np.ndarray, "F 3 3"], corner: int) -> Float64[np.ndarray, " F"]:
-    u = corners[:, (corner + 1) % 3] - corners[:, corner]
-    v = corners[:, (corner + 2) % 3] - corners[:, corner]
-    return np.arctan2(np.linalg.norm(np.cross(u, v), axis=1), np.einsum("nd,nd->n", u, v))
-
-
 def _summed(index: np.ndarray, vectors: Float64[np.ndarray, "F 3 3"], count: int) -> Float64[np.ndarray, "K 3"]:
     flat = index.reshape(-1)
     return np.stack([np.bincount(flat, vectors[..., axis].reshape(-1), count) for axis in range(3)], axis=1)
 
 
-def _crossings(
-    values: Float64[np.ndarray, "B N"], known: Bool[np.ndarray, "B N"]
-) -> tuple[Bool[np.ndarray, "B N"], Bool[np.ndarray, "B N"]]:
+def _crossings(values: Float64[np.ndarray, "B N"], known: _Mask) -> tuple[_Mask, _Mask]:
     """Return masks of voxels at edges that the surface crosses, and of those whose sign changes only far from it."""
     shape = (len(values), POINTS, POINTS, POINTS)
     values, known = values.reshape(shape), known.reshape(shape)

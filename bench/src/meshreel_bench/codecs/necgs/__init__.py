@@ -36,7 +36,7 @@ from jaxtyping import Bool, Float16, Float32
 from meshreel.errors import InputError
 from meshreel.types import Mesh, MeshSequence
 
-from ...codec import DecodedFrames, Progress, TwoSteps
+from ...codec import DecodedFrames, Progress, TwoSteps, reported
 from .stream import BITS, MOST_CHANNELS, MOST_FEATURES, RESOLUTIONS, Coded, Shape, decode_stream, encode_stream
 from .volumes import Placement, box_of, extract, place_grids, truncated_distances
 
@@ -114,14 +114,12 @@ class NecgsCodec(TwoSteps):
                 raise InputError(f"frame {number}: a coordinate is not finite; repair the mesh")
         boxes = [box_of(mesh) for mesh in sequence]
         placement = place_grids(boxes, self.resolution)
-        full, trimmed, volumes = np.array([box is not None for box in boxes], bool), False, list[np.ndarray]()
-        numbers = np.flatnonzero(full).tolist()
+        full = np.array([box is not None for box in boxes], bool)
+        numbers, trimmed, volumes = np.flatnonzero(full).tolist(), False, list[np.ndarray]()
         meshes = (placement.inverse(sequence[number], number, self.resolution) for number in numbers)
-        for number, (volume, sheets) in zip(numbers, self._fitted(meshes), strict=True):
+        for volume, sheets in reported(self._fitted(meshes), progress, "volumes", len(numbers)):
             trimmed |= sheets
             volumes.append(volume)
-            if progress is not None:
-                progress("volumes", number + 1, len(boxes))
         return FittedVolumes(placement, full, trimmed, volumes)
 
     def _fitted(self, meshes: Iterator[Mesh]) -> Iterator[tuple[Float16[np.ndarray, "K K K 4"], bool]]:
@@ -154,10 +152,8 @@ class NecgsCodec(TwoSteps):
             a, b = wanted[..., 0] < 0, made[..., 0] < 0
             kept = 0.0 if extract(made, coded.trimmed).is_empty else (a & b).sum() / max((a | b).sum(), 1)
             if kept < KEPT and not extract(wanted, coded.trimmed).is_empty:
-                raise InputError(
-                    f"frame {number}: training ended with {kept:.0%} of its body; "
-                    f"give more epochs than {self.epochs}, another rate than {self.rate:g} or another seed"
-                )
+                text = f"give more epochs than {self.epochs}, another rate than {self.rate:g} or another seed"
+                raise InputError(f"frame {number}: training ended with {kept:.0%} of its body; {text}")
 
     def decode(self, data: bytes) -> Sequence[Mesh]:
         """Return the frames, each decoded on access. Raises FormatError for damaged bytes."""
@@ -209,6 +205,5 @@ def _need_torch() -> None:
     try:
         import torch  # noqa: F401
     except ImportError as error:
-        raise InputError(
-            f"NeCGS needs the extra necgs ({error}): pip install 'meshreel-bench[necgs]', in a clone './bench[necgs]'"
-        ) from None
+        text = f"NeCGS needs the extra necgs ({error}): pip install 'meshreel-bench[necgs]'"
+        raise InputError(f"{text}, in a clone './bench[necgs]'") from None

@@ -44,11 +44,8 @@ def decode_volumes(features: Tensor, parameters: Sequence[Tensor]) -> Tensor:
 
 
 def _convolved(values: Tensor, weights: Tensor, bias: Tensor) -> Tensor:
-    """Return a convolution.
-
-    On CPUs the layout of the weights selects an algorithm that takes two thirds of the time. A single small volume is
-    cut into two halves with a shared border, for which a faster algorithm exists.
-    """
+    # On CPUs this layout selects an algorithm that takes two thirds of the time. A single small volume is cut into two
+    # halves with a shared border, for which a faster algorithm exists.
     weights = weights.contiguous(memory_format=torch.channels_last_3d)
     if len(values) > 1 or values.device.type != "cpu":
         return functional.conv3d(values, weights, bias, padding=1)
@@ -151,24 +148,19 @@ _SAMPLES = 4.0  # points of the mesh per vertex of the first surface
 _MOST_SAMPLES = 60_000
 
 
+@repeatable()
 def fit_volume(distances: Float32[np.ndarray, "K K K"], mesh: Mesh, steps: int) -> Float32[np.ndarray, "K K K 4"]:
     """Return the volume after `steps` steps from zero deformations."""
     start = np.concatenate([distances[..., None], np.zeros((*distances.shape, 3), np.float32)], axis=-1)
     first = cut(distances[None])
     if steps == 0 or not len(first.faces):
         return start
-    surface = Surface(mesh)
-    count = int(min(_SAMPLES * len(first.low), _MOST_SAMPLES))
+    surface, count = Surface(mesh), int(min(_SAMPLES * len(first.low), _MOST_SAMPLES))
     samples = scatter(mesh, np.ones(len(mesh.faces), bool), count).points
-    return _descended(start, surface, samples, steps)
-
-
-@repeatable()
-def _descended(start: np.ndarray, surface: Surface, samples: np.ndarray, steps: int) -> np.ndarray:
     volume = torch.from_numpy(start).reshape(-1, 4).requires_grad_()
     adam = torch.optim.Adam([volume], lr=RATE)
     for step in range(steps):
-        adam.param_groups[0]["lr"] = RATE * 10 ** (-step / max(steps, 1))
+        adam.param_groups[0]["lr"] = RATE * 10 ** (-step / steps)
         error = _error(volume, start.shape[0], surface, samples)
         if error is None:
             break

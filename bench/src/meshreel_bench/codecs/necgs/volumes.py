@@ -229,12 +229,8 @@ def _triangles(case: int) -> list[tuple[int, int, int]]:
 
 def _sides() -> list[list[int]]:
     """Return the corners of the six faces, counter-clockwise from outside."""
-    sides = []
-    for axis in range(3):
-        b, c = 1 << (axis + 1) % 3, 1 << (axis + 2) % 3
-        ring = [0, b, b | c, c]
-        sides += [ring[::-1], [corner | 1 << axis for corner in ring]]
-    return sides
+    rings = [(axis, [0, 1 << (axis + 1) % 3, 7 ^ 1 << axis, 1 << (axis + 2) % 3]) for axis in range(3)]
+    return [side for axis, ring in rings for side in (ring[::-1], [corner | 1 << axis for corner in ring])]
 
 
 def _steps(side: list[int], case: int) -> list[tuple[int, int]]:

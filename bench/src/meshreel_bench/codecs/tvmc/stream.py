@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 from typing import Annotated
 
+import DracoPy
 import numpy as np
 from jaxtyping import Float64, Int32, Int64
 
@@ -124,8 +125,6 @@ def decode_tracked(data: bytes, step: float) -> list[Mesh]:
 
 def encode_cloud(points: Float64[np.ndarray, "V 3"], step: float) -> bytes:
     """Return points as a Draco cloud of multiples of `step`, in their order."""
-    import DracoPy
-
     cells = np.rint(points / step)
     if not np.abs(cells).max(initial=0) <= MOST_CELLS:  # false for NaN, too
         raise InputError(f"displacements of {np.abs(cells).max():g} steps; give a larger step, and finite vertices")
@@ -138,8 +137,6 @@ def encode_cloud(points: Float64[np.ndarray, "V 3"], step: float) -> bytes:
 
 def decode_cloud(data: bytes, step: float) -> Float64[np.ndarray, "V 3"]:
     """Return the points of a cloud."""
-    import DracoPy
-
     return np.rint(np.asarray(DracoPy.decode(bytes(data)).points, dtype=np.float64)) * step
 
 
@@ -170,14 +167,12 @@ class TvmcVideo(DecodedFrames):
     def _moving(self, frame: int) -> Iterator[Mesh]:
         near = range(bisect_left(self._firsts, frame - MOST_FRAMES + 1), bisect_right(self._firsts, frame))
         groups = [n for n in near if frame < self._firsts[n] + self.stream.groups[n].frame_count]
-        self._decoded = {number: self._decoded.get(number) or self._decode(number) for number in groups}
+        self._decoded = {n: self._decoded.get(n) or self._decode(self.stream.groups[n]) for n in groups}
         return (meshes[frame - self._firsts[number]] for number, meshes in self._decoded.items())
 
-    def _decode(self, number: int) -> list[Mesh]:
-        group = self.stream.groups[number]
-        if group.kind == Kind.TRACKED:
-            return decode_tracked(group.payload, self.stream.step)
-        return decode_intra(group.payload)
+    def _decode(self, group: Group) -> list[Mesh]:
+        is_tracked = group.kind == Kind.TRACKED
+        return decode_tracked(group.payload, self.stream.step) if is_tracked else decode_intra(group.payload)
 
     def _still(self, frame: int) -> Iterator[Mesh]:
         """Yield the background of a frame, normalised, if it has one."""
