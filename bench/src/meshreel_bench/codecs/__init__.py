@@ -33,8 +33,8 @@ def make_codec(name: str, options: dict[str, Any]) -> Codec:
     except InputError:
         raise  # its message says which value is wrong
     except (Exception, SystemExit) as error:  # a constructor may raise anything
-        reason = error if isinstance(error, TypeError) else f"{type(error).__name__}: {error}"
-        raise InputError(f"codec {name!r} does not take {options}: {reason}") from error
+        why = error if isinstance(error, TypeError) else f"{type(error).__name__}: {error}"
+        raise InputError(f"codec {name!r} does not take {options}: {why}") from error
     try:
         whole = isinstance(made, Codec)  # evaluates properties
     except (Exception, SystemExit) as error:

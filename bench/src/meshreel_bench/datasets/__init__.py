@@ -98,10 +98,9 @@ class Store:
         if name in (*SCENES, ROOM3, PROCEDURAL, *SENSED, PEOPLE):
             return _scene(name, self.data, frames, self.cache)
         if name in RECORDINGS:
-            source = Path(RECORDED, name)
-            check_source(self.data / source, source)
-            chosen = ":" if frames is None else f":{frames}"
-            recording, _ = open_recording(self.data / source, frames=chosen, keep=False)
+            known_as, chosen = Path(RECORDED, name), ":" if frames is None else f":{frames}"
+            check_source(self.data / known_as, known_as)
+            recording, _ = open_recording(self.data / known_as, frames=chosen, keep=False)
             captured = Captured(recording, _kept(name, self.cache) / name / "meshes")
             return Dataset(captured, captured.cameras, pictures=captured.colors)
         if name == WALKER:
