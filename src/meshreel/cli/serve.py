@@ -5,9 +5,6 @@ from __future__ import annotations
 import threading
 import webbrowser
 from pathlib import Path
-from typing import Annotated
-
-from cyclopts import Parameter
 
 from ..decoder.video import open as open_video
 from ..errors import InputError
@@ -18,12 +15,7 @@ from .console import Common
 
 
 def play(
-    file: Path,
-    /,
-    *,
-    browser: Annotated[bool, Parameter(negative="--no-browser")] = True,
-    server: Annotated[ServerOptions, Parameter(name="*")] = ServerOptions(),
-    common: Common = Common(),
+    file: Path, /, *, browser: bool = True, server: ServerOptions = ServerOptions(), common: Common = Common()
 ) -> None:
     """Play a .reel file in a browser, on this machine or on a headset. Ctrl-C stops it.
 
@@ -51,12 +43,7 @@ def _open(address: str, common: Common) -> None:
 
 
 def serve(
-    folder: Path,
-    /,
-    *,
-    cors: tuple[str, ...] = (),
-    server: Annotated[ServerOptions, Parameter(name="*")] = ServerOptions(),
-    common: Common = Common(),
+    folder: Path, /, *, cors: tuple[str, ...] = (), server: ServerOptions = ServerOptions(), common: Common = Common()
 ) -> None:
     """Serve a folder of .reel files: a gallery, a page that plays each, and the files. Ctrl-C stops it.
 

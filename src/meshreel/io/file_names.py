@@ -36,10 +36,7 @@ def is_pattern(name: str) -> bool:
 def find_frames(
     source: str | Path | Iterable[str | Path], order: Order = "auto"
 ) -> tuple[tuple[Place, ...], tuple[str, ...]]:
-    """Return the frame files of a source and warnings about their order. A list keeps its order.
-
-    For a folder without mesh files, use its subfolder `meshes`, as in the releases of TSMC's authors.
-    """
+    """Return a source's frame files, or those of its folder `meshes`, and warnings. A list keeps its order."""
     if not isinstance(source, str | Path):
         return tuple(located_all(source)), ()
     path = located(source)
@@ -129,11 +126,7 @@ def _ordered(source: Place, root: _P, paths: list[_P], order: Order) -> tuple[tu
 
 
 def in_order(source: Place, names: list[str], order: Order = "auto") -> tuple[list[str], list[int]]:
-    """Return names in the order of the numbers in them, and the number of each, if one alone decides.
-
-    A fraction is one number. Raises InputError for names of several patterns, for two of equal numbers, and where
-    readings of the numbers disagree; it names `source`.
-    """
+    """Return names by their numbers, and these if one alone decides. Raises InputError, which names `source`."""
     if order == "name":
         return sorted(names), []
     found, columns = _decided(source, names, order)
@@ -161,25 +154,21 @@ def _decided(source: Place, names: list[str], order: Order, of_time: bool = Fals
     columns = _columns(names, next(iter(patterns)), of_time)
     if not columns:
         raise InputError(f"{source}: {names[0]!r} and {len(names) - 1} more names differ by no number; mend them")
-    by_all, by_last = (
-        _sorted(source, names, list(zip(*chosen, strict=True)), order) for chosen in (columns, columns[-1:])
-    )
+    both = (columns, columns[-1:])
+    by_all, by_last = (_sorted(source, names, list(zip(*chosen, strict=True)), order) for chosen in both)
     if not by_all:  # two names share the one number
         _sorted(source, names, list(zip(*columns, strict=True)), "last")
     if order == "last" or by_all == by_last:
-        return by_last or by_all, [
-            max(columns, key=lambda column: (_evenness(column), -max(map(len, column))))
-        ]  # not a time
+        best = max(columns, key=lambda column: (_evenness(column), -max(map(len, column))))  # not a time
+        return by_last or by_all, [best]
     if order != "all" and _evenness(columns[0]) > max(0.5, _evenness(columns[-1])):
         return by_all, columns[:1]  # what stands behind is a count, or a hash
     if order == "all" or all(map(_wraps, columns[1:])):
         return by_all, columns
     if not by_last:
         _sorted(source, names, list(zip(*columns[-1:], strict=True)), "last", f", or --order all for {_first(by_all)}")
-    ways = f"{_first(by_all)} (--order all), or {_first(by_last)} (--order last)"
-    raise InputError(
-        f"{source}: the {len(names)} names have several numbers, and may be in the order {ways}; say which"
-    )
+    ways = f"{_first(by_all)} (--order all), or {_first(by_last)} (--order last); say which"
+    raise InputError(f"{source}: the {len(names)} names have several numbers, and may be in the order {ways}")
 
 
 def _first(names: list[str]) -> str:
@@ -190,10 +179,7 @@ Column = tuple[str, ...]  # a number of each name, as it is written
 
 
 def _columns(names: list[str], pattern: str, of_time: bool) -> list[Column]:
-    """Return the numbers that differ, from left to right; two with a point between them are one fraction.
-
-    Of a time they are one, too, where the whole number does not differ.
-    """
+    """Return the numbers that differ; two with a point between are one, of a time also where the whole is alike."""
     columns, found = zip(*(re.findall(r"\d+", name) for name in names), strict=True), list[Column | None]()
     before: Column | None = None
     for column, text in zip(columns, ["", *pattern.split("#")[1:]], strict=False):
@@ -220,10 +206,8 @@ def _sorted(source: Place, names: list[str], keys: list[Column], order: Order, r
             raise InputError(f"{text}; give a glob that fits only one of them{remedy}")
     for others in _other_readings(names, keys) if order == "auto" else ():
         if (other := sorted(names, key=dict(zip(names, others, strict=True)).__getitem__)) != found:
-            ways = f"{_first(found)} (--order all), or {_first(other)} (name them so that these sort)"
-            raise InputError(
-                f"{source}: numbers of the {len(names)} names may be fractions, or dates: {ways}; say which"
-            )
+            ways = f"{_first(found)} (--order all), or {_first(other)} (name them so that these sort); say which"
+            raise InputError(f"{source}: numbers of the {len(names)} names may be fractions, or dates: {ways}")
     return found
 
 
@@ -235,10 +219,8 @@ def _other_readings(names: list[str], keys: list[Column]) -> Iterator[list[tuple
         yield [tuple(Fraction(one if "." in one else f"0.{one}") for one in key) for key in keys]
     dates = [re.search(r"(?<!\d)(\d\d)\D(\d\d)\D((?:19|20)\d\d)(?!\d)", name) for name in names]
     for parts in ((3, 2, 1), (3, 1, 2)) if all(dates) else ():
-        yield [
-            (*(date and date[part] for part in parts), *map(Fraction, key))
-            for date, key in zip(dates, keys, strict=True)
-        ]
+        pairs = zip(dates, keys, strict=True)
+        yield [(*(date and date[part] for part in parts), *map(Fraction, key)) for date, key in pairs]
 
 
 def _evenness(column: Column) -> float:

@@ -152,10 +152,7 @@ def located_all(names: object) -> list[Place]:
 
 @contextmanager
 def uploaded(output: Place) -> Iterator[Path]:
-    """Yield a path for an output; for a URL, a path in a temporary folder, uploaded at the end of the block.
-
-    Raises InputError if the URL takes no files, before or after the block; after it, the file is kept.
-    """
+    """Yield a path for an output; of a URL, one to upload at the end, kept if that fails. Raises InputError."""
     if isinstance(output, Path):
         yield output
         return

@@ -1,7 +1,6 @@
 """Surfaces of GLB files (binary glTF 2): all triangles of a scene, placed by its nodes, at rest or at a time.
 
-In: the bytes of a file. Out: Polygons. Whatever would change surface or time and is not read is refused; whatever else
-is not read is named.
+Whatever would change surface or time and is not read is refused; whatever else is not read is named.
 """
 
 from __future__ import annotations
@@ -17,39 +16,33 @@ from jaxtyping import Float32, Float64, Int64, UInt8
 
 from ..types import Texture
 from .glb_file import PASSED_OVER, from_linear, to_linear
-from .gltf import DRACO, QUANTIZED, Entry, Gltf
+from .gltf import DRACO, MESHOPTS, QUANTIZED, Entry, Gltf
 from .looks import Look, light_in_picture, with_looks
 from .polygons import Polygons, Unreadable, shares_of
 
 Matrix = Float64[np.ndarray, "4 4"]
 T = TypeVar("T")
 
-_KNOWN = {  # extensions, each of which is read, or changes neither surface nor time nor base colours
-    *(DRACO, QUANTIZED, "EXT_meshopt_compression", "KHR_meshopt_compression", "EXT_mesh_gpu_instancing"),
-    *("KHR_texture_transform", "EXT_texture_webp", "EXT_texture_avif", "KHR_materials_unlit", "KHR_node_visibility"),
-    "KHR_materials_pbrSpecularGlossiness",
-}
 _INSTANCES, _TRANSFORM = "EXT_mesh_gpu_instancing", "KHR_texture_transform"
 _SHINE = "KHR_materials_pbrSpecularGlossiness"
+_KNOWN = {  # extensions, each of which is read, or changes neither surface nor time nor base colours
+    *(DRACO, QUANTIZED, *MESHOPTS, _INSTANCES, _TRANSFORM, _SHINE),
+    *("EXT_texture_webp", "EXT_texture_avif", "KHR_materials_unlit", "KHR_node_visibility"),
+}
 _FINE, _COARSE = 512, 2048  # texels of a side: light has at least, and at most, so many (guesses)
 _STRIP, _FAN = 5, 6  # modes of primitives (glTF 2.0, section 5.24)
 _OTHER_MODES = {0: "points", 1: "lines", 2: "lines", 3: "lines"}
 _LIGHT = to_linear(np.repeat(np.arange(256, dtype=np.uint8)[:, None], 3, axis=1))[:, 0] / 65535  # of sRGB values
+_SHINING = ("metallicFactor", "roughnessFactor", "metallicRoughnessTexture")
 _WORDS = {  # of entries that are not read, by the ends of their names
-    "attributes.NORMAL": "normals",
-    "attributes.TANGENT": "tangents",
-    "targets.NORMAL": "normals",
-    "targets.TANGENT": "tangents",
+    **dict.fromkeys(("attributes.NORMAL", "targets.NORMAL"), "normals"),
+    **dict.fromkeys(("attributes.TANGENT", "targets.TANGENT"), "tangents"),
     "attributes.TEXCOORD_0": "texture coordinates",
     "nodes.camera": "cameras",
     "materials.normalTexture": "normal maps",
-    "materials.alphaMode": "transparency",
-    "materials.alphaCutoff": "transparency",
-    "materials.emissiveFactor": "light (emissiveFactor)",
-    "materials.emissiveTexture": "light (emissiveTexture)",
-    "pbrMetallicRoughness.metallicFactor": "shine",
-    "pbrMetallicRoughness.roughnessFactor": "shine",
-    "pbrMetallicRoughness.metallicRoughnessTexture": "shine",
+    **dict.fromkeys(("materials.alphaMode", "materials.alphaCutoff"), "transparency"),
+    **{f"materials.{name}": f"light ({name})" for name in ("emissiveFactor", "emissiveTexture")},
+    **dict.fromkeys((f"pbrMetallicRoughness.{name}" for name in _SHINING), "shine"),
 }
 
 
@@ -89,10 +82,7 @@ class Scene:
         return _guarded(lambda: self._joined(list(self._parts(time))))
 
     def count(self, frame_rate: float) -> int:
-        """Return the number of frames of the animation at a rate, 1/s: with its last moment, unless we wrote it.
-
-        The last time of an animation of ours is the end of its last frame.
-        """
+        """Return the number of frames at a rate, 1/s; the last time of an animation of ours is the end of a frame."""
         steps = self.duration * frame_rate
         return max(1, round(steps)) if self.is_ours else int(steps + 1e-3) + 1
 
@@ -192,8 +182,7 @@ class Scene:
             joints = self._joints(node, places)
             matrices = [places[number] @ one for one in self._instances(node)]
             for primitive in mesh.get("primitives", []):
-                found = self._primitive(primitive, shares, joints)
-                if found is None:
+                if (found := self._primitive(primitive, shares, joints)) is None:
                     continue
                 for matrix in matrices if joints is None else [np.eye(4)]:
                     total += len(found.vertices)
@@ -283,9 +272,8 @@ class Scene:
         self, target: Entry, share: float, vertices: np.ndarray, light: np.ndarray | None
     ) -> tuple[np.ndarray, np.ndarray | None]:
         """Return vertices and light with a share of a morph target's differences."""
-        moved, lit = (
-            None if (n := target.get(name)) is None else self._file.array(n) for name in ("POSITION", "COLOR_0")
-        )
+        numbers = (target.get(name) for name in ("POSITION", "COLOR_0"))
+        moved, lit = (None if number is None else self._file.array(number) for number in numbers)
         if moved is not None:
             vertices = vertices + share * moved.astype(np.float64)
         if lit is not None and light is not None:
@@ -308,7 +296,7 @@ class Scene:
                 use, factor = paint.get("diffuseTexture"), paint.numbers("diffuseFactor", (1.0, 1.0, 1.0, 1.0))
             paint.pass_over()
         if extensions.get("KHR_materials_unlit") is not None:
-            for name in ("metallicFactor", "roughnessFactor", "metallicRoughnessTexture"):
+            for name in _SHINING:
                 shine.get(name)
         if material.get("alphaMode", "OPAQUE") != "OPAQUE":
             self._named.add("transparency")
@@ -317,7 +305,10 @@ class Scene:
             picture, sampler, why = self._file.texture(use.whole("index"))
             uv = self._places(use, read)
             if picture is not None and uv is not None:
-                return self._pictured(picture, sampler, uv, tint, light, faces), uv, None
+                wraps = {sampler.get(name, 10497) for name in ("wrapS", "wrapT")}
+                if wraps != {10497} and ((uv < 0) | (uv > 1)).any():
+                    self._named.add("pictures that do not repeat beyond their borders (wrapS, wrapT)")
+                return self._pictured(picture, uv, tint, light, faces), uv, None
             self._named.add(why or "a texture (without places)")
         if light is not None:
             shares = _fractions(light)[:, :3]
@@ -325,13 +316,7 @@ class Scene:
         return Look(_bytes(tint) if is_tinted else None), None, None
 
     def _pictured(
-        self,
-        picture: Texture,
-        sampler: Entry,
-        uv: np.ndarray,
-        tint: np.ndarray,
-        light: np.ndarray | None,
-        faces: np.ndarray,
+        self, picture: Texture, uv: np.ndarray, tint: np.ndarray, light: np.ndarray | None, faces: np.ndarray
     ) -> Look:
         """Return the look of a picture that colours multiply."""
         shares = np.ones((0, 3)) if light is None else _fractions(light)[:, :3]
@@ -346,9 +331,6 @@ class Scene:
                 self._named.add("colours of vertices that multiply a texture, whose texels several faces share")
             else:
                 picture, tint = shaded, np.ones(3)
-        wraps = {sampler.get(name, 10497) for name in ("wrapS", "wrapT")}
-        if wraps != {10497} and ((uv < 0) | (uv > 1)).any():
-            self._named.add("pictures that do not repeat beyond their borders (wrapS, wrapT)")
         return Look(None, picture if (tint == 1).all() else self._tinted(picture, *map(float, tint)))
 
     def _places(self, use: Entry, read: Callable[[str], np.ndarray | None]) -> Float32[np.ndarray, "V 2"] | None:
@@ -382,9 +364,8 @@ class Scene:
         sizes = np.full(len(corners) // 3, 3, np.int64)
         surface = Polygons(vertices, corners, sizes, colors=colors, colored=colored, uv=uv)
         looks = [part.look for part in parts]
-        if colored.any() or any(
-            look.color is not None for look in looks
-        ):  # then what has no colour is white, not unknown
+        # Beside colours, what has none is white, not unknown.
+        if colored.any() or any(look.color is not None for look in looks):
             looks = [look if look != Look() else Look((255, 255, 255)) for look in looks]
         found = with_looks(surface, looks, which)
         named = {_WORDS.get(".".join(name.split(".")[-2:]), _plain(name)) for name in self._file.tree.unread()}

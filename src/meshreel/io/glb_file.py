@@ -74,17 +74,13 @@ class GlbFile:
 
     def put(self, values: np.ndarray, kind: str, what: object = "its arrays", bounded: bool = False) -> int:
         """Append values to the newest view and return the number of their accessor."""
-        accessor: dict[str, Any] = {
-            "bufferView": len(self._tree["bufferViews"]) - 1,
-            "byteOffset": self._tree["bufferViews"][-1]["byteLength"],
-            "componentType": _COMPONENTS[values.dtype.str[1:]],
-            "count": len(values),
-            "type": kind,
-        }
+        number, view = len(self._tree["bufferViews"]) - 1, self._tree["bufferViews"][-1]
+        accessor: dict[str, Any] = {"bufferView": number, "byteOffset": view["byteLength"]}
+        accessor |= {"componentType": _COMPONENTS[values.dtype.str[1:]], "count": len(values), "type": kind}
         if bounded:
             low, high = values.min(axis=0), values.max(axis=0)
             accessor |= {"min": np.atleast_1d(low).tolist(), "max": np.atleast_1d(high).tolist()}
-        stride = self._tree["bufferViews"][-1].get("byteStride", 0) // values.itemsize
+        stride = view.get("byteStride", 0) // values.itemsize
         if values.ndim > 1 and stride > values.shape[1]:
             values = np.pad(values, ((0, 0), (0, stride - values.shape[1])))
         self._append(values.astype(values.dtype.newbyteorder("<"), copy=False).tobytes(), what)
@@ -111,10 +107,7 @@ class GlbFile:
         return self.add("materials", {"doubleSided": True} | looks)
 
     def put_faces(self, faces: Faces, frames: list[dict[str, int]], what: object = "its faces") -> list[dict[str, Any]]:
-        """Append faces and return their primitives: the textured ones, and the others.
-
-        `frames` are the accessors of the first frame, and of the differences of each other frame from it.
-        """
+        """Append faces and return primitives: textured, others. `frames`: accessors of the first and differences."""
         primitives = []
         halves = (faces.pictured, faces.picture, COLORS), (~faces.pictured, faces.material, PLACES)
         for chosen, material, hidden in halves:
@@ -194,10 +187,7 @@ def to_linear(colors: UInt8[np.ndarray, "V 3"]) -> UInt16[np.ndarray, "V 3"]:
 
 
 def from_linear(light: np.ndarray) -> UInt8[np.ndarray, "V 3"]:
-    """Convert linear light, full-scale integers or fractions of 1, to sRGB.
-
-    Raises Unreadable for values that are not finite, or far outside these limits.
-    """
+    """Convert linear light, full-scale integers or fractions of 1, to sRGB. Raises Unreadable far outside of these."""
     shares = shares_of(light, np.iinfo(light.dtype).max if light.dtype.kind in "iu" else 1.0)
     s = np.where(shares <= 0.0031308, 12.92 * shares, 1.055 * shares ** (1 / 2.4) - 0.055)
     return np.rint(255 * s).astype(np.uint8)

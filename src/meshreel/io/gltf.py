@@ -1,7 +1,4 @@
-"""Documents of binary glTF 2: a description, of which each entry that is read is noted, and the arrays that it names.
-
-In: the bytes of a GLB file. Out: entries, arrays, pictures, and the names of the entries that nothing read.
-"""
+"""Documents of binary glTF 2: bytes -> entries, arrays, pictures, and the names of the entries that nothing read."""
 
 from __future__ import annotations
 
@@ -19,7 +16,7 @@ from .pictures import parse_picture
 from .polygons import Unreadable
 
 DRACO, QUANTIZED = "KHR_draco_mesh_compression", "KHR_mesh_quantization"
-_MESHOPTS = (MESHOPT, "KHR_meshopt_compression")
+MESHOPTS = (MESHOPT, "KHR_meshopt_compression")
 _COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 # Values that a file may claim: some, more for each of its bytes, and in all (guess).
@@ -169,7 +166,7 @@ class Gltf:
         view = self.item("bufferViews", number)
         extensions = view.get("extensions")
         if isinstance(extensions, Entry):
-            packed = next((extensions.get(name) for name in _MESHOPTS if name in extensions), None)
+            packed = next((extensions.get(name) for name in MESHOPTS if name in extensions), None)
             if isinstance(packed, Entry):
                 for key in ("buffer", "byteOffset"):  # of a buffer for readers without the extension
                     view.get(key)
@@ -242,9 +239,8 @@ class Gltf:
         mesh = DracoPy.decode(data)
         names = packed.get("attributes")
         arrays = {name: mesh.get_attribute_by_unique_id(number) for name, number in names.items()}
-        return np.asarray(mesh.faces).reshape(-1), {
-            name: np.asarray(found["data"]) for name, found in arrays.items() if found
-        }
+        data_of = {name: np.asarray(found["data"]) for name, found in arrays.items() if found}
+        return np.asarray(mesh.faces).reshape(-1), data_of
 
 
 def _claims_of_draco(data: bytes) -> tuple[int, int]:

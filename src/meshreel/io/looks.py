@@ -1,7 +1,4 @@
-"""Looks of faces, colours and pictures of materials, as colours of vertices and one texture.
-
-In: polygons and the look of each. Out: polygons with colours, and places in one picture, which may be made of several.
-"""
+"""Looks of faces, colours and pictures of materials -> colours of vertices and one texture, perhaps of several."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Materials of OBJ files, and the files that meshes name: found beside the mesh, never outside its folder.
-
-In: the place of a mesh and names. Out: looks, and the names of what is not kept.
-"""
+"""Materials of OBJ files, and the files that meshes name: found beside the mesh, never outside its folder."""
 
 from __future__ import annotations
 
@@ -54,7 +51,8 @@ def with_materials(polygons: Polygons, mesh: Place) -> Polygons:
     has_places, uv, count = polygons.uv is not None, polygons.uv, len(polygons.sizes)
     which = np.full(count, -1) if polygons.material_of is None else polygons.material_of
     if polygons.pictures:
-        looks, named = _of_pictures(mesh, polygons.pictures)
+        pairs = [_picture(mesh, _folder(mesh), name) for name in polygons.pictures]
+        looks, named = [Look(None, picture) for picture, _ in pairs], {word for _, word in pairs if word}
     else:
         terms, named = _read_libraries(mesh, polygons.libraries)
         names = polygons.materials
@@ -72,12 +70,6 @@ def with_materials(polygons: Polygons, mesh: Place) -> Polygons:
                 chosen = np.repeat(which == number, polygons.sizes)[:, None]
                 uv = np.where(chosen, uv * np.array(scale) + np.array(offset), uv).astype(np.float32)
     return with_looks(replace(polygons, uv=uv), looks, which).naming(named)
-
-
-def _of_pictures(mesh: Place, names: tuple[str, ...]) -> tuple[list[Look], set[str]]:
-    """Return the looks of pictures that a mesh names."""
-    found = [_picture(mesh, _folder(mesh), name) for name in names]
-    return [Look(None, picture) for picture, _ in found], {word for _, word in found if word}
 
 
 def _picture(mesh: Place, folder: Place, name: str) -> tuple[Texture | None, str]:
@@ -240,10 +232,7 @@ def _inside(mesh: Place, folder: Place, name: str) -> PurePosixPath | None:
 
 
 def find_beside(mesh: Place, folder: Place, name: str) -> Place | None:
-    """Return the file that a file in `folder` names: there, beside the mesh, or by its last name alone.
-
-    Letters of either case match. A file outside the folder of the mesh is never taken.
-    """
+    """Return the file that one in `folder` names, in any case: there, or beside the mesh; never outside its folder."""
     name = name.replace("\\", "/")
     root = _folder(mesh)
     paths = [] if _is_absolute(name) else [_inside(mesh, folder, name), _inside(mesh, root, name)]
@@ -252,10 +241,8 @@ def find_beside(mesh: Place, folder: Place, name: str) -> Place | None:
     if not isinstance(root, Path):
         first = next((path for path in paths if path is not None), None)
         return None if first is None else root / str(first)
-    for path in paths:
-        if path is not None and (found := _spelled(root, path.parts)) is not None:
-            return found
-    return None
+    found = (_spelled(root, path.parts) for path in paths if path is not None)
+    return next((place for place in found if place is not None), None)
 
 
 def _spelled(root: Path, parts: tuple[str, ...]) -> Path | None:
@@ -264,7 +251,7 @@ def _spelled(root: Path, parts: tuple[str, ...]) -> Path | None:
     for part in parts:
         try:
             if not (place / part).exists():
-                part = _names(place).get(part.lower(), "")
+                part = _listed(place, place.stat().st_mtime_ns).get(part.lower(), "")
         except (OSError, ValueError):  # of a name too long, or with a null
             return None
         if not part:
@@ -276,11 +263,6 @@ def _spelled(root: Path, parts: tuple[str, ...]) -> Path | None:
         return None
 
 
-def _names(folder: Path) -> dict[str, str]:
-    return _listed(folder, folder.stat().st_mtime_ns)
-
-
 @lru_cache(maxsize=16)
-def _listed(folder: Path, changed: int) -> dict[str, str]:
-    del changed
+def _listed(folder: Path, _changed: int) -> dict[str, str]:
     return {path.name.lower(): path.name for path in sorted(folder.iterdir(), reverse=True)}

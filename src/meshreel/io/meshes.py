@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -21,13 +21,7 @@ from .ply import parse_ply
 from .polygons import Dropped, Polygons, Unreadable, triangulate
 from .stl_off import parse_off, parse_stl
 
-_PARSERS: dict[str, Callable[[bytes], Polygons]] = {
-    ".obj": parse_obj,
-    ".ply": parse_ply,
-    ".glb": parse_glb,
-    ".stl": parse_stl,
-    ".off": parse_off,
-}
+_PARSERS = {".obj": parse_obj, ".ply": parse_ply, ".glb": parse_glb, ".stl": parse_stl, ".off": parse_off}
 EXTENSIONS = tuple(_PARSERS)
 _MARK = b"\xef\xbb\xbf"  # of byte order, at the beginning of texts of some programs
 _BEGINNINGS = {  # of files of other kinds, in small letters
@@ -40,8 +34,7 @@ _BEGINNINGS = {  # of files of other kinds, in small letters
     b"\x93numpy": "an array of NumPy",
     b"reel\r\n": "a .reel file",
     b"kaydara fbx": "an FBX file",
-    b"pxr-usdc": "a USD file",
-    b"#usda": "a USD file",
+    **dict.fromkeys((b"pxr-usdc", b"#usda"), "a USD file"),
     b"gltf": "a GLB file",
     b"ply": "a PLY file",
     b"off": "an OFF file",
@@ -59,10 +52,7 @@ class Loaded:
 
 
 def read_mesh(path: Place, where: str | None = None) -> Loaded:
-    """Read the mesh in a file, with its vertices and faces in the order of the file and polygons cut into triangles.
-
-    A file without faces is an empty frame; its vertices are dropped and named. `where` begins each error message.
-    """
+    """Read a mesh in the file's order, cut into triangles; without faces it is empty. `where` begins errors."""
     where, kind = where or str(path), path.suffix.lower()
     parse = _PARSERS.get(kind)
     if parse is None:
@@ -113,19 +103,18 @@ def _scene(path: Place, where: str) -> Scene:
 
 
 @lru_cache(maxsize=2)  # scenes at a time (guess)
-def _opened(path: Place, where: str, state: object) -> Scene:
+def _opened(path: Place, where: str, _state: object) -> Scene:
     """Return the scene of a file, read again if the file has changed."""
-    del state
     return Scene(_read(path, where))
 
 
-def _without(polygons: Polygons, gone: Bool[np.ndarray, " V"]) -> Polygons:
-    """Return polygons without some vertices that no face has."""
-    numbers, corners = np.cumsum(~gone) - 1, polygons.corners
-    valid = (corners >= 0) & (corners < len(gone))
-    colors = None if polygons.colors is None else polygons.colors[~gone]
+def _only(polygons: Polygons, kept: Bool[np.ndarray, " V"]) -> Polygons:
+    """Return polygons without other vertices, which no face has."""
+    numbers, corners = np.cumsum(kept) - 1, polygons.corners
+    valid = (corners >= 0) & (corners < len(kept))
+    colors = None if polygons.colors is None else polygons.colors[kept]
     corners = np.where(valid, numbers[np.where(valid, corners, 0)], corners)
-    return replace(polygons, vertices=polygons.vertices[~gone], corners=corners, colors=colors, colored=None)
+    return replace(polygons, vertices=polygons.vertices[kept], corners=corners, colors=colors, colored=None)
 
 
 def checked(polygons: Polygons) -> Loaded:
@@ -135,8 +124,7 @@ def checked(polygons: Polygons) -> Loaded:
     used = np.zeros(len(vertices), bool)
     used[corners[(corners >= 0) & (corners < len(vertices))]] = True
     if len(sizes) and not near[~used].all():  # programs mark points without a measurement so
-        kept = used | near.all(axis=1)
-        return checked(_without(polygons, ~kept))
+        return checked(_only(polygons, used | near.all(axis=1)))
     if not near.all():
         bad = np.flatnonzero(~near.all(axis=1))
         x, y, z = vertices[bad[0]]

@@ -107,9 +107,8 @@ class Archive:
         state = self.path.stat()
         return _opened, (self.path.absolute(), state.st_size, state.st_mtime_ns)
 
-    def only(self, numbers: Sequence[int]) -> Archive:
+    def only(self, _numbers: Sequence[int]) -> Archive:
         """Return the archive: it is one file, whatever frames are read."""
-        del numbers
         return self
 
     def __len__(self) -> int:
@@ -128,16 +127,14 @@ class Archive:
 
     def _check_colors(self) -> None:
         """Raise InputError if colours or pictures do not match the vertices and frames."""
-        colors, texture, rows = self._colors, self._texture, (None, self._vertices.rows)
-        if colors is not None and (
-            colors.shape != self._vertices.shape or colors.rows not in rows or colors.dtype.kind not in "fiu"
-        ):
+        colors, texture, rows, shape = self._colors, self._texture, (None, self._vertices.rows), self._vertices.shape
+        if colors is not None and (colors.shape != shape or colors.rows not in rows or colors.dtype.kind not in "fiu"):
             raise InputError(f"{self.path}: {colors}; it must be numbers V x 3, or T x V x 3 as 'vertices'")
-        if texture is not None and (
-            texture.shape[2:] != (3,) or 0 in texture.shape or texture.rows not in rows or texture.dtype != np.uint8
-        ):
+        if texture is None:
+            return
+        if texture.shape[2:] != (3,) or 0 in texture.shape or texture.rows not in rows or texture.dtype != np.uint8:
             raise InputError(f"{self.path}: {texture}; it must be uint8 H x W x 3, or T x H x W x 3")
-        if texture is not None and texture.shape[0] * texture.shape[1] > MOST_PIXELS:
+        if texture.shape[0] * texture.shape[1] > MOST_PIXELS:
             raise InputError(f"{self.path}: {texture}, more than 8192 x 8192 pixels; make it smaller")
 
     def _picture(self, index: int) -> UInt8[np.ndarray, "H W 3"]:
@@ -151,9 +148,8 @@ class Archive:
 
 
 @lru_cache(maxsize=4)  # archives at a time (guess)
-def _opened(path: Path, size: int, changed: int) -> Archive:
+def _opened(path: Path, _size: int, _changed: int) -> Archive:
     """Return the archive of a path, opened again if the file has changed."""
-    del size, changed
     return Archive(path)
 
 
@@ -167,10 +163,7 @@ def _head(archive: zipfile.ZipFile, name: str) -> tuple[tuple[int, ...], np.dtyp
         begin = stream.tell()
     if fortran and len(shape) > 1:
         raise ValueError(f"'{name}' is in Fortran order; save numpy.ascontiguousarray of it")
-    if (
-        dtype.hasobject
-        or min(shape, default=0) < 0
-        or begin + int(np.prod(shape, dtype=object)) * dtype.itemsize > archive.getinfo(member).file_size
-    ):
+    end = begin + int(np.prod(shape, dtype=object)) * dtype.itemsize
+    if dtype.hasobject or min(shape, default=0) < 0 or end > archive.getinfo(member).file_size:
         raise ValueError(f"'{name}' announces {dtype} {shape}, more than the file holds")
     return shape, dtype, begin

@@ -43,8 +43,7 @@ def read_picture(place: Place) -> UInt8[np.ndarray, "H W 3"]:
 
 
 @lru_cache(maxsize=4)  # as many as a frame and its neighbours have (guess)
-def _read(place: Place, changed: int) -> UInt8[np.ndarray, "H W 3"]:
-    del changed
+def _read(place: Place, _changed: int) -> UInt8[np.ndarray, "H W 3"]:
     return parse_picture(read_input(place, "check it, or encode with --color none"), str(place))
 
 
@@ -63,11 +62,7 @@ def parse_picture(data: bytes, where: str) -> UInt8[np.ndarray, "H W 3"]:
 
 @contextmanager
 def opened(data: bytes, where: str, wanted: str, remedy: str) -> Iterator[Image.Image]:
-    """Open the picture in the bytes of a file.
-
-    Raises InputError, also for damage found inside the block; its message begins with `where`, and ends with `wanted`
-    if the bytes are no picture, or with the `remedy` for damage.
-    """
+    """Open a picture. Raises InputError, also of damage in the block: `where`, and `wanted`, or `remedy` for damage."""
     from PIL import Image, UnidentifiedImageError
 
     try:
@@ -141,10 +136,7 @@ def is_mask(path: Path) -> bool:
 
 
 def find_masks(folder: Path, views: int, frames: int) -> list[list[Path]]:
-    """Return the files of the masks by view and frame, whose numbers are the last numbers in their names.
-
-    Raises InputError if a view or a frame has no mask, or two.
-    """
+    """Return the masks by view and frame, the last numbers in names. Raises InputError for none, or two of one."""
     places = _numbered(folder, (path for path in _listed(folder) if path.is_dir()), "view")
     masks = []
     for view in range(views):

@@ -15,7 +15,6 @@ Points = Float64[np.ndarray, "V 3"]
 Corners = Int64[np.ndarray, "P N"]
 Dropped = frozenset[str]  # names of data in a file other than geometry
 
-
 _MOST_CORNERS = 4096  # of a concave polygon, whose cutting takes quadratic time: seconds for so many (guess)
 _SEARCHES = 64  # of all corners of a polygon for an ear, in which few are found (guess)
 
@@ -54,10 +53,7 @@ class Polygons:
 
 
 def eight_bits(values: np.ndarray, what: str = "vertex") -> UInt8[np.ndarray, "..."]:
-    """Convert colours to 8 bits: from unsigned 16-bit integers, from fractions of 1, or from 0 to 255.
-
-    Floats beyond 2 count as 0 to 255, which some programs write as text. Raises Unreadable as `shares_of` does.
-    """
+    """Convert to 8 bits: 16-bit integers, fractions of 1, 0 to 255, as of floats beyond 2. Raises as `shares_of`."""
     if values.dtype.kind in "iu":
         most = 65535.0 if values.dtype.kind == "u" and values.dtype.itemsize == 2 else 255.0
     else:
@@ -67,10 +63,7 @@ def eight_bits(values: np.ndarray, what: str = "vertex") -> UInt8[np.ndarray, ".
 
 
 def shares_of(colors: np.ndarray, most: float, what: str = "vertex") -> Float64[np.ndarray, "V 3"]:
-    """Return colours as shares, 0 to 1, of `most`; blended colours exceed the range a little.
-
-    Raises Unreadable for values that are not finite, or far outside the range.
-    """
+    """Return colours as shares, 0 to 1, of `most`, which blended ones exceed a little. Raises Unreadable for others."""
     shares = colors.astype(np.float64) / most
     strange = np.flatnonzero(~((shares >= -1.0) & (shares <= 2.0)).all(axis=1))
     if len(strange):
@@ -81,10 +74,7 @@ def shares_of(colors: np.ndarray, most: float, what: str = "vertex") -> Float64[
 
 
 def triangulate(polygons: Polygons) -> Int64[np.ndarray, "F 3"]:
-    """Cut polygons into triangles: quads along a diagonal that does not fold, others as fans or by ear clipping.
-
-    Return the numbers of the triangles' corners among all corners. The caller must have checked indices and sizes.
-    """
+    """Cut polygons, which are checked, into triangles without folds; return their corners' numbers among all."""
     sizes, corners = polygons.sizes, np.arange(len(polygons.corners))
     if (sizes == 3).all():
         return corners.reshape(-1, 3)
@@ -190,10 +180,6 @@ class Lines:
     def __len__(self) -> int:
         return len(self.starts)
 
-    def whole(self, number: int | np.integer) -> str:
-        """Return one line."""
-        return self.text[self.starts[number] : self.ends[number]].tobytes().decode("utf-8", "replace").strip()
-
     def written(self, number: int | np.integer) -> str:
         """Return one line with what looks like a comment."""
         begin = int(self.starts[number])
@@ -203,7 +189,7 @@ class Lines:
 
     def line(self, number: int | np.integer) -> str:
         """Return one line, shortened for an error message."""
-        text = self.whole(number)
+        text = self.text[self.starts[number] : self.ends[number]].tobytes().decode("utf-8", "replace").strip()
         return text if len(text) <= 60 else text[:57] + "..."
 
     def values(

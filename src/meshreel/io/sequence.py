@@ -95,9 +95,8 @@ class Animation:
     def __len__(self) -> int:
         return self.count
 
-    def only(self, numbers: Sequence[int]) -> Animation:
+    def only(self, _numbers: Sequence[int]) -> Animation:
         """Return the animation with an absolute path: it is one file, whatever frames are read."""
-        del numbers
         return replace(self, path=self.path.absolute())
 
     def name(self, index: int) -> str:
@@ -111,8 +110,7 @@ class Animation:
 class _Seen:
     """Counts for warnings, from the frames read so far; a frame read twice counts once."""
 
-    # By frame: merged vertices, all vertices, lost faces.
-    merged: dict[int, tuple[int, int, int]] = field(default_factory=dict)
+    merged: dict[int, tuple[int, int, int]] = field(default_factory=dict)  # by frame: merged, all vertices, lost faces
     empty: set[int] = field(default_factory=set)  # frames without a surface
     dropped: dict[str, int] = field(default_factory=dict)  # kind of dropped data: first frame that has it
     smallest: tuple[float, int] | None = None  # diagonal, frame
@@ -197,10 +195,8 @@ class FileSequence(MeshSequence):
 def open_sequence(source: str | Path | Sequence[str | Path], options: SequenceOptions | None = None) -> FileSequence:
     """Return the frames of a folder, a glob pattern, a list of files, one file or an .npz; none is read yet.
 
-    An animated GLB file alone has a frame for each moment of its animation at the frame rate.
-
-    All but an .npz may be URLs, such as s3:// and https:// (extra `remote`).
-    The up axis is the one that `meshreel capture` recorded in the folder, otherwise y.
+    An animated GLB file alone has a frame for each moment of its animation at the frame rate. All but an .npz may be
+    URLs, such as s3:// and https:// (extra `remote`). The up axis is that of `meshreel capture` in the folder, or y.
     """
     options = options or SequenceOptions()
     place = located(source) if isinstance(source, str | Path) else None

@@ -67,10 +67,7 @@ def check_apart(output: Path, inputs: Iterable[Path]) -> None:
 
 
 def check_free(paths: Iterable[Path], force: bool, inputs: Sequence[Path] = ()) -> None:
-    """Raise InputError if files are there that a user did not name and a run would replace, unless `force`.
-
-    That does not replace an input.
-    """
+    """Raise InputError if unnamed files would be replaced, unless `force`, which does not replace an input."""
     there = [path for path in paths if os.path.lexists(path)]
     for path in there if force else ():
         check_apart(path, inputs)
@@ -80,10 +77,7 @@ def check_free(paths: Iterable[Path], force: bool, inputs: Sequence[Path] = ()) 
 
 
 def write_mesh(mesh: Mesh, path: Path) -> None:
-    """Write a mesh to a .ply, .obj, .glb or .npz file, which appears when it is complete.
-
-    A .ply has no texture; the texture of an .obj is in a .mtl and a .png of its name.
-    """
+    """Write a .ply, .obj, .glb or .npz file when it is complete. A .ply has no texture; an .obj has it beside it."""
     path = Path(path_of(path))
     extension = path.suffix.lower()
     pack = _FORMATS.get(extension)
@@ -96,10 +90,7 @@ def write_mesh(mesh: Mesh, path: Path) -> None:
 
 
 def write_colored(mesh: Mesh, colors: UInt8[np.ndarray, "F 3"], path: Path) -> None:
-    """Write a mesh to a .ply file with these colors (red, green, blue) of faces.
-
-    The file has colors of vertices, which most viewers show: a vertex of faces with several colors is duplicated.
-    """
+    """Write a .ply with these colors of faces as those of vertices, which viewers show; shared ones are duplicated."""
     code = colors.astype(np.int64) @ (65536, 256, 1)
     corners = np.stack([mesh.faces.reshape(-1), np.repeat(code, 3)], axis=1)
     split, number = np.unique(corners, axis=0, return_inverse=True)
@@ -109,10 +100,7 @@ def write_colored(mesh: Mesh, colors: UInt8[np.ndarray, "F 3"], path: Path) -> N
 
 @contextmanager
 def replacing(path: Path) -> Iterator[BinaryIO]:
-    """Open a file that takes its final name at the end of the block; after a failure, nothing is left behind.
-
-    If another process writes the same file, wait for its end; the later file stays.
-    """
+    """Open a file that is complete at the end of the block or not there; wait for another process that writes it."""
     with unfinished(path, _WAIT, durable=False) as file, cannot_be_written(path):
         yield file
 
@@ -158,9 +146,8 @@ def _pack_obj(mesh: Mesh, path: Path) -> bytes:
         forms, has_place = ("f %d %d %d\n", "f %d/%d %d/%d %d/%d\n"), finite[numbers].all(axis=1).tolist()
         vertices += f"mtllib {path.stem}.mtl\nusemtl {_MATERIAL}\n"
         vertices += "".join(f"vt {u:.9g} {v:.9g}\n" for u, v in places[finite].tolist())
-        faces = "".join(
-            forms[has] % tuple(row if has else row[::2]) for has, row in zip(has_place, rows.tolist(), strict=True)
-        )
+        pairs = zip(has_place, rows.tolist(), strict=True)
+        faces = "".join(forms[has] % tuple(row if has else row[::2]) for has, row in pairs)
     return ("# meshreel\n" + vertices + faces).encode()  # not empty: readers report an empty file as damaged
 
 
@@ -207,12 +194,7 @@ def _fits_float32(mesh: Mesh) -> bool:
     return bool(lost.max(initial=0.0) <= _TOLERANCE * mesh.diagonal)
 
 
-_FORMATS: dict[str, Callable[[Mesh, Path], bytes]] = {
-    ".ply": _pack_ply,
-    ".obj": _pack_obj,
-    ".glb": _pack_glb,
-    ".npz": _pack_npz,
-}
+_FORMATS = {".ply": _pack_ply, ".obj": _pack_obj, ".glb": _pack_glb, ".npz": _pack_npz}
 
 
 def part_of(path: Path, hidden: bool = True) -> Path:
@@ -225,10 +207,7 @@ def part_of(path: Path, hidden: bool = True) -> Path:
 
 @contextmanager
 def unfinished(path: Path, wait: float = 0.0, durable: bool = True) -> Iterator[BinaryIO]:
-    """Open a file that takes the name `path` at the end of the block, and is removed if the block fails.
-
-    A `durable` file is on the disk by then and survives a loss of power. Raises InputError if it cannot be written.
-    """
+    """Open a file that is named at the block's end, or removed; `durable`: it is on the disk. Raises InputError."""
     name = part_of(path)
     with cannot_be_written(path):
         file = claim(name, path, wait)
@@ -290,14 +269,10 @@ def claim(name: Path, output: Path, wait: float = 0.0) -> BinaryIO:
 
 def discard(file: BinaryIO, name: Path) -> None:
     """Remove an unfinished file and close it."""
-    if os.name != "nt":  # remove it before its lock ends; Windows removes no open file
-        with suppress(OSError):
-            name.unlink()
-    with suppress(OSError):  # there may be no room for buffered bytes
-        file.close()
-    if os.name == "nt":
-        with suppress(OSError):
-            name.unlink()
+    steps: list[Callable[[], None]] = [name.unlink, file.close]  # it is removed before its lock ends,
+    for step in reversed(steps) if os.name == "nt" else steps:  # but Windows removes no open file
+        with suppress(OSError):  # there may be no room for buffered bytes
+            step()
 
 
 def sync(file: BinaryIO) -> None:

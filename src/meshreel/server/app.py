@@ -28,13 +28,8 @@ from .pages import gallery_page, player_page, policy
 
 EXPOSED = ("Accept-Ranges", "Content-Length", "Content-Range", "ETag")
 # Not from the system, whose list may be wrong (on Windows, it is in the registry) or missing.
-TYPES = {
-    ".css": "text/css",
-    ".html": "text/html",
-    ".js": "text/javascript",
-    ".txt": "text/plain",
-    ".wasm": "application/wasm",
-}
+TYPES = {".css": "text/css", ".html": "text/html", ".js": "text/javascript", ".txt": "text/plain"}
+TYPES |= {".wasm": "application/wasm"}
 BYTES = "application/octet-stream"  # .reel files and unknown types
 SAFE = {"X-Content-Type-Options": "nosniff", "Referrer-Policy": "no-referrer"}
 FRESH = SAFE | {"Cache-Control": "no-cache"}  # browsers may keep it, but must revalidate it
@@ -89,10 +84,7 @@ class _Pages:
         self._gallery: asyncio.Future[str] | None = None
 
     async def home(self, request: Request) -> Response:
-        """Return the player of the only file, or the gallery.
-
-        It takes all files of the folder: one is made at a time, for all clients that wait, and those that leave do not.
-        """
+        """Return the only file's player, or the gallery, which is made once for all clients that wait."""
         if self._library.only is not None:
             return self._watch(self._library.only)
         if self._gallery is None or self._gallery.done():
@@ -124,10 +116,7 @@ class _Pages:
         return await _file(request, _OWN / f"gallery{kind}", TYPES[kind], FRESH)
 
     async def player(self, request: Request) -> Response:
-        """Return a file of the built player, in Brotli if the build brought it and the browser takes it.
-
-        An address that begins with the sum over all files is never used for other contents: browsers keep it.
-        """
+        """Return a file of the player, in Brotli if it can. Browsers keep addresses with the sum over all."""
         path = request.path_params["path"]
         name = path.removeprefix(f"{self._edition}/")
         if name not in self._names or name.endswith(".br"):

@@ -1,7 +1,4 @@
-"""Process that reads the heads of files for the gallery: bytes of strangers cost the server neither time nor memory.
-
-In: paths, a line of JSON each. Out: the facts of each file, or, as a text, why it cannot be read now.
-"""
+"""Process that reads the heads of files for the gallery: bytes of strangers cost the server neither time nor memory."""
 
 from __future__ import annotations
 
@@ -42,10 +39,7 @@ class HeadReader:
             self._process = None
 
     def read(self, path: Path) -> dict[str, Any]:
-        """Return size, frames, duration and error of a file, as far as it has them.
-
-        Raises InputError if it cannot be opened.
-        """
+        """Return size, frames, duration and error of a file, as far as it has them. Raises InputError."""
         if self._process is None:
             command, variables = [sys.executable, "-P", "-m", __name__], os.environ | {"OPENBLAS_NUM_THREADS": "1"}
             pipes: Any = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL}

@@ -18,10 +18,7 @@ Version = tuple[int, int, int]  # of a file, which changes with its contents: si
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """Facts of a file for the gallery; for a file that cannot be read, numbers are 0 and `error` says why.
-
-    A file whose head is long, or was not read in the time of a gallery, has its size alone.
-    """
+    """Facts of a file for the gallery: 0 and `error` where unreadable; size alone where its head is long or unread."""
 
     name: str  # relative to the folder, with slashes
     size: int = 0  # bytes
@@ -97,15 +94,10 @@ class Library:
                 return Entry(name, found.st_size)
             facts = before.get(key) or Entry(name, **heads.read(path))
         except (MeshreelError, OSError) as error:
-            return Entry(name, error=_without_path(error, path))
+            text = (error.strerror if isinstance(error, OSError) else str(error)) or type(error).__name__
+            return Entry(name, error=text.removeprefix(f"{path}: "))  # viewers need not know the server's folders
         before[key] = self.known[key] = facts
         return replace(facts, name=name)  # links have one path
-
-
-def _without_path(error: MeshreelError | OSError, path: Path) -> str:
-    """Return the text of an error without the path: viewers need not know the folders of the server."""
-    text = error.strerror if isinstance(error, OSError) else str(error)
-    return (text or type(error).__name__).removeprefix(f"{path}: ")
 
 
 def as_text(name: str) -> str:

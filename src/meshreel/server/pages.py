@@ -34,10 +34,7 @@ _PLAIN = "data:image/svg+xml," + quote(
 
 
 def policy(styles: str = "") -> str:
-    """Return the content security policy of a page with these styles within it.
-
-    The player loads its own files, worker and wasm only. Any site may embed the page in a frame.
-    """
+    """Return the content security policy of a page with these styles: own files only; any site may embed the page."""
     known = f" 'sha256-{b64encode(sha256(styles.encode()).digest()).decode()}'" if styles else ""
     return (
         "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; worker-src 'self' blob:; "
@@ -49,14 +46,9 @@ def policy(styles: str = "") -> str:
 def player_page(name: str, player: str, styles: str) -> str:
     """Return the page that plays one file; `player` is the address of the player's folder, `styles` its page.css."""
     source = escape(f"/files/{quote(name)}")
-    preloads = "".join(
-        f'<link {how} href="{player}/{file}">\n'
-        for how, files in (
-            ('rel="modulepreload"', ("meshreel-player.js", "three.js")),
-            ('rel="preload" as="fetch" crossorigin', ("core.wasm",)),
-        )
-        for file in files
-    )
+    modules = ("meshreel-player.js", "three.js")
+    preloads = "".join(f'<link rel="modulepreload" href="{player}/{file}">\n' for file in modules)
+    preloads += f'<link rel="preload" as="fetch" crossorigin href="{player}/core.wasm">\n'
     return (
         f"{_HEAD.format(title=escape(f'{name} · meshreel'))}<style>{styles}</style>\n{preloads}"
         f'<script type="module" src="{player}/page.js"></script>\n</head>\n<body>\n'

@@ -28,6 +28,7 @@ UNKNOWN = "meshreel, for one run of its server"  # organization that signs the c
 VALID = timedelta(days=365)  # validity of the certificate; Apple's systems refuse more than 825 days
 
 
+@Parameter(name="*")
 @dataclass(frozen=True, slots=True)
 class ServerOptions:
     """Address and encryption of the server."""
@@ -45,18 +46,12 @@ class ServerOptions:
 
     @property
     def hosts(self) -> tuple[str, ...]:
-        """Host names that requests may have: only local ones if the server listens to this machine alone.
-
-        So a page of another site, whose name is made to resolve to this machine, reads nothing (DNS rebinding).
-        """
+        """Host names that requests may have; of a local server only local ones, against DNS rebinding by a site."""
         return tuple(map(_bracketed, LOCAL)) if self.host in LOCAL else ("*",)
 
 
 def run(app: Starlette, options: ServerOptions, announce: Callable[[list[str]], None]) -> None:
-    """Serve until SIGINT, which is the regular end, or SIGTERM; `announce` gets the addresses once it listens.
-
-    Raises InputError if the host is unknown or the port is taken.
-    """
+    """Serve until SIGINT or SIGTERM; `announce` gets the addresses. Raises InputError for a host or a taken port."""
     logging.getLogger("uvicorn.error").addFilter(_is_news)
     with _listening(options) as listener:
         encryption = _encryption(listener.getsockname()[0]) if options.https else None
@@ -117,10 +112,8 @@ def _encryption(address: str) -> ssl.SSLContext:
 
     names = [name for name in dict.fromkeys([*LOCAL, *_own_addresses(), address]) if name not in EVERYWHERE]
     maker = trustme.CA(organization_name=UNKNOWN)
-    now = datetime.now(UTC)
-    made = maker.issue_cert(
-        *names, organization_name=UNKNOWN, not_before=now - timedelta(days=1), not_after=now + VALID
-    )
+    begin, end = datetime.now(UTC) - timedelta(days=1), datetime.now(UTC) + VALID
+    made = maker.issue_cert(*names, organization_name=UNKNOWN, not_before=begin, not_after=end)
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
     made.configure_cert(context)
     return context
