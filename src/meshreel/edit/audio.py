@@ -19,13 +19,8 @@ from ..io.files import Place, located, read_input
 
 _START = 1 << 16  # bytes at the start within which Ogg and WebM name their tracks (guess)
 _PICTURES = re.compile(rb"hdlr.{8}vide|V_(VP[89]|AV1|MPEG)", re.DOTALL)  # marks of a video track in MP4 and in WebM
-_KNOWN = {
-    b"RIFF": "a WAV file",
-    b"fLaC": "a FLAC file",
-    b"FORM": "an AIFF file",
-    b"caff": "a CAF file",
-    b"\x89PNG": "a PNG picture",
-}
+_KNOWN = {b"RIFF": "a WAV file", b"fLaC": "a FLAC file", b"FORM": "an AIFF file", b"caff": "a CAF file"}
+_KNOWN |= {b"\x89PNG": "a PNG picture"}
 _REMEDY = "give Opus (.opus, .ogg, .webm), AAC (.m4a, .aac) or MP3, as ffmpeg -i IN -vn -c:a libopus OUT.opus makes it"
 Given = str | Place | bytes  # a path, a URL (extra `remote`), or the bytes of an audio file
 _MOST = 1e8  # s, three years: a larger offset was meant in another unit (guess)
@@ -33,10 +28,7 @@ _CLOSE = 1000  # microseconds within which joined files have the same audio at t
 
 
 def packed_audio(audio: Given, start: float, first_time: int = 0) -> bytes:
-    """Return the payload of an audio file that begins `start` seconds after the first frame, or before it.
-
-    `first_time` is that of the header. Raises InputError for another file, and for a start that is none.
-    """
+    """Return the payload of audio `start` seconds after the first frame (`first_time`). Raises InputError."""
     if not abs(start) <= _MOST:  # also NaN
         raise InputError(f"audio start {start}: give seconds after the first frame, as 0.5; or before it, as -2")
     held = viewed(audio)
@@ -46,10 +38,7 @@ def packed_audio(audio: Given, start: float, first_time: int = 0) -> bytes:
 
 
 def joined_audio(joined: AudioFile | None, path: Place, record: AudioFile | None, later: int) -> AudioFile | None:
-    """Return the audio of joined files, with that of a next one, which begins `later` microseconds after its own time.
-
-    Raises InputError where it is another one, or the same at another time.
-    """
+    """Return joined files' audio and that of a next one, `later` microseconds later. Raises InputError for another."""
     if record is None:
         return joined
     moved = replace(record, start=record.start + later)

@@ -65,11 +65,9 @@ def piece_of(path: Place, reader: ReelReader, numbers: Iterable[int], first: int
     """Return chunks of a file, renumbered without gaps."""
     numbers = tuple(numbers)
     places = {number: place for place, number in enumerate(numbers, first)}
-    entries = tuple(
-        replace(entry, depends_on=tuple(places[number] for number in entry.depends_on))
-        for entry in (reader.index.chunks[number] for number in numbers)
-    )
-    return Piece(path, numbers, entries)
+    chosen = [reader.index.chunks[number] for number in numbers]
+    entries = (replace(entry, depends_on=tuple(places[n] for n in entry.depends_on)) for entry in chosen)
+    return Piece(path, numbers, tuple(entries))
 
 
 def silent(reader: ReelReader) -> list[int]:
@@ -87,9 +85,7 @@ def _with_metadata(header: Header, metadata: dict[str, Any]) -> Header:
     return replace(header, metadata=text)
 
 
-def written(
-    output: Place, header: Header, metadata: dict[str, Any], pieces: Sequence[Piece], audio: bytes = b""
-) -> Edited:
+def written(output: Place, header: Header, metadata: dict[str, Any], pieces: list[Piece], audio: bytes = b"") -> Edited:
     """Write the chunks of all pieces, and audio, under one head; the file appears when it is complete."""
     header, index = _with_metadata(header, metadata), Index(tuple(e for piece in pieces for e in piece.entries))
     coded = sum(entry.frames for entry in index.chunks if entry.kind == ChunkKind.GROUP and entry.track == 0)

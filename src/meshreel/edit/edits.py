@@ -1,8 +1,4 @@
-"""Edits of .reel files that encode nothing again: chunks are copied, byte for byte, under another head.
-
-In: files. Out: a file with some of their frames, one after the other, in another time, place or with other metadata.
-What was edited is kept in the metadata. Needs nothing of the extra `encode`.
-"""
+"""Edits of .reel files: chunks are copied, byte for byte, under another head. Needs nothing of the extra `encode`."""
 
 from __future__ import annotations
 
@@ -270,10 +266,7 @@ def _relabelled(
     edit: Edit | None = None,
     audio: bytes | None = None,
 ) -> Edited:
-    """Write a file with all its chunks, unknown kinds included, under another header, with its own edit or another.
-
-    Without `audio` it keeps its own; with a payload, or with no bytes, unknown kinds are refused.
-    """
+    """Write a file with all its chunks under another header; with `audio`, or no bytes, unknown kinds are refused."""
     metadata = {name: value for name, value in metadata.items() if name != ITEM}  # not an edit if the flag is missing
     metadata |= (edit or reader.edit).item(reader.coded_count)
     piece = Piece(path, tuple(range(len(reader.chunks))), reader.index.chunks)

@@ -1,8 +1,4 @@
-"""Metadata of files that are joined, cut or scaled: from the metadata of parts to those of a whole.
-
-In: JSON objects as an encoder wrote them (`encoder.file.summary`). Out: the same of the edited file.
-Means over frames are joined from exact totals, so that parts give the metadata of one encode.
-"""
+"""Metadata of files that are joined, cut or scaled; by exact totals, parts give the means of one encode."""
 
 from __future__ import annotations
 
@@ -43,10 +39,7 @@ class Totals:
 
     @staticmethod
     def from_metadata(metadata: dict[str, Any], frames: int) -> Totals:
-        """Return the totals of a file of `frames` frames; if it is no part, from its rounded means.
-
-        Raises KeyError, TypeError or ValueError for metadata that have none, or that no encoder wrote.
-        """
+        """Return the totals of a file; of no part, by rounded means. Raises KeyError, TypeError or ValueError."""
         if PART in metadata:
             return Totals(frames, *map(_number, metadata[PART]["totals"]))
         rms, worst, psnr, angle = (_number(metadata[name]) for name in MEANS)
@@ -92,16 +85,11 @@ def tags_of(metadata: dict[str, Any]) -> set[str]:
 
 
 def scaled_metadata(metadata: dict[str, Any], scale: float) -> dict[str, Any]:
-    """Return the metadata of a file whose frames are scaled: names in `_m` and the totals of a part are in metres.
-
-    Raises KeyError, TypeError or ValueError for metadata that no encoder wrote.
-    """
+    """Return the metadata of scaled frames: `_m` and totals are in metres. Raises KeyError, TypeError or ValueError."""
     if scale == 1:
         return metadata
-    found = {
-        name: shortened(value * scale) if name.endswith("_m") and type(value) in (int, float) else value
-        for name, value in metadata.items()
-    }
+    lengths = {name for name, value in metadata.items() if name.endswith("_m") and type(value) in (int, float)}
+    found = {name: shortened(value * scale) if name in lengths else value for name, value in metadata.items()}
     if PART in metadata:
         squares, worst, *others = metadata[PART]["totals"]
         exact = [None if squares is None else squares * scale**2, None if worst is None else worst * scale, *others]
@@ -110,19 +98,13 @@ def scaled_metadata(metadata: dict[str, Any], scale: float) -> dict[str, Any]:
 
 
 def shared(metadata: dict[str, Any]) -> dict[str, Any]:
-    """Return the metadata that all parts of a sequence share, the digest of their options among them.
-
-    Raises KeyError or TypeError for metadata that no encoder wrote.
-    """
+    """Return the metadata that all parts share, with the digest of their options. Raises KeyError or TypeError."""
     found = {name: value for name, value in metadata.items() if name in _SHARED}
     return found | ({"options": metadata[PART]["options"], "frames": metadata[PART]["of"]} if PART in metadata else {})
 
 
 def place_in_whole(metadata: dict[str, Any]) -> tuple[int, int] | None:
-    """Return the first frame of a part, and how many frames its sequence has; None for a file that is no part.
-
-    Raises KeyError, TypeError or ValueError for metadata that no encoder wrote.
-    """
+    """Return a part's first frame and its sequence's length, or None. Raises KeyError, TypeError or ValueError."""
     part = metadata.get(PART)
     return None if part is None else (int(part["first_frame"]), int(part["of"]))
 
