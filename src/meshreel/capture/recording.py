@@ -50,10 +50,7 @@ class FusionOptions:
 
 
 def fuse_depths(pictures: Sequence[DepthPicture], options: FusionOptions) -> Mesh:
-    """Fuse depth pictures into a mesh, which is empty where no camera measured anything.
-
-    Raises InputError where the surface takes more blocks of voxels than `reconstruct.MOST_BLOCKS`.
-    """
+    """Fuse depth pictures into a mesh, which may be empty. Raises InputError beyond `reconstruct.MOST_BLOCKS`."""
     fine = [picture.finer(FINER) for picture in pictures if picture.depth.any()]
     if not fine:
         return Mesh.empty()
@@ -171,11 +168,7 @@ class Kept:
 def open_recording(
     folder: Path, options: FusionOptions = FusionOptions(), frames: str = ":", keep: bool = True, order: Order = "auto"
 ) -> tuple[Recording, list[str]]:
-    """Open the recording in a rig's folder; also return a warning for each problem that a user must know.
-
-    `frames` is a range A:B, with B excluded; `order` is that of the pictures' names. Raises InputError where the rig is
-    wrong or one of its cameras moves.
-    """
+    """Open the recording in a rig's folder, frames A:B, with warnings. Raises InputError, also for moving cameras."""
     rig = read_rig(folder, order)
     warnings = [*rig.remarks, *rig.missing()]
     for number, camera in enumerate(rig.cameras):
@@ -202,10 +195,7 @@ def unsteady(recording: Recording) -> list[str]:
 
 
 def moved_share(depths: list[Float64[np.ndarray, "H W"]]) -> float:
-    """Return the share of pixels whose depth (m) differs from their usual depth, in the median frame.
-
-    Pixels without a measurement are ignored. Fewer than three usable frames give 0.
-    """
+    """Return the share of measured pixels that differ from their usual depth, m, in the median of 3 frames or more."""
     seen = [depth for depth in depths if (depth > 0).mean() >= LEAST]
     if len(seen) < 3:
         return 0.0

@@ -1,7 +1,7 @@
 """Export of a .reel file to one animated file that other programs play: GLB or USD.
 
-In: a reader and a path. Out: the file. Frames of a group with the same vertices become one moving shape; every other
-frame becomes a shape that is visible for one frame. The states of a background are still shapes.
+Frames of a group with the same vertices become one moving shape, every other frame a shape that is visible for one
+frame. The states of a background are still shapes.
 """
 
 from __future__ import annotations

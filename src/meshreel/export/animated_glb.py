@@ -35,11 +35,7 @@ _MATERIAL = {
 
 @contextmanager
 def animated_glb(path: Path, animation: Animation, compressed: bool = False) -> Iterator[GlbWriter]:
-    """Open a writer of shapes; the file appears at the end of the block, and not at all if the block fails.
-
-    Compressing needs the extra `glb`. Raises InputError if the file cannot be written, or if float32 times cannot
-    distinguish its frames.
-    """
+    """Open a writer of shapes; the file appears if the block succeeds. Raises InputError; compressing needs `glb`."""
     with replacing(path) as file, tempfile.TemporaryFile(dir=path.parent) as spool:
         if compressed:
             check_meshopt()

@@ -1,8 +1,7 @@
 """Writer of USD: a Mesh prim for each shape, with points as time samples, shown and hidden by its visibility.
 
-In: shapes, one after the other. Out: a .usd or .usdc file (crate), .usda (text) or .usdz (package). Needs the extra
-`usd`; the only module that imports `pxr`. The stage is saved whenever _MOST_UNSAVED bytes are pending, so that memory
-stays bounded.
+A file is .usd or .usdc (crate), .usda (text) or .usdz (package). Needs the extra `usd`; the only module that imports
+`pxr`. The stage is saved whenever _MOST_UNSAVED bytes are pending, so that memory stays bounded.
 """
 
 from __future__ import annotations
@@ -17,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float32, Float64
+from jaxtyping import Float32
 
 from ..errors import InputError
 from ..io.file_names import is_text
@@ -34,10 +33,7 @@ _ROUNDED = 1e-6  # s: times of .reel files are whole microseconds
 
 @contextmanager
 def animated_usd(path: Path, animation: Animation) -> Iterator[UsdWriter]:
-    """Open a writer of shapes; the file appears at the end of the block, and not at all if the block fails.
-
-    Raises InputError if the file cannot be written, or if `pxr` is not installed.
-    """
+    """Open a writer of shapes; the file appears if the block succeeds. Raises InputError, also without `pxr`."""
     try:
         from pxr import Tf
     except ImportError as error:
@@ -185,7 +181,6 @@ def _codes(animation: Animation) -> list[float]:
     """Return the times of frames in units of a frame: whole numbers if they follow the frame rate up to rounding."""
     exact = animation.times * animation.frame_rate
     rounded = np.round(exact)
-    near: Float64[np.ndarray, " T"]
     near = np.where(np.abs(exact - rounded) <= _ROUNDED * animation.frame_rate, rounded, exact)
     codes: list[float] = (near if (np.diff(near) > 0).all() else exact).tolist()
     return codes

@@ -1,8 +1,7 @@
 """Export of a .reel file to one file per frame: a mesh, or its splats as PLY (Kerbl et al. 2023) or SPZ.
 
-In: a function that decodes a frame, and paths. Out: files, and the errors of the frames that cannot be decoded. Splats
-have positions, logarithms of scales, quaternions, opacities (in PLY their logits), and colours as harmonics of degree
-0, without those that the frame hides. SPZ is Niantic's format in version 3: 20 bytes a splat, packed by gzip.
+Splats have positions, logarithms of scales, quaternions, opacities (in PLY their logits), and colours as harmonics of
+degree 0, without those that the frame hides. SPZ is Niantic's, version 3: 20 bytes a splat, packed by gzip.
 """
 
 from __future__ import annotations
@@ -33,11 +32,7 @@ def write_frames(
     progress: Callable[[int], None] = lambda _: None,
     write: Callable[[Any, Path], None] = write_mesh,
 ) -> list[FormatError]:
-    """Decode each frame `i` and `write` it to `paths[i]`; return the errors of damaged frames.
-
-    The file of a damaged frame is removed if an earlier run left one. `progress` gets the number of frames done. Raises
-    InputError if a file cannot be written.
-    """
+    """Decode and write each frame; return errors of damaged ones, whose old files are removed. Raises InputError."""
     failed: list[FormatError] = []
     for number, path in enumerate(paths):
         try:
@@ -85,13 +80,9 @@ def _spz(rows: Float64[np.ndarray, "N 17"]) -> bytes:
     most = float(np.abs(places).max(initial=1.0))
     fraction = min(max(22 - math.floor(math.log2(most)), 0), 16)  # bits of a place behind the point
     fixed = np.clip(np.round(places * 2**fraction), 1 - 2**23, 2**23 - 1).astype("<i4")
-    parts = (
-        np.ascontiguousarray(fixed).view(np.uint8).reshape(-1, 4)[:, :3],
-        _bytes(255 / (1 + np.exp(-logits))),
-        _bytes(255 * (0.15 * colors + 0.5)),
-        _bytes(16 * (scales + 10)),
-        _smallest_three(turns[:, [1, 2, 3, 0]]).view(np.uint8),
-    )
+    looks = [_bytes(255 / (1 + np.exp(-logits))), _bytes(255 * (0.15 * colors + 0.5)), _bytes(16 * (scales + 10))]
+    packed_turns = _smallest_three(turns[:, [1, 2, 3, 0]]).view(np.uint8)
+    parts = [np.ascontiguousarray(fixed).view(np.uint8).reshape(-1, 4)[:, :3], *looks, packed_turns]
     head = struct.pack("<4sIIBBBB", b"NGSP", 3, len(rows), 0, fraction, 0, 0)
     return gzip.compress(head + b"".join(part.tobytes() for part in parts), mtime=0)
 
@@ -115,12 +106,6 @@ def _bytes(values: Float64[np.ndarray, "..."]) -> UInt8[np.ndarray, "..."]:
 def _rows(bound: Bound) -> Float64[np.ndarray, "N 17"]:
     visible = bound.opacities > 0
     opacities = np.minimum(bound.opacities[visible], MOST_OPACITY)
-    columns = (
-        bound.means[visible],
-        bound.axes[visible, 2],
-        (bound.colors[visible] - 0.5) / HARMONIC,
-        np.log(opacities / (1 - opacities))[:, None],
-        np.log(bound.scales[visible]),
-        quaternions(np.swapaxes(bound.axes[visible], 1, 2)),
-    )
-    return np.concatenate(columns, axis=1)
+    logits, axes = np.log(opacities / (1 - opacities))[:, None], bound.axes[visible]
+    looks = [(bound.colors[visible] - 0.5) / HARMONIC, logits, np.log(bound.scales[visible])]
+    return np.concatenate([bound.means[visible], axes[:, 2], *looks, quaternions(np.swapaxes(axes, 1, 2))], axis=1)

@@ -1,7 +1,4 @@
-"""Shapes: surfaces over time, the input of the writers of animated files (`animated_glb`, `animated_usd`).
-
-In: an Animation, which all shapes of a file share, and shapes one by one. Out: one file that other programs play.
-"""
+"""Shapes: surfaces over time, the input of the writers of animated files (`animated_glb`, `animated_usd`)."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Poses of colour cameras from a board of markers that is moved through their common view.
-
-OpenCV finds the board's pose in each picture; the cameras' relative poses are means over frames.
-"""
+"""Poses of colour cameras: means over frames of those of a board of markers, which OpenCV finds in their pictures."""
 
 from __future__ import annotations
 
@@ -79,10 +76,7 @@ def opencv() -> Any:
 
 
 def poses_by_board(cameras: Sequence[ColorCamera], options: BoardOptions) -> tuple[dict[str, Matrix], list[str]]:
-    """Return poses of cameras, and a warning for cameras that do not see the board together with the first one.
-
-    The first camera that sees it with another keeps its pose. Raises InputError where no two see it in one frame.
-    """
+    """Return the cameras' poses, of which the first stays, and a warning for unseen ones. Raises InputError."""
     board = options.made()
     seen = [_seen(camera, board) for camera in cameras]
     across = {  # poses of j in i

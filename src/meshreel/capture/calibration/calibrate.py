@@ -94,12 +94,9 @@ def refine_views(views: Sequence[StillView], report: Report = lambda *_: None) -
         PairDistance((names[i], names[j]), share, first.get((i, j), (0.0, math.nan))[1], after)
         for (i, j), (share, after) in last.items()
     )
-    unlike = (
-        f"cameras {' and '.join(pair.cameras)} see surfaces {1000 * pair.after:.0f} mm apart; begin with better poses "
-        "(--poses, --board), and check the cameras' own numbers"
-        for pair in pairs
-        if pair.after > APART
-    )
+    remedy = "begin with better poses (--poses, --board), and check the cameras' own numbers"
+    far = [(" and ".join(pair.cameras), 1000 * pair.after) for pair in pairs if pair.after > APART]
+    unlike = (f"cameras {both} see surfaces {away:.0f} mm apart; {remedy}" for both, away in far)
     warnings = (*_strangers(names, list(last)), *_sliding(names, unfixed), *unlike)
     return Calibration(tuple(views), cameras, pairs, warnings)
 
@@ -212,10 +209,7 @@ class _Scene:
         )
 
     def unfixed(self, poses: Poses) -> Directions:
-        """Return the directions in which cameras can move and the surfaces still lie on each other, as on one plane.
-
-        Noise gives a plane normals of all directions, and edges fix what no plane fixes: a motion is tried.
-        """
+        """Return directions in which surfaces stay on each other. Each is tried: noise gives planes all normals."""
         values, vectors = strict.eigen(self.problem(poses, REACH[-1])[0])
         weak = (values > 1e-9 * max(float(values.mean()), 1.0)) & (values < WEAK * values.mean())
         rest, found = max(self.cost(poses), LEAST_COST), []
@@ -261,10 +255,7 @@ def _sliding(names: Sequence[str], unfixed: Directions) -> Iterator[str]:
 
 
 def _ahead(step: Step, before: tuple[Step, Step] | None) -> Step:
-    """Return a step that goes on where steps shrink slowly; `before`: the step before, as solved and as taken.
-
-    Anderson (1965) with one step before: without, directions that only edges fix take over a hundred steps.
-    """
+    """Return a step that goes on where steps shrink slowly (Anderson 1965); `before`: the last, solved and taken."""
     if before is None:
         return step
     last, taken = before

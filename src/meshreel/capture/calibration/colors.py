@@ -122,9 +122,7 @@ def calibrate(frames: Iterable[Moment], options: CalibrationOptions) -> list[Cor
         for _ in range(options.rounds):
             poses = fit_poses(looks, gains, poses)
     candidates.append((fit_gains(*_joined(looks, poses)), poses))
-    errors = [
-        disagreement([_Look.at(moment, each[1], 0, options.places) for moment in judged], *each) for each in candidates
-    ]
+    errors = [disagreement([_Look.at(one, each[1], 0, options.places) for one in judged], *each) for each in candidates]
     best = min(range(3), key=lambda number: errors[number])
     return [Correction(*each) for each in zip(*candidates[best], strict=True)] if best else None
 
@@ -308,20 +306,15 @@ def _solved(normal: Matrix, slope: Slope, estimate: np.ndarray, deviation: float
 def remembered(
     rig: Rig, looked_at: Sequence[int], depends_on: dict[str, Any], find: Callable[[], Corrections]
 ) -> Corrections:
-    """Return the corrections of a rig's colour cameras from its folder, or find them and try to write them there.
-
-    They depend on the frames `looked_at`, the cameras and `depends_on`: a file of others, or damaged, is replaced.
-    """
+    """Return the corrections in a rig's folder if of these `looked_at` and `depends_on`; else find and write them."""
     digest = _digest(rig, looked_at, depends_on)
     with suppress(*_DAMAGED):
         record = json_of((rig.folder / REMEMBERED).read_bytes())
         if record["of"] == digest:
             return _corrections(rig, record["cameras"])
     found = find()
-    entries = [
-        {"name": camera.name, "log2_gains": one.gains.tolist(), "motion": one.pose.tolist()}
-        for camera, one in zip(rig.color_cameras, found, strict=False)
-    ]
+    pairs = zip(rig.color_cameras, found, strict=False)
+    entries = [{"name": eye.name, "log2_gains": one.gains.tolist(), "motion": one.pose.tolist()} for eye, one in pairs]
     with suppress(OSError, InputError):
         if rig.folder.stat().st_mode & 0o222:  # root could write where nobody is meant to
             text = json.dumps({"of": digest, "cameras": entries}, indent=1) + "\n"
@@ -333,10 +326,8 @@ def _corrections(rig: Rig, entries: list[dict[str, Any]]) -> Corrections:
     """Return corrections as they were written. Raises ValueError unless each is of its camera, and possible."""
     if entries and [entry["name"] for entry in entries] != [camera.name for camera in rig.color_cameras]:
         raise ValueError("of other cameras")
-    return tuple(
-        Correction(_numbers(entry["log2_gains"], 3, MOST_GAIN), _numbers(entry["motion"], 6, MOST_MOTION))
-        for entry in entries
-    )
+    pairs = ((_numbers(one["log2_gains"], 3, MOST_GAIN), _numbers(one["motion"], 6, MOST_MOTION)) for one in entries)
+    return tuple(Correction(*pair) for pair in pairs)
 
 
 def _numbers(values: Any, count: int, most: float) -> Float64[np.ndarray, " n"]:

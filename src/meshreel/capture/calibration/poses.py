@@ -9,7 +9,7 @@ import json
 import re
 import struct
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -33,10 +33,7 @@ _DAMAGED = (ValueError, LookupError, TypeError, AttributeError, ArithmeticError,
 
 
 def read_poses(path: Path) -> dict[str, Matrix]:
-    """Read the poses in a file, of which the name tells the form, or in a folder of COLMAP's.
-
-    Raises InputError where it cannot be read or has none.
-    """
+    """Read the poses in a file, whose name tells the form, or in COLMAP's folder. Raises InputError for none."""
     if path.is_dir():
         path = next((p for p in (path / "images.bin", path / "images.txt") if p.exists()), path / "images.bin")
     read = _READERS.get(path.suffix.lower())
@@ -85,10 +82,7 @@ def mean_pose(poses: Iterable[Matrix]) -> Matrix:
 
 
 def pose_of(turns: Any, shifts: Any) -> Float64[np.ndarray, "*T 4 4"]:
-    """Return the matrices of rotations (3 x 3, quaternions x y z w, or rotation vectors) and translations.
-
-    Raises ValueError for numbers that are no rotation.
-    """
+    """Return matrices of rotations (3 x 3, quaternions x y z w, or vectors) and translations. Raises ValueError."""
     from scipy.spatial.transform import Rotation
 
     numbers, places = np.asarray(turns, np.float64), np.asarray(shifts, np.float64)
@@ -101,10 +95,7 @@ def pose_of(turns: Any, shifts: Any) -> Float64[np.ndarray, "*T 4 4"]:
 
 
 def pose_in_root(above: Mapping[str, tuple[str, Matrix]], frame: str) -> tuple[str, Matrix]:
-    """Return the root of a frame, and the frame's pose in it; `above` has each frame's parent, and its pose there.
-
-    Raises ValueError for frames that hang on each other.
-    """
+    """Return a frame's root and its pose there; `above`: parent and pose of each. Raises ValueError for a circle."""
     pose = np.eye(4)
     for _ in range(len(above) + 1):
         if frame not in above:
@@ -198,14 +189,7 @@ def _transforms(records: list[dict[str, Any]]) -> dict[str, Matrix]:
     return {frame: pose_in_root(above, frame)[1] for frame in optical or above}
 
 
-_READERS: dict[str, Callable[[bytes], Mapping[str, Any]]] = {
-    ".txt": _colmap_text,
-    ".bin": _colmap_binary,
-    ".yml": _yaml,
-    ".yaml": _yaml,
-    ".toml": _toml,
-    ".json": _json,
-}
+_READERS = {".txt": _colmap_text, ".bin": _colmap_binary, ".yml": _yaml, ".yaml": _yaml, ".toml": _toml, ".json": _json}
 
 
 def with_poses(rig: Rig, depth: Mapping[str, Matrix], color: Mapping[str, Matrix]) -> Rig:
@@ -227,10 +211,7 @@ def with_poses(rig: Rig, depth: Mapping[str, Matrix], color: Mapping[str, Matrix
 
 
 def posed_by(rig: Rig, poses: Mapping[str, Matrix], kind: str, where: Path) -> tuple[Rig, list[str]]:
-    """Return a rig with the poses of a file, which are those of its depth or its colour cameras (`kind`).
-
-    Also return a warning that names cameras without one. Raises InputError where it has none of any camera.
-    """
+    """Return a rig with a file's poses of its depth or colour cameras (`kind`), and warnings. Raises InputError."""
     names = [camera.name for camera in (rig.cameras if kind == "depth" else rig.color_cameras)]
     if not names:
         raise InputError(f"{rig.folder}: has no {kind} cameras, whose poses {where} is said to have; check --poses-of")

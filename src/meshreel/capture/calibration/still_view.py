@@ -1,7 +1,4 @@
-"""Still surface in the view of a rig's camera: a small plane at each pixel.
-
-Only the plane of a pixel whose window is flat up to the noise counts: edges, borders and what moves have none.
-"""
+"""Still surface in the view of a rig's camera: a small plane at each pixel whose window is flat up to the noise."""
 
 from __future__ import annotations
 

@@ -64,10 +64,8 @@ def _lens(camera: dict[str, Any], deep: bool, width: int, height: int) -> Camera
     """Return the lens of a mode from what is known of the whole sensor, whose first pixel begins at 0."""
     cx, cy, fx, fy, k1, k2, k3, k4, k5, k6, _, _, p2, p1 = map(float, camera["Intrinsics"]["ModelParameters"][:14])
     if deep:
-        (left, wide), (top, high) = (
-            (begin * side / part, 1024 * side / part)
-            for (begin, part), side in zip(NARROW if width != height else ALL, (width, height), strict=True)
-        )
+        sides = zip(NARROW if width != height else ALL, (width, height), strict=True)
+        (left, wide), (top, high) = ((begin * side / part, 1024 * side / part) for (begin, part), side in sides)
     else:  # 4:3, of which 16:9 leaves out as much above as below; early calibrations are of 16:9
         left, top, wide, high = 0.0, (width * 0.75 - height) / 2, float(width), width * 0.75
         if camera["SensorWidth"] * 9 == camera["SensorHeight"] * 16:

@@ -236,9 +236,7 @@ def _is_straight(name: str) -> bool:
 
 def _lens(info: Any, straight: bool) -> Camera | None:
     """Return the lens that a CameraInfo tells, None where it has zeros; `straight`: of rectified pictures."""
-    matrix, bends, projection = (
-        np.asarray(getattr(info, name, getattr(info, name.upper(), None)), np.float64) for name in ("k", "d", "p")
-    )
+    matrix, bends, projection = (np.asarray(getattr(info, k, getattr(info, k.upper(), None)), float) for k in "kdp")
     numbers = projection.reshape(3, 4) if straight and projection.any() else matrix.reshape(3, 3)
     if not numbers.any() or not info.width:
         return None

@@ -66,10 +66,7 @@ class Take:
 
 
 def lens_of(width: int, height: int, focal: Pair, center: Pair, distortion: tuple[float, ...] = ()) -> Camera:
-    """Return the lens of intrinsics that call the middles of pixels whole numbers, as most recorders do.
-
-    Raises ValueError where the distortion is not finite.
-    """
+    """Return the lens of intrinsics to which middles of pixels are whole numbers. Raises ValueError if not finite."""
     if not np.isfinite(distortion).all():
         raise ValueError(f"its lens bends by {distortion}: not finite")
     return Camera(width, height, focal, (center[0] + 0.5, center[1] + 0.5), distortion=distortion)

@@ -43,11 +43,7 @@ Report = Callable[[int], None]  # how many pictures were read so far
 def write_takes(
     takes: Sequence[Take], folder: Path, report: Report = lambda _: None, depth_unit: float | None = None
 ) -> list[str]:
-    """Write a rig's folder, which appears when it is complete; return warnings for the user.
-
-    `depth_unit` is what 1 means in pictures of depth, m, in place of what the recordings say.
-    Raises InputError where a recording cannot be read, has no calibration, or moves; and where the folder has files.
-    """
+    """Write a complete rig's folder; return warnings. `depth_unit`, m, replaces that of takes. Raises InputError."""
     parts = _parts(takes, depth_unit)
     with _appearing(folder) as place:
         pictures = count(1)

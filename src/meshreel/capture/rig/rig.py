@@ -100,16 +100,13 @@ class Rig:
 
 
 def read_rig(folder: Path, order: Order = "auto") -> Rig:
-    """Read the rig in a folder, with pictures in the order of their names.
-
-    Raises InputError where its description or a camera's pictures are missing or wrong.
-    """
+    """Read the rig in a folder. Raises InputError where its description or pictures are missing or wrong."""
     entries, cameras, rate, alone = _described(folder)
     folders = [folder / str(e.get("depth", f"{c.name}/depth")) for e, c in zip(entries, cameras, strict=True)]
     keyed = [pictures_in(place, camera.name, "depth", order) for place, camera in zip(folders, cameras, strict=True)]
     beside = [number for number, entry in enumerate(entries) if "color" in entry]
     colors = [_color_camera(folder, entries[k]["color"], cameras[k].record(), k) for k in beside]
-    colors += [_color_camera(folder, entry, {"name": f"color{number}"}) for number, entry in enumerate(alone)]
+    colors += [_color_camera(folder, entry, {"name": f"color{number}"}, None) for number, entry in enumerate(alone)]
     keyed += [pictures_in(place, camera.name, "color", order) for camera, place in colors]
     files = _numbered(folder, keyed)
     seen = tuple(replace(each, files=of) for (each, _), of in zip(colors, files[len(cameras) :], strict=True))
@@ -240,13 +237,8 @@ def _unknown(folder: Path, entries: list[Any]) -> Iterator[str]:
         yield f"{folder}: unknown keys describe cameras and are ignored: {keys}"
 
 
-def _color_camera(
-    folder: Path, entry: Any, beside: dict[str, Any], number: int | None = None
-) -> tuple[ColorCamera, Path]:
-    """Return the colour camera of an entry, a folder or an object, without pictures, and the folder of these.
-
-    What the entry does not say is as `beside` has it.
-    """
+def _color_camera(folder: Path, entry: Any, beside: dict[str, Any], number: int | None) -> tuple[ColorCamera, Path]:
+    """Return the camera of a folder or an object, else as `beside` has it, and the folder of its pictures."""
     path, given = folder / RIG, {"folder": entry} if isinstance(entry, str) else entry
     if not isinstance(given, dict):
         raise InputError(f"{path}: color of camera {beside['name']} is {entry!r:.40}; give a folder or an object")

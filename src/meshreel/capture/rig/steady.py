@@ -1,9 +1,8 @@
 """Depth pictures without the error that a sensor makes in a frame as a whole.
 
-In: a rig of cameras that stand still. Out: its depth pictures, in which what stands still is where it usually is. A
-sensor drifts as it warms up, and some measure single frames as a whole some centimetres too far: what stands still and
-what moves is then off alike, and each pixel beside its neighbours is right. Such an error is told by the pixels' usual
-depth. One that is smaller than what single pixels are off is left alone.
+A sensor drifts as it warms up, and some measure single frames as a whole some centimetres too far: what stands still
+and what moves is then off alike. Such an error is told by the pixels' usual depth, where cameras stand still. One that
+is smaller than what single pixels are off is left alone.
 """
 
 from __future__ import annotations
@@ -37,17 +36,17 @@ class SteadyDepth:
 
     def pictures(self, frame: int) -> list[DepthPicture | None]:
         """Return the pictures of a frame. Errors as in `Rig.depth_pictures`."""
-        found = enumerate(self.rig.depth_pictures(frame))
-        return [None if picture is None else self._corrected(number, picture) for number, picture in found]
+        pictures = self.rig.depth_pictures(frame)
+        for number, picture in enumerate(pictures):
+            if picture is not None and (error := self._error(number, picture)):
+                depth = np.rint(picture.depth / (1 + error)).astype(np.uint16)
+                pictures[number] = replace(picture, depth=depth)
+        return pictures
 
     def errors(self, frames: Sequence[int]) -> list[list[float]]:
         """Return the error of each camera in these frames, as a share of the depth; 0 where it is left alone."""
         each = zip(*(self.rig.depth_pictures(frame) for frame in frames), strict=True)
         return [[0.0 if one is None else self._error(k, one) for one in some] for k, some in enumerate(each)]
-
-    def _corrected(self, number: int, picture: DepthPicture) -> DepthPicture:
-        error = self._error(number, picture)
-        return replace(picture, depth=np.rint(picture.depth / (1 + error)).astype(np.uint16)) if error else picture
 
     def _error(self, number: int, picture: DepthPicture) -> float:
         usual = self._usual_depth(number)

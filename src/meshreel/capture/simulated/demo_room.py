@@ -1,7 +1,4 @@
-"""The demo's scene: a procedural furnished room in which two people move, for a simulated rig.
-
-y is up, in metres; the floor is at height 0, and the front and right sides of the room are open.
-"""
+"""The demo's scene: two people in a furnished room; y is up, m, the floor at 0, open at the front and on the right."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""A procedural person of soft parts: pose -> body of capsules.
-
-The person stands at its own origin and faces +z, with y up and x to its left. Sizes are those of an adult of 1.75 m.
-"""
+"""A procedural person of capsules, an adult of 1.75 m at its own origin: +z is ahead, y up, x to its left."""
 
 from __future__ import annotations
 
@@ -40,23 +37,16 @@ def figure(pose: Pose, thinnest: float) -> Body:
     """Return the person's parts in world coordinates, none thinner than `thinnest` (m), so that a grid resolves it."""
     bob = -pose.stride * (0.035 + 0.02 * np.cos(4 * np.pi * pose.step))  # lowest when both feet are far apart
     lift = np.array([0.0, bob + pose.hips[0], pose.hips[1]])
-    chains = [
-        replace(one, starts=_lean(one.starts, lift, pose.lean), ends=_lean(one.ends, lift, pose.lean))
-        for one in (_torso(lift, pose), _head(lift))
-    ]
+    trunk = (_torso(lift, pose), _head(lift))
+    chains = [replace(c, starts=_lean(c.starts, lift, pose.lean), ends=_lean(c.ends, lift, pose.lean)) for c in trunk]
     for side, phase in ((1.0, 0.0), (-1.0, 0.5)):
         chains += [_leg(lift, side, pose.step + phase, pose.stride), *_arm(lift, side, pose)]
-    turn = turn_about_y(pose.heading)
-    return tuple(
-        Chain(
-            pose.size * chain.starts @ turn.T + pose.place,
-            pose.size * chain.ends @ turn.T + pose.place,
-            np.maximum(pose.size * chain.radii, thinnest),
-            chain.blend * pose.size,
-            chain.join * pose.size,
-        )
-        for chain in chains
-    )
+    turn, body = turn_about_y(pose.heading), list[Chain]()
+    for chain in chains:
+        starts, ends = (pose.size * places @ turn.T + pose.place for places in (chain.starts, chain.ends))
+        radii = np.maximum(pose.size * chain.radii, thinnest)
+        body.append(Chain(starts, ends, radii, chain.blend * pose.size, chain.join * pose.size))
+    return tuple(body)
 
 
 def turn_about_y(angle: float) -> Float64[np.ndarray, "3 3"]:
@@ -164,10 +154,8 @@ def _hand(wrist: Vector, along: Vector, side: float) -> list[Row]:
     for offset, length in ((-0.024, 0.075), (0.0, 0.095), (0.022, 0.088)):
         knuckle = wrist + 0.085 * along + offset * across
         tip = knuckle + length * along + 0.5 * offset * across - 0.012 * flat
-        rows += [
-            (tuple(wrist + 0.5 * offset * across), tuple(knuckle), 0.022, 0.018),
-            (tuple(knuckle), tuple(tip), 0.015, 0.012),
-        ]
+        base = wrist + 0.5 * offset * across
+        rows += [(tuple(base), tuple(knuckle), 0.022, 0.018), (tuple(knuckle), tuple(tip), 0.015, 0.012)]
     root = wrist + 0.03 * along + 0.02 * across
     rows += [(tuple(root), tuple(root + 0.045 * along + 0.045 * across - 0.01 * flat), 0.018, 0.013)]
     return rows

@@ -69,10 +69,7 @@ class SoftBodies(MeshSequence):
 
 
 def soft_bodies(options: SoftBodiesOptions | None = None) -> SoftBodies:
-    """Return people who walk up to each other, shake hands, part and wave; y up, metres, a new grid for each frame.
-
-    About 10k vertices and under 1.5 s a frame at the default spacing; the same options give the same frames.
-    """
+    """Return people who meet, shake hands, part and wave; y up, m, a new grid, 10k vertices and 1.5 s for a frame."""
     return SoftBodies(options or SoftBodiesOptions())
 
 

@@ -13,6 +13,7 @@ from ...geometry.cameras import Camera, CameraPose, looking_at
 from ..rig.cameras import DepthCamera
 
 Depth = Float64[np.ndarray, "H W"]  # m
+Point = Float64[np.ndarray, " 3"]  # m
 DEEPEST = 65_535  # units, largest value of a 16-bit depth picture
 JUMP = 0.05  # m between neighbouring pixels: where they are farther apart, flying pixels come up (guess)
 MIXED = 1.0  # pixels of disparity by which surfaces in a window differ where the nearer one wins (guess)
@@ -39,10 +40,8 @@ class SensorOptions:
 
     def __post_init__(self) -> None:
         numbers = (self.noise, *self.pose_error, *self.deviation, *self.rim, self.baseline, self.step, self.smooth)
-        good = all(math.isfinite(value) and value >= 0 for value in numbers) and self.window >= 1
-        if not (
-            good and self.trusted > 0 and 0 < self.grazing <= 90 and 0 <= self.holes <= 1 and 0 <= self.flying <= 1
-        ):
+        good = all(math.isfinite(value) and value >= 0 for value in numbers) and self.window >= 1 and self.trusted > 0
+        if not (good and 0 < self.grazing <= 90 and 0 <= self.holes <= 1 and 0 <= self.flying <= 1):
             text = "give numbers from 0 on, a window from 1 on, degrees up to 90 and shares up to 1"
             raise InputError(f"{self}: {text}")
         if self.step and not self.baseline:
@@ -112,16 +111,9 @@ CORNERS, OVERHEAD, LOW_DOWN = Mount(), Mount(1.0, 0.5, 0.0), Mount(0.15)
 
 
 def mounted(
-    camera: DepthCamera,
-    low: Float64[np.ndarray, " 3"],
-    high: Float64[np.ndarray, " 3"],
-    count: int = 4,
-    mount: Mount = CORNERS,
+    camera: DepthCamera, low: Point, high: Point, count: int = 4, mount: Mount = CORNERS
 ) -> tuple[DepthCamera, ...]:
-    """Return copies of a camera around a box whose corners are `low` and `high`, m; y is up.
-
-    They stand on an ellipse, the first at 45 degrees.
-    """
+    """Return copies of a camera on an ellipse around a box (m, y up) with these corners, the first at 45 degrees."""
     middle, half = (low + high) / 2, (high - low) / 2
     heights = [low[1] + share * (high[1] - low[1]) for share in (mount.height, mount.target)]
     cameras = []
@@ -152,7 +144,8 @@ def measured(
     white = random.standard_normal(depth.shape)
     if sensor.window > 1:
         white = uniform_filter(white, sensor.window) * sensor.window  # of the same deviation
-    away = _away(camera.view)
+    rows, columns = (np.linspace(-1, 1, count) ** 2 / 2 for count in depth.shape)
+    away = rows[:, None] + columns  # squared distance from the middle of the picture: 1 at its corners
     constant, linear, square = sensor.deviation
     deviation = sensor.noise * (constant + linear * depth + square * depth**2) * (1 + sensor.rim[1] * away)
     depth += deviation * white + sensor.rim[0] * away
@@ -189,9 +182,3 @@ def _flown(depth: Depth, flying: float, random: np.random.Generator) -> Depth:
         share = random.random(depth.shape)
         found[mixed] = share[mixed] * depth[mixed] + (1 - share[mixed]) * beside[mixed]
     return found
-
-
-def _away(view: Camera) -> Float64[np.ndarray, "H W"]:
-    """Return the squared distance of pixels from the middle of the picture: 1 at its corners."""
-    rows, columns = (np.linspace(-1, 1, count) ** 2 / 2 for count in (view.height, view.width))
-    return rows[:, None] + columns

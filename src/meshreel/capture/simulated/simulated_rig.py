@@ -1,7 +1,4 @@
-"""Simulation of a rig: depths and colours that cameras would see of known meshes, with sensor errors (paper, 4.1).
-
-Beside the rig's folder it writes the truth: the clean mesh of each frame and which of its faces move.
-"""
+"""Simulation of a rig (paper, 4.1): what cameras, with errors, would see of known meshes, and the truth beside it."""
 
 from __future__ import annotations
 
@@ -29,7 +26,7 @@ from ...io.write import make_folder, replacing, write_file, write_mesh, write_pi
 from ...types import Mesh
 from ..rig.cameras import DepthCamera, posed
 from ..rig.rig import RIG, read_cameras, write_rig
-from .sensors import Depth, SensorOptions, measured, mounted
+from .sensors import Depth, Point, SensorOptions, measured, mounted
 
 Pixels = UInt8[np.ndarray, "H W 3"]
 # Colours, 0 to 255, of places and the faces that they are on.
@@ -59,13 +56,8 @@ class SceneFrame:
         return SceneFrame(concatenate(parts), np.repeat(np.arange(len(parts)) >= len(still), faces))
 
 
-def corner_cameras(
-    low: Float64[np.ndarray, " 3"], high: Float64[np.ndarray, " 3"], width: int = 640, count: int = 4
-) -> tuple[DepthCamera, ...]:
-    """Return cameras with the paper's field of view (75 x 65 degrees) high up around a box, looking down at its middle.
-
-    Pictures are 0.9 times as high as wide; those of the paper have 640 x 576 pixels.
-    """
+def corner_cameras(low: Point, high: Point, width: int = 640, count: int = 4) -> tuple[DepthCamera, ...]:
+    """Return cameras with the paper's view (75 x 65 degrees, 640 x 576 pixels) high up around a box's middle."""
     view = Camera(640, 576, (417.0, 452.0), (320.0, 288.0)).resized(width, round(0.9 * width))
     return mounted(DepthCamera("corner", view, depth_range=(0.25, 8.0)), low, high, count)
 
@@ -87,7 +79,7 @@ def simulate_rig(
     places = [folder / camera.name / "depth" for camera in cameras]  # where `rig.json` will name them
     for place in (*places, folder / TRUTH):
         make_folder(place)
-    labels, count = {}, 0
+    labels = {}
     drawn = np.random.default_rng([sensor.seed, 1 << 29])
     eyes = [] if color is None else [SimulatedColor.beside(camera, color, drawn) for camera in cameras]
     for camera in cameras[: len(eyes)]:
@@ -103,17 +95,20 @@ def simulate_rig(
                 write_picture(picture, folder / camera.name / "color" / f"color_{number:05}.png")
         write_mesh(frame.mesh, folder / TRUTH / f"frame_{number:05}.ply")
         labels[f"frame_{number:05}"] = np.packbits(frame.dynamic)
-        count = number + 1
-        progress(count)
+        progress(number + 1)
     with replacing(folder / TRUTH / LABELS) as file:
         np.savez_compressed(file, **labels)  # type: ignore[arg-type]  # NumPy 2.1 stores `allow_pickle=` as an array
     record = {"frames_per_second": frame_rate, "cameras": [camera.record() for camera in cameras]}
     write_file(folder / TRUTH / RIG, (json.dumps(record, indent=1) + "\n").encode())
     random = np.random.default_rng([sensor.seed, 1 << 30])
-    wrong = tuple(_mistaken(camera, sensor, random) for camera in cameras)
+    wrong = []  # cameras with the errors of their calibration
+    for camera in cameras:
+        pose = turned(camera.view.pose.to_world, sensor.pose_error[1], random)
+        pose[:3, 3] += sensor.pose_error[0] * random.standard_normal(3)
+        wrong.append(posed(camera, pose))
     described = [eye.record(f"{camera.name}/color", random) for camera, eye in zip(cameras, eyes, strict=False)]
-    write_rig(folder, wrong, frame_rate, described)
-    return count
+    write_rig(folder, tuple(wrong), frame_rate, described)
+    return len(labels)
 
 
 def _cut_grazing(rays: Rays, normals: Float64[np.ndarray, "F 3"], camera: Camera, grazing: float) -> Depth:
@@ -126,14 +121,6 @@ def _cut_grazing(rays: Rays, normals: Float64[np.ndarray, "F 3"], camera: Camera
     along = directions[hit] / np.linalg.norm(directions[hit], axis=1)[:, None]
     cosines[hit] = np.abs((normals[faces] * along).sum(axis=1))
     return np.where(cosines >= math.cos(math.radians(grazing)), depth, np.inf)
-
-
-def _mistaken(camera: DepthCamera, sensor: SensorOptions, random: np.random.Generator) -> DepthCamera:
-    """Return the camera with the errors of its calibration."""
-    apart, degrees = sensor.pose_error
-    pose = turned(camera.view.pose.to_world, degrees, random)
-    pose[:3, 3] += apart * random.standard_normal(3)
-    return posed(camera, pose)
 
 
 @dataclass(frozen=True, slots=True)

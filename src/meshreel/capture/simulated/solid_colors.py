@@ -1,7 +1,4 @@
-"""Procedural colours, sRGB in 0 to 255, that belong to the material of a person's parts and of a room.
-
-The same place of a moving part has the same colour in every frame, with detail of some millimetres.
-"""
+"""Procedural colours, sRGB in 0 to 255, that stay with the material of a person's parts and of a room."""
 
 from __future__ import annotations
 
@@ -74,10 +71,7 @@ def room_colors(points: Points) -> Colors:
 
 
 def _local(body: Body, pose: Pose, points: Points) -> tuple[Int64[np.ndarray, " N"], Int64[np.ndarray, " N"], Points]:
-    """Return the chain and the row of the part that each place is on, and the place along and across its axis, m.
-
-    `points` are in the person's own frame, as large as an adult; the body is in the world.
-    """
+    """Return chain and row of each place's part, and the place along and across its axis, m, in the person's frame."""
     turn = turn_about_y(pose.heading)
     order, nearest = np.argsort(points[:, 1], kind="stable"), np.full(len(points), np.inf)
     heights = points[order, 1]
