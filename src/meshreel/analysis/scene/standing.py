@@ -1,4 +1,4 @@
-"""Tell surface that rests from surface that moves slowly, and measure the noise of what rests, place by place.
+"""Surface that rests, told from surface that moves slowly, and the noise of what rests, place by place.
 
 In: frames. Out: whether they are a scene, and the `Standing` of its regions. Noise is new in every frame: surface that
 rests is as far from its place in the next frame as in the last one. Motion goes on: a surface that moves slowly is near

@@ -34,7 +34,7 @@ DISTANCE = 4.0  # times the distance to reach that a clean frame may have: 1.5 a
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """How well a frame is shown; shares of its surface."""
+    """The shares of a frame's surface that are lost and invented, and its distance."""
 
     lost: float = 0.0  # without decoded surface near it
     piece: float = 0.0  # the largest connected area of that
