@@ -128,10 +128,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def run_app(make: Callable[[], App], arguments: Sequence[str] | None = None) -> int:
-    """Run one command and return its exit code: 0, 2 after an error, or 128 plus the number of a signal.
-
-    Without `arguments`, parse those of the process and exit with the code.
-    """
+    """Run a command and return its exit code: 0, 2, or 128 plus a signal; without `arguments`, exit with it."""
     tokens = list(sys.argv[1:] if arguments is None else arguments)
     signals = _Signals(raises=arguments is not None)
     with signals.heeded(lasting=arguments is None):
@@ -242,10 +239,7 @@ def _stopped(number: int, error: BaseException) -> int:
 
 
 class _Signals:
-    """Handlers of SIGINT and SIGTERM: they raise while a command runs, and end the process while modules are loaded.
-
-    In the middle of an import, an exception may be lost, or turn into another with a traceback.
-    """
+    """Handlers of signals: they raise while a command runs, and end the process in imports, which lose exceptions."""
 
     def __init__(self, raises: bool) -> None:
         self.heard: list[int] = []

@@ -27,9 +27,8 @@ from .sources import make_rig
 _FUSION = FusionOptions()
 
 
-def _as_unit(kind: object, tokens: Sequence[Token]) -> float:
+def _as_unit(_kind: object, tokens: Sequence[Token]) -> float:
     """Return a unit in metres that is written as a number, or as mm, cm or m. Raises ValueError for other words."""
-    del kind
     word = tokens[0].value
     unit = {"mm": 0.001, "cm": 0.01, "m": 1.0}.get(word) or float(word)
     if not 1e-6 <= unit <= 10:
@@ -133,14 +132,11 @@ def _rig_facts(rig: Rig) -> tuple[dict[str, Any], list[str]]:
     streams: list[tuple[str, DepthCamera | ColorCamera, Mapping[int, Path]]] = []
     streams += [("depth", camera, files) for camera, files in zip(rig.cameras, rig.files, strict=True)]
     streams += [("color", camera, camera.files) for camera in rig.color_cameras]
-    cameras = [
-        {"name": one.name, "kind": kind, "width": one.view.width, "height": one.view.height, "pictures": len(files)}
-        for kind, one, files in streams
-    ]
-    lines = [f"{rig.folder}: a rig, {len(rig.frames)} frames, {rig.frame_rate:g} a second"]
-    for camera in cameras:
-        size = f"{camera['width']} x {camera['height']}, {camera['pictures']} pictures"
-        lines.append(f"  {camera['name']}: {camera['kind']} {size}, calibrated")
+    cameras, lines = [], [f"{rig.folder}: a rig, {len(rig.frames)} frames, {rig.frame_rate:g} a second"]
+    for kind, one, files in streams:
+        width, height, count = one.view.width, one.view.height, len(files)
+        cameras.append({"name": one.name, "kind": kind, "width": width, "height": height, "pictures": count})
+        lines.append(f"  {one.name}: {kind} {width} x {height}, {count} pictures, calibrated")
     about = {"path": str(rig.folder), "kind": "a rig", "frames": len(rig.frames), "frame_rate": rig.frame_rate}
     return about | {"cameras": cameras}, lines
 
@@ -166,7 +162,6 @@ def _fuse(recording: Recording, output: Path, format: str, common: Common) -> No
 
 def _made(recording: Recording) -> dict[str, Any]:
     """Return everything that the frames depend on; the files of pictures are told apart by their sizes."""
-    cameras = [camera.record() for camera in recording.rig.cameras]
     sizes = [[_size(files[n]) if n in files else -1 for n in recording.numbers] for files in recording.rig.files]
     return {
         "rig": str(recording.rig.folder.resolve()),
@@ -174,7 +169,7 @@ def _made(recording: Recording) -> dict[str, Any]:
         "up": recording.rig.up,
         "frames": recording.numbers,
         "fusion": asdict(recording.options),
-        "cameras": cameras,
+        "cameras": [camera.record() for camera in recording.rig.cameras],
         "pictures": [zlib.crc32(json.dumps(each).encode()) for each in sizes],
     }
 

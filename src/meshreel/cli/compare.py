@@ -130,10 +130,7 @@ def _other(row: dict[str, Any], originals: str, decoded: str) -> Iterator[str]:
 
 
 def _options(looking: Looking, sequence: MeshSequence, decoded: MeshSequence) -> ComparisonOptions:
-    """Return the requested options, with the key frames that a file records unless others are given.
-
-    By default, SSIM is not computed for recordings with depth pictures, which judge the frames.
-    """
+    """Return the options, with a file's own key frames unless others are given, and no SSIM beside depth pictures."""
     options = looking.options(captured(sequence).depth is None)
     if isinstance(decoded, Video) and not options.keys:
         recorded = decoded.reader.metadata.get("key_frames")
@@ -199,10 +196,8 @@ def both_table(title: str, row: dict[str, Any]) -> Table:
 
 def is_reel(path: str) -> bool:
     """Return True for names that end in .reel and for files with its signature."""
-    if path.endswith(".reel"):
-        return True
-    if not Path(path).is_file():
-        return False
+    if path.endswith(".reel") or not Path(path).is_file():
+        return path.endswith(".reel")
     with FileSource(path) as source:
         return source.get_bytes(0, len(MAGIC)) == MAGIC
 
@@ -249,11 +244,7 @@ ASIDE = 0.11  # turns, from a camera to which the encoder fitted splats
 
 
 def compare_splats(sequence: MeshSequence, video: Video, progress: Progress) -> dict[str, Any]:
-    """Return PSNR, dB, and SSIM of pictures of splats in some frames, cropped to the bodies.
-
-    They are compared with a rig's pictures, or with renders of coloured meshes from cameras that were not used to fit.
-    Raises InputError if there are neither.
-    """
+    """Return PSNR, dB, and SSIM of splats on pictures of a rig, or renders from other cameras. Raises InputError."""
     numbers, squares, scores = evenly(len(sequence), FRAMES), list[float](), list[float]()
     for done, number in enumerate(numbers, 1):
         if (bound := video.splats(number)) is not None:

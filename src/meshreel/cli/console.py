@@ -14,22 +14,13 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from cyclopts import Parameter
+from rich import progress
 from rich.console import Console
-from rich.progress import (
-    BarColumn,
-    MofNCompleteColumn,
-    Progress,
-    ProgressColumn,
-    SpinnerColumn,
-    Task,
-    TaskID,
-    TextColumn,
-    TimeElapsedColumn,
-)
 from rich.text import Text
 
 from . import program, shown
 
+Flag = Annotated[bool, Parameter(negative="")]
 Force = Annotated[bool, Parameter(help="Replace files that are there and that were not named.", negative="")]
 EVERY = 10.0  # s, between two lines of progress outside a terminal
 
@@ -73,17 +64,13 @@ class Common:
         """Show progress on standard error: a bar per stage, or lines if it is no terminal; nothing if quiet."""
         console = Console(stderr=True)
         columns = (
-            SpinnerColumn(),
-            TextColumn("{task.description:<10}"),
-            BarColumn(),
-            MofNCompleteColumn(),
-            TextColumn(counted),
-            TimeElapsedColumn(),
-            TextColumn("left"),
-            _LeftColumn(),
+            progress.SpinnerColumn(),
+            progress.TextColumn("{task.description:<10}"),
+            *(progress.BarColumn(), progress.MofNCompleteColumn(), progress.TextColumn(counted)),
+            *(progress.TimeElapsedColumn(), progress.TextColumn("left"), _LeftColumn()),
         )
         visible = console.is_terminal and not self.quiet
-        bars = Progress(*columns, console=console, disable=not visible)
+        bars = progress.Progress(*columns, console=console, disable=not visible)
         with bars, nullcontext() if visible or self.quiet else _lines(bars, counted):
             yield StageBars(bars, total)
 
@@ -109,10 +96,10 @@ class _Console(Console):
 class StageBars:
     """Progress callback that opens a bar when a stage reports for the first time."""
 
-    def __init__(self, bars: Progress, total: int) -> None:
+    def __init__(self, bars: progress.Progress, total: int) -> None:
         self.bars = bars
         self.total = total
-        self.tasks: dict[str, TaskID] = {}
+        self.tasks: dict[str, progress.TaskID] = {}
 
     def __call__(self, stage: str, done: int, total: int) -> None:
         """Show that `done` of `total` frames have passed `stage`."""
@@ -124,7 +111,7 @@ class StageBars:
         self.bars.update(self.tasks[stage], completed=done, total=total)
 
 
-def left(task: Task) -> float | None:
+def left(task: progress.Task) -> float | None:
     """Return the seconds that a stage still takes at its pace so far; None before its first frame."""
     gained = task.completed - task.fields["first"]  # frames of an earlier run took no time
     if gained <= 0 or task.elapsed is None or task.remaining is None:
@@ -132,15 +119,15 @@ def left(task: Task) -> float | None:
     return task.elapsed * task.remaining / gained
 
 
-class _LeftColumn(ProgressColumn):
+class _LeftColumn(progress.ProgressColumn):
     """Column with the time left, from the mean time of all frames so far, because single frames vary."""
 
-    def render(self, task: Task) -> Text:
+    def render(self, task: progress.Task) -> Text:
         return Text(_clock(left(task)), style="progress.remaining")
 
 
 @contextmanager
-def _lines(bars: Progress, counted: str) -> Iterator[None]:
+def _lines(bars: progress.Progress, counted: str) -> Iterator[None]:
     """Print a line of progress on standard error every `EVERY` seconds, until the block ends."""
     ended = threading.Event()
 
@@ -159,7 +146,7 @@ def _lines(bars: Progress, counted: str) -> Iterator[None]:
         thread.join()
 
 
-def line_of(tasks: Iterable[Task], counted: str = "frames") -> str:
+def line_of(tasks: Iterable[progress.Task], counted: str = "frames") -> str:
     """Return a line with the progress of the unfinished stages, or the last finished stage; empty before any."""
     if not (all_of_them := list(tasks)):
         return ""

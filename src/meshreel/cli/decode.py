@@ -25,6 +25,7 @@ from ..io.write import check_apart, check_free, frame_names, left_over, make_fol
 from ..types import Mesh, Texture, Up
 from .console import Common, Force
 
+How = tuple[Callable[[int], Any], Callable[[Any, Path], None]]  # decodes a frame, and writes it
 UNKNOWN = "chunks of kinds that this version does not know (update meshreel)"
 CONTENTS: dict[int, str] = {  # of chunks, by their kind, and how else they are written; "": in all outputs
     ChunkKind.STATIC: "background (meshreel decode without --splats)",
@@ -173,13 +174,7 @@ def _not_kept(reader: ReelReader, format: str) -> str:
     return ""
 
 
-def _write(
-    file: Path,
-    output: Path,
-    names: list[str],
-    how: tuple[Callable[[int], Any], Callable[[Any, Path], None]],
-    common: Common,
-) -> None:
+def _write(file: Path, output: Path, names: list[str], how: How, common: Common) -> None:
     """Decode and write frames by the functions `how`. Raises FormatError at the end if some are damaged."""
     make_folder(output)
     common.warn(left_over(output, names, f"frame_*{Path(names[0]).suffix}"))

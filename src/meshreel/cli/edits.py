@@ -13,7 +13,7 @@ from ..errors import InputError
 from ..io.files import Place, located
 from ..texts import json_of
 from ..types import Up
-from .console import Common
+from .console import Common, Flag
 
 File = Annotated[str, Parameter(help="The .reel file; it may be a URL (extra `remote`).")]
 Output = Annotated[
@@ -21,15 +21,7 @@ Output = Annotated[
 ]
 
 
-def cut(
-    file: File,
-    /,
-    *,
-    output: Output,
-    frames: str,
-    keys: Annotated[bool, Parameter(negative="")] = False,
-    common: Common = Common(),
-) -> None:
+def cut(file: File, /, *, output: Output, frames: str, keys: Flag = False, common: Common = Common()) -> None:
     """Write some frames of a .reel file; nothing is encoded again.
 
     Parameters

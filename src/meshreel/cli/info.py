@@ -3,24 +3,21 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
-from cyclopts import Parameter
 from rich.table import Table
 
 from ..decoder.describe import describe_file
 from ..decoder.video import open as open_video
 from ..errors import FormatError
-from .console import Common
+from .console import Common, Flag
 
 MOST = 8  # rows of a table without --groups: all of them fit on a screen (guess)
 MOST_CONTENTS = 24  # largest number of rows of contents; above it, tracks are added up
 _LONGEST = 80  # largest number of shown characters of a recorded value
 
 
-def command(
-    file: Path, /, *, groups: Annotated[bool, Parameter(negative="")] = False, common: Common = Common()
-) -> None:
+def command(file: Path, /, *, groups: Flag = False, common: Common = Common()) -> None:
     """Show what is in a file: duration, box, vertices, rate by content, tracks, and what the encoder recorded.
 
     Parameters

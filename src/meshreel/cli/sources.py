@@ -34,9 +34,8 @@ _READ = SequenceOptions()
 _VIEWS = ViewOptions()
 
 
-def as_rate(kind: object, tokens: Sequence[Token]) -> float:
+def as_rate(_kind: object, tokens: Sequence[Token]) -> float:
     """Return a rate that is written as a number or as a fraction. Raises ValueError for other words."""
-    del kind
     return float(Fraction(tokens[0].value))
 
 
@@ -55,10 +54,7 @@ class Source:
 
 
 def open_source(inputs: Sequence[str], reading: Reading, common: Common = Common(quiet=True)) -> Source:
-    """Open mesh files, or the folder of a rig or recordings, whose frames are fused on access. Raises InputError.
-
-    The truth of a simulated rig has a description of cameras, too, but is opened as the mesh files that it holds.
-    """
+    """Open mesh files (as is the truth of a rig), or a rig or recordings, fused on access. Raises InputError."""
     folder = located(inputs[0])
     if isinstance(folder, Path) and is_take(folder):
         takes = [open_take(Path(name)) for name in inputs]

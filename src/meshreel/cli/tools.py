@@ -30,8 +30,7 @@ EMBED = """\
 def doctor(*, common: Common = Common()) -> None:
     """Report installed packages by extra, the video codecs, and if a GPU and a browser are found."""
     row: dict[str, Any] = {"meshreel": __version__, "python": platform.python_version(), "system": platform.platform()}
-    row |= {"extras": _extras(), "codecs": _codecs(), "gpu": _gpu()}
-    row["browser"] = _browser()
+    row |= {"extras": _extras(), "codecs": _codecs(), "gpu": _gpu(), "browser": _browser()}
     row["player"] = (files("meshreel") / "player" / "meshreel-player.js").is_file()
     table = Table("extra", "installed", "missing")
     for extra, packages in row["extras"].items():

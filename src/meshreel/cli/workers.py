@@ -29,10 +29,7 @@ CONNECTS = 10.0  # s, longest time until a scheduler answers (guess)
 
 @contextmanager
 def workers(jobs: int, cluster: str | None = None) -> Iterator[Executor | None]:
-    """Start processes that encode `jobs` intervals at a time, none for one job; an interrupt ends them at once.
-
-    With the address of a Dask scheduler, its workers encode. Raises InputError if several jobs are requested, too.
-    """
+    """Start processes for `jobs` intervals at a time, none for one, or take a Dask scheduler's. Raises InputError."""
     if jobs < 1:
         raise InputError(f"--jobs must be at least 1, got {jobs}")
     if cluster is not None:
@@ -85,10 +82,7 @@ def installed() -> dict[str, Any]:
 
 
 class _ClusterWorkers(Executor):
-    """Workers of a Dask cluster.
-
-    Not the client's own executor: that one reports an error if a worker dies right after it has sent its result.
-    """
+    """Workers of a Dask cluster. The client's own executor fails if a worker dies after it has sent its result."""
 
     def __init__(self, client: Client) -> None:
         self._client = client
