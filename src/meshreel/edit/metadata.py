@@ -16,8 +16,9 @@ PART = "part"  # of a part: its place in the sequence, its exact totals, and a d
 LAST = "last_interval"  # of a cut whose frames are not even: microseconds from its last frame to what came next
 KEYS = "key_frames"
 CANONICAL = "canonical_references"
+LEAST_COVERED = "least_covered"  # a share of a frame's surface, the track, and the frame
 MEANS = ("rms_m", "worst_rms_m", "d2_psnr_paper", "normal_error_deg")
-_OF_GROUPS = (KEYS, CANONICAL, *MEANS)
+_OF_GROUPS = (KEYS, CANONICAL, LEAST_COVERED, *MEANS)
 _SHARED = ("preset", "quality", "noise_m", "up")  # that files are joined by
 
 

@@ -18,7 +18,7 @@ import numpy as np
 from ...analysis.survey import Survey
 from ...container.writer import ReelWriter
 from ...decoder.video import open as open_video
-from ...edit.metadata import CANONICAL, KEYS, PART, Totals, shortened, up_metadata
+from ...edit.metadata import CANONICAL, KEYS, LEAST_COVERED, PART, Totals, shortened, up_metadata
 from ...format.layout import Form, Header
 from ...geometry.closest_points import distances
 from ...geometry.topology import drop_unreferenced
@@ -112,9 +112,6 @@ def warnings_of_scene(parts: Parts, moves: bool, dropped: int) -> Iterator[str]:
         yield f"{text}; if something does, encode with --dynamic-only"
     if dropped:
         yield f"{dropped} faces of bits that move, far from all bodies and there only for a moment, are not kept"
-
-
-LEAST_COVERED = "least_covered"  # in the metadata: a share of a frame's surface, the track, and the frame
 
 
 def least_covered(groups: Sequence[GroupSummary]) -> GroupSummary | None:
