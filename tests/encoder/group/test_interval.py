@@ -9,7 +9,7 @@ import pytest
 from meshreel.analysis.fit.frame import FrameSurface
 from meshreel.analysis.survey import survey_sequence
 from meshreel.encoder.group.forms import target_of
-from meshreel.encoder.group.interval import BodyFrames, Interval, NormalisedFrames, Sight, Views
+from meshreel.encoder.group.interval import BodyFrames, Interval, NormalisedFrames, Views
 from meshreel.encoder.layers.candidates import Ahead
 from meshreel.format.edit import Edit
 from meshreel.geometry.cameras import Camera
@@ -25,7 +25,7 @@ SURVEY, NUMBERS = survey_sequence(FRAMES), range(2, 5)
 VIEW = Camera.of(4, 4, np.diag([4.0, 4.0, 1.0]), np.eye(4))
 PICTURES = ChosenPictures(lambda _: [DepthPicture(VIEW, np.ones((4, 4), np.uint16), 1.0, 9.0)], tuple(range(6)))
 VIEWS = Views(ChosenPictures(lambda _: [], tuple(range(6))), FRAMES, WORLD)
-INTERVAL = Interval(MESHES[2:5], first_frame=2, views=VIEWS, sight=Sight(PICTURES, WORLD))
+INTERVAL = Interval(MESHES[2:5], first_frame=2, views=VIEWS, depth=PICTURES, place=WORLD)
 AHEAD = Ahead(2, [FrameSurface(mesh) for mesh in MESHES[2:5]], 0.0, target_of(MESHES, quick().method.target, 0.0))
 WHOLE, BODIES = DerivedSequence(FRAMES), ((0,),) * 3
 LOOKUPS: dict[str, tuple[Callable[[int], Any], range]] = {

@@ -21,6 +21,7 @@ from ...geometry.topology import border_edges, border_mask, face_normals, unique
 from ...types import Mesh
 
 Points = Float64[np.ndarray, "N 3"]
+Array = Float64[np.ndarray, " _"]
 ON_BORDER = 1e-6  # points of a surface with an interpolated `inside` up to this lie on an open border: rounding
 EDGE_SAMPLES = 8  # per border edge: a guess; sliding along the border is free, so a finer search gains nothing
 SAMPLES = 4000  # of each surface: as many as tracking matches
@@ -34,9 +35,13 @@ WRONG = 0.03  # share of samples beyond the usual share: visible folds; good fit
 class FrameSurface:
     """A frame prepared for matching: search structure, vertex normals, and which vertices are on no open border."""
 
-    def __init__(self, mesh: Mesh, free: FreeSpace | None = None) -> None:
-        """`free`: the space that cameras saw through in the frame, if known."""
+    def __init__(self, mesh: Mesh, free: FreeSpace | None = None, uneven: Array | None = None) -> None:
+        """`free`: the space that cameras saw through in the frame, if known.
+
+        `uneven`: the noise of each vertex, in units of the RMS noise of the frames; None: the same everywhere.
+        """
         self.mesh, self.free = mesh, free
+        self.uneven = uneven
         self.surface = Surface(mesh)
         self.normals = vertex_normals(mesh)
         self.inside = np.ones(len(mesh.vertices), bool)
@@ -47,6 +52,18 @@ class FrameSurface:
     def inside_at(self, hits: Hits) -> Float64[np.ndarray, " N"]:
         """Interpolate 1 for vertices inside and 0 for those on open borders at points of the surface."""
         return np.einsum("nk,nk->n", hits.barycentric, self.inside[self.mesh.faces[hits.faces]])
+
+    def gaps(
+        self, hits: Hits, points: Points, near: Int64[np.ndarray, " M"], back: Float64[np.ndarray, "M 3"]
+    ) -> tuple[Array, Array]:
+        """Return squared distances of points from their `hits` on the frame, and of vertices `near` from points `back`.
+
+        Where the frame is noisier, a distance counts for as much less.
+        """
+        ahead, behind = ((hits.points - points) ** 2).sum(axis=1), ((back - self.mesh.vertices[near]) ** 2).sum(axis=1)
+        if self.uneven is None:
+            return ahead, behind
+        return ahead / self.uneven[self.mesh.faces[hits.faces]].mean(axis=1) ** 2, behind / self.uneven[near] ** 2
 
     def samples(self, count: int) -> Int64[np.ndarray, " S"]:
         """Return about `count` vertices, spread evenly over the area."""
@@ -132,7 +149,7 @@ class Closeness:
         to_frame, to_fit = frame.surface.closest(template), self._surface.closest(frame_points)
         normals = vertex_normals(self._surface.mesh)[self._samples]
         fit_normals, frame_normals = self._surface.normals[to_fit.faces], frame.surface.normals[to_frame.faces]
-        back, ahead = ((to_frame.points - template) ** 2).sum(axis=1), ((to_fit.points - frame_points) ** 2).sum(axis=1)
+        back, ahead = frame.gaps(to_frame, template, chosen, to_fit.points)
         if self._noise > 0:  # holes of noisy frames do not call for another template
             inside = frame.inside_at(to_frame) > ON_BORDER, ~self._surface.past_border(to_fit)
             return shared_distance((back, ahead), inside, self._noise)

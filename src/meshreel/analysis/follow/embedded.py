@@ -231,7 +231,7 @@ class Tracker:
         frame_points = surface.mesh.vertices[surface.samples(self.options.samples)]
         key_points, back = vertices[self._samples], self._moved.closest(frame_points)
         ahead = surface.surface.closest(key_points)
-        squares = ((ahead.points - key_points) ** 2).sum(axis=1), ((back.points - frame_points) ** 2).sum(axis=1)
+        squares = surface.gaps(ahead, key_points, surface.samples(self.options.samples), back.points)
         if self._noise > 0:  # compare only surface that both have
             inside = surface.inside_at(ahead) > ON_BORDER, ~self._moved.past_border(back)
             return shared_distance(squares, inside, self._noise)

@@ -91,7 +91,7 @@ class RigidBody:
         """Return the body's RMS distance from a frame, and that of its worst part."""
         body, frame_points = self._moved(motion), frame.mesh.vertices[frame.samples(SAMPLES)]
         ahead, back = frame.surface.closest(body), self._surface.closest(frame_points)
-        squares = ((ahead.points - body) ** 2).sum(axis=1), ((back.points - frame_points) ** 2).sum(axis=1)
+        squares = frame.gaps(ahead, body, frame.samples(SAMPLES), back.points)
         over = frame.inside_at(ahead) > ON_BORDER, ~self._surface.past_border(back)
         noise = max(self._noise, EXACT)
         usable = over[0] & (squares[0] <= (STRAY * noise) ** 2)

@@ -8,7 +8,9 @@ from fractions import Fraction
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float64
 
+from ...analysis.scene.standing import LocalNoise
 from ...analysis.survey import Survey, piece_of_faces
 from ...errors import InputError
 from ...geometry.color_views import MARGIN, ColorFrames, ColorPicture, ColorViews, Paint, Painted
@@ -17,6 +19,7 @@ from ...geometry.derived_sequences import CapturedSequence, DerivedSequence, onl
 from ...geometry.topology import clean, part_of
 from ...types import Frames, Mesh, MeshSequence, Placement, Up, offset
 
+UNEVEN = (0.25, 4.0)  # least and most noise of a place, in RMS noises of the frames (guess)
 MOST_FRAMES = 64  # in a group: the tracker's distances and the basis grow with it (guess)
 
 
@@ -26,6 +29,10 @@ class Interval:
 
     frames: Frames  # normalised
     noise: float = 0.0  # RMS distance of the frames from the truth, normalised; 0: a clean capture
+    local: LocalNoise | None = field(default=None, kw_only=True)  # the noise by place, m; None: alike everywhere
+    place: Placement = field(
+        default=Placement(1.0, (0.0, 0.0, 0.0)), kw_only=True
+    )  # of the frames, for noise and depth
     frame_rate: float = field(default=30.0, kw_only=True)  # 1/s
     first_frame: int = 0  # its number in the sequence
     track: int = 0
@@ -33,7 +40,7 @@ class Interval:
     surface: str = ""
     up: Up = field(default="y", kw_only=True)  # the axis that points up
     views: Views | None = field(default=None, kw_only=True)  # of colour cameras
-    sight: Sight | None = field(default=None, kw_only=True)  # of depth cameras
+    depth: DepthFrames | None = field(default=None, kw_only=True)  # of the sequence
     weight: Fraction = field(default=Fraction(1), kw_only=True)  # of each frame in progress: bodies share a frame
     pictured: bool = field(default=False, kw_only=True)  # with textures or splats, which frames of Draco cannot have
     larger: float = field(default=1.0, kw_only=True)  # diagonal of whole frames / of this body: targets are of frames
@@ -56,11 +63,16 @@ class Interval:
             return None
         return Painted(mesh) if self.views is None else self.views.at(self._of_sequence(number))
 
+    def unevenness(self, points: Float64[np.ndarray, "N 3"]) -> Float64[np.ndarray, " N"] | None:
+        """Return the noise at points of the frames, in units of `noise`; None where it is the same everywhere."""
+        if self.local is None or self.noise == 0:
+            return None
+        found = self.local.at(self.place.origin + self.place.scale * points)[0]
+        return np.clip(found / (self.place.scale * self.noise), *UNEVEN)
+
     def free(self, number: int) -> FreeSpace | None:
         """Return the space that cameras saw through in frame `number`, counted from the first; None if unknown."""
-        if self.sight is None:
-            return None
-        return FreeSpace.of(self.sight.depth[self._of_sequence(number)], self.sight.place)
+        return None if self.depth is None else FreeSpace.of(self.depth[self._of_sequence(number)], self.place)
 
     def _of_sequence(self, number: int) -> int:
         return self.first_frame + offset(number, range(len(self.frames)))
@@ -157,11 +169,3 @@ class Views:
         """Return all surface of a frame, in normalised coordinates."""
         mesh, place = self.sequence[number], self.place
         return mesh.at((mesh.vertices - place.origin) / place.scale)
-
-
-@dataclass(frozen=True, slots=True)
-class Sight:
-    """The depth pictures of a sequence, which tell where there is no surface."""
-
-    depth: DepthFrames
-    place: Placement  # of the coordinates in which they are asked

@@ -89,8 +89,8 @@ class GroupCoder:
         decoded = [Mesh(positions, faces) for positions in encoded.positions]
         if not self.options.tails:
             return payload, layers, decoded
-        known, free = [surface.surface for surface in self.surfaces], [surface.free for surface in self.surfaces]
-        found = find_tails(known, decoded, len(payload), noise=self.noise, free=free)
+        known, free, uneven = zip(*((each.surface, each.free, each.uneven) for each in self.surfaces), strict=True)
+        found = find_tails(known, decoded, len(payload), noise=self.noise, free=free, uneven=uneven)
         if found is None:
             return payload, layers, decoded
         record, frames = found

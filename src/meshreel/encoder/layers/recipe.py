@@ -98,13 +98,17 @@ class _Planner:
         """Return the next frames."""
         numbers = range(self._at, min(self._at + self._options.group_size, len(self._interval.frames)))
         known, noise = self._surfaces, self._interval.noise
-        frames, free = self._interval.frames, self._interval.free if self._options.tails else lambda _: None
-        self._surfaces = {at: known.get(at) or FrameSurface(frames[at], free(at)) for at in numbers}
+        self._surfaces = {at: known.get(at) or self._surface(at) for at in numbers}
         meshes = [surface.mesh for surface in self._surfaces.values()]
         note("frames", *(array for mesh in meshes for array in (mesh.vertices, mesh.faces)))
         target = target_of(meshes, self._target, noise)
         ahead = Ahead(self._at, list(self._surfaces.values()), noise, target, frame_rate=self._interval.frame_rate)
         return replace(ahead, paint=self._interval.paint) if self._colored else ahead
+
+    def _surface(self, number: int) -> FrameSurface:
+        interval, mesh = self._interval, self._interval.frames[number]
+        free = interval.free(number) if self._options.tails else None
+        return FrameSurface(mesh, free, interval.unevenness(mesh.vertices))
 
     def _standing(self, ahead: Ahead) -> list[Coded]:
         """Code the template where it was, if its residual there is hardly larger than usual: a fit would only slide."""

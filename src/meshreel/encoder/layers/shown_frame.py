@@ -25,21 +25,43 @@ TINY = 1e-300  # of areas: a mesh may have none
 class ShownFrame:
     """A frame and its decoded mesh, sampled at vertices and centroids, with the distances between both."""
 
-    def __init__(self, surface: Surface, decoded: Mesh, free: FreeSpace | None = None) -> None:
+    def __init__(
+        self,
+        surface: Surface,
+        decoded: Mesh,
+        free: FreeSpace | None = None,
+        uneven: Float64[np.ndarray, " V"] | None = None,
+    ) -> None:
+        """`uneven`: the noise of each vertex, in units of all noise; squared distances are in units of its square."""
         original, self._free = surface.mesh, free
+        corners = np.ones(len(original.vertices)) if uneven is None else uneven**2
+        middles = corners[original.faces].mean(axis=1) if uneven is not None else np.ones(len(original.faces))
+        self._uneven = np.concatenate([corners, middles])
         self.original, self.decoded, self.surface, self.knows_free = original, decoded, surface, free is not None
         self.points, areas = _samples(original)
         shares = np.bincount(original.faces.reshape(-1), np.repeat(areas / 12, 3), len(original.vertices))
         weights = np.concatenate([shares, 0.75 * areas])
         self.weights = weights / weights.sum()
-        self.squared, self.hit = squared_distances(Surface(decoded), self.points)
+        self.squared, self.hit = self.ahead(Surface(decoded))
         points, self.areas = _samples(decoded)
-        self._nearest = squared_distances(self.surface, points)  # of the decoded mesh's samples
+        self._nearest = self._back(points)  # of the decoded mesh's samples
         self.apart = self._of_free(points, self._nearest[0], decoded)  # of each decoded face, squared
         self.errors = (
             dot(self.weights, self.squared),
             dot(self.areas, self.apart) / max(float(self.areas.sum()), TINY),
         )
+
+    def ahead(
+        self, surface: Surface, some: Int64[np.ndarray, " n"] | slice = slice(None)
+    ) -> tuple[Float64[np.ndarray, " n"], Int32[np.ndarray, " n"]]:
+        """Return squared distances of some of the frame's samples from a surface, and its faces that are closest."""
+        squared, faces = _squared_distances(surface, self.points[some])
+        return squared / self._uneven[some], faces
+
+    def _back(self, points: Float64[np.ndarray, "N 3"]) -> tuple[Float64[np.ndarray, " N"], Int32[np.ndarray, " N"]]:
+        """Return squared distances of points from the frame's surface, and its faces that are closest."""
+        squared, faces = _squared_distances(self.surface, points)
+        return squared / self._uneven[len(self.original.vertices) + faces], faces
 
     def wrong(self) -> Bool[np.ndarray, " F"]:
         """Return the decoded faces that face away from the frame's surface, or are farther from it than `FAR`."""
@@ -76,9 +98,9 @@ class ShownFrame:
         if gone.all():
             return np.full(len(self.squared), np.inf)
         squared = self.squared.copy()
-        moved = gone[self.hit]
+        moved = np.flatnonzero(gone[self.hit])
         kept = Surface(Mesh(self.decoded.vertices, self.decoded.faces[~gone]))
-        squared[moved] = squared_distances(kept, self.points[moved])[0]
+        squared[moved] = self.ahead(kept, moved)[0]
         return squared
 
     def errors_with(self, gone: Bool[np.ndarray, " F"], patch: Mesh, least: float) -> tuple[float, float]:
@@ -90,9 +112,9 @@ class ShownFrame:
         if not patch.is_empty:
             far = np.flatnonzero(squared > least)
             squared = squared.copy()
-            squared[far] = np.minimum(squared[far], squared_distances(Surface(patch), self.points[far])[0])
+            squared[far] = np.minimum(squared[far], self.ahead(Surface(patch), far)[0])
             points, added = _samples(patch)
-            away = self._of_free(points, squared_distances(self.surface, points)[0], patch)
+            away = self._of_free(points, self._back(points)[0], patch)
             areas, apart = np.concatenate([areas, added]), np.concatenate([apart, away])
         return dot(self.weights, squared), dot(areas, apart) / float(areas.sum()) if areas.any() else np.inf
 
@@ -120,7 +142,7 @@ def _samples(mesh: Mesh) -> tuple[Float64[np.ndarray, "N 3"], Float64[np.ndarray
     return np.concatenate([mesh.vertices, mesh.vertices[mesh.faces].mean(axis=1)]), face_normals(mesh)[1]
 
 
-def squared_distances(
+def _squared_distances(
     surface: Surface, points: Float64[np.ndarray, "N 3"]
 ) -> tuple[Float64[np.ndarray, " N"], Int32[np.ndarray, " N"]]:
     """Return the squared distances of points from a surface, and the faces that are closest."""

@@ -26,7 +26,7 @@ from ...geometry.depth import FreeSpace
 from ...geometry.strict import dot
 from ...geometry.topology import clean, concatenate, drop_unreferenced
 from ...types import Mesh
-from .shown_frame import FAR, HOLE, ShownFrame, ghosts, regions, squared_distances
+from .shown_frame import FAR, HOLE, ShownFrame, ghosts, regions
 
 LEAST_BYTES = 4  # bytes of a region or a patch at least (guess)
 DRACO_HEAD = 36  # bytes of a Draco mesh that all patches share
@@ -45,17 +45,18 @@ def find_tails(
     *,
     noise: float,
     free: Sequence[FreeSpace | None] = (),
+    uneven: Sequence[Float64[np.ndarray, " _"] | None] = (),
 ) -> tuple[LayersPatches, list[Mesh]] | None:
     """Return the layer of patches that lowers squared error + price x bytes most, and the frames as decoded with it.
 
     None where no layer does. The `decoded` meshes of a group have the same faces; `size` is that of their layers,
     bytes. `noise` is the RMS distance of the frames from the truth: thresholds count from there where the rest is
-    nearer. `free` is what cameras saw through in each frame: surface that a frame lacks stays unless one saw through
-    it. Neither the mean nor the larger of both directions' errors rises by more than the layer's bytes are worth; but
-    holes are patched at any price.
+    nearer; `uneven` is that of each vertex in units of it, for each frame. `free` is what cameras saw through in each
+    frame: surface that a frame lacks stays unless one saw through it. Neither the mean nor the larger of both
+    directions' errors rises by more than the layer's bytes are worth; but holes are patched at any price.
     """
     surfaces = [frame if isinstance(frame, Surface) else Surface(frame) for frame in frames]
-    shown = [ShownFrame(*each) for each in zip_longest(surfaces, decoded, free)]
+    shown = [ShownFrame(*each) for each in zip_longest(surfaces, decoded, free, uneven)]
     faces = decoded[0].faces
     usual = float(np.mean([frame.body() for frame in shown]))  # squared
     if not EXACT**2 < usual < np.inf:
@@ -200,7 +201,7 @@ class _Search:
         self, frame: ShownFrame, squared: Float64[np.ndarray, " N"], samples: Int64[np.ndarray, " n"], patch: Mesh
     ) -> float:
         size = max(len(encode_mesh(patch, step_of(self.rung))) - DRACO_HEAD, LEAST_BYTES)
-        near = squared_distances(Surface(patch), frame.points[samples])[0]
+        near = frame.ahead(Surface(patch), samples)[0]
         gain = dot(frame.weights[samples], np.maximum(squared[samples] - near, 0.0))
         return float(gain / 2 - self.price * size)
 

@@ -111,14 +111,17 @@ def _alone(interval: Interval, recipe: Recipe) -> Iterator[EncodedGroup]:
 def _verdict(interval: Interval, number: int, frame: Mesh, mesh: Mesh) -> Verdict:
     if mesh.is_empty:
         return Verdict(1.0, 1.0, 0.0, np.inf)
-    near, surface = max(NEAR[0] * frame.diagonal, NEAR[1] * interval.noise), Surface(mesh)
-    gaps = surface.distances(frame.vertices[area_samples(frame, SAMPLES)])
-    points = mesh.vertices[area_samples(mesh, SAMPLES)]
-    back = Surface(frame).distances(points)
-    beyond = back > near
+    uneven, surface = interval.unevenness(frame.vertices), Surface(mesh)
+    noise = interval.noise * (np.ones(len(frame.vertices)) if uneven is None else uneven)
+    near, chosen = np.maximum(NEAR[0] * frame.diagonal, NEAR[1] * noise), area_samples(frame, SAMPLES)
+    gaps = surface.distances(frame.vertices[chosen])
+    points, original = mesh.vertices[area_samples(mesh, SAMPLES)], Surface(frame)
+    hits = original.closest(points)
+    back = np.linalg.norm(hits.points - points, axis=1)
+    beyond = back > near[frame.faces[hits.faces]].mean(axis=1)
     if beyond.any() and (free := interval.free(number)) is not None:  # what no camera saw through may be there
         beyond[beyond] = free.at(points[beyond])
-    lost = float((gaps > near).mean())
+    lost = float((gaps > near[chosen]).mean())
     piece = _largest(frame, surface, near) if lost else 0.0
     return Verdict(lost, piece, float(beyond.mean()), max(_rms(gaps), _rms(back)))
 
@@ -127,7 +130,7 @@ def _rms(gaps: Float64[np.ndarray, " N"]) -> float:
     return float(np.sqrt((gaps**2).mean()))
 
 
-def _largest(frame: Mesh, surface: Surface, near: float) -> float:
+def _largest(frame: Mesh, surface: Surface, near: Float64[np.ndarray, " V"]) -> float:
     """Return the share of a frame's surface in its largest connected area that is farther than `near`."""
     far = (surface.distances(frame.vertices) > near)[frame.faces].all(axis=1)
     if not far.any():

@@ -28,7 +28,7 @@ from ...geometry.derived_sequences import digest
 from ...geometry.topology import part_of
 from ...types import Mesh, MeshSequence, Placement, evenly
 from ..group.forms import empty_groups
-from ..group.interval import Interval, Sight, Views, frames_in
+from ..group.interval import Interval, Views, frames_in
 from ..run.schedule import Job, encode_intervals
 from ..settings.options import EncoderOptions
 from .parts import Parts
@@ -68,8 +68,7 @@ def scene_intervals(job: Job, parts: Parts, tracks: Tracks) -> Iterator[Interval
     interval: they can where all have a surface or none has, and where they are of about one scale.
     """
     sequence, survey = job.sequence, parts.survey
-    depth, place = sequence.depth, Placement(survey.unit, tuple(survey.center))
-    sight = None if depth is None else Sight(depth, place)
+    place = Placement(survey.unit, tuple(survey.center))
     longest = job.recipe.longest(sequence.frame_rate)
     for frames in key_intervals(sequence, parts.segmentation, job.options):
         found = list[Interval]()
@@ -79,8 +78,8 @@ def scene_intervals(job: Job, parts: Parts, tracks: Tracks) -> Iterator[Interval
                 some = normalised[cut.start : cut.stop]
                 noise = _noise(meshes[cut.start : cut.stop], parts)
                 one = Interval(some, noise, frames.start + cut.start, track, digest(some))
-                one = replace(one, up=sequence.up, frame_rate=sequence.frame_rate)
-                found.append(replace(one, views=Views.of(sequence, survey), sight=sight))
+                one = replace(one, up=sequence.up, frame_rate=sequence.frame_rate, local=parts.noise, place=place)
+                found.append(replace(one, views=Views.of(sequence, survey), depth=sequence.depth))
         weight = Fraction(len(frames), sum(len(interval.frames) for interval in found))
         yield from (replace(interval, weight=weight) for interval in found)
 
@@ -89,8 +88,8 @@ def _noise(meshes: Sequence[Mesh], parts: Parts) -> float:
     """Return the noise of a body, normalised: as much as the surface has that stands still around it."""
     some = [meshes[number] for number in evenly(len(meshes), MEASURED)]
     points = np.concatenate([mesh.vertices[area_samples(mesh, SAMPLES)] for mesh in some])
-    usual = float(np.median(parts.noise.at(points)[0])) if len(points) else 0.0
-    return min(usual / parts.survey.unit, MOST_NOISE)
+    squared = float((parts.noise.at(points)[0] ** 2).mean()) if len(points) else 0.0
+    return min(squared**0.5 / parts.survey.unit, MOST_NOISE)
 
 
 def key_intervals(sequence: MeshSequence, segmentation: Segmentation, options: EncoderOptions) -> Iterator[range]:
