@@ -132,8 +132,8 @@ def test_scenes_have_lines_of_their_background(tmp_path: Path):
     lines = list[str]()
     Encoder(scene(2), digests=lines.append).encode(tmp_path / "a.reel", quick())
     stages = [json.loads(line)["stage"] for line in "".join(lines).splitlines()]
-    assert stages[:3] == ["survey", "background and noise", "background, coded"]
-    assert "payload" in stages
+    assert stages[0] == "survey"
+    assert stages.index("background and noise") < stages.index("background, coded") < stages.index("payload")
 
 
 def test_a_digest_tells_values_shapes_and_types_apart():

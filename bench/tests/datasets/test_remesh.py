@@ -38,7 +38,6 @@ def test_a_seed_gives_the_same_mesh_again_and_every_frame_has_a_seed_of_its_own(
     assert len(a.faces) != len(b.faces) or not np.array_equal(a.faces, b.faces)
     frames = remeshed(MeshList((BALL, BALL)), None, SMALL)
     assert not equal(frames[0], frames[1]) and frames.frame_rate == 30 and len(list(frames)) == 2
-    assert equal(frames[-1], frames[1])
     with pytest.raises(IndexError):
         frames[2]
 
@@ -116,5 +115,5 @@ def test_each_gear_is_a_body_that_is_coded_apart():
 
 def test_shapes_are_sequences_by_name_without_data(tmp_path):
     store = Store(tmp_path / "none")
-    assert [len(store.open(name).sequence) for name in SHAPES] == [24, 24]
+    assert [len(store.open(name).sequence) for name in SHAPES] == [24, 24, 1800]
     assert len(store.open("prism", 3).sequence[0].vertices) == 10 and store.digest("gears") is None

@@ -54,3 +54,12 @@ def test_a_frame_without_a_measurement_is_no_error(tmp_path):
     record(tmp_path, [camera()], BALLS)
     write_picture(np.zeros((96, 96), np.uint16), tmp_path / "front" / "depth" / "depth_00003.png")
     assert SteadyDepth(read_rig(tmp_path)).errors(range(9)) == [[0.0] * 9]
+
+
+@pytest.mark.parametrize("count", [3, 9])
+def test_a_body_that_fills_the_picture_and_moves_is_no_error(tmp_path, count):
+    """Of a ball alone, all pixels agree on how far it has moved from its usual place."""
+    record(tmp_path, [camera()], [(0.0, 0.0, 0.01 * k) for k in range(count)], wall=False)
+    rig = read_rig(tmp_path)
+    for number in range(count):
+        assert np.array_equal(SteadyDepth(rig).pictures(number)[0].depth, rig.depth_pictures(number)[0].depth)

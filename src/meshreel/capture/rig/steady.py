@@ -1,8 +1,9 @@
 """Depth pictures without the error that a sensor makes in a frame as a whole.
 
-A sensor drifts as it warms up, and some measure single frames as a whole some centimetres too far: what stands still
-and what moves is then off alike. Such an error is told by the pixels' usual depth, where cameras stand still. One that
-is smaller than what single pixels are off is left alone.
+Some sensors measure single frames as a whole some centimetres too far: what stands still and what moves is then off
+alike. Such an error is told by the pixels' usual depth, where cameras stand still. It is new in every frame, as noise
+is; what goes on from a frame to the next may be a body that moves and fills the picture, and is left alone, as is an
+error that is smaller than what single pixels are off.
 """
 
 from __future__ import annotations
@@ -15,12 +16,15 @@ import numpy as np
 from jaxtyping import Float32
 
 from ...geometry.depth import DepthPicture, apart
+from ...types import evenly
 from .rig import Rig
 
 FRAMES = 32  # of a recording, which tell the usual depth of each pixel (guess)
 OFTEN = 0.5  # least share of these in which a pixel has a depth (guess)
 WIDE = 3.0  # times `apart`: what differs from the usual depth by more is something else (guess)
 AGREE = 0.5  # least share of the pixels that must agree on an error (guess)
+PROBES = 16  # frames of which, with those before and after each, errors are asked whether they are new in each (guess)
+JUMPS = 4.0  # times the mean square that noise has by second differences: motion has 5 and more, noise 1 (guess)
 MEDIAN = 0.6745  # of an absolute value, in standard deviations
 
 
@@ -30,6 +34,7 @@ class SteadyDepth:
     def __init__(self, rig: Rig) -> None:
         self.rig = rig
         self._usual = dict[int, Float32[np.ndarray, "H W"]]()  # units, of each camera; 0: unknown
+        self._jumps = dict[int, bool]()  # by camera, whether its errors are new in every frame
 
     def __reduce__(self) -> Any:
         return SteadyDepth, (self.rig,)  # what was read is read again where it is needed
@@ -38,15 +43,32 @@ class SteadyDepth:
         """Return the pictures of a frame. Errors as in `Rig.depth_pictures`."""
         pictures = self.rig.depth_pictures(frame)
         for number, picture in enumerate(pictures):
-            if picture is not None and (error := self._error(number, picture)):
-                depth = np.rint(picture.depth / (1 + error)).astype(np.uint16)
-                pictures[number] = replace(picture, depth=depth)
+            if error := self._wrong(number, picture):
+                assert picture is not None
+                pictures[number] = replace(picture, depth=np.rint(picture.depth / (1 + error)).astype(np.uint16))
         return pictures
 
     def errors(self, frames: Sequence[int]) -> list[list[float]]:
         """Return the error of each camera in these frames, as a share of the depth; 0 where it is left alone."""
         each = zip(*(self.rig.depth_pictures(frame) for frame in frames), strict=True)
-        return [[0.0 if one is None else self._error(k, one) for one in some] for k, some in enumerate(each)]
+        return [[self._wrong(k, one) for one in some] for k, some in enumerate(each)]
+
+    def _wrong(self, number: int, picture: DepthPicture | None) -> float:
+        """Return the error to take out of a camera's picture."""
+        error = 0.0 if picture is None else self._error(number, picture)
+        return error if error and self._are_jumps(number) else 0.0
+
+    def _are_jumps(self, number: int) -> bool:
+        """Return whether the errors of a camera are new in every frame: motion nearly cancels in second differences."""
+        if number not in self._jumps:
+            frames = sorted(self.rig.files[number])
+            middles = evenly(len(frames) - 2, PROBES) if len(frames) > 2 else []
+            pictures = {k: self.rig.depth_pictures(frames[k])[number] for m in middles for k in (m, m + 1, m + 2)}
+            found = {k: 0.0 if one is None else self._error(number, one) for k, one in pictures.items()}
+            e = np.array([[found[m + k] for k in range(3)] for m in middles]).reshape(-1, 3)
+            second = ((e[:, 0] - 2 * e[:, 1] + e[:, 2]) ** 2).mean() / 6 if len(e) else 0.0
+            self._jumps[number] = bool(second > 0 and (e**2).mean() <= JUMPS * second)
+        return self._jumps[number]
 
     def _error(self, number: int, picture: DepthPicture) -> float:
         usual = self._usual_depth(number)
