@@ -9,6 +9,7 @@ from rich.table import Table
 
 from ..decoder.describe import describe_file
 from ..decoder.video import open as open_video
+from ..edit.metadata import LEAST_COVERED
 from ..errors import FormatError
 from .console import Common, Flag
 
@@ -36,7 +37,7 @@ def command(file: Path, /, *, groups: Flag = False, common: Common = Common()) -
         size = f"{row['bytes'] - missing} of {size} ({missing} are missing: the file is truncated)"
     length = f"{row['frames']} frames at {row['frame_rate']:g}/s, {row['duration_s']:.4g} s"
     head = f"{file}: {length}, {size}, {row['mbps']:.4g} Mbps"
-    metadata = {name: str(value) for name, value in row["metadata"].items()}
+    metadata = {name: _said(name, value) for name, value in row["metadata"].items()}
     short = {name: text if len(text) <= _LONGEST else f"{text[:_LONGEST]} ..." for name, text in metadata.items()}
     recorded = ", ".join(f"{name} {text}" for name, text in (metadata if groups else short).items())
     # Control characters are escaped: an untrusted file must not control the terminal.
@@ -49,6 +50,14 @@ def command(file: Path, /, *, groups: Flag = False, common: Common = Common()) -
     common.warn(f"background: {state['error']}" for state in row["background"] if "error" in state)
     common.warn([f"audio: {row['audio']['error']}"] if "error" in (row["audio"] or {}) else [])
     common.warn(f"group {i}: {group['error']}" for i, group in enumerate(row["groups"]) if "error" in group)
+
+
+def _said(name: str, value: object) -> str:
+    """Return what the encoder recorded, as text; of the frame that is covered least, in words."""
+    if name == LEAST_COVERED and isinstance(value, list) and [type(each) for each in value[1:]] == [int, int]:
+        share, track, frame = value
+        return f"frame {frame} of track {track}" + (f", to {100 * share:.3g} %" if isinstance(share, float) else "")
+    return str(value)
 
 
 def _decode_all(file: Path, row: dict[str, Any]) -> None:

@@ -68,10 +68,13 @@ def joined_metadata(parts: Sequence[tuple[dict[str, Any], int]]) -> tuple[dict[s
     dropped = {PART, ITEM, LAST} | {name for name in _OF_GROUPS if not all(name in metadata for metadata, _ in parts)}
     every = (item for metadata, _ in reversed(parts) for item in metadata.items())  # of several tags the first counts
     found = {name: value for name, value in every if name not in dropped}
+    firsts = accumulate((frames for _, frames in parts), initial=0)  # the last is the number of all frames
+    placed = [(first, metadata) for first, (metadata, _) in zip(firsts, parts, strict=False)]
     if KEYS in found:
-        firsts = accumulate((frames for _, frames in parts), initial=0)
-        pairs = zip(firsts, parts, strict=False)  # the last of `firsts` is the number of all frames
-        found[KEYS] = [first + key for first, (metadata, _) in pairs for key in metadata[KEYS]]
+        found[KEYS] = [first + key for first, metadata in placed for key in metadata[KEYS]]
+    if LEAST_COVERED in found:
+        each = [(first, *metadata[LEAST_COVERED]) for first, metadata in placed]
+        found[LEAST_COVERED] = min([float(share), track, first + frame] for first, share, track, frame in each)
     if CANONICAL in found:
         found[CANONICAL] = sum(metadata[CANONICAL] for metadata, _ in parts)
     if all(name in found for name in MEANS):

@@ -25,7 +25,7 @@ from .viewpoints import AnyCamera, Box, ViewOptions, read_cameras, views_around
 
 Row = dict[str, Any]
 _PSNRS = ("d2_psnr_paper", "d1_psnr", "d2_psnr", "symmetric_psnr", *COLORS, *RENDERS[:2], *MEASURES)
-_LARGER_IS_BETTER = (*_PSNRS, "ssim", "ssim_masked", *RENDERS[2:])
+_LARGER_IS_BETTER = (*_PSNRS, "covered", "ssim", "ssim_masked", *RENDERS[2:])
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +59,8 @@ class Comparison:
         if self.keys:
             between = aggregate([self.frames[i] for i in used if i not in self.keys])
             row |= {f"{name}_without_keys": value for name, value in between.items() if not name.endswith("_worst")}
+        if used:
+            row["least_covered_frame"] = min(used, key=lambda number: self.frames[number]["covered"])
         row |= {
             "frames_compared": len(self.frames),
             "frames_empty": sum(self.empty),
@@ -140,6 +142,7 @@ def aggregate(frames: Sequence[Row]) -> Row:
 def _distance_row(errors: SurfaceErrors) -> Row:
     row: Row = {"diagonal_m": errors.diagonal}
     row |= {name: getattr(errors, name) for name in ("d2_psnr_paper", "d1_psnr", "d2_psnr", "symmetric_psnr")}
+    row |= {"covered": errors.forward.covered, "invented": 1 - errors.backward.covered}
     row |= {"normal_error_deg": errors.angle, "normal_error_at_vertices_deg": errors.vertex_angle}
     for name, one_way in (("forward", errors.forward), ("backward", errors.backward)):
         row[f"rms_{name}_m"] = one_way.rms

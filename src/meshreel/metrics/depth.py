@@ -171,11 +171,12 @@ def judge(judged: DepthJudge, decoded: Frames, numbers: Iterable[int], refreshes
 
     By part: the shares of pixels `covered` and `invented`, the number of `lost_runs` a frame and the area of the
     largest. `cracks` is the share of all measured pixels, those beside steps included, in slits of up to four pixels
-    without decoded surface; few pixels, but conspicuous. `limbs_shown` counts the frames that show the lower third of a
-    body, `limbs_lost` those of them whose decoded mesh covers less than half of it. Between successive frames:
-    `still_flicker_m` is the RMS change of decoded depth at pixels that measured still surface in both, and
-    `body_flicker_deg` that of normals on bodies, with their motion removed. `refreshes` are the frames in which another
-    background begins: its change does not count. Shares of nothing are None.
+    without decoded surface; few pixels, but conspicuous. `body_covered_worst` is that of the frame whose body is
+    covered least. `limbs_shown` counts the frames that show the lower third of a body, `limbs_lost` those of them whose
+    decoded mesh covers less than half of it. Between successive frames: `still_flicker_m` is the RMS change of decoded
+    depth at pixels that measured still surface in both, and `body_flicker_deg` that of normals on bodies, with their
+    motion removed. `refreshes` are the frames in which another background begins: its change does not count. Shares of
+    nothing are None.
     """
     rows, before = list[Row](), dict[int, Judged]()
     for number in numbers:
@@ -188,8 +189,11 @@ def judge(judged: DepthJudge, decoded: Frames, numbers: Iterable[int], refreshes
         before = now
     sums = {name: sum(row[name] for row in rows) for name in (rows[0] if rows else ())}
     sums |= {name: max(row[name] for row in rows) for name in sums if name.endswith("largest_lost_m2")}
-    rates = _rates(sums, len(rows)) if rows else {}
-    return {"frames_judged": len(rows)} | rates | {"per_frame": [{"frame": r["frame"]} | _rates(r, 1) for r in rows]}
+    rates, each = _rates(sums, len(rows)) if rows else {}, [{"frame": row["frame"]} | _rates(row, 1) for row in rows]
+    if shown := [row for row in each if row["body_covered"] is not None]:
+        least = min(shown, key=lambda row: row["body_covered"])
+        rates |= {"body_covered_worst": least["body_covered"], "body_least_covered_frame": least["frame"]}
+    return {"frames_judged": len(rows)} | rates | {"per_frame": each}
 
 
 def clear_pixels(picture: DepthPicture) -> Mask:

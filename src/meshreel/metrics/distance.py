@@ -17,6 +17,7 @@ from ..geometry.strict import dot
 from ..types import Mesh
 from .surface_samples import RESOLUTION, WORST_ANGLE, Samples, angles, interpolate, sample, used_surface
 
+NEAR = 0.006  # diagonals of the original, within which a surface covers another: 1 cm on a body (decision 24)
 _LEAST, _MOST = 1e-3, 1e6  # m, extents of meshes that are measured in metres; others are scaled (guess)
 PSNR_CEILING = -20 * math.log10(RESOLUTION)  # dB, about 132; stands for an infinite PSNR in a mean over frames
 
@@ -31,6 +32,7 @@ class OneWayErrors:
     hausdorff95: float  # m, distance that 95 % of the area does not exceed
     angle: float  # degrees, mean over the area, between interpolated vertex normals
     vertex_angle: float  # degrees, mean over the vertices, where quantisation rotates normals most
+    covered: float  # share of the area that is within `NEAR` of the other surface
 
     def times(self, unit: float) -> OneWayErrors:
         """Return the errors of the same meshes scaled by `unit`."""
@@ -127,20 +129,20 @@ def surface_errors(original: Mesh | Original, decoded: Mesh) -> SurfaceErrors:
         unit = 2.0 ** math.floor(math.log2(extent))
         smaller = surface_errors(*(Mesh.of(mesh.vertices * (1 / unit), mesh.faces) for mesh in (original, decoded)))
         return SurfaceErrors(original.diagonal, smaller.forward.times(unit), smaller.backward.times(unit))
-    ways = (_one_way(one, other, RESOLUTION * original.diagonal) for one, other in ((a, b), (b, a)))
+    ways = (_one_way(one, other, original.diagonal) for one, other in ((a, b), (b, a)))
     return SurfaceErrors(original.diagonal, *ways)
 
 
-_PERFECT = OneWayErrors(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-_WORST = OneWayErrors(math.inf, math.inf, math.inf, math.inf, WORST_ANGLE, WORST_ANGLE)
+_PERFECT = OneWayErrors(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+_WORST = OneWayErrors(math.inf, math.inf, math.inf, math.inf, WORST_ANGLE, WORST_ANGLE, 0.0)
 
 
-def _one_way(source: Samples, target: Samples, resolution: float) -> OneWayErrors:
-    """Measure from the samples of one mesh to the surface of the other; distances below `resolution`, m, become 0."""
+def _one_way(source: Samples, target: Samples, diagonal: float) -> OneWayErrors:
+    """Measure from the samples of one mesh to the surface of the other; distances below `RESOLUTION` become 0."""
     hits, vertices = target.surface.closest(source.points), len(source.mesh.vertices)
     offsets = hits.points - source.points
     distances = np.sqrt(np.einsum("nd,nd->n", offsets, offsets))
-    noise = distances < resolution
+    noise = distances < RESOLUTION * diagonal
     offsets[noise], distances[noise] = 0, 0
     normals = interpolate(target.vertex_normals, target.mesh.faces[hits.faces], hits.barycentric)
     squared = distances**2
@@ -154,6 +156,7 @@ def _one_way(source: Samples, target: Samples, resolution: float) -> OneWayError
         hausdorff95=quantile(distances, source.weights, 0.95),
         angle=dot(source.weights, normal_angles),
         vertex_angle=float(normal_angles[:vertices].mean()),
+        covered=dot(source.weights, np.where(distances <= NEAR * diagonal, 1.0, 0.0)),
     )
 
 

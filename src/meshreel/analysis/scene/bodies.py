@@ -7,11 +7,11 @@ that follows a person does not follow an object at their side; other small piece
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float64, Int64
+from jaxtyping import Bool, Int64
 from scipy.spatial import cKDTree
 
 from ...geometry.closest_points import Surface
@@ -22,6 +22,7 @@ from ...types import Mesh
 MOST_RINGS = 4  # largest number of rings added around moving faces where the background has a gap: a guess
 AROUND = 0.9  # m around moving surface within which surface that the room lacks counts as moving: a guess
 SPECK = 0.002  # m^2: smaller pieces of surface that the room lacks are noise: a guess
+PIECE = 0.01  # m^2: the same far from bodies (guess)
 RING = 2.0  # cells, the longest edge of a face in a ring, so that large faces of a wall stay out of it: a guess
 NEAR = 3.0  # cells of the scene: pieces of consecutive frames nearer than this are one (guess)
 LEAST = 0.1  # m^2: pieces that never reach this area are bits (guess)
@@ -80,28 +81,21 @@ def with_ring(mesh: Mesh, moves: Bool[np.ndarray, " F"], cell: float, background
     return part_of(mesh, cut)
 
 
-def beyond(
-    mesh: Mesh,
-    moves: Bool[np.ndarray, " F"],
-    room: Surface,
-    far: Callable[[Float64[np.ndarray, "N 3"]], Float64[np.ndarray, " N"]],
-) -> Bool[np.ndarray, " F"]:
-    """Return the moving faces, and those near them that are farther from the room than `far` tells of places, m.
+def beyond(mesh: Mesh, moves: Bool[np.ndarray, " F"], off: Bool[np.ndarray, " V"]) -> Bool[np.ndarray, " F"]:
+    """Return the moving faces, and other pieces of vertices that are `off` the room: near bodies smaller ones, too.
 
     A foot stands so long and so near to the floor that it seems to belong to the room, but the floor has no such
     surface.
     """
-    if not moves.any():
-        return moves
+    body = moves | off[mesh.faces].all(axis=1)
+    if not body.any():
+        return body
     corners = mesh.vertices[mesh.faces[moves]].reshape(-1, 3)
-    low, high = corners.min(axis=0) - AROUND, corners.max(axis=0) + AROUND
-    near = ((mesh.vertices >= low) & (mesh.vertices <= high)).all(axis=1)[mesh.faces].all(axis=1) & ~moves
-    off = np.zeros(len(mesh.vertices), bool)
-    vertices = np.unique(mesh.faces[near])
-    off[vertices] = room.distances(mesh.vertices[vertices]) > far(mesh.vertices[vertices])
-    body = moves | (near & off[mesh.faces].all(axis=1))
+    low, high = (corners.min(axis=0) - AROUND, corners.max(axis=0) + AROUND) if len(corners) else np.array([[np.inf], [-np.inf]])
+    near = ((mesh.vertices >= low) & (mesh.vertices <= high)).all(axis=1)[mesh.faces[body]].all(axis=1)
     pieces = connected_faces(mesh.faces[body], len(mesh.vertices))
-    body[body] = (np.bincount(pieces, face_normals(part_of(mesh, body))[1]) >= SPECK)[pieces]
+    is_near = np.bincount(pieces, near) > 0
+    body[body] = (np.bincount(pieces, face_normals(part_of(mesh, body))[1]) >= np.where(is_near, SPECK, PIECE))[pieces]
     return body | moves
 
 

@@ -88,9 +88,6 @@ class Summary:
         return sum(group.share * group.frame_count * group.fidelity.psnr for group in self.groups) / self.frame_count
 
 
-ASTRAY = 0.005  # of the surface: noise, and what a border of the background lacks, is less (guess)
-
-
 def warnings_of(survey: Survey) -> Iterator[str]:
     """Yield warnings of surface that no file of the sequence has."""
     if survey.dropped:
@@ -101,11 +98,7 @@ def warnings_of(survey: Survey) -> Iterator[str]:
 
 
 def warnings_of_scene(parts: Parts, moves: bool, dropped: int) -> Iterator[str]:
-    """Yield warnings of still surface, of all moving surface or of `dropped` faces of it that the file lacks."""
-    if parts.astray > ASTRAY:
-        text = f"{100 * parts.astray:.1f} % of the surface stands still, but is far from the background that frames"
-        why = "it flies, or is there for a while only"
-        yield f"{text} share, and is not kept: {why}; to keep all, encode with --dynamic-only"
+    """Yield warnings of a scene in which nothing moves, or of `dropped` faces of moving surface that the file lacks."""
     if not moves:
         least = 2 * parts.segmentation.cell
         text = f"nothing moves by more than {least:.2g} m, or no view sees it: the whole scene is background"

@@ -63,7 +63,6 @@ class Parts:
     background: Mesh  # m, as in the first frame; empty where nothing stands still
     changes: list[Change]
     noise: LocalNoise  # distances of still surface from the background: what bodies near it have
-    astray: float = 0.0  # share of the frames' surface that stands still, but is not in the background
     free: tuple[FreeSpace, ...] = ()  # of some frames; none where no depth is known
 
     @cached_property
@@ -75,7 +74,7 @@ class Parts:
         """Cut the surface that moves out of a frame, with what the room does not have there."""
         by, moves = self.segmentation, self.segmentation.moving(frame, mesh)
         if (room := self.room(sum(change.frame <= frame for change in self.changes))) is not None:
-            more = beyond(mesh, moves, room, self._far) & ~moves
+            more = beyond(mesh, moves, self._off(mesh, room)) & ~moves
             if self.free:  # room that is measured now and then was not seen through in other frames
                 middles = mesh.vertices[mesh.faces[more]].mean(axis=1)
                 seen = sum(free.at(middles).astype(np.int64) for free in self.free)
@@ -83,9 +82,12 @@ class Parts:
             moves |= more
         return with_ring(mesh, moves, by.cell, self.room(0))
 
-    def _far(self, points: Float64[np.ndarray, "N 3"]) -> Float64[np.ndarray, " N"]:
-        """Return the distance from the room, m, beyond which surface is not of it."""
-        return np.maximum(APART * self.noise.at(points)[2], LEAST_APART)
+    def _off(self, mesh: Mesh, room: Surface) -> Bool[np.ndarray, " V"]:
+        """Return True for each vertex that is so far from the room that it is not of it."""
+        gaps = room.distances(mesh.vertices)
+        off = gaps > LEAST_APART
+        off[off] = gaps[off] > APART * self.noise.at(mesh.vertices[off])[2]
+        return off
 
 
 class NoRoom(Exception):
@@ -119,9 +121,9 @@ def take_apart(
         _check_nothing_lost(sequence, segmentation)
     changes = [_change(sequence, depth, segmentation, frame) for frame in segmentation.changes]
     stages.reach("background", 1.0)
-    sizes, noise, astray = _measured(sequence, segmentation, background, changes, stages)
+    sizes, noise = _measured(sequence, segmentation, background, changes, stages)
     survey = replace(survey, scale=(float(np.median(sizes)) if sizes else 0.0) or survey.diagonal)
-    return Parts(survey, segmentation, background, changes, noise, astray, free_space(sequence))
+    return Parts(survey, segmentation, background, changes, noise, free_space(sequence))
 
 
 def free_space(sequence: CapturedSequence) -> tuple[FreeSpace, ...]:
@@ -214,12 +216,12 @@ def _rooms(background: Mesh, changes: Sequence[Change]) -> Callable[[int], Surfa
 
 def _measured(
     sequence: CapturedSequence, segmentation: Segmentation, background: Mesh, changes: Sequence[Change], stages: Stages
-) -> tuple[list[float], LocalNoise, float]:
-    """Measure bodies and noise in some frames; still surface that is far from the background is no noise.
+) -> tuple[list[float], LocalNoise]:
+    """Return the diagonals of the largest body in each of some frames, m, and the noise of still surface.
 
-    Return the diagonals of the largest body of each frame, m, and noise and astray as in `Parts`.
+    Surface that is far from the background is no noise.
     """
-    far, sizes, lost, whole = OUTLIER * segmentation.noise, list[float](), 0.0, 0.0
+    far, sizes = OUTLIER * segmentation.noise, list[float]()
     places, distances = list[Float64[np.ndarray, "N 3"]](), list[Float64[np.ndarray, " N"]]()
     room_after = _rooms(background, changes)
     for number in evenly(len(sequence), PROBES):
@@ -232,12 +234,8 @@ def _measured(
             largest = moving.vertices[label == np.bincount(label).argmax()]
             sizes.append(Mesh(largest, moving.faces[:0]).diagonal)
         still = part_of(mesh, ~moves)
-        areas = face_normals(still)[1]
-        whole += float(face_normals(mesh)[1].sum())
         room = room_after(sum(change.frame <= number for change in changes))
-        if room is None:
-            lost += float(areas.sum())
-        elif not still.is_empty:
+        if room is not None and not still.is_empty:
             hits = room.closest(still.vertices)
             ways = still.vertices - hits.points
             gaps, chosen = np.linalg.norm(ways, axis=1), area_samples(still, SAMPLES)
@@ -245,12 +243,10 @@ def _measured(
             places.append(still.vertices[chosen])
             ahead = (ways * room.normals[hits.faces]).sum(axis=1)
             distances.append(np.copysign(gaps, ahead)[chosen])
-            lost += float(areas[(gaps[still.faces] >= far).all(axis=1)].sum())
     stages.reach("noise", 1.0)
     fine = REGION * segmentation.cell
     wide = max(fine, float(np.median(sizes or [0.0])) / 2)
-    noise = LocalNoise.of(places, distances, fine, wide, _cameras(sequence))
-    return sizes, noise, lost / whole if whole else 0.0
+    return sizes, LocalNoise.of(places, distances, fine, wide, _cameras(sequence))
 
 
 _COLORS = ("depth", "hue", "limit")  # arrays of a ColorChange
@@ -263,7 +259,7 @@ def pack_parts(parts: Parts) -> bytes | None:
     if not isinstance(by, ByPlace):
         return None
     arrays: dict[str, Any] = {
-        "numbers": [parts.survey.unit, parts.astray, by.cell, by.lattice.size, by.island],
+        "numbers": [parts.survey.unit, by.cell, by.lattice.size, by.island],
         "noise places": parts.noise.places,
         "noise": np.stack([parts.noise.rms, parts.noise.deviation, parts.noise.off]),
         "origin": by.lattice.origin,
@@ -288,7 +284,7 @@ def unpack_parts(data: bytes, sequence: CapturedSequence, survey: Survey) -> Par
     """Return the parts of a surveyed scene, or None where no encoder packed them."""
     try:
         with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
-            unit, astray, cell, size, island = arrays["numbers"].tolist()
+            unit, cell, size, island = arrays["numbers"].tolist()
             rms, spread, off = arrays["noise"]
             noise = LocalNoise(arrays["noise places"], rms, spread, off, _cameras(sequence))
             rest = Rest(arrays["until"], arrays["since"])
@@ -303,7 +299,7 @@ def unpack_parts(data: bytes, sequence: CapturedSequence, survey: Survey) -> Par
         return None
     changes = [Change(frame, mesh) for frame, mesh in zip(frames, came, strict=True)]
     survey = replace(survey, scale=unit)
-    return Parts(survey, by, background, changes, noise, astray, free_space(sequence))
+    return Parts(survey, by, background, changes, noise, free_space(sequence))
 
 
 def _colors(arrays: Any, sequence: CapturedSequence) -> ColorChange | None:
