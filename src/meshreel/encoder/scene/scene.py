@@ -88,8 +88,8 @@ def _noise(meshes: Sequence[Mesh], parts: Parts) -> float:
     """Return the noise of a body, normalised: as much as the surface has that stands still around it."""
     some = [meshes[number] for number in evenly(len(meshes), MEASURED)]
     points = np.concatenate([mesh.vertices[area_samples(mesh, SAMPLES)] for mesh in some])
-    usual = float(np.median(parts.noise.at(points)[0])) if len(points) else 0.0
-    return min(usual / parts.survey.unit, MOST_NOISE)
+    squared = float((parts.noise.at(points)[0] ** 2).mean()) if len(points) else 0.0
+    return min(squared**0.5 / parts.survey.unit, MOST_NOISE)
 
 
 def key_intervals(sequence: MeshSequence, segmentation: Segmentation, options: EncoderOptions) -> Iterator[range]:

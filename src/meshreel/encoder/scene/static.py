@@ -67,11 +67,12 @@ def encode_static(
     """
     survey = parts.survey
     place = Placement(survey.unit, tuple(survey.center))
-    usual = float(np.median(parts.noise.off)) if len(parts.noise.off) else 0.0
-    step = options.lattice * max(usual / survey.unit, LEAST_NOISE)
+    usual = max(float(np.median(parts.noise.off)) / survey.unit if len(parts.noise.off) else 0.0, LEAST_NOISE)
+    step = options.lattice * usual
 
     def coded(mesh: Mesh) -> tuple[bytes, Mesh]:
-        most = options.coarse * np.maximum(parts.noise.at(mesh.vertices)[2] / survey.unit, LEAST_NOISE)
+        # Where there is less noise than usual, more would be spent on little: a room's background would double.
+        most = options.coarse * np.maximum(parts.noise.at(mesh.vertices)[2] / survey.unit, usual)
         return _coded(mesh.at((mesh.vertices - survey.center) / survey.unit), most, step)
 
     payload, state = coded(parts.background)
