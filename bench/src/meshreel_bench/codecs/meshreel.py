@@ -6,6 +6,7 @@ import hashlib
 import tempfile
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from itertools import islice
 from pathlib import Path
 from typing import TypeVar
@@ -24,6 +25,7 @@ from meshreel.errors import InputError
 from meshreel.types import MeshSequence
 
 from ..codec import Progress, TwoSteps
+from .broken import STAGES, BrokenOptions
 
 
 class Prepared(TwoSteps):
@@ -204,6 +206,7 @@ VARIANTS: dict[str, Change] = {
     LARGER: _paper(lambda o: replace(o, reference=replace(o.reference, vertices=5000))),
     FROM_MESHES: _scene(lambda o: replace(o, from_depth=False)),
     TOGETHER: _scene(lambda o: replace(o, near=1e4)),  # all pieces are near each other
+    **{stage: partial(BrokenOptions.of, stage=stage) for stage in STAGES},
 }
 
 

@@ -20,6 +20,7 @@ EXPERIMENTS: dict[str, Study] = {
     "ablation_gof": ablations.GOF,
     "ablation_stages": ablations.STAGES,
     "ablation_scene": ablations.SCENE,
+    "broken": ablations.BROKEN,
     "scenes": scenes.STUDY,
     "sensors": scenes.SENSORS,
     "recordings": scenes.RECORDINGS,

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from ..codecs.broken import STAGES as BROKEN_STAGES
 from ..codecs.meshreel import BOTH, FROM_MESHES, IN_MDS_POSE, PARTS, RELEASED, TOGETHER, UNIFORM
 from ..names import BEST, LITERAL, LITERAL_FINEST, MORE_CENTERS, OURS, PUBLISHED, TSMC
 from ..rows import Options
 from .scenes import MEASURES
-from .study import D2, MASKED, NORMALS, SYMMETRIC, TRACKER, Bound, Measure, Needs, NoMore, Study, Sweep, Which
+from .study import D2, MASKED, NORMALS, SYMMETRIC, TRACKER, Bound, Measure, Needs, NoMore, Reaches, Study, Sweep, Which
 
 LITERAL_PRESET = "paper-literal"
 POSES = (Measure("canonical_groups", "groups in the MDS pose"), Measure("draco_frames", "frames of Draco", sign=-1))
@@ -75,6 +76,18 @@ STAGES = Study(
     anchor=BEST,
     frames={LONG: 32},
     notes=("Positive: without the part more rate is needed.",),
+)
+BROKEN = Study(
+    title="Stages that are broken on purpose: the encoder must catch each, and deliver what covers the frames",
+    sequences=("dancer", "mitch", "crane60", "prism"),
+    sweeps=(Sweep("meshreel", {"variant": tuple(BROKEN_STAGES)}, {"preset": "best", "quality": 50.0}),),
+    frames=dict.fromkeys(("dancer", "mitch", "crane60", "prism"), 8),
+    measures=(D2, Measure("covered_worst", "covered, worst frame")),
+    promises=tuple(
+        Reaches(f"{name}: a stage that {stage}", Which(name, f"{BEST}, {stage}"), (Bound("covered_worst", 0.98),))
+        for name in ("dancer", "mitch", "crane60", "prism")
+        for stage in BROKEN_STAGES
+    ),
 )
 SCENE = Study(
     title="A scene: one sequence of all that moves against a track a body, and a background from meshes against depth",
