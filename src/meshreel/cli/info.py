@@ -53,7 +53,7 @@ def command(file: Path, /, *, groups: Flag = False, common: Common = Common()) -
 
 
 def _said(name: str, value: object) -> str:
-    """Return what the encoder recorded, as text; of the frame that is covered least, in words."""
+    """Return recorded metadata as text; in words, the frame of whose surface the least share is decoded."""
     if name == LEAST_COVERED and isinstance(value, list) and [type(each) for each in value[1:]] == [int, int]:
         share, track, frame = value
         return f"frame {frame} of track {track}" + (f", to {100 * share:.3g} %" if isinstance(share, float) else "")
