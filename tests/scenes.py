@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from skimage.measure import marching_cubes
 
+from meshreel.analysis.scene.standing import scene_standing
 from meshreel.geometry.topology import concatenate, weld
 from meshreel.types import Mesh
 
@@ -50,6 +51,10 @@ def figure(turn: float) -> Mesh:
 def with_room(bodies: Sequence[Mesh], sigma: float = NOISE) -> list[Mesh]:
     """Frames: the room's faces first, those of the body behind them; noise is another in every frame."""
     return [noisy(concatenate([room(), body]), sigma, seed) for seed, body in enumerate(bodies)]
+
+
+def is_scene(frames: Sequence[Mesh]) -> bool:
+    return scene_standing(frames) is not None
 
 
 def of_body(frame: Mesh) -> np.ndarray:

@@ -3,6 +3,8 @@
 import json
 from dataclasses import replace
 
+import pytest
+
 import meshreel
 from meshreel.coding.mesh import encode_empty
 from meshreel.container.writer import ReelWriter
@@ -147,6 +149,22 @@ def test_what_was_recorded_cannot_steer_a_terminal(run, tmp_path):
         writer.add_group(0, 1, encode_empty())
     said = run("info", tmp_path / "a.reel")
     assert said.code == 0 and "recorded at encode: tool a\\x1b[31m\\nb\n" in said.out
+
+
+@pytest.mark.parametrize(
+    ("metadata", "words"),
+    [
+        ("[0.9006, 1, 36]", "least_covered frame 36 of track 1, to 90.1 %"),
+        ("[null, 1]", "least_covered [None, 1]"),
+        ('"x"', "least_covered x"),
+    ],
+)
+def test_the_frame_that_is_covered_least_is_named(run, tmp_path, metadata, words):
+    header = replace(HEADER, metadata=f'{{"least_covered": {metadata}}}')
+    with ReelWriter(tmp_path / "a.reel", header) as writer:
+        writer.add_group(0, 1, encode_empty())
+    said = run("info", tmp_path / "a.reel")
+    assert said.code == 0 and f"recorded at encode: {words}\n" in said.out
 
 
 def test_box_duration_mesh_layers_and_colour_are_shown_first(run):

@@ -35,6 +35,8 @@ def test_aggregates_are_the_mean_and_the_worst_of_the_frames():
     assert row["rms_forward_percent"] == pytest.approx(100 * row["rms_forward_m"] / BODY.diagonal)
     assert [f["d1_psnr"] for f in row["per_frame"]] == [e.d1_psnr for e in errors]
     assert row["frames_compared"] == 3 and "ssim" not in row
+    assert row["covered_worst"] == errors[2].forward.covered < row["covered"] and row["least_covered_frame"] == 2
+    assert row["invented_worst"] == 1 - errors[2].backward.covered
 
 
 def test_an_original_frame_is_drawn_once_for_several_comparisons_and_changes_no_number(monkeypatch):

@@ -91,6 +91,7 @@ def test_a_body_without_its_lower_third_has_lost_a_limb_and_one_without_its_head
     legless, headless = scene((slice(20, 60), BODY[1])), scene((slice(40, 80), BODY[1]))
     found = judged([MEASURED[0], legless, MEASURED[2]])
     assert (found["limbs_shown"], found["limbs_lost"]) == (1, 1) and found["body_covered"] < 0.7
+    assert found["body_covered_worst"] == found["body_covered"] and found["body_least_covered_frame"] == 1
     found = judged([MEASURED[0], headless, MEASURED[2]])
     assert (found["limbs_shown"], found["limbs_lost"]) == (1, 0)
 

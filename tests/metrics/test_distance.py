@@ -67,6 +67,7 @@ def test_surface_that_is_left_over_is_invisible_one_way_and_visible_both_ways():
     assert errors.d2_psnr_paper == math.inf
     assert errors.symmetric_rms > 0.5
     assert errors.d1_psnr < 20
+    assert errors.forward.covered == 1 and errors.backward.covered == pytest.approx(0.5)
 
 
 def test_a_few_huge_invented_triangles_count_by_their_area():

@@ -25,6 +25,15 @@ def test_the_distance_is_that_of_parallel_surfaces():
     assert closeness(larger, BALL) == pytest.approx(0.001, rel=0.02)
 
 
+def test_where_a_frame_is_noisier_its_distance_counts_for_as_much_less():
+    """A sphere whose upper half is off by 3 mm, where it has three times the noise of the lower half, off by 1 mm."""
+    upper = BALL.vertices[:, 2] > 0
+    frame = Mesh(BALL.vertices * (1 + np.where(upper, 0.003, 0.001) / RADIUS)[:, None], BALL.faces)
+    for uneven, wanted in ((None, 5**0.5), (np.where(upper, 3.0, 1.0), 1.0)):
+        measured = Closeness(BALL, 5e-4, 0.001).of(BALL.vertices, FrameSurface(frame, uneven=uneven))
+        assert measured == pytest.approx(0.001 * wanted, rel=0.1)
+
+
 def test_a_template_that_lacks_surface_is_wrong_and_so_is_one_with_more():
     speck = Mesh.of(0.25 * BALL.vertices + [0.5, 0, 0], BALL.faces)  # a sixteenth of the area
     assert closeness(BALL, concatenate([BALL, speck])) == np.inf

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from meshreel.analysis.scene.bodies import at_most, find_bodies, ring, same_bodies, with_ring
+from meshreel.analysis.scene.bodies import at_most, beyond, find_bodies, ring, same_bodies, with_ring
 from meshreel.geometry.closest_points import Surface
 from meshreel.geometry.topology import concatenate, part_of
 from meshreel.types import Mesh
@@ -139,3 +139,15 @@ def test_a_ring_goes_on_to_where_the_background_begins_but_not_without_end():
     for background in (Surface(floor), None):
         assert len(with_ring(floor, moves, cell, background).faces) == len(narrow.faces)
     assert with_ring(floor, np.zeros_like(moves), cell, Surface(rest)).is_empty
+
+
+@pytest.mark.parametrize(("side", "away", "is_coded"), [(0.2, 3.0, True), (0.06, 3.0, False), (0.06, 0.3, True)])
+def test_what_the_room_lacks_is_coded_where_it_is_large_or_beside_a_body(side, away, is_coded):
+    body, piece = moved(sphere(0.3, 2), (0, 0, 1)), moved(plane(side, 4), (away, 0, 1))
+    mesh = concatenate([plane(8.0, 20), body, piece])
+    first = len(mesh.faces) - len(piece.faces)
+    moves = np.zeros(len(mesh.faces), bool)
+    moves[first - len(body.faces) : first] = True
+    off = np.arange(len(mesh.vertices)) >= len(mesh.vertices) - len(piece.vertices)
+    found = beyond(mesh, moves, off)
+    assert found[:first].tolist() == moves[:first].tolist() and found[first:].all() == found[first:].any() == is_coded

@@ -3,11 +3,10 @@
 import numpy as np
 import pytest
 
-from meshreel.analysis.scene.standing import is_scene
 from meshreel.errors import InputError
 from meshreel.types import Mesh
 from tests.metrics.shapes import moved, plane, sphere
-from tests.scenes import ball, figure, room, with_room
+from tests.scenes import ball, figure, is_scene, room, with_room
 
 ROLLING = with_room([ball(0.5 + 0.25 * t) for t in range(5)])
 

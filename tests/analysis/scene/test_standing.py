@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
-from meshreel.analysis.scene.standing import LocalNoise, is_scene, standing
+from meshreel.analysis.scene.standing import LocalNoise, standing
 from meshreel.geometry.cameras import Camera, CameraPose
 from meshreel.types import Mesh
 from tests.metrics.shapes import plane
+from tests.scenes import is_scene
 from tests.small_scene import scene
 
 SHEET = plane(1.0, 60)  # edges of 1.7 cm, z = 0

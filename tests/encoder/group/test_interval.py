@@ -1,12 +1,14 @@
 """Intervals, and all else that is asked for frames by number: none has a frame for a number outside its range."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
 from meshreel.analysis.fit.frame import FrameSurface
+from meshreel.analysis.scene.standing import LocalNoise
 from meshreel.analysis.survey import survey_sequence
 from meshreel.encoder.group.forms import target_of
 from meshreel.encoder.group.interval import BodyFrames, Interval, NormalisedFrames, Views
@@ -15,6 +17,7 @@ from meshreel.format.edit import Edit
 from meshreel.geometry.cameras import Camera
 from meshreel.geometry.depth import WORLD, DepthPicture
 from meshreel.geometry.derived_sequences import ChosenPictures, DerivedSequence, picked, unchanging
+from meshreel.types import Placement
 from tests.colored_body import painted
 from tests.small_options import quick
 from tests.spheres import sliding_sphere
@@ -53,3 +56,12 @@ def test_a_frame_is_found_by_its_number_and_by_no_other(name: str):
     for number in (numbers.start - 1, numbers.stop, -1, -len(numbers)):
         with pytest.raises(IndexError, match=f"frame {number}: there are frames {numbers.start} to {numbers.stop - 1}"):
             lookup(number)
+
+
+def test_the_noise_of_a_place_is_in_units_of_that_of_the_body():
+    local = LocalNoise(np.array([[2.0, 0, 0]]), *np.full((3, 1), 0.006))
+    interval = Interval(MESHES[2:5], 0.001, place=Placement(4.0, (0.0, 0.0, 0.0)), local=local)
+    points = np.array([[0.5, 0, 0], [0.6, 0.0, 0]])
+    assert interval.unevenness(points) == pytest.approx(1.5)
+    assert replace(interval, noise=1e-6).unevenness(points) == pytest.approx(4.0)  # at most
+    assert replace(interval, noise=0.0).unevenness(points) is None and INTERVAL.unevenness(points) is None

@@ -70,11 +70,6 @@ class Standing:
         return (self.keys[at] == cells) & ~self.rests[at] if len(self.keys) else np.zeros(len(cells), bool)
 
 
-def is_scene(frames: Frames) -> bool:
-    """Return whether a sequence has a background, as `scene_standing` tells."""
-    return scene_standing(frames) is not None
-
-
 def scene_standing(frames: Frames) -> Standing | None:
     """Measure what stands still in a sequence that has a background; None for others, empty ones and single frames.
 

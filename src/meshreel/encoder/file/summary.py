@@ -108,9 +108,12 @@ def warnings_of_scene(parts: Parts, moves: bool, dropped: int) -> Iterator[str]:
 
 
 def least_covered(groups: Sequence[GroupSummary]) -> GroupSummary | None:
-    """Return the group with the frame of whose surface the least share is decoded; None if no frame has any."""
+    """Return the group with the frame of whose surface the least share is decoded; None if no frame has any.
+
+    Of equal ones it is that of the first track and frame, as where parts of a file are joined.
+    """
     shown = [group for group in groups if group.form != Form.EMPTY]
-    return min(shown, key=lambda group: group.fidelity.covered, default=None)
+    return min(shown, key=lambda one: (shortened(one.fidelity.covered), one.track, one.fidelity.least), default=None)
 
 
 def warnings_of_groups(groups: Sequence[GroupSummary]) -> Iterator[str]:
