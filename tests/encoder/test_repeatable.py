@@ -130,7 +130,7 @@ def test_lines_of_digests_name_each_stage_in_the_order_of_the_file(tmp_path: Pat
 
 def test_scenes_have_lines_of_their_background(tmp_path: Path):
     lines = list[str]()
-    Encoder(scene(2), digests=lines.append).encode(tmp_path / "a.reel", quick())
+    Encoder(scene(4), digests=lines.append).encode(tmp_path / "a.reel", quick())
     stages = [json.loads(line)["stage"] for line in "".join(lines).splitlines()]
     assert stages[0] == "survey"
     assert stages.index("background and noise") < stages.index("background, coded") < stages.index("payload")

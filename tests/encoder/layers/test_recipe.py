@@ -84,9 +84,9 @@ def test_a_frame_is_prepared_once_for_all_that_is_tried_with_it(monkeypatch: pyt
     prepared = list[Mesh]()
 
     class Counted(FrameSurface):
-        def __init__(self, mesh: Mesh, free: None) -> None:
+        def __init__(self, mesh: Mesh, *rest: None) -> None:
             prepared.append(mesh)
-            super().__init__(mesh, free)
+            super().__init__(mesh, *rest)
 
     monkeypatch.setattr(layered, "FrameSurface", Counted)
     other = Mesh.of(BALL.vertices * [1.6, 0.3, 0.8] + [0, 0.3, 0], BALL.faces)
