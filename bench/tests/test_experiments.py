@@ -34,7 +34,7 @@ def test_tables_share_the_points_of_figure_6():
 
 def test_promises_of_speed_are_about_points_that_are_declared():
     declared = list(layers.SPEED.points())
-    for promise in [each for each in layers.SPEED_PROMISES if not isinstance(each, Gains)]:
+    for promise in [each for each in layers.SPEED.promises if not isinstance(each, Gains)]:
         for which in (promise.which, *getattr(promise, "than", ())):
             fits = [p for p in declared if p.sequence == which.sequence and p.options.items() >= which.options.items()]
             assert any(make_codec(p.codec, dict(p.options)).name == which.curve for p in fits), which

@@ -63,8 +63,8 @@ def bd_rate(anchor: Curve, test: Curve, highest: float = math.inf) -> BdRate:
     low, high = float(max(a[0, 0], b[0, 0])), float(min(a[-1, 0], b[-1, 0], highest))
     if low >= high:
         below = "" if math.isinf(highest) else f" below {highest:.4g}"
-        reason = f"no common quality{below}: {_range(anchor.name, a)}, {_range(test.name, b)}"
-        return BdRate(None, low, high, counts, reason)
+        ranges = (f"{c.name} {p[0, 0]:.4g} to {p[-1, 0]:.4g}" for c, p in ((anchor, a), (test, b)))
+        return BdRate(None, low, high, counts, f"no common quality{below}: {', '.join(ranges)}")
     mean = float(_log_rate(b).integrate(low, high) - _log_rate(a).integrate(low, high)) / (high - low)
     return BdRate(100 * math.expm1(mean), low, high, counts)
 
@@ -194,7 +194,3 @@ def _log_rate(points: Float64[np.ndarray, "N 2"]) -> Any:
 def _cross(a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]) -> float:
     """Return a number above 0 where the path from a over b to c turns upward."""
     return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
-
-
-def _range(name: str, points: Float64[np.ndarray, "N 2"]) -> str:
-    return f"{name} {points[0, 0]:.4g} to {points[-1, 0]:.4g}"

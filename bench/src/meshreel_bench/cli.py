@@ -251,8 +251,5 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def make_app() -> App:
     """Return the parser of `meshreel-bench`."""
     app = App(name="meshreel-bench", help=HELP, suppress_keyboard_interrupt=False)
-    app.command(run)
-    app.command(report)
-    app.command(list_experiments, name="list")
-    app.command(codecs)
+    app.update(command)
     return app

@@ -159,7 +159,7 @@ Change = Callable[[EncoderOptions], EncoderOptions]
 Method = TypeVar("Method", LayersOptions, PaperOptions)
 
 
-def _method(kind: type[Method], change: Callable[[Method], Method], text: str) -> Change:
+def _method(kind: type[Method], text: str, change: Callable[[Method], Method]) -> Change:
     """Return a change of one method; `text` names the method and its presets in errors."""
 
     def changed(options: EncoderOptions) -> EncoderOptions:
@@ -170,12 +170,8 @@ def _method(kind: type[Method], change: Callable[[Method], Method], text: str) -
     return changed
 
 
-def _layers(change: Callable[[LayersOptions], LayersOptions]) -> Change:
-    return _method(LayersOptions, change, "the recipe of layers; use preset `best`")
-
-
-def _paper(change: Callable[[PaperOptions], PaperOptions]) -> Change:
-    return _method(PaperOptions, change, "the paper's recipe; use preset `paper` or `paper-literal`")
+_layers = partial(_method, LayersOptions, "the recipe of layers; use preset `best`")
+_paper = partial(_method, PaperOptions, "the paper's recipe; use preset `paper` or `paper-literal`")
 
 
 def _plain(options: PaperOptions) -> PaperOptions:

@@ -31,7 +31,7 @@ from .long_room import LongRoom
 from .remesh import Place, RemeshOptions, SideBySide, gears, prism, remeshed
 from .rooms import PROCEDURAL, ROOM, ROOM2, ROOM3, SENSED, WALKERS
 from .scenes import PEOPLE, SCENES, Captured, SceneData, open_scene
-from .walker import FRAMES, Truth, Walker
+from .walker import FRAMES, TrueLuma, Walker, true_luma
 
 DEMO = "demo"  # procedural bodies: needs no benchmark data
 # Neither do these.
@@ -73,7 +73,7 @@ class Dataset:
     cameras: tuple[Camera, ...] = ()  # where it was seen from; none: look from around it
     scene: SceneData | None = None  # of a simulated scene
     pictures: ColorFrames | None = None  # of colour cameras: what decoded colours are compared with
-    truth: Truth | None = None  # what simulated colour cameras without errors would see
+    truth: TrueLuma | None = None  # what simulated colour cameras without errors would see
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,7 +105,7 @@ class Store:
             return Dataset(captured, captured.cameras, pictures=captured.colors)
         if name == WALKER:
             count = frames or FRAMES
-            return Dataset(Walker(_kept(name, self.cache) / f"{name}-{count}", count), truth=Truth())
+            return Dataset(Walker(_kept(name, self.cache) / f"{name}-{count}", count), truth=true_luma)
         if name == SYNTHETIC:
             count = min(frames or SYNTHETIC_FRAMES, SYNTHETIC_FRAMES)
             bodies = [(_open_files(body, self.data, count), place) for body, place in BODIES.items()]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -16,13 +16,8 @@ from meshreel.capture.rig.rig import RIG
 from meshreel.capture.simulated.figure import Pose, figure
 from meshreel.capture.simulated.implicit import polygonize
 from meshreel.capture.simulated.procedural import grid_of_frame
-from meshreel.capture.simulated.simulated_rig import (
-    ColorSensorOptions,
-    SceneFrame,
-    SensorOptions,
-    shade_of,
-    simulate_rig,
-)
+from meshreel.capture.simulated.sensors import SensorOptions
+from meshreel.capture.simulated.simulated_rig import ColorSensorOptions, SceneFrame, shade_of, simulate_rig
 from meshreel.capture.simulated.solid_colors import WALKER, person_colors
 from meshreel.geometry.cameras import Camera, CameraPose, looking_at
 from meshreel.geometry.closest_points import Surface
@@ -37,6 +32,7 @@ CYCLE = 1.0  # s, of the steps
 SENSOR = ColorSensorOptions(gain=0.06, balance=0.02, pose_error=0.2)  # 1024 x 1280 pixels of 1.7 mm
 TEXEL = 0.002  # m: what a texel of 1024 x 1024 is on a person
 SAMPLES = 12  # places in a texel whose mean is its true colour
+TrueLuma = Callable[[int, np.ndarray], tuple[np.ndarray, np.ndarray]]  # like `true_luma`
 
 
 class Walker(Frames):
@@ -61,27 +57,21 @@ class Walker(Frames):
         return _scene(range(self._count)[index]).mesh
 
 
-@dataclass(frozen=True, slots=True)
-class Truth:
-    """True appearance of the person, as cameras without errors see it."""
-
-    def luma(
-        self, number: int, points: Float64[np.ndarray, "N 3"]
-    ) -> tuple[Float64[np.ndarray, " N"], Bool[np.ndarray, " N"]]:
-        """Return the luma of a texel at the surface closest to each point in a frame; whether a camera sees it."""
-        frame, random = _scene(number), np.random.default_rng(number)
-        assert frame.paint is not None
-        hits = Surface(frame.mesh).closest(points)
-        faces, normals = hits.faces.astype(np.int64), face_normals(frame.mesh)[0][hits.faces]
-        black = [ColorPicture(c.view, np.zeros((c.view.height, c.view.width, 3), np.uint8)) for c in CAMERAS]
-        seen = ColorViews(black, frame.mesh).at(hits.points, normals)[1]
-        along = np.cross(normals, [0.3, 0.5, 0.8])
-        along /= np.linalg.norm(along, axis=1, keepdims=True)
-        ways, found = (along, np.cross(normals, along)), np.zeros((len(points), 3))
-        for _ in range(SAMPLES):
-            u, v = TEXEL * (random.random((2, len(points), 1)) - 0.5)
-            found += frame.paint(hits.points + u * ways[0] + v * ways[1], faces) / SAMPLES
-        return found @ TO_YUV[0] * shade_of(frame.mesh, faces, number), seen
+def true_luma(number: int, points: Float64[np.ndarray, "N 3"]) -> tuple[np.ndarray, Bool[np.ndarray, " N"]]:
+    """Return the luma of a texel at the surface closest to each point in a frame; whether a camera sees it."""
+    frame, random = _scene(number), np.random.default_rng(number)
+    assert frame.paint is not None
+    hits = Surface(frame.mesh).closest(points)
+    faces, normals = hits.faces.astype(np.int64), face_normals(frame.mesh)[0][hits.faces]
+    black = [ColorPicture(c.view, np.zeros((c.view.height, c.view.width, 3), np.uint8)) for c in CAMERAS]
+    seen = ColorViews(black, frame.mesh).at(hits.points, normals)[1]
+    along = np.cross(normals, [0.3, 0.5, 0.8])
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    ways, found = (along, np.cross(normals, along)), np.zeros((len(points), 3))
+    for _ in range(SAMPLES):
+        u, v = TEXEL * (random.random((2, len(points), 1)) - 0.5)
+        found += frame.paint(hits.points + u * ways[0] + v * ways[1], faces) / SAMPLES
+    return found @ TO_YUV[0] * shade_of(frame.mesh, faces, number), seen
 
 
 def _scene(number: int) -> SceneFrame:
@@ -93,9 +83,9 @@ def _scene(number: int) -> SceneFrame:
     return SceneFrame(mesh, np.ones(len(mesh.faces), bool), paint)
 
 
-def _camera(number: int, count: int) -> DepthCamera:
-    """Return one of the cameras on a circle of 2.6 m; every second one stands higher."""
-    angle = 2 * math.pi * number / count
+def _camera(number: int) -> DepthCamera:
+    """Return one of six cameras on a circle of 2.6 m; every second one stands higher."""
+    angle = 2 * math.pi * number / 6
     eye = np.array([2.6 * math.sin(angle), 1.6 if number % 2 else 0.8, 2.6 * math.cos(angle)])
     pose = looking_at(eye, np.array([0.0, 0.9, 0.0]))
     width, height = 512, 640
@@ -104,4 +94,4 @@ def _camera(number: int, count: int) -> DepthCamera:
     return DepthCamera(f"c{number}", view)
 
 
-CAMERAS = tuple(_camera(number, 6) for number in range(6))
+CAMERAS = tuple(map(_camera, range(6)))

@@ -6,29 +6,13 @@ from math import log2
 
 from ..names import BEST, DECIMATED, DRACO, SUBDIVIDED
 from ..rows import Options
-from .study import (
-    D2,
-    KEYLESS,
-    NORMALS,
-    SYMMETRIC,
-    Always,
-    Bound,
-    Flat,
-    Gains,
-    NoMore,
-    Promise,
-    Reaches,
-    Study,
-    Sweep,
-    Values,
-    Which,
-    at_most,
-)
+from . import study
+from .study import D2, NORMALS, SYMMETRIC, Always, Bound, Flat, Gains, NoMore, Reaches, Study, Sweep, Which, at_most
 
 REMESHED = ("crane60", "samba60")
 BODIES = ("dancer", "basketball_player", "mitch", *REMESHED)
 BACKWARDS = tuple(f"{body}-backwards" for body in REMESHED)
-QUALITIES: dict[str, Values] = {
+QUALITIES: dict[str, study.Values] = {
     "dancer": {"quality": (5.0, 20.0, 35.0, 45.0, 50.0, 65.0, 80.0, 95.0)},
     "basketball_player": {"quality": (5.0, 20.0, 35.0, 50.0, 65.0, 80.0, 95.0)},
     "mitch": {"quality": (50.0, 65.0, 67.0, 69.0, 80.0)},
@@ -38,7 +22,7 @@ QUALITIES: dict[str, Values] = {
 }
 
 
-def _pairs(*pairs: tuple[float, int]) -> Values:
+def _pairs(*pairs: tuple[float, int]) -> study.Values:
     return {"fraction": tuple(fraction for fraction, _ in pairs), "qp": tuple(qp for _, qp in pairs)}
 
 
@@ -57,7 +41,7 @@ FINE_ON = {
     "samba60": _pairs((0.08, 8), (0.2, 10), (0.5, 11)),
 }
 FEW = ("mitch", "crane60", "samba60")  # one point each of Draco and of plain decimation, which are off the hull there
-JUDGED = (SYMMETRIC, NORMALS, KEYLESS)
+JUDGED = (SYMMETRIC, NORMALS, study.KEYLESS)
 ANCHORS = (DRACO, DECIMATED, SUBDIVIDED)
 USUAL: Options = {"preset": "best", "quality": 50.0}
 COLLISION = Which("collision", BEST)
@@ -70,31 +54,6 @@ def _bounds(mbps: float, db: float, degrees: float, *more: Bound) -> tuple[Bound
     return (rate, Bound(D2.key, db, "dB"), normals, *more)
 
 
-PROMISES: tuple[Promise, ...] = (
-    Reaches(
-        "dancer: rate, D2, normals, SSIM without key frames (released code 5.8 Mbps at 56.4 dB)",
-        Which("dancer", BEST),
-        _bounds(0.34, 64.0, 5.3, Bound(KEYLESS.key, 0.86, "SSIM")),
-    ),
-    Reaches("dancer, high: rate, D2, normals", Which("dancer", BEST), _bounds(1.0, 67.9, 4.1)),
-    Reaches(
-        "basketball_player: rate, D2, normals, worst frame's D2",
-        Which("basketball_player", BEST),
-        _bounds(0.39, 65.0, 4.3, Bound("d2_psnr_paper_worst", 62.0, "dB")),
-    ),
-    Reaches("mitch: rate, D2, normals", Which("mitch", BEST), _bounds(0.27, 70.0, 3.4)),
-    *(Gains(body, BEST, ANCHORS, JUDGED, -70.0) for body in REMESHED),
-    *(
-        Always(f"{body}: bytes of frames 31 to 60 over those of 1 to 30", Which(body, BEST), NO_MORE)
-        for body in (*REMESHED, *BACKWARDS)
-    ),
-    Always("collision: decoded triangles that bridge the bodies once they are apart", COLLISION, at_most("bridges", 0)),
-    *(Gains(body, BEST, ANCHORS, JUDGED, -60.0, ends_past=PAST) for body in BODIES[:2]),
-    Always("bodies: step of PSNR at a border of groups", Which("", BEST), at_most("border_step_db", 1.5, "dB")),
-    Always("encode, dancer", Which("dancer", BEST), at_most("encode_s", 4.0, "CPU s/frame")),
-    Flat(COLLISION),
-    Always("decode, dancer", Which("dancer", BEST), at_most("decode_ms", 1.5, "ms")),
-)
 STUDY = Study(
     title="Targets of the preset `best`",
     sequences=(*BODIES, "collision", *BACKWARDS),
@@ -107,9 +66,35 @@ STUDY = Study(
         *(Sweep("meshreel", {}, USUAL, only=("collision",), frames=frames) for frames in (20, 60)),
     ),
     metrics="parallel views",
-    measures=(SYMMETRIC, KEYLESS, D2, NORMALS),
+    measures=(SYMMETRIC, study.KEYLESS, D2, NORMALS),
     anchor=SUBDIVIDED,
-    promises=PROMISES,
+    promises=(
+        Reaches(
+            "dancer: rate, D2, normals, SSIM without key frames (released code 5.8 Mbps at 56.4 dB)",
+            Which("dancer", BEST),
+            _bounds(0.34, 64.0, 5.3, Bound(study.KEYLESS.key, 0.86, "SSIM")),
+        ),
+        Reaches("dancer, high: rate, D2, normals", Which("dancer", BEST), _bounds(1.0, 67.9, 4.1)),
+        Reaches(
+            "basketball_player: rate, D2, normals, worst frame's D2",
+            Which("basketball_player", BEST),
+            _bounds(0.39, 65.0, 4.3, Bound("d2_psnr_paper_worst", 62.0, "dB")),
+        ),
+        Reaches("mitch: rate, D2, normals", Which("mitch", BEST), _bounds(0.27, 70.0, 3.4)),
+        *(Gains(body, BEST, ANCHORS, JUDGED, -70.0) for body in REMESHED),
+        *(
+            Always(f"{body}: bytes of frames 31 to 60 over those of 1 to 30", Which(body, BEST), NO_MORE)
+            for body in (*REMESHED, *BACKWARDS)
+        ),
+        Always(
+            "collision: decoded triangles that bridge the bodies once they are apart", COLLISION, at_most("bridges", 0)
+        ),
+        *(Gains(body, BEST, ANCHORS, JUDGED, -60.0, ends_past=PAST) for body in BODIES[:2]),
+        Always("bodies: step of PSNR at a border of groups", Which("", BEST), at_most("border_step_db", 1.5, "dB")),
+        Always("encode, dancer", Which("dancer", BEST), at_most("encode_s", 4.0, "CPU s/frame")),
+        Flat(COLLISION),
+        Always("decode, dancer", Which("dancer", BEST), at_most("decode_ms", 1.5, "ms")),
+    ),
 )
 
 DEFAULT = 50.0  # quality
@@ -125,7 +110,7 @@ LEAST = min(OF_FOUR)
 DIAGONALS = {"dancer": 2.197, "basketball_player": 2.131, "mitch": 2.284, "crane": 2.164}
 DIAGONAL_OF_FOUR = 4.559
 AROUND = (40.0, DEFAULT, 60.0)  # qualities, for a curve
-OTHERS: dict[str, Values] = {TOGETHER: {"quality": tuple(OF_FOUR)}, "dancer": {"quality": AROUND}}
+OTHERS: dict[str, study.Values] = {TOGETHER: {"quality": tuple(OF_FOUR)}, "dancer": {"quality": AROUND}}
 FAST = Which("dancer", f"{BEST}, fast", {"quality": DEFAULT})
 # Qualities at which each body alone has the step, in metres, that it has among the four at the least quality.
 ALONE = {body: round(LEAST - 25 * log2(DIAGONAL_OF_FOUR / own), 1) for body, own in DIAGONALS.items()}
@@ -135,38 +120,9 @@ def _which(sequence: str, quality: float = DEFAULT) -> Which:
     return Which(sequence, BEST, {"quality": quality})
 
 
-EACH: dict[str, Values] = {body: {"quality": (quality,)} for body, quality in ALONE.items()}
+EACH: dict[str, study.Values] = {body: {"quality": (quality,)} for body, quality in ALONE.items()}
 DANCER, PLAIN_DRACO, DECODE = _which("dancer"), Which("dancer", f"{DECIMATED}, DracoPy"), "decode_ms_at_rest"
 APART = tuple(_which(body, quality) for body, quality in ALONE.items())
-SPEED_PROMISES: tuple[Promise, ...] = (
-    *(
-        Reaches(f"{which.sequence}: encode", which, (at_most("encode_s_at_rest", limit, "CPU s/frame"),), aim)
-        for which, (limit, aim) in [
-            *((_which(sequence), limits) for sequence, limits in LIMITS.items()),
-            *((_which(TOGETHER, quality), limits) for quality, limits in OF_FOUR.items()),
-        ]
-    ),
-    NoMore(f"{TOGETHER}: encode against four alone", _which(TOGETHER, LEAST), "encode_s_at_rest", 1.2, APART),
-    NoMore(f"{TOGETHER}: rate against four alone", _which(TOGETHER, LEAST), "mbps", 1.2, APART),
-    Reaches(
-        "basketball_player: frames fitted and tracked for a frame that is coded",
-        _which("basketball_player"),
-        (at_most("work.frames fitted", 2.5), at_most("work.frames tracked", 2.5)),
-    ),
-    *(Reaches(f"{body}: memory of an encode", _which(body), (at_most("encode_mb", 350, "MB"),)) for body in DIAGONALS),
-    *(
-        Reaches(
-            f"dancer: efficiency of 8, 32 and 100 workers, an hour in intervals of {frames} frames (model)",
-            DANCER,
-            tuple(Bound(f"efficiency.{workers}.{frames}", least) for workers, least in EFFICIENCY.items()),
-        )
-        for frames in (60, 120)
-    ),
-    Reaches("dancer, fast: encode", FAST, (at_most("encode_s_at_rest", 0.5, "CPU s/frame"),), "0.25"),
-    Gains("dancer", FAST.curve, (BEST,), (D2, NORMALS), 3.0),
-    Reaches("dancer: decode", DANCER, (at_most(DECODE, 0.35, "ms"),), "0.2"),
-    NoMore("dancer: decode against decimated Draco that is no better in D2", DANCER, DECODE, 1.0, (PLAIN_DRACO,)),
-)
 SPEED = Study(
     title="Speed",
     sequences=(*LIMITS, TOGETHER),
@@ -179,7 +135,38 @@ SPEED = Study(
     ),
     metrics="distances",
     measures=(D2, NORMALS),
-    promises=SPEED_PROMISES,
+    promises=(
+        *(
+            Reaches(f"{which.sequence}: encode", which, (at_most("encode_s_at_rest", limit, "CPU s/frame"),), aim)
+            for which, (limit, aim) in [
+                *((_which(sequence), limits) for sequence, limits in LIMITS.items()),
+                *((_which(TOGETHER, quality), limits) for quality, limits in OF_FOUR.items()),
+            ]
+        ),
+        NoMore(f"{TOGETHER}: encode against four alone", _which(TOGETHER, LEAST), "encode_s_at_rest", 1.2, APART),
+        NoMore(f"{TOGETHER}: rate against four alone", _which(TOGETHER, LEAST), "mbps", 1.2, APART),
+        Reaches(
+            "basketball_player: frames fitted and tracked for a frame that is coded",
+            _which("basketball_player"),
+            (at_most("work.frames fitted", 2.5), at_most("work.frames tracked", 2.5)),
+        ),
+        *(
+            Reaches(f"{body}: memory of an encode", _which(body), (at_most("encode_mb", 350, "MB"),))
+            for body in DIAGONALS
+        ),
+        *(
+            Reaches(
+                f"dancer: efficiency of 8, 32 and 100 workers, an hour in intervals of {frames} frames (model)",
+                DANCER,
+                tuple(Bound(f"efficiency.{workers}.{frames}", least) for workers, least in EFFICIENCY.items()),
+            )
+            for frames in (60, 120)
+        ),
+        Reaches("dancer, fast: encode", FAST, (at_most("encode_s_at_rest", 0.5, "CPU s/frame"),), "0.25"),
+        Gains("dancer", FAST.curve, (BEST,), (D2, NORMALS), 3.0),
+        Reaches("dancer: decode", DANCER, (at_most(DECODE, 0.35, "ms"),), "0.2"),
+        NoMore("dancer: decode against decimated Draco that is no better in D2", DANCER, DECODE, 1.0, (PLAIN_DRACO,)),
+    ),
     frames={"crane": 60},
     notes=(
         "Times *at rest* are processor times, scaled by those of a fixed loop that runs in the same process meanwhile.",

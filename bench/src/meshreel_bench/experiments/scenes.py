@@ -8,22 +8,7 @@ from __future__ import annotations
 from ..datasets.rooms import SENSED
 from ..names import BEST, PAINTED, TEXTURED
 from ..rows import Options
-from .study import (
-    D2,
-    Always,
-    Bound,
-    Flat,
-    Gains,
-    Measure,
-    NoMore,
-    Promise,
-    Reaches,
-    Rises,
-    Study,
-    Sweep,
-    Which,
-    at_most,
-)
+from .study import D2, Always, Bound, Flat, Gains, Measure, NoMore, Reaches, Rises, Study, Sweep, Which, at_most
 
 ROOM, STANDING, ROOM3 = "room2", "room2-standing", "room3"
 LOOPED = f"{ROOM}-forth-and-back"
@@ -57,59 +42,6 @@ def _over_input(key: str, limit: float, unit: str = "", least: bool = False) -> 
     return Bound(key, limit, unit, least, over_floor=True)
 
 
-PROMISES: tuple[Promise, ...] = (
-    Reaches(
-        f"{ROOM}: segmentation, IoU of the dynamic faces, share of static ones called dynamic",
-        Which(ROOM, "segmentation"),
-        (Bound("iou_mean", 0.95), Bound("iou_worst", 0.9), at_most("static_called_dynamic", 0.002)),
-        "0.98, 0.96, 0.0005",
-    ),
-    _overlaps(STANDING, Bound("iou_mean", 0.85), aim="0.94"),
-    Reaches(
-        f"{ROOM}: background: median error to the clean room, share covered within 20 mm, bytes",
-        DEFAULT,
-        (at_most("truth_background_median_m", 1.2e-3, "m"), Bound("truth_background_covered", 0.99), SMALL),
-        "0.8 mm, 99.5 %, 40 kB",
-    ),
-    Reaches(
-        f"{ROOM}: rate with the background once in 10 s, D2 and SSIM to the truth",
-        SYSTEM,
-        (at_most("mbps_background_10s", 0.8, "Mbps"), Bound("truth_d2_psnr_backward", 62.5, "dB"), ALIKE),
-        "0.5 Mbps",
-    ),
-    Reaches(
-        f"{ROOM}: people to the truth against the noisy input: median distance, normals, SSIM, coverage",
-        DEFAULT,
-        (
-            _over_input("truth_people_median_m", 0.0, "m"),
-            _over_input("truth_people_normal_error_deg", 0.0, "degrees"),
-            _over_input("truth_people_ssim_masked", 0.1, "SSIM", least=True),
-            _over_input("truth_people_coverage_rms_m", 1e-3, "m"),
-        ),
-        "2.2 mm, 16 degrees, no loss of coverage",
-    ),
-    _overlaps(ROOM3, Bound("iou_mean", 0.95), Bound("iou_worst", 0.92)),
-    Reaches(
-        f"{ROOM3}: people to the truth, share missed by 30 mm, door's bytes over theirs, until things are room",
-        IN_ROOM3,
-        (
-            at_most("truth_people_rms_backward_m", 4.5e-3, "m"),
-            at_most("truth_people_missed", 0.02),
-            at_most("door_bytes_of_people", 0.2),
-            at_most("crate_room_s", 1.0, "s"),
-            at_most("door_room_s", 1.0, "s"),
-        ),
-    ),
-    *(
-        Reaches(f"{own.sequence}: flicker of people over the input's", own, (at_most("people_flicker_of_input", 0.5),))
-        for own in (DEFAULT, IN_ROOM3)
-    ),
-    Always(f"{ROOM}: encode", SYSTEM, at_most("encode_s", 6.0, "CPU s/frame")),
-    Always(f"{ROOM}: decode", SYSTEM, at_most("decode_ms", 5.0, "ms")),
-    Always(f"{ROOM}: first frame", SYSTEM, at_most("first_frame_ms", 200.0, "ms")),
-    Flat(Which(LOOPED, BEST)),
-    *(Gains(ROOM, BEST, (name, f"{name}, subdivided"), INPUT, most, below_floor=True) for name, most in ANCHORS),
-)
 NOTES = (
     "Anchors are given the frames that are measured, and their rate is that of these. Anchor b has true labels.",
     "D2: peak is the scene's diagonal; to the truth from the decoded surface, to the input from the input's. Coverage",
@@ -134,7 +66,61 @@ STUDY = Study(
     metrics="regions",
     measures=MEASURES,
     best=BEST,
-    promises=PROMISES,
+    promises=(
+        Reaches(
+            f"{ROOM}: segmentation, IoU of the dynamic faces, share of static ones called dynamic",
+            Which(ROOM, "segmentation"),
+            (Bound("iou_mean", 0.95), Bound("iou_worst", 0.9), at_most("static_called_dynamic", 0.002)),
+            "0.98, 0.96, 0.0005",
+        ),
+        _overlaps(STANDING, Bound("iou_mean", 0.85), aim="0.94"),
+        Reaches(
+            f"{ROOM}: background: median error to the clean room, share covered within 20 mm, bytes",
+            DEFAULT,
+            (at_most("truth_background_median_m", 1.2e-3, "m"), Bound("truth_background_covered", 0.99), SMALL),
+            "0.8 mm, 99.5 %, 40 kB",
+        ),
+        Reaches(
+            f"{ROOM}: rate with the background once in 10 s, D2 and SSIM to the truth",
+            SYSTEM,
+            (at_most("mbps_background_10s", 0.8, "Mbps"), Bound("truth_d2_psnr_backward", 62.5, "dB"), ALIKE),
+            "0.5 Mbps",
+        ),
+        Reaches(
+            f"{ROOM}: people to the truth against the noisy input: median distance, normals, SSIM, coverage",
+            DEFAULT,
+            (
+                _over_input("truth_people_median_m", 0.0, "m"),
+                _over_input("truth_people_normal_error_deg", 0.0, "degrees"),
+                _over_input("truth_people_ssim_masked", 0.1, "SSIM", least=True),
+                _over_input("truth_people_coverage_rms_m", 1e-3, "m"),
+            ),
+            "2.2 mm, 16 degrees, no loss of coverage",
+        ),
+        _overlaps(ROOM3, Bound("iou_mean", 0.95), Bound("iou_worst", 0.92)),
+        Reaches(
+            f"{ROOM3}: people to the truth, share missed by 30 mm, door's bytes over theirs, until things are room",
+            IN_ROOM3,
+            (
+                at_most("truth_people_rms_backward_m", 4.5e-3, "m"),
+                at_most("truth_people_missed", 0.02),
+                at_most("door_bytes_of_people", 0.2),
+                at_most("crate_room_s", 1.0, "s"),
+                at_most("door_room_s", 1.0, "s"),
+            ),
+        ),
+        *(
+            Reaches(
+                f"{own.sequence}: flicker of people over the input's", own, (at_most("people_flicker_of_input", 0.5),)
+            )
+            for own in (DEFAULT, IN_ROOM3)
+        ),
+        Always(f"{ROOM}: encode", SYSTEM, at_most("encode_s", 6.0, "CPU s/frame")),
+        Always(f"{ROOM}: decode", SYSTEM, at_most("decode_ms", 5.0, "ms")),
+        Always(f"{ROOM}: first frame", SYSTEM, at_most("first_frame_ms", 200.0, "ms")),
+        Flat(Which(LOOPED, BEST)),
+        *(Gains(ROOM, BEST, (name, f"{name}, subdivided"), INPUT, most, below_floor=True) for name, most in ANCHORS),
+    ),
     floors=(ROOM, STANDING, ROOM3),
     notes=NOTES,
 )
@@ -186,20 +172,6 @@ def _dial(quality: float) -> Which:
     return Which(LIVING_ROOM, BEST, {"quality": quality})
 
 
-DEPTH_PROMISES: tuple[Promise, ...] = (
-    _reaches("still surface covered, invented", Bound("still_covered", 0.97), at_most("still_invented", 0.005)),
-    _reaches("body covered", Bound("body_covered", 0.95)),
-    _reaches("frames that show the body's lower third and have not half of it", at_most("limbs_lost", 0)),
-    _reaches("groups of bodies, those of Draco", Bound("group_frames", 8, "frames"), at_most("draco_groups", 0)),
-    _reaches("rate, the background's share", at_most("mbps", 0.12, "Mbps"), at_most("background_mbps", 0.12, "Mbps")),
-    _reaches("change of still surface between refreshes", at_most("still_flicker_m", 0, "m")),
-    *(Always(f"{LIVING_ROOM}: step of PSNR at a border of groups", which, STEP) for which in RECORDED),
-    *(
-        NoMore(f"{LIVING_ROOM}: rate at quality 10 and at {high:g}", _dial(10.0), "mbps", 1 / factor, (_dial(high),))
-        for high, factor in list(DIAL.items())[1:]
-    ),
-    *(Rises(BEST, measure) for measure in (COVERED, D2)),
-)
 RECORDINGS = Study(
     title="Recordings by their depth pictures",
     sequences=(LIVING_ROOM,),
@@ -209,7 +181,24 @@ RECORDINGS = Study(
     ),
     metrics="depth",
     measures=DEPTH_MEASURES,
-    promises=DEPTH_PROMISES,
+    promises=(
+        _reaches("still surface covered, invented", Bound("still_covered", 0.97), at_most("still_invented", 0.005)),
+        _reaches("body covered", Bound("body_covered", 0.95)),
+        _reaches("frames that show the body's lower third and have not half of it", at_most("limbs_lost", 0)),
+        _reaches("groups of bodies, those of Draco", Bound("group_frames", 8, "frames"), at_most("draco_groups", 0)),
+        _reaches(
+            "rate, the background's share", at_most("mbps", 0.12, "Mbps"), at_most("background_mbps", 0.12, "Mbps")
+        ),
+        _reaches("change of still surface between refreshes", at_most("still_flicker_m", 0, "m")),
+        *(Always(f"{LIVING_ROOM}: step of PSNR at a border of groups", which, STEP) for which in RECORDED),
+        *(
+            NoMore(
+                f"{LIVING_ROOM}: rate at quality 10 and at {high:g}", _dial(10.0), "mbps", 1 / factor, (_dial(high),)
+            )
+            for high, factor in list(DIAL.items())[1:]
+        ),
+        *(Rises(BEST, measure) for measure in (COVERED, D2)),
+    ),
     notes=(
         "What is decoded is rendered into each depth camera: *covered* is the share of measured pixels with surface",
         "there, *invented* that with surface where the camera saw through; lost runs are missing areas over 100 cm2,",

@@ -20,7 +20,7 @@ from meshreel.metrics.render import Crop, Pixels
 from meshreel.metrics.surface_samples import scatter
 from meshreel.types import Mesh, MeshSequence
 
-from ..datasets.walker import Truth
+from ..datasets.walker import TrueLuma
 from ..rows import ColorBytes
 
 BEFORE = 0.015  # of the depth: what is nearer than what stands by more is something else (guess)
@@ -56,7 +56,7 @@ def picture_psnrs(found: Iterable[Float64[np.ndarray, "3 2"]]) -> dict[str, floa
     return {name: psnr(square / count) for name, (square, count) in zip(PARTS, total, strict=True) if count}
 
 
-def texel_products(truth: Truth, number: int, decoded: Mesh) -> Float64[np.ndarray, " 4"]:
+def texel_products(truth: TrueLuma, number: int, decoded: Mesh) -> Float64[np.ndarray, " 4"]:
     """Return the number of texels of a frame that cameras see, and the sums of their luma's products with the truth's.
 
     These are of luma and itself, luma and truth, truth and itself. No product where the frame has no texture.
@@ -73,7 +73,7 @@ def texel_products(truth: Truth, number: int, decoded: Mesh) -> Float64[np.ndarr
     w = (ab[:, 0] * (middles - a)[:, 1] - ab[:, 1] * (middles - a)[:, 0]) / area
     inside = (v >= 0) & (w >= 0) & (v + w <= 1)
     weights, faces = np.stack([1 - v - w, v, w], axis=1)[inside], some.faces[inside].astype(np.int32)
-    true, seen = truth.luma(number, blend(decoded.vertices, decoded.faces[faces], weights))
+    true, seen = truth(number, blend(decoded.vertices, decoded.faces[faces], weights))
     shown, true = (Painted(decoded).on(faces, weights) @ TO_YUV[0])[seen], true[seen]
     return np.array([len(true), shown @ shown, shown @ true, true @ true])
 

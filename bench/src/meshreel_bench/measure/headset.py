@@ -42,8 +42,8 @@ def headset_values(data: bytes, level: int, throttle: float, rate: float) -> Val
         reader = ReelReader(BytesSource(data))
         concat([once] * ceil((SECONDS + BUFFERED) * reader.header.frame_rate / reader.frame_count), long)
         with playing(long) as address:
-            numbers = (SECONDS, throttle, rate)
-            command = ["node", "headset.mjs", f"{address}?layers={level}&controls=0", *map(str, numbers)]
+            query = f"{address}?layers={level}&controls=0"
+            command = ["node", "headset.mjs", query, *map(str, (SECONDS, throttle, rate))]
             tries = list[dict[str, float]]()
             while len(tries) < 2 and not (tries and tries[0]["shown_share"] >= HOLDS):
                 tries.append(_values(json.loads(_output(command, WEB)), rate))
@@ -78,9 +78,9 @@ def aarch64_values(data: bytes) -> Values:
 
 
 def _output(command: list[str], folder: Path, **environment: str) -> str:
-    environment = {**os.environ, **environment}
+    known = {**os.environ, **environment}
     try:
-        done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=True)
+        done = subprocess.run(command, cwd=folder, env=known, capture_output=True, text=True, check=True)
     except FileNotFoundError as error:
         raise InputError(f"{command[0]}: {error.strerror}; run in a checkout, after `scripts/setup web`") from None
     except subprocess.CalledProcessError as error:

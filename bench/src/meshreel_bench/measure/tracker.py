@@ -14,15 +14,7 @@ from jaxtyping import Float64
 from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 
-from meshreel.analysis.reference.track import (
-    AGREEMENT,
-    LEAST_AFFINITY,
-    REACH,
-    ROUNDS,
-    SEED,
-    TrackOptions,
-    track_centers,
-)
+from meshreel.analysis.reference import track as ours
 from meshreel.analysis.survey import survey_sequence
 from meshreel.errors import InputError
 from meshreel.geometry.inside import interior_samples
@@ -41,12 +33,12 @@ def tracker_values(sequence: MeshSequence, method: str) -> dict[str, float | Non
     """Return distances of centers from the true motion, and CPU s a frame. InputError where faces change."""
     if method not in (OURS, PUBLISHED):
         raise InputError(f"no tracker is called {method!r}; give {OURS} or {PUBLISHED}")
-    survey, options = survey_sequence(sequence), TrackOptions()
+    survey, options = survey_sequence(sequence), ours.TrackOptions()
     frames = [Mesh.of((mesh.vertices - survey.low) / survey.diagonal, mesh.faces) for mesh in sequence]
     if any(not np.array_equal(frame.faces, frames[0].faces) for frame in frames):
         raise InputError("true motion is known of frames that share their faces only")
-    first, start = track_centers(frames[:1], options).positions[0], time.process_time()
-    track = track_centers(frames, options).positions if method == OURS else published_track(frames, first, options)
+    first, start = ours.track_centers(frames[:1], options).positions[0], time.process_time()
+    track = ours.track_centers(frames, options).positions if method == OURS else published_track(frames, first, options)
     seconds = time.process_time() - start
     truth, other = (carried(frames, track[0], count) for count in BOUND)
     errors, spread = (np.linalg.norm(a - truth, axis=2)[1:] * survey.diagonal * 1000 for a in (track, other))
@@ -78,18 +70,18 @@ def carried(frames: Sequence[Mesh], centers: Float64[np.ndarray, "K 3"], count: 
     return np.stack(track)
 
 
-def published_track(frames: Sequence[Mesh], first: Float64[np.ndarray, "K 3"], options: TrackOptions) -> Track:
+def published_track(frames: Sequence[Mesh], first: Float64[np.ndarray, "K 3"], options: ours.TrackOptions) -> Track:
     """Return centers that balance an even spread and rigidity, round by round, by affinities of all pairs so far."""
-    draw = lambda t: interior_samples(frames[t], options.samples, np.random.default_rng((SEED, t))).points  # noqa: E731
+    draw = lambda t: interior_samples(frames[t], options.samples, np.random.default_rng((ours.SEED, t))).points  # noqa: E731
     track, points = [first], draw(0)
     distance, difference = cdist(first, first, "sqeuclidean"), np.zeros((len(first), len(first)))
     for t in range(1, len(frames)):
         before, following = track[-1], draw(t)
-        affinity = np.exp2(-distance / REACH**2 - difference / AGREEMENT**2)
-        affinity[affinity < LEAST_AFFINITY] = 0
+        affinity = np.exp2(-distance / ours.REACH**2 - difference / ours.AGREEMENT**2)
+        affinity[affinity < ours.LEAST_AFFINITY] = 0
         np.fill_diagonal(affinity, 0)
         now = 2 * before - track[-2] if len(track) > 1 else before.copy()
-        for _ in range(ROUNDS):
+        for _ in range(ours.ROUNDS):
             owners = cKDTree(now).query(following)[1]
             counts = np.bincount(owners, minlength=len(now))
             sums = np.stack([np.bincount(owners, following[:, a], len(now)) for a in range(3)], axis=1)

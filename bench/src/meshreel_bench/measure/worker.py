@@ -253,8 +253,7 @@ _DIGITS = 12  # of a commit
 @cache
 def maker() -> Maker:
     """Return version, commit and machine of this process."""
-    machine = (platform.platform(), platform.python_version(), processor(), os.cpu_count())
-    return Maker(__version__, _commit(), *machine)
+    return Maker(__version__, _commit(), platform.platform(), platform.python_version(), processor(), os.cpu_count())
 
 
 def _commit() -> str:

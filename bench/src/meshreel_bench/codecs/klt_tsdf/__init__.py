@@ -39,25 +39,8 @@ from meshreel.geometry.topology import drop_unreferenced
 from meshreel.types import Mesh, MeshSequence
 
 from ...codec import DecodedFrames, Options, Progress, reported
-from .components import (
-    MOST,
-    STEP_ONE,
-    TRUNCATION,
-    VOXELS,
-    Field,
-    Model,
-    cells_at,
-    crossed,
-    decode_basis,
-    encode_basis,
-    field_of,
-    forward,
-    join,
-    learned,
-    model_of,
-    polygonize,
-    split,
-)
+from . import components
+from .components import Field, Model, cells_at, field_of, join, split
 from .grid import block_keys, prepared, sample
 
 MAGIC = b"KLTT"
@@ -93,7 +76,7 @@ class KltTsdfCodec(Options):
     group: int = 10  # frames that share the entropy coder's adaptive models
 
     def __post_init__(self) -> None:
-        ranges = {"cells": (8, 1024), "basis": (1, MOST), "step": (0.0005, 1), "group": (1, MOST_GROUP)}
+        ranges = {"cells": (8, 1024), "basis": (1, components.MOST), "step": (0.0005, 1), "group": (1, MOST_GROUP)}
         for name, (least, most) in ranges.items():
             if not least <= getattr(self, name) <= most:
                 raise InputError(f"{name} {getattr(self, name):g}: give {least:g} to {most}")
@@ -102,13 +85,13 @@ class KltTsdfCodec(Options):
         """The stream. Raises InputError where frames take more blocks than memory is for."""
         survey = survey_sequence(sequence)
         voxel = survey.diagonal / self.cells
-        symbols, energies = learned(self.basis)
-        model = model_of(symbols, max(round(self.step * TRUNCATION * STEP_ONE), 1))
+        symbols, energies = components.learned(self.basis)
+        model = components.model_of(symbols, max(round(self.step * components.TRUNCATION * components.STEP_ONE), 1))
         scaled = (Mesh.of((mesh.vertices - survey.low) / voxel, mesh.faces) for mesh in sequence)
         starts = range(0, len(sequence), self.group)
         each = reported(starts, progress, "code", len(starts))
         groups = [encode_group(islice(scaled, self.group), model, energies) for _ in each]
-        low, table = tuple(map(float, survey.low)), encode_basis(symbols)
+        low, table = tuple(map(float, survey.low)), components.encode_basis(symbols)
         head = MAGIC, VERSION, len(sequence), self.group, self.basis, model.step
         data = pack(Stream(*head, deblocking=0, voxel=voxel, low=low, table=table, groups=join(groups)))
         return data + zlib.crc32(data).to_bytes(4, "little")
@@ -129,7 +112,7 @@ class Video(DecodedFrames):
         self.stream = stream = unpack_all(Stream, data[:-4])
         if stream.version != VERSION:
             raise FormatError(f"version {stream.version} of klt_tsdf; this one reads {VERSION}")
-        self._model = model_of(decode_basis(stream.table, stream.basis), stream.step)
+        self._model = components.model_of(components.decode_basis(stream.table, stream.basis), stream.step)
         self._groups = split(stream.groups, -(-stream.frames // stream.group))
         self._last: tuple[int, list[Frame]] | None = None
 
@@ -143,7 +126,7 @@ class Video(DecodedFrames):
             self._last = which, decode_group(self._groups[which], count, self.stream.basis)
         places, symbols, left_out = self._last[1][inside]
         field = field_of(places, symbols, self._model)
-        (mesh, cells), omitted = polygonize(field), _decode_omitted(left_out, field)
+        (mesh, cells), omitted = components.polygonize(field), _decode_omitted(left_out, field)
         if len(omitted):
             mesh = drop_unreferenced(Mesh(mesh.vertices, mesh.faces[~np.isin(cells, omitted)]))
         return Mesh.of(mesh.vertices * self.stream.voxel + self.stream.low, mesh.faces)
@@ -162,7 +145,7 @@ def encode_group(meshes: Iterable[Mesh], model: Model, energies: Float64[np.ndar
     frames = list[Frame]()
     for mesh in map(prepared, meshes):
         blocks = sample(mesh)
-        symbols = forward(blocks, model, energies)
+        symbols = components.forward(blocks, model, energies)
         frames.append((blocks.places, symbols, _encode_omitted(mesh, field_of(blocks.places, symbols, model))))
     places, each, omitted = (list(column) for column in zip(*frames, strict=True))
     every = np.concatenate(each)
@@ -182,12 +165,12 @@ def decode_group(data: bytes, count: int, width: int) -> list[Frame]:
 
 def _encode_omitted(mesh: Mesh, field: Field) -> bytes:
     """Return the bits of blocks and cells whose surface is left out; no bytes if none is."""
-    cells = _wrong(mesh, *polygonize(field))
+    cells = _wrong(mesh, *components.polygonize(field))
     if len(cells) == 0:
         return b""
     chosen = np.zeros(len(field.places), bool)
-    chosen[cells // VOXELS] = True
-    seen = crossed(field, chosen)
+    chosen[cells // components.VOXELS] = True
+    seen = components.crossed(field, chosen)
     return join([encode_bits(chosen, field.places), encode_bits(np.isin(seen, cells), cells_at(seen, field))])
 
 
@@ -196,7 +179,7 @@ def _decode_omitted(data: bytes, field: Field) -> Int64[np.ndarray, " C"]:
     if not data:
         return np.zeros(0, np.int64)
     first, second = split(data, 2)
-    cells = crossed(field, decode_bits(first, field.places))
+    cells = components.crossed(field, decode_bits(first, field.places))
     return cells[decode_bits(second, cells_at(cells, field))]
 
 

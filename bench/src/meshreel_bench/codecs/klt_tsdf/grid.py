@@ -140,11 +140,10 @@ def _crossings(values: Float64[np.ndarray, "B N"], known: _Mask) -> tuple[_Mask,
     values, known = values.reshape(shape), known.reshape(shape)
     near, phantom = np.zeros(shape, bool), np.zeros(shape, bool)
     for axis in range(1, 4):
-        low = tuple(slice(None, -1) if k == axis else slice(None) for k in range(4))
-        high = tuple(slice(1, None) if k == axis else slice(None) for k in range(4))
-        changes = ((values[low] < 0) != (values[high] < 0)) & known[low] & known[high]
-        real = np.abs(values[low]) + np.abs(values[high]) <= _CROSSED
-        for end in (low, high):
-            near[end] |= changes & real
-            phantom[end] |= changes & ~real
+        v, k, n, p = (np.moveaxis(each, axis, 0) for each in (values, known, near, phantom))  # views
+        changes = ((v[:-1] < 0) != (v[1:] < 0)) & k[:-1] & k[1:]
+        real = np.abs(v[:-1]) + np.abs(v[1:]) <= _CROSSED
+        for end in (slice(None, -1), slice(1, None)):
+            n[end] |= changes & real
+            p[end] |= changes & ~real
     return near.reshape(len(values), -1), (phantom & ~near).reshape(len(values), -1)

@@ -203,6 +203,9 @@ def cases_of(values: np.ndarray) -> UInt8[np.ndarray, " C"]:
 
 CORNERS = [(n & 1, n >> 1 & 1, n >> 2) for n in range(8)]
 EDGES = [(n, axis) for axis in range(3) for n in range(8) if not n >> axis & 1]  # first corner, axis
+_RINGS = [(axis, [0, 1 << (axis + 1) % 3, 7 ^ 1 << axis, 1 << (axis + 2) % 3]) for axis in range(3)]
+# Corners of the six faces, counter-clockwise from outside.
+SIDES = [side for axis, ring in _RINGS for side in (ring[::-1], [corner | 1 << axis for corner in ring])]
 
 
 @cache
@@ -217,7 +220,7 @@ def triangles_of_cases() -> Int8[np.ndarray, "N T 3"]:
 
 def _triangles(case: int) -> list[tuple[int, int, int]]:
     """Return the loops of the surface on the cube's faces, each as a fan; bit n of `case`: corner n is inside."""
-    following = dict(step for side in _sides() for step in _steps(side, case))
+    following = dict(step for side in SIDES for step in _steps(side, case))
     triangles = []
     while following:
         loop = [min(following)]
@@ -225,12 +228,6 @@ def _triangles(case: int) -> list[tuple[int, int, int]]:
             loop.append(edge)
         triangles += [(loop[0], a, b) for a, b in pairwise(loop[1:])]
     return triangles
-
-
-def _sides() -> list[list[int]]:
-    """Return the corners of the six faces, counter-clockwise from outside."""
-    rings = [(axis, [0, 1 << (axis + 1) % 3, 7 ^ 1 << axis, 1 << (axis + 2) % 3]) for axis in range(3)]
-    return [side for axis, ring in rings for side in (ring[::-1], [corner | 1 << axis for corner in ring])]
 
 
 def _steps(side: list[int], case: int) -> list[tuple[int, int]]:

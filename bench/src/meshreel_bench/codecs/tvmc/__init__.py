@@ -38,19 +38,7 @@ from meshreel.types import Mesh
 
 from ...codec import Progress
 from ..meshreel import Prepared
-from .stream import (
-    MAGIC,
-    MOST_CELLS,
-    VERSION,
-    Group,
-    Kind,
-    State,
-    Stream,
-    TvmcVideo,
-    encode_tracked,
-    pack_stream,
-    unpack_stream,
-)
+from .stream import MOST_CELLS, Group, Kind, State, Stream, TvmcVideo, encode_tracked, pack_stream, unpack_stream
 
 USUAL = 2000  # vertices of a reference
 LEAST_QP, MOST_QP = 2, 16  # bits; guesses
@@ -101,8 +89,11 @@ class TvmcCodec(Prepared):
         runs = tuple(run_lengths(bare).tolist()) if tracking.states and bare.any() else ()
         states = tuple(State(state.frame, state.payload) for state in tracking.states)
         groups = tuple(each.coded(step) if isinstance(each, Tracked) else each for each in tracking.groups)
-        origin = tuple(map(float, survey.center))
-        return pack_stream(Stream(MAGIC, VERSION, len(bare), origin, survey.unit, step, runs, states, groups))
+        origin, scale, count = tuple(map(float, survey.center)), survey.unit, len(bare)
+        record = Stream(
+            frame_count=count, origin=origin, scale=scale, step=step, bare=runs, states=states, groups=groups
+        )
+        return pack_stream(record)
 
     def step(self, tracking: Tracking) -> float:
         """Return the step of displacements, normalised; one for all groups, so that still vertices stay."""

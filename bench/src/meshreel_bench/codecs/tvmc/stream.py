@@ -68,12 +68,12 @@ class TrackedPayload:
     displacements: Annotated[tuple[bytes, ...], List(U8, Blob(Varint())), "one Draco point cloud per frame"]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Stream:
     """A sequence. A frame shows the state of its time and the groups that contain it; with neither it is empty."""
 
-    magic: Annotated[bytes, Bytes(4), "TVMC"]
-    version: Annotated[int, U8, "1"]
+    magic: Annotated[bytes, Bytes(4), "TVMC"] = MAGIC
+    version: Annotated[int, U8, "1"] = VERSION
     frame_count: Annotated[int, U32, "of the sequence"]
     origin: Annotated[tuple[float, ...], Array(3, F64), "of normalised coordinates, m"]
     scale: Annotated[float, F64, "m, the unit of normalised coordinates"]
