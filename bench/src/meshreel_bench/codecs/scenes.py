@@ -11,7 +11,7 @@ from meshreel.analysis.survey import Survey
 from meshreel.decoder.video import open as open_video
 from meshreel.errors import InputError
 from meshreel.geometry.decimate import decimate_faces
-from meshreel.geometry.topology import concatenate, part_of
+from meshreel.geometry.topology import concatenate, drop_unreferenced
 from meshreel.types import Mesh, MeshSequence
 
 from ..codec import Options, Progress
@@ -67,7 +67,8 @@ class BackgroundDracoCodec(Options):
         frames = _scene_frames(sequence)
         meshes = [_with_share(frames.scene.background(self.labels), self.background_share)]
         for number in frames.in_scene:
-            moving = part_of(frames.scene.meshes[number], frames.scene.labels(number, self.labels))
+            mesh = frames.scene.meshes[number]
+            moving = drop_unreferenced(Mesh.of(mesh.vertices, mesh.faces[frames.scene.labels(number, self.labels)]))
             meshes.append(_with_share(moving, self.share))
         points = [(self.background_qp, 0), *[(self.qp, self.levels)] * len(frames)]
         return _written(frames.frame_rate, meshes, points, progress)
