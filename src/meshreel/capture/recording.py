@@ -104,10 +104,11 @@ class Recording(MeshSequence):
 
     @property
     def files(self) -> tuple[Path, ...]:
-        """The files that the frames are made of: the description of the rig, and its pictures."""
+        """The files that the frames are made of: the rig's description, its pictures, and those of usual depths."""
         described = [path for path in (self.rig.folder / RIG, self.rig.folder / SINGLE) if path.exists()]
         pictures = (*self.rig.files, *(camera.files for camera in self.rig.color_cameras))
-        return (*described, *(of[number] for number in self.numbers for of in pictures if number in of))
+        frames = (*described, *(of[number] for number in self.numbers for of in pictures if number in of))
+        return (*frames, *(path for path in self.steady.files if path not in set(frames)))
 
     @property
     def up(self) -> Up:

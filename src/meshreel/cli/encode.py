@@ -209,7 +209,7 @@ def summary_row(summary: Summary, frame_rate: float) -> dict[str, Any]:
                 "rms_m": group.fidelity.distance,
                 "worst_rms_m": group.fidelity.worst,
                 "normal_error_deg": group.fidelity.angle,
-                "least_covered": group.fidelity.covered,
+                "least_covered": group.fidelity.covered if math.isfinite(group.fidelity.covered) else None,
                 "least_covered_frame": round(group.fidelity.least),
                 "encoded_again": group.mended,
             }

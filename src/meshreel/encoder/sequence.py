@@ -251,7 +251,10 @@ class Encoder:
                 made = job.sequence, survey, job.scene, job.stages, self._masker, self._standing
                 self._scene = (*how, parts or take_apart(*made))
             except NoRoom as reason:
-                self._stands, self._moves = False, (f"{reason}: encoded as bodies, without a background",)
+                if self._masker is not None:
+                    raise InputError(f"{reason}: the masks call it still; look at them, or encode without") from None
+                remedy = "if it is a room, is it in metres? else give --scale"
+                self._stands, self._moves = False, (f"{reason}: encoded as bodies, without a background; {remedy}",)
                 return None
         return self._scene[2]
 
@@ -279,8 +282,9 @@ def _encode_scene(job: Job, file: BinaryIO, writer: ReelWriter, parts: Parts) ->
         "background and noise",
         parts.background.vertices,
         parts.background.faces,
+        parts.noise.places,
         parts.noise.rms,
-        parts.noise.deviation,
+        parts.noise.off,
     )
     job.stages.add("room", 0)
     states = colored_states(sequence, parts, job.scene, options.appearance)

@@ -63,15 +63,27 @@ def test_noise_has_a_place():
     points = np.random.default_rng(1).uniform(0, 4, (60_000, 3)) * [1, 1, 0]
     sigma = np.where(points[:, 0] < 2, 0.001, 0.01)
     noise = LocalNoise.of([points] * 2, [noisy(points, sigma, seed) for seed in (2, 3)], 0.2, 1.0)
-    rms, deviation, off = noise.at(np.array([[0.5, 2, 0], [3.5, 2, 0], [3.5, 2, 5]]))
-    for found in (rms, deviation, off):
+    for found in noise.at(np.array([[0.5, 2, 0], [3.5, 2, 0], [3.5, 2, 5]])):  # RMS, and with what frames are off
         assert found == pytest.approx([0.001, 0.01, 0.01], rel=0.25)
+
+
+def test_few_places_have_one_noise_and_none_has_no_noise():
+    points, sigma = np.random.default_rng(1).uniform(0, 4, (50, 3)), np.full(50, 0.003)
+    assert LocalNoise.of([points], [noisy(points, sigma, 2)], 0.1, 1.0).at(points[:2])[1] == pytest.approx(
+        0.003, rel=0.5
+    )
+    assert not LocalNoise.of([], [], 0.1, 1.0).at(points).any()
+
+
+def test_frames_whose_neighbours_are_empty_tell_nothing_of_rest():
+    frames = [plane(1.0, 30) if number % 2 else Mesh.empty() for number in range(16)]
+    assert not len(standing(frames).keys) and not is_scene(frames)
 
 
 def test_what_a_frame_is_off_as_a_whole_is_no_noise_of_a_shape():
     points = np.random.default_rng(1).uniform(0, 2, (30_000, 3)) * [1, 1, 0]
     gaps = [noisy(points, np.full(len(points), 0.001), seed, off) for seed, off in enumerate([0.02, -0.02, 0.05])]
-    rms, _, off = LocalNoise.of([points] * 3, gaps, 0.2, 1.0).at(np.array([[1.0, 1, 0]]))
+    rms, off = LocalNoise.of([points] * 3, gaps, 0.2, 1.0).at(np.array([[1.0, 1, 0]]))
     assert rms[0] == pytest.approx(0.001, rel=0.1) and off[0] > 0.015
 
 

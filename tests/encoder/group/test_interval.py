@@ -59,7 +59,7 @@ def test_a_frame_is_found_by_its_number_and_by_no_other(name: str):
 
 
 def test_the_noise_of_a_place_is_in_units_of_that_of_the_body():
-    local = LocalNoise(np.array([[2.0, 0, 0]]), *np.full((3, 1), 0.006))
+    local = LocalNoise(np.array([[2.0, 0, 0]]), *np.full((2, 1), 0.006))
     interval = Interval(MESHES[2:5], 0.001, place=Placement(4.0, (0.0, 0.0, 0.0)), local=local)
     points = np.array([[0.5, 0, 0], [0.6, 0.0, 0]])
     assert interval.unevenness(points) == pytest.approx(1.5)

@@ -48,6 +48,6 @@ def test_groups_that_hold_are_those_of_the_recipe(name: str):
 
 
 def test_where_nothing_holds_there_is_an_error_and_no_file(monkeypatch):
-    monkeypatch.setattr("meshreel.encoder.run.judge.NEAR", (0.0, 0.0))
+    monkeypatch.setattr("meshreel.encoder.run.judge.NEAR", 0.0)
     with pytest.raises(InputError, match=r"frames 3 to \d of track 0: neither a template nor a mesh"):
         groups_of(Interval(frames_of(body(1, 3)), first_frame=3), recipe())

@@ -104,7 +104,7 @@ def rolling(tmp_path_factory):
 
 def noise_of(deviation: float) -> LocalNoise:
     """The same noise everywhere, m."""
-    return LocalNoise(np.zeros((1, 3)), *np.full((3, 1), deviation))
+    return LocalNoise(np.zeros((1, 3)), *np.full((2, 1), deviation))
 
 
 def test_a_scene_comes_back_as_it_was_without_its_noise(rolling):

@@ -58,7 +58,7 @@ class FrameSurface:
     ) -> tuple[Array, Array]:
         """Return squared distances of points from their `hits` on the frame, and of vertices `near` from points `back`.
 
-        Where the frame is noisier, a distance counts for as much less.
+        They are in units of the square of the noise there, relative to all noise.
         """
         ahead, behind = ((hits.points - points) ** 2).sum(axis=1), ((back - self.mesh.vertices[near]) ** 2).sum(axis=1)
         if self.uneven is None:

@@ -101,7 +101,7 @@ def standing(frames: Frames) -> Standing:
     """Measure the regions of a sequence's surface in `PROBES` frames, and in the frames before and after each."""
     last, some = len(frames) - 1, evenly(len(frames), PROBES)
     middles = sorted({min(max(number, 1), last - 1) for number in some} if last > 2 else some)
-    probes = {number: _Probe.of(frames[number]) for number in middles if not frames[number].is_empty}
+    probes = {number: _Probe.of(mesh) for number in middles if not (mesh := frames[number]).is_empty}
     asked = dict[int, list[tuple[_Probe, bool]]]()  # by frame: probes whose samples are looked for, as at another time
     for middle, probe in probes.items():
         for number in sorted({max(middle - 1, 0), min(middle + 1, last)} - {middle}):
@@ -113,7 +113,9 @@ def standing(frames: Frames) -> Standing:
             surface = Surface(mesh)
             for probe, is_far in those:
                 (probe.far if is_far else probe.beside).append(probe.offsets(surface))
-    return _regions(list(probes.values()), isinstance(frames, CapturedSequence) and frames.depth is not None)
+    # Two frames tell nothing of noise; where a sensor is known, too, only what a region does on its own counts then.
+    sensed = len(frames) > 2 and isinstance(frames, CapturedSequence) and frames.depth is not None
+    return _regions([probe for probe in probes.values() if probe.beside], sensed)
 
 
 @dataclass(frozen=True, slots=True)
@@ -209,7 +211,7 @@ def _as_a_whole(
 
 @dataclass(frozen=True, slots=True)
 class LocalNoise:
-    """Distances of surface from the truth, by place: measured where surface rests, and as near to that elsewhere.
+    """Distances of surface from the truth, by place: measured where surface rests, elsewhere as at places most alike.
 
     What a frame is off as a whole is no noise of a shape: a sensor may measure everything 2 cm too far in one frame and
     too near in the next, and each to a millimetre.
@@ -217,7 +219,6 @@ class LocalNoise:
 
     places: Float64[np.ndarray, "C 3"]  # m
     rms: Float64[np.ndarray, " C"]  # m, of a shape, without its tails
-    deviation: Float64[np.ndarray, " C"]  # m, the same by the median, as a standard deviation
     off: Float64[np.ndarray, " C"]  # m, deviation from the place, with what a frame is off as a whole
     cameras: tuple[Camera, ...] = ()  # depth cameras that stand still; without them, near places are alike
 
@@ -235,32 +236,35 @@ class LocalNoise:
         """
         points, gap = np.concatenate([np.zeros((0, 3)), *places]), np.concatenate([np.zeros(0), *gaps])
         if not len(points):
-            return LocalNoise(points, gap, gap, gap)
+            return LocalNoise(points, gap, gap)
         frame = np.repeat(np.arange(len(places)), [len(some) for some in places])
         around = np.unique(Lattice(np.round(points[0], 6), wide).keys(points), return_inverse=True)[1]
         group = around * len(places) + frame
         shape = gap - _as_a_whole(points, gap, group, int(group.max()) + 1)
         lattice = Lattice(np.round(points[0], 6), fine)
         keys, cell = np.unique(lattice.keys(points), return_inverse=True)
+        if (np.bincount(cell) < FEWEST).all():  # too few anywhere: all places are one
+            keys, cell = keys[len(keys) // 2][None], np.zeros_like(cell)
         off, enough = _deviations(gap, cell, len(keys), 1.0)
+        enough |= len(keys) == 1
         deviation, _ = _deviations(shape, cell, len(keys), 1.0)
         usual = np.abs(shape) <= TAIL * deviation[cell]
         squares = np.bincount(cell[usual], shape[usual] ** 2, len(keys))
         rms = np.sqrt(squares / np.maximum(np.bincount(cell[usual], minlength=len(keys)), 1))
-        return LocalNoise(lattice.centers(keys)[enough], rms[enough], deviation[enough], off[enough], cameras)
+        return LocalNoise(lattice.centers(keys)[enough], rms[enough], off[enough], cameras)
 
     @property
     def mean(self) -> float:
         """RMS over all places, m."""
         return float(np.sqrt((self.rms**2).mean())) if len(self.rms) else 0.0
 
-    def at(self, points: Float64[np.ndarray, "N 3"]) -> Float64[np.ndarray, "3 N"]:
-        """Return RMS, deviation and `off` at points, m: the medians of the places most like each."""
+    def at(self, points: Float64[np.ndarray, "N 3"]) -> Float64[np.ndarray, "2 N"]:
+        """Return `rms` and `off` at points, m: the medians of the places most like each."""
         if not len(self.rms):
-            return np.zeros((3, len(points)))
+            return np.zeros((2, len(points)))
         tree = cKDTree(self._conditions(self.places))
         near = tree.query(self._conditions(points), k=np.arange(1, min(NEAREST, len(self.rms)) + 1))[1]
-        return np.stack([np.median(some[near], axis=1) for some in (self.rms, self.deviation, self.off)])
+        return np.stack([np.median(some[near], axis=1) for some in (self.rms, self.off)])
 
     def _conditions(self, points: Float64[np.ndarray, "N 3"]) -> Float64[np.ndarray, "N D"]:
         """Return on what the noise of a place depends: where in a picture it is, and how far from the camera."""

@@ -1,15 +1,17 @@
 """Depth pictures without the error that a sensor makes in a frame as a whole.
 
-Some sensors measure single frames as a whole some centimetres too far: what stands still and what moves is then off
-alike. Such an error is told by the pixels' usual depth, where cameras stand still. It is new in every frame, as noise
-is; what goes on from a frame to the next may be a body that moves and fills the picture, and is left alone, as is an
-error that is smaller than what single pixels are off.
+Some sensors measure frames as a whole some centimetres too far: what stands still and what moves is then off by about
+one share of its depth. Such an error is told by the pixels' usual depth, where cameras stand still. A camera's errors
+are taken out if they are new in every frame, as noise is; what goes on from a frame to the next may be a body that
+moves and fills the picture. One that is smaller than what single pixels are off is left alone, and so are all of a
+camera of whose frames that are looked at none has one.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -23,7 +25,7 @@ FRAMES = 32  # of a recording, which tell the usual depth of each pixel (guess)
 OFTEN = 0.5  # least share of these in which a pixel has a depth (guess)
 WIDE = 3.0  # times `apart`: what differs from the usual depth by more is something else (guess)
 AGREE = 0.5  # least share of the pixels that must agree on an error (guess)
-PROBES = 16  # frames of which, with those before and after each, errors are asked whether they are new in each (guess)
+PROBES = 16  # frames, each with its neighbours, in which errors are tested for being independent (guess)
 JUMPS = 4.0  # times the mean square that noise has by second differences: motion has 5 and more, noise 1 (guess)
 MEDIAN = 0.6745  # of an absolute value, in standard deviations
 
@@ -31,13 +33,14 @@ MEDIAN = 0.6745  # of an absolute value, in standard deviations
 class SteadyDepth:
     """The depth pictures of a rig, corrected frame by frame."""
 
-    def __init__(self, rig: Rig) -> None:
+    def __init__(self, rig: Rig, jumps: dict[int, bool] | None = None) -> None:
+        """Take a rig, and of each camera, by number, whether its errors are new in every frame, where it is known."""
         self.rig = rig
         self._usual = dict[int, Float32[np.ndarray, "H W"]]()  # units, of each camera; 0: unknown
-        self._jumps = dict[int, bool]()  # by camera, whether its errors are new in every frame
+        self._jumps = dict(jumps or {})
 
     def __reduce__(self) -> Any:
-        return SteadyDepth, (self.rig,)  # what was read is read again where it is needed
+        return SteadyDepth, (self.rig, self._jumps)  # usual depths are read again where a camera has errors
 
     def pictures(self, frame: int) -> list[DepthPicture | None]:
         """Return the pictures of a frame. Errors as in `Rig.depth_pictures`."""
@@ -45,7 +48,8 @@ class SteadyDepth:
         for number, picture in enumerate(pictures):
             if error := self._wrong(number, picture):
                 assert picture is not None
-                pictures[number] = replace(picture, depth=np.rint(picture.depth / (1 + error)).astype(np.uint16))
+                depth = np.clip(np.rint(picture.depth / (1 + error)), 0, np.iinfo(np.uint16).max)
+                pictures[number] = replace(picture, depth=depth.astype(np.uint16))
         return pictures
 
     def errors(self, frames: Sequence[int]) -> list[list[float]]:
@@ -53,18 +57,27 @@ class SteadyDepth:
         each = zip(*(self.rig.depth_pictures(frame) for frame in frames), strict=True)
         return [[self._wrong(k, one) for one in some] for k, some in enumerate(each)]
 
+    @property
+    def files(self) -> list[Path]:
+        """The pictures that tell the usual depths of cameras whose errors are taken out."""
+        wrong = [number for number, jumps in self._jumps.items() if jumps]
+        return [self.rig.files[number][frame] for number in wrong for frame in self._usual_frames(number)]
+
+    def _usual_frames(self, number: int) -> list[int]:
+        frames = sorted(self.rig.files[number])
+        return [frames[k] for k in evenly(len(frames), FRAMES)]
+
     def _wrong(self, number: int, picture: DepthPicture | None) -> float:
         """Return the error to take out of a camera's picture."""
-        error = 0.0 if picture is None else self._error(number, picture)
-        return error if error and self._are_jumps(number) else 0.0
+        return self._error(number, picture) if picture is not None and self._are_jumps(number) else 0.0
 
     def _are_jumps(self, number: int) -> bool:
         """Return whether the errors of a camera are new in every frame: motion nearly cancels in second differences."""
         if number not in self._jumps:
             frames = sorted(self.rig.files[number])
             middles = evenly(len(frames) - 2, PROBES) if len(frames) > 2 else []
-            pictures = {k: self.rig.depth_pictures(frames[k])[number] for m in middles for k in (m, m + 1, m + 2)}
-            found = {k: 0.0 if one is None else self._error(number, one) for k, one in pictures.items()}
+            probed, camera = sorted({m + k for m in middles for k in range(3)}), self.rig.cameras[number]
+            found = {k: self._error(number, camera.picture(self.rig.depth(number, frames[k]))) for k in probed}
             e = np.array([[found[m + k] for k in range(3)] for m in middles]).reshape(-1, 3)
             second = ((e[:, 0] - 2 * e[:, 1] + e[:, 2]) ** 2).mean() / 6 if len(e) else 0.0
             self._jumps[number] = bool(second > 0 and (e**2).mean() <= JUMPS * second)
@@ -85,8 +98,7 @@ class SteadyDepth:
     def _usual_depth(self, number: int) -> Float32[np.ndarray, "H W"]:
         """Return the median depth of each pixel of a camera, in its units; 0 where it seldom has one."""
         if number not in self._usual:
-            frames = sorted(self.rig.files[number])
-            some = sorted({frames[int(k)] for k in np.linspace(0, len(frames) - 1, FRAMES)})
+            some = self._usual_frames(number)
             stack = np.sort(np.stack([self.rig.depth(number, frame) for frame in some]), axis=0)
             count = (stack > 0).sum(axis=0)
             middle = len(some) - count + count // 2  # those without a depth are first

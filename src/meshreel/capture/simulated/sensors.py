@@ -32,7 +32,7 @@ class SensorOptions:
     deviation: tuple[float, float, float] = (0.005, 0.005, 0.0)  # m, of 1, z and z^2 at a depth z: `depth_noise`
     rim: tuple[float, float] = (0.0, 0.0)  # at the corners, less with the square towards the middle: m too far, as by
     # light that comes around; share by which noise is larger
-    baseline: float = 0.0  # m, to the other lens or projector on the left: what it does not see is not measured
+    baseline: float = 0.0  # m, to the other lens or projector on the right: what it does not see is not measured
     window: int = 1  # pixels, side of a square in which noise is alike; with a baseline, near surface is wider by half
     step: float = 0.0  # pixels of disparity that depths are rounded to
     smooth: float = 0.0  # pixels, standard deviation of a filter over the picture
@@ -54,27 +54,29 @@ def _camera(width: int, height: int, focal: float, near: float, far: float) -> D
 
 # Cameras on the market, at the origin, and their errors. A number that the source does not give is a guess.
 SENSORS = {
-    # Structured light. Khoshelham and Elberink 2012: focal length 580 pixels, 0.5 to 5 m, deviation 1.425e-3 z^2 m,
+    # Structured light. Khoshelham and Elberink 2012: focal length 586 pixels, 0.5 to 5 m, deviation 1.425e-3 z^2 m,
     # half a step of disparity, .41 unrounded. Konolige and Mihelich, ROS kinect_calibration: baseline 7.5 cm,
     # windows of 9 x 9 pixels, steps of 1/8 pixel.
     "kinect_v1": (
-        _camera(640, 480, 580.0, 0.5, 5.0),
+        _camera(640, 480, 586.0, 0.5, 5.0),
         SensorOptions(1.0, 75.0, 0.005, 0.0, deviation=(0.0, 0.0, 1.17e-3), baseline=0.075, window=9, step=1 / 8),
     ),
-    # Time of flight. Microsoft: 512 x 424 pixels of 70 x 60 degrees, 0.5 to 4.5 m. Yang et al. 2015 (IEEE Sensors J.
-    # 15(8)): errors below 2 mm in the middle, above 4 mm in the corners.
+    # Time of flight. Microsoft: 512 x 424 pixels of 70 x 60 degrees, 0.5 to 4.5 m. Fankhauser et al. 2015 (ICAR):
+    # deviation of about 1.3, 1.7 and 4.3 mm at 1, 2 and 4 m. Yang et al. 2015 (IEEE Sensors J. 15(8)): errors below
+    # 2 mm in the middle, above 4 mm in the corners.
     "kinect_v2": (
         _camera(512, 424, 365.0, 0.5, 4.5),
-        SensorOptions(1.0, 80.0, 0.002, 0.5, deviation=(0.002, 0.0, 0.0), rim=(0.004, 1.0)),
+        SensorOptions(1.0, 80.0, 0.002, 0.5, deviation=(0.001, 0.0, 2e-4), rim=(0.004, 1.0)),
     ),
     # Time of flight. Microsoft, Azure Kinect DK hardware specifications, NFOV unbinned: 640 x 576 pixels of 75 x 65
-    # degrees, 0.5 to 3.86 m, deviation up to 17 mm, here at the far end; systematic error up to 11 mm + 0.1 % of depth.
+    # degrees, 0.5 to 3.86 m, deviation up to 17 mm, here at the far end; systematic error up to 11 mm + 0.1 %
+    # of depth, here at the corners. Focal length: that of its calibrations, for the lens bends (guess).
     "azure_kinect": (
-        _camera(640, 576, 430.0, 0.5, 3.86),
+        _camera(640, 576, 504.0, 0.5, 3.86),
         SensorOptions(1.0, 80.0, 0.002, 0.3, deviation=(0.0, 0.0, 1.14e-3), rim=(0.011, 0.5)),
     ),
     # Active stereo. Intel, D400 datasheet: 848 x 480 pixels of 87 x 58 degrees, baselines of 50 and 95 mm; Tuning depth
-    # cameras: deviation of .08 pixels, z^2 / (f b) times that. Keselman et al. 2017: windows of 7 x 7 pixels.
+    # cameras: deviation of .08 pixels, z^2 / (f b) times that. windows of 7 x 7 pixels (guess).
     "d435": (
         _camera(848, 480, 447.0, 0.28, 4.0),
         SensorOptions(1.0, 80.0, 0.005, 0.0, deviation=(0.0, 0.0, 3.58e-3), baseline=0.05, window=7, step=1 / 32),
@@ -83,14 +85,14 @@ SENSORS = {
         _camera(848, 480, 447.0, 0.6, 6.0),
         SensorOptions(1.0, 80.0, 0.005, 0.0, deviation=(0.0, 0.0, 1.88e-3), baseline=0.095, window=7, step=1 / 32),
     ),
-    # Scanning LiDAR. Intel, L515 datasheet: 1024 x 768 pixels of 70 x 55 degrees, 0.25 to 9 m, deviation 2.5 mm at 1 m
-    # and 15.5 mm at 9 m.
+    # Scanning LiDAR. Intel, L515 datasheet: 1024 x 768 pixels of 70 x 55 degrees, 0.25 to 6.5 m, deviation 2.5 mm at
+    # 1 m and 15.5 mm at 9 m, which are of 640 x 480 pixels.
     "l515": (
-        _camera(1024, 768, 734.0, 0.25, 9.0),
+        _camera(1024, 768, 734.0, 0.25, 6.5),
         SensorOptions(1.0, 80.0, 0.005, 0.2, deviation=(8.75e-4, 1.625e-3, 0.0)),
     ),
-    # LiDAR of phones. Apple, ARKit sceneDepth: 256 x 192 pixels, to 5 m, with a confidence, between 24 x 24 spots, 10
-    # pixels apart. Luetzenburg et al. 2021 (Sci. Rep. 11): 1 cm.
+    # LiDAR of phones. Apple, ARKit sceneDepth: 256 x 192 pixels, to 5 m, with a confidence, between 24 x 24 spots, 8 to
+    # 11 pixels apart. Luetzenburg et al. 2021 (Sci. Rep. 11): small objects are right to 1 cm; as noise, a guess.
     "iphone_lidar": (
         _camera(256, 192, 193.0, 0.2, 5.0),
         SensorOptions(1.0, 80.0, 0.002, 0.3, deviation=(0.01, 0.0, 0.0), window=9, smooth=1.0, trusted=0.05),
@@ -139,11 +141,12 @@ def measured(
     if sensor.smooth:
         share = gaussian_filter(seen.astype(np.float64), sensor.smooth)
         filtered = gaussian_filter(depth, sensor.smooth) / np.maximum(share, 1e-9)
-        seen &= np.abs(filtered - depth) <= sensor.trusted * depth
+        if math.isfinite(sensor.trusted):
+            seen &= np.abs(filtered - depth) <= sensor.trusted * depth
         depth = filtered
     white = random.standard_normal(depth.shape)
     if sensor.window > 1:
-        white = uniform_filter(white, sensor.window) * sensor.window  # of the same deviation
+        white = uniform_filter(white, sensor.window, mode="wrap") * sensor.window  # of the same deviation
     rows, columns = (np.linspace(-1, 1, count) ** 2 / 2 for count in depth.shape)
     away = rows[:, None] + columns  # squared distance from the middle of the picture: 1 at its corners
     constant, linear, square = sensor.deviation
@@ -164,10 +167,11 @@ def _matched(depth: Depth, strength: float, window: int) -> Depth:
     from scipy.ndimage import minimum_filter
 
     disparity = strength / depth
-    other = np.arange(depth.shape[1]) - disparity  # the column in the picture of the lens or projector on the left
+    other = np.arange(depth.shape[1]) - disparity  # the column in the picture of the lens or projector on the right
     nearest = np.minimum.accumulate(other[:, ::-1], axis=1)[:, ::-1]  # surface farther right that lies before it there
     wider = minimum_filter(depth, window)
-    return np.where(strength / wider - disparity > MIXED, wider, np.where(nearest < other, np.inf, depth))
+    hidden = (nearest < other) | (other < 0)
+    return np.where(strength / wider - disparity > MIXED, wider, np.where(hidden, np.inf, depth))
 
 
 def _flown(depth: Depth, flying: float, random: np.random.Generator) -> Depth:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, field
@@ -108,12 +109,12 @@ def warnings_of_scene(parts: Parts, moves: bool, dropped: int) -> Iterator[str]:
 
 
 def least_covered(groups: Sequence[GroupSummary]) -> GroupSummary | None:
-    """Return the group with the frame of whose surface the least share is decoded; None if no frame has any.
+    """Return the group with the frame of whose surface the least share is decoded; None where none is judged.
 
     Of equal ones it is that of the first track and frame, as where parts of a file are joined.
     """
-    shown = [group for group in groups if group.form != Form.EMPTY]
-    return min(shown, key=lambda one: (shortened(one.fidelity.covered), one.track, one.fidelity.least), default=None)
+    judged = [group for group in groups if math.isfinite(group.fidelity.covered)]
+    return min(judged, key=lambda one: (shortened(one.fidelity.covered), one.track, one.fidelity.least), default=None)
 
 
 def warnings_of_groups(groups: Sequence[GroupSummary]) -> Iterator[str]:
@@ -122,8 +123,8 @@ def warnings_of_groups(groups: Sequence[GroupSummary]) -> Iterator[str]:
     if again:
         count = sum(group.frame_count for group in again)
         forms = " and ".join(sorted({group.form.name.lower() for group in again}))
-        text = f"{count} frames, the least covered of which is frame {round(again[0].fidelity.least)} of track"
-        yield f"{text} {again[0].track}, were lost by what was tried first, and are encoded again, as {forms}"
+        first = f"frame {again[0].fidelity.least:.0f} of track {again[0].track} is one of them"
+        yield f"{count} frames were not shown by what was tried first, and are encoded again, as {forms}: {first}"
 
 
 def warnings_of_colors(groups: Sequence[GroupSummary], states: Sequence[Static] = ()) -> Iterator[str]:

@@ -186,7 +186,7 @@ class Fidelity(Target):
     """Error measures of decoded frames against the originals."""
 
     psnr: float = 0.0  # d2_psnr_paper, mean over the frames, dB; larger is better
-    covered: float = 1.0  # share of the surface of its least covered frame
+    covered: float = math.inf  # share of the surface of its least covered frame; infinite: not judged
     least: float = 0.0  # the number of that frame
 
     def reaches(self, target: Target) -> bool:

@@ -34,9 +34,8 @@ class ShownFrame:
     ) -> None:
         """`uneven`: the noise of each vertex, in units of all noise; squared distances are in units of its square."""
         original, self._free = surface.mesh, free
-        corners = np.ones(len(original.vertices)) if uneven is None else uneven**2
-        middles = corners[original.faces].mean(axis=1) if uneven is not None else np.ones(len(original.faces))
-        self._uneven = np.concatenate([corners, middles])
+        corners = np.ones(len(original.vertices)) if uneven is None else uneven
+        self._uneven = np.concatenate([corners, corners[original.faces].mean(axis=1)]) ** 2
         self.original, self.decoded, self.surface, self.knows_free = original, decoded, surface, free is not None
         self.points, areas = _samples(original)
         shares = np.bincount(original.faces.reshape(-1), np.repeat(areas / 12, 3), len(original.vertices))

@@ -42,7 +42,7 @@ APART, LEAST_APART = 4.0, 0.03  # deviations, and m: what is farther from the ro
 OUTLIER = 3.0  # times the segmentation's `noise`: still surface farther from the background is no noise (guess)
 SAMPLES = 20_000  # vertices of a frame at which noise is measured (guess)
 LOOKED_AT = 4  # frames in which surface that is called still is asked whether it rests (guess)
-MOVED = 0.02  # share of the still surface that may be elsewhere at other times: rooms have less than .001
+MOVED = 0.02  # share of the still surface that may be elsewhere at other times: rooms have less than .01
 MOVED_SENSED = 0.2  # the same in a recording, whose sensors' errors may drift: rooms have up to .055
 
 
@@ -86,7 +86,7 @@ class Parts:
         """Return True for each vertex that is so far from the room that it is not of it."""
         gaps = room.distances(mesh.vertices)
         off = gaps > LEAST_APART
-        off[off] = gaps[off] > APART * self.noise.at(mesh.vertices[off])[2]
+        off[off] = gaps[off] > APART * self.noise.at(mesh.vertices[off])[1]
         return off
 
 
@@ -236,13 +236,12 @@ def _measured(
         still = part_of(mesh, ~moves)
         room = room_after(sum(change.frame <= number for change in changes))
         if room is not None and not still.is_empty:
-            hits = room.closest(still.vertices)
-            ways = still.vertices - hits.points
-            gaps, chosen = np.linalg.norm(ways, axis=1), area_samples(still, SAMPLES)
-            chosen = chosen[gaps[chosen] < far]
-            places.append(still.vertices[chosen])
-            ahead = (ways * room.normals[hits.faces]).sum(axis=1)
-            distances.append(np.copysign(gaps, ahead)[chosen])
+            points = still.vertices[area_samples(still, SAMPLES)]
+            hits = room.closest(points)
+            ways = points - hits.points
+            gaps, ahead = np.linalg.norm(ways, axis=1), (ways * room.normals[hits.faces]).sum(axis=1)
+            places.append(points[gaps < far])
+            distances.append(np.copysign(gaps, ahead)[gaps < far])
     stages.reach("noise", 1.0)
     fine = REGION * segmentation.cell
     wide = max(fine, float(np.median(sizes or [0.0])) / 2)
@@ -261,7 +260,7 @@ def pack_parts(parts: Parts) -> bytes | None:
     arrays: dict[str, Any] = {
         "numbers": [parts.survey.unit, by.cell, by.lattice.size, by.island],
         "noise places": parts.noise.places,
-        "noise": np.stack([parts.noise.rms, parts.noise.deviation, parts.noise.off]),
+        "noise": np.stack([parts.noise.rms, parts.noise.off]),
         "origin": by.lattice.origin,
         "keys": by.keys,
         "chosen": by.chosen,
@@ -285,8 +284,8 @@ def unpack_parts(data: bytes, sequence: CapturedSequence, survey: Survey) -> Par
     try:
         with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
             unit, cell, size, island = arrays["numbers"].tolist()
-            rms, spread, off = arrays["noise"]
-            noise = LocalNoise(arrays["noise places"], rms, spread, off, _cameras(sequence))
+            rms, off = arrays["noise"]
+            noise = LocalNoise(arrays["noise places"], rms, off, _cameras(sequence))
             rest = Rest(arrays["until"], arrays["since"])
             places = Lattice(arrays["origin"], size), arrays["keys"], arrays["chosen"]
             by = ByPlace(cell, *places, rest, island, _colors(arrays, sequence))

@@ -85,11 +85,11 @@ def scene_intervals(job: Job, parts: Parts, tracks: Tracks) -> Iterator[Interval
 
 
 def _noise(meshes: Sequence[Mesh], parts: Parts) -> float:
-    """Return the noise of a body, normalised: as much as the surface has that stands still around it."""
+    """Return the RMS noise of a body, normalised: that of the places most like its own where surface rests."""
     some = [meshes[number] for number in evenly(len(meshes), MEASURED)]
     points = np.concatenate([mesh.vertices[area_samples(mesh, SAMPLES)] for mesh in some])
     squared = float((parts.noise.at(points)[0] ** 2).mean()) if len(points) else 0.0
-    return min(squared**0.5 / parts.survey.unit, MOST_NOISE)
+    return min(squared**0.5, MOST_NOISE * max(mesh.diagonal for mesh in some)) / parts.survey.unit
 
 
 def key_intervals(sequence: MeshSequence, segmentation: Segmentation, options: EncoderOptions) -> Iterator[range]:

@@ -72,7 +72,7 @@ def encode_static(
 
     def coded(mesh: Mesh) -> tuple[bytes, Mesh]:
         # Where there is less noise than usual, more would be spent on little: a room's background would double.
-        most = options.coarse * np.maximum(parts.noise.at(mesh.vertices)[2] / survey.unit, usual)
+        most = options.coarse * np.maximum(parts.noise.at(mesh.vertices)[1] / survey.unit, usual)
         return _coded(mesh.at((mesh.vertices - survey.center) / survey.unit), most, step)
 
     payload, state = coded(parts.background)
