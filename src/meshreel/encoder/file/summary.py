@@ -99,13 +99,14 @@ def warnings_of(survey: Survey) -> Iterator[str]:
 
 
 def warnings_of_scene(parts: Parts, moves: bool, dropped: int) -> Iterator[str]:
-    """Yield warnings of a scene in which nothing moves, or of `dropped` faces of moving surface that the file lacks."""
+    """Yield warnings of a scene in which nothing moves, or of `dropped` faces that the file lacks."""
     if not moves:
         least = 2 * parts.segmentation.cell
         text = f"nothing moves by more than {least:.2g} m, or no view sees it: the whole scene is background"
         yield f"{text}; if something does, encode with --dynamic-only"
     if dropped:
-        yield f"{dropped} faces of bits that move, far from all bodies and there only for a moment, are not kept"
+        text = f"{dropped} faces of bits that move or that the room lacks, far from all bodies, are not kept:"
+        yield f"{text} they are small, or there only for a moment; to keep all, encode with --dynamic-only"
 
 
 def least_covered(groups: Sequence[GroupSummary]) -> GroupSummary | None:

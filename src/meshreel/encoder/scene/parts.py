@@ -70,17 +70,23 @@ class Parts:
         """The room after so many changes, prepared for queries; None where nothing stands in it."""
         return _rooms(self.background, self.changes)
 
-    def moving(self, frame: int, mesh: Mesh) -> Mesh:
-        """Cut the surface that moves out of a frame, with what the room does not have there."""
+    def moving(self, frame: int, mesh: Mesh) -> tuple[Mesh, int]:
+        """Cut the surface that moves out of a frame, with what the room does not have there.
+
+        Return it, and the number of faces of which neither has anything: bits that are too small, or seldom measured.
+        """
         by, moves = self.segmentation, self.segmentation.moving(frame, mesh)
-        if (room := self.room(sum(change.frame <= frame for change in self.changes))) is not None:
-            more = beyond(mesh, moves, self._off(mesh, room)) & ~moves
+        room = self.room(sum(change.frame <= frame for change in self.changes))
+        off = np.ones(len(mesh.vertices), bool) if room is None else self._off(mesh, room)
+        if room is not None:
+            more = beyond(mesh, moves, off) & ~moves
             if self.free:  # room that is measured now and then was not seen through in other frames
                 middles = mesh.vertices[mesh.faces[more]].mean(axis=1)
                 seen = sum(free.at(middles).astype(np.int64) for free in self.free)
                 more[more] = seen >= min(SEEN_THROUGH, len(self.free))
             moves |= more
-        return with_ring(mesh, moves, by.cell, self.room(0))
+        lost = int((off[mesh.faces].all(axis=1) & ~moves).sum())
+        return with_ring(mesh, moves, by.cell, self.room(0)), lost
 
     def _off(self, mesh: Mesh, room: Surface) -> Bool[np.ndarray, " V"]:
         """Return True for each vertex that is so far from the room that it is not of it."""

@@ -72,7 +72,9 @@ def scene_intervals(job: Job, parts: Parts, tracks: Tracks) -> Iterator[Interval
     longest = job.recipe.longest(sequence.frame_rate)
     for frames in key_intervals(sequence, parts.segmentation, job.options):
         found = list[Interval]()
-        for track, meshes in tracks.of([parts.moving(k, sequence[k]) for k in frames]):
+        moving, lost = zip(*(parts.moving(k, sequence[k]) for k in frames), strict=True)
+        tracks.dropped += sum(lost)
+        for track, meshes in tracks.of(moving):
             normalised = [survey.normalise(mesh) for mesh in meshes]
             for cut in _cut(normalised, frames, survey, longest):
                 some = normalised[cut.start : cut.stop]
