@@ -43,7 +43,8 @@ def test_a_plane_at_two_metres_deviates_as_is_published(name):
     middle = pictures[:, high // 2 - high // 8 : high // 2 + high // 8, wide // 2 - wide // 8 : wide // 2 + wide // 8]
     found = middle[middle > 0]
     assert found.std() == pytest.approx(PUBLISHED[name], rel=0.2) and found.mean() == pytest.approx(2.0, abs=4e-3)
-    assert (pictures > 0).mean() > 0.99
+    band = int(camera.view.focal[0] * errors.baseline / 2.0) + 2  # columns that the other lens does not have
+    assert (pictures[:, :, band:] > 0).mean() > 0.99
 
 
 def test_the_rim_of_a_time_of_flight_camera_measures_too_far_and_noisier():
@@ -80,7 +81,8 @@ def test_fattening_widens_a_silhouette_by_half_the_window():
         136:344, 296:504
     ].all()
     slope = np.linspace(1.0, 3.0, 480)[:, None]  # as of a floor, steep but without a step
-    assert abs(taken(slope, STEREO, replace(EXACT, baseline=0.095, window=9)) - slope).max() < 1e-3
+    found = taken(slope, STEREO, replace(EXACT, baseline=0.095, window=9))
+    assert abs(found - slope)[:, int(STEREO.view.focal[0] * 0.095) + 1 :].max() < 1e-3  # others the other lens lacks
 
 
 def test_noise_is_alike_in_a_window():
