@@ -177,7 +177,8 @@ def test_bodies_need_not_be_nearer_to_noisy_frames_than_the_truth_is(preset, mon
     assert summary.scene is not None and noises
     target = quick(preset=preset).method.target
     for noise in noises:
-        assert 0.5 * NOISE < noise * video.reader.header.scale < 3 * NOISE
+        # Less than all: what a place is off as a whole is left out.
+        assert 0.4 * NOISE < noise * video.reader.header.scale < 3 * NOISE
         clean = target_of(ROLLING, target, 0.0).distance
         assert target_of(ROLLING, target, noise).distance == pytest.approx(np.hypot(clean, noise))
 
