@@ -162,6 +162,7 @@ def sequence() -> MeshList:
 def test_a_file_has_the_layer_where_it_pays_and_plays_without_it(sequence: MeshList, tmp_path, monkeypatch) -> None:
     monkeypatch.setattr("meshreel.analysis.follow.embedded.LOST", 1.0)  # else the frame with the knob is alone
     monkeypatch.setattr("meshreel.analysis.fit.frame.WRONG", 1.0)
+    monkeypatch.setattr("meshreel.encoder.run.judge.INVENTED", (1.0, 1.0))  # the knob pulls at the template
     encode(sequence, tmp_path / "with.reel", options=options())
     patched = meshreel.open(tmp_path / "with.reel")
     assert payload_bytes_by_purpose(patched.reader.read_chunk(0))["patches"] > 0
