@@ -119,6 +119,23 @@ def test_a_cut_has_no_means_of_the_whole_file_and_joins_without_them(tmp_path):
     assert meshreel.open(tmp_path / "c.reel").metadata["rms_m"] == 0.001
 
 
+def test_what_was_least_covered_is_joined_dropped_by_cuts_and_believed_of_no_forger(tmp_path):
+    (tmp_path / "a.reel").write_bytes(known(DATA, {"least_covered": [0.9, 1, 2]}))
+    (tmp_path / "b.reel").write_bytes(known(DATA, {"least_covered": [0.8, 0, 4]}))
+    concat([tmp_path / "a.reel", tmp_path / "b.reel"], tmp_path / "c.reel")
+    count = meshreel.open(tmp_path / "a.reel").reader.frame_count
+    assert meshreel.open(tmp_path / "c.reel").metadata["least_covered"] == [0.8, 0, count + 4]
+    cut(tmp_path / "a.reel", tmp_path / "d.reel", "1:3")
+    assert "least_covered" not in meshreel.open(tmp_path / "d.reel").metadata
+    for forged in ([1e308, 0, 1], [0.5, -3, 1], [0.5, 0, 1.5], ["0.3", 0, 1], [0.5, 0], 1, [0.5, [1], 2]):
+        (tmp_path / "b.reel").write_bytes(known(DATA, {"least_covered": forged}))
+        with pytest.raises(InputError, match="metadata"):
+            concat([tmp_path / "b.reel"] * 2, tmp_path / "e.reel")
+    (tmp_path / "b.reel").write_bytes(known(DATA, dict.fromkeys(MEANS, 1e200)))
+    with pytest.raises(InputError, match="metadata"):
+        concat([tmp_path / "b.reel"] * 2, tmp_path / "e.reel")
+
+
 def known(data: bytes, metadata: dict[str, object] | None = None) -> bytes:
     """A file with metadata as an encode writes them."""
     reader = ReelReader(BytesSource(data))
@@ -324,7 +341,7 @@ def test_tags_are_added_and_taken_away_and_those_that_readers_use_are_not(tmp_pa
     video = meshreel.open(tmp_path / "b.reel")
     assert video.metadata == meshreel.open(FILES[0]).metadata | {"title": "Grüße", "rights": ["x"]}
     assert records(video) == records(meshreel.open(FILES[0]))
-    for name in ("up", "edit", "part", "key_frames", "history", ""):
+    for name in ("up", "edit", "part", "key_frames", "history", "least_covered", "quality", "noise_m", "rms_m", ""):
         with pytest.raises(InputError, match="is no name for a tag"):
             tag(FILES[0], tmp_path / "c.reel", {name: 1})
     for value in ({1, 2}, float("nan")):

@@ -13,6 +13,7 @@ from ..edit.metadata import LEAST_COVERED
 from ..errors import FormatError
 from .console import Common, Flag
 
+ALL = 0.99995  # share from which on a frame is covered to 100.0 %
 MOST = 8  # rows of a table without --groups: all of them fit on a screen (guess)
 MOST_CONTENTS = 24  # largest number of rows of contents; above it, tracks are added up
 _LONGEST = 80  # largest number of shown characters of a recorded value
@@ -56,7 +57,10 @@ def _said(name: str, value: object) -> str:
     """Return recorded metadata as text; in words, the frame of whose surface the least share is decoded."""
     if name == LEAST_COVERED and isinstance(value, list) and [type(each) for each in value[1:]] == [int, int]:
         share, track, frame = value
-        return f"frame {frame} of track {track}" + (f", to {100 * share:.3g} %" if isinstance(share, float) else "")
+        known = isinstance(share, float)
+        if known and share >= ALL:
+            return "none, each to 100 %"
+        return f"frame {frame} of track {track}" + (f", to {100 * share:.3g} %" if known else "")
     return str(value)
 
 

@@ -20,12 +20,24 @@ from ..io.sequence import SequenceOptions
 from ..types import Up, check_up
 from .audio import Given, joined_audio, packed_audio
 from .copies import Edited, Piece, check_known, opened, piece_of, silent, written
-from .metadata import HISTORY, LAST, MEANS, PART, joined_metadata, place_in_whole, scaled_metadata, shared, up_metadata
+from .metadata import (
+    HISTORY,
+    LAST,
+    LEAST_COVERED,
+    MEANS,
+    PART,
+    RECORDED,
+    joined_metadata,
+    place_in_whole,
+    scaled_metadata,
+    shared,
+    up_metadata,
+)
 
 Name = str | Place
 Numbers = Sequence[Any] | np.ndarray
 Part = tuple[dict[str, Any], int]  # the metadata of a file, and its number of frames
-_OWN = ("key_frames", PART, HISTORY, ITEM, LAST, "up")  # metadata that `tag` does not change: others depend on them
+_OWN = (PART, HISTORY, ITEM, LAST, *RECORDED)  # metadata that `tag` does not change: others depend on them
 
 
 def cut(source: Name, output: Name, frames: str, at_keys: bool = False) -> Edited:
@@ -51,7 +63,7 @@ def cut(source: Name, output: Name, frames: str, at_keys: bool = False) -> Edite
         shown = range(first, first + edit.frame_count)
         intervals = reader.header.intervals[shown.start : shown.stop - 1]
         header = replace(reader.header, first_time=round(1e6 * reader.timestamp(shown.start)), intervals=intervals)
-        lost = (ITEM, PART) if len(shown) == count else (ITEM, PART, *MEANS)  # means are over all frames
+        lost = (ITEM, PART) if len(shown) == count else (ITEM, PART, LEAST_COVERED, *MEANS)  # which are of all frames
         metadata = {name: value for name, value in reader.metadata.items() if name not in lost}
         if behind := reader.header.intervals[shown.stop - 1 : shown.stop]:
             metadata[LAST] = behind[0]
@@ -204,7 +216,7 @@ def _check_alike(path: Place, reader: ReelReader, other: ReelReader, first: Plac
         ours, theirs = shared(other.metadata), shared(reader.metadata)
         joined_metadata(parts[-1:])
         begin, own = place_in_whole(parts[0][0]), place_in_whole(parts[-1][0])
-    except (KeyError, TypeError, ValueError) as error:
+    except (KeyError, TypeError, ValueError, OverflowError) as error:
         raise _unknown(path, error) from None
     if ours != theirs:
         text = f"{path}: differs from {first}: {first_difference(ours, theirs)}"

@@ -20,6 +20,7 @@ LEAST_COVERED = "least_covered"  # a share of a frame's surface, the track, and 
 MEANS = ("rms_m", "worst_rms_m", "d2_psnr_paper", "normal_error_deg")
 _OF_GROUPS = (KEYS, CANONICAL, LEAST_COVERED, *MEANS)
 _SHARED = ("preset", "quality", "noise_m", "up")  # that files are joined by
+RECORDED = (*_OF_GROUPS, *_SHARED)  # by an encoder
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +64,7 @@ def joined_metadata(parts: Sequence[tuple[dict[str, Any], int]]) -> tuple[dict[s
     """Return the metadata of a whole from those of its parts and their numbers of frames; and tags that differ.
 
     Key frames and means are joined where all parts have them: scenes have none, and cuts no means. Raises KeyError,
-    TypeError or ValueError for metadata that no encoder wrote.
+    TypeError, ValueError or OverflowError for metadata that no encoder wrote.
     """
     dropped = {PART, ITEM, LAST} | {name for name in _OF_GROUPS if not all(name in metadata for metadata, _ in parts)}
     every = (item for metadata, _ in reversed(parts) for item in metadata.items())  # of several tags the first counts
@@ -73,8 +74,8 @@ def joined_metadata(parts: Sequence[tuple[dict[str, Any], int]]) -> tuple[dict[s
     if KEYS in found:
         found[KEYS] = [first + key for first, metadata in placed for key in metadata[KEYS]]
     if LEAST_COVERED in found:
-        each = [(first, *metadata[LEAST_COVERED]) for first, metadata in placed]
-        found[LEAST_COVERED] = min([float(share), track, first + frame] for first, share, track, frame in each)
+        each = [(first, *_least(metadata[LEAST_COVERED])) for first, metadata in placed]
+        found[LEAST_COVERED] = min([share, track, first + frame] for first, share, track, frame in each)
     if CANONICAL in found:
         found[CANONICAL] = sum(metadata[CANONICAL] for metadata, _ in parts)
     if all(name in found for name in MEANS):
@@ -85,7 +86,7 @@ def joined_metadata(parts: Sequence[tuple[dict[str, Any], int]]) -> tuple[dict[s
 
 def tags_of(metadata: dict[str, Any]) -> set[str]:
     """Return the names of metadata that users gave."""
-    return metadata.keys() - {PART, ITEM, HISTORY, LAST, *_OF_GROUPS, *_SHARED}
+    return metadata.keys() - {PART, ITEM, HISTORY, LAST, *RECORDED}
 
 
 def scaled_metadata(metadata: dict[str, Any], scale: float) -> dict[str, Any]:
@@ -121,6 +122,13 @@ def up_metadata(up: Up) -> dict[str, Any]:
 def shortened(value: float) -> float | None:
     """Round to four significant digits; None if JSON has no such number."""
     return float(f"{value:.4g}") if math.isfinite(value) else None
+
+
+def _least(value: Any) -> tuple[float, int, int]:
+    share, track, frame = value
+    if not (0 <= share <= 1 and type(track) is type(frame) is int and min(track, frame) >= 0):
+        raise ValueError(f"{LEAST_COVERED} {value}: not a share from 0 to 1, a track and a frame")
+    return float(share), track, frame
 
 
 def _number(value: float | None) -> float:

@@ -163,7 +163,7 @@ class Encoder:
         if parts is None:
             survey = survey_job(job)
             return intervals_of(job, survey, tracked_bodies(job, survey)[0])
-        return scene_intervals(job, parts, Tracks(parts.segmentation.cell, job.scene.near))
+        return scene_intervals(job, parts, Tracks(parts.segmentation, job.scene.near))
 
     def parts(self, options: EncoderOptions) -> Parts | None:
         """Return the parts of the scene; None where the sequence is no scene, or `options.scene` is None."""
@@ -253,7 +253,7 @@ class Encoder:
             except NoRoom as reason:
                 if self._masker is not None:
                     raise InputError(f"{reason}: the masks call it still; look at them, or encode without") from None
-                remedy = "if it is a room, is it in metres? else give --scale"
+                remedy = "a room in another unit than metres needs --scale"
                 self._stands, self._moves = False, (f"{reason}: encoded as bodies, without a background; {remedy}",)
                 return None
         return self._scene[2]

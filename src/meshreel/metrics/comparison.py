@@ -21,6 +21,7 @@ from .color import COLORS, RENDERS, color_errors, render_errors
 from .distance import PSNR_CEILING, Original, SurfaceErrors, surface_errors
 from .mpeg import MEASURES, MpegOptions, mpeg_errors
 from .render import Remembered, ssim_normals
+from .surface_samples import used_surface
 from .viewpoints import AnyCamera, Box, ViewOptions, read_cameras, views_around
 
 Row = dict[str, Any]
@@ -121,6 +122,8 @@ def frame_row(original: Mesh | OriginalFrame, decoded: Mesh, cameras: Sequence[A
     """Return the metrics of one frame by name; SSIM only with cameras."""
     prepared = _prepared(original)
     mesh, row = prepared.mesh, _distance_row(surface_errors(prepared.surface, decoded))
+    if used_surface(decoded).is_empty:
+        row["invented"] = 0.0
     if mesh.is_colored and decoded.is_colored:
         row |= color_errors(mesh, decoded) | (render_errors(mesh, decoded, cameras) if cameras else {})
     return row | (ssim_normals(prepared.pictures, decoded, cameras) if cameras else {})
@@ -142,7 +145,7 @@ def aggregate(frames: Sequence[Row]) -> Row:
 def _distance_row(errors: SurfaceErrors) -> Row:
     row: Row = {"diagonal_m": errors.diagonal}
     row |= {name: getattr(errors, name) for name in ("d2_psnr_paper", "d1_psnr", "d2_psnr", "symmetric_psnr")}
-    row |= {"covered": errors.forward.covered, "invented": 1 - errors.backward.covered}
+    row |= {"covered": errors.forward.covered, "invented": max(1 - errors.backward.covered, 0.0)}
     row |= {"normal_error_deg": errors.angle, "normal_error_at_vertices_deg": errors.vertex_angle}
     for name, one_way in (("forward", errors.forward), ("backward", errors.backward)):
         row[f"rms_{name}_m"] = one_way.rms

@@ -12,6 +12,7 @@ from meshreel.analysis.scene.cut import NEVER, Rest, find_rest
 from meshreel.analysis.scene.labelling import ByPlace
 from meshreel.analysis.scene.places import Places, Tally
 from meshreel.analysis.scene.segmentation import segment
+from meshreel.analysis.scene.standing import Standing
 from meshreel.analysis.scene.views import place_views
 from meshreel.analysis.survey import survey_sequence
 from meshreel.coding.background import decode_background, decode_change
@@ -27,6 +28,14 @@ from meshreel.geometry.voxels import Lattice, neighbours, spread
 from meshreel.types import Mesh, MeshList, Placement
 
 FRAMES, LIFTED, PUT = 28, 9, 18  # at 4 frames a second
+
+
+@pytest.fixture(autouse=True, scope="module")
+def noisy() -> Iterator[None]:
+    """Scenes without noise are taken apart otherwise, and know no changes."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Standing, "same", 0.0)
+        yield
 
 
 def sheet(corner: tuple[float, ...], along: tuple[float, ...], across: tuple[float, ...], levels: int) -> Mesh:

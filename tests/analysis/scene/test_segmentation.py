@@ -120,8 +120,8 @@ def test_empty_frames_are_passed_over_and_nothing_moves_where_there_is_nothing()
 def test_edges_without_length_do_not_say_how_large_cells_are():
     flat = Mesh.of(np.zeros((3, 3)), [[0, 1, 2]])
     many = concatenate([*[flat] * 8000, room()])
-    assert 0.05 < segment(MeshList((many,) * 3)).lattice.size < 0.1
-    assert not segment(MeshList((flat,) * 3)).chosen.any()
+    assert 0.05 < segment(MeshList((many,) * 3)).cell < 0.1
+    assert not segment(MeshList((flat,) * 3)).moving(0, flat).any()
 
 
 # a square of 8 x 8 cells of 1 cm, as two faces each

@@ -5,8 +5,9 @@ import pytest
 
 from meshreel.analysis.scene.standing import LocalNoise, standing
 from meshreel.geometry.cameras import Camera, CameraPose
+from meshreel.geometry.topology import concatenate
 from meshreel.types import Mesh
-from tests.metrics.shapes import plane
+from tests.metrics.shapes import moved, plane
 from tests.scenes import is_scene
 from tests.small_scene import scene
 
@@ -53,6 +54,22 @@ def test_where_a_part_moves_that_part_is_told():
 
 def test_a_small_room_with_noise_is_a_scene():
     assert is_scene(scene(8))
+
+
+def test_frames_without_noise_have_places_that_are_the_same():
+    assert standing(scene(6, noise=0.0)).same > 0 == standing(scene(6)).same
+    assert standing(waving(0.01, 8.0)).same == 0  # nothing rests
+
+
+def test_tiles_that_bob_are_each_as_stiff_as_a_wall():
+    """Each with a phase of its own, some in a region: in regions this looks like noise."""
+    tile, random = plane(0.2, 4), np.random.default_rng(0)
+    places, phases = np.mgrid[0:12, 0:12].reshape(2, -1).T * 0.25, random.uniform(0, 2 * np.pi, 144)
+    frames = [
+        concatenate([moved(tile, (*at, 0.02 * np.sin(p + 1.3 * t))) for at, p in zip(places, phases, strict=True)])
+        for t in range(10)
+    ]
+    assert not is_scene(frames)
 
 
 def noisy(points: np.ndarray, sigma: np.ndarray, seed: int, off: float = 0.0) -> np.ndarray:

@@ -202,7 +202,7 @@ def test_colors_that_readers_would_refuse_are_left_out_and_the_summary_tells_of_
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(budget, "LIMITS", replace(budget.LIMITS, colors=0, per_byte=1))
-    body, room = COLORED[:2], [replace(mesh, colors=np.full(mesh.vertices.shape, 9, np.uint8)) for mesh in scene(2)]
+    body, room = COLORED[:2], [replace(mesh, colors=np.full(mesh.vertices.shape, 9, np.uint8)) for mesh in scene(4)]
     for meshes, lost in ((body, "2 frames"), (room, "the background")):
         summary = Encoder(welded(MeshList(tuple(meshes), 10.0))).encode(tmp_path / "bare.reel", quick())
         assert f"no colours of {lost}: they would cost a reader too much" in summary.warnings

@@ -12,10 +12,6 @@ from meshreel.types import MeshList
 from tests.scales import SCALES, Scale, room
 from tests.small_options import quick
 
-MARKS = {
-    "a town": pytest.mark.xfail(strict=True, raises=AssertionError, reason="a lorry is smaller than a cell of a town"),
-}
-
 
 def worst(scale: Scale, video: meshreel.Video) -> float:
     """The RMS distance from what truly moves to what is decoded, in the worst frame."""
@@ -25,7 +21,7 @@ def worst(scale: Scale, video: meshreel.Video) -> float:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", [pytest.param(name, marks=MARKS.get(name, ())) for name in SCALES])
+@pytest.mark.parametrize("name", SCALES)
 @pytest.mark.filterwarnings("ignore::UserWarning")
 def test_what_moves_is_where_it_was(name: str, tmp_path: Path):
     scale = SCALES[name]()

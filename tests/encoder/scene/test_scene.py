@@ -23,7 +23,7 @@ from meshreel.encoder.run.interval_files import IntervalFiles
 from meshreel.encoder.run.schedule import Job
 from meshreel.encoder.scene.parts import Parts, take_apart
 from meshreel.encoder.scene.scene import encode_bodies
-from meshreel.encoder.scene.static import encode_static
+from meshreel.encoder.scene.static import LEAST_NOISE, encode_static
 from meshreel.encoder.scene.tracks import TrackGroup
 from meshreel.encoder.sequence import Encoder, encode
 from meshreel.encoder.settings.options import EncoderOptions, SceneOptions
@@ -366,7 +366,7 @@ def test_a_background_is_no_finer_than_its_noise_asks_for():
         payload = encode_static(parts, 1, 30.0, options)[0].payload
         place = Placement(1.0, tuple(survey.center))
         away = rms(parts.background.vertices, place.of(decode_background(payload)))
-        assert away <= max(options.coarse * noise, 1e-4)
+        assert away <= options.coarse * max(noise, LEAST_NOISE)
         sizes.append(len(payload))
     assert sizes[0] > sizes[1] > sizes[2]
 

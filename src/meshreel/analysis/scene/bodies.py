@@ -103,10 +103,11 @@ def beyond(mesh: Mesh, moves: Bool[np.ndarray, " F"], off: Bool[np.ndarray, " V"
     return body | moves
 
 
-def find_bodies(moving: Sequence[Mesh], size: float, near: float = NEAR) -> Bodies:
+def find_bodies(moving: Sequence[Mesh], size: float, near: float = NEAR, clean: bool = False) -> Bodies:
     """Find the bodies in the moving surface of consecutive frames; `size` is the width of the scene's cells, m.
 
-    Pieces of consecutive frames that are nearer than `near` cells are one.
+    Pieces of consecutive frames that are nearer than `near` cells are one. In `clean` frames bits are no noise, and
+    those of no body are one more together.
     """
     lattice = _lattice(moving, near * size)
     pieces = list[_Piece]()
@@ -123,8 +124,11 @@ def find_bodies(moving: Sequence[Mesh], size: float, near: float = NEAR) -> Bodi
     for body, cluster in zip(bodies, large, strict=True):
         for piece in cluster:
             body[piece.frame].append(piece.mesh)
-    small = (cluster for cluster in clusters if max(piece.area for piece in cluster) < LEAST)
-    dropped = sum(_given(bodies, bits, len(moving), size) for bits in small)
+    small = [cluster for cluster in clusters if max(piece.area for piece in cluster) < LEAST]
+    if clean and small:
+        bits = [piece for cluster in small for piece in cluster]
+        bodies.append([[bit.mesh for bit in bits if bit.frame == frame] for frame in range(len(moving))])
+    dropped = 0 if clean else sum(_given(bodies, bits, len(moving), size) for bits in small)
     return Bodies([[concatenate(meshes) for meshes in body] for body in bodies], dropped)
 
 

@@ -16,9 +16,10 @@ from jaxtyping import Bool, Float64, Int32, Int64, UInt8
 from scipy.spatial import cKDTree
 
 from ...geometry.cameras import Camera, Rays, Seen
-from ...geometry.topology import connected_faces, face_normals, unique_edges
+from ...geometry.closest_points import Surface
+from ...geometry.topology import connected_faces, face_normals, part_of, unique_edges
 from ...geometry.voxels import Lattice, spread
-from ...types import Mesh
+from ...types import Frames, Mesh
 from .color_looks import ColorChange
 from .cut import NEAR_CHANGE, NEVER, Rest
 from .masks import Masker
@@ -149,6 +150,11 @@ class ByPlace:
         return cKDTree(self.lattice.centers(self.keys))
 
 
+def _no_change(self: ByMasks | ByRest, change: int, mesh: Mesh) -> Bool[np.ndarray, " F"]:
+    """Raise ValueError: `changes` is empty, so there is no valid argument."""
+    raise ValueError(f"change {change} of a mesh of {len(mesh.faces)} faces: {type(self).__name__} knows of none")
+
+
 @dataclass(frozen=True, slots=True)
 class ByMasks:
     """Segmentation by masks: each pixel that sees a face votes on its label (eqs. 1 to 4)."""
@@ -173,11 +179,7 @@ class ByMasks:
     def still_at_first(self, frame: int, mesh: Mesh) -> Bool[np.ndarray, " F"]:
         return ~self.moving(frame, mesh)
 
-    def came(self, change: int, mesh: Mesh) -> Bool[np.ndarray, " F"]:
-        """Raise ValueError: `changes` is empty, so there is no valid argument."""
-        raise ValueError(f"change {change} of a mesh of {len(mesh.faces)} faces: masks know of no changes")
-
-    gone = came  # nor does anything leave the room
+    came = gone = _no_change  # nor does anything leave the room
 
     def moving(self, frame: int, mesh: Mesh) -> Bool[np.ndarray, " F"]:
         """Return True for each face that pixels vote to be moving; a frame's masks are made once.
@@ -196,7 +198,52 @@ class ByMasks:
         return without_islands(mesh, _filled(mesh, moves, seen > 0), self.island)
 
 
-Segmentation = ByPlace | ByMasks  # labels of a scene's frames
+@dataclass(frozen=True)
+class ByRest:
+    """Segmentation of frames without noise: what is not where surface is in all frames moves."""
+
+    room: Mesh  # m, the surface that is in the same place in all frames
+    cell: float  # m
+    noise: float  # m, within which places are the same
+    changes: tuple[int, ...] = ()  # what comes to rest is not in all frames
+
+    def moving(self, frame: int, mesh: Mesh) -> Bool[np.ndarray, " F"]:
+        """Return True for each face with a corner or a middle that the room does not have."""
+        del frame
+        return is_off(mesh, self._surface, self.noise)
+
+    def still_at_first(self, frame: int, mesh: Mesh) -> Bool[np.ndarray, " F"]:
+        return ~self.moving(frame, mesh)
+
+    came = gone = _no_change
+
+    @cached_property
+    def _surface(self) -> Surface:
+        return Surface(self.room)
+
+
+Segmentation = ByPlace | ByMasks | ByRest  # labels of a scene's frames
+
+
+def in_all_frames(frames: Frames, same: float) -> Mesh:
+    """Return the faces of the first frame with surface that all others have within `same` (m) of the same place."""
+    room = Mesh.empty()
+    for number in range(len(frames)):
+        mesh = frames[number]
+        if room.is_empty or mesh.is_empty:
+            room = room if mesh.is_empty else mesh
+            continue
+        room = part_of(room, ~is_off(room, Surface(mesh), same))
+        if room.is_empty:
+            break
+    return room
+
+
+def is_off(mesh: Mesh, surface: Surface, same: float) -> Bool[np.ndarray, " F"]:
+    """Return True for each face with a corner or a middle that is farther than `same` from a surface."""
+    corners = (surface.distances(mesh.vertices) > same)[mesh.faces].any(axis=1)
+    corners[~corners] = surface.distances(mesh.vertices[mesh.faces[~corners]].mean(axis=1)) > same
+    return corners
 
 
 def looks(mesh: Mesh, views: Sequence[Camera]) -> list[Seen]:

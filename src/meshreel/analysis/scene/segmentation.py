@@ -23,7 +23,7 @@ from ...geometry.voxels import Lattice
 from ...types import MeshSequence, evenly
 from .color_looks import CHANGE_SIDE, MOMENTS, SIDE, ColorChange, ColorLooks
 from .cut import Rest, find_rest, moving_places
-from .labelling import ByMasks, ByPlace, looks
+from .labelling import ByMasks, ByPlace, ByRest, in_all_frames, looks
 from .masks import Masker
 from .places import Observations, Report, find_places, inspected
 from .standing import Standing, standing
@@ -43,19 +43,22 @@ def segment(
     cameras: Cameras = (),
     report: Report = lambda _share: None,
     stands: Standing | None = None,
-) -> ByPlace:
+) -> ByPlace | ByRest:
     """Segment a scene by geometric change over the whole sequence, whose `standing` is measured if it is not given.
 
     It is looked at by the given cameras, which are of one size, or by placed ones. If nothing moves and the faces turn
-    their backs to the inside of the scene, it is segmented again with all faces reversed.
+    their backs to the inside of the scene, it is segmented again with all faces reversed. Frames without noise are
+    compared instead.
     """
     frames = captured(frames)
     chosen = _with_surface(frames, inspected(len(frames), frames.frame_rate))
     if not chosen:
         nothing = np.zeros(0, np.int64), np.zeros(0, bool), Rest.none(0)
         return ByPlace(1.0, Lattice(np.zeros(3), 1.0), *nothing, _ISLAND)
-    change = (stands or standing(frames)).usual_change
-    places = _by_place(frames, chosen, cameras, change, report)
+    stands = stands or standing(frames)
+    if stands.same and not (room := in_all_frames(frames, stands.same)).is_empty:
+        return ByRest(room, edge_length(frames, chosen), stands.same)
+    places = _by_place(frames, chosen, cameras, change := stands.usual_change, report)
     if places.chosen.any():
         return places
     first = frames[chosen[0]]

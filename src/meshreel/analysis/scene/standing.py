@@ -18,7 +18,7 @@ from scipy.spatial import cKDTree
 from ...geometry.cameras import Camera
 from ...geometry.closest_points import Surface, area_samples
 from ...geometry.derived_sequences import CapturedSequence
-from ...geometry.topology import border_edges, drop_unreferenced, edge_lengths, face_normals, vertex_normals
+from ...geometry.topology import border_edges, components, drop_unreferenced, edge_lengths, face_normals, vertex_normals
 from ...geometry.voxels import Lattice, around, distinct, spread
 from ...types import Frames, Mesh, evenly
 from ..survey import UNLIKE, check
@@ -39,6 +39,7 @@ TAIL = 4.0  # standard deviations, by the median, beyond which a distance is no 
 NEAREST = 8  # cells whose noise a place has (guess)
 BY_RANGE, ELSEWHERE = 0.5, 100.0  # rad, as unlike as e times the range is, and as another camera (guess)
 EXACT = 1e-6  # diagonals: the noise of frames that are equal (guess)
+SAME, MOST = 2e-5, 0.9  # diagonals, within which clean surface is in one place; share of it without noise (guess)
 SECOND, MEDIAN = 6**0.5, 0.6745  # deviation of a second difference, and median of an absolute value, in deviations
 
 
@@ -50,8 +51,15 @@ class Standing:
     keys: Int64[np.ndarray, " R"]  # sorted
     noise: Float64[np.ndarray, " R"]  # m, standard deviation
     change: Float64[np.ndarray, " R"]  # m, the same of the surface at other times
-    area: Float64[np.ndarray, " R"]  # m^2, in a frame
+    area: Float64[np.ndarray, " R"]  # m^2, in a frame, of surface whose noise is known
     sensed: bool  # by sensors that are known
+    diagonal: float  # m, of the largest frame
+
+    @property
+    def same(self) -> float:
+        """Distance, m, within which surface that rests is in the same place in all frames; 0 where it has noise."""
+        noise, found = self.noise[self.rests], SAME * self.diagonal
+        return found if not self.sensed and len(noise) and np.quantile(noise, MOST) <= EXACT * self.diagonal else 0.0
 
     @property
     def rests(self) -> Bool[np.ndarray, " R"]:
@@ -124,6 +132,7 @@ class _Probe:
 
     points: Float64[np.ndarray, "N 3"]
     normals: Float64[np.ndarray, "N 3"]
+    pieces: Int64[np.ndarray, " N"]  # number of the connected piece that each is on
     area: float  # m^2, of a sample
     size: float  # m, of regions in which there are enough samples
     diagonal: float  # m
@@ -136,9 +145,8 @@ class _Probe:
         chosen, lengths = area_samples(mesh, SAMPLES), edge_lengths(mesh)
         usual = float(np.median(lengths[lengths > 0])) if lengths.any() else 1.0
         size, area = REGION * usual * max(1.0, len(mesh.vertices) / len(chosen)) ** 0.5, face_normals(mesh)[1].sum()
-        return _Probe(
-            mesh.vertices[chosen], vertex_normals(mesh)[chosen], area / len(chosen), size, mesh.diagonal, [], []
-        )
+        normals, pieces = vertex_normals(mesh)[chosen], components(mesh.faces, len(mesh.vertices))[chosen]
+        return _Probe(mesh.vertices[chosen], normals, pieces, area / len(chosen), size, mesh.diagonal, [], [])
 
     def offsets(self, surface: Surface) -> Float64[np.ndarray, " N"]:
         hits = surface.closest(self.points)
@@ -152,29 +160,36 @@ def _regions(probes: list[_Probe], sensed: bool) -> Standing:
     """Return the regions of some frames; where sensors are known, noise may be what a region does as a whole."""
     if not probes:
         none = np.zeros(0)
-        return Standing(Lattice(np.zeros(3), 1.0), np.zeros(0, np.int64), none, none, none, sensed)
+        return Standing(Lattice(np.zeros(3), 1.0), np.zeros(0, np.int64), none, none, none, sensed, 0.0)
     points, exact = np.concatenate([probe.points for probe in probes]), EXACT * max(p.diagonal for p in probes)
     lattice = Lattice(np.round(points[0], 6), max(probe.size for probe in probes))
     keys, region = np.unique(lattice.keys(points), return_inverse=True)
     count = len(keys)
-    area = np.bincount(region, np.concatenate([np.full(len(p.points), p.area) for p in probes]), count) / len(probes)
     each = np.split(region, np.cumsum([len(p.points) for p in probes])[:-1])
     # Where there is one neighbour in time only, as in a sequence of two frames, its offset counts.
     seconds = [sum(p.beside, np.zeros(len(p.points))) * (3**0.5 if len(p.beside) == 1 else 1.0) for p in probes]
     second, far = np.concatenate(seconds), np.concatenate([np.zeros(0), *(one for p in probes for one in p.far)])
+    areas = np.concatenate([np.full(len(p.points), p.area) for p in probes]) / len(probes)
+    area = np.bincount(region, np.where(np.isfinite(second), areas, 0), count)  # of what is known
     noise, known = _deviations(second, region, count, SECOND)
     again = np.concatenate([np.zeros(0, np.int64), *(own for p, own in zip(probes, each, strict=True) for _ in p.far)])
     change, seen = _deviations(far, again, count, 2**0.5)
     keep = np.flatnonzero(known & seen)
     if not sensed:
+        # What pieces do as a whole is none, either: leaves that flutter are each as stiff as a wall.
         window = np.repeat(np.arange(len(probes)), [len(p.points) for p in probes])
-        own = second - _as_a_whole(points, second, region * len(probes) + window, count * len(probes))
-        noise = np.minimum(noise, _deviations(own, region, count, SECOND)[0] * SMOOTH / RESTS)
+        labels = np.stack([region, window, np.concatenate([p.pieces for p in probes])], axis=1)
+        group = np.unique(labels, axis=0, return_inverse=True)[1].reshape(-1)
+        own = second - _as_a_whole(points, second, group, int(group.max()) + 1)
+        smooth, told = _deviations(own, region, count, SECOND)
+        noise[told] = np.minimum(noise, smooth * SMOOTH / RESTS)[told]
         if len(keep):
             middles = lattice.centers(keys[keep])
             near = cKDTree(middles).query(middles, k=np.arange(1, min(AROUND, len(keep)) + 1))[1]
             noise[keep] = np.minimum(noise[keep], ROUGHER * np.median(noise[keep][near], axis=1))
-    return Standing(lattice, keys[keep], np.maximum(noise, exact)[keep], change[keep], area[keep], sensed)
+    return Standing(
+        lattice, keys[keep], np.maximum(noise, exact)[keep], change[keep], area[keep], sensed, exact / EXACT
+    )
 
 
 def _deviations(
@@ -193,9 +208,13 @@ def _deviations(
 def _as_a_whole(
     points: Float64[np.ndarray, "N 3"], values: Float64[np.ndarray, " N"], group: Int64[np.ndarray, " N"], count: int
 ) -> Float64[np.ndarray, " N"]:
-    """Return the values of the linear function of place that fits those of each group best, damped a little."""
+    """Return the values of the linear function of place that fits those of each group best, damped a little.
+
+    In a group of fewer than `FEWEST` this is their mean; NaN for one alone.
+    """
     known = np.isfinite(values)
-    weight = np.maximum(np.bincount(group[known], minlength=count), 1)
+    sizes = np.bincount(group[known], minlength=count)
+    weight = np.maximum(sizes, 1)
 
     def mean(some: Iterable[float] | Float64[np.ndarray, " N"]) -> Float64[np.ndarray, " G"]:
         return np.bincount(group[known], np.asarray(some)[known], count) / weight
@@ -205,8 +224,8 @@ def _as_a_whole(
     moments = np.array([[mean(offset[:, i] * offset[:, j]) for j in range(3)] for i in range(3)]).transpose(2, 0, 1)
     damped = moments + (1e-3 * np.trace(moments, axis1=1, axis2=2) + 1e-30)[:, None, None] * np.eye(3)
     right = np.stack([mean(offset[:, i] * np.where(known, rest, 0)) for i in range(3)], axis=1)
-    slopes = np.linalg.solve(damped, right[..., None])[..., 0]
-    return mean(values)[group] + (offset * slopes[group]).sum(axis=1)
+    slopes = np.linalg.solve(damped, right[..., None])[..., 0] * (sizes >= FEWEST)[:, None]
+    return np.where(sizes > 1, mean(values), np.nan)[group] + (offset * slopes[group]).sum(axis=1)
 
 
 @dataclass(frozen=True, slots=True)
@@ -240,7 +259,7 @@ class LocalNoise:
         frame = np.repeat(np.arange(len(places)), [len(some) for some in places])
         around = np.unique(Lattice(np.round(points[0], 6), wide).keys(points), return_inverse=True)[1]
         group = around * len(places) + frame
-        shape = gap - _as_a_whole(points, gap, group, int(group.max()) + 1)
+        shape = gap - np.nan_to_num(_as_a_whole(points, gap, group, int(group.max()) + 1))
         lattice = Lattice(np.round(points[0], 6), fine)
         keys, cell = np.unique(lattice.keys(points), return_inverse=True)
         if (np.bincount(cell) < FEWEST).all():  # too few anywhere: all places are one

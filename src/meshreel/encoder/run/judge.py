@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from jaxtyping import Float64, Int64
@@ -17,14 +18,16 @@ from jaxtyping import Float64, Int64
 from ... import _core
 from ...errors import InputError
 from ...geometry.closest_points import Surface, area_samples
-from ...geometry.topology import connected_faces, drop_unreferenced, face_normals
+from ...geometry.topology import components, connected_faces, face_normals
 from ...metrics.distance import NEAR
+from ...metrics.surface_samples import used_surface
 from ...types import Frames, Mesh
 from ..group.forms import NORMALISED, EncodedGroup, intra_only, target_of
 from ..group.interval import Interval
 from ..group.progress import Stages
 from ..settings.options import Recipe
 
+PART = 0.1  # of the diagonal of a connected piece, within which it is covered: another leaf is not this one (guess)
 SAMPLES = 4000  # vertices of a surface that look for the other one, or all vertices and middles of faces (guess)
 NOISES = 4.0  # times the noise, within which surface is covered, too (guess)
 # Shares of the surface, of clean frames and of noisy ones. Measured at qualities 10 to 95: clean bodies lose .001 at
@@ -42,11 +45,18 @@ class Verdict:
     invented: float = 0.0  # of the decoded surface, that without surface of the frame near it
     distance: float = 0.0  # normalised, RMS of the samples of the side that is farther off
 
-    def holds(self, noise: float, target: float) -> bool:
-        """Return whether the frame is shown: up to `DISTANCE` times the `target` distance, where it has no noise."""
+    def fault(self, noise: float, target: float) -> str:
+        """Return why the frame is not shown, empty where it is: up to `DISTANCE` times the `target`, without noise."""
         lost, piece, invented = (limits[noise > 0] for limits in (LOST, PIECE, INVENTED))
-        near = noise > 0 or self.distance <= DISTANCE * target
-        return near and self.lost <= lost and self.piece <= piece and self.invented <= invented
+        for name, share, most in (
+            ("lost", self.lost, lost),
+            ("lost in one piece", self.piece, piece),
+            ("invented", self.invented, invented),
+        ):
+            if share > most:
+                return f"{100 * share:.1f} % of its surface is {name}"
+        far = noise == 0 and self.distance > DISTANCE * target
+        return f"it is {self.distance / target:.1f} times as far off as the quality asks for" if far else ""
 
 
 def judged(interval: Interval, recipe: Recipe, stages: Stages | None) -> Iterator[EncodedGroup]:
@@ -56,9 +66,9 @@ def judged(interval: Interval, recipe: Recipe, stages: Stages | None) -> Iterato
         state, first = None, at
         for group in recipe.encode(_from(interval, at, count), stages):
             some = _from(interval, at, at + group.frame_count)
-            group, state, holds = _judged(some, recipe, group, state)
+            group, state, fault = _judged(some, recipe, group, state)
             at += group.frame_count
-            if not holds:  # alone, the same frames may be encoded otherwise
+            if fault:  # alone, the same frames may be encoded otherwise
                 ways = (recipe.finer(), None) if group.frame_count == count - first else (recipe, recipe.finer(), None)
                 yield from _again(some, recipe, ways)
                 break  # the groups that follow were predicted from it
@@ -67,45 +77,54 @@ def judged(interval: Interval, recipe: Recipe, stages: Stages | None) -> Iterato
 
 def _judged(
     interval: Interval, recipe: Recipe, group: EncodedGroup, state: _core.GroupState | None
-) -> tuple[EncodedGroup, _core.GroupState | None, bool]:
-    """Return a group with its least covered frame, the state after it, and whether it holds; `state` is that before."""
+) -> tuple[EncodedGroup, _core.GroupState | None, str]:
+    """Return a group with its least covered frame, the state after it, and why it does not hold, empty where it does.
+
+    `state` is that before it.
+    """
     if not recipe.judged or interval.frames[0].is_empty:
-        return group, None, True
+        return group, None, ""
     frames = list(interval.frames)
     found = _core.Group(group.payload, len(frames), None, state if group.predicted else None, NORMALISED)
-    shown = [drop_unreferenced(Mesh(*arrays[:2])) for arrays in found.frames()]
+    shown = [used_surface(Mesh(*arrays[:2])) for arrays in found.frames()]
     target = target_of(frames, recipe.options.target.scaled(interval.larger), interval.noise).distance
     verdicts = [_verdict(interval, number, *both) for number, both in enumerate(zip(frames, shown, strict=True))]
     covered = 1 - max(verdict.lost for verdict in verdicts)
     worst = max(range(len(frames)), key=lambda number: verdicts[number].lost)
     fidelity = replace(group.fidelity, covered=covered, least=interval.first_frame + worst)
-    holds = all(verdict.holds(interval.noise, target) for verdict in verdicts)
-    return replace(group, fidelity=fidelity), found.state, holds
+    faults = ((number, verdict.fault(interval.noise, target)) for number, verdict in enumerate(verdicts))
+    fault = next((f"frame {interval.first_frame + number}: {why}" for number, why in faults if why), "")
+    return replace(group, fidelity=fidelity), found.state, fault
 
 
 def _again(interval: Interval, recipe: Recipe, ways: Sequence[Recipe | None]) -> Iterator[EncodedGroup]:
-    """Yield groups of the frames of one that does not hold, by the first way by which all hold; None: each alone."""
-    for way in ways:
-        groups, at = list[EncodedGroup](), 0
-        state, holds = None, True
-        for group in _alone(interval, recipe) if way is None else way.encode(interval, Stages(None, 1)):
+    """Yield groups of the frames of one that does not hold, by the first way by which all hold; None: each alone.
+
+    Alone, frames are coded with their noise where they do not hold without.
+    """
+    tries = [lambda way=way: way.encode(interval, Stages(None, 1)) for way in ways if way is not None]
+    tries += [partial(_alone, interval, recipe, noise) for noise in sorted({interval.noise, 0.0}, reverse=True)]
+    fault = ""
+    for encode in tries:
+        groups, at, fault = list[EncodedGroup](), 0, ""
+        state = None
+        for group in encode():
             some = _from(interval, at, at + group.frame_count)
-            group, state, held = _judged(some, recipe, group, state)
+            group, state, why = _judged(some, recipe, group, state)
             groups.append(replace(group, mended=True))
-            holds, at = holds and held, at + group.frame_count
-        if holds:
+            fault, at = fault or why, at + group.frame_count
+        if not fault:
             yield from groups
             return
-    where = f"frames {interval.first_frame} to {interval.stop - 1}"
-    text = f"{where} of track {interval.track}: neither a template nor a mesh for each shows them as they are"
-    raise InputError(f"{text}; raise --quality, or look whether these frames are damaged")
+    text = f"{fault}, and neither a template nor a mesh of its own shows it better (track {interval.track})"
+    raise InputError(f"{text}; raise --quality, try --dynamic-only, or look whether the frame is damaged")
 
 
-def _alone(interval: Interval, recipe: Recipe) -> Iterator[EncodedGroup]:
-    """Yield the frames as meshes of their own."""
+def _alone(interval: Interval, recipe: Recipe, noise: float) -> Iterator[EncodedGroup]:
+    """Yield the frames as meshes of their own, to the distance that frames of this noise have."""
     frames, target = list(interval.frames), recipe.options.target.scaled(interval.larger)
     while frames:
-        group = intra_only(frames, target_of(frames, target, interval.noise), recipe.options.intra)
+        group = intra_only(frames, target_of(frames, target, noise), recipe.options.intra)
         frames = frames[group.frame_count :]
         yield group
 
@@ -115,7 +134,7 @@ def _verdict(interval: Interval, number: int, frame: Mesh, mesh: Mesh) -> Verdic
         return Verdict(1.0, 1.0, 0.0, np.inf)
     uneven, surface = interval.unevenness(frame.vertices), Surface(mesh)
     noise = interval.noise * (np.ones(len(frame.vertices)) if uneven is None else uneven)
-    near = np.maximum(NEAR * frame.diagonal, NOISES * noise)
+    near = np.maximum(np.minimum(NEAR * frame.diagonal, PART * _piece_sizes(frame)), NOISES * noise)
     (corners, shares), (others, weights) = _samples(frame), _samples(mesh)
     gaps = surface.distances(frame.vertices[corners].mean(axis=1))
     points, original = mesh.vertices[others].mean(axis=1), Surface(frame)
@@ -139,6 +158,15 @@ def _samples(mesh: Mesh) -> tuple[Int64[np.ndarray, "N 3"], Float64[np.ndarray, 
     around = np.bincount(mesh.faces.reshape(-1), (areas / 12).repeat(3), len(mesh.vertices))
     shares = np.concatenate([around, 0.75 * areas])
     return np.concatenate([chosen[:, None].repeat(3, axis=1), mesh.faces]), shares / max(shares.sum(), 1e-300)
+
+
+def _piece_sizes(mesh: Mesh) -> Float64[np.ndarray, " V"]:
+    """Return the diagonal of the box of each vertex's connected piece."""
+    label = components(mesh.faces, len(mesh.vertices))
+    order = np.argsort(label, kind="stable")
+    starts = np.flatnonzero(np.diff(label[order], prepend=-1))
+    low, high = (each.reduceat(mesh.vertices[order], starts, axis=0) for each in (np.minimum, np.maximum))
+    return np.linalg.norm(high - low, axis=1)[label]
 
 
 def _largest(frame: Mesh, surface: Surface, near: Float64[np.ndarray, " V"]) -> float:

@@ -20,7 +20,7 @@ from ...analysis.scene.background import FRAMES, Moment, fuse_background, fuse_s
 from ...analysis.scene.bodies import beyond, ring, with_ring
 from ...analysis.scene.color_looks import CHANGE_SIDE, ColorChange, ColorLooks
 from ...analysis.scene.cut import Rest
-from ...analysis.scene.labelling import ByPlace, Segmentation
+from ...analysis.scene.labelling import ByPlace, ByRest, Segmentation
 from ...analysis.scene.masks import Masker
 from ...analysis.scene.segmentation import segment, segment_by
 from ...analysis.scene.standing import REGION, LocalNoise, Standing
@@ -76,6 +76,8 @@ class Parts:
         Return it, and the number of faces of which neither has anything: bits that are too small, or seldom measured.
         """
         by, moves = self.segmentation, self.segmentation.moving(frame, mesh)
+        if isinstance(by, ByRest):
+            return with_ring(mesh, moves, by.cell, self.room(0)), 0
         room = self.room(sum(change.frame <= frame for change in self.changes))
         off = np.ones(len(mesh.vertices), bool) if room is None else self._off(mesh, room)
         if room is not None:
@@ -119,6 +121,8 @@ def take_apart(
     else:
         segmentation = segment_by(masker, sequence, options.cameras)
     stages.reach("segment", 1.0)
+    if isinstance(segmentation, ByRest):
+        return _clean(sequence, survey, segmentation, stages)
     if standing is not None:
         _check_it_rests(sequence, segmentation, standing)
     depth = sequence.depth if options.from_depth else None
@@ -130,6 +134,15 @@ def take_apart(
     sizes, noise = _measured(sequence, segmentation, background, changes, stages)
     survey = replace(survey, scale=(float(np.median(sizes)) if sizes else 0.0) or survey.diagonal)
     return Parts(survey, segmentation, background, changes, noise, free_space(sequence))
+
+
+def _clean(sequence: CapturedSequence, survey: Survey, segmentation: ByRest, stages: Stages) -> Parts:
+    """Return the parts of a scene without noise, whose background is surface of its frames as it is."""
+    stages.reach("background", 1.0)
+    sizes, _ = _measured(sequence, segmentation, segmentation.room, [], stages)
+    survey = replace(survey, scale=float(np.median(sizes)) if sizes else survey.diagonal)
+    none = np.zeros(0)
+    return Parts(survey, segmentation, segmentation.room, [], LocalNoise(np.zeros((0, 3)), none, none))
 
 
 def free_space(sequence: CapturedSequence) -> tuple[FreeSpace, ...]:
@@ -149,13 +162,18 @@ def _cameras(sequence: CapturedSequence) -> tuple[Camera, ...]:
 
 def _check_it_rests(sequence: MeshSequence, segmentation: Segmentation, standing: Standing) -> None:
     """Raise NoRoom where too much of the surface that is called still is elsewhere at other times."""
-    still, moved = 0.0, 0.0
+    still, moved, most, where = 0.0, 0.0, 0.0, ""
     for number in evenly(len(sequence), LOOKED_AT):
         mesh = sequence[number]
         areas = np.where(segmentation.moving(number, mesh), 0, face_normals(mesh)[1])
-        still, moved = still + float(areas.sum()), moved + float(areas[standing.moves(mesh)].sum())
+        chosen = standing.moves(mesh) & (areas > 0)
+        still, moved = still + float(areas.sum()), moved + float(areas[chosen].sum())
+        if areas[chosen].sum() > most:
+            most, place = areas[chosen].sum(), np.median(mesh.vertices[mesh.faces[chosen]], axis=(0, 1))
+            where = f"around {place[0]:.2f} {place[1]:.2f} {place[2]:.2f} in frame {number}"
     if moved > (MOVED_SENSED if standing.sensed else MOVED) * still:
-        raise NoRoom(f"{100 * moved / still:.0f} % of what seems to stand still moves by more than its noise")
+        text = f"{100 * moved / still:.0f} % of what seems to stand still moves by more than its noise, most of it"
+        raise NoRoom(f"{text} {where}")
 
 
 def _check_nothing_lost(sequence: MeshSequence, segmentation: Segmentation) -> None:

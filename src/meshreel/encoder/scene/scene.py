@@ -20,7 +20,7 @@ from jaxtyping import Bool, UInt16
 from scipy.spatial import cKDTree
 
 from ...analysis.scene.bodies import NEAR, at_most, find_bodies, same_bodies, with_ring
-from ...analysis.scene.labelling import Segmentation
+from ...analysis.scene.labelling import ByRest, Segmentation
 from ...analysis.survey import Survey
 from ...format.checks import MOST_TRACKS
 from ...geometry.closest_points import area_samples
@@ -46,7 +46,7 @@ def encode_bodies(job: Job, parts: Parts) -> tuple[list[TrackGroup], int]:
     in none of the groups. The intervals of the whole scene are one stream: workers need not wait for the last body of a
     key interval.
     """
-    tracks, found = Tracks(parts.segmentation.cell, job.scene.near), list[TrackGroup]()
+    tracks, found = Tracks(parts.segmentation, job.scene.near), list[TrackGroup]()
     places = deque[tuple[int, int]]()  # track and first frame of intervals that are not encoded yet
 
     def intervals() -> Iterator[Interval]:
@@ -122,8 +122,8 @@ def _cut(meshes: Sequence[Mesh], frames: range, survey: Survey, longest: int) ->
 class Tracks:
     """Assigns the bodies of each key interval to tracks: to their own from before, or to one that is free."""
 
-    def __init__(self, cell: float, near: float) -> None:
-        self._cell, self._near = cell, near
+    def __init__(self, segmentation: Segmentation, near: float) -> None:
+        self._cell, self._near, self._clean = segmentation.cell, near, isinstance(segmentation, ByRest)
         self._last: list[Mesh] = []  # of each track, in the last frame so far
         self._frames = 0
         self.began: list[int] = []  # the first frame of each track's first key interval: before, it is empty
@@ -131,7 +131,7 @@ class Tracks:
 
     def of(self, moving: Sequence[Mesh]) -> list[tuple[int, list[Mesh]]]:
         """Return each track's mesh in each frame of the next key interval."""
-        apart = find_bodies(moving, self._cell, self._near)
+        apart = find_bodies(moving, self._cell, self._near, self._clean)
         bodies, self.dropped = at_most(apart.meshes, MOST_TRACKS), self.dropped + apart.dropped
         before = same_bodies(self._last, [body[0] for body in bodies], self._cell, self._near)
         free = [number for number in range(len(self._last) + len(bodies) + 1) if number not in before]
@@ -151,7 +151,7 @@ def label_frames(
 ) -> Iterator[tuple[Bool[np.ndarray, " F"], UInt16[np.ndarray, " F"]]]:
     """Yield which faces of each frame move, and the body of each: 1 + its track; 0: it stands still, or is of none."""
     cell = segmentation.cell
-    tracks = Tracks(cell, options.scene.near if options.scene else NEAR)
+    tracks = Tracks(segmentation, options.scene.near if options.scene else NEAR)
     for frames in key_intervals(sequence, segmentation, options):
         moving = list[Bool[np.ndarray, " F"]]()
         parts, coded = list[Mesh](), list[Mesh]()

@@ -34,7 +34,7 @@ from .parts import Parts
 
 FRACTIONS = (0.75, 0.5, 0.35, 0.22, 0.15, 0.1, 0.07, 0.045, 0.03, 0.02)  # of the background's vertices (decision 19)
 HALVINGS = 2  # of the factor between two fractions, in search for a smaller mesh that is near enough (guess)
-LEAST_NOISE = 1e-4  # of the unit: the noise that a background is coded for, at least (guess)
+LEAST_NOISE = 8e-4  # of the unit: the noise that a background is coded for, at least: bodies come as near to frames
 STILL_FRAMES = 16  # in which a background is looked at for its colours, at most (guess)
 PICTURES_A_SECOND = 8  # of a background: shadows move slowly (guess)
 FINER = 2  # of the rate factor of a background's pictures than of a body's (guess)
