@@ -12,6 +12,7 @@ import numpy as np
 from jaxtyping import Bool, Float64, UInt8
 
 from ...analysis.appearance.bake import Texels, median_colors, picture, projected, texels_of, unwrap
+from ...analysis.scene.labelling import ByRest
 from ...coding.appearance.atlas import encode_atlas
 from ...coding.appearance.pictures import MOST_CRF
 from ...coding.background import changed, decode_background, decode_change, encode_background, encode_change
@@ -35,6 +36,7 @@ from .parts import Parts
 FRACTIONS = (0.75, 0.5, 0.35, 0.22, 0.15, 0.1, 0.07, 0.045, 0.03, 0.02)  # of the background's vertices (decision 19)
 HALVINGS = 2  # of the factor between two fractions, in search for a smaller mesh that is near enough (guess)
 LEAST_NOISE = 8e-4  # of the unit: the noise that a background is coded for, at least: bodies come as near to frames
+WORST = 4.0  # times what is allowed on average, of a place where there is no noise to hide it (guess)
 STILL_FRAMES = 16  # in which a background is looked at for its colours, at most (guess)
 PICTURES_A_SECOND = 8  # of a background: shadows move slowly (guess)
 FINER = 2  # of the rate factor of a background's pictures than of a body's (guess)
@@ -73,7 +75,8 @@ def encode_static(
     def coded(mesh: Mesh) -> tuple[bytes, Mesh]:
         # Where there is less noise than usual, more would be spent on little: a room's background would double.
         most = options.coarse * np.maximum(parts.noise.at(mesh.vertices)[1] / survey.unit, usual)
-        return _coded(mesh.at((mesh.vertices - survey.center) / survey.unit), most, step)
+        exact = isinstance(parts.segmentation, ByRest)
+        return _coded(mesh.at((mesh.vertices - survey.center) / survey.unit), most, step, exact)
 
     payload, state = coded(parts.background)
     found = [] if state.is_empty else [Static(0, payload, False)]
@@ -104,10 +107,11 @@ def refreshes(count: int, frame_rate: float, options: SceneOptions) -> range:
     return range(0, count, count if options.refresh is None else max(1, round(options.refresh * frame_rate)))
 
 
-def _coded(mesh: Mesh, most: Float64[np.ndarray, " V"], step: float) -> tuple[bytes, Mesh]:
+def _coded(mesh: Mesh, most: Float64[np.ndarray, " V"], step: float, exact: bool) -> tuple[bytes, Mesh]:
     """Encode a mesh with the fewest vertices that keep it near; return payload and decoded mesh.
 
-    The RMS of its vertices' distances, in units of what is allowed at each, is at most 1.
+    The RMS of its vertices' distances, in units of what is allowed at each, is at most 1; if `exact`, no distance is
+    over `WORST`, from it or from what is decoded.
     """
     if mesh.is_empty:
         return b"", mesh
@@ -116,7 +120,12 @@ def _coded(mesh: Mesh, most: Float64[np.ndarray, " V"], step: float) -> tuple[by
         """Return the payload of a simplified mesh, the decoded mesh, and whether this is near enough."""
         payload = encode_background(small, step)
         decoded = decode_background(payload)
-        near = not decoded.is_empty and float(((distances(mesh.vertices, decoded) / most) ** 2).mean()) <= 1
+        if decoded.is_empty:
+            return payload, decoded, False
+        off = distances(mesh.vertices, decoded) / most
+        near = float((off**2).mean()) <= 1
+        if near and exact:
+            near = float(max(off.max(), (distances(decoded.vertices, mesh) / np.median(most)).max())) <= WORST
         return payload, decoded, near
 
     steps = [clean(mesh)]  # each from the one before: these are nearer to the mesh than what is made from it at once
