@@ -28,7 +28,7 @@ from ..group.progress import Stages
 from ..settings.options import Recipe
 
 PART = 0.1  # of the diagonal of a connected piece, within which it is covered: another leaf is not this one (guess)
-SAMPLES = 4000  # vertices of a surface that look for the other one, or all vertices and middles of faces (guess)
+SAMPLES = 2000  # vertices of a surface that look for the other one, or all vertices and middles of faces (guess)
 NOISES = 4.0  # times the noise, within which surface is covered, too (guess)
 # Shares of the surface, of clean frames and of noisy ones. Measured at qualities 10 to 95: clean bodies lose .001 at
 # most, noisy ones .07, of which .016 in one piece.
@@ -41,7 +41,7 @@ class Verdict:
     """The shares of a frame's surface that are lost and invented, and its distance."""
 
     lost: float = 0.0  # without decoded surface near it
-    piece: float = 0.0  # the largest connected area of that
+    piece: float = 0.0  # the largest connected area of that, or all of it where that is little
     invented: float = 0.0  # of the decoded surface, that without surface of the frame near it
     distance: float = 0.0  # normalised, RMS of the samples of the side that is farther off
 
@@ -132,7 +132,7 @@ def _alone(interval: Interval, recipe: Recipe, noise: float) -> Iterator[Encoded
 def _verdict(interval: Interval, number: int, frame: Mesh, mesh: Mesh) -> Verdict:
     if mesh.is_empty:
         return Verdict(1.0, 1.0, 0.0, np.inf)
-    uneven, surface = interval.unevenness(frame.vertices), Surface(mesh)
+    uneven, surface, noisy = interval.unevenness(frame.vertices), Surface(mesh), interval.noise > 0
     noise = interval.noise * (np.ones(len(frame.vertices)) if uneven is None else uneven)
     near = np.maximum(np.minimum(NEAR * frame.diagonal, PART * _piece_sizes(frame)), NOISES * noise)
     (corners, shares), (others, weights) = _samples(frame), _samples(mesh)
@@ -144,7 +144,7 @@ def _verdict(interval: Interval, number: int, frame: Mesh, mesh: Mesh) -> Verdic
     if beyond.any() and (free := interval.free(number)) is not None:  # surface is invented where a camera saw through
         beyond[beyond] = free.at(points[beyond])
     lost = float(shares[gaps > near[corners].mean(axis=1)].sum())
-    piece = _largest(frame, surface, near) if lost else 0.0
+    piece = _largest(frame, surface, near) if lost > PIECE[noisy] else lost
     rms = max(float((shares * gaps**2).sum()), float((weights * back**2).sum())) ** 0.5
     return Verdict(lost, piece, float(weights[beyond].sum()), rms)
 
