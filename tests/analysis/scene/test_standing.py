@@ -113,3 +113,15 @@ def test_a_body_has_the_noise_of_its_place_in_the_picture_and_not_of_what_is_bes
     middle, rim = np.array([[0.2, 0.1, 1.5]]), np.array([[1.3, 0, 1.5]])
     assert noise.at(middle)[0, 0] == pytest.approx(0.001, rel=0.3)
     assert noise.at(rim)[0, 0] == pytest.approx(0.02, rel=0.3)
+
+
+@pytest.mark.parametrize("power", [0.0, 1.0, 2.0])
+def test_a_body_has_the_noise_of_its_depth_and_not_of_what_it_hides(power: float):
+    """A wall that goes back, whose noise grows with its depth, behind a body that is nearer."""
+    camera = Camera(100, 100, (50.0, 50.0), (50.0, 50.0), CameraPose.of_world(np.eye(4)))
+    wall = np.random.default_rng(1).uniform(-1, 1, (60_000, 3))
+    wall = np.stack([3 * wall[:, 0], 2 * wall[:, 1], 4 + 1.5 * wall[:, 0]], axis=1)
+    noise = LocalNoise.of([wall], [noisy(wall, 0.002 * wall[:, 2] ** power, 2)], 0.2, 9.0, (camera,))
+    body = np.array([[0.1, 0.1, 1.5], [-0.2, 0.2, 2.0]])
+    assert noise.at(body)[0] == pytest.approx(0.002 * body[:, 2] ** power, rel=0.3)
+    assert noise.at(wall[:50])[0] == pytest.approx(0.002 * wall[:50, 2] ** power, rel=0.3)

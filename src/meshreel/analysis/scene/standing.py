@@ -37,7 +37,10 @@ SMOOTH = 8.0  # the same over noise from which what a region does as a whole is 
 AROUND, ROUGHER = 16, 3.0  # regions around one, and times their usual noise that its own may be (guess)
 TAIL = 4.0  # standard deviations, by the median, beyond which a distance is no noise (guess)
 NEAREST = 8  # cells whose noise a place has (guess)
-BY_RANGE, ELSEWHERE = 0.5, 100.0  # rad, as unlike as e times the range is, and as another camera (guess)
+COMPARED = 64  # cells in about the direction of one, with which its noise is compared (guess)
+LEAST_SPREAD = 0.02  # of logarithms of depths that tell a power (guess)
+MOST_POWER = 2.0  # of the depth: the noise of disparities; that of times of flight has less (guess)
+BY_DEPTH, ELSEWHERE = 0.5, 100.0  # rad, as unlike as e times the depth is, and as another camera (guess)
 EXACT = 1e-6  # diagonals: the noise of frames that are equal (guess)
 SAME, MOST = 2e-5, 0.9  # diagonals, within which clean surface is in one place; share of it without noise (guess)
 SECOND, MEDIAN = 6**0.5, 0.6745  # deviation of a second difference, and median of an absolute value, in deviations
@@ -278,19 +281,39 @@ class LocalNoise:
         return float(np.sqrt((self.rms**2).mean())) if len(self.rms) else 0.0
 
     def at(self, points: Float64[np.ndarray, "N 3"]) -> Float64[np.ndarray, "2 N"]:
-        """Return `rms` and `off` at points, m: the medians of the places most like each."""
+        """Return `rms` and `off` at points, m: the medians of the places most like each.
+
+        What moves is nearer to a camera than what it hides: noise is taken to its depth by the power that places show.
+        """
         if not len(self.rms):
             return np.zeros((2, len(points)))
-        tree = cKDTree(self._conditions(self.places))
-        near = tree.query(self._conditions(points), k=np.arange(1, min(NEAREST, len(self.rms)) + 1))[1]
-        return np.stack([np.median(some[near], axis=1) for some in (self.rms, self.off)])
+        known, asked = self._conditions(self.places), self._conditions(points)
+        near = cKDTree(known).query(asked, k=np.arange(1, min(NEAREST, len(self.rms)) + 1))[1]
+        times = np.ones(near.shape)
+        if self.cameras:
+            times = np.exp(self._power(known) * (asked[:, 3, None] - known[near, 3]) / BY_DEPTH)
+        return np.stack([np.median(some[near] * times, axis=1) for some in (self.rms, self.off)])
+
+    def _power(self, conditions: Float64[np.ndarray, "C D"]) -> float:
+        """Return the power of the depth with which noise grows, by places in nearly the same direction."""
+        known = np.flatnonzero(self.rms > 0)
+        if len(known) < 2:
+            return 0.0
+        ways, depths = np.delete(conditions[known], 3, axis=1), conditions[known, 3] / BY_DEPTH
+        near = cKDTree(ways).query(ways, k=np.arange(1, min(COMPARED, len(known)) + 1))[1]
+        farther = depths[near] - depths[:, None]
+        noisier = np.log(self.rms[known])[near] - np.log(self.rms[known])[:, None]
+        square = float((farther**2).sum())
+        enough = square > LEAST_SPREAD**2 * farther.size
+        return float(np.clip((farther * noisier).sum() / square, 0.0, MOST_POWER)) if enough else 0.0
 
     def _conditions(self, points: Float64[np.ndarray, "N 3"]) -> Float64[np.ndarray, "N D"]:
-        """Return on what the noise of a place depends: where in a picture it is, and how far from the camera."""
+        """Return on what the noise of a place depends: where in a picture it is, and at which depth."""
         if not self.cameras:
             return points
         own = np.stack([camera.local(points) for camera in self.cameras])
         ranges = np.maximum(np.linalg.norm(own, axis=2), 1e-9)
         nearest, each = ranges.argmin(axis=0), np.arange(len(points))
         ranges, own = ranges[nearest, each], own[nearest, each]
-        return np.column_stack([own / ranges[:, None], BY_RANGE * np.log(ranges), ELSEWHERE * nearest])
+        depths = np.log(np.maximum(own[:, 2], 1e-9))
+        return np.column_stack([own / ranges[:, None], BY_DEPTH * depths, ELSEWHERE * nearest])
