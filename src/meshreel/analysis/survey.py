@@ -18,7 +18,7 @@ from jaxtyping import Float64, Int64
 from ..errors import InputError
 from ..format.checks import MOST_TRACKS
 from ..geometry.strict import norm
-from ..geometry.topology import clean, components, drop_unreferenced, face_normals, linked
+from ..geometry.topology import boxes_of, clean, components, drop_unreferenced, face_normals, linked
 from ..types import Mesh, MeshSequence, offset
 
 UNLIKE = 30.0  # times the median size: a larger frame of a room must be in another unit; a guess
@@ -194,15 +194,13 @@ def _found(mesh: Mesh) -> _Found | None:
     own = np.flatnonzero((areas >= LEAST * areas.max()) & (faces >= LEAST_FACES))
     if len(own) < 2:
         return None
-    order = np.argsort(labels, kind="stable")
-    starts = np.searchsorted(labels[order], np.arange(len(areas)))
-    corners = [best.reduceat(mesh.vertices[order], starts, axis=0) for best in (np.minimum, np.maximum)]
-    (lows, highs), middles = corners, corners[0] + corners[1]
+    lows, highs = boxes_of(labels, mesh.vertices, len(areas))
+    middles = lows + highs
     gaps = np.maximum(np.maximum(lows[own] - highs[:, None], lows[:, None] - highs[own]), 0.0)
     gap, middle_gap = ((offsets**2).sum(axis=2) for offsets in (gaps, middles[own] - middles[:, None]))
     nearest = np.lexsort((middle_gap, gap), axis=-1)[:, 0]  # the piece with the nearest box, then the nearest middle
     nearest[own] = np.arange(len(own))
-    return _Found(labels, np.concatenate(corners, axis=1), own, nearest)
+    return _Found(labels, np.concatenate([lows, highs], axis=1), own, nearest)
 
 
 def bodies_of(frames: Sequence[tuple[Piece, ...]]) -> list[Int64[np.ndarray, " P"]] | None:

@@ -143,6 +143,15 @@ def components(faces: Int32[np.ndarray, "F 3"], count: int) -> Int64[np.ndarray,
     return _core.components(faces, count).astype(np.int64)
 
 
+def boxes_of(
+    labels: Int64[np.ndarray, " V"], vertices: Float64[np.ndarray, "V 3"], count: int
+) -> tuple[Float64[np.ndarray, "C 3"], Float64[np.ndarray, "C 3"]]:
+    """Return the lower and the upper corners of the boxes of `count` components, each of which has a vertex."""
+    order = np.argsort(labels, kind="stable")
+    starts = np.searchsorted(labels[order], np.arange(count))
+    return np.minimum.reduceat(vertices[order], starts, axis=0), np.maximum.reduceat(vertices[order], starts, axis=0)
+
+
 def linked(pairs: Int64[np.ndarray, "L 2"], count: int) -> Int64[np.ndarray, " N"]:
     """Label each of `count` items with its component of the graph whose edges are `pairs`."""
     return components(pairs[:, [0, 1, 1]].astype(np.int32), count)

@@ -91,11 +91,7 @@ def beyond(mesh: Mesh, moves: Bool[np.ndarray, " F"], off: Bool[np.ndarray, " V"
     if not body.any():
         return body
     corners = mesh.vertices[mesh.faces[moves]].reshape(-1, 3)
-    low, high = (
-        (corners.min(axis=0) - AROUND, corners.max(axis=0) + AROUND)
-        if len(corners)
-        else np.array([[np.inf], [-np.inf]])
-    )
+    low, high = corners.min(axis=0, initial=np.inf) - AROUND, corners.max(axis=0, initial=-np.inf) + AROUND
     near = ((mesh.vertices >= low) & (mesh.vertices <= high)).all(axis=1)[mesh.faces[body]].all(axis=1)
     pieces = connected_faces(mesh.faces[body], len(mesh.vertices))
     is_near = np.bincount(pieces, near) > 0

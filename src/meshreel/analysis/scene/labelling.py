@@ -241,9 +241,9 @@ def in_all_frames(frames: Frames, same: float) -> Mesh:
 
 def is_off(mesh: Mesh, surface: Surface, same: float) -> Bool[np.ndarray, " F"]:
     """Return True for each face with a corner or a middle that is farther than `same` from a surface."""
-    corners = (surface.distances(mesh.vertices) > same)[mesh.faces].any(axis=1)
-    corners[~corners] = surface.distances(mesh.vertices[mesh.faces[~corners]].mean(axis=1)) > same
-    return corners
+    off = (surface.distances(mesh.vertices) > same)[mesh.faces].any(axis=1)
+    off[~off] = surface.distances(mesh.vertices[mesh.faces[~off]].mean(axis=1)) > same
+    return off
 
 
 def looks(mesh: Mesh, views: Sequence[Camera]) -> list[Seen]:

@@ -58,7 +58,8 @@ def segment(
     stands = stands or standing(frames)
     if stands.same and not (room := in_all_frames(frames, stands.same)).is_empty:
         return ByRest(room, edge_length(frames, chosen), stands.same)
-    places = _by_place(frames, chosen, cameras, change := stands.usual_change, report)
+    change = stands.usual_change
+    places = _by_place(frames, chosen, cameras, change, report)
     if places.chosen.any():
         return places
     first = frames[chosen[0]]

@@ -10,6 +10,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float64, Int64
@@ -190,9 +192,8 @@ def _regions(probes: list[_Probe], sensed: bool) -> Standing:
             middles = lattice.centers(keys[keep])
             near = cKDTree(middles).query(middles, k=np.arange(1, min(AROUND, len(keep)) + 1))[1]
             noise[keep] = np.minimum(noise[keep], ROUGHER * np.median(noise[keep][near], axis=1))
-    return Standing(
-        lattice, keys[keep], np.maximum(noise, exact)[keep], change[keep], area[keep], sensed, exact / EXACT
-    )
+    noise = np.maximum(noise, exact)
+    return Standing(lattice, keys[keep], noise[keep], change[keep], area[keep], sensed, exact / EXACT)
 
 
 def _deviations(
@@ -231,7 +232,7 @@ def _as_a_whole(
     return np.where(sizes > 1, mean(values), np.nan)[group] + (offset * slopes[group]).sum(axis=1)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)  # no slots: cached properties need a dict
 class LocalNoise:
     """Distances of surface from the truth, by place: measured where surface rests, elsewhere as at places most alike.
 
@@ -287,19 +288,30 @@ class LocalNoise:
         """
         if not len(self.rms):
             return np.zeros((2, len(points)))
-        known, asked = self._conditions(self.places), self._conditions(points)
-        near = cKDTree(known).query(asked, k=np.arange(1, min(NEAREST, len(self.rms)) + 1))[1]
+        known, asked = self._known, self._conditions(points)
+        near = self._tree.query(asked, k=np.arange(1, min(NEAREST, len(self.rms)) + 1))[1]
         times = np.ones(near.shape)
         if self.cameras:
-            times = np.exp(self._power(known) * (asked[:, 3, None] - known[near, 3]) / BY_DEPTH)
+            times = np.exp(self._power * (asked[:, 3, None] - known[near, 3]) / BY_DEPTH)
         return np.stack([np.median(some[near] * times, axis=1) for some in (self.rms, self.off)])
 
-    def _power(self, conditions: Float64[np.ndarray, "C D"]) -> float:
-        """Return the power of the depth with which noise grows, by places in nearly the same direction."""
+    @cached_property
+    def _known(self) -> Float64[np.ndarray, "C D"]:
+        """The conditions of all places."""
+        return self._conditions(self.places)
+
+    @cached_property
+    def _tree(self) -> Any:
+        """Search tree of the conditions of all places."""
+        return cKDTree(self._known)
+
+    @cached_property
+    def _power(self) -> float:
+        """The power of the depth with which noise grows, by places in nearly the same direction."""
         known = np.flatnonzero(self.rms > 0)
         if len(known) < 2:
             return 0.0
-        ways, depths = np.delete(conditions[known], 3, axis=1), conditions[known, 3] / BY_DEPTH
+        ways, depths = np.delete(self._known[known], 3, axis=1), self._known[known, 3] / BY_DEPTH
         near = cKDTree(ways).query(ways, k=np.arange(1, min(COMPARED, len(known)) + 1))[1]
         farther = depths[near] - depths[:, None]
         noisier = np.log(self.rms[known])[near] - np.log(self.rms[known])[:, None]

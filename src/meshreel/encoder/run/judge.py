@@ -18,7 +18,7 @@ from jaxtyping import Float64, Int64
 from ... import _core
 from ...errors import InputError
 from ...geometry.closest_points import Surface, area_samples
-from ...geometry.topology import components, connected_faces, face_normals
+from ...geometry.topology import boxes_of, components, connected_faces, face_normals
 from ...metrics.distance import NEAR
 from ...metrics.surface_samples import used_surface
 from ...types import Frames, Mesh
@@ -163,9 +163,7 @@ def _samples(mesh: Mesh) -> tuple[Int64[np.ndarray, "N 3"], Float64[np.ndarray, 
 def _piece_sizes(mesh: Mesh) -> Float64[np.ndarray, " V"]:
     """Return the diagonal of the box of each vertex's connected piece."""
     label = components(mesh.faces, len(mesh.vertices))
-    order = np.argsort(label, kind="stable")
-    starts = np.flatnonzero(np.diff(label[order], prepend=-1))
-    low, high = (each.reduceat(mesh.vertices[order], starts, axis=0) for each in (np.minimum, np.maximum))
+    low, high = boxes_of(label, mesh.vertices, int(label.max()) + 1)
     return np.linalg.norm(high - low, axis=1)[label]
 
 

@@ -121,28 +121,20 @@ def take_apart(
     else:
         segmentation = segment_by(masker, sequence, options.cameras)
     stages.reach("segment", 1.0)
-    if isinstance(segmentation, ByRest):
-        return _clean(sequence, survey, segmentation, stages)
-    if standing is not None:
-        _check_it_rests(sequence, segmentation, standing)
     depth = sequence.depth if options.from_depth else None
-    background = _background(sequence, depth, segmentation, stages)
-    if background.is_empty:
-        _check_nothing_lost(sequence, segmentation)
+    if isinstance(segmentation, ByRest):  # frames without noise: their own surface, of which none has to be measured
+        background, noisy = segmentation.room, Mesh.empty()
+    else:
+        if standing is not None:
+            _check_it_rests(sequence, segmentation, standing)
+        background = noisy = _background(sequence, depth, segmentation, stages)
+        if background.is_empty:
+            _check_nothing_lost(sequence, segmentation)
     changes = [_change(sequence, depth, segmentation, frame) for frame in segmentation.changes]
     stages.reach("background", 1.0)
-    sizes, noise = _measured(sequence, segmentation, background, changes, stages)
+    sizes, noise = _measured(sequence, segmentation, noisy, changes, stages)
     survey = replace(survey, scale=(float(np.median(sizes)) if sizes else 0.0) or survey.diagonal)
     return Parts(survey, segmentation, background, changes, noise, free_space(sequence))
-
-
-def _clean(sequence: CapturedSequence, survey: Survey, segmentation: ByRest, stages: Stages) -> Parts:
-    """Return the parts of a scene without noise, whose background is surface of its frames as it is."""
-    stages.reach("background", 1.0)
-    sizes, _ = _measured(sequence, segmentation, segmentation.room, [], stages)
-    survey = replace(survey, scale=float(np.median(sizes)) if sizes else survey.diagonal)
-    none = np.zeros(0)
-    return Parts(survey, segmentation, segmentation.room, [], LocalNoise(np.zeros((0, 3)), none, none))
 
 
 def free_space(sequence: CapturedSequence) -> tuple[FreeSpace, ...]:
