@@ -11,6 +11,7 @@ void bind_entropy(nanobind::module_&);
 void bind_laplacian(nanobind::module_&);
 void bind_layers(nanobind::module_&);
 void bind_fit(nanobind::module_&);
+void bind_raster(nanobind::module_&);
 void bind_reading(nanobind::module_&);
 void bind_topology(nanobind::module_&);
 void bind_tracking(nanobind::module_&);
@@ -28,6 +29,7 @@ NB_MODULE(_core, m) {
     meshreel::bind_laplacian(m);
     meshreel::bind_layers(m);
     meshreel::bind_fit(m);
+    meshreel::bind_raster(m);
     meshreel::bind_reading(m);
     meshreel::bind_topology(m);
     meshreel::bind_tracking(m);

@@ -312,6 +312,17 @@ class SurfaceTree:
         self, origins: Float64[np.ndarray, "M 3"], ways: Float64[np.ndarray, "N 3"], weighted: bool
     ) -> tuple[Int32[np.ndarray, " N"], Float64[np.ndarray, " N"], Float64[np.ndarray, "K 3"]]: ...
 
+def draw(
+    positions: Float64[np.ndarray, "V 3"],
+    faces: Int32[np.ndarray, "F 3"],
+    turn: Float64[np.ndarray, "3 3"],
+    shift: Float64[np.ndarray, " 3"],
+    lens: Float64[np.ndarray, " 4"],
+    parallel: bool,
+    crop: Int32[np.ndarray, " 4"],
+    weighted: bool,
+) -> tuple[Int32[np.ndarray, "H W"], Float64[np.ndarray, "H W"], Float64[np.ndarray, "N 3"] | None]: ...
+
 class FitTarget:
     def __init__(
         self,

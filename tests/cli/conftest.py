@@ -12,7 +12,7 @@ import pytest
 from meshreel.analysis.scene.masks import write_views
 from meshreel.analysis.scene.views import place_views
 from meshreel.cli import main
-from meshreel.geometry.cameras import Rays
+from meshreel.geometry.drawing import draw
 from meshreel.io.write import write_mesh, write_picture
 from tests.capture.depth_scenes import camera, record
 from tests.golden import GOLDEN
@@ -95,9 +95,8 @@ def painted(tmp_path_factory) -> Path:
     views = place_views(frames, "y", *VIEWS)
     write_views(folder, frames, views)
     for number, mesh in enumerate(frames):
-        rays = Rays(mesh)
         for view, own in enumerate(views):
-            mask = np.where(rays.look(own).faces >= ROOM_FACES, 255, 0).astype(np.uint8)
+            mask = np.where(draw(mesh, own).faces >= ROOM_FACES, 255, 0).astype(np.uint8)
             write_picture(mask, folder / f"view{view:02}" / f"frame_{number:05}.png")
     return folder
 

@@ -41,7 +41,7 @@ def test_aggregates_are_the_mean_and_the_worst_of_the_frames():
 
 def test_an_original_frame_is_drawn_once_for_several_comparisons_and_changes_no_number(monkeypatch):
     drawn, look = list[Mesh](), Visible.look
-    monkeypatch.setattr(Visible, "look", lambda self, pixels: (drawn.append(self.mesh), look(self, pixels))[1])
+    monkeypatch.setattr(Visible, "look", lambda self, *view: (drawn.append(self.mesh), look(self, *view))[1])
     cameras = views_around(Box.of(ORIGINALS), SMALL)
     options = ComparisonOptions(cameras)
     prepared = [OriginalFrame(mesh) for mesh in ORIGINALS]

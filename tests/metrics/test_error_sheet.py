@@ -6,7 +6,7 @@ import pytest
 
 from meshreel.errors import InputError
 from meshreel.metrics.error_sheet import SheetOptions, _rows, error_at_pixels, write_sheet
-from meshreel.metrics.render import Crop, look
+from meshreel.metrics.render import look
 from meshreel.metrics.viewpoints import Box, ViewOptions, views_around
 from meshreel.types import Mesh, MeshList
 
@@ -18,11 +18,11 @@ BODY = sphere(levels=3)
 def test_the_error_of_a_pixel_is_the_distance_of_what_it_sees():
     fine = sphere(levels=5)
     camera = views_around(Box.of([fine]), ViewOptions(64, 64))[0]
-    view = look(fine, camera, Crop(0, 64, 0, 64))
+    view = look(fine, camera)
     errors = error_at_pixels(view, moved(sphere(1.1, 5), (0, 0, 0)))
     assert np.allclose(errors, 0.1, atol=3e-3) and len(errors) == view.covered.sum() > 500
     offset = (1e6, 1e6, -1e6)
-    far = look(moved(fine, offset), views_around(Box.of([moved(fine, offset)]), ViewOptions(64, 64))[0], view.crop)
+    far = look(moved(fine, offset), views_around(Box.of([moved(fine, offset)]), ViewOptions(64, 64))[0])
     assert np.allclose(error_at_pixels(far, moved(sphere(1.1, 5), offset)), 0.1, atol=3e-3)
     assert np.isinf(error_at_pixels(view, Mesh.empty())).all()
 

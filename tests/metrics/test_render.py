@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from meshreel.geometry.cameras import Camera
-from meshreel.metrics.render import Crop, crop_of, look
+from meshreel.metrics.render import crop_of, look
 from meshreel.metrics.viewpoints import Box, ViewOptions, views_around
 from meshreel.types import Mesh
 
@@ -13,13 +13,13 @@ FAR = ViewOptions(64, 64, fov=1.0)  # rays are nearly parallel
 
 
 def render_normals(mesh: Mesh, camera: Camera) -> np.ndarray:
-    return look(mesh, camera, Crop(0, camera.height, 0, camera.width)).colors
+    return look(mesh, camera).colors
 
 
 def test_a_sphere_seen_from_the_front_shows_its_analytic_normals():
     body = sphere(levels=5)
     camera = views_around(Box.of([body]), SMALL)[0]
-    view = look(body, camera, Crop(0, 120, 0, 160))
+    view = look(body, camera)
     assert np.degrees(np.arccos(np.clip((view.normals * view.points).sum(axis=1), -1, 1))).max() < 3
     assert np.allclose(np.linalg.norm(view.points, axis=1), 1, atol=5e-3)
     eye = -camera.extrinsic[:3, :3].T @ camera.extrinsic[:3, 3]
@@ -54,7 +54,7 @@ def test_the_nearest_surface_is_seen_and_the_picture_is_not_mirrored():
 def test_a_crop_shows_the_same_pixels_as_the_whole_picture():
     body = noisy(moved(sphere(levels=3), (0.4, 0.1, 0)), 0.02)
     for camera in views_around(Box(np.full(3, -2.0), np.full(3, 2.0)), SMALL):
-        full = look(body, camera, Crop(0, 120, 0, 160))
+        full = look(body, camera)
         crop = crop_of([body], camera)
         part = look(body, camera, crop)
         assert part.covered.sum() == full.covered.sum() > 100

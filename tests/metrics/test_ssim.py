@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from meshreel.metrics import render
-from meshreel.metrics.render import Crop, look, ssim_map, ssim_normals
+from meshreel.metrics.render import look, ssim_map, ssim_normals
 from meshreel.metrics.viewpoints import Box, ViewOptions, views_around
 from meshreel.types import Mesh
 
@@ -21,7 +21,7 @@ def test_the_whole_form_is_scikit_image_on_the_whole_picture():
     cameras = views_around(Box(np.full(3, -2.0), np.full(3, 2.0)), SMALL)
     expected = [
         skimage.structural_similarity(
-            *(look(m, camera, Crop(0, 120, 0, 160)).colors.astype(float) for m in (a, b)),
+            *(look(m, camera).colors.astype(float) for m in (a, b)),
             win_size=7,
             channel_axis=-1,
             data_range=1.0,
@@ -37,7 +37,7 @@ def test_the_masked_form_is_the_mean_over_pixels_that_either_mesh_covers():
     cameras = _views(a)
     expected = []
     for camera in cameras:
-        views = [look(m, camera, Crop(0, 120, 0, 160)) for m in (a, b)]
+        views = [look(m, camera) for m in (a, b)]
         covered = np.pad((views[0].covered | views[1].covered)[3:-3, 3:-3], 3)
         scores = ssim_map(*(v.colors.astype(float) for v in views))
         expected.append(scores[covered].mean())

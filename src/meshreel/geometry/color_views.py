@@ -14,8 +14,9 @@ import numpy as np
 from jaxtyping import Bool, Float, Float32, Float64, Int32, Int64, UInt8
 
 from ..types import GREY, Mesh, Placement
-from .cameras import Camera, CameraPose, Rays
+from .cameras import Camera, CameraPose
 from .closest_points import Surface
+from .drawing import draw
 from .strict import products
 from .topology import blend, face_normals
 
@@ -68,8 +69,7 @@ class ColorViews:
 
         If `clear`, a place near a step in depth counts as hidden, as pictures mix both sides there.
         """
-        rays = Rays(hides)
-        self.views = [View(picture, rays, margin, clear) for picture in pictures]
+        self.views = [View(picture, hides, margin, clear) for picture in pictures]
 
     def at(self, points: Points, normals: Points) -> tuple[Points, Mask]:
         """Return the colours of places with these normals, 0 to 255, and a mask of those that some camera saw."""
@@ -98,14 +98,14 @@ class ColorViews:
 class View:
     """A picture, and the depth of the surface at each of its pixels; a large picture's depths are coarser."""
 
-    def __init__(self, picture: ColorPicture, rays: Rays, margin: float, clear: bool = False) -> None:
+    def __init__(self, picture: ColorPicture, hides: Mesh, margin: float, clear: bool = False) -> None:
         from scipy.ndimage import distance_transform_edt
 
         self.picture, self._margin, self._clear, camera = picture, margin, clear, picture.camera
         self._shrink = max(1, -(-max(camera.width, camera.height) // MOST_SIDE))
         width, height = -(-camera.width // self._shrink), -(-camera.height // self._shrink)
         intrinsic = camera.intrinsic / [[self._shrink], [self._shrink], [1.0]]
-        self._depth = rays.look(Camera.of(width, height, intrinsic, camera.extrinsic)).depth
+        self._depth = draw(hides, Camera.of(width, height, intrinsic, camera.extrinsic)).depth
         steps = _steps(_smooth(self._depth) if clear else self._depth)
         self._from_step = distance_transform_edt(~steps) * self._shrink
 

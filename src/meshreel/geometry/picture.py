@@ -11,7 +11,7 @@ import zlib
 import numpy as np
 
 from ..types import Mesh
-from .cameras import Rays
+from .drawing import Parallel, draw_places
 from .topology import blend, face_normals
 
 WIDTH, HEIGHT = 400, 300  # pixels (guess)
@@ -28,16 +28,13 @@ def picture(mesh: Mesh) -> bytes:
     size = np.maximum(high - low, 1e-12)
     scale = 0.94 * min(WIDTH / size[0], HEIGHT / size[1])
     shown = Mesh((turned - (low + high) / 2) * scale, mesh.faces)  # pixels, from the middle of the picture
-    across, up = np.meshgrid(np.arange(WIDTH) + 0.5 - WIDTH / 2, HEIGHT / 2 - 0.5 - np.arange(HEIGHT))
-    starts = np.stack([across, up, np.full(up.shape, scale * size[2] + 1)], axis=2).reshape(-1, 3)
-    hit = Rays(shown).cast(starts, np.broadcast_to([0.0, 0.0, -1.0], starts.shape))
-    seen = hit.faces >= 0
-    faces, weights = hit.faces[seen], hit.barycentric[seen]
+    seen = draw_places(shown, Parallel(WIDTH, HEIGHT, 1.0, np.diag([1.0, -1.0, -1.0, 1.0])))
+    faces, weights = seen.faces, seen.barycentric
     light = 0.35 + 0.65 * np.abs(face_normals(shown)[0][faces, 2:])
     color = _CLAY if mesh.colors is None else blend(mesh.colors.astype(np.float64), mesh.faces[faces], weights)
-    pixels = np.zeros((HEIGHT * WIDTH, 4), np.uint8)
-    pixels[seen, :3], pixels[seen, 3] = (color * light).round(), 255
-    return _png(pixels.reshape(HEIGHT, WIDTH, 4))
+    pixels = np.zeros((HEIGHT, WIDTH, 4), np.uint8)
+    pixels[seen.covered, :3], pixels[seen.covered, 3] = (color * light).round(), 255
+    return _png(pixels)
 
 
 def _png(pixels: np.ndarray) -> bytes:

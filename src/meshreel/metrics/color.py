@@ -13,12 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float64, Int32
 
-from ..geometry.cameras import Rays
 from ..geometry.color_views import Painted
+from ..geometry.drawing import Crop, Viewer, draw_places
 from ..types import LUMA, Mesh
-from .render import MARGIN, Picture, Pixels, crop_of, ssim_view
+from .render import MARGIN, Picture, crop_of, ssim_view
 from .surface_samples import scatter
-from .viewpoints import AnyCamera
 
 POINTS = 60_000  # on each surface: a seventh of the texels of a person's texture of 1024 x 1024 (guess)
 PEAK = 255.0
@@ -66,21 +65,19 @@ class Colored:
     """A mesh prepared for several views in its colours; a mesh without colours is grey (`render.Visible`)."""
 
     def __init__(self, mesh: Mesh) -> None:
-        self._surface = None if mesh.is_empty else (Rays(mesh), Painted(mesh))
+        self._mesh, self._painted = mesh, None if mesh.is_empty else Painted(mesh)
 
-    def look(self, pixels: Pixels) -> ColorView:
-        shape, image = pixels.crop.shape, np.ones((*pixels.crop.shape, 3), np.float32)
-        if self._surface is None:
-            return ColorView(np.zeros(shape, bool), image, np.full(shape, -1, np.int32))
-        rays, painted = self._surface
-        hit = rays.cast(*pixels.world_rays)
-        covered = hit.faces >= 0
-        colors = painted.on(hit.faces[covered], hit.barycentric[covered])
-        image.reshape(-1, 3)[covered] = np.clip(np.rint(colors), 0, 255) / 255
-        return ColorView(covered.reshape(shape), image, hit.faces.reshape(shape))
+    def look(self, camera: Viewer, crop: Crop | None = None) -> ColorView:
+        """Return the picture in a crop, or the whole picture."""
+        seen = draw_places(self._mesh, camera, crop)
+        image, faces = np.ones((*seen.covered.shape, 3), np.float32), np.full(seen.covered.shape, -1, np.int32)
+        if self._painted is not None:
+            image[seen.covered] = np.clip(np.rint(self._painted.on(seen.faces, seen.barycentric)), 0, 255) / 255
+        faces[seen.covered] = seen.faces
+        return ColorView(seen.covered, image, faces)
 
 
-def render_errors(original: Mesh, decoded: Mesh, cameras: Sequence[AnyCamera]) -> dict[str, float]:
+def render_errors(original: Mesh, decoded: Mesh, cameras: Sequence[Viewer]) -> dict[str, float]:
     """Return errors of pictures of two meshes in their colours over all views, by name.
 
     The PSNR of luma, dB, is over pixels that either mesh covers, so that silhouettes count, and over those that both
@@ -89,13 +86,13 @@ def render_errors(original: Mesh, decoded: Mesh, cameras: Sequence[AnyCamera]) -
     pair, scores = (Colored(original), Colored(decoded)), list[float]()
     squares, counts = np.zeros(2), np.zeros(2)
     for camera in cameras:
-        pixels = Pixels(camera, crop_of([original, decoded], camera, MARGIN))
-        a, b = (colored.look(pixels) for colored in pair)
+        crop = crop_of([original, decoded], camera, MARGIN)
+        a, b = (colored.look(camera, crop) for colored in pair)
         squared_luma = np.square(PEAK * ((a.colors - b.colors).astype(np.float64) @ TO_YUV[0]))
         for area, mask in enumerate((a.covered | b.covered, a.covered & b.covered)):
             squares[area] += squared_luma[mask].sum()
             counts[area] += mask.sum()
-        masked = ssim_view(a, b, pixels)[1]
+        masked = ssim_view(a, b, camera, crop)[1]
         scores += [] if masked is None else [masked]
     union, inside = (squares / np.maximum(counts, 1)).tolist()
     found = psnr(union), psnr(inside), float(np.mean(scores)) if scores else 1.0

@@ -16,13 +16,14 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
+from ..geometry.drawing import Viewer
 from ..types import Mesh
 from .color import COLORS, RENDERS, color_errors, render_errors
 from .distance import PSNR_CEILING, Original, SurfaceErrors, surface_errors
 from .mpeg import MEASURES, MpegOptions, mpeg_errors
 from .render import Remembered, ssim_normals
 from .surface_samples import used_surface
-from .viewpoints import AnyCamera, Box, ViewOptions, read_cameras, views_around
+from .viewpoints import Box, ViewOptions, read_cameras, views_around
 
 Row = dict[str, Any]
 _PSNRS = ("d2_psnr_paper", "d1_psnr", "d2_psnr", "symmetric_psnr", *COLORS, *RENDERS[:2], *MEASURES)
@@ -33,7 +34,7 @@ _LARGER_IS_BETTER = (*_PSNRS, "covered", "ssim", "ssim_masked", *RENDERS[2:])
 class ComparisonOptions:
     """Options of a comparison."""
 
-    cameras: Path | Sequence[AnyCamera] | None = None  # Open3D pinhole JSON; None: four views around the originals
+    cameras: Path | Sequence[Viewer] | None = None  # Open3D pinhole JSON; None: four views around the originals
     views: ViewOptions = field(default_factory=ViewOptions)  # used where no cameras are given
     ssim: bool = True  # rendering and SSIM take about 2 s per frame at 1920 x 1080
     keys: Sequence[int] = ()  # key frames, without which aggregates are also computed
@@ -50,7 +51,7 @@ class Comparison:
 
     frames: tuple[Row, ...]  # metrics of each frame; inf and nan are kept here
     empty: tuple[bool, ...]  # frames without surface on both sides
-    cameras: tuple[AnyCamera, ...]
+    cameras: tuple[Viewer, ...]
     keys: tuple[int, ...]
 
     def to_row(self) -> Row:
@@ -118,7 +119,7 @@ def compare_sequences(
     return Comparison(tuple(rows), tuple(empty), tuple(cameras), tuple(options.keys))
 
 
-def frame_row(original: Mesh | OriginalFrame, decoded: Mesh, cameras: Sequence[AnyCamera]) -> Row:
+def frame_row(original: Mesh | OriginalFrame, decoded: Mesh, cameras: Sequence[Viewer]) -> Row:
     """Return the metrics of one frame by name; SSIM only with cameras."""
     prepared = _prepared(original)
     mesh, row = prepared.mesh, _distance_row(surface_errors(prepared.surface, decoded))
@@ -160,7 +161,7 @@ def _prepared(original: Mesh | OriginalFrame) -> OriginalFrame:
     return original if isinstance(original, OriginalFrame) else OriginalFrame(original)
 
 
-def _cameras(originals: Iterable[Mesh | OriginalFrame], options: ComparisonOptions) -> Sequence[AnyCamera]:
+def _cameras(originals: Iterable[Mesh | OriginalFrame], options: ComparisonOptions) -> Sequence[Viewer]:
     if options.cameras is not None:
         return read_cameras(options.cameras) if isinstance(options.cameras, Path) else options.cameras
     return views_around(Box.of(_prepared(original).mesh for original in originals), options.views)

@@ -23,7 +23,7 @@ from ..geometry.closest_points import Surface
 from ..geometry.depth import STEP, DepthFrames, DepthPicture, apart
 from ..types import Frames, Mesh, evenly
 from .comparison import Row
-from .render import Crop, Pixels, View, Visible
+from .render import View, Visible
 from .surface_samples import angles, interpolate, welded_normals
 
 Mask = Bool[np.ndarray, "H W"]
@@ -134,7 +134,7 @@ class DepthJudge:
         for number, picture in enumerate(self._frames[frame]):
             if picture is not None:
                 camera = picture.camera
-                view = visible.look(Pixels(camera, Crop(0, camera.height, 0, camera.width)))
+                view = visible.look(camera)
                 depth, clear = picture.depth * picture.unit, clear_pixels(picture)
                 judged[number] = Judged(camera, depth, view, clear, self._body(number, depth))
         return judged
@@ -230,7 +230,7 @@ def _changes(before: Mapping[int, Judged], now: Mapping[int, Judged], refreshed:
     steps, angles = np.concatenate(moved), np.zeros(0)
     if pairs:
         first, second = (Patch.join(each.patch() for each in views) for views in zip(*pairs, strict=True))
-        angles = angles_after_motion(first, second, pairs[0][1].view.mesh)
+        angles = angles_after_motion(first, second, pairs[0][1].view.places.mesh)
     sums = {"still_changes": len(steps), "still_squares_m2": float(steps @ steps)}
     return sums | {"body_changes": len(angles), "body_squares_deg2": float(angles @ angles)}
 

@@ -21,7 +21,7 @@ from ..io.write import replacing
 from ..types import Frames, Mesh
 from .color import Colored
 from .distance import surface_errors
-from .render import Crop, Pixels, View, look
+from .render import View, look
 from .surface_samples import used_surface
 from .viewpoints import Box, ViewOptions, extent, views_around
 
@@ -87,11 +87,9 @@ def _rows(originals: Frames, decoded: Frames, options: SheetOptions) -> Iterator
         factor = 1000.0 if options.unit == "mm" else 100 / (errors.diagonal or 1.0)
         label = f"frame {frame}\nD2 {errors.d2_psnr_paper:.1f} dB\nnormals {errors.angle:.1f}°"
         for camera in cameras:
-            crop = Crop(0, camera.height, 0, camera.width)
-            views = [look(mesh, camera, crop) for mesh in meshes]
+            views = [look(mesh, camera) for mesh in meshes]
             if all(mesh.is_colored for mesh in meshes):
-                pixels = Pixels(camera, crop)
-                pictures = [Colored(mesh).look(pixels).colors for mesh in meshes]
+                pictures = [Colored(mesh).look(camera).colors for mesh in meshes]
             else:
                 pictures = [view.colors for view in views]  # of their normals
             yield SheetRow(label, views[0], views[1], pictures, factor * error_at_pixels(views[0], meshes[1]))
@@ -109,7 +107,7 @@ def _cameras(meshes: list[Mesh], options: SheetOptions) -> list[Camera]:
 def _draw(rows: list[SheetRow], options: SheetOptions) -> Any:
     from matplotlib.figure import Figure
 
-    height, width = rows[0].original.crop.shape
+    height, width = rows[0].original.covered.shape
     size = np.array([_LEFT + 3 * (width + _GAP) + _RIGHT, _TOP + len(rows) * (height + _GAP)])
     errors = np.concatenate([row.errors[np.isfinite(row.errors)] for row in rows])
     limit = max(float(np.quantile(errors, 0.99)), _LEAST_LIMIT) if len(errors) else 1.0
@@ -135,7 +133,7 @@ def _draw(rows: list[SheetRow], options: SheetOptions) -> Any:
 
 
 def _heat_map(axis: Any, row: SheetRow, limit: float) -> Any:
-    backdrop = np.ones((*row.original.crop.shape, 3))
+    backdrop = np.ones((*row.original.covered.shape, 3))
     backdrop[row.decoded.covered & ~row.original.covered] = _INVENTED
     axis.imshow(backdrop)
     errors = np.ma.masked_array(np.zeros(row.original.covered.shape), mask=~row.original.covered)

@@ -16,11 +16,13 @@ from jaxtyping import Bool, Float64, Int64
 from scipy.spatial import cKDTree
 
 from ..errors import InputError
-from ..geometry.cameras import Rays
+from ..geometry.cameras import matrix_of
 from ..geometry.color_views import Painted
+from ..geometry.drawing import Crop, Parallel, draw_places
 from ..geometry.topology import face_normals
 from ..types import Mesh
 from .color import PEAK, TO_YUV
+from .render import crop_of
 from .surface_samples import used_surface
 from .viewpoints import Box
 
@@ -128,12 +130,12 @@ def _picture_squares(original: Mesh, decoded: Mesh, pixels: int) -> tuple[float,
     """Return mean squared differences of depth (radii) and luma, over pixels of all views that see both meshes."""
     box = Box.of([original, decoded])
     radius = BORDER * float(np.linalg.norm(box.size)) / 2
-    drawn = [(Rays(mesh), Painted(mesh) if mesh.is_colored else None) for mesh in (original, decoded)]
+    pair = [(mesh, Painted(mesh) if mesh.is_colored else None) for mesh in (original, decoded)]
     sums, count = np.zeros(2), 0
     for way in directions():
-        rays = _rays(way, np.concatenate([original.vertices, decoded.vertices]) - box.center, radius, pixels)
-        starts = rays + box.center + radius * way
-        a, b = (_seen(*each, starts, -way) for each in drawn)
+        camera = _camera(way, box.center, radius, pixels)
+        crop = crop_of([original, decoded], camera)
+        a, b = (_seen(*each, camera, crop) for each in pair)
         both = a[0] & b[0]
         count += int(both.sum())
         sums += [np.square((a[1] - b[1])[both] / radius).sum(), np.square((a[2] - b[2])[both]).sum()]
@@ -141,15 +143,16 @@ def _picture_squares(original: Mesh, decoded: Mesh, pixels: int) -> tuple[float,
 
 
 def _seen(
-    rays: Rays, painted: Painted | None, starts: Points, way: Way
-) -> tuple[Bool[np.ndarray, " N"], Values, Values]:
-    """Return a mask of the parallel rays that meet a mesh, their lengths, and the luma there."""
-    hit = rays.cast(starts, np.broadcast_to(way, starts.shape))
-    hits, luma = hit.faces >= 0, np.zeros(len(starts))
+    mesh: Mesh, painted: Painted | None, camera: Parallel, crop: Crop
+) -> tuple[Bool[np.ndarray, "H W"], Float64[np.ndarray, "H W"], Float64[np.ndarray, "H W"]]:
+    """Return a mask of the pixels that see a mesh, their depths, and the luma there."""
+    seen = draw_places(mesh, camera, crop)
+    depth, luma = np.zeros(crop.shape), np.zeros(crop.shape)
+    depth[seen.covered] = seen.depth
     if painted is not None:
-        colors = np.clip(np.rint(painted.on(hit.faces[hits], hit.barycentric[hits])), 0, PEAK)
-        luma[hits] = np.rint(colors @ TO_YUV[0])
-    return hits, np.where(hits, hit.distances, 0.0), luma
+        colors = np.clip(np.rint(painted.on(seen.faces, seen.barycentric)), 0, PEAK)
+        luma[seen.covered] = np.rint(colors @ TO_YUV[0])
+    return seen.covered, depth, luma
 
 
 def directions() -> Iterator[Way]:
@@ -159,15 +162,13 @@ def directions() -> Iterator[Way]:
         yield np.array([math.cos(turn) * math.sqrt(1 - y * y), y, math.sin(turn) * math.sqrt(1 - y * y)])
 
 
-def _rays(way: Way, points: Points, radius: float, pixels: int) -> Float64[np.ndarray, "P 3"]:
-    """Return the points where a picture's rays cross the plane through its middle, within the points' rectangle."""
+def _camera(way: Way, center: Way, radius: float, pixels: int) -> Parallel:
+    """Return the camera that looks at the middle from a direction, whose middle pixel sees it."""
     up = np.array([0.0, 0.0, 1.0]) if abs(abs(way[1]) - 1) < 1e-6 else np.array([0.0, 1.0, 0.0])
     right = np.cross(up, way) / np.linalg.norm(np.cross(up, way))
-    axes, pixel = np.stack([right, np.cross(way, right)]), 2 * radius / pixels
-    at = points @ axes.T / pixel
-    low, high = np.floor(at.min(axis=0)).astype(int), np.ceil(at.max(axis=0)).astype(int)
-    columns, rows = np.meshgrid(np.arange(low[0], high[0] + 1), np.arange(low[1], high[1] + 1))
-    return np.stack([columns.ravel(), rows.ravel()], axis=1) * pixel @ axes
+    turn = np.stack([right, np.cross(way, right), -way])
+    side = pixels + 1 - pixels % 2
+    return Parallel(side, side, 2 * radius / pixels, matrix_of(turn, -turn @ center))
 
 
 def _psnr(square: float, peak: float) -> float:

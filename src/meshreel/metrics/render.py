@@ -1,4 +1,4 @@
-"""Pictures of surface normals by ray casting, without GL, window or lighting, and their SSIM.
+"""Pictures of surface normals, without GL, window or lighting, and their SSIM.
 
 A pixel that a mesh covers has the color (n + 1) / 2 of the interpolated vertex normal n in world axes, as in the paper
 (section 4.1); all others are white, the default background of Open3D's viewer. Faces are visible from both sides, with
@@ -11,17 +11,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
-from jaxtyping import Bool, Float32, Float64, Int32
+from jaxtyping import Bool, Float32, Float64
 from scipy.ndimage import uniform_filter
 
-from ..geometry.cameras import Rays
-from ..geometry.topology import blend
+from ..geometry.drawing import Crop, SeenPlaces, Viewer, draw_places
 from ..types import Mesh
 from .surface_samples import interpolate, used_surface, welded_normals
-from .viewpoints import AnyCamera
 
 BACKGROUND = 1.0  # white
 _SIDE = 7  # pixels, side of the SSIM window: scikit-image's default
@@ -31,34 +28,20 @@ MARGIN = 2 * _SIDE  # pixels of a crop around what is seen
 
 
 @dataclass(frozen=True, slots=True)
-class Crop:
-    """Crop of a picture, a rectangle of pixels: rows top to bottom, columns left to right, ends excluded."""
-
-    top: int
-    bottom: int
-    left: int
-    right: int
-
-    @property
-    def shape(self) -> tuple[int, int]:
-        return self.bottom - self.top, self.right - self.left
-
-
-@dataclass(frozen=True, slots=True)
 class View:
-    """Surface that one camera sees in one crop."""
+    """Surface that one camera sees in one crop, with the normals at the places that its covered pixels see."""
 
-    crop: Crop
-    covered: Bool[np.ndarray, "H W"]
-    mesh: Mesh
-    corners: Int32[np.ndarray, "N 3"]  # vertices of the faces that the covered pixels see, row by row
-    weights: Float64[np.ndarray, "N 3"]  # barycentric, of the points where their rays end
+    places: SeenPlaces
     normals: Float64[np.ndarray, "N 3"]
 
     @property
+    def covered(self) -> Bool[np.ndarray, "H W"]:
+        return self.places.covered
+
+    @property
     def points(self) -> Float64[np.ndarray, "N 3"]:
-        """End points of the covered pixels' rays in world coordinates, m."""
-        return blend(self.mesh.vertices, self.corners, self.weights)
+        """Places that the covered pixels see in world coordinates, m."""
+        return self.places.points
 
     @property
     def colors(self) -> Float32[np.ndarray, "H W 3"]:
@@ -68,7 +51,7 @@ class View:
         return image
 
 
-def crop_of(meshes: list[Mesh], camera: AnyCamera, border: int = 8) -> Crop:
+def crop_of(meshes: list[Mesh], camera: Viewer, border: int = 8) -> Crop:
     """Return the crop of all pixels that can see a mesh, widened by `border` pixels and clipped to the image."""
     vertices = np.concatenate([m.vertices for m in meshes])
     if len(vertices) == 0:
@@ -82,8 +65,8 @@ def crop_of(meshes: list[Mesh], camera: AnyCamera, border: int = 8) -> Crop:
     return Crop(int(low[1]), int(high[1]), int(low[0]), int(high[0]))
 
 
-def look(mesh: Mesh, camera: AnyCamera, crop: Crop) -> View:
-    return Visible(mesh).look(Pixels(camera, crop))
+def look(mesh: Mesh, camera: Viewer, crop: Crop | None = None) -> View:
+    return Visible(mesh).look(camera, crop)
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,39 +77,17 @@ class Picture:
     colors: Float32[np.ndarray, "H W 3"]  # 0 to 1
 
 
-class Pixels:
-    """Crop of a camera's picture, with the rays through its pixels, which all meshes rendered there share."""
-
-    def __init__(self, camera: AnyCamera, crop: Crop) -> None:
-        self.camera, self.crop = camera, crop
-
-    @cached_property
-    def rays(self) -> tuple[Float64[np.ndarray, "N 3"], Float64[np.ndarray, "N 3"]]:
-        """Origins and unit directions of the rays in the camera frame, row by row."""
-        crop = self.crop
-        rows, columns = np.mgrid[crop.top : crop.bottom, crop.left : crop.right]
-        return self.camera.rays(np.column_stack([columns.ravel(), rows.ravel()]) + 0.5)
-
-    @cached_property
-    def world_rays(self) -> tuple[Float64[np.ndarray, "N 3"], Float64[np.ndarray, "N 3"]]:
-        """Origins and unit directions of the same rays in world coordinates."""
-        (origins, directions), pose = self.rays, self.camera.extrinsic
-        return (origins - pose[:3, 3]) @ pose[:3, :3], directions @ pose[:3, :3]
-
-
 class Visible:
-    """A mesh prepared for several views: its surface and its normals are computed once."""
+    """A mesh prepared for several views: its normals are computed once."""
 
     def __init__(self, mesh: Mesh) -> None:
         self.mesh = used_surface(mesh)
-        self._normals, self._rays = welded_normals(self.mesh), Rays(self.mesh)
+        self._normals = welded_normals(self.mesh)
 
-    def look(self, pixels: Pixels) -> View:
-        mesh, crop, answer = self.mesh, pixels.crop, self._rays.cast(*pixels.world_rays)
-        hit = answer.faces >= 0
-        corners, weights = mesh.faces[answer.faces[hit]], answer.barycentric[hit]
-        normals = interpolate(self._normals, corners, weights)
-        return View(crop, hit.reshape(crop.shape), mesh, corners, weights, normals)
+    def look(self, camera: Viewer, crop: Crop | None = None) -> View:
+        """Return the surface that a camera sees in a crop, or in its whole picture."""
+        places = draw_places(self.mesh, camera, crop)
+        return View(places, interpolate(self._normals, self.mesh.faces[places.faces], places.barycentric))
 
 
 _C1, _C2 = 0.01**2, 0.03**2  # Wang et al., at data range 1
@@ -137,34 +98,33 @@ class Remembered:
 
     def __init__(self, mesh: Mesh) -> None:
         self.mesh, self._visible = mesh, Visible(mesh)
-        self._drawn = list[tuple[AnyCamera, Crop, Picture]]()
+        self._drawn = list[tuple[Viewer, Crop, Picture]]()
 
-    def look(self, pixels: Pixels) -> Picture:
+    def look(self, camera: Viewer, crop: Crop) -> Picture:
         """Render the mesh in a crop of a camera's image, or return the picture from before."""
-        for camera, crop, drawn in self._drawn:
-            if camera is pixels.camera and crop == pixels.crop:
+        for known, part, drawn in self._drawn:
+            if known is camera and part == crop:
                 return drawn
-        view = self._visible.look(pixels)
-        self._drawn.append((pixels.camera, pixels.crop, Picture(view.covered, view.colors)))
+        view = self._visible.look(camera, crop)
+        self._drawn.append((camera, crop, Picture(view.covered, view.colors)))
         return self._drawn[-1][-1]
 
 
-def ssim_normals(original: Mesh | Remembered, decoded: Mesh, cameras: Sequence[AnyCamera]) -> dict[str, float]:
+def ssim_normals(original: Mesh | Remembered, decoded: Mesh, cameras: Sequence[Viewer]) -> dict[str, float]:
     """Return SSIM between the normal-colored renderings of two meshes (paper, section 4: four views); 1 is identical.
 
     `ssim` is over whole pictures, `ssim_masked` over pixels that either mesh covers, without views that see neither.
     """
     pair = original if isinstance(original, Remembered) else Remembered(original), Visible(decoded)
-    views = [Pixels(camera, crop_of([pair[0].mesh, decoded], camera, MARGIN)) for camera in cameras]
-    scores = [ssim_view(pair[0].look(pixels), pair[1].look(pixels), pixels) for pixels in views]
+    views = [(camera, crop_of([pair[0].mesh, decoded], camera, MARGIN)) for camera in cameras]
+    scores = [ssim_view(pair[0].look(*view), pair[1].look(*view), *view) for view in views]
     counted = [masked for _, masked in scores if masked is not None]
     whole, masked = float(np.mean([whole for whole, _ in scores])), float(np.mean(counted)) if counted else 1.0
     return {"ssim": whole, "ssim_masked": masked}
 
 
-def ssim_view(a: Picture | View, b: Picture | View, pixels: Pixels) -> tuple[float, float | None]:
+def ssim_view(a: Picture | View, b: Picture | View, camera: Viewer, crop: Crop) -> tuple[float, float | None]:
     """Return SSIM of two pictures over the whole image, and over pixels that either covers; None without such."""
-    camera, crop = pixels.camera, pixels.crop
     interior = np.zeros((camera.height, camera.width), dtype=bool)
     interior[BORDER:-BORDER, BORDER:-BORDER] = True
     inside = interior[crop.top : crop.bottom, crop.left : crop.right]

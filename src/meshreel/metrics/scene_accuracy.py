@@ -20,11 +20,12 @@ from jaxtyping import Bool, Float64
 from ..errors import InputError
 from ..geometry.cameras import Camera, Rays
 from ..geometry.closest_points import Surface, carried_labels
+from ..geometry.drawing import draw_places
 from ..geometry.topology import face_normals
 from ..types import Frames, Mesh
 from .comparison import Row, finite
 from .distance import PSNR_CEILING, psnr, quantile
-from .render import BACKGROUND, BORDER, Crop, Picture, Pixels, ssim_map
+from .render import BACKGROUND, BORDER, Picture, ssim_map
 from .surface_samples import WORST_ANGLE, Scatter, angles, interpolate, scatter, welded_normals
 
 PARTS = ("all", "people", "background")
@@ -258,11 +259,10 @@ def _picture(scene: Scene, camera: Camera) -> ScenePicture:
     colors = np.full((*shape, 3), BACKGROUND, np.float32)
     covered, dynamic = np.zeros(shape, bool), np.zeros(shape, bool)
     if not scene.mesh.is_empty:
-        hit = scene.rays.cast(*Pixels(camera, Crop(0, camera.height, 0, camera.width)).world_rays)
-        covered = (hit.faces >= 0).reshape(shape)
-        faces, weights = hit.faces[covered.ravel()], hit.barycentric[covered.ravel()]
-        colors[covered] = (interpolate(scene.normals, scene.mesh.faces[faces], weights) + 1) / 2
-        dynamic[covered] = scene.dynamic[faces]
+        seen = draw_places(scene.mesh, camera)
+        covered = seen.covered
+        colors[covered] = (interpolate(scene.normals, scene.mesh.faces[seen.faces], seen.barycentric) + 1) / 2
+        dynamic[covered] = scene.dynamic[seen.faces]
     return ScenePicture(covered, colors, dynamic)
 
 

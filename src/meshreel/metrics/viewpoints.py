@@ -6,7 +6,6 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float64
@@ -17,32 +16,6 @@ from ..io.files import read_input
 from ..types import UP_AXES, Mesh, check_up
 
 MARGIN = 1.05  # times the box, so that nothing touches the border (guess)
-
-
-@runtime_checkable
-class AnyCamera(Protocol):
-    """Interface between a renderer and a camera, perspective or parallel."""
-
-    @property
-    def width(self) -> int:
-        """Width of the picture, pixels."""
-
-    @property
-    def height(self) -> int:
-        """Height of the picture, pixels."""
-
-    @property
-    def extrinsic(self) -> Float64[np.ndarray, "4 4"]:
-        """World to camera."""
-
-    def rays(self, pixels: Float64[np.ndarray, "N 2"]) -> tuple[np.ndarray, np.ndarray]:
-        """Return origins and unit directions (N x 3 each, camera frame) through image positions (column, row)."""
-
-    def project(self, points: Float64[np.ndarray, "N 3"]) -> Float64[np.ndarray, "N 2"]:
-        """Return image positions of points in the camera frame; not finite for points that are not in front of it."""
-
-    def record(self) -> dict[str, Any]:
-        """Return the camera for JSON."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,8 +6,8 @@ from scipy.ndimage import binary_erosion
 
 from meshreel.analysis.scene.background import Moment, fuse_still_depth, usual_pictures
 from meshreel.capture.recording import FusionOptions, fuse_depths
-from meshreel.geometry.cameras import Rays
 from meshreel.geometry.closest_points import distances
+from meshreel.geometry.drawing import draw
 from meshreel.types import Mesh
 from tests.capture.depth_scenes import RADIUS, WALL, camera, measured
 
@@ -103,17 +103,17 @@ def test_a_floor_seen_at_a_grazing_angle_has_no_cracks():
     depth = np.where((below > 1) & (below < 4), below * 1000, 0)[:, None] * np.ones(AHEAD.view.width)
     picture = AHEAD.picture(depth.astype(np.uint16))
     mesh = fuse_still_depth([Moment([picture], Mesh.empty(), np.zeros(0, bool))], VOXEL)
-    seen = Rays(mesh).look(AHEAD.view).depth
+    seen = draw(mesh, AHEAD.view).depth
     inside = binary_erosion(depth > 0, iterations=2)
     assert np.mean(np.isfinite(seen[inside])) > 0.99
 
 
 def slits(depth: np.ndarray) -> int:
-    """Rays, four a pixel each way, that meet no fused surface amid measured depth."""
+    """Samples, four a pixel each way, that see no fused surface amid measured depth."""
     picture = SHARP.picture(depth)
     mesh = fuse_still_depth([Moment([picture], Mesh.empty(), np.zeros(0, bool))], VOXEL)
     inside = np.repeat(np.repeat(binary_erosion(depth > 0, iterations=6), 4, axis=0), 4, axis=1)
-    return int((inside & ~np.isfinite(Rays(mesh).look(picture.finer(4).camera).depth)).sum())
+    return int((inside & ~np.isfinite(draw(mesh, picture.finer(4).camera).depth)).sum())
 
 
 def test_a_step_and_what_it_hides_leave_no_slit_between_them():
@@ -126,7 +126,7 @@ def test_what_a_camera_does_not_measure_is_closed_if_small():
     depth = np.full((AHEAD.view.height, AHEAD.view.width), 2000, np.uint16)
     depth[40:43, 40:43] = 0
     mesh = fuse_still_depth([Moment([AHEAD.picture(depth)], Mesh.empty(), np.zeros(0, bool))], VOXEL)
-    assert np.isfinite(Rays(mesh).look(AHEAD.view).depth[38:46, 38:46]).all()
+    assert np.isfinite(draw(mesh, AHEAD.view).depth[38:46, 38:46]).all()
     depth[30:60, 30:60] = 0
     mesh = fuse_still_depth([Moment([AHEAD.picture(depth)], Mesh.empty(), np.zeros(0, bool))], VOXEL)
-    assert not np.isfinite(Rays(mesh).look(AHEAD.view).depth[40:50, 40:50]).any()
+    assert not np.isfinite(draw(mesh, AHEAD.view).depth[40:50, 40:50]).any()

@@ -7,8 +7,9 @@ import pytest
 
 from meshreel.analysis.scene.color_looks import ColorChange, ColorLooks
 from meshreel.analysis.scene.labelling import ByPlace, Rest
-from meshreel.geometry.cameras import Camera, Rays, looking_at
+from meshreel.geometry.cameras import Camera, looking_at
 from meshreel.geometry.color_views import ColorPicture
+from meshreel.geometry.drawing import draw
 from meshreel.geometry.topology import concatenate
 from meshreel.geometry.voxels import Lattice, spread
 from meshreel.types import Mesh
@@ -56,7 +57,7 @@ COME = concatenate([ROOM, FOOT])
 
 
 def picture(mesh: Mesh, shaded: bool = False, skin: tuple[int, int, int] = SKIN) -> ColorPicture:
-    faces = Rays(mesh).look(EYE).faces
+    faces = draw(mesh, EYE).faces
     colors = np.where((faces >= len(ROOM.faces))[..., None], skin, FLOOR) * (SHADE if shaded else 1.0)
     noisy = colors + np.random.default_rng(int(shaded)).normal(0, 2, colors.shape)
     return ColorPicture(EYE, np.clip(np.rint(noisy), 0, 255).astype(np.uint8))
@@ -72,7 +73,7 @@ def change() -> ColorChange:
 
 
 def test_a_foot_of_another_colour_is_found_and_neither_a_shadow_nor_one_of_the_floor_s(change: ColorChange):
-    found, seen = change.faces(7, COME), np.unique(Rays(COME).look(EYE).faces)
+    found, seen = change.faces(7, COME), np.unique(draw(COME, EYE).faces)
     own = seen[seen >= len(ROOM.faces)]
     assert found[own].mean() > 0.8 and found[: len(ROOM.faces)].mean() < 0.01
     assert not change.faces(6, ROOM).any() and not change.faces(8, COME).any()

@@ -14,7 +14,7 @@ from meshreel.analysis.scene.hypotheses import (
     variation,
 )
 from meshreel.analysis.scene.views import place_views
-from meshreel.geometry.cameras import Rays
+from meshreel.geometry.drawing import draw
 from meshreel.geometry.topology import concatenate
 from tests.analysis.scene.test_views import ROOM, box
 from tests.metrics.shapes import moved, sphere
@@ -88,7 +88,7 @@ def test_the_reference_view_is_the_one_that_sees_the_change():
     views = place_views([ROOM], "y", 6, 80, 60)
     walls = box((0, 0, 0), (5, 2.5, 4), inwards=True)
     meshes = [concatenate([walls, moved(sphere(0.4), (x, 1.2, 2))]) for x in (1.5, 2.5, 3.5)]
-    moments = [[Rays(mesh).look(view) for view in views] for mesh in meshes]
+    moments = [[draw(mesh, view) for view in views] for mesh in meshes]
     changes = [
         max(int((np.abs(m[k].depth - moments[0][k].depth) > 0.1).sum()) for m in moments) for k in range(len(views))
     ]

@@ -18,7 +18,8 @@ from meshreel.analysis.scene.masks import (
 from meshreel.analysis.scene.segmentation import scene_views, segment_by
 from meshreel.analysis.scene.views import place_views
 from meshreel.errors import InputError
-from meshreel.geometry.cameras import CameraPose, Rays, pack_cameras
+from meshreel.geometry.cameras import CameraPose, pack_cameras
+from meshreel.geometry.drawing import draw
 from meshreel.io.write import write_picture
 from meshreel.types import Mesh, MeshList
 from tests.analysis.scene.test_views import ROOM
@@ -26,7 +27,7 @@ from tests.metrics.shapes import sphere
 
 BALL = len(sphere().faces)  # the last faces of the room are the ball's
 VIEWS = place_views([ROOM], "y", 3, 80, 60)
-SEEN = [Rays(ROOM).look(view) for view in VIEWS]
+SEEN = [draw(ROOM, view) for view in VIEWS]
 
 
 @pytest.fixture

@@ -8,7 +8,7 @@ from PIL import Image
 
 from meshreel.analysis.scene.masks import CAMERAS, normal_picture, read_view_file, write_views
 from meshreel.errors import InputError
-from meshreel.geometry.cameras import Rays
+from meshreel.geometry.drawing import draw
 from meshreel.metrics.viewpoints import Box, ViewOptions, views_around
 from meshreel.types import Mesh, MeshList
 from tests.metrics.shapes import moved, plane, sphere
@@ -20,17 +20,16 @@ def test_a_wall_has_the_color_of_its_normal_from_either_side_of_its_faces():
     wall = moved(plane(2), (-1, -1, 0))
     for mesh in (wall, Mesh.of(wall.vertices, wall.faces[:, ::-1])):
         for view, blue in ((VIEWS[0], 255), (VIEWS[2], 0)):  # the picture's normals face the camera
-            picture = normal_picture(Rays(mesh).look(view), view)
+            picture = normal_picture(draw(mesh, view), view)
             assert picture.shape == (60, 80, 3) and np.abs(picture[30, 40].astype(int) - [128, 128, blue]).max() <= 1
             assert (picture[0, 0] == 255).all()
 
 
 def test_a_ball_has_the_colors_of_its_normals():
-    seen = Rays(sphere(levels=6)).look(VIEWS[1])
+    seen = draw(sphere(levels=6), VIEWS[1])
     picture = normal_picture(seen, VIEWS[1])
     rows, columns = np.nonzero(seen.faces >= 0)
-    _, ahead = VIEWS[1].rays(np.stack([columns + 0.5, rows + 0.5], axis=1))
-    local = ahead / ahead[:, 2:] * seen.depth[rows, columns][:, None]
+    local = VIEWS[1].ahead[rows, columns] * seen.depth[rows, columns][:, None]
     world = (local - VIEWS[1].extrinsic[:3, 3]) @ VIEWS[1].extrinsic[:3, :3]
     away = np.abs(picture[rows, columns] / 255 * 2 - 1 - world).max(axis=1)
     assert np.percentile(away, 90) < 0.1
@@ -41,7 +40,7 @@ def test_an_edge_between_near_and_far_is_not_blurred():
         np.concatenate([moved(plane(2), (-1, -1, 0)).vertices, moved(plane(1), (-1, -1, 0.5)).vertices]),
         np.concatenate([plane(2).faces, plane(1).faces + len(plane(2).vertices)]),
     )
-    picture = normal_picture(Rays(both).look(VIEWS[0]), VIEWS[0]).astype(int)
+    picture = normal_picture(draw(both, VIEWS[0]), VIEWS[0]).astype(int)
     covered = picture[(picture != 255).any(axis=2)]
     assert len(covered) > 500 and np.abs(covered - [128, 128, 255]).max() <= 1
 

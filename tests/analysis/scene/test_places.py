@@ -10,8 +10,9 @@ from meshreel.analysis.scene import places as module
 from meshreel.analysis.scene.cut import moving_places
 from meshreel.analysis.scene.places import Observations, Places, find_places, inspected, states
 from meshreel.analysis.scene.views import place_views
-from meshreel.geometry.cameras import CameraPose, Rays
+from meshreel.geometry.cameras import CameraPose
 from meshreel.geometry.depth import DepthPicture
+from meshreel.geometry.drawing import draw
 from meshreel.geometry.voxels import Lattice
 from meshreel.types import Frames, Mesh
 from tests.metrics.shapes import moved, plane
@@ -173,10 +174,10 @@ WITH, WITHOUT = (with_room([body])[0] for body in (TABLE, Mesh.empty()))
 
 def measured(mesh: Mesh, view, hidden: Mesh | None = None) -> DepthPicture:
     """What a camera measures of a mesh; nothing where another mesh would be in the way."""
-    seen = Rays(mesh).look(view)
+    seen = draw(mesh, view)
     depth = np.where(seen.faces >= 0, seen.depth, 0.0)
     if hidden is not None:
-        depth[Rays(hidden).look(view).faces >= 0] = 0.0
+        depth[draw(hidden, view).faces >= 0] = 0.0
     return DepthPicture(view, depth.astype(np.float32), 1.0, 10.0)
 
 

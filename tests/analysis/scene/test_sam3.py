@@ -16,8 +16,8 @@ from meshreel.analysis.scene.masks import Masker, normal_picture
 from meshreel.analysis.scene.segmentation import segment_by
 from meshreel.analysis.scene.views import place_views
 from meshreel.errors import InputError
-from meshreel.geometry.cameras import Rays
 from meshreel.geometry.color_views import ColorPicture
+from meshreel.geometry.drawing import draw
 from meshreel.geometry.topology import concatenate
 from meshreel.types import MeshList
 from tests.analysis.scene.test_views import box
@@ -26,7 +26,7 @@ from tests.metrics.shapes import moved, sphere
 WALLS = box((0, 0, 0), (5, 2.5, 4), inwards=True)
 FRAMES = [concatenate([WALLS, moved(sphere(0.4, levels=2), (x, 1.2, 2))]) for x in (1.0, 1.8, 2.6, 3.4)]
 VIEWS = place_views(FRAMES, "y", 3, 80, 60)
-SEEN = [[Rays(mesh).look(view) for view in VIEWS] for mesh in FRAMES]
+SEEN = [[draw(mesh, view) for view in VIEWS] for mesh in FRAMES]
 EASILY = sam3.Sam3Options(reference=1, variation=0.001, overlap=0.01)
 
 
@@ -158,7 +158,7 @@ def test_the_pictures_of_a_colour_camera_are_used_where_there_are_any(tmp_path: 
     found = segment_by(sam3.Sam3Masks(tmp_path), frames)
     assert not found.moving(0, FRAMES[0]).any() and found.views == (VIEWS[0],)
     assert [set(picture.reshape(-1).tolist()) for picture in tracker.pictures[:3]] == [{0}, {50}, {100}]
-    assert np.array_equal(tracker.pictures[3], normal_picture(Rays(FRAMES[3]).look(VIEWS[0]), VIEWS[0]))
+    assert np.array_equal(tracker.pictures[3], normal_picture(draw(FRAMES[3], VIEWS[0]), VIEWS[0]))
     segment_by(masker := sam3.Sam3Masks(tmp_path), frames, VIEWS).moving(0, FRAMES[0])
     assert masker.reference and np.array_equal(
         tracker.pictures[1], normal_picture(SEEN[1][masker.reference], VIEWS[masker.reference])
@@ -176,7 +176,7 @@ def test_the_view_in_which_most_changes_is_followed(tmp_path: Path, monkeypatch:
     monkeypatch.setattr(sam3, "WordTracker", lambda *_: tracker)
     found = segment_by(sam3.Sam3Masks(tmp_path), MeshList(tuple(FRAMES)), views)
     assert not found.moving(0, FRAMES[0]).any()
-    wanted = [normal_picture(Rays(mesh).look(views[-1]), views[-1]) for mesh in FRAMES]
+    wanted = [normal_picture(draw(mesh, views[-1]), views[-1]) for mesh in FRAMES]
     assert all(np.array_equal(*pair) for pair in zip(tracker.pictures, wanted, strict=True))
 
 

@@ -7,7 +7,7 @@ from hypothesis.extra.numpy import arrays
 
 from meshreel.analysis.scene.labelling import votes
 from meshreel.analysis.scene.views import place_views
-from meshreel.geometry.cameras import Rays
+from meshreel.geometry.drawing import draw
 from meshreel.types import Mesh
 from tests.metrics.shapes import sphere
 
@@ -27,8 +27,7 @@ def test_votes_are_the_sums_of_the_paper(ids, masks):
 def test_a_mask_of_one_half_of_a_ball_finds_that_half():
     ball = sphere(levels=4)
     views = place_views([ball, Mesh(3 * ball.vertices, ball.faces[:, ::-1])], "y", 12, 160, 120)
-    rays = Rays(ball)
-    ids = np.stack([rays.look(view).faces for view in views])
+    ids = np.stack([draw(ball, view).faces for view in views])
     assert ids.shape == (12, 120, 160) and ids.dtype == np.int32
     right = ball.vertices[ball.faces].mean(axis=1)[:, 0] > 0
     dynamic, count = votes(ids, (ids >= 0) & right[ids], len(ball.faces))

@@ -13,7 +13,7 @@ from meshreel.capture.recording import open_recording
 from meshreel.capture.rig.cameras import posed
 from meshreel.capture.rig.rig import read_rig
 from meshreel.errors import InputError
-from meshreel.geometry.cameras import Rays
+from meshreel.geometry.drawing import draw
 from meshreel.io.pictures import read_depth
 from meshreel.io.write import write_picture
 from tests.capture.depth_scenes import camera, measured, record
@@ -370,5 +370,5 @@ def test_the_view_of_a_camera_has_pixel_centers_at_halves():
     numbers = local[:, :2] / local[:, 2:] * [said["fx"], said["fy"]] + [said["cx"], said["cy"]]
     assert np.allclose(one.view.project(local), numbers + 0.5)
     assert np.allclose(one.view.eye, one.view.pose.to_world[:3, 3]) and (one.view.width, one.view.height) == (96, 96)
-    depth = Rays(sliding_sphere(1, levels=2)[0]).look(one.view).depth
+    depth = draw(sliding_sphere(1, levels=2)[0], one.view).depth
     assert np.isfinite(depth[47, 47]) and np.isinf(depth[0, 0])

@@ -7,7 +7,7 @@ import pytest
 
 from meshreel.capture.simulated.demo_room import FURNITURE, SIZE, RoomOptions, furnished_room, room_cameras
 from meshreel.errors import InputError
-from meshreel.geometry.cameras import Rays
+from meshreel.geometry.drawing import draw
 from meshreel.geometry.topology import components, face_normals, unique_edges
 from meshreel.types import Mesh
 
@@ -84,7 +84,7 @@ def test_every_camera_sees_both_people_and_the_room() -> None:
     frame = room[0]
     for camera in room_cameras(128):
         assert (camera.view.width, camera.view.height) == (128, 115)
-        faces = Rays(frame.mesh).look(camera.view).faces
+        faces = draw(frame.mesh, camera.view).faces
         seen = faces[faces >= 0]
         dynamic = seen[frame.dynamic[seen]] - len(room.still.faces)
         assert min((dynamic < walker).sum(), (dynamic >= walker).sum()) > 30  # pixels

@@ -13,7 +13,7 @@ import numpy as np
 
 import meshreel
 from meshreel.geometry.cameras import Camera
-from meshreel.metrics.render import Crop, Pixels, Visible
+from meshreel.metrics.render import look
 from meshreel.types import Mesh
 
 
@@ -32,8 +32,8 @@ def main(file: str, frame: str, width: str, height: str, fov: str, camera: str) 
     intrinsic = np.array([[focal, 0, w / 2], [0, focal, h / 2], [0, 0, 1]])
     with meshreel.open(file) as video:
         mesh, origin = video[int(frame)], np.array(video.reader.header.origin)
-    pixels = Pixels(Camera.of(w, h, intrinsic, extrinsic), Crop(0, h, 0, w))
-    picture = Visible(Mesh(mesh.vertices - origin, mesh.faces)).look(pixels).colors
+    moved = Mesh(mesh.vertices - origin, mesh.faces)
+    picture = look(moved, Camera.of(w, h, intrinsic, extrinsic)).colors
     sys.stdout.buffer.write((255 * picture).round().astype(np.uint8).tobytes())
 
 

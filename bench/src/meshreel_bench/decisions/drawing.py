@@ -1,4 +1,4 @@
-"""Panels of equal size for the documentation's pictures, meshes by ray casting, and the picture of docs/tutorial.md."""
+"""Panels of equal size for the documentation's pictures, meshes drawn, and the picture of docs/tutorial.md."""
 
 from __future__ import annotations
 
@@ -24,18 +24,19 @@ from meshreel.decoder.video import open as open_video
 from meshreel.encoder.sequence import encode
 from meshreel.geometry.cameras import looking_at
 from meshreel.geometry.closest_points import Surface
+from meshreel.geometry.drawing import Parallel
 from meshreel.geometry.topology import blend, components, concatenate, face_normals, part_of
-from meshreel.metrics.render import Crop, look
+from meshreel.metrics.render import look
 from meshreel.metrics.viewpoints import Box
 from meshreel.types import Mesh
 
-from ..parallel_views import OrthographicCamera, parallel_views_around
+from ..parallel_views import parallel_views_around
 
 DPI = 100
 TOP, GAP, RIGHT, BOTTOM = 26, 6, 80, 8  # pixels over, between, right (for a color bar) and under the panels
 LIGHT = np.array([0.3, 0.5, 0.8]) / np.linalg.norm([0.3, 0.5, 0.8])
 GREY = 0.82
-FINE = 3  # rays a pixel and axis, averaged
+FINE = 3  # samples a pixel and axis, averaged
 COLORS = 256  # of a picture's palette
 BODIES = np.array([[0.87, 0.45, 0.20], [0.20, 0.45, 0.70], [0.35, 0.65, 0.35]])  # RGB of three bodies
 
@@ -88,12 +89,12 @@ def write_small(source: io.BytesIO | Path, path: Path) -> None:
     picture.save(path, optimize=True)
 
 
-def camera_for(meshes: list[Mesh], size: int, view: int = 0) -> OrthographicCamera:
+def camera_for(meshes: list[Mesh], size: int, view: int = 0) -> Parallel:
     """A parallel view of everything in the meshes: 0 front, 1 right, 2 back, 3 left."""
     return parallel_views_around(Box.of(meshes), size)[view]
 
 
-def oblique(meshes: list[Mesh], towards_eye: np.ndarray, shape: tuple[int, int], margin: float) -> OrthographicCamera:
+def oblique(meshes: list[Mesh], towards_eye: np.ndarray, shape: tuple[int, int], margin: float) -> Parallel:
     """A parallel view that holds all meshes, `shape` pixels wide and high, `margin` times as large as they need."""
     rotation = looking_at(towards_eye, np.zeros(3))[:3, :3].T
     turned = np.concatenate([mesh.vertices for mesh in meshes]) @ rotation.T
@@ -101,13 +102,13 @@ def oblique(meshes: list[Mesh], towards_eye: np.ndarray, shape: tuple[int, int],
     extrinsic = np.eye(4)
     extrinsic[:3, :3], extrinsic[:3, 3] = rotation, -(low + high) / 2
     pixel = margin * max((high - low)[:2] / shape)  # m
-    return OrthographicCamera(*shape, pixel, extrinsic, back=2 * float(np.linalg.norm(Box.of(meshes).size)))
+    return Parallel(*shape, pixel, extrinsic)
 
 
-def shaded(mesh: Mesh, camera: OrthographicCamera, colors: Float64[np.ndarray, "V 3"] | None = None) -> np.ndarray:
+def shaded(mesh: Mesh, camera: Parallel, colors: Float64[np.ndarray, "V 3"] | None = None) -> np.ndarray:
     """A mesh under a lamp beside the camera: grey, or colors of its vertices."""
     camera = _finer(camera)
-    view = look(mesh, camera, Crop(0, camera.height, 0, camera.width))
+    view = look(mesh, camera)
     picture = np.ones((camera.height, camera.width, 3))
     turned = view.normals @ camera.extrinsic[:3, :3].T * [1, -1, -1]
     light = 0.45 + 0.55 * np.abs(turned @ LIGHT)
@@ -119,26 +120,26 @@ def shaded(mesh: Mesh, camera: OrthographicCamera, colors: Float64[np.ndarray, "
     return _averaged(picture)
 
 
-def normal_colored(mesh: Mesh, camera: OrthographicCamera) -> np.ndarray:
+def normal_colored(mesh: Mesh, camera: Parallel) -> np.ndarray:
     """A mesh in the colors of its normals, as in the paper."""
     camera = _finer(camera)
-    return _averaged(look(mesh, camera, Crop(0, camera.height, 0, camera.width)).colors)
+    return _averaged(look(mesh, camera).colors)
 
 
-def heat(mesh: Mesh, camera: OrthographicCamera, other: Mesh) -> np.ma.MaskedArray:
+def heat(mesh: Mesh, camera: Parallel, other: Mesh) -> np.ma.MaskedArray:
     """Distance from what the camera sees of a mesh to the surface of another one; masked where nothing is seen."""
-    view = look(mesh, camera, Crop(0, camera.height, 0, camera.width))
+    view = look(mesh, camera)
     distances = np.ma.masked_array(np.zeros(view.covered.shape), mask=~view.covered)
     distances[view.covered] = np.linalg.norm(Surface(other).closest(view.points).points - view.points, axis=1)
     return distances
 
 
-def placed(points: Float64[np.ndarray, "K 3"], camera: OrthographicCamera) -> Float64[np.ndarray, "K 3"]:
+def placed(points: Float64[np.ndarray, "K 3"], camera: Parallel) -> Float64[np.ndarray, "K 3"]:
     """Points in the coordinates of a camera."""
     return points @ camera.extrinsic[:3, :3].T + camera.extrinsic[:3, 3]
 
 
-def draw_edges(axes: Any, title: str, mesh: Mesh, camera: OrthographicCamera, line: float) -> None:
+def draw_edges(axes: Any, title: str, mesh: Mesh, camera: Parallel, line: float) -> None:
     """The mesh's faces with their edges, nearest last."""
     points = placed(mesh.vertices, camera)
     flat, normals = camera.project(points)[mesh.faces], face_normals(Mesh(points, mesh.faces))[0]
@@ -151,7 +152,7 @@ def draw_edges(axes: Any, title: str, mesh: Mesh, camera: OrthographicCamera, li
 
 
 def draw_points(
-    axes: Any, title: str, points: np.ndarray, camera: OrthographicCamera, colors: np.ndarray, size: float = 7.0
+    axes: Any, title: str, points: np.ndarray, camera: Parallel, colors: np.ndarray, size: float = 7.0
 ) -> None:
     """Points as dots, nearest last; small ones have no rim."""
     local = placed(points, camera)
@@ -162,12 +163,12 @@ def draw_points(
     _finish(axes, title, camera)
 
 
-def _finish(axes: Any, title: str, camera: OrthographicCamera) -> None:
+def _finish(axes: Any, title: str, camera: Parallel) -> None:
     axes.set(xlim=(0, camera.width), ylim=(camera.height, 0))
     axes.set_title(title, fontsize=9)
 
 
-def _finer(camera: OrthographicCamera) -> OrthographicCamera:
+def _finer(camera: Parallel) -> Parallel:
     return replace(camera, width=FINE * camera.width, height=FINE * camera.height, pixel=camera.pixel / FINE)
 
 

@@ -12,11 +12,10 @@ from meshreel.container.reader import ReelReader
 from meshreel.decoder.video import Video
 from meshreel.format.layout import ChunkKind, Form, Pictures
 from meshreel.format.records import unpack_all
-from meshreel.geometry.cameras import Rays
 from meshreel.geometry.color_views import ColorPicture, Painted
+from meshreel.geometry.drawing import draw
 from meshreel.geometry.topology import blend
 from meshreel.metrics.color import PEAK, POINTS, TO_YUV, Colored, psnr
-from meshreel.metrics.render import Crop, Pixels
 from meshreel.metrics.surface_samples import scatter
 from meshreel.types import Mesh, MeshSequence
 
@@ -38,9 +37,8 @@ def picture_squares(picture: ColorPicture, original: Mesh, decoded: Mesh, still:
     from scipy.ndimage import binary_dilation, binary_erosion
 
     camera = picture.camera
-    pixels = Pixels(camera, Crop(0, camera.height, 0, camera.width))
-    shown, wanted = Colored(decoded).look(pixels), Colored(original).look(pixels)
-    near, far = (Rays(mesh).look(camera).depth for mesh in (original, decoded))
+    shown, wanted = Colored(decoded).look(camera), Colored(original).look(camera)
+    near, far = (draw(mesh, camera).depth for mesh in (original, decoded))
     ahead = near < (1 - BEFORE) * far
     apart = np.square(PEAK * shown.colors.astype(np.float64) @ TO_YUV[0] - picture.pixels @ TO_YUV[0])
     still_here = shown.covered & (shown.faces < still) & ~ahead

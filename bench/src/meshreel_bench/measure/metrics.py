@@ -16,13 +16,14 @@ from meshreel.errors import InputError
 from meshreel.format.layout import MAGIC, ChunkKind
 from meshreel.geometry.closest_points import Surface, distances
 from meshreel.geometry.derived_sequences import captured, picked
+from meshreel.geometry.drawing import Viewer
 from meshreel.geometry.topology import components, drop_unreferenced, face_normals, weld
 from meshreel.metrics.comparison import ComparisonOptions, OriginalFrame, compare_sequences, finite
 from meshreel.metrics.depth import DepthJudge, judge
 from meshreel.metrics.mpeg import MpegOptions
 from meshreel.metrics.scene_accuracy import Scene, people_flicker, scene_means, scene_row, visible
 from meshreel.metrics.surface_samples import scatter
-from meshreel.metrics.viewpoints import AnyCamera, Box
+from meshreel.metrics.viewpoints import Box
 from meshreel.types import UP_AXES, Frames, Mesh
 
 from ..datasets import Dataset
@@ -67,7 +68,7 @@ def _to_input(frames: Measured, metrics: Metrics) -> tuple[Values, PerFrame]:
     known = frames.known
     originals = picked(known.sequence, frames.numbers)
     prepared = None if known.scene is None else [_original(known.scene, number) for number in frames.numbers]
-    cameras: Sequence[AnyCamera] | None = known.cameras or None
+    cameras: Sequence[Viewer] | None = known.cameras or None
     if cameras is None and metrics in ("parallel views", "colors"):
         cameras = parallel_views_around(Box.of(originals))
     mpeg = MpegOptions(PIXELS) if metrics == "mpeg" else None

@@ -18,8 +18,9 @@ from jaxtyping import Float32, Float64, Int32
 
 from ...errors import InputError
 from ...geometry.atlas import finer_places
-from ...geometry.cameras import Camera, CameraPose, Hit, Rays, looking_at, pixels_near
+from ...geometry.cameras import Camera, CameraPose, looking_at
 from ...geometry.color_views import ColorPicture, Painted, sampled
+from ...geometry.drawing import SeenPlaces, draw, draw_places
 from ...geometry.splats import Carrier, Splats, locate, pose
 from ...types import UP_AXES, Mesh, Up
 from .splat_raster import LEAST, Drawing, Flat, project
@@ -44,11 +45,11 @@ GOLDEN = (math.sqrt(5) - 1) / 2  # turns from a frame's cameras to the next fram
 TILTS = (0.1, 0.4)  # rad above the horizon, of alternate cameras (guess)
 AWAY = 1.6  # sizes of the mesh between its middle and a camera (guess)
 BORDER = 3  # pixels beside the mesh
-FINER = 2  # rays a pixel, along both sides
+FINER = 2  # samples a pixel, along both sides
 HIDDEN = 0.01  # of the distance: surface that is nearer by more hides the mesh (guess)
 Contribution = Float64[np.ndarray, " N"]  # of each splat to the pictures
 Points = Float64[np.ndarray, "N 3"]  # or their colours
-Colors = Callable[[Hit, Points], Points]  # of hits at positions
+Colors = Callable[[SeenPlaces, Camera], Points]  # of places that a camera sees
 
 
 @dataclass(frozen=True, slots=True)
@@ -282,8 +283,8 @@ def cut_to(camera: Camera, mesh: Mesh, size: int, most: float = math.inf) -> Cam
 
 def rendered(mesh: Mesh, cameras: Sequence[Camera]) -> tuple[SplatView, ...]:
     """Return unlit pictures of a coloured mesh."""
-    rays, painted = Rays(mesh), Painted(mesh)
-    return tuple(_view(mesh, rays, camera, lambda hit, _: painted.on(hit.faces, hit.barycentric)) for camera in cameras)
+    painted = Painted(mesh)
+    return tuple(_view(mesh, camera, lambda seen, _: painted.on(seen.faces, seen.barycentric)) for camera in cameras)
 
 
 def taken(pictures: Sequence[ColorPicture], body: Mesh, whole: Mesh, size: int) -> tuple[SplatView, ...]:
@@ -291,37 +292,27 @@ def taken(pictures: Sequence[ColorPicture], body: Mesh, whole: Mesh, size: int) 
 
     `whole` is all surface of the frame.
     """
-    rays, hides, views = Rays(body), Rays(whole), list[SplatView]()
-    for picture in pictures:
-        camera = cut_to(picture.camera.straight, body, size, most=1.0)
-        if camera is not None:
-            views.append(_view(body, rays, camera, partial(_pictured, picture, hides)))
-    return tuple(views)
+    cut = ((picture, cut_to(picture.camera.straight, body, size, most=1.0)) for picture in pictures)
+    return tuple(_view(body, camera, partial(_pictured, picture, whole)) for picture, camera in cut if camera)
 
 
-def _pictured(picture: ColorPicture, hides: Rays, _hit: Hit, points: Points) -> Points:
-    eye = picture.camera.eye
-    first = hides.cast(np.broadcast_to(eye, points.shape), points - eye).distances  # the points are at 1
-    positions, _ = picture.project(points)
+def _pictured(picture: ColorPicture, whole: Mesh, seen: SeenPlaces, camera: Camera) -> Points:
+    nearest = draw(whole, camera).depth[seen.covered]
+    positions, _ = picture.project(seen.points)
     height, width = picture.pixels.shape[:2]
     with np.errstate(invalid="ignore"):
         inside = (positions >= 0).all(axis=1) & (positions <= [width, height]).all(axis=1)
-    known = inside & (first > 1 - HIDDEN)
-    colors = np.full(points.shape, np.nan)
+    known = inside & (nearest > (1 - HIDDEN) * seen.depth)
+    colors = np.full((len(positions), 3), np.nan)
     colors[known] = sampled(picture.pixels, positions[known]) / picture.gains
     return colors
 
 
-def _view(mesh: Mesh, rays: Rays, camera: Camera, colors: Colors) -> SplatView:
-    """Render a view with `FINER` x `FINER` rays per pixel, whose colours are averaged."""
+def _view(mesh: Mesh, camera: Camera, colors: Colors) -> SplatView:
+    """Draw a view with `FINER` x `FINER` samples per pixel, whose colours are averaged."""
     fine = camera.resized(FINER * camera.width, FINER * camera.height)
-    rows, columns = np.nonzero(pixels_near(fine, mesh))
-    _, local = fine.rays(np.column_stack([columns, rows]) + 0.5)
-    directions = local @ fine.extrinsic[:3, :3]
-    hit = rays.cast(np.broadcast_to(fine.eye, directions.shape), directions)
-    met = hit.faces >= 0
-    met_hit = Hit(hit.faces[met], hit.distances[met], hit.barycentric[met])
+    seen = draw_places(mesh, fine)
     picture = np.full((fine.height, fine.width, 3), 255.0)
-    picture[rows[met], columns[met]] = colors(met_hit, fine.eye + hit.distances[met, None] * directions[met])
+    picture[seen.covered] = colors(seen, fine)
     parts = picture.reshape(camera.height, FINER, camera.width, FINER, 3)
     return SplatView(camera, (parts.mean(axis=(1, 3)) / 255).astype(np.float32))

@@ -16,8 +16,8 @@ import numpy as np
 from jaxtyping import Bool
 from scipy.ndimage import binary_dilation
 
-from ...geometry.cameras import Rays, pixels_near
 from ...geometry.depth import STEP, DepthPicture, FreeSpace, inverse_depths
+from ...geometry.drawing import draw
 from ...geometry.reconstruct import ALONE, GRAZING, SEEN, MeanOptions, MeanSurface, close_holes, extract, integrate
 from ...geometry.topology import face_normals, part_of, without_fragments
 from ...types import Mesh
@@ -88,11 +88,10 @@ def usual_pictures(moments: Iterable[Moment]) -> list[DepthPicture]:
     stacks: dict[int, list[np.ndarray]] = {}
     cameras: dict[int, DepthPicture] = {}
     for moment in moments:
-        rays = Rays(moment.mesh)
         for number, picture in enumerate(moment.pictures):
             if picture is not None:
                 cameras[number] = picture
-                stacks.setdefault(number, []).append(_still(picture, rays, moment))
+                stacks.setdefault(number, []).append(_still(picture, moment))
     usual = list[DepthPicture]()
     for number, stack in sorted(stacks.items()):
         # A door that soon opens is measured a few times only, and the surface behind it perhaps never.
@@ -108,11 +107,10 @@ def usual_pictures(moments: Iterable[Moment]) -> list[DepthPicture]:
     return usual
 
 
-def _still(picture: DepthPicture, rays: Rays, moment: Moment) -> np.ndarray:
+def _still(picture: DepthPicture, moment: Moment) -> np.ndarray:
     """Return the depths of a picture; `HIDDEN` at pixels that see moving faces, and within `RIM` of them."""
-    moves = pixels_near(picture.camera, Mesh(moment.mesh.vertices, moment.mesh.faces[~moment.still]))
-    faces = rays.faces_in(picture.camera, moves)  # of the whole mesh: still faces may hide moving ones
-    moves[moves] = (faces >= 0) & ~np.append(moment.still, True)[faces]
+    faces = draw(moment.mesh, picture.camera).faces  # of the whole mesh: still faces may hide moving ones
+    moves = ~np.append(moment.still, True)[faces]
     return np.where(binary_dilation(moves, iterations=RIM), HIDDEN, picture.depth.astype(np.float32))
 
 

@@ -13,8 +13,8 @@ import numpy as np
 from jaxtyping import Bool, Float32, UInt8
 from scipy.ndimage import binary_opening, uniform_filter
 
-from ...geometry.cameras import Rays
 from ...geometry.color_views import ColorFrames, sampled
+from ...geometry.drawing import draw
 from ...types import Frames, Mesh
 
 SIDE = 640  # pixels, largest length of a view's longer side, for tools that make masks (guess)
@@ -65,8 +65,8 @@ class ColorChange:
         """Find the usual depth and hue over the frames `numbers`."""
         depths, hues = [], []
         for number in numbers:
-            rays = Rays(frames[number])
-            depths.append([rays.look(view).depth for view in looks.views])
+            mesh = frames[number]
+            depths.append([draw(mesh, view).depth for view in looks.views])
             hues.append([_hue(looks, number, view) for view in range(len(looks.views))])
         depth = np.array(depths, np.float32)
         far = _quantile(np.where(np.isfinite(depth), depth, np.nan), _FAR)
@@ -77,9 +77,9 @@ class ColorChange:
 
     def faces(self, frame: int, mesh: Mesh) -> Bool[np.ndarray, " F"]:
         """Return the faces of a frame whose pixels mostly see another hue, nearer than usual."""
-        rays, changed, visible = Rays(mesh), np.zeros(len(mesh.faces)), np.zeros(len(mesh.faces))
+        changed, visible = np.zeros(len(mesh.faces)), np.zeros(len(mesh.faces))
         for number, view in enumerate(self.looks.views):
-            sight = rays.look(view)
+            sight = draw(mesh, view)
             change = np.nan_to_num(np.abs(_hue(self.looks, frame, number) - self.hue[number]).max(axis=-1))
             before = np.nan_to_num(self.depth[number] - sight.depth, neginf=0.0)
             unlike = (uniform_filter(change, 3) > self.limit[number]) & (uniform_filter(before, 3) > self.nearer)

@@ -17,8 +17,9 @@ import numpy as np
 from jaxtyping import Bool, Float32, Float64, Int32
 from scipy.ndimage import binary_opening, distance_transform_edt, label
 
-from ...geometry.cameras import Camera, Seen
+from ...geometry.cameras import Camera
 from ...geometry.depth import apart
+from ...geometry.drawing import Seen
 from ...geometry.strict import inverse, products
 
 Objects = Int32[np.ndarray, "T H W"]  # numbers of objects, from 1 on, over time or in several views; 0: none

@@ -15,8 +15,9 @@ import numpy as np
 from jaxtyping import Bool, Float64, Int32, Int64, UInt8
 from scipy.spatial import cKDTree
 
-from ...geometry.cameras import Camera, Rays, Seen
+from ...geometry.cameras import Camera
 from ...geometry.closest_points import Surface
+from ...geometry.drawing import Seen, draw
 from ...geometry.topology import connected_faces, face_normals, part_of, unique_edges
 from ...geometry.voxels import Lattice, spread
 from ...types import Frames, Mesh
@@ -248,8 +249,7 @@ def is_off(mesh: Mesh, surface: Surface, same: float) -> Bool[np.ndarray, " F"]:
 
 def looks(mesh: Mesh, views: Sequence[Camera]) -> list[Seen]:
     """Render a mesh in each view."""
-    rays = Rays(mesh)
-    return [rays.look(view) for view in views]
+    return [draw(mesh, view) for view in views]
 
 
 def without_islands(mesh: Mesh, chosen: Bool[np.ndarray, " F"], least: float) -> Bool[np.ndarray, " F"]:

@@ -15,7 +15,8 @@ import numpy as np
 from jaxtyping import Bool, Float64, Integer, UInt8
 
 from ...errors import InputError
-from ...geometry.cameras import Camera, Rays, Seen, pack_cameras, unpack_cameras
+from ...geometry.cameras import Camera, pack_cameras, unpack_cameras
+from ...geometry.drawing import Seen, draw
 from ...io.files import read_input
 from ...io.pictures import find_masks, last_number, read_mask
 from ...io.write import frame_names, make_folder, write_file, write_picture
@@ -66,10 +67,10 @@ def write_views(
     for place in places:
         make_folder(place)
     for number, name in enumerate(frame_names(len(frames), "png")):
-        rays = Rays(frames[number])
+        mesh = frames[number]
         for view, place in enumerate(places):
             photo = None if colors is None else colors.at(number, view)
-            picture = normal_picture(rays.look(views[view]), views[view]) if photo is None else photo
+            picture = normal_picture(draw(mesh, views[view]), views[view]) if photo is None else photo
             write_picture(picture, place / name)
         report(number + 1)
     write_file(folder / CAMERAS, pack_cameras(views))
@@ -99,10 +100,10 @@ def look_at_labels(
     mesh: Mesh, moving: Bool[np.ndarray, " F"], bodies: Integer[np.ndarray, " F"], views: Sequence[Camera]
 ) -> tuple[list[Picture], list[int]]:
     """Return each view's picture, and the number of moving faces that it sees."""
-    rays, colors = Rays(mesh), label_colors(moving, bodies)
+    colors = label_colors(moving, bodies)
     pictures, counts = list[Picture](), list[int]()
     for view in views:
-        seen = rays.look(view)
+        seen = draw(mesh, view)
         normals = normal_picture(seen, view).astype(np.float64) * (2 / 255) - 1
         light = _AMBIENT + (1 - _AMBIENT) * np.abs(normals @ _LIGHT)
         hit = seen.faces >= 0

@@ -18,8 +18,9 @@ import numpy as np
 from jaxtyping import Bool, Float32, Float64, Int32, Int64, UInt16
 from scipy.ndimage import minimum_filter
 
-from ...geometry.cameras import Camera, Rays
+from ...geometry.cameras import Camera
 from ...geometry.depth import DepthPicture
+from ...geometry.drawing import backs, draw
 from ...geometry.topology import face_normals
 from ...geometry.voxels import Lattice, distinct, neighbours, spread
 from ...types import Frames, Mesh, evenly
@@ -55,12 +56,12 @@ class Observations:
 
     def observe(self, number: int, mesh: Mesh, cells: Int64[np.ndarray, " C"], lattice: Lattice) -> _Observation:
         """Return the observations of a frame, given its mesh and occupied cells."""
-        rays, unit = Rays(mesh), lattice.size / _FINENESS
+        unit = lattice.size / _FINENESS
         # Only an annotation: to call the type would make a class for each frame, which stays until all garbage goes.
         depths: list[UInt16[np.ndarray, "H W"]] = []
         for view in self.views:
-            sight = rays.look(view)
-            depth = np.where(np.isfinite(sight.depth) & ~rays.backs(view, sight), sight.depth, 0.0)
+            sight = draw(mesh, view)
+            depth = np.where(np.isfinite(sight.depth) & ~backs(mesh, view, sight), sight.depth, 0.0)
             depths.append(np.clip(np.rint(depth / unit), 0, _DEEPEST).astype(np.uint16))
         return _Observation(cells, depths, None if self.pictures is None else self.pictures(number))
 

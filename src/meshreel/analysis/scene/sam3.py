@@ -20,7 +20,8 @@ import numpy as np
 from jaxtyping import Bool, Float32, Int32, UInt8
 
 from ...errors import InputError
-from ...geometry.cameras import Camera, Seen
+from ...geometry.cameras import Camera
+from ...geometry.drawing import Seen
 from .color_looks import ColorLooks
 from .hypotheses import OVERLAP, VARIATION, Hypotheses, hypotheses, moving_in_views, reference_view, thinned, tour
 from .masks import Masker, Picture, normal_picture

@@ -17,7 +17,8 @@ import numpy as np
 from jaxtyping import Bool, Float64, Int64, UInt8
 
 from ...errors import InputError
-from ...geometry.cameras import Camera, Rays
+from ...geometry.cameras import Camera
+from ...geometry.drawing import draw
 from ...geometry.strict import products
 from ...geometry.topology import concatenate, face_normals
 from ...io.files import read_file
@@ -85,10 +86,10 @@ def simulate_rig(
     for camera in cameras[: len(eyes)]:
         make_folder(folder / camera.name / "color")
     for number, frame in enumerate(frames):
-        rays, normals = Rays(frame.mesh), face_normals(frame.mesh)[0]
+        normals = face_normals(frame.mesh)[0]
         for which, (camera, place) in enumerate(zip(cameras, places, strict=True)):
             random = np.random.default_rng([sensor.seed, number, which])
-            clean = _cut_grazing(rays, normals, camera.view, sensor.grazing)
+            clean = _cut_grazing(frame.mesh, normals, camera.view, sensor.grazing)
             write_picture(measured(clean, camera, sensor, random), place / f"depth_{number:05}.png")
             if which < len(eyes) and frame.paint is not None:
                 picture = eyes[which].picture(frame.mesh, frame.paint, number, random)
@@ -111,13 +112,12 @@ def simulate_rig(
     return len(labels)
 
 
-def _cut_grazing(rays: Rays, normals: Float64[np.ndarray, "F 3"], camera: Camera, grazing: float) -> Depth:
+def _cut_grazing(mesh: Mesh, normals: Float64[np.ndarray, "F 3"], camera: Camera, grazing: float) -> Depth:
     """Return the depth along the optical axis, infinite for a miss, and `grazing` degrees or more from the normal."""
     directions = camera.ahead @ camera.pose.to_world[:3, :3].T
-    answer = rays.cast(camera.pose.to_world[None, :3, 3], directions.reshape(-1, 3))
-    depth = answer.distances.reshape(directions.shape[:2])  # directions go one metre along the axis
-    cosines, hit = np.zeros(depth.shape), np.isfinite(depth)
-    faces = answer.faces.reshape(depth.shape)[hit]
+    seen = draw(mesh, camera)
+    depth, hit = seen.depth.astype(np.float64), seen.faces >= 0
+    cosines, faces = np.zeros(depth.shape), seen.faces[hit]
     along = directions[hit] / np.linalg.norm(directions[hit], axis=1)[:, None]
     cosines[hit] = np.abs((normals[faces] * along).sum(axis=1))
     return np.where(cosines >= math.cos(math.radians(grazing)), depth, np.inf)
@@ -210,7 +210,7 @@ class SimulatedColor:
         from scipy.ndimage import gaussian_filter
 
         camera = self.camera.view
-        seen = Rays(mesh).look(camera)
+        seen = draw(mesh, camera)
         rows, columns = np.nonzero(seen.faces >= 0)
         depth, faces = seen.depth[rows, columns].astype(np.float64), seen.faces[rows, columns].astype(np.int64)
         ahead = np.linalg.solve(camera.intrinsic, np.stack([columns + 0.5, rows + 0.5, np.ones(len(rows))])).T
