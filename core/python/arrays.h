@@ -57,6 +57,13 @@ inline void check_decoded(int status) {
     throw nb::python_error();
 }
 
+// Result of a call of the core, during which other threads may run Python.
+template <class Call>
+int without_gil(Call call) {
+    const nb::gil_scoped_release released;
+    return call();
+}
+
 inline void expect(bool fits) {
     if (!fits) throw nb::value_error("array sizes do not fit");
 }

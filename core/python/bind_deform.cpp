@@ -63,7 +63,7 @@ public:
         const mr_deform_rounds rounds{gates.shape(0), gates.data(), rigidity.data(), torn,
                                       place,          agreement,    tolerance,       iterations};
         Buffer<double> turned(rotations.data(), rotations.size()), moved(positions.data(), positions.size());
-        check(mr_deform(&graph_, &frame.view(), &rounds, turned.data(), moved.data()));
+        check(without_gil([&] { return mr_deform(&graph_, &frame.view(), &rounds, turned.data(), moved.data()); }));
         return nb::make_tuple(turned.shaped(graph_.node_count, 3, 3), moved.shaped(graph_.node_count, 3));
     }
 
@@ -71,7 +71,9 @@ public:
                    double agreement) const {
         check_pose(rotations, positions);
         double sum = 0.0;
-        check(mr_deform_matched(&graph_, &frame.view(), gate, agreement, rotations.data(), positions.data(), &sum));
+        check(without_gil([&] {
+            return mr_deform_matched(&graph_, &frame.view(), gate, agreement, rotations.data(), positions.data(), &sum);
+        }));
         return sum;
     }
 

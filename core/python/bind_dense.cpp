@@ -17,7 +17,7 @@ Out<double, 3> products(In<double, 3> a, In<double, 3> b) {
 Out<double, 3> inverses(In<double, 3> matrices) {
     expect(matrices.shape(1) == matrices.shape(2));
     Buffer<double> out(matrices.size());
-    check(mr_inverses(matrices.data(), matrices.shape(0), matrices.shape(1), out.data()));
+    check(without_gil([&] { return mr_inverses(matrices.data(), matrices.shape(0), matrices.shape(1), out.data()); }));
     return out.shaped(matrices.shape(0), matrices.shape(1), matrices.shape(2));
 }
 
@@ -25,7 +25,7 @@ nb::tuple eigen(In<double, 3> matrices) {
     expect(matrices.shape(1) == matrices.shape(2));
     const size_t count = matrices.shape(0), size = matrices.shape(1);
     Buffer<double> values(count * size), vectors(count * size * size);
-    check(mr_eigen(matrices.data(), count, size, values.data(), vectors.data()));
+    check(without_gil([&] { return mr_eigen(matrices.data(), count, size, values.data(), vectors.data()); }));
     return nb::make_tuple(values.shaped(count, size), vectors.shaped(count, size, size));
 }
 

@@ -62,7 +62,7 @@ void weight_contexts(const Columns& columns, const Starts& starts, const Indices
     const mr_weights weights = view(columns, starts, indices);
     if (classes.size() != columns.size() || signs.size() != columns.size())
         throw nb::value_error("one context a symbol");
-    check(mr_weight_contexts(&weights, classes.data(), signs.data()));
+    check(without_gil([&] { return mr_weight_contexts(&weights, classes.data(), signs.data()); }));
 }
 
 nb::bytes encode_integers(const Indices& values) {

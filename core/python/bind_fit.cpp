@@ -57,14 +57,16 @@ public:
                                    strides.data(), agreement,    anchor,
                                    tolerance,      iterations,   turn};
         Buffer<double> positions(start.data(), 3 * vertices_);
-        check(mr_fit(fitted_.get(), &target.view(), &rounds, rest.data(), place.data(), positions.data()));
+        check(without_gil([&] {
+            return mr_fit(fitted_.get(), &target.view(), &rounds, rest.data(), place.data(), positions.data());
+        }));
         return positions.shaped(vertices_, 3);
     }
 
     Out<double, 2> turned_laplacian(In<double, 2> rest, In<double, 2> now) const {
         expect(are_vectors(rest, vertices_) && are_vectors(now, vertices_));
         Buffer<double> shape(3 * vertices_);
-        check(mr_turned_laplacian(fitted_.get(), rest.data(), now.data(), shape.data()));
+        check(without_gil([&] { return mr_turned_laplacian(fitted_.get(), rest.data(), now.data(), shape.data()); }));
         return shape.shaped(vertices_, 3);
     }
 
@@ -80,7 +82,10 @@ void bind_fit(nb::module_& m) {
         .def(nb::init<In<double, 2>, In<int32_t, 2>>(), "positions"_a, "faces"_a)
         .def("move", &PySurfaceTree::move, "positions"_a, "Gives the vertices other positions.")
         .def("closest", &PySurfaceTree::closest, "queries"_a, "reach"_a, "guesses"_a = nb::none(),
-             "The closest face to each query, -1 where none is within reach, and the weights of its corners.")
+             "gone"_a = nb::none(),
+             "The closest face to each query but those marked as gone, -1 where none is within reach, and the weights "
+             "of "
+             "its corners.")
         .def("cast", &PySurfaceTree::cast, "origins"_a, "ways"_a, "weighted"_a,
              "The first face that each ray meets, -1 for none, the distance in lengths of its way, and the weights of "
              "the corners there, if wanted. One origin is that of all rays.");

@@ -10,7 +10,8 @@ public:
     Laplacian(In<double, 2> vertices, In<int32_t, 2> faces, In<int32_t, 1> anchors, double anchor_weight)
         : vertices_(vertices.shape(0)), rows_(vertices.shape(0) + anchors.shape(0)) {
         const mr_mesh mesh = mesh_of(vertices, faces);
-        check(mr_laplacian_create(&mesh, anchors.data(), anchors.shape(0), anchor_weight, &system_));
+        check(without_gil(
+            [&] { return mr_laplacian_create(&mesh, anchors.data(), anchors.shape(0), anchor_weight, &system_); }));
     }
     Laplacian(const Laplacian&) = delete;
     ~Laplacian() { mr_laplacian_destroy(system_); }
@@ -27,7 +28,7 @@ public:
         expect(weights.shape(0) == vertices_);
         const size_t columns = weights.shape(1);
         Buffer<double> deltas(rows_ * columns);
-        check(mr_laplacian_forward(system_, weights.data(), columns, deltas.data()));
+        check(without_gil([&] { return mr_laplacian_forward(system_, weights.data(), columns, deltas.data()); }));
         return deltas.shaped(rows_, columns);
     }
 
@@ -35,7 +36,7 @@ public:
         expect(deltas.shape(0) == rows_);
         const size_t columns = deltas.shape(1);
         Buffer<double> weights(vertices_ * columns);
-        check(mr_laplacian_inverse(system_, deltas.data(), columns, weights.data()));
+        check(without_gil([&] { return mr_laplacian_inverse(system_, deltas.data(), columns, weights.data()); }));
         return weights.shaped(vertices_, columns);
     }
 
@@ -43,7 +44,9 @@ public:
         const size_t columns = deltas.shape(1);
         expect(deltas.shape(0) == rows_ && steps.shape(0) == columns && prices.shape(0) == columns);
         Buffer<int32_t> symbols(rows_ * columns);
-        check(mr_laplacian_quantize(system_, deltas.data(), columns, steps.data(), prices.data(), symbols.data()));
+        check(without_gil([&] {
+            return mr_laplacian_quantize(system_, deltas.data(), columns, steps.data(), prices.data(), symbols.data());
+        }));
         return symbols.shaped(rows_, columns);
     }
 

@@ -20,7 +20,7 @@ using namespace nb::literals;
 nb::tuple hierarchy(In<double, 2> positions, In<int32_t, 2> faces) {
     const mr_mesh mesh = mesh_of(positions, faces);
     mr_hierarchy* made = nullptr;
-    check(mr_hierarchy_create(&mesh, &made));
+    check(without_gil([&] { return mr_hierarchy_create(&mesh, &made); }));
     const std::unique_ptr<mr_hierarchy, void (*)(mr_hierarchy*)> owner(made, mr_hierarchy_destroy);
     const mr_graph graph = mr_hierarchy_graph(made);
     const size_t count = graph.count, links = static_cast<size_t>(graph.starts[count]);
@@ -61,7 +61,9 @@ nb::tuple predict_forward(In<double, 2> values, const Graph& graph, double step,
     const mr_graph view = graph.view();
     Buffer<int32_t> symbols(columns * count);
     Buffer<double> decoded(columns * count);
-    check(mr_predict_forward(&view, values.data(), columns, step, price, symbols.data(), decoded.data()));
+    check(without_gil([&] {
+        return mr_predict_forward(&view, values.data(), columns, step, price, symbols.data(), decoded.data());
+    }));
     return nb::make_tuple(symbols.shaped(columns, count), decoded.shaped(columns, count));
 }
 
@@ -84,7 +86,9 @@ nb::tuple predict_surface(In<double, 2> values, const Graph& graph, const Surfac
     const mr_graph view = graph.view();
     Buffer<int32_t> symbols(columns * count);
     Buffer<double> decoded(columns * count);
-    check(mr_predict_surface(&view, &metric, values.data(), step, price, symbols.data(), decoded.data()));
+    check(without_gil([&] {
+        return mr_predict_surface(&view, &metric, values.data(), step, price, symbols.data(), decoded.data());
+    }));
     return nb::make_tuple(symbols.shaped(columns, count), decoded.shaped(columns, count));
 }
 
@@ -113,7 +117,7 @@ Out<double, 2> decode_field(const nb::bytes& record, const Graph& graph, size_t 
     const mr_graph nodes = graph.view();
     expect(head <= INT32_MAX);
     Buffer<double> rows(graph.count() * width);
-    check_decoded(mr_decode_field(&bytes, &nodes, width, head, rows.data()));
+    check_decoded(without_gil([&] { return mr_decode_field(&bytes, &nodes, width, head, rows.data()); }));
     return rows.shaped(graph.count(), width);
 }
 
@@ -122,7 +126,7 @@ Out<double, 3> decode_motion(const nb::bytes& record, In<double, 2> positions, I
     const mr_mesh base = mesh_of(positions, faces);
     expect(frames <= UINT8_MAX);
     Buffer<double> rows(3 * frames * base.vertices);
-    check_decoded(mr_decode_motion(&bytes, &base, frames, rows.data()));
+    check_decoded(without_gil([&] { return mr_decode_motion(&bytes, &base, frames, rows.data()); }));
     return rows.shaped(base.vertices, 3, frames);
 }
 
@@ -138,7 +142,8 @@ nb::tuple subdivide(In<int32_t, 2> faces, size_t vertices) {
     const size_t face_count = faces.shape(0);
     Buffer<int32_t> edges(6 * face_count), finer(12 * face_count);
     size_t count = 0;
-    check(mr_subdivide(faces.data(), face_count, vertices, edges.data(), finer.data(), &count));
+    check(without_gil(
+        [&] { return mr_subdivide(faces.data(), face_count, vertices, edges.data(), finer.data(), &count); }));
     return nb::make_tuple(edges.shaped(count, 2), finer.shaped(4 * face_count, 3));
 }
 
@@ -147,7 +152,8 @@ nb::tuple siblings(In<int32_t, 2> finer, size_t vertices, size_t edge_count) {
     const size_t face_count = finer.shape(0) / 4;
     Buffer<int64_t> starts(edge_count + 1);
     Buffer<int32_t> near(3 * face_count);
-    check(mr_siblings(finer.data(), face_count, vertices, edge_count, starts.data(), near.data()));
+    check(without_gil(
+        [&] { return mr_siblings(finer.data(), face_count, vertices, edge_count, starts.data(), near.data()); }));
     const size_t links = static_cast<size_t>(starts.data()[edge_count]);
     return nb::make_tuple(starts.shaped(edge_count + 1), near.shaped(links));
 }
@@ -186,7 +192,8 @@ nb::tuple edge_frames(In<double, 2> positions, In<int32_t, 2> faces, In<int32_t,
     expect(positions.shape(1) == 3);
     const mr_level level = view(1, positions.shape(0), faces, edges);
     Buffer<double> midpoints(3 * level.edge_count), directions(3 * level.edge_count);
-    check(mr_edge_frames(&level, positions.data(), curvature, midpoints.data(), directions.data()));
+    check(without_gil(
+        [&] { return mr_edge_frames(&level, positions.data(), curvature, midpoints.data(), directions.data()); }));
     return nb::make_tuple(midpoints.shaped(level.edge_count, 3), directions.shaped(level.edge_count, 3));
 }
 
@@ -219,7 +226,8 @@ Out<double, 3> refine(In<double, 3> rows, In<int32_t, 2> faces, In<int32_t, 2> e
     expect(rows.shape(1) == 3 && scalars.shape(0) == count && scalars.shape(1) == frames);
     const mr_level level = view(frames, vertices, faces, edges);
     Buffer<double> positions(3 * frames * (vertices + count));
-    check_decoded(mr_refine(&level, rows.data(), curvature, scalars.data(), Target(positions.data(), {}).get()));
+    check_decoded(without_gil(
+        [&] { return mr_refine(&level, rows.data(), curvature, scalars.data(), Target(positions.data(), {}).get()); }));
     return positions.shaped(frames, vertices + count, 3);
 }
 
@@ -230,7 +238,7 @@ nb::tuple decode_level(const nb::bytes& record, const Level& level, In<double, 3
     const size_t count = shape.vertices + shape.edge_count;
     Buffer<double> finer(3 * shape.frames * count), last(shape.edge_count);
     std::copy(rows.data(), rows.data() + rows.size(), finer.data());
-    check_decoded(mr_decode_level(&bytes, &shape, finer.data(), last.data()));
+    check_decoded(without_gil([&] { return mr_decode_level(&bytes, &shape, finer.data(), last.data()); }));
     return nb::make_tuple(finer.shaped(count, 3, shape.frames), last.shaped(shape.edge_count));
 }
 
@@ -244,7 +252,8 @@ Out<double, 1> decode_last_level(const nb::bytes& record, const Level& level, In
     expect(positions.shape(2) == 3);
     Buffer<double> last(shape.edge_count);
     const Target target(positions.data(), place);
-    check_decoded(mr_decode_last_level(&bytes, &shape, rows.data(), last.data(), target.get()));
+    check_decoded(
+        without_gil([&] { return mr_decode_last_level(&bytes, &shape, rows.data(), last.data(), target.get()); }));
     return last.shaped(shape.edge_count);
 }
 
@@ -264,7 +273,7 @@ nb::tuple decode_colors(nb::bytes records, In<double, 2> positions, In<int32_t, 
     Buffer<uint8_t> colors(3 * frames * vertices);
     Buffer<double> last(3 * vertices);
     const mr_bytes bytes = bytes_of(records);
-    check_decoded(mr_decode_colors(&colored, &bytes, colors.data(), last.data()));
+    check_decoded(without_gil([&] { return mr_decode_colors(&colored, &bytes, colors.data(), last.data()); }));
     return nb::make_tuple(colors.shaped(frames, vertices, 3), last.shaped(vertices, 3));
 }
 
@@ -287,7 +296,7 @@ Out<int32_t, 3> decode_places(In<double, 2> positions, In<int32_t, 2> faces, InO
     const mr_place_symbols symbols{joins.data(),   starts.data(),   rests.data(),
                                    joins.shape(0), starts.shape(0), rests.shape(0)};
     Buffer<int32_t> places(6 * mesh.face_count);
-    check_decoded(mr_decode_places(&mesh, &symbols, places.data()));
+    check_decoded(without_gil([&] { return mr_decode_places(&mesh, &symbols, places.data()); }));
     return places.shaped(mesh.face_count, 3, 2);
 }
 

@@ -26,16 +26,12 @@ nb::tuple draw(In<double, 2> positions, In<int32_t, 2> faces, In<double, 2> turn
     Buffer<double> depths(wide * high);
     std::optional<Buffer<double>> weights;
     size_t covered = 0;
-    int status = MR_OK;
-    {
-        const nb::gil_scoped_release released;
-        status = mr_draw(&mesh, &viewer, &part, seen.data(), depths.data());
-        if (status == MR_OK && weighted) {
-            covered = wide * high - static_cast<size_t>(std::count(seen.data(), seen.data() + wide * high, -1));
-            status = mr_draw_weights(&mesh, &viewer, &part, seen.data(), weights.emplace(3 * covered).data());
-        }
-    }
-    check(status);
+    check(without_gil([&] {
+        const int status = mr_draw(&mesh, &viewer, &part, seen.data(), depths.data());
+        if (status != MR_OK || !weighted) return status;
+        covered = wide * high - static_cast<size_t>(std::count(seen.data(), seen.data() + wide * high, -1));
+        return mr_draw_weights(&mesh, &viewer, &part, seen.data(), weights.emplace(3 * covered).data());
+    }));
     nb::object places = nb::none();
     if (weights) places = nb::cast(weights->shaped(covered, 3));
     return nb::make_tuple(seen.shaped(high, wide), depths.shaped(high, wide), places);

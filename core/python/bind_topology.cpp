@@ -39,28 +39,28 @@ nb::tuple rest_of(In<double, 2> positions, In<int32_t, 2> faces) {
 
 nb::tuple decimate(In<double, 2> positions, In<int32_t, 2> faces, size_t wanted, double border) {
     Rest left(mesh_of(positions, faces));
-    check(mr_decimate(&left.mesh, wanted, border, &left.rest));
+    check(without_gil([&] { return mr_decimate(&left.mesh, wanted, border, &left.rest); }));
     return nb::make_tuple(left.left(), left.kept());
 }
 
 Out<int32_t, 1> components(In<int32_t, 2> faces, size_t vertices) {
     expect(faces.shape(1) == 3);
     Buffer<int32_t> labels(vertices);
-    check(mr_components(faces.data(), faces.shape(0), vertices, labels.data()));
+    check(without_gil([&] { return mr_components(faces.data(), faces.shape(0), vertices, labels.data()); }));
     return labels.shaped(vertices);
 }
 
 nb::tuple face_normals(In<double, 2> positions, In<int32_t, 2> faces) {
     const mr_mesh mesh = mesh_of(positions, faces);
     Buffer<double> normals(3 * mesh.face_count), areas(mesh.face_count);
-    check(mr_face_normals(&mesh, normals.data(), areas.data()));
+    check(without_gil([&] { return mr_face_normals(&mesh, normals.data(), areas.data()); }));
     return nb::make_tuple(normals.shaped(mesh.face_count, 3), areas.shaped(mesh.face_count));
 }
 
 Out<double, 2> vertex_normals(In<double, 2> positions, In<int32_t, 2> faces) {
     const mr_mesh mesh = mesh_of(positions, faces);
     Buffer<double> normals(3 * mesh.vertices);
-    check(mr_vertex_normals(&mesh, normals.data()));
+    check(without_gil([&] { return mr_vertex_normals(&mesh, normals.data()); }));
     return normals.shaped(mesh.vertices, 3);
 }
 
@@ -68,10 +68,10 @@ nb::tuple spread(In<double, 2> positions, In<int32_t, 2> faces, double spacing, 
     const mr_mesh mesh = mesh_of(positions, faces);
     Buffer<int32_t> parts(mesh.face_count);
     size_t count = 0;
-    check(mr_spread_parts(&mesh, spacing, most, parts.data(), &count));
+    check(without_gil([&] { return mr_spread_parts(&mesh, spacing, most, parts.data(), &count); }));
     Buffer<double> points(3 * count);
     Buffer<int64_t> of(count);
-    check(mr_spread(&mesh, parts.data(), points.data(), of.data()));
+    check(without_gil([&] { return mr_spread(&mesh, parts.data(), points.data(), of.data()); }));
     return nb::make_tuple(points.shaped(count, 3), of.shaped(count));
 }
 

@@ -43,7 +43,7 @@ nb::tuple spread_centers(Points samples, Output centers, OutputIndices owners, d
     require(owners.shape(0) == samples.shape(0), "tracking: one owner a sample");
     const mr_relaxation p = problem_of(samples, tolerance, max_rounds, centers.shape(0));
     mr_relaxed r{centers.data(), nullptr, owners.data(), 0, 0};
-    check(mr_relax_centers(&p, &r));
+    check(without_gil([&] { return mr_relax_centers(&p, &r); }));
     return nb::make_tuple(r.energy, r.rounds);
 }
 
@@ -60,7 +60,7 @@ nb::tuple follow_centers(Points samples, Points previous, Indices offsets, Indic
     p.spread = spread;
     p.rigidity = rigidity;
     mr_relaxed r{centers.data(), rotations.data(), owners.data(), 0, 0};
-    check(mr_relax_centers(&p, &r));
+    check(without_gil([&] { return mr_relax_centers(&p, &r); }));
     return nb::make_tuple(r.energy, r.rounds);
 }
 

@@ -26,7 +26,7 @@ Out<int32_t, 2> touched_blocks(In<float, 2> depths, In<double, 2> projection, In
     mr_touched* touched = nullptr;
     const int32_t* blocks = nullptr;
     size_t count = 0;
-    check(mr_touched_create(&picture, voxel, reach, &touched, &blocks, &count));
+    check(without_gil([&] { return mr_touched_create(&picture, voxel, reach, &touched, &blocks, &count); }));
     const std::unique_ptr<mr_touched, Destroy<mr_touched, mr_touched_destroy>> owner(touched);
     return Buffer<int32_t>(blocks, 3 * count).shaped(count, 3);
 }
@@ -37,7 +37,7 @@ void integrate(In<float, 2> depths, In<double, 2> projection, In<double, 2> ways
     const size_t count = blocks.shape(0);
     expect(distances.shape(0) == count && weights.shape(0) == count);
     const mr_blocks into{blocks.data(), count, voxel, distances.data(), weights.data()};
-    check(mr_integrate(&picture, reach, &into));
+    check(without_gil([&] { return mr_integrate(&picture, reach, &into); }));
 }
 
 nb::tuple zero_level(Blocks blocks, Voxels distances, Voxels weights, double voxel, float least) {
@@ -47,7 +47,7 @@ nb::tuple zero_level(Blocks blocks, Voxels distances, Voxels weights, double vox
                        const_cast<float*>(weights.data())};
     mr_zero* zero = nullptr;
     mr_mesh mesh{};
-    check(mr_zero_create(&of, least, &zero, &mesh));
+    check(without_gil([&] { return mr_zero_create(&of, least, &zero, &mesh); }));
     const std::unique_ptr<mr_zero, Destroy<mr_zero, mr_zero_destroy>> owner(zero);
     return nb::make_tuple(Buffer<double>(mesh.positions, 3 * mesh.vertices).shaped(mesh.vertices, 3),
                           Buffer<int32_t>(mesh.faces, 3 * mesh.face_count).shaped(mesh.face_count, 3));

@@ -31,20 +31,20 @@ std::unique_ptr<SurfaceTree> tree_of_points(const double* points, size_t count) 
 
 class Fit {
 public:
-    Fit(const Template& fitted, const mr_target& target, const mr_fit_rounds& rounds, double* positions)
+    Fit(const Template& fitted, const mr_target& target, const mr_fit_rounds& rounds, const double* rest,
+        double* positions)
         : fitted_(fitted), target_(target), rounds_(rounds), x_(positions), equations_(fitted) {
         seen_.assign(target.mesh.vertices, -1);
         sees_.assign(fitted.count + fitted.faces.size(), -1);
         normals_.resize(fitted.count);
         face_normals_.resize(fitted.faces.size());
-        if (!fitted.tree) {
-            const mr_mesh mesh{positions, fitted.count, fitted.faces[0].data(), fitted.faces.size()};
-            fitted.tree = std::make_unique<SurfaceTree>(mesh);
-        }
+        tree_ = fitted.take_tree(rest);
     }
+    ~Fit() { fitted_.give_tree(std::move(tree_)); }
+    Fit(const Fit&) = delete;
 
     void round(double gate, double smoothing, size_t stride, const std::vector<Vec>& shape, const double* place) {
-        fitted_.tree->move(x_);
+        tree_->move(x_);
         find_normals();
         equations_.clear(x_);
         from_target(gate, stride);
@@ -77,7 +77,7 @@ private:
         for (size_t v = 0; v < target_.mesh.vertices; v += stride) {
             if (!target_.inside[v]) continue;
             const Vec point = load(target_.mesh.positions + 3 * v), normal = load(target_.normals + 3 * v);
-            const Hit hit = fitted_.tree->closest(point, gate, seen_[v]);
+            const Hit hit = tree_->closest(point, gate, seen_[v]);
             if (hit.face < 0) continue;
             seen_[v] = hit.face;
             Vec closest{0, 0, 0};
@@ -157,8 +157,8 @@ private:
         const mr_rim& rim = target_.rim;
         if (fitted_.sides.empty() || rim.count == 0) return;
         const Samples own = own_samples();
-        if (fitted_.rim) fitted_.rim->move(own.points.data());
-        else fitted_.rim = tree_of_points(own.points.data(), own.count());
+        if (own_rim_) own_rim_->move(own.points.data());
+        else own_rim_ = tree_of_points(own.points.data(), own.count());
         if (!rim_) rim_ = tree_of_points(rim.points, rim.count);
         for (size_t k = 0; k < own.count(); ++k) {
             const Hit hit = rim_->closest(load(&own.points[3 * k]), gate, -1);
@@ -166,7 +166,7 @@ private:
         }
         const double evenly = static_cast<double>(own.count()) / static_cast<double>(rim.count);
         for (size_t k = 0; k < rim.count; ++k) {
-            const Hit hit = fitted_.rim->closest(load(rim.points + 3 * k), gate, -1);
+            const Hit hit = own_rim_->closest(load(rim.points + 3 * k), gate, -1);
             if (hit.face >= 0) pair_borders(own, static_cast<size_t>(hit.face), k, gate, evenly);
         }
     }
@@ -189,7 +189,7 @@ private:
     Equations equations_;
     std::vector<int32_t> seen_, sees_;  // closest faces so far: of the template, and of the frame
     std::vector<Vec> normals_, face_normals_;
-    std::unique_ptr<SurfaceTree> rim_;
+    std::unique_ptr<SurfaceTree> tree_, own_rim_, rim_;  // of the template, its border, and the frame's border
 };
 
 bool is_valid(const Template& fitted, const mr_target& target, const mr_fit_rounds& rounds) {
@@ -206,6 +206,7 @@ bool is_valid(const Template& fitted, const mr_target& target, const mr_fit_roun
 using namespace meshreel;
 
 struct mr_template {
+    mr_template(const int32_t* faces, size_t face_count, size_t vertices) : fitted(faces, face_count, vertices) {}
     Template fitted;
 };
 
@@ -213,7 +214,7 @@ int mr_template_create(const int32_t* faces, size_t face_count, size_t vertices,
     return guarded(MR_NO_MEMORY, [&]() -> int {
         if (face_count > INT32_MAX / 3 || vertices > INT32_MAX || !in_range(faces, 3 * face_count, vertices))
             return MR_BAD_INPUT;
-        *out = new mr_template{Template(faces, face_count, vertices)};
+        *out = new mr_template(faces, face_count, vertices);
         return MR_OK;
     });
 }
@@ -225,7 +226,7 @@ int mr_fit(mr_template* fitted, const mr_target* target, const mr_fit_rounds* ro
     return guarded(MR_NO_MEMORY, [&]() -> int {
         const Template& f = fitted->fitted;
         if (!is_valid(f, *target, *rounds)) return MR_BAD_INPUT;
-        Fit fit(f, *target, *rounds, positions);
+        Fit fit(f, *target, *rounds, rest, positions);
         std::vector<Matrix> turns;
         std::vector<Vec> kept, shape;
         laplacian(f, rest, kept);

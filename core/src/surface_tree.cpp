@@ -239,7 +239,7 @@ void SurfaceTree::refit(Node& node) const {
 
 // The smallest squared distance to a triangle of the block, or `best` if that is less. Of equally close faces the one
 // with the least number counts, so that no answer depends on the way to it.
-float SurfaceTree::visit(const Block& block, const float* query, float best, int32_t& face) const {
+float SurfaceTree::visit(const Block& block, const float* query, const uint8_t* gone, float best, int32_t& face) const {
     float squared[kWide];
     for (int k = 0; k < kWide; ++k) {
         const float x = query[0] - block.a[0][k], y = query[1] - block.a[1][k], z = query[2] - block.a[2][k];
@@ -266,8 +266,10 @@ float SurfaceTree::visit(const Block& block, const float* query, float best, int
         const bool inside = (v >= 0.0f) & (w >= 0.0f) & (v + w <= 1.0f) & (inner < least);
         squared[k] = inside ? inner : least;
     }
-    for (int k = 0; k < kWide; ++k)
+    for (int k = 0; k < kWide; ++k) {
+        if (gone != nullptr && gone[block.face[k]]) continue;
         if (squared[k] < best || (squared[k] == best && block.face[k] < face)) best = squared[k], face = block.face[k];
+    }
     return best;
 }
 
@@ -291,12 +293,12 @@ Hit SurfaceTree::exact(Vec query, int32_t face) const {
     return hit;
 }
 
-Hit SurfaceTree::closest(Vec query, double reach, int32_t guess) const {
+Hit SurfaceTree::closest(Vec query, double reach, int32_t guess, const uint8_t* gone) const {
     const Vec local = query - origin_;
     const float p[3] = {static_cast<float>(local.x), static_cast<float>(local.y), static_cast<float>(local.z)};
     float best = static_cast<float>(reach * reach);
     int32_t face = INT32_MAX;
-    if (guess >= 0) {  // a bound, a little above what `visit` finds
+    if (guess >= 0 && (gone == nullptr || !gone[guess])) {  // a bound, a little above what `visit` finds
         const Hit start = exact(local, guess);
         const Vec a = corner(guess, 0), b = corner(guess, 1), c = corner(guess, 2);
         const Vec gap = start.weights[0] * a + start.weights[1] * b + start.weights[2] * c - local;
@@ -314,7 +316,7 @@ Hit SurfaceTree::closest(Vec query, double reach, int32_t guess) const {
         const Waiting next = stack[--size];
         if (!(next.squared <= best)) continue;
         if (next.child < 0) {
-            best = visit(blocks_[static_cast<size_t>(~next.child)], p, best, face);
+            best = visit(blocks_[static_cast<size_t>(~next.child)], p, gone, best, face);
             continue;
         }
         const Node& node = nodes_[static_cast<size_t>(next.child)];
@@ -338,10 +340,11 @@ Hit SurfaceTree::closest(Vec query, double reach, int32_t guess) const {
     return face == INT32_MAX ? Hit{-1, {}} : exact(local, face);
 }
 
-void SurfaceTree::closest(const double* queries, size_t count, double reach, int32_t* faces, double* weights) const {
+void SurfaceTree::closest(const double* queries, size_t count, double reach, const uint8_t* gone, int32_t* faces,
+                          double* weights) const {
     int32_t before = -1;
     const auto ask = [&](size_t k) {
-        const Hit hit = closest(load(queries + 3 * k), reach, faces[k] >= 0 ? faces[k] : before);
+        const Hit hit = closest(load(queries + 3 * k), reach, faces[k] >= 0 ? faces[k] : before, gone);
         faces[k] = hit.face;
         std::copy(hit.weights.begin(), hit.weights.end(), weights + 3 * k);
         before = hit.face;
@@ -369,13 +372,13 @@ int mr_tree_move(mr_tree* tree, const double* positions) {
     return MR_OK;
 }
 
-int mr_tree_closest(const mr_tree* tree, const double* queries, size_t count, double reach, int32_t* faces,
-                    double* weights) {
+int mr_tree_closest(const mr_tree* tree, const double* queries, size_t count, double reach, const uint8_t* gone,
+                    int32_t* faces, double* weights) {
     return guarded(MR_NO_MEMORY, [&]() -> int {
         if (count > UINT32_MAX) return MR_BAD_INPUT;
         for (size_t k = 0; k < count; ++k)
             if (faces[k] >= static_cast<int64_t>(tree->tree.face_count())) return MR_BAD_INPUT;
-        if (count > 0) tree->tree.closest(queries, count, reach, faces, weights);
+        if (count > 0) tree->tree.closest(queries, count, reach, gone, faces, weights);
         return MR_OK;
     });
 }

@@ -23,12 +23,13 @@ public:
 
     void move(const double* positions);
 
-    // `guess` is a face that may be near, or -1.
-    Hit closest(Vec query, double reach, int32_t guess) const;
+    // `guess` is a face that may be near, or -1; `gone` is null or marks faces that are left out.
+    Hit closest(Vec query, double reach, int32_t guess, const uint8_t* gone = nullptr) const;
 
     // The same for many queries; each begins with its guess, or without one with what the query before it found. They
     // are visited along a curve, so that neighbours follow each other.
-    void closest(const double* queries, size_t count, double reach, int32_t* faces, double* weights) const;
+    void closest(const double* queries, size_t count, double reach, const uint8_t* gone, int32_t* faces,
+                 double* weights) const;
 
     struct Rays {
         const double *origins, *ways;  // count x 3
@@ -74,7 +75,7 @@ private:
     Box box_of(const Block& block) const;
     void refit(Node& node) const;
     Box box_of(int32_t child) const;
-    float visit(const Block& block, const float* query, float best, int32_t& face) const;
+    float visit(const Block& block, const float* query, const uint8_t* gone, float best, int32_t& face) const;
     Hit exact(Vec query, int32_t face) const;
     double met(int32_t face, Vec origin, Vec way, double* weights) const;
     Vec corner(int32_t face, int k) const { return load(&positions_[3 * static_cast<size_t>(faces_[face][k])]); }

@@ -61,6 +61,24 @@ Template::Template(const int32_t* given, size_t face_count, size_t vertices)
         shares[v] = starts[v + 1] > starts[v] ? 1.0f / static_cast<float>(starts[v + 1] - starts[v]) : 0.0f;
 }
 
+std::unique_ptr<SurfaceTree> Template::take_tree(const double* rest) const {
+    {
+        const std::lock_guard<std::mutex> lock(mutex_);
+        if (rest_.empty()) rest_.assign(rest, rest + 3 * count);
+        if (!free_.empty()) {
+            std::unique_ptr<SurfaceTree> tree = std::move(free_.back());
+            free_.pop_back();
+            return tree;
+        }
+    }
+    return std::make_unique<SurfaceTree>(mr_mesh{rest_.data(), count, faces[0].data(), faces.size()});
+}
+
+void Template::give_tree(std::unique_ptr<SurfaceTree> tree) const {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    free_.push_back(std::move(tree));
+}
+
 void laplacian(const Template& fitted, const double* positions, std::vector<Vec>& rows) {
     rows.resize(fitted.count);
     for (size_t v = 0; v < fitted.count; ++v) {

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <mutex>
 #include <vector>
 
 #include "rigid3.h"
@@ -30,7 +31,15 @@ struct Template {
     std::vector<uint8_t> inside;                     // 0 at open borders
     std::vector<Side> sides;
 
-    mutable std::unique_ptr<SurfaceTree> tree, rim;  // of the surface and of the samples on its border
+    // A tree of the surface, for a fit alone: several may run side by side. All are built at the rest of the first fit,
+    // which those beside it share, so that answers do not depend on which tree a fit gets.
+    std::unique_ptr<SurfaceTree> take_tree(const double* rest) const;
+    void give_tree(std::unique_ptr<SurfaceTree> tree) const;
+
+private:
+    mutable std::mutex mutex_;
+    mutable std::vector<double> rest_;
+    mutable std::vector<std::unique_ptr<SurfaceTree>> free_;
 };
 
 // Rows L x of positions, x 3: each vertex minus the mean of its neighbours.

@@ -47,7 +47,7 @@ std::vector<int32_t> checked(const mr_tree* tree, const Shape& shape, std::vecto
     std::vector<double> queries, weights(3 * count);
     for (size_t k = 0; k < 3 * count; ++k) queries.push_back(0.0015 * noise.within(1000));
     std::vector<int32_t> found = guesses;
-    CHECK(mr_tree_closest(tree, queries.data(), count, HUGE_VAL, found.data(), weights.data()) == MR_OK);
+    CHECK(mr_tree_closest(tree, queries.data(), count, HUGE_VAL, nullptr, found.data(), weights.data()) == MR_OK);
     const auto corner = [&](size_t f, size_t k) {
         return load(&shape.positions[3 * static_cast<size_t>(shape.faces[3 * f + k])]);
     };
@@ -66,7 +66,8 @@ std::vector<int32_t> checked(const mr_tree* tree, const Shape& shape, std::vecto
         CHECK(static_cast<size_t>(found[q]) < shape.face_count() / 2);  // of equal faces the first
         int32_t face = guesses[q];                                      // just out of reach
         double unused[3];
-        CHECK(mr_tree_closest(tree, &queries[3 * q], 1, least - kEnough, &face, unused) == MR_OK && face == -1);
+        CHECK(mr_tree_closest(tree, &queries[3 * q], 1, least - kEnough, nullptr, &face, unused) == MR_OK &&
+              face == -1);
     }
     return found;
 }
@@ -100,7 +101,7 @@ TEST(the_closest_point_of_a_face_that_is_a_line_but_for_rounding_is_beside_the_q
         const double query[3] = {0.0, 0.0, 0.06 * k};
         int32_t face = -1;
         double w[3];
-        CHECK(mr_tree_closest(tree, query, 1, HUGE_VAL, &face, w) == MR_OK && face == 0);
+        CHECK(mr_tree_closest(tree, query, 1, HUGE_VAL, nullptr, &face, w) == MR_OK && face == 0);
         CHECK(std::fabs(2.34 * w[0] + 0.06 * w[1] + 2.40 * w[2] - query[2]) < 1e-9);
     }
     mr_tree_destroy(tree);
@@ -158,7 +159,7 @@ TEST(trees_refuse_meshes_without_faces_and_faces_out_of_range) {
     CHECK(mr_tree_create(&good, &tree) == MR_OK);
     int32_t guess = 4;
     double weights[3];
-    CHECK(mr_tree_closest(tree, shape.positions.data(), 1, HUGE_VAL, &guess, weights) == MR_BAD_INPUT);
+    CHECK(mr_tree_closest(tree, shape.positions.data(), 1, HUGE_VAL, nullptr, &guess, weights) == MR_BAD_INPUT);
     mr_tree_destroy(tree);
     shape.faces[5] = 4;
     CHECK(mr_tree_create(&good, &tree) == MR_BAD_INPUT);

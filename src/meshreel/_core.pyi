@@ -306,7 +306,11 @@ class SurfaceTree:
     def __init__(self, positions: Float64[np.ndarray, "V 3"], faces: Int32[np.ndarray, "F 3"]) -> None: ...
     def move(self, positions: Float64[np.ndarray, "V 3"]) -> None: ...
     def closest(
-        self, queries: Float64[np.ndarray, "N 3"], reach: float, guesses: Int32[np.ndarray, " N"] | None = None
+        self,
+        queries: Float64[np.ndarray, "N 3"],
+        reach: float,
+        guesses: Int32[np.ndarray, " N"] | None = None,
+        gone: UInt8[np.ndarray, " F"] | None = None,
     ) -> tuple[Int32[np.ndarray, " N"], Float64[np.ndarray, "N 3"]]: ...
     def cast(
         self, origins: Float64[np.ndarray, "M 3"], ways: Float64[np.ndarray, "N 3"], weighted: bool

@@ -95,5 +95,5 @@ def test_clear_views_leave_out_what_is_beside_a_step_and_not_beside_a_hole() -> 
     points = np.array([[0.225, 0, 2], [0.32, 0, 2], [0.58, 0.77, 2]])  # 1 and 6 pixels from the step, beside the hole
     assert hole.any()
     for clear, wanted in ((True, [False, True, True]), (False, [True, True, True])):
-        views = ColorViews([ColorPicture(AHEAD, PIXELS)], room, clear=clear)
-        assert views.at(points, NORMALS[:3])[1].tolist() == wanted
+        views = ColorViews([ColorPicture(AHEAD, PIXELS)], room)
+        assert (views.clear if clear else views).at(points, NORMALS[:3])[1].tolist() == wanted

@@ -18,8 +18,9 @@ int mr_tree_move(mr_tree* tree, const double* positions);
 
 // For each query, the closest face, and the weights of its three corners at the closest point. In `faces` is a face to
 // begin with, the better the faster, or -1; where nothing is within `reach` it is -1 afterwards, and weights are 0.
-int mr_tree_closest(const mr_tree* tree, const double* queries, size_t count, double reach, int32_t* faces,
-                    double* weights);
+// Unless `gone` is null, it has a byte for each face: those that are not 0 are left out.
+int mr_tree_closest(const mr_tree* tree, const double* queries, size_t count, double reach, const uint8_t* gone,
+                    int32_t* faces, double* weights);
 
 // Rays from `origins` along `ways`, count x 3 each, or all from one origin.
 struct mr_rays {

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float64, Int64
@@ -18,6 +19,7 @@ from jaxtyping import Float64, Int64
 from ..errors import InputError
 from ..format.checks import MOST_TRACKS
 from ..geometry.strict import norm
+from ..geometry.threads import ahead
 from ..geometry.topology import boxes_of, clean, components, drop_unreferenced, face_normals, linked
 from ..types import Mesh, MeshSequence, offset
 
@@ -80,7 +82,7 @@ class Survey:
 
 
 def survey_sequence(sequence: MeshSequence, report: Report = lambda *_: None, cleaned: bool = True) -> Survey:
-    """Survey a sequence with one frame in memory at a time. Raises InputError if it is empty or a frame is invalid.
+    """Survey a sequence, a frame for each thread in memory. Raises InputError if it is empty or a frame is invalid.
 
     Unless `cleaned`, faces without area count like any others, and pieces are not searched: scenes have too many faces
     for that.
@@ -92,17 +94,21 @@ def survey_frames(sequence: MeshSequence, numbers: range, cleaned: bool, report:
     """Survey the frames `numbers` of a sequence as `survey_sequence` does; `joined` combines such surveys."""
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
     diagonals, flattened, dropped, pieces = list[float](), list[int](), 0, list[tuple[Piece, ...]]()
-    for number in numbers:
+
+    def surveyed(number: int) -> tuple[int, int, tuple[Piece, ...], float, tuple[Any, Any] | None]:
         check(mesh := sequence[number], f"frame {number}")
-        had_faces, before = not mesh.is_empty, len(mesh.faces)
+        before = len(mesh.faces)
         mesh = clean(mesh) if cleaned else drop_unreferenced(mesh)
-        dropped += before - len(mesh.faces)
-        diagonals.append(0.0 if mesh.is_empty else mesh.diagonal)
-        flattened += [number] if had_faces and mesh.is_empty else []
-        pieces += [pieces_of(mesh)] if cleaned else []
-        if not mesh.is_empty:
-            lower, upper = mesh.box
-            low, high = np.minimum(low, lower), np.maximum(high, upper)
+        box = None if mesh.is_empty else mesh.box
+        return before, len(mesh.faces), pieces_of(mesh) if cleaned else (), 0.0 if box is None else mesh.diagonal, box
+
+    for number, (before, after, own, diagonal, box) in zip(numbers, ahead(surveyed, numbers), strict=True):
+        dropped += before - after
+        diagonals.append(diagonal)
+        flattened += [number] if before and not after else []
+        pieces += [own] if cleaned else []
+        if box is not None:
+            low, high = np.minimum(low, box[0]), np.maximum(high, box[1])
         report("survey", 1)
     return Survey(low, high, tuple(diagonals), tuple(flattened), dropped=dropped, pieces=tuple(pieces))
 

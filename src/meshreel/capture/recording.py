@@ -9,6 +9,7 @@ from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from pathlib import Path
+from threading import Lock
 from typing import Any
 
 import numpy as np
@@ -30,6 +31,7 @@ from .rig.steady import SteadyDepth
 MOVED = 0.5  # share of pixels that differ from their usual depth, in the median frame, of a camera that moves (guess)
 LEAST = 0.3  # share of pixels with a measurement below which a frame is ignored: it may show no background (guess)
 LOOKED_AT = 12  # frames examined for what a sensor is off as a whole (guess)
+_ONE_THREAD = Lock()  # at a time, at a file of meshes
 FINER = 2  # times the rows and columns of the pictures, interpolated, that are fused (decision 28)
 
 
@@ -153,15 +155,18 @@ class Kept:
         if number not in self._places:
             return None
         offset, size = self._places[number]
-        self._file.seek(offset)
-        return pickle.loads(self._file.read(size))
+        with _ONE_THREAD:
+            self._file.seek(offset)
+            data = self._file.read(size)
+        return pickle.loads(data)
 
     def put(self, number: int, mesh: Mesh) -> None:
         """Keep a mesh, unless the disk has no room: it is fused again, then."""
-        with suppress(OSError):
+        data = pickle.dumps(mesh)
+        with suppress(OSError), _ONE_THREAD:
             if self._file is None:  # without a buffer: one that could not be written would fail again when it is read
                 self._file = tempfile.TemporaryFile(prefix="meshreel-", buffering=0)  # noqa: SIM115
-            offset, data = self._file.seek(0, 2), pickle.dumps(mesh)
+            offset = self._file.seek(0, 2)
             if self._file.write(data) == len(data):
                 self._places[number] = (offset, len(data))
 

@@ -17,6 +17,7 @@ from ..encoder.sequence import encode
 from ..encoder.settings.options import QUALITY
 from ..encoder.settings.settings import Settings
 from ..errors import InputError
+from ..geometry.threads import ahead, cores, threads
 from ..io.write import check_free
 from ..metrics.error_sheet import SheetOptions, write_sheet
 from ..types import evenly
@@ -35,7 +36,7 @@ def command(
     frames: int = RoomOptions().frames,
     quality: float = QUALITY,
     seed: int = 0,
-    jobs: int = 1,
+    jobs: int | None = None,
     force: Force = False,
     common: Common = Common(),
 ) -> None:
@@ -54,20 +55,20 @@ def command(
     seed
         Seed of the sensor noise.
     jobs
-        Number of intervals to encode side by side; the file is the same.
+        Number of cores to use, in place of all that this process may use; the file is the same.
     """
     if seed < 0:
         raise InputError(f"--seed must not be negative, got {seed}")
     options, room = Settings(quality=quality).resolved(), RoomOptions(frames=frames, seed=seed)  # errors before work
     file, picture = output / "demo.reel", output / "demo.png"
     check_free([file, picture], force or (output / "rig" / TRUTH).is_dir())  # of an earlier demo
-    with common.stages(frames) as progress, workers(jobs) as executor:
+    with common.stages(frames) as progress, workers(jobs) as executor, threads(jobs or cores()):
         _forget(output / "rig", [camera.name for camera in room_cameras(WIDTH)])
         record_room(output / "rig", room, WIDTH, lambda k: progress("simulate", k, frames))
         capture, _ = open_recording(output / "rig", FusionOptions(VOXEL))
-        for number, _ in enumerate(capture, 1):  # the recording keeps fused frames
+        for number, _ in enumerate(ahead(capture.__getitem__, range(len(capture))), 1):  # the recording keeps them
             progress("fuse", number, len(capture))
-        summary = encode(capture, file, options=options, executor=executor, progress=progress, resume=False)
+        summary = encode(capture, file, options=options, executor=executor, jobs=jobs, progress=progress, resume=False)
         with open_video(file) as video:
             clean = read_truth(output / "rig" / TRUTH)
             truth = against_truth(capture, video, clean, evenly(frames, _JUDGED), progress)

@@ -100,7 +100,7 @@ def encode(
     masking: Masking = Masking(),
     part: Part = Part(),
     hearing: Hearing = Hearing(),
-    jobs: int = 1,
+    jobs: int | None = None,
     cluster: str | None = None,
     resume: bool | None = None,
     debug_digests: Path | None = None,
@@ -120,7 +120,7 @@ def encode(
         The .reel file to write; it appears only when it is complete. Inputs and output may be URLs, as s3://bucket/scan;
         inputs also https:// (extra `remote`).
     jobs
-        Number of intervals to encode side by side; the file is the same.
+        Number of cores to use, in place of all that this process may use; the file is the same.
     cluster
         Address of a Dask scheduler, as tcp://10.0.0.7:8786, whose workers encode in place of this machine (extra
         `cluster`). They read the inputs by the same paths or URLs; the file is the same.
@@ -152,15 +152,14 @@ def encode(
     source = open_source(inputs, reading if part.survey is None else replace(reading, frames=":"), common)
     sequence, masker = upright(source.sequence, masking.up), masking.masker(len(source.sequence))
     excerpt = part.excerpt(sequence, reading.frames, options)
-    here = jobs == 1 and cluster is None  # with workers, this process reads no frame
-    early = lacking if sequence.colors is not None or (lacking and here and is_colored(sequence)) else ()
+    early = lacking if sequence.colors is not None or (lacking and is_colored(sequence)) else ()
     common.warn(early)  # now, not after minutes
     with (
         common.stages(len(sequence if excerpt is None else excerpt.frames)) as progress,
         workers(jobs, cluster) as executor,
         _lines(debug_digests, place, sequence.files) as digests,
     ):
-        encoder = Encoder(sequence, executor, progress, masker, digests, excerpt)
+        encoder = Encoder(sequence, executor, progress, masker, digests, excerpt, jobs)
         encoder.audio = sound
         if goal is None:
             summary = encoder.encode(place, options, resume)
@@ -277,7 +276,7 @@ def survey(
     output: Annotated[str, Parameter(name=["--output", "-o"])],
     reading: Reading = Reading(),
     up: Annotated[Up | None, Parameter(allow_leading_hyphen=True)] = None,
-    jobs: int = 1,
+    jobs: int | None = None,
     cluster: str | None = None,
     common: Common = Common(),
 ) -> None:
@@ -293,7 +292,7 @@ def survey(
     up
         Axis that points up, as `encode` takes it.
     jobs
-        Number of processes that read side by side; the file is the same.
+        Number of cores to use, as `encode` takes it.
     cluster
         Address of a Dask scheduler whose workers read, as `encode` takes it.
     """
@@ -306,7 +305,7 @@ def survey(
     sequence = upright(source.sequence, up)
     with uploaded(place) as path, common.stages(len(sequence)) as progress, workers(jobs, cluster) as executor:
         check_apart(path, sequence.files)
-        facts = Encoder(sequence, executor, progress).survey(path)
+        facts = Encoder(sequence, executor, progress, jobs=jobs).survey(path)
     warnings = (*source.warnings, *warnings_of(facts))
     common.warn(warnings)
     row = {"output": str(place), "frames": len(sequence), "warnings": warnings}

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 from .. import __version__
 from ..encoder.run.worker import Told, die_with_parent, end_with_parent, tell_to
 from ..errors import InputError
+from ..geometry.threads import cores
 from ..io.files import first_difference
 
 if TYPE_CHECKING:
@@ -28,21 +29,24 @@ CONNECTS = 10.0  # s, longest time until a scheduler answers (guess)
 
 
 @contextmanager
-def workers(jobs: int, cluster: str | None = None) -> Iterator[Executor | None]:
-    """Start processes for `jobs` intervals at a time, none for one, or take a Dask scheduler's. Raises InputError."""
-    if jobs < 1:
+def workers(jobs: int | None, cluster: str | None = None) -> Iterator[Executor | None]:
+    """Yield processes for `jobs` intervals at a time, which start when they are needed, or a Dask scheduler's.
+
+    None of both for one job; None jobs are as many as there are cores. Raises InputError.
+    """
+    if jobs is not None and jobs < 1:
         raise InputError(f"--jobs must be at least 1, got {jobs}")
     if cluster is not None:
-        if jobs > 1:
+        if jobs is not None:
             text = "the cluster has workers of its own, give one of both"
             raise InputError(f"--jobs {jobs} and --cluster {cluster}: {text}")
         with _cluster(cluster) as executor:
             yield executor
         return
-    if jobs == 1:
+    if (count := cores() if jobs is None else jobs) == 1:
         yield None
         return
-    executor = _Workers(jobs)
+    executor = _Workers(count)
     try:
         yield executor
     except BaseException:

@@ -27,6 +27,7 @@ from ..edit.metadata import shortened, up_metadata
 from ..errors import InputError
 from ..format.layout import Form
 from ..geometry.derived_sequences import captured, is_colored, unchanging, welded
+from ..geometry.threads import cores, threads
 from ..geometry.work import since, so_far
 from ..io.files import Place, located
 from ..types import MeshSequence, evenly
@@ -83,6 +84,7 @@ def encode(
     background_refresh: float | None = None,
     options: EncoderOptions | Settings | None = None,
     executor: Executor | None = None,
+    jobs: int | None = None,
     progress: Progress | None = None,
     resume: bool | None = None,
     audio: Given | None = None,
@@ -93,9 +95,10 @@ def encode(
     `sequence` is a MeshSequence or an iterable of meshes (`as_sequence`, which also takes a frame rate); vertices
     at equal positions are welded. The keywords from `quality` to `background_refresh` are the fields of `Settings`,
     which say when to touch them; `options` replace them all. Most of a scene stands still: it becomes a background and
-    bodies. Bodies that never touch are coded apart in any sequence. With an executor, intervals are encoded side by
-    side, to the same bytes; memory then holds an interval for each worker and one more. Warns of surface that the file
-    lacks.
+    bodies. Bodies that never touch are coded apart in any sequence. Warns of surface that the file lacks.
+    `jobs` is the number of cores to use, by default all that the process may use: threads share the frames of a group.
+    An executor's workers encode long intervals side by side; memory then holds an interval for each worker and one
+    more. The bytes are the same.
     `audio` is a path, a URL or the bytes of an audio file (Opus, AAC, MP3), kept as it is, which begins `audio_start`
     seconds after the first frame. Raises InputError for frames or audio that cannot be used, before anything is
     encoded.
@@ -122,7 +125,7 @@ def encode(
     )
     if options is not None and settings != Settings():
         raise InputError("options and settings: leave the settings out, or give Settings(...) as options")
-    encoder, output = Encoder(welded(as_sequence(sequence)), executor, progress), located(path)
+    encoder, output = Encoder(welded(as_sequence(sequence)), executor, progress, jobs=jobs), located(path)
     encoder.audio = b"" if audio is None else packed_audio(audio, audio_start)
     chosen = options or settings
     summary = encoder.encode(output, chosen.resolved() if isinstance(chosen, Settings) else chosen, resume)
@@ -142,12 +145,17 @@ class Encoder:
         masker: Masker | None = None,
         digests: WriteLines | None = None,
         excerpt: Excerpt | None = None,
+        jobs: int | None = None,
     ) -> None:
         """Take executor and progress as `encode` does; with a `masker`, whose masks mark moving pixels, it is a scene.
 
         `digests` takes lines of JSON, one for each stage. Of an `excerpt`, only its frames are encoded. The attributes
         `progress`, `audio` and `find`, which finds the groups of the paper's recipe, may be replaced between encodes.
+        Raises InputError for `jobs` below 1.
         """
+        if jobs is not None and jobs < 1:
+            raise InputError(f"jobs must be at least 1, got {jobs}")
+        self._cores = cores() if jobs is None else jobs
         self.sequence, self._executor, self._masker = unchanging(captured(sequence)), executor, masker
         self.progress, self.digests, self._excerpt = progress, digests, excerpt
         self.find: FindGroups = find_groups
@@ -174,9 +182,13 @@ class Encoder:
         with opened_output(path, self.sequence.files, resume) as (file, files):
             return self.encode_into(file, options, files)
 
-    @threadpool_limits.wrap(limits=1)  # idle threads of BLAS would take a third of the processor's time
     def encode_into(self, file: BinaryIO, options: EncoderOptions, files: IntervalFiles) -> Summary:
         """Encode the sequence into an open, empty file; its groups wait in the files of their intervals."""
+        # Idle threads of BLAS would take a third of the processor's time.
+        with threadpool_limits(1), threads(self._cores):
+            return self._encoded(file, options, files)
+
+    def _encoded(self, file: BinaryIO, options: EncoderOptions, files: IntervalFiles) -> Summary:
         if options.scene is None and self._masker is not None:
             raise InputError("masks for a sequence that is not taken apart (scene=None): give one of both")
         before, excerpt = so_far(), self._excerpt
@@ -206,7 +218,8 @@ class Encoder:
 
     def survey(self, path: Path) -> Survey:
         """Survey the sequence, and write a file of it for encodes of its parts."""
-        survey = survey_job(self._job(EncoderOptions()))
+        with threads(self._cores):
+            survey = survey_job(self._job(EncoderOptions()))
         write_survey(survey, self.sequence, path)
         return survey
 

@@ -5,6 +5,8 @@ The tree decides in float32, about the middle of the mesh, which face is closest
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -45,13 +47,15 @@ class Surface:
         """Areas of the faces, in squared units of the vertices."""
         return face_normals(self.mesh)[1]
 
-    def closest(self, queries: Float64[np.ndarray, "N 3"]) -> Hits:
+    def closest(self, queries: Float64[np.ndarray, "N 3"], gone: Bool[np.ndarray, " F"] | None = None) -> Hits:
         """Find the closest point of the surface to each query, with its face and barycentric weights.
 
-        Among equally close faces, the one with the lowest number is chosen.
+        Faces that are `gone`, of which some must be left, do not count. Among equally close faces, the one with the
+        lowest number is chosen.
         """
         work.count("closest points", len(queries))
-        faces, barycentric = self.tree.closest(np.ascontiguousarray(queries), np.inf)
+        out = None if gone is None else gone.view(np.uint8)
+        faces, barycentric = self.tree.closest(np.ascontiguousarray(queries), np.inf, None, out)
         return Hits(blend(self.mesh.vertices, self.mesh.faces[faces], barycentric), faces, barycentric)
 
     def distances(self, points: Float64[np.ndarray, "N 3"]) -> Float64[np.ndarray, " N"]:
@@ -79,6 +83,26 @@ class Surface:
         ends = np.zeros(len(self.mesh.vertices), bool)
         ends[edges[border].reshape(-1)] = True
         return border[face_edges], ends[self.mesh.faces]
+
+
+class MovingSurface:
+    """A mesh whose vertices move; threads that ask at the same time get a search structure each."""
+
+    def __init__(self, mesh: Mesh) -> None:
+        self._mesh, self._free = mesh, [Surface(mesh)]
+
+    @contextmanager
+    def at(self, vertices: Float64[np.ndarray, "V 3"]) -> Iterator[Surface]:
+        """Yield the surface with its vertices there."""
+        try:
+            surface = self._free.pop()
+        except IndexError:
+            surface = Surface(self._mesh)
+        surface.move(vertices)
+        try:
+            yield surface
+        finally:
+            self._free.append(surface)
 
 
 def area_samples(mesh: Mesh, count: int) -> Int64[np.ndarray, " S"]:

@@ -7,17 +7,21 @@ most squarely count most.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass, replace
+from itertools import repeat
 from typing import Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Bool, Float, Float32, Float64, Int32, Int64, UInt8
 
 from ..types import GREY, Mesh, Placement
+from . import work
 from .cameras import Camera, CameraPose
 from .closest_points import Surface
 from .drawing import draw
 from .strict import products
+from .threads import mapped
 from .topology import blend, face_normals
 
 Points = Float64[np.ndarray, "N 3"]  # also normals, and colours from 0 to 255
@@ -62,14 +66,21 @@ class ColorFrames(Protocol):
 class ColorViews:
     """The pictures of one moment, prepared for repeated queries."""
 
-    def __init__(
-        self, pictures: Sequence[ColorPicture], hides: Mesh, margin: float = MARGIN, clear: bool = False
-    ) -> None:
-        """Take pictures, and all surface that may occlude a place; `margin` is in the unit of its vertices.
+    def __init__(self, pictures: Sequence[ColorPicture], hides: Mesh, margin: float = MARGIN) -> None:
+        """Take pictures, and all surface that may occlude a place; `margin` is in the unit of its vertices."""
+        self.views = mapped(View.of, pictures, repeat(hides), repeat(margin))
 
-        If `clear`, a place near a step in depth counts as hidden, as pictures mix both sides there.
-        """
-        self.views = [View(picture, hides, margin, clear) for picture in pictures]
+    @property
+    def clear(self) -> ColorViews:
+        """The same views, in which a place near a step in depth counts as hidden: pictures mix both sides there."""
+        found = copy(self)
+        found.views = mapped(View.cleared, self.views)
+        return found
+
+    @property
+    def nbytes(self) -> int:
+        """Memory of the pictures and of the depths, bytes."""
+        return sum(view.picture.pixels.nbytes + view.depth.nbytes + view.from_step.nbytes for view in self.views)
 
     def at(self, points: Points, normals: Points) -> tuple[Points, Mask]:
         """Return the colours of places with these normals, 0 to 255, and a mask of those that some camera saw."""
@@ -95,19 +106,31 @@ class ColorViews:
         return float(most.sum())
 
 
+@dataclass(frozen=True, slots=True)
 class View:
     """A picture, and the depth of the surface at each of its pixels; a large picture's depths are coarser."""
 
-    def __init__(self, picture: ColorPicture, hides: Mesh, margin: float, clear: bool = False) -> None:
-        from scipy.ndimage import distance_transform_edt
+    picture: ColorPicture
+    shrink: int  # pixels of the picture, along a side, in each of these
+    depth: Float32[np.ndarray, "H W"]
+    from_step: UInt8[np.ndarray, "H W"]  # distance from a step in depth, in 255ths of `FEATHER`
+    margin: float
 
-        self.picture, self._margin, self._clear, camera = picture, margin, clear, picture.camera
-        self._shrink = max(1, -(-max(camera.width, camera.height) // MOST_SIDE))
-        width, height = -(-camera.width // self._shrink), -(-camera.height // self._shrink)
-        intrinsic = camera.intrinsic / [[self._shrink], [self._shrink], [1.0]]
-        self._depth = draw(hides, Camera.of(width, height, intrinsic, camera.extrinsic)).depth
-        steps = _steps(_smooth(self._depth) if clear else self._depth)
-        self._from_step = distance_transform_edt(~steps) * self._shrink
+    @staticmethod
+    def of(picture: ColorPicture, hides: Mesh, margin: float) -> View:
+        """Return the view of surface from where a picture was taken."""
+        work.count("pictures drawn")
+        camera = picture.camera
+        shrink = max(1, -(-max(camera.width, camera.height) // MOST_SIDE))
+        width, height = -(-camera.width // shrink), -(-camera.height // shrink)
+        intrinsic = camera.intrinsic / [[shrink], [shrink], [1.0]]
+        depth = draw(hides, Camera.of(width, height, intrinsic, camera.extrinsic)).depth
+        return View(picture, shrink, depth, _from_step(depth, shrink), margin)
+
+    def cleared(self) -> View:
+        """Return the view in which places near a step are hidden; the steps are those of smoothed depth."""
+        near = _from_step(_smooth(self.depth), self.shrink)
+        return replace(self, from_step=np.where(near == 255, near, 0).astype(np.uint8))
 
     def weights(self, points: Points, normals: Points, at_step: float = 0.0) -> Float64[np.ndarray, " N"]:
         """Return how well the picture shows places: the cube of the cosine of the view, less near steps; 0 if hidden.
@@ -121,12 +144,10 @@ class View:
         with np.errstate(invalid="ignore"):
             inside = (positions >= 0.5).all(axis=1) & (positions <= size - 0.5).all(axis=1) & (cosine > 0)
         rows = np.flatnonzero(inside)
-        cells = np.minimum(positions[rows] / self._shrink, np.array(self._depth.shape[::-1]) - 1e-9).astype(np.int64)
+        cells = np.minimum(positions[rows] / self.shrink, np.array(self.depth.shape[::-1]) - 1e-9).astype(np.int64)
         at = (cells[:, 1], cells[:, 0])
-        hidden = depth[rows] > self._depth[at] + np.maximum(self._margin, MARGIN * depth[rows])
-        near = np.minimum(self._from_step[at] / FEATHER, 1.0)
-        if self._clear:
-            near = np.floor(near)
+        hidden = depth[rows] > self.depth[at] + np.maximum(self.margin, MARGIN * depth[rows])
+        near = self.from_step[at] / 255
         weights = np.zeros(len(points))
         weights[rows] = np.where(hidden, 0.0, cosine[rows] ** 3 * np.maximum(near, at_step))
         return weights
@@ -136,6 +157,14 @@ class View:
         colors = np.zeros((len(points), 3))
         colors[chosen] = sampled(self.picture.pixels, self.picture.project(points[chosen])[0]) / self.picture.gains
         return colors
+
+
+def _from_step(depth: Float32[np.ndarray, "H W"], shrink: int) -> UInt8[np.ndarray, "H W"]:
+    """Return the distance of each pixel from a step in depth, in 255ths of `FEATHER`, at most 255."""
+    from scipy.ndimage import distance_transform_edt
+
+    away = distance_transform_edt(~_steps(depth)) * shrink
+    return np.floor(np.minimum(away / FEATHER, 1.0) * 255).astype(np.uint8)
 
 
 def _smooth(depth: Float32[np.ndarray, "H W"]) -> Float32[np.ndarray, "H W"]:

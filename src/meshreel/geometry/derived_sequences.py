@@ -13,6 +13,7 @@ from collections import OrderedDict
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from threading import Lock
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -27,6 +28,7 @@ from .topology import part_of, weld
 
 # Bytes of frames that an encode keeps: the frames of a key interval, 120, with 20,000 vertices each take 115 MB.
 MOST_KEPT = 1 << 27
+_ONE_THREAD = Lock()  # at a time: memories go to other processes, which locks cannot
 
 
 @runtime_checkable
@@ -96,16 +98,20 @@ class Memory:
 
     def get(self, number: int) -> Mesh | None:
         """Return a frame, None where it is not kept."""
-        if number in self._meshes:
-            self._meshes.move_to_end(number)
-        return self._meshes.get(number)
+        with _ONE_THREAD:
+            if number in self._meshes:
+                self._meshes.move_to_end(number)
+            return self._meshes.get(number)
 
     def keep(self, number: int, mesh: Mesh) -> None:
-        """Keep a frame that is not kept yet, in place of those that were not used for longest."""
-        self._meshes[number] = mesh
-        self._free -= _nbytes(mesh)
-        while self._free < 0:
-            self._free += _nbytes(self._meshes.popitem(last=False)[1])
+        """Keep a frame in place of those that were not used for longest."""
+        with _ONE_THREAD:
+            if number in self._meshes:  # another thread has read it, too
+                return
+            self._meshes[number] = mesh
+            self._free -= _nbytes(mesh)
+            while self._free < 0:
+                self._free += _nbytes(self._meshes.popitem(last=False)[1])
 
     def check(self, number: int, now: str, name: str) -> None:
         """Raise InputError if a frame is not what it was when it was read first."""

@@ -17,25 +17,34 @@ Kind = Literal[
     "frames fitted",  # from a prediction; those of an accepted group are fitted again
     "frames fitted again",
     "surfaces fused",
+    "pictures drawn",  # of surface as a colour camera sees it
     "decimations",
     "closest points",
 ]
-Work = dict[str, int]  # number of times by kind
+Work = dict[Kind, int]  # number of times by kind
+Report = Callable[[Kind, int], object]
 
 _here = threading.local()
+_ONE_REPORT = threading.Lock()
 
 
 def count(kind: Kind, number: int = 1) -> None:
     """Count work that this thread does."""
     _counts()[kind] += number
-    if (report := getattr(_here, "report", None)) is not None:
-        report(kind, number)
+    if (report := reporter()) is not None:
+        with _ONE_REPORT:
+            report(kind, number)
+
+
+def reporter() -> Report | None:
+    """Return the function that gets the work that this thread counts; None where it is not reported."""
+    return getattr(_here, "report", None)
 
 
 @contextmanager
-def reporting(report: Callable[[Kind, int], object]) -> Iterator[None]:
-    """Call `report` with the work that this thread counts in the block."""
-    before, _here.report = getattr(_here, "report", None), report
+def reporting(report: Report | None) -> Iterator[None]:
+    """Call `report`, one call at a time, with the work that this thread counts in the block."""
+    before, _here.report = reporter(), report
     try:
         yield
     finally:
@@ -57,7 +66,7 @@ def add(work: Work) -> None:
     _counts().update(work)
 
 
-def _counts() -> Counter[str]:
+def _counts() -> Counter[Kind]:
     if not hasattr(_here, "counts"):
-        _here.counts = Counter[str]()
+        _here.counts = Counter[Kind]()
     return _here.counts

@@ -223,7 +223,7 @@ class StageTimer:
 def cost_of(timers: Sequence[StageTimer], frames: int) -> Encoding:
     """Return the cost of a frame while these timers ran, and this process's peak memory."""
 
-    def a_frame(totals: Sequence[Mapping[str, float]]) -> dict[str, float]:
+    def a_frame(totals: Sequence[Mapping[Any, float]]) -> dict[str, float]:
         names = dict.fromkeys(name for total in totals for name in total)
         return {name: sum(total.get(name, 0.0) for total in totals) / frames for name in names}
 

@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import Bool, Float64, Int32, Int64
 
 from ... import _core
-from ...geometry.closest_points import Hits, Surface, area_samples
+from ...geometry.closest_points import Hits, MovingSurface, Surface, area_samples
 from ...geometry.depth import FreeSpace
 from ...geometry.topology import border_edges, border_mask, face_normals, unique_edges, vertex_normals
 from ...types import Mesh
@@ -137,26 +137,27 @@ class Closeness:
 
         With noise, holes of the frames do not count.
         """
-        self._surface, self._samples, self._noise = Surface(template), area_samples(template, SAMPLES), noise
+        self._surface, self._samples, self._noise = MovingSurface(template), area_samples(template, SAMPLES), noise
         self._far = max(FAR, FAR_OFF * target)
-        self._usual = 1.0  # share without counterpart in the best fit: gear wheels in mesh face each other
+        self.usual = 1.0  # share without counterpart in the best fit: gear wheels in mesh face each other
 
     def of(self, positions: Float64[np.ndarray, "V 3"], frame: FrameSurface) -> float:
         """Return the RMS distance between the template at these positions and a frame; infinite where it is wrong."""
-        self._surface.move(positions)
         chosen = frame.samples(SAMPLES)
         template, frame_points = positions[self._samples], frame.mesh.vertices[chosen]
-        to_frame, to_fit = frame.surface.closest(template), self._surface.closest(frame_points)
-        normals = vertex_normals(self._surface.mesh)[self._samples]
-        fit_normals, frame_normals = self._surface.normals[to_fit.faces], frame.surface.normals[to_frame.faces]
+        to_frame = frame.surface.closest(template)
+        with self._surface.at(positions) as fitted:
+            to_fit, normals = fitted.closest(frame_points), vertex_normals(fitted.mesh)[self._samples]
+            fit_normals, frame_normals = fitted.normals[to_fit.faces], frame.surface.normals[to_frame.faces]
+            beside = fitted.past_border(to_fit) if self._noise > 0 else None
         back, ahead = frame.gaps(to_frame, template, chosen, to_fit.points)
-        if self._noise > 0:  # holes of noisy frames do not call for another template
-            inside = frame.inside_at(to_frame) > ON_BORDER, ~self._surface.past_border(to_fit)
+        if beside is not None:  # holes of noisy frames do not call for another template
+            inside = frame.inside_at(to_frame) > ON_BORDER, ~beside
             return shared_distance((back, ahead), inside, self._noise)
         wrong = (np.einsum("nd,nd->n", normals, frame_normals) < 0) | (back > self._far**2)
         lacking = (np.einsum("nd,nd->n", frame.normals[chosen], fit_normals) < 0) | (ahead > self._far**2)
         share = float(max(wrong.mean(), lacking.mean()))
-        self._usual = min(self._usual, share)
-        if share > self._usual + WRONG:
+        self.usual = min(self.usual, share)
+        if share > self.usual + WRONG:
             return np.inf
         return float(np.sqrt(max(back.mean(), ahead.mean())))

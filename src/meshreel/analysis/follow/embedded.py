@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from threading import Lock
 
 import numpy as np
 from jaxtyping import Float64, Int64
@@ -19,10 +20,11 @@ from scipy.spatial import cKDTree
 
 from ... import _core
 from ...geometry import work
-from ...geometry.closest_points import Surface, area_samples
+from ...geometry.closest_points import MovingSurface, area_samples
 from ...geometry.color_views import Paint
 from ...geometry.rigid import quaternions
 from ...geometry.strict import products, rotations_of
+from ...geometry.threads import mapped_until
 from ...geometry.topology import clean, vertex_normals
 from ...types import Mesh
 from ..fit.frame import ON_BORDER, FrameSurface, shared_distance
@@ -43,7 +45,7 @@ from .rigid import RigidBody, RigidMotion
 NOISY_LOST = 3.0  # RMS distances of the noise that a residual may have in addition: legs vanish (decision 16)
 Painter = Callable[[], Paint | None]  # opens the colour source of a frame, if it has one
 CLEARLY = 0.8  # share of the best residual that a start by colour must reach: it is rougher than one by shape (guess)
-UNUSUAL = 1.25  # a frame is retried if its residual exceeds this many times the median so far (decision 15)
+UNUSUAL = 1.25  # a frame is retried if its residual exceeds this many times the median so far, and its neighbour's
 AGREEMENT = 0.3  # smallest cosine between the normals of a pair (guess)
 TORN = (0.5, 0.15)  # an edge off by this share of its length counts a quarter; try, retry (decision 15)
 DOUBT = 0.0005  # diagonals: a frame with a larger, unusual residual is tried again from elsewhere (decision 15)
@@ -88,7 +90,7 @@ class Tracker:
         self.mesh = clean(key_mesh)
         o = self.options
         self._samples = area_samples(self.mesh, o.samples)
-        self._moved = Surface(self.mesh)
+        self._moved = MovingSurface(self.mesh)
         nodes = farthest_first(self.mesh, self._samples, o.fine.nodes)
         self._graph, coarse = build_graph(self.mesh, nodes), build_graph(self.mesh, nodes[: o.coarse.nodes])
         self._fine, self._few = self._rest(self._graph), self._rest(coarse)
@@ -96,15 +98,17 @@ class Tracker:
         self._all = self._graph.bind(self.mesh.vertices, self._graph.cells)
         self._poses = {key: Pose.at(self._graph.nodes)}
         self.residuals = {key: 0.0}  # RMS distances of the moved key mesh and registered frames, as by `step`
-        self._paint = paint
+        self._paint, self._coloring = paint, Lock()
         self._colored: ColoredPlaces | None = None
+        self._torn = dict[int, float]()  # of `TORN`, that with which a frame was registered best: it is tried first
         self._body = RigidBody(self.mesh, noise) if noise > 0 else None  # bending costs clean bodies nothing
         self._rigid = {} if self._body is None else {key: RigidMotion(np.eye(3), np.zeros(3))}
 
     def step(self, frame: int, surface: FrameSurface, paint: Painter | None = None) -> float:
         """Register a frame, starting from the nearest registered frame between it and the key; return its residual.
 
-        A frame may be registered again. `paint` opens the frame's colour source.
+        A frame may be registered again. `paint` opens the frame's colour source. Frames on both sides of the key may be
+        registered side by side once the one beside the key, on the side that begins, is known.
         """
         assert frame != self.key, "the key needs no registration"
         work.count("frames tracked")
@@ -153,22 +157,30 @@ class Tracker:
     @property
     def _followed(self) -> list[int]:
         """Registered frames with a measured pose: the key, and all that are not empty."""
-        return [frame for frame, residual in self.residuals.items() if residual < np.inf]
+        return [frame for frame, residual in list(self.residuals.items()) if residual < np.inf]
 
     def _follow(self, frame: int, surface: FrameSurface, paint: Painter | None) -> tuple[Pose, float]:
         """Register a frame from several starts until one is good enough; return the best pose and its residual."""
         o, last = self.options, self._known(frame)
         target = surface.sampled(o.samples)
-        usual = np.median([r for r in self.residuals.values() if 0 < r < np.inf] or [0.0])  # includes noise
+        known = [at for at in self._followed if (at - self.key) * (frame - self.key) > 0 or at == self.key + 1]
+        usual = float(np.median([self.residuals[at] for at in known if self.residuals[at] > 0] or [0.0]))
+        usual = max(usual, self.residuals[last])  # includes noise; it grows away from the key
         starts = self._starts(frame, target)
         best = self._poses[last], np.inf
-        enough = max(self._doubt, UNUSUAL * float(usual))
-        tries = [(starts[0], TORN[0]), (starts[0], TORN[1]), *((start, TORN[0]) for start in starts[1:])]
-        for start, torn in tries:
-            result = self._from(start, target, torn, surface)
-            best = result if result[1] < best[1] else best
-            if result[1] < enough:
-                return best
+        enough = max(self._doubt, UNUSUAL * usual)
+        before = self._torn.get(self.key + 1 if last == self.key else last, TORN[0])
+        tries = [(starts[0], before), *((starts[0], torn) for torn in TORN if torn != before)]
+        tries += [(start, TORN[0]) for start in starts[1:]]
+
+        def tried(start: Pose, torn: float) -> tuple[Pose, float]:
+            return self._from(start, target, torn, surface)
+
+        found = mapped_until(lambda result: result[1] < enough, tried, *zip(*tries, strict=True))
+        best = min([best, *found], key=lambda result: result[1])
+        self._torn[frame] = next((torn for (_, torn), each in zip(tries, found, strict=False) if each is best), before)
+        if found[-1][1] < enough:
+            return best
         for start in self._by_color(starts[0], surface, paint):
             result = self._from(start, target, TORN[0], surface)
             if result[1] < CLEARLY * best[1] or result[1] <= self.lost < best[1]:
@@ -210,9 +222,10 @@ class Tracker:
         frame_paint = paint() if paint is not None else None
         if frame_paint is None:
             return
-        if self._paint is not None and (key_paint := self._paint()) is not None:
-            self._colored = ColoredPlaces(self.mesh, self._samples, key_paint)
-        self._paint = None
+        with self._coloring:  # both sides of the key may ask at a time
+            if self._paint is not None and (key_paint := self._paint()) is not None:
+                self._colored = ColoredPlaces(self.mesh, self._samples, key_paint)
+            self._paint = None
         if self._colored is not None:
             points = moved(self._fine.points, self._fine.nodes, self._fine.binding, pose)
             offsets = self._colored.offsets(pose.positions, points, surface, self.options.samples, frame_paint)
@@ -227,13 +240,14 @@ class Tracker:
     def _measure(self, pose: Pose, surface: FrameSurface) -> float:
         """Return the RMS distance over samples of both surfaces; the larger of both directions."""
         vertices = moved(self.mesh.vertices, self._graph.nodes, self._all, pose)
-        self._moved.move(vertices)
-        frame_points = surface.mesh.vertices[surface.samples(self.options.samples)]
-        key_points, back = vertices[self._samples], self._moved.closest(frame_points)
+        frame_points, key_points = surface.mesh.vertices[surface.samples(self.options.samples)], vertices[self._samples]
+        with self._moved.at(vertices) as now:
+            back = now.closest(frame_points)
+            beside = now.past_border(back) if self._noise > 0 else None
         ahead = surface.surface.closest(key_points)
         squares = surface.gaps(ahead, key_points, surface.samples(self.options.samples), back.points)
-        if self._noise > 0:  # compare only surface that both have
-            inside = surface.inside_at(ahead) > ON_BORDER, ~self._moved.past_border(back)
+        if beside is not None:  # compare only surface that both have
+            inside = surface.inside_at(ahead) > ON_BORDER, ~beside
             return shared_distance(squares, inside, self._noise)
         return float(np.sqrt(max(each.mean() for each in squares)))
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float64
 
-from ...geometry.closest_points import Surface, area_samples
+from ...geometry.closest_points import MovingSurface, area_samples
 from ...geometry.rigid import fit_rigid
 from ...geometry.strict import inverse, products, rotations_of
 from ...geometry.topology import vertex_normals
@@ -60,7 +60,7 @@ class RigidBody:
 
     def __init__(self, mesh: Mesh, noise: float) -> None:
         """`noise` is the RMS distance of the frames from the truth."""
-        self._surface, self._noise = Surface(mesh), noise
+        self._surface, self._noise = MovingSurface(mesh), noise
         self._vertices, self._chosen = mesh.vertices, area_samples(mesh, SAMPLES)
         self._normals = vertex_normals(mesh)[self._chosen]
         centers = mesh.vertices[farthest_first(mesh, self._chosen, BLOCKS)]
@@ -89,10 +89,13 @@ class RigidBody:
 
     def residual(self, frame: FrameSurface, motion: RigidMotion) -> tuple[float, float]:
         """Return the body's RMS distance from a frame, and that of its worst part."""
-        body, frame_points = self._moved(motion), frame.mesh.vertices[frame.samples(SAMPLES)]
-        ahead, back = frame.surface.closest(body), self._surface.closest(frame_points)
+        vertices, frame_points = motion.of(self._vertices), frame.mesh.vertices[frame.samples(SAMPLES)]
+        body = vertices[self._chosen]
+        ahead = frame.surface.closest(body)
+        with self._surface.at(vertices) as moved:
+            back = moved.closest(frame_points)
+            over = frame.inside_at(ahead) > ON_BORDER, ~moved.past_border(back)
         squares = frame.gaps(ahead, body, frame.samples(SAMPLES), back.points)
-        over = frame.inside_at(ahead) > ON_BORDER, ~self._surface.past_border(back)
         noise = max(self._noise, EXACT)
         usable = over[0] & (squares[0] <= (STRAY * noise) ** 2)
         count = np.bincount(self._block[usable], minlength=BLOCKS)
@@ -100,19 +103,17 @@ class RigidBody:
         parts = np.sqrt(sums[count >= 8] / count[count >= 8])
         return shared_distance(squares, over, noise), float(parts.max(initial=0.0))
 
-    def _moved(self, motion: RigidMotion) -> Float64[np.ndarray, "S 3"]:
-        vertices = motion.of(self._vertices)
-        self._surface.move(vertices)
-        return vertices[self._chosen]
-
     def _pairs(
         self, frame: FrameSurface, motion: RigidMotion, gate: float
     ) -> tuple[Float64[np.ndarray, "R 6"], Float64[np.ndarray, " R"]]:
         """Return the rows of a small turn and step for pairs in both directions, and the gaps to close."""
-        source, target = self._moved(motion), frame.mesh.vertices[frame.samples(SAMPLES)]
-        ahead, back = frame.surface.closest(source), self._surface.closest(target)
-        inside, past = frame.inside_at(ahead) > ON_BORDER, self._surface.past_border(back)
-        facing = frame.surface.normals[ahead.faces], self._surface.normals[back.faces]
+        vertices, target = motion.of(self._vertices), frame.mesh.vertices[frame.samples(SAMPLES)]
+        source = vertices[self._chosen]
+        ahead = frame.surface.closest(source)
+        with self._surface.at(vertices) as moved:
+            back = moved.closest(target)
+            inside, past = frame.inside_at(ahead) > ON_BORDER, moved.past_border(back)
+            facing = frame.surface.normals[ahead.faces], moved.normals[back.faces]
         own_ways, their_ways = products(self._normals, motion.turn.T), frame.normals[frame.samples(SAMPLES)]
         inside &= (facing[0] * own_ways).sum(axis=1) > ALIKE
         within = ~past & ((facing[1] * their_ways).sum(axis=1) > ALIKE)

@@ -15,6 +15,7 @@ from scipy.ndimage import binary_opening, uniform_filter
 
 from ...geometry.color_views import ColorFrames, sampled
 from ...geometry.drawing import draw
+from ...geometry.threads import ahead
 from ...types import Frames, Mesh
 
 SIDE = 640  # pixels, largest length of a view's longer side, for tools that make masks (guess)
@@ -63,11 +64,13 @@ class ColorChange:
     @staticmethod
     def of(frames: Frames, looks: ColorLooks, numbers: Sequence[int], nearer: float) -> ColorChange:
         """Find the usual depth and hue over the frames `numbers`."""
-        depths, hues = [], []
-        for number in numbers:
+
+        def seen(number: int) -> tuple[list[np.ndarray], list[np.ndarray]]:
             mesh = frames[number]
-            depths.append([draw(mesh, view).depth for view in looks.views])
-            hues.append([_hue(looks, number, view) for view in range(len(looks.views))])
+            depths = [draw(mesh, view).depth for view in looks.views]
+            return depths, [_hue(looks, number, view) for view in range(len(looks.views))]
+
+        depths, hues = zip(*ahead(seen, numbers), strict=True)
         depth = np.array(depths, np.float32)
         far = _quantile(np.where(np.isfinite(depth), depth, np.nan), _FAR)
         room = np.where((np.abs(depth - far) < _ROOM * nearer)[..., None], np.array(hues, np.float32), np.nan)

@@ -40,11 +40,12 @@ class _LabelCache:
     def of(self, frame: int, mesh: Mesh, find: Callable[[], Bool[np.ndarray, " F"]]) -> Bool[np.ndarray, " F"]:
         """Return the labels of a frame, calling `find` if they are not in the cache."""
         key = (frame, len(mesh.faces), float(mesh.vertices.sum()))
-        if key not in self._known:
-            if len(self._known) >= self.most:
-                del self._known[next(iter(self._known))]
-            self._known[key] = np.packbits(find())
-        return np.unpackbits(self._known[key], count=len(mesh.faces)).astype(bool)
+        if (packed := self._known.get(key)) is None:
+            packed = np.packbits(find())
+            while len(self._known) >= self.most:
+                self._known.pop(next(iter(self._known)), None)  # another thread may have removed it
+            self._known[key] = packed
+        return np.unpackbits(packed, count=len(mesh.faces)).astype(bool)
 
 
 @dataclass(frozen=True)

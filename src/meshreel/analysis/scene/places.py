@@ -21,6 +21,7 @@ from scipy.ndimage import minimum_filter
 from ...geometry.cameras import Camera
 from ...geometry.depth import DepthPicture
 from ...geometry.drawing import backs, draw
+from ...geometry.threads import ahead
 from ...geometry.topology import face_normals
 from ...geometry.voxels import Lattice, distinct, neighbours, spread
 from ...types import Frames, Mesh, evenly
@@ -54,16 +55,21 @@ class Observations:
     pictures: Callable[[int], list[DepthPicture | None]] | None = None  # of a frame: one for each camera
     report: Report = lambda _share: None  # called with the progress of `find_places`
 
-    def observe(self, number: int, mesh: Mesh, cells: Int64[np.ndarray, " C"], lattice: Lattice) -> _Observation:
-        """Return the observations of a frame, given its mesh and occupied cells."""
-        unit = lattice.size / _FINENESS
+    def observe(self, number: int, lattice: Lattice, seen: bool = True) -> _Observation:
+        """Return the observations of a frame; unless `seen`, without the depths of the views."""
+        mesh, unit = self.frames[number], lattice.size / _FINENESS
         # Only an annotation: to call the type would make a class for each frame, which stays until all garbage goes.
         depths: list[UInt16[np.ndarray, "H W"]] = []
-        for view in self.views:
+        for view in self.views if seen else ():
             sight = draw(mesh, view)
             depth = np.where(np.isfinite(sight.depth) & ~backs(mesh, view, sight), sight.depth, 0.0)
             depths.append(np.clip(np.rint(depth / unit), 0, _DEEPEST).astype(np.uint16))
-        return _Observation(cells, depths, None if self.pictures is None else self.pictures(number))
+        points, faces = spread(mesh, 1.5 * lattice.size)
+        keys, cell = np.unique(lattice.keys(points), return_inverse=True)
+        normals = face_normals(mesh)[0][faces]
+        sums = [np.bincount(cell.reshape(-1), normals[:, axis], len(keys)) for axis in range(3)]
+        measured = None if self.pictures is None else self.pictures(number)
+        return _Observation(keys, np.stack(sums, axis=1).astype(np.float32), depths, measured)
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,6 +146,7 @@ class _Observation:
     """Observations of one frame: its occupied cells, the depths of the views, and the cameras' depth pictures."""
 
     cells: Int64[np.ndarray, " C"]  # sorted keys of the cells with surface
+    normals: Float32[np.ndarray, "C 3"]  # sums of the normals of the surface in each
     # For each view, in units of a cell / _FINENESS; 0 where a ray hits nothing, or a face from behind.
     depths: list[UInt16[np.ndarray, "H W"]]
     measured: list[DepthPicture | None] | None  # for each camera; None without cameras
@@ -148,17 +155,15 @@ class _Observation:
 def find_places(observed: Observations, lattice: Lattice) -> Places:
     """Find the places of a scene and count observations there; frames after the first 32 are read twice.
 
-    Meshes are in memory one at a time. Takes about 1 s of CPU for a frame of 500,000 faces.
+    A mesh for each thread is in memory at a time. Takes about 1 s of CPU for a frame of 500,000 faces.
     """
     passes = len(observed.frames) + max(0, len(observed.frames) - _TOGETHER)
     observations, cells, cameras = list[_Observation](), _Known(), dict[int, _Counted]()
-    for number in range(len(observed.frames)):
-        occupied_cells = cells.add(mesh := observed.frames[number], lattice)
-        if number < _TOGETHER:
-            observations.append(observed.observe(number, mesh, occupied_cells, lattice))
-            _count_depths(cameras, observations[-1].measured)
-        elif observed.pictures is not None:
-            _count_depths(cameras, observed.pictures(number))
+    found = ahead(lambda number: observed.observe(number, lattice, number < _TOGETHER), range(len(observed.frames)))
+    for number, one in enumerate(found):
+        cells.add(one.cells, one.normals)
+        _count_depths(cameras, one.measured)
+        observations += [one] if number < _TOGETHER else []
         observed.report((number + 1) / passes)
     keys, normals = cells.places()
     eyes = {number: (camera, 2 * count >= len(observed.frames)) for number, (camera, count) in cameras.items()}
@@ -176,10 +181,7 @@ def states(observed: Observations, numbers: range, places: Places) -> Iterator[t
     """Yield for each frame in `numbers` two masks of places: occupied ones, and others that are seen free."""
     lattice = places.lattice
     for start in range(0, len(numbers), _TOGETHER):
-        together = list[_Observation]()
-        for number in numbers[start : start + _TOGETHER]:
-            points, _ = spread(mesh := observed.frames[number], 1.5 * lattice.size)
-            together.append(observed.observe(number, mesh, distinct(lattice.keys(points)), lattice))
+        together = list(ahead(lambda number: observed.observe(number, lattice), numbers[start : start + _TOGETHER]))
         yield from _states(together, places, observed.views)
 
 
@@ -239,16 +241,11 @@ class _Known:
         self._keys, self._sums = np.zeros(0, np.int64), np.zeros((0, 3), np.float32)
         self._new = list[tuple[Int64[np.ndarray, " C"], Float32[np.ndarray, "C 3"]]]()
 
-    def add(self, mesh: Mesh, lattice: Lattice) -> Int64[np.ndarray, " C"]:
-        """Add the cells in which a frame has surface, and the sums of its normals there; return the cells' keys."""
-        points, faces = spread(mesh, 1.5 * lattice.size)
-        keys, cell = np.unique(lattice.keys(points), return_inverse=True)
-        normals = face_normals(mesh)[0][faces]
-        sums = [np.bincount(cell.reshape(-1), normals[:, axis], len(keys)) for axis in range(3)]
-        self._new.append((keys, np.stack(sums, axis=1).astype(np.float32)))
+    def add(self, cells: Int64[np.ndarray, " C"], normals: Float32[np.ndarray, "C 3"]) -> None:
+        """Add the cells in which a frame has surface, and the sums of its normals there."""
+        self._new.append((cells, normals))
         if len(self._new) == _TOGETHER:  # merging after every frame would sort all keys each time
             self._take()
-        return keys
 
     def places(self) -> tuple[Keys, Float64[np.ndarray, "P 3"]]:
         """Return the sorted keys of the cells, and the mean normals there, of unit length; 0 where they cancel."""

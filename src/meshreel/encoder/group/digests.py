@@ -11,7 +11,7 @@ import json
 import os
 import platform
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from contextvars import ContextVar
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 
 from ... import __version__
+from ...geometry.threads import threads
 
 WriteLines = Callable[[str], object]  # takes whole lines of JSON
 LIBRARIES = ("numpy", "scipy", "libigl", "fast-simplification", "DracoPy", "trimesh")
@@ -33,7 +34,8 @@ def noted(write: WriteLines | None, **where: int) -> Iterator[None]:
     """Pass the line of each stage in the block to `write`, with the place that it is of; None: no digests are made."""
     token = _listener.set(None if write is None else (write, where))
     try:
-        yield
+        with nullcontext() if write is None else threads(1):  # lines of one stage after another
+            yield
     finally:
         _listener.reset(token)
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import repeat
 from typing import TypeVar
 
 import numpy as np
@@ -19,6 +20,7 @@ from ...errors import InputError
 from ...format.budget import CostlyError
 from ...format.layout import Form
 from ...geometry.decimate import decimate
+from ...geometry.threads import mapped
 from ...metrics.distance import PSNR_CEILING, Original, surface_errors
 from ...metrics.surface_samples import WORST_ANGLE
 from ...types import Mesh
@@ -112,7 +114,7 @@ def cheapest_intra(
     originals, middle = [Original(frame) for frame in frames], len(frames) // 2
     budget = most_bytes / len(frames)
     for _, fraction, step, levels in sorted(_on_one_frame(originals[middle], target, budget, options)):
-        meshes = [_reduced(frame, fraction) for frame in frames]
+        meshes = mapped(_reduced, frames, repeat(fraction))
         payload = encode_intra(meshes, step, levels)
         if len(payload) >= most_bytes:
             continue
@@ -199,7 +201,7 @@ NO_ERROR = Fidelity(0.0, 0.0, 0.0, PSNR_CEILING)
 
 def measure(originals: Sequence[Mesh | Original], decoded: Sequence[Mesh]) -> Fidelity:
     """Measure decoded frames; a frame with a surface on one side only has an infinite distance."""
-    errors = [surface_errors(a, b) for a, b in zip(originals, decoded, strict=True)]
+    errors = mapped(surface_errors, originals, decoded)
     distances = [e.symmetric_rms for e in errors]
     mean_square = sum(d * d for d in distances) / len(errors)
     angle = sum(e.angle for e in errors) / len(errors)

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import copy
+from collections import OrderedDict
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from threading import Lock
 from typing import Any
 
 import numpy as np
@@ -20,6 +23,7 @@ from ...geometry.topology import clean, part_of
 from ...types import Frames, Mesh, MeshSequence, Placement, Up, offset
 
 UNEVEN = (0.25, 4.0)  # least and most noise of a place, in RMS noises of the frames (guess)
+MOST_VIEWS = 1 << 28  # bytes: four cameras' pictures of 1280 x 1152 pixels of 14 frames
 MOST_FRAMES = 64  # in a group: the tracker's distances and the basis grow with it (guess)
 
 
@@ -146,6 +150,7 @@ class Views:
     colors: ColorFrames
     sequence: MeshSequence
     place: Placement  # of the coordinates in which the cameras are asked
+    recent: Recent = field(default_factory=lambda: Recent(), kw_only=True, compare=False)
 
     @staticmethod
     def of(sequence: CapturedSequence, survey: Survey) -> Views | None:
@@ -153,13 +158,13 @@ class Views:
         colors = sequence.colors
         return None if colors is None else Views(colors, sequence, Placement(survey.unit, tuple(survey.center)))
 
-    def at(self, number: int, clear: bool = False, hides: Mesh | None = None) -> ColorViews:
-        """Return the cameras' views of a frame; if `clear`, only away from steps in depth.
+    def at(self, number: int) -> ColorViews:
+        """Return the cameras' views of a frame, whose surface hides a place; those used last are kept."""
+        return self.recent.get(number, lambda: self.of_surface(number, self.surface(number)))
 
-        What hides a place is the surface of the frame, or another one in normalised coordinates.
-        """
-        hides = self.surface(number) if hides is None else hides
-        return ColorViews(self.pictures(number), hides, MARGIN / self.place.scale, clear)
+    def of_surface(self, number: int, hides: Mesh) -> ColorViews:
+        """Return the cameras' views of a surface in a frame, in normalised coordinates."""
+        return ColorViews(self.pictures(number), hides, MARGIN / self.place.scale)
 
     def pictures(self, number: int) -> list[ColorPicture]:
         """Return the pictures of a frame, for places in normalised coordinates."""
@@ -169,3 +174,29 @@ class Views:
         """Return all surface of a frame, in normalised coordinates."""
         mesh, place = self.sequence[number], self.place
         return mesh.at((mesh.vertices - place.origin) / place.scale)
+
+
+class Recent:
+    """The views of the frames that were looked at last, as many as fit into `MOST_VIEWS` bytes."""
+
+    def __init__(self) -> None:
+        self._views, self._free, self._lock = OrderedDict[int, ColorViews](), MOST_VIEWS, Lock()
+
+    def get(self, number: int, make: Callable[[], ColorViews]) -> ColorViews:
+        """Return the views of a frame, made where they are not kept."""
+        with self._lock:
+            if number in self._views:
+                self._views.move_to_end(number)
+                return self._views[number]
+        views = make()
+        with self._lock:
+            if number not in self._views:
+                self._views[number] = views
+                self._free -= views.nbytes
+                while self._free < 0 and len(self._views) > 1:
+                    self._free += self._views.popitem(last=False)[1].nbytes
+        return views
+
+    def __reduce__(self) -> tuple[type[Recent], tuple[()]]:
+        """Go to other processes without what is kept."""
+        return Recent, ()

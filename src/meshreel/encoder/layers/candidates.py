@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
+from copy import copy
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import islice, repeat
 
 import numpy as np
 from jaxtyping import Float64
@@ -22,6 +24,7 @@ from ...analysis.follow.template import LEVELS, base_mesh, fused_mesh, shared_de
 from ...coding.layers.coder import LayersState
 from ...coding.mesh import CodedReference, code_on_lattice
 from ...geometry.color_views import Paint
+from ...geometry.threads import mapped
 from ...types import Mesh, offset
 from ..group.digests import note
 from ..group.forms import Target
@@ -31,6 +34,7 @@ LATTICE = 0.33  # spacing of the base's lattice, in steps: the motion codes what
 LATTICE_ALONE = 0.8  # the same for a single frame, whose base need not move (decision 14)
 MOTIONS = 18.0  # 1/s: components of a noisy body's motion that are kept; weaker ones are noise (decision 28)
 LATER, EARLIER = 1, -1  # sides of a key
+TOGETHER = 4  # frames that are tracked before they are fitted side by side; beyond a lost one in vain (guess)
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,6 +92,7 @@ class Candidate:
         self._fits: dict[int, Float64[np.ndarray, "V 3"]] = {}
         self._residuals = dict[int, float]()
         self.slide: Slide | None = None
+        self._closeness: Closeness
         self._ends = dict[int, int]()  # by side, the frame where the template is lost
 
     @classmethod
@@ -126,11 +131,21 @@ class Candidate:
         """Track and fit the frames ahead on both sides of the key, up to one that is lost."""
         if self._usual == np.inf:
             return  # nothing is left of the key's surface as it would be coded
-        for side in (LATER, EARLIER):
-            for number in self._tracked(ahead, side):
-                if number not in self._residuals:
-                    self._fit(ahead, number)
-                if self._residuals[number] > self._limit(ahead):
+        next(self._tracked(ahead, LATER), None)  # the other side goes on from the motion of the first step
+        sides = [copy(self._closeness) for _ in (LATER, EARLIER)]
+        mapped(self._follow, repeat(ahead), (LATER, EARLIER), sides)
+        self._closeness = min(sides, key=lambda closeness: closeness.usual)
+
+    def _follow(self, ahead: Ahead, side: int, closeness: Closeness) -> None:
+        """Track and fit the frames on a side of the key, up to one that is lost."""
+        tracked, is_lost = self._tracked(ahead, side), False
+        while not is_lost and (some := list(islice(tracked, TOGETHER))):
+            new = [number for number in some if number not in self._residuals]
+            fitted = dict(zip(new, mapped(self._fitted, repeat(ahead), new), strict=True))
+            for number in some:
+                if number in fitted:
+                    self._take_fit(ahead, number, fitted[number], closeness)
+                if is_lost := self._residuals[number] > self._limit(ahead):
                     self._ends[side] = number
                     break
 
@@ -158,14 +173,15 @@ class Candidate:
             most = math.ceil(MOTIONS * len(first) / ahead.frame_rate)
             usual[:, :count] = strongest_components(first[:, :count], len(first) // 2, most)
         detail = shared_detail(self.reference.mesh.faces, count, self.reference.levels)
-        triples = zip(numbers, detail(usual), first, strict=True)
-        return np.stack([self._fitting.second(ahead.at(number), *both) for number, *both in triples])
+        surfaces = [ahead.at(number) for number in numbers]
+        return np.stack(mapped(self._fitting.second, surfaces, detail(usual), first))
 
     def _slid(
         self, ahead: Ahead, numbers: range, positions: Float64[np.ndarray, "T V 3"]
     ) -> Float64[np.ndarray, "T V 3"]:
         """Return fits to frames, slid to where these have the colours of the key, or of the first that has colours."""
-        paints = {number: ahead.painter(number)() for number in numbers if number != self.key}
+        others = [number for number in numbers if number != self.key]
+        paints = dict(zip(others, mapped(lambda number: ahead.painter(number)(), others), strict=True))
         if self.slide is None:
             starts = {self.key: self._paint() if self._paint else None, **paints}.items()
             faces = self.reference.base.faces
@@ -173,10 +189,10 @@ class Candidate:
             self.slide = next(slides, None)
         if self.slide is None:
             return positions
-        found = positions.copy()
-        for number, paint in paints.items():
-            if paint is not None:
-                found[number - numbers.start] = self.slide.to(positions[number - numbers.start], paint)
+        found, known = positions.copy(), [number for number, paint in paints.items() if paint is not None]
+        fits = [positions[number - numbers.start] for number in known]
+        for number, slid in zip(known, mapped(self.slide.to, fits, map(paints.get, known)), strict=True):
+            found[number - numbers.start] = slid
         return found
 
     def followed(
@@ -249,7 +265,12 @@ class Candidate:
         self._closeness = closeness or Closeness(Mesh(points, faces), self._target, self._noise)
 
     def _fit(self, ahead: Ahead, number: int) -> None:
+        self._take_fit(ahead, number, self._fitted(ahead, number), self._closeness)
+
+    def _fitted(self, ahead: Ahead, number: int) -> Float64[np.ndarray, "V 3"]:
         prediction = self._tracker.placed(number, self._points, self._binding)
-        positions = self._fitting.first(ahead.at(number), self._rest, prediction)
-        self._fits[number], self._residuals[number] = positions, self._closeness.of(positions, ahead.at(number))
+        return self._fitting.first(ahead.at(number), self._rest, prediction)
+
+    def _take_fit(self, ahead: Ahead, number: int, positions: Float64[np.ndarray, "V 3"], closeness: Closeness) -> None:
+        self._fits[number], self._residuals[number] = positions, closeness.of(positions, ahead.at(number))
         note("first fit", self.key, number, positions)

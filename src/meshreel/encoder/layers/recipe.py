@@ -19,6 +19,7 @@ from ...analysis.fit.frame import FrameSurface
 from ...analysis.plan import Plan, PlannedGroup, best_plan, next_key, rival
 from ...coding.layers.coder import layers_bytes_by_purpose
 from ...format.layout import Form
+from ...geometry.threads import mapped
 from ..group.digests import note
 from ..group.forms import EncodedGroup, empty_groups, most_for, target_of
 from ..group.interval import Interval, frames_in
@@ -98,7 +99,7 @@ class _Planner:
         """Return the next frames."""
         numbers = range(self._at, min(self._at + self._options.group_size, len(self._interval.frames)))
         known, noise = self._surfaces, self._interval.noise
-        self._surfaces = {at: known.get(at) or self._surface(at) for at in numbers}
+        self._surfaces = dict(zip(numbers, mapped(lambda at: known.get(at) or self._surface(at), numbers), strict=True))
         meshes = [surface.mesh for surface in self._surfaces.values()]
         note("frames", *(array for mesh in meshes for array in (mesh.vertices, mesh.faces)))
         target = target_of(meshes, self._target, noise)

@@ -41,7 +41,8 @@ class ShownFrame:
         shares = np.bincount(original.faces.reshape(-1), np.repeat(areas / 12, 3), len(original.vertices))
         weights = np.concatenate([shares, 0.75 * areas])
         self.weights = weights / weights.sum()
-        self.squared, self.hit = self.ahead(Surface(decoded))
+        self._decoded = Surface(decoded)
+        self.squared, self.hit = self.ahead(self._decoded)
         points, self.areas = _samples(decoded)
         self._nearest = self._back(points)  # of the decoded mesh's samples
         self.apart = self._of_free(points, self._nearest[0], decoded)  # of each decoded face, squared
@@ -51,10 +52,16 @@ class ShownFrame:
         )
 
     def ahead(
-        self, surface: Surface, some: Int64[np.ndarray, " n"] | slice = slice(None)
+        self,
+        surface: Surface,
+        some: Int64[np.ndarray, " n"] | slice = slice(None),
+        gone: Bool[np.ndarray, " F"] | None = None,
     ) -> tuple[Float64[np.ndarray, " n"], Int32[np.ndarray, " n"]]:
-        """Return squared distances of some of the frame's samples from a surface, and its faces that are closest."""
-        squared, faces = _squared_distances(surface, self.points[some])
+        """Return squared distances of some of the frame's samples from a surface, and its faces that are closest.
+
+        Faces that are `gone` are left out.
+        """
+        squared, faces = _squared_distances(surface, self.points[some], gone)
         return squared / self._uneven[some], faces
 
     def _back(self, points: Float64[np.ndarray, "N 3"]) -> tuple[Float64[np.ndarray, " N"], Int32[np.ndarray, " N"]]:
@@ -86,6 +93,8 @@ class ShownFrame:
 
     def gains(self, gone: Bool[np.ndarray, " F"]) -> Float64[np.ndarray, " F"]:
         """Return how much each face lowers the mean of both errors when all these faces are dropped."""
+        if not gone.any():
+            return np.zeros(len(gone))
         invented = self.areas * (self.apart - self.errors[1]) / max(self.areas.sum(), TINY)
         lost = self.weights * (self.left(gone) - self.squared)
         return (invented * gone - np.bincount(self.hit, lost, len(gone))) / 2
@@ -98,8 +107,7 @@ class ShownFrame:
             return np.full(len(self.squared), np.inf)
         squared = self.squared.copy()
         moved = np.flatnonzero(gone[self.hit])
-        kept = Surface(Mesh(self.decoded.vertices, self.decoded.faces[~gone]))
-        squared[moved] = self.ahead(kept, moved)[0]
+        squared[moved] = self.ahead(self._decoded, moved, gone)[0]
         return squared
 
     def errors_with(self, gone: Bool[np.ndarray, " F"], patch: Mesh, least: float) -> tuple[float, float]:
@@ -142,10 +150,10 @@ def _samples(mesh: Mesh) -> tuple[Float64[np.ndarray, "N 3"], Float64[np.ndarray
 
 
 def _squared_distances(
-    surface: Surface, points: Float64[np.ndarray, "N 3"]
+    surface: Surface, points: Float64[np.ndarray, "N 3"], gone: Bool[np.ndarray, " F"] | None = None
 ) -> tuple[Float64[np.ndarray, " N"], Int32[np.ndarray, " N"]]:
-    """Return the squared distances of points from a surface, and the faces that are closest."""
-    hits = surface.closest(points)
+    """Return the squared distances of points from a surface, and the faces that are closest, of those not gone."""
+    hits = surface.closest(points, gone)
     return ((hits.points - points) ** 2).sum(axis=1), hits.faces
 
 

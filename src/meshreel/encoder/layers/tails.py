@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import zip_longest
+from itertools import repeat
 
 import numpy as np
 from jaxtyping import Bool, Float64, Int32, Int64
@@ -24,6 +24,7 @@ from ...geometry.closest_points import Surface
 from ...geometry.decimate import decimate
 from ...geometry.depth import FreeSpace
 from ...geometry.strict import dot
+from ...geometry.threads import mapped
 from ...geometry.topology import clean, concatenate, drop_unreferenced
 from ...types import Mesh
 from .shown_frame import FAR, HOLE, ShownFrame, ghosts, regions
@@ -55,8 +56,8 @@ def find_tails(
     frame: surface that a frame lacks stays unless one saw through it. Neither the mean nor the larger of both
     directions' errors rises by more than the layer's bytes are worth; but holes are patched at any price.
     """
-    surfaces = [frame if isinstance(frame, Surface) else Surface(frame) for frame in frames]
-    shown = [ShownFrame(*each) for each in zip_longest(surfaces, decoded, free, uneven)]
+    surfaces = mapped(lambda frame: frame if isinstance(frame, Surface) else Surface(frame), frames)
+    shown = mapped(ShownFrame, surfaces, decoded, free or repeat(None), uneven or repeat(None))
     faces = decoded[0].faces
     usual = float(np.mean([frame.body() for frame in shown]))  # squared
     if not EXACT**2 < usual < np.inf:
@@ -123,8 +124,8 @@ class _Search:
     def _errors(self, tried: _Coded | None) -> Float64[np.ndarray, "T 2"]:
         if tried is None:
             return np.array([frame.errors for frame in self.frames])
-        pairs = zip(self.frames, tried.parts.dropped, tried.parts.meshes, strict=True)
-        return np.array([frame.errors_with(gone, patch, self.usual) for frame, gone, patch in pairs])
+        parts = tried.parts
+        return np.array(mapped(ShownFrame.errors_with, self.frames, parts.dropped, parts.meshes, repeat(self.usual)))
 
     def masks(self, gone: Bool[np.ndarray, "T F"]) -> Iterator[Bool[np.ndarray, "T F"]]:
         """Yield a mask of the faces worth dropping for each threshold, with those gone anyway; no empty one."""
@@ -136,10 +137,7 @@ class _Search:
     def _paying(self, far: Bool[np.ndarray, "T F"]) -> Bool[np.ndarray, "T F"]:
         """Return the regions of faces, connected in space and time, that are worth their bytes."""
         labels = regions(self.faces, far)
-        gains = np.zeros(far.shape)
-        for gain, frame, gone in zip(gains, self.frames, far, strict=True):
-            if gone.any():
-                gain += frame.gains(gone)
+        gains = np.stack(mapped(ShownFrame.gains, self.frames, far))
         totals = np.bincount(labels[far], gains[far], labels.max() + 1)
         chosen = np.zeros_like(far)
         for label in np.flatnonzero(totals > self.price * LEAST_BYTES):
@@ -150,11 +148,9 @@ class _Search:
 
     def patches(self, best: _Coded | None) -> Iterator[tuple[Mesh, ...]]:
         """Yield the patches worth their bytes for each threshold."""
-        left = [frame.left(best.parts.dropped[t] if best else None) for t, frame in enumerate(self.frames)]
+        left = mapped(ShownFrame.left, self.frames, best.parts.dropped if best else repeat(None))
         for threshold in THRESHOLDS:
-            meshes = tuple(
-                self._patch(frame, squared, threshold) for frame, squared in zip(self.frames, left, strict=True)
-            )
+            meshes = tuple(mapped(self._patch, self.frames, left, repeat(threshold)))
             if not all(mesh.is_empty for mesh in meshes):
                 yield meshes
 

@@ -18,6 +18,7 @@ from jaxtyping import Float64, Int64
 from ... import _core
 from ...errors import InputError
 from ...geometry.closest_points import Surface, area_samples
+from ...geometry.threads import mapped
 from ...geometry.topology import boxes_of, components, connected_faces, face_normals
 from ...metrics.distance import NEAR
 from ...metrics.surface_samples import used_surface
@@ -84,11 +85,11 @@ def _judged(
     """
     if not recipe.judged or interval.frames[0].is_empty:
         return group, None, ""
-    frames = list(interval.frames)
+    frames = mapped(interval.frames.__getitem__, range(len(interval.frames)))
     found = _core.Group(group.payload, len(frames), None, state if group.predicted else None, NORMALISED)
     shown = [used_surface(Mesh(*arrays[:2])) for arrays in found.frames()]
     target = target_of(frames, recipe.options.target.scaled(interval.larger), interval.noise).distance
-    verdicts = [_verdict(interval, number, *both) for number, both in enumerate(zip(frames, shown, strict=True))]
+    verdicts = mapped(partial(_verdict, interval), range(len(frames)), frames, shown)
     covered = 1 - max(verdict.lost for verdict in verdicts)
     worst = max(range(len(frames)), key=lambda number: verdicts[number].lost)
     fidelity = replace(group.fidelity, covered=covered, least=interval.first_frame + worst)

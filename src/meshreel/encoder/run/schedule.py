@@ -9,13 +9,14 @@ from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import islice
+from itertools import chain, islice
 from typing import Any
 
 from threadpoolctl import threadpool_limits
 
 from ...format.layout import Header
 from ...geometry.derived_sequences import DerivedSequence
+from ...geometry.threads import threads
 from ...geometry.work import Work, add, reporting, since, so_far
 from ...types import evenly
 from ..appearance.colors import colored_groups, has_pictures
@@ -30,6 +31,7 @@ from .judge import judged
 from .worker import end_with_parent, tell
 
 AHEAD = 2  # calls for each worker, so that none waits for its next (guess)
+WORTH = 15  # frames of an interval from which a process of its own pays: it takes 2 s to begin (guess)
 UNKNOWN = 8  # workers of an executor that does not say how many it has (guess)
 _LOOK = 0.5  # s, between two looks at what workers tell of calls that are not done (guess)
 
@@ -48,6 +50,7 @@ class Job:
     executor: Executor | None
     stages: Stages
     recipe: Recipe
+    cores: int = 1  # that this process may use
     files: IntervalFiles | None = None  # of the output, which the encoding of intervals needs
     head: Header = NEUTRAL  # of the files of intervals
     chosen: range | None = None  # the frames that are encoded; None: all
@@ -68,6 +71,7 @@ class Task:
     appearance: AppearanceOptions | None
     head: Header  # of its file
     noting: bool  # digests are wanted
+    threads: int = 1  # of a worker process
 
     def done(self, stages: IntervalStages) -> tuple[bytes, str]:
         """Encode the interval; return its file and its lines of digests."""
@@ -82,11 +86,17 @@ def encode_intervals(job: Job, intervals: Iterable[Interval]) -> Iterator[list[E
     """Yield the groups of each interval, in order; with an executor, its workers encode them in any order.
 
     An interval that has a file is not encoded again, and others get one as soon as they are done: what waits here for
-    an earlier interval has no payloads.
+    an earlier interval has no payloads. Few or short intervals are encoded here, where threads share what was read.
     """
-    assert job.files is not None
     job.stages.add("code", 0)  # the time that a frame takes is counted from here
-    encode = _one_by_one if job.executor is None else _side_by_side
+    intervals, encode = iter(intervals), _one_by_one
+    if job.executor is not None:
+        count = workers_of(job.executor)
+        first = list(islice(intervals, count))
+        intervals = chain(first, intervals)
+        if len(first) > 1 and sum(len(interval.frames) for interval in first) >= WORTH * len(first):
+            encode, job = _side_by_side, replace(job, cores=max(1, count // len(first)))
+    assert job.files is not None
     for groups, lines in encode(job, job.files, intervals):
         if lines and (write := listener()) is not None:
             write(lines)
@@ -150,7 +160,7 @@ def encode_interval(
 
 
 def _task(job: Job, interval: Interval) -> Task:
-    return Task(interval, job.recipe, job.options.appearance, job.head, listener() is not None)
+    return Task(interval, job.recipe, job.options.appearance, job.head, listener() is not None, job.cores)
 
 
 def _begun(job: Job, files: IntervalFiles, interval: Interval) -> tuple[IntervalStages, list[EncodedGroup] | None]:
@@ -170,7 +180,7 @@ def encode_sent(task: Task, number: int) -> tuple[bytes, str, Any, Work]:
     end_with_parent()
     count = len(task.interval.frames)
     stages = IntervalStages(Stages(partial(tell, number), count), count, task.recipe.options.group_size)
-    with threadpool_limits(1):
+    with threadpool_limits(1), threads(task.threads):
         before = so_far()
         data, lines = task.done(stages)
         return data, lines, task.interval.observed, since(before)

@@ -34,7 +34,7 @@ _DAMAGED = (KeyError, TypeError, ValueError, OverflowError)  # of a record that 
 
 def survey_job(job: Job, cleaned: bool = True) -> Survey:
     """Survey the sequence of a job, with the errors of `survey_sequence`; an executor's workers read the files."""
-    if job.executor is None or not job.sequence.is_stored:
+    if job.executor is None or not job.sequence.is_stored or len(job.sequence) < 2 * SLICE:
         return survey_sequence(job.sequence, job.stages.add, cleaned)
     count, found = len(job.sequence), dict[int, Survey]()
 

@@ -25,6 +25,7 @@ from ...analysis.survey import Survey
 from ...format.checks import MOST_TRACKS
 from ...geometry.closest_points import area_samples
 from ...geometry.derived_sequences import digest
+from ...geometry.threads import ahead
 from ...geometry.topology import part_of
 from ...types import Mesh, MeshSequence, Placement, evenly
 from ..group.forms import empty_groups
@@ -68,11 +69,11 @@ def scene_intervals(job: Job, parts: Parts, tracks: Tracks) -> Iterator[Interval
     interval: they can where all have a surface or none has, and where they are of about one scale.
     """
     sequence, survey = job.sequence, parts.survey
-    place = Placement(survey.unit, tuple(survey.center))
+    place, views = Placement(survey.unit, tuple(survey.center)), Views.of(sequence, survey)
     longest = job.recipe.longest(sequence.frame_rate)
     for frames in key_intervals(sequence, parts.segmentation, job.options):
         found = list[Interval]()
-        moving, lost = zip(*(parts.moving(k, sequence[k]) for k in frames), strict=True)
+        moving, lost = zip(*ahead(lambda number: parts.moving(number, sequence[number]), frames), strict=True)
         tracks.dropped += sum(lost)
         for track, meshes in tracks.of(moving):
             normalised = [survey.normalise(mesh) for mesh in meshes]
@@ -81,7 +82,7 @@ def scene_intervals(job: Job, parts: Parts, tracks: Tracks) -> Iterator[Interval
                 noise = _noise(meshes[cut.start : cut.stop], parts)
                 one = Interval(some, noise, frames.start + cut.start, track, digest(some))
                 one = replace(one, up=sequence.up, frame_rate=sequence.frame_rate, local=parts.noise, place=place)
-                found.append(replace(one, views=Views.of(sequence, survey), depth=sequence.depth))
+                found.append(replace(one, views=views, depth=sequence.depth))
         weight = Fraction(len(frames), sum(len(interval.frames) for interval in found))
         yield from (replace(interval, weight=weight) for interval in found)
 

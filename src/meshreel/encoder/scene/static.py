@@ -25,6 +25,7 @@ from ...geometry.closest_points import distances
 from ...geometry.color_views import Paint, Painted, spread_colors
 from ...geometry.decimate import decimate_faces
 from ...geometry.derived_sequences import CapturedSequence, is_colored
+from ...geometry.threads import ahead
 from ...geometry.topology import clean, face_normals, vertex_normals
 from ...types import Mesh, Placement, evenly
 from ..appearance.colors import fitting_size
@@ -233,7 +234,8 @@ class _Looks:
         some = [frames[number] for number in evenly(len(frames), STILL_FRAMES)]
         if self._views is None:
             return median_colors(points, normals, map(self._paint, some))
-        colors, known = median_colors(points, normals, (self._views.at(number, clear=True) for number in some))
+        views = self._views
+        colors, known = median_colors(points, normals, ahead(lambda number: views.at(number).clear, some))
         rest = np.flatnonzero(~known)
         colors[rest], known[rest] = median_colors(points[rest], normals[rest], map(self._paint, some))
         return colors, known
@@ -242,7 +244,7 @@ class _Looks:
         self, number: int, points: Float64[np.ndarray, "N 3"], normals: Float64[np.ndarray, "N 3"]
     ) -> tuple[UInt8[np.ndarray, "N 3"], Bool[np.ndarray, " N"]]:
         """Return the colours of places in one frame, and which of them it shows, away from the border of what moves."""
-        paint = self._paint(number) if self._views is None else self._views.at(number, clear=True)
+        paint = self._paint(number) if self._views is None else self._views.at(number).clear
         colors, seen = paint.at(points, normals)
         return np.clip(np.rint(colors), 0, 255).astype(np.uint8), seen
 
@@ -250,7 +252,7 @@ class _Looks:
         """Return the places of a background in a texture, as cameras see it where there are some, and its scale."""
         if self._views is None:
             return unwrap(mesh, size or fitting_size([self._paint(frames.start)], [mesh])), 1.0
-        return projected(mesh, self._views.at(frames[evenly(len(frames), 1)[0]], hides=mesh))
+        return projected(mesh, self._views.of_surface(frames[evenly(len(frames), 1)[0]], mesh))
 
     def _paint(self, number: int) -> Paint:
         if self._views is not None:

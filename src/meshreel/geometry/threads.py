@@ -1,0 +1,141 @@
+"""Calls side by side in the threads of a process: cameras of a frame, frames of a group, bodies of a scene.
+
+In: a function and its arguments. Out: its results, in the order of the arguments, so that they are the same with any
+number of threads. The core gives up Python's lock while it works. A thread that waits for calls does some of them
+itself: calls may be side by side within calls.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor, wait
+from contextlib import ExitStack, contextmanager
+from contextvars import ContextVar, copy_context
+from itertools import islice
+from pathlib import Path
+from threading import Lock
+from typing import Any, TypeVar
+
+from . import work
+
+_T = TypeVar("_T")
+_QUOTA = "/sys/fs/cgroup/cpu.max"  # of a container: microseconds of work a period, or "max", and the period
+
+
+class _Helpers(ThreadPoolExecutor):
+    """Threads beside one that waits for calls."""
+
+    def __init__(self, count: int) -> None:
+        super().__init__(count)
+        self.count = count
+
+
+_helpers = ContextVar[_Helpers | None]("threads beside this one", default=None)
+
+
+def cores() -> int:
+    """Return the number of cores that this process may use: those that it is bound to, within a container's share."""
+    count = len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count() or 1
+    try:
+        quota, period = Path(_QUOTA).read_text(encoding="ascii").split()
+        return max(1, min(count, round(int(quota) / int(period))))
+    except (OSError, ValueError):  # no container, or one without a limit
+        return count
+
+
+@contextmanager
+def threads(count: int) -> Iterator[None]:
+    """Let calls of `mapped` in the block use so many threads, this one included."""
+    with ExitStack() as stack:
+        token = _helpers.set(stack.enter_context(_Helpers(count - 1)) if count > 1 else None)
+        try:
+            yield
+        finally:
+            _helpers.reset(token)
+
+
+def mapped(function: Callable[..., _T], *arguments: Iterable[Any]) -> list[_T]:
+    """Return the results of calls, as `map` would; raises what the first call that fails raises.
+
+    The work of calls in other threads is counted here.
+    """
+    return mapped_until(lambda _: False, function, *arguments)
+
+
+def ahead(function: Callable[[Any], _T], arguments: Iterable[Any]) -> Iterator[_T]:
+    """Yield the results of calls in order; as many as there are threads are done, and in memory, together."""
+    helpers, waiting = _helpers.get(), iter(arguments)
+    while some := list(islice(waiting, 1 if helpers is None else 1 + helpers.count)):
+        yield from mapped(function, some)
+
+
+def mapped_until(enough: Callable[[_T], bool], function: Callable[..., _T], *arguments: Iterable[Any]) -> list[_T]:
+    """Return the results of calls up to the first that is enough; other threads may do later ones in vain."""
+    calls, helpers = list(zip(*arguments, strict=False)), _helpers.get()
+    shared = _Calls(function, calls, enough)
+    count = 0 if helpers is None else min(helpers.count, len(calls) - 1)
+    beside = [helpers.submit(copy_context().run, shared.help) for _ in range(count) if helpers is not None]
+    try:
+        shared.do()
+    finally:
+        shared.stop()
+        wait([future for future in beside if not future.cancel()])
+    for done in shared.helped:
+        work.add(done)
+    return shared.found()
+
+
+class _Calls:
+    """Calls that several threads take one after another."""
+
+    def __init__(
+        self, function: Callable[..., Any], calls: list[tuple[Any, ...]], enough: Callable[[Any], bool]
+    ) -> None:
+        self._function, self._calls, self._enough = function, calls, enough
+        self._next, self._lock = 0, Lock()
+        self._results, self._errors = dict[int, Any](), dict[int, Exception]()
+        self.helped, self._report = list[work.Work](), work.reporter()
+
+    def help(self) -> None:
+        """Do calls in another thread, which reports its work as the first does, and remember that work."""
+        before = work.so_far()
+        with work.reporting(self._report):
+            self.do()
+        self.helped.append(work.since(before))
+
+    def do(self) -> None:
+        """Do calls until none is left, one has failed, or one is enough: those before it have begun then."""
+        while (number := self._take()) is not None:
+            try:
+                found = self._results[number] = self._function(*self._calls[number])
+                if self._enough(found):
+                    self.stop()
+            except Exception as error:
+                self._errors[number] = error
+                self.stop()
+
+    def stop(self) -> None:
+        """Let no thread begin another call."""
+        with self._lock:
+            self._next = len(self._calls)
+
+    def found(self) -> list[Any]:
+        """Return the results in order, up to the first that is enough; raises the error of a call before that."""
+        results = list[Any]()
+        for number in range(len(self._calls)):
+            if number in self._errors:
+                raise self._errors[number]
+            results.append(self._results[number])
+            if self._enough(results[-1]):
+                break
+        return results
+
+    def _take(self) -> int | None:
+        with self._lock:
+            number = self._next
+            if number == len(self._calls):
+                return None
+            self._next += 1
+            return number
