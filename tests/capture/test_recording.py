@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from meshreel.capture.recording import FusionOptions, Kept, fuse_depths, open_recording
+from meshreel.capture.simulated.demo_room import RoomOptions, record_room
 from meshreel.errors import InputError
 from meshreel.geometry.derived_sequences import captured, picked
 from meshreel.geometry.topology import components, face_normals, without_fragments
@@ -173,3 +174,12 @@ def test_a_slanted_wall_is_fused_at_its_place(side):
     mesh = fuse_depths(views([slanted], ball=(0.0, 50.0, 0.0)), FusionOptions(voxel=0.02))
     seen = mesh.vertices[np.abs(mesh.vertices[:, :2]).max(axis=1) < 0.5]
     assert len(seen) > 500 and abs(np.median(seen[:, 2]) - WALL) < 1e-3  # half a pixel would be several mm
+
+
+def test_frames_without_colors_are_the_same_but_for_them_whichever_is_read_first(tmp_path):
+    record_room(tmp_path, RoomOptions(frames=2, seed=5), 96)
+    frames, other = (open_recording(tmp_path, FusionOptions(0.08))[0] for _ in range(2))
+    bare = [frames.uncolored[0], frames[0], frames.uncolored[0], other[0], other.uncolored[0], other[0]]
+    assert [mesh.is_colored for mesh in bare] == [False, True, False, True, False, True]
+    assert all(np.array_equal(mesh.vertices, bare[0].vertices) for mesh in bare)
+    assert np.array_equal(bare[1].colors, bare[5].colors)

@@ -89,6 +89,21 @@ def test_threads_workers_locale_hash_seed_and_folder_do_not_matter(alone: str, t
     assert encoded(tmp_path / "else where", jobs=2, **threads, **other) == alone
 
 
+@pytest.mark.parametrize("name", SEQUENCES)
+def test_threads_that_take_turns_all_the_time_give_the_same_bytes(name: str, tmp_path: Path):
+    frames, preset = SEQUENCES[name]
+    options = replace(quick(preset), appearance=Settings(texture=128).resolved().appearance)
+    for jobs in (1, 3):
+        before = sys.getswitchinterval()
+        sys.setswitchinterval(before if jobs == 1 else 1e-5)
+        try:
+            encoder = Encoder(MeshList(tuple(frames), 10.0), jobs=jobs)
+            encoder.encode(tmp_path / f"{jobs}.reel", options)
+        finally:
+            sys.setswitchinterval(before)
+    assert (tmp_path / "1.reel").read_bytes() == (tmp_path / "3.reel").read_bytes()
+
+
 @pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="names instructions of x86")
 @pytest.mark.slow
 def test_instructions_of_an_older_processor_give_the_same_bytes(alone: str, tmp_path: Path):

@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
-from meshreel.geometry.closest_points import Surface, distances
+from meshreel.geometry.closest_points import MovingSurface, Surface, distances
+from meshreel.geometry.threads import mapped, threads
+from meshreel.types import Mesh
 from tests.metrics.shapes import brute_force_distances, moved, plane, sphere
 
 
@@ -40,3 +42,28 @@ def test_the_border_separates_points_past_the_border_at_any_offset():
     surface = Surface(moved(plane(1.0, 4), place))
     assert surface.past_border(surface.closest(points + place)).tolist() == [False, True, True]
     assert len(surface.past_border(surface.closest(np.zeros((0, 3))))) == 0
+
+
+def test_faces_that_are_gone_are_as_if_they_had_never_been():
+    ball, rng = sphere(0.5, 3), np.random.default_rng(1)
+    gone, points = rng.random(len(ball.faces)) < 0.5, rng.normal(0, 0.6, (400, 3))
+    hits, rest = Surface(ball).closest(points, gone), np.flatnonzero(~gone)
+    wanted = Surface(ball.with_faces(~gone)).closest(points)
+    assert not gone[hits.faces].any()
+    np.testing.assert_allclose(hits.points, wanted.points, atol=1e-6)
+    assert (hits.faces == rest[wanted.faces]).mean() > 0.9  # others are as near: edges
+
+
+def test_a_surface_that_moves_answers_several_threads_at_a_time():
+    ball, points = sphere(0.5, 3), np.random.default_rng(2).normal(0, 0.6, (200, 3))
+    moving, places = MovingSurface(ball), [ball.vertices + [0.1 * k, 0, 0] for k in range(8)]
+
+    def asked(vertices: np.ndarray) -> np.ndarray:
+        with moving.at(vertices) as there:
+            return there.distances(points)
+
+    with threads(4):
+        found = mapped(asked, places)
+    for distances_there, vertices in zip(found, places, strict=True):
+        wanted = distances(points, Mesh(vertices, ball.faces))
+        np.testing.assert_allclose(distances_there, wanted, atol=1e-6)

@@ -6,6 +6,7 @@ import pickle
 import tempfile
 from collections.abc import Sequence
 from contextlib import suppress
+from copy import copy
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -73,7 +74,7 @@ class Recording(MeshSequence):
         chosen = SequenceOptions(frames=frames).chosen(len(numbers))
         self.rig, self.options = rig, options
         self.numbers = [numbers[index] for index in chosen]  # of the frames, in the files' names
-        self._kept = Kept() if keep else None
+        self._kept, self._paints = Kept() if keep else None, bool(rig.color_cameras)
         self.steady = SteadyDepth(rig)
 
     @property
@@ -85,16 +86,25 @@ class Recording(MeshSequence):
 
     def __getitem__(self, index: int) -> Mesh:
         number = self.numbers[index]
-        if self._kept is not None and (kept := self._kept.get(number)) is not None:
-            return kept
+        kept = None if self._kept is None else self._kept.get(number)
+        if kept is not None and (kept.is_colored or kept.is_empty or not self._paints):
+            return kept if self._paints else replace(kept, colors=None)
         pictures = [picture for picture in self.steady.pictures(number) if picture is not None]
         try:
-            mesh = self._colored(fuse_depths(pictures, self.options), number)
+            mesh = fuse_depths(pictures, self.options) if kept is None else kept
         except InputError as error:
             raise InputError(f"{self.rig.folder}: frame {number}: {error}") from None
-        if self._kept is not None:
+        mesh = self._colored(mesh, number) if self._paints else mesh
+        if self._kept is not None and (kept is None or mesh.is_colored):
             self._kept.put(number, mesh)
         return mesh
+
+    @property
+    def uncolored(self) -> Recording:
+        """The same frames without colours of their vertices, for which all pictures of a frame must be asked."""
+        found = copy(self)
+        found._paints = False
+        return found
 
     def _colored(self, mesh: Mesh, number: int) -> Mesh:
         """Return a fused mesh with colours of its vertices, where the rig has colour cameras."""

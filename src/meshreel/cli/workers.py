@@ -37,7 +37,7 @@ def workers(jobs: int | None, cluster: str | None = None) -> Iterator[Executor |
     if jobs is not None and jobs < 1:
         raise InputError(f"--jobs must be at least 1, got {jobs}")
     if cluster is not None:
-        if jobs is not None:
+        if jobs is not None and jobs > 1:
             text = "the cluster has workers of its own, give one of both"
             raise InputError(f"--jobs {jobs} and --cluster {cluster}: {text}")
         with _cluster(cluster) as executor:
@@ -112,6 +112,8 @@ def _hand_over(future: Future[Any], call: Any) -> None:
 
 class _Workers(ProcessPoolExecutor):
     """Worker processes that report their progress."""
+
+    worth = 15  # frames of an interval, at least: a process takes 2 s to begin (guess)
 
     def __init__(self, jobs: int) -> None:
         context = _Context()

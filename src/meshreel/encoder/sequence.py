@@ -26,7 +26,7 @@ from ..edit.audio import Given, packed_audio
 from ..edit.metadata import shortened, up_metadata
 from ..errors import InputError
 from ..format.layout import Form
-from ..geometry.derived_sequences import captured, is_colored, unchanging, welded
+from ..geometry.derived_sequences import captured, is_colored, unchanging, uncolored, welded
 from ..geometry.threads import cores, threads
 from ..geometry.work import since, so_far
 from ..io.files import Place, located
@@ -156,7 +156,10 @@ class Encoder:
         if jobs is not None and jobs < 1:
             raise InputError(f"jobs must be at least 1, got {jobs}")
         self._cores = cores() if jobs is None else jobs
-        self.sequence, self._executor, self._masker = unchanging(captured(sequence)), executor, masker
+        self.sequence = unchanging(
+            uncolored(captured(sequence))
+        )  # colours are asked of the pictures, where they are known
+        self._executor, self._masker = executor, masker
         self.progress, self.digests, self._excerpt = progress, digests, excerpt
         self.find: FindGroups = find_groups
         self.audio = b""  # payload of `packed_audio` that files get

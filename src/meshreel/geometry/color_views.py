@@ -78,9 +78,21 @@ class ColorViews:
         return found
 
     @property
+    def without_pictures(self) -> ColorViews:
+        """The same views of the surface, to be given pictures before they are asked."""
+        none = np.zeros((0, 0, 3), np.uint8)
+        return self.with_pictures([replace(view.picture, pixels=none) for view in self.views])
+
+    def with_pictures(self, pictures: Sequence[ColorPicture]) -> ColorViews:
+        """Return the views with pictures of the same cameras."""
+        found = copy(self)
+        found.views = [replace(view, picture=picture) for view, picture in zip(self.views, pictures, strict=True)]
+        return found
+
+    @property
     def nbytes(self) -> int:
-        """Memory of the pictures and of the depths, bytes."""
-        return sum(view.picture.pixels.nbytes + view.depth.nbytes + view.from_step.nbytes for view in self.views)
+        """Memory of the depths, bytes."""
+        return sum(view.depth.nbytes + view.from_step.nbytes for view in self.views)
 
     def at(self, points: Points, normals: Points) -> tuple[Points, Mask]:
         """Return the colours of places with these normals, 0 to 255, and a mask of those that some camera saw."""

@@ -238,6 +238,16 @@ def unchanging(source: MeshSequence) -> DerivedSequence:
     return DerivedSequence(source, memory=Memory(MOST_KEPT))
 
 
+def uncolored(source: MeshSequence) -> MeshSequence:
+    """Return the same frames without the colours that they have from cameras' pictures, where the source has those."""
+    if not isinstance(source, DerivedSequence):
+        bare: MeshSequence = getattr(source, "uncolored", source)
+        return bare
+    found = copy.copy(source)
+    found.source = uncolored(source.source)
+    return found
+
+
 def upright(source: MeshSequence, up: Up | None) -> DerivedSequence:
     """Return the same frames with a given axis that points up; None keeps the source's."""
     return DerivedSequence(source, axis=up)

@@ -64,10 +64,13 @@ def mapped(function: Callable[..., _T], *arguments: Iterable[Any]) -> list[_T]:
     return mapped_until(lambda _: False, function, *arguments)
 
 
-def ahead(function: Callable[[Any], _T], arguments: Iterable[Any]) -> Iterator[_T]:
-    """Yield the results of calls in order; as many as there are threads are done, and in memory, together."""
+def ahead(function: Callable[[Any], _T], arguments: Iterable[Any], most: int = 1 << 20) -> Iterator[_T]:
+    """Yield the results of calls in order; as many as there are threads are done, and in memory, together.
+
+    They are at most `most`.
+    """
     helpers, waiting = _helpers.get(), iter(arguments)
-    while some := list(islice(waiting, 1 if helpers is None else 1 + helpers.count)):
+    while some := list(islice(waiting, 1 if helpers is None else min(1 + helpers.count, most))):
         yield from mapped(function, some)
 
 
@@ -95,7 +98,7 @@ class _Calls:
     ) -> None:
         self._function, self._calls, self._enough = function, calls, enough
         self._next, self._lock = 0, Lock()
-        self._results, self._errors = dict[int, Any](), dict[int, Exception]()
+        self._results, self._errors = dict[int, Any](), dict[int, BaseException]()
         self.helped, self._report = list[work.Work](), work.reporter()
 
     def help(self) -> None:
@@ -112,7 +115,7 @@ class _Calls:
                 found = self._results[number] = self._function(*self._calls[number])
                 if self._enough(found):
                     self.stop()
-            except Exception as error:
+            except BaseException as error:  # which the thread that waits raises
                 self._errors[number] = error
                 self.stop()
 

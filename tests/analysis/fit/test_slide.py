@@ -42,3 +42,18 @@ def test_a_template_follows_a_pattern_that_has_moved(light: float) -> None:
 def test_without_texture_or_sight_nothing_moves(paint: Pattern) -> None:
     np.testing.assert_allclose(Slide(FACES, FLAT, Pattern()).to(FLAT, paint), FLAT, atol=0.05)
     np.testing.assert_array_equal(Slide(FACES, FLAT, paint).to(FLAT, paint), FLAT)
+
+
+class Coarse(Pattern):
+    """The same, of which the pictures show a pixel a vertex."""
+
+    def pixels_on(self, mesh: object) -> float:
+        del mesh
+        return SIDE**2
+
+
+def test_colors_are_compared_no_finer_than_pictures_show_them() -> None:
+    found = Slide(FACES, FLAT, Coarse()).to(FLAT, Coarse(0.8)) - FLAT
+    assert np.abs(found[INNER] - [0.8, 0, 0]).mean() < 0.3
+    fine, coarse = (Slide(FACES, FLAT, paint)._finer.shape[0] for paint in (Pattern(), Coarse()))
+    assert coarse == SIDE**2 and fine > 12 * coarse

@@ -74,7 +74,7 @@ def fake(monkeypatch):
 
 
 def encode(path, resume=None, sequence=BALLS, options=EACH_ALONE, executor=None):
-    Encoder(sequence, executor).encode(path, options, resume)
+    Encoder(sequence, executor, jobs=1).encode(path, options, resume)
     return path.read_bytes()
 
 

@@ -128,7 +128,7 @@ def test_workers_read_the_files_and_the_bytes_are_those_of_one_process(folder, t
     readers, read = set(), io.read_mesh
     monkeypatch.setattr(io, "read_mesh", lambda *where: readers.add(threading.get_ident()) or read(*where))
     one, many, executor = opened(folder), opened("memory://balls" if by_url else folder), Scrambled()
-    Encoder(one).encode(tmp_path / "one.reel", EACH_ALONE)
+    Encoder(one, jobs=1).encode(tmp_path / "one.reel", EACH_ALONE)
     assert readers == {threading.get_ident()}
     readers.clear()
     summary = Encoder(many, executor).encode(tmp_path / "many.reel", EACH_ALONE)

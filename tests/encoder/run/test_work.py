@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from meshreel.capture.recording import FusionOptions, open_recording
+from meshreel.capture.simulated.demo_room import RoomOptions, record_room
 from meshreel.encoder.sequence import encode
 from meshreel.encoder.settings.settings import Settings
 from meshreel.format.layout import Form
@@ -10,7 +12,7 @@ from meshreel.io.sequence import SequenceOptions, open_sequence
 from meshreel.types import Mesh, MeshList
 from tests.scenes import ball, with_room
 from tests.shared_data import performer
-from tests.small_options import quick
+from tests.small_options import quick, small
 from tests.spheres import sliding_sphere
 
 BALL = Mesh.of(sliding_sphere(1, levels=2)[0].vertices, sliding_sphere(1, levels=2)[0].faces)
@@ -43,6 +45,17 @@ def test_frames_of_a_room_are_read_once_and_tracked_and_fitted_once(tmp_path):
     frames = with_room([ball(0.5 + 0.35 * t) for t in range(4)])
     work = encode(MeshList(tuple(frames)), tmp_path / "a.reel", options=quick(group_size=4)).work
     assert work["frames read"] == 4 and work["frames fitted"] <= 4 and work["frames tracked"] <= 4
+
+
+def test_each_camera_s_view_of_a_frame_is_drawn_once_and_threads_change_no_byte(tmp_path):
+    record_room(tmp_path / "rig", RoomOptions(frames=3, seed=5), 96)
+    options, files = small(Settings(texture=128).resolved()), [tmp_path / f"{jobs}.reel" for jobs in (1, 3)]
+    for jobs, file in zip((1, 3), files, strict=True):
+        frames, _ = open_recording(tmp_path / "rig", FusionOptions(0.06))
+        work = encode(frames, file, options=options, jobs=jobs).work
+    cameras = len(frames.rig.color_cameras)  # whose calibration the first encode has left
+    assert cameras == 4 and work["pictures drawn"] <= cameras * (len(frames) + 1)  # one more for the atlas of the room
+    assert files[0].read_bytes() == files[1].read_bytes()
 
 
 @pytest.mark.slow

@@ -196,10 +196,10 @@ def test_a_stopped_encode_continues_with_the_bodies_that_are_missing(tmp_path, m
 
     monkeypatch.setattr(LayersRecipe, "encode", stops)
     with pytest.raises(KeyboardInterrupt):
-        Encoder(sequence).encode(tmp_path / "a.reel", OPTIONS)
+        Encoder(sequence, jobs=1).encode(tmp_path / "a.reel", OPTIONS)
     with pytest.raises(InputError, match="has the 1 intervals that are done"):
-        Encoder(sequence).encode(tmp_path / "a.reel", OPTIONS)
-    assert Encoder(sequence).encode(tmp_path / "a.reel", OPTIONS, resume=True).continued == 1
+        Encoder(sequence, jobs=1).encode(tmp_path / "a.reel", OPTIONS)
+    assert Encoder(sequence, jobs=1).encode(tmp_path / "a.reel", OPTIONS, resume=True).continued == 1
     assert calls == [(0, 0), (0, 1), (0, 1), (3, 0), (3, 1)]
     assert (tmp_path / "a.reel").read_bytes() == (tmp_path / "whole.reel").read_bytes()
 

@@ -159,9 +159,13 @@ def median_colors(points: Points, normals: Points, paints: Iterable[Paint]) -> t
     mask = np.any(masks, axis=0)
     for start in range(0, len(points), TOGETHER):
         block = slice(start, start + TOGETHER)
-        hidden = np.repeat(~np.stack([array[block] for array in masks])[..., None], 3, axis=2)
-        medians = np.ma.median(np.ma.masked_array(np.stack([array[block] for array in stack]), hidden), axis=0)
-        medians_or_grey[block] = np.rint(np.ma.filled(medians, float(GREY))).astype(np.uint8)
+        known = np.stack([array[block] for array in masks])
+        values = np.stack([array[block] for array in stack]).astype(np.int16)
+        values[~known] = 256  # last in order
+        ordered, count = np.sort(values, axis=0), known.sum(axis=0)
+        middles = np.maximum(count - 1, 0) // 2, np.minimum(count // 2, len(stack) - 1)
+        low, high = (np.take_along_axis(ordered, at[None, :, None], 0)[0] for at in middles)
+        medians_or_grey[block][count > 0] = np.rint((low + high)[count > 0] / 2).astype(np.uint8)
     return medians_or_grey, mask
 
 

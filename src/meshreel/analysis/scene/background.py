@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from itertools import repeat
 
 import numpy as np
 from jaxtyping import Bool
@@ -19,6 +20,7 @@ from scipy.ndimage import binary_dilation
 from ...geometry.depth import STEP, DepthPicture, FreeSpace, inverse_depths
 from ...geometry.drawing import draw
 from ...geometry.reconstruct import ALONE, GRAZING, SEEN, MeanOptions, MeanSurface, close_holes, extract, integrate
+from ...geometry.threads import mapped
 from ...geometry.topology import face_normals, part_of, without_fragments
 from ...types import Mesh
 
@@ -70,9 +72,9 @@ def fuse_still_depth(moments: Iterable[Moment], voxel: float) -> Mesh:
     usual = usual_pictures(moments)
     if not usual:
         return Mesh.empty()
-    usual = [_smooth(picture) for picture in usual]
-    fine = [picture.finer(FINER) for picture in usual]
-    past = [_continued(picture).finer(FINER) for picture in usual]
+    usual = mapped(_smooth, usual)
+    fine = mapped(DepthPicture.finer, usual, repeat(FINER))
+    past = mapped(lambda picture: _continued(picture).finer(FINER), usual)
     mesh = extract(integrate(fine, FINER_VOXEL * voxel, GRAZING if len(usual) > 1 else ALONE, past), SEEN)
     normals, middles = face_normals(mesh)[0], mesh.vertices[mesh.faces].mean(axis=1)
     best = np.full(len(middles), -1.0)  # cosine between a face's normal and the ray of the camera that it faces most
@@ -88,10 +90,11 @@ def usual_pictures(moments: Iterable[Moment]) -> list[DepthPicture]:
     stacks: dict[int, list[np.ndarray]] = {}
     cameras: dict[int, DepthPicture] = {}
     for moment in moments:
-        for number, picture in enumerate(moment.pictures):
-            if picture is not None:
-                cameras[number] = picture
-                stacks.setdefault(number, []).append(_still(picture, moment))
+        known = [(number, picture) for number, picture in enumerate(moment.pictures) if picture is not None]
+        stills = mapped(_still, (picture for _, picture in known), repeat(moment))
+        for (number, picture), still in zip(known, stills, strict=True):
+            cameras[number] = picture
+            stacks.setdefault(number, []).append(still)
     usual = list[DepthPicture]()
     for number, stack in sorted(stacks.items()):
         # A door that soon opens is measured a few times only, and the surface behind it perhaps never.

@@ -20,6 +20,7 @@ from scipy.spatial import cKDTree
 from ...geometry.cameras import Camera
 from ...geometry.closest_points import Surface, area_samples
 from ...geometry.derived_sequences import CapturedSequence
+from ...geometry.threads import mapped
 from ...geometry.topology import border_edges, components, drop_unreferenced, edge_lengths, face_normals, vertex_normals
 from ...geometry.voxels import Lattice, around, distinct, spread
 from ...types import Frames, Mesh, evenly
@@ -88,10 +89,12 @@ def scene_standing(frames: Frames) -> Standing | None:
 
     Raises InputError if one of the few inspected frames is invalid.
     """
-    numbers, meshes = evenly(len(frames), PROBES), list[Mesh]()
-    for number in numbers:
+
+    def checked(number: int) -> Mesh:
         check(mesh := frames[number], f"frame {number}")
-        meshes += [] if mesh.is_empty else [drop_unreferenced(mesh)]
+        return mesh if mesh.is_empty else drop_unreferenced(mesh)
+
+    meshes = [mesh for mesh in mapped(checked, evenly(len(frames), PROBES)) if not mesh.is_empty]
     sizes = [mesh.diagonal for mesh in meshes]
     if len(meshes) < 2 or sizes[0] == 0 or max(sizes) > UNLIKE * min(sizes):
         return None
@@ -114,18 +117,23 @@ def standing(frames: Frames) -> Standing:
     """Measure the regions of a sequence's surface in `PROBES` frames, and in the frames before and after each."""
     last, some = len(frames) - 1, evenly(len(frames), PROBES)
     middles = sorted({min(max(number, 1), last - 1) for number in some} if last > 2 else some)
-    probes = {number: _Probe.of(mesh) for number in middles if not (mesh := frames[number]).is_empty}
+    found = mapped(lambda number: None if (mesh := frames[number]).is_empty else _Probe.of(mesh), middles)
+    probes = {number: probe for number, probe in zip(middles, found, strict=True) if probe is not None}
     asked = dict[int, list[tuple[_Probe, bool]]]()  # by frame: probes whose samples are looked for, as at another time
     for middle, probe in probes.items():
         for number in sorted({max(middle - 1, 0), min(middle + 1, last)} - {middle}):
             asked.setdefault(number, []).append((probe, False))
         for number in probes.keys() - {middle}:
             asked.setdefault(number, []).append((probe, True))
-    for number, those in sorted(asked.items()):
-        if not (mesh := frames[number]).is_empty:
-            surface = Surface(mesh)
-            for probe, is_far in those:
-                (probe.far if is_far else probe.beside).append(probe.offsets(surface))
+    order = sorted(asked.items())
+
+    def offsets(number: int, those: list[tuple[_Probe, bool]]) -> list[Float64[np.ndarray, " _"]]:
+        surface = None if (mesh := frames[number]).is_empty else Surface(mesh)
+        return [] if surface is None else [probe.offsets(surface) for probe, _ in those]
+
+    for (_, those), own in zip(order, mapped(offsets, *zip(*order, strict=True)) if order else [], strict=True):
+        for (probe, is_far), each in zip(those, own, strict=False):
+            (probe.far if is_far else probe.beside).append(each)
     # Two frames tell nothing of noise; where a sensor is known, too, only what a region does on its own counts then.
     sensed = len(frames) > 2 and isinstance(frames, CapturedSequence) and frames.depth is not None
     return _regions([probe for probe in probes.values() if probe.beside], sensed)

@@ -12,6 +12,7 @@ from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
+from jaxtyping import UInt8
 
 from ... import _core
 from ...analysis.appearance.bake import bake, picture, texels_of, unwrap, vertex_colors
@@ -26,6 +27,7 @@ from ...format.budget import CostlyError
 from ...format.layout import ChunkKind, Form
 from ...geometry.color_views import Paint
 from ...geometry.splats import Carrier
+from ...geometry.threads import mapped
 from ...types import GREY, Mesh, evenly
 from ..group.forms import NORMALISED, EncodedGroup
 from ..group.interval import Interval
@@ -52,7 +54,7 @@ def colored_groups(
             yield from chain.done()
             chain = _Chain(interval, options)
         meshes = [interval.frames[number] for number in numbers]
-        paints = [interval.paint(number, mesh) for number, mesh in zip(numbers, meshes, strict=True)]
+        paints = mapped(interval.paint, numbers, meshes)
         if any(paint is not None for paint in paints):
             chain.add(group, numbers, paints, has_pictures(interval, meshes, options))
             if stages is not None:
@@ -90,12 +92,7 @@ class _Chain:
         canvas = canvas_of(group.payload, [len(mesh.vertices) for mesh in meshes], None, known)
         if self._splats is not None:
             self._splats.add(group.form, canvas, meshes, numbers)
-        colors = [
-            np.full(mesh.vertices.shape, GREY, np.uint8)
-            if paint is None or mesh.is_empty
-            else vertex_colors(paint, mesh)
-            for paint, mesh in zip(paints, meshes, strict=True)
-        ]
+        colors = mapped(_vertex_colors, paints, meshes)
         texture = options.texture if pictured and not self.groups and group.form == Form.LAYERS else None
         is_covered = texture is not None or self._video is not None
         step = COARSER * options.color_step if is_covered else options.color_step
@@ -115,8 +112,7 @@ class _Chain:
             companions.append(Companion(ChunkKind.ATLAS, self._video.atlas))
         if self._video is not None:
             self._pictured.append(len(self.groups))
-            for paint, mesh in zip(paints, meshes, strict=True):
-                self._video.add(paint, mesh)
+            self._video.add(paints, meshes)
         self.groups.append(replace(group, companions=tuple(companions)))
 
     def done(self) -> list[EncodedGroup]:
@@ -146,16 +142,27 @@ class _Video:
         self._colors, self._seen = np.full((count, 3), GREY, np.uint8), np.zeros(count, bool)  # so far
         self.videos = Videos(layout, options)
 
-    def add(self, paint: Paint | None, mesh: Mesh) -> None:
-        """Add the picture of a frame, whose mesh begins with the template.
+    def add(self, paints: Sequence[Paint | None], meshes: Sequence[Mesh]) -> None:
+        """Add the pictures of frames, whose meshes begin with the template.
 
         What nobody sees keeps the colour that was seen last.
         """
-        if paint is not None:
-            colors, seen = bake(paint, Mesh(mesh.vertices[: self._count], self._faces), self._texels)
-            self._colors[seen] = colors[seen]
-            self._seen |= seen
-        self.videos.add(picture(self._texels, self._colors, self._seen))
+        for baked in mapped(self._baked, paints, meshes):
+            if baked is not None:
+                colors, seen = baked
+                self._colors[seen] = colors[seen]
+                self._seen |= seen
+            self.videos.add(picture(self._texels, self._colors, self._seen))
+
+    def _baked(self, paint: Paint | None, mesh: Mesh) -> tuple[np.ndarray, np.ndarray] | None:
+        whole = Mesh(mesh.vertices[: self._count], self._faces)
+        return None if paint is None else bake(paint, whole, self._texels)
+
+
+def _vertex_colors(paint: Paint | None, mesh: Mesh) -> UInt8[np.ndarray, "V 3"]:
+    if paint is None or mesh.is_empty:
+        return np.full(mesh.vertices.shape, GREY, np.uint8)
+    return vertex_colors(paint, mesh)
 
 
 def fitting_size(paints: Sequence[Paint | None], meshes: Sequence[Mesh]) -> int:

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from threading import Lock
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 from jaxtyping import Float64
@@ -23,7 +23,8 @@ from ...geometry.topology import clean, part_of
 from ...types import Frames, Mesh, MeshSequence, Placement, Up, offset
 
 UNEVEN = (0.25, 4.0)  # least and most noise of a place, in RMS noises of the frames (guess)
-MOST_VIEWS = 1 << 28  # bytes: four cameras' pictures of 1280 x 1152 pixels of 14 frames
+MOST_RECENT = 1 << 27  # bytes: what four cameras of 1280 x 1152 pixels see in 40 frames, or their pictures in 7
+_T = TypeVar("_T")
 MOST_FRAMES = 64  # in a group: the tracker's distances and the basis grow with it (guess)
 
 
@@ -150,7 +151,12 @@ class Views:
     colors: ColorFrames
     sequence: MeshSequence
     place: Placement  # of the coordinates in which the cameras are asked
-    recent: Recent = field(default_factory=lambda: Recent(), kw_only=True, compare=False)
+    recent: Recent[ColorViews] = field(
+        default_factory=lambda: Recent(_bytes_of_views), kw_only=True, compare=False
+    )  # without pictures
+    recent_pictures: Recent[list[ColorPicture]] = field(
+        default_factory=lambda: Recent(_bytes_of_pictures), kw_only=True, compare=False
+    )
 
     @staticmethod
     def of(sequence: CapturedSequence, survey: Survey) -> Views | None:
@@ -159,8 +165,12 @@ class Views:
         return None if colors is None else Views(colors, sequence, Placement(survey.unit, tuple(survey.center)))
 
     def at(self, number: int) -> ColorViews:
-        """Return the cameras' views of a frame, whose surface hides a place; those used last are kept."""
-        return self.recent.get(number, lambda: self.of_surface(number, self.surface(number)))
+        """Return the cameras' views of a frame, whose surface hides a place; those asked for last are kept."""
+        depths = self.recent.get(number, self._depths)
+        return depths.with_pictures(self.pictures(number))
+
+    def _depths(self, number: int) -> ColorViews:
+        return self.of_surface(number, self.surface(number)).without_pictures
 
     def of_surface(self, number: int, hides: Mesh) -> ColorViews:
         """Return the cameras' views of a surface in a frame, in normalised coordinates."""
@@ -168,6 +178,9 @@ class Views:
 
     def pictures(self, number: int) -> list[ColorPicture]:
         """Return the pictures of a frame, for places in normalised coordinates."""
+        return self.recent_pictures.get(number, self._placed)
+
+    def _placed(self, number: int) -> list[ColorPicture]:
         return [picture.placed(self.place) for picture in self.colors[number] if picture is not None]
 
     def surface(self, number: int) -> Mesh:
@@ -176,27 +189,36 @@ class Views:
         return mesh.at((mesh.vertices - place.origin) / place.scale)
 
 
-class Recent:
-    """The views of the frames that were looked at last, as many as fit into `MOST_VIEWS` bytes."""
+class Recent(Generic[_T]):
+    """What was made of the frames that were asked for last, as much as fits into `MOST_RECENT` bytes."""
 
-    def __init__(self) -> None:
-        self._views, self._free, self._lock = OrderedDict[int, ColorViews](), MOST_VIEWS, Lock()
+    def __init__(self, nbytes: Callable[[_T], int]) -> None:
+        """`nbytes` returns the memory of what is made of a frame."""
+        self._nbytes, self._made, self._free, self._lock = nbytes, OrderedDict[int, _T](), MOST_RECENT, Lock()
 
-    def get(self, number: int, make: Callable[[], ColorViews]) -> ColorViews:
-        """Return the views of a frame, made where they are not kept."""
+    def get(self, number: int, make: Callable[[int], _T]) -> _T:
+        """Return what is kept of a frame, or make it."""
         with self._lock:
-            if number in self._views:
-                self._views.move_to_end(number)
-                return self._views[number]
-        views = make()
+            if number in self._made:
+                self._made.move_to_end(number)
+                return self._made[number]
+        made = make(number)
         with self._lock:
-            if number not in self._views:
-                self._views[number] = views
-                self._free -= views.nbytes
-                while self._free < 0 and len(self._views) > 1:
-                    self._free += self._views.popitem(last=False)[1].nbytes
-        return views
+            if number not in self._made:
+                self._made[number] = made
+                self._free -= self._nbytes(made)
+                while self._free < 0 and len(self._made) > 1:
+                    self._free += self._nbytes(self._made.popitem(last=False)[1])
+        return made
 
-    def __reduce__(self) -> tuple[type[Recent], tuple[()]]:
+    def __reduce__(self) -> tuple[Any, ...]:
         """Go to other processes without what is kept."""
-        return Recent, ()
+        return Recent, (self._nbytes,)
+
+
+def _bytes_of_views(views: ColorViews) -> int:
+    return views.nbytes
+
+
+def _bytes_of_pictures(pictures: list[ColorPicture]) -> int:
+    return sum(picture.pixels.nbytes for picture in pictures)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from fractions import Fraction
+from threading import Lock
 from typing import Any
 
 Progress = Callable[[str, int, int], None]  # stage, frames done in it, frames of the sequence
@@ -17,6 +18,7 @@ class Stages:
         self._progress = progress
         self._total = total
         self._done: dict[str, Fraction] = {}
+        self._one_thread = Lock()
 
     def reach(self, stage: str, share: float) -> None:
         """Count frames of `stage` up to this share of all frames."""
@@ -24,9 +26,10 @@ class Stages:
 
     def add(self, stage: str, count: int | Fraction) -> None:
         """Count `count` further frames of `stage`."""
-        self._done[stage] = self._done.get(stage, Fraction()) + count
-        if self._progress is not None:
-            self._progress(stage, int(self._done[stage]), self._total)
+        with self._one_thread:
+            self._done[stage] = self._done.get(stage, Fraction()) + count
+            if self._progress is not None:
+                self._progress(stage, int(self._done[stage]), self._total)
 
 
 class IntervalStages(Stages):

@@ -16,7 +16,7 @@ from threadpoolctl import threadpool_limits
 
 from ...format.layout import Header
 from ...geometry.derived_sequences import DerivedSequence
-from ...geometry.threads import threads
+from ...geometry.threads import ahead, threads
 from ...geometry.work import Work, add, reporting, since, so_far
 from ...types import evenly
 from ..appearance.colors import colored_groups, has_pictures
@@ -30,8 +30,8 @@ from .interval_files import IntervalFiles, pack_interval
 from .judge import judged
 from .worker import end_with_parent, tell
 
+BESIDE = 2  # intervals in one process: each holds its frames in memory (guess)
 AHEAD = 2  # calls for each worker, so that none waits for its next (guess)
-WORTH = 15  # frames of an interval from which a process of its own pays: it takes 2 s to begin (guess)
 UNKNOWN = 8  # workers of an executor that does not say how many it has (guess)
 _LOOK = 0.5  # s, between two looks at what workers tell of calls that are not done (guess)
 
@@ -50,10 +50,10 @@ class Job:
     executor: Executor | None
     stages: Stages
     recipe: Recipe
-    cores: int = 1  # that this process may use
     files: IntervalFiles | None = None  # of the output, which the encoding of intervals needs
     head: Header = NEUTRAL  # of the files of intervals
     chosen: range | None = None  # the frames that are encoded; None: all
+    cores: int = 1  # that a worker process may use
 
     @property
     def scene(self) -> SceneOptions:
@@ -86,16 +86,18 @@ def encode_intervals(job: Job, intervals: Iterable[Interval]) -> Iterator[list[E
     """Yield the groups of each interval, in order; with an executor, its workers encode them in any order.
 
     An interval that has a file is not encoded again, and others get one as soon as they are done: what waits here for
-    an earlier interval has no payloads. Few or short intervals are encoded here, where threads share what was read.
+    an earlier interval has no payloads. An executor's `worth` is the least number of frames for which a worker pays:
+    few or short intervals are encoded here, then, where threads share what was read.
     """
     job.stages.add("code", 0)  # the time that a frame takes is counted from here
-    intervals, encode = iter(intervals), _one_by_one
-    if job.executor is not None:
+    intervals, encode = iter(intervals), _one_by_one if job.executor is None else _side_by_side
+    if job.executor is not None and (worth := getattr(job.executor, "worth", 0)):
         count = workers_of(job.executor)
         first = list(islice(intervals, count))
         intervals = chain(first, intervals)
-        if len(first) > 1 and sum(len(interval.frames) for interval in first) >= WORTH * len(first):
-            encode, job = _side_by_side, replace(job, cores=max(1, count // len(first)))
+        if len(first) < 2 or sum(len(interval.frames) for interval in first) < worth * len(first):
+            encode = _one_by_one
+        job = replace(job, cores=count // max(1, len(first)))
     assert job.files is not None
     for groups, lines in encode(job, job.files, intervals):
         if lines and (write := listener()) is not None:
@@ -104,14 +106,16 @@ def encode_intervals(job: Job, intervals: Iterable[Interval]) -> Iterator[list[E
 
 
 def _one_by_one(job: Job, files: IntervalFiles, intervals: Iterable[Interval]) -> Iterator[_Done]:
-    """Encode intervals here, each when it is asked for."""
-    for interval in intervals:
+    """Encode intervals here, a few at a time: bodies of the same frames share what was read."""
+
+    def encoded(interval: Interval) -> _Done:
         stages, known = _begun(job, files, interval)
         if known is not None:
-            yield known, ""
-            continue
+            return known, ""
         data, lines = _task(job, interval).done(stages)
-        yield files.keep(interval, data), lines
+        return files.keep(interval, data), lines
+
+    return ahead(encoded, intervals, BESIDE)
 
 
 def _side_by_side(job: Job, files: IntervalFiles, intervals: Iterable[Interval]) -> Iterator[_Done]:

@@ -34,7 +34,8 @@ _DAMAGED = (KeyError, TypeError, ValueError, OverflowError)  # of a record that 
 
 def survey_job(job: Job, cleaned: bool = True) -> Survey:
     """Survey the sequence of a job, with the errors of `survey_sequence`; an executor's workers read the files."""
-    if job.executor is None or not job.sequence.is_stored or len(job.sequence) < 2 * SLICE:
+    short = getattr(job.executor, "worth", 0) and len(job.sequence) < 2 * SLICE
+    if job.executor is None or short or not job.sequence.is_stored:
         return survey_sequence(job.sequence, job.stages.add, cleaned)
     count, found = len(job.sequence), dict[int, Survey]()
 

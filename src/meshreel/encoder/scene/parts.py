@@ -29,9 +29,11 @@ from ...geometry.cameras import Camera
 from ...geometry.closest_points import Surface, area_samples
 from ...geometry.depth import DepthFrames, FreeSpace
 from ...geometry.derived_sequences import CapturedSequence, picked
+from ...geometry.threads import ahead
 from ...geometry.topology import components, concatenate, face_normals, part_of
 from ...geometry.voxels import Lattice
 from ...types import Mesh, MeshSequence, evenly
+from ..group.interval import Views
 from ..group.progress import Stages
 from ..settings.options import SceneOptions
 
@@ -64,6 +66,7 @@ class Parts:
     changes: list[Change]
     noise: LocalNoise  # distances of still surface from the background: what bodies near it have
     free: tuple[FreeSpace, ...] = ()  # of some frames; none where no depth is known
+    views: Views | None = None  # of colour cameras
 
     @cached_property
     def room(self) -> Callable[[int], Surface | None]:
@@ -134,7 +137,7 @@ def take_apart(
     stages.reach("background", 1.0)
     sizes, noise = _measured(sequence, segmentation, noisy, changes, stages)
     survey = replace(survey, scale=(float(np.median(sizes)) if sizes else 0.0) or survey.diagonal)
-    return Parts(survey, segmentation, background, changes, noise, free_space(sequence))
+    return Parts(survey, segmentation, background, changes, noise, free_space(sequence), Views.of(sequence, survey))
 
 
 def free_space(sequence: CapturedSequence) -> tuple[FreeSpace, ...]:
@@ -206,8 +209,12 @@ def _fused(
     cell: float,
 ) -> Mesh:
     """Fuse the still faces of some frames from their depth pictures, which are known."""
-    meshes = ((number, sequence[number]) for number in numbers)
-    return fuse_still_depth((Moment(depth[k], mesh, still(k, mesh)) for k, mesh in meshes), cell)
+
+    def moment(number: int) -> Moment:
+        mesh = sequence[number]
+        return Moment(depth[number], mesh, still(number, mesh))
+
+    return fuse_still_depth(ahead(moment, numbers), cell)
 
 
 def _change(sequence: CapturedSequence, depth: DepthFrames | None, segmentation: Segmentation, frame: int) -> Change:
@@ -240,10 +247,14 @@ def _measured(
     far, sizes = OUTLIER * segmentation.noise, list[float]()
     places, distances = list[Float64[np.ndarray, "N 3"]](), list[Float64[np.ndarray, " N"]]()
     room_after = _rooms(background, changes)
-    for number in evenly(len(sequence), PROBES):
-        stages.reach("noise", number / len(sequence))
+
+    def seen(number: int) -> tuple[Mesh, Bool[np.ndarray, " F"]]:
         mesh = sequence[number]
-        moves = segmentation.moving(number, mesh)
+        return mesh, segmentation.moving(number, mesh)
+
+    some = evenly(len(sequence), PROBES)
+    for number, (mesh, moves) in zip(some, ahead(seen, some), strict=True):
+        stages.reach("noise", number / len(sequence))
         moving = part_of(mesh, moves)
         if moves.any():
             label = components(moving.faces, len(moving.vertices))
@@ -255,9 +266,9 @@ def _measured(
             points = still.vertices[area_samples(still, SAMPLES)]
             hits = room.closest(points)
             ways = points - hits.points
-            gaps, ahead = np.linalg.norm(ways, axis=1), (ways * room.normals[hits.faces]).sum(axis=1)
+            gaps, outward = np.linalg.norm(ways, axis=1), (ways * room.normals[hits.faces]).sum(axis=1)
             places.append(points[gaps < far])
-            distances.append(np.copysign(gaps, ahead)[gaps < far])
+            distances.append(np.copysign(gaps, outward)[gaps < far])
     stages.reach("noise", 1.0)
     fine = REGION * segmentation.cell
     wide = max(fine, float(np.median(sizes or [0.0])) / 2)
@@ -314,7 +325,7 @@ def unpack_parts(data: bytes, sequence: CapturedSequence, survey: Survey) -> Par
         return None
     changes = [Change(frame, mesh) for frame, mesh in zip(frames, came, strict=True)]
     survey = replace(survey, scale=unit)
-    return Parts(survey, by, background, changes, noise, free_space(sequence))
+    return Parts(survey, by, background, changes, noise, free_space(sequence), Views.of(sequence, survey))
 
 
 def _colors(arrays: Any, sequence: CapturedSequence) -> ColorChange | None:

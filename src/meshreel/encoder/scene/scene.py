@@ -29,7 +29,7 @@ from ...geometry.threads import ahead
 from ...geometry.topology import part_of
 from ...types import Mesh, MeshSequence, Placement, evenly
 from ..group.forms import empty_groups
-from ..group.interval import Interval, Views, frames_in
+from ..group.interval import Interval, frames_in
 from ..run.schedule import Job, encode_intervals
 from ..settings.options import EncoderOptions
 from .parts import Parts
@@ -69,7 +69,7 @@ def scene_intervals(job: Job, parts: Parts, tracks: Tracks) -> Iterator[Interval
     interval: they can where all have a surface or none has, and where they are of about one scale.
     """
     sequence, survey = job.sequence, parts.survey
-    place, views = Placement(survey.unit, tuple(survey.center)), Views.of(sequence, survey)
+    place = Placement(survey.unit, tuple(survey.center))
     longest = job.recipe.longest(sequence.frame_rate)
     for frames in key_intervals(sequence, parts.segmentation, job.options):
         found = list[Interval]()
@@ -82,7 +82,7 @@ def scene_intervals(job: Job, parts: Parts, tracks: Tracks) -> Iterator[Interval
                 noise = _noise(meshes[cut.start : cut.stop], parts)
                 one = Interval(some, noise, frames.start + cut.start, track, digest(some))
                 one = replace(one, up=sequence.up, frame_rate=sequence.frame_rate, local=parts.noise, place=place)
-                found.append(replace(one, views=views, depth=sequence.depth))
+                found.append(replace(one, views=parts.views, depth=sequence.depth))
         weight = Fraction(len(frames), sum(len(interval.frames) for interval in found))
         yield from (replace(interval, weight=weight) for interval in found)
 

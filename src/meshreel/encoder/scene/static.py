@@ -30,7 +30,6 @@ from ...geometry.topology import clean, face_normals, vertex_normals
 from ...types import Mesh, Placement, evenly
 from ..appearance.colors import fitting_size
 from ..appearance.videos import AppearanceOptions, TextureOptions, layered_pictures
-from ..group.interval import Views
 from ..settings.options import SceneOptions
 from .parts import Parts
 
@@ -152,7 +151,7 @@ def colored_states(
     sequence: CapturedSequence, parts: Parts, background: SceneOptions, options: AppearanceOptions | None
 ) -> list[Static]:
     """Encode the states of the background with the colours that still surface has from each state to the next."""
-    if options is None or not is_colored(sequence):
+    if options is None or not (sequence.colors is not None or is_colored(sequence)):
         return encode_static(parts, len(sequence), sequence.frame_rate, background)
     found, mesh, looks, bare = list[Static](), Mesh.empty(), _Looks(sequence, parts), False
     texture = options.texture if options.texture and (options.texture.always or looks.has_pictures) else None
@@ -220,7 +219,7 @@ class _Looks:
     """Evidence of a scene's still surface from its frames, in normalised coordinates."""
 
     def __init__(self, sequence: CapturedSequence, parts: Parts) -> None:
-        self._sequence, self._parts, self._views = sequence, parts, Views.of(sequence, parts.survey)
+        self._sequence, self._parts, self._views = sequence, parts, parts.views
         self.has_pictures = self._views is not None or sequence[0].texture is not None
         self.frame_rate = sequence.frame_rate
 

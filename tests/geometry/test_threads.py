@@ -1,0 +1,95 @@
+import threading
+import time
+
+import pytest
+
+from meshreel.geometry import threads as sides
+from meshreel.geometry import work
+from meshreel.geometry.threads import ahead, cores, mapped, mapped_until, threads
+
+
+def slowly(number: int, factor: int = 2) -> int:
+    time.sleep(0.002 * (5 - number % 5))
+    return factor * number
+
+
+@pytest.mark.parametrize("count", [1, 2, 5])
+def test_results_are_in_the_order_of_the_arguments(count):
+    with threads(count):
+        assert mapped(slowly, range(12)) == [2 * k for k in range(12)]
+        assert mapped(slowly, range(3), [1, 3, 5]) == [0, 3, 10]
+        assert mapped(slowly, []) == []
+
+
+def test_calls_wait_for_each_other_in_no_more_threads_than_are_wanted():
+    seen, lock, most = set[int](), threading.Lock(), [0, 0]
+
+    def call(_: int) -> None:
+        with lock:
+            most[0] += 1
+            most[1] = max(most)
+        seen.add(threading.get_ident())
+        time.sleep(0.01)
+        with lock:
+            most[0] -= 1
+
+    with threads(3):
+        mapped(call, range(12))
+    assert 2 <= len(seen) <= 3 and 2 <= most[1] <= 3 and threading.get_ident() in seen
+    seen.clear()
+    mapped(call, range(4))
+    assert seen == {threading.get_ident()}  # outside of the block
+
+
+def test_calls_within_calls_end_though_every_thread_waits():
+    with threads(2):
+        assert mapped(lambda a: sum(mapped(lambda b: slowly(a * b), range(6))), range(6)) == [30 * a for a in range(6)]
+
+
+@pytest.mark.parametrize("count", [1, 4])
+def test_the_first_call_that_fails_is_told_of(count):
+    begun = list[int]()
+
+    def fails(number: int) -> int:
+        begun.append(number)
+        time.sleep(0.02 if number == 3 else 0.0)
+        if number in (3, 4):
+            raise ValueError(f"call {number}")
+        return number
+
+    with threads(count), pytest.raises(ValueError, match="call 3"):
+        mapped(fails, range(100))
+    assert len(begun) < 20
+
+
+@pytest.mark.parametrize("count", [1, 4])
+def test_calls_after_one_that_is_enough_do_not_count(count):
+    with threads(count):
+        assert mapped_until(lambda found: found >= 6, slowly, range(50)) == [0, 2, 4, 6]
+        assert mapped_until(lambda found: found > 50, slowly, range(5)) == [0, 2, 4, 6, 8]
+
+
+@pytest.mark.parametrize(("count", "most", "together"), [(1, 9, 1), (4, 9, 4), (4, 2, 2)])
+def test_no_more_results_wait_than_there_are_threads(count, most, together):
+    begun = list[int]()
+    with threads(count):
+        for number, found in enumerate(ahead(lambda k: (begun.append(k), slowly(k))[1], iter(range(10)), most)):
+            assert found == 2 * number and len(begun) <= number + together
+    assert sorted(begun) == list(range(10))
+
+
+def test_work_of_all_threads_is_counted_and_reported_once():
+    told = list[int]()
+    with threads(3), work.reporting(lambda _, number: told.append(number)):
+        before = work.so_far()
+        mapped(lambda number: (slowly(number), work.count("frames fitted", number)), range(8))
+        assert work.since(before) == {"frames fitted": 28} and sum(told) == 28
+
+
+@pytest.mark.parametrize(("quota", "count"), [("200000 100000", 2), ("50000 100000", 1), ("max 100000", 64), ("?", 64)])
+def test_cores_are_those_of_the_process_within_the_quota_of_its_container(monkeypatch, tmp_path, quota, count):
+    (tmp_path / "cpu.max").write_text(quota)
+    monkeypatch.setattr(sides, "_QUOTA", str(tmp_path / "cpu.max"))
+    monkeypatch.setattr("os.sched_getaffinity", lambda _: set(range(64)), raising=False)
+    monkeypatch.setattr("os.cpu_count", lambda: 64)
+    assert cores() == count
