@@ -107,6 +107,24 @@ TEST(the_closest_point_of_a_face_that_is_a_line_but_for_rounding_is_beside_the_q
     mr_tree_destroy(tree);
 }
 
+TEST(faces_that_are_gone_answer_no_query) {
+    const Shape shape = triangles(1, 200);
+    const mr_mesh mesh = shape.view();
+    mr_tree* tree = nullptr;
+    CHECK(mr_tree_create(&mesh, &tree) == MR_OK);
+    Noise noise(9);
+    std::vector<double> queries, weights(3 * 300);
+    for (int k = 0; k < 3 * 300; ++k) queries.push_back(0.0015 * noise.within(1000));
+    std::vector<int32_t> faces(300, -1);
+    CHECK(mr_tree_closest(tree, queries.data(), 300, HUGE_VAL, nullptr, faces.data(), weights.data()) == MR_OK);
+    std::vector<uint8_t> gone(shape.face_count(), 0);
+    for (int32_t face : faces) gone[static_cast<size_t>(face)] = 1;
+    std::vector<int32_t> others = faces;  // guesses that are gone, too
+    CHECK(mr_tree_closest(tree, queries.data(), 300, HUGE_VAL, gone.data(), others.data(), weights.data()) == MR_OK);
+    for (int32_t face : others) CHECK(face >= 0 && gone[static_cast<size_t>(face)] == 0);
+    mr_tree_destroy(tree);
+}
+
 TEST(rays_meet_the_nearest_of_all_faces) {
     const Shape shape = triangles(1, 200);
     const mr_mesh mesh = shape.view();

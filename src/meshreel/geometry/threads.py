@@ -24,7 +24,7 @@ _T = TypeVar("_T")
 _QUOTA = "/sys/fs/cgroup/cpu.max"  # of a container: microseconds of work a period, or "max", and the period
 
 
-class _Helpers(ThreadPoolExecutor):
+class _Pool(ThreadPoolExecutor):
     """Threads beside one that waits for calls."""
 
     def __init__(self, count: int) -> None:
@@ -32,7 +32,7 @@ class _Helpers(ThreadPoolExecutor):
         self.count = count
 
 
-_helpers = ContextVar[_Helpers | None]("threads beside this one", default=None)
+_pool = ContextVar[_Pool | None]("threads beside this one", default=None)
 
 
 def cores() -> int:
@@ -49,11 +49,11 @@ def cores() -> int:
 def threads(count: int) -> Iterator[None]:
     """Let calls of `mapped` in the block use so many threads, this one included."""
     with ExitStack() as stack:
-        token = _helpers.set(stack.enter_context(_Helpers(count - 1)) if count > 1 else None)
+        token = _pool.set(stack.enter_context(_Pool(count - 1)) if count > 1 else None)
         try:
             yield
         finally:
-            _helpers.reset(token)
+            _pool.reset(token)
 
 
 def mapped(function: Callable[..., _T], *arguments: Iterable[Any]) -> list[_T]:
@@ -69,17 +69,17 @@ def ahead(function: Callable[[Any], _T], arguments: Iterable[Any], most: int = 1
 
     They are at most `most`.
     """
-    helpers, waiting = _helpers.get(), iter(arguments)
-    while some := list(islice(waiting, 1 if helpers is None else min(1 + helpers.count, most))):
+    pool, waiting = _pool.get(), iter(arguments)
+    while some := list(islice(waiting, 1 if pool is None else min(1 + pool.count, most))):
         yield from mapped(function, some)
 
 
 def mapped_until(enough: Callable[[_T], bool], function: Callable[..., _T], *arguments: Iterable[Any]) -> list[_T]:
     """Return the results of calls up to the first that is enough; other threads may do later ones in vain."""
-    calls, helpers = list(zip(*arguments, strict=False)), _helpers.get()
+    calls, pool = list(zip(*arguments, strict=False)), _pool.get()
     shared = _Calls(function, calls, enough)
-    count = 0 if helpers is None else min(helpers.count, len(calls) - 1)
-    beside = [helpers.submit(copy_context().run, shared.help) for _ in range(count) if helpers is not None]
+    count = 0 if pool is None else min(pool.count, len(calls) - 1)
+    beside = [pool.submit(copy_context().run, shared.help) for _ in range(count) if pool is not None]
     try:
         shared.do()
     finally:

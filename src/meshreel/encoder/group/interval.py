@@ -190,14 +190,14 @@ class Views:
 
 
 class Recent(Generic[_T]):
-    """What was made of the frames that were asked for last, as much as fits into `MOST_RECENT` bytes."""
+    """Results for the frames that were asked for last, as many as fit into `MOST_RECENT` bytes."""
 
     def __init__(self, nbytes: Callable[[_T], int]) -> None:
-        """`nbytes` returns the memory of what is made of a frame."""
+        """`nbytes` returns the memory that a frame's result takes."""
         self._nbytes, self._made, self._free, self._lock = nbytes, OrderedDict[int, _T](), MOST_RECENT, Lock()
 
     def get(self, number: int, make: Callable[[int], _T]) -> _T:
-        """Return what is kept of a frame, or make it."""
+        """Return the result for a frame, which is made where it is not kept."""
         with self._lock:
             if number in self._made:
                 self._made.move_to_end(number)
@@ -212,7 +212,7 @@ class Recent(Generic[_T]):
         return made
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Go to other processes without what is kept."""
+        """Go to other processes without results."""
         return Recent, (self._nbytes,)
 
 
