@@ -294,6 +294,8 @@ class MeshSequence(Frames, Protocol):
 class MeshList(MeshSequence):
     """A MeshSequence of meshes in memory."""
 
+    is_shared: ClassVar[bool] = True  # threads may read it at the same time
+
     meshes: tuple[Mesh, ...]
     frame_rate: float = 30.0  # 1/s
     up: Up = "y"  # the axis that points up

@@ -1,5 +1,6 @@
 """Derived sequences: chosen frames, and what they know of their source."""
 
+import time
 from typing import ClassVar
 
 import numpy as np
@@ -9,8 +10,9 @@ from hypothesis import strategies as st
 
 from meshreel.errors import InputError
 from meshreel.geometry import derived_sequences
-from meshreel.geometry.derived_sequences import DerivedSequence, Memory, captured, picked, unchanging
-from meshreel.types import Mesh, MeshList
+from meshreel.geometry.derived_sequences import DerivedSequence, Memory, captured, picked, unchanging, welded
+from meshreel.geometry.threads import mapped, threads
+from meshreel.types import Mesh, MeshList, MeshSequence
 from tests.spheres import sliding_sphere
 
 
@@ -78,3 +80,32 @@ def test_a_frame_that_changed_before_it_is_read_again_is_refused(monkeypatch: py
     assert frames[2] is frames[2] and Counted.reads == {0: 2, 1: 2, 2: 2}
     with pytest.raises(InputError, match="frame 0: has changed while it was encoded"):
         frames[0]
+
+
+class OneReader(MeshSequence):
+    """Frames from one handle, which only one thread may use at a time."""
+
+    frame_rate = 30.0
+
+    def __init__(self) -> None:
+        self.inside, self.most = 0, 0
+
+    def __len__(self) -> int:
+        return 12
+
+    def __getitem__(self, index: int) -> Mesh:
+        self.inside += 1
+        self.most = max(self.most, self.inside)
+        time.sleep(0.002)
+        self.inside -= 1
+        return Mesh.of([[index, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 1, 2]])
+
+
+def test_a_sequence_that_does_not_say_that_threads_may_share_it_is_read_by_one_at_a_time():
+    source = OneReader()
+    frames = unchanging(welded(source))
+    with threads(4):
+        found = mapped(frames.__getitem__, range(12))
+    assert [mesh.vertices.max() for mesh in found] == [max(k, 1) for k in range(12)] and source.most == 1
+    shared = MeshList(tuple(found))
+    assert unchanging(welded(shared)).is_shared and not frames.is_shared

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from meshreel.errors import InputError
+from meshreel.geometry.threads import mapped, threads
 from meshreel.geometry.topology import weld
 from meshreel.io import meshes
 from meshreel.io.file_names import in_order
@@ -329,3 +330,14 @@ def test_only_steps_of_twice_the_usual_one_are_gaps(tmp_path, names, lost):
     mesh = Mesh.of([[0, 0, 0], [0, 1, 0], [1, 0, 0]], [[0, 1, 2]])
     found = warnings_of(tmp_path, *[mesh] * len(names), names=names)
     assert found == () if lost == 0 else f"{lost} frames are missing" in found[0]
+
+
+@pytest.mark.parametrize("save", [np.savez, np.savez_compressed])
+def test_threads_read_an_archive_in_any_order(save, tmp_path):
+    vertices = np.random.default_rng(0).random((24, 50, 3))
+    save(tmp_path / "a.npz", vertices=vertices, faces=np.arange(48).reshape(16, 3))
+    frames = open_sequence(tmp_path / "a.npz")
+    order = np.random.default_rng(1).permutation(24).tolist() + [1, 0, 3, 2, 5, 4, 9, 8, 23, 0]
+    with threads(4):
+        found = mapped(lambda number: frames[number].vertices, order)
+    assert all(np.array_equal(mesh, vertices[number]) for mesh, number in zip(found, order, strict=True))

@@ -77,6 +77,8 @@ class Recording(MeshSequence):
         self._kept, self._paints = Kept() if keep else None, bool(rig.color_cameras)
         self.steady = SteadyDepth(rig)
 
+    is_shared = True  # threads may read frames at the same time
+
     @property
     def frame_rate(self) -> float:
         return self.rig.frame_rate

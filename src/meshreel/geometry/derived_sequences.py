@@ -11,10 +11,11 @@ import hashlib
 import operator
 from collections import OrderedDict
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
-from threading import Lock
-from typing import Any, Protocol, runtime_checkable
+from threading import Lock, RLock
+from typing import Any, ClassVar, Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Bool
@@ -29,6 +30,7 @@ from .topology import part_of, weld
 # Bytes of frames that an encode keeps: the frames of a key interval, 120, with 20,000 vertices each take 115 MB.
 MOST_KEPT = 1 << 27
 _ONE_THREAD = Lock()  # at a time: memories go to other processes, which locks cannot
+_ONE_READER = RLock()  # of sequences that are not said to be read by several threads at a time
 
 
 @runtime_checkable
@@ -71,6 +73,7 @@ def only(sequence: MeshSequence, numbers: Sequence[int]) -> MeshSequence:
 class Held(MeshSequence):
     """Some frames of a sequence in memory, under their numbers in it."""
 
+    is_shared: ClassVar[bool] = True
     meshes: Mapping[int, Mesh]
     count: int  # frames of the whole sequence
     frame_rate: float  # 1/s
@@ -172,6 +175,11 @@ class DerivedSequence(MeshSequence):
         """True if the frames are in files, which other processes can read."""
         return self.numbers is None and getattr(self.source, "is_stored", False)
 
+    @property
+    def is_shared(self) -> bool:
+        """True if threads may read frames of the source at the same time."""
+        return getattr(self.source, "is_shared", False)
+
     def only(self, numbers: Sequence[int]) -> DerivedSequence:
         """Return the sequence with these of its frames, as the function `only` does; picked ones are read now."""
         if self.numbers is not None:  # what chooses among faces cannot always be sent
@@ -219,7 +227,8 @@ class DerivedSequence(MeshSequence):
             return self.frame(self.source, number)
         if (mesh := memory.get(number)) is None:
             work.count("frames read")
-            mesh = self.frame(self.source, number)
+            with nullcontext() if self.is_shared else _ONE_READER:
+                mesh = self.frame(self.source, number)
             memory.check(number, digest([mesh]), self.name(number))
             memory.keep(number, mesh)
         return mesh

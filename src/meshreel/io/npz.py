@@ -43,6 +43,9 @@ def _reading(where: str) -> Iterator[None]:
         raise InputError(f"{where}: cannot be read as .npz ({error}); write it again with numpy.savez") from None
 
 
+PASSED = 4  # rows of an array in an archive that are kept, at most (guess)
+
+
 class _Stream:
     """An array in an archive with a row for each frame, or one row for all, read forward row by row."""
 
@@ -54,6 +57,7 @@ class _Stream:
         self.shape = shape[-dimensions:] if len(shape) <= dimensions + 1 else ()
         self._stream: IO[bytes] | None = None
         self._lock = threading.Lock()  # of the stream, which has one position
+        self._next, self._passed = 0, dict[int, bytes]()  # the row that follows, and those that nobody asked for yet
 
     def __str__(self) -> str:
         return f"'{self._name}' is {self.dtype} {self._whole}"
@@ -64,11 +68,27 @@ class _Stream:
         with self._lock:
             if self._stream is None:  # while the sequence lives
                 self._stream = zipfile.ZipFile(self._path).open(f"{self._name}.npy")  # noqa: SIM115
-            self._stream.seek(self._begin + (0 if self.rows is None else frame) * size)
-            data = self._stream.read(size)
+                self._stream.seek(self._begin)
+            data = self._read(0 if self.rows is None else frame, size)
         if len(data) < size:
             raise Unreadable(f"'{self._name}' has {len(data)} of {size} bytes (truncated?)")
         return np.frombuffer(data, dtype=self.dtype).reshape(self.shape)
+
+    def _read(self, row: int, size: int) -> bytes:
+        """Read a row, and keep a few that lie before it: threads ask in another order, and no stream goes back."""
+        if row in self._passed:
+            return self._passed.pop(row)
+        assert (stream := self._stream) is not None
+        if not 0 <= row - self._next <= PASSED:
+            self._passed.clear()
+            stream.seek(self._begin + row * size)
+            self._next = row
+        for number in range(self._next, row):
+            self._passed[number] = stream.read(size)
+        while len(self._passed) > PASSED:
+            self._passed.pop(min(self._passed))
+        self._next = row + 1
+        return stream.read(size)
 
 
 class Archive:
@@ -140,11 +160,11 @@ class Archive:
     def _picture(self, index: int) -> UInt8[np.ndarray, "H W 3"]:
         assert self._texture is not None
         index = 0 if self._texture.rows is None else index
-        if self._last is None or self._last[0] != index:
+        last = self._last
+        if last is None or last[0] != index:
             with _reading(self.name(index)):
-                self._last = index, self._texture.row(index)
-        assert self._last is not None
-        return self._last[1]
+                last = self._last = index, self._texture.row(index)
+        return last[1]
 
 
 @lru_cache(maxsize=4)  # archives at a time (guess)

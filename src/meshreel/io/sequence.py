@@ -8,6 +8,7 @@ import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from threading import Lock
 from typing import Any
 
 import numpy as np
@@ -51,6 +52,9 @@ class SequenceOptions:
         if len(numbers) == 0:
             raise InputError(f"frames {self.frames!r} of {count} frames leave 0; choose at least one")
         return numbers
+
+
+_ONE_THREAD = Lock()  # at a time, at the counts of a sequence
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,7 +155,7 @@ class FileSequence(MeshSequence):
     def files(self) -> tuple[Path, ...]:
         return self._frames.paths
 
-    is_stored = True  # other processes can read the frames
+    is_stored = is_shared = True  # other processes can read the frames, and threads at the same time
 
     def only(self, numbers: Sequence[int]) -> FileSequence:
         """Return the sequence restricted to these frames, under the same numbers; it pickles as their file names."""
@@ -183,7 +187,8 @@ class FileSequence(MeshSequence):
             self._seen.merged[number] = (merged, len(loaded_mesh.vertices), len(loaded_mesh.faces) - len(mesh.faces))
         sized = (mesh.diagonal, number) if mesh.diagonal > 0 else None
         empty = {number} if mesh.is_empty else set[int]()
-        self._seen.add(_Seen({}, empty, dict.fromkeys(loaded.dropped, number), sized, sized))
+        with _ONE_THREAD:
+            self._seen.add(_Seen({}, empty, dict.fromkeys(loaded.dropped, number), sized, sized))
         return mesh
 
     def name(self, index: int) -> str:

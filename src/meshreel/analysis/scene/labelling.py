@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from threading import Lock
 from typing import Any
 
 import numpy as np
@@ -28,6 +29,7 @@ from .masks import Masker
 _REMEMBERED = 600  # frames whose labels are kept, some 50 kB each: a guess, enough for seconds of a scene
 _FLICKER_AREA = 0.2  # m^2: smaller separate moving surface beside an object at rest is flicker (decision 28)
 _ELSEWHERE = 2.0  # cells: surface farther from the middle of every known place is at no place (decision 18)
+_ONE_MASKER = Lock()  # a masker is asked by one thread at a time
 
 
 @dataclass(slots=True)
@@ -194,7 +196,8 @@ class ByMasks:
         if mesh.is_empty:
             return np.zeros(0, bool)
         sights = looks(mesh, self.views)
-        masks = self.masker.masks(frame, sights, self.views)
+        with _ONE_MASKER:
+            masks = self.masker.masks(frame, sights, self.views)
         dynamic, seen = votes(np.stack([s.faces for s in sights]), masks, len(mesh.faces))
         moves = dynamic / np.maximum(seen, 1) >= self.threshold  # eq. 4
         return without_islands(mesh, _filled(mesh, moves, seen > 0), self.island)
