@@ -110,19 +110,32 @@ def _hand_over(future: Future[Any], call: Any) -> None:
         future.set_exception(error)
 
 
-class _Workers(ProcessPoolExecutor):
-    """Worker processes that report their progress."""
+class _Workers(Executor):
+    """Worker processes that report their progress; the first call starts them."""
 
     worth = 15  # frames of an interval, at least: a process takes 2 s to begin (guess)
 
     def __init__(self, jobs: int) -> None:
-        context = _Context()
-        self._queue = context.SimpleQueue()
-        super().__init__(jobs, mp_context=context, initializer=_begin, initargs=(self._queue,))
+        self._max_workers = jobs
+        self._pool: ProcessPoolExecutor | None = None
+        self._queue: SimpleQueue[Told] | None = None
+
+    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+        """Let a process call a function."""
+        if self._pool is None:
+            context = _Context()
+            self._queue = context.SimpleQueue()
+            self._pool = ProcessPoolExecutor(self._max_workers, context, _begin, (self._queue,))
+        return self._pool.submit(fn, *args, **kwargs)
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
+        """End the processes that were started."""
+        if self._pool is not None:
+            self._pool.shutdown(wait, cancel_futures=cancel_futures)
 
     def told(self) -> Iterator[Told]:
         """Yield the workers' reports since the last call."""
-        while not self._queue.empty():
+        while self._queue is not None and not self._queue.empty():
             yield self._queue.get()
 
 

@@ -78,7 +78,8 @@ class _Stream:
         """Read a row, and keep a few that lie before it: threads ask in another order, and no stream goes back."""
         if row in self._passed:
             return self._passed.pop(row)
-        assert (stream := self._stream) is not None
+        stream = self._stream
+        assert stream is not None
         if not 0 <= row - self._next <= PASSED:
             self._passed.clear()
             stream.seek(self._begin + row * size)
