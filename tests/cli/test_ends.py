@@ -101,6 +101,7 @@ def test_a_whole_run_in_a_process_of_its_own_ends_with_zero(balls, tmp_path):
 
 WORKERS = """
 import sys, time
+from multiprocessing import active_children
 from meshreel.cli.workers import workers
 
 def lives(seconds):
@@ -111,7 +112,7 @@ if __name__ == "__main__":
         for _ in range(2):
             executor.submit(lives, 0.5)
         executor.submit(lives, 0.0).result()  # both have started
-        print(*executor._processes, flush=True)
+        print(*(child.pid for child in active_children()), flush=True)
         for _ in range(2):
             executor.submit(lives, 60.0)
         time.sleep(60)
