@@ -83,9 +83,8 @@ void bind_fit(nb::module_& m) {
         .def("move", &PySurfaceTree::move, "positions"_a, "Gives the vertices other positions.")
         .def("closest", &PySurfaceTree::closest, "queries"_a, "reach"_a, "guesses"_a = nb::none(),
              "gone"_a = nb::none(),
-             "The closest face to each query but those marked as gone, -1 where none is within reach, and the weights "
-             "of "
-             "its corners.")
+             "The closest face to each query, those that are gone left out, -1 where none is within reach, and the "
+             "weights of its corners.")
         .def("cast", &PySurfaceTree::cast, "origins"_a, "ways"_a, "weighted"_a,
              "The first face that each ray meets, -1 for none, the distance in lengths of its way, and the weights of "
              "the corners there, if wanted. One origin is that of all rays.");

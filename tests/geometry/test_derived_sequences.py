@@ -37,7 +37,7 @@ def triangles(count: int) -> Mesh:
 
 @given(st.integers(0, 100), st.lists(st.integers(0, 9), max_size=40))
 def test_the_frames_used_last_are_kept_as_far_as_they_fit(most: int, numbers: list[int]):
-    recent, used = Memory(most), list[int]()
+    recent, used = Memory(most).recent, list[int]()
     for number in numbers:
         fitting = [k for at, k in enumerate(used) if sum(12 * other for other in used[: at + 1]) <= most]
         found = recent.get(number)

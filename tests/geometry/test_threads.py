@@ -19,6 +19,8 @@ def test_results_are_in_the_order_of_the_arguments(count):
         assert mapped(slowly, range(12)) == [2 * k for k in range(12)]
         assert mapped(slowly, range(3), [1, 3, 5]) == [0, 3, 10]
         assert mapped(slowly, []) == []
+        with pytest.raises(ValueError, match="of different lengths"):
+            mapped(slowly, range(3), [1, 3])
 
 
 def test_calls_wait_for_each_other_in_no_more_threads_than_are_wanted():

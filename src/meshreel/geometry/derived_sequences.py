@@ -15,7 +15,7 @@ from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 from threading import Lock, RLock
-from typing import Any, ClassVar, Protocol, runtime_checkable
+from typing import Any, ClassVar, Generic, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
 from jaxtyping import Bool
@@ -29,7 +29,7 @@ from .topology import part_of, weld
 
 # Bytes of frames that an encode keeps: the frames of a key interval, 120, with 20,000 vertices each take 115 MB.
 MOST_KEPT = 1 << 27
-_ONE_THREAD = Lock()  # at a time: memories go to other processes, which locks cannot
+_T = TypeVar("_T")
 _ONE_READER = RLock()  # of sequences that are not said to be read by several threads at a time
 
 
@@ -92,29 +92,42 @@ class Held(MeshSequence):
         return self.meshes[index]
 
 
+class Recent(Generic[_T]):
+    """Results for the frames that were asked for last, as many as fit into some bytes; threads may share them."""
+
+    def __init__(self, most: int, nbytes: Callable[[_T], int]) -> None:
+        """`nbytes` returns the memory that a frame's result takes, of which there are at most `most` bytes."""
+        self._most, self._nbytes, self._free = most, nbytes, most
+        self._kept, self._lock = OrderedDict[int, _T](), Lock()
+
+    def get(self, number: int) -> _T | None:
+        """Return the result for a frame, None where it is not kept."""
+        with self._lock:
+            if number in self._kept:
+                self._kept.move_to_end(number)
+            return self._kept.get(number)
+
+    def keep(self, number: int, result: _T) -> None:
+        """Keep the result for a frame in place of those that were not used for longest."""
+        with self._lock:
+            if number in self._kept:  # another thread has made it, too
+                return
+            self._kept[number] = result
+            self._free -= self._nbytes(result)
+            while self._free < 0:
+                self._free += self._nbytes(self._kept.popitem(last=False)[1])
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Go to other processes without results."""
+        return Recent, (self._most, self._nbytes)
+
+
 class Memory:
     """Digests of the frames that were read, and those used last, as many as fit into `most` bytes."""
 
     def __init__(self, most: int) -> None:
         self.digests: dict[int, str] = {}
-        self._meshes, self._free = OrderedDict[int, Mesh](), most
-
-    def get(self, number: int) -> Mesh | None:
-        """Return a frame, None where it is not kept."""
-        with _ONE_THREAD:
-            if number in self._meshes:
-                self._meshes.move_to_end(number)
-            return self._meshes.get(number)
-
-    def keep(self, number: int, mesh: Mesh) -> None:
-        """Keep a frame in place of those that were not used for longest."""
-        with _ONE_THREAD:
-            if number in self._meshes:  # another thread has read it, too
-                return
-            self._meshes[number] = mesh
-            self._free -= _nbytes(mesh)
-            while self._free < 0:
-                self._free += _nbytes(self._meshes.popitem(last=False)[1])
+        self.recent = Recent(most, _nbytes)
 
     def check(self, number: int, now: str, name: str) -> None:
         """Raise InputError if a frame is not what it was when it was read first."""
@@ -225,12 +238,12 @@ class DerivedSequence(MeshSequence):
         number, memory = self._number(index), self.memory
         if memory is None:
             return self.frame(self.source, number)
-        if (mesh := memory.get(number)) is None:
+        if (mesh := memory.recent.get(number)) is None:
             work.count("frames read")
             with nullcontext() if self.is_shared else _ONE_READER:
                 mesh = self.frame(self.source, number)
             memory.check(number, digest([mesh]), self.name(number))
-            memory.keep(number, mesh)
+            memory.recent.keep(number, mesh)
         return mesh
 
 

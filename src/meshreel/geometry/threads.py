@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sized
 from concurrent.futures import ThreadPoolExecutor, wait
 from contextlib import ExitStack, contextmanager
 from contextvars import ContextVar, copy_context
@@ -57,7 +57,7 @@ def threads(count: int) -> Iterator[None]:
 
 
 def mapped(function: Callable[..., _T], *arguments: Iterable[Any]) -> list[_T]:
-    """Return the results of calls, as `map` would; raises what the first call that fails raises.
+    """Return the results of calls; raises what the first that fails raises, ValueError for arguments of unlike lengths.
 
     The work of calls in other threads is counted here.
     """
@@ -76,6 +76,8 @@ def ahead(function: Callable[[Any], _T], arguments: Iterable[Any], most: int = 1
 
 def mapped_until(enough: Callable[[_T], bool], function: Callable[..., _T], *arguments: Iterable[Any]) -> list[_T]:
     """Return the results of calls up to the first that is enough; other threads may do later ones in vain."""
+    if len({len(each) for each in arguments if isinstance(each, Sized)}) > 1:  # beside `repeat`
+        raise ValueError("arguments of different lengths")
     calls, pool = list(zip(*arguments, strict=False)), _pool.get()
     shared = _Calls(function, calls, enough)
     count = 0 if pool is None else min(pool.count, len(calls) - 1)

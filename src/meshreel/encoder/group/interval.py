@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import copy
-from collections import OrderedDict
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
-from threading import Lock
-from typing import Any, Generic, TypeVar
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float64
@@ -18,13 +15,12 @@ from ...analysis.survey import Survey, piece_of_faces
 from ...errors import InputError
 from ...geometry.color_views import MARGIN, ColorFrames, ColorPicture, ColorViews, Paint, Painted
 from ...geometry.depth import DepthFrames, FreeSpace
-from ...geometry.derived_sequences import CapturedSequence, DerivedSequence, only
+from ...geometry.derived_sequences import CapturedSequence, DerivedSequence, Recent, only
 from ...geometry.topology import clean, part_of
 from ...types import Frames, Mesh, MeshSequence, Placement, Up, offset
 
 UNEVEN = (0.25, 4.0)  # least and most noise of a place, in RMS noises of the frames (guess)
 MOST_RECENT = 1 << 27  # bytes: what four cameras of 1280 x 1152 pixels see in 40 frames, or their pictures in 7
-_T = TypeVar("_T")
 MOST_FRAMES = 64  # in a group: the tracker's distances and the basis grow with it (guess)
 
 
@@ -151,11 +147,11 @@ class Views:
     colors: ColorFrames
     sequence: MeshSequence
     place: Placement  # of the coordinates in which the cameras are asked
-    recent: Recent[ColorViews] = field(
-        default_factory=lambda: Recent(_bytes_of_views), kw_only=True, compare=False
+    depths: Recent[ColorViews] = field(
+        default_factory=lambda: Recent(MOST_RECENT, _bytes_of_views), kw_only=True, compare=False
     )  # without pictures
-    recent_pictures: Recent[list[ColorPicture]] = field(
-        default_factory=lambda: Recent(_bytes_of_pictures), kw_only=True, compare=False
+    placed: Recent[list[ColorPicture]] = field(
+        default_factory=lambda: Recent(MOST_RECENT, _bytes_of_pictures), kw_only=True, compare=False
     )
 
     @staticmethod
@@ -166,54 +162,26 @@ class Views:
 
     def at(self, number: int) -> ColorViews:
         """Return the cameras' views of a frame, whose surface hides a place; those asked for last are kept."""
-        depths = self.recent.get(number, self._depths)
-        return depths.with_pictures(self.pictures(number))
-
-    def _depths(self, number: int) -> ColorViews:
-        return self.of_surface(number, self.surface(number)).without_pictures
+        if (views := self.depths.get(number)) is None:
+            views = self.of_surface(number, self.surface(number)).without_pictures
+            self.depths.keep(number, views)
+        return views.with_pictures(self.pictures(number))
 
     def of_surface(self, number: int, hides: Mesh) -> ColorViews:
         """Return the cameras' views of a surface in a frame, in normalised coordinates."""
         return ColorViews(self.pictures(number), hides, MARGIN / self.place.scale)
 
     def pictures(self, number: int) -> list[ColorPicture]:
-        """Return the pictures of a frame, for places in normalised coordinates."""
-        return self.recent_pictures.get(number, self._placed)
-
-    def _placed(self, number: int) -> list[ColorPicture]:
-        return [picture.placed(self.place) for picture in self.colors[number] if picture is not None]
+        """Return the pictures of a frame, for places in normalised coordinates; those asked for last are kept."""
+        if (pictures := self.placed.get(number)) is None:
+            pictures = [picture.placed(self.place) for picture in self.colors[number] if picture is not None]
+            self.placed.keep(number, pictures)
+        return pictures
 
     def surface(self, number: int) -> Mesh:
         """Return all surface of a frame, in normalised coordinates."""
         mesh, place = self.sequence[number], self.place
         return mesh.at((mesh.vertices - place.origin) / place.scale)
-
-
-class Recent(Generic[_T]):
-    """Results for the frames that were asked for last, as many as fit into `MOST_RECENT` bytes."""
-
-    def __init__(self, nbytes: Callable[[_T], int]) -> None:
-        """`nbytes` returns the memory that a frame's result takes."""
-        self._nbytes, self._made, self._free, self._lock = nbytes, OrderedDict[int, _T](), MOST_RECENT, Lock()
-
-    def get(self, number: int, make: Callable[[int], _T]) -> _T:
-        """Return the result for a frame, which is made where it is not kept."""
-        with self._lock:
-            if number in self._made:
-                self._made.move_to_end(number)
-                return self._made[number]
-        made = make(number)
-        with self._lock:
-            if number not in self._made:
-                self._made[number] = made
-                self._free -= self._nbytes(made)
-                while self._free < 0 and len(self._made) > 1:
-                    self._free += self._nbytes(self._made.popitem(last=False)[1])
-        return made
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        """Go to other processes without results."""
-        return Recent, (self._nbytes,)
 
 
 def _bytes_of_views(views: ColorViews) -> int:
