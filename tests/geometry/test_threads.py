@@ -25,21 +25,24 @@ def test_results_are_in_the_order_of_the_arguments(count):
 
 def test_calls_wait_for_each_other_in_no_more_threads_than_are_wanted():
     seen, lock, most = set[int](), threading.Lock(), [0, 0]
+    all_three = threading.Barrier(3)
 
-    def call(_: int) -> None:
+    def call(number: int) -> None:
         with lock:
             most[0] += 1
             most[1] = max(most)
         seen.add(threading.get_ident())
+        if number < 3:
+            all_three.wait()  # however late another thread comes
         time.sleep(0.01)
         with lock:
             most[0] -= 1
 
     with threads(3):
         mapped(call, range(12))
-    assert 2 <= len(seen) <= 3 and 2 <= most[1] <= 3 and threading.get_ident() in seen
+    assert len(seen) == most[1] == 3 and threading.get_ident() in seen
     seen.clear()
-    mapped(call, range(4))
+    mapped(lambda _: seen.add(threading.get_ident()), range(4))
     assert seen == {threading.get_ident()}  # outside of the block
 
 
@@ -49,19 +52,22 @@ def test_calls_within_calls_end_though_every_thread_waits():
 
 
 @pytest.mark.parametrize("count", [1, 4])
-def test_the_first_call_that_fails_is_told_of(count):
-    begun = list[int]()
+def test_the_first_call_that_fails_is_told_of(count, monkeypatch):
+    begun, stopped, stop = list[int](), threading.Event(), sides._Calls.stop
+    monkeypatch.setattr(sides._Calls, "stop", lambda calls: (stop(calls), stopped.set()))
 
     def fails(number: int) -> int:
         begun.append(number)
-        time.sleep(0.02 if number == 3 else 0.0)
         if number in (3, 4):
+            time.sleep(0.02 if number == 3 else 0.0)
             raise ValueError(f"call {number}")
+        if number > 4:  # another thread than the one that fails
+            stopped.wait()
         return number
 
     with threads(count), pytest.raises(ValueError, match="call 3"):
         mapped(fails, range(100))
-    assert len(begun) < 20
+    assert len(begun) <= 5 + count
 
 
 @pytest.mark.parametrize("count", [1, 4])
