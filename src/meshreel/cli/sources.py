@@ -12,7 +12,7 @@ from typing import Annotated
 from cyclopts import Parameter, Token
 
 from ..analysis.scene.masks import ImageMasks, Masker, read_view_file
-from ..analysis.scene.sam3 import PromptBy, Sam3Masks, Sam3Options
+from ..analysis.scene.sam3 import PromptBy, Sam3Masks
 from ..analysis.scene.segmentation import Cameras
 from ..capture.recording import open_recording
 from ..capture.recordings import is_rig, is_take, open_take
@@ -138,7 +138,7 @@ class Masking:
         if self.masks is not None:
             return ImageMasks(self.masks, frames)
         if self.sam3 is not None:
-            return Sam3Masks(self.sam3, self.prompts or None, Sam3Options(None, self.prompt_by, self.device))
+            return Sam3Masks(self.sam3, self.prompts or None, self.prompt_by, self.device)
         return None
 
 

@@ -53,9 +53,9 @@ class Hypotheses:
         return int(self.objects.max(initial=0)) + 1
 
 
-def hypotheses(tracked: Tracked, least: float = VARIATION) -> Hypotheses:
-    """Select the objects of a video whose masks vary over time by at least `least`."""
-    moving = {number for number in tracked.kinds if variation(tracked.objects, number) >= least}
+def hypotheses(tracked: Tracked) -> Hypotheses:
+    """Select the objects of a video whose masks vary over time by at least `VARIATION`."""
+    moving = {number for number in tracked.kinds if variation(tracked.objects, number) >= VARIATION}
     still = {tracked.kinds[number] for number in tracked.kinds if number not in moving}
     kinds = frozenset(tracked.kinds[number] for number in moving) - still
     objects = np.where(np.isin(tracked.objects, sorted(moving)), tracked.objects, 0)
@@ -76,11 +76,11 @@ def variation(objects: Objects, number: int) -> float:
     return 1.0 - float(np.mean([overlap(mask, usual) for mask in masks]))
 
 
-def moving_in_views(tracked: Tracked, moving: Hypotheses, frame: int, least: float = OVERLAP) -> Objects:
+def moving_in_views(tracked: Tracked, moving: Hypotheses, frame: int) -> Objects:
     """Return the moving objects of one moment in every view, the reference view first; 0: none.
 
-    An object in the reference view moves if it matches one of the hypotheses, with an overlap of `least`; one that this
-    view does not see moves if its kind does.
+    An object in the reference view moves if it overlaps with one of the hypotheses by `OVERLAP`; one that this view does
+    not see moves if its kind does.
     """
     numbers = np.zeros(max(tracked.kinds, default=0) + 1, np.int32)
     for number, kind in tracked.kinds.items():
@@ -89,7 +89,7 @@ def moving_in_views(tracked: Tracked, moving: Hypotheses, frame: int, least: flo
             seen = moving.objects[frame]
             shares = {int(other): overlap(mask, seen == other) for other in np.unique(seen[mask]) if other}
             best = max(shares, key=lambda other: (shares[other], -other), default=0)
-            numbers[number] = best if shares.get(best, 0.0) >= least else 0
+            numbers[number] = best if shares.get(best, 0.0) >= OVERLAP else 0
         elif kind in moving.kinds:
             numbers[number] = moving.elsewhere
     return numbers[tracked.objects]

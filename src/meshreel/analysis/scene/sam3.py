@@ -12,34 +12,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
 from jaxtyping import Bool, Float32, Int32, UInt8
 
-from ...errors import InputError
 from ...geometry.cameras import Camera
 from ...geometry.drawing import Seen
 from .color_looks import ColorLooks
-from .hypotheses import OVERLAP, VARIATION, Hypotheses, hypotheses, moving_in_views, reference_view, thinned, tour
+from .hypotheses import Hypotheses, hypotheses, moving_in_views, reference_view, thinned, tour
 from .masks import Masker, Picture, normal_picture
 from .sam3_trackers import PointTracker, WordTracker
 
 AUTOMATIC = ("person", "animal", "vehicle", "object")  # default prompts: things that may move; a guess
 PromptBy = Literal["words", "motion"]
-
-
-@dataclass(frozen=True, slots=True)
-class Sam3Options:
-    """Options of masks by SAM3."""
-
-    reference: int | None = None  # number of the view that is tracked over time; None: the one with most changes
-    prompt_by: PromptBy = "words"  # prompts of objects: words, or points at which the reference view sees motion
-    device: str = "cpu"  # torch's name of a device: cpu, cuda, cuda:1 ...
-    variation: float = VARIATION  # smallest variation over time of a moving object's mask
-    overlap: float = OVERLAP  # smallest intersection over union of two masks of one object
 
 
 class Sam3Masks(Masker):
@@ -50,15 +37,20 @@ class Sam3Masks(Masker):
 
     observes = True
 
-    def __init__(self, path: Path, prompts: Sequence[str] | None = None, options: Sam3Options = Sam3Options()) -> None:
-        """Load the weights in the folder `path`. Raises InputError if they or the extra `sam3` are missing."""
+    def __init__(
+        self, path: Path, prompts: Sequence[str] | None = None, prompt_by: PromptBy = "words", device: str = "cpu"
+    ) -> None:
+        """Load the weights in the folder `path` to a torch device, as cuda:1.
+
+        Objects are prompted for by words, or by points at which the reference view sees motion. Raises InputError if
+        the weights or the extra `sam3` are missing.
+        """
         self._tracker: WordTracker | PointTracker
-        if options.prompt_by == "words":
-            self._tracker = WordTracker(path, tuple(prompts or AUTOMATIC), options.device)
+        if prompt_by == "words":
+            self._tracker = WordTracker(path, tuple(prompts or AUTOMATIC), device)
         else:
-            self._tracker = PointTracker(path, options.device)
-        self._options = options
-        self._chosen = options.reference
+            self._tracker = PointTracker(path, device)
+        self._chosen: int | None = None
         self._colors: ColorLooks | None = None
         self._pictures: list[Picture] = []
         self._depths: list[Float32[np.ndarray, "h w"]] = []
@@ -81,9 +73,8 @@ class Sam3Masks(Masker):
         if self._moving is not None or frame < len(self._pictures):
             return
         assert frame == len(self._pictures), "frames are observed in order, before masks"
-        number = self._reference(views)
-        self._pictures.append(self._picture(frame, number, seen, views))
-        self._depths.append(thinned(seen[number].depth))
+        self._pictures.append(self._picture(frame, self.reference, seen, views))
+        self._depths.append(thinned(seen[self.reference].depth))
 
     def masks(self, frame: int, seen: Sequence[Seen], views: Sequence[Camera]) -> Bool[np.ndarray, "X H W"]:
         """Return the masks of an observed frame; True: moving."""
@@ -97,22 +88,16 @@ class Sam3Masks(Masker):
         if self._moving is None:  # stage 1, at the first call
             assert self._pictures, "observe the frames first"
             over_time = self._tracker.over_time(self._pictures, self._depths)
-            self._moving = hypotheses(over_time, self._options.variation)
+            self._moving = hypotheses(over_time)
             self._pictures, self._depths = [], []
         moving = self._moving
         if not moving.objects.any():
             return np.zeros((len(views), views[0].height, views[0].width), np.int32)
-        order = tour(views, self._reference(views))
+        order = tour(views, self.reference)
         pictures = [self._picture(frame, number, seen, views) for number in order]
         tracked = self._tracker.through_views(pictures, moving.objects[frame])
-        return moving_in_views(tracked, moving, frame, self._options.overlap)[np.argsort(order)]
+        return moving_in_views(tracked, moving, frame)[np.argsort(order)]
 
     def _picture(self, frame: int, number: int, seen: Sequence[Seen], views: Sequence[Camera]) -> Picture:
         photo = None if self._colors is None else self._colors.at(frame, number)
         return normal_picture(seen[number], views[number]) if photo is None else photo
-
-    def _reference(self, views: Sequence[Camera]) -> int:
-        number = self.reference
-        if not 0 <= number < len(views):
-            raise InputError(f"reference view {number} of {len(views)}: give 0 to {len(views) - 1}")
-        return number
