@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -83,7 +82,7 @@ def command(
         row = {"frames": len(sequence), "views": len(views)}
         text = f"{output}: pictures of {row['frames']} frames from {row['views']} views, and {CAMERAS}"
     else:
-        row = _write_labels(_Labelling(sequence, masker, scene), output, previews, common)
+        row = _write_labels(sequence, masker, scene, output, previews, common)
         text = f"{output}: {_describe(row)}"
     warnings = (*source.warnings, *getattr(masker, "remarks", ()), *left)
     common.warn(warnings)
@@ -103,27 +102,20 @@ def _left_over(output: Path, count: int, views_only: bool, previews: int) -> tup
     return (*left_over(output / LABELS, frame_names(count, "npz")), *left_over(output / COLORED, colored))
 
 
-@dataclass(frozen=True, slots=True)
-class _Labelling:
-    """A scene to label, with the source of masks and the options."""
-
-    frames: MeshSequence
-    masker: Masker | None
-    options: SceneOptions
-
-
-def _write_labels(scene: _Labelling, output: Path, previews: int, common: Common) -> dict[str, Any]:
-    frames, count, options = scene.frames, len(scene.frames), scene.options
+def _write_labels(
+    frames: MeshSequence, masker: Masker | None, options: SceneOptions, output: Path, previews: int, common: Common
+) -> dict[str, Any]:
+    count = len(frames)
     chosen = evenly(count, previews)
     names = [Path(name).stem for name in frame_names(count, "npz")]
     moving, of_bodies, rows = list[int](), list[list[int]](), list[tuple[int, list[Picture], list[int]]]()
     with common.stages(count) as progress:
         by: Segmentation
-        if scene.masker is None:
+        if masker is None:
             views = scene_views(frames, options.cameras)
             by = segment(frames, options.cameras, lambda share: progress("segment", round(share * count), count))
         else:
-            masks = segment_by(scene.masker, frames, options.cameras)
+            masks = segment_by(masker, frames, options.cameras)
             views, by = tuple(masks.views), masks
         progress("segment", count, count)
         for folder in (LABELS, *([COLORED] if chosen else [])):
