@@ -79,8 +79,8 @@ def variation(objects: Objects, number: int) -> float:
 def moving_in_views(tracked: Tracked, moving: Hypotheses, frame: int) -> Objects:
     """Return the moving objects of one moment in every view, the reference view first; 0: none.
 
-    An object in the reference view moves if it overlaps with one of the hypotheses by `OVERLAP`; one that this view does
-    not see moves if its kind does.
+    An object in the reference view moves if it overlaps with one of the hypotheses by `OVERLAP`; one that this view
+    does not see moves if its kind does.
     """
     numbers = np.zeros(max(tracked.kinds, default=0) + 1, np.int32)
     for number, kind in tracked.kinds.items():
