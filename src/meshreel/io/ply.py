@@ -263,32 +263,15 @@ class _Binary:
             raise Unreadable(f"PLY announces {element.rows} {element.name} rows but the file is too short (truncated?)")
         if element.rows == 0 or not element.properties:
             return {name: np.zeros(0) for name in wanted}, dict.fromkeys(wanted, _NOTHING)
-        lengths = self._lengths_of_first_row(element)
-        fields = [(f"{k}", p.dtype, (n,)) for k, (p, n) in enumerate(zip(element.properties, lengths, strict=True))]
-        counts = [(f"n{k}", p.count or np.dtype("V0")) for k, p in enumerate(element.properties)]
-        row = np.dtype([part for pair in zip(counts, fields, strict=True) for part in pair])
-        if self._at + row.itemsize * element.rows <= len(self._data):
-            rows = np.frombuffer(self._data, dtype=row, count=element.rows, offset=self._at)
-            if all((rows[f"n{k}"] == n).all() for k, n in enumerate(lengths) if element.properties[k].count):
-                self._at += row.itemsize * element.rows
-                return _even_rows(element, rows, wanted)
-        return self._uneven_rows(element, wanted)
+        if all(field.count is None for field in element.properties):
+            row = np.dtype([(f"{k}", field.dtype) for k, field in enumerate(element.properties)])
+            rows = np.frombuffer(self._data, row, element.rows, self._at)
+            self._at += rows.nbytes
+            return {field.name: rows[f"{k}"] for k, field in enumerate(element.properties) if field.name in wanted}, {}
+        return self._rows_of_lists(element, wanted)
 
-    def _lengths_of_first_row(self, element: _Element) -> list[int]:
-        at, lengths = self._at, list[int]()
-        for field in element.properties:
-            length = 1
-            if field.count is not None:
-                count, at = self._data[at : at + field.count.itemsize], at + field.count.itemsize
-                length = int.from_bytes(count, "big" if field.count.byteorder == ">" else "little")
-            lengths.append(length)
-            at += length * field.dtype.itemsize
-            if at > len(self._data):
-                raise _short(element, 0)
-        return lengths
-
-    def _uneven_rows(self, element: _Element, wanted: Collection[str]) -> tuple[Columns, Items]:
-        """Read rows of different lengths: where a row begins depends on the row before."""
+    def _rows_of_lists(self, element: _Element, wanted: Collection[str]) -> tuple[Columns, Items]:
+        """Read rows of any lengths: where a row begins depends on the row before."""
         sizes = [(p.count.itemsize if p.count else 0, p.dtype.itemsize) for p in element.properties]
         fields = np.array(sizes, dtype=np.int64)
         is_big = any(p.count is not None and p.count.byteorder == ">" for p in element.properties)
@@ -307,19 +290,6 @@ class _Binary:
                 items[field.name] = values.view(field.dtype), lengths.view(np.int64)
         self._at = end
         return columns, items
-
-
-def _even_rows(element: _Element, rows: np.ndarray, wanted: Collection[str]) -> tuple[Columns, Items]:
-    columns, items = Columns(), Items()
-    for k, field in enumerate(element.properties):
-        block = rows[f"{k}"]
-        if field.name not in wanted:
-            continue
-        if field.count is None:
-            columns[field.name] = block[:, 0]
-        else:
-            items[field.name] = block.reshape(-1), np.full(len(block), block.shape[1], dtype=np.int64)
-    return columns, items
 
 
 def _short(element: _Element, row: int) -> Unreadable:
