@@ -21,6 +21,7 @@ from jaxtyping import Float64
 from ...errors import InputError
 from ...geometry import strict
 from ...geometry.depth import depth_noise
+from ...geometry.topology import linked
 from ...io.write import replacing
 from ...types import UP_AXES, Up
 from ..rig.cameras import DepthCamera, posed
@@ -235,10 +236,8 @@ class _Scene:
 
 def _strangers(names: Sequence[str], pairs: Sequence[tuple[int, int]]) -> Iterator[str]:
     """Yield a warning where cameras do not hang together by pairs that overlap."""
-    group = list(range(len(names)))
-    for i, j in pairs:
-        group = [group[i] if each == group[j] else each for each in group]
-    parts = [[name for name, each in zip(names, group, strict=True) if each == one] for one in dict.fromkeys(group)]
+    group = linked(np.array(pairs, np.int64).reshape(-1, 2), len(names))
+    parts = [[names[k] for k in np.flatnonzero(group == one).tolist()] for one in range(group.max() + 1)]
     if len(parts) > 1:
         shown = " | ".join(", ".join(part) for part in parts)
         yield f"no surface is seen from both sides of a bar: {shown}; poses across a bar are as they were given"
