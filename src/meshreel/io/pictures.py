@@ -9,7 +9,7 @@ from __future__ import annotations
 import io
 import re
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -110,11 +110,9 @@ def parse_depth(data: bytes, where: str) -> UInt16[np.ndarray, "H W"]:
 
 def is_deep(data: bytes) -> bool:
     """Return True if the bytes of a file are a grey picture of 16 bits."""
-    try:
-        with opened(data, "", "", "") as image:
-            return image.mode in DEEP
-    except InputError:
-        return False
+    with suppress(InputError), opened(data, "", "", "") as image:
+        return image.mode in DEEP
+    return False
 
 
 def read_mask(path: Path) -> UInt8[np.ndarray, "H W"]:
@@ -128,11 +126,9 @@ def read_mask(path: Path) -> UInt8[np.ndarray, "H W"]:
 
 def is_mask(path: Path) -> bool:
     """Return True if the header of a file is that of a mask, False for color pictures and other files."""
-    try:
-        with opened(read_input(path), "", "", "") as image:
-            return image.mode in _MODES
-    except InputError:
-        return False
+    with suppress(InputError), opened(read_input(path), "", "", "") as image:
+        return image.mode in _MODES
+    return False
 
 
 def find_masks(folder: Path, views: int, frames: int) -> list[list[Path]]:
