@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -148,7 +149,7 @@ class Views:
     sequence: MeshSequence
     place: Placement  # of the coordinates in which the cameras are asked
     depths: Recent[ColorViews] = field(
-        default_factory=lambda: Recent(MOST_RECENT, _bytes_of_views), kw_only=True, compare=False
+        default_factory=lambda: Recent(MOST_RECENT, attrgetter("nbytes")), kw_only=True, compare=False
     )  # without pictures
     placed: Recent[list[ColorPicture]] = field(
         default_factory=lambda: Recent(MOST_RECENT, _bytes_of_pictures), kw_only=True, compare=False
@@ -182,10 +183,6 @@ class Views:
         """Return all surface of a frame, in normalised coordinates."""
         mesh, place = self.sequence[number], self.place
         return mesh.at((mesh.vertices - place.origin) / place.scale)
-
-
-def _bytes_of_views(views: ColorViews) -> int:
-    return views.nbytes
 
 
 def _bytes_of_pictures(pictures: list[ColorPicture]) -> int:
