@@ -2,6 +2,8 @@
 
 import os
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 
@@ -43,6 +45,15 @@ def without_secret(text: str) -> str:
             if further := _FURTHER.match(text, at):
                 found, at = f"{found}{further[1]}?...", further.start(2) + len(further[2].rstrip(":;,.)]'\""))
     return found + text[at:]
+
+
+@contextmanager
+def needed(text: str) -> Iterator[None]:
+    """Raise InputError with a text, which tells what to install, where an import in the block fails."""
+    try:
+        yield
+    except ImportError as error:
+        raise InputError(text) from error
 
 
 def path_of(name: object) -> str | Path:

@@ -18,7 +18,7 @@ from jaxtyping import Bool, Float32, Float64, Int32, Int64
 from scipy.spatial import cKDTree
 
 from .. import _core
-from ..errors import InputError
+from ..errors import InputError, needed
 from ..types import Mesh
 from .closest_points import Surface
 from .depth import DepthPicture
@@ -188,11 +188,9 @@ def poisson_surface(points: Points, normals: Points, depth: int, reach: float) -
     `depth` is that of the octree. Runs in one thread, so that the same points give the same bits. Raises InputError
     without Open3D.
     """
-    try:
+    text = "Poisson reconstruction needs the extra `open3d`: pip install 'meshreel[open3d]'"
+    with needed(f"{text}; or use preset `paper`, which does without"):
         import open3d as o3d
-    except ImportError as error:
-        text = "Poisson reconstruction needs the extra `open3d`: pip install 'meshreel[open3d]'"
-        raise InputError(f"{text}; or use preset `paper`, which does without") from error
     if len(points) < 10:
         return Mesh.empty()
     cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points))

@@ -15,7 +15,7 @@ from typing import IO, Any, BinaryIO
 import numpy as np
 from jaxtyping import Bool, Float32, Int32, Int64, UInt8, UInt16, UInt32
 
-from ..errors import InputError
+from ..errors import InputError, needed
 from .pictures import pack_picture
 from .polygons import shares_of
 
@@ -204,10 +204,8 @@ def _words(*values: int) -> bytes:
 
 def check_meshopt() -> Any:
     """Return the package. Raises InputError if it is not installed."""
-    try:
+    with needed("meshoptimizer is not installed; pip install 'meshreel[glb]'"):
         import meshoptimizer
-    except ImportError:
-        raise InputError("meshoptimizer is not installed; pip install 'meshreel[glb]'") from None
     return meshoptimizer
 
 

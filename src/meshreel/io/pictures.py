@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from jaxtyping import UInt8, UInt16
 
-from ..errors import InputError
+from ..errors import InputError, needed
 from .files import Place, read_input
 
 if TYPE_CHECKING:
@@ -84,10 +84,8 @@ def opened(data: bytes, where: str, wanted: str, remedy: str) -> Iterator[Image.
 
 def pack_picture(pixels: UInt8[np.ndarray, "H W *C"] | UInt16[np.ndarray, "H W"]) -> bytes:
     """Return the bytes of a PNG file, grey or in colour. Raises InputError if Pillow is missing."""
-    try:
+    with needed("pictures need the extra `color`: pip install 'meshreel[color]'"):
         from PIL import Image
-    except ImportError:
-        raise InputError("pictures need the extra `color`: pip install 'meshreel[color]'") from None
     packed = io.BytesIO()
     Image.fromarray(pixels).save(packed, format="PNG", compress_level=1)  # a quarter of the time for a tenth more
     return packed.getvalue()

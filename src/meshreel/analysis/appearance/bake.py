@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float64, Int32, Int64, UInt8
 
-from ...errors import InputError
+from ...errors import InputError, needed
 from ...geometry.atlas import MOST_SIDE, Layout
 from ...geometry.color_views import ColorViews, Paint, spread_colors
 from ...geometry.splats import located
@@ -174,11 +174,8 @@ def unwrap(base: Mesh, size: int) -> Layout:
 
     Raises InputError if xatlas is missing, or cannot fit the mesh.
     """
-    try:
+    with needed("textures need the extra `color`: pip install 'meshreel[color]', or give --color vertices"):
         import xatlas
-    except ImportError:
-        remedy = "pip install 'meshreel[color]', or give --color vertices"
-        raise InputError(f"textures need the extra `color`: {remedy}") from None
     density = 0.0
     for _ in range(PACKINGS):
         atlas = xatlas.Atlas()

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float32, Float64, Int32
 
-from ...errors import InputError
+from ...errors import InputError, needed
 from ...geometry.atlas import finer_places
 from ...geometry.cameras import Camera, CameraPose, looking_at
 from ...geometry.color_views import ColorPicture, Painted, sampled
@@ -76,10 +76,8 @@ def fit_splats(frames: Sequence[SplatFrame], count: int, steps: int = STEPS) -> 
     pictures = [(frame.carrier, view) for frame in frames for view in frame.views]
     if not any((view.pixels < 1).any() for _, view in pictures):
         raise InputError(f"no splats: none of {len(pictures)} pictures shows the surface; check the cameras")
-    try:
+    with needed("splats are fitted by torch: pip install 'meshreel[splats]'"):
         import torch
-    except ImportError:
-        raise InputError("splats are fitted by torch: pip install 'meshreel[splats]'") from None
     threads = torch.get_num_threads()
     torch.set_num_threads(1)  # sums have an order
     try:

@@ -11,7 +11,7 @@ import numpy as np
 from cyclopts import Parameter
 from jaxtyping import UInt8
 
-from ...errors import InputError
+from ...errors import InputError, needed
 from ...geometry import strict
 from ...geometry.cameras import Matrix
 from ..rig.cameras import ColorCamera
@@ -68,10 +68,8 @@ class BoardOptions:
 
 def opencv() -> Any:
     """Return OpenCV. Raises InputError where it is missing."""
-    try:
+    with needed("boards need the extra `calibrate`: pip install 'meshreel[calibrate]'"):
         import cv2
-    except ImportError:
-        raise InputError("boards need the extra `calibrate`: pip install 'meshreel[calibrate]'") from None
     return cv2
 
 

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float64
 
-from ...errors import InputError
+from ...errors import InputError, needed
 from ...geometry import strict
 from ...geometry.cameras import Matrix
 from ...io.files import read_input, read_json
@@ -145,10 +145,8 @@ def _toml(data: bytes) -> dict[str, Matrix]:
 
 def _yaml(data: bytes) -> dict[str, Matrix]:
     """Parse YAML of OpenCV's FileStorage, or of `ros2 topic echo /tf_static`."""
-    try:
+    with needed("YAML needs the extra `calibrate`: pip install 'meshreel[calibrate]'"):
         records = [record for record in yaml_of(data) if isinstance(record, dict)]
-    except ImportError:
-        raise InputError("YAML needs the extra `calibrate`: pip install 'meshreel[calibrate]'") from None
     if any("transforms" in record for record in records):
         return _transforms([one for record in records for one in record.get("transforms", [])])
     return _opencv({key: value for record in records for key, value in record.items()})

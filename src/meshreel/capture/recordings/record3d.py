@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...errors import InputError
+from ...errors import needed
 from ...io.files import MOST_BYTES, read_file
 from ...io.pictures import last_number
 from ...texts import json_of
@@ -91,12 +91,10 @@ def _by_number(names: list[str], extensions: tuple[str, ...]) -> dict[int, str]:
 
 def _lzfse(load: Callable[[str], bytes], aspect: float, name: str) -> np.ndarray:
     """Return the depths, m, in a file of an .r3d; `aspect` is width by height."""
-    try:
+    text = "the depth of an .r3d is compressed by LZFSE, which meshreel does not read by itself"
+    remedy = "export it in Record3D as EXR + JPG, or pip install pyliblzfse (needs a C compiler)"
+    with needed(f"{text}; {remedy}"):
         import liblzfse
-    except ImportError:
-        text = "the depth of an .r3d is compressed by LZFSE, which meshreel does not read by itself"
-        remedy = "export it in Record3D as EXR + JPG, or pip install pyliblzfse (needs a C compiler)"
-        raise InputError(f"{text}; {remedy}") from None
     depth = np.frombuffer(liblzfse.decompress(load(name)), "<f4")
     return depth.reshape(-1, max(1, round((len(depth) * aspect) ** 0.5)))
 

@@ -18,7 +18,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ...errors import FormatError, InputError
+from ...errors import FormatError, InputError, needed
 from ...format.budget import check_pictures
 from ...format.kinds import Varint
 from ...format.layout import LAYER_PICTURES, Form, Pictures, VideoCodec
@@ -238,10 +238,8 @@ def _threads() -> set[int]:
 
 def _context(codec: str, mode: Literal["r", "w"]) -> Any:
     os.environ.setdefault("SVT_LOG", "1")  # errors only: SVT would report each encoder on standard error
-    try:
+    with needed("textures need the extra `color`: pip install 'meshreel[color]'"):
         import av
-    except ImportError:
-        raise InputError("textures need the extra `color`: pip install 'meshreel[color]'") from None
     try:
         return av.CodecContext.create(codec, mode)
     except (av.error.FFmpegError, ValueError) as error:
