@@ -11,9 +11,10 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Float64
+from jaxtyping import Float64, Int32
 
 from ..geometry.strict import dot
+from ..geometry.topology import blend
 from ..types import Mesh
 from .surface_samples import RESOLUTION, WORST_ANGLE, Samples, angles, interpolate, sample, used_surface
 
@@ -106,6 +107,7 @@ class Original:
 
     def __init__(self, mesh: Mesh) -> None:
         self.mesh = used_surface(mesh)
+        self.is_whole = len(self.mesh.faces) == len(mesh.faces)
 
     @cached_property
     def samples(self) -> Samples:
@@ -113,13 +115,20 @@ class Original:
         return sample(self.mesh, self.mesh.middle)
 
 
-def surface_errors(original: Mesh | Original, decoded: Mesh) -> SurfaceErrors:
+Closest = tuple[Int32[np.ndarray, " _"], Float64[np.ndarray, "_ 3"]]  # faces, and weights of their corners
+BothClosest = tuple[Closest, Closest]  # decoded surface closest to samples of the original, and the other way
+
+
+def surface_errors(original: Mesh | Original, decoded: Mesh, closest: BothClosest | None = None) -> SurfaceErrors:
     """Measure all distances and normal errors between two meshes of one frame.
 
-    Faces without area and vertices without faces are no surface: they are ignored, also in the diagonal.
+    Faces without area and vertices without faces are no surface: they are ignored, also in the diagonal. `closest` is
+    what is known: of the vertices and middles of faces of both meshes; it is not used where other points are compared.
     """
-    prepared = original if isinstance(original, Original) else Original(original)
-    original, decoded = prepared.mesh, used_surface(decoded)
+    prepared, shown = original if isinstance(original, Original) else Original(original), Original(decoded)
+    if not (prepared.is_whole and shown.is_whole):
+        closest = None
+    original, decoded = prepared.mesh, shown.mesh
     if original.is_empty or decoded.is_empty:
         errors = _PERFECT if original.is_empty and decoded.is_empty else _WORST
         return SurfaceErrors(original.diagonal, errors, errors)
@@ -127,9 +136,10 @@ def surface_errors(original: Mesh | Original, decoded: Mesh) -> SurfaceErrors:
     extent = max(float(np.abs(mesh.vertices).max()) for mesh in (a.mesh, b.mesh))
     if not _LEAST <= extent <= _MOST:  # in metres, squares of the queries' float32 would be inf or 0
         unit = 2.0 ** math.floor(math.log2(extent))
-        smaller = surface_errors(*(Mesh.of(mesh.vertices * (1 / unit), mesh.faces) for mesh in (original, decoded)))
+        scaled = [Mesh.of(mesh.vertices * (1 / unit), mesh.faces) for mesh in (original, decoded)]
+        smaller = surface_errors(scaled[0], scaled[1])
         return SurfaceErrors(original.diagonal, smaller.forward.times(unit), smaller.backward.times(unit))
-    ways = (_one_way(one, other, original.diagonal) for one, other in ((a, b), (b, a)))
+    ways = (_one_way(*way, original.diagonal) for way in zip((a, b), (b, a), closest or (None, None), strict=True))
     return SurfaceErrors(original.diagonal, *ways)
 
 
@@ -137,14 +147,18 @@ _PERFECT = OneWayErrors(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 _WORST = OneWayErrors(math.inf, math.inf, math.inf, math.inf, WORST_ANGLE, WORST_ANGLE, 0.0)
 
 
-def _one_way(source: Samples, target: Samples, diagonal: float) -> OneWayErrors:
+def _one_way(source: Samples, target: Samples, closest: Closest | None, diagonal: float) -> OneWayErrors:
     """Measure from the samples of one mesh to the surface of the other; distances below `RESOLUTION` become 0."""
-    hits, vertices = target.surface.closest(source.points), len(source.mesh.vertices)
-    offsets = hits.points - source.points
+    vertices = len(source.mesh.vertices)
+    if closest is None or len(closest[0]) != len(source.points):  # of a mesh that is sampled more finely
+        hits = target.surface.closest(source.points)
+        closest = hits.faces, hits.barycentric
+    corners = target.mesh.faces[closest[0]]
+    offsets = blend(target.mesh.vertices, corners, closest[1]) - source.points
     distances = np.sqrt(np.einsum("nd,nd->n", offsets, offsets))
     noise = distances < RESOLUTION * diagonal
     offsets[noise], distances[noise] = 0, 0
-    normals = interpolate(target.vertex_normals, target.mesh.faces[hits.faces], hits.barycentric)
+    normals = interpolate(target.vertex_normals, corners, closest[1])
     squared = distances**2
     along = np.einsum("nd,nd->n", offsets, normals) ** 2
     along = np.where(normals.any(axis=1), along, squared)  # without a normal the whole distance counts

@@ -83,7 +83,7 @@ def _rows(originals: Frames, decoded: Frames, options: SheetOptions) -> Iterator
     pairs = [(frame, originals[frame - first], decoded[frame - first]) for frame in frames]
     cameras = _cameras([mesh for _, mesh, _ in pairs], options)
     for frame, *meshes in pairs:
-        errors = surface_errors(*meshes)
+        errors = surface_errors(meshes[0], meshes[1])
         factor = 1000.0 if options.unit == "mm" else 100 / (errors.diagonal or 1.0)
         label = f"frame {frame}\nD2 {errors.d2_psnr_paper:.1f} dB\nnormals {errors.angle:.1f}°"
         for camera in cameras:

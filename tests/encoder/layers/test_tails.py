@@ -10,6 +10,7 @@ from meshreel.coding.group import payload_bytes_by_purpose
 from meshreel.coding.layers.patches import decode_patches
 from meshreel.encoder.group.forms import Fidelity, measure
 from meshreel.encoder.layers import tails
+from meshreel.encoder.layers.shown_frame import shown_frames
 from meshreel.encoder.layers.tails import find_tails
 from meshreel.encoder.sequence import encode
 from meshreel.encoder.settings.options import EncoderOptions
@@ -41,18 +42,18 @@ def noisy(mesh: Mesh, frames: int = 6) -> np.ndarray:
 
 
 def test_where_the_template_fits_there_is_no_layer() -> None:
-    assert find_tails([BALL] * 6, meshes(noisy(BALL), BALL.faces), SIZE, noise=0.0) is None
+    assert find_tails(shown_frames([BALL] * 6, meshes(noisy(BALL), BALL.faces)), SIZE, 0.0) is None
 
 
 def test_a_perfect_template_has_no_tails() -> None:
     places = np.repeat(BALL.vertices[None], 2, axis=0)
-    assert find_tails([BALL] * 2, meshes(places, BALL.faces), SIZE, noise=0.0) is None
+    assert find_tails(shown_frames([BALL] * 2, meshes(places, BALL.faces)), SIZE, 0.0) is None
 
 
 def test_surface_that_is_not_there_any_more_is_dropped() -> None:
     template = concatenate([BALL, knob()])
     frames = [template] * 3 + [BALL] * 3
-    found = find_tails(frames, meshes(noisy(template), template.faces), SIZE, noise=0.0)
+    found = find_tails(shown_frames(frames, meshes(noisy(template), template.faces)), SIZE, 0.0)
     assert found is not None
     for t, frame in enumerate(found[1]):
         assert len(frame.faces) == (len(template.faces) if t < 3 else len(BALL.faces))
@@ -61,7 +62,7 @@ def test_surface_that_is_not_there_any_more_is_dropped() -> None:
 
 def test_surface_that_is_new_is_added() -> None:
     frames = [BALL] * 5 + [concatenate([BALL, knob()])]
-    found = find_tails(frames, meshes(noisy(BALL), BALL.faces), SIZE, noise=0.0)
+    found = find_tails(shown_frames(frames, meshes(noisy(BALL), BALL.faces)), SIZE, 0.0)
     assert found is not None
     assert [len(frame.faces) > len(BALL.faces) for frame in found[1]] == [False] * 5 + [True]
     plain = [Mesh(places, BALL.faces) for places in noisy(BALL)]
@@ -71,13 +72,13 @@ def test_surface_that_is_new_is_added() -> None:
 def test_without_shares_nothing_is_added(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("meshreel.encoder.layers.tails.SHARES", ())
     frames = [BALL] * 5 + [concatenate([BALL, knob()])]
-    assert find_tails(frames, meshes(noisy(BALL), BALL.faces), SIZE, noise=0.0) is None
+    assert find_tails(shown_frames(frames, meshes(noisy(BALL), BALL.faces)), SIZE, 0.0) is None
 
 
 def test_where_bytes_are_dear_nothing_is_sent(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("meshreel.encoder.layers.tails.EXCHANGE", 1e9)
     frames = [BALL] * 5 + [concatenate([BALL, knob(0.004, 0.32)])]
-    assert find_tails(frames, meshes(noisy(BALL), BALL.faces), SIZE, noise=0.0) is None
+    assert find_tails(shown_frames(frames, meshes(noisy(BALL), BALL.faces)), SIZE, 0.0) is None
 
 
 def sheet(step: float = 0.05) -> Mesh:
@@ -96,7 +97,7 @@ def test_patches_on_an_almost_exact_template_are_close_to_the_frame(noise: float
     frames = [flat] * 3 + [concatenate([flat, knob(at=0.45)])]
     places = np.repeat(flat.vertices[None], 4, axis=0)
     places = places + noise * np.random.default_rng(0).normal(size=places.shape)
-    found = find_tails(frames, meshes(places, flat.faces), SIZE, noise=0.0)
+    found = find_tails(shown_frames(frames, meshes(places, flat.faces)), SIZE, 0.0)
     assert (found is None) == (noise == 1e-9)  # there a byte is worth nothing
     if found is not None:
         decoded = decode_patches(found[0], 4, len(flat.faces)).apply(places, flat.faces)
@@ -108,7 +109,7 @@ def test_a_mask_that_pays_is_kept_where_a_patch_beside_it_does_not(monkeypatch: 
     frames = [concatenate([BALL, knob(0.012, at=-0.4)]), template, BALL]
     places = noisy(template, 3)
     monkeypatch.setattr(tails._Search, "holds", lambda _, tried: all(mesh.is_empty for mesh in tried.parts.meshes))
-    found = find_tails(frames, meshes(places, template.faces), SIZE, noise=0.0)
+    found = find_tails(shown_frames(frames, meshes(places, template.faces)), SIZE, 0.0)
     assert found is not None and found[0].dropped and not found[0].mesh
 
 
@@ -118,7 +119,7 @@ def test_tails_remove_the_error_that_their_bytes_are_worth(size: int, scale: flo
     template = concatenate([BALL, knob(scale)])
     frames = [concatenate([BALL, knob(scale, -0.4)])] * 2 + [template] * 4
     places = noisy(template)
-    found = find_tails(frames, meshes(places, template.faces), size, noise=0.0)
+    found = find_tails(shown_frames(frames, meshes(places, template.faces)), size, 0.0)
     assert found is not None
     before = measure(frames, [Mesh(p, template.faces) for p in places]).distance ** 2
     after = measure(frames, found[1]).distance ** 2
@@ -132,13 +133,13 @@ def test_the_frames_are_those_that_the_record_decodes_to() -> None:
     template = concatenate([BALL, knob()])
     frames = [concatenate([BALL, knob(at=-0.4)]), template, BALL]
     places = noisy(template, 3)
-    found = find_tails(frames, meshes(places, template.faces), SIZE, noise=0.0)
+    found = find_tails(shown_frames(frames, meshes(places, template.faces)), SIZE, 0.0)
     assert found is not None and found[0].mesh and found[0].dropped
     decoded = decode_patches(found[0], 3, len(template.faces)).apply(places, template.faces)
     for mine, theirs in zip(decoded, found[1], strict=True):
         np.testing.assert_array_equal(mine.vertices, theirs.vertices)
         np.testing.assert_array_equal(mine.faces, theirs.faces)
-    assert find_tails(frames, meshes(places, template.faces), SIZE, noise=0.0)[0] == found[0]  # type: ignore[index]
+    assert find_tails(shown_frames(frames, meshes(places, template.faces)), SIZE, 0.0)[0] == found[0]  # type: ignore[index]
 
 
 def meshes(positions: np.ndarray, faces: np.ndarray) -> list[Mesh]:
@@ -186,9 +187,9 @@ def test_surface_that_a_frame_lacks_stays_unless_a_camera_saw_through_it():
     place = Placement(1.0, (0.0, 0.0, 3.0))
     frames, shown = [Mesh(BALL.vertices + NOISE[0], BALL.faces)] * 2, [more] * 2
     seen, blind = FreeSpace.of([away], place), FreeSpace.of([], place)
-    dropped = find_tails(frames, shown, SIZE, noise=1e-3, free=[seen] * 2)
+    dropped = find_tails(shown_frames(frames, shown, [seen] * 2), SIZE, 1e-3)
     assert dropped is not None and all(len(mesh.faces) < len(more.faces) for mesh in dropped[1])
-    assert find_tails(frames, shown, SIZE, noise=1e-3, free=[blind] * 2) is None
+    assert find_tails(shown_frames(frames, shown, [blind] * 2), SIZE, 1e-3) is None
 
 
 @pytest.mark.parametrize(("measured", "stays"), [(0, False), (2, True)])
@@ -198,12 +199,12 @@ def test_surface_that_cameras_face_and_hardly_ever_measure_goes(measured: int, s
     dark = DepthPicture(camera, np.zeros((64, 64), np.float32), 1.0, 10.0)
     free = [FreeSpace.of([dark], Placement(1.0, (0.0, 0.0, 3.0)))] * 4
     frames = [concatenate([bare, knob()])] * measured + [bare] * (4 - measured)
-    found = find_tails(frames, [more] * 4, SIZE, noise=1e-3, free=free)
+    found = find_tails(shown_frames(frames, [more] * 4, free), SIZE, 1e-3)
     faces = len(more.faces) if found is None else len(found[1][-1].faces)
     assert (faces == len(more.faces)) == stays
 
 
 def test_holes_of_noisy_bodies_are_patched_at_any_price():
     frame = concatenate([Mesh(BALL.vertices + NOISE[0], BALL.faces), knob()])
-    found = find_tails([frame] * 2, [BALL] * 2, 10, noise=1e-3)  # a byte costs more than the knob
+    found = find_tails(shown_frames([frame] * 2, [BALL] * 2), 10, 1e-3)  # a byte costs more than the knob
     assert found is not None and all(len(mesh.faces) > len(BALL.faces) for mesh in found[1])

@@ -21,7 +21,7 @@ from ...format.budget import CostlyError
 from ...format.layout import Form
 from ...geometry.decimate import decimate
 from ...geometry.threads import mapped
-from ...metrics.distance import PSNR_CEILING, Original, surface_errors
+from ...metrics.distance import PSNR_CEILING, BothClosest, Original, surface_errors
 from ...metrics.surface_samples import WORST_ANGLE
 from ...types import Mesh
 
@@ -199,9 +199,14 @@ class Fidelity(Target):
 NO_ERROR = Fidelity(0.0, 0.0, 0.0, PSNR_CEILING)
 
 
-def measure(originals: Sequence[Mesh | Original], decoded: Sequence[Mesh]) -> Fidelity:
-    """Measure decoded frames; a frame with a surface on one side only has an infinite distance."""
-    errors = mapped(surface_errors, originals, decoded)
+def measure(
+    originals: Sequence[Mesh | Original], decoded: Sequence[Mesh], closest: Sequence[BothClosest | None] = ()
+) -> Fidelity:
+    """Measure decoded frames; a frame with a surface on one side only has an infinite distance.
+
+    `closest`: of each frame what `surface_errors` need not look for.
+    """
+    errors = mapped(surface_errors, originals, decoded, closest or repeat(None))
     distances = [e.symmetric_rms for e in errors]
     mean_square = sum(d * d for d in distances) / len(errors)
     angle = sum(e.angle for e in errors) / len(errors)

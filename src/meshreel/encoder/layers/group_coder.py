@@ -17,10 +17,12 @@ from ...coding.mesh import CodedReference
 from ...format.budget import CostlyError
 from ...format.layout import Form
 from ...format.records import pack
+from ...metrics.distance import BothClosest
 from ...types import Mesh
 from ..group.digests import note
 from ..group.forms import EncodedGroup, Target, cheaper, cheapest_intra, intra_only, measure, most_for
 from .options import LayersOptions
+from .shown_frame import shown_frames
 from .tails import find_tails
 
 MOST_FOR_EDGES = 4  # times the bytes that frames with their edges may cost (guess)
@@ -63,36 +65,39 @@ class GroupCoder:
             half = len(self.surfaces) // 2
             return replace(self, surfaces=self.surfaces[:half]).layers(reference, positions[:half], previous)
         note("fields and symbols", encoded.payload)
-        payload, ends, shown = self._with_tails(encoded, reference.base.faces)
+        payload, ends, shown, closest = self._with_tails(encoded, reference.base.faces)
         note("patches", payload[len(encoded.payload) :])
         count = len(self.surfaces)
         most = min(self.options.measured or count, count)
         some = [(2 * k + 1) * count // (2 * most) for k in range(most)]
-        fidelity = measure([self.surfaces[k].mesh for k in some], [shown[k] for k in some])
+        frames = self.frames
+        fidelity = measure([frames[k] for k in some], [shown[k] for k in some], [closest[k] for k in some])
         note("fidelity", fidelity)
         chosen = EncodedGroup(Form.LAYERS, len(self.surfaces), payload, ends, fidelity, previous is not None)
         if not np.isfinite(chosen.fidelity.distance) or any(mesh.is_empty for mesh in shown):
             return self.alone(), None  # the template has collapsed: nothing is comparable
         if fidelity.angle > self.options.flat * self.target.angle:  # edges are lost, as those of few, large faces
-            sharp = cheapest_intra(self.frames, self.target, MOST_FOR_EDGES * len(payload), self.options.intra)
+            sharp = cheapest_intra(frames, self.target, MOST_FOR_EDGES * len(payload), self.options.intra)
             if sharp is not None:
                 return sharp, None
         if self.tries_draco and most_for(chosen) > self.dearer:
-            chosen = cheaper(self.frames, chosen, self.options.intra)
+            chosen = cheaper(frames, chosen, self.options.intra)
         return chosen, encoded.state if chosen.form == Form.LAYERS else None
 
     def _with_tails(
         self, encoded: EncodedLayers, faces: Int32[np.ndarray, "F 3"]
-    ) -> tuple[bytes, tuple[int, ...], list[Mesh]]:
-        """Return the encoded layers, where each ends, and their frames, with a layer of patches where that pays."""
+    ) -> tuple[bytes, tuple[int, ...], list[Mesh], list[BothClosest | None]]:
+        """Return the encoded layers, with patches where they pay, where each ends, its frames, and what is closest."""
         payload, layers = encoded.payload, encoded.layers
         decoded = [Mesh(positions, faces) for positions in encoded.positions]
         if not self.options.tails:
-            return payload, layers, decoded
+            return payload, layers, decoded, [None] * len(decoded)
         known, free, uneven = zip(*((each.surface, each.free, each.uneven) for each in self.surfaces), strict=True)
-        found = find_tails(known, decoded, len(payload), noise=self.noise, free=free, uneven=uneven)
+        shown = shown_frames(known, decoded, free, uneven)
+        found = find_tails(shown, len(payload), self.noise)
         if found is None:
-            return payload, layers, decoded
+            return payload, layers, decoded, [frame.closest for frame in shown]
         record, frames = found
         payload += pack(record)
-        return payload, (*layers, len(payload)), frames
+        closest = [frame.closest if mesh.faces is faces else None for frame, mesh in zip(shown, frames, strict=True)]
+        return payload, (*layers, len(payload)), frames, closest

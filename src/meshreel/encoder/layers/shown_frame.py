@@ -7,13 +7,15 @@ where faces are dropped or patched, and which faces may not be shown, whatever i
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from itertools import repeat
 
 import numpy as np
 from jaxtyping import Bool, Float64, Int32, Int64
 
-from ...geometry.closest_points import Surface
+from ...geometry.closest_points import Hits, Surface
 from ...geometry.depth import FreeSpace
 from ...geometry.strict import dot
+from ...geometry.threads import mapped
 from ...geometry.topology import components, connected_faces, face_normals
 from ...types import Mesh
 
@@ -34,17 +36,20 @@ class ShownFrame:
     ) -> None:
         """`uneven`: the noise of each vertex, in units of all noise; squared distances are in units of its square."""
         original, self._free = surface.mesh, free
-        corners = np.ones(len(original.vertices)) if uneven is None else uneven
-        self._uneven = np.concatenate([corners, corners[original.faces].mean(axis=1)]) ** 2
+        self._uneven: Float64[np.ndarray, " N"] | None = None
+        if uneven is not None:
+            self._uneven = np.concatenate([uneven, uneven[original.faces].mean(axis=1)]) ** 2
         self.original, self.decoded, self.surface, self.knows_free = original, decoded, surface, free is not None
-        self.points, areas = _samples(original)
+        mine, areas = _samples(original)
         shares = np.bincount(original.faces.reshape(-1), np.repeat(areas / 12, 3), len(original.vertices))
         weights = np.concatenate([shares, 0.75 * areas])
         self.weights = weights / weights.sum()
         self._decoded = Surface(decoded)
-        self.squared, self.hit = self.ahead(self._decoded)
         points, self.areas = _samples(decoded)
-        self._nearest = self._back(points)  # of the decoded mesh's samples
+        ahead, back = self._decoded.closest(mine), surface.closest(points)
+        self.closest = (ahead.faces, ahead.barycentric), (back.faces, back.barycentric)  # to the samples of either
+        self.squared, self.hit = self._by_noise(_squared(ahead, mine), slice(None)), ahead.faces
+        self._nearest = self._back(back, points)
         self.apart = self._of_free(points, self._nearest[0], decoded)  # of each decoded face, squared
         self.errors = (
             dot(self.weights, self.squared),
@@ -52,22 +57,27 @@ class ShownFrame:
         )
 
     def ahead(
-        self,
-        surface: Surface,
-        some: Int64[np.ndarray, " n"] | slice = slice(None),
-        gone: Bool[np.ndarray, " F"] | None = None,
+        self, surface: Surface, some: Int64[np.ndarray, " n"], gone: Bool[np.ndarray, " F"] | None = None
     ) -> tuple[Float64[np.ndarray, " n"], Int32[np.ndarray, " n"]]:
         """Return squared distances of some of the frame's samples from a surface, and its faces that are closest.
 
         Faces that are `gone` are left out.
         """
-        squared, faces = _squared_distances(surface, self.points[some], gone)
-        return squared / self._uneven[some], faces
+        points = _points(self.original)[some]
+        hits = surface.closest(points, gone)
+        return self._by_noise(_squared(hits, points), some), hits.faces
 
-    def _back(self, points: Float64[np.ndarray, "N 3"]) -> tuple[Float64[np.ndarray, " N"], Int32[np.ndarray, " N"]]:
-        """Return squared distances of points from the frame's surface, and its faces that are closest."""
-        squared, faces = _squared_distances(self.surface, points)
-        return squared / self._uneven[len(self.original.vertices) + faces], faces
+    def _back(
+        self, hits: Hits, points: Float64[np.ndarray, "N 3"]
+    ) -> tuple[Float64[np.ndarray, " N"], Int32[np.ndarray, " N"]]:
+        """Return squared distances of points from their `hits` on the frame's surface, and its faces there."""
+        return self._by_noise(_squared(hits, points), len(self.original.vertices) + hits.faces), hits.faces
+
+    def _by_noise(
+        self, squared: Float64[np.ndarray, " n"], samples: Int64[np.ndarray, " n"] | Int32[np.ndarray, " n"] | slice
+    ) -> Float64[np.ndarray, " n"]:
+        """Return squared distances in units of the squared noise of the frame's samples there."""
+        return squared if self._uneven is None else squared / self._uneven[samples]
 
     def wrong(self) -> Bool[np.ndarray, " F"]:
         """Return the decoded faces that face away from the frame's surface, or are farther from it than `FAR`."""
@@ -121,7 +131,7 @@ class ShownFrame:
             squared = squared.copy()
             squared[far] = np.minimum(squared[far], self.ahead(Surface(patch), far)[0])
             points, added = _samples(patch)
-            away = self._of_free(points, self._back(points)[0], patch)
+            away = self._of_free(points, self._back(self.surface.closest(points), points)[0], patch)
             areas, apart = np.concatenate([areas, added]), np.concatenate([apart, away])
         return dot(self.weights, squared), dot(areas, apart) / float(areas.sum()) if areas.any() else np.inf
 
@@ -145,16 +155,27 @@ class ShownFrame:
         return _of_faces(squared, mesh.faces)
 
 
+def shown_frames(
+    frames: Sequence[Mesh | Surface],
+    decoded: Sequence[Mesh],
+    free: Sequence[FreeSpace | None] = (),
+    uneven: Sequence[Float64[np.ndarray, " _"] | None] = (),
+) -> list[ShownFrame]:
+    """Return each frame beside its decoded mesh, with what cameras saw through and the noise of its vertices."""
+    surfaces = mapped(lambda frame: frame if isinstance(frame, Surface) else Surface(frame), frames)
+    return mapped(ShownFrame, surfaces, decoded, free or repeat(None), uneven or repeat(None))
+
+
 def _samples(mesh: Mesh) -> tuple[Float64[np.ndarray, "N 3"], Float64[np.ndarray, " F"]]:
-    return np.concatenate([mesh.vertices, mesh.vertices[mesh.faces].mean(axis=1)]), face_normals(mesh)[1]
+    return _points(mesh), face_normals(mesh)[1]
 
 
-def _squared_distances(
-    surface: Surface, points: Float64[np.ndarray, "N 3"], gone: Bool[np.ndarray, " F"] | None = None
-) -> tuple[Float64[np.ndarray, " N"], Int32[np.ndarray, " N"]]:
-    """Return the squared distances of points from a surface, and the faces that are closest, of those not gone."""
-    hits = surface.closest(points, gone)
-    return ((hits.points - points) ** 2).sum(axis=1), hits.faces
+def _points(mesh: Mesh) -> Float64[np.ndarray, "N 3"]:
+    return np.concatenate([mesh.vertices, mesh.vertices[mesh.faces].mean(axis=1)])
+
+
+def _squared(hits: Hits, points: Float64[np.ndarray, "N 3"]) -> Float64[np.ndarray, " N"]:
+    return ((hits.points - points) ** 2).sum(axis=1)
 
 
 def _of_faces(squared: Float64[np.ndarray, " N"], faces: Int32[np.ndarray, "F 3"]) -> Float64[np.ndarray, " F"]:

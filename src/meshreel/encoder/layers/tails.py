@@ -22,7 +22,6 @@ from ...format.layout import LayersPatches
 from ...format.records import pack
 from ...geometry.closest_points import Surface
 from ...geometry.decimate import decimate
-from ...geometry.depth import FreeSpace
 from ...geometry.strict import dot
 from ...geometry.threads import mapped
 from ...geometry.topology import clean, concatenate, drop_unreferenced
@@ -39,44 +38,33 @@ LATTICE = 2.0  # spacing of the patches' lattice, in RMS distances of the rest (
 EXCHANGE = 1.33  # power of the rate with which the squared error falls: 4 dB a doubling (decision 13)
 
 
-def find_tails(
-    frames: Sequence[Mesh | Surface],
-    decoded: Sequence[Mesh],
-    size: int,
-    *,
-    noise: float,
-    free: Sequence[FreeSpace | None] = (),
-    uneven: Sequence[Float64[np.ndarray, " _"] | None] = (),
-) -> tuple[LayersPatches, list[Mesh]] | None:
+def find_tails(shown: list[ShownFrame], size: int, noise: float) -> tuple[LayersPatches, list[Mesh]] | None:
     """Return the layer of patches that lowers squared error + price x bytes most, and the frames as decoded with it.
 
-    None where no layer does. The `decoded` meshes of a group have the same faces; `size` is that of their layers,
-    bytes. `noise` is the RMS distance of the frames from the truth: thresholds count from there where the rest is
-    nearer; `uneven` is that of each vertex in units of it, for each frame. `free` is what cameras saw through in each
-    frame: surface that a frame lacks stays unless one saw through it. Neither the mean nor the larger of both
-    directions' errors rises by more than the layer's bytes are worth; but holes are patched at any price.
+    None where no layer does. The decoded meshes of a group have the same faces; `size` is that of their layers, bytes.
+    `noise` is the RMS distance of the frames from the truth: thresholds count from there where the rest is nearer.
+    Surface that a frame lacks stays unless a camera saw through it. Neither the mean nor the larger of both directions'
+    errors rises by more than the layer's bytes are worth; but holes are patched at any price.
     """
-    surfaces = mapped(lambda frame: frame if isinstance(frame, Surface) else Surface(frame), frames)
-    shown = mapped(ShownFrame, surfaces, decoded, free or repeat(None), uneven or repeat(None))
-    faces = decoded[0].faces
+    faces = shown[0].decoded.faces
     usual = float(np.mean([frame.body() for frame in shown]))  # squared
     if not EXACT**2 < usual < np.inf:
         return None
     if noise > 0:  # a foot that the template lacks may be more than a tail
         usual = min(usual, (NOISY_REST * noise) ** 2)
-    price = EXCHANGE * len(frames) * usual / size
+    price = EXCHANGE * len(shown) * usual / size
     usual = max(usual, noise**2)
-    rung = _rung([surface.mesh for surface in surfaces], LATTICE * usual**0.5)
+    rung = _rung([frame.original for frame in shown], LATTICE * usual**0.5)
     search = _Search(shown, faces, usual, price, rung, noise)
     gone = ghosts(shown, faces, search.far if noise > 0 else None)
     best, least = None, np.inf if gone.any() else search.cost(None)
     better = list[_Coded]()  # each than those before it
     for dropped in search.masks(gone):
-        tried = search.coded(dropped, (Mesh.empty(),) * len(frames))
+        tried = search.coded(dropped, (Mesh.empty(),) * len(shown))
         if (cost := search.cost(tried)) < least:
             best, least = tried, cost
             better.append(tried)
-    dropped = best.parts.dropped if best else np.zeros((len(frames), len(faces)), bool)
+    dropped = best.parts.dropped if best else np.zeros((len(shown), len(faces)), bool)
     if torn := search.is_torn(dropped):
         better, least = [], np.inf
     for patches in search.patches(best):
@@ -88,7 +76,7 @@ def find_tails(
     chosen = next((tried for tried in reversed(better) if torn or search.holds(tried)), least_of_all)
     if chosen is None:
         return None
-    return chosen.record, chosen.parts.apply(np.stack([mesh.vertices for mesh in decoded]), faces)
+    return chosen.record, chosen.parts.apply(np.stack([frame.decoded.vertices for frame in shown]), faces)
 
 
 @dataclass(frozen=True, slots=True)
