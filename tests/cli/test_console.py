@@ -3,10 +3,11 @@
 import time
 
 import pytest
-from rich.progress import Progress
+from rich.progress import Progress as RichProgress
 
 from meshreel.cli import console, shown
-from meshreel.cli.console import Common, StageBars, left, line_of
+from meshreel.cli.console import Common, StageBars, line_of
+from meshreel.encoder.group.progress import Progress
 
 
 class Clock:
@@ -20,51 +21,37 @@ class Clock:
 def staged():
     """Stages without a display, and the clock that they go by."""
     clock = Clock()
-    return StageBars(Progress(disable=True, get_time=clock), 100), clock
+    return StageBars(RichProgress(disable=True, get_time=clock)), clock
 
 
-def test_the_time_left_is_that_of_the_frames_so_far(staged):
-    progress, clock = staged
-    progress("code", 20, 100)  # of an earlier run
-    (task,) = progress.bars.tasks
-    assert left(task) is None
-    for clock.now, done in ((30.0, 21), (80.0, 40)):
-        progress("code", done, 100)
-    assert left(task) == 80.0 * 60 / 20
-
-
-def test_a_line_tells_of_all_stages_that_are_not_done(staged):
+def test_a_line_tells_of_the_first_stage_that_is_not_done(staged):
     progress, clock = staged
     assert line_of(progress.bars.tasks) == ""
-    progress("survey", 100, 100)
+    progress("read", 100, 100)
     clock.now = 30.0
-    assert line_of(progress.bars.tasks) == "meshreel: survey is done; 0:00:30 so far"
-    for stage, done in (("code", 0), ("track", 1)):
-        progress(stage, done, 100)
-    clock.now = 120.0
-    assert line_of(progress.bars.tasks) == "meshreel: code 0, track 1 of 100 frames; 0:02:00 so far"
-    progress("code", 10, 100)
-    assert line_of(progress.bars.tasks).endswith("code 10, track 1 of 100 frames; 0:02:00 so far, about 0:13:30 left")
+    assert line_of(progress.bars.tasks).startswith("meshreel: read 100 of 100 frames; 0:00:30 so far")
+    progress("compare", 0, 100)
+    clock.now = 80.0
+    progress("compare", 20, 100)
+    line = line_of(progress.bars.tasks)
+    assert line == "meshreel: compare 20 of 100 frames; 0:01:20 so far, about 0:03:20 left"
 
 
-def test_a_stage_that_begins_again_counts_its_time_anew(staged):
+def test_an_encode_is_one_bar_with_the_share_of_the_whole_and_the_stage(staged):
     progress, clock = staged
-    progress("code", 0, 100)
-    clock.now = 1000.0
-    progress("code", 100, 100)
-    (task,) = progress.bars.tasks
-    assert task.finished
-    progress("code", 0, 100)
-    clock.now = 1010.0
-    progress("code", 10, 100)
-    assert not task.finished and left(task) == 90.0
+    progress.encode(Progress("survey", 3, 10, 0.01, None))
+    clock.now = 20.0
+    assert line_of(progress.bars.tasks) == "meshreel: encode 1 %, survey; 0:00:20 so far, about -:--:-- left"
+    progress.encode(Progress("track", 1, 10, 0.25, 59.8))
+    assert line_of(progress.bars.tasks) == "meshreel: encode 25 %, track; 0:00:20 so far, about 0:01:00 left"
+    assert len(progress.bars.tasks) == 1 and progress.bars.tasks[0].percentage == 25
 
 
 @pytest.mark.parametrize("quiet", [False, True])
 def test_outside_a_terminal_lines_come_as_long_as_it_lasts(monkeypatch, capsys, quiet):
     monkeypatch.setattr(console, "EVERY", 0.02)
     said, patience = "", 10 if quiet else 3000
-    with Common(quiet=quiet).stages(8) as progress:
+    with Common(quiet=quiet).stages() as progress:
         progress("code", 3, 8)
         while said.count("\n") < 3 and (patience := patience - 1):
             time.sleep(0.02)

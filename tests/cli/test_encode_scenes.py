@@ -25,11 +25,11 @@ QUICK = quick("paper").method
 def quick_bodies(monkeypatch):
     """Bodies coded frame by frame: what is told of a scene does not depend on how its bodies are coded."""
 
-    def frame_by_frame(recipe, interval, stages):
+    def frame_by_frame(recipe, interval):
         del recipe
         frames = interval.frames
         alone = [frames] if frames[0].is_empty else [[frame] for frame in frames]
-        return [group for some in alone for group in PaperRecipe(QUICK).encode(Interval(some), stages)]
+        return [group for some in alone for group in PaperRecipe(QUICK).encode(Interval(some))]
 
     monkeypatch.setattr("meshreel.encoder.layers.recipe.LayersRecipe.encode", frame_by_frame)
 

@@ -22,8 +22,8 @@ from tests.small_options import resolve_small
 real = command.Encoder
 
 def slow(sequence, executor, progress, *rest):
-    def wait(stage, done, total):
-        if stage == "code" and done == 1:
+    def wait(now):
+        if now.stage == "code" and now.done == 1:
             print("coding", flush=True)
             time.sleep(120)
     return real(sequence, executor, wait, *rest)

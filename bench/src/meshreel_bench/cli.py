@@ -145,7 +145,7 @@ def run(
     store = Store(selection.data.absolute(), output.absolute().with_suffix(CACHE), reading.options())
     common.warn(views_missing(selection.data, [point.sequence for point in points]))
     how = Measuring(store, running.limit, running.retry, running.jobs)
-    with common.stages(len(points), "points") as progress:
+    with common.stages("points") as progress:
         done = 0
 
         def opening(sequence: str) -> None:

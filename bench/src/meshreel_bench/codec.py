@@ -7,6 +7,7 @@ from dataclasses import asdict
 from typing import Any, Protocol, TypeVar, cast, runtime_checkable
 
 from meshreel.decoder.video import open as open_video
+from meshreel.encoder.group.progress import Report
 from meshreel.types import Mesh, MeshSequence
 
 from .rows import ColorBytes
@@ -21,6 +22,11 @@ def reported(items: Iterable[Item], progress: Progress | None, stage: str, count
         yield item
         if progress is not None:
             progress(stage, number, count)
+
+
+def of_encoder(progress: Progress | None) -> Report | None:
+    """Return the callback for an encoder of meshreel."""
+    return None if progress is None else lambda now: progress(now.stage, now.done, now.total)
 
 
 @runtime_checkable

@@ -8,7 +8,7 @@ sequence of open surface most of which is in the same place in all frames; a lon
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -18,6 +18,7 @@ from jaxtyping import Float64, Int64
 
 from ..errors import InputError
 from ..format.checks import MOST_TRACKS
+from ..geometry import work
 from ..geometry.strict import norm
 from ..geometry.threads import ahead
 from ..geometry.topology import boxes_of, clean, components, drop_unreferenced, face_normals, linked
@@ -25,7 +26,6 @@ from ..types import Mesh, MeshSequence, offset
 
 UNLIKE = 30.0  # times the median size: a larger frame of a room must be in another unit; a guess
 LARGEST_RATIO = 10.0  # largest ratio of the diagonals of two frames in one interval: a guess
-Report = Callable[[str, int], object]  # takes a stage, and the number of further frames that have passed it
 LEAST = 0.05  # share of the area of the frame's largest piece: smaller pieces are bits (guess)
 LEAST_FACES = 500  # smaller pieces are bits: a separate track would cost more than they do (guess)
 Box = tuple[float, ...]  # m, six: the lower and the upper corner, along the axes
@@ -81,16 +81,16 @@ class Survey:
         return intervals
 
 
-def survey_sequence(sequence: MeshSequence, report: Report = lambda *_: None, cleaned: bool = True) -> Survey:
+def survey_sequence(sequence: MeshSequence, cleaned: bool = True) -> Survey:
     """Survey a sequence, a frame for each thread in memory. Raises InputError if it is empty or a frame is invalid.
 
     Unless `cleaned`, faces without area count like any others, and pieces are not searched: scenes have too many faces
     for that.
     """
-    return joined([survey_frames(sequence, range(len(sequence)), cleaned, report)])
+    return joined([survey_frames(sequence, range(len(sequence)), cleaned)])
 
 
-def survey_frames(sequence: MeshSequence, numbers: range, cleaned: bool, report: Report = lambda *_: None) -> Survey:
+def survey_frames(sequence: MeshSequence, numbers: range, cleaned: bool) -> Survey:
     """Survey the frames `numbers` of a sequence as `survey_sequence` does; `joined` combines such surveys."""
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
     diagonals, flattened, dropped, pieces = list[float](), list[int](), 0, list[tuple[Piece, ...]]()
@@ -109,7 +109,7 @@ def survey_frames(sequence: MeshSequence, numbers: range, cleaned: bool, report:
         pieces += [own] if cleaned else []
         if box is not None:
             low, high = np.minimum(low, box[0]), np.maximum(high, box[1])
-        report("survey", 1)
+        work.passed("survey")
     return Survey(low, high, tuple(diagonals), tuple(flattened), dropped=dropped, pieces=tuple(pieces))
 
 

@@ -85,7 +85,7 @@ def command(
         by_board, remarks = poses_by_board(posed.color_cameras, board)
         posed, warnings = with_poses(posed, {}, by_board), warnings + remarks
     if refine:
-        with common.stages(0, "rounds") as progress:
+        with common.stages("rounds") as progress:
             calibration = refined(posed, progress)
         posed = with_poses(posed, {camera.name: camera.view.pose.to_world for camera in calibration.cameras}, {})
         warnings += calibration.warnings

@@ -145,7 +145,7 @@ def _fuse(recording: Recording, output: Path, format: str, common: Common) -> No
     names = frame_names(len(recording), format)
     missing = _started(output, _made(recording), names)
     bare = []
-    with common.stages(len(recording)) as progress:
+    with common.stages() as progress:
         for index, name in enumerate(names):
             if name in missing:
                 mesh = recording[index]

@@ -19,7 +19,6 @@ from ..container.sources import FileSource
 from ..decoder.describe import describe_file
 from ..decoder.video import Video
 from ..decoder.video import open as open_video
-from ..encoder.group.progress import Progress
 from ..errors import FormatError, InputError
 from ..export.frames import check_splats
 from ..export.shapes import check_output
@@ -97,7 +96,7 @@ def command(
         check_splats(other, decoded)
     truth = None if knowing.truth is None else open_truth(knowing.truth, reading, len(sequence))
     try:
-        with common.stages(len(sequence)) as progress:
+        with common.stages() as progress:
             row = compare_sequences(sequence, counted(other, progress), _options(looking, sequence, other)).to_row()
             if captured(sequence).depth is not None:
                 row["depth"] = by_depth(captured(sequence), other, progress)
@@ -243,7 +242,7 @@ FRAMES, VIEWS, SIZE = 8, 4, 256  # frames that are compared, cameras around each
 ASIDE = 0.11  # turns, from a camera to which the encoder fitted splats
 
 
-def compare_splats(sequence: MeshSequence, video: Video, progress: Progress) -> dict[str, Any]:
+def compare_splats(sequence: MeshSequence, video: Video, progress: StageBars) -> dict[str, Any]:
     """Return PSNR, dB, and SSIM of splats on pictures of a rig, or renders from other cameras. Raises InputError."""
     numbers, squares, scores = evenly(len(sequence), FRAMES), list[float](), list[float]()
     for done, number in enumerate(numbers, 1):

@@ -11,7 +11,7 @@ from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass
 from datetime import timedelta
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 from rich import progress
@@ -19,6 +19,9 @@ from rich.console import Console
 from rich.text import Text
 
 from . import program, shown
+
+if TYPE_CHECKING:
+    from ..encoder.group.progress import Progress
 
 Flag = Annotated[bool, Parameter(negative="")]
 Force = Annotated[bool, Parameter(help="Replace files that are there and that were not named.", negative="")]
@@ -60,19 +63,19 @@ class Common:
             sys.stdout.flush()  # a server prints its addresses and keeps running
 
     @contextmanager
-    def stages(self, total: int, counted: str = "frames") -> Iterator[StageBars]:
+    def stages(self, counted: str = "frames") -> Iterator[StageBars]:
         """Show progress on standard error: a bar per stage, or lines if it is no terminal; nothing if quiet."""
         console = Console(stderr=True)
         columns = (
             progress.SpinnerColumn(),
             progress.TextColumn("{task.description:<10}"),
-            *(progress.BarColumn(), progress.MofNCompleteColumn(), progress.TextColumn(counted)),
-            *(progress.TimeElapsedColumn(), progress.TextColumn("left"), _LeftColumn()),
+            *(progress.BarColumn(), progress.TextColumn("{task.fields[count]}")),
+            *(progress.TimeElapsedColumn(), progress.TextColumn("left {task.fields[left]}")),
         )
         visible = console.is_terminal and not self.quiet
         bars = progress.Progress(*columns, console=console, disable=not visible)
-        with bars, nullcontext() if visible or self.quiet else _lines(bars, counted):
-            yield StageBars(bars, total)
+        with bars, nullcontext() if visible or self.quiet else _lines(bars):
+            yield StageBars(bars, counted)
 
 
 def called_as() -> str:
@@ -94,47 +97,40 @@ class _Console(Console):
 
 
 class StageBars:
-    """Progress callback that opens a bar when a stage reports for the first time."""
+    """Progress as a bar for each stage of a command, of which an encode is one."""
 
-    def __init__(self, bars: progress.Progress, total: int) -> None:
-        self.bars = bars
-        self.total = total
-        self.tasks: dict[str, progress.TaskID] = {}
+    def __init__(self, bars: progress.Progress, counted: str = "frames") -> None:
+        self.bars, self._counted = bars, counted
+        self._tasks: dict[str, progress.Task] = {}
 
     def __call__(self, stage: str, done: int, total: int) -> None:
         """Show that `done` of `total` frames have passed `stage`."""
-        if stage not in self.tasks:
-            self.tasks[stage] = self.bars.add_task(stage, total=total, first=done)
-        task = next(task for task in self.bars.tasks if task.id == self.tasks[stage])
-        if done < task.completed:  # the next encode of a search for a target
-            self.bars.reset(task.id, total=total, completed=done, first=done)
-        self.bars.update(self.tasks[stage], completed=done, total=total)
+        task = self._show(stage, done, total, f"{done} of {total} {self._counted}")
+        if done and task.elapsed is not None:
+            task.fields["left"] = _clock(task.elapsed * (total - done) / done)
 
+    def encode(self, now: Progress) -> None:
+        """Show how far an encode is, and the stage that it is in."""
+        task = self._show("encode", now.share, 1.0, f"{100 * now.share:.0f} %, {now.stage}")
+        task.fields["left"] = _clock(now.left)
 
-def left(task: progress.Task) -> float | None:
-    """Return the seconds that a stage still takes at its pace so far; None before its first frame."""
-    gained = task.completed - task.fields["first"]  # frames of an earlier run took no time
-    if gained <= 0 or task.elapsed is None or task.remaining is None:
-        return None
-    return task.elapsed * task.remaining / gained
-
-
-class _LeftColumn(progress.ProgressColumn):
-    """Column with the time left, from the mean time of all frames so far, because single frames vary."""
-
-    def render(self, task: progress.Task) -> Text:
-        return Text(_clock(left(task)), style="progress.remaining")
+    def _show(self, name: str, done: float, total: float, count: str) -> progress.Task:
+        if name not in self._tasks:
+            self.bars.add_task(name, total=total, count=count, left=_clock(None))
+            self._tasks[name] = self.bars.tasks[-1]
+        self.bars.update(self._tasks[name].id, completed=done, total=total, count=count)
+        return self._tasks[name]
 
 
 @contextmanager
-def _lines(bars: progress.Progress, counted: str) -> Iterator[None]:
+def _lines(bars: progress.Progress) -> Iterator[None]:
     """Print a line of progress on standard error every `EVERY` seconds, until the block ends."""
     ended = threading.Event()
 
     def run() -> None:
         with suppress(OSError, ValueError):  # standard error is closed
             while not ended.wait(EVERY):
-                if text := line_of(bars.tasks, counted):
+                if text := line_of(bars.tasks):
                     print(text, file=sys.stderr, flush=True)
 
     thread = threading.Thread(target=run, name="lines of progress", daemon=True)
@@ -146,19 +142,14 @@ def _lines(bars: progress.Progress, counted: str) -> Iterator[None]:
         thread.join()
 
 
-def line_of(tasks: Iterable[progress.Task], counted: str = "frames") -> str:
-    """Return a line with the progress of the unfinished stages, or the last finished stage; empty before any."""
-    if not (all_of_them := list(tasks)):
+def line_of(tasks: Iterable[progress.Task]) -> str:
+    """Return a line with the progress of the first unfinished stage, or of the last one; empty before any."""
+    if not (known := list(tasks)):
         return ""
-    began = min(task.start_time or 0.0 for task in all_of_them)
-    so_far = f"{_clock(all_of_them[0].get_time() - began)} so far"
-    open_ones = [task for task in all_of_them if not task.finished]
-    if not open_ones:
-        return f"{program()}: {all_of_them[-1].description} is done; {so_far}"
-    counts = ", ".join(f"{task.description} {task.completed:.0f}" for task in open_ones)
-    lefts = [seconds for task in open_ones if (seconds := left(task)) is not None]
-    rest = f", about {_clock(max(lefts))} left" if lefts else ""
-    return f"{program()}: {counts} of {open_ones[0].total:.0f} {counted}; {so_far}{rest}"
+    task = next((each for each in known if not each.finished), known[-1])
+    so_far = _clock(task.get_time() - min(each.start_time or 0.0 for each in known))
+    now = f"{program()}: {task.description} {task.fields['count']}"
+    return f"{now}; {so_far} so far, about {task.fields['left']} left"
 
 
 def _clock(seconds: float | None) -> str:

@@ -178,7 +178,7 @@ def _write(file: Path, output: Path, names: list[str], how: How, common: Common)
     """Decode and write frames by the functions `how`. Raises FormatError at the end if some are damaged."""
     make_folder(output)
     common.warn(left_over(output, names, f"frame_*{Path(names[0]).suffix}"))
-    with common.stages(len(names)) as progress:
+    with common.stages() as progress:
         paths, (decode, write) = [output / name for name in names], how
         failed = write_frames(decode, paths, lambda done: progress("decode", done, len(names)), write)
     if failed:
@@ -245,7 +245,7 @@ def export(
         check_part(file, video.reader, only)
         chosen = wanted.chosen(len(video))
         try:
-            with common.stages(len(chosen)) as progress:
+            with common.stages() as progress:
                 count = export_animated(video.reader, target, chosen, options, progress)
         except FormatError as error:
             raise FormatError(f"{file}: {error}; nothing is written, copy the file again") from error

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -62,13 +63,14 @@ def command(
     options, room = Settings(quality=quality).resolved(), RoomOptions(frames=frames, seed=seed)  # errors before work
     file, picture = output / "demo.reel", output / "demo.png"
     check_free([file, picture], force or (output / "rig" / TRUTH).is_dir())  # of an earlier demo
-    with common.stages(frames) as progress, workers(jobs) as executor, threads(jobs or cores()):
+    with common.stages() as progress, workers(jobs) as executor, threads(jobs or cores()):
         _forget(output / "rig", [camera.name for camera in room_cameras(WIDTH)])
         record_room(output / "rig", room, WIDTH, lambda k: progress("simulate", k, frames))
         capture, _ = open_recording(output / "rig", FusionOptions(VOXEL))
         for number, _ in enumerate(ahead(capture.__getitem__, range(len(capture))), 1):  # the recording keeps them
             progress("fuse", number, len(capture))
-        summary = encode(capture, file, options=options, executor=executor, jobs=jobs, progress=progress, resume=False)
+        encoded = partial(encode, options=options, executor=executor, jobs=jobs, resume=False)
+        summary = encoded(capture, file, progress=progress.encode)
         with open_video(file) as video:
             clean = read_truth(output / "rig" / TRUTH)
             truth = against_truth(capture, video, clean, evenly(frames, _JUDGED), progress)

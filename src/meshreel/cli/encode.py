@@ -155,11 +155,11 @@ def encode(
     early = lacking if sequence.colors is not None or (lacking and is_colored(sequence)) else ()
     common.warn(early)  # now, not after minutes
     with (
-        common.stages(len(sequence if excerpt is None else excerpt.frames)) as progress,
+        common.stages() as progress,
         workers(jobs, cluster) as executor,
         _lines(debug_digests, place, sequence.files) as digests,
     ):
-        encoder = Encoder(sequence, executor, progress, masker, digests, excerpt, jobs)
+        encoder = Encoder(sequence, executor, progress.encode, masker, digests, excerpt, jobs)
         encoder.audio = sound
         if goal is None:
             summary = encoder.encode(place, options, resume)
@@ -303,9 +303,9 @@ def survey(
         raise InputError(f"--frames {reading.frames}: a survey is of all frames; give --frames to encode --survey")
     source = open_source(inputs, reading, common)
     sequence = upright(source.sequence, up)
-    with uploaded(place) as path, common.stages(len(sequence)) as progress, workers(jobs, cluster) as executor:
+    with uploaded(place) as path, common.stages() as progress, workers(jobs, cluster) as executor:
         check_apart(path, sequence.files)
-        facts = Encoder(sequence, executor, progress, jobs=jobs).survey(path)
+        facts = Encoder(sequence, executor, progress.encode, jobs=jobs).survey(path)
     warnings = (*source.warnings, *warnings_of(facts))
     common.warn(warnings)
     row = {"output": str(place), "frames": len(sequence), "warnings": warnings}

@@ -11,11 +11,13 @@ from cyclopts import Parameter
 from ..analysis.scene.labelling import Segmentation
 from ..analysis.scene.masks import CAMERAS, Masker, Picture, label_colors, look_at_labels, sheet, write_views
 from ..analysis.scene.segmentation import mask_views, scene_views, segment, segment_by
+from ..encoder.group.progress import Stages
 from ..encoder.scene.scene import label_frames
 from ..encoder.settings.options import EncoderOptions, SceneOptions
 from ..errors import InputError
 from ..geometry.cameras import pack_cameras
 from ..geometry.derived_sequences import upright
+from ..geometry.work import reporting
 from ..io.pictures import is_mask
 from ..io.write import (
     check_free,
@@ -77,7 +79,7 @@ def command(
     check_free((path for name in (*kept, CAMERAS) for path in sorted(output.glob(name))), force)
     if views_only:
         views, colors = mask_views(sequence, scene.cameras)
-        with common.stages(len(sequence)) as progress:
+        with common.stages() as progress:
             write_views(output, sequence, views, lambda done: progress("look", done, len(sequence)), colors)
         row = {"frames": len(sequence), "views": len(views)}
         text = f"{output}: pictures of {row['frames']} frames from {row['views']} views, and {CAMERAS}"
@@ -109,11 +111,14 @@ def _write_labels(
     chosen = evenly(count, previews)
     names = [Path(name).stem for name in frame_names(count, "npz")]
     moving, of_bodies, rows = list[int](), list[list[int]](), list[tuple[int, list[Picture], list[int]]]()
-    with common.stages(count) as progress:
+    with common.stages() as progress:
         by: Segmentation
         if masker is None:
             views = scene_views(frames, options.cameras)
-            by = segment(frames, options.cameras, lambda share: progress("segment", round(share * count), count))
+            stages = Stages(progress.encode, count)
+            stages.expect("scene")
+            with reporting(stages.passed):
+                by = segment(frames, options.cameras)
         else:
             masks = segment_by(masker, frames, options.cameras)
             views, by = tuple(masks.views), masks

@@ -84,7 +84,7 @@ def make_rig(takes: Sequence[Take], folder: Path, common: Common, depth_unit: fl
     """Write the rig of recordings and show progress; return warnings for the user."""
     streams = [each for take in takes for sensor in take.sensors for each in (sensor.depth, sensor.color) if each]
     total = sum(stream.count for stream in streams)
-    with common.stages(total, "pictures") as progress:
+    with common.stages("pictures") as progress:
         return write_takes(takes, folder, lambda done: progress("read", done, total), depth_unit)
 
 

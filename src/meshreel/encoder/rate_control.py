@@ -18,6 +18,7 @@ from .sequence import Encoder
 from .settings.options import EncoderOptions
 
 TRIALS = 8  # whole encodes, at most (guess)
+USUAL_TRIALS = 3  # that progress expects (guess)
 FIRST_QUALITY = 50.0  # middle of the scale (guess)
 DIGITS = 4  # significant digits of a tried quality: a file records all of them (guess)
 
@@ -90,6 +91,7 @@ def encode_to(
     if resume:
         text = f"{path}: a search for a target begins again, it cannot continue"
         raise InputError(f"{text}; leave --resume (resume=True) out, or give the quality in place of the target")
+    stages = encoder.stages(USUAL_TRIALS - 1)
     with opened_output(path, encoder.sequence.files, resume, lasting=False) as (file, files):
         for _ in range(TRIALS):
             quality = search.next()
@@ -98,13 +100,15 @@ def encode_to(
             files.restart()
             file.seek(0)
             file.truncate()
-            summary = encoder.encode_into(file, options_at(quality), files)
+            summary = encoder.encode_into(file, options_at(quality), files, stages)
             value = goal.measured(summary, encoder.sequence.frame_rate)
             if abs(value - goal.wanted) <= goal.tolerance:
+                stages.finish()
                 return summary, quality
             if over := goal.exceeded_by_background(summary, encoder.sequence.frame_rate):
                 raise InputError(f"{path}: {over}")
             search.learn(quality, value)
+            stages.again()
         raise InputError(f"{path}: no quality gives {goal.text_of(goal.wanted)}; {search.found()}")
 
 

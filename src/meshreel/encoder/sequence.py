@@ -28,7 +28,7 @@ from ..errors import InputError
 from ..format.layout import Form
 from ..geometry.derived_sequences import captured, is_colored, unchanging, uncolored, welded
 from ..geometry.threads import cores, threads
-from ..geometry.work import since, so_far
+from ..geometry.work import reporting, since, so_far
 from ..io.files import Place, located
 from ..types import MeshSequence, evenly
 from .appearance.videos import TextureSize
@@ -49,7 +49,7 @@ from .file.summary import (
 )
 from .group.digests import WriteLines, note, noted
 from .group.interval import Interval
-from .group.progress import Progress, Stages
+from .group.progress import Report, Stages
 from .paper.recipe import FindGroups, find_groups
 from .run.interval_files import IntervalFiles, made_of, opened_output
 from .run.schedule import Job
@@ -85,7 +85,7 @@ def encode(
     options: EncoderOptions | Settings | None = None,
     executor: Executor | None = None,
     jobs: int | None = None,
-    progress: Progress | None = None,
+    progress: Report | None = None,
     resume: bool | None = None,
     audio: Given | None = None,
     audio_start: float = 0.0,
@@ -141,7 +141,7 @@ class Encoder:
         self,
         sequence: MeshSequence,
         executor: Executor | None = None,
-        progress: Progress | None = None,
+        progress: Report | None = None,
         masker: Masker | None = None,
         digests: WriteLines | None = None,
         excerpt: Excerpt | None = None,
@@ -178,20 +178,30 @@ class Encoder:
 
     def parts(self, options: EncoderOptions) -> Parts | None:
         """Return the parts of the scene; None where the sequence is no scene, or `options.scene` is None."""
-        return self._parts(self._job(options)) if self._is_scene(options) else None
+        job = self._job(options)
+        with reporting(job.stages.passed):
+            return self._parts(job) if self._is_scene(job) else None
 
     def encode(self, path: str | Place, options: EncoderOptions, resume: bool | None = None) -> Summary:
         """Encode the sequence as the function `encode` does, with the same errors."""
+        stages = self.stages()
         with opened_output(path, self.sequence.files, resume) as (file, files):
-            return self.encode_into(file, options, files)
+            summary = self.encode_into(file, options, files, stages)
+        stages.finish()
+        return summary
 
-    def encode_into(self, file: BinaryIO, options: EncoderOptions, files: IntervalFiles) -> Summary:
+    def stages(self, trials: float = 0) -> Stages:
+        """Return the counter of an encode's frames, for its progress; so many `trials` are expected after it."""
+        frames = range(len(self.sequence)) if self._excerpt is None else self._excerpt.frames
+        return Stages(self.progress, len(frames), trials)
+
+    def encode_into(self, file: BinaryIO, options: EncoderOptions, files: IntervalFiles, stages: Stages) -> Summary:
         """Encode the sequence into an open, empty file; its groups wait in the files of their intervals."""
         # Idle threads of BLAS would take a third of the processor's time.
-        with threadpool_limits(1), threads(self._cores):
-            return self._encoded(file, options, files)
+        with threadpool_limits(1), threads(self._cores), reporting(stages.passed):
+            return self._encoded(file, options, files, stages)
 
-    def _encoded(self, file: BinaryIO, options: EncoderOptions, files: IntervalFiles) -> Summary:
+    def _encoded(self, file: BinaryIO, options: EncoderOptions, files: IntervalFiles, stages: Stages) -> Summary:
         if options.scene is None and self._masker is not None:
             raise InputError("masks for a sequence that is not taken apart (scene=None): give one of both")
         before, excerpt = so_far(), self._excerpt
@@ -199,12 +209,12 @@ class Encoder:
         drawn = options.appearance is not None and options.appearance.splats is not None
         if drawn and self.sequence.colors is None and not is_colored(self.sequence):
             raise InputError("splats need colours, and no frame has any: give colour cameras or coloured meshes")
+        job, made = self._job(options, stages), made_of(self.sequence, options, self._masker)
         if excerpt is not None:
             excerpt.whole.check(self.sequence)
-            if self._is_scene(options):
+            if self._is_scene(job):
                 text = "a scene has one background for all frames, and is not encoded in parts"
                 raise InputError(f"{text}; encode it in one run, with --cluster perhaps, or with --dynamic-only")
-        job, made = self._job(options), made_of(self.sequence, options, self._masker)
         files.check(made)
         survey, parts = self._whole(job, files)
         made |= {"surfaces": self.sequence.digests} | ({} if excerpt is None else {"part": str(excerpt.frames)})
@@ -221,22 +231,30 @@ class Encoder:
 
     def survey(self, path: Path) -> Survey:
         """Survey the sequence, and write a file of it for encodes of its parts."""
-        with threads(self._cores):
-            survey = survey_job(self._job(EncoderOptions()))
+        job = self._job(EncoderOptions())
+        with threads(self._cores), reporting(job.stages.passed):
+            survey = survey_job(job)
         write_survey(survey, self.sequence, path)
         return survey
 
-    def _job(self, options: EncoderOptions) -> Job:
-        stages = Stages(self.progress, len(self.sequence) if self._excerpt is None else len(self._excerpt.frames))
-        job = Job(self.sequence, options, self._executor, stages, options.recipe(self.find))
+    def _job(self, options: EncoderOptions, stages: Stages | None = None) -> Job:
+        job = Job(self.sequence, options, self._executor, stages or self.stages(), options.recipe(self.find))
+        self._expect(job)
         return replace(job, chosen=None if self._excerpt is None else self._excerpt.frames)
 
-    def _is_scene(self, options: EncoderOptions) -> bool:
-        if options.scene is None or not len(self.sequence):
+    def _expect(self, job: Job) -> None:
+        """Let progress expect the stages that are ahead."""
+        scene = ("scene", "room") if job.options.scene is not None and self._stands is not False else ()
+        color = ("color",) if job.options.appearance is not None and self.sequence.colors is not None else ()
+        job.stages.expect("look", "survey", *scene, *color, job.recipe.name.partition("-")[0])
+
+    def _is_scene(self, job: Job) -> bool:
+        if job.options.scene is None or not len(self.sequence):
             return False
         if self._stands is None:
             self._standing = scene_standing(self.sequence)
             self._stands = self._standing is not None
+            self._expect(job)
         return self._stands
 
     def _whole(self, job: Job, files: IntervalFiles) -> tuple[Survey, Parts | None]:
@@ -247,7 +265,7 @@ class Encoder:
         if self._excerpt is not None:
             return self._excerpt.whole.survey, None
         survey = None if files.whole is None else survey_from_facts(self.sequence, files.whole)
-        if self._is_scene(job.options) and (parts := self._parts(job, files, survey)) is not None:
+        if self._is_scene(job) and (parts := self._parts(job, files, survey)) is not None:
             return parts.survey, parts
         return survey_job(job) if survey is None or not survey.pieces else survey, None
 
@@ -264,13 +282,14 @@ class Encoder:
                 files.check({"surfaces": self.sequence.digests})
                 parts = None if files.scene is None else unpack_parts(files.scene, job.sequence, survey)
             try:
-                made = job.sequence, survey, job.scene, job.stages, self._masker, self._standing
+                made = job.sequence, survey, job.scene, self._masker, self._standing
                 self._scene = (*how, parts or take_apart(*made))
             except NoRoom as reason:
                 if self._masker is not None:
                     raise InputError(f"{reason}: the masks call it still; look at them, or encode without") from None
                 remedy = "a room in another unit than metres needs --scale"
                 self._stands, self._moves = False, (f"{reason}: encoded as bodies, without a background; {remedy}",)
+                self._expect(job)
                 return None
         return self._scene[2]
 
@@ -302,9 +321,7 @@ def _encode_scene(job: Job, file: BinaryIO, writer: ReelWriter, parts: Parts) ->
         parts.noise.rms,
         parts.noise.off,
     )
-    job.stages.add("room", 0)
     states = colored_states(sequence, parts, job.scene, options.appearance)
-    job.stages.reach("room", 1.0)
     note("background, coded", *(state.payload for state in states))
     with writer:
         coded, dropped = encode_bodies(job, parts)

@@ -1,6 +1,6 @@
-"""Counts of an encode's work: a measure of cost that does not depend on the machine.
+"""Counts of an encode's work: a measure of cost that does not depend on the machine; and of its progress.
 
-In: calls of `count` beside the work. Out: counts by kind since a moment.
+In: calls of `count` and `passed` beside the work. Out: counts by kind since a moment; reports as it is done.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ Kind = Literal[
     "closest points",
 ]
 Work = dict[Kind, int]  # number of times by kind
-Report = Callable[[Kind, int], object]
+Report = Callable[[str, int], object]  # a kind of work or a stage, and the number of times or frames
 
 _here = threading.local()
 _ONE_REPORT = threading.Lock()
@@ -31,9 +31,14 @@ _ONE_REPORT = threading.Lock()
 def count(kind: Kind, number: int = 1) -> None:
     """Count work that this thread does."""
     _counts()[kind] += number
+    passed(kind, number)
+
+
+def passed(stage: str, number: int = 1) -> None:
+    """Report that this thread has brought frames through a stage."""
     if (report := reporter()) is not None:
         with _ONE_REPORT:
-            report(kind, number)
+            report(stage, number)
 
 
 def reporter() -> Report | None:
@@ -43,7 +48,7 @@ def reporter() -> Report | None:
 
 @contextmanager
 def reporting(report: Report | None) -> Iterator[None]:
-    """Call `report`, one call at a time, with the work that this thread counts in the block."""
+    """Call `report`, one call at a time, with the work and the stages of this thread in the block."""
     before, _here.report = reporter(), report
     try:
         yield

@@ -13,6 +13,7 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float64, Int32
 
+from ..geometry import work
 from ..geometry.strict import dot
 from ..geometry.topology import blend
 from ..types import Mesh
@@ -125,6 +126,7 @@ def surface_errors(original: Mesh | Original, decoded: Mesh, closest: BothCloses
     Faces without area and vertices without faces are no surface: they are ignored, also in the diagonal. `closest` is
     what is known: of the vertices and middles of faces of both meshes; it is not used where other points are compared.
     """
+    work.passed("measure")
     prepared, shown = original if isinstance(original, Original) else Original(original), Original(decoded)
     if not (prepared.is_whole and shown.is_whole):
         closest = None

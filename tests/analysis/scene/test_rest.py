@@ -16,7 +16,6 @@ from meshreel.analysis.scene.standing import Standing
 from meshreel.analysis.scene.views import place_views
 from meshreel.analysis.survey import survey_sequence
 from meshreel.coding.background import decode_background, decode_change
-from meshreel.encoder.group.progress import Stages
 from meshreel.encoder.scene.parts import Parts, take_apart
 from meshreel.encoder.scene.static import encode_static
 from meshreel.encoder.settings.options import SceneOptions
@@ -89,7 +88,7 @@ def scene() -> MeshList:
 
 @pytest.fixture(scope="module")
 def parts(scene: MeshList) -> Parts:
-    return take_apart(captured(scene), survey_sequence(scene), OPTIONS, Stages(None, FRAMES))
+    return take_apart(captured(scene), survey_sequence(scene), OPTIONS)
 
 
 @pytest.fixture(scope="module")

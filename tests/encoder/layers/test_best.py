@@ -45,7 +45,7 @@ def test_an_executor_gives_the_same_bytes(written, tmp_path):
             tmp_path / "b.reel",
             options=OPTIONS,
             executor=executor,
-            progress=lambda s, done, _: last.update({s: done}),
+            progress=lambda now: last.update({now.stage: now.done}),
         )
     assert (tmp_path / "b.reel").read_bytes() == path.read_bytes()
     assert replace(again, work={}) == replace(summary, work={})  # each interval reads its frames again
@@ -58,7 +58,7 @@ def test_more_empty_frames_than_a_group_holds_are_more_groups(tmp_path, monkeypa
     frames = MeshList((Mesh.empty(),) * 150, frame_rate=30.0)
     options = replace(OPTIONS, key_interval=600.0)
     summary = encode(
-        frames, tmp_path / "a.reel", options=options, progress=lambda s, done, _: reported.update({s: done})
+        frames, tmp_path / "a.reel", options=options, progress=lambda now: reported.update({now.stage: now.done})
     )
     assert [group.frame_count for group in summary.groups] == [100, 50]
     assert (reported["survey"], reported["code"]) == (150, 150)

@@ -8,7 +8,6 @@ import pytest
 
 from meshreel.encoder.group.forms import EncodedGroup
 from meshreel.encoder.group.interval import Interval
-from meshreel.encoder.group.progress import Stages
 from meshreel.encoder.layers.recipe import LayersRecipe
 from meshreel.encoder.run.judge import judged
 from meshreel.errors import InputError
@@ -39,7 +38,7 @@ def recipe() -> LayersRecipe:
 
 
 def groups_of(interval: Interval, by: LayersRecipe) -> list[EncodedGroup]:
-    found = list(judged(interval, by, None))
+    found = list(judged(interval, by))
     assert sum(group.frame_count for group in found) == len(interval.frames)
     return found
 
@@ -63,9 +62,9 @@ def test_where_nothing_holds_there_is_an_error_and_no_file(monkeypatch):
 class Frozen(LayersRecipe):
     """Shows the first frame for all, and what it finds for each frame alone."""
 
-    def encode(self, interval: Interval, stages: Stages | None = None) -> Iterator[EncodedGroup]:
+    def encode(self, interval: Interval) -> Iterator[EncodedGroup]:
         frames = [interval.frames[0]] * len(interval.frames)
-        yield from super().encode(replace(interval, frames=MeshList(tuple(frames), 30.0)), stages)
+        yield from super().encode(replace(interval, frames=MeshList(tuple(frames), 30.0)))
 
 
 def test_leaves_that_are_not_where_they_were_are_lost_though_the_tree_is_large():

@@ -85,8 +85,8 @@ def assert_rolls(video, offset=(0.0, 0.0, 0.0)):
 def plainly(monkeypatch):
     """Bodies coded frame by frame, where it does not matter how: a fraction of the time."""
 
-    def coded(recipe, interval, stages=None):
-        del recipe, stages
+    def coded(recipe, interval):
+        del recipe
         frames = interval.frames
         if frames[0].is_empty:
             return [EncodedGroup(Form.EMPTY, len(frames), encode_empty(), (), NO_ERROR)]
@@ -135,13 +135,12 @@ def test_the_same_scene_gives_the_same_bytes_with_an_executor_too(tmp_path):
     stages: dict[str, list[int]] = {}
     encoded(ROLLING, tmp_path / "a.reel")
     with ThreadPoolExecutor(2) as executor:
-        record = lambda stage, done, _: stages.setdefault(stage, []).append(done)  # noqa: E731
+        record = lambda now: stages.setdefault(now.stage, []).append(now.done)  # noqa: E731
         encoded(ROLLING, tmp_path / "b.reel", executor=executor, progress=record)
     assert (tmp_path / "b.reel").read_bytes() == (tmp_path / "a.reel").read_bytes()
-    assert {stage: done[-1] for stage, done in stages.items()} == dict.fromkeys(
-        ("survey", "segment", "background", "noise", "room", "code", "track", "fit"), 4
-    )
-    for stage in ("segment", "background"):  # frame by frame, and not all at the end
+    ends = [stages[each][-1] for each in ("survey", "observe", "background", "noise", "bodies", "code", "track", "fit")]
+    assert ends == 8 * [4]
+    for stage in ("observe", "background"):  # frame by frame, and not all at the end
         assert sorted(stages[stage]) == stages[stage] and len(set(stages[stage])) > 2
 
 

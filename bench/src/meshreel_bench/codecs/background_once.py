@@ -13,7 +13,7 @@ from meshreel.encoder.settings.options import EncoderOptions, SceneOptions
 from meshreel.geometry.topology import part_of
 from meshreel.types import MeshSequence
 
-from ..codec import Progress, TwoSteps
+from ..codec import Progress, TwoSteps, of_encoder
 from .draco import Frames, check_point, decimated, write_frames
 
 Still = tuple[Sequence[Static], Frames]  # states of the background of a scene, and its moving faces by frame
@@ -37,7 +37,7 @@ class BackgroundOnceDracoCodec(TwoSteps):
 
     def analyse(self, sequence: MeshSequence, progress: Progress | None = None) -> Still:
         """Return the background and what moves. Raises InputError for frames that cannot be used."""
-        if (parts := Encoder(sequence, progress=progress).parts(EncoderOptions())) is None:
+        if (parts := Encoder(sequence, progress=of_encoder(progress)).parts(EncoderOptions())) is None:
             survey = survey_sequence(sequence)
             return (), Frames(sequence.frame_rate, survey, [survey.normalise(mesh) for mesh in sequence])
         states = encode_static(parts, len(sequence), sequence.frame_rate, SceneOptions())

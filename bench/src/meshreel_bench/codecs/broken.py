@@ -12,7 +12,6 @@ import numpy as np
 
 from meshreel.encoder.group.forms import EncodedGroup
 from meshreel.encoder.group.interval import Interval
-from meshreel.encoder.group.progress import Stages
 from meshreel.encoder.layers.recipe import LayersRecipe
 from meshreel.encoder.paper.recipe import find_groups
 from meshreel.encoder.settings.options import EncoderOptions, FindGroups, Recipe
@@ -49,13 +48,13 @@ class Broken(LayersRecipe):
     times: int = 1
     _broken: dict[tuple[int, int], int] = field(default_factory=dict, compare=False, repr=False)
 
-    def encode(self, interval: Interval, stages: Stages | None = None) -> Iterator[EncodedGroup]:
+    def encode(self, interval: Interval) -> Iterator[EncodedGroup]:
         place = interval.first_frame, interval.track
         self._broken[place] = self._broken.get(place, 0) + 1
         if self._broken[place] <= self.times and not interval.frames[0].is_empty:
             frames = STAGES[self.stage](list(interval.frames))
             interval = replace(interval, frames=MeshList(tuple(frames), interval.frame_rate))
-        yield from super().encode(interval, stages)
+        yield from super().encode(interval)
 
 
 @dataclass(frozen=True, slots=True)

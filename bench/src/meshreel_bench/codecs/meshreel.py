@@ -15,16 +15,17 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from meshreel.encoder.group.interval import Interval
-from meshreel.encoder.group.progress import Stages
+from meshreel.encoder.group.progress import IntervalStages
 from meshreel.encoder.layers.options import LayersOptions
 from meshreel.encoder.paper.recipe import Fitted, FoundGroup, PaperOptions, find_groups
 from meshreel.encoder.sequence import Encoder
 from meshreel.encoder.settings.options import EncoderOptions, SceneOptions, plain_displacements
 from meshreel.encoder.settings.settings import Settings
 from meshreel.errors import InputError
+from meshreel.geometry.work import reporting
 from meshreel.types import MeshSequence
 
-from ..codec import Progress, TwoSteps
+from ..codec import Progress, TwoSteps, of_encoder
 from .broken import STAGES, BrokenOptions
 
 
@@ -45,7 +46,7 @@ class Prepared(TwoSteps):
 
     def analyse(self, sequence: MeshSequence, progress: Progress | None = None) -> Encoder:
         """Return an encoder that has found what operating points share. Raises InputError for unusable frames."""
-        encoder = Encoder(sequence, progress=progress)
+        encoder = Encoder(sequence, progress=of_encoder(progress))
         prepare(encoder, self.encoder_options)
         return encoder
 
@@ -85,7 +86,7 @@ class MeshreelCodec(Prepared):
         return find_variant(self.variant)(Settings(**chosen).resolved())
 
     def code(self, analysis: Encoder, progress: Progress | None = None) -> bytes:
-        analysis.progress = progress
+        analysis.progress = of_encoder(progress)
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "video.reel"
             analysis.encode(path, self.encoder_options)
@@ -101,10 +102,10 @@ class GroupStore:
     def __init__(self) -> None:
         self._known: dict[bytes, Found] = {}
 
-    def find(self, interval: Interval, options: PaperOptions, stages: Stages | None = None) -> list[FoundGroup]:
+    def find(self, interval: Interval, options: PaperOptions) -> list[FoundGroup]:
         """Return the groups of `paper.find_groups`."""
         if (key := _key(interval, options)) not in self._known:
-            found = find_groups(interval, options, stages)
+            found = find_groups(interval, options)
             self._known[key] = tuple((len(group.frames), group.fitted) for group in found)
         frames = iter(interval.frames)
         return [FoundGroup(list(islice(frames, count)), fitted) for count, fitted in self._known[key]]
@@ -117,14 +118,17 @@ def prepare(encoder: Encoder, options: EncoderOptions) -> None:
     These are the parts of a scene and, for the paper's recipe, its groups for any size of the basis. They take a few
     hundred kB a frame, as long as the encoder lives.
     """
-    parts, count = encoder.parts(options), len(encoder.sequence)
+    encoder.parts(options)
     if isinstance(options.method, PaperOptions):
-        store, stages = GroupStore(), Stages(encoder.progress, count)
+        store, whole = GroupStore(), encoder.stages()
         encoder.find = store.find
+        whole.expect("paper")
         for interval in encoder.intervals(options):
+            stages = IntervalStages(whole.passed, len(interval.frames), options.method.group_size, interval.weight)
             if not interval.frames[0].is_empty:
-                store.find(interval, options.method, stages if parts is None else None)
-            stages.reach("fit", interval.stop / count)
+                with reporting(stages.passed):
+                    store.find(interval, options.method)
+            stages.reach("refine", len(interval.frames))
 
 
 def shared_options(options: EncoderOptions) -> EncoderOptions:

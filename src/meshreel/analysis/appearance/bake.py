@@ -19,6 +19,7 @@ from ...geometry.atlas import MOST_SIDE, Layout
 from ...geometry.color_views import ColorViews, Paint, spread_colors
 from ...geometry.splats import located
 from ...geometry.topology import blend, face_normals
+from ...geometry.work import passed
 from ...types import GREY, Mesh
 
 Points = Float64[np.ndarray, "N 3"]
@@ -150,6 +151,7 @@ def median_colors(points: Points, normals: Points, paints: Iterable[Paint]) -> t
     """Return the medians over frames of the points' colours, and a mask of known colours; others are grey."""
     stack, masks = list[np.ndarray](), list[np.ndarray]()
     for paint in paints:
+        passed("room")
         colors, mask = paint.at(points, normals)
         stack.append(np.clip(np.rint(colors), 0, 255).astype(np.uint8))
         masks.append(mask)

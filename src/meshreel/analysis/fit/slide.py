@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Bool, Float64, Int32
 
+from ...geometry import work
 from ...geometry.color_views import Paint
 from ...geometry.strict import inverses
 from ...geometry.topology import face_normals, subdivide, unique_edges, vertex_normals
@@ -51,6 +52,7 @@ class Slide:
 
     def to(self, positions: Points, paint: Paint) -> Points:
         """Return the positions on a frame, slid so that its colours agree with the key frame's."""
+        work.passed("slide")
         slid = positions
         for blurs in map(self._times, BLURS):
             mesh = self._sampled(slid)

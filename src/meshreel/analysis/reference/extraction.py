@@ -17,6 +17,7 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Bool, Float64, Int64
 
+from ...geometry import work
 from ...geometry.closest_points import Surface
 from ...geometry.decimate import decimate
 from ...geometry.reconstruct import MeanOptions, MeanSurface, close_holes, poisson_surface
@@ -108,6 +109,7 @@ def extract_reference(
     """
     assert len(frames) == len(centers), "one pose of the centers for each frame"
     group = Group(frames, centers, options.poisson)
+    work.passed("reference")
     best = min(_trials(group, options, pose, again), key=_misfit)
     mesh = group.fused(group.pose(best.frame), best.key, VOXEL, options.vertices)
     return Reference(mesh, group.pose(best.frame), best.frame, best.key, group.kin)
@@ -144,7 +146,8 @@ def _trial(group: Group, frame: int, key: int, options: ReferenceOptions) -> Tri
         return Trial(frame, key, np.inf)
     tried = sorted({key, *np.linspace(0, len(surfaces) - 1, TRIAL_FRAMES).round().astype(int).tolist()})
     frames = [surfaces[t] for t in tried]
-    fitted = fit_surfaces(mesh.faces, group.sent(mesh, pose)[tried], frames, TRIAL_FIT, tried.index(key))
+    with work.reporting(None):  # these are no fits of the group
+        fitted = fit_surfaces(mesh.faces, group.sent(mesh, pose)[tried], frames, TRIAL_FIT, tried.index(key))
     rms = []
     for frame_surface, moved in zip(frames, fitted, strict=True):
         original = frame_surface.mesh.vertices
@@ -155,6 +158,7 @@ def _trial(group: Group, frame: int, key: int, options: ReferenceOptions) -> Tri
         inside = np.einsum("nd,nd->n", offset, frame_surface.surface.normals[hits.faces]) < 0
         to_frame = np.where(inside, np.minimum(gaps, group.edge), gaps)  # where bodies touch, a frame lacks surface
         rms.append(max(np.sqrt(np.mean(to_fit**2)), np.sqrt(np.mean(to_frame**2))))
+    work.passed("reference")
     return Trial(frame, key, float(np.mean(rms)) + float(np.max(rms)))
 
 

@@ -18,6 +18,7 @@ from scipy.spatial import cKDTree
 
 from ... import _core
 from ...errors import InputError
+from ...geometry import work
 from ...geometry.inside import Samples, interior_samples
 from ...geometry.strict import exp
 from ...types import Centers, Mesh
@@ -62,6 +63,7 @@ def track_centers(frames: Sequence[Mesh], options: TrackOptions) -> Centers:
     graph = _Affinities(first, bodies)
     track = [first]
     for t in range(1, len(frames)):
+        work.count("frames tracked")
         following = _samples(frames, t, options)
         now, rotations, next_owners = _follow(track, following, graph)
         graph.learn(track[-1], now, rotations, samples.points, owners)

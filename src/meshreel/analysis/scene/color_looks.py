@@ -13,6 +13,7 @@ import numpy as np
 from jaxtyping import Bool, Float32, UInt8
 from scipy.ndimage import binary_opening, uniform_filter
 
+from ...geometry import work
 from ...geometry.color_views import ColorFrames, sampled
 from ...geometry.drawing import draw
 from ...geometry.threads import ahead
@@ -66,6 +67,7 @@ class ColorChange:
         """Find the usual depth and hue over the frames `numbers`."""
 
         def seen(number: int) -> tuple[list[np.ndarray], list[np.ndarray]]:
+            work.passed("compare")
             mesh = frames[number]
             depths = [draw(mesh, view).depth for view in looks.views]
             return depths, [_hue(looks, number, view) for view in range(len(looks.views))]

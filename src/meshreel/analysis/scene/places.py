@@ -18,6 +18,7 @@ import numpy as np
 from jaxtyping import Bool, Float32, Float64, Int32, Int64, UInt16
 from scipy.ndimage import minimum_filter
 
+from ...geometry import work
 from ...geometry.cameras import Camera
 from ...geometry.depth import DepthPicture
 from ...geometry.drawing import backs, draw
@@ -43,9 +44,6 @@ def inspected(count: int, frame_rate: float) -> list[int]:
     return evenly(count, max(_FRAMES, math.ceil((count - 1) / frame_rate * _RATE) + 1))
 
 
-Report = Callable[[float], None]  # receives the share of the work that is done, 0 to 1
-
-
 @dataclass(frozen=True, slots=True)
 class Observations:
     """Frames, the views of them, and the depth pictures that cameras took of each frame, if there are any."""
@@ -53,7 +51,6 @@ class Observations:
     frames: Sequence[Mesh] | Frames
     views: Sequence[Camera]
     pictures: Callable[[int], list[DepthPicture | None]] | None = None  # of a frame: one for each camera
-    report: Report = lambda _share: None  # called with the progress of `find_places`
 
     def observe(self, number: int, lattice: Lattice, seen: bool = True) -> _Observation:
         """Return the observations of a frame; unless `seen`, without the depths of the views."""
@@ -157,14 +154,13 @@ def find_places(observed: Observations, lattice: Lattice) -> Places:
 
     A mesh for each thread is in memory at a time. Takes about 1 s of CPU for a frame of 500,000 faces.
     """
-    passes = len(observed.frames) + max(0, len(observed.frames) - _TOGETHER)
     observations, cells, cameras = list[_Observation](), _Known(), dict[int, _Counted]()
     found = ahead(lambda number: observed.observe(number, lattice, number < _TOGETHER), range(len(observed.frames)))
     for number, one in enumerate(found):
         cells.add(one.cells, one.normals)
         _count_depths(cameras, one.measured)
         observations += [one] if number < _TOGETHER else []
-        observed.report((number + 1) / passes)
+        work.passed("observe")
     keys, normals = cells.places()
     eyes = {number: (camera, 2 * count >= len(observed.frames)) for number, (camera, count) in cameras.items()}
     places = Places(lattice, keys, neighbours(keys), normals, Tally(len(keys)), eyes)
@@ -173,7 +169,7 @@ def find_places(observed: Observations, lattice: Lattice) -> Places:
     observations.clear()
     for occupied, free in states(observed, range(_TOGETHER, len(observed.frames)), places):
         places.tally.add(occupied, free)
-        observed.report((len(observed.frames) - _TOGETHER + places.tally.frames) / passes)
+        work.passed("segment")
     return places
 
 

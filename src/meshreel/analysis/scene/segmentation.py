@@ -25,7 +25,7 @@ from .color_looks import CHANGE_SIDE, MOMENTS, SIDE, ColorChange, ColorLooks
 from .cut import Rest, find_rest, moving_places
 from .labelling import ByMasks, ByPlace, ByRest, in_all_frames, looks
 from .masks import Masker
-from .places import Observations, Report, find_places, inspected
+from .places import Observations, find_places, inspected
 from .standing import Standing, standing
 from .views import place_views
 
@@ -38,12 +38,7 @@ _ISLAND = 0.01  # m^2: connected faces with less area take the label of the face
 Cameras = tuple[Camera, ...]
 
 
-def segment(
-    frames: MeshSequence,
-    cameras: Cameras = (),
-    report: Report = lambda _share: None,
-    stands: Standing | None = None,
-) -> ByPlace | ByRest:
+def segment(frames: MeshSequence, cameras: Cameras = (), stands: Standing | None = None) -> ByPlace | ByRest:
     """Segment a scene by geometric change over the whole sequence, whose `standing` is measured if it is not given.
 
     It is looked at by the given cameras, which are of one size, or by placed ones. If nothing moves and the faces turn
@@ -59,27 +54,25 @@ def segment(
     if stands.same and not (room := in_all_frames(frames, stands.same)).is_empty:
         return ByRest(room, edge_length(frames, chosen), stands.same)
     change = stands.usual_change
-    places = _by_place(frames, chosen, cameras, change, report)
+    places = _by_place(frames, chosen, cameras, change)
     if places.chosen.any():
         return places
     first = frames[chosen[0]]
     normals, areas = face_normals(first)
     away = first.vertices[first.faces].mean(axis=1) - first.middle
     if (areas * (normals * away).sum(axis=1)).sum() > 0:  # a room's faces look inwards
-        reversed_places = _by_place(DerivedSequence(frames, turned_over), chosen, cameras, change, lambda _: None)
+        reversed_places = _by_place(DerivedSequence(frames, turned_over), chosen, cameras, change)
         places = reversed_places if reversed_places.chosen.any() else places
     return places
 
 
-def _by_place(
-    frames: CapturedSequence, chosen: Sequence[int], cameras: Cameras, noise: float, report: Report
-) -> ByPlace:
+def _by_place(frames: CapturedSequence, chosen: Sequence[int], cameras: Cameras, noise: float) -> ByPlace:
     """Segment a scene in which surface at rest is `noise` (m) from where it is in another frame."""
     cell, views = edge_length(frames, chosen), _views(frames, chosen, cameras)
     lattice = Lattice.near(frames[chosen[0]], max(cell, min(_WIDTH * noise, _WIDEST * cell)))
     frames_seen = picked(frames, chosen)
     pictures = None if frames_seen.depth is None else frames_seen.depth.__getitem__
-    places = find_places(Observations(frames_seen, views, pictures, report), lattice)
+    places = find_places(Observations(frames_seen, views, pictures), lattice)
     moving = moving_places(places)
 
     @lru_cache(maxsize=1)  # successive queries about places beside a change concern the same frames

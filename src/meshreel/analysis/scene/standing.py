@@ -23,6 +23,7 @@ from ...geometry.derived_sequences import CapturedSequence
 from ...geometry.threads import mapped
 from ...geometry.topology import border_edges, components, drop_unreferenced, edge_lengths, face_normals, vertex_normals
 from ...geometry.voxels import Lattice, around, distinct, spread
+from ...geometry.work import passed
 from ...types import Frames, Mesh, evenly
 from ..survey import UNLIKE, check
 
@@ -91,6 +92,7 @@ def scene_standing(frames: Frames) -> Standing | None:
     """
 
     def checked(number: int) -> Mesh:
+        passed("look")
         check(mesh := frames[number], f"frame {number}")
         return mesh if mesh.is_empty else drop_unreferenced(mesh)
 
@@ -128,6 +130,7 @@ def standing(frames: Frames) -> Standing:
     order = sorted(asked.items())
 
     def offsets(number: int, those: list[tuple[_Probe, bool]]) -> list[Float64[np.ndarray, " _"]]:
+        passed("look")
         surface = None if (mesh := frames[number]).is_empty else Surface(mesh)
         return [] if surface is None else [probe.offsets(surface) for probe, _ in those]
 

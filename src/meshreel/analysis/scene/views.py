@@ -18,6 +18,7 @@ import numpy as np
 from jaxtyping import Float32, Float64, Int64
 
 from ...errors import InputError
+from ...geometry import work
 from ...geometry.cameras import Camera, CameraPose, Rays, matrix_of
 from ...geometry.strict import dot, norm, products, rounded
 from ...geometry.topology import face_normals
@@ -60,6 +61,7 @@ def place_views(
         candidates.append(replace(lens, pose=pose))
     pixels = np.empty((len(candidates), sum(len(part.points) for part in samples)), np.float32)  # some 100 MB
     for number, (eye, sees) in enumerate(places):
+        work.passed("views")
         pixels[len(_WAYS) * number : len(_WAYS) * (number + 1)] = _pixels(eye, sees, samples, _turns(up), lens)
     return _greedy(candidates, pixels, count)
 
@@ -99,6 +101,7 @@ def _outside(eyes: list[Place], samples: list[_Samples]) -> list[tuple[Place, li
     """Return the places inside no object in any frame, or all if none is, with the visible samples of each frame."""
     places, outside = [], []
     for eye in eyes:
+        work.passed("views")
         looks = [part.seen_from(eye) for part in samples]
         places.append((eye, [free for free, _ in looks]))
         outside.append(all(back.sum() <= _INSIDE * free.sum() for free, back in looks))

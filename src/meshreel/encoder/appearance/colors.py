@@ -25,13 +25,13 @@ from ...container.writer import Companion
 from ...errors import InputError
 from ...format.budget import CostlyError
 from ...format.layout import ChunkKind, Form
+from ...geometry import work
 from ...geometry.color_views import Paint
 from ...geometry.splats import Carrier
 from ...geometry.threads import mapped
 from ...types import GREY, Mesh, evenly
 from ..group.forms import NORMALISED, EncodedGroup
 from ..group.interval import Interval
-from ..group.progress import Stages
 from .videos import TEXTURE_SIZES, AppearanceOptions, TextureOptions, Videos
 
 USED = 0.43  # of a texture is on the surface, as unwrapped; measured on basketball_player
@@ -40,7 +40,7 @@ MOST_FITTING = 1024  # texels, unless a larger texture is asked for: 2 mm on a p
 
 
 def colored_groups(
-    groups: Iterable[EncodedGroup], interval: Interval, options: AppearanceOptions | None, stages: Stages | None = None
+    groups: Iterable[EncodedGroup], interval: Interval, options: AppearanceOptions | None
 ) -> Iterator[EncodedGroup]:
     """Yield the groups of an interval with the colours of their frames."""
     if options is None:
@@ -57,8 +57,6 @@ def colored_groups(
         paints = mapped(interval.paint, numbers, meshes)
         if any(paint is not None for paint in paints):
             chain.add(group, numbers, paints, has_pictures(interval, meshes, options))
-            if stages is not None:
-                stages.add("color", group.frame_count)
         else:
             chain.groups.append(group)
     yield from chain.done()
@@ -160,6 +158,7 @@ class _Video:
 
 
 def _vertex_colors(paint: Paint | None, mesh: Mesh) -> UInt8[np.ndarray, "V 3"]:
+    work.passed("color")
     if paint is None or mesh.is_empty:
         return np.full(mesh.vertices.shape, GREY, np.uint8)
     return vertex_colors(paint, mesh)

@@ -23,7 +23,6 @@ from ...geometry.threads import mapped
 from ..group.digests import note
 from ..group.forms import EncodedGroup, empty_groups, most_for, target_of
 from ..group.interval import Interval, frames_in
-from ..group.progress import Stages
 from .candidates import Ahead, Candidate, Followed
 from .group_coder import GroupCoder
 from .options import LayersOptions
@@ -60,14 +59,10 @@ class LayersRecipe:
         small = max(1, o.group_size // FINER)
         return replace(self, options=replace(o, template_error=o.template_error / FINER, group_size=small, errors=()))
 
-    def encode(self, interval: Interval, stages: Stages | None = None) -> Iterator[EncodedGroup]:
+    def encode(self, interval: Interval) -> Iterator[EncodedGroup]:
         """Yield the groups of an interval; only the frames of one plan are in memory at a time."""
         frames = interval.frames
-        stages = stages or Stages(None, len(frames))
-        groups = empty_groups(len(frames)) if frames[0].is_empty else _Planner(interval, self).groups()
-        for group in groups:
-            stages.add("code", group.frame_count)
-            yield group
+        yield from empty_groups(len(frames)) if frames[0].is_empty else _Planner(interval, self).groups()
 
 
 class _Planner:

@@ -12,6 +12,7 @@ from itertools import repeat
 import numpy as np
 from jaxtyping import Bool, Float64, Int32, Int64
 
+from ...geometry import work
 from ...geometry.closest_points import Hits, Surface
 from ...geometry.depth import FreeSpace
 from ...geometry.strict import dot
@@ -35,6 +36,7 @@ class ShownFrame:
         uneven: Float64[np.ndarray, " V"] | None = None,
     ) -> None:
         """`uneven`: the noise of each vertex, in units of all noise; squared distances are in units of its square."""
+        work.passed("patch")
         original, self._free = surface.mesh, free
         self._uneven: Float64[np.ndarray, " N"] | None = None
         if uneven is not None:

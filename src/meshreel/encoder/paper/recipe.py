@@ -40,7 +40,6 @@ from ..group.forms import (
     target_of,
 )
 from ..group.interval import Interval, check_group_size
-from ..group.progress import Stages
 
 REFERENCE_BITS = 14  # of the reference's lattice (paper: qp = 14)
 LEVELS = 1  # midpoint subdivisions of the decoded reference (decision 10)
@@ -89,22 +88,20 @@ class FoundGroup:
     fitted: Fitted | None  # None: no reference follows them
 
 
-FindGroups = Callable[[Interval, PaperOptions, "Stages | None"], list[FoundGroup]]
+FindGroups = Callable[[Interval, PaperOptions], list[FoundGroup]]
 
 
-def find_groups(interval: Interval, options: PaperOptions, stages: Stages | None = None) -> list[FoundGroup]:
+def find_groups(interval: Interval, options: PaperOptions) -> list[FoundGroup]:
     """Cut an interval into groups that one reference follows each, or none does; every frame has a surface.
 
     The interval is cut where the fit fails, `DEPTH` times at most.
     """
     frames = list(interval.frames)
-    stages = stages or Stages(None, len(frames))
     if len(frames) == 1:
         return [FoundGroup(frames, None)]
     centers = track_centers(frames, options.track)
     note("centers", centers.positions)
-    stages.add("track", len(frames))
-    return _Cutting(options, interval.noise).groups(frames, centers, DEPTH, stages)
+    return _Cutting(options, interval.noise).groups(frames, centers, DEPTH)
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,20 +130,17 @@ class PaperRecipe:
         del frame_rate
         return self.options.group_size
 
-    def encode(self, interval: Interval, stages: Stages | None = None) -> Iterator[EncodedGroup]:
+    def encode(self, interval: Interval) -> Iterator[EncodedGroup]:
         """Yield an interval as one group, or as several where one reference cannot follow."""
-        count = len(interval.frames)
-        stages = stages or Stages(None, count)
         if interval.frames[0].is_empty:
-            yield from empty_groups(count)
-        else:
-            for found in self.find(interval, self.options, stages):
-                yield from _encode_group(found, self.options, interval.noise)
-        stages.add("code", count)
+            yield from empty_groups(len(interval.frames))
+            return
+        for found in self.find(interval, self.options):
+            yield from _encode_group(found, self.options, interval.noise)
 
 
 def analyze(
-    frames: Sequence[Mesh], centers: Centers, options: PaperOptions, stages: Stages, again: bool = False
+    frames: Sequence[Mesh], centers: Centers, options: PaperOptions, again: bool = False
 ) -> tuple[Fitted, Float64[np.ndarray, " T"]]:
     """Return the fitted reference of a group, as decoded, and each frame's residual (paper, sections 3.3.1 and 3.3.2).
 
@@ -156,7 +150,6 @@ def analyze(
     reference = extract_reference(frames, centers, options.reference, options.pose, again)
     if reference.mesh.is_empty:
         raise NoReferenceError("no surface is common to the frames")
-    stages.add("reference", len(frames))
     coded = code_reference(reference.mesh, REFERENCE_BITS, LEVELS)
     if coded.base.is_empty:
         raise NoReferenceError("the reference mesh has no faces left after Draco")
@@ -165,7 +158,6 @@ def analyze(
         fit = snap_to_vertices(coded.base.faces, predictions, frames)
     else:
         fit = fit_frames(coded.base.faces, predictions, frames, FitOptions(), reference.key)
-    stages.add("fit", len(frames))
     return Fitted(coded, fit.positions, reference.frame == MDS), fit.residuals
 
 
@@ -177,13 +169,13 @@ class _Cutting:
     noise: float
     again: bool = False  # the frames are a part of some that were one group
 
-    def groups(self, frames: Sequence[Mesh], centers: Centers, depth: int, stages: Stages) -> list[FoundGroup]:
+    def groups(self, frames: Sequence[Mesh], centers: Centers, depth: int) -> list[FoundGroup]:
         """Cut frames as `find_groups` does, from tracked centers; `depth` times at most."""
         options = self.options
         if len(frames) == 1:
             return [FoundGroup(frames, None)]
         try:
-            fitted, residuals = analyze(frames, centers, options, stages, self.again)
+            fitted, residuals = analyze(frames, centers, options, self.again)
         except NoReferenceError:
             return [FoundGroup(frames, None)]
         note("reference, coded", fitted.reference.base.vertices, fitted.reference.base.faces)
@@ -197,8 +189,7 @@ class _Cutting:
         known = replace(centers, positions=centers.positions[:cut])
         retracked = track_centers(tail, options.track)  # centers that were lost before the cut would spoil the tail
         parts = replace(self, again=True)
-        again = Stages(None, len(frames))  # these frames have been through the stages once
-        return [*parts.groups(head, known, depth - 1, again), *parts.groups(tail, retracked, depth - 1, again)]
+        return [*parts.groups(head, known, depth - 1), *parts.groups(tail, retracked, depth - 1)]
 
 
 def _encode_group(found: FoundGroup, options: PaperOptions, noise: float) -> Iterator[EncodedGroup]:

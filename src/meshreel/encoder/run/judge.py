@@ -17,6 +17,7 @@ from jaxtyping import Float64, Int64
 
 from ... import _core
 from ...errors import InputError
+from ...geometry import work
 from ...geometry.closest_points import Surface, area_samples
 from ...geometry.threads import mapped
 from ...geometry.topology import boxes_of, components, connected_faces, face_normals
@@ -25,7 +26,6 @@ from ...metrics.surface_samples import used_surface
 from ...types import Frames, Mesh
 from ..group.forms import NORMALISED, EncodedGroup, intra_only, target_of
 from ..group.interval import Interval
-from ..group.progress import Stages
 from ..settings.options import Recipe
 
 PART = 0.1  # of the diagonal of a connected piece, within which it is covered: another leaf is not this one (guess)
@@ -60,12 +60,13 @@ class Verdict:
         return f"it is {self.distance / target:.1f} times as far off as the quality asks for" if far else ""
 
 
-def judged(interval: Interval, recipe: Recipe, stages: Stages | None) -> Iterator[EncodedGroup]:
+def judged(interval: Interval, recipe: Recipe) -> Iterator[EncodedGroup]:
     """Yield the groups of an interval, each of which holds. Raises InputError for frames that no mesh reproduces."""
     at, count = 0, len(interval.frames)
     while at < count:
         state, first = None, at
-        for group in recipe.encode(_from(interval, at, count), stages):
+        for group in recipe.encode(_from(interval, at, count)):
+            work.passed("code", group.frame_count)
             some = _from(interval, at, at + group.frame_count)
             group, state, fault = _judged(some, recipe, group, state)
             at += group.frame_count
@@ -103,7 +104,7 @@ def _again(interval: Interval, recipe: Recipe, ways: Sequence[Recipe | None]) ->
 
     Alone, frames are coded with their noise where they do not hold without.
     """
-    tries = [lambda way=way: way.encode(interval, Stages(None, 1)) for way in ways if way is not None]
+    tries = [lambda way=way: way.encode(interval) for way in ways if way is not None]
     tries += [partial(_alone, interval, recipe, noise) for noise in sorted({interval.noise, 0.0}, reverse=True)]
     fault = ""
     for encode in tries:
@@ -131,6 +132,7 @@ def _alone(interval: Interval, recipe: Recipe, noise: float) -> Iterator[Encoded
 
 
 def _verdict(interval: Interval, number: int, frame: Mesh, mesh: Mesh) -> Verdict:
+    work.passed("judge")
     if mesh.is_empty:
         return Verdict(1.0, 1.0, 0.0, np.inf)
     uneven, surface, noisy = interval.unevenness(frame.vertices), Surface(mesh), interval.noise > 0

@@ -77,8 +77,9 @@ class Task:
         """Encode the interval; return its file and its lines of digests."""
         interval, lines = self.interval, list[str]()
         noting = noted(lines.append if self.noting else None, track=interval.track, frame=interval.first_frame)
-        with reporting(stages.add_work), noting:
-            groups = list(encode_interval(interval, self.recipe, self.appearance, stages))
+        with reporting(stages.passed), noting:
+            groups = list(encode_interval(interval, self.recipe, self.appearance))
+        stages.end()
         return pack_interval(interval, groups, self.head), "".join(lines)
 
 
@@ -89,7 +90,6 @@ def encode_intervals(job: Job, intervals: Iterable[Interval]) -> Iterator[list[E
     an earlier interval has no payloads. An executor's `worth` is the least number of frames for which a worker pays:
     few or short intervals are encoded here, then, where threads share what was read.
     """
-    job.stages.add("code", 0)  # the time that a frame takes is counted from here
     intervals, encode = iter(intervals), _one_by_one if job.executor is None else _side_by_side
     if job.executor is not None and (worth := getattr(job.executor, "worth", 0)):
         count = workers_of(job.executor)
@@ -134,14 +134,15 @@ def _side_by_side(job: Job, files: IntervalFiles, intervals: Iterable[Interval])
             yield number, encode_sent, (_task(job, interval.to_send()), number)
 
     def look() -> None:
-        for number, stage, done in told() if told is not None else ():
+        for number, stage, count in told() if told is not None else ():
             if number in sent:
-                sent[number][1].reach_frame(stage, done)
+                stages = sent[number][1]
+                stages.reach(stage, stages.reached[stage] + count)
 
     for number, (data, lines, observed, work) in as_done(job.executor, calls(), None if told is None else look):
         interval, stages = sent.pop(number)
         interval.learn(observed)
-        stages.reach("code", 1.0)
+        stages.end()
         add(work)
         ready[number] = files.keep(interval, data), lines
         while next_one in ready:
@@ -151,14 +152,14 @@ def _side_by_side(job: Job, files: IntervalFiles, intervals: Iterable[Interval])
 
 
 def encode_interval(
-    interval: Interval, recipe: Recipe, appearance: AppearanceOptions | None = None, stages: Stages | None = None
+    interval: Interval, recipe: Recipe, appearance: AppearanceOptions | None = None
 ) -> Iterator[EncodedGroup]:
     """Yield the groups of an interval, in order, with colours by `appearance`; None leaves colours out."""
     count = len(interval.frames)
     sample = (interval.frames[number] for number in evenly(count, LOOKED_AT))
     splats = appearance is not None and appearance.splats is not None
     interval = replace(interval, pictured=splats or has_pictures(interval, sample, appearance))
-    for group in colored_groups(judged(interval, recipe, stages), interval, appearance, stages):
+    for group in colored_groups(judged(interval, recipe), interval, appearance):
         note("payload", group.form.name, group.payload, *(one.read() for one in group.companions))
         yield group
 
@@ -169,10 +170,10 @@ def _task(job: Job, interval: Interval) -> Task:
 
 def _begun(job: Job, files: IntervalFiles, interval: Interval) -> tuple[IntervalStages, list[EncodedGroup] | None]:
     """Return the progress of an interval, and its groups if an earlier run encoded it."""
-    stages = IntervalStages(job.stages, len(interval.frames), job.recipe.options.group_size, interval.weight)
+    stages = IntervalStages(job.stages.passed, len(interval.frames), job.recipe.options.group_size, interval.weight)
     known = files.take(interval, job.head)
     if known is not None:
-        stages.reach("code", 1.0)
+        job.stages.skip(len(interval.frames) * interval.weight)
     return stages, known
 
 
@@ -183,7 +184,7 @@ def encode_sent(task: Task, number: int) -> tuple[bytes, str, Any, Work]:
     """
     end_with_parent()
     count = len(task.interval.frames)
-    stages = IntervalStages(Stages(partial(tell, number), count), count, task.recipe.options.group_size)
+    stages = IntervalStages(partial(tell, number), count, task.recipe.options.group_size)
     with threadpool_limits(1), threads(task.threads):
         before = so_far()
         data, lines = task.done(stages)

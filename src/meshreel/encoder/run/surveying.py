@@ -20,7 +20,7 @@ from ...analysis.survey import Piece, Survey, joined, survey_frames, survey_sequ
 from ...errors import InputError
 from ...format.checks import LARGEST
 from ...geometry.derived_sequences import DerivedSequence
-from ...geometry.work import Work, add, since, so_far
+from ...geometry.work import Work, add, passed, since, so_far
 from ...io.files import Place, read_input
 from ...io.write import write_file
 from ...texts import json_of
@@ -36,7 +36,7 @@ def survey_job(job: Job, cleaned: bool = True) -> Survey:
     """Survey the sequence of a job, with the errors of `survey_sequence`; an executor's workers read the files."""
     short = getattr(job.executor, "worth", 0) and len(job.sequence) < 2 * SLICE
     if job.executor is None or short or not job.sequence.is_stored:
-        return survey_sequence(job.sequence, job.stages.add, cleaned)
+        return survey_sequence(job.sequence, cleaned)
     count, found = len(job.sequence), dict[int, Survey]()
 
     def calls() -> Iterator[Call]:
@@ -48,7 +48,7 @@ def survey_job(job: Job, cleaned: bool = True) -> Survey:
         job.sequence.learn(observed)
         add(work)
         found[start] = survey
-        job.stages.add("survey", len(survey.diagonals))
+        passed("survey", len(survey.diagonals))
     return joined([found[start] for start in sorted(found)])
 
 

@@ -11,9 +11,10 @@ import signal
 import sys
 import threading
 from collections.abc import Callable
+from fractions import Fraction
 from functools import cache
 
-Told = tuple[int, str, int]  # number of a call, stage, frames of it that are done
+Told = tuple[int, str, int]  # number of a call, stage, further frames that have passed it
 _listener: Callable[[Told], object] | None = None
 
 
@@ -23,11 +24,10 @@ def tell_to(listener: Callable[[Told], object]) -> None:
     _listener = listener
 
 
-def tell(number: int, stage: str, done: int, total: int) -> None:
-    """Report to the parent, if it listens, the number of a call's frames that have passed a stage."""
-    del total
+def tell(number: int, stage: str, count: Fraction) -> None:
+    """Report to the parent, if it listens, how many further frames of a call have passed a stage."""
     if _listener is not None:
-        _listener((number, stage, done))
+        _listener((number, stage, int(count)))
 
 
 def die_with_parent() -> None:

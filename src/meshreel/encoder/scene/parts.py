@@ -32,9 +32,9 @@ from ...geometry.derived_sequences import CapturedSequence, picked
 from ...geometry.threads import ahead
 from ...geometry.topology import components, concatenate, face_normals, part_of
 from ...geometry.voxels import Lattice
+from ...geometry.work import passed
 from ...types import Mesh, MeshSequence, evenly
 from ..group.interval import Views
-from ..group.progress import Stages
 from ..settings.options import SceneOptions
 
 PROBES = 12  # frames, at most, in which moving surface is measured (guess)
@@ -78,6 +78,7 @@ class Parts:
 
         Return it, and the number of faces of which neither has anything: bits that are too small, or seldom measured.
         """
+        passed("bodies")
         by, moves = self.segmentation, self.segmentation.moving(frame, mesh)
         if isinstance(by, ByRest):
             return with_ring(mesh, moves, by.cell, self.room(0)), 0
@@ -109,7 +110,6 @@ def take_apart(
     sequence: CapturedSequence,
     survey: Survey,
     options: SceneOptions,
-    stages: Stages,
     masker: Masker | None = None,
     standing: Standing | None = None,
 ) -> Parts:
@@ -120,22 +120,20 @@ def take_apart(
     check_one_unit(survey)
     segmentation: Segmentation
     if masker is None:
-        segmentation = segment(sequence, options.cameras, lambda share: stages.reach("segment", share), standing)
+        segmentation = segment(sequence, options.cameras, standing)
     else:
         segmentation = segment_by(masker, sequence, options.cameras)
-    stages.reach("segment", 1.0)
     depth = sequence.depth if options.from_depth else None
     if isinstance(segmentation, ByRest):  # frames without noise: their own surface, of which none has to be measured
         background, noisy = segmentation.room, Mesh.empty()
     else:
         if standing is not None:
             _check_it_rests(sequence, segmentation, standing)
-        background = noisy = _background(sequence, depth, segmentation, stages)
+        background = noisy = _background(sequence, depth, segmentation)
         if background.is_empty:
             _check_nothing_lost(sequence, segmentation)
     changes = [_change(sequence, depth, segmentation, frame) for frame in segmentation.changes]
-    stages.reach("background", 1.0)
-    sizes, noise = _measured(sequence, segmentation, noisy, changes, stages)
+    sizes, noise = _measured(sequence, segmentation, noisy, changes)
     survey = replace(survey, scale=(float(np.median(sizes)) if sizes else 0.0) or survey.diagonal)
     return Parts(survey, segmentation, background, changes, noise, free_space(sequence), Views.of(sequence, survey))
 
@@ -181,14 +179,12 @@ def _check_nothing_lost(sequence: MeshSequence, segmentation: Segmentation) -> N
             raise NoRoom(f"{text} stand still, but are too small for a room")
 
 
-def _background(
-    sequence: CapturedSequence, depth: DepthFrames | None, segmentation: Segmentation, stages: Stages
-) -> Mesh:
+def _background(sequence: CapturedSequence, depth: DepthFrames | None, segmentation: Segmentation) -> Mesh:
     """Fuse the surface that stands still at first, from the cameras' depth where it is known."""
     numbers, cell = evenly(len(sequence), FRAMES), segmentation.cell
 
     def stands(number: int, mesh: Mesh) -> Bool[np.ndarray, " F"]:
-        stages.reach("background", number / len(sequence))
+        passed("background")
         return segmentation.still_at_first(number, mesh)
 
     if depth is not None:
@@ -238,7 +234,7 @@ def _rooms(background: Mesh, changes: Sequence[Change]) -> Callable[[int], Surfa
 
 
 def _measured(
-    sequence: CapturedSequence, segmentation: Segmentation, background: Mesh, changes: Sequence[Change], stages: Stages
+    sequence: CapturedSequence, segmentation: Segmentation, background: Mesh, changes: Sequence[Change]
 ) -> tuple[list[float], LocalNoise]:
     """Return the diagonals of the largest body in each of some frames, m, and the noise of still surface.
 
@@ -254,7 +250,7 @@ def _measured(
 
     some = evenly(len(sequence), PROBES)
     for number, (mesh, moves) in zip(some, ahead(seen, some), strict=True):
-        stages.reach("noise", number / len(sequence))
+        passed("noise")
         moving = part_of(mesh, moves)
         if moves.any():
             label = components(moving.faces, len(moving.vertices))
@@ -269,7 +265,6 @@ def _measured(
             gaps, outward = np.linalg.norm(ways, axis=1), (ways * room.normals[hits.faces]).sum(axis=1)
             places.append(points[gaps < far])
             distances.append(np.copysign(gaps, outward)[gaps < far])
-    stages.reach("noise", 1.0)
     fine = REGION * segmentation.cell
     wide = max(fine, float(np.median(sizes or [0.0])) / 2)
     return sizes, LocalNoise.of(places, distances, fine, wide, _cameras(sequence))

@@ -84,6 +84,7 @@ def scene_intervals(job: Job, parts: Parts, tracks: Tracks) -> Iterator[Interval
                 one = replace(one, up=sequence.up, frame_rate=sequence.frame_rate, local=parts.noise, place=place)
                 found.append(replace(one, views=parts.views, depth=sequence.depth))
         weight = Fraction(len(frames), sum(len(interval.frames) for interval in found))
+        job.stages.bodies = float(1 / weight)
         yield from (replace(interval, weight=weight) for interval in found)
 
 

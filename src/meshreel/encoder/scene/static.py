@@ -27,6 +27,7 @@ from ...geometry.decimate import decimate_faces
 from ...geometry.derived_sequences import CapturedSequence, is_colored
 from ...geometry.threads import ahead
 from ...geometry.topology import clean, face_normals, vertex_normals
+from ...geometry.work import passed
 from ...types import Mesh, Placement, evenly
 from ..appearance.colors import fitting_size
 from ..appearance.videos import AppearanceOptions, TextureOptions, layered_pictures
@@ -243,6 +244,7 @@ class _Looks:
         self, number: int, points: Float64[np.ndarray, "N 3"], normals: Float64[np.ndarray, "N 3"]
     ) -> tuple[UInt8[np.ndarray, "N 3"], Bool[np.ndarray, " N"]]:
         """Return the colours of places in one frame, and which of them it shows, away from the border of what moves."""
+        passed("pictures")
         paint = self._paint(number) if self._views is None else self._views.at(number).clear
         colors, seen = paint.at(points, normals)
         return np.clip(np.rint(colors), 0, 255).astype(np.uint8), seen

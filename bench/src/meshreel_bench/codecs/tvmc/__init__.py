@@ -27,7 +27,6 @@ from meshreel.coding.layers.patches import run_lengths
 from meshreel.coding.mesh import CodedReference
 from meshreel.encoder.group.forms import intra_only, target_of
 from meshreel.encoder.group.interval import Interval
-from meshreel.encoder.group.progress import Stages
 from meshreel.encoder.paper.recipe import FoundGroup, PaperOptions, displacement_field
 from meshreel.encoder.scene.static import Static, encode_static
 from meshreel.encoder.sequence import Encoder
@@ -79,7 +78,8 @@ class TvmcCodec(Prepared):
 
     def code(self, analysis: Encoder, progress: Progress | None = None) -> bytes:
         data, count = self.pack(track_sequence(analysis, self.encoder_options)), len(analysis.sequence)
-        Stages(progress, count).add("code", count)
+        if progress is not None:
+            progress("code", count, count)
         return data
 
     def pack(self, tracking: Tracking) -> bytes:
@@ -138,7 +138,7 @@ def track_sequence(encoder: Encoder, options: EncoderOptions) -> Tracking:
     assert isinstance(options.method, PaperOptions), "references are those of the paper's recipe"
     for interval in encoder.intervals(options):
         if not interval.frames[0].is_empty:
-            groups += _groups(interval, encoder.find(interval, options.method, None), options.method)
+            groups += _groups(interval, encoder.find(interval, options.method), options.method)
     survey, states = survey_sequence(sequence) if parts is None else parts.survey, list[Static]()
     if parts is not None and options.scene is not None:
         states = encode_static(parts, len(sequence), sequence.frame_rate, options.scene)
