@@ -172,7 +172,8 @@ class Encoder:
         """Yield the intervals that `encode` encodes, of all tracks of a scene."""
         job, parts = self._job(options), self.parts(options)
         if parts is None:
-            survey = survey_job(job)
+            with reporting(job.stages.passed):
+                survey = survey_job(job)
             return intervals_of(job, survey, tracked_bodies(job, survey)[0])
         return scene_intervals(job, parts, Tracks(parts.segmentation, job.scene.near))
 

@@ -112,6 +112,7 @@ def extract_reference(
     work.passed("reference")
     best = min(_trials(group, options, pose, again), key=_misfit)
     mesh = group.fused(group.pose(best.frame), best.key, VOXEL, options.vertices)
+    work.passed("reference", len(frames))
     return Reference(mesh, group.pose(best.frame), best.frame, best.key, group.kin)
 
 

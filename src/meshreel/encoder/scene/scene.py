@@ -83,9 +83,10 @@ def scene_intervals(job: Job, parts: Parts, tracks: Tracks) -> Iterator[Interval
                 one = Interval(some, noise, frames.start + cut.start, track, digest(some))
                 one = replace(one, up=sequence.up, frame_rate=sequence.frame_rate, local=parts.noise, place=place)
                 found.append(replace(one, views=parts.views, depth=sequence.depth))
-        weight = Fraction(len(frames), sum(len(interval.frames) for interval in found))
-        job.stages.bodies = float(1 / weight)
-        yield from (replace(interval, weight=weight) for interval in found)
+        sizes = [1 + sum(len(mesh.vertices) for mesh in interval.frames) for interval in found]
+        job.stages.bodies = sum(sizes) / max(sizes)
+        for interval, size in zip(found, sizes, strict=True):
+            yield replace(interval, weight=Fraction(len(frames) * size, sum(sizes) * len(interval.frames)))
 
 
 def _noise(meshes: Sequence[Mesh], parts: Parts) -> float:
