@@ -109,7 +109,7 @@ def extract_reference(
     """
     assert len(frames) == len(centers), "one pose of the centers for each frame"
     group = Group(frames, centers, options.poisson)
-    work.passed("reference")
+    work.passed("reference", len(frames) // 3)  # of the time that a reference takes
     best = min(_trials(group, options, pose, again), key=_misfit)
     mesh = group.fused(group.pose(best.frame), best.key, VOXEL, options.vertices)
     work.passed("reference", len(frames))
