@@ -11,10 +11,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float64, Int32
+from jaxtyping import Float64
 
 from ..geometry.color_views import Painted
-from ..geometry.drawing import Crop, Viewer, draw_places
+from ..geometry.drawing import Crop, SeenPlaces, Viewer, draw_places
 from ..types import LUMA, Mesh
 from .render import MARGIN, Picture, crop_of, ssim_view
 from .surface_samples import scatter
@@ -56,9 +56,9 @@ def _squares(mesh: Mesh, own: Painted, other: Painted) -> Float64[np.ndarray, " 
 
 @dataclass(frozen=True, slots=True)
 class ColorView(Picture):
-    """Picture of a mesh in its colours, and the faces that it sees."""
+    """Picture of a mesh in its colours, and the places that it sees."""
 
-    faces: Int32[np.ndarray, "H W"]  # -1 where nothing is seen
+    places: SeenPlaces
 
 
 class Colored:
@@ -70,11 +70,10 @@ class Colored:
     def look(self, camera: Viewer, crop: Crop | None = None) -> ColorView:
         """Return the picture in a crop, or the whole picture."""
         seen = draw_places(self._mesh, camera, crop)
-        image, faces = np.ones((*seen.covered.shape, 3), np.float32), np.full(seen.covered.shape, -1, np.int32)
+        image = np.ones((*seen.covered.shape, 3), np.float32)
         if self._painted is not None:
             image[seen.covered] = np.clip(np.rint(self._painted.on(seen.faces, seen.barycentric)), 0, 255) / 255
-        faces[seen.covered] = seen.faces
-        return ColorView(seen.covered, image, faces)
+        return ColorView(seen.covered, image, seen)
 
 
 def render_errors(original: Mesh, decoded: Mesh, cameras: Sequence[Viewer]) -> dict[str, float]:

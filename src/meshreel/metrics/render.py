@@ -98,16 +98,18 @@ class Remembered:
 
     def __init__(self, mesh: Mesh) -> None:
         self.mesh, self._visible = mesh, Visible(mesh)
-        self._drawn = list[tuple[Viewer, Crop, Picture]]()
+        self._drawn = dict[int, tuple[Viewer, Crop, Picture]]()  # by the identity of the camera
 
     def look(self, camera: Viewer, crop: Crop) -> Picture:
-        """Render the mesh in a crop of a camera's image, or return the picture from before."""
-        for known, part, drawn in self._drawn:
-            if known is camera and part == crop:
-                return drawn
-        view = self._visible.look(camera, crop)
-        self._drawn.append((camera, crop, Picture(view.covered, view.colors)))
-        return self._drawn[-1][-1]
+        """Return the picture in a crop around the whole mesh, which is rendered once for each camera."""
+        if id(camera) not in self._drawn:
+            view = self._visible.look(camera, part := crop_of([self.mesh], camera))
+            self._drawn[id(camera)] = camera, part, Picture(view.covered, view.colors)
+        _, part, drawn = self._drawn[id(camera)]
+        at = slice(part.top - crop.top, part.bottom - crop.top), slice(part.left - crop.left, part.right - crop.left)
+        covered, colors = np.zeros(crop.shape, bool), np.full((*crop.shape, 3), BACKGROUND, np.float32)
+        covered[at], colors[at] = drawn.covered, drawn.colors
+        return Picture(covered, colors)
 
 
 def ssim_normals(original: Mesh | Remembered, decoded: Mesh, cameras: Sequence[Viewer]) -> dict[str, float]:
@@ -139,11 +141,10 @@ def ssim_view(a: Picture | View, b: Picture | View, camera: Viewer, crop: Crop) 
 
 def ssim_map(a: Float64[np.ndarray, "H W 3"], b: Float64[np.ndarray, "H W 3"]) -> Float64[np.ndarray, "H W"]:
     """Return the SSIM of every pixel, averaged over the three channels (Wang et al. 2004, eq. 13)."""
+    return np.asarray(sum(map(_ssim, np.moveaxis(a, -1, 0), np.moveaxis(b, -1, 0))) / 3)
 
-    def mean(values: Float64[np.ndarray, "H W 3"]) -> Float64[np.ndarray, "H W 3"]:
-        return uniform_filter(values, (_SIDE, _SIDE, 1))
 
-    ux, uy = mean(a), mean(b)
-    vx, vy, vxy = (_UNBIASED * (mean(p * q) - u * v) for p, q, u, v in ((a, a, ux, ux), (b, b, uy, uy), (a, b, ux, uy)))
-    means, spreads = ux * ux + uy * uy + _C1, vx + vy + _C2
-    return np.asarray((2 * ux * uy + _C1) * (2 * vxy + _C2) / (means * spreads)).mean(axis=-1)
+def _ssim(a: Float64[np.ndarray, "H W"], b: Float64[np.ndarray, "H W"]) -> Float64[np.ndarray, "H W"]:
+    ux, uy, xx, yy, xy = (uniform_filter(values, _SIDE) for values in (a, b, a * a, b * b, a * b))
+    vx, vy, vxy = (_UNBIASED * v for v in (xx - ux * ux, yy - uy * uy, xy - ux * uy))
+    return np.asarray((2 * ux * uy + _C1) * (2 * vxy + _C2) / ((ux * ux + uy * uy + _C1) * (vx + vy + _C2)))

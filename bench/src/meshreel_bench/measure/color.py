@@ -13,7 +13,6 @@ from meshreel.decoder.video import Video
 from meshreel.format.layout import ChunkKind, Form, Pictures
 from meshreel.format.records import unpack_all
 from meshreel.geometry.color_views import ColorPicture, Painted
-from meshreel.geometry.drawing import draw
 from meshreel.geometry.topology import blend
 from meshreel.metrics.color import PEAK, POINTS, TO_YUV, Colored, psnr
 from meshreel.metrics.surface_samples import scatter
@@ -36,12 +35,13 @@ def picture_squares(picture: ColorPicture, original: Mesh, decoded: Mesh, still:
     """
     from scipy.ndimage import binary_dilation, binary_erosion
 
-    camera = picture.camera
-    shown, wanted = Colored(decoded).look(camera), Colored(original).look(camera)
-    near, far = (draw(mesh, camera).depth for mesh in (original, decoded))
-    ahead = near < (1 - BEFORE) * far
+    shown, wanted = (Colored(mesh).look(picture.camera) for mesh in (decoded, original))
+    near, far = (np.full(view.covered.shape, np.inf) for view in (wanted, shown))
+    near[wanted.covered], far[shown.covered] = wanted.places.depth, shown.places.depth
+    still_here = shown.covered.copy()
+    still_here[still_here] = shown.places.faces < still
+    still_here &= near >= (1 - BEFORE) * far
     apart = np.square(PEAK * shown.colors.astype(np.float64) @ TO_YUV[0] - picture.pixels @ TO_YUV[0])
-    still_here = shown.covered & (shown.faces < still) & ~ahead
     both = shown.covered & wanted.covered
     stands, moves = (binary_erosion(mask & both, iterations=EDGE) for mask in (still_here, ~still_here))
     stands &= ~binary_dilation(moves, iterations=EDGE + HALO)
