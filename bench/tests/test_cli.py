@@ -8,6 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from meshreel_bench.cli import describe, main, make_app, operating_point
+from meshreel_bench.codecs.draco import DracoCodec
+from meshreel_bench.measure import digests
 from meshreel_bench.rows import append_row, read_rows
 from msgspec.structs import replace
 
@@ -90,11 +92,29 @@ def test_what_cannot_be_done_is_refused_in_a_line(bench, tmp_path, monkeypatch, 
     assert code != 0 and reason in " ".join(said.split())
 
 
-def test_rows_of_one_name_and_different_content_make_no_report(bench, tmp_path):
-    for number, codec in enumerate(("a", "b")):
-        append_row(tmp_path / "rows.jsonl", replace(row("own", codec, 1.0, 60.0), source=str(number)))
+@pytest.mark.parametrize("state", ["source", "encoder", "data"])
+def test_rows_of_different_states_make_no_report(bench, tmp_path, state):
+    rows = [row("own", "a", rate, 60.0) for rate in (1.0, 2.0)]
+    for each in (rows[0], replace(rows[1], **{state: "0123"})):
+        append_row(tmp_path / "rows.jsonl", each)
     code, _, said = bench("report", tmp_path / "rows.jsonl", "-o", tmp_path / "out")
-    assert code != 0 and "different content" in said
+    said = " ".join(said.split())
+    assert code != 0 and "rows.jsonl: rows of different states" in said and "run figure6 --stale`" in said
+
+
+def test_only_rows_of_another_encoder_are_measured_again_where_it_is_asked_for(bench, data, monkeypatch):
+    rows = data / "rows.jsonl"
+    run = ("run", "figure6", "-o", rows, "--data", data, "--on", "own", "--only", "draco", "--no-ssim", "--json")
+    run = (*run, "--add", "decimated_draco:fraction=0.5", "--only", "decimated_draco")
+    assert bench(*run)[1]["stale"] == 0
+    digests._digest.cache_clear()
+    monkeypatch.setattr(DracoCodec, "encode", lambda *_: b"other bytes")
+    code, found, said = bench(*run)
+    assert code == 0 and found["stale"] == 5 and "5 of 10 rows are of another encoder" in " ".join(said.split())
+    code, found, said = bench(*run, "--stale")
+    digests._digest.cache_clear()
+    assert code == 0 and found["stale"] == 0 and said.count("(measured before)") == 5
+    assert len(rows.read_text().splitlines()) == 15
 
 
 def test_experiments_and_codecs_are_listed(bench):

@@ -2,7 +2,7 @@
 
 import msgspec
 import pytest
-from meshreel_bench.rows import Point, append_row, checked, disagreements, join_rows, mixtures, read_rows
+from meshreel_bench.rows import Point, append_row, checked, join_rows, read_rows
 
 from bench.tests.made_up import failed, floor, row
 from meshreel.errors import InputError
@@ -83,24 +83,3 @@ def test_of_a_point_the_last_row_of_a_file_counts_and_of_several_files_the_first
     # points that differ in frames or metrics are different points
     points = [Point("a", "b"), Point("a", "b", frames=3), Point("a", "b", metrics="regions"), Point("a", "b", {"q": 1})]
     assert len({point.key for point in points}) == 4
-
-
-def test_points_that_two_experiments_measured_with_other_bytes_are_found():
-    seen, smaller, alike, other = (row("ball", "best", rate, 60.0) for rate in (2.0, 1.0, 2.01, 3.0))
-    smaller, alike = (msgspec.structs.replace(each, point=seen.point) for each in (smaller, alike))
-    distances = msgspec.structs.replace(smaller, point=msgspec.structs.replace(seen.point, metrics="distances"))
-    assert disagreements([seen, distances, other]) == [(distances, seen)]
-    assert disagreements([seen, alike, other, failed("ball", "draco", "no luck")]) == []
-
-
-def test_rows_of_data_that_were_made_anew_are_found():
-    def measured(sequence, codec, diagonal, name="diagonal_m"):
-        made = row(sequence, codec, 1.0, 60.0)
-        return msgspec.structs.replace(made, metrics=made.metrics | {name: diagonal})
-
-    old, new, newest = (measured("room", "draco", diagonal) for diagonal in (4.0, 4.01, 4.02))
-    other_frames, elsewhere = measured("room", "best", 4.0112), measured("hall", "draco", 6.0)
-    assert mixtures([old, new, elsewhere, other_frames, newest]) == [[[new, other_frames], [old], [newest]]]
-    assert mixtures([new, other_frames, elsewhere, row("room", "draco", 1.0, 60.0)]) == []
-    parts = measured("room", "best", 4.03, "input_diagonal_m")  # of a scene's people, its background and all of it
-    assert mixtures([old, parts]) == [[[old], [parts]]]

@@ -21,8 +21,9 @@ from .codecs import codec_names, codec_version, make_codec
 from .datasets import Store, released_in, views_missing
 from .experiments import EXPERIMENTS, find_experiment
 from .experiments.study import Sweep
+from .measure.digests import is_stale
 from .measure.runner import Measuring, run_points
-from .report.pages import parts_of, write_report
+from .report.pages import mixtures, parts_of, write_report
 from .report.values import value
 from .report.verdicts import Verdict, verdicts
 from .rows import Options, Point, Row, join_rows, parted, read_rows
@@ -46,6 +47,8 @@ class Running:
     """Seconds per point; a point that takes longer, crashes or decodes invalid meshes is recorded as failed."""
     retry: Annotated[bool, Parameter(negative="")] = False
     """Measure failed points again; successful ones are never repeated."""
+    stale: Annotated[bool, Parameter(negative="")] = False
+    """Measure points again whose rows are of another encoder or other data, or do not say of which."""
     ssim: bool = True
     """Compare rendered pictures too (slower)."""
 
@@ -144,7 +147,7 @@ def run(
     points = selection.points(experiment, running.ssim)
     store = Store(selection.data.absolute(), output.absolute().with_suffix(CACHE), reading.options())
     common.warn(views_missing(selection.data, [point.sequence for point in points]))
-    how = Measuring(store, running.limit, running.retry, running.jobs)
+    how = Measuring(store, running.limit, running.retry, running.stale, running.jobs)
     with common.stages("points") as progress:
         done = 0
 
@@ -162,8 +165,11 @@ def run(
         rows = run_points(points, output, how, report, opening)
     measured, failed = parted(rows)
     common.warn(tuple(describe(row) for row in failed))
+    if stale := sum(map(is_stale, rows)):
+        text = f"{stale} of {len(rows)} rows are of another encoder than today's, or do not say of which"
+        common.warn((f"{text}; --stale measures them again",))
     found = verdicts(find_experiment(experiment), measured)
-    counts = {"output": str(output), "rows": len(rows), "failed": len(failed)}
+    counts = {"output": str(output), "rows": len(rows), "failed": len(failed), "stale": stale}
     common.result(counts | {"promises": [asdict(verdict) for verdict in found]}, verdict_table(found))
     if len(failed) == len(rows):
         raise InputError(f"{output}: all {len(rows)} points failed; mend what they report, and run again with --retry")
@@ -186,11 +192,12 @@ def report(rows: list[Path], /, *, output: Output, common: Common = Common()) ->
     files = {path: read_rows(path) for path in rows}
     if empty := [path for path, found in files.items() if not found]:
         raise InputError(f"{empty[0]}: has no rows; make some with `meshreel-bench run`")
-    joined, sources = join_rows(files.values()), dict[str, str | None]()
-    for row in joined:
-        if sources.setdefault(row.point.sequence, row.source) != row.source:
-            text = f"rows of {row.point.sequence} are of sequences of different content, or read in different ways"
-            raise InputError(f"{text}; make a report of each, or delete the lines of one")
+    joined = join_rows(files.values())
+    for part in parts_of(joined):
+        if mixed := mixtures(part.rows):
+            paths = " ".join(str(path) for path, own in files.items() if any(row in own for row in part.rows))
+            text = f"{paths}: rows of different states make no page: {'; '.join(mixed)}"
+            raise InputError(f"{text}; measure them again with `meshreel-bench run {part.name} --stale`")
     common.warn(tuple(describe(row) for row in parted(joined)[1]))
     written = [str(path) for path in write_report(joined, output)]
     found = [verdict for part in parts_of(joined) for verdict in verdicts(part.study, part.rows)]

@@ -11,9 +11,7 @@ import msgspec
 
 from meshreel.errors import InputError
 
-AGREE = 0.01  # of the bytes: less is a container, or another order of vertices (guess)
-ALIKE = 1e-3  # of a mean diagonal: those of other frames of one recording differ by up to 6e-4 (measured)
-
+METHOD = ("preset", "variant", "color", "levels", "labels", "decoder")  # options that choose one; others: its points
 BEGINNING = b'{"point":'  # of a row
 Count = Annotated[int, msgspec.Meta(gt=0)]
 Positive = Annotated[float, msgspec.Meta(gt=0)]
@@ -39,6 +37,11 @@ class Point(msgspec.Struct, frozen=True):
     def key(self) -> str:
         """Text that is equal for equal points."""
         return json.dumps(msgspec.to_builtins(self), sort_keys=True)
+
+    @property
+    def method(self) -> Options:
+        """Options that choose a method of the codec."""
+        return {name: self.options[name] for name in METHOD if name in self.options}
 
 
 class Maker(msgspec.Struct, frozen=True):
@@ -127,6 +130,8 @@ class Row(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True, forbid_
     made_by: Maker | None = None
     source: str | None = None  # digest of a sequence that is none of the benchmark's
     codec_version: str | None = None  # of another distribution's codec
+    encoder: str | None = None  # digest of its codec's method (`measure.digests`); None: not recorded
+    data: str | None = None  # digest of the sequence's first frame
     failed: str | None = None  # reason why nothing was measured
 
     @property
@@ -186,39 +191,6 @@ def join_rows(files: Iterable[Sequence[Row]]) -> list[Row]:
         if known is None or (known.failed and not row.failed):
             found[row.point.key] = row
     return list(found.values())
-
-
-def disagreements(rows: Iterable[Row]) -> list[tuple[Row, Row]]:
-    """Return pairs of rows of one operating point that experiments measured with bytes that differ by over 1 %."""
-    found: dict[str, list[Row]] = {}
-    for row in rows:
-        if row.stream and not row.failed and row.decoding:  # no part of a stream, as levels that are played
-            found.setdefault(msgspec.structs.replace(row.point, metrics="views").key, []).append(row)
-    pairs = [(min(own, key=_size), max(own, key=_size)) for own in found.values()]
-    return [(least, most) for least, most in pairs if _size(most) > (1 + AGREE) * _size(least)]
-
-
-def mixtures(rows: Iterable[Row]) -> list[list[list[Row]]]:
-    """Return the rows of sequences that were generated again between measurements, by version, the largest first."""
-    found: dict[object, list[tuple[float, Row]]] = {}
-    for row in rows:
-        if diagonal := row.metrics.get("diagonal_m") or row.metrics.get("input_diagonal_m"):
-            found.setdefault((row.point.sequence, row.frames), []).append((diagonal, row))
-    several = []
-    for measured in found.values():
-        makes, last = list[list[Row]](), 0.0
-        for diagonal, row in sorted(measured, key=lambda pair: pair[0]):
-            if diagonal > (1 + ALIKE) * last:
-                makes.append([])
-            makes[-1].append(row)
-            last = diagonal
-        if len(makes) > 1:
-            several.append(sorted(makes, key=len, reverse=True))
-    return several
-
-
-def _size(row: Row) -> int:
-    return row.stream.bytes if row.stream else 0
 
 
 def check_writable(path: Path) -> None:

@@ -58,7 +58,8 @@ REMESHED = {  # new connectivity in every frame: of a body, its first frames
 RELEASED = ("answering", "drinking", "arena", "sitting", "synthetic")  # folders of the data of TSMC's authors
 LONG, LONG_FRAMES = "synthetic2x150", 150  # crane150, and samba150 that passes close by
 FAR, NEAR = 2.2, 0.5  # m, of the second body's way: surfaces are 1.2 m apart first, 0.06 in the middle, 0.7 last
-NAMES = (DEMO, *SHAPES, SYNTHETIC, LONG, *SCENES, ROOM3, PROCEDURAL, WALKER, *RECORDINGS, *REMESHED, *SENSED, PEOPLE)
+ROOMS = (*SCENES, ROOM3, PROCEDURAL, *SENSED, PEOPLE)
+NAMES = (DEMO, *SHAPES, SYNTHETIC, LONG, *ROOMS, WALKER, *RECORDINGS, *REMESHED)
 PLAYED: dict[str, Callable[[int], Iterable[int]]] = {  # endings of names: the order of so many frames
     "-backwards": lambda count: reversed(range(count)),
     "-forth-and-back": lambda count: cycle([*range(count), *range(count - 2, 0, -1)]),  # ends are not repeated
@@ -95,7 +96,7 @@ class Store:
             return Dataset(soft_bodies(SoftBodiesOptions(frames=frames or SoftBodiesOptions().frames)))
         if name in SHAPES:
             return Dataset(SHAPES[name](*([frames] if frames else [])))
-        if name in (*SCENES, ROOM3, PROCEDURAL, *SENSED, PEOPLE):
+        if name in ROOMS:
             return _scene(name, self.data, frames, self.cache)
         if name in RECORDINGS:
             known_as, chosen = Path(RECORDED, name), ":" if frames is None else f":{frames}"
@@ -134,6 +135,11 @@ class Store:
         files = [path] if path.exists() else open_sequence(path).files
         read = (*map(checksum, files), self.own.frame_rate, self.own.frames, self.own.scale)
         return hashlib.sha256(repr(read).encode()).hexdigest()
+
+
+def is_scene(name: str) -> bool:
+    """Return whether a sequence is one of cameras in a room."""
+    return name.removesuffix("-backwards").removesuffix("-forth-and-back") in (*ROOMS, *RECORDINGS, *RELEASED)
 
 
 def released_in(data: Path) -> tuple[str, ...]:

@@ -17,6 +17,7 @@ from ..codecs import codec_version, make_codec
 from ..datasets import Store
 from ..experiments.study import HEADSET
 from ..rows import Point, Row, append_row, check_writable, read_rows
+from .digests import encoder_digest, is_stale, mesh_digest
 from .point import empty_row, measure_points
 from .worker import WorkerError, end_all, in_fresh_process
 
@@ -30,6 +31,7 @@ class Measuring:
     store: Store
     limit_s: float | None = None  # wall time of a point
     retry: bool = False  # points that failed before are measured again
+    stale: bool = False  # so are those of other encoders or data
     jobs: int = 1  # points side by side
 
 
@@ -47,6 +49,11 @@ def run_points(
     """
     wanted, stored = {point.key for point in points}, read_rows(file) if file.exists() else []
     found = {row.point.key: row for row in stored if row.point.key in wanted and _is_valid(row, how)}
+    if how.stale:
+        places = dict.fromkeys((row.point.sequence, row.point.frames) for row in found.values())
+        today = {place: mesh_digest(how.store.open(*place).sequence[0]) for place in places}
+        kept = (row for row in found.values() if row.failed or not is_stale(row))
+        found = {r.point.key: r for r in kept if r.failed or r.data == today[r.point.sequence, r.point.frames]}
     missing = [point for point in points if point.key not in found]
     for row in [found[point.key] for point in points if point.key in found]:
         report(row, False)
@@ -55,7 +62,8 @@ def run_points(
     for sequence, frames in dict.fromkeys((point.sequence, point.frames) for point in missing):
         opening(sequence)
         how.store.open(sequence, frames)  # what takes long to make is made once, before processes need it
-    for row in _measured(runs_of(missing), how):
+    for measured in _measured(runs_of(missing), how):
+        row = msgspec.structs.replace(measured, encoder=encoder_digest(measured.point))
         append_row(file, row)
         found[row.point.key] = row
         report(row, True)

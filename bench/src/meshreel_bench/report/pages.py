@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
@@ -13,10 +13,11 @@ from pathlib import Path
 from meshreel.errors import InputError
 from meshreel.io.write import make_folder, replacing
 
+from ..datasets import is_scene
 from ..experiments import EXPERIMENTS
 from ..experiments.study import D2, MASKED, Study
 from ..names import looks_of, title
-from ..rows import Row, disagreements, mixtures, parted
+from ..rows import Row, parted
 from . import tables
 from .bandwidth import anchor_rows
 from .comparison import beyond_table, headline, losses, rate_table, winners_table
@@ -33,10 +34,7 @@ TEXT = "results.md"  # package data: the first page, with a line {NAME} for each
 BEYOND = "Other codecs go beyond the best measured point of `best`; the furthest of them:"
 MISSED = "## Missed targets"
 PAPER = "The paper's own numbers stand beside ours in [reproducing.md](reproducing.md)."
-DOUBTS = (
-    "## Rows to measure again: bytes differ between two experiments, as the encoder changed",
-    "## Rows to measure again: the scene was made anew, and its diagonal differs from most",
-)
+DOUBTS = "## Rows to measure again: their states differ, or are not recorded"
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,7 +153,7 @@ def _first_page(parts: Sequence[Part]) -> list[str]:
             for p in parts
         ],
         "{missed}": _section(MISSED, [f"- {tables.text(v.text)} ({v.bound}): {tables.text(v.value)}" for v in missed]),
-        "{doubts}": [line for head, lines in _doubts(parts).items() for line in _section(head, lines)],
+        "{doubts}": _section(DOUBTS, [f"- {tables.text(line)}" for line in _doubts(parts)]),
     }
     page = (files(__package__) / TEXT).read_text(encoding="utf-8")
     lines = [line for text in page.splitlines() for line in made.get(text, [text])]
@@ -167,21 +165,23 @@ def _section(head: str, lines: Sequence[str]) -> list[str]:
     return ["", head, "", *lines] if lines else []
 
 
-def _doubts(parts: Sequence[Part]) -> dict[str, list[str]]:
-    """Return by heading the rows to measure again: points whose bytes differ by experiment, codecs given other data."""
-    names = {id(row): part.name for part in reversed(parts) for row in part.rows}
+def _doubts(parts: Sequence[Part]) -> Iterator[str]:
     rows = [row for part in parts for row in part.rows]
-    points = [
-        f"{a.point.sequence}, {a.name}, {tables.operating_point(a)}: {a.mbps:.4g} and {b.mbps:.4g} Mbps"
-        for a, b in disagreements(rows)
-    ]
-    data = [
-        f"{most[0].point.sequence}: {', '.join(dict.fromkeys(f'{row.name} ({names[id(row)]})' for row in other))}"
-        for most, *others in mixtures(rows)
-        for other in others
-    ]
-    pairs = zip(DOUBTS, (points, data), strict=True)
-    return {head: [f"- {tables.text(line)}" for line in lines] for head, lines in pairs}
+    yield from mixtures(rows)
+    if unknown := sum(row.encoder is None for row in rows):
+        yield f"{unknown} of {len(rows)} rows do not say of which encoder and data they are."
+
+
+def mixtures(rows: Iterable[Row]) -> list[str]:
+    """Return the methods and sequences of which some rows were measured in another state than others."""
+    found: dict[str, set[str | None]] = {}
+    for row in rows:
+        kind, data = "scenes" if is_scene(row.point.sequence) else "bodies", f"data of {row.point.sequence}"
+        method = " ".join([row.point.codec, *map(str, row.point.method.values())])
+        length = "" if row.point.frames is None else f", {row.point.frames} frames"
+        for name, state in ((f"{method}, {kind}", row.encoder), (data, row.source), (data + length, row.data)):
+            found.setdefault(name, set()).add(state)
+    return [name for name, states in found.items() if len(states) > 1]
 
 
 def _appendix(part: Part) -> Iterator[str]:
