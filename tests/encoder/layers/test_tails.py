@@ -1,6 +1,6 @@
 """Patches are found where surface is missing or too much, and nowhere else; and only where they pay."""
 
-from dataclasses import replace
+from dataclasses import astuple, replace
 
 import numpy as np
 import pytest
@@ -16,9 +16,11 @@ from meshreel.encoder.sequence import encode
 from meshreel.encoder.settings.options import EncoderOptions
 from meshreel.encoder.settings.settings import Settings
 from meshreel.format.records import pack
+from meshreel.geometry import work
 from meshreel.geometry.cameras import Camera
 from meshreel.geometry.depth import DepthPicture, FreeSpace
 from meshreel.geometry.topology import concatenate
+from meshreel.metrics.distance import surface_errors
 from meshreel.types import Mesh, MeshList, Placement
 from tests.coding.paper.test_laplacian import icosahedron
 from tests.small_options import with_method
@@ -140,6 +142,24 @@ def test_the_frames_are_those_that_the_record_decodes_to() -> None:
         np.testing.assert_array_equal(mine.vertices, theirs.vertices)
         np.testing.assert_array_equal(mine.faces, theirs.faces)
     assert find_tails(shown_frames(frames, meshes(places, template.faces)), SIZE, 0.0)[0] == found[0]  # type: ignore[index]
+
+
+def test_closest_points_of_shown_frames_are_those_that_a_measure_asks_for():
+    """With faces dropped and surface patched: the errors are the same, and nothing is asked again."""
+    ball = Mesh.of(0.3 * icosahedron(5).vertices, icosahedron(5).faces)
+    template, frame = concatenate([ball, knob(0.02)]), concatenate([ball, knob(0.02, -0.4)])
+    decoded = Mesh(template.vertices + 1e-4 * np.sin(7 * template.vertices), template.faces)
+    found = find_tails(shown_frames([frame] * 2, [decoded] * 2), SIZE, 0.0)
+    assert found is not None and len(template.faces) > len(found[1][0].faces) > len(ball.faces)
+    before = work.so_far()
+    known = surface_errors(frame, found[1][0], found[2][0])
+    assert not work.since(before)
+    measured = surface_errors(frame, found[1][0])
+    assert work.since(before)["closest points"] > 2 * len(ball.faces)
+    for each in ("forward", "backward"):
+        assert astuple(getattr(known, each)) == pytest.approx(
+            astuple(getattr(measured, each)), rel=1e-3
+        )  # the tree decides in float32
 
 
 def meshes(positions: np.ndarray, faces: np.ndarray) -> list[Mesh]:

@@ -97,7 +97,6 @@ class GroupCoder:
         found = find_tails(shown, len(payload), self.noise)
         if found is None:
             return payload, layers, decoded, [frame.closest for frame in shown]
-        record, frames = found
+        record, frames, closest = found
         payload += pack(record)
-        closest = [frame.closest if mesh.faces is faces else None for frame, mesh in zip(shown, frames, strict=True)]
-        return payload, (*layers, len(payload)), frames, closest
+        return payload, (*layers, len(payload)), frames, [*closest]

@@ -17,7 +17,8 @@ from ...geometry.closest_points import Hits, Surface
 from ...geometry.depth import FreeSpace
 from ...geometry.strict import dot
 from ...geometry.threads import mapped
-from ...geometry.topology import components, connected_faces, face_normals
+from ...geometry.topology import blend, components, connected_faces, face_normals
+from ...metrics.distance import BothClosest
 from ...types import Mesh
 
 BODY = 0.98  # share of the surface; the rest is the tails (decision 13)
@@ -65,7 +66,7 @@ class ShownFrame:
 
         Faces that are `gone` are left out.
         """
-        points = _points(self.original)[some]
+        points = self._points(some)
         hits = surface.closest(points, gone)
         return self._by_noise(_squared(hits, points), some), hits.faces
 
@@ -74,6 +75,14 @@ class ShownFrame:
     ) -> tuple[Float64[np.ndarray, " N"], Int32[np.ndarray, " N"]]:
         """Return squared distances of points from their `hits` on the frame's surface, and its faces there."""
         return self._by_noise(_squared(hits, points), len(self.original.vertices) + hits.faces), hits.faces
+
+    def _points(self, some: Int64[np.ndarray, " n"]) -> Float64[np.ndarray, "n 3"]:
+        """Return some of the frame's samples: keeping all of them would take 24 bytes each."""
+        count, faces = len(self.original.vertices), self.original.faces
+        middles = some >= count
+        points = self.original.vertices[np.where(middles, 0, some)]
+        points[middles] = self.original.vertices[faces[some[middles] - count]].mean(axis=1)
+        return points
 
     def _by_noise(
         self, squared: Float64[np.ndarray, " n"], samples: Int64[np.ndarray, " n"] | Int32[np.ndarray, " n"] | slice
@@ -137,6 +146,41 @@ class ShownFrame:
             areas, apart = np.concatenate([areas, added]), np.concatenate([apart, away])
         return dot(self.weights, squared), dot(areas, apart) / float(areas.sum()) if areas.any() else np.inf
 
+    def closest_with(self, gone: Bool[np.ndarray, " F"], patch: Mesh) -> BothClosest:
+        """Return what is closest to the samples of the frame, and to those of the decoded mesh as it is shown.
+
+        That is without the dropped faces, and the vertices that no face has then, and with a patch.
+        """
+        points, count = _samples(self.original)[0], len(self.decoded.vertices)
+        (faces, weights), (back, back_weights) = ([each.copy() for each in pair] for pair in self.closest)
+        moved = np.flatnonzero(gone[faces])
+        if len(moved):
+            hits = self._decoded.closest(points[moved], gone)
+            faces[moved], weights[moved] = hits.faces, hits.barycentric
+        corners = self.decoded.faces[faces]
+        squared = ((blend(self.decoded.vertices, corners, weights) - points) ** 2).sum(axis=1)
+        faces = (np.cumsum(~gone, dtype=np.int32) - 1)[faces]
+        used = np.zeros(count, bool)
+        used[self.decoded.faces[~gone]] = True
+        if patch.is_empty:
+            own = np.concatenate([used, ~gone])
+            return (faces, weights), (back[own], back_weights[own])
+        low, high = patch.vertices.min(axis=0), patch.vertices.max(axis=0)
+        beside = np.maximum(np.maximum(low - points, points - high), 0.0)
+        near = np.flatnonzero((beside**2).sum(axis=1) < squared)
+        if len(near):
+            hits = Surface(patch).closest(points[near])
+            nearer = _squared(hits, points[near]) < squared[near]
+            faces[near[nearer]] = int((~gone).sum()) + hits.faces[nearer]
+            weights[near[nearer]] = hits.barycentric[nearer]
+        hits, added = self.surface.closest(_samples(patch)[0]), len(patch.vertices)
+        both = ((back, hits.faces), (back_weights, hits.barycentric))
+        back, back_weights = (
+            np.concatenate([mine[:count][used], theirs[:added], mine[count:][~gone], theirs[added:]])
+            for mine, theirs in both
+        )
+        return (faces, weights), (back, back_weights)
+
     def lost(self, squared: Float64[np.ndarray, " N"], limit: float) -> Iterator[Int64[np.ndarray, " S"]]:
         """Yield connected faces, with a rim, that are farther than a squared limit from the decoded mesh."""
         faces, count = self.original.faces, len(self.original.vertices)
@@ -169,11 +213,7 @@ def shown_frames(
 
 
 def _samples(mesh: Mesh) -> tuple[Float64[np.ndarray, "N 3"], Float64[np.ndarray, " F"]]:
-    return _points(mesh), face_normals(mesh)[1]
-
-
-def _points(mesh: Mesh) -> Float64[np.ndarray, "N 3"]:
-    return np.concatenate([mesh.vertices, mesh.vertices[mesh.faces].mean(axis=1)])
+    return np.concatenate([mesh.vertices, mesh.vertices[mesh.faces].mean(axis=1)]), face_normals(mesh)[1]
 
 
 def _squared(hits: Hits, points: Float64[np.ndarray, "N 3"]) -> Float64[np.ndarray, " N"]:

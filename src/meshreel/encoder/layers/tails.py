@@ -25,6 +25,7 @@ from ...geometry.decimate import decimate
 from ...geometry.strict import dot
 from ...geometry.threads import mapped
 from ...geometry.topology import clean, concatenate, drop_unreferenced
+from ...metrics.distance import BothClosest
 from ...types import Mesh
 from .shown_frame import FAR, HOLE, ShownFrame, ghosts, regions
 
@@ -38,8 +39,10 @@ LATTICE = 2.0  # spacing of the patches' lattice, in RMS distances of the rest (
 EXCHANGE = 1.33  # power of the rate with which the squared error falls: 4 dB a doubling (decision 13)
 
 
-def find_tails(shown: list[ShownFrame], size: int, noise: float) -> tuple[LayersPatches, list[Mesh]] | None:
-    """Return the layer of patches that lowers squared error + price x bytes most, and the frames as decoded with it.
+def find_tails(
+    shown: list[ShownFrame], size: int, noise: float
+) -> tuple[LayersPatches, list[Mesh], list[BothClosest]] | None:
+    """Return the layer of patches that lowers squared error + price x bytes most, the frames with it, what is closest.
 
     None where no layer does. The decoded meshes of a group have the same faces; `size` is that of their layers, bytes.
     `noise` is the RMS distance of the frames from the truth: thresholds count from there where the rest is nearer.
@@ -76,7 +79,9 @@ def find_tails(shown: list[ShownFrame], size: int, noise: float) -> tuple[Layers
     chosen = next((tried for tried in reversed(better) if torn or search.holds(tried)), least_of_all)
     if chosen is None:
         return None
-    return chosen.record, chosen.parts.apply(np.stack([frame.decoded.vertices for frame in shown]), faces)
+    parts = chosen.parts
+    closest = mapped(ShownFrame.closest_with, shown, parts.dropped, parts.meshes)
+    return chosen.record, parts.apply(np.stack([frame.decoded.vertices for frame in shown]), faces), closest
 
 
 @dataclass(frozen=True, slots=True)
