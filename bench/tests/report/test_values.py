@@ -40,6 +40,17 @@ def test_the_model_of_an_hour_knows_one_worker_and_loses_time_where_intervals_ar
     assert busy(108_000, 108_000) < 1e-4  # one interval: all others wait for it
 
 
+def test_the_model_of_cores_knows_what_an_interval_does_side_by_side():
+    def busy(cores, seconds):
+        encoding = Encoding(1.0, stages_s={"track": 0.4, "measure": 0.5, "code": 0.1})
+        return value(msgspec.structs.replace(ROW, encoding=encoding), f"cores.{cores}.{seconds}")
+
+    assert busy(1, 4) == pytest.approx(1.0) == busy(1, 60)
+    assert busy(8, 4) == busy(8, 1) == pytest.approx(1 / 8 / (0.4 / 2 + 0.5 / 8 + 0.1))
+    assert busy(15, 60) == pytest.approx(1.0) and busy(8, 60) == pytest.approx(15 / 16)  # so many intervals
+    assert busy(30, 60) == pytest.approx(1 / 2 / (0.4 / 2 + 0.5 / 2 + 0.1))
+
+
 def test_a_background_counts_as_sent_every_ten_seconds():
     made = with_stream(1000, coded_frames=10, background_bytes=400)
     assert value(made, "mbps_background_10s") == pytest.approx(8 * (600 * 30 / 10 + 40) / 1e6)

@@ -157,9 +157,8 @@ def test_closest_points_of_shown_frames_are_those_that_a_measure_asks_for():
     measured = surface_errors(frame, found[1][0])
     assert work.since(before)["closest points"] > 2 * len(ball.faces)
     for each in ("forward", "backward"):
-        assert astuple(getattr(known, each)) == pytest.approx(
-            astuple(getattr(measured, each)), rel=1e-3
-        )  # the tree decides in float32
+        one, other = astuple(getattr(known, each)), astuple(getattr(measured, each))
+        assert one == pytest.approx(other, rel=1e-3)  # the tree decides in float32
 
 
 def meshes(positions: np.ndarray, faces: np.ndarray) -> list[Mesh]:

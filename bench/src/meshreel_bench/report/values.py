@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from heapq import heapreplace
-from math import log1p, sqrt
+from math import ceil, log1p, sqrt
 from typing import Any
 
 import numpy as np
@@ -22,6 +22,9 @@ HALF = 30  # frames of each half of a long sequence
 # that did nothing else: the fifth percentile of 300 runs.
 REST_S = 0.0233
 HOUR = 108_000  # frames
+INTERVAL_S = 4.0  # of a file as it is made by default
+# Threads of an interval that a stage keeps busy: sides of a key, frames of either that follow, frames of a group.
+SIDE_BY_SIDE = {"track": 2, "fit": 8} | dict.fromkeys(("survey", "refine", "patch", "measure", "judge"), 16)
 VARIATION, DRAWS = 0.35, 20  # of an interval's time: its deviation over its mean (guess), and draws to average over
 
 
@@ -98,6 +101,18 @@ def _efficiency(row: Row, workers: int, interval: int) -> float | None:
     return float(np.mean((surveyed.sum() + coded.sum(axis=1)) / ends)) / workers
 
 
+def _of_cores(row: Row, cores: int, seconds: int) -> float | None:
+    """Return the share of their time that cores are busy with a clip, by a row's times: intervals side by side.
+
+    Cores that are left over share in what each interval does side by side.
+    """
+    stages = row.encoding.stages_s if row.encoding else {}
+    intervals, whole = ceil(seconds / INTERVAL_S), sum(stages.values())
+    beside = min(cores, intervals)
+    one = sum(each / min(cores / beside, SIDE_BY_SIDE.get(stage, 1)) for stage, each in stages.items())
+    return whole * intervals / (cores * one * ceil(intervals / beside)) if whole else None
+
+
 def _end(times: np.ndarray, workers: int) -> float:
     """Return the time at which the last of several calls is done, s."""
     free = [0.0] * workers
@@ -120,6 +135,7 @@ def _of_key(row: Row, what: str, frames: int) -> float | None:
 
 
 WITH_NUMBERS: dict[str, Callable[..., float | None]] = {
+    "cores": _of_cores,
     "efficiency": _efficiency,
     "mbps": lambda row, frames: _of_key(row, "all", frames),
     "texture_mbps": lambda row, frames: _of_key(row, "texture", frames),
