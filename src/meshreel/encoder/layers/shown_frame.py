@@ -147,7 +147,7 @@ class ShownFrame:
         return dot(self.weights, squared), dot(areas, apart) / float(areas.sum()) if areas.any() else np.inf
 
     def closest_with(self, gone: Bool[np.ndarray, " F"], patch: Mesh) -> BothClosest:
-        """Return what is closest to the samples of the frame, and to those of the decoded mesh as it is shown.
+        """Return the closest points to samples of the frame, and to samples of the decoded mesh as it is shown.
 
         That is without the dropped faces, and the vertices that no face has then, and with a patch.
         """
