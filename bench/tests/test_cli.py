@@ -102,6 +102,12 @@ def test_rows_of_different_states_make_no_report(bench, tmp_path, state):
     assert code != 0 and "rows.jsonl: rows of different states" in said and "run figure6 --stale`" in said
 
 
+def test_rows_of_one_state_make_a_report(bench, tmp_path):
+    for rate in (1.0, 2.0):
+        append_row(tmp_path / "rows.jsonl", replace(row("own", "a", rate, 60.0), encoder="01", data="23"))
+    assert bench("report", tmp_path / "rows.jsonl", "-o", tmp_path / "out")[0] == 0
+
+
 def test_only_rows_of_another_encoder_are_measured_again_where_it_is_asked_for(bench, data, monkeypatch):
     rows = data / "rows.jsonl"
     run = ("run", "figure6", "-o", rows, "--data", data, "--on", "own", "--only", "draco", "--no-ssim", "--json")

@@ -24,6 +24,15 @@ def staged():
     return StageBars(RichProgress(disable=True, get_time=clock)), clock
 
 
+def test_the_time_left_is_that_of_the_frames_so_far(staged):
+    progress, clock = staged
+    progress("fuse", 20, 100)  # of an earlier run
+    assert "left" not in line_of(progress.bars.tasks)
+    for clock.now, done in ((30.0, 21), (80.0, 40)):
+        progress("fuse", done, 100)
+    assert line_of(progress.bars.tasks).endswith("fuse 40 of 100 frames; 0:01:20 so far, about 0:04:00 left")
+
+
 def test_a_line_tells_of_the_first_stage_that_is_not_done(staged):
     progress, clock = staged
     assert line_of(progress.bars.tasks) == ""
@@ -41,7 +50,7 @@ def test_an_encode_is_one_bar_with_the_share_of_the_whole_and_the_stage(staged):
     progress, clock = staged
     progress.encode(Progress("survey", 3, 10, 0.01, None))
     clock.now = 20.0
-    assert line_of(progress.bars.tasks) == "meshreel: encode 1 %, survey; 0:00:20 so far, about -:--:-- left"
+    assert line_of(progress.bars.tasks) == "meshreel: encode 1 %, survey; 0:00:20 so far"
     progress.encode(Progress("track", 1, 10, 0.25, 59.8))
     assert line_of(progress.bars.tasks) == "meshreel: encode 25 %, track; 0:00:20 so far, about 0:01:00 left"
     assert len(progress.bars.tasks) == 1 and progress.bars.tasks[0].percentage == 25

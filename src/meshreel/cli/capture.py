@@ -146,12 +146,15 @@ def _fuse(recording: Recording, output: Path, format: str, common: Common) -> No
     missing = _started(output, _made(recording), names)
     bare = []
     with common.stages() as progress:
+        done = len(names) - len(missing)
+        progress("fuse", done, len(names))
         for index, name in enumerate(names):
             if name in missing:
                 mesh = recording[index]
                 write_mesh(mesh, output / name)
                 bare += [name] if mesh.is_empty else []
-            progress("fuse", index + 1, len(recording))
+                done += 1
+                progress("fuse", done, len(names))
     if bare:
         common.warn([f"{output}: {len(bare)} of {len(missing)} fused frames have no surface, as {bare[0]}"])
     row = {"output": str(output), "frames": len(names), "fused": len(missing), "frame_rate": recording.frame_rate}

@@ -106,17 +106,18 @@ class StageBars:
     def __call__(self, stage: str, done: int, total: int) -> None:
         """Show that `done` of `total` frames have passed `stage`."""
         task = self._show(stage, done, total, f"{done} of {total} {self._counted}")
-        if done and task.elapsed is not None:
-            task.fields["left"] = _clock(task.elapsed * (total - done) / done)
+        new = done - task.fields["first"]  # frames of an earlier run took no time
+        if new > 0 and task.elapsed is not None:
+            task.fields["left"] = _clock(task.elapsed * (total - done) / new)
 
-    def encode(self, now: Progress) -> None:
-        """Show how far an encode is, and the stage that it is in."""
-        task = self._show("encode", now.share, 1.0, f"{100 * now.share:.0f} %, {now.stage}")
+    def encode(self, now: Progress, name: str = "encode") -> None:
+        """Show how far an encode, or a part of one, is, and the stage that it is in."""
+        task = self._show(name, now.share, 1.0, f"{100 * now.share:.0f} %, {now.stage}")
         task.fields["left"] = _clock(now.left)
 
     def _show(self, name: str, done: float, total: float, count: str) -> progress.Task:
         if name not in self._tasks:
-            self.bars.add_task(name, total=total, count=count, left=_clock(None))
+            self.bars.add_task(name, total=total, count=count, left=_clock(None), first=done)
             self._tasks[name] = self.bars.tasks[-1]
         self.bars.update(self._tasks[name].id, completed=done, total=total, count=count)
         return self._tasks[name]
@@ -149,7 +150,8 @@ def line_of(tasks: Iterable[progress.Task]) -> str:
     task = next((each for each in known if not each.finished), known[-1])
     so_far = _clock(task.get_time() - min(each.start_time or 0.0 for each in known))
     now = f"{program()}: {task.description} {task.fields['count']}"
-    return f"{now}; {so_far} so far, about {task.fields['left']} left"
+    left = "" if task.fields["left"] == _clock(None) else f", about {task.fields['left']} left"
+    return f"{now}; {so_far} so far{left}"
 
 
 def _clock(seconds: float | None) -> str:

@@ -7,6 +7,7 @@ import re
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -305,7 +306,7 @@ def survey(
     sequence = upright(source.sequence, up)
     with uploaded(place) as path, common.stages() as progress, workers(jobs, cluster) as executor:
         check_apart(path, sequence.files)
-        facts = Encoder(sequence, executor, progress.encode, jobs=jobs).survey(path)
+        facts = Encoder(sequence, executor, partial(progress.encode, name="survey"), jobs=jobs).survey(path)
     warnings = (*source.warnings, *warnings_of(facts))
     common.warn(warnings)
     row = {"output": str(place), "frames": len(sequence), "warnings": warnings}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -115,14 +116,15 @@ def _write_labels(
         by: Segmentation
         if masker is None:
             views = scene_views(frames, options.cameras)
-            stages = Stages(progress.encode, count)
-            stages.expect("scene")
+            stages = Stages(partial(progress.encode, name="segment"), count)
+            stages.expect("segment")
             with reporting(stages.passed):
                 by = segment(frames, options.cameras)
+            stages.finish()
         else:
             masks = segment_by(masker, frames, options.cameras)
             views, by = tuple(masks.views), masks
-        progress("segment", count, count)
+            progress("segment", count, count)
         for folder in (LABELS, *([COLORED] if chosen else [])):
             make_folder(output / folder)
         for number, (moves, body_of) in enumerate(label_frames(frames, by, EncoderOptions(scene=options))):

@@ -233,8 +233,10 @@ class Encoder:
     def survey(self, path: Path) -> Survey:
         """Survey the sequence, and write a file of it for encodes of its parts."""
         job = self._job(EncoderOptions())
+        job.stages.expect("survey")
         with threads(self._cores), reporting(job.stages.passed):
             survey = survey_job(job)
+        job.stages.finish()
         write_survey(survey, self.sequence, path)
         return survey
 
@@ -245,7 +247,7 @@ class Encoder:
 
     def _expect(self, job: Job) -> None:
         """Let progress expect the stages that are ahead."""
-        scene = ("scene", "room") if job.options.scene is not None and self._stands is not False else ()
+        scene = ("segment", "background", "room") if job.options.scene is not None and self._stands is not False else ()
         color = ("color",) if job.options.appearance is not None and self.sequence.colors is not None else ()
         job.stages.expect("look", "survey", *scene, *color, job.recipe.name.partition("-")[0])
 

@@ -101,12 +101,12 @@ class _Calls:
         self._function, self._calls, self._enough = function, calls, enough
         self._next, self._lock = 0, Lock()
         self._results, self._errors = dict[int, Any](), dict[int, BaseException]()
-        self.helped, self._report = list[work.Work](), work.reporter()
+        self.helped, self._reporter = list[work.Work](), work.reporter()
 
     def help(self) -> None:
         """Do calls in another thread, which reports its work as the first does, and remember that work."""
         before = work.so_far()
-        with work.reporting(self._report):
+        with work.reporting_by(self._reporter):
             self.do()
         self.helped.append(work.since(before))
 

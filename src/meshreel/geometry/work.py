@@ -8,7 +8,7 @@ from __future__ import annotations
 import threading
 from collections import Counter
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from typing import Literal
 
 Kind = Literal[
@@ -24,8 +24,9 @@ Kind = Literal[
 Work = dict[Kind, int]  # number of times by kind
 Report = Callable[[str, int], object]  # a kind of work or a stage, and the number of times or frames
 
+Reporter = tuple[Report, threading.Lock]  # one call at a time
+
 _here = threading.local()
-_ONE_REPORT = threading.Lock()
 
 
 def count(kind: Kind, number: int = 1) -> None:
@@ -36,24 +37,30 @@ def count(kind: Kind, number: int = 1) -> None:
 
 def passed(stage: str, number: int = 1) -> None:
     """Report that this thread has brought frames through a stage."""
-    if (report := reporter()) is not None:
-        with _ONE_REPORT:
+    if (known := reporter()) is not None:
+        report, one_call = known
+        with one_call:
             report(stage, number)
 
 
-def reporter() -> Report | None:
-    """Return the function that gets the work that this thread counts; None where it is not reported."""
-    return getattr(_here, "report", None)
+def reporter() -> Reporter | None:
+    """Return what gets the work that this thread counts; None where it is not reported."""
+    return getattr(_here, "reporter", None)
+
+
+def reporting(report: Report | None) -> AbstractContextManager[None]:
+    """Call `report`, one call at a time, with the work and the stages of this thread in the block."""
+    return reporting_by(None if report is None else (report, threading.Lock()))
 
 
 @contextmanager
-def reporting(report: Report | None) -> Iterator[None]:
-    """Call `report`, one call at a time, with the work and the stages of this thread in the block."""
-    before, _here.report = reporter(), report
+def reporting_by(known: Reporter | None) -> Iterator[None]:
+    """Let this thread report in the block as another one does."""
+    before, _here.reporter = reporter(), known
     try:
         yield
     finally:
-        _here.report = before
+        _here.reporter = before
 
 
 def so_far() -> Work:

@@ -8,12 +8,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from meshreel.encoder.group.progress import COSTS, GROWTH, MOST, IntervalStages, Progress, Stages
+from meshreel.encoder.group.progress import COSTS, GROWTH, MOST, VIEWS, IntervalStages, Progress, Stages
 from meshreel.encoder.sequence import Encoder
+from meshreel.geometry import work
 from tests.small_options import quick
 from tests.spheres import sliding_sphere
 
-PARTS = ("look", "survey", "scene", "room", "color", "best")
+PARTS = ("look", "survey", "segment", "background", "room", "color", "best")
 GROUP = 16
 
 
@@ -78,8 +79,8 @@ class Simulated:
     def encode(self, start: int = 0):
         if start:
             self.stages.skip(Fraction(start))
-        for stage in [stage for part in PARTS[3 * bool(start) : 4] for stage in COSTS[part]]:
-            for _ in range(MOST.get(stage, self.frames)):
+        for stage in [stage for part in PARTS[4 * bool(start) : 5] for stage in COSTS[part]]:
+            for _ in range(VIEWS if stage == "views" else min(MOST.get(stage, self.frames), self.frames)):
                 self.step(stage, self.stages.passed)
         interval = IntervalStages(self.stages.passed, self.frames, GROUP)
         interval.reached |= dict.fromkeys((*COSTS["best"], *COSTS["color"], "reference"), start)
@@ -144,3 +145,24 @@ def test_an_encode_tells_of_each_frame_that_it_tracks(tmp_path):
     assert all(counts == sorted(counts) and counts[-1] == 6 for counts in told.values())
     assert told["track"][:5] == [1, 2, 3, 4, 5]
     assert shares == sorted(shares) and len(set(shares)) > 20 and shares[-1] == 1
+
+
+def test_a_callback_may_read_frames_and_encode(tmp_path):
+    """Neither counts as work of the encode that it hears of, nor waits for it."""
+    balls, seen = sliding_sphere(4, levels=2), list[int]()
+
+    def look(now: Progress) -> None:
+        work.count("frames read")
+        if now.stage == "fit" and not seen:
+            inner = Encoder(balls, jobs=2).encode(tmp_path / "inner.reel", replace(quick(), scene=None))
+            seen.append(inner.work["frames fitted"])
+
+    summary = Encoder(balls, progress=look, jobs=2).encode(tmp_path / "a.reel", replace(quick(), scene=None))
+    assert seen == [summary.work["frames fitted"]]
+    assert (tmp_path / "inner.reel").read_bytes() == (tmp_path / "a.reel").read_bytes()
+
+
+def test_a_survey_alone_ends_with_all_of_it_done(tmp_path):
+    told = list[Progress]()
+    Encoder(sliding_sphere(4, levels=1), progress=told.append).survey(tmp_path / "a.survey")
+    assert (told[-1].share, told[-1].left) == (1, 0) and told[-2].share == pytest.approx(1)

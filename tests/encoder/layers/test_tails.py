@@ -161,6 +161,17 @@ def test_closest_points_of_shown_frames_are_those_that_a_measure_asks_for():
         assert one == pytest.approx(other, rel=1e-3)  # the tree decides in float32
 
 
+def test_where_every_face_is_dropped_the_patch_is_closest_to_all():
+    frame, patch = concatenate([BALL, knob()]), knob()
+    shown = shown_frames([frame], [BALL])[0]
+    (faces, _), (back, _) = shown.closest_with(np.ones(len(BALL.faces), bool), patch)
+    assert faces.min() >= 0 and set(faces) <= set(range(len(patch.faces)))
+    assert len(back) == len(patch.vertices) + len(patch.faces)
+    none, few = shown.closest_with(np.zeros(len(BALL.faces), bool), Mesh.empty()), np.arange(len(BALL.faces)) < 3
+    assert all((one == other).all() for one, other in zip(none[0] + none[1], sum(shown.closest, ()), strict=True))
+    assert shown.closest_with(few, Mesh.empty())[0][0].max() == len(BALL.faces) - 4
+
+
 def meshes(positions: np.ndarray, faces: np.ndarray) -> list[Mesh]:
     return [Mesh(places, faces) for places in positions]
 

@@ -138,8 +138,10 @@ class Store:
 
 
 def is_scene(name: str) -> bool:
-    """Return whether a sequence is one of cameras in a room."""
-    return name.removesuffix("-backwards").removesuffix("-forth-and-back") in (*ROOMS, *RECORDINGS, *RELEASED)
+    """Return whether a sequence is a capture by cameras, with a background."""
+    for ending in PLAYED:
+        name = name.removesuffix(ending)
+    return name in (*ROOMS, *RECORDINGS, *RELEASED)
 
 
 def released_in(data: Path) -> tuple[str, ...]:

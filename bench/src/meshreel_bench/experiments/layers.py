@@ -103,8 +103,7 @@ LIMITS = {"dancer": (0.6, "0.4"), "prism": (0.1, ""), "gears": (1.0, ""), "baske
 LIMITS |= {"living_room": (0.7, ""), "mitch": (0.45, ""), "crane": (0.5, ""), "room2": (1.2, "")}
 LIMITS |= {"dancer160k": (4.0, "")}
 EFFICIENCY = {8: 0.97, 32: 0.95, 100: 0.95}  # of an encode of an hour of frames, at least, by workers
-# Of clips of so many s, on so many cores.
-CORES = {1: {8: 0.0, 16: 0.0, 64: 0.0}, 4: {8: 0.8, 16: 0.0, 64: 0.0}, 60: {8: 0.8, 16: 0.0, 64: 0.0}}
+CORES = {4: {8: 0.8}, 60: {8: 0.8}}  # of clips of so many s, on so many cores
 WORSE = {"fraction": 0.1, "qp": 10}  # a little worse than the default quality in D2
 TOGETHER, OF_FOUR = "synthetic4", {35.0: (2.0, "1.5"), 60.0: (2.0, "1.5"), 85.0: (3.0, "")}  # by quality
 LEAST = min(OF_FOUR)
@@ -166,7 +165,7 @@ SPEED = Study(
         ),
         *(
             Reaches(
-                f"dancer: efficiency of 8, 16 and 64 cores, a clip of {seconds} s (model)",
+                f"dancer: efficiency of 8 cores, a clip of {seconds} s (model)",
                 DANCER,
                 tuple(Bound(f"cores.{count}.{seconds}", least) for count, least in leasts.items()),
             )

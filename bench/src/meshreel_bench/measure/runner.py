@@ -50,10 +50,14 @@ def run_points(
     wanted, stored = {point.key for point in points}, read_rows(file) if file.exists() else []
     found = {row.point.key: row for row in stored if row.point.key in wanted and _is_valid(row, how)}
     if how.stale:
-        places = dict.fromkeys((row.point.sequence, row.point.frames) for row in found.values())
-        today = {place: mesh_digest(how.store.open(*place).sequence[0]) for place in places}
-        kept = (row for row in found.values() if row.failed or not is_stale(row))
-        found = {r.point.key: r for r in kept if r.failed or r.data == today[r.point.sequence, r.point.frames]}
+        found = {key: row for key, row in found.items() if not is_stale(row)}
+        today = dict[tuple[str, int | None], str]()
+        for place in dict.fromkeys((row.point.sequence, row.point.frames) for row in found.values() if not row.failed):
+            opening(place[0])
+            today[place] = mesh_digest(how.store.open(*place).sequence[0])
+        found = {
+            r.point.key: r for r in found.values() if r.failed or r.data == today[r.point.sequence, r.point.frames]
+        }
     missing = [point for point in points if point.key not in found]
     for row in [found[point.key] for point in points if point.key in found]:
         report(row, False)
@@ -63,7 +67,8 @@ def run_points(
         opening(sequence)
         how.store.open(sequence, frames)  # what takes long to make is made once, before processes need it
     for measured in _measured(runs_of(missing), how):
-        row = msgspec.structs.replace(measured, encoder=encoder_digest(measured.point))
+        state = None if measured.failed else encoder_digest(measured.point)
+        row = msgspec.structs.replace(measured, encoder=state)
         append_row(file, row)
         found[row.point.key] = row
         report(row, True)

@@ -176,10 +176,12 @@ def mixtures(rows: Iterable[Row]) -> list[str]:
     """Return the methods and sequences of which some rows were measured in another state than others."""
     found: dict[str, set[str | None]] = {}
     for row in rows:
-        kind, data = "scenes" if is_scene(row.point.sequence) else "bodies", f"data of {row.point.sequence}"
+        sequence = row.point.sequence
+        kind, data = "scenes" if is_scene(sequence) else "bodies", f"data of {sequence}"
         method = " ".join([row.point.codec, *map(str, row.point.method.values())])
         length = "" if row.point.frames is None else f", {row.point.frames} frames"
-        for name, state in ((f"{method}, {kind}", row.encoder), (data, row.source), (data + length, row.data)):
+        found_in = ((f"{method}, {kind}", row.encoder), (f"files of {sequence}", row.source), (data + length, row.data))
+        for name, state in found_in:
             found.setdefault(name, set()).add(state)
     return [name for name, states in found.items() if len(states) > 1]
 

@@ -9,7 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from meshreel.encoder.layers.candidates import TOGETHER
+from meshreel.encoder.layers.options import LayersOptions
 from meshreel.encoder.run.surveying import SLICE
+from meshreel.encoder.settings.options import EncoderOptions
 
 from ..bd_rate import Curve, hull
 from ..experiments.study import D2, FLOOR, Measure
@@ -22,9 +25,10 @@ HALF = 30  # frames of each half of a long sequence
 # that did nothing else: the fifth percentile of 300 runs.
 REST_S = 0.0233
 HOUR = 108_000  # frames
-INTERVAL_S = 4.0  # of a file as it is made by default
-# Threads of an interval that a stage keeps busy: sides of a key, frames of either that follow, frames of a group.
-SIDE_BY_SIDE = {"track": 2, "fit": 8} | dict.fromkeys(("survey", "refine", "patch", "measure", "judge"), 16)
+# Threads of an interval that a stage keeps busy: sides of a key, frames of either that are fitted at a time, frames of
+# a group (the encoder's own numbers); others count as one thread's.
+SIDE_BY_SIDE = {"track": 2, "fit": 2 * TOGETHER}
+SIDE_BY_SIDE |= dict.fromkeys(("survey", "refine", "patch", "measure", "judge"), LayersOptions().group_size)
 VARIATION, DRAWS = 0.35, 20  # of an interval's time: its deviation over its mean (guess), and draws to average over
 
 
@@ -107,7 +111,7 @@ def _of_cores(row: Row, cores: int, seconds: int) -> float | None:
     Cores that are left over share in what each interval does side by side.
     """
     stages = row.encoding.stages_s if row.encoding else {}
-    intervals, whole = ceil(seconds / INTERVAL_S), sum(stages.values())
+    intervals, whole = ceil(seconds / EncoderOptions().key_interval), sum(stages.values())
     beside = min(cores, intervals)
     one = sum(each / min(cores / beside, SIDE_BY_SIDE.get(stage, 1)) for stage, each in stages.items())
     return whole * intervals / (cores * one * ceil(intervals / beside)) if whole else None

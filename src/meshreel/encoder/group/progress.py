@@ -13,27 +13,31 @@ from dataclasses import dataclass
 from fractions import Fraction
 from threading import Lock
 
+from ...geometry.work import reporting
+
 KINDS = {"frames tracked": "track", "frames fitted": "fit", "frames fitted again": "refine"}  # of work
 # Of the parts of an encode, the stages in their order, s a frame; measured on two cores with dancer, the rig of
 # `meshreel demo` and living_room at 2 cm.
 COSTS = {
     "look": {"look": 0.4},
     "survey": {"survey": 0.1},
-    "scene": {"views": 0.04, "observe": 0.13, "segment": 0.1, "compare": 0.4, "background": 0.4, "noise": 0.1},
+    "segment": {"views": 0.04, "observe": 0.13, "segment": 0.1, "compare": 0.4},
+    "background": {"background": 0.4, "noise": 0.1},
     "room": {"room": 0.7, "pictures": 0.5, "bodies": 0.15},
     "best": {"track": 0.38, "fit": 0.2, "refine": 0.12, "patch": 0.1, "measure": 0.2, "code": 0.03, "judge": 0.05},
     "paper": {"track": 0.35, "reference": 0.7, "fit": 0.4, "refine": 0.1, "measure": 0.2, "code": 0.1},
     "color": {"slide": 0.28, "color": 0.17},
 }
-MOST = {"look": 16, "views": 120, "compare": 16, "background": 20, "noise": 12, "room": 16}  # frames, or places
+VIEWS = 120  # places from which segmentation looks
+MOST = {"look": 16, "compare": 16, "background": 20, "noise": 12, "room": 16}  # frames of stages that need no more
 _BEFORE = ("track", "reference", "fit", "slide", "refine", "patch", "measure", "code")  # in the order of a frame
 _AFTER = ("judge", "color")  # of groups that are coded
 _OFTEN = ("bodies", *_BEFORE, *_AFTER)  # they follow each other again and again
-_ONCE = ("look", *COSTS["scene"])  # not again by a search for a target
+_ONCE = ("look", *COSTS["segment"], *COSTS["background"])  # not again by a search for a target
 GROWTH = 1.1  # times the least time left so far that it may be (a decision)
 MARGIN = 1.0  # by which the time left is told larger at first, as it may not grow (guess)
 EARLIEST = 0.05  # share that is done before the time left is told (guess)
-FIRM = 1  # frames of a stage that tell as much of its time as what is usual (guess)
+FIRM = 1  # weight of the usual time of a frame, in frames that were timed (guess)
 SECONDS = 5.0  # that tell as much of the speed as what is usual (guess)
 BODIES = 1.5  # of a scene, before they are known (guess)
 
@@ -44,7 +48,7 @@ class Progress:
 
     stage: str  # that frames have just passed
     done: int  # frames that have passed it
-    total: int  # frames that pass it
+    total: int  # frames that pass it; of "views" places, from which a scene is seen
     share: float  # of the whole encode, 0 to 1; never falls
     left: float | None  # s, estimated; never grows by more than a tenth; None at first
 
@@ -70,11 +74,11 @@ class Stages:
         """Expect the stages of these parts of `COSTS`, in this order."""
         stages = {stage: seconds for part in parts for stage, seconds in COSTS[part].items()}
         self._usual = {stage: stages[stage] for stage in stages if not self._before or stage not in _ONCE}
-        self._totals = {stage: MOST.get(stage, self._total) for stage in stages}
+        self._totals = {stage: min(MOST.get(stage, self._total), self._total) for stage in stages} | {"views": VIEWS}
         self.bodies = self.bodies if "room" in parts else 1.0
 
     def passed(self, stage: str, count: int | Fraction) -> None:
-        """Count further frames that have passed a stage, if it is expected; those before it lack none then."""
+        """Count further frames that have passed a stage, if it is expected; stages that end before it have ended."""
         if stage not in self._usual:
             return
         with self._one_thread:
@@ -88,17 +92,21 @@ class Stages:
             self._done[stage], self._timed[stage] = self._done[stage] + count, self._timed[stage] + count
             if self._report is not None:
                 left = self._left()
-                self._report(Progress(stage, int(self._done[stage]), self._totals[stage], self._share, left))
+                told = Progress(stage, int(self._done[stage]), self._totals[stage], self._share, left)
+                with reporting(None):  # what the callback does is no work of this encode
+                    self._report(told)
 
     def skip(self, count: Fraction) -> None:
         """Count frames that are known from an earlier run, and take no time."""
-        for stage in (*_BEFORE, *_AFTER):
-            self._done[stage] += count
+        with self._one_thread:
+            for stage in (*_BEFORE, *_AFTER):
+                self._done[stage] += count
 
     def again(self) -> None:
         """Begin another encode of the frames, after which half a further one is expected at least."""
-        self._before, self._more = sum(self._seconds.values()), max(self._more - 1, 0.5)
-        self._done.clear()
+        with self._one_thread:
+            self._before, self._more = sum(self._seconds.values()), max(self._more - 1, 0.5)
+            self._done.clear()
 
     def finish(self) -> None:
         """Report that the encode is done."""

@@ -18,7 +18,7 @@ from ...geometry.depth import FreeSpace
 from ...geometry.strict import dot
 from ...geometry.threads import mapped
 from ...geometry.topology import blend, components, connected_faces, face_normals
-from ...metrics.distance import BothClosest
+from ...metrics.distance import BothClosest, Closest
 from ...types import Mesh
 
 BODY = 0.98  # share of the surface; the rest is the tails (decision 13)
@@ -77,7 +77,7 @@ class ShownFrame:
         return self._by_noise(_squared(hits, points), len(self.original.vertices) + hits.faces), hits.faces
 
     def _points(self, some: Int64[np.ndarray, " n"]) -> Float64[np.ndarray, "n 3"]:
-        """Return some of the frame's samples: keeping all of them would take 24 bytes each."""
+        """Return some of the frame's samples, which are not kept."""
         count, faces = len(self.original.vertices), self.original.faces
         middles = some >= count
         points = self.original.vertices[np.where(middles, 0, some)]
@@ -147,39 +147,42 @@ class ShownFrame:
         return dot(self.weights, squared), dot(areas, apart) / float(areas.sum()) if areas.any() else np.inf
 
     def closest_with(self, gone: Bool[np.ndarray, " F"], patch: Mesh) -> BothClosest:
-        """Return the closest points to samples of the frame, and to samples of the decoded mesh as it is shown.
+        """Return the closest points between the frame and the mesh as it is shown: without dropped faces, with a patch.
 
-        That is without the dropped faces, and the vertices that no face has then, and with a patch.
+        Faces are numbered as `Patches.apply` puts them together; samples are of the vertices that have faces then.
         """
-        points, count = _samples(self.original)[0], len(self.decoded.vertices)
-        (faces, weights), (back, back_weights) = ([each.copy() for each in pair] for pair in self.closest)
+        kept, used, count = ~gone, np.zeros(len(self.decoded.vertices), bool), len(self.decoded.vertices)
+        used[self.decoded.faces[kept]] = True
+        ahead, (faces, weights) = self._ahead_with(gone, patch), self.closest[1]
+        hits, first = self.surface.closest(_samples(patch)[0]), len(patch.vertices)
+        back = (
+            np.concatenate([own[:count][used], added[:first], own[count:][kept], added[first:]])
+            for own, added in ((faces, hits.faces), (weights, hits.barycentric))
+        )
+        return ahead, (next(back), next(back))
+
+    def _ahead_with(self, gone: Bool[np.ndarray, " F"], patch: Mesh) -> Closest:
+        """Return what of the mesh as it is shown is closest to the frame's samples."""
+        points, kept = _samples(self.original)[0], ~gone
+        faces, weights = (each.copy() for each in self.closest[0])
         moved = np.flatnonzero(gone[faces])
-        if len(moved):
+        if len(moved) and kept.any():
             hits = self._decoded.closest(points[moved], gone)
             faces[moved], weights[moved] = hits.faces, hits.barycentric
         corners = self.decoded.faces[faces]
         squared = ((blend(self.decoded.vertices, corners, weights) - points) ** 2).sum(axis=1)
-        faces = (np.cumsum(~gone, dtype=np.int32) - 1)[faces]
-        used = np.zeros(count, bool)
-        used[self.decoded.faces[~gone]] = True
-        if patch.is_empty:
-            own = np.concatenate([used, ~gone])
-            return (faces, weights), (back[own], back_weights[own])
-        low, high = patch.vertices.min(axis=0), patch.vertices.max(axis=0)
-        beside = np.maximum(np.maximum(low - points, points - high), 0.0)
-        near = np.flatnonzero((beside**2).sum(axis=1) < squared)
-        if len(near):
-            hits = Surface(patch).closest(points[near])
-            nearer = _squared(hits, points[near]) < squared[near]
-            faces[near[nearer]] = int((~gone).sum()) + hits.faces[nearer]
-            weights[near[nearer]] = hits.barycentric[nearer]
-        hits, added = self.surface.closest(_samples(patch)[0]), len(patch.vertices)
-        both = ((back, hits.faces), (back_weights, hits.barycentric))
-        back, back_weights = (
-            np.concatenate([mine[:count][used], theirs[:added], mine[count:][~gone], theirs[added:]])
-            for mine, theirs in both
-        )
-        return (faces, weights), (back, back_weights)
+        if not kept.any():  # the patch is all that is left
+            squared[:] = np.inf
+        faces = (np.cumsum(kept, dtype=np.int32) - 1)[faces]
+        if not patch.is_empty:
+            low, high = patch.vertices.min(axis=0), patch.vertices.max(axis=0)
+            to_box = np.maximum(np.maximum(low - points, points - high), 0.0)
+            asked = np.flatnonzero((to_box**2).sum(axis=1) < squared)  # others are nearer to what is kept
+            hits = Surface(patch).closest(points[asked])
+            nearer = _squared(hits, points[asked]) < squared[asked]
+            faces[asked[nearer]] = np.count_nonzero(kept) + hits.faces[nearer]
+            weights[asked[nearer]] = hits.barycentric[nearer]
+        return faces, weights
 
     def lost(self, squared: Float64[np.ndarray, " N"], limit: float) -> Iterator[Int64[np.ndarray, " S"]]:
         """Yield connected faces, with a rim, that are farther than a squared limit from the decoded mesh."""
