@@ -99,7 +99,7 @@ def test_rows_of_different_states_make_no_report(bench, tmp_path, state):
         append_row(tmp_path / "rows.jsonl", each)
     code, _, said = bench("report", tmp_path / "rows.jsonl", "-o", tmp_path / "out")
     said = " ".join(said.split())
-    assert code != 0 and "rows.jsonl: rows of different states" in said and "run figure6 --stale`" in said
+    assert code != 0 and "rows.jsonl: rows of different states" in said and "run figure6 --stale -o" in said
 
 
 def test_rows_of_one_state_make_a_report(bench, tmp_path):

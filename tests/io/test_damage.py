@@ -41,6 +41,35 @@ def test_headers_that_no_parser_survives_are_refused_by_name(tmp_path: Path, nam
         read(tmp_path, name, BAD_HEADERS[name])
 
 
+PLACES, PLACE_ROWS = (
+    "element vertex 3\n" + "".join(f"property float {axis}\n" for axis in "xyz"),
+    "0 0 0\n1 0 0\n0 1 0\n",
+)
+FACES = "element face 1\nproperty list uchar int vertex_indices\n"
+RED = "".join(f"property uchar {color}\n" for color in ("red", "green", "blue"))
+STRIPS = "element tristrips 1\nproperty list uchar int vertex_indices\n"
+
+
+@pytest.mark.parametrize(
+    ("elements", "rows", "said"),
+    [
+        (PLACES + PLACES + FACES, PLACE_ROWS + PLACE_ROWS + "3 0 1 2\n", "several elements called vertex"),
+        (PLACES + FACES + RED + FACES, PLACE_ROWS + "3 0 1 2 9 9 9\n3 0 1 2\n", "several elements called face"),
+        (PLACES + FACES + RED + STRIPS, PLACE_ROWS + "3 0 1 2 9 9 9\n3 2 1 0\n", "strips of triangles beside faces"),
+        (PLACES + STRIPS + FACES + RED, PLACE_ROWS + "3 2 1 0\n3 0 1 2 9 9 9\n", "strips of triangles beside faces"),
+    ],
+)
+def test_ply_elements_that_do_not_go_together_are_refused(tmp_path: Path, elements: str, rows: str, said: str) -> None:
+    with pytest.raises(InputError, match=rf"a.ply: PLY has .*{said}"):
+        read(tmp_path, "a.ply", f"ply\nformat ascii 1.0\n{elements}end_header\n{rows}")
+
+
+@pytest.mark.parametrize("elements", [FACES + STRIPS, STRIPS + FACES])
+def test_ply_faces_and_strips_make_one_surface(tmp_path: Path, elements: str) -> None:
+    text = f"ply\nformat ascii 1.0\n{PLACES}{elements}end_header\n{PLACE_ROWS}3 0 1 2\n3 0 1 2\n"
+    assert read(tmp_path, "a.ply", text).mesh.faces.tolist() == [[0, 1, 2], [0, 1, 2]]
+
+
 def test_ply_elements_without_properties_take_no_bytes(tmp_path: Path) -> None:
     head = "ply\nformat binary_little_endian 1.0\nelement nothing " + "9" * 18 + "\nelement vertex 0\nend_header\n"
     assert read(tmp_path, "m.ply", head.replace("element vertex 0\n", "")).mesh.is_empty

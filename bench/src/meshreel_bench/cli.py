@@ -195,9 +195,10 @@ def report(rows: list[Path], /, *, output: Output, common: Common = Common()) ->
     joined = join_rows(files.values())
     for part in parts_of(joined):
         if mixed := mixtures(part.rows):
-            paths = " ".join(str(path) for path, own in files.items() if any(row in own for row in part.rows))
-            text = f"{paths}: rows of different states make no page: {'; '.join(mixed)}"
-            raise InputError(f"{text}; measure them again with `meshreel-bench run {part.name} --stale`")
+            keys = {row.point.key for row in part.rows}
+            paths = [path for path, own in files.items() if any(row.point.key in keys for row in own)]
+            text = f"{' '.join(map(str, paths))}: rows of different states make no page: {'; '.join(mixed)}"
+            raise InputError(f"{text}; measure them again: meshreel-bench run {part.name} --stale -o {paths[0]}")
     common.warn(tuple(describe(row) for row in parted(joined)[1]))
     written = [str(path) for path in write_report(joined, output)]
     found = [verdict for part in parts_of(joined) for verdict in verdicts(part.study, part.rows)]

@@ -10,6 +10,7 @@ import warnings
 from collections.abc import Iterable, Iterator
 from concurrent.futures import Executor
 from dataclasses import replace
+from numbers import Integral
 from pathlib import Path
 from typing import BinaryIO
 
@@ -153,8 +154,8 @@ class Encoder:
         `progress`, `audio` and `find`, which finds the groups of the paper's recipe, may be replaced between encodes.
         Raises InputError for `jobs` below 1.
         """
-        if jobs is not None and jobs < 1:
-            raise InputError(f"jobs must be at least 1, got {jobs}")
+        if jobs is not None and not (isinstance(jobs, Integral) and jobs >= 1):
+            raise InputError(f"jobs must be a whole number, at least 1, got {jobs!r}")
         self._cores = cores() if jobs is None else jobs
         self.sequence = unchanging(
             uncolored(captured(sequence))

@@ -59,7 +59,13 @@ def parse_ply(data: bytes) -> Polygons:
     comments = (re.match(r"\s*comment\s+TextureFile\s+(.+)", line) for line in lines)
     pictures = tuple(found[1].strip() for found in comments if found)
     surface, kept = Polygons(np.zeros((0, 3)), np.zeros(0, np.int64), np.zeros(0, np.int64)), _Kept()
-    vertex_places = None
+    vertex_places, full = None, [element.name for element in elements if element.rows]
+    if twice := [name for name in ("vertex", "face", _STRIPS) if full.count(name) > 1]:
+        raise Unreadable(f"PLY has several elements called {twice[0]}; export one of each")
+    looks = {_CORNER_PLACES, _PICTURE, *(name for names in _COLORS for name in names)}
+    painted = any(field.name in looks for each in elements if each.name == "face" for field in each.properties)
+    if painted and "face" in full and _STRIPS in full:
+        raise Unreadable("PLY has strips of triangles beside faces with colours or pictures; export triangles alone")
     for element in elements:
         if element.name == "vertex":
             surface, vertex_places = _vertices(body, element, surface, kept)
@@ -113,7 +119,8 @@ def _faces(body: _Text | _Binary, element: _Element, surface: Polygons, kept: _K
     columns, items = body.read(element, wanted)
     corners, sizes = items.get(name or "", _NOTHING)
     kept.add((element.name, name or ""))
-    surface = replace(surface, corners=whole(corners, "PLY index"), sizes=sizes)
+    corners = np.concatenate([surface.corners, whole(corners, "PLY index")])  # strips may come first
+    surface = replace(surface, corners=corners, sizes=np.concatenate([surface.sizes, sizes]))
     if _CORNER_PLACES in items:
         values, counts = items[_CORNER_PLACES]
         if np.array_equal(counts, 2 * sizes):

@@ -78,10 +78,13 @@ class Stages:
         self.bodies = self.bodies if "room" in parts else 1.0
 
     def passed(self, stage: str, count: int | Fraction) -> None:
-        """Count further frames that have passed a stage, if it is expected; stages that end before it have ended."""
-        if stage not in self._usual:
+        """Count further frames that have passed a stage that is expected; stages that end before it have ended."""
+        if stage not in self._usual and not (stage in COSTS["color"] and self._usual):
             return
         with self._one_thread:
+            if stage not in self._usual:  # frames turn out to have colours
+                self._usual |= COSTS["color"]
+                self._totals |= dict.fromkeys(COSTS["color"], self._total)
             for earlier in self._usual:
                 if earlier == stage or earlier in _OFTEN:
                     break
