@@ -45,7 +45,7 @@ PLACES, PLACE_ROWS = (
     "element vertex 3\n" + "".join(f"property float {axis}\n" for axis in "xyz"),
     "0 0 0\n1 0 0\n0 1 0\n",
 )
-FACES = "element face 1\nproperty list uchar int vertex_indices\n"
+LISTS = "element face 1\nproperty list uchar int vertex_indices\n"
 RED = "".join(f"property uchar {color}\n" for color in ("red", "green", "blue"))
 STRIPS = "element tristrips 1\nproperty list uchar int vertex_indices\n"
 
@@ -53,10 +53,10 @@ STRIPS = "element tristrips 1\nproperty list uchar int vertex_indices\n"
 @pytest.mark.parametrize(
     ("elements", "rows", "said"),
     [
-        (PLACES + PLACES + FACES, PLACE_ROWS + PLACE_ROWS + "3 0 1 2\n", "several elements called vertex"),
-        (PLACES + FACES + RED + FACES, PLACE_ROWS + "3 0 1 2 9 9 9\n3 0 1 2\n", "several elements called face"),
-        (PLACES + FACES + RED + STRIPS, PLACE_ROWS + "3 0 1 2 9 9 9\n3 2 1 0\n", "strips of triangles beside faces"),
-        (PLACES + STRIPS + FACES + RED, PLACE_ROWS + "3 2 1 0\n3 0 1 2 9 9 9\n", "strips of triangles beside faces"),
+        (PLACES + PLACES + LISTS, PLACE_ROWS + PLACE_ROWS + "3 0 1 2\n", "several elements called vertex"),
+        (PLACES + LISTS + RED + LISTS, PLACE_ROWS + "3 0 1 2 9 9 9\n3 0 1 2\n", "several elements called face"),
+        (PLACES + LISTS + RED + STRIPS, PLACE_ROWS + "3 0 1 2 9 9 9\n3 2 1 0\n", "strips of triangles beside faces"),
+        (PLACES + STRIPS + LISTS + RED, PLACE_ROWS + "3 2 1 0\n3 0 1 2 9 9 9\n", "strips of triangles beside faces"),
     ],
 )
 def test_ply_elements_that_do_not_go_together_are_refused(tmp_path: Path, elements: str, rows: str, said: str) -> None:
@@ -64,7 +64,7 @@ def test_ply_elements_that_do_not_go_together_are_refused(tmp_path: Path, elemen
         read(tmp_path, "a.ply", f"ply\nformat ascii 1.0\n{elements}end_header\n{rows}")
 
 
-@pytest.mark.parametrize("elements", [FACES + STRIPS, STRIPS + FACES])
+@pytest.mark.parametrize("elements", [LISTS + STRIPS, STRIPS + LISTS])
 def test_ply_faces_and_strips_make_one_surface(tmp_path: Path, elements: str) -> None:
     text = f"ply\nformat ascii 1.0\n{PLACES}{elements}end_header\n{PLACE_ROWS}3 0 1 2\n3 0 1 2\n"
     assert read(tmp_path, "a.ply", text).mesh.faces.tolist() == [[0, 1, 2], [0, 1, 2]]
@@ -132,3 +132,18 @@ def test_an_archive_with_a_flipped_byte_anywhere_is_read_or_refused(tmp_path: Pa
         path.write_bytes(data[:at] + bytes([data[at] ^ 0xFF]) + data[at + 1 :])
         with suppress(InputError):
             list(open_sequence(path))
+
+
+@pytest.mark.parametrize(
+    ("kind", "alphas", "dropped"),
+    [
+        ("uchar", "255 255 255", set()),
+        ("float", "1 1 1", set()),
+        ("uchar", "255 254 255", {"transparency"}),
+    ],
+)
+def test_ply_transparency_is_named_where_a_vertex_is_not_opaque(tmp_path: Path, kind, alphas, dropped) -> None:
+    places = (*zip(PLACE_ROWS.splitlines(), alphas.split(), strict=True),)
+    rows = "".join(f"{place} {alpha}\n" for place, alpha in places)
+    text = f"ply\nformat ascii 1.0\n{PLACES}property {kind} alpha\n{LISTS}end_header\n{rows}3 0 1 2\n"
+    assert read(tmp_path, "a.ply", text).dropped == dropped

@@ -27,10 +27,11 @@ _INDICES = ("vertex_indices", "vertex_index")
 _STRIPS = "tristrips"  # of the Stanford scanning repository
 _COLORS = (("red", "green", "blue"), ("r", "g", "b"), ("diffuse_red", "diffuse_green", "diffuse_blue"))
 _PLACES = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"), ("texture_s", "texture_t"))
+_ALPHA = (("alpha",), ("a",))
 _CORNER_PLACES, _PICTURE = "texcoord", "texnumber"  # of faces, as MeshLab writes them
 _WORDS = {
     **dict.fromkeys(("nx", "ny", "nz"), "normals"),
-    **dict.fromkeys(("alpha", "a"), "transparency"),
+    **dict.fromkeys((name for names in _ALPHA for name in names), "transparency"),
     **dict.fromkeys((*(name for pair in _PLACES for name in pair), _CORNER_PLACES), "texture coordinates"),
 }
 
@@ -99,13 +100,21 @@ def _vertices(
 ) -> tuple[Polygons, np.ndarray | None]:
     """Return the surface with its vertices and their colours, and the vertices' places in a picture."""
     places, names = _named(element, (("x", "y", "z"),), kept), _named(element, _COLORS, kept)
-    uv = _named(element, _PLACES, set())
-    columns, _ = body.read(element, {*places, *names, *uv})
+    uv, alpha = _named(element, _PLACES, set()), _named(element, _ALPHA, set())
+    columns, _ = body.read(element, {*places, *names, *uv, *alpha})
     if not places:
         raise Unreadable("PLY vertices have no x, y, z")
+    if alpha and _is_opaque(element, columns[alpha[0]], alpha[0]):  # some tools write it always
+        kept.add((element.name, alpha[0]))
     colors = eight_bits(_of_kind(element, _stacked(columns, names), names[0])) if names else None
     surface = replace(surface, vertices=_stacked(columns, places).astype(np.float64), colors=colors)
     return surface, _stacked(columns, uv).astype(np.float32) if uv else None
+
+
+def _is_opaque(element: _Element, alpha: np.ndarray, name: str) -> bool:
+    kind = next(field.dtype.kind for field in element.properties if field.name == name)
+    full = (255, 65535) if kind in "iu" else (1.0, 255.0)
+    return len(alpha) > 0 and float(alpha.max()) in full and bool((alpha == alpha.max()).all())
 
 
 def _faces(body: _Text | _Binary, element: _Element, surface: Polygons, kept: _Kept) -> Polygons:
