@@ -44,7 +44,7 @@ def passed(stage: str, number: int = 1) -> None:
 
 
 def reporter() -> Reporter | None:
-    """Return what gets the work that this thread counts; None where it is not reported."""
+    """Return the function that gets the work of this thread, with its lock; None where it is not reported."""
     return getattr(_here, "reporter", None)
 
 

@@ -162,7 +162,7 @@ class ShownFrame:
         return ahead, (next(back), next(back))
 
     def _ahead_with(self, gone: Bool[np.ndarray, " F"], patch: Mesh) -> Closest:
-        """Return what of the mesh as it is shown is closest to the frame's samples."""
+        """Return the closest points of the mesh, as it is shown, to the frame's samples."""
         points, kept = _samples(self.original)[0], ~gone
         faces, weights = (each.copy() for each in self.closest[0])
         moved = np.flatnonzero(gone[faces])
