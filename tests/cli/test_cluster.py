@@ -40,8 +40,8 @@ def balls(tmp_path_factory):
 def test_a_worker_that_is_killed_costs_no_byte(cluster, balls, tmp_path):
     killed = set[int]()
 
-    def kill(stage, done, _):
-        if stage == "code" and done > 2 and not killed:
+    def kill(now):
+        if now.stage == "code" and now.done > 2 and not killed:
             killed.add(pids.pop())
             os.kill(*killed, signal.SIGKILL)
 
