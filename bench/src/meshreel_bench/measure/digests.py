@@ -64,11 +64,6 @@ def _digest(codec: str, options: tuple[tuple[str, Option], ...], of_scene: bool)
     return digest.hexdigest()[:_DIGITS]
 
 
-def mesh_digest(mesh: Mesh) -> str:
-    """Return a digest of a mesh's surface."""
-    return hashlib.sha256(mesh.vertices.tobytes() + mesh.faces.tobytes()).hexdigest()[:_DIGITS]
-
-
 @cache
 def _body() -> MeshSequence:
     """Return one of the demo's bodies, with colours and a texture."""

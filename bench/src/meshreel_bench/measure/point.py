@@ -20,7 +20,7 @@ from meshreel.container.reader import ReelReader
 from meshreel.container.sources import BytesSource
 from meshreel.errors import InputError
 from meshreel.format.layout import MAGIC, ChunkKind
-from meshreel.geometry.derived_sequences import picked
+from meshreel.geometry.derived_sequences import digest, picked
 from meshreel.types import Mesh, MeshSequence, evenly
 
 from ..codec import BackgroundCodec, Codec, ColorCodec, TwoStepCodec
@@ -34,7 +34,6 @@ from ..experiments.study import FOUND as SEGMENTATION
 from ..names import FLOOR_RATIO, FOUND_NAME
 from ..rows import Encoding, Group, Point, Row, Stream, checked
 from .color import color_bytes
-from .digests import mesh_digest
 from .headset import aarch64_values, headset_values
 from .metrics import Labels, Measured, measure_frames, score_labels
 from .splats import splat_values
@@ -74,7 +73,7 @@ def measure_point(point: Point, store: Store) -> Row:
     some = evenly(count, SOME if known.cameras else LONG // 2 if is_long else count)
     whole = not known.cameras or point.sampled or point.metrics == "regions"
     numbers = list(range(count)) if point.metrics == "depth" else some if whole else some[::2]
-    about = {"frames": count, "measured_frames": numbers, "data": mesh_digest(known.sequence[0])}
+    about = {"frames": count, "measured_frames": numbers, "data": digest([known.sequence[0]])}
     row = empty_row(point, store, frame_rate=known.sequence.frame_rate, **about)
     return STAND_INS.get(point.codec, _coded)(_Case(row, known, store, some, painted))
 

@@ -12,12 +12,14 @@ from pathlib import Path
 
 import msgspec
 
+from meshreel.geometry.derived_sequences import digest
+
 from ..codec import TwoStepCodec
 from ..codecs import codec_version, make_codec
 from ..datasets import Store
 from ..experiments.study import HEADSET
 from ..rows import Point, Row, append_row, check_writable, read_rows
-from .digests import encoder_digest, is_stale, mesh_digest
+from .digests import encoder_digest, is_stale
 from .point import empty_row, measure_points
 from .worker import WorkerError, end_all, in_fresh_process
 
@@ -50,14 +52,7 @@ def run_points(
     wanted, stored = {point.key for point in points}, read_rows(file) if file.exists() else []
     found = {row.point.key: row for row in stored if row.point.key in wanted and _is_valid(row, how)}
     if how.stale:
-        found = {key: row for key, row in found.items() if not is_stale(row)}
-        today = dict[tuple[str, int | None], str]()
-        for place in dict.fromkeys((row.point.sequence, row.point.frames) for row in found.values() if not row.failed):
-            opening(place[0])
-            today[place] = mesh_digest(how.store.open(*place).sequence[0])
-        found = {
-            r.point.key: r for r in found.values() if r.failed or r.data == today[r.point.sequence, r.point.frames]
-        }
+        found = _of_today(found, how, opening)
     missing = [point for point in points if point.key not in found]
     for row in [found[point.key] for point in points if point.key in found]:
         report(row, False)
@@ -73,6 +68,16 @@ def run_points(
         found[row.point.key] = row
         report(row, True)
     return [found[point.key] for point in points]
+
+
+def _of_today(found: dict[str, Row], how: Measuring, opening: Callable[[str], None]) -> dict[str, Row]:
+    """Return the rows of today's encoders and data, by the keys of their points, and those that failed."""
+    found = {key: row for key, row in found.items() if not is_stale(row)}
+    today = dict[tuple[str, int | None], str]()
+    for place in dict.fromkeys((row.point.sequence, row.point.frames) for row in found.values() if not row.failed):
+        opening(place[0])
+        today[place] = digest([how.store.open(*place).sequence[0]])
+    return {k: r for k, r in found.items() if r.failed or r.data == today[r.point.sequence, r.point.frames]}
 
 
 def _is_valid(row: Row, how: Measuring) -> bool:
