@@ -26,8 +26,11 @@ export function linkOf(player: MeshreelPlayer): string {
 /** Has the page's address follow what is seen while it stands still, and what is seen follow an address that is typed: `apply` reads it. */
 export function followAddress(player: MeshreelPlayer, apply: () => void): void {
   let timer = 0;
+  let known = location.href; // another one has been typed, and its event is on its way
   const write = (): void => {
+    if (location.href !== known) return;
     if (player.paused && !player.seeking && player.info && linkOf(player) !== location.href) history.replaceState(history.state, "", linkOf(player));
+    known = location.href;
   };
   const later = (): void => {
     clearTimeout(timer);
@@ -35,5 +38,9 @@ export function followAddress(player: MeshreelPlayer, apply: () => void): void {
   };
   for (const type of ["pause", "seeked", "camerachange", "ended"]) player.addEventListener(type, later);
   new MutationObserver(later).observe(player, { attributeFilter: ["mode", "section", "up"] });
-  addEventListener("hashchange", apply); // replaceState brings none
+  // replaceState brings none
+  addEventListener("hashchange", () => {
+    known = location.href;
+    apply();
+  });
 }

@@ -39,6 +39,21 @@ describeInBrowser("the page of a recording", () => {
     await page.close();
   });
 
+  test("an address that is typed while its own is due stays", async () => {
+    const { page, errors } = await visit("");
+    await page.keyboard.press("End");
+    await expect.poll(() => hash(page)).toMatch(/^#t=[\d.]+$/);
+    await page.keyboard.press("m");
+    await page.evaluate(() => {
+      setTimeout(() => void (location.hash = "mode=tracks"), 400); // the page's own timer, begun after it, is due beside it
+      document.querySelector("meshreel-player")!.dispatchEvent(new Event("camerachange"));
+      for (const end = performance.now() + 600; performance.now() < end; );
+    });
+    await expect.poll(() => page.evaluate(() => document.querySelector("meshreel-player")!.mode)).toBe("tracks");
+    expect(errors).toEqual([]);
+    await page.close();
+  });
+
   test("a link to what is seen is copied", async () => {
     const { page } = await visit("&t=0.04");
     await page.context().grantPermissions(["clipboard-read", "clipboard-write"]);
