@@ -10,6 +10,7 @@
 #include "guarded.h"
 #include "pair_weight.h"
 #include "point_tree.h"
+#include "rounds.h"
 #include "tree_handle.h"
 
 namespace meshreel {
@@ -52,7 +53,7 @@ public:
         return all;
     }
 
-    bool round(double gate, double rigidity, const mr_deform_rounds& rounds) {
+    bool round(double gate, double rigidity, double tolerance, const mr_deform_rounds& rounds) {
         const std::vector<Pair> all = pairs(gate, rounds.agreement);
         double sum = 0.0;
         for (const Pair& pair : all) sum += pair.weight;
@@ -64,7 +65,7 @@ public:
         find_holds(rounds.torn, holds.data());
         for (size_t e = 0; e < graph_.edge_count; ++e) add_edge(equations, e, std::sqrt(rigidity * holds[e] * scale));
         std::vector<float> x;
-        equations.solve(rounds.iterations, rounds.tolerance, x);
+        equations.solve(rounds.iterations, tolerance, x);
         return take(x);
     }
 
@@ -220,8 +221,10 @@ int mr_deform(const mr_deformation* graph, const mr_seen* frame, const mr_deform
     return guarded(MR_NO_MEMORY, [&]() -> int {
         if (!is_valid(*graph, *frame, rounds->gates, rounds->count)) return MR_BAD_INPUT;
         Rounds state(*graph, *frame, rotations, positions);
-        for (size_t k = 0; k < rounds->count; ++k)
-            if (!state.round(rounds->gates[k], rounds->rigidity[k], *rounds)) break;
+        for (size_t k = 0; k < rounds->count; ++k) {
+            const double tolerance = tolerance_of(k, rounds->count, rounds->tolerance, graph->sample_count);
+            if (!state.round(rounds->gates[k], rounds->rigidity[k], tolerance, *rounds)) break;
+        }
         return MR_OK;
     });
 }

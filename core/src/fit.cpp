@@ -8,6 +8,7 @@
 #include "fit_equations.h"
 #include "guarded.h"
 #include "pair_weight.h"
+#include "rounds.h"
 #include "tree_handle.h"
 
 namespace meshreel {
@@ -43,14 +44,15 @@ public:
     ~Fit() { fitted_.give_tree(std::move(tree_)); }
     Fit(const Fit&) = delete;
 
-    void round(double gate, double smoothing, size_t stride, const std::vector<Vec>& shape, const double* place) {
+    void round(double gate, double smoothing, size_t stride, double tolerance, const std::vector<Vec>& shape,
+               const double* place) {
         tree_->move(x_);
         find_normals();
         equations_.clear(x_);
         from_target(gate, stride);
         from_template(gate, stride);
         from_borders(2.0 * gate);
-        equations_.solve(smoothing, shape, rounds_.anchor, place, rounds_.iterations, rounds_.tolerance, x_);
+        equations_.solve(smoothing, shape, rounds_.anchor, place, rounds_.iterations, tolerance, x_);
     }
 
 private:
@@ -236,7 +238,9 @@ int mr_fit(mr_template* fitted, const mr_target* target, const mr_fit_rounds* ro
                 neighbourhood_turns(f, rest, positions, turns);
                 for (size_t v = 0; v < f.count; ++v) shape[v] = turns[v] * kept[v];
             }
-            fit.round(rounds->gates[k], rounds->smoothing[k], static_cast<size_t>(rounds->strides[k]), shape, place);
+            const double tolerance = tolerance_of(k, rounds->count, rounds->tolerance, f.count);
+            fit.round(rounds->gates[k], rounds->smoothing[k], static_cast<size_t>(rounds->strides[k]), tolerance, shape,
+                      place);
         }
         return MR_OK;
     });

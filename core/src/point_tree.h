@@ -9,21 +9,25 @@
 #include <numeric>
 #include <vector>
 
+#include "lanes.h"
+
 namespace meshreel {
 
-using Point6 = std::array<float, 6>;
+using Point6 = std::array<float, 8>;  // the last two are 0
 
 class PointTree {
 public:
     explicit PointTree(const std::vector<Point6>& points) : points_(points), order_(points.size()) {
         std::iota(order_.begin(), order_.end(), 0);
         if (!points.empty()) build(0, static_cast<int32_t>(points.size()));
-        refit();
+        move(points);
     }
 
     void move(const std::vector<Point6>& points) {
         points_ = points;
-        refit();
+        ordered_.resize(points.size());
+        for (size_t k = 0; k < points.size(); ++k) ordered_[k] = points[static_cast<size_t>(order_[k])];
+        for (size_t n = nodes_.size(); n-- > 0;) refit(n);
     }
 
     // The point nearest to a query within a squared reach, the first of several; -1 for none. `guess` may be near, or
@@ -31,26 +35,32 @@ public:
     int32_t nearest(const Point6& query, float reach, int32_t guess) const {
         int32_t found = -1;
         float best = reach;
-        const auto ask = [&](int32_t point) {
-            const float squared = distance(query, points_[static_cast<size_t>(point)]);
+        const auto ask = [&](int32_t point, const Point6& at) {
+            const float squared = distance(query, at);
             if (squared < best || (squared == best && point < found)) best = squared, found = point;
         };
-        if (guess >= 0) ask(guess);
-        int32_t stack[64];  // a half has half of the points
+        if (guess >= 0) ask(guess, points_[static_cast<size_t>(guess)]);
+        struct Waiting {
+            float squared;
+            int32_t node;
+        };
+        Waiting stack[64];  // a half has half of the points
         int size = 0;
-        if (!nodes_.empty()) stack[size++] = 0;
+        if (!nodes_.empty()) stack[size++] = {0.0f, 0};
         while (size > 0) {
-            const Node& node = nodes_[static_cast<size_t>(stack[--size])];
-            if (!(outside(query, node) <= best)) continue;
+            const Waiting next = stack[--size];
+            if (!(next.squared <= best)) continue;
+            const Node& node = nodes_[static_cast<size_t>(next.node)];
             if (node.right < 0) {
-                for (int32_t k = node.begin; k < node.end; ++k) ask(order_[static_cast<size_t>(k)]);
+                for (int32_t k = node.begin; k < node.end; ++k)
+                    ask(order_[static_cast<size_t>(k)], ordered_[static_cast<size_t>(k)]);
                 continue;
             }
-            const int32_t left = static_cast<int32_t>(&node - nodes_.data()) + 1;
-            const bool first = outside(query, nodes_[static_cast<size_t>(left)]) <=
-                               outside(query, nodes_[static_cast<size_t>(node.right)]);
-            stack[size++] = first ? node.right : left;
-            stack[size++] = first ? left : node.right;
+            const Waiting left{outside(query, nodes_[static_cast<size_t>(next.node) + 1]), next.node + 1};
+            const Waiting right{outside(query, nodes_[static_cast<size_t>(node.right)]), node.right};
+            const bool first = left.squared <= right.squared;
+            stack[size++] = first ? right : left;
+            stack[size++] = first ? left : right;
         }
         return found;
     }
@@ -63,29 +73,34 @@ private:
         int32_t begin, end, right;  // the left one follows; -1 in leaves
     };
 
+    static float sum_of(Lanes a) { return (a[0] + a[1]) + (a[2] + a[3]); }
+
     static float distance(const Point6& a, const Point6& b) {
-        float sum = 0.0f;
-        for (size_t d = 0; d < 6; ++d) sum += (a[d] - b[d]) * (a[d] - b[d]);
-        return sum;
+        const Lanes first = load_lanes(&a[0]) - load_lanes(&b[0]), last = load_lanes(&a[4]) - load_lanes(&b[4]);
+        return sum_of(first * first + last * last);
     }
 
     static float outside(const Point6& query, const Node& node) {
-        float sum = 0.0f;
-        for (size_t d = 0; d < 6; ++d) {
-            const float out = std::max(std::max(node.low[d] - query[d], query[d] - node.high[d]), 0.0f);
-            sum += out * out;
+        Lanes sum = lanes(0.0f);
+        for (size_t d = 0; d < 8; d += 4) {
+            const Lanes at = load_lanes(&query[d]), below = load_lanes(&node.low[d]) - at;
+            const Lanes out = larger(larger(below, at - load_lanes(&node.high[d])), lanes(0.0f));
+            sum = sum + out * out;
         }
-        return sum;
+        return sum_of(sum);
     }
 
     void bound(Node& node) const {
         node.low.fill(std::numeric_limits<float>::infinity());
         node.high.fill(-std::numeric_limits<float>::infinity());
-        for (int32_t k = node.begin; k < node.end; ++k) widen(node, points_[order_[k]], points_[order_[k]]);
+        for (int32_t k = node.begin; k < node.end; ++k) {
+            const Point6& point = points_[static_cast<size_t>(order_[static_cast<size_t>(k)])];
+            widen(node, point, point);
+        }
     }
 
     static void widen(Node& node, const Point6& low, const Point6& high) {
-        for (size_t d = 0; d < 6; ++d)
+        for (size_t d = 0; d < 8; ++d)
             node.low[d] = std::min(node.low[d], low[d]), node.high[d] = std::max(node.high[d], high[d]);
     }
 
@@ -108,14 +123,8 @@ private:
         return static_cast<int32_t>(number);
     }
 
-    void refit() {
-        for (size_t n = nodes_.size(); n-- > 0;) {
-            Node& node = nodes_[n];
-            bound_from_below(node, n);
-        }
-    }
-
-    void bound_from_below(Node& node, size_t number) {
+    void refit(size_t number) {
+        Node& node = nodes_[number];
         if (node.right < 0) {
             bound(node);
             return;
@@ -125,7 +134,7 @@ private:
         widen(node, right.low, right.high);
     }
 
-    std::vector<Point6> points_;
+    std::vector<Point6> points_, ordered_;  // by number, and as leaves have them
     std::vector<int32_t> order_;
     std::vector<Node> nodes_;  // children after their parents
 };

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numeric>
 
 #include "arrays.h"
 #include "guarded.h"
@@ -26,18 +25,14 @@ constexpr float kInfinity = std::numeric_limits<float>::infinity();
 float inverse(float x) { return x > std::numeric_limits<float>::min() ? 1.0f / x : 0.0f; }
 double shortened(double t) { return t < 0.0 ? 0.0 : t > 1.0 ? 1.0 : t; }
 
-struct Bounds {
-    float low[3] = {kInfinity, kInfinity, kInfinity}, high[3] = {-kInfinity, -kInfinity, -kInfinity};
+struct Bounds {  // of three lanes; the fourth counts for nothing
+    Lanes low = lanes(kInfinity), high = lanes(-kInfinity);
 
-    void add(const float* p) {
-        for (int d = 0; d < 3; ++d) low[d] = std::min(low[d], p[d]), high[d] = std::max(high[d], p[d]);
-    }
-    void add(const Bounds& other) {
-        for (int d = 0; d < 3; ++d) low[d] = std::min(low[d], other.low[d]), high[d] = std::max(high[d], other.high[d]);
-    }
+    void add(Lanes p) { low = smaller(p, low), high = larger(p, high); }
+    void add(const Bounds& other) { low = smaller(other.low, low), high = larger(other.high, high); }
     float area() const {
-        const float x = high[0] - low[0], y = high[1] - low[1], z = high[2] - low[2];
-        return x < 0.0f ? 0.0f : x * y + y * z + z * x;
+        const Lanes size = high - low;
+        return size[0] < 0.0f ? 0.0f : size[0] * size[1] + size[1] * size[2] + size[2] * size[0];
     }
 };
 
@@ -92,16 +87,15 @@ SurfaceTree::SurfaceTree(const mr_mesh& mesh) : vertices_(mesh.vertices), faces_
     positions_.resize(3 * vertices_);
     for (size_t v = 0; v < vertices_; ++v) store(&positions_[3 * v], load(mesh.positions + 3 * v) - origin_);
     middles_.resize(faces_.size());
-    order_.resize(faces_.size());
-    std::iota(order_.begin(), order_.end(), 0);
+    apart_.resize(faces_.size());
     for (size_t f = 0; f < faces_.size(); ++f) {
         const int32_t face = static_cast<int32_t>(f);
         const Vec m = (1.0 / 3.0) * (corner(face, 0) + corner(face, 1) + corner(face, 2));
-        middles_[f] = {static_cast<float>(m.x), static_cast<float>(m.y), static_cast<float>(m.z)};
+        middles_[f] = {{static_cast<float>(m.x), static_cast<float>(m.y), static_cast<float>(m.z), 0.0f}, face};
     }
     root_ = build({0, static_cast<int32_t>(faces_.size())});
     for (size_t n = nodes_.size(); n-- > 0;) refit(nodes_[n]);
-    middles_ = {}, order_ = {};
+    middles_ = {}, apart_ = {};
 }
 
 void SurfaceTree::move(const double* positions) {
@@ -142,21 +136,22 @@ std::vector<SurfaceTree::Range> SurfaceTree::children(Range range) {
 // Sorts a range into two by the surface area heuristic over bins of middles; returns the first.
 SurfaceTree::Range SurfaceTree::halved(Range range) {
     Bounds all;
-    for (int32_t k = range.begin; k < range.end; ++k) all.add(middles_[order_[k]].data());
+    for (int32_t k = range.begin; k < range.end; ++k) all.add(load_lanes(middles_[k].at));
     int axis = 0;
     for (int d = 1; d < 3; ++d)
         if (all.high[d] - all.low[d] > all.high[axis] - all.low[axis]) axis = d;
     const float size = all.high[axis] - all.low[axis], scale = size > 0.0f ? kBins / size : 0.0f;
-    const auto bin_of = [&](int32_t face) {
-        return std::min(static_cast<int>((middles_[face][axis] - all.low[axis]) * scale), kBins - 1);
+    const float low = all.low[axis];
+    const auto bin_of = [&](const Middle& middle) {
+        return std::min(static_cast<int>((middle.at[axis] - low) * scale), kBins - 1);
     };
     const int32_t middle = range.begin + (range.end - range.begin) / 2;
     if (!(scale > 0.0f) || !std::isfinite(scale)) return {range.begin, middle};
     Bounds bins[kBins];
     int32_t counts[kBins] = {};
     for (int32_t k = range.begin; k < range.end; ++k) {
-        const int bin = bin_of(order_[k]);
-        bins[bin].add(middles_[order_[k]].data());
+        const int bin = bin_of(middles_[k]);
+        bins[bin].add(load_lanes(middles_[k].at));
         ++counts[bin];
     }
     float costs[kBins] = {}, least = kInfinity;
@@ -173,15 +168,19 @@ SurfaceTree::Range SurfaceTree::halved(Range range) {
         costs[b] += side.area() * static_cast<float>(count);
         if (costs[b] < least) least = costs[b], best = b;
     }
-    const auto split = std::stable_partition(order_.begin() + range.begin, order_.begin() + range.end,
-                                             [&](int32_t face) { return bin_of(face) <= best; });
-    const int32_t at = static_cast<int32_t>(split - order_.begin());
+    int32_t at = range.begin, others = 0;
+    for (int32_t k = range.begin; k < range.end; ++k) {
+        const Middle own = middles_[k];
+        if (bin_of(own) <= best) middles_[at++] = own;
+        else apart_[others++] = own;
+    }
+    std::copy(apart_.begin(), apart_.begin() + others, middles_.begin() + at);
     return {range.begin, at == range.begin || at == range.end ? middle : at};
 }
 
 int32_t SurfaceTree::leaf(Range range) {
     Block block;
-    for (int k = 0; k < kWide; ++k) block.face[k] = order_[std::min(range.begin + k, range.end - 1)];
+    for (int k = 0; k < kWide; ++k) block.face[k] = middles_[std::min(range.begin + k, range.end - 1)].face;
     fill(block);
     blocks_.push_back(block);
     return ~static_cast<int32_t>(blocks_.size() - 1);
@@ -296,7 +295,8 @@ Hit SurfaceTree::exact(Vec query, int32_t face) const {
 Hit SurfaceTree::closest(Vec query, double reach, int32_t guess, const uint8_t* gone) const {
     const Vec local = query - origin_;
     const float p[3] = {static_cast<float>(local.x), static_cast<float>(local.y), static_cast<float>(local.z)};
-    float best = static_cast<float>(reach * reach);
+    float best =
+        std::min(static_cast<float>(reach * reach), std::numeric_limits<float>::max());  // no empty box is so near
     int32_t face = INT32_MAX;
     if (guess >= 0 && (gone == nullptr || !gone[guess])) {  // a bound, a little above what `visit` finds
         const Hit start = exact(local, guess);
@@ -329,12 +329,12 @@ Hit SurfaceTree::closest(Vec query, double reach, int32_t guess, const uint8_t* 
         float squared[kWide];
         store_lanes(squared, all);
         const int first = size;
-        for (int k = 0; k < kWide; ++k) {
-            if (node.child[k] == kNothing || !(squared[k] <= best)) continue;
-            int at = size++;
-            for (; at > first && stack[at - 1].squared < squared[k]; --at) stack[at] = stack[at - 1];
-            stack[at] = {squared[k], node.child[k]};
+        for (int k = 0; k < kWide; ++k) {  // without branches, which no processor would foresee
+            stack[size] = {squared[k], node.child[k]};
+            size += squared[k] <= best;
         }
+        for (int at = first; at + 1 < size; ++at)
+            if (stack[at].squared < stack[size - 1].squared) std::swap(stack[at], stack[size - 1]);
     }
     if (face == INT32_MAX && std::isinf(reach)) face = std::max(guess, 0);  // of a query that is not finite
     return face == INT32_MAX ? Hit{-1, {}} : exact(local, face);

@@ -66,6 +66,10 @@ private:
     struct Range {
         int32_t begin, end;
     };
+    struct Middle {
+        float at[4];  // the last is 0
+        int32_t face;
+    };
 
     int32_t build(Range range);
     Range halved(Range range);
@@ -84,10 +88,9 @@ private:
     std::vector<std::array<int32_t, 3>> faces_;
     std::vector<double> positions_;  // relative to origin_
     Vec origin_;
-    double slack_;                               // of a distance: single precision may miss so much
-    std::vector<std::array<float, 3>> middles_;  // of faces, while the tree is built
-    std::vector<int32_t> order_;
-    std::vector<Node> nodes_;  // children after their parents
+    double slack_;                         // of a distance: single precision may miss so much
+    std::vector<Middle> middles_, apart_;  // of faces, while the tree is built
+    std::vector<Node> nodes_;              // children after their parents
     std::vector<Block> blocks_;
     int32_t root_ = kNothing;
 };
