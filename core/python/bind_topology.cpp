@@ -1,3 +1,7 @@
+#include <nanobind/stl/optional.h>
+
+#include <optional>
+
 #include "arrays.h"
 #include "meshreel/decimate.h"
 #include "meshreel/topology.h"
@@ -64,6 +68,15 @@ Out<double, 2> vertex_normals(In<double, 2> positions, In<int32_t, 2> faces) {
     return normals.shaped(mesh.vertices, 3);
 }
 
+Out<double, 2> blend(In<double, 2> values, In<int32_t, 2> corners, std::optional<In<double, 2>> weights) {
+    const mr_mesh mesh = mesh_of(values, corners);
+    if (weights) expect(weights->shape(0) == mesh.face_count && weights->shape(1) == 3);
+    Buffer<double> points(3 * mesh.face_count);
+    const double* shares = weights ? weights->data() : nullptr;
+    check(without_gil([&] { return mr_blend(&mesh, shares, points.data()); }));
+    return points.shaped(mesh.face_count, 3);
+}
+
 nb::tuple spread(In<double, 2> positions, In<int32_t, 2> faces, double spacing, int32_t most) {
     const mr_mesh mesh = mesh_of(positions, faces);
     Buffer<int32_t> parts(mesh.face_count);
@@ -84,6 +97,7 @@ void bind_topology(nb::module_& m) {
     m.def("decimate", &decimate);
     m.def("components", &components);
     m.def("face_normals", &face_normals);
+    m.def("blend", &blend, nb::arg("values"), nb::arg("corners"), nb::arg("weights").none());
     m.def("vertex_normals", &vertex_normals);
     m.def("spread", &spread);
 }

@@ -306,6 +306,18 @@ int mr_vertex_normals(const mr_mesh* mesh, double* normals) {
     return checked(*mesh, [&] { normals_of_vertices(*mesh, normals); });
 }
 
+int mr_blend(const mr_mesh* mesh, const double* weights, double* points) {
+    return checked(*mesh, [&] {
+        for (size_t f = 0; f < mesh->face_count; ++f) {
+            const int32_t* corners = mesh->faces + 3 * f;
+            const double *a = mesh->positions + 3 * size_t(corners[0]), *b = mesh->positions + 3 * size_t(corners[1]),
+                         *c = mesh->positions + 3 * size_t(corners[2]), *w = weights ? weights + 3 * f : nullptr;
+            for (size_t d = 0; d < 3; ++d)
+                points[3 * f + d] = w ? w[0] * a[d] + w[1] * b[d] + w[2] * c[d] : (a[d] + b[d] + c[d]) / 3.0;
+        }
+    });
+}
+
 int mr_spread_parts(const mr_mesh* mesh, double spacing, int32_t most, int32_t* parts, size_t* count) {
     if (!(spacing > 0) || most < 1) return MR_BAD_INPUT;
     return checked(*mesh, [&] {

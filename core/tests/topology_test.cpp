@@ -49,6 +49,17 @@ TEST(welding_merges_equal_positions_in_the_order_of_their_first) {
     CHECK(none.take(mr_weld) == MR_OK && none.left.size() == 6);
 }
 
+TEST(blends_weight_corners_and_without_weights_are_their_mean) {
+    Case mesh{{3, 0, 0, 0, 3, 0, 0, 0, 6}, {0, 1, 2, 2, 2, 0}};
+    const mr_mesh view = mesh.mesh();
+    const double weights[] = {1, 0, 0, 0.5, 0, 0.5};
+    Reals points(6);
+    CHECK(mr_blend(&view, weights, points.data()) == MR_OK && points == Reals({3, 0, 0, 1.5, 0, 3}));
+    CHECK(mr_blend(&view, nullptr, points.data()) == MR_OK && points == Reals({1, 1, 2, 1, 0, 4}));
+    mesh.faces[4] = 3;
+    CHECK(mr_blend(&view, weights, points.data()) == MR_BAD_INPUT);
+}
+
 TEST(cleaning_leaves_each_face_with_an_area_once_and_no_loose_vertex) {
     Case mesh{{9, 9, 9, 0, 0, 0, 1, 0, 0, 0, 1, 0, 2, 0, 0}, {1, 1, 2, 1, 2, 4, 1, 2, 3, 3, 2, 1, 2, 3, 4}};
     CHECK(mesh.take(mr_clean) == MR_OK);

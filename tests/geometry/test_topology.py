@@ -8,12 +8,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from meshreel import _core
 from meshreel.geometry.topology import (
     blend,
     clean,
     components,
     concatenate,
     drop_unreferenced,
+    face_means,
     face_normals,
     subdivide_midpoint,
     unique_edges,
@@ -77,6 +79,10 @@ def assert_as_formulas(mesh: Mesh) -> None:
     assert_same_bits(drop_unreferenced(mesh), formulas.drop_unreferenced(mesh))
     assert_same_bits(face_normals(mesh), formulas.face_normals(mesh))
     assert_same_bits((vertex_normals(mesh),), (formulas.vertex_normals(mesh),))
+    assert_same_bits((face_means(mesh.vertices, mesh.faces),), (formulas.face_means(mesh.vertices, mesh.faces),))
+    shares = np.linspace(-1.0, 2.0, 3 * len(mesh.faces)).reshape(-1, 3)
+    mixed = blend(mesh.vertices, mesh.faces, shares)
+    assert_same_bits((mixed,), (formulas.blend(mesh.vertices, mesh.faces, shares),))
     for one, other in zip(unique_edges(mesh.faces), formulas.unique_edges(mesh.faces), strict=True):
         np.testing.assert_array_equal(one, other)
 
@@ -111,6 +117,10 @@ def test_a_face_that_refers_to_a_missing_vertex_is_refused(call: Callable[[Mesh]
     for points in (CORNERS, CORNERS[:0]):
         with pytest.raises(ValueError, match="an index is out of range"):
             call(Mesh.of(points, [[0, 1, 2], [2, wrong, 1]]))
+        with pytest.raises(ValueError, match="an index is out of range"):
+            face_means(points, np.array([[0, 1, 2], [2, wrong, 1]], np.int32))
+    with pytest.raises(ValueError, match="sizes do not fit"):
+        _core.blend(CORNERS, SOLID.faces, np.zeros((3, 3)))
     with pytest.raises(ValueError, match="an index is out of range"):
         components(np.array([[0, 1, wrong]], np.int32), 4)
 

@@ -28,6 +28,17 @@ def vertex_normals(mesh):
     return total / np.where(length > 0, length, 1.0)[:, None]
 
 
+def blend(values, corners, weights):
+    a, b, c = (values[corners[:, k]] for k in range(3))
+    u, v, w = (weights[:, k, None] for k in range(3))
+    return u * a + v * b + w * c
+
+
+def face_means(values, faces):
+    a, b, c = (values[faces[:, k]] for k in range(3))
+    return (a + b + c) / 3
+
+
 def weld(mesh):
     _, first, inverse = np.unique(mesh.vertices, axis=0, return_index=True, return_inverse=True)
     order = np.argsort(first)  # keep the order of first appearance

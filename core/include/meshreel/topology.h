@@ -42,6 +42,9 @@ int mr_face_normals(const struct mr_mesh* mesh, double* normals, double* areas);
 // the faces are summed that have it as their first corner, then as their second, then as their third.
 int mr_vertex_normals(const struct mr_mesh* mesh, double* normals);
 
+// The positions of each face's corners, added up with their weights; without weights their mean.
+int mr_blend(const struct mr_mesh* mesh, const double* weights, double* points);
+
 // Cuts each face into parts^2 equal parts, 1 to `most`^2, whose sides are at most `spacing` long where `most` allows
 // it. Sets the number of all parts; then the middles of those of each face, and the face of each.
 int mr_spread_parts(const struct mr_mesh* mesh, double spacing, int32_t most, int32_t* parts, size_t* count);

@@ -16,7 +16,7 @@ from jaxtyping import Bool, Float64, Int32, Int64
 from .. import _core
 from ..types import Mesh
 from . import work
-from .topology import blend, border_mask, face_normals, unique_edges
+from .topology import blend, border_mask, face_means, face_normals, unique_edges
 
 _AT_BORDER = 1e-4  # barycentric weight below which a point is on an edge (guess)
 
@@ -122,4 +122,4 @@ def distances(points: Float64[np.ndarray, "N 3"], mesh: Mesh) -> Float64[np.ndar
 
 def carried_labels(surface: Surface, labels: Bool[np.ndarray, " F"], mesh: Mesh) -> Bool[np.ndarray, " G"]:
     """Transfer face labels to another mesh: each face takes the label of the face nearest to its middle."""
-    return labels[surface.closest(mesh.vertices[mesh.faces].mean(axis=1)).faces]
+    return labels[surface.closest(face_means(mesh.vertices, mesh.faces)).faces]

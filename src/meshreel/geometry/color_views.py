@@ -22,7 +22,7 @@ from .closest_points import Surface
 from .drawing import draw
 from .strict import products
 from .threads import mapped
-from .topology import blend, face_normals
+from .topology import blend, face_means, face_normals
 
 Points = Float64[np.ndarray, "N 3"]  # also normals, and colours from 0 to 255
 Mask = Bool[np.ndarray, " N"]
@@ -109,7 +109,7 @@ class ColorViews:
     def pixels_on(self, mesh: Mesh) -> float:
         """Return how many pixels of the pictures show a mesh: each face counts in the picture that resolves it best."""
         normals, areas = face_normals(mesh)
-        middles, most = mesh.vertices[mesh.faces].mean(axis=1), np.zeros(len(mesh.faces))
+        middles, most = face_means(mesh.vertices, mesh.faces), np.zeros(len(mesh.faces))
         for view in self.views:
             camera, depth = view.picture.camera, view.picture.project(middles)[1]
             cosine = np.cbrt(view.weights(middles, normals))  # less near steps

@@ -67,10 +67,12 @@ def face_normals(mesh: Mesh) -> tuple[Float64[np.ndarray, "F 3"], Float64[np.nda
 
 def blend(values: Float64[np.ndarray, "V 3"], corners: Int32[np.ndarray, "N 3"], weights: Triples) -> Triples:
     """Interpolate values of vertices inside faces, given by their three corners, by barycentric weights."""
-    a, b, c = (np.ascontiguousarray(corner) for corner in corners.T)
-    u, v, w = (np.ascontiguousarray(weight) for weight in weights.T)
-    axes = (np.ascontiguousarray(axis) for axis in values.T)  # axis by axis, to save memory
-    return np.stack([u * axis[a] + v * axis[b] + w * axis[c] for axis in axes], axis=1)
+    return _core.blend(values, corners, weights)
+
+
+def face_means(values: Float64[np.ndarray, "V 3"], faces: Int32[np.ndarray, "F 3"]) -> Float64[np.ndarray, "F 3"]:
+    """Return the mean of the values of each face's corners; of vertices, the faces' middles."""
+    return _core.blend(values, faces, None)
 
 
 def vertex_normals(mesh: Mesh) -> Float64[np.ndarray, "V 3"]:

@@ -15,7 +15,7 @@ from jaxtyping import Bool, Float64, Int32, Int64
 
 from ..geometry.closest_points import Surface
 from ..geometry.strict import angle
-from ..geometry.topology import blend, drop_unreferenced, face_normals, subdivide_midpoint, vertex_normals
+from ..geometry.topology import blend, drop_unreferenced, face_means, face_normals, subdivide_midpoint, vertex_normals
 from ..types import Mesh
 
 Points = Float64[np.ndarray, "N 3"]
@@ -54,18 +54,14 @@ def sample(mesh: Mesh, center: Float64[np.ndarray, " 3"]) -> Samples:
     # 1/12 for each corner and 3/4 for the centroid integrate quadratics over a triangle exactly
     shares = np.bincount(fine.faces.reshape(-1), np.repeat(areas / 12, 3), len(fine.vertices))
     weights = np.concatenate([shares, areas * 0.75])
-    points = np.concatenate([fine.vertices, _centroids(fine.vertices, fine.faces)])
-    directions = np.concatenate([fine_normals, _centroids(fine_normals, fine.faces)])
+    points = np.concatenate([fine.vertices, face_means(fine.vertices, fine.faces)])
+    directions = np.concatenate([fine_normals, face_means(fine_normals, fine.faces)])
     return Samples(mesh, normals, points, unit(directions), weights / weights.sum())
 
 
 def used_surface(mesh: Mesh) -> Mesh:
     """Remove zero-area faces and vertices that no face uses; the result may be empty."""
     return drop_unreferenced(Mesh.of(mesh.vertices, mesh.faces[face_normals(mesh)[1] > 0]))
-
-
-def _centroids(values: Float64[np.ndarray, "V 3"], faces: Int32[np.ndarray, "F 3"]) -> Float64[np.ndarray, "F 3"]:
-    return (values[faces[:, 0]] + values[faces[:, 1]] + values[faces[:, 2]]) / 3
 
 
 def welded_normals(mesh: Mesh) -> Float64[np.ndarray, "V 3"]:

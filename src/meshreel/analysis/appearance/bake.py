@@ -18,7 +18,7 @@ from ...errors import InputError, needed
 from ...geometry.atlas import MOST_SIDE, Layout
 from ...geometry.color_views import ColorViews, Paint, spread_colors
 from ...geometry.splats import located
-from ...geometry.topology import blend, face_normals
+from ...geometry.topology import blend, face_means, face_normals
 from ...geometry.work import passed
 from ...types import GREY, Mesh
 
@@ -205,7 +205,7 @@ def projected(mesh: Mesh, views: ColorViews) -> tuple[Layout, float]:
     A face is in the picture that sees it most frontally; a face that no picture has entirely has no place. Small
     pictures are enlarged, because corners are on whole texels, and large ones are reduced to fit a texture.
     """
-    normals, middles = face_normals(mesh)[0], mesh.vertices[mesh.faces].mean(axis=1)
+    normals, middles = face_normals(mesh)[0], face_means(mesh.vertices, mesh.faces)
     best, weight = np.full(len(mesh.faces), -1), np.zeros(len(mesh.faces))
     places, left, height = np.zeros((len(mesh.faces), 3, 2)), 0, 0
     for number, view in enumerate(views.views):

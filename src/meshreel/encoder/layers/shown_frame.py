@@ -13,11 +13,11 @@ import numpy as np
 from jaxtyping import Bool, Float64, Int32, Int64
 
 from ...geometry import work
-from ...geometry.closest_points import Hits, Surface
+from ...geometry.closest_points import Hits, MovingSurface, Surface
 from ...geometry.depth import FreeSpace
 from ...geometry.strict import dot
 from ...geometry.threads import mapped
-from ...geometry.topology import blend, components, connected_faces, face_normals
+from ...geometry.topology import blend, components, connected_faces, face_means, face_normals
 from ...metrics.distance import BothClosest, Closest
 from ...types import Mesh
 
@@ -33,10 +33,14 @@ class ShownFrame:
         self,
         surface: Surface,
         decoded: Mesh,
+        moving: MovingSurface,
         free: FreeSpace | None = None,
         uneven: Float64[np.ndarray, " V"] | None = None,
     ) -> None:
-        """`uneven`: the noise of each vertex, in units of all noise; squared distances are in units of its square."""
+        """`moving` has the faces of `decoded`. `uneven` is the noise of each vertex, in units of all noise.
+
+        Squared distances are in units of its square.
+        """
         work.passed("patch")
         original, self._free = surface.mesh, free
         self._uneven: Float64[np.ndarray, " N"] | None = None
@@ -47,9 +51,11 @@ class ShownFrame:
         shares = np.bincount(original.faces.reshape(-1), np.repeat(areas / 12, 3), len(original.vertices))
         weights = np.concatenate([shares, 0.75 * areas])
         self.weights = weights / weights.sum()
-        self._decoded = Surface(decoded)
+        self._moving = moving
         points, self.areas = _samples(decoded)
-        ahead, back = self._decoded.closest(mine), surface.closest(points)
+        with moving.at(decoded.vertices) as shown:
+            ahead = shown.closest(mine)
+        back = surface.closest(points)
         self.closest = (ahead.faces, ahead.barycentric), (back.faces, back.barycentric)  # to the samples of either
         self.squared, self.hit = self._by_noise(_squared(ahead, mine), slice(None)), ahead.faces
         self._nearest = self._back(back, points)
@@ -81,7 +87,7 @@ class ShownFrame:
         count, faces = len(self.original.vertices), self.original.faces
         middles = some >= count
         points = self.original.vertices[np.where(middles, 0, some)]
-        points[middles] = self.original.vertices[faces[some[middles] - count]].mean(axis=1)
+        points[middles] = face_means(self.original.vertices, faces[some[middles] - count])
         return points
 
     def _by_noise(
@@ -100,7 +106,7 @@ class ShownFrame:
     def measured(self, far: float) -> tuple[Bool[np.ndarray, " F"], Bool[np.ndarray, " F"]]:
         """Return the decoded faces that cameras face, and those that are within a squared distance of the surface."""
         middles = len(self.decoded.vertices)
-        points = self.decoded.vertices[self.decoded.faces].mean(axis=1)
+        points = face_means(self.decoded.vertices, self.decoded.faces)
         there = self._nearest[0][middles:] <= far
         if self._free is None:
             return np.zeros_like(there), there
@@ -128,7 +134,8 @@ class ShownFrame:
             return np.full(len(self.squared), np.inf)
         squared = self.squared.copy()
         moved = np.flatnonzero(gone[self.hit])
-        squared[moved] = self.ahead(self._decoded, moved, gone)[0]
+        with self._moving.at(self.decoded.vertices) as shown:
+            squared[moved] = self.ahead(shown, moved, gone)[0]
         return squared
 
     def errors_with(self, gone: Bool[np.ndarray, " F"], patch: Mesh, least: float) -> tuple[float, float]:
@@ -167,7 +174,8 @@ class ShownFrame:
         faces, weights = (each.copy() for each in self.closest[0])
         moved = np.flatnonzero(gone[faces])
         if len(moved) and kept.any():
-            hits = self._decoded.closest(points[moved], gone)
+            with self._moving.at(self.decoded.vertices) as shown:
+                hits = shown.closest(points[moved], gone)
             faces[moved], weights[moved] = hits.faces, hits.barycentric
         corners = self.decoded.faces[faces]
         squared = ((blend(self.decoded.vertices, corners, weights) - points) ** 2).sum(axis=1)
@@ -210,13 +218,17 @@ def shown_frames(
     free: Sequence[FreeSpace | None] = (),
     uneven: Sequence[Float64[np.ndarray, " _"] | None] = (),
 ) -> list[ShownFrame]:
-    """Return each frame beside its decoded mesh, with what cameras saw through and the noise of its vertices."""
+    """Return each frame beside its decoded mesh, with what cameras saw through and the noise of its vertices.
+
+    Decoded meshes have the same faces.
+    """
     surfaces = mapped(lambda frame: frame if isinstance(frame, Surface) else Surface(frame), frames)
-    return mapped(ShownFrame, surfaces, decoded, free or repeat(None), uneven or repeat(None))
+    moving = MovingSurface(decoded[0])
+    return mapped(ShownFrame, surfaces, decoded, repeat(moving), free or repeat(None), uneven or repeat(None))
 
 
 def _samples(mesh: Mesh) -> tuple[Float64[np.ndarray, "N 3"], Float64[np.ndarray, " F"]]:
-    return np.concatenate([mesh.vertices, mesh.vertices[mesh.faces].mean(axis=1)]), face_normals(mesh)[1]
+    return np.concatenate([mesh.vertices, face_means(mesh.vertices, mesh.faces)]), face_normals(mesh)[1]
 
 
 def _squared(hits: Hits, points: Float64[np.ndarray, "N 3"]) -> Float64[np.ndarray, " N"]:
@@ -225,7 +237,8 @@ def _squared(hits: Hits, points: Float64[np.ndarray, "N 3"]) -> Float64[np.ndarr
 
 def _of_faces(squared: Float64[np.ndarray, " N"], faces: Int32[np.ndarray, "F 3"]) -> Float64[np.ndarray, " F"]:
     """Return means over the faces; 1/12 for each corner and 3/4 for the centroid integrate quadratics exactly."""
-    return squared[faces].sum(axis=1) / 12 + 0.75 * squared[-len(faces) :]
+    a, b, c = faces.T
+    return (squared[a] + squared[b] + squared[c]) / 12 + 0.75 * squared[-len(faces) :]
 
 
 SHARD = 1e-5  # squared diagonals: half a square centimetre of a body that faces the wrong way shows (guess)
