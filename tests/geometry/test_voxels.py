@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from meshreel.geometry.voxels import Lattice, around, distinct, moved, neighbours, spread
+from meshreel.geometry.voxels import Lattice, around, contains, distinct, moved, neighbours, spread
 from meshreel.types import Mesh
 from tests.metrics.shapes import moved as shifted
 from tests.metrics.shapes import sphere
@@ -69,6 +69,12 @@ def test_moved_cells_differ_by_the_offset(cells, offset):
 @given(st.lists(st.integers(0, 50)))
 def test_distinct_keys_are_those_of_unique(keys):
     assert np.array_equal(distinct(np.array(keys, np.int64)), np.unique(np.array(keys, np.int64)))
+
+
+@given(st.lists(st.integers(0, 50), min_size=1), st.lists(st.integers(-9, 60)))
+def test_keys_that_are_contained_are_those_of_isin(keys, wanted):
+    keys, wanted = distinct(np.array(keys, np.int64)), np.array(wanted, np.int64)
+    assert np.array_equal(contains(keys, wanted), np.isin(wanted, keys))
 
 
 @given(NEAR)

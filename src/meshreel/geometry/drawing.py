@@ -16,7 +16,7 @@ from .. import _core
 from ..types import Mesh
 from .cameras import Camera
 from .strict import products
-from .topology import blend, face_normals
+from .topology import blend
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,12 +97,12 @@ def draw_places(mesh: Mesh, camera: Viewer, crop: Crop | None = None) -> SeenPla
     return SeenPlaces(mesh, covered, faces[covered], depth[covered], weights)
 
 
-def backs(mesh: Mesh, camera: Camera, seen: Seen) -> Bool[np.ndarray, "H W"]:
-    """Return a mask of the pixels that see the back of a face; `seen` is the result of `draw`."""
-    if mesh.is_empty:
-        return np.zeros(seen.faces.shape, bool)
-    normals = products(face_normals(mesh)[0], camera.extrinsic[:3, :3].T)
-    return (np.einsum("hwd,hwd->hw", normals[seen.faces], camera.ahead) > 0) & (seen.faces >= 0)
+def backs(normals: Float64[np.ndarray, "F 3"], camera: Camera, seen: Seen) -> Bool[np.ndarray, "H W"]:
+    """Return a mask of the pixels that see the back of a face, by the faces' normals and the result of `draw`."""
+    covered, found = seen.faces >= 0, np.zeros(seen.faces.shape, bool)
+    own = products(normals, camera.extrinsic[:3, :3].T)[seen.faces[covered]]
+    found[covered] = np.einsum("nd,nd->n", own, camera.ahead[covered]) > 0
+    return found
 
 
 def _drawn(mesh: Mesh, camera: Viewer, crop: Crop | None, weighted: bool) -> tuple[Any, Any, Any]:

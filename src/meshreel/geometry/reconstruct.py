@@ -24,7 +24,7 @@ from .closest_points import Surface
 from .depth import DepthPicture
 from .strict import inverse, products
 from .topology import clean, unique_edges, weld
-from .voxels import Lattice, around, distinct, spread
+from .voxels import Lattice, around, contains, distinct, spread
 
 Points = Float64[np.ndarray, "N 3"]
 
@@ -265,7 +265,7 @@ def _loops(mesh: Mesh) -> Iterator[Int64[np.ndarray, " n"]]:
     f = mesh.faces.astype(np.int64)
     half = np.concatenate([f[:, [0, 1]], f[:, [1, 2]], f[:, [2, 0]]])
     count = len(mesh.vertices)
-    border = half[~np.isin(half[:, 0] * count + half[:, 1], half[:, 1] * count + half[:, 0])]
+    border = half[~contains(distinct(half[:, 1] * count + half[:, 0]), half[:, 0] * count + half[:, 1])]
     following = defaultdict[int, list[int]](list)
     for a, b in border[np.lexsort(border.T)[::-1]].tolist():
         following[a].append(b)

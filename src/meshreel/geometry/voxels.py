@@ -9,7 +9,7 @@ import itertools
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float64, Int32, Int64
+from jaxtyping import Bool, Float64, Int32, Int64
 
 from .. import _core
 from ..types import Mesh
@@ -69,6 +69,11 @@ def around(keys: Int64[np.ndarray, " P"]) -> Int64[np.ndarray, " Q"]:
     for axis in np.eye(3, dtype=np.int64):
         keys = distinct(np.concatenate([moved(keys, axis * step) for step in (-1, 0, 1)]))
     return keys
+
+
+def contains(keys: Int64[np.ndarray, " P"], wanted: Int64[np.ndarray, " N"]) -> Bool[np.ndarray, " N"]:
+    """Return which wanted keys are among the sorted keys, some; np.isin would sort both again."""
+    return keys[np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)] == wanted
 
 
 def neighbours(keys: Int64[np.ndarray, " P"]) -> Int32[np.ndarray, "P 26"]:

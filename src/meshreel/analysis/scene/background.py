@@ -21,7 +21,7 @@ from ...geometry.depth import STEP, DepthPicture, FreeSpace, inverse_depths
 from ...geometry.drawing import draw
 from ...geometry.reconstruct import ALONE, GRAZING, SEEN, MeanOptions, MeanSurface, close_holes, extract, integrate
 from ...geometry.threads import mapped
-from ...geometry.topology import face_normals, part_of, without_fragments
+from ...geometry.topology import face_means, face_normals, part_of, without_fragments
 from ...types import Mesh
 
 FRAMES = 20  # of a scene: largest number of fused frames, spread over the sequence (decision 19)
@@ -76,7 +76,7 @@ def fuse_still_depth(moments: Iterable[Moment], voxel: float) -> Mesh:
     fine = mapped(DepthPicture.finer, usual, repeat(FINER))
     past = mapped(lambda picture: _continued(picture).finer(FINER), usual)
     mesh = extract(integrate(fine, FINER_VOXEL * voxel, GRAZING if len(usual) > 1 else ALONE, past), SEEN)
-    normals, middles = face_normals(mesh)[0], mesh.vertices[mesh.faces].mean(axis=1)
+    normals, middles = face_normals(mesh)[0], face_means(mesh.vertices, mesh.faces)
     best = np.full(len(middles), -1.0)  # cosine between a face's normal and the ray of the camera that it faces most
     for picture in usual:
         rays = picture.camera.eye - middles

@@ -16,7 +16,7 @@ from scipy.spatial import cKDTree
 
 from ...geometry.closest_points import Surface
 from ...geometry.topology import concatenate, connected_faces, face_normals, linked, part_of, with_neighbours
-from ...geometry.voxels import Lattice, around, distinct, spread
+from ...geometry.voxels import Lattice, around, contains, distinct, spread
 from ...types import Mesh
 
 MOST_RINGS = 4  # largest number of rings added around moving faces where the background has a gap: a guess
@@ -174,7 +174,7 @@ def _linked(pieces: list[_Piece]) -> Int64[np.ndarray, " N"]:
         keys = np.concatenate([pieces[k].cells for k in later] or [np.zeros(0, np.int64)])
         owner = np.repeat(later, [len(pieces[k].cells) for k in later])
         for k in current:
-            near = np.isin(keys, around(pieces[k].cells))
+            near = contains(around(pieces[k].cells), keys)
             links += [(k, int(other)) for other in np.unique(owner[near])]
     return linked(np.array(links, np.int64).reshape(-1, 2), len(pieces))
 

@@ -57,14 +57,14 @@ class Observations:
         mesh, unit = self.frames[number], lattice.size / _FINENESS
         # Only an annotation: to call the type would make a class for each frame, which stays until all garbage goes.
         depths: list[UInt16[np.ndarray, "H W"]] = []
+        normals = face_normals(mesh)[0]
         for view in self.views if seen else ():
             sight = draw(mesh, view)
-            depth = np.where(np.isfinite(sight.depth) & ~backs(mesh, view, sight), sight.depth, 0.0)
+            depth = np.where(np.isfinite(sight.depth) & ~backs(normals, view, sight), sight.depth, 0.0)
             depths.append(np.clip(np.rint(depth / unit), 0, _DEEPEST).astype(np.uint16))
         points, faces = spread(mesh, 1.5 * lattice.size)
         keys, cell = np.unique(lattice.keys(points), return_inverse=True)
-        normals = face_normals(mesh)[0][faces]
-        sums = [np.bincount(cell.reshape(-1), normals[:, axis], len(keys)) for axis in range(3)]
+        sums = [np.bincount(cell.reshape(-1), normals[faces, axis], len(keys)) for axis in range(3)]
         measured = None if self.pictures is None else self.pictures(number)
         return _Observation(keys, np.stack(sums, axis=1).astype(np.float32), depths, measured)
 

@@ -21,8 +21,16 @@ from ...geometry.cameras import Camera
 from ...geometry.closest_points import Surface, area_samples
 from ...geometry.derived_sequences import CapturedSequence
 from ...geometry.threads import mapped
-from ...geometry.topology import border_edges, components, drop_unreferenced, edge_lengths, face_normals, vertex_normals
-from ...geometry.voxels import Lattice, around, distinct, spread
+from ...geometry.topology import (
+    border_edges,
+    components,
+    drop_unreferenced,
+    edge_lengths,
+    face_means,
+    face_normals,
+    vertex_normals,
+)
+from ...geometry.voxels import Lattice, around, contains, distinct, spread
 from ...geometry.work import passed
 from ...types import Frames, Mesh, evenly
 from ..survey import UNLIKE, check
@@ -80,7 +88,7 @@ class Standing:
 
     def moves(self, mesh: Mesh) -> Bool[np.ndarray, " F"]:
         """Return True for each face of a mesh in a region that does not rest."""
-        cells = self.lattice.keys(mesh.vertices[mesh.faces].mean(axis=1))
+        cells = self.lattice.keys(face_means(mesh.vertices, mesh.faces))
         at = np.minimum(np.searchsorted(self.keys, cells), max(len(self.keys) - 1, 0))
         return (self.keys[at] == cells) & ~self.rests[at] if len(self.keys) else np.zeros(len(cells), bool)
 
@@ -107,7 +115,7 @@ def scene_standing(frames: Frames) -> Standing | None:
     lattice = Lattice.near(meshes[0], sizes[0] / CELLS)
     cells = [distinct(lattice.keys(spread(mesh, lattice.size)[0])) for mesh in meshes]
     wide = [around(occupied) for occupied in cells]
-    still = [np.mean([np.isin(occupied, other).mean() for other in wide]) for occupied in cells]
+    still = [np.mean([contains(other, occupied).mean() for other in wide]) for occupied in cells]
     if float(np.median(still)) < SHARE:
         return None
     found, whole = standing(frames), float(np.mean([face_normals(mesh)[1].sum() for mesh in meshes]))

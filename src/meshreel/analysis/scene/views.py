@@ -21,6 +21,7 @@ from ...errors import InputError
 from ...geometry import work
 from ...geometry.cameras import Camera, CameraPose, Rays, matrix_of
 from ...geometry.strict import dot, norm, products, rounded
+from ...geometry.threads import mapped
 from ...geometry.topology import face_normals
 from ...types import UP_AXES, Frames, Mesh, Up
 
@@ -60,9 +61,12 @@ def place_views(
         pose = CameraPose.of_world(matrix_of(turn, -products(turn, eye[:, None])[:, 0]))
         candidates.append(replace(lens, pose=pose))
     pixels = np.empty((len(candidates), sum(len(part.points) for part in samples)), np.float32)  # some 100 MB
-    for number, (eye, sees) in enumerate(places):
+
+    def fill(number: int, eye: Place, sees: list[np.ndarray]) -> None:
         work.passed("views")
         pixels[len(_WAYS) * number : len(_WAYS) * (number + 1)] = _pixels(eye, sees, samples, _turns(up), lens)
+
+    mapped(fill, range(len(places)), *zip(*places, strict=True))
     return _greedy(candidates, pixels, count)
 
 
@@ -99,13 +103,14 @@ class _Samples:
 
 def _outside(eyes: list[Place], samples: list[_Samples]) -> list[tuple[Place, list[np.ndarray]]]:
     """Return the places inside no object in any frame, or all if none is, with the visible samples of each frame."""
-    places, outside = [], []
-    for eye in eyes:
+
+    def look(eye: Place) -> tuple[list[np.ndarray], bool]:
         work.passed("views")
         looks = [part.seen_from(eye) for part in samples]
-        places.append((eye, [free for free, _ in looks]))
-        outside.append(all(back.sum() <= _INSIDE * free.sum() for free, back in looks))
-    return [place for place, out in zip(places, outside, strict=True) if out] or places
+        return [free for free, _ in looks], all(back.sum() <= _INSIDE * free.sum() for free, back in looks)
+
+    places = [(eye, sees, out) for eye, (sees, out) in zip(eyes, mapped(look, eyes), strict=True)]
+    return [(eye, sees) for eye, sees, out in places if out] or [(eye, sees) for eye, sees, _ in places]
 
 
 def _pixels(
