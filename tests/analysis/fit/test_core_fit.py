@@ -59,7 +59,7 @@ def test_the_shape_turns_as_the_best_rotation_of_each_neighbourhood() -> None:
     turn = np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]])
     template = _core.FitTemplate(rest.faces, len(rest.vertices))
     rigid = template.turned_laplacian(rest.vertices, rest.vertices @ turn.T + 0.3)
-    assert np.abs(rigid - laplacian(rest.faces, len(rest.vertices)) @ rest.vertices @ turn.T).max() < 3e-6  # 1e-4 rad
+    assert np.abs(rigid - laplacian(rest.faces, len(rest.vertices)) @ rest.vertices @ turn.T).max() < 1e-7
     now = bumpy(Mesh(rest.vertices @ turn.T, rest.faces), 5)
     found = template.turned_laplacian(rest.vertices, now.vertices)
     assert np.abs(found - turned_laplacian(rest.faces, rest.vertices, now.vertices)).max() < 3e-6
