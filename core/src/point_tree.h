@@ -13,7 +13,7 @@
 
 namespace meshreel {
 
-using Point6 = std::array<float, 8>;  // the last two are 0
+using Point6 = std::array<float, 8>;  // six numbers, and two zeros that fill two lanes
 
 class PointTree {
 public:

@@ -5,8 +5,9 @@
 
 namespace meshreel {
 
-// Times the tolerance of the last round, in those before it: the next has other pairs. Shapes of few points, which are
-// soon solved, may come out exact, and are not solved roughly (decision 40; guesses).
+// Times the tolerance of the last round, in those before it: the next has other pairs. Shapes of few points, vertices
+// of a template or samples that are tracked, are soon solved and may come out exact: not roughly (decision 40;
+// guesses).
 constexpr double kRougher = 10.0;
 constexpr size_t kFew = 2000;
 

@@ -17,7 +17,7 @@ constexpr int kCurveBits = 10;  // per coordinate, of the cells along the curve
 // Nodes on a path. A node halves twice; a half has either half of its faces, or its size shrinks by a bin at least,
 // which 2^252, the range of single precision, allows 63 times an axis at 16 bins; and halving 2^31 faces takes 31.
 constexpr int kDeepest = 128;
-constexpr double kSlack = 1e-6;  // error of a distance in single precision, and more, in half diagonals of the mesh
+constexpr double kSlack = 1e-6;  // error of a distance in single precision, and more, in distances from the origin
 // Squared sine of a face's angle: below, rounding leaves nothing of the inside, and the edges answer (guess).
 constexpr double kThin = 1e-10;
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
@@ -99,6 +99,15 @@ SurfaceTree::SurfaceTree(const mr_mesh& mesh) : vertices_(mesh.vertices), faces_
 }
 
 void SurfaceTree::move(const double* positions) {
+    Vec low = load(positions), high = low;
+    for (size_t v = 1; v < vertices_; ++v) {
+        const Vec p = load(positions + 3 * v);
+        low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
+        high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
+    }
+    const Vec middle = 0.5 * (low + high), half = high - middle;
+    if (dot(middle - origin_, middle - origin_) > dot(half, half)) origin_ = middle;  // else rounding stays as it was
+    slack_ = kSlack * (std::sqrt(dot(half, half)) + std::sqrt(dot(middle - origin_, middle - origin_)));
     for (size_t v = 0; v < vertices_; ++v) store(&positions_[3 * v], load(positions + 3 * v) - origin_);
     for (Block& block : blocks_) fill(block);
     for (size_t n = nodes_.size(); n-- > 0;) refit(nodes_[n]);
@@ -143,7 +152,8 @@ SurfaceTree::Range SurfaceTree::halved(Range range) {
     const float size = all.high[axis] - all.low[axis], scale = size > 0.0f ? kBins / size : 0.0f;
     const float low = all.low[axis];
     const auto bin_of = [&](const Middle& middle) {
-        return std::min(static_cast<int>((middle.at[axis] - low) * scale), kBins - 1);
+        const float place = (middle.at[axis] - low) * scale;
+        return place < kBins - 1 ? static_cast<int>(place) : kBins - 1;  // the last for NaN, too
     };
     const int32_t middle = range.begin + (range.end - range.begin) / 2;
     if (!(scale > 0.0f) || !std::isfinite(scale)) return {range.begin, middle};
@@ -295,8 +305,7 @@ Hit SurfaceTree::exact(Vec query, int32_t face) const {
 Hit SurfaceTree::closest(Vec query, double reach, int32_t guess, const uint8_t* gone) const {
     const Vec local = query - origin_;
     const float p[3] = {static_cast<float>(local.x), static_cast<float>(local.y), static_cast<float>(local.z)};
-    float best =
-        std::min(static_cast<float>(reach * reach), std::numeric_limits<float>::max());  // no empty box is so near
+    float best = static_cast<float>(reach * reach);
     int32_t face = INT32_MAX;
     if (guess >= 0 && (gone == nullptr || !gone[guess])) {  // a bound, a little above what `visit` finds
         const Hit start = exact(local, guess);
@@ -331,12 +340,17 @@ Hit SurfaceTree::closest(Vec query, double reach, int32_t guess, const uint8_t* 
         const int first = size;
         for (int k = 0; k < kWide; ++k) {  // without branches, which no processor would foresee
             stack[size] = {squared[k], node.child[k]};
-            size += squared[k] <= best;
+            size += (squared[k] <= best) & (node.child[k] != kNothing);  // NaN is as near to nothing as to all
         }
-        for (int at = first; at + 1 < size; ++at)
+        for (int at = first; at + 1 < size; ++at)  // the nearest last, which is asked first
             if (stack[at].squared < stack[size - 1].squared) std::swap(stack[at], stack[size - 1]);
     }
-    if (face == INT32_MAX && std::isinf(reach)) face = std::max(guess, 0);  // of a query that is not finite
+    if (face == INT32_MAX && std::isinf(reach)) {  // of a query that is not finite, or too far for single precision
+        face = std::max(guess, 0);
+        if (gone != nullptr && gone[face])
+            face = static_cast<int32_t>(std::find(gone, gone + faces_.size(), 0) - gone) %
+                   static_cast<int32_t>(faces_.size());
+    }
     return face == INT32_MAX ? Hit{-1, {}} : exact(local, face);
 }
 

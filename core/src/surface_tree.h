@@ -89,7 +89,7 @@ private:
     std::vector<double> positions_;  // relative to origin_
     Vec origin_;
     double slack_;                         // of a distance: single precision may miss so much
-    std::vector<Middle> middles_, apart_;  // of faces, while the tree is built
+    std::vector<Middle> middles_, apart_;  // of faces while the tree is built, and room for those of a second half
     std::vector<Node> nodes_;              // children after their parents
     std::vector<Block> blocks_;
     int32_t root_ = kNothing;

@@ -1,6 +1,7 @@
 #include "meshreel/tree.h"
 
 #include <algorithm>
+#include <limits>
 
 #include "../src/rigid3.h"
 #include "check.h"
@@ -87,6 +88,48 @@ TEST(closest_points_are_those_of_all_faces_whatever_the_guess_and_after_moves) {
     CHECK(mr_tree_move(tree, shape.positions.data()) == MR_OK);
     CHECK(checked(tree, shape, guesses) == checked(tree, shape, std::vector<int32_t>(100, -1)));
     mr_tree_destroy(tree);
+}
+
+TEST(queries_that_are_not_finite_reach_no_empty_box) {
+    const double nan = std::numeric_limits<double>::quiet_NaN(), inf = std::numeric_limits<double>::infinity();
+    for (size_t count = 1; count < 12; ++count) {
+        const Shape shape = triangles(5, count);
+        const mr_mesh mesh = shape.view();
+        mr_tree* tree = nullptr;
+        CHECK(mr_tree_create(&mesh, &tree) == MR_OK);
+        for (double x : {nan, inf, -inf, 1e300, -1e300})
+            for (double reach : {inf, 1.0}) {
+                const double query[] = {x, x, x};
+                int32_t face = -1;
+                double weights[3];
+                CHECK(mr_tree_closest(tree, query, 1, reach, nullptr, &face, weights) == MR_OK);
+                CHECK(face >= -1 && face < static_cast<int32_t>(shape.face_count()));
+            }
+        mr_tree_destroy(tree);
+    }
+}
+
+TEST(vertices_that_are_not_finite_build_a_tree_that_answers_with_a_face) {
+    for (double x : {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity(), 1e39}) {
+        Shape shape = triangles(6, 200);
+        shape.positions[100] = x;
+        const mr_mesh mesh = shape.view();
+        mr_tree* tree = nullptr;
+        CHECK(mr_tree_create(&mesh, &tree) == MR_OK);
+        std::vector<uint8_t> gone(shape.face_count(), 1);
+        gone[7] = 0;
+        for (int moves = 0; moves < 2; ++moves) {
+            const double query[] = {0.1, 0.2, 0.3}, far[] = {1e25, 0.0, 0.0},
+                         inf = std::numeric_limits<double>::infinity();
+            for (const double* asked : {query, far}) {
+                int32_t face = -1;
+                double weights[3];
+                CHECK(mr_tree_closest(tree, asked, 1, inf, gone.data(), &face, weights) == MR_OK && face == 7);
+            }
+            CHECK(mr_tree_move(tree, shape.positions.data()) == MR_OK);
+        }
+        mr_tree_destroy(tree);
+    }
 }
 
 TEST(the_closest_point_of_a_face_that_is_a_line_but_for_rounding_is_beside_the_query) {

@@ -54,6 +54,14 @@ def test_faces_that_are_gone_are_as_if_they_had_never_been():
     assert (hits.faces == rest[wanted.faces]).mean() > 0.9  # others are as near: edges
 
 
+def test_a_surface_that_moved_far_answers_as_one_that_was_built_there():
+    ball, rng = sphere(levels=3), np.random.default_rng(0)
+    surface, away = Surface(ball), ball.at(ball.vertices + 1e6)
+    surface.move(away.vertices)
+    queries = away.vertices[rng.integers(0, len(away.vertices), 50)] + 0.2 * rng.standard_normal((50, 3))
+    assert np.allclose(surface.distances(queries), distances(queries, away), rtol=1e-9)
+
+
 def test_a_surface_that_moves_answers_several_threads_at_a_time():
     ball, points = sphere(0.5, 3), np.random.default_rng(2).normal(0, 0.6, (200, 3))
     moving, places = MovingSurface(ball), [ball.vertices + [0.1 * k, 0, 0] for k in range(8)]

@@ -45,7 +45,7 @@ struct mr_deform_rounds {
     double torn;             // an edge off by this share of its length counts a quarter (Geman and McClure)
     double place;            // squared row weight towards the pose a round begins with, relative to the same
     double agreement;        // smallest cosine between the normals of a pair
-    double tolerance;        // of the conjugate gradients of the last round
+    double tolerance;        // relative residual of the conjugate gradients; larger before the last round
     int32_t iterations;
 };
 

@@ -43,7 +43,7 @@ struct mr_fit_rounds {
     const int32_t* strides;   // of each round, >= 1: every so manieth point is matched, and counts so many times
     double agreement;         // smallest cosine between the normals of a pair
     double anchor;            // row weight
-    double tolerance;         // of the conjugate gradients of the last round: relative residual at which they stop
+    double tolerance;         // relative residual of the conjugate gradients; larger before the last round
     int32_t iterations;       // at most
     int32_t turn;             // whether the shape, L rest, turns with each vertex's neighbourhood
 };

@@ -72,7 +72,7 @@ def around(keys: Int64[np.ndarray, " P"]) -> Int64[np.ndarray, " Q"]:
 
 
 def contains(keys: Int64[np.ndarray, " P"], wanted: Int64[np.ndarray, " N"]) -> Bool[np.ndarray, " N"]:
-    """Return which wanted keys are among the sorted keys, some; np.isin would sort both again."""
+    """Return a mask of the wanted keys that are among sorted keys, at least one; np.isin would sort both again."""
     return keys[np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)] == wanted
 
 

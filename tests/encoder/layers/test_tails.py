@@ -19,6 +19,7 @@ from meshreel.format.records import pack
 from meshreel.geometry import work
 from meshreel.geometry.cameras import Camera
 from meshreel.geometry.depth import DepthPicture, FreeSpace
+from meshreel.geometry.threads import threads
 from meshreel.geometry.topology import concatenate
 from meshreel.metrics.distance import surface_errors
 from meshreel.types import Mesh, MeshList, Placement
@@ -159,6 +160,18 @@ def test_closest_points_of_shown_frames_are_those_that_a_measure_asks_for():
     for each in ("forward", "backward"):
         one, other = astuple(getattr(known, each)), astuple(getattr(measured, each))
         assert one == pytest.approx(other, rel=1e-3)  # the tree decides in float32
+
+
+def test_frames_that_share_a_tree_are_as_frames_alone_however_far_apart():
+    places = [BALL.vertices + [x, 0, 0] for x in (0.0, 40.0, -3.0)]
+    frames, decoded = meshes(places, BALL.faces), meshes([p + 1e-3 * np.sin(9 * p) for p in places], BALL.faces)
+    gone = np.arange(len(BALL.faces)) < 30
+    with threads(2):
+        together = shown_frames(frames, decoded)
+    for shown, frame, mesh in zip(together, frames, decoded, strict=True):
+        (alone,) = shown_frames([frame], [mesh])
+        assert np.allclose(shown.squared, alone.squared, rtol=1e-3, atol=1e-12)
+        assert np.allclose(shown.left(gone), alone.left(gone), rtol=1e-3, atol=1e-12)
 
 
 def test_where_every_face_is_dropped_the_patch_is_closest_to_all():

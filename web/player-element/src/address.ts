@@ -26,9 +26,9 @@ export function linkOf(player: MeshreelPlayer): string {
 /** Has the page's address follow what is seen while it stands still, and what is seen follow an address that is typed: `apply` reads it. */
 export function followAddress(player: MeshreelPlayer, apply: () => void): void {
   let timer = 0;
-  let known = location.href; // another one has been typed, and its event is on its way
+  let known = location.href; // as last written, or applied
   const write = (): void => {
-    if (location.href !== known) return;
+    if (location.href !== known) return; // another one has been typed, and its event is on its way
     if (player.paused && !player.seeking && player.info && linkOf(player) !== location.href) history.replaceState(history.state, "", linkOf(player));
     known = location.href;
   };

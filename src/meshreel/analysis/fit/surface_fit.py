@@ -49,7 +49,7 @@ class FitOptions:
     restart: bool = True  # the second fit starts from the coherent positions, and the key keeps its first fit
     second_smoothing: float | None = None  # row weight of the coherent shape; None: the last of `smoothing`
     iterations: int = 40  # largest number of conjugate-gradient iterations per round
-    tolerance: float = 1e-3  # relative residual at which they stop
+    tolerance: float = 1e-3  # relative residual at which they stop; larger before the last round
 
     def rounds(self, noise: float) -> tuple[Rounds, Rounds]:
         """Return the rounds of both fits to frames at this RMS distance from the truth: noise makes them stiffer."""
