@@ -75,15 +75,9 @@ std::vector<uint32_t> along_curve(const double* queries, size_t count) {
 SurfaceTree::SurfaceTree(const mr_mesh& mesh) : vertices_(mesh.vertices), faces_(mesh.face_count) {
     for (size_t f = 0; f < mesh.face_count; ++f)
         faces_[f] = {mesh.faces[3 * f], mesh.faces[3 * f + 1], mesh.faces[3 * f + 2]};
-    Vec low = load(mesh.positions + 3 * static_cast<size_t>(faces_[0][0])), high = low;
-    for (const auto& face : faces_)
-        for (int32_t v : face) {
-            const Vec p = load(mesh.positions + 3 * static_cast<size_t>(v));
-            low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
-            high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
-        }
-    origin_ = 0.5 * (low + high);
-    slack_ = kSlack * std::sqrt(dot(high - origin_, high - origin_));
+    const Span span = span_of(mesh.positions);
+    origin_ = span.middle;
+    slack_ = kSlack * std::sqrt(dot(span.half, span.half));
     positions_.resize(3 * vertices_);
     for (size_t v = 0; v < vertices_; ++v) store(&positions_[3 * v], load(mesh.positions + 3 * v) - origin_);
     middles_.resize(faces_.size());
@@ -98,14 +92,20 @@ SurfaceTree::SurfaceTree(const mr_mesh& mesh) : vertices_(mesh.vertices), faces_
     middles_ = {}, apart_ = {};
 }
 
+SurfaceTree::Span SurfaceTree::span_of(const double* positions) const {
+    Vec low = load(positions + 3 * static_cast<size_t>(faces_[0][0])), high = low;
+    for (const auto& face : faces_)
+        for (int32_t v : face) {
+            const Vec p = load(positions + 3 * static_cast<size_t>(v));
+            low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
+            high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
+        }
+    const Vec middle = 0.5 * (low + high);
+    return {middle, high - middle};
+}
+
 void SurfaceTree::move(const double* positions) {
-    Vec low = load(positions), high = low;
-    for (size_t v = 1; v < vertices_; ++v) {
-        const Vec p = load(positions + 3 * v);
-        low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
-        high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
-    }
-    const Vec middle = 0.5 * (low + high), half = high - middle;
+    const auto [middle, half] = span_of(positions);
     if (dot(middle - origin_, middle - origin_) > dot(half, half)) origin_ = middle;  // else rounding stays as it was
     slack_ = kSlack * (std::sqrt(dot(half, half)) + std::sqrt(dot(middle - origin_, middle - origin_)));
     for (size_t v = 0; v < vertices_; ++v) store(&positions_[3 * v], load(positions + 3 * v) - origin_);

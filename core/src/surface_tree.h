@@ -71,6 +71,11 @@ private:
         int32_t face;
     };
 
+    struct Span {  // of a box around all faces: vertices without one do not count
+        Vec middle, half;
+    };
+
+    Span span_of(const double* positions) const;
     int32_t build(Range range);
     Range halved(Range range);
     std::vector<Range> children(Range range);

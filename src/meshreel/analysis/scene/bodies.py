@@ -15,7 +15,15 @@ from jaxtyping import Bool, Int64
 from scipy.spatial import cKDTree
 
 from ...geometry.closest_points import Surface
-from ...geometry.topology import concatenate, connected_faces, face_normals, linked, part_of, with_neighbours
+from ...geometry.topology import (
+    concatenate,
+    connected_faces,
+    face_means,
+    face_normals,
+    linked,
+    part_of,
+    with_neighbours,
+)
 from ...geometry.voxels import Lattice, around, contains, distinct, spread
 from ...types import Mesh
 
@@ -74,7 +82,7 @@ def with_ring(mesh: Mesh, moves: Bool[np.ndarray, " F"], cell: float, background
         return part_of(mesh, cut)
     for _ in range(MOST_RINGS - 1):
         more = np.flatnonzero(ring(mesh, cut, cell))
-        more = more[background.past_border(background.closest(mesh.vertices[mesh.faces[more]].mean(axis=1)))]
+        more = more[background.past_border(background.closest(face_means(mesh.vertices, mesh.faces[more])))]
         if not len(more):
             break
         cut[more] = True

@@ -19,7 +19,7 @@ from scipy.spatial import cKDTree
 from ...geometry.cameras import Camera
 from ...geometry.closest_points import Surface
 from ...geometry.drawing import Seen, draw
-from ...geometry.topology import connected_faces, face_normals, part_of, unique_edges
+from ...geometry.topology import connected_faces, face_means, face_normals, part_of, unique_edges
 from ...geometry.voxels import Lattice, spread
 from ...types import Frames, Mesh
 from .color_looks import ColorChange
@@ -247,7 +247,7 @@ def in_all_frames(frames: Frames, same: float) -> Mesh:
 def is_off(mesh: Mesh, surface: Surface, same: float) -> Bool[np.ndarray, " F"]:
     """Return True for each face with a corner or a middle that is farther than `same` from a surface."""
     off = (surface.distances(mesh.vertices) > same)[mesh.faces].any(axis=1)
-    off[~off] = surface.distances(mesh.vertices[mesh.faces[~off]].mean(axis=1)) > same
+    off[~off] = surface.distances(face_means(mesh.vertices, mesh.faces[~off])) > same
     return off
 
 

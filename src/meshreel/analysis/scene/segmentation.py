@@ -18,7 +18,7 @@ from ...errors import InputError
 from ...geometry.cameras import Camera
 from ...geometry.closest_points import Surface
 from ...geometry.derived_sequences import CapturedSequence, DerivedSequence, captured, picked, turned_over
-from ...geometry.topology import edge_lengths, face_normals
+from ...geometry.topology import edge_lengths, face_means, face_normals
 from ...geometry.voxels import Lattice
 from ...types import MeshSequence, evenly
 from .color_looks import CHANGE_SIDE, MOMENTS, SIDE, ColorChange, ColorLooks
@@ -59,7 +59,7 @@ def segment(frames: MeshSequence, cameras: Cameras = (), stands: Standing | None
         return places
     first = frames[chosen[0]]
     normals, areas = face_normals(first)
-    away = first.vertices[first.faces].mean(axis=1) - first.middle
+    away = face_means(first.vertices, first.faces) - first.middle
     if (areas * (normals * away).sum(axis=1)).sum() > 0:  # a room's faces look inwards
         reversed_places = _by_place(DerivedSequence(frames, turned_over), chosen, cameras, change)
         places = reversed_places if reversed_places.chosen.any() else places

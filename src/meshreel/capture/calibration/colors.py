@@ -22,7 +22,7 @@ from ...errors import InputError
 from ...geometry import strict
 from ...geometry.cameras import CameraPose, matrix_of
 from ...geometry.color_views import ColorFrames, ColorPicture, ColorViews, sampled
-from ...geometry.topology import face_normals, subdivide_midpoint
+from ...geometry.topology import face_means, face_normals, subdivide_midpoint
 from ...io.write import write_file
 from ...texts import json_of
 from ...types import Frames, Mesh, evenly
@@ -226,7 +226,7 @@ def _places(mesh: Mesh, count: int) -> tuple[Float64[np.ndarray, "N 3"], Float64
     while 0 < len(mesh.faces) < count:
         mesh = subdivide_midpoint(mesh)
     chosen = slice(None, None, max(1, len(mesh.faces) // count))
-    return mesh.vertices[mesh.faces[chosen]].mean(axis=1), face_normals(mesh)[0][chosen]
+    return face_means(mesh.vertices, mesh.faces[chosen]), face_normals(mesh)[0][chosen]
 
 
 def _joined(looks: Sequence[_Look], poses: Poses) -> tuple[Colors, Trust]:

@@ -30,7 +30,7 @@ from ...geometry.closest_points import Surface, area_samples
 from ...geometry.depth import DepthFrames, FreeSpace
 from ...geometry.derived_sequences import CapturedSequence, picked
 from ...geometry.threads import ahead
-from ...geometry.topology import components, concatenate, face_normals, part_of
+from ...geometry.topology import components, concatenate, face_means, face_normals, part_of
 from ...geometry.voxels import Lattice
 from ...geometry.work import passed
 from ...types import Mesh, MeshSequence, evenly
@@ -87,7 +87,7 @@ class Parts:
         if room is not None:
             more = beyond(mesh, moves, off) & ~moves
             if self.free:  # room that is measured now and then was not seen through in other frames
-                middles = mesh.vertices[mesh.faces[more]].mean(axis=1)
+                middles = face_means(mesh.vertices, mesh.faces[more])
                 seen = sum(free.at(middles).astype(np.int64) for free in self.free)
                 more[more] = seen >= min(SEEN_THROUGH, len(self.free))
             moves |= more
