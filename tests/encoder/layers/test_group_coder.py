@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import meshreel
 from meshreel.analysis.fit.frame import FrameSurface
 from meshreel.coding.group import decode_group
 from meshreel.coding.mesh import CodedReference, code_on_lattice
@@ -12,7 +13,7 @@ from meshreel.encoder.group.forms import EncodedGroup, Fidelity, measure, target
 from meshreel.encoder.layers import group_coder as layers_group
 from meshreel.encoder.layers.group_coder import MOST_FOR_EDGES, GroupCoder
 from meshreel.format.layout import Form
-from meshreel.types import Mesh
+from meshreel.types import Mesh, MeshList
 from tests.small_options import quick
 from tests.spheres import sliding_sphere
 
@@ -61,6 +62,20 @@ def test_a_group_whose_edges_are_lost_is_coded_one_by_one_with_its_edges():
     assert len(sharp.payload) <= MOST_FOR_EDGES * len(flat.payload)
     strict = replace(options, flat=1.0)
     assert coded(strict, errors=(0.01,) * 3, target=replace(target, angle=3.0)).form == Form.DRACO
+
+
+def test_a_turning_body_of_few_large_faces_keeps_its_edges_however_cheap_its_motion_is(tmp_path):
+    """Each corner of a prism has one normal, which a template that is subdivided does not have."""
+    ring = np.exp(2j * np.pi * np.arange(5) / 5)
+    ends = [np.column_stack([ring.real, ring.imag, np.full(5, z)]) for z in (-1.0, 1.0)]
+    sides = [[k, (k + 1) % 5, k + 5] for k in range(5)] + [[(k + 1) % 5, (k + 1) % 5 + 5, k + 5] for k in range(5)]
+    lids = [corners for k in (1, 2, 3) for corners in ([0, k + 1, k], [5, k + 5, k + 6])]
+    tilted = np.concatenate(ends) @ np.array([[1.0, 0.0, 0.0], [0.0, 0.6, -0.8], [0.0, 0.8, 0.6]])
+    turns = (np.array([[np.cos(a), np.sin(a), 0], [-np.sin(a), np.cos(a), 0], [0, 0, 1]]) for a in np.radians(4) * np.arange(16))
+    frames = [Mesh.of(tilted @ turn, sides + lids) for turn in turns]
+    meshreel.encode(MeshList(tuple(frames)), tmp_path / "prism.reel")
+    with meshreel.open(tmp_path / "prism.reel") as video:
+        assert max(measure([frame], [shown]).angle for frame, shown in zip(frames, video, strict=True)) < 1
 
 
 def test_a_template_that_has_collapsed_is_replaced_by_frames_that_stand_alone():

@@ -26,6 +26,7 @@ from .shown_frame import shown_frames
 from .tails import find_tails
 
 MOST_FOR_EDGES = 4  # times the bytes that frames with their edges may cost (guess)
+ALWAYS_FOR_EDGES = 256  # bytes a frame that they may cost whatever else is cheap: 60 kbit/s, a tenth of a person's
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +78,8 @@ class GroupCoder:
         if not np.isfinite(chosen.fidelity.distance) or any(mesh.is_empty for mesh in shown):
             return self.alone(), None  # the template has collapsed: nothing is comparable
         if fidelity.angle > self.options.flat * self.target.angle:  # edges are lost, as those of few, large faces
-            sharp = cheapest_intra(frames, self.target, MOST_FOR_EDGES * len(payload), self.options.intra)
+            most = max(MOST_FOR_EDGES * len(payload), ALWAYS_FOR_EDGES * count)
+            sharp = cheapest_intra(frames, self.target, most, self.options.intra)
             if sharp is not None:
                 return sharp, None
         if self.tries_draco and most_for(chosen) > self.dearer:
