@@ -11,10 +11,13 @@ import pytest
 
 pytest.importorskip("starlette", reason="the extra `play` is not installed")
 
+import meshreel
 from meshreel.cli import main
 from meshreel.cli.console import Common
+from meshreel.io.write import write_mesh
 from tests.cli.conftest import failed
 from tests.golden import GOLDEN
+from tests.spheres import sliding_sphere
 
 FILE = GOLDEN / "scene.reel"
 needs_signals = pytest.mark.skipif(sys.platform == "win32", reason="no SIGINT for one process on Windows")
@@ -60,6 +63,21 @@ def test_play_serves_page_player_and_ranges_until_it_is_stopped(started, number,
 
 
 @needs_signals
+def test_a_folder_of_meshes_is_encoded_for_its_play_alone(started, tmp_path):
+    folder = tmp_path / "ball"
+    folder.mkdir()
+    for number, ball in enumerate(sliding_sphere(3, levels=2)):
+        write_mesh(ball, folder / f"ball_{number}.ply")
+    process, address = started("play", str(folder), "--no-browser")
+    with meshreel.open(fetch(f"{address}files/ball.reel")) as video:
+        assert len(video) == 3
+    process.send_signal(signal.SIGINT)
+    _, err = process.communicate(timeout=60)
+    assert process.returncode == 0 and f"encode {folder} -o ball.reel" in err
+    assert [path.name for path in tmp_path.iterdir()] == ["ball"] and not [*folder.glob("*.reel")]
+
+
+@needs_signals
 def test_serve_shows_what_is_in_the_folder_now(started, tmp_path):
     process, address = started("serve", str(tmp_path))
     assert "This folder has no .reel files" in fetch(address).decode()
@@ -75,6 +93,11 @@ def test_what_cannot_be_played_is_reported_before_anything_is_served(run, tmp_pa
     damaged.write_bytes(b"nothing")
     assert failed(run("play", damaged, "--no-browser"), "damaged.reel", "not a .reel file")
     assert failed(run("play", tmp_path / "absent.reel", "--no-browser"), "absent.reel")
+    (tmp_path / "ball.ply").write_text("ply")
+    assert failed(run("play", tmp_path / "ball.ply"), "encode it first", "ball.reel")
+    (tmp_path / "reels").mkdir()
+    (tmp_path / "reels" / "scene.reel").write_bytes(FILE.read_bytes())
+    assert failed(run("play", tmp_path / "reels"), "0 mesh files", f"serve {tmp_path / 'reels'}")
     assert failed(run("serve", FILE), "no folder")
     assert failed(run("play", FILE, "--no-browser", "--port", "99999"), "--port 99999")
 

@@ -48,12 +48,19 @@ COMMANDS = {
     "export": "Write a .reel file as one animated file, GLB or USD, that other programs play.",
     "info": "Show the rate by content, tracks over time, groups and forms, and what the encoder recorded.",
     "compare": "Compare original meshes with decoded ones by every metric, and print the rate of a .reel file.",
-    "play": "Play a .reel file in a browser, on this machine or on a headset.",
+    "play": "Play a .reel file, a folder of meshes or a sample in a browser, on this machine or on a headset.",
     "serve": "Serve a folder of .reel files: a gallery, and a page that plays each.",
     "player": "Copy the player's files for a web server.",
     "demo": "Make a short capture of moving people, encode it, and measure the result.",
     "doctor": "Report installed packages and extras, and what this machine can do with them.",
     "completion": "Print a script that lets a shell complete commands and flags.",
+}
+GROUPS = {  # of commands in the help, in its order
+    "Make": ("encode", "capture", "calibrate", "segment", "survey", "demo"),
+    "Look": ("play", "info", "decode", "export"),
+    "Edit": ("cut", "concat", "retime", "transform", "tag"),
+    "Serve": ("serve", "player"),
+    "Check": ("compare", "doctor", "completion"),
 }
 SHARED = {  # modules with several commands
     **dict.fromkeys(("cut", "concat", "retime", "transform", "tag"), "edits"),
@@ -77,7 +84,7 @@ EXAMPLES = {  # two of each command, shown below its help; a test parses each
     "export": ("scan.reel --glb", "scan.reel -o scan.usdz --texture"),
     "info": ("scan.reel", "scan.reel --groups --json"),
     "compare": ("scan scan.reel --sheet errors.png", "'takes/walk_*.obj' walk.reel --scale 0.001 --no-ssim"),
-    "play": ("scan.reel", "scan.reel --host 0.0.0.0 --https"),
+    "play": ("", "scan.reel --host 0.0.0.0 --https"),
     "serve": ("recordings --port 8000", "recordings --cors https://example.org"),
     "player": ("--copy-to site/player", ""),
     "demo": ("", "-o demo --frames 8 --jobs 2"),
@@ -108,17 +115,19 @@ def make_app(names: Sequence[str] = tuple(COMMANDS)) -> App:
     """Return the parser of the command line, with the commands that other distributions add."""
     from importlib.metadata import entry_points
 
-    from cyclopts import App
+    from cyclopts import App, Group
 
     help = "Compression of time-varying meshes."
     app = App(name="meshreel", help=help, version=__version__, suppress_keyboard_interrupt=False)
+    titles = [Group(title, sort_key=at) for at, title in enumerate(GROUPS)]
+    groups = {name: title for title, some in zip(titles, GROUPS.values(), strict=True) for name in some}
     for name in names:
         examples = (f"    meshreel {name} {line}".rstrip() for line in EXAMPLES[name])
         epilogue = "\n".join(["Examples:", "", *examples])  # Markdown
-        app.command(place_of(name), name=name, help=COMMANDS[name], help_epilogue=epilogue)
+        app.command(place_of(name), name=name, help=COMMANDS[name], help_epilogue=epilogue, group=groups[name])
     added = {entry.name: entry.value for entry in entry_points(group=PLUGINS) if entry.name not in COMMANDS}
     for name, where in added.items():
-        app.command(where, name=name, help=BENCH)
+        app.command(where, name=name, help=BENCH, group=groups["compare"])
     return app
 
 
