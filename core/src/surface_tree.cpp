@@ -90,6 +90,7 @@ SurfaceTree::SurfaceTree(const mr_mesh& mesh) : vertices_(mesh.vertices), faces_
     root_ = build({0, static_cast<int32_t>(faces_.size())});
     for (size_t n = nodes_.size(); n-- > 0;) refit(nodes_[n]);
     middles_ = {}, apart_ = {};
+    nodes_.shrink_to_fit(), blocks_.shrink_to_fit();  // a frame keeps its tree for long
 }
 
 SurfaceTree::Span SurfaceTree::span_of(const double* positions) const {
@@ -142,8 +143,10 @@ std::vector<SurfaceTree::Range> SurfaceTree::children(Range range) {
     return parts;
 }
 
-// Sorts a range into two by the surface area heuristic over bins of middles; returns the first.
+// Sorts a range into two by the surface area heuristic over bins of middles; returns the first. A leaf costs the same
+// however full it is.
 SurfaceTree::Range SurfaceTree::halved(Range range) {
+    const auto leaves = [](int32_t count) { return static_cast<float>((count + kWide - 1) / kWide); };
     Bounds all;
     for (int32_t k = range.begin; k < range.end; ++k) all.add(load_lanes(middles_[k].at));
     int axis = 0;
@@ -170,12 +173,12 @@ SurfaceTree::Range SurfaceTree::halved(Range range) {
     int32_t count = 0;
     for (int b = 0; b + 1 < kBins; ++b) {
         side.add(bins[b]), count += counts[b];
-        costs[b] = side.area() * static_cast<float>(count);
+        costs[b] = side.area() * leaves(count);
     }
     side = {}, count = 0;
     for (int b = kBins - 1; b-- > 0;) {
         side.add(bins[b + 1]), count += counts[b + 1];
-        costs[b] += side.area() * static_cast<float>(count);
+        costs[b] += side.area() * leaves(count);
         if (costs[b] < least) least = costs[b], best = b;
     }
     int32_t at = range.begin, others = 0;

@@ -42,7 +42,7 @@ def read_file(path: Place) -> bytes:
         if not stat.S_ISREG(state.st_mode):
             raise OSError("it is a pipe or a device, which cannot be read twice")
         with os.fdopen(number, "rb", closefd=False) as file:
-            data = b"" if state.st_size > MOST_BYTES else file.read(MOST_BYTES + 1)  # the file may grow meanwhile
+            data = b"" if state.st_size > MOST_BYTES else file.read()  # a bound would take its bytes of memory
         if max(state.st_size, len(data)) > MOST_BYTES:
             raise OSError(f"it has {state.st_size} bytes, more than the {MOST_BYTES} that an input file may have")
         return data
