@@ -71,7 +71,8 @@ def test_a_turning_body_of_few_large_faces_keeps_its_edges_however_cheap_its_mot
     sides = [[k, (k + 1) % 5, k + 5] for k in range(5)] + [[(k + 1) % 5, (k + 1) % 5 + 5, k + 5] for k in range(5)]
     lids = [corners for k in (1, 2, 3) for corners in ([0, k + 1, k], [5, k + 5, k + 6])]
     tilted = np.concatenate(ends) @ np.array([[1.0, 0.0, 0.0], [0.0, 0.6, -0.8], [0.0, 0.8, 0.6]])
-    turns = (np.array([[np.cos(a), np.sin(a), 0], [-np.sin(a), np.cos(a), 0], [0, 0, 1]]) for a in np.radians(4) * np.arange(16))
+    angles = np.radians(4) * np.arange(16)
+    turns = (np.array([[np.cos(a), np.sin(a), 0], [-np.sin(a), np.cos(a), 0], [0, 0, 1]]) for a in angles)
     frames = [Mesh.of(tilted @ turn, sides + lids) for turn in turns]
     meshreel.encode(MeshList(tuple(frames)), tmp_path / "prism.reel")
     with meshreel.open(tmp_path / "prism.reel") as video:
