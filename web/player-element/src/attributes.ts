@@ -73,7 +73,7 @@ const RULES: Readonly<Record<string, { read: Reader<unknown>; wanted: string }>>
 export function complaint(name: string, text: string): string | null {
   const rule = RULES[name];
   if (!rule || text.trim() === "" || rule.read(text) !== null) return null;
-  return `${name} "${text}" is passed over: give ${rule.wanted}`;
+  return `${name} "${text}" is ignored: give ${rule.wanted}`;
 }
 
 /** A speed from 0.1 to 4; 1 where the text is none. */

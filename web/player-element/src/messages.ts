@@ -15,23 +15,23 @@ type Words = Omit<Message, "detail" | "retry">;
 const FOREIGN: Words = { title: "This is not a .reel file", advice: "Open a file that meshreel wrote, or correct the address." };
 
 const OF_FORMAT: Readonly<Record<FormatErrorKind, Words>> = {
-  damaged: { title: "This file is damaged", advice: "It ends too early or its bytes were changed. Fetch it again." },
+  damaged: { title: "This file is damaged", advice: "It ends too early or its bytes were changed. Download it again." },
   foreign: FOREIGN,
   newer: { title: "This file is newer than the player", advice: "Update the player, then open it again." },
 };
 
 const OF_SOURCE: Readonly<Record<SourceErrorKind, Words>> = {
   missing: { title: "The recording was not found", advice: "The address may be wrong, or the file was moved." },
-  refused: { title: "The recording is not open to you", advice: "The server refuses it. Sign in where it is kept, or ask its owner." },
-  failing: { title: "The server has a problem", advice: "Try again in a moment." },
-  unreachable: { title: "The recording cannot be fetched", advice: "The server did not answer. Look at your connection." },
+  refused: { title: "Access denied", advice: "The server refuses to send the recording. Sign in, or ask its owner." },
+  failing: { title: "Server error", advice: "Try again in a moment." },
+  unreachable: { title: "The recording could not be loaded", advice: "The server did not answer. Check your connection." },
   foreign: FOREIGN,
-  unusable: { title: "The recording cannot be read", advice: "What came does not fit the file. Open it again, or tell its owner what stands below." },
+  unusable: { title: "The recording cannot be read", advice: "The server sent unexpected data. Try again, or send its owner the message below." },
 };
 
 const NO_GRAPHICS: Words = {
-  title: "This browser cannot draw it",
-  advice: "WebGL 2 is switched off or missing. Switch on graphics acceleration, or use another browser.",
+  title: "WebGL 2 is not available",
+  advice: "Turn on graphics acceleration in the browser's settings, or use another browser.",
 };
 const OTHER: Words = { title: "The recording cannot be played", advice: "Something went wrong in the player." };
 

@@ -14,9 +14,9 @@ export interface Statistics extends Stats, PictureStats {
 export function statisticsLines(stats: Statistics, info: Info | null, frame: number): (readonly [string, string])[] {
   return [
     ["Frame", info ? `${frame + 1} of ${info.frameCount}, ${Number(info.frameRate.toFixed(2))} fps` : "none yet"],
-    ["Rate", stats.mbps > 0 ? formatRate(stats.mbps) : "not known yet"],
-    ["Bandwidth", stats.bandwidthMbps > 0 ? formatRate(stats.bandwidthMbps) : "not known yet"],
-    ["Fetched", info ? `${formatAmount(stats.fetchedBytes, "B")} of ${formatAmount(info.size, "B")}` : formatAmount(stats.fetchedBytes, "B")],
+    ["Bitrate", stats.mbps > 0 ? formatRate(stats.mbps) : "not known yet"],
+    ["Connection speed", stats.bandwidthMbps > 0 ? formatRate(stats.bandwidthMbps) : "not known yet"],
+    ["Downloaded", info ? `${formatAmount(stats.fetchedBytes, "B")} of ${formatAmount(info.size, "B")}` : formatAmount(stats.fetchedBytes, "B")],
     ["Decode", `${stats.decodeMs.toFixed(1)} ms a group, load ${(stats.decodeLoad * 100).toFixed(0)} %`],
     ["Buffer", `${stats.bufferedSeconds.toFixed(1)} s, ${formatCount(stats.stalls)} ${stats.stalls === 1 ? "stall" : "stalls"}`],
     ["Layers", layersText(stats, info?.mostLayers ?? 0)],

@@ -122,19 +122,28 @@ describeOnPage("controls of <meshreel-player>", (on) => {
     expect(await on.page.locator(".time").getAttribute("title")).toBe("Frame 13 of 48");
   });
 
-  test("speed, layers and shading are chosen in the settings and are then attributes", async () => {
+  test("speed, quality and shading are chosen in the settings and are then attributes", async () => {
     await on.shown();
     await on.page.getByRole("button", { name: "Settings" }).click();
-    await on.page.getByLabel("Speed").selectOption("0.5");
-    await on.page.getByLabel("Layers").selectOption("1");
+    await on.page.getByLabel("Playback speed").selectOption("0.5");
+    await on.page.getByLabel("Quality").selectOption("1");
     await on.page.getByLabel("Shading").selectOption("wireframe");
     expect(await on.get((player) => ["speed", "layers", "mode"].map((name) => player.getAttribute(name)))).toEqual(["0.5", "1", "wireframe"]);
     expect(await on.page.evaluate(() => [engine.playbacks[0]!.playbackRate, engine.playbacks[0]!.layers, engine.stages[0]!.mode])).toEqual([0.5, 1, "wireframe"]);
-    await on.page.getByLabel("Layers").selectOption("auto");
+    await on.page.getByLabel("Quality").selectOption("auto");
     expect(await on.page.evaluate(() => engine.playbacks[0]!.layers)).toBe("auto");
     await on.page.keyboard.press("Escape");
     expect(await on.page.locator(".settings").isHidden()).toBe(true);
     expect(await on.page.getByRole("button", { name: "Settings" }).evaluate((node) => node.matches(":focus"))).toBe(true);
+  });
+
+  test("the settings have the names that video players and model viewers have", async () => {
+    await on.shown("share");
+    const names = await on.page.locator(".settings .label").allTextContents();
+    expect(names).toEqual([
+      "Playback speed", "Quality", "Shading", "Loop", "Statistics", "Save screenshot", "Reset view",
+      "Frame numbers", "Auto-rotate", "Fly mode", "Copy link", "Open file", "Keyboard shortcuts",
+    ]);
   });
 
   test("letters typed into a menu are the menu's", async () => {
@@ -205,7 +214,7 @@ describeOnPage("controls of <meshreel-player>", (on) => {
     await on.shown();
     await on.page.locator("button.fullscreen").click();
     await on.page.waitForFunction(() => document.fullscreenElement?.localName === "meshreel-player");
-    await expect.poll(() => on.page.locator("button.fullscreen").getAttribute("aria-label")).toBe("Leave full screen");
+    await expect.poll(() => on.page.locator("button.fullscreen").getAttribute("aria-label")).toBe("Exit full screen");
     await on.press("f");
     await on.page.waitForFunction(() => document.fullscreenElement === null);
   });
@@ -213,7 +222,7 @@ describeOnPage("controls of <meshreel-player>", (on) => {
   test("help opens with a question mark, takes the focus, and closes with Escape", async () => {
     await on.shown();
     await on.press("?");
-    const help = on.page.getByRole("dialog", { name: "Keys and gestures" });
+    const help = on.page.getByRole("dialog", { name: "Keyboard shortcuts" });
     expect(await help.isVisible()).toBe(true);
     expect(await help.textContent()).toContain("next frame");
     await on.page.keyboard.press("Escape");
@@ -315,7 +324,7 @@ describeOnPage("controls of <meshreel-player>", (on) => {
     await on.page.evaluate(() => void (engine.webgl = false));
     await on.put('<meshreel-player src="walk.reel" controls></meshreel-player>', false);
     await on.page.evaluate(() => void (engine.webgl = true));
-    expect(await on.page.getByRole("alert").textContent()).toContain("WebGL 2 is switched off");
+    expect(await on.page.getByRole("alert").textContent()).toContain("WebGL 2 is not available");
     await on.page.getByRole("button", { name: "Try again" }).click();
     await on.eventually((player) => player.readyState === 4);
   });
@@ -333,7 +342,7 @@ describeOnPage("controls of <meshreel-player>", (on) => {
     await on.shown();
     expect(await on.page.locator("button.vr").isVisible()).toBe(false);
     await on.press("v");
-    await expect.poll(() => on.page.locator(".toasts").textContent()).toBe("No headset was found");
+    await expect.poll(() => on.page.locator(".toasts").textContent()).toBe("No headset found");
   });
 
   test("time stands still while no picture can be drawn, as in a page that was hidden", async () => {

@@ -143,7 +143,7 @@ describeOnPage("<meshreel-player>", (on) => {
     await on.get((player) => void (player.currentTime = 1.95));
     await on.press("k");
     await on.eventually((player) => player.ended);
-    await expect.poll(() => on.page.locator("button.play").getAttribute("aria-label")).toBe("Play again");
+    await expect.poll(() => on.page.locator("button.play").getAttribute("aria-label")).toBe("Replay");
     await on.page.locator("button.play").click();
     await on.eventually((player) => !player.ended && player.currentTime < 1);
   });
@@ -182,7 +182,7 @@ describeOnPage("<meshreel-player>", (on) => {
 
   test("a camera, a mode or a number of layers that is none leaves what was set, and warns", async () => {
     await on.put('<meshreel-player src="walk.reel" controls mode="x" layers="1" camera="1,2,3,0,0,0"></meshreel-player>');
-    await on.page.locator(".toast", { hasText: 'mode "x" is passed over' }).waitFor();
+    await on.page.locator(".toast", { hasText: 'mode "x" is ignored' }).waitFor();
     const told = await on.get((player) => {
       const messages: string[] = [];
       player.addEventListener("warning", (event) => messages.push((event as CustomEvent<Error>).detail.message));
@@ -195,7 +195,7 @@ describeOnPage("<meshreel-player>", (on) => {
       const { mode, layers, camera } = player;
       return { messages, mode, layers, camera, attributes: ["mode", "layers", "camera"].map((name) => player.getAttribute(name)) };
     });
-    expect(told.messages.map((message) => message.split(" is passed over: give ")[0])).toEqual(
+    expect(told.messages.map((message) => message.split(" is ignored: give ")[0])).toEqual(
       ['camera "1,2"', 'mode "pink"', 'layers "high"', 'layers "NaN"'],
     );
     expect(told).toMatchObject({ mode: "normal", layers: 1, camera: "7,7,7,0,0,0", attributes: ["normal", "1", "1,2,3,0,0,0"] });

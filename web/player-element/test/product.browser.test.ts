@@ -152,7 +152,7 @@ describeInBrowser("the built player", () => {
     const most = await page.evaluate(() => document.querySelector("meshreel-player")!.info!.mostLayers);
     expect(most).toBeGreaterThan(0);
     await page.locator("button.more").click();
-    await page.getByLabel("Layers").selectOption({ label: "Full" });
+    await page.getByLabel("Quality").selectOption({ label: "Highest" });
     await shown(most);
     expect(errors).toEqual([]);
     await page.close();

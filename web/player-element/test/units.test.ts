@@ -67,7 +67,7 @@ describe("attributes", () => {
       expect(good.filter((text) => parse.complaint(name, text) !== null)).toEqual([]);
       expect(bad.filter((text) => parse.complaint(name, text) === null)).toEqual([]);
     }
-    expect(parse.complaint("layers", "high")).toBe('layers "high" is passed over: give auto, or a whole number of layers from 0');
+    expect(parse.complaint("layers", "high")).toBe('layers "high" is ignored: give auto, or a whole number of layers from 0');
     expect(parse.complaint("poster", "high")).toBeNull();
   });
   test("interpolation is on unless it is switched off", () => {
@@ -152,7 +152,7 @@ describe("menus", () => {
   test("numbers of layers go from full to lowest below auto", () => {
     const choices = layersChoices(INFO.mostLayers, "auto");
     expect(choices.map(({ value }) => value)).toEqual(["auto", "3", "2", "1", "0"]);
-    expect(choices.map(({ text }) => text)).toEqual(["Auto", "Full", "Level 2 of 3", "Level 1 of 3", "Lowest"]);
+    expect(choices.map(({ text }) => text)).toEqual(["Auto", "Highest", "2 of 3 layers", "1 of 3 layers", "Lowest"]);
   });
   test("of many numbers of layers some are offered, and always the one that is set", () => {
     const values = layersChoices(40, 7).map(({ value }) => value);
@@ -226,7 +226,7 @@ describe("small parts", () => {
     const playback = new FakePlayback("x", { layers: "auto", interpolate: true, textures: true, splats: true, loop: false, playbackRate: 1, muted: false, volume: 1, crossOrigin: null });
     const lines = statisticsLines({ ...playback.stats, triangles: 41_234, gpuBytes: 12_345_678, splats: 0, sortMs: 0, headsetRate: 0, fps: 60, frameMs: 0.42, drawn: 1 }, INFO, 4);
     expect(Object.fromEntries(lines)).toMatchObject({
-      Frame: "5 of 48, 24 fps", Rate: "2.41 Mbit/s", Bandwidth: "48.2 Mbit/s", Triangles: "41,234", "GPU memory": "12.3 MB", Layers: "3 of 3",
+      Frame: "5 of 48, 24 fps", Bitrate: "2.41 Mbit/s", "Connection speed": "48.2 Mbit/s", Triangles: "41,234", "GPU memory": "12.3 MB", Layers: "3 of 3",
       "Skipped groups": "0", Colours: "none", Display: "60 fps, 0.4 ms each",
     });
     playback.dispose();

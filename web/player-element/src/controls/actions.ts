@@ -42,7 +42,7 @@ const ACTS: Readonly<Record<Action, Act>> = {
   },
   mute: (player, surface) => {
     player.muted = !player.muted;
-    surface.tell(player.muted ? "Muted" : "Sound on");
+    surface.tell(player.muted ? "Muted" : "Unmuted");
   },
   louder: (player, surface) => setVolume(player, surface, LOUDER),
   quieter: (player, surface) => setVolume(player, surface, -LOUDER),
@@ -53,7 +53,7 @@ const ACTS: Readonly<Record<Action, Act>> = {
   autoRotate: (player) => void (player.autoRotate = !player.autoRotate),
   fly: (player, surface) => {
     player.fly = !player.fly;
-    surface.tell(player.fly ? "Flying: W A S D, Q E, drag" : "Flying ended");
+    surface.tell(player.fly ? "Fly mode on: W A S D, Q E, drag" : "Fly mode off");
   },
   fit: (player) => player.fit(),
   turnLeft: (player) => player.orbit(-TURN, 0),
@@ -103,8 +103,8 @@ async function toggleFullscreen(player: MeshreelPlayer, surface: Surface): Promi
 export async function toggleVr(player: MeshreelPlayer, surface: Surface, passthrough = false): Promise<void> {
   if (player.presenting) player.exitVr();
   else if (await (passthrough ? player.arSupported() : player.vrSupported())) {
-    await player.enterVr(passthrough).catch((error: Error) => surface.tell(`The headset did not start: ${error.message}`));
-  } else surface.tell("No headset was found");
+    await player.enterVr(passthrough).catch((error: Error) => surface.tell(`VR did not start: ${error.message}`));
+  } else surface.tell("No headset found");
 }
 
 /** Puts a link to what is seen on the clipboard. */
@@ -128,6 +128,6 @@ export async function saveScreenshot(player: MeshreelPlayer, surface: Surface): 
     setTimeout(() => URL.revokeObjectURL(address), 10_000);
     surface.tell("Screenshot saved");
   } catch (error) {
-    surface.tell(`No screenshot: ${error instanceof Error ? error.message : error}`);
+    surface.tell(`Screenshot failed: ${error instanceof Error ? error.message : error}`);
   }
 }

@@ -92,7 +92,7 @@ export class Bar {
     const player = this.#player;
     const known = () => player.duration > 0;
     const play = (): Look => {
-      if (player.ended) return { icon: "replay", label: "Play again" };
+      if (player.ended) return { icon: "replay", label: "Replay" };
       return player.paused ? { icon: "play", label: "Play" } : { icon: "pause", label: "Pause" };
     };
     return [
@@ -111,7 +111,7 @@ export class Bar {
       this.#button("loop tool", "L", () => ({ icon: "loop", label: "Loop", pressed: player.loop }), () => act("loop")),
       this.#button("stats tool", "S", () => ({ icon: "stats", label: "Statistics", pressed: player.stats }), () => act("stats")),
       this.#button("screenshot tool", "", () => ({ icon: "camera", label: "Save screenshot", enabled: known() }), () => screenshot()),
-      this.#button("fit tool", "0", () => ({ icon: "fit", label: "Fit the view", enabled: known() }), () => act("fit")),
+      this.#button("fit tool", "0", () => ({ icon: "fit", label: "Reset view", enabled: known() }), () => act("fit")),
     ];
   }
 
@@ -120,23 +120,23 @@ export class Bar {
     const { act } = this.#acts;
     return [
       this.#button("frames", "N", () => ({ icon: "frames", label: "Frame numbers", pressed: player.frames }), () => act("frames")),
-      this.#button("autorotate", "R", () => ({ icon: "replay", label: "Turn by itself", pressed: player.autoRotate }), () => act("autoRotate")),
-      this.#button("fly", "G", () => ({ icon: "fly", label: "Fly through it", pressed: player.fly }), () => act("fly")),
+      this.#button("autorotate", "R", () => ({ icon: "replay", label: "Auto-rotate", pressed: player.autoRotate }), () => act("autoRotate")),
+      this.#button("fly", "G", () => ({ icon: "fly", label: "Fly mode", pressed: player.fly }), () => act("fly")),
       this.#button("share", "", () => ({ icon: "link", label: "Copy link", shown: player.share, enabled: player.info !== null }), () => this.#acts.copyLink()),
-      this.#button("open", "", () => ({ icon: "open", label: "Open a file" }), () => this.#acts.openFile()),
-      this.#button("help", "?", () => ({ icon: "help", label: "Keys and gestures" }), () => this.#acts.act("help")),
+      this.#button("open", "", () => ({ icon: "open", label: "Open file" }), () => this.#acts.openFile()),
+      this.#button("help", "?", () => ({ icon: "help", label: "Keyboard shortcuts" }), () => this.#acts.act("help")),
     ];
   }
 
   #screens(): HTMLElement[] {
     const player = this.#player;
     const vr = (): Look => ({
-      icon: "vr", label: player.presenting ? "Leave virtual reality" : "Virtual reality", shown: this.headset, enabled: player.info !== null,
+      icon: "vr", label: player.presenting ? "Exit VR" : "Enter VR", shown: this.headset, enabled: player.info !== null,
     });
-    const ar = (): Look => ({ icon: "ar", label: "In your room", shown: this.passthrough && !player.presenting, enabled: player.info !== null });
+    const ar = (): Look => ({ icon: "ar", label: "View in your space", shown: this.passthrough && !player.presenting, enabled: player.info !== null });
     const screen = (): Look => {
       const full = document.fullscreenElement !== null;
-      return { icon: full ? "exitFullscreen" : "fullscreen", label: full ? "Leave full screen" : "Full screen", shown: document.fullscreenEnabled };
+      return { icon: full ? "exitFullscreen" : "fullscreen", label: full ? "Exit full screen" : "Full screen", shown: document.fullscreenEnabled };
     };
     return [
       this.#button("vr", "V", vr, () => this.#acts.act("vr")).element,
@@ -149,9 +149,9 @@ export class Bar {
     const player = this.#player;
     const most = () => player.info?.mostLayers ?? 0;
     const menus = [
-      new Menu("speed", "Speed", () => ({ choices: speedChoices(player.playbackRate), value: String(player.playbackRate) }),
+      new Menu("speed", "Playback speed", () => ({ choices: speedChoices(player.playbackRate), value: String(player.playbackRate) }),
         (value) => void (player.playbackRate = Number(value))),
-      new Menu("layers", "Layers",
+      new Menu("layers", "Quality",
         () => ({ choices: layersChoices(most(), player.layers), value: layersValue(most(), player.layers), enabled: most() > 0 }),
         (value) => void (player.layers = parseLayers(value))),
       new Menu("mode", "Shading", () => ({ choices: modeChoices(player.info), value: player.mode }),

@@ -8,7 +8,7 @@ import type { Choice } from "./dom.ts";
 const SPEEDS = [0.1, 0.25, 0.5, 0.75, 1, 1.25, 1.5, 2, 4];
 const MOST_LEVELS = 6;
 const MODE_NAMES: Readonly<Record<Mode, string>> = {
-  splats: "Splats", color: "Colours", shaded: "Shaded", normal: "Normals", wireframe: "Wireframe", tracks: "Parts in colour",
+  splats: "Splats", color: "Colour", shaded: "Shaded", normal: "Normals", wireframe: "Wireframe", tracks: "Colour by body",
 };
 
 /** Usual speeds, and the one that is set if it is none of them. */
@@ -17,7 +17,7 @@ export function speedChoices(current: number): readonly Choice[] {
   return speeds.map((speed) => ({ value: String(speed), text: formatSpeed(speed) }));
 }
 
-/** Auto, then levels from full to base; of many levels a few, evenly spaced, and the one that is set. */
+/** Auto, then numbers of layers from the highest to the lowest; of many a few, evenly spaced, and the one that is set. */
 export function layersChoices(mostLayers: number, current: Layers): readonly Choice[] {
   const levels = new Set<number>();
   const count = Math.min(mostLayers + 1, MOST_LEVELS);
@@ -33,8 +33,8 @@ export function layersValue(mostLayers: number, current: Layers): string {
 }
 
 function levelName(level: number, most: number): string {
-  if (level === most) return "Full";
-  return level === 0 ? "Lowest" : `Level ${level} of ${most}`;
+  if (level === most) return "Highest";
+  return level === 0 ? "Lowest" : `${level} of ${most} layers`;
 }
 
 export function modeChoices(has: Looks | null): readonly Choice[] {

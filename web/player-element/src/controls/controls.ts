@@ -36,7 +36,7 @@ export class Controls implements Surface {
     shadow.adoptedStyleSheets = [styleSheet()];
     this.picture = make("div", {
       class: "picture", part: "picture", tabindex: "0", role: "application", "aria-roledescription": "3D view",
-      "aria-label": "Recording. Drag to look from another side; press question mark for keys",
+      "aria-label": "Recording. Drag to rotate; press question mark for keyboard shortcuts",
     });
     const open = () => this.#file.click();
     const act = (action: Action) => this.#act(action);
@@ -114,7 +114,7 @@ export class Controls implements Surface {
   }
 
   onStage(type: string): void {
-    if (type === "lost") this.warn("The graphics card took the picture away; waiting for it");
+    if (type === "lost") this.warn("The graphics driver was reset; waiting for it");
     if (type !== "change" && type !== "camerachange") this.refresh();
   }
 

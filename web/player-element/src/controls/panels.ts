@@ -54,10 +54,10 @@ export class HelpPanel {
     const rows = KEYS.map(({ shown, says }) => make("div", {}, make("dt", {}, make("kbd", {}, shown)), make("dd", {}, says)));
     const button = new Button("close", "", () => ({ icon: "close", label: "Close" }), close);
     this.element = make(
-      "div", { class: "panel help-panel", part: "help-panel", role: "dialog", "aria-label": "Keys and gestures" },
-      make("div", { class: "title" }, make("strong", {}, "Keys and gestures"), button.element),
+      "div", { class: "panel help-panel", part: "help-panel", role: "dialog", "aria-label": "Keyboard shortcuts" },
+      make("div", { class: "title" }, make("strong", {}, "Keyboard shortcuts"), button.element),
       make("dl", {}, ...rows),
-      make("p", {}, "Drag to turn, with the right button or two fingers to move, wheel or pinch to come closer."),
+      make("p", {}, "Drag to rotate, right-drag or two fingers to pan, scroll or pinch to zoom."),
     );
     this.element.hidden = true;
   }
@@ -82,7 +82,7 @@ export class ErrorPanel {
 
   constructor(retry: () => void, open: () => void) {
     this.#retry = make("button", { type: "button", class: "text primary", part: "button retry" }, "Try again");
-    const another = make("button", { type: "button", class: "text another", part: "button another" }, "Open a file");
+    const another = make("button", { type: "button", class: "text another", part: "button another" }, "Open file");
     this.#retry.addEventListener("click", retry);
     another.addEventListener("click", open);
     this.element = make(
@@ -138,7 +138,7 @@ export class Toasts {
 
 /** Welcome of an empty player. */
 export function emptyPanel(open: () => void): HTMLElement {
-  const button = make("button", { type: "button", class: "text primary", part: "button open" }, "Open a file");
+  const button = make("button", { type: "button", class: "text primary", part: "button open" }, "Open file");
   button.addEventListener("click", open);
   return make("div", { class: "empty", part: "empty" }, icon("open"), make("strong", {}, "Drop a .reel file here"), button);
 }

@@ -8,13 +8,13 @@ export const PANELS = `
   left: 8px; top: 8px; margin: 0; padding: 8px 12px; font-size: 12px; line-height: 1.5; pointer-events: none; max-width: calc(100% - 16px);
   max-height: calc(100% - 16px); overflow: hidden; background: color-mix(in srgb, var(--_panel) 88%, transparent);
 }
-.statistics div { display: grid; grid-template-columns: 100px auto; gap: 8px; }
+.statistics div { display: grid; grid-template-columns: 116px auto; gap: 8px; }
 .statistics dt { color: var(--_quiet); }
 .statistics dd { margin: 0; }
 @container player (max-width: 360px) or (max-height: 300px) {
   .statistics { padding: 4px 8px; font-size: 10px; line-height: 1.35; }
   .root[data-controls] .statistics { max-height: calc(100% - var(--_button) - 42px); overflow: auto; pointer-events: auto; }
-  .statistics div { grid-template-columns: 78px auto; }
+  .statistics div { grid-template-columns: 92px auto; }
 }
 
 .help-panel {
