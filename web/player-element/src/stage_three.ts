@@ -19,6 +19,7 @@ const MARGIN = 1.05; // of the distance at which everything just fits
 const STEEPEST = 0.01; // radians from straight above or below
 const CLOSEST = 1e-3; // of the recording's size: how near the camera comes
 const FARTHEST = 20; // of its size: how far the camera goes
+const DARK = 0.2; // lightness (linear) below which a background is dark
 const NEAR = 0.002; // of the camera's distance: what it sees. A background may reach far beyond the recording's box.
 const FAR = 50;
 
@@ -95,7 +96,9 @@ export class ThreeStage extends EventTarget implements Stage {
   set background(colour: string) {
     this.#background = colour;
     const isOpaque = !/^rgba|\//.test(colour); // as a computed style is written; what lies behind the canvas has the colour, too
-    this.#scene.background = isOpaque ? new Color(colour) : null; // not a clear colour: that would be lost with the context
+    const behind = isOpaque ? new Color(colour) : null;
+    this.#scene.background = behind; // not a clear colour: that would be lost with the context
+    this.#floor.isDark = behind !== null && behind.getHSL({ h: 0, s: 0, l: 0 }).l < DARK;
   }
 
   get camera(): string {

@@ -93,6 +93,15 @@ describeInBrowser("the player and a recording's own colours", () => {
     expect([bare, normals]).toEqual([off, off]);
   });
 
+  test("on a dark page the ground is brighter, so that its shadow is seen", async () => {
+    const { page } = await site.visit("player/index.html?src=/layers.reel&background=rgb(20,23,28)&controls=0&mode=shaded");
+    await page.waitForFunction(() => (document.querySelector("meshreel-player")!.statistics?.triangles ?? 0) > 0);
+    const greys = Object.entries(await colorsOf(page)).map(([color, count]) => [Number(color.split(",")[0]), count] as const);
+    const bright = greys.reduce((sum, [red, count]) => sum + (red > 45 && red < 75 ? count : 0), 0);
+    expect(bright).toBeGreaterThan(3000);
+    await page.close();
+  });
+
   test.skipIf(!hasPython)("the key M goes through all looks, and colours are one of them where there are some", async () => {
     const seen = async (file: string, count: number): Promise<string[]> => {
       const { page } = await open(file, 1);

@@ -11,6 +11,7 @@ const SIDE = 256; // texels of the shadow
 const ASIDE = 0.35; // of the recording's size: how far the shadow's picture reaches beyond it (guess)
 const REACH = 0.5; // of the recording's height: what hangs higher casts none (guess)
 const RIM = 2; // of the half side of the shadow's picture: where the ground has faded away (guess)
+const GLOWS = { bright: 0.08, dark: 0.2 }; // of the ground on pages: on dark ones a shadow is seen only where that is brighter (guess)
 const BELOW = 0.002; // of its height: so that soles hide it
 
 /** To be put beside a recording, in the space in which that stands upright. */
@@ -26,7 +27,7 @@ export class Ground extends Group {
       glslVersion: GLSL3,
       vertexShader: GROUND_VERTEX,
       fragmentShader: GROUND_FRAGMENT,
-      uniforms: { shadow: { value: this.#target.texture }, rim: { value: RIM } },
+      uniforms: { shadow: { value: this.#target.texture }, rim: { value: RIM }, glow: { value: GLOWS.bright } },
       blending: CustomBlending, // of colours that have their alpha in them
       blendSrc: OneFactor,
       blendDst: OneMinusSrcAlphaFactor,
@@ -37,6 +38,11 @@ export class Ground extends Group {
     this.#disc.renderOrder = -1; // of all that is transparent, first
     this.#eye.rotation.x = Math.PI / 2;
     this.add(this.#disc, this.#eye);
+  }
+
+  /** True on a dark background. */
+  set isDark(isDark: boolean) {
+    this.#disc.material.uniforms.glow!.value = isDark ? GLOWS.dark : GLOWS.bright;
   }
 
   /** Lies under a box. */

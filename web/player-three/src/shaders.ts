@@ -104,12 +104,12 @@ uniform mat4 modelViewMatrix;
 uniform mat4 projectionMatrix;
 uniform bool hasColors;
 out vec3 scenePosition;
-out vec3 sceneNormal;
-out vec3 ownColor;
+centroid out vec3 sceneNormal;
+centroid out vec3 ownColor;
 out vec3 toEye; // in the scene's own axes, any length
 #ifdef PLACES
 in vec2 place; // in PLACE_SCALEths of the texture's sides, more where it has none
-out vec2 texturePlace;
+centroid out vec2 texturePlace;
 #endif
 #ifdef EDGES
 out vec3 barycentric;
@@ -151,22 +151,25 @@ uniform vec3 clay; // of a surface without colours of its own
 uniform vec3 color; // of its track
 uniform vec3 edgeColor;
 in vec3 scenePosition;
-in vec3 sceneNormal;
-in vec3 ownColor;
+centroid in vec3 sceneNormal;
+centroid in vec3 ownColor;
 in vec3 toEye;
 #ifdef PLACES
 uniform sampler2D image;
 uniform bool hasImage;
-in vec2 texturePlace;
+centroid in vec2 texturePlace;
 #endif
 #ifdef EDGES
 in vec3 barycentric;
 #endif
 out vec4 fragment;
 
+const float FACING_LIGHT = 0.87; // on what looks at the viewer
+const float RELIEF = 0.5; // share of the light's differences that captured colours take (guess)
+
 // A matte surface in a soft room: a large lamp beside the viewer, a bright ceiling, a warm floor. What looks down close to the floor is in the
 // dark, which stands in for what surfaces hide from each other.
-vec3 shaded(vec3 n, vec3 own) {
+vec3 lightOn(vec3 n) {
   vec3 eye = normalize(toEye);
   vec3 lamp = normalize(eye + 0.7 * up + 0.5 * normalize(cross(up, eye) + 1e-6));
   float key = pow(max((dot(n, lamp) + 0.3) / 1.3, 0.0), 1.3);
@@ -174,7 +177,7 @@ vec3 shaded(vec3 n, vec3 own) {
   float height = (dot(scenePosition, up) - ground.x) * ground.y; // 0 on the floor, 1 at the top
   float hidden = (1.0 - sky) * exp(-7.0 * max(height, 0.0));
   vec3 ambient = mix(vec3(0.27, 0.255, 0.245), vec3(0.43, 0.44, 0.46), sky);
-  return own * (ambient * (1.0 - 0.6 * hidden) + 0.68 * key * vec3(1.0, 0.985, 0.96));
+  return ambient * (1.0 - 0.6 * hidden) + 0.68 * key * vec3(1.0, 0.985, 0.96);
 }
 
 #ifdef EDGES
@@ -209,7 +212,12 @@ void main() {
   if (mode == NORMAL_MODE) result = 0.5 * (n + 1.0);
   else if (mode == TRACKS_MODE) result = color;
   else if (mode == COLOR_MODE && isOwn) result = own;
-  else result = shaded(seenFromOutside ? n : -n, own);
+  else {
+    // Multisampling shows slivers of faces behind the silhouette: lit from outside as their neighbours, they are no dark dots.
+    float inside = seenFromOutside ? 0.0 : smoothstep(0.1, 0.5, -dot(n, normalize(toEye)));
+    vec3 light = mix(lightOn(n), lightOn(-n), inside);
+    result = own * (isOwn ? 1.0 + RELIEF * (light - FACING_LIGHT) : light); // captured colours have light in them already
+  }
 #ifdef EDGES
   result = mix(result, edgeColor, edge());
 #endif
@@ -233,6 +241,7 @@ void main() {
 export const GROUND_FRAGMENT = `${PRECISION}
 uniform sampler2D shadow;
 uniform float rim;
+uniform float glow; // of the ground's middle
 in vec2 place;
 out vec4 fragment;
 
@@ -245,7 +254,7 @@ float blurred(vec2 uv, float lod) {
 void main() {
   vec2 uv = 0.5 + 0.5 * place;
   float dark = 0.3 * blurred(uv, 1.5) + 0.35 * blurred(uv, 3.0) + 0.4 * blurred(uv, 4.5);
-  float light = 0.08 * pow(max(1.0 - length(place) / rim, 0.0), 1.5);
+  float light = glow * pow(max(1.0 - length(place) / rim, 0.0), 1.5);
   dark = min(1.2 * dark, 0.8);
   fragment = vec4(vec3(light * (1.0 - dark)), light + dark * (1.0 - light));
 }

@@ -166,6 +166,19 @@ describeInBrowser("a scene in Chromium", () => {
     expect(Math.min(...line)).toBeLessThan(Math.max(...line) - 60);
   });
 
+  test("a face that is seen aslant from behind, as slivers at an outline are, is lit as from the front", async () => {
+    await prepare(true);
+    await look("shaded");
+    await show(0);
+    const seen: number[][] = [];
+    for (const height of [-0.45, -0.55]) { // above the floor, and below it
+      await open.page.evaluate((y) => window.api.camera(0, y, 3), height);
+      seen.push((await picture()).at([0.9, -0.5, 0]));
+    }
+    expect(seen[0]).not.toEqual(WHITE);
+    expect(seen[1]).toBeNear(seen[0]!, 12);
+  });
+
   describe("colours of its own", () => {
     const FLOOR: Vector = [-0.85, -0.5, 0.9];
     const LONE: Vector = [0.9, 0.8, 0]; // the middle of what has none
@@ -200,11 +213,12 @@ describeInBrowser("a scene in Chromium", () => {
       for (const drawn of [shaded, edges]) {
         const lit = drawn.at(FLOOR);
         const share = lit[1] / FLOOR_COLOR[1];
-        expect(share).toBeGreaterThan(0.2);
-        expect(share).toBeLessThan(1);
+        expect(share).toBeGreaterThan(0.7); // light is in them already
+        expect(share).toBeLessThan(1.2);
         expect(lit).toBeNear(FLOOR_COLOR.map((value) => share * value), 1);
       }
-      expect(shaded.at([0.2, 0, 0])).toBeNear(sphereColor(2).map((value) => 0.87 * value), 4); // looks at the viewer
+      expect(shaded.at([0.2, 0, 0])).toBeNear(sphereColor(2), 4); // what looks at the viewer is as it was captured
+      expect(shaded.at([0.2 - 0.9 * RADIUS, 0, 0])[1]).toBeLessThan(0.95 * sphereColor(2)[1]!); // and what is away from the lamp darker
       expect(clay.at([0.2, 0, 0])).toBeNear(trackColor(0).map((value) => 255 * value), 2);
     });
 

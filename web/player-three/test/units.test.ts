@@ -7,6 +7,7 @@ import { updateFar } from "../src/far.ts";
 import { orderSplats } from "../src/order.ts";
 import type { OrderJob } from "../src/order.ts";
 import { localFrame, triangleCount, vertexRoom } from "../src/ranges.ts";
+import { surfaceVertex, SURFACE_FRAGMENT } from "../src/shaders.ts";
 import { Sorter } from "../src/sorter.ts";
 import type { OrderWorker } from "../src/sorter.ts";
 import { Upload } from "../src/upload.ts";
@@ -18,6 +19,13 @@ test("a frame shows the group's triangles and its own, and a frame beside the gr
   expect([9, 10, 11, 12, 13, 14].map((frame) => localFrame(packed, frame))).toEqual([0, 0, 1, 2, 3, 3]);
   expect([10, 11, 12, 13].map((frame) => triangleCount(packed, frame) - sphereTriangles)).toEqual([0, 0, 2, 0]);
   expect(triangleCount(makeFloor(3).packed, 5)).toBe(18);
+});
+
+test("normals, colours and places are those of the covered part of a pixel, so that none is extrapolated at outlines", () => {
+  for (const name of ["vec3 sceneNormal", "vec3 ownColor", "vec2 texturePlace"]) {
+    expect(surfaceVertex("texture")).toContain(`centroid out ${name};`);
+    expect(SURFACE_FRAGMENT).toContain(`centroid in ${name};`);
+  }
 });
 
 test("a body is far where it is small, and near again where it is somewhat larger", () => {
