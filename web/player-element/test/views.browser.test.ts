@@ -130,6 +130,39 @@ describeInBrowser("the page of a recording", () => {
     await page.close();
   });
 
+  test("a recording opens so that its box fills the picture above the bar in one direction, with the same small margins above and below", async () => {
+    const { page, errors } = await visit("");
+    const bounds = (): Promise<number[]> =>
+      page.evaluate(() => {
+        const player = document.querySelector("meshreel-player")!;
+        const { minimum, size } = player.info!.box;
+        const [eye, target] = [player.camera.split(",").slice(0, 3).map(Number), player.camera.split(",").slice(3).map(Number)];
+        const unit = (v: number[]): number[] => v.map((value) => value / Math.hypot(...v));
+        const dot = (u: number[], v: number[]): number => u.reduce((sum, value, k) => sum + value * v[k]!, 0);
+        const back = unit(eye.map((value, k) => value - target[k]!));
+        const aside = unit([back[2]!, 0, -back[0]!]);
+        const up = [back[1]! * aside[2]! - back[2]! * aside[1]!, back[2]! * aside[0]! - back[0]! * aside[2]!, back[0]! * aside[1]! - back[1]! * aside[0]!];
+        const bar = player.shadowRoot!.querySelector<HTMLElement>(".bar")!.offsetHeight;
+        const focal = player.clientHeight / 2 / Math.tan(Math.PI / 8); // pixels
+        const seen = Array.from({ length: 8 }, (_, k) => {
+          const from = eye.map((value, axis) => minimum[axis]! + ((k >> axis) & 1) * size[axis]! - value);
+          return [(focal * dot(from, aside)) / -dot(from, back), (focal * dot(from, up)) / -dot(from, back)];
+        });
+        const of = (axis: number): number[] => seen.map((place) => place[axis]!);
+        const [wide, high] = [player.clientWidth / 2, (player.clientHeight - bar) / 2];
+        return [Math.min(...of(0)) / wide, Math.max(...of(0)) / wide, Math.min(...of(1)) / high, Math.max(...of(1)) / high];
+      });
+    for (const [width, height] of [[320, 480], [400, 400], [640, 360]] as const) {
+      await page.setViewportSize({ width, height });
+      const most = async (): Promise<number> => Math.max(...(await bounds()).map(Math.abs));
+      await expect.poll(most).toBeCloseTo(1 / 1.05, 2); // it fills one of them
+      const [, , below, above] = await bounds();
+      expect(-below!).toBeCloseTo(above!, 1);
+    }
+    expect(errors).toEqual([]);
+    await page.close();
+  });
+
   test("without three.js an error says what is missing", async () => {
     const page = await site.browser.newPage();
     await page.route("**/three.js", (route) => route.abort());
