@@ -1,5 +1,7 @@
 // Playing one part over and over.
 
+const NEAR_END = 1e-3; // s: attributes have three digits
+
 /** The part of a player that it needs. */
 export interface Sectioned {
   readonly section: readonly [number, number] | null;
@@ -26,4 +28,11 @@ export function cut({ section, duration, currentTime }: Sectioned, end: "from" |
   const [from, to] = section ?? [0, duration];
   const made = end === "from" ? [currentTime, to > currentTime ? to : duration] as const : [from < currentTime ? from : 0, currentTime] as const;
   return made[1] > made[0] ? made : null;
+}
+
+/** What comes next of one button that sets where a section begins, then where it ends, then takes it away. */
+export function nextCut({ section, duration, currentTime }: Sectioned): "sectionFrom" | "sectionTo" | "sectionOff" {
+  if (section === null) return "sectionFrom";
+  const [from, to] = section;
+  return to >= duration - NEAR_END && currentTime > from && currentTime < duration - NEAR_END ? "sectionTo" : "sectionOff";
 }

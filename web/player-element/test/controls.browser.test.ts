@@ -142,8 +142,22 @@ describeOnPage("controls of <meshreel-player>", (on) => {
     const names = await on.page.locator(".settings .label").allTextContents();
     expect(names).toEqual([
       "Playback speed", "Quality", "Shading", "Loop", "Statistics", "Save screenshot", "Reset view",
-      "Frame numbers", "Auto-rotate", "Fly mode", "Copy link", "Open file", "Keyboard shortcuts",
+      "Set loop start", "Frame numbers", "Auto-rotate", "Fly mode", "Copy link", "Open file", "Keyboard shortcuts",
     ]);
+  });
+
+  test("a part is repeated by one button, without keys: its start, its end, cleared", async () => {
+    await on.shown();
+    expect(await on.page.locator("div.section").isVisible()).toBe(false);
+    await on.page.getByRole("button", { name: "Settings" }).click();
+    const sections: unknown[] = [];
+    for (const [time, name] of [[0.5, "Set loop start"], [1, "Set loop end"], [0.75, "Clear loop"]] as const) {
+      await on.page.evaluate((to) => void (document.querySelector("meshreel-player")!.currentTime = to), time);
+      await on.eventually((player) => !player.seeking);
+      await on.page.getByRole("button", { name }).click();
+      sections.push(await on.get((player) => player.section));
+    }
+    expect(sections).toEqual([[0.5, 2], [0.5, 1], null]);
   });
 
   test("letters typed into a menu are the menu's", async () => {

@@ -46,9 +46,18 @@ const ACTS: Readonly<Record<Action, Act>> = {
   },
   louder: (player, surface) => setVolume(player, surface, LOUDER),
   quieter: (player, surface) => setVolume(player, surface, -LOUDER),
-  sectionFrom: (player) => void (player.section = cut(player, "from")),
-  sectionTo: (player) => void (player.section = cut(player, "to")),
-  sectionOff: (player) => void (player.section = null),
+  sectionFrom: (player, surface) => {
+    player.section = cut(player, "from");
+    surface.tell("Loop start set");
+  },
+  sectionTo: (player, surface) => {
+    player.section = cut(player, "to");
+    surface.tell("Loop end set");
+  },
+  sectionOff: (player, surface) => {
+    player.section = null;
+    surface.tell("Loop cleared");
+  },
   frames: (player) => void (player.frames = !player.frames),
   autoRotate: (player) => void (player.autoRotate = !player.autoRotate),
   fly: (player, surface) => {

@@ -5,6 +5,7 @@ import { formatTime, timeDigits } from "../format.ts";
 import type { Action } from "../keyboard.ts";
 import type { Mode } from "@meshreel/player-three/modes";
 import { parseLayers } from "../attributes.ts";
+import { nextCut } from "../section.ts";
 import { layersChoices, layersValue, modeChoices, speedChoices } from "./choices.ts";
 import { Button, type Look, make, Menu, setText } from "./dom.ts";
 import { SeekBar } from "./seek.ts";
@@ -118,7 +119,12 @@ export class Bar {
   #rows(): Button[] {
     const player = this.#player;
     const { act } = this.#acts;
+    const section = (): Look => {
+      const label = { sectionFrom: "Set loop start", sectionTo: "Set loop end", sectionOff: "Clear loop" }[nextCut(player)];
+      return { icon: "section", label, pressed: player.section !== null, enabled: player.duration > 0 };
+    };
     return [
+      this.#button("repeat", "", section, () => act(nextCut(player))),
       this.#button("frames", "N", () => ({ icon: "frames", label: "Frame numbers", pressed: player.frames }), () => act("frames")),
       this.#button("autorotate", "R", () => ({ icon: "replay", label: "Auto-rotate", pressed: player.autoRotate }), () => act("autoRotate")),
       this.#button("fly", "G", () => ({ icon: "fly", label: "Fly mode", pressed: player.fly }), () => act("fly")),

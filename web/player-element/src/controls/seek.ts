@@ -12,6 +12,7 @@ export class SeekBar {
   readonly input: HTMLInputElement;
   #player: MeshreelPlayer;
   readonly #label = make("span", { class: "at" });
+  readonly #section = make("div", { class: "section" });
   readonly #thumbnails = new Thumbnails();
   #scrubbing = false;
   #resume = false; // it played before it was dragged
@@ -22,7 +23,7 @@ export class SeekBar {
     this.input = make("input", {
       type: "range", min: "0", max: "0", step: "any", value: "0", part: "seek", class: "range", "aria-label": "Seek",
     });
-    this.element = make("div", { class: "seek" }, make("div", { class: "track", part: "track" }, make("div", { class: "section" })), this.input,
+    this.element = make("div", { class: "seek" }, make("div", { class: "track", part: "track" }, this.#section), this.input,
       make("span", { class: "tip", part: "tip", "aria-hidden": "true" }, this.#thumbnails.element, this.#label));
     this.input.addEventListener("input", () => this.#drag());
     this.input.addEventListener("change", () => this.#drop());
@@ -41,6 +42,7 @@ export class SeekBar {
     const end = buffered.length > 0 ? buffered.end(0) : currentTime;
     this.element.style.setProperty("--played", String(known ? time / duration : 0));
     const [from, to] = this.#player.section ?? [0, 0];
+    this.#section.hidden = to === 0;
     this.element.style.setProperty("--from", String(known ? from / duration : 0));
     this.element.style.setProperty("--to", String(known ? Math.min(1, to / duration) : 0));
     this.element.style.setProperty("--buffered", String(known ? end / duration : 0));
