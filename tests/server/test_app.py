@@ -25,7 +25,8 @@ def test_head_has_the_headers_and_no_body(client, folder):
 def test_the_gallery_shows_rate_and_length_and_what_is_wrong_with_a_file(client):
     text = client.get("/").text
     assert text.index("cut") < text.index("none") < text.index("walk")
-    assert "14 frames" in text and "Mbps" in text
+    assert "14 frames" in text and "Mbps" in text and '<span class="time">0:01</span>' in text
+    assert 'data-duration="0.560" data-size="1336"' in text  # to sort by
     assert "the file is truncated" in text and "not a .reel file" in text
     assert unescape(text).count(ODD.removesuffix(".reel")) == 1 and "<i>" not in text
 

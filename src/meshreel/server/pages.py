@@ -10,6 +10,7 @@ from base64 import b64encode
 from collections.abc import Sequence
 from hashlib import sha256
 from html import escape
+from math import ceil
 from urllib.parse import quote
 
 from .library import Entry
@@ -26,6 +27,15 @@ _HEAD = """\
 """
 # Until the script is there.
 _LOADING = '<svg class="loading" viewBox="0 0 48 48"><circle cx="24" cy="24" r="22"/></svg>'
+
+_TOOLS = """\
+<div class="tools">
+<input type="search" placeholder="Search" aria-label="Search">
+<select aria-label="Sort by">
+<option value="name">Name<option value="duration">Duration<option value="size">Size
+</select>
+</div>
+"""
 
 # A play mark, shown until a poster is drawn.
 _PLAIN = "data:image/svg+xml," + quote(
@@ -62,7 +72,8 @@ def gallery_page(title: str, entries: Sequence[Entry], player: str) -> str:
     head = _HEAD.format(title=escape(f"{title} · meshreel")) + '<link rel="stylesheet" href="/gallery.css">\n'
     for script in (f"{player}/meshreel-player.js", "/gallery.js") if entries else ():
         head += f'<script type="module" src="{script}"></script>\n'
-    body = f"<ul>\n{''.join(map(_tile, entries))}</ul>" if entries else "<p>This folder has no .reel files.</p>"
+    tiles = f"{_TOOLS}<ul>\n{''.join(map(_tile, entries))}</ul>"
+    body = tiles if entries else "<p>This folder has no .reel files.</p>"
     return f"{head}</head>\n<body>\n<main>\n<h1>{escape(title)}</h1>\n{body}\n</main>\n</body>\n</html>\n"
 
 
@@ -70,12 +81,21 @@ def _tile(entry: Entry) -> str:
     name = escape(entry.name.removesuffix(".reel"))
     address = quote(entry.name)
     size = f"{entry.size / 1e6:.3g} MB" if entry.size >= 1e6 else f"{entry.size / 1e3:.3g} kB"
-    facts = f"{entry.mbps:.3g} Mbps, {entry.duration:.1f} s, {entry.frames} frames, {size}"
+    facts = f"{entry.mbps:.3g} Mbps, {entry.frames} frames, {size}"
     facts = facts if entry.frames else size
     lines = f'<div class="facts">{facts}</div>' if not entry.error or entry.frames else ""
     lines += f'<div class="error">{escape(entry.error)}</div>' if entry.error else ""
     picture = f'<img src="{_PLAIN}" data-file="/files/{address}" alt="">'
     plays = entry.frames > 0 or not entry.error
     poster = picture if plays else '<div class="blank"></div>'
+    poster += f'<span class="time">{_minutes(entry.duration)}</span>' if entry.frames else ""
     inside = f'{poster}<div class="facts-box"><div class="name">{name}</div>{lines}</div>'
-    return f'<li><a href="/watch/{address}">{inside}</a></li>\n' if plays else f"<li>{inside}</li>\n"
+    order = f'data-duration="{entry.duration:.3f}" data-size="{entry.size}"'
+    return f"<li {order}>" + (f'<a href="/watch/{address}">{inside}</a>' if plays else inside) + "</li>\n"
+
+
+def _minutes(seconds: float) -> str:
+    """Return a duration as "1:05", rounded up; in hours, too, where there are any."""
+    minutes, rest = divmod(ceil(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours}:{minutes:02}:{rest:02}" if hours else f"{minutes}:{rest:02}"

@@ -42,4 +42,32 @@ describeInBrowser("the player of meshreel play", () => {
       server.kill();
     }
   });
+
+  test.skipIf(!hasPython)("shows a gallery that is searched and sorted, and plays what a mouse points at", async () => {
+    const server = spawn(PYTHON, ["-m", "meshreel", "serve", join(ROOT, "conformance/v1"), "--port", "0", "--json"]);
+    const browser = await launchBrowser();
+    try {
+      const [line] = (await once(server.stdout, "data")) as [Buffer];
+      const page = await browser.newPage({ viewport: { width: 1000, height: 700 } });
+      const errors: string[] = [];
+      page.on("pageerror", (error) => errors.push(String(error)));
+      await page.goto((JSON.parse(line.toString()) as { addresses: string[] }).addresses[0]!);
+      const names = (): Promise<string[]> => page.locator("li:visible .name").allTextContents();
+      await page.getByLabel("Search").fill("LAY pos");
+      expect(await names()).toEqual(["layers_posed"]);
+      await page.getByLabel("Search").fill("lay");
+      await page.getByLabel("Sort by").selectOption("size");
+      expect(await names()).toEqual(["layers", "layers_open", "layers_patched", "layers_posed"]);
+      await page.getByLabel("Sort by").selectOption("name");
+      expect((await names()).sort()).toEqual(await names());
+      await page.locator("li:visible").first().hover();
+      await page.waitForFunction(() => document.querySelector<HTMLElement & { currentFrame: number; paused: boolean }>("li .preview")?.paused === false);
+      await page.mouse.move(1, 1);
+      await page.locator(".preview").waitFor({ state: "detached" });
+      expect(errors).toEqual([]);
+    } finally {
+      await browser.close();
+      server.kill();
+    }
+  });
 });
