@@ -8,13 +8,13 @@ import type { VrActions } from "@meshreel/xr";
 import { Color, Group, PerspectiveCamera, Scene, Spherical, Vector3, WebGLRenderer } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import { readCamera } from "./attributes.ts";
+import { fitting, FROM } from "./fitting.ts";
 import { Fly } from "./fly.ts";
 import type { PictureStats, Stage } from "./stage.ts";
 import type { Up } from "@meshreel/player-three/upright";
 
 const FOV = 45; // degrees, of the picture's height
 const TANGENT = Math.tan((FOV * Math.PI) / 360); // of half of that
-const FROM = new Vector3(0.25, 0.25, 1).normalize(); // direction from which a fitting view looks
 const MARGIN = 1.05; // around what just fits
 const STEEPEST = 0.01; // radians from straight above or below
 const CLOSEST = 1e-3; // of the recording's size: how near the camera comes
@@ -299,25 +299,6 @@ export class ThreeStage extends EventTarget implements Stage {
     this.dispatchEvent(new Event("change"));
     this.dispatchEvent(new Event("camerachange"));
   }
-}
-
-/**
- * How far above a box's middle a camera looks in the direction FROM, and from how far, so that the box's picture fills the view in one
- * direction and has its height in the middle; given the tangents of half the angles of view. The target stays on the box's axis, about which the camera turns.
- */
-function fitting({ size }: Box, wide: number, high: number): { lift: number; distance: number } {
-  const right = new Vector3(0, 1, 0).cross(FROM).normalize();
-  const up = FROM.clone().cross(right);
-  let [above, below, aside] = [-Infinity, Infinity, 0]; // where planes through the corners, as steep as the view's borders, meet the axes
-  for (let k = 0; k < 8; k++) {
-    const corner = new Vector3(...size).multiply(new Vector3(k & 1 ? 0.5 : -0.5, k & 2 ? 0.5 : -0.5, k & 4 ? 0.5 : -0.5));
-    const [x, y, z] = [corner.dot(right), corner.dot(up), corner.dot(FROM)];
-    above = Math.max(above, y + high * z);
-    below = Math.min(below, y - high * z);
-    aside = Math.max(aside, Math.abs(x) / wide + z);
-  }
-  const lift = (above + below) / 2 / up.y;
-  return { lift, distance: Math.max((above - below) / (2 * high), aside) - lift * FROM.y };
 }
 
 /** True if the camera comes to rest softly. */
