@@ -25,7 +25,6 @@ export class MeshreelPlayer extends Viewed {
   static engine: Engine;
 
   #controls: Controls;
-  #source: Blob | null = null; // a file that was opened; it stands in for `src`
   #playback: Playback | null = null;
   #passing = new AbortController();
   #error: Error | null = null;
@@ -66,7 +65,7 @@ export class MeshreelPlayer extends Viewed {
 
   attributeChangedCallback(name: string, before: string | null, after: string | null): void {
     if (name === "src") {
-      this.#source = this.#left = null;
+      this.file = this.#left = null;
       this.#startAt = 0;
       if (this.isConnected) this.#queueLoad();
     } else if (before !== after && !this.restoring) {
@@ -79,7 +78,7 @@ export class MeshreelPlayer extends Viewed {
 
   /** Opens a file, or without one what was open before, from its start. */
   load(file?: Blob): void {
-    if (file) this.#source = file;
+    if (file) this.file = file;
     this.#startAt = 0;
     this.#open();
   }
@@ -123,7 +122,7 @@ export class MeshreelPlayer extends Viewed {
     return this.#error;
   }
   get currentSrc(): string {
-    return this.#source ? "" : this.src;
+    return this.file ? "" : this.src;
   }
   /** 0 nothing, 1 the head, 2 this frame, 4 the next ones too: as HTMLMediaElement.readyState. */
   get readyState(): 0 | 1 | 2 | 4 {
@@ -193,7 +192,7 @@ export class MeshreelPlayer extends Viewed {
     queueMicrotask(() => {
       const isAsked = this.#queued && this.isConnected;
       this.#queued = false;
-      if (isAsked && this.#left === null && this.preload === "none" && !this.autoplay && !this.#source) this.#close();
+      if (isAsked && this.#left === null && this.preload === "none" && !this.autoplay && !this.file) this.#close();
       else if (isAsked) this.#open(this.#left === true);
       this.#controls.refresh();
     });
@@ -205,7 +204,7 @@ export class MeshreelPlayer extends Viewed {
     this.#left = this.#error = null;
     this.#queued = false; // `play` came first
     this.#controls.refresh();
-    const source = this.#source ?? this.src;
+    const source = this.file ?? this.src;
     if (source === "") return;
     const loading = MeshreelPlayer.engine.load();
     if (loading === null && !this.#hasView()) return;

@@ -3,6 +3,7 @@
 import type { Packed, Playback, Shown } from "@meshreel/player-core/types";
 import type { Bench } from "@meshreel/player-three/bench";
 import type { VrActions } from "@meshreel/xr/actions";
+import { Glimpses, type Take } from "./glimpses.ts";
 import type { Engine, Stage } from "./stage.ts";
 
 /** A longer gap between two pictures is a page that was hidden or a machine that slept: time stood still meanwhile. */
@@ -15,6 +16,7 @@ export class View {
   readonly canvas: HTMLCanvasElement;
   /** Pictures drawn since the view was made. */
   drawn = 0;
+  #engine: Engine;
   #box: HTMLElement;
   #cover: HTMLElement;
   #report: (event: Event) => void;
@@ -37,6 +39,7 @@ export class View {
    * Throws where there is no WebGL 2.
    */
   constructor(engine: Engine, box: HTMLElement, cover: HTMLElement, report: (event: Event) => void) {
+    this.#engine = engine;
     this.#box = box;
     this.#cover = cover;
     this.#report = report;
@@ -104,6 +107,17 @@ export class View {
     const shown = this.#playback?.update(this.#clock) ?? null; // the clock does not move
     if (shown) this.#last = shown;
     return this.stage.picture(this.#last);
+  }
+
+  /** Draws other times of a source for `take`; what is seen stays. */
+  glimpses(source: string | Blob, crossOrigin: string | null, take: Take): Glimpses {
+    const draw = (shown: Shown): void => {
+      if (this.stage.presenting) return;
+      this.stage.draw(shown);
+      take(this.canvas, shown.frame);
+      this.stage.draw(this.#last); // in the same task: the other is never seen
+    };
+    return new Glimpses(this.#engine, source, crossOrigin, { draw, release: (packed) => this.stage.release(packed) });
   }
 
   async enterVr(actions: VrActions, passthrough: boolean): Promise<void> {

@@ -1,5 +1,6 @@
 // Properties of an element's picture: camera, headset, screenshots.
 
+import type { Glimpses, Take } from "./glimpses.ts";
 import { arSupported, vrSupported } from "@meshreel/xr/supported";
 import { Reflected } from "./reflected.ts";
 import type { View } from "./view.ts";
@@ -7,6 +8,9 @@ import type { View } from "./view.ts";
 export class Viewed extends Reflected {
   /** The picture; null before there is one. */
   protected view: View | null = null;
+  /** A file that was opened; it stands in for `src`. */
+  protected file: Blob | null = null;
+  #glimpses: Glimpses | null = null;
 
   /** Position and target of the camera, as text for the attribute `camera`. */
   get camera(): string {
@@ -32,6 +36,17 @@ export class Viewed extends Reflected {
   async screenshot(): Promise<Blob> {
     if (!this.view) throw new DOMException("there is no picture yet", "InvalidStateError");
     return this.view.picture();
+  }
+  /** Has `take` get a picture of a time without seeking, decoded beside playback; of several that wait only the last. */
+  glimpse(time: number, take: Take): void {
+    if (!this.view || this.presenting) return;
+    this.#glimpses ??= this.view.glimpses(this.file ?? this.src, this.crossOrigin, take);
+    this.#glimpses.want(time);
+  }
+  /** Frees what glimpses were decoded with. */
+  endGlimpses(): void {
+    this.#glimpses?.dispose();
+    this.#glimpses = null;
   }
   async vrSupported(): Promise<boolean> {
     return vrSupported();

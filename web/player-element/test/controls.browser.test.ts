@@ -83,7 +83,7 @@ describeOnPage("controls of <meshreel-player>", (on) => {
     expect(await on.page.locator(".tip").textContent()).toBe("0:01.00 · 25");
   });
 
-  test("a picture of the time pointed at is shown where it was seen before, with the frame's number, and nothing is drawn for it", async () => {
+  test("a picture of the time pointed at is shown with the frame's number: kept where it was seen before, else decoded beside playback", async () => {
     await on.shown("muted");
     await on.get((player) => void (player.currentTime = 1));
     await on.eventually((player) => !player.seeking);
@@ -94,19 +94,27 @@ describeOnPage("controls of <meshreel-player>", (on) => {
       return on.page.locator(".thumbnail").isVisible();
     };
     const draws = await on.page.evaluate(() => engine.stages[0]!.draws);
-    expect(await point(0.75)).toBe(false);
-    expect(await on.page.locator(".tip").textContent()).toBe("0:01.50 · 37");
-    expect(await point(0.5)).toBe(true);
+    expect(await point(0.51)).toBe(true);
+    expect(await on.page.evaluate(() => [engine.stages[0]!.draws, engine.playbacks.length])).toEqual([draws, 1]);
+    await point(0.755);
+    expect(await on.page.locator(".tip").textContent()).toBe("0:01.51 · 37");
+    await on.page.locator(".thumbnail").waitFor();
+    const made = await on.page.evaluate(() => [engine.stages[0]!.shown!.frame, engine.stages[0]!.draws, engine.playbacks[1]!.layers, engine.playbacks[1]!.currentFrame]);
+    expect(made).toEqual([24, draws + 2, 0, 36]); // what is seen was drawn again
+    expect(await on.get((player) => player.currentTime)).toBe(1);
+    await on.page.mouse.move(box.x + 50, box.y - 100);
+    await expect.poll(() => on.page.evaluate(() => engine.playbacks[1]!.disposed)).toBe(true);
+    expect(await point(0.51)).toBe(true);
     const colours = await on.page.locator(".thumbnail").evaluate((node: HTMLCanvasElement) => {
       const { data } = node.getContext("2d")!.getImageData(0, 0, node.width, node.height);
       return new Set(Array.from({ length: data.length / 4 }, (_, k) => data.slice(4 * k, 4 * k + 3).join())).size;
     });
     expect(colours).toBeGreaterThan(1);
-    expect(await on.page.evaluate(() => engine.stages[0]!.draws)).toBe(draws);
     if (process.env.MESHREEL_PICTURES) await on.page.screenshot({ path: `${process.env.MESHREEL_PICTURES}/thumbnail.png` });
     await on.get((player) => void (player.src = "other.reel"));
     await on.eventually((player) => player.readyState === 4);
-    expect(await point(0.49)).toBe(false);
+    await point(0.51); // what was kept is of another recording
+    await expect.poll(() => on.page.evaluate(() => engine.playbacks.at(-1)!.layers)).toBe(0);
   });
 
   test("the seek bar says its time and shows what is buffered", async () => {

@@ -17,6 +17,7 @@ export class SeekBar {
   #scrubbing = false;
   #resume = false; // it played before it was dragged
   #wanted: number | null = null;
+  #part = 0; // of the recording, that was pointed at last
 
   constructor(player: MeshreelPlayer) {
     this.#player = player;
@@ -29,7 +30,11 @@ export class SeekBar {
     this.input.addEventListener("change", () => this.#drop());
     this.element.addEventListener("pointermove", (event) => this.#hover(event));
     player.addEventListener("seeked", () => this.#follow());
-    player.addEventListener("emptied", () => this.#thumbnails.clear());
+    this.element.addEventListener("pointerleave", () => player.endGlimpses());
+    player.addEventListener("emptied", () => {
+      player.endGlimpses();
+      this.#thumbnails.clear();
+    });
   }
 
   refresh(): void {
@@ -52,7 +57,7 @@ export class SeekBar {
   /** After a picture of a frame was drawn into a canvas, in the same task. */
   drawn(canvas: HTMLCanvasElement, frame: number): void {
     const { info, presenting } = this.#player;
-    if (info && !presenting) this.#thumbnails.take(canvas, frame / info.frameCount);
+    if (info && !presenting) this.#thumbnails.take(canvas, frame, info.frameCount);
   }
 
   #drag(): void {
@@ -93,6 +98,17 @@ export class SeekBar {
     const { frameRate, frameCount } = this.#player.info ?? { frameRate: 0, frameCount: 0 };
     const frame = Math.min(frameCount, Math.floor(part * duration * frameRate + 1e-6) + 1);
     setText(this.#label, `${formatTime(part * duration, timeDigits(duration, frameRate))} · ${frame}`);
-    this.#thumbnails.show(part);
+    this.#look(part, frameCount);
+  }
+
+  /** Shows the picture of a share of the recording, as soon as there is one. */
+  #look(part: number, frameCount: number): void {
+    this.#part = part;
+    const missing = this.#thumbnails.show(part, frameCount);
+    if (missing === null || this.#scrubbing || this.#player.waiting) return;
+    this.#player.glimpse(missing * this.#player.duration, (canvas, frame) => {
+      this.#thumbnails.take(canvas, frame, frameCount);
+      this.#thumbnails.show(this.#part, frameCount);
+    });
   }
 }
