@@ -20,6 +20,7 @@ export function applyToStage(name: string, settings: Reflected, stage: Stage): v
   if (name === "autorotate") stage.autoRotate = settings.autoRotate;
   if (name === "fly") stage.fly = settings.fly;
   if (name === "ground") stage.ground = settings.ground;
+  if (name === "exposure") stage.exposure = settings.exposure;
   if (name === "up") stage.up = settings.up;
   if (name === "camera") stage.camera = settings.getAttribute("camera") ?? "";
 }

@@ -11,7 +11,7 @@ export type Theme = "auto" | "light" | "dark";
 /** Attributes whose change the element must hear of. */
 export const OBSERVED = [
   "src", "controls", "autoplay", "loop", "poster", "layers", "speed", "playbackrate", "interpolate", "mode", "camera",
-  "up", "stats", "background", "theme", "textures", "ground",
+  "up", "stats", "background", "theme", "textures", "ground", "exposure",
   "autorotate", "fly", "section", "frames", "share", "muted", "volume", "playsinline", "crossorigin",
 ] as const;
 
@@ -43,6 +43,11 @@ export const readSection: Reader<readonly [number, number]> = (text) => {
   return typeof from === "number" && typeof to === "number" && rest.length === 0 && from >= 0 && to > from ? [from, to] : null;
 };
 
+const readExposure: Reader<number> = (text) => {
+  const exposure = readNumber(text);
+  return exposure !== null && exposure >= 0 ? exposure : null;
+};
+
 const readVolume: Reader<number> = (text) => {
   const volume = readNumber(text);
   return volume !== null && volume >= 0 && volume <= 1 ? volume : null;
@@ -59,6 +64,7 @@ const RULES: Readonly<Record<string, { read: Reader<unknown>; wanted: string }>>
   interpolate: { read: readSwitch, wanted: "on, or off" },
   textures: { read: readSwitch, wanted: "on, or off" },
   ground: { read: readSwitch, wanted: "on, or off" },
+  exposure: { read: readExposure, wanted: "a number from 0" },
   mode: { read: readMode, wanted: MODES.join(", ") },
   playbackrate: { read: readNumber, wanted: "a number" },
   layers: { read: readLayers, wanted: "auto, or a whole number of layers from 0" },
@@ -84,6 +90,11 @@ export function parseSpeed(text: string | null): number {
 /** A volume from 0 to 1; 1 where the text is none. */
 export function parseVolume(text: string | null): number {
   return readVolume(text ?? "") ?? 1;
+}
+
+/** Brightness of the light, 1 where the text is none. */
+export function parseExposure(text: string | null): number {
+  return readExposure(text ?? "") ?? 1;
 }
 
 /** Layers beyond the first, or "auto" where the text is no whole number from 0. */
@@ -123,5 +134,5 @@ export function parseFlag(text: string | null): boolean {
 /** Properties that a page may have set before the element was defined. */
 export const PROPERTIES = [
   "src", "poster", "preload", "controls", "autoplay", "loop", "stats", "layers", "playbackRate", "interpolate", "textures", "mode", "theme",
-  "up", "background", "camera", "currentTime", "ground", "autoRotate", "fly", "section", "frames", "share", "muted", "volume", "playsInline", "crossOrigin",
+  "up", "background", "camera", "currentTime", "ground", "exposure", "autoRotate", "fly", "section", "frames", "share", "muted", "volume", "playsInline", "crossOrigin",
 ];

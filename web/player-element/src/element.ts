@@ -262,7 +262,7 @@ export class MeshreelPlayer extends Viewed {
   #makeView(): View {
     const { picture, cover } = this.#controls;
     const view = new View(MeshreelPlayer.engine, picture, cover, (event) => this.#onView(event));
-    for (const name of ["mode", "up", "ground", "autorotate", "fly"]) applyToStage(name, this, view.stage);
+    for (const name of ["mode", "up", "ground", "exposure", "autorotate", "fly"]) applyToStage(name, this, view.stage);
     view.stage.background = this.#controls.background;
     return view;
   }

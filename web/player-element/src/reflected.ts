@@ -132,6 +132,14 @@ export class Reflected extends Element {
     this.setAttribute("ground", value ? "on" : "off");
   }
 
+  /** Brightness of the light on surfaces that are lit, 1 as usual; as `<model-viewer>` has it. */
+  get exposure(): number {
+    return parse.parseExposure(this.getAttribute("exposure"));
+  }
+  set exposure(value: number) {
+    this.setAttribute("exposure", String(value));
+  }
+
   /** True if the camera orbits by itself; not for viewers who prefer reduced motion. */
   get autoRotate(): boolean {
     return parse.parseFlag(this.getAttribute("autorotate"));

@@ -30,6 +30,7 @@ export interface Stage extends EventTarget {
   fly: boolean; // the camera moves through the scene, instead of around what it looks at
   readonly isFit: boolean; // the view was not changed since it fitted
   ground: boolean; // true for a ground, if the recording has none
+  exposure: number; // times the usual light
   camera: string; // as the attribute has it; "" fits the view
   up: Up | null; // the recording's axis that points up; null: as it says itself. A change fits the view.
   /** A new recording: forgets the last one's groups, fits the view. */

@@ -89,6 +89,14 @@ export class ThreeStage extends EventTarget implements Stage {
     this.#mode = this.#reel.mode = mode;
   }
 
+  get exposure(): number {
+    return this.#reel.exposure;
+  }
+
+  set exposure(exposure: number) {
+    this.#reel.exposure = exposure;
+  }
+
   get background(): string {
     return this.#background;
   }
@@ -146,9 +154,10 @@ export class ThreeStage extends EventTarget implements Stage {
   begin(info: Info): void {
     this.exitVr(); // a session's place is that of one recording
     this.#reel.removeFromParent();
+    const { exposure } = this.#reel;
     this.#reel.dispose();
     this.#reel = new ReelScene(this.#sorter);
-    this.#reel.mode = this.#mode;
+    Object.assign(this.#reel, { mode: this.#mode, exposure });
     this.#content.add(this.#reel);
     this.#stand(info);
   }

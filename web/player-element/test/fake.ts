@@ -153,6 +153,7 @@ export class FakeStage extends EventTarget implements Stage {
   mode: Mode = "shaded";
   background = "";
   ground = true;
+  exposure = 1;
   autoRotate = false;
   fly = false;
   isFit = true;

@@ -67,6 +67,8 @@ describe("attributes", () => {
       expect(good.filter((text) => parse.complaint(name, text) !== null)).toEqual([]);
       expect(bad.filter((text) => parse.complaint(name, text) === null)).toEqual([]);
     }
+    expect(["", "0", "2.5", "-1", "x"].map(parse.parseExposure)).toEqual([1, 0, 2.5, 1, 1]);
+    expect(parse.complaint("exposure", "-1")).toBe('exposure "-1" is ignored: give a number from 0');
     expect(parse.complaint("layers", "high")).toBe('layers "high" is ignored: give auto, or a whole number of layers from 0');
     expect(parse.complaint("poster", "high")).toBeNull();
   });

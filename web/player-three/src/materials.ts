@@ -13,12 +13,13 @@ import type { Feed } from "./shaders.ts";
 export interface Look {
   readonly mode: IUniform<number>;
   readonly flatNormals: IUniform<boolean>;
+  readonly exposure: IUniform<number>;
   readonly up: IUniform<Vector>;
   readonly ground: IUniform<readonly [number, number]>; // its position along `up`, and 1 / the height of the recording
 }
 
 export function makeLook(): Look {
-  return { mode: { value: MODES.indexOf("shaded") }, flatNormals: { value: false }, up: { value: [0, 1, 0] }, ground: { value: [-1e6, 1] } };
+  return { mode: { value: MODES.indexOf("shaded") }, flatNormals: { value: false }, exposure: { value: 1 }, up: { value: [0, 1, 0] }, ground: { value: [-1e6, 1] } };
 }
 
 /** Uniforms of a part: which vertices of which frames it shows. Names as in shaders.ts. */

@@ -72,6 +72,15 @@ export class ReelScene extends Group {
     if (!this.#edges) for (const upload of this.#uploads.values()) upload.dropEdges();
   }
 
+  /** Brightness of the light, 1 as usual. */
+  get exposure(): number {
+    return this.#look.exposure.value;
+  }
+
+  set exposure(exposure: number) {
+    this.#look.exposure.value = exposure;
+  }
+
   /** One normal a triangle instead of one a vertex. */
   get flat(): boolean {
     return this.#look.flatNormals.value;

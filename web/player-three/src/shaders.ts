@@ -146,6 +146,7 @@ uniform int mode; // the number of a Mode in modes.ts; -1: the shadow on the gro
 uniform vec3 up; // in the scene's own axes, as all here
 uniform vec2 ground; // where it is along that, and 1 / the height of what stands on it
 uniform bool flatNormals;
+uniform float exposure;
 uniform bool hasColors;
 uniform vec3 clay; // of a surface without colours of its own
 uniform vec3 color; // of its track
@@ -216,7 +217,7 @@ void main() {
     // Multisampling shows slivers of faces behind the silhouette: lit from outside as their neighbours, they are no dark dots.
     float inside = seenFromOutside ? 0.0 : smoothstep(0.1, 0.5, -dot(n, normalize(toEye)));
     vec3 light = mix(lightOn(n), lightOn(-n), inside);
-    result = own * (isOwn ? 1.0 + RELIEF * (light - FACING_LIGHT) : light); // captured colours have light in them already
+    result = exposure * own * (isOwn ? 1.0 + RELIEF * (light - FACING_LIGHT) : light); // captured colours have light in them already
   }
 #ifdef EDGES
   result = mix(result, edgeColor, edge());

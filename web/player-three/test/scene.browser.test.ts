@@ -161,6 +161,9 @@ describeInBrowser("a scene in Chromium", () => {
     expect(colour.at([0, 0.8, 0])).toBeNear(trackColor(1).map((share) => 255 * share), 2);
     const shaded = await looking("shaded");
     expect(shaded.at([0.2, 0, 0])[0]).toBeGreaterThan(shaded.at([0.2 - 0.9 * RADIUS, 0, 0])[0] + 20); // darker away from the lamp, which is to the right
+    await open.page.evaluate(() => window.api.look("shaded", false, 0.5));
+    await show(2);
+    expect((await picture()).at([0.2, 0, 0])).toBeNear(shaded.at([0.2, 0, 0]).map((value) => value / 2), 2);
     const edges = await looking("wireframe");
     const line = Array.from({ length: 40 }, (_, k) => edges.at([0.05 + 0.0075 * k, 0.02, 0])[0]);
     expect(Math.min(...line)).toBeLessThan(Math.max(...line) - 60);

@@ -64,7 +64,8 @@ const api = {
     renderer.render(root, camera);
     image.close();
   },
-  look(mode: Mode, flat = false): void {
+  look(mode: Mode, flat = false, exposure = 1): void {
+    scene.exposure = exposure;
     scene.mode = mode;
     scene.flat = flat;
   },
