@@ -126,7 +126,7 @@ describeInBrowser("the built player in a headset", () => {
     site.write("splats.reel", readFileSync(join(ROOT, "conformance/v1/splats/splats.reel")));
     const { page, errors } = await site.visit("player/index.html?src=/splats.reel&t=0.28&background=white", [{ path: IWER }, installHeadset]); // without patches
     await page.waitForFunction(() => (document.querySelector("meshreel-player")!.statistics?.splats ?? 0) > 0);
-    await page.locator("button.vr").click();
+    await page.locator("button.ar").click();
     await page.waitForFunction(() => document.querySelector("meshreel-player")!.presenting);
     await page.evaluate(() => headset.frames(3));
     const [left, right] = await page.evaluate(() => headset.eyes());
@@ -142,7 +142,7 @@ describeInBrowser("the built player in a headset", () => {
     await page.mouse.move(100, 100); // controls hide while it plays
     await page.locator("button.vr").click();
     const text = await page.waitForFunction(() => document.querySelector("pre")!.textContent!.split("\n").find((line) => line.startsWith("{")));
-    expect(JSON.parse((await text.jsonValue())!)).toMatchObject({ place: "VR", displayRate: 72 });
+    expect(JSON.parse((await text.jsonValue())!)).toMatchObject({ place: "VR", displayRate: 90 });
     expect(errors).toEqual([]);
     await page.close();
   });

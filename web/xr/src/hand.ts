@@ -1,7 +1,7 @@
 // A controller: what is drawn of it and what it does.
 
-import { BoxGeometry, CylinderGeometry, Mesh, MeshBasicMaterial } from "three";
-import type { BufferGeometry, Object3D, Vector3, WebXRManager, WebXRSpaceEventMap } from "three";
+import { BoxGeometry, CylinderGeometry, Mesh, MeshBasicMaterial, Vector3 } from "three";
+import type { BufferGeometry, Object3D, WebXRManager, WebXRSpaceEventMap } from "three";
 import { Stick } from "./stick.ts";
 import type { StickActions } from "./stick.ts";
 
@@ -13,6 +13,7 @@ const RAY = { length: 0.8, radius: 0.0015 } as const; // m
 const GRIP = { width: 0.03, length: 0.1 } as const; // m
 const FREE = 0xd8dde6;
 const HOLDING = 0x4da3ff;
+const STILL = 0.03; // m: a bare hand that pinches and moves less plays or pauses (guess)
 const STICK_BUTTON = 3; // of the mapping xr-standard
 const STICK_X = 2;
 
@@ -26,6 +27,7 @@ export class Hand {
   readonly #stick: Stick;
   #source: XRInputSource | null = null;
   #squeezes = false;
+  readonly #pinched = new Vector3(); // where a bare hand began to pinch, m
 
   /** To be made before the session starts, so that three gives it the controller. `room` is where the tracking space is drawn. */
   constructor(xr: WebXRManager, index: number, room: Object3D, actions: HandActions) {
@@ -39,6 +41,8 @@ export class Hand {
     this.#pointing.addEventListener("connected", this.#connect);
     this.#pointing.addEventListener("disconnected", this.#disconnect);
     this.#pointing.addEventListener("select", this.#select);
+    this.#pointing.addEventListener("selectstart", this.#pinch);
+    this.#pointing.addEventListener("selectend", this.#part);
     this.#pointing.addEventListener("squeezestart", this.#squeeze);
     this.#pointing.addEventListener("squeezeend", this.#letGo);
   }
@@ -58,6 +62,8 @@ export class Hand {
     this.#pointing.removeEventListener("connected", this.#connect);
     this.#pointing.removeEventListener("disconnected", this.#disconnect);
     this.#pointing.removeEventListener("select", this.#select);
+    this.#pointing.removeEventListener("selectstart", this.#pinch);
+    this.#pointing.removeEventListener("selectend", this.#part);
     this.#pointing.removeEventListener("squeezestart", this.#squeeze);
     this.#pointing.removeEventListener("squeezeend", this.#letGo);
     for (const mesh of [this.#ray, this.#body]) {
@@ -79,7 +85,26 @@ export class Hand {
     this.#letGo();
   };
 
-  #select = (): void => this.#actions.select();
+  #select = (): void => {
+    if (!this.#isBare) this.#actions.select();
+  };
+
+  /** A bare hand has no grip: it holds by a pinch. */
+  #pinch = (): void => {
+    if (!this.#isBare) return;
+    this.#pinched.copy(this.#grip.position);
+    this.#squeeze();
+  };
+
+  #part = (): void => {
+    if (!this.#isBare) return;
+    this.#letGo();
+    if (this.#grip.position.distanceTo(this.#pinched) < STILL) this.#actions.select();
+  };
+
+  get #isBare(): boolean {
+    return this.#source?.hand != null;
+  }
 
   #squeeze = (): void => {
     this.#squeezes = true;

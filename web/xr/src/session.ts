@@ -3,6 +3,7 @@
 import type { Object3D, PerspectiveCamera, WebGLRenderer } from "three";
 import type { Box } from "@meshreel/player-core/types";
 import type { VrActions } from "./actions.ts";
+import { Floor } from "./floor.ts";
 import { Grab } from "./grab.ts";
 import { Hand } from "./hand.ts";
 import { keep } from "./keep.ts";
@@ -23,11 +24,11 @@ export interface VrOptions {
   onend(): void;
 }
 
-const RATE = 72; // Hz: what every Quest has, and leaves the most time for a picture
+const RATE = 90; // Hz: at most, of those that the headset offers
 const NEAR = 0.05; // m
 const FAR = 1000; // m
 const SEEK = 1; // s, each time that a held thumbstick repeats
-const INIT: XRSessionInit = { requiredFeatures: ["local-floor"], optionalFeatures: ["bounded-floor", "layers"] };
+const INIT: XRSessionInit = { requiredFeatures: ["local-floor"], optionalFeatures: ["bounded-floor", "layers", "hand-tracking"] };
 
 /** The recording in a headset, at true scale in front of the viewer. */
 export class VrSession {
@@ -35,6 +36,7 @@ export class VrSession {
   readonly #session: XRSession;
   readonly #restore: () => void;
   readonly #hands: readonly Hand[];
+  readonly #floor: Floor | null;
   readonly #pose = makePose();
   readonly #grab = new Grab();
   readonly #viewer: Viewer = { x: 0, z: 0, turn: 0 };
@@ -71,6 +73,8 @@ export class VrSession {
       click: () => this.#place(),
     };
     const room = content.parent!;
+    this.#floor = options.passthrough ? null : new Floor();
+    if (this.#floor) room.add(this.#floor);
     this.#hands = [0, 1].map((index) => new Hand(renderer.xr, index, room, handActions));
   }
 
@@ -110,7 +114,8 @@ export class VrSession {
 
   #askForRate(): void {
     const session = this.#session;
-    if (session.supportedFrameRates?.includes(RATE)) session.updateTargetFrameRate(RATE).catch(() => undefined); // its own rate does too
+    const offered = [...(session.supportedFrameRates ?? [])].filter((rate) => rate <= RATE);
+    if (offered.length > 0) session.updateTargetFrameRate(Math.max(...offered)).catch(() => undefined); // its own rate does too
   }
 
   /** Nothing is allocated here. */
@@ -144,6 +149,7 @@ export class VrSession {
     renderer.xr.setAnimationLoop(null);
     if (this.#foveation !== undefined) renderer.xr.setFoveation(this.#foveation);
     for (const hand of this.#hands) hand.dispose();
+    this.#floor?.dispose();
     this.#restore();
     this.#resolve();
     if (this.#entered) onend();

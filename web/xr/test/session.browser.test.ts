@@ -91,6 +91,7 @@ describeInBrowser("a session in a simulated Quest 3", () => {
     await enter();
   });
   afterEach(async () => {
+    await open.page.evaluate(() => window.vr.bare(false));
     await open.page.evaluate(() => window.vr.end());
     expect(await state()).toEqual(before);
     expect(open.errors).toEqual([]);
@@ -110,8 +111,33 @@ describeInBrowser("a session in a simulated Quest 3", () => {
     expect(left.middle - right.middle).toBeLessThan(0.03);
   });
 
-  test("it asks for 72 pictures a second", async () => {
-    expect(await open.page.evaluate(() => window.vr.rate())).toBe(72);
+  test("there is a floor as far as the horizon", async () => {
+    const { left } = await open.page.evaluate(() => window.vr.eyes());
+    expect(left.sky[0]).toBeGreaterThan(0.8);
+    expect(left.sky[1]).toBeLessThan(0.05);
+  });
+
+  test("a bare hand that pinches and moves takes it along, one that stays plays or pauses", async () => {
+    const hand = (x: number, pinch: number): Promise<void> =>
+      open.page.evaluate(async ([to, value]) => {
+        window.vr.hand(to, 1.3, -0.4, value);
+        await window.vr.frames(3);
+      }, [x, pinch] as const);
+    await open.page.evaluate(() => window.vr.bare(true));
+    await hand(0.25, 0);
+    const [before] = (await content()).position;
+    await hand(0.25, 1);
+    await hand(0.55, 1);
+    await hand(0.55, 0);
+    expect((await content()).position[0]! - before!).toBeCloseTo(0.3, 2);
+    expect(await told()).toEqual([]);
+    await hand(0.55, 1);
+    await hand(0.55, 0);
+    expect(await told()).toEqual(["toggle"]);
+  });
+
+  test("it asks for 90 pictures a second, where the headset has them", async () => {
+    expect(await open.page.evaluate(() => window.vr.rate())).toBe(90);
   });
 
   test("the recording stands on the floor, its middle 1.5 m ahead, at true scale", async () => {

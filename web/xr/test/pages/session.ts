@@ -50,6 +50,7 @@ interface Seen {
   readonly sphere: number;
   readonly floor: number;
   readonly middle: number;
+  readonly sky: readonly [number, number]; // shares of the upper and the lower half that show nothing but the background
 }
 
 /** The sphere is yellow, the floor grey, what is behind them blue and dark. */
@@ -57,17 +58,19 @@ function seenBy(eye: 0 | 1, picture: ImageData): Seen {
   const { data, width, height } = picture;
   const half = width / 2;
   let [sphere, floor, sum] = [0, 0, 0];
+  const sky: [number, number] = [0, 0];
   for (let y = 0; y < height; y++) {
     for (let x = 0; x < half; x++) {
       const at = 4 * (y * width + eye * half + x);
       const [red, blue] = [data[at], data[at + 2]];
+      if (Math.abs(red - 0x20) < 3 && Math.abs(blue - 0x40) < 3) sky[y < height / 2 ? 0 : 1] += 2 / (half * height);
       if (red - blue > 30) {
         sphere++;
         sum += x / half;
       } else if (red > 100 && red < 190 && blue - red < 30) floor++;
     }
   }
-  return { sphere: sphere / (half * height), floor: floor / (half * height), middle: sum / Math.max(sphere, 1) };
+  return { sphere: sphere / (half * height), floor: floor / (half * height), middle: sum / Math.max(sphere, 1), sky };
 }
 
 async function pixelsOf(picture: string): Promise<ImageData> {
@@ -122,6 +125,14 @@ const api = {
   },
   stick(hand: "left" | "right", x: number): void {
     device.controllers[hand]?.updateAxes("thumbstick", x, 0);
+  },
+  /** Bare hands instead of controllers, or these again. */
+  bare(isBare: boolean): void {
+    device.primaryInputMode = isBare ? "hand" : "controller";
+  },
+  hand(x: number, y: number, z: number, pinch: number): void {
+    device.hands.right?.position.set(x, y, z);
+    device.hands.right?.updatePinchValue(pinch);
   },
   head(x: number, y: number, z: number): void {
     device.position.set(x, y, z);
