@@ -178,6 +178,7 @@ export class MeshreelPlayer extends Viewed {
       toggle: () => (this.paused ? void this.play().catch(() => undefined) : this.pause()),
       step: (frames) => this.step(frames),
       seekBy: (seconds) => (this.currentTime += seconds),
+      time: () => [this.currentTime, this.duration],
     }, passthrough);
   }
   /** Lets a bench collect from now on what is decoded and drawn; what is given back ends that. Error where nothing is open. */

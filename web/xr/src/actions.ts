@@ -5,4 +5,6 @@ export interface VrActions {
   toggle(): void;
   step(frames: number): void;
   seekBy(seconds: number): void;
+  /** Seconds from the start, and of how many. */
+  time(): readonly [number, number];
 }

@@ -25,13 +25,15 @@ export class Hand {
   readonly #body = new Mesh(new BoxGeometry(GRIP.width, GRIP.width, GRIP.length), this.#material);
   readonly #actions: HandActions;
   readonly #stick: Stick;
+  readonly #panel: Object3D;
   #source: XRInputSource | null = null;
   #squeezes = false;
   readonly #pinched = new Vector3(); // where a bare hand began to pinch, m
 
-  /** To be made before the session starts, so that three gives it the controller. `room` is where the tracking space is drawn. */
-  constructor(xr: WebXRManager, index: number, room: Object3D, actions: HandActions) {
+  /** To be made before the session starts, so that three gives it the controller. `room` is where the tracking space is drawn, `panel` what the left one wears. */
+  constructor(xr: WebXRManager, index: number, room: Object3D, actions: HandActions, panel: Object3D) {
     this.#actions = actions;
+    this.#panel = panel;
     this.#stick = new Stick(actions);
     this.#pointing = xr.getController(index);
     this.#grip = xr.getControllerGrip(index);
@@ -77,6 +79,7 @@ export class Hand {
 
   #connect = (event: WebXRSpaceEventMap["connected"]): void => {
     this.#source = event.data;
+    if (event.data.handedness === "left") this.#grip.add(this.#panel);
   };
 
   #disconnect = (): void => {

@@ -7,6 +7,7 @@ import { Floor } from "./floor.ts";
 import { Grab } from "./grab.ts";
 import { Hand } from "./hand.ts";
 import { keep } from "./keep.ts";
+import { Panel } from "./panel.ts";
 import { applyPose, makePose, place, setViewer } from "./pose.ts";
 import type { Viewer } from "./pose.ts";
 
@@ -37,6 +38,7 @@ export class VrSession {
   readonly #restore: () => void;
   readonly #hands: readonly Hand[];
   readonly #floor: Floor | null;
+  readonly #panel = new Panel();
   readonly #pose = makePose();
   readonly #grab = new Grab();
   readonly #viewer: Viewer = { x: 0, z: 0, turn: 0 };
@@ -75,7 +77,7 @@ export class VrSession {
     const room = content.parent!;
     this.#floor = options.passthrough ? null : new Floor();
     if (this.#floor) room.add(this.#floor);
-    this.#hands = [0, 1].map((index) => new Hand(renderer.xr, index, room, handActions));
+    this.#hands = [0, 1].map((index) => new Hand(renderer.xr, index, room, handActions, this.#panel));
   }
 
   /** Pictures a second of the headset; 0 where it does not report it. */
@@ -118,13 +120,14 @@ export class VrSession {
     if (offered.length > 0) session.updateTargetFrameRate(Math.max(...offered)).catch(() => undefined); // its own rate does too
   }
 
-  /** Nothing is allocated here. */
+  /** Nothing is allocated here, but four times a second for the panel. */
   #frame = (now: number): void => {
     const left = this.#hands[0];
     const right = this.#hands[1];
     if (!this.#placed) this.#place();
     left.update(now);
     right.update(now);
+    this.#panel.update(now, this.#options.actions.time);
     this.#grab.follow(this.#pose, left.holds, right.holds);
     applyPose(this.#pose, this.#options.content);
     this.#options.frame(now);
@@ -150,6 +153,7 @@ export class VrSession {
     if (this.#foveation !== undefined) renderer.xr.setFoveation(this.#foveation);
     for (const hand of this.#hands) hand.dispose();
     this.#floor?.dispose();
+    this.#panel.dispose();
     this.#restore();
     this.#resolve();
     if (this.#entered) onend();

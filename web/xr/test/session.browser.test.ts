@@ -117,6 +117,14 @@ describeInBrowser("a session in a simulated Quest 3", () => {
     expect(left.sky[1]).toBeLessThan(0.05);
   });
 
+  test("a panel at the left wrist shows how much was played", async () => {
+    expect(await open.page.evaluate(() => window.vr.played(0.5))).toBeCloseTo(0.25, 2);
+    expect(await open.page.evaluate(() => window.vr.played(1))).toBeCloseTo(0.5, 2);
+    await move("left", 0, 1.45, -0.3);
+    const { picture } = await open.page.evaluate(() => window.vr.eyes());
+    if (process.env.MESHREEL_PICTURES) writeFileSync(join(process.env.MESHREEL_PICTURES, "vr-panel.png"), Buffer.from(picture.split(",")[1], "base64"));
+  });
+
   test("a bare hand that pinches and moves takes it along, one that stays plays or pauses", async () => {
     const hand = (x: number, pinch: number): Promise<void> =>
       open.page.evaluate(async ([to, value]) => {

@@ -1,7 +1,7 @@
 // The page of session.browser.test.ts: a canvas of 640 x 320, a recording, and a headset that is simulated.
 
 import { metaQuest3, XRDevice } from "iwer";
-import { Group, PerspectiveCamera, Scene, WebGLRenderer } from "three";
+import { Group, Mesh, MeshBasicMaterial, PerspectiveCamera, Scene, WebGLRenderer } from "three";
 import type { Box } from "@meshreel/player-core/types";
 import { ReelScene } from "@meshreel/player-three";
 import { makeFloor, makeGroup } from "../../../player-three/test/analytic.ts";
@@ -34,6 +34,7 @@ let vr: VrSession | null = null;
 let pictures = 0;
 let pageFrames = 0;
 let told: string[] = [];
+let time = 0; // s
 let wanted: ((picture: string) => void) | null = null;
 renderer.setAnimationLoop(() => pageFrames++);
 
@@ -99,6 +100,7 @@ const api = {
         toggle: () => told.push("toggle"),
         step: (frames) => told.push(`step ${frames}`),
         seekBy: (seconds) => told.push(`seek ${seconds}`),
+        time: () => [time, 2],
       },
       onend: () => told.push(`end ${renderer.xr.isPresenting}`),
     });
@@ -152,6 +154,21 @@ const api = {
   },
   memory: () => ({ ...renderer.info.memory }),
   content: () => ({ position: content.position.toArray(), scale: content.scale.x, turn: content.rotation.y }),
+  /** Share of its timeline that the panel at the left wrist shows as played at a time; -1 where there is none. */
+  async played(seconds: number): Promise<number> {
+    time = seconds;
+    await new Promise((done) => setTimeout(done, 300));
+    await api.frames(2);
+    let canvas: HTMLCanvasElement | undefined;
+    root.traverseVisible((object) => {
+      const image: unknown = object instanceof Mesh && object.material instanceof MeshBasicMaterial ? object.material.map?.image : null;
+      if (image instanceof HTMLCanvasElement) canvas = image;
+    });
+    if (canvas === undefined) return -1;
+    const { width } = canvas;
+    const { data } = canvas.getContext("2d")!.getImageData(0, 74, width, 1);
+    return Array.from({ length: width }, (_, x) => data[4 * x + 2]!).filter((blue) => blue > 200).length / (width - 48);
+  },
   /** What the actions were told since the last call. */
   told: (): string[] => told.splice(0),
   active: (): boolean => device.activeSession !== undefined,
