@@ -1,12 +1,14 @@
 // A controller: what is drawn of it and what it does.
 
-import { BoxGeometry, CylinderGeometry, Mesh, MeshBasicMaterial, Vector3 } from "three";
+import { BoxGeometry, CylinderGeometry, Mesh, MeshBasicMaterial, RingGeometry, Vector3 } from "three";
 import type { BufferGeometry, Object3D, WebXRManager, WebXRSpaceEventMap } from "three";
 import { Stick } from "./stick.ts";
 import type { StickActions } from "./stick.ts";
 
 export interface HandActions extends StickActions {
   select(): void;
+  /** Goes to a point of the floor. */
+  teleport(place: Vector3): void;
 }
 
 const RAY = { length: 0.8, radius: 0.0015 } as const; // m
@@ -14,8 +16,12 @@ const GRIP = { width: 0.03, length: 0.1 } as const; // m
 const FREE = 0xd8dde6;
 const HOLDING = 0x4da3ff;
 const STILL = 0.03; // m: a bare hand that pinches and moves less plays or pauses (guess)
+const AIMS = 0.6; // of the way to the edge that a stick is pushed forward
+const LONGEST = 8; // m, of a jump (guess)
+const RING = [0.14, 0.18] as const; // m, radii of the mark on the floor
 const STICK_BUTTON = 3; // of the mapping xr-standard
 const STICK_X = 2;
+const STICK_Y = 3; // -1 is forward
 
 export class Hand {
   readonly #pointing: ReturnType<WebXRManager["getController"]>;
@@ -23,6 +29,9 @@ export class Hand {
   readonly #material = new MeshBasicMaterial({ color: FREE });
   readonly #ray = new Mesh(rayGeometry(), this.#material);
   readonly #body = new Mesh(new BoxGeometry(GRIP.width, GRIP.width, GRIP.length), this.#material);
+  readonly #mark = new Mesh(new RingGeometry(...RING, 32).rotateX(-Math.PI / 2), this.#material); // where it would go
+  readonly #from = new Vector3();
+  readonly #along = new Vector3();
   readonly #actions: HandActions;
   readonly #stick: Stick;
   readonly #panel: Object3D;
@@ -39,7 +48,8 @@ export class Hand {
     this.#grip = xr.getControllerGrip(index);
     this.#pointing.add(this.#ray);
     this.#grip.add(this.#body);
-    room.add(this.#pointing, this.#grip);
+    this.#mark.visible = false;
+    room.add(this.#pointing, this.#grip, this.#mark);
     this.#pointing.addEventListener("connected", this.#connect);
     this.#pointing.addEventListener("disconnected", this.#disconnect);
     this.#pointing.addEventListener("select", this.#select);
@@ -57,6 +67,7 @@ export class Hand {
   /** Once a picture, with milliseconds. */
   update(now: number): void {
     const gamepad = this.#source?.gamepad;
+    if (gamepad) this.#aim(-(gamepad.axes[STICK_Y] ?? 0) > AIMS);
     if (gamepad) this.#stick.update(gamepad.axes[STICK_X] ?? gamepad.axes[0] ?? 0, gamepad.buttons[STICK_BUTTON]?.pressed ?? false, now);
   }
 
@@ -68,13 +79,25 @@ export class Hand {
     this.#pointing.removeEventListener("selectend", this.#part);
     this.#pointing.removeEventListener("squeezestart", this.#squeeze);
     this.#pointing.removeEventListener("squeezeend", this.#letGo);
-    for (const mesh of [this.#ray, this.#body]) {
+    for (const mesh of [this.#ray, this.#body, this.#mark]) {
       mesh.removeFromParent();
       mesh.geometry.dispose();
     }
     this.#material.dispose();
     this.#pointing.removeFromParent();
     this.#grip.removeFromParent();
+  }
+
+  /** Marks where it points at the floor while `aims`; goes there when it no longer does. */
+  #aim(aims: boolean): void {
+    if (!aims && this.#mark.visible) this.#actions.teleport(this.#mark.position);
+    this.#mark.visible = false;
+    if (!aims) return;
+    const from = this.#from.setFromMatrixPosition(this.#pointing.matrixWorld);
+    const along = this.#along.set(0, 0, -1).transformDirection(this.#pointing.matrixWorld);
+    const way = -from.y / along.y;
+    this.#mark.visible = way > 0 && way < LONGEST;
+    this.#mark.position.copy(from).addScaledVector(along, way);
   }
 
   #connect = (event: WebXRSpaceEventMap["connected"]): void => {
@@ -85,6 +108,7 @@ export class Hand {
   #disconnect = (): void => {
     this.#source = null;
     this.#stick.reset();
+    this.#mark.visible = false;
     this.#letGo();
   };
 

@@ -2,12 +2,12 @@
 
 import { CanvasTexture, Mesh, MeshBasicMaterial, PlaneGeometry, SRGBColorSpace } from "three";
 
-const [WIDTH, HEIGHT] = [512, 320]; // pixels
+const [WIDTH, HEIGHT] = [512, 360]; // pixels
 const WIDE = 0.16; // m
 const EVERY = 250; // ms between two looks at the time
 const LINE = 44; // pixels
 const MARGIN = 24; // pixels
-const HINTS = [["Trigger", "play, pause"], ["Stick ← →", "step; hold to seek"], ["Stick click", "bring it here"], ["Grip", "move; both: scale"]] as const;
+const HINTS = [["Trigger", "play, pause"], ["Stick ← →", "step; hold to seek"], ["Stick ↑", "go there"], ["Stick click", "bring it here"], ["Grip", "move; both: scale"]] as const;
 
 export class Panel extends Mesh<PlaneGeometry, MeshBasicMaterial> {
   readonly #context: CanvasRenderingContext2D;

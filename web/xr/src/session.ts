@@ -1,6 +1,6 @@
 // A session in a headset, from the click to the moment at which the page is as it was.
 
-import type { Object3D, PerspectiveCamera, WebGLRenderer } from "three";
+import type { Object3D, PerspectiveCamera, Vector3, WebGLRenderer } from "three";
 import type { Box } from "@meshreel/player-core/types";
 import type { VrActions } from "./actions.ts";
 import { Floor } from "./floor.ts";
@@ -73,6 +73,7 @@ export class VrSession {
       tap: (side: number) => actions.step(side),
       hold: (side: number) => actions.seekBy(SEEK * side),
       click: () => this.#place(),
+      teleport: (place: Vector3) => this.#go(place),
     };
     const room = content.parent!;
     this.#floor = options.passthrough ? null : new Floor();
@@ -133,15 +134,28 @@ export class VrSession {
     this.#options.frame(now);
   };
 
+  /** Moves the recording so that what is at a point of the floor comes under the viewer. */
+  #go({ x, z }: Vector3): void {
+    this.#look();
+    this.#pose.position.x += this.#viewer.x - x;
+    this.#pose.position.z += this.#viewer.z - z;
+    this.#grab.release();
+  }
+
   /** In front of where the viewer is now. Until the headset knows, of where the room has its zero. */
   #place(): void {
+    this.#placed = this.#look();
+    place(this.#options.box, this.#viewer, this.#pose, this.#options.passthrough);
+    this.#grab.release();
+  }
+
+  /** Takes in where the viewer is; false where the headset does not know yet. */
+  #look(): boolean {
     const { xr } = this.#options.renderer;
     const space = xr.getReferenceSpace();
     const head = space === null ? undefined : xr.getFrame().getViewerPose(space)?.transform;
-    this.#placed = head !== undefined;
     if (head !== undefined) setViewer(this.#viewer, head.position, head.orientation);
-    place(this.#options.box, this.#viewer, this.#pose, this.#options.passthrough);
-    this.#grab.release();
+    return head !== undefined;
   }
 
   #close = (): void => {

@@ -117,6 +117,19 @@ describeInBrowser("a session in a simulated Quest 3", () => {
     expect(left.sky[1]).toBeLessThan(0.05);
   });
 
+  test("a stick that is pushed forward goes where its hand points at the floor", async () => {
+    await open.page.evaluate(() => window.vr.tilt("right", 45));
+    await open.page.evaluate(() => window.vr.stick("right", 0, -1));
+    await frames(3);
+    const before = (await content()).position;
+    await push("right", 0);
+    const after = (await content()).position;
+    // From 1.3 m above the floor and 0.4 m ahead, 45 degrees down: 1.7 m ahead, 0.25 m to the right.
+    expectNear(after, [before[0]! - 0.25, before[1]!, before[2]! + 1.7]);
+    expect(await told()).toEqual([]);
+    await open.page.evaluate(() => window.vr.tilt("right", 0));
+  });
+
   test("a panel at the left wrist shows how much was played", async () => {
     expect(await open.page.evaluate(() => window.vr.played(0.5))).toBeCloseTo(0.25, 2);
     expect(await open.page.evaluate(() => window.vr.played(1))).toBeCloseTo(0.5, 2);

@@ -125,8 +125,8 @@ const api = {
   button(hand: "left" | "right", id: string, value: number): void {
     device.controllers[hand]?.updateButtonValue(id, value);
   },
-  stick(hand: "left" | "right", x: number): void {
-    device.controllers[hand]?.updateAxes("thumbstick", x, 0);
+  stick(hand: "left" | "right", x: number, y = 0): void {
+    device.controllers[hand]?.updateAxes("thumbstick", x, y);
   },
   /** Bare hands instead of controllers, or these again. */
   bare(isBare: boolean): void {
@@ -135,6 +135,11 @@ const api = {
   hand(x: number, y: number, z: number, pinch: number): void {
     device.hands.right?.position.set(x, y, z);
     device.hands.right?.updatePinchValue(pinch);
+  },
+  /** Degrees that a hand points below the horizon. */
+  tilt(hand: "left" | "right", degrees: number): void {
+    const half = (-degrees * Math.PI) / 360;
+    device.controllers[hand]?.quaternion.set(Math.sin(half), 0, 0, Math.cos(half));
   },
   head(x: number, y: number, z: number): void {
     device.position.set(x, y, z);
