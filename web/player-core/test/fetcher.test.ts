@@ -68,6 +68,16 @@ test("finer layers are fetched behind those at hand", async () => {
   expect(Buffer.compare(fetcher.payload(HEAD.chunks[7], 2), bytesOf(7, 2))).toBe(0);
 });
 
+test("finer layers of a chunk whose first are on their way come behind these: none comes twice", async () => {
+  wishes = [10, 11, 12].flatMap((number) => [1, 2].map((count) => ({ chunk: HEAD.chunks[number], count, when: "soon" as const })));
+  fetcher.want(wishes.slice(0, 1));
+  await pass(0.025);
+  fetcher.want([...wishes, ...wishes]);
+  await pass(1);
+  expect(wholeLayers([10, 11, 12])).toEqual([2, 2, 2]);
+  expect(source.sentBytes).toBe(90_000);
+});
+
 test("a payload is a copy: it may be given away", async () => {
   want([7]);
   await pass(1);

@@ -39,7 +39,8 @@ interface Request {
 }
 
 interface Range {
-  from: number;
+  readonly behind: number; // the bytes of its chunk that are at hand
+  readonly from: number;
   readonly to: number;
   readonly when: When;
 }
@@ -97,14 +98,12 @@ export class Fetcher {
   /** Fetches these, in their order; what is on its way and not among them is cancelled. */
   want(wishes: readonly Wish[]): void {
     this.#wanted = new Set(wishes.map(({ chunk }) => chunk.offset));
-    const missing = wishes.map((wish) => this.#missingOf(wish)).filter(({ from, to }) => from < to);
+    const missing = this.#missingOf(wishes);
     for (const request of this.#requests) {
       if (!missing.some(({ from, to }) => from <= request.at + this.#join && from < request.to && to > request.at)) request.controller.abort();
     }
     this.#requests = this.#requests.filter(({ controller }) => !controller.signal.aborted);
-    const rest = missing.map((range) => this.#notOnItsWay(range)).filter(({ from, to }) => from < to);
-    if (!isWorthwhile(rest)) rest.length = 0;
-    while (rest.length > 0 && this.#mayAsk(rest[0])) this.#ask(this.#batch(rest));
+    if (isWorthwhile(this.#notOnTheirWay(missing))) this.#askFor(missing);
     this.#evict();
   }
 
@@ -132,15 +131,31 @@ export class Fetcher {
     this.#heldBytes = 0;
   }
 
-  #missingOf({ chunk, count, when }: Wish): Range {
-    const held = this.#held.get(chunk.offset)?.length ?? 0;
-    return { from: chunk.offset + held, to: chunk.offset + sizeOfLayers(chunk, count), when };
+  /** Ranges of these that are not at hand, each byte once: of a chunk more layers may be wanted later than the first. */
+  #missingOf(wishes: readonly Wish[]): Range[] {
+    const ends = new Map<number, number>(); // by offset of the chunk
+    const ranges: Range[] = [];
+    for (const { chunk, count, when } of wishes) {
+      const behind = chunk.offset + (this.#held.get(chunk.offset)?.length ?? 0);
+      const from = ends.get(chunk.offset) ?? behind;
+      const to = chunk.offset + sizeOfLayers(chunk, count);
+      if (from < to) ranges.push({ behind, from, to, when });
+      ends.set(chunk.offset, Math.max(from, to));
+    }
+    return ranges;
   }
 
-  #notOnItsWay({ from, to, when }: Range): Range {
-    let start = from;
-    for (const request of this.#requests) if (request.at <= start && start < request.to) start = request.to;
-    return { from: start, to, when };
+  #askFor(missing: readonly Range[]): void {
+    for (;;) {
+      const rest = this.#notOnTheirWay(missing); // a request may have taken some with it that lie between others
+      if (rest.length === 0 || !this.#mayAsk(rest[0])) return;
+      this.#ask(this.#batch(rest));
+    }
+  }
+
+  /** Those of which nothing is on its way, nor of the bytes before in their chunk: bytes that come before these are lost. */
+  #notOnTheirWay(ranges: readonly Range[]): Range[] {
+    return ranges.filter(({ behind, to }) => !this.#requests.some((request) => request.at < to && behind < request.to));
   }
 
   #mayAsk({ when }: Range): boolean {
@@ -159,16 +174,18 @@ export class Fetcher {
   }
 
   /** Takes ranges that lie together from the start of `rest`. */
-  #batch(rest: Range[]): Range {
+  #batch(rest: Range[]): Pick<Range, "from" | "to"> {
     const { bandwidth } = this.#source;
     const most = bandwidth > 0 ? Math.min(Math.max(bandwidth / 8, BATCH[0]), BATCH[1]) : 4 * BATCH[0];
-    const { from, when } = rest[0];
+    const { from } = rest[0];
     let { to } = rest.shift()!;
-    while (rest.length > 0 && rest[0].from >= to && rest[0].from <= to + this.#join && rest[0].to <= from + most) ({ to } = rest.shift()!);
-    return { from, to, when };
+    const isNext = (other: Range): boolean => other.from >= to && other.from <= to + this.#join && other.to <= from + most;
+    const isComing = (other: Range): boolean => this.#requests.some((request) => request.at < other.from && request.to > to);
+    while (rest.length > 0 && isNext(rest[0]) && !isComing(rest[0])) ({ to } = rest.shift()!);
+    return { from, to };
   }
 
-  #ask({ from, to }: Range): void {
+  #ask({ from, to }: Pick<Range, "from" | "to">): void {
     const request: Request = { at: from, to, controller: new AbortController() };
     const { signal } = request.controller;
     this.#requests.push(request);
