@@ -271,7 +271,7 @@ export class Player extends PlaybackTarget implements Playback {
     this.#wakesIn = Infinity;
     const [session, clock] = [this.#session, this.#clock];
     if (session === null || clock === null || this.#error !== null) return;
-    session.pump({ time: clock.time, speed: this.#rate, loop: this.#loop, layers: this.#layers, splats: this.splats, isWaiting: this.#hasStalled && !clock.isRunning });
+    session.pump({ time: clock.time, speed: this.#rate, loop: this.#loop, layers: this.#layers, splats: this.splats, isPaused: this.#paused, isWaiting: this.#hasStalled && !clock.isRunning });
     if (this.#progress.isNew(session.fetcher.isFetching, TICK_MS)) this.#tell("progress");
     if (performance.now() - this.#updated > UNSEEN_MS) this.sound.rest(); // time stands still while nothing is displayed
     const level = this.#layers === "auto" ? session.level : this.#layers;

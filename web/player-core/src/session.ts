@@ -1,23 +1,23 @@
 // One open file: what of it is fetched, decoded and shown, kept in step with the play head.
 
-import { Adaptive } from "./time/adaptive.ts";
+import { Adaptive, PLENTY } from "./time/adaptive.ts";
 import { Timeline } from "./time/clock.ts";
 import { Decoding } from "./time/decoding.ts";
 import type { DecodingEvents } from "./time/decoding.ts";
 import { Fetcher } from "./net/fetcher.ts";
 import type { When, Wish } from "./net/fetcher.ts";
 import { Form } from "./format/layout.gen.ts";
-import { Links, companionLayers, sizeWithCompanions } from "./format/links.ts";
+import { Links, companionLayers, mostLayers, sizeWithCompanions } from "./format/links.ts";
 import type { Opened } from "./net/opening.ts";
 import { Picture } from "./time/picture.ts";
 import type { Share } from "./time/pool.ts";
 import { isVideo } from "./format/reader.ts";
 import type { Chunk, Head } from "./format/reader.ts";
 import { plan } from "./time/scheduler.ts";
-import type { Plan, Step } from "./time/scheduler.ts";
+import type { Coming, Plan, Step } from "./time/scheduler.ts";
 import type { Source } from "./net/source.ts";
 import { Textures } from "./time/textures.ts";
-import type { Layers, Stats } from "./types.ts";
+import type { Layers, Packed, Stats } from "./types.ts";
 
 export interface Limits {
   readonly bufferSeconds: number; // of bytes fetched ahead, at normal speed
@@ -32,6 +32,7 @@ export interface Aim {
   readonly loop: boolean;
   readonly layers: Layers;
   readonly splats: boolean; // true if they are wanted
+  readonly isPaused: boolean;
   readonly isWaiting: boolean; // it should play and cannot
 }
 
@@ -41,7 +42,9 @@ export interface SessionEvents extends DecodingEvents {
 }
 
 const BEHIND = 1; // s of content: what is decoded behind the play head is kept
-const COMPRESSED = 1 << 25; // bytes of chunks kept though they are not wanted now: they may be again
+const COMPRESSED = 1 << 25; // bytes of chunks kept though they are not wanted now: they may be again; files up to these are fetched whole
+const MOST_WHOLE = 1 << 13; // chunks of these: all are looked through
+const IDLE = 64; // wishes of idle time that are looked for at once: enough to fill some requests (guess)
 const LATER = 3 / 4; // of the seconds that are fetched ahead: what lies beyond waits until it fills a request
 const MOST_BUFFERED = 60; // s of content that `statsAt` looks ahead
 const STATICS = 1 / 4; // share of the memory that states of the background may keep
@@ -70,9 +73,11 @@ export class Session {
   readonly #adaptive: Adaptive;
   readonly #movingTracks: number; // that have something to decode
   readonly #rates = new Map<string, number>(); // bits/s by layers beyond the first and what is wanted with them
-  #plan: Plan = { steps: [], keep: new Set(), chainCount: 0, coming: [] };
+  #plan: Plan | null = null; // the last one
   #size: number | null = null; // of the file, as the source had it last
   #speed = 1;
+  #isResting = false;
+  #isWhole = false; // all that may be wanted of bytes was at hand, when it was looked for last
 
   constructor({ head, first, decodable }: Opened, source: Source, share: Share, limits: Limits, events: SessionEvents, textures: boolean) {
     this.head = head;
@@ -85,10 +90,10 @@ export class Session {
     this.#links = new Links(head);
     this.fetcher = new Fetcher(head, source, { arrived: events.changed, failed: events.failed }, COMPRESSED);
     this.fetcher.put(first, 0);
-    this.decoding = new Decoding(head, this.#links, this.fetcher, share, events);
+    this.decoding = new Decoding(head, this.#links, this.fetcher, share, { ...events, ready: (packed, before) => this.#onReady(packed, before) });
     this.textures = new Textures(head, this.fetcher, this.decoding, { warn: events.warn, changed: events.textured }, { on: textures, decodable });
     this.picture = new Picture(head, this.decoding, this.textures);
-    this.#adaptive = new Adaptive(head, this.timeline, this.#bandwidth, this.decoding.wanted);
+    this.#adaptive = new Adaptive(head, this.timeline, this.decoding.wanted);
   }
 
   /** Layers beyond the first that "auto" chooses now. */
@@ -102,6 +107,9 @@ export class Session {
     this.#checkSize();
     const { bufferSeconds, memory } = this.#limits;
     const decodedSeconds = Math.max(this.#limits.decodedSeconds, 0.5);
+    const isAuto = aim.layers === "auto";
+    this.#isResting = aim.isPaused || (aim.loop && this.#isDecoded);
+    if (isAuto) this.#adapt(aim);
     const outlook = {
       time: aim.time,
       loop: aim.loop,
@@ -110,22 +118,28 @@ export class Session {
       behindSeconds: BEHIND,
       memory,
       layers: aim.layers === "auto" ? this.#adaptive.level : aim.layers,
-      exact: aim.layers !== "auto",
+      bearable: this.#isResting ? Infinity : this.#adaptive.bearable,
+      isResting: this.#isResting,
+      speed: aim.speed,
+      exact: !isAuto,
     };
     this.textures.loop = aim.loop;
     if (aim.splats !== this.decoding.wanted.splats) this.decoding.want({ splats: aim.splats });
     const made = plan(this.head, this.#links, this.timeline, outlook, this.decoding);
     const keep = new Set(made.keep);
     this.picture.addTo(keep);
-    this.#plan = { ...made, keep };
-    this.decoding.run(this.#plan);
+    this.#plan = made;
+    this.decoding.run({ ...made, keep });
     this.decoding.release(STATICS * memory);
     const whenOf = (ahead: number): When => (ahead <= 0 ? "now" : ahead < LATER * outlook.fetchSeconds ? "soon" : "later");
-    const wishesOf = (steps: readonly Step[]): Wish[] => steps.flatMap((step) => this.#wishesOf(step, whenOf(step.ahead)));
+    const wishesOf = (steps: readonly Step[]): Wish[] => steps.flatMap(({ chunk, fetched, ahead }) => this.#wishesOf({ chunk, layers: fetched }, whenOf(ahead)));
     const urgent = wishesOf(made.steps.filter(({ ahead }) => ahead <= 0));
     const later = wishesOf(made.steps.filter(({ ahead }) => ahead > 0));
-    this.fetcher.want([...this.#pictureWishes(made, whenOf), ...urgent, ...this.#slowWishes(made, aim.time, aim.time + outlook.fetchSeconds), ...later]);
-    if (aim.layers === "auto") this.#adapt(aim);
+    const more = made.more.flatMap(({ ahead, ...wanted }) => this.#wishesOf(wanted, whenOf(ahead)));
+    const whole = isAuto && this.#isResting ? this.#wholeWishes(made) : [];
+    const slow = this.#slowWishes(made, aim.time, aim.time + outlook.fetchSeconds);
+    const idle = isAuto ? this.#idleWishes(made, aim, outlook.bearable, whenOf) : [];
+    this.fetcher.want([...this.#pictureWishes(made, whenOf), ...urgent, ...whole, ...slow, ...later, ...more, ...idle]);
   }
 
   /** Seconds of content from a time on that can be shown; Infinity if that is all. It looks for `most` of them, or some more. */
@@ -147,12 +161,11 @@ export class Session {
     return this.#firstAhead((step) => step.decode && !this.decoding.isSettled(step.chunk)) === Infinity;
   }
 
-  /** Decoding time over playing time, of the workers that have something to do. */
-  get load(): number {
+  #loadAt(layers: number): number {
     const { frameCount, duration } = this.timeline;
-    const workers = Math.max(1, Math.min(this.#share.size, this.#plan.chainCount));
+    const workers = Math.max(1, Math.min(this.#share.size, this.#plan?.chainCount ?? 1));
     const framesPerMs = (this.#speed * this.#movingTracks * frameCount) / (1000 * duration);
-    return (this.decoding.msPerFrame * framesPerMs) / workers;
+    return (this.decoding.msPerFrame(layers) * framesPerMs) / workers;
   }
 
   /** Statistics at a time, s. */
@@ -163,7 +176,7 @@ export class Session {
     return {
       mbps: this.rateAt(layers) / 1e6,
       decodeMs: this.decoding.lastMs,
-      decodeLoad: this.load,
+      decodeLoad: this.#loadAt(this.decoding.lastLayers),
       bufferedSeconds: Math.min(this.readyAhead(time, loop, MOST_BUFFERED), loop ? duration : duration - time),
       layers,
       wholeLayers,
@@ -199,8 +212,14 @@ export class Session {
     this.decoding.close();
   }
 
+  /** True if all groups are decoded, however coarse: of a short recording. */
+  get #isDecoded(): boolean {
+    const groups = (this.#plan?.coming ?? []).filter(({ chunk }) => chunk.kind === "group");
+    return groups.length === this.head.tracks.reduce((sum, track) => sum + track.length, 0) && groups.every(({ chunk }) => this.decoding.isSettled(chunk));
+  }
+
   /** A chunk's layers, and behind them what comes with these. */
-  #wishesOf({ chunk, layers }: Step, when: When): Wish[] {
+  #wishesOf({ chunk, layers }: Pick<Step, "chunk" | "layers">, when: When): Wish[] {
     const count = layers + 1;
     const others = this.decoding.companionsOf(chunk).filter((other) => !isVideo(other) || (chunk.kind === "group" && !this.textures.isFar(chunk)));
     const companions = others.map((other) => ({ chunk: other, count: companionLayers(chunk, other, count), when }));
@@ -225,22 +244,72 @@ export class Session {
     return coming.flatMap(({ chunk }) => (chunk.kind === "static" ? this.textures.layersOf(chunk, first, last) : [])).map((layer) => ({ chunk: layer, count: 1, when: "soon" }));
   }
 
-  #adapt(aim: Aim): void {
-    this.#adaptive.wanted = this.decoding.wanted;
-    const before = this.#adaptive.level;
-    const level = this.#adaptive.decide({
-      now: performance.now(),
-      time: aim.time,
-      speed: aim.speed,
-      bandwidth: this.#bandwidth,
-      fetched: this.#firstAhead((step) => !this.decoding.hasBytes(step)) / aim.speed,
-      decoded: this.#firstAhead(({ decode, chunk }) => decode && !this.decoding.isSettled(chunk)) / aim.speed,
-      load: this.load,
-      isWaiting: aim.isWaiting,
+  /** All layers of the groups at the play head, and of those that they are predicted from. */
+  #wholeWishes({ coming }: Plan): Wish[] {
+    return coming.filter(({ chunk, ahead }) => chunk.kind === "group" && ahead <= 0).flatMap(({ chunk }) => {
+      const layers = mostLayers(chunk);
+      if (this.decoding.decodedAt(chunk) >= layers || this.decoding.isFailed(chunk)) return [];
+      const chain = [chunk];
+      for (let before = this.#links.previousOf(chunk); before !== null && this.decoding.stateAt(before) < Math.min(layers, mostLayers(before)); ) {
+        chain.unshift(before);
+        before = this.#links.previousOf(before);
+      }
+      return chain.flatMap((other) => this.#wishesOf({ chunk: other, layers: Math.min(layers, mostLayers(other)) }, "now"));
     });
-    if (level === before) return;
-    this.decoding.resetTimings();
-    this.#events.changed(); // to plan with it
+  }
+
+  /** What is fetched where nothing else is: layer by layer of the groups that come, then, with time to rest, all others of a file which may be kept whole. */
+  #idleWishes({ coming, steps }: Plan, { time, speed }: Aim, bearable: number, whenOf: (ahead: number) => When): Wish[] {
+    const isAmple = (): boolean => this.#firstAhead((step) => !this.decoding.hasBytes(step), steps) > PLENTY * speed;
+    if (!(this.#isResting ? this.picture.isReady(this.timeline.frameAt(time)) : isAmple())) return [];
+    const near = coming.filter(({ chunk }) => chunk.kind === "group" && chunk.form !== Form.EMPTY);
+    if (!this.#isResting) near.sort((a, b) => Number(this.decoding.decodedAt(a.chunk) >= 0) - Number(this.decoding.decodedAt(b.chunk) >= 0));
+    const wishes: Wish[] = [];
+    const add = (chunk: Chunk, layers: number, when: When): void => {
+      if (wishes.length >= IDLE || this.decoding.isFailed(chunk)) return;
+      wishes.push(...this.#wishesOf({ chunk, layers: Math.min(layers, mostLayers(chunk)) }, when).filter((wish) => this.fetcher.layersOf(wish.chunk) < wish.count));
+    };
+    for (let layers = 0; layers <= Math.min(bearable, this.head.info.mostLayers); layers++) {
+      for (const { chunk, ahead } of near) add(chunk, layers, this.#isResting ? "soon" : whenOf(ahead));
+    }
+    if (this.#isResting && this.#isSmall) for (const chunk of this.#others(near)) add(chunk, bearable, "soon");
+    this.#isWhole = wishes.length === 0;
+    return wishes;
+  }
+
+  /** True if a file may be kept whole. */
+  get #isSmall(): boolean {
+    return this.head.chunks.length <= MOST_WHOLE && (this.rateAt(Infinity) / 8) * this.timeline.duration <= COMPRESSED;
+  }
+
+  /** Groups that are not among these, from those that follow on. */
+  #others(coming: readonly Coming[]): Chunk[] {
+    const near = new Set(coming.map(({ chunk }) => chunk));
+    const last = coming.reduce((most, { chunk }) => Math.max(most, chunk.number), 0);
+    const others = this.head.chunks.filter((chunk) => chunk.kind === "group" && chunk.form !== Form.EMPTY && !near.has(chunk));
+    return [...others.filter(({ number }) => number > last), ...others.filter(({ number }) => number < last)];
+  }
+
+  /** Pictures that a group did not need with fewer layers are not waited for. */
+  #onReady(packed: Packed, before: Packed | null): void {
+    if (packed.kind === "group" && packed.places !== null && before?.places === null) this.textures.begin(packed.track);
+    this.#events.ready(packed, before);
+  }
+
+  #adapt({ time, speed, isWaiting }: Aim): void {
+    this.#adaptive.wanted = this.decoding.wanted;
+    this.#adaptive.decide({
+      now: performance.now(),
+      time,
+      speed,
+      bandwidth: this.#isWhole ? 0 : this.#bandwidth,
+      fetched: this.#firstAhead((step) => !this.decoding.hasBytes(step)) / speed,
+      decoded: this.#firstAhead(({ decode, chunk }) => decode && !this.decoding.isSettled(chunk)) / speed,
+      layers: this.decoding.lastLayers,
+      loadAt: (layers) => this.#loadAt(layers),
+      isWaiting,
+      isResting: this.#isResting,
+    });
   }
 
   /** A source that sends everything in any case sends nothing sooner where less is asked for. */
@@ -248,9 +317,9 @@ export class Session {
     return this.#source.isSelective ? this.#source.bandwidth : 0;
   }
 
-  /** Seconds of content until the first step of the last plan for which something holds. */
-  #firstAhead(holds: (step: Step) => boolean): number {
-    return this.#plan.steps.reduce((first, step) => (step.ahead < first && holds(step) ? step.ahead : first), Infinity);
+  /** Seconds of content until the first step of a plan, the last one if not given, for which something holds; 0 before there is one. */
+  #firstAhead(holds: (step: Step) => boolean, steps = this.#plan?.steps): number {
+    return steps?.reduce((first, step) => (step.ahead < first && holds(step) ? step.ahead : first), Infinity) ?? 0;
   }
 
   /** The first frame behind one at which a track begins another group. */

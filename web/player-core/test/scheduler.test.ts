@@ -17,15 +17,19 @@ class Table implements Holdings {
   readonly decoded = new Map<number, number>();
   readonly states = new Map<number, number>();
   readonly failed = new Set<number>();
+  readonly reach = new Map<number, number>();
   bytes = 1000;
+  seconds = 0;
 
   decodedAt = ({ number }: Chunk): number => this.decoded.get(number) ?? -1;
   stateAt = ({ number }: Chunk): number => this.states.get(number) ?? -1;
   isFailed = ({ number }: Chunk): boolean => this.failed.has(number);
   bytesOf = (): number => this.bytes;
+  reachOf = ({ number }: Chunk): number => this.reach.get(number) ?? -1;
+  secondsOf = (): number => this.seconds;
 }
 
-const OUTLOOK: Outlook = { time: 0, loop: false, fetchSeconds: 4, decodeSeconds: 2, behindSeconds: 1, memory: 1e9, layers: 9, exact: false };
+const OUTLOOK: Outlook = { time: 0, loop: false, fetchSeconds: 4, decodeSeconds: 2, behindSeconds: 1, memory: 1e9, layers: 9, bearable: Infinity, isResting: false, speed: 1, exact: false };
 
 function planned(file: Uint8Array, outlook: Partial<Outlook> = {}, table = new Table()): Plan {
   const head = Head.parse(file);
@@ -213,5 +217,50 @@ describe("whatever the file and whatever is at hand", () => {
       }
     }
     expect(steps).toBeGreaterThan(3000);
+  });
+});
+
+describe("bytes at hand", () => {
+  const file = stream(20, [100, 100, 100], 10);
+  const coarse = (): Table => {
+    const table = new Table();
+    for (let chunk = 0; chunk < 4; chunk++) table.decoded.set(chunk, 0);
+    for (let chunk = 0; chunk < 4; chunk++) table.states.set(chunk, 0);
+    for (let chunk = 0; chunk < 6; chunk++) table.reach.set(chunk, 2);
+    return table;
+  };
+  const near = { time: 0.1, fetchSeconds: 1, decodeSeconds: 1, layers: 0 };
+
+  test("are decoded again, finer, with all the time at rest", () => {
+    expect(told(planned(file, { ...near, isResting: true }, coarse())).slice(0, 3)).toEqual([[0, 2, true, true], [1, 2, true, true], [2, 2, true, true]]);
+  });
+
+  test("are decoded finer while it plays where there is time for the chain before it was shown", () => {
+    const table = coarse();
+    table.seconds = 0.12; // half of what is left of group 0 is 0.15 s
+    expect(told(planned(file, near, table))).toEqual([[0, 2, true, true], [1, 2, true, true], [2, 2, true, true]]);
+    table.seconds = 0.3;
+    expect(planned(file, near, table).steps).toEqual([]);
+  });
+
+  test("of more layers than decoding bears are of no use while it plays", () => {
+    expect(told(planned(file, { ...near, bearable: 1 }, coarse()))[0]).toEqual([0, 1, true, true]);
+  });
+
+  test("of a chain are as good as those of its poorest group", () => {
+    const table = coarse();
+    table.reach.set(1, 1);
+    expect(told(planned(file, { ...near, isResting: true }, table)).slice(0, 3)).toEqual([[0, 2, true, true], [1, 1, true, true], [2, 1, true, true]]);
+  });
+
+  test("do until better ones come, where a group is shown soon: its finer layers are still fetched", () => {
+    const table = new Table();
+    const [first, , third] = planned(file, { ...near, layers: 2 }, table).steps;
+    expect([first.least, first.fetched, third.least]).toEqual([0, 2, 2]);
+    table.decoded.set(0, 0);
+    table.states.set(0, 0);
+    const { more, steps } = planned(file, { ...near, layers: 2 }, table);
+    expect(more.map(({ chunk, layers }) => [chunk.number, layers])).toEqual([[0, 2]]);
+    expect(steps.map(({ chunk, layers, fetched }) => [chunk.number, layers, fetched])).toEqual([[1, 0, 2], [2, 0, 2]]);
   });
 });

@@ -54,6 +54,19 @@ describe("pictures", () => {
     };
   }
 
+  test("come with the layers that need them: until they are decoded a loop goes on without, and does not wait", async () => {
+    rig.begin(textured(2, 2), FAST);
+    rig.player.loop = true;
+    rig.player.layers = 0;
+    await Promise.all([rig.player.play(), pass(2)]);
+    expect([rig.viewer.shown?.groups[0]?.layers, rig.player.stats.textures]).toEqual([0, "left out"]);
+    rig.player.layers = "auto";
+    await pass(3);
+    const { shown } = rig.viewer;
+    expect([shown?.groups[0]?.layers, frameOf(shown), rig.player.stats.textures]).toEqual([1, shown?.frame, "shown"]);
+    expect(rig.player.stats.stalls).toBe(0);
+  });
+
   test("are those of their frames, decoded once each, a few ahead", async () => {
     rig.begin(textured(4, 2), FAST);
     watch();

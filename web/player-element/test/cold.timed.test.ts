@@ -1,10 +1,11 @@
-// How long a first visitor waits on a slow line: until something is seen, and until the recording is.
+// How long a first visitor waits: on a slow line until something is seen and until the recording is, and anywhere until it is seen with all its layers.
 
 import { spawn } from "node:child_process";
 import { once } from "node:events";
 import { join } from "node:path";
 
-import type { Browser } from "playwright-core";
+import { devices } from "playwright-core";
+import type { Browser, BrowserContextOptions } from "playwright-core";
 import { expect, test } from "vitest";
 
 import { describeInBrowser, launchBrowser } from "../../test/browser.ts";
@@ -33,6 +34,72 @@ async function visit(browser: Browser, address: URL, bits: number, milliseconds:
     await link.close();
   }
 }
+
+/** One opening: until the first frame is shown, until the last byte of the recording came, and until all layers are shown, in ms. */
+interface Opening {
+  readonly seen: number;
+  readonly last: number;
+  readonly whole: number;
+}
+
+const OPENINGS = Number(process.env.MESHREEL_OPENINGS ?? 1); // of each kind
+const SIZES = [320, 640, 1280]; // pixels of width
+const KINDS: Readonly<Record<string, BrowserContextOptions & { readonly throttle?: number }>> = {
+  ...Object.fromEntries(SIZES.map((width) => [`${width} px`, { viewport: { width, height: (3 * width) / 4 } }])),
+  phone: { ...devices["Pixel 7"]!, throttle: 4 },
+  "4 x slower": { viewport: { width: 640, height: 480 }, throttle: 4 },
+};
+
+/** Opens a page and waits until the picture that stands there has all layers. */
+async function openOnce(browser: Browser, address: string, { throttle = 1, ...options }: (typeof KINDS)[string]): Promise<Opening> {
+  const context = await browser.newContext(options);
+  try {
+    const page = await context.newPage();
+    await (await context.newCDPSession(page)).send("Emulation.setCPUThrottlingRate", { rate: throttle });
+    await page.goto(`${address}${address.includes("?") ? "&" : "?"}autoplay=0`, { waitUntil: "commit" });
+    const when = async (isThere: () => boolean): Promise<number> => {
+      await page.waitForFunction(isThere, undefined, { polling: 10 });
+      return page.evaluate(() => performance.now());
+    };
+    const seen = await when(() => (document.querySelector("meshreel-player")?.statistics?.triangles ?? 0) > 0);
+    const whole = await when(() => {
+      const { layers, wholeLayers } = document.querySelector("meshreel-player")!.statistics!;
+      return layers === wholeLayers;
+    });
+    const last = await page.evaluate(() => Math.max(...performance.getEntriesByType("resource").filter(({ name }) => name.endsWith(".reel")).map((entry) => entry.startTime + entry.duration)));
+    return { seen, last, whole };
+  } finally {
+    await context.close();
+  }
+}
+
+describeInBrowser("the player of meshreel play", () => {
+  test.runIf(ALL && hasPython)("shows all layers at any size and speed, a second after the last byte at most", { timeout: 1e6 }, async () => {
+    const server = spawn(PYTHON, ["-m", "meshreel", "play", process.env.MESHREEL_RECORDING ?? RECORDING, "--no-browser", "--json"]);
+    const browser = await launchBrowser();
+    try {
+      const [line] = (await once(server.stdout, "data")) as [Buffer];
+      const address = new URL((JSON.parse(line.toString()) as { addresses: string[] }).addresses[0]);
+      await openOnce(browser, address.href, {}); // the first that the server and the browser see
+      for (const [kind, options] of Object.entries(KINDS)) {
+        const openings: Opening[] = [];
+        for (let k = 0; k < OPENINGS; k++) openings.push(await openOnce(browser, address.href, options));
+        const behind = openings.map(({ seen, last, whole }) => whole - Math.max(seen, last)); // drawing for the first time takes what it takes
+        const mean = (of: (opening: Opening) => number): string => (openings.reduce((sum, opening) => sum + of(opening), 0) / OPENINGS / 1000).toFixed(2);
+        console.log(`${kind}: ${OPENINGS} of ${OPENINGS} whole; mean: first frame ${mean(({ seen }) => seen)} s, last byte ${mean(({ last }) => last)} s, whole ${mean(({ whole }) => whole)} s`);
+        expect(Math.max(...behind), kind).toBeLessThan(1000 * (options.throttle ?? 1));
+      }
+      const link = await openLink(Number(address.port), BITS, MILLISECONDS);
+      const { last, whole } = await openOnce(browser, link.origin + address.pathname + address.search, {});
+      console.log(`slow line: last byte ${(last / 1000).toFixed(2)} s, whole ${(whole / 1000).toFixed(2)} s, ${link.bytes} bytes, which need ${(5 * MILLISECONDS) / 1000 + (8 * link.bytes) / BITS} s`);
+      await link.close();
+      expect(whole - last).toBeLessThan(1000);
+    } finally {
+      await browser.close();
+      server.kill();
+    }
+  });
+});
 
 describeInBrowser("the player of meshreel play, on a cold line of 1 Mbit/s and 200 ms", () => {
   test.runIf(ALL && hasPython)("shows its first frame within 4 s", async () => {

@@ -7,6 +7,8 @@ import type { Frame, Page } from "playwright-core";
 import { afterAll, beforeAll, expect, test } from "vitest";
 import { describeInBrowser } from "../../test/browser.ts";
 import { slowTest } from "../../test/slow.ts";
+import { FileServer } from "../../player-core/test/server.ts";
+import { ROOT } from "../../test/python.ts";
 import { buildPlayer, Site } from "./product.ts";
 
 const PLAYER = '<meshreel-player src="scene.reel" controls style="width:320px;height:240px;aspect-ratio:auto"></meshreel-player>';
@@ -156,6 +158,31 @@ describeInBrowser("the built player", () => {
     await shown(most);
     expect(errors).toEqual([]);
     await page.close();
+  });
+
+  test("all layers are shown of a picture that stands, and of a loop, however the line was measured", async () => {
+    const server = await FileServer.of(readFileSync(join(ROOT, "conformance/v1/layers.reel")));
+    server.respond = async (response, asked, count) => {
+      response.setHeader("Access-Control-Allow-Origin", "*");
+      response.setHeader("Access-Control-Expose-Headers", "Content-Range");
+      await new Promise((done) => setTimeout(done, count === 0 ? 300 : 0));
+      const body = server.begin(response, asked);
+      for (let at = 0; at < body.length; at += 100) {
+        response.write(body.subarray(at, at + 100));
+        await new Promise((done) => setTimeout(done, 50)); // 16 kbit/s
+      }
+      response.end();
+    };
+    for (const looped of ["autoplay=0", "autoplay&loop"]) {
+      const { page, errors } = await site.visit(`player/index.html?src=${server.url}&${looped}`);
+      await page.waitForFunction(() => {
+        const { triangles, layers, wholeLayers } = document.querySelector("meshreel-player")?.statistics ?? {};
+        return triangles! > 0 && wholeLayers! > 0 && layers === wholeLayers;
+      });
+      expect(errors).toEqual([]);
+      await page.close();
+    }
+    await server.close();
   });
 
   test("a file that is not there is told", async () => {
@@ -344,7 +371,7 @@ describeInBrowser("the built player", () => {
 
   test("the player is small enough for a page", () => {
     const size = (name: string) => gzipSync(readFileSync(join(site.folder, "player", name))).length;
-    expect(size("meshreel-player.js")).toBeLessThan(46_000);
+    expect(size("meshreel-player.js")).toBeLessThan(47_500);
     expect(size("three.js")).toBeLessThan(140_000);
     expect(size("worker.js") + size("core.wasm")).toBeLessThan(150_000);
   });

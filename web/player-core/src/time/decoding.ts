@@ -15,7 +15,7 @@ import type { Companion, DecodeJob } from "../protocol.ts";
 import type { Packed } from "../types.ts";
 
 export interface DecodingEvents {
-  ready(packed: Packed): void;
+  ready(packed: Packed, before: Packed | null): void; // in the place of what was decoded before
   release(packed: Packed): void;
   warn(error: Error): void;
   changed(): void; // a job is done: there may be more to show, and more to do
@@ -32,13 +32,14 @@ interface State extends With {
 }
 
 const TRIES = 3; // of a job whose state a worker had dropped
-const [FEWEST_TIMINGS, TIMINGS] = [2, 12]; // jobs that the load is measured over, at least and at most
+const [FEWEST_TIMINGS, TIMINGS] = [2, 12]; // jobs of one number of layers that the load is measured over, at least and at most
 
 export class Decoding implements Holdings {
   /** Counts what changes in what can be shown. */
   version = 0;
   wanted: Wanted = { textures: null, splats: true }; // of companions
   lastMs = 0; // of decoding the last group
+  lastLayers = 0; // beyond the first, of that
   readonly #head: Head;
   readonly #links: Links;
   readonly #fetcher: Fetcher;
@@ -53,8 +54,7 @@ export class Decoding implements Holdings {
   readonly #tries = new Map<number, number>();
   #keep: ReadonlySet<number> = new Set();
   #bytesPerFrame = 0; // of the last groups
-  #stale = new Set<number>(); // chunks whose jobs had begun when timings were forgotten
-  readonly #timings: { readonly ms: number; readonly frames: number }[] = []; // of the last groups
+  readonly #timings = new Map<number, readonly { readonly ms: number; readonly frames: number }[]>(); // of the last groups, by layers beyond the first
 
   constructor(head: Head, links: Links, fetcher: Fetcher, share: Share, events: DecodingEvents) {
     this.#head = head;
@@ -114,10 +114,20 @@ export class Decoding implements Holdings {
     this.#events.changed();
   }
 
-  /** True if the bytes of a step are at hand. */
-  hasBytes({ chunk, layers }: Step): boolean {
+  /** True if the bytes of a chunk with so many layers beyond the first are at hand, and those of its companions but for pictures. */
+  hasBytes({ chunk, layers }: Pick<Step, "chunk" | "layers">): boolean {
     const has = (other: Chunk, count: number): boolean => this.#fetcher.layersOf(other) >= count;
     return has(chunk, layers + 1) && this.companionsOf(chunk).every((companion) => isVideo(companion) || has(companion, companionLayers(chunk, companion, layers + 1)));
+  }
+
+  reachOf(chunk: Chunk): number {
+    let layers = this.#fetcher.layersOf(chunk) - 1;
+    while (layers >= 0 && !this.hasBytes({ chunk, layers })) layers--;
+    return layers;
+  }
+
+  secondsOf({ frameCount }: Chunk, layers: number): number {
+    return ((this.msPerFrame(layers) || this.msPerFrame(this.lastLayers)) * frameCount) / 1000;
   }
 
   bytesOf(chunk: Chunk): number {
@@ -131,11 +141,12 @@ export class Decoding implements Holdings {
     return count;
   }
 
-  /** Milliseconds of decoding a frame of one track, over the last groups; 0 before there are some. */
-  get msPerFrame(): number {
-    if (this.#timings.length < FEWEST_TIMINGS) return 0;
-    const frames = this.#timings.reduce((sum, timing) => sum + timing.frames, 0);
-    return this.#timings.reduce((sum, timing) => sum + timing.ms, 0) / frames;
+  /** Milliseconds of decoding a frame of one track with so many layers beyond the first, over the last groups; 0 before there are some. */
+  msPerFrame(layers: number): number {
+    const timings = this.#timings.get(layers) ?? [];
+    if (timings.length < FEWEST_TIMINGS) return 0;
+    const frames = timings.reduce((sum, timing) => sum + timing.frames, 0);
+    return timings.reduce((sum, timing) => sum + timing.ms, 0) / frames;
   }
 
   /** Does the steps whose bytes are at hand, in their order; cancels all others that have not started. */
@@ -145,16 +156,10 @@ export class Decoding implements Holdings {
     this.#submitted.clear();
     for (const step of steps) {
       if (!step.decode || this.#running.has(step.chunk.number)) continue;
-      if (!this.hasBytes(step) || !this.#hasState(step)) continue;
-      this.#submitted.set(step.chunk.number, step);
+      const layers = this.#layersFor(step);
+      if (layers >= step.least) this.#submitted.set(step.chunk.number, { ...step, layers });
     }
     for (const step of [...this.#submitted.values()]) this.#submit(step);
-  }
-
-  /** Forgets how long decoding took, as where it will take another time from here on. */
-  resetTimings(): void {
-    this.#timings.length = 0;
-    this.#stale = new Set(this.#running.keys());
   }
 
   /** Lets go of what is decoded and is not in the plan any more. States of the background may stay while they are small. */
@@ -220,11 +225,13 @@ export class Decoding implements Holdings {
     return (!textured && this.picturesOf(chunk, layers) !== null) || (!splatted && this.#hasSplats(chunk));
   }
 
-  #hasState({ chunk, layers }: Step): boolean {
+  /** Layers beyond the first of a step for which bytes and states are at hand, or soon will be; -1 where there are none. */
+  #layersFor({ chunk, layers }: Step): number {
+    const most = Math.min(layers, this.reachOf(chunk));
     const previous = this.#links.previousOf(chunk);
-    if (previous === null) return true;
+    if (previous === null) return most;
     const state = this.#submitted.get(previous.number)?.layers ?? this.stateAt(previous);
-    return state >= Math.min(layers, mostLayers(previous));
+    return state < Math.min(most, mostLayers(previous)) ? state : most;
   }
 
   #submit(step: Step): void {
@@ -272,7 +279,7 @@ export class Decoding implements Holdings {
     if (outcome.kind === "decoded") {
       this.#states.set(chunk.number, { ...made, layers, worker: outcome.worker });
       this.#tries.delete(chunk.number);
-      this.#time(chunk, outcome.ms);
+      this.#time(step, outcome.ms);
       const { packed } = outcome;
       const crowd = packed === null ? null : this.#crowdOf(chunk, bytesOf(packed));
       if (crowd !== null) this.#fail(chunk, crowd);
@@ -311,7 +318,7 @@ export class Decoding implements Holdings {
       this.#bytesPerFrame = this.#bytesPerFrame === 0 ? perFrame : (this.#bytesPerFrame + perFrame) / 2;
     }
     this.version++;
-    this.#events.ready(packed);
+    this.#events.ready(packed, old);
     if (old !== null) this.#events.release(old);
   }
 
@@ -322,11 +329,11 @@ export class Decoding implements Holdings {
     this.#events.release(packed);
   }
 
-  #time({ number, kind, frameCount: frames }: Chunk, ms: number): void {
-    if (this.#stale.delete(number) || kind !== "group") return; // the background is decoded once
-    this.lastMs = ms;
-    this.#timings.push({ ms, frames });
-    if (this.#timings.length > TIMINGS) this.#timings.shift();
+  #time({ chunk: { kind, frameCount: frames }, layers }: Step, ms: number): void {
+    if (kind !== "group") return; // the background is decoded once
+    [this.lastMs, this.lastLayers] = [ms, layers];
+    const timings = this.#timings.get(layers) ?? [];
+    this.#timings.set(layers, [...timings, { ms, frames }].slice(-TIMINGS));
   }
 
   #countTry(chunk: Chunk): number {

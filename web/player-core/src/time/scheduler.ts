@@ -16,6 +16,10 @@ export interface Holdings {
   isFailed(chunk: Chunk): boolean;
   /** Bytes that it takes when it is decoded, measured or estimated. */
   bytesOf(chunk: Chunk): number;
+  /** That the bytes at hand of a chunk and its companions are enough for. */
+  reachOf(chunk: Chunk): number;
+  /** Seconds that decoding it with so many layers takes, as measured lately; 0 before that. */
+  secondsOf(chunk: Chunk, layers: number): number;
 }
 
 /** Position of the play head, and the extent that is wanted around it. */
@@ -26,8 +30,13 @@ export interface Outlook {
   readonly decodeSeconds: number; // of content, ahead; not more than fetchSeconds
   readonly behindSeconds: number; // of content: what is decoded behind the play head is kept
   readonly memory: number; // bytes that decoded groups may take
-  readonly layers: number;
-  /** True if groups decoded with other layers are decoded again, with the chains that predict them. */
+  readonly layers: number; // that are fetched
+  /** Layers that decoding bears: more bytes at hand than these need are of no use in time. */
+  readonly bearable: number;
+  /** True if decoding has all the time that it takes: nothing moves on, or all that comes is decoded. */
+  readonly isResting: boolean;
+  readonly speed: number; // content seconds a second
+  /** True if groups are decoded with `layers` and no others, again where need be, with the chains that predict them. */
   readonly exact: boolean;
 }
 
@@ -35,6 +44,8 @@ export interface Outlook {
 export interface Step {
   readonly chunk: Chunk;
   readonly layers: number;
+  readonly fetched: number; // layers that are fetched: some may come too late to be decoded
+  readonly least: number; // layers with which it is decoded where the bytes of the others do not come in time
   show: boolean; // or only its state is wanted, for the next of its chain
   decode: boolean; // or it is only fetched, for later
   ahead: number; // s of content until a frame needs it; 0 or less: that at the play head does
@@ -46,9 +57,15 @@ export interface Coming {
   readonly ahead: number; // s, as of a step
 }
 
+/** A chunk that is decoded, and of which more layers are fetched. */
+export interface More extends Coming {
+  readonly layers: number;
+}
+
 /** Why a chunk is wanted. */
 interface Need {
   readonly ahead: number; // s
+  readonly left: number; // s of content until it was shown
   readonly decode: boolean;
 }
 
@@ -56,18 +73,22 @@ export interface Plan {
   readonly steps: readonly Step[]; // in order
   readonly keep: ReadonlySet<number>; // chunks that are shown, or soon will be
   readonly chainCount: number; // that can be decoded beside each other
+  readonly more: readonly More[];
   readonly coming: readonly Coming[]; // groups and backgrounds that will be shown, decoded or not, in the order of time
 }
 
 const MOST_GROUPS = 4096; // of all tracks, ahead or behind: a hostile frame rate has a whole file within a second
 const FEWEST_GROUPS = 64; // of each track, however many there are
+const NEAR = 0.5; // s of display time: what is shown so soon is decoded with the layers that have come (guess)
+const SPARE = 1 / 2; // of the time until a group was shown: what decoding its chain again, finer, may take (guess)
 const SURE_GROUPS = 2; // of each track, the shown one and the next: wanted whatever memory they take
 
 /**
  * Steps for the frame at the play head first, then for those ahead in their order, from the start again with `loop`.
  *
- * A group predicted from another is decoded to its level or a coarser one. So within a chain the number of layers only falls;
- * a rise waits for the next group that stands alone. With `exact` it does not wait: the chain is decoded again, finer.
+ * Chunks are fetched with `layers` and decoded with all that are at hand. A group predicted from another is decoded with as many layers or fewer, so
+ * within a chain their number falls; it rises with the next group that stands alone, or where finer bytes are at hand and there is time to decode the chain
+ * again. With `exact` it is, time or not.
  */
 export function plan(head: Head, links: Links, timeline: Timeline, outlook: Outlook, holdings: Holdings): Plan {
   const planner = new Planner(head, links, outlook, holdings);
@@ -78,7 +99,8 @@ export function plan(head: Head, links: Links, timeline: Timeline, outlook: Outl
     for (const group of groupsBetween(head, first, last, most)) {
       const frame = Math.max(group.shownFirst, first);
       const ahead = timeline.startOf(frame) - time + (frame < now ? timeline.duration : 0);
-      planner.addGroup(group, frame, frame === now ? 0 : ahead, ahead <= decodeSeconds);
+      const left = ahead + timeline.startOf(group.shownEnd) - timeline.startOf(frame);
+      planner.addGroup(group, frame, { ahead: frame === now ? 0 : ahead, left, decode: ahead <= decodeSeconds });
     }
   }
   const behind = Math.max(timeline.frameAt(time - behindSeconds), now - most);
@@ -119,6 +141,9 @@ class Planner {
   readonly #coming = new Map<Chunk, number>();
   readonly #groupsOfTrack: number[];
   #bytes = 0; // decoded
+  readonly #fetched = new Map<Chunk, number>(); // layers
+  readonly #more: More[] = [];
+  #spent = 0; // s, of decoding chains again
 
   constructor(head: Head, links: Links, outlook: Outlook, holdings: Holdings) {
     this.#head = head;
@@ -128,49 +153,96 @@ class Planner {
     this.#groupsOfTrack = head.tracks.map(() => 0);
   }
 
-  addGroup(group: Chunk, frame: number, ahead: number, isNear: boolean): void {
+  addGroup(group: Chunk, frame: number, need: Need): void {
     const background = this.#head.staticOfFrame(frame);
-    if (background !== null) this.#add(background, { ahead, decode: isNear });
-    for (const chunk of background === null ? [group] : [background, group]) if (!this.#coming.has(chunk)) this.#coming.set(chunk, ahead);
+    if (background !== null) this.#add(background, need);
+    for (const chunk of background === null ? [group] : [background, group]) if (!this.#coming.has(chunk)) this.#coming.set(chunk, need.ahead);
     if (group.form === Form.EMPTY) return;
     const isSure = ++this.#groupsOfTrack[group.track] <= SURE_GROUPS;
     this.#bytes += this.#holdings.bytesOf(group);
-    const decode = isNear && (isSure || this.#bytes <= this.#outlook.memory);
+    const decode = need.decode && (isSure || this.#bytes <= this.#outlook.memory);
     if (decode) this.#chains.add(this.#links.rootOf(group));
-    this.#add(group, { ahead, decode });
+    this.#add(group, { ...need, decode });
   }
 
   plan(): Plan {
     const steps = [...this.#steps.values()];
     const coming = Array.from(this.#coming, ([chunk, ahead]) => ({ chunk, ahead }));
     const urgent = steps.filter((step) => step.ahead <= 0).sort((a, b) => a.chunk.number - b.chunk.number);
-    return { steps: [...urgent, ...steps.filter((step) => step.ahead > 0)], keep: this.keep, chainCount: this.#chains.size, coming };
+    return { steps: [...urgent, ...steps.filter((step) => step.ahead > 0)], keep: this.keep, chainCount: this.#chains.size, more: this.#more, coming };
   }
 
   /** Wants a chunk to be shown, and before it what it is predicted from, as far as that is not at hand. */
   #add(chunk: Chunk, need: Need): void {
     if (this.#holdings.isFailed(chunk)) return;
     if (need.decode) this.keep.add(chunk.number);
-    const wanted = this.#wantedOf(chunk);
     const decoded = this.#holdings.decodedAt(chunk);
-    if (decoded === wanted || (decoded >= 0 && !this.#outlook.exact)) return;
+    const { layers, fetched, before } = this.#wayTo(chunk);
+    this.#fetched.set(chunk, fetched);
+    const { exact, speed } = this.#outlook;
+    if (exact ? decoded === layers : this.#refine(chunk, decoded, fetched, need)) return;
+    if (decoded >= 0 && !exact) {
+      if (decoded < fetched) this.#more.push({ chunk, layers: fetched, ahead: need.ahead });
+    } else {
+      const isSoon = !exact && chunk.kind === "group" && need.ahead <= NEAR * speed;
+      this.#stepThrough([...before, chunk], { layers, fetched, least: isSoon ? 0 : layers }, need);
+    }
+  }
+
+  /** Layers with which a chunk is decoded and fetched, and the chunks of its chain that are decoded before it. */
+  #wayTo(chunk: Chunk): { layers: number; fetched: number; before: Chunk[] } {
+    let layers = chunk.kind === "static" ? mostLayers(chunk) : Math.min(this.#outlook.layers, mostLayers(chunk));
+    let fetched = layers;
     const before: Chunk[] = [];
-    let layers = wanted;
     for (let previous = this.#links.previousOf(chunk); previous !== null; previous = this.#links.previousOf(previous)) {
       const state = this.#stateOf(previous);
       if (state >= Math.min(layers, mostLayers(previous))) break;
       if (state >= 0 && !this.#outlook.exact) {
         layers = state;
+        const possible = this.#fetched.get(previous) ?? Math.max(state, this.#finest(previous).layers);
+        if (possible < mostLayers(previous)) fetched = Math.min(fetched, possible);
         break;
       }
-      before.push(previous);
+      before.unshift(previous);
     }
-    for (const other of before.reverse()) this.#step(other, layers, false, need);
-    this.#step(chunk, layers, true, need);
+    return { layers, fetched, before };
   }
 
-  #wantedOf(chunk: Chunk): number {
-    return chunk.kind === "static" ? mostLayers(chunk) : Math.min(this.#outlook.layers, mostLayers(chunk));
+  /** Decodes a chunk with the layers that are at hand, where they are enough and there is time for its chain. True if no other step is needed. */
+  #refine(chunk: Chunk, decoded: number, wanted: number, need: Need): boolean {
+    const { layers, chain } = this.#finest(chunk);
+    const isShown = decoded >= 0;
+    const isFiner = need.decode && (isShown ? layers > decoded : layers >= wanted);
+    if (!isFiner || !((chain.length === 1 && !isShown) || this.#hasTime(chain, layers, isShown, need))) return false;
+    this.#stepThrough(chain, { layers, fetched: Math.max(layers, wanted), least: layers }, need);
+    return true;
+  }
+
+  /** The most layers of a chunk that bytes at hand allow, and the end of its chain that is decoded for them. */
+  #finest(chunk: Chunk): { layers: number; chain: Chunk[] } {
+    let layers = Math.min(this.#outlook.bearable, this.#holdings.reachOf(chunk));
+    const chain = [chunk];
+    const isReached = (other: Chunk): boolean => this.#holdings.stateAt(other) >= Math.min(layers, mostLayers(other));
+    for (let previous = this.#links.previousOf(chunk); previous !== null; previous = this.#links.previousOf(previous)) {
+      const step = this.#steps.get(previous.number);
+      if (step === undefined && isReached(previous)) break;
+      const limit = step?.layers ?? this.#holdings.reachOf(previous);
+      if (limit < mostLayers(previous)) layers = Math.min(layers, limit);
+      if (step !== undefined) break;
+      chain.unshift(previous);
+    }
+    const start = chain.slice(0, -1).map(isReached).lastIndexOf(true) + 1; // fewer layers need less
+    return { layers, chain: chain.slice(start) };
+  }
+
+  /** True if a chain can be decoded before most of it was shown, beside what was added before. */
+  #hasTime(chain: readonly Chunk[], layers: number, isShown: boolean, { ahead, left }: Need): boolean {
+    const { isResting, speed } = this.#outlook;
+    if (isResting && (isShown || ahead > 0)) return true;
+    const seconds = chain.reduce((sum, chunk) => sum + this.#holdings.secondsOf(chunk, layers), this.#spent);
+    if (seconds >= (SPARE * left) / speed) return false;
+    this.#spent = seconds;
+    return true;
   }
 
   /** Of the state that will be there: that of a step takes the place of one at hand, be it coarser. */
@@ -178,12 +250,16 @@ class Planner {
     return this.#steps.get(chunk.number)?.layers ?? this.#holdings.stateAt(chunk);
   }
 
-  #step(chunk: Chunk, layers: number, show: boolean, { ahead, decode }: Need): void {
-    const old = this.#steps.get(chunk.number);
-    const step = old ?? { chunk, layers: Math.min(layers, mostLayers(chunk)), show, decode, ahead };
-    step.show ||= show && decode;
-    step.decode ||= decode;
-    step.ahead = Math.min(step.ahead, ahead);
-    this.#steps.set(chunk.number, step);
+  /** Steps for the end of a chain, of which the last chunk is shown. */
+  #stepThrough(chain: readonly Chunk[], { layers, fetched, least }: Pick<Step, "layers" | "fetched" | "least">, { ahead, decode }: Need): void {
+    for (const chunk of chain) {
+      const most = mostLayers(chunk);
+      const old = this.#steps.get(chunk.number);
+      const step = old ?? { chunk, layers: Math.min(layers, most), fetched: Math.min(fetched, most), least: Math.min(least, most), show: false, decode, ahead };
+      step.show ||= chunk === chain.at(-1) && decode;
+      step.decode ||= decode;
+      step.ahead = Math.min(step.ahead, ahead);
+      this.#steps.set(chunk.number, step);
+    }
   }
 }

@@ -91,6 +91,11 @@ export class Textures implements LaneHost {
     }
   }
 
+  /** Shows a track without textures until its first picture is there. */
+  begin(track: number): void {
+    this.#early.add(track);
+  }
+
   /** True if the pictures of a chunk are left out because its track is far. */
   isFar({ kind, track }: Chunk): boolean {
     return kind === "group" && this.#far.has(track);
