@@ -7,6 +7,8 @@ import pytest
 
 from meshreel.geometry.cameras import Camera, CameraPose
 from meshreel.geometry.color_views import ColorPicture, ColorViews, sampled, spread_colors
+from meshreel.geometry.depth import DepthPicture
+from meshreel.geometry.drawing import draw
 from meshreel.geometry.topology import concatenate, subdivide_midpoint
 from meshreel.types import GREY, Mesh, Placement
 
@@ -88,12 +90,80 @@ def test_a_picture_that_is_too_bright_is_divided_by_its_gains() -> None:
     np.testing.assert_allclose(colors, [[39.5 / 2, 39.5 * 2, 0]])
 
 
-def test_clear_views_leave_out_what_is_beside_a_step_and_not_beside_a_hole() -> None:
-    screen = Mesh(WALL.vertices * [0.1, 0.1, 0.5], WALL.faces)
-    hole = np.linalg.norm(WALL.vertices[WALL.faces].mean(axis=1) - [0.58, 0.58, 2], axis=1) < 0.15
-    room = concatenate([WALL.with_faces(~hole), screen])
-    points = np.array([[0.225, 0, 2], [0.32, 0, 2], [0.58, 0.77, 2]])  # 1 and 6 pixels from the step, beside the hole
+def test_clear_views_leave_out_what_is_beside_a_step_and_not_beside_a_small_hole() -> None:
+    screen, wall = Mesh(WALL.vertices * [0.1, 0.1, 0.5], WALL.faces), subdivide_midpoint(WALL, 2)
+    hole = np.linalg.norm(wall.vertices[wall.faces].mean(axis=1) - [0.58, 0.58, 2], axis=1) < 0.05
+    room = concatenate([wall.with_faces(~hole), screen])
+    points = np.array([[0.225, 0, 2], [0.32, 0, 2], [0.58, 0.66, 2]])  # 1 and 6 pixels from the step, beside the hole
     assert hole.any()
     for clear, wanted in ((True, [False, True, True]), (False, [True, True, True])):
         views = ColorViews([ColorPicture(AHEAD, PIXELS)], room)
         assert (views.clear if clear else views).at(points, NORMALS[:3])[1].tolist() == wanted
+
+
+def depths_of(mesh: Mesh, camera: Camera = AHEAD) -> np.ndarray:
+    """What a depth camera without errors measures of a mesh, mm."""
+    depth = draw(mesh, camera).depth
+    return np.where(np.isfinite(depth), np.rint(1000 * np.where(np.isfinite(depth), depth, 0)), 0).astype(np.uint16)
+
+
+def test_no_color_crosses_a_step() -> None:
+    screen = Mesh(WALL.vertices * [0.3, 0.3, 0.75], WALL.faces)  # .3 m to all sides, before a wall at 2 m
+    room, aside = concatenate([WALL, screen]), np.eye(4)
+    aside[:3, 3] = [-0.25, 0, 0]  # to the right
+    cameras = [AHEAD, replace(AHEAD, pose=CameraPose.of_world(aside))]
+    pictures = []
+    for camera in cameras:
+        seen = draw(room, camera)
+        pixels = np.where(seen.faces < 0, 0, np.where(seen.faces < len(WALL.faces), 200, 90)).astype(np.uint8)
+        pictures.append(ColorPicture(camera, pixels[..., None].repeat(3, axis=2)))
+    views = ColorViews(pictures, room)
+    for mesh, color in ((subdivide_midpoint(WALL, 3), 200), (subdivide_midpoint(screen, 3), 90)):
+        colors, known = views.at(mesh.vertices, np.tile([0.0, 0, -1], (len(mesh.vertices), 1)))
+        assert known.mean() > 0.5 and (colors[known].round() == color).all()
+
+
+def test_a_place_before_the_surface_has_not_the_color_behind_it() -> None:
+    views = ColorViews([ColorPicture(AHEAD, PIXELS)], WALL)
+    assert views.at(np.array([[0.0, 0, 1.97], [0, 0, 1.99], [0, 0, 2.01], [0, 0, 2.03]]), NORMALS[:4])[1].tolist() == [
+        False, True, True, False
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("scale", [1.0, 0.2])
+def test_guessed_surface_beyond_what_was_measured_has_no_color(scale: float) -> None:
+    small = Mesh(WALL.vertices * [0.5, 0.5, 1], WALL.faces)  # what is there; the wall was guessed beyond it
+    place, points = Placement(scale, (0.0, 0.0, 0.0)), np.array([[0.3, 0, 2], [0.47, 0, 2], [0.56, 0, 2], [0.7, 0, 2]])
+    measured = depths_of(small)
+    measured[40, 52] = 0  # a hole of one pixel changes nothing, of 9 pixels it is one
+    measured[20:29, 20:29] = 0
+    points = np.concatenate([points, [[0.25, 0.01, 2], [-0.31, -0.31, 2]]])
+    depth, picture = DepthPicture(AHEAD, measured, 0.001, 8.0).placed(place), ColorPicture(AHEAD, PIXELS).placed(place)
+    hides, normals = Mesh(WALL.vertices / scale, WALL.faces), np.tile([0.0, 0, -1], (6, 1))
+    for depths, wanted in (([depth], [True, True, False, False, True, False]), ([], [True] * 6)):
+        views = ColorViews([picture], hides, 0.01 / scale, depths)
+        assert views.at(points / scale, normals)[1].tolist() == wanted
+    assert views.clear.at(points / scale, normals)[1].all()
+    assert ColorViews([picture], hides, 0.01 / scale, [depth]).clear.at(points / scale, normals)[1].tolist() == [
+        True, False, False, False, True, False
+    ]  # fmt: skip
+
+
+def test_noisy_measurements_confirm_a_surface_and_those_of_a_camera_elsewhere_say_nothing() -> None:
+    noisy = depths_of(WALL) + np.random.default_rng(0).normal(0, 15, (SIDE, SIDE))  # mm
+    points = np.stack([*np.meshgrid(np.linspace(-0.7, 0.7, 20), np.linspace(-0.7, 0.7, 20))], 2).reshape(-1, 2)
+    points, away = np.column_stack([points, np.full(400, 2.0)]), np.eye(4)
+    away[:3, 3] = [-1.5, 0, 0]
+    cameras = AHEAD, replace(AHEAD, pose=CameraPose.of_world(away))
+    for camera, measured in zip(cameras, (np.rint(noisy), np.zeros((SIDE, SIDE))), strict=True):
+        depth = DepthPicture(camera, measured.astype(np.uint16), 0.001, 8.0)
+        views = ColorViews([ColorPicture(AHEAD, PIXELS)], WALL, depths=[depth])
+        assert views.at(points, np.tile([0.0, 0, -1], (400, 1)))[1].mean() > 0.99
+
+
+def test_a_bent_lens_shows_what_is_hidden_where_it_is() -> None:
+    screen = Mesh(WALL.vertices * [0.05, 0.05, 0.5] + [0.14, 0, 0], WALL.faces)  # hides .18 to .38 of the wall
+    bent = ColorPicture(replace(AHEAD, distortion=(1.0,)), PIXELS)
+    views = ColorViews([bent], concatenate([WALL, screen]))
+    points = np.array([[0.1, 0, 2], [0.28, 0, 2], [0.45, 0, 2]])
+    assert views.at(points, NORMALS[:3])[1].tolist() == [True, False, True]

@@ -96,7 +96,7 @@ class Recording(MeshSequence):
             mesh = fuse_depths(pictures, self.options) if kept is None else kept
         except InputError as error:
             raise InputError(f"{self.rig.folder}: frame {number}: {error}") from None
-        mesh = self._colored(mesh, number) if self._paints else mesh
+        mesh = self._colored(mesh, number, pictures) if self._paints else mesh
         if self._kept is not None and (kept is None or mesh.is_colored):
             self._kept.put(number, mesh)
         return mesh
@@ -108,12 +108,12 @@ class Recording(MeshSequence):
         found._paints = False
         return found
 
-    def _colored(self, mesh: Mesh, number: int) -> Mesh:
-        """Return a fused mesh with colours of its vertices, where the rig has colour cameras."""
+    def _colored(self, mesh: Mesh, number: int, depths: Sequence[DepthPicture]) -> Mesh:
+        """Return a mesh, fused from these pictures, with colours of its vertices, where the rig has colour cameras."""
         pictures = [picture for picture in self.rig.color_pictures(number) if picture is not None]
         if not pictures or mesh.is_empty:
             return mesh
-        colors, seen = ColorViews(pictures, mesh).at(mesh.vertices, vertex_normals(mesh))
+        colors, seen = ColorViews(pictures, mesh, depths=depths).at(mesh.vertices, vertex_normals(mesh))
         return replace(mesh, colors=spread_colors(mesh, colors, seen))
 
     @property

@@ -21,7 +21,7 @@ from jaxtyping import Float64, Int32, Int64
 from .. import _core
 from ..errors import InputError
 from ..texts import json_of
-from ..types import Mesh
+from ..types import Mesh, Placement
 from .strict import inverse, products
 
 Matrix = Float64[np.ndarray, "4 4"]
@@ -130,6 +130,12 @@ class Camera:
         x, y = width / self.width, height / self.height
         focal, center = (self.focal[0] * x, self.focal[1] * y), (self.center[0] * x, self.center[1] * y)
         return replace(self, width=width, height=height, focal=focal, center=center)
+
+    def placed(self, place: Placement) -> Camera:
+        """Return the camera for places in normalised coordinates, in which depths are normalised, too."""
+        origin, extrinsic = np.asarray(place.origin), self.extrinsic.copy()
+        extrinsic[:3, 3] = (products(extrinsic[:3, :3], origin[:, None])[:, 0] + extrinsic[:3, 3]) / place.scale
+        return replace(self, pose=CameraPose.of_world(extrinsic))
 
     def local(self, points: Points) -> Points:
         """Return points of the world in the camera frame."""

@@ -1,11 +1,13 @@
 """Colours of places on a surface: from camera pictures, from a texture, or blended from vertices.
 
-In camera pictures, places are projected, tested for occlusion by a mesh, and blended: cameras that looked at a place
-most squarely count most.
+In camera pictures, places are projected and blended: cameras that looked at a place most squarely count most. A picture
+counts only where its camera saw the place: the surface drawn into it is there, as deep, the depth camera beside it, if
+there is one, measured it as deep, and no step in depth is among the pixels that are mixed.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass, replace
@@ -17,8 +19,9 @@ from jaxtyping import Bool, Float, Float32, Float64, Int32, Int64, UInt8
 
 from ..types import GREY, Mesh, Placement
 from . import work
-from .cameras import Camera, CameraPose
+from .cameras import Camera
 from .closest_points import Surface
+from .depth import DepthPicture
 from .drawing import draw
 from .strict import products
 from .threads import mapped
@@ -29,9 +32,12 @@ Mask = Bool[np.ndarray, " N"]
 _Pair = tuple[Int64[np.ndarray, " N"], Int64[np.ndarray, " N"], Float64[np.ndarray, " N"]]
 
 MOST_SIDE = 512  # pixels, of the depth pictures that test occlusion: a third of the time of whole ones (guess)
-MARGIN = 0.01  # of the depth, and at least as many metres: how far a place may lie behind the visible surface (guess)
+MARGIN = 0.01  # of the depth, and at least as many metres: how far a place may lie off the visible surface (guess)
 FEATHER = 4.0  # pixels from a step in depth within which a colour counts less, and none at it: both sides mix (guess)
 NOISE = 5  # pixels across, of the median that a depth picture is smoothed by (guess)
+BESIDE = 0.1  # of the usual depth, between two cameras: the largest distance at which both see the same (guess)
+OUTLIER = 4.0  # standard deviations of measured depths from the drawn surface, beyond which they are of another (guess)
+MEDIAN = 0.6745  # of an absolute value, in standard deviations
 STEP = 0.03  # of the depth between neighbours: a step (guess)
 
 
@@ -50,9 +56,7 @@ class ColorPicture:
 
     def placed(self, place: Placement) -> ColorPicture:
         """Return the picture for places in normalised coordinates."""
-        origin, extrinsic = np.asarray(place.origin), self.camera.extrinsic.copy()
-        extrinsic[:3, 3] = (products(extrinsic[:3, :3], origin[:, None])[:, 0] + extrinsic[:3, 3]) / place.scale
-        return replace(self, camera=replace(self.camera, pose=CameraPose.of_world(extrinsic)))
+        return replace(self, camera=self.camera.placed(place))
 
 
 @runtime_checkable
@@ -66,9 +70,18 @@ class ColorFrames(Protocol):
 class ColorViews:
     """The pictures of one moment, prepared for repeated queries."""
 
-    def __init__(self, pictures: Sequence[ColorPicture], hides: Mesh, margin: float = MARGIN) -> None:
-        """Take pictures, and all surface that may occlude a place; `margin` is in the unit of its vertices."""
-        self.views = mapped(View.of, pictures, repeat(hides), repeat(margin))
+    def __init__(
+        self,
+        pictures: Sequence[ColorPicture],
+        hides: Mesh,
+        margin: float = MARGIN,
+        depths: Sequence[DepthPicture] = (),
+    ) -> None:
+        """Take pictures, all surface that may occlude a place, and what depth cameras measured at that moment.
+
+        `margin` is in the unit of the vertices, as are the depths.
+        """
+        self.views = mapped(View.of, pictures, repeat(hides), repeat(margin), repeat(depths))
 
     @property
     def clear(self) -> ColorViews:
@@ -120,23 +133,23 @@ class ColorViews:
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """A picture, and the depth of the surface at each of its pixels; a large picture's depths are coarser."""
+    """A picture, and the depth of the surface that each of its pixels shows; a large picture's depths are coarser."""
 
     picture: ColorPicture
     shrink: int  # pixels of the picture, along a side, in each of these
-    depth: Float32[np.ndarray, "H W"]
+    depth: Float32[np.ndarray, "H W"]  # through a lens without distortion; infinite where the camera saw no surface
     from_step: UInt8[np.ndarray, "H W"]  # distance from a step in depth, in 255ths of `FEATHER`
     margin: float
 
     @staticmethod
-    def of(picture: ColorPicture, hides: Mesh, margin: float) -> View:
+    def of(picture: ColorPicture, hides: Mesh, margin: float, depths: Sequence[DepthPicture] = ()) -> View:
         """Return the view of surface from where a picture was taken."""
         work.count("pictures drawn")
         camera = picture.camera
         shrink = max(1, -(-max(camera.width, camera.height) // MOST_SIDE))
         width, height = -(-camera.width // shrink), -(-camera.height // shrink)
-        intrinsic = camera.intrinsic / [[shrink], [shrink], [1.0]]
-        depth = draw(hides, Camera.of(width, height, intrinsic, camera.extrinsic)).depth
+        coarse = Camera.of(width, height, camera.intrinsic / [[shrink], [shrink], [1.0]], camera.extrinsic)
+        depth = _confirmed(draw(hides, coarse).depth, coarse, margin, depths)
         return View(picture, shrink, depth, _from_step(depth, shrink), margin)
 
     def cleared(self) -> View:
@@ -149,19 +162,23 @@ class View:
 
         `at_step` is the share of the weight that remains at a step.
         """
-        positions, depth = self.picture.project(points)
-        to_eye = self.picture.camera.eye - points
+        camera = self.picture.camera
+        local, to_eye = camera.local(points), camera.eye - points
+        positions, depth = camera.project(local), local[:, 2]
+        straight = camera.straight.project(local) if any(camera.distortion) else positions
         cosine = np.einsum("nd,nd->n", normals, to_eye) / np.maximum(np.linalg.norm(to_eye, axis=1), 1e-12)
-        size = np.array([self.picture.camera.width, self.picture.camera.height])
+        size = np.array([camera.width, camera.height])
         with np.errstate(invalid="ignore"):
             inside = (positions >= 0.5).all(axis=1) & (positions <= size - 0.5).all(axis=1) & (cosine > 0)
+            inside &= (straight >= 0).all(axis=1) & (straight <= size).all(axis=1)
         rows = np.flatnonzero(inside)
-        cells = np.minimum(positions[rows] / self.shrink, np.array(self.depth.shape[::-1]) - 1e-9).astype(np.int64)
-        at = (cells[:, 1], cells[:, 0])
-        hidden = depth[rows] > self.depth[at] + np.maximum(self.margin, MARGIN * depth[rows])
-        near = self.from_step[at] / 255
+        places = straight[rows] / self.shrink
+        cells = np.minimum(places, np.array(self.depth.shape[::-1]) - 1e-9).astype(np.int64)
+        near = self.from_step[cells[:, 1], cells[:, 0]] / 255
+        seen = sampled(1 / self.depth[..., None], places)[:, 0]  # the inverse depth of a plane is linear in a picture
+        agrees = np.abs(seen * depth[rows] - 1) <= np.maximum(self.margin / depth[rows], MARGIN)
         weights = np.zeros(len(points))
-        weights[rows] = np.where(hidden, 0.0, cosine[rows] ** 3 * np.maximum(near, at_step))
+        weights[rows] = np.where(agrees, cosine[rows] ** 3 * np.maximum(near, at_step), 0.0)
         return weights
 
     def colors(self, points: Points, chosen: Mask) -> Points:
@@ -169,6 +186,53 @@ class View:
         colors = np.zeros((len(points), 3))
         colors[chosen] = sampled(self.picture.pixels, self.picture.project(points[chosen])[0]) / self.picture.gains
         return colors
+
+
+def _confirmed(
+    drawn: Float32[np.ndarray, "H W"], camera: Camera, margin: float, depths: Sequence[DepthPicture]
+) -> Float32[np.ndarray, "H W"]:
+    """Return the depths that a camera sees of a surface, infinite where the depth camera beside it measured none there.
+
+    Surface that no measurement confirms was guessed, beyond the border of what was seen or between things. Depths are
+    alike within the noise, which is measured here, and what the surface rises by in a pixel. Single pixels without a
+    measurement count as their neighbours do; what lies beside the depth camera's picture counts as it is drawn.
+    """
+    from scipy.ndimage import binary_closing
+
+    covered = np.isfinite(drawn)
+    if not depths or not covered.any():
+        return drawn
+    beside = min(depths, key=lambda one: float(np.linalg.norm(one.camera.eye - camera.eye)))
+    if np.linalg.norm(beside.camera.eye - camera.eye) > BESIDE * np.median(drawn[covered]):
+        return drawn
+    own = drawn[covered].astype(np.float64)
+    local = camera.ahead[covered] * own[:, None]
+    pixels, inside, there = beside.camera.seen(products(local - camera.extrinsic[:3, 3], camera.extrinsic[:3, :3]))
+    measured = beside.depth.reshape(-1)[pixels] * beside.unit
+    off = np.where((measured > 0) & (measured <= beside.far), np.abs(measured - there), np.inf) / there
+    known = off[off < STEP]
+    noise = float(np.median(known)) / MEDIAN if len(known) else 0.0
+    pitch = max(1.0, camera.focal[0] / beside.camera.focal[0], camera.focal[1] / beside.camera.focal[1])
+    allowed = np.maximum(margin / there, max(MARGIN, OUTLIER * noise)) + pitch * _rise(drawn)[covered][inside] / there
+    agrees = np.ones(len(own), bool)
+    agrees[inside] = off <= allowed
+    confirmed = np.zeros(drawn.shape, bool)
+    confirmed[covered] = agrees
+    confirmed |= binary_closing(confirmed, np.ones((2 * math.ceil(pitch) + 1,) * 2))
+    return np.where(confirmed, drawn, np.inf).astype(np.float32)
+
+
+def _rise(depth: Float32[np.ndarray, "H W"]) -> Float32[np.ndarray, "H W"]:
+    """Return the change of depth from each pixel to its neighbours on the same surface, the largest."""
+    rise = np.zeros_like(depth)
+    for axis in (0, 1):
+        before, after = np.moveaxis(depth, axis, 0)[:-1], np.moveaxis(depth, axis, 0)[1:]
+        with np.errstate(invalid="ignore"):
+            change = np.abs(before - after)
+            change[~(change <= STEP * np.minimum(before, after))] = 0
+        there = np.moveaxis(rise, axis, 0)
+        there[:-1], there[1:] = np.maximum(there[:-1], change), np.maximum(there[1:], change)
+    return rise
 
 
 def _from_step(depth: Float32[np.ndarray, "H W"], shrink: int) -> UInt8[np.ndarray, "H W"]:
@@ -180,14 +244,16 @@ def _from_step(depth: Float32[np.ndarray, "H W"], shrink: int) -> UInt8[np.ndarr
 
 
 def _smooth(depth: Float32[np.ndarray, "H W"]) -> Float32[np.ndarray, "H W"]:
-    """Return a depth picture without holes and noise, so that steps are those of the surface.
+    """Return a depth picture without small holes and noise, so that steps are those of the surface.
 
     A hole takes the depth of the nearest pixel: between near and far surface its middle is a step.
     """
-    from scipy.ndimage import distance_transform_edt, median_filter
+    from scipy.ndimage import binary_closing, distance_transform_edt, median_filter
 
-    nearest = distance_transform_edt(~np.isfinite(depth), return_distances=False, return_indices=True)
-    return median_filter(depth[tuple(nearest)], NOISE)
+    known = np.isfinite(depth)
+    nearest = distance_transform_edt(~known, return_distances=False, return_indices=True)
+    smooth = median_filter(depth[tuple(nearest)], NOISE)
+    return np.where(known | binary_closing(known, np.ones((NOISE, NOISE))), smooth, np.inf).astype(np.float32)
 
 
 def _steps(depth: Float32[np.ndarray, "H W"]) -> Bool[np.ndarray, "H W"]:
@@ -204,8 +270,10 @@ def _steps(depth: Float32[np.ndarray, "H W"]) -> Bool[np.ndarray, "H W"]:
     return steps
 
 
-def sampled(pixels: UInt8[np.ndarray, "H W 3"], positions: Float64[np.ndarray, "N 2"]) -> Points:
-    """Return the colours at positions in a picture, blended between the middles of pixels."""
+def sampled(
+    pixels: UInt8[np.ndarray, "H W C"] | Float32[np.ndarray, "H W C"], positions: Float64[np.ndarray, "N 2"]
+) -> Float64[np.ndarray, "N C"]:
+    """Return the values at positions in a picture, blended between the middles of pixels."""
     height, width = pixels.shape[:2]
     x, y = np.clip(positions - 0.5, 0, [width - 1, height - 1]).T
     x0, y0 = np.minimum(x.astype(np.int64), width - 2), np.minimum(y.astype(np.int64), height - 2)
@@ -286,10 +354,12 @@ def bilinear(pixels: UInt8[np.ndarray, "H W 3"], places: Float[np.ndarray, "N 2"
     return _between(pixels, (x0, (x0 + 1) % width, x - left), (y0, (y0 + 1) % height, y - above))
 
 
-def _between(pixels: UInt8[np.ndarray, "H W 3"], columns: _Pair, rows: _Pair) -> Points:
+def _between(
+    pixels: UInt8[np.ndarray, "H W C"] | Float32[np.ndarray, "H W C"], columns: _Pair, rows: _Pair
+) -> Float64[np.ndarray, "N C"]:
     """Blend the pixels of two columns and two rows each; a pair ends with the share of its second."""
     (x0, x1, fx), (y0, y1, fy) = ((first, second, share[:, None]) for first, second, share in (columns, rows))
-    width, flat = pixels.shape[1], pixels.reshape(-1, 3)
+    width, flat = pixels.shape[1], pixels.reshape(-1, pixels.shape[2])
     upper = flat[y0 * width + x0] * (1 - fx) + flat[y0 * width + x1] * fx
     lower = flat[y1 * width + x0] * (1 - fx) + flat[y1 * width + x1] * fx
     return upper * (1 - fy) + lower * fy

@@ -41,6 +41,10 @@ class DepthPicture:
     unit: float  # m, of a depth of 1
     far: float  # m, the largest depth that counts
 
+    def placed(self, place: Placement) -> DepthPicture:
+        """Return the picture for places in normalised coordinates."""
+        return replace(self, camera=self.camera.placed(place), unit=self.unit / place.scale, far=self.far / place.scale)
+
     def finer(self, factor: int) -> DepthPicture:
         """Return the picture with `factor` times as many rows and columns, interpolated along surfaces.
 

@@ -39,13 +39,24 @@ def test_a_texture_of_twice_the_size_has_the_same_colors() -> None:
 def test_what_is_between_charts_leads_from_one_to_the_other() -> None:
     texels = texels_of(LAYOUT, 0)
     colors = np.full((len(texels.pixels), 3), 200, np.uint8)
-    whole = picture(texels, colors, np.ones(len(colors), bool))
+    whole = picture(texels, SQUARE, colors, np.ones(len(colors), bool))
     assert whole.shape == (32, 64, 3) and (whole == 200).all()
     half = texels.pixels % 64 < 16
     colors[half] = 100
-    unseen = picture(texels, colors, (texels.pixels % 64 < 8) | (texels.pixels % 64 >= 24))
+    unseen = picture(texels, SQUARE, colors, (texels.pixels % 64 < 8) | (texels.pixels % 64 >= 24))
     assert (np.diff(unseen[10, :32, 0].astype(int)) >= 0).all() and 100 < unseen[10, 16, 0] < 200
-    assert (picture(texels, colors, np.zeros(len(colors), bool)) == GREY).all()
+    assert (picture(texels, SQUARE, colors, np.zeros(len(colors), bool)) == GREY).all()
+
+
+def test_texels_that_nobody_saw_have_the_color_of_their_surface_and_not_of_the_chart_beside() -> None:
+    apart = Mesh.of([*SQUARE.vertices, *SQUARE.vertices + [0, 0, 1]], [*SQUARE.faces, *SQUARE.faces + 4])
+    near = subdivide_midpoint(apart, 2)
+    places = np.concatenate([PLACES[:, :, :], PLACES + [32, 0]])  # side by side, without a gap
+    texels = texels_of(Layout(64, 32, np.ascontiguousarray(places.astype(np.int32))), 2)
+    left = texels.pixels % 64 < 32
+    colors = np.where(left[:, None], 40, 220).astype(np.uint8).repeat(3, axis=1)
+    found = picture(texels, near, colors, (texels.pixels % 64 < 30) & (texels.pixels % 64 != 0) | ~left)
+    assert (found[:, :32] == 40).all() and (found[:, 32:] == 220).all()
 
 
 def test_colors_that_are_linear_on_faces_are_those_of_the_vertices() -> None:

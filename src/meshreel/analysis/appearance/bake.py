@@ -83,15 +83,35 @@ def bake(paint: Paint, mesh: Mesh, texels: Texels) -> tuple[Colors, Known]:
     return np.clip(np.rint(colors), 0, 255).astype(np.uint8), known
 
 
-def picture(texels: Texels, colors: Colors, seen: Known) -> UInt8[np.ndarray, "H W 3"]:
-    """Return a picture with these colours of its texels, interpolated elsewhere."""
-    values = np.full((texels.height * texels.width, 3), float(GREY))
-    values[texels.pixels] = colors
-    known = np.zeros(len(values), bool)
-    known[texels.pixels] = seen
-    shape = (texels.height, texels.width)
+def picture(texels: Texels, mesh: Mesh, colors: Colors, seen: Known) -> UInt8[np.ndarray, "H W 3"]:
+    """Return a picture with these colours of its texels on a mesh, of which those that are not seen have others.
+
+    These have the colours of the surface around them, whatever lies between in the picture; what is beside the surface
+    has those of texels nearby.
+    """
+    shape, pixels = (texels.height, texels.width), texels.pixels
+    values, known = (
+        np.full((texels.height * texels.width, 3), float(GREY)),
+        np.zeros(texels.height * texels.width, bool),
+    )
+    values[pixels], known[pixels] = colors, seen
+    if seen.any() and not seen.all():
+        smooth = _around(texels, mesh, colors, seen)
+        values[pixels] -= smooth
+        values[pixels] = smooth + _filled(values.reshape(*shape, 3), known.reshape(shape)).reshape(-1, 3)[pixels]
+        known[pixels] = True
     filled = _filled(values.reshape(*shape, 3), known.reshape(shape))
     return np.clip(np.rint(filled), 0, 255).astype(np.uint8)
+
+
+def _around(texels: Texels, mesh: Mesh, colors: Colors, seen: Known) -> Points:
+    """Return the colours of all texels as vertices would have them: means of texels seen around, or of neighbours."""
+    corners, count = mesh.faces[texels.faces], len(mesh.vertices)
+    at, shares = corners[seen].reshape(-1), texels.barycentric[seen]
+    weights = np.bincount(at, shares.reshape(-1), count)
+    sums = [np.bincount(at, (shares * channel[:, None]).reshape(-1), count) for channel in colors[seen].T]
+    means = np.stack(sums, axis=1) / np.where(weights > 0, weights, 1)[:, None]
+    return blend(spread_colors(mesh, means, weights > 0).astype(np.float64), corners, texels.barycentric)
 
 
 def _filled(values: Float64[np.ndarray, "H W 3"], known: Bool[np.ndarray, "H W"]) -> Float64[np.ndarray, "H W 3"]:
@@ -125,19 +145,27 @@ def _doubled(values: Float64[np.ndarray, "h w 3"]) -> Float64[np.ndarray, "H W 3
 
 def vertex_colors(paint: Paint, mesh: Mesh) -> UInt8[np.ndarray, "V 3"]:
     """Return the colours of a mesh's vertices; vertices of unknown colour get the means of their neighbours."""
-    normals, areas = face_normals(mesh)
+    return fitted_colors(mesh, *paint.at(*face_places(mesh)))
+
+
+def face_places(mesh: Mesh) -> tuple[Points, Points]:
+    """Return the places on the faces of a mesh whose colours tell those of its vertices, with their normals."""
     points = np.einsum("pk,fkc->fpc", PLACES, mesh.vertices[mesh.faces]).reshape(-1, 3)
-    colors, known_places = paint.at(points, normals.repeat(len(PLACES), axis=0))
-    target = colors.reshape(len(mesh.faces), len(PLACES), 3)
-    weights = (areas[:, None] * known_places.reshape(-1, len(PLACES)))[..., None] * PLACES  # places on corners
+    return points, face_normals(mesh)[0].repeat(len(PLACES), axis=0)
+
+
+def fitted_colors(mesh: Mesh, colors: Points, known: Known) -> UInt8[np.ndarray, "V 3"]:
+    """Return the colours of vertices which, blended, are nearest to the known ones of `face_places`."""
+    target, areas = colors.reshape(len(mesh.faces), len(PLACES), 3), face_normals(mesh)[1]
+    weights = (areas[:, None] * known.reshape(-1, len(PLACES)))[..., None] * PLACES  # places on corners
     total = _gathered(mesh, weights.sum(axis=1)[..., None])[:, 0]
-    known = total > 0
+    known_vertices = total > 0
     fitted = np.full((len(mesh.vertices), 3), float(GREY))
     for _ in range(REFINEMENTS):
         blended = np.einsum("pk,fkc->fpc", PLACES, fitted[mesh.faces])
         change = _gathered(mesh, np.einsum("fpk,fpc->fkc", weights, target - blended))
-        fitted[known] += change[known] / total[known, None]
-    return spread_colors(mesh, fitted, known)
+        fitted[known_vertices] += change[known_vertices] / total[known_vertices, None]
+    return spread_colors(mesh, fitted, known_vertices)
 
 
 def _gathered(mesh: Mesh, values: Float64[np.ndarray, "F 3 C"]) -> Float64[np.ndarray, "V C"]:

@@ -143,18 +143,20 @@ class _Video:
     def add(self, paints: Sequence[Paint | None], meshes: Sequence[Mesh]) -> None:
         """Add the pictures of frames, whose meshes begin with the template.
 
-        What nobody sees keeps the colour that was seen last.
+        What no camera sees keeps the colour that was seen last; until then it has that of the surface around it.
         """
         for baked in mapped(self._baked, paints, meshes):
             if baked is not None:
                 colors, seen = baked
                 self._colors[seen] = colors[seen]
                 self._seen |= seen
-            self.videos.add(picture(self._texels, self._colors, self._seen))
+            self.videos.add(picture(self._texels, self._whole(meshes[0]), self._colors, self._seen))
 
     def _baked(self, paint: Paint | None, mesh: Mesh) -> tuple[np.ndarray, np.ndarray] | None:
-        whole = Mesh(mesh.vertices[: self._count], self._faces)
-        return None if paint is None else bake(paint, whole, self._texels)
+        return None if paint is None else bake(paint, self._whole(mesh), self._texels)
+
+    def _whole(self, mesh: Mesh) -> Mesh:
+        return Mesh(mesh.vertices[: self._count], self._faces)
 
 
 def _vertex_colors(paint: Paint | None, mesh: Mesh) -> UInt8[np.ndarray, "V 3"]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from operator import attrgetter
@@ -15,7 +16,7 @@ from ...analysis.scene.standing import LocalNoise
 from ...analysis.survey import Survey, piece_of_faces
 from ...errors import InputError
 from ...geometry.color_views import MARGIN, ColorFrames, ColorPicture, ColorViews, Paint, Painted
-from ...geometry.depth import DepthFrames, FreeSpace
+from ...geometry.depth import DepthFrames, DepthPicture, FreeSpace
 from ...geometry.derived_sequences import CapturedSequence, DerivedSequence, Recent, only
 from ...geometry.topology import clean, part_of
 from ...types import Frames, Mesh, MeshSequence, Placement, Up, offset
@@ -148,7 +149,8 @@ class Views:
     colors: ColorFrames
     sequence: MeshSequence
     place: Placement  # of the coordinates in which the cameras are asked
-    depths: Recent[ColorViews] = field(
+    depth: DepthFrames | None = None  # of the sequence
+    seen: Recent[ColorViews] = field(
         default_factory=lambda: Recent(MOST_RECENT, attrgetter("nbytes")), kw_only=True, compare=False
     )  # without pictures
     placed: Recent[list[ColorPicture]] = field(
@@ -158,19 +160,21 @@ class Views:
     @staticmethod
     def of(sequence: CapturedSequence, survey: Survey) -> Views | None:
         """Return the views of a sequence, None where no colour cameras recorded it."""
-        colors = sequence.colors
-        return None if colors is None else Views(colors, sequence, Placement(survey.unit, tuple(survey.center)))
+        colors, place = sequence.colors, Placement(survey.unit, tuple(survey.center))
+        return None if colors is None else Views(colors, sequence, place, sequence.depth)
 
     def at(self, number: int) -> ColorViews:
         """Return the cameras' views of a frame, whose surface hides a place; those asked for last are kept."""
-        if (views := self.depths.get(number)) is None:
-            views = self.of_surface(number, self.surface(number)).without_pictures
-            self.depths.keep(number, views)
+        if (views := self.seen.get(number)) is None:
+            measured = () if self.depth is None else self.depth[number]
+            depths = [picture.placed(self.place) for picture in measured if picture is not None]
+            views = self.of_surface(number, self.surface(number), depths).without_pictures
+            self.seen.keep(number, views)
         return views.with_pictures(self.pictures(number))
 
-    def of_surface(self, number: int, hides: Mesh) -> ColorViews:
+    def of_surface(self, number: int, hides: Mesh, depths: Sequence[DepthPicture] = ()) -> ColorViews:
         """Return the cameras' views of a surface in a frame, in normalised coordinates."""
-        return ColorViews(self.pictures(number), hides, MARGIN / self.place.scale)
+        return ColorViews(self.pictures(number), hides, MARGIN / self.place.scale, depths)
 
     def pictures(self, number: int) -> list[ColorPicture]:
         """Return the pictures of a frame, for places in normalised coordinates; those asked for last are kept."""

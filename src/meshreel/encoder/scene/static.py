@@ -11,7 +11,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Bool, Float64, UInt8
 
-from ...analysis.appearance.bake import Texels, median_colors, picture, projected, texels_of, unwrap
+from ...analysis.appearance.bake import (
+    Texels,
+    face_places,
+    fitted_colors,
+    median_colors,
+    picture,
+    projected,
+    texels_of,
+    unwrap,
+)
 from ...analysis.scene.labelling import ByRest
 from ...coding.appearance.atlas import encode_atlas
 from ...coding.appearance.pictures import MOST_CRF
@@ -22,11 +31,11 @@ from ...format.budget import Chain, CostlyError
 from ...format.layout import ChunkKind
 from ...geometry.atlas import Layout
 from ...geometry.closest_points import distances
-from ...geometry.color_views import Paint, Painted, spread_colors
+from ...geometry.color_views import Paint, Painted
 from ...geometry.decimate import decimate_faces
 from ...geometry.derived_sequences import CapturedSequence, is_colored
 from ...geometry.threads import ahead
-from ...geometry.topology import clean, face_normals, vertex_normals
+from ...geometry.topology import clean, face_normals
 from ...geometry.work import passed
 from ...types import Mesh, Placement, evenly
 from ..appearance.colors import fitting_size
@@ -162,15 +171,17 @@ def colored_states(
         mesh = decode_change(state.payload, mesh) if state.is_patch else decode_background(state.payload)
         canvas, bare = background_canvas(state.payload), bare and state.is_patch  # what changes it has no colours, too
         [coded] = canvas.meshes
-        frames, count = range(state.frame, end), len(mesh.vertices)
-        points, normals, surface = [mesh.vertices], [vertex_normals(mesh)], None
+        frames, surface = range(state.frame, end), None
+        points, normals = ([each] for each in face_places(mesh))
+        count = len(points[0])
         if texture and not state.is_patch:
             layout, scale = looks.layout(mesh, frames, texture.size)
             texels = texels_of(layout, 0)
-            surface = _Unwrapped(layout, scale, texels, texels.places(mesh), face_normals(mesh)[0][texels.faces])
+            normals_there = face_normals(mesh)[0][texels.faces]
+            surface = _Unwrapped(mesh, layout, scale, texels, texels.places(mesh), normals_there)
             points, normals = [*points, surface.places], [*normals, surface.normals]
         colors, seen = looks.colors(frames, np.concatenate(points), np.concatenate(normals))
-        shown = spread_colors(mesh, colors[:count].astype(np.float64), seen[:count])[count - coded.vertices :]
+        shown = fitted_colors(mesh, colors[:count], seen[:count])[len(mesh.vertices) - coded.vertices :]
         try:
             encoded = encode_group_colors(canvas, [shown], options.color_step, None)
         except CostlyError:  # the summary tells of it
@@ -190,6 +201,7 @@ def colored_states(
 class _Unwrapped:
     """The texels of a background, and where they are."""
 
+    mesh: Mesh
     layout: Layout
     scale: float  # texels along a pixel of the cameras; 1 where there are none
     texels: Texels
@@ -210,7 +222,7 @@ def _pictured(
 
     def picture_of(frame: int) -> UInt8[np.ndarray, "H W 3"]:
         colors, seen = looks.moment(min(frame + some.step // 2, frames[-1]), surface.places, surface.normals)
-        return picture(surface.texels, np.where(seen[:, None], colors, usual[0]), usual[1] | seen)
+        return picture(surface.texels, surface.mesh, np.where(seen[:, None], colors, usual[0]), usual[1] | seen)
 
     some = frames[:: max(1, round(looks.frame_rate / PICTURES_A_SECOND))]
     return layered_pictures(surface.layout, some, picture_of, slow)
