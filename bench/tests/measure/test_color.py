@@ -5,8 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from meshreel_bench.codecs.meshreel import MeshreelCodec
-from meshreel_bench.measure.color import color_bytes, picture_psnrs, picture_squares, swimming
+from meshreel_bench.measure.color import (
+    color_bytes,
+    dark_shares,
+    near_truth,
+    picture_psnrs,
+    picture_squares,
+    swimming,
+)
 
+from meshreel.capture.simulated.simulated_rig import SceneFrame, shade_of
 from meshreel.decoder.video import open as open_video
 from meshreel.format.layout import ChunkKind
 from meshreel.geometry.cameras import Camera, CameraPose
@@ -51,6 +59,32 @@ def test_pixels_that_only_one_frame_covers_do_not_count():
     assert squares[0, 0] < 1e-6
     assert 0 < squares[0, 1] < 0.5 * picture_squares(picture(BALL), BALL, BALL, 0)[0, 1]
     assert picture_psnrs([]) == {}
+
+
+def test_dark_vertices_are_counted_at_open_edges_and_elsewhere():
+    half = BALL.with_faces(BALL.vertices[BALL.faces].mean(axis=1)[:, 0] > 0)
+    colors = np.full(BALL.vertices.shape, 200, np.uint8)
+    colors[BALL.vertices[:, 0] < 0.02] = 59
+    found = dark_shares(replace(half, colors=colors))
+    assert found["dark_open_edges"] > 0.9 and found["dark_inside"] < 0.05
+    assert dark_shares(half) == {}
+
+
+@pytest.mark.parametrize("off, wanted", [(0, 1.0), (10, 1.0), (20, 0.0)])
+def test_places_are_near_the_truth_within_some_levels_and_a_pixel(off, wanted):
+    lit = shade_of(BALL, np.arange(len(BALL.faces)), 0)
+    dynamic = np.ones(len(BALL.faces), bool)
+    truth = SceneFrame(BALL, dynamic, lambda points, faces: np.full((len(points), 3), 100.0) / lit[faces, None])
+    shown = painted(100 + off, BALL.at(1.002 * BALL.vertices))
+    assert near_truth(truth, 0, [picture(BALL), None], shown) == wanted
+
+
+def test_half_of_wide_stripes_are_not_near_the_truth():
+    def stripes(points, _faces):
+        return np.where(points[:, :1] < 0, 100.0, 180.0).repeat(3, axis=1)
+
+    truth = SceneFrame(BALL, np.ones(len(BALL.faces), bool), stripes)
+    assert 0.4 < near_truth(truth, 0, [picture(BALL)], painted(170)) < 0.7
 
 
 @pytest.fixture(scope="module")

@@ -16,7 +16,9 @@ import numpy as np
 
 from meshreel.analysis.scene.masks import VIEW_FILES, read_view_file
 from meshreel.capture.recording import open_recording
+from meshreel.capture.simulated.demo_room import RoomOptions, furnished_room
 from meshreel.capture.simulated.procedural import SoftBodiesOptions, soft_bodies
+from meshreel.capture.simulated.simulated_rig import SceneFrame
 from meshreel.errors import InputError
 from meshreel.geometry.cameras import Camera
 from meshreel.geometry.color_views import ColorFrames
@@ -75,6 +77,7 @@ class Dataset:
     scene: SceneData | None = None  # of a simulated scene
     pictures: ColorFrames | None = None  # of colour cameras: what decoded colours are compared with
     truth: TrueLuma | None = None  # what simulated colour cameras without errors would see
+    painted: Callable[[int], SceneFrame] | None = None  # clean frames with their colours, of a room that is simulated
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,7 +168,8 @@ def _scene(name: str, data: Path, frames: int | None, cache: Path | None) -> Dat
         if not (data / ROOM).exists():
             error.add_note("--data is the folder of the benchmark's data, or of answering/meshes ... of TSMC's authors")
         raise
-    return Dataset(scene.meshes, scene.meshes.cameras, scene, scene.meshes.colors)
+    painted = furnished_room(RoomOptions(len(scene.meshes))).__getitem__ if name == PROCEDURAL else None
+    return Dataset(scene.meshes, scene.meshes.cameras, scene, scene.meshes.colors, painted=painted)
 
 
 def _kept(name: str, cache: Path | None) -> Path:

@@ -1,19 +1,21 @@
-"""Colours of decoded frames beside pictures of the same moments, how much textures swim, and the bytes of colours."""
+"""Colours of decoded frames beside pictures of the same moments and the truth, their swimming, and their bytes."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from jaxtyping import Float64, Int32, Int64
 
+from meshreel.capture.simulated.simulated_rig import SceneFrame, shade_of
 from meshreel.coding.group import payload_bytes_by_purpose
 from meshreel.container.reader import ReelReader
 from meshreel.decoder.video import Video
 from meshreel.format.layout import ChunkKind, Form, Pictures
 from meshreel.format.records import unpack_all
-from meshreel.geometry.color_views import ColorPicture, Painted
-from meshreel.geometry.topology import blend
+from meshreel.geometry.closest_points import Surface
+from meshreel.geometry.color_views import ColorPicture, ColorViews, Painted
+from meshreel.geometry.topology import blend, border_edges, face_normals
 from meshreel.metrics.color import PEAK, POINTS, TO_YUV, Colored, psnr
 from meshreel.metrics.surface_samples import scatter
 from meshreel.types import Mesh, MeshSequence
@@ -25,6 +27,10 @@ BEFORE = 0.015  # of the depth: what is nearer than what stands by more is somet
 HALO = 6  # pixels around what moves that do not count as standing: its depth goes beyond its picture (living_room)
 EDGE = 2  # pixels from silhouettes that do not count: pictures are registered to depth within as many (living_room)
 TEXELS = 60_000  # of a frame that are compared with the truth, at most (guess)
+DARK = 60  # levels of 255: what is darker at an open edge was taken from beyond it; nothing in the rooms is so dark
+ALIKE = 12  # levels of 255 within which a colour is the true one: the noise of cameras and what coding loses (guess)
+PLACES = 8_000  # of a frame's part that are compared with the truth, at most (guess)
+AROUND = 12  # places within a pixel of one, whose colours its pixel may have (guess)
 PARTS = ("picture_y_psnr", "picture_still_y_psnr", "picture_moving_y_psnr")  # all that is seen, what stands, what moves
 
 
@@ -80,6 +86,42 @@ def texel_psnr(found: Iterable[Float64[np.ndarray, " 4"]]) -> dict[str, float]:
     """Return the PSNR of luma of all texels that are seen; how bright all cameras are together cannot be known."""
     count, shown, both, true = sum(found, np.zeros(4)).tolist()
     return {"texel_y_psnr": psnr((shown - both * both / true) / count)} if count else {}
+
+
+def dark_shares(background: Mesh) -> dict[str, float]:
+    """Return the shares of vertices at the open edges of a background, and of others, that are dark."""
+    if background.colors is None or background.is_empty:
+        return {}
+    used, edge = np.zeros((2, len(background.vertices)), bool)
+    used[background.faces], edge[border_edges(background)] = True, True
+    dark = background.colors.max(axis=1) < DARK
+    parts = {"dark_open_edges": edge, "dark_inside": used & ~edge}
+    return {name: float(dark[part].mean()) for name, part in parts.items() if part.any()}
+
+
+def near_truth(scene: SceneFrame, frame: int, pictures: Sequence[ColorPicture | None], decoded: Mesh) -> float:
+    """Return the share of a decoded surface's places, of those that a camera sees, that have the colour of the truth.
+
+    That is within `ALIKE` of what the true surface has within a pixel around; 1 where no camera sees anything.
+    """
+    assert scene.paint is not None
+    some, surface = scatter(decoded, np.ones(len(decoded.faces), bool), PLACES), Surface(scene.mesh)
+    hits, eyes = surface.closest(some.points), [picture for picture in pictures if picture is not None]
+    normals = face_normals(scene.mesh)[0][hits.faces]
+    seen = ColorViews(eyes, scene.mesh).at(hits.points, normals)[1]
+    pixel = np.min([np.linalg.norm(hits.points - e.camera.eye, axis=1) / e.camera.focal[0] for e in eyes], axis=0)
+    along = np.cross(normals, [0.3, 0.5, 0.8])
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    ways, least, most = (along, np.cross(normals, along)), np.full((len(seen), 3), 255.0), np.zeros((len(seen), 3))
+    for step in range(AROUND):
+        radius, angle = np.sqrt(step / (AROUND - 1)) * pixel[:, None], 2.4 * step  # a spiral, from the place outwards
+        there = surface.closest(hits.points + radius * (np.cos(angle) * ways[0] + np.sin(angle) * ways[1]))
+        faces = there.faces.astype(np.int64)
+        colors = scene.paint(there.points, faces) * shade_of(scene.mesh, faces, frame)[:, None]
+        least, most = np.minimum(least, colors), np.maximum(most, colors)
+    shown = Painted(decoded).on(some.faces.astype(np.int32), some.barycentric)
+    off = np.maximum(least - shown, shown - most).max(axis=1)
+    return float((off <= ALIKE)[seen].mean()) if seen.any() else 1.0
 
 
 def color_bytes(reader: ReelReader) -> ColorBytes | None:

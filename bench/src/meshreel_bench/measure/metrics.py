@@ -31,7 +31,15 @@ from ..datasets.rooms import NAMES, PEOPLE, THINGS, Parts, moving_parts
 from ..datasets.scenes import SceneData
 from ..parallel_views import parallel_views_around
 from ..rows import Metrics
-from .color import picture_psnrs, picture_squares, swimming, texel_products, texel_psnr
+from .color import (
+    dark_shares,
+    near_truth,
+    picture_psnrs,
+    picture_squares,
+    swimming,
+    texel_products,
+    texel_psnr,
+)
 
 KEPT = ("d2_psnr_paper", "normal_error_deg", "ssim", "ssim_masked")  # of each frame
 NO_METRICS = ("frames_compared", "frames_missing", "key_frames", "per_frame", "cameras")  # of a comparison's record
@@ -97,7 +105,15 @@ def _colors(frames: Measured) -> dict[str, float]:
     truth = frames.known.truth
     if truth is not None:
         found |= texel_psnr(texel_products(truth, *pair) for pair in zip(frames.numbers, frames.decoded, strict=True))
-    return found if video is None else found | swimming(video, originals)
+    if video is None:
+        return found
+    if (painted := frames.known.painted) is not None and pictures is not None:
+        parts = {"background": video.background, "people": video.moving}
+        for name, part in parts.items():
+            shares = [near_truth(painted(k), k, pictures[k], part(k)) for k in frames.numbers if not part(k).is_empty]
+            found |= {f"{name}_near_truth": min(shares)} if shares else {}
+        found |= dark_shares(video.background(0))
+    return found | swimming(video, originals)
 
 
 def _depth(frames: Measured) -> Values:

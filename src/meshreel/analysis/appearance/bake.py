@@ -36,12 +36,13 @@ PACKINGS = 8  # of packing, with texels per metre corrected after each (guess)
 MARGIN = 0.995  # of the size that would just fit: packing is not quite proportional (guess)
 ENLARGED = 3.0  # largest number of texels along a pixel: 39 dB of living_room; with 2: 38, with 1: 36, at similar rates
 USUAL_SIDE = 1024  # texels, side up to which small pictures are enlarged (guess)
+BESIDE = 1.0  # texels from a chart within which a texel is mixed with those of the chart: they are blended
 BLOCK = 16  # texels: the height of the texture is a multiple, as video has blocks
 
 
 @dataclass(frozen=True, slots=True)
 class Texels:
-    """The texels of an atlas whose middles are on the mesh, with their places on it."""
+    """The texels of an atlas that show the mesh, with their places on it: at borders of charts, the nearest ones."""
 
     height: int
     width: int
@@ -55,11 +56,15 @@ class Texels:
 
 
 def texels_of(layout: Layout, levels: int) -> Texels:
-    """Find the texels of an atlas on a base mesh that is subdivided `levels` times."""
-    pixels, faces, weights = list[np.ndarray](), list[np.ndarray](), list[np.ndarray]()
+    """Find the texels of an atlas on a base mesh that is subdivided `levels` times.
+
+    Those within `BESIDE` of a chart are mixed with its texels where it is shown, and so are of it, too.
+    """
+    pixels, faces, weights, away = ([np.zeros((0, *shape))] for shape in ((), (), (3,), ()))
     corners = layout.places.astype(np.float64)
-    low = np.clip(np.ceil(corners.min(axis=1) - 0.5), 0, None).astype(np.int64)
-    high = np.floor(corners.max(axis=1) - 0.5).astype(np.int64)
+    size = np.array([layout.width, layout.height])
+    low = np.clip(np.ceil(corners.min(axis=1) - 0.5 - BESIDE), 0, None).astype(np.int64)
+    high = np.minimum(np.floor(corners.max(axis=1) - 0.5 + BESIDE), size - 1).astype(np.int64)
     for face, ((a, b, c), (x0, y0), (x1, y1)) in enumerate(zip(corners, low, high, strict=True)):
         area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
         if area == 0 or x1 < x0 or y1 < y0:
@@ -67,13 +72,19 @@ def texels_of(layout: Layout, levels: int) -> Texels:
         x, y = np.meshgrid(np.arange(x0, x1 + 1) + 0.5, np.arange(y0, y1 + 1) + 0.5)
         v = ((x - a[0]) * (c[1] - a[1]) - (y - a[1]) * (c[0] - a[0])) / area
         w = ((b[0] - a[0]) * (y - a[1]) - (b[1] - a[1]) * (x - a[0])) / area
-        inside = (v >= 0) & (w >= 0) & (v + w <= 1)
-        pixels.append((y[inside].astype(np.int64)) * layout.width + x[inside].astype(np.int64))
-        faces.append(np.full(int(inside.sum()), face))
-        weights.append(np.stack([1 - v[inside] - w[inside], v[inside], w[inside]], axis=1))
-    numbers, first = np.unique(np.concatenate([np.zeros(0, np.int64), *pixels]), return_index=True)
-    base_faces = np.concatenate([np.zeros(0, np.int64), *faces])[first]
-    finer, barycentric, _ = located(base_faces, np.concatenate([np.zeros((0, 3)), *weights])[first], levels)
+        shares = np.stack([1 - v - w, v, w], axis=-1)
+        heights = abs(area) / np.hypot(*np.stack([c - b, a - c, b - a], axis=1))  # of the corners over their edges
+        outside = np.maximum(-(shares * heights).min(axis=-1), 0)
+        near = outside <= BESIDE
+        pixels.append(y[near].astype(np.int64) * layout.width + x[near].astype(np.int64))
+        faces.append(np.full(int(near.sum()), face))
+        weights.append(np.maximum(shares[near], 0))
+        away.append(outside[near])
+    order = np.argsort(np.concatenate(away), kind="stable")  # the nearest face has a texel
+    numbers, first = np.unique(np.concatenate(pixels)[order].astype(np.int64), return_index=True)
+    chosen, whole = order[first], np.concatenate(weights)
+    shares = whole[chosen] / whole[chosen].sum(axis=1, keepdims=True)
+    finer, barycentric, _ = located(np.concatenate(faces)[chosen].astype(np.int64), shares, levels)
     return Texels(layout.height, layout.width, numbers, finer.astype(np.int32), barycentric)
 
 
