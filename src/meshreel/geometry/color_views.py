@@ -34,6 +34,7 @@ _Pair = tuple[Int64[np.ndarray, " N"], Int64[np.ndarray, " N"], Float64[np.ndarr
 MOST_SIDE = 512  # pixels, of the depth pictures that test occlusion: a third of the time of whole ones (guess)
 MARGIN = 0.01  # of the depth, and at least as many metres: how far a place may lie off the visible surface (guess)
 FEATHER = 4.0  # pixels from a step in depth within which a colour counts less, and none at it: both sides mix (guess)
+LEAST = 0.01  # of the weight of a frontal view: at the outline of a body, pixels mix it with what is behind (measured)
 NOISE = 5  # pixels across, of the median that a depth picture is smoothed by (guess)
 BESIDE = 0.1  # of the usual depth, between two cameras: the largest distance at which both see the same (guess)
 OUTLIER = 4.0  # standard deviations of measured depths from the drawn surface, beyond which they are of another (guess)
@@ -112,6 +113,7 @@ class ColorViews:
         sums, weights = np.zeros((len(points), 3)), np.zeros(len(points))
         for view in self.views:
             weight = view.weights(points, normals)
+            weight[weight < LEAST] = 0
             colors = view.colors(points, weight > 0)
             sums += colors * weight[:, None]
             weights += weight

@@ -67,19 +67,30 @@ def texel_products(truth: TrueLuma, number: int, decoded: Mesh) -> Float64[np.nd
     """
     if decoded.texture is None or decoded.uv is None or decoded.is_empty:
         return np.zeros(4)
-    some = scatter(decoded, np.ones(len(decoded.faces), bool), TEXELS)
+    faces, weights = _texels(decoded, TEXELS)
+    true, seen = truth(number, blend(decoded.vertices, decoded.faces[faces], weights))
+    shown, true = (Painted(decoded).on(faces, weights) @ TO_YUV[0])[seen], true[seen]
+    return np.array([len(true), shown @ shown, shown @ true, true @ true])
+
+
+def _texels(decoded: Mesh, most: int) -> tuple[Int32[np.ndarray, " N"], Float64[np.ndarray, "N 3"]]:
+    """Return faces and weights of places spread over a mesh, moved to the middles of their texels; where a face has no
+    texel's middle, or no place in a texture beside others, none.
+    """
+    some = scatter(decoded, np.ones(len(decoded.faces), bool), most)
+    if decoded.texture is None or decoded.uv is None:
+        return some.faces.astype(np.int32), some.barycentric
     size = np.array(decoded.texture.pixels.shape[1::-1])
     corners = decoded.uv[some.faces].astype(np.float64) * size
     middles = np.floor(np.einsum("nkc,nk->nc", corners, some.barycentric)) + 0.5
     a, ab, ac = corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    area = ab[:, 0] * ac[:, 1] - ab[:, 1] * ac[:, 0]
-    v = ((middles - a)[:, 0] * ac[:, 1] - (middles - a)[:, 1] * ac[:, 0]) / area
-    w = (ab[:, 0] * (middles - a)[:, 1] - ab[:, 1] * (middles - a)[:, 0]) / area
-    inside = (v >= 0) & (w >= 0) & (v + w <= 1)
-    weights, faces = np.stack([1 - v - w, v, w], axis=1)[inside], some.faces[inside].astype(np.int32)
-    true, seen = truth(number, blend(decoded.vertices, decoded.faces[faces], weights))
-    shown, true = (Painted(decoded).on(faces, weights) @ TO_YUV[0])[seen], true[seen]
-    return np.array([len(true), shown @ shown, shown @ true, true @ true])
+    with np.errstate(divide="ignore", invalid="ignore"):  # faces without a place in the texture
+        area = ab[:, 0] * ac[:, 1] - ab[:, 1] * ac[:, 0]
+        v = ((middles - a)[:, 0] * ac[:, 1] - (middles - a)[:, 1] * ac[:, 0]) / area
+        w = (ab[:, 0] * (middles - a)[:, 1] - ab[:, 1] * (middles - a)[:, 0]) / area
+        inside = (v >= 0) & (w >= 0) & (v + w <= 1)
+    v, w = v[inside], w[inside]
+    return some.faces[inside].astype(np.int32), np.stack([1 - v - w, v, w], axis=1)
 
 
 def texel_psnr(found: Iterable[Float64[np.ndarray, " 4"]]) -> dict[str, float]:
@@ -99,29 +110,35 @@ def dark_shares(background: Mesh) -> dict[str, float]:
     return {name: float(dark[part].mean()) for name, part in parts.items() if part.any()}
 
 
-def near_truth(scene: SceneFrame, frame: int, pictures: Sequence[ColorPicture | None], decoded: Mesh) -> float:
-    """Return the share of a decoded surface's places, of those that a camera sees, that have the colour of the truth.
+def near_truth(
+    scene: SceneFrame, frame: int, pictures: Sequence[ColorPicture | None], decoded: Mesh
+) -> Int64[np.ndarray, " 2"]:
+    """Return how many texels of a decoded surface that a camera sees have the colour of the truth, and how many not.
 
-    That is within `ALIKE` of what the true surface has within a pixel around; 1 where no camera sees anything.
+    The colour is that of the truth within `ALIKE` of what the true surface has in the pixel that shows it best.
     """
     assert scene.paint is not None
-    some, surface = scatter(decoded, np.ones(len(decoded.faces), bool), PLACES), Surface(scene.mesh)
-    hits, eyes = surface.closest(some.points), [picture for picture in pictures if picture is not None]
-    normals = face_normals(scene.mesh)[0][hits.faces]
-    seen = ColorViews(eyes, scene.mesh).at(hits.points, normals)[1]
-    pixel = np.min([np.linalg.norm(hits.points - e.camera.eye, axis=1) / e.camera.focal[0] for e in eyes], axis=0)
+    (own, weights), surface = _texels(decoded, PLACES), Surface(scene.mesh)
+    hits = surface.closest(blend(decoded.vertices, decoded.faces[own], weights))
+    normals, sizes = face_normals(scene.mesh)[0][hits.faces], list[np.ndarray]()
+    for view in ColorViews([picture for picture in pictures if picture is not None], scene.mesh).views:
+        camera = view.picture.camera
+        size = np.linalg.norm(hits.points - camera.eye, axis=1, keepdims=True) / camera.focal[0]
+        sizes.append(np.where(view.weights(hits.points, normals)[:, None] > 0, size, np.inf))
+    pixel = np.min(sizes, axis=0)
+    seen = np.isfinite(pixel[:, 0])
     along = np.cross(normals, [0.3, 0.5, 0.8])
     along /= np.linalg.norm(along, axis=1, keepdims=True)
     ways, least, most = (along, np.cross(normals, along)), np.full((len(seen), 3), 255.0), np.zeros((len(seen), 3))
     for step in range(AROUND):
-        radius, angle = np.sqrt(step / (AROUND - 1)) * pixel[:, None], 2.4 * step  # a spiral, from the place outwards
+        radius, angle = np.sqrt(step / (AROUND - 1)) * np.where(seen[:, None], pixel, 0), 2.4 * step  # a spiral
         there = surface.closest(hits.points + radius * (np.cos(angle) * ways[0] + np.sin(angle) * ways[1]))
         faces = there.faces.astype(np.int64)
         colors = scene.paint(there.points, faces) * shade_of(scene.mesh, faces, frame)[:, None]
         least, most = np.minimum(least, colors), np.maximum(most, colors)
-    shown = Painted(decoded).on(some.faces.astype(np.int32), some.barycentric)
-    off = np.maximum(least - shown, shown - most).max(axis=1)
-    return float((off <= ALIKE)[seen].mean()) if seen.any() else 1.0
+    shown = Painted(decoded).on(own, weights)
+    alike = np.maximum(least - shown, shown - most).max(axis=1) <= ALIKE
+    return np.array([(alike & seen).sum(), (~alike & seen).sum()])
 
 
 def color_bytes(reader: ReelReader) -> ColorBytes | None:

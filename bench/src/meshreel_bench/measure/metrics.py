@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Bool, Float64
 
-from meshreel.decoder.video import Video
+from meshreel.decoder.video import BACKGROUND, Video
 from meshreel.decoder.video import open as open_video
 from meshreel.errors import InputError
 from meshreel.format.layout import MAGIC, ChunkKind
@@ -108,10 +108,16 @@ def _colors(frames: Measured) -> dict[str, float]:
     if video is None:
         return found
     if (painted := frames.known.painted) is not None and pictures is not None:
-        parts = {"background": video.background, "people": video.moving}
-        for name, part in parts.items():
-            shares = [near_truth(painted(k), k, pictures[k], part(k)) for k in frames.numbers if not part(k).is_empty]
-            found |= {f"{name}_near_truth": min(shares)} if shares else {}
+        counts = {"background": list[np.ndarray](), "people": list[np.ndarray]()}
+        for k in frames.numbers:
+            parts = {name: mesh for name, mesh in video.parts(k).items() if not mesh.is_empty}
+            near = {name: near_truth(painted(k), k, pictures[k], mesh) for name, mesh in parts.items()}
+            counts["background"].append(near.pop(BACKGROUND, np.zeros(2)))
+            counts["people"].append(sum(near.values(), np.zeros(2)))
+        shares = {
+            name: [alike / (alike + other) for alike, other in each if alike + other] for name, each in counts.items()
+        }
+        found |= {f"{name}_near_truth": float(min(each)) for name, each in shares.items() if each}
         found |= dark_shares(video.background(0))
     return found | swimming(video, originals)
 
