@@ -34,7 +34,7 @@ _Pair = tuple[Int64[np.ndarray, " N"], Int64[np.ndarray, " N"], Float64[np.ndarr
 MOST_SIDE = 512  # pixels, of the depth pictures that test occlusion: a third of the time of whole ones (guess)
 MARGIN = 0.01  # of the depth, and at least as many metres: how far a place may lie off the visible surface (guess)
 FEATHER = 4.0  # pixels from a step in depth within which a colour counts less, and none at it: both sides mix (guess)
-LEAST = 0.01  # of the weight of a frontal view: at the outline of a body, pixels mix it with what is behind (measured)
+LEAST = 0.01  # of a frontal view's weight, near a step: at outlines, pixels mix a body with what is behind (measured)
 NOISE = 5  # pixels across, of the median that a depth picture is smoothed by (guess)
 BESIDE = 0.1  # of the usual depth, between two cameras: the largest distance at which both see the same (guess)
 OUTLIER = 4.0  # standard deviations of measured depths from the drawn surface, beyond which they are of another (guess)
@@ -113,7 +113,6 @@ class ColorViews:
         sums, weights = np.zeros((len(points), 3)), np.zeros(len(points))
         for view in self.views:
             weight = view.weights(points, normals)
-            weight[weight < LEAST] = 0
             colors = view.colors(points, weight > 0)
             sums += colors * weight[:, None]
             weights += weight
@@ -155,9 +154,9 @@ class View:
         return View(picture, shrink, depth, _from_step(depth, shrink), margin)
 
     def cleared(self) -> View:
-        """Return the view in which places near a step are hidden; the steps are those of smoothed depth."""
-        near = _from_step(_smooth(self.depth), self.shrink)
-        return replace(self, from_step=np.where(near == 255, near, 0).astype(np.uint8))
+        """Return the view in which places near a step are hidden, and at a hole: steps are those of smoothed depth."""
+        clear = (_from_step(_smooth(self.depth), self.shrink) == 255) & (self.from_step > 0)
+        return replace(self, from_step=np.where(clear, 255, 0).astype(np.uint8))
 
     def weights(self, points: Points, normals: Points, at_step: float = 0.0) -> Float64[np.ndarray, " N"]:
         """Return how well the picture shows places: the cube of the cosine of the view, less near steps; 0 if hidden.
@@ -176,11 +175,12 @@ class View:
         rows = np.flatnonzero(inside)
         places = straight[rows] / self.shrink
         cells = np.minimum(places, np.array(self.depth.shape[::-1]) - 1e-9).astype(np.int64)
-        near = self.from_step[cells[:, 1], cells[:, 0]] / 255
+        squarely, near = cosine[rows] ** 3, self.from_step[cells[:, 1], cells[:, 0]] / 255
+        near[(near < 1) & (squarely * near < LEAST)] = 0
         seen = sampled(1 / self.depth[..., None], places)[:, 0]  # the inverse depth of a plane is linear in a picture
         agrees = np.abs(seen * depth[rows] - 1) <= np.maximum(self.margin / depth[rows], MARGIN)
         weights = np.zeros(len(points))
-        weights[rows] = np.where(agrees, cosine[rows] ** 3 * np.maximum(near, at_step), 0.0)
+        weights[rows] = np.where(agrees, squarely * np.maximum(near, at_step), 0.0)
         return weights
 
     def colors(self, points: Points, chosen: Mask) -> Points:
@@ -246,16 +246,14 @@ def _from_step(depth: Float32[np.ndarray, "H W"], shrink: int) -> UInt8[np.ndarr
 
 
 def _smooth(depth: Float32[np.ndarray, "H W"]) -> Float32[np.ndarray, "H W"]:
-    """Return a depth picture without small holes and noise, so that steps are those of the surface.
+    """Return a depth picture without holes and noise, so that steps are those of the surface.
 
     A hole takes the depth of the nearest pixel: between near and far surface its middle is a step.
     """
-    from scipy.ndimage import binary_closing, distance_transform_edt, median_filter
+    from scipy.ndimage import distance_transform_edt, median_filter
 
-    known = np.isfinite(depth)
-    nearest = distance_transform_edt(~known, return_distances=False, return_indices=True)
-    smooth = median_filter(depth[tuple(nearest)], NOISE)
-    return np.where(known | binary_closing(known, np.ones((NOISE, NOISE))), smooth, np.inf).astype(np.float32)
+    nearest = distance_transform_edt(~np.isfinite(depth), return_distances=False, return_indices=True)
+    return median_filter(depth[tuple(nearest)], NOISE)
 
 
 def _steps(depth: Float32[np.ndarray, "H W"]) -> Bool[np.ndarray, "H W"]:
