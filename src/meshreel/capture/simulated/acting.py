@@ -51,7 +51,7 @@ def woman(time: float) -> Stance:
     right = (1 - raised) ** 2 * hanging[1] + 2 * raised * (1 - raised) * out + raised**2 * up
     pole = (1 - raised) * np.array([-0.45, -0.2, -1.0]) + raised * np.array([-0.8, -1.0, -0.15])
     hands = (Limb(hanging[0], np.array([0.45, -0.2, -1.0]), 0.28), Limb(right, pole, 0.28 - 0.24 * raised, 0.25 * shake))
-    look = (curve(time, (0.0, -0.12), (1.2, 0.06)), curve(time, (0.0, 0.05), (1.0, -0.02)), 0.05 * shake + 0.08 * raised)
+    look = (curve(time, (0.0, -0.12), (1.2, 0.06)), curve(time, (0.0, -0.05), (1.0, -0.12)), 0.05 * shake + 0.08 * raised)
     tilt = 0.045 * pace * math.sin(2 * math.pi * (phase + 0.15)) - 0.025 * raised
     return Stance(start + body * way, heading, lift, hands, (feet[0], feet[1]), tilt, -0.16 * swing - 0.06 * raised, 0.03, look)
 

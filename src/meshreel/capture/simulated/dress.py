@@ -27,11 +27,11 @@ class Look:
     trousers: RGB
     seam: RGB
     shoes: RGB
-    stripes: tuple[float, float] = (0.034, 0.35)  # m from one to the next, and the share that is coloured
+    stripes: tuple[float, float] = (0.115, 0.40)  # m from one to the next, and the share that is coloured
 
 
-WOMAN = Look((226, 178, 150), (190, 92, 88), (88, 62, 38), (78, 46, 28), (240, 234, 222), (38, 60, 104), (70, 98, 142), (196, 158, 96), (238, 236, 230))
-CHILD = Look((232, 186, 158), (206, 116, 108), (64, 98, 120), (150, 100, 54), (244, 190, 64), (228, 92, 60), (62, 92, 106), (50, 74, 86), (206, 60, 52), (10.0, 0.0))
+WOMAN = Look((236, 190, 162), (190, 92, 88), (88, 62, 38), (78, 46, 28), (44, 66, 112), (240, 232, 216), (84, 112, 154), (196, 158, 96), (238, 236, 230))
+CHILD = Look((240, 196, 168), (206, 116, 108), (64, 98, 120), (150, 100, 54), (244, 190, 64), (228, 92, 60), (62, 92, 106), (50, 74, 86), (206, 60, 52), (10.0, 0.0))
 
 
 def soft(value: Share, edge: float, width: float) -> Share:
@@ -55,7 +55,7 @@ def dressed_colors(build: Build, look: Look, points: Points) -> Colors:
     cloth = ~above & ~arm & (y > (0.885 if build.is_child else 0.987))
     colors[cloth] = shirt_colors(build, look, points[cloth], y[cloth])
     sleeve = arm & (along < build.sleeve)
-    colors[sleeve] = shirt_colors(build, look, points[sleeve], 1.40 - along[sleeve])
+    colors[sleeve] = shirt_colors(build, look, points[sleeve], np.full(int(sleeve.sum()), 2.0))
     legs = ~above & ~arm & ~cloth
     colors[legs] = leg_colors(build, look, points[legs])
     hand = arm & ~sleeve
@@ -71,11 +71,11 @@ def skin_colors(look: Look, points: Points) -> Colors:
 
 
 def shirt_colors(build: Build, look: Look, points: Points, height: Share) -> Colors:
-    knit = 1 + 0.03 * np.sin(2 * np.pi * height / 0.004)
+    knit = 1 + 0.03 * np.sin(2 * np.pi * points[:, 1] / 0.004)
     colors = np.repeat(np.array([look.shirt], float), len(points), axis=0)
     step, share = look.stripes
     phase = height / step % 1.0
-    colors = mixed(colors, look.stripe, soft(phase, 1 - share, 0.08) * (points[:, 1] < 1.40))
+    colors = mixed(colors, look.stripe, soft(share / 2 - np.abs(phase - 0.5), 0, 0.03) * (height < 1.35))
     if build.is_child:  # a star on the chest
         u, v = points[:, 0], points[:, 1] - 1.245
         around, far = np.arctan2(u, v), np.hypot(u, v)
@@ -83,8 +83,7 @@ def shirt_colors(build: Build, look: Look, points: Points, height: Share) -> Col
         rim = 0.075 * 0.45 / (0.45 * np.cos(corner * 0.628) + (1 - 0.45) * np.sin(corner * 0.628) * 1.25 + 0.0)
         rim = np.minimum(rim, 0.075) * (1 - 0.35 * soft(corner, 0.5, 0.9))
         colors = mixed(colors, look.stripe, soft(rim - far, 0, 0.003) * (points[:, 2] > 0.02))
-        hems = np.abs(points[:, 1] - 1.475) < 0.012
-        colors[hems] = look.stripe
+        colors[(points[:, 1] > 1.466) & (np.hypot(points[:, 0], points[:, 2] + 0.018) < 0.074)] = look.stripe
     return colors * (knit * (1 + 0.03 * _noise(points, 0.006)))[:, None]
 
 
@@ -102,7 +101,7 @@ def leg_colors(build: Build, look: Look, points: Points) -> Colors:
     seams = np.maximum(seams, 0.9 * back)
     seams = np.maximum(seams, np.exp(-((points[:, 0] / 0.002) ** 2)) * (z > 0) * (y > 0.84))
     colors = mixed(cloth, look.seam, 0.75 * seams)
-    shoe = y < 0.076
+    shoe = (y < 0.076) | ((z > 0.034) & (y < 0.13))
     if build.is_child:
         bare = (y < build.trouser) & (y > 0.168)
         colors[bare] = skin_colors(look, points[bare])
@@ -166,11 +165,11 @@ def head_colors(build: Build, look: Look, own: Points, skin: Colors) -> Colors:
 
 
 def brows(look: Look, colors: Colors, x: Share, y: Share, front: Share, c: float) -> Colors:
-    middle = 0.0185 + 0.0045 * np.sin(np.pi * np.clip((x - 0.012) / 0.050, 0, 1)) + 0.002 * c
-    thick = 0.0030 * np.clip(1.15 - (x - 0.012) / 0.045, 0.2, 1.0) * (1 - 0.15 * c)
+    middle = 0.0205 + 0.0040 * np.sin(np.pi * np.clip((x - 0.006) / 0.056, 0, 1)) + 0.002 * c
+    thick = 0.0026 * np.clip(1.15 - (x - 0.012) / 0.045, 0.2, 1.0) * (1 - 0.15 * c)
     hairs = 0.85 + 0.15 * np.sin(2400 * x + 900 * y)
     share = soft(thick - np.abs(y - middle), 0, 0.002) * soft(x, 0.0125, 0.004) * soft(-x, -0.0495, 0.004)
-    return mixed(colors, tuple(0.75 * np.array(look.hair)), 0.85 * share * hairs * front)
+    return mixed(colors, tuple(0.75 * np.array(look.hair)), (0.72 - 0.1 * c) * share * hairs * front)
 
 
 def mouth(look: Look, colors: Colors, x: Share, y: Share, front: Share) -> Colors:
@@ -214,7 +213,7 @@ def eyes(look: Look, colors: Colors, own: Points, front: Share, c: float) -> Col
 def hair_colors(build: Build, look: Look, own: Points, colors: Colors) -> Colors:
     x, y, z = own.T
     places = own.astype(np.float32)
-    share = soft(-hair(build).distance(places).astype(float), -0.0022, 0.0012)
+    share = soft(-hair(build).distance(places).astype(float), -0.0042, 0.0012)
     ridge = strands(build, places).astype(float)
     around = np.arctan2(x + 0.02, z + 0.03)
     fine = np.sin(140 * around + 3 * np.sin(30 * y)) * 0.5 + 0.5 * np.sin(311 * around + 50 * y)

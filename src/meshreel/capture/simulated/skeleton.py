@@ -8,11 +8,11 @@ import numpy as np
 from jaxtyping import Float64
 
 from ...geometry.strict import products
-from ...geometry.topology import unique_edges
+from ...geometry.topology import unique_edges, vertex_normals
 from ...types import Mesh
 from .figure import _bent, turn_about_y
 from .person import (
-    ANKLE, ARM, ELBOW, FOREARM, HIP, KNEE, SHOULDER, UPPER_ARM, WRIST, Build, finger_joints, head_place,
+    ANKLE, ARM, ELBOW, FOREARM, HIP, KNEE, SHOULDER, REST, UPPER_ARM, WRIST, Build, finger_joints, folds,
 )
 from .sculpture import Vector
 
@@ -170,9 +170,18 @@ def placed(build: Build, stance: Stance) -> Float64[np.ndarray, "B 3 4"]:
     return moves
 
 
+def bends(moves: Float64[np.ndarray, "B 3 4"]) -> tuple[float, ...]:
+    """Return how far elbows and knees (left, right) and the waist are bent, 0 to 1."""
+    pairs = [(FIRST + side * OF_SIDE + bone, FIRST + side * OF_SIDE + bone + 1) for bone in (UPPER, THIGH) for side in (0, 1)]
+    cosines = [(float((moves[a, :, :3] * moves[b, :, :3]).sum()) - 1) / 2 for a, b in (*pairs, (PELVIS, CHEST))]
+    return tuple(min((1 - cosine) / 1.2, 1.0) for cosine in cosines)
+
+
 def carried(mesh: Mesh, shares: Float64[np.ndarray, "V B"], build: Build, stance: Stance) -> Mesh:
-    """Return the mesh of the still pose in a stance, m."""
+    """Return the mesh of the still pose in a stance, with the folds of the stance, m."""
     moves = placed(build, stance)
+    folded = folds(mesh.vertices, bends(moves), build.trouser) - folds(mesh.vertices, REST, build.trouser)
+    still = mesh.vertices + folded[:, None] * vertex_normals(mesh)
     blended = products(shares, moves.reshape(len(moves), 12)).reshape(-1, 3, 4)
-    own = np.einsum("nij,nj->ni", blended[:, :, :3], mesh.vertices) + blended[:, :, 3]
+    own = np.einsum("nij,nj->ni", blended[:, :, :3], still) + blended[:, :, 3]
     return mesh.at(build.size * products(own, turn_about_y(stance.heading).T) + stance.place)

@@ -24,11 +24,13 @@ from .simulated_rig import ColorSensorOptions, SceneFrame, SensorOptions, corner
 from .skeleton import Stance, carried, weights
 from .solid_colors import Colors, Points
 
-FACES = 40_000  # of a person's surface (guess)
+WIDTH = 256  # pixels of a depth picture (guess)
+VOXEL = 0.03  # m, for the fusion of such pictures (guess)
+FACES = 24_000  # of a person's surface (guess)
 SPACING = 0.005  # m, of the lattice of an adult's surface (guess)
 BUILDS = (Build(0.97), Build(0.68, 1.27, True, False, 0.17, 0.55))
 LOOKS = (WOMAN, CHILD)
-KEY = np.array([0.50, 0.72, 0.48])  # where the light comes from
+KEY = np.array([0.46, 0.60, 0.66])  # where the light comes from
 
 
 @dataclass(frozen=True)
@@ -170,7 +172,7 @@ def stage_cameras(width: int = 320) -> tuple[DepthCamera, ...]:
 
 
 def record_stage(
-    folder: Path, options: StageOptions, width: int = 256, progress: Callable[[int], None] = lambda _done: None
+    folder: Path, options: StageOptions, width: int = WIDTH, progress: Callable[[int], None] = lambda _done: None
 ) -> None:
     """Write what four depth cameras measure, and the truth; `progress` gets the number of finished frames."""
     sensor, cameras = SensorOptions(noise=0.3, seed=options.seed), stage_cameras(width)
