@@ -10,8 +10,8 @@ from cyclopts import Parameter
 
 from ..capture.recording import FusionOptions, open_recording
 from ..capture.rig.rig import RIG, read_cameras
-from ..capture.simulated.stage import VOXEL, WIDTH, StageOptions, record_stage, stage_cameras
 from ..capture.simulated.simulated_rig import TRUTH, read_truth
+from ..capture.simulated.stage import VOXEL, WIDTH, StageOptions, record_stage, stage_cameras
 from ..decoder.describe import describe_file
 from ..decoder.video import open as open_video
 from ..encoder.sequence import encode
