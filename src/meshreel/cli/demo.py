@@ -1,4 +1,4 @@
-"""`meshreel demo`: record, capture, encode, decode and measure a procedural room in which two people move."""
+"""`meshreel demo`: record, capture, encode, decode and measure a woman and a child in a procedural room."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def command(
     force: Force = False,
     common: Common = Common(),
 ) -> None:
-    """Simulate depth cameras in a room where two people move, capture and encode it, and measure the result.
+    """Simulate depth cameras in a room where a woman walks in and waves and a child jumps, encode and measure that.
 
     Captured meshes, which are noisy, and decoded ones are compared with the truth, which a simulation knows.
 

@@ -1,4 +1,4 @@
-"""What the people of the demo do: a woman walks in and waves, a child looks up at her and jumps for joy.
+"""Story of the demo: a woman walks in and waves, a child looks up at her and jumps for joy.
 
 Times and sizes are guesses by eye. Afterwards the woman stands there, and the child jumps again and again.
 """
@@ -88,8 +88,8 @@ def _child(time: float) -> Stance:
     now, air = time % PERIOD - LEAP, 2 * math.sqrt(2 * HEIGHT / GRAVITY)  # s, since it leaps, and that it flies
     rise = max(HEIGHT - GRAVITY / 2 * (now - air / 2) ** 2, 0.0)
     lift = curve(now, (-0.42, -0.008), (-0.14, -0.11), (0.0, 0.0), (air, 0.0), (air + 0.13, -0.10), (air + 0.5, -0.008))
-    swung = curve(now, (-0.42, 0.0), (-0.14, 0.2), (0.0, 0.0))
-    raised = curve(now, (-0.10, 0.0), (0.12, 1.0), (air, 0.9), (air + 0.55, 0.0))
+    swung = curve(now, (-0.42, 0.0), (-0.18, 0.2), (0.05, 0.0))
+    raised = curve(now, (-0.20, 0.0), (0.22, 1.0), (air, 0.96), (air + 0.70, 0.0))
     tucked = curve(now, (0.0, 0.0), (air / 2, 1.0), (air, 0.0))
     wrist = _between(HANGING + [0.025, 0.0, -swung], np.array([0.62, 1.25, 0.22]), np.array([0.36, 1.76, 0.06]), raised)
     pole = (1 - raised) * BACK + raised * np.array([1.0, -0.6, -0.4])

@@ -32,7 +32,7 @@ FOOTPRINTS = np.array(
 BOOKS = np.array(
     [(176, 74, 60), (54, 84, 110), (214, 170, 88), (96, 124, 98), (226, 214, 192), (120, 72, 84), (70, 110, 120)], float
 )
-COARSE = 0.02  # m, of the lattice of furniture (guess)
+COARSE, MANY = 0.03, 20_000  # m, of the lattice of furniture, and faces, which none has (guess)
 FLAT = 0.004  # m from a plane that still is on it
 
 
@@ -56,9 +56,9 @@ def furniture() -> tuple[Thing, ...]:
     return (
         Thing(joined(panels), _room),
         Thing(box(SHELF), _shelf),
-        Thing(meshed(_sofa_parts(), COARSE, 5000), _sofa),
-        Thing(meshed(_plant_parts(), COARSE, 3000), _plant),
-        Thing(meshed([ball(BALL[0], (BALL[1],) * 3, 0.0)], COARSE, 800), _ball),
+        Thing(meshed(_sofa_parts(), COARSE, MANY), _sofa),
+        Thing(meshed(_plant_parts(), COARSE, MANY), _plant),
+        Thing(meshed([ball(BALL[0], (BALL[1],) * 3, 0.0)], COARSE, MANY), _ball),
     )
 
 

@@ -46,7 +46,7 @@ SMOOTHED = 6  # rounds in which weights of neighbours are averaged (guess)
 
 @dataclass(frozen=True, slots=True)
 class Limb:
-    """Where a hand or a foot is, and how it is held; in the person's frame, of an adult's size."""
+    """Place and hold of a hand or a foot, in the person's frame, of an adult's size."""
 
     place: Vector  # m, of the wrist or the ankle
     pole: Vector  # way to which elbow or knee points
@@ -56,7 +56,7 @@ class Limb:
 
 @dataclass(frozen=True, slots=True)
 class Stance:
-    """Where a person is and what the body does at a moment."""
+    """Place and pose of a person at a moment."""
 
     place: Vector  # m, on the floor below the hips
     heading: float  # rad about y; 0 faces +z
@@ -89,7 +89,7 @@ def bones() -> Bones:
     for side in (1.0, -1.0):
         first = len(ends)
         radii += [0.048, 0.036, 0.026, 0.075, 0.05, 0.04, *(0.009, 0.008) * 5]
-        seams += [0.035, 0.022, 0.012, 0.035, 0.03, 0.012, *(0.005, 0.004) * 5]
+        seams += [0.035, 0.022, 0.012, 0.035, 0.03, 0.006, *(0.005, 0.004) * 5]
         parents += [CHEST, first + UPPER, first + FORE, PELVIS, first + THIGH, first + SHIN]
         for digit in range(5):
             parents += [first + HAND, first + DIGITS + 2 * digit]
