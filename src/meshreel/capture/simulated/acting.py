@@ -78,8 +78,8 @@ def _foot(time: float, phase: float, side: float) -> Limb:
     at = here + moved * moved * (3 - 2 * moved) * (there - here) - walked(time)
     heels = (-0.26 * came, 0.0, 0.0, 0.58 * goes, 0.35 * goes, -0.2 * goes, -0.26 * goes)
     pitch = float(np.interp(share, (0.0, 0.1, 0.38, STANCE, 0.76, 0.92, 1.0), heels))
-    up = (0.125 if pitch > 0 else -0.06) * math.sin(pitch) + 0.035 * goes * math.sin(math.pi * moved)
-    ahead = 0.125 * (1 - math.cos(max(pitch, 0.0))) + at
+    up = (0.165 if pitch > 0 else -0.06) * math.sin(pitch) + 0.035 * goes * math.sin(math.pi * moved)
+    ahead = 0.165 * (1 - math.cos(max(pitch, 0.0))) + at
     ankle = np.array([(0.099 - 0.03 * goes) * side, 0.085 + up, -0.024 + ahead])
     return Limb(ankle, np.array([0.15 * side, 0.0, 1.0]), pitch, 0.12)
 
