@@ -21,6 +21,12 @@ if TYPE_CHECKING:
 Up = Literal["y", "z", "-y", "-z"]  # the axis of a recording that points up
 UPS: tuple[Up, ...] = get_args(Up)
 UP_AXES = {"y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0), "-y": (0.0, -1.0, 0.0), "-z": (0.0, 0.0, -1.0)}
+UPRIGHT: dict[Up, list[list[int]]] = {  # rotations that turn an axis to +y
+    "y": [[1, 0, 0], [0, 1, 0], [0, 0, 1]],
+    "z": [[1, 0, 0], [0, 0, 1], [0, -1, 0]],
+    "-y": [[1, 0, 0], [0, -1, 0], [0, 0, -1]],
+    "-z": [[1, 0, 0], [0, 0, -1], [0, 1, 0]],
+}
 LUMA = (0.2126, 0.7152, 0.0722)  # of red, green and blue (ITU-R BT.709)
 GREY = 128  # red, green and blue of a surface without colours beside one with colours
 

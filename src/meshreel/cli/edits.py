@@ -122,9 +122,10 @@ def tag(
     audio: str | None = None,
     audio_start: float | None = None,
     no_audio: Annotated[bool, Parameter(negative="")] = False,
+    view: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None,
     common: Common = Common(),
 ) -> None:
-    """Write a .reel file with other metadata, which `meshreel info` shows, or other audio.
+    """Write a .reel file with other metadata, which `meshreel info` shows, other audio or another first view.
 
     Parameters
     ----------
@@ -137,6 +138,9 @@ def tag(
         is left out.
     no_audio
         Take the audio away.
+    view
+        View that players begin with: x,y,z of the camera and x,y,z of what it looks at, in metres as frames have them,
+        and perhaps ,DEGREES of its field of view (45). The player's menu copies it.
     """
     if no_audio and (audio, audio_start) != (None, None):
         raise InputError("--no-audio takes away what --audio and --audio-start are for; give one of them")
@@ -149,8 +153,19 @@ def tag(
             tags[name] = json_of(text) if text else None
         except ValueError:
             tags[name] = text
-    sound = b"" if no_audio else audio
-    _tell(_checked(output), edit.tag(file, _checked(output), tags, audio=sound, audio_start=audio_start), common)
+    sound, numbers = b"" if no_audio else audio, None if view is None else _numbers(view)
+    done = edit.tag(file, _checked(output), tags, audio=sound, audio_start=audio_start, view=numbers)
+    _tell(_checked(output), done, common)
+
+
+def _numbers(view: str) -> list[float]:
+    try:
+        numbers = [float(number) for number in view.split(",")]
+    except ValueError:
+        numbers = []
+    if len(numbers) not in (6, 7):
+        raise InputError(f"--view {view!r}: give six numbers with commas, as 0,1.6,3,0,1,0; a seventh may be degrees")
+    return numbers
 
 
 def _checked(output: str) -> Place:

@@ -11,6 +11,7 @@ from ..decoder.describe import describe_file
 from ..decoder.video import open as open_video
 from ..edit.metadata import LEAST_COVERED
 from ..errors import FormatError
+from ..format.view import ITEM as VIEW
 from .console import Common, Flag
 
 ALL = 0.99995  # share from which on a frame is covered to 100.0 %
@@ -38,7 +39,9 @@ def command(file: Path, /, *, groups: Flag = False, common: Common = Common()) -
         size = f"{row['bytes'] - missing} of {size} ({missing} are missing: the file is truncated)"
     length = f"{row['frames']} frames at {row['frame_rate']:g}/s, {row['duration_s']:.4g} s"
     head = f"{file}: {length}, {size}, {row['mbps']:.4g} Mbps"
-    metadata = {name: _said(name, value) for name, value in row["metadata"].items()}
+    metadata = {
+        name: _said(name, value) for name, value in row["metadata"].items() if not (row["view"] and name == VIEW)
+    }
     short = {name: text if len(text) <= _LONGEST else f"{text[:_LONGEST]} ..." for name, text in metadata.items()}
     recorded = ", ".join(f"{name} {text}" for name, text in (metadata if groups else short).items())
     # Control characters are escaped: an untrusted file must not control the terminal.
@@ -79,7 +82,7 @@ def _decode_all(file: Path, row: dict[str, Any]) -> None:
 
 
 def _looks(row: dict[str, Any]) -> str:
-    """Describe box, mesh, layers, colour and audio in a line."""
+    """Describe box, mesh, layers, colour, audio and first view in a line."""
     low, high = row["box_m"]
     box = " x ".join(f"{end - begin:.3g}" for begin, end in zip(low, high, strict=True))
     mesh, hidden = row["first_surface"], row["frames_hidden"]
@@ -88,6 +91,9 @@ def _looks(row: dict[str, Any]) -> str:
     if (sound := row["audio"]) is not None:
         begin = f", from {sound['start_s']:g} s" if "start_s" in sound else ""
         parts.append(f"audio: {sound.get('type', 'damaged')}, {sound['bytes']} bytes{begin}")
+    if (view := row["view"]) is not None:
+        begin, end = (" ".join(f"{number:.3g}" for number in view[name]) for name in ("position", "target"))
+        parts.append(f"first view: from {begin} to {end} m, {view['fov']:g} degrees")
     return "; ".join([*parts, *([f"{hidden} frames more are hidden"] if hidden else [])])
 
 

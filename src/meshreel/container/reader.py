@@ -18,6 +18,7 @@ from ..format.checks import COMPANIONS, check_file, unpack_audio
 from ..format.edit import Edit
 from ..format.layout import EDITED, MAGIC, VERSION, AudioFile, Checksum, ChunkKind, Form, Header, Index, Layer, Preamble
 from ..format.records import least_size, unpack, unpack_all
+from ..format.view import View, known_view
 from ..shapes import Float64
 from ..types import Up, known_up
 from .sources import Source
@@ -125,6 +126,12 @@ class ReelReader:
     def up(self) -> Up:
         """The axis that points up: y, z, -y or -z; y if the file does not name one."""
         return known_up(self.metadata.get("up"))
+
+    @property
+    def view(self) -> View | None:
+        """The first view, m; None if the file has none."""
+        view, turn = known_view(self.metadata), np.array(self.edit.rotation or np.eye(3)).reshape(3, 3)
+        return None if view is None else view.moved(self.header.scale, turn, self.header.origin)
 
     @property
     def missing(self) -> tuple[Chunk, ...]:

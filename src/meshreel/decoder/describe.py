@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -57,6 +58,7 @@ def describe_file(file: Path) -> dict[str, Any]:
         "duration_s": reader.duration,
         "box_m": [corner.tolist() for corner in reader.box],
         "up": reader.up,
+        "view": None if reader.view is None else asdict(reader.view),
         "first_surface": surface,
         "layers": max(group["layers"] for group in groups),
         "color": _color(reader),

@@ -23,6 +23,7 @@ from ..container.reader import Chunk, ReelReader
 from ..container.sources import BytesSource, FileSource, Source, Stream, StreamSource, source_at, viewed
 from ..errors import FormatError, InputError, path_of, without_secret
 from ..format.layout import MEDIA_TYPES, Form
+from ..format.view import View
 from ..geometry.splats import Bound
 from ..geometry.topology import concatenate
 from ..shapes import Float, Float64
@@ -168,6 +169,11 @@ class Video(Sequence[Mesh]):
     def up(self) -> Up:
         """Axis that points up: y, z, -y or -z; y if the file does not name one."""
         return self.reader.up
+
+    @property
+    def view(self) -> View | None:
+        """The view that players begin with: position and target in metres, and degrees; None if the file has none."""
+        return self.reader.view
 
     def __len__(self) -> int:
         return self.reader.frame_count

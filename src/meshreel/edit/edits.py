@@ -15,6 +15,8 @@ from ..format.checks import COMPANIONS
 from ..format.edit import ITEM, Edit, is_rotation, joined, nearest_rotation
 from ..format.layout import Form, Header
 from ..format.records import pack
+from ..format.view import ITEM as VIEW
+from ..format.view import USUAL, View
 from ..io.files import Place, first_difference, located, located_all
 from ..io.sequence import SequenceOptions
 from ..types import Up, check_up
@@ -37,7 +39,7 @@ from .metadata import (
 Name = str | Place
 Numbers = Sequence[Any] | np.ndarray
 Part = tuple[dict[str, Any], int]  # the metadata of a file, and its number of frames
-_OWN = (PART, HISTORY, ITEM, LAST, *RECORDED)  # metadata that `tag` does not change: others depend on them
+_OWN = (PART, HISTORY, ITEM, VIEW, LAST, *RECORDED)  # metadata that `tag` does not change: others depend on them
 
 
 def cut(source: Name, output: Name, frames: str, at_keys: bool = False) -> Edited:
@@ -177,18 +179,22 @@ def tag(
     *,
     audio: Given | None = None,
     audio_start: float | None = None,
+    view: Numbers | None = None,
 ) -> Edited:
-    """Write a file with other metadata or audio.
+    """Write a file with other metadata, audio or first view.
 
     `values` are names with values that JSON can hold; None takes a name away. `audio` is a path, a URL or the bytes of
     an audio file, in place of one that the file has; no bytes take that away. It begins `audio_start` seconds after the
-    first frame (0), which may also move the audio that the file has. Raises InputError for other audio or values.
+    first frame (0), which may also move the audio that the file has. `view` is what players begin with: position and
+    target (x, y, z, m, as frames have them), and perhaps the degrees of the field of view of the picture's height (45).
+    Raises InputError for other audio, values or views.
     """
     values = values or {}
     if own := [name for name in values if name in _OWN or not name]:
         raise InputError(f"{own[0]!r} is no name for a tag: readers use it; choose another, as title")
     with opened(located(source)) as (path, reader):
         metadata = {name: value for name, value in (reader.metadata | values).items() if value is not None}
+        metadata |= {} if view is None else _normalised(reader, view).item
         if audio is None and audio_start is not None:
             if (known := reader.read_audio()) is None:
                 raise InputError(f"{path}: has no audio that could begin at {audio_start:g} s; give one, too")
@@ -197,6 +203,21 @@ def tag(
         if audio:
             payload = packed_audio(audio, audio_start or 0.0, reader.header.first_time)
         return _relabelled(path, reader, output, reader.header, metadata, audio=payload)
+
+
+def _normalised(reader: ReelReader, view: Numbers) -> View:
+    """Return a view in the normalised coordinates of a file. Raises InputError for one that no file may have."""
+    numbers = _numbers("view", [*view, USUAL] if len(view) == 6 else view, (7,))
+    turn = np.array(reader.edit.rotation or np.eye(3)).reshape(3, 3)
+    places = (numbers[:6].reshape(2, 3) - reader.header.origin) @ turn / reader.header.scale
+    position, target = (tuple(place) for place in places.tolist())
+    found, fov = View(position, target, float(numbers[6])), numbers[6]
+    if not 0 < fov < 180:
+        raise InputError(f"view: a field of view of {fov:g} degrees; give one between 0 and 180, as 45")
+    if not found.is_valid:
+        text = f"view from {numbers[:3].tolist()} to {numbers[3:6].tolist()}"
+        raise InputError(f"{text}: position and target are the same, or too far away; give two places, m")
+    return found
 
 
 def _check_alike(path: Place, reader: ReelReader, other: ReelReader, first: Place, parts: Sequence[Part]) -> None:

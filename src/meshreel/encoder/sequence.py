@@ -33,6 +33,7 @@ from ..geometry.work import reporting, since, so_far
 from ..io.files import Place, located
 from ..types import MeshSequence, evenly
 from .appearance.videos import TextureSize
+from .file.first_view import first_view
 from .file.summary import (
     GroupSummary,
     SceneSummary,
@@ -307,7 +308,7 @@ def _encode_tracked(job: Job, writer: ReelWriter, survey: Survey) -> Summary:
         for encoded in encode_tracked(job, survey):
             groups += [write_tracked(writer, each, [], survey.diagonal) for each in encoded]
         part = None if job.chosen is None else (job.chosen.start, len(sequence))
-        metadata = metadata_of(options, groups, sequence.up, part)
+        metadata = metadata_of(options, groups, sequence.up, part) | first_view(job, survey)
         writer.header = make_header(sequence.frame_rate, survey, metadata)
     texts = warnings_of(survey) if job.chosen is None else ()  # the survey told of them
     return Summary(writer.size, tuple(groups), (*texts, *warnings_of_groups(groups), *warnings_of_colors(groups)))
@@ -328,20 +329,21 @@ def _encode_scene(job: Job, file: BinaryIO, writer: ReelWriter, parts: Parts) ->
     states = colored_states(sequence, parts, job.scene, options.appearance)
     note("background, coded", *(state.payload for state in states))
     with writer:
-        coded, dropped = encode_bodies(job, parts)
+        coded, tracks = encode_bodies(job, parts)
         groups = write_in_order(writer, coded, states, survey)
         metadata = {
             **chosen_options(options, groups),
             "noise_m": shortened(parts.noise.mean),
             **up_metadata(sequence.up),
+            **first_view(job, survey, tracks.seen, parts.background),
         }
         writer.header = make_header(sequence.frame_rate, survey, metadata)
     measured = evenly(len(sequence), MEASURED)
     psnr = mean_psnr(sequence, file, survey.diagonal, measured)
-    size, tracks = sum(map(len, states)), 1 + max(group.track for group in groups)
+    size, count = sum(map(len, states)), 1 + max(group.track for group in groups)
     faces = len(decode_background(states[0].payload).faces) if states else 0
-    scene = SceneSummary(size, faces, parts.noise.mean, psnr, tuple(measured), tracks)
+    scene = SceneSummary(size, faces, parts.noise.mean, psnr, tuple(measured), count)
     moves = any(group.form != Form.EMPTY for group in groups)
-    lost = (*warnings_of_scene(parts, moves, dropped), *warnings_of_groups(groups))
+    lost = (*warnings_of_scene(parts, moves, tracks.dropped), *warnings_of_groups(groups))
     texts = (*warnings_of(survey), *lost, *warnings_of_colors(groups, states))
     return Summary(writer.size, tuple(groups), texts, scene)

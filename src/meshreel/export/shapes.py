@@ -12,14 +12,7 @@ from jaxtyping import Bool, Float32, Float64, Int32
 from ..errors import InputError
 from ..geometry.cameras import matrix_of
 from ..geometry.topology import vertex_normals
-from ..types import Mesh, Up
-
-_TURNS: dict[Up, list[list[int]]] = {  # rotations that turn an axis to +y
-    "y": [[1, 0, 0], [0, 1, 0], [0, 0, 1]],
-    "z": [[1, 0, 0], [0, 0, 1], [0, -1, 0]],
-    "-y": [[1, 0, 0], [0, -1, 0], [0, 0, -1]],
-    "-z": [[1, 0, 0], [0, 0, -1], [0, 1, 0]],
-}
+from ..types import UPRIGHT, Mesh, Up
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +54,7 @@ class Animation:
     @property
     def root(self) -> Float64[np.ndarray, "4 4"]:
         """Matrix from coordinates relative to `origin` to the coordinates of the file, in which +y is up."""
-        turn = np.array(_TURNS[self.up], np.float64)
+        turn = np.array(UPRIGHT[self.up], np.float64)
         return matrix_of(turn, turn @ np.asarray(self.origin))
 
     def local(self, shape: Shape, vertices: Float64[np.ndarray, "V 3"]) -> Float32[np.ndarray, "V 3"]:

@@ -289,9 +289,9 @@ def bodies_of(sequence: MeshList, options: EncoderOptions, parts: Parts) -> tupl
     """Return the groups of a scene as encoded, with their payloads in memory, and the faces that are in none."""
     stages, recipe = Stages(None, len(sequence)), options.recipe()
     with TemporaryDirectory() as folder, IntervalFiles(Path(folder, "a.reel")) as files:
-        groups, dropped = encode_bodies(Job(captured(sequence), options, None, stages, recipe, files), parts)
+        groups, tracks = encode_bodies(Job(captured(sequence), options, None, stages, recipe, files), parts)
         loaded = [(e, e.group.stored.read() if e.group.stored else e.group.payload) for e in groups]
-        return [replace(e, group=replace(e.group, payload=data)) for e, data in loaded], dropped
+        return [replace(e, group=replace(e.group, payload=data)) for e, data in loaded], tracks.dropped
 
 
 def shown(groups: list[TrackGroup], track: int, frames: int) -> str:

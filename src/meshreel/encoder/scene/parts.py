@@ -27,6 +27,7 @@ from ...analysis.scene.standing import REGION, LocalNoise, Standing
 from ...analysis.survey import Survey, check_one_unit
 from ...geometry.cameras import Camera
 from ...geometry.closest_points import Surface, area_samples
+from ...geometry.color_views import ColorFrames
 from ...geometry.depth import DepthFrames, FreeSpace
 from ...geometry.derived_sequences import CapturedSequence, picked
 from ...geometry.threads import ahead
@@ -144,12 +145,16 @@ def free_space(sequence: CapturedSequence) -> tuple[FreeSpace, ...]:
     return () if depth is None else tuple(FreeSpace.of(depth[number]) for number in some)
 
 
-def _cameras(sequence: CapturedSequence) -> tuple[Camera, ...]:
-    """Return the depth cameras of a sequence."""
+def cameras_of(pictures: DepthFrames | ColorFrames | None, count: int) -> tuple[Camera, ...]:
+    """Return the cameras of the pictures of `count` frames, some of which may lack a camera's picture."""
     found = dict[int, Camera]()
-    if (depth := sequence.depth) is not None:
-        for number in evenly(len(sequence), PROBES):
-            found |= {at: each.camera for at, each in enumerate(depth[number]) if each is not None}
+    if pictures is None:
+        return ()
+    for number in evenly(count, PROBES):
+        some = pictures[number]
+        found |= {at: each.camera for at, each in enumerate(some) if each is not None}
+        if len(found) == len(some):
+            break
     return tuple(found[at] for at in sorted(found))
 
 
@@ -267,7 +272,7 @@ def _measured(
             distances.append(np.copysign(gaps, outward)[gaps < far])
     fine = REGION * segmentation.cell
     wide = max(fine, float(np.median(sizes or [0.0])) / 2)
-    return sizes, LocalNoise.of(places, distances, fine, wide, _cameras(sequence))
+    return sizes, LocalNoise.of(places, distances, fine, wide, cameras_of(sequence.depth, len(sequence)))
 
 
 _COLORS = ("depth", "hue", "limit")  # arrays of a ColorChange
@@ -307,7 +312,7 @@ def unpack_parts(data: bytes, sequence: CapturedSequence, survey: Survey) -> Par
         with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
             unit, cell, size, island = arrays["numbers"].tolist()
             rms, off = arrays["noise"]
-            noise = LocalNoise(arrays["noise places"], rms, off, _cameras(sequence))
+            noise = LocalNoise(arrays["noise places"], rms, off, cameras_of(sequence.depth, len(sequence)))
             rest = Rest(arrays["until"], arrays["since"])
             places = Lattice(arrays["origin"], size), arrays["keys"], arrays["chosen"]
             by = ByPlace(cell, *places, rest, island, _colors(arrays, sequence))

@@ -19,6 +19,7 @@ import numpy as np
 from jaxtyping import Bool, UInt16
 from scipy.spatial import cKDTree
 
+from ...analysis.front import Body, bodies_of, sampled
 from ...analysis.scene.bodies import NEAR, at_most, find_bodies, same_bodies, with_ring
 from ...analysis.scene.labelling import ByRest, Segmentation
 from ...analysis.survey import Survey
@@ -40,12 +41,11 @@ MEASURED, SAMPLES = 4, 1000  # frames of a body, and vertices of each, at whose 
 MOST_NOISE = 0.05  # RMS, of the diagonal of a body: beyond, nothing is left of a hand (guess)
 
 
-def encode_bodies(job: Job, parts: Parts) -> tuple[list[TrackGroup], int]:
+def encode_bodies(job: Job, parts: Parts) -> tuple[list[TrackGroup], Tracks]:
     """Encode the groups of all tracks; each track has all frames, and no group has frames with surface and without.
 
-    Return them in the order of the file, and the number of faces of pieces that were there for a moment only, and are
-    in none of the groups. The intervals of the whole scene are one stream: workers need not wait for the last body of a
-    key interval.
+    Return them in the order of the file, and the tracks. The intervals of the whole scene are one stream: workers need
+    not wait for the last body of a key interval.
     """
     tracks, found = Tracks(parts.segmentation, job.scene.near), list[TrackGroup]()
     places = deque[tuple[int, int]]()  # track and first frame of intervals that are not encoded yet
@@ -59,7 +59,7 @@ def encode_bodies(job: Job, parts: Parts) -> tuple[list[TrackGroup], int]:
         found += placed(*places.popleft(), groups)
     for track, began in enumerate(tracks.began):
         found += placed(track, 0, empty_groups(began))
-    return sorted(found, key=lambda each: (each.first_frame, each.track)), tracks.dropped
+    return sorted(found, key=lambda each: (each.first_frame, each.track)), tracks
 
 
 def scene_intervals(job: Job, parts: Parts, tracks: Tracks) -> Iterator[Interval]:
@@ -71,11 +71,16 @@ def scene_intervals(job: Job, parts: Parts, tracks: Tracks) -> Iterator[Interval
     sequence, survey = job.sequence, parts.survey
     place = Placement(survey.unit, tuple(survey.center))
     longest = job.recipe.longest(sequence.frame_rate)
+    looked_at = set(sampled(len(sequence), sequence.frame_rate))
     for frames in key_intervals(sequence, parts.segmentation, job.options):
         found = list[Interval]()
         moving, lost = zip(*ahead(lambda number: parts.moving(number, sequence[number]), frames), strict=True)
         tracks.dropped += sum(lost)
-        for track, meshes in tracks.of(moving):
+        of_tracks = tracks.of(moving)
+        for number in looked_at.intersection(frames):
+            bodies = (meshes[number - frames.start] for _, meshes in of_tracks)
+            tracks.seen[number] = bodies_of(bodies, sequence.up)
+        for track, meshes in of_tracks:
             normalised = [survey.normalise(mesh) for mesh in meshes]
             for cut in _cut(normalised, frames, survey, longest):
                 some = normalised[cut.start : cut.stop]
@@ -130,7 +135,8 @@ class Tracks:
         self._last: list[Mesh] = []  # of each track, in the last frame so far
         self._frames = 0
         self.began: list[int] = []  # the first frame of each track's first key interval: before, it is empty
-        self.dropped = 0  # faces that are in no track
+        self.dropped = 0  # faces that are in no track: of pieces that were there for a moment only
+        self.seen = dict[int, list[Body]]()  # what the bodies of some frames tell of the first view
 
     def of(self, moving: Sequence[Mesh]) -> list[tuple[int, list[Mesh]]]:
         """Return each track's mesh in each frame of the next key interval."""

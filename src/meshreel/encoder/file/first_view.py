@@ -1,0 +1,135 @@
+"""Guess of the first view: from where the cameras of a rig saw the people, else from where bodies face, else aside.
+
+In: bodies of some frames, the cameras and the room, if they are known. Out: a view in normalised coordinates, from
+which all of the bodies fit a square picture in all of these frames.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import product
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float64
+
+from ...analysis.front import Body, bodies_of, front_of, sampled
+from ...analysis.survey import Survey, piece_of_faces
+from ...format.view import USUAL, View
+from ...geometry.cameras import Camera, Rays, looking_at
+from ...geometry.threads import ahead
+from ...geometry.topology import clean, part_of
+from ...types import UPRIGHT, Mesh, Up
+from ..run.schedule import Job
+from ..scene.parts import cameras_of
+
+Point = Float64[np.ndarray, "3"]
+
+ASIDE = np.array([0.6, 0.8])  # direction, seen from above, of a three-quarter view of what has no front (guess)
+EYES = 0.93  # of the height of what stands: people's eyes
+ONE_SIDE = 0.5  # length of the mean direction to the cameras, from which on they are on one side (guess)
+SEEN = 0.5  # share of the corners of the bodies' boxes that a camera must see, to count (guess)
+STEEPEST = 0.87  # sine of the steepest look down or up, 60 degrees (guess)
+MARGIN = 1.1  # times the picture that just holds all: for the player's controls, and for beauty (guess)
+FREE, CLOSEST, WIDEST = 0.9, 0.5, 90.0  # of the way to a wall, of the distance wanted; degrees before a wall (guesses)
+DIGITS = 4  # of normalised places: 0.2 mm of a person
+
+
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """What stands around the bodies, in the world."""
+
+    up: Up
+    cameras: tuple[Camera, ...] = ()
+    room: Mesh = field(default_factory=Mesh.empty)
+
+
+def first_view(
+    job: Job, survey: Survey, seen: Mapping[int, Sequence[Body]] | None = None, room: Mesh | None = None
+) -> dict[str, Any]:
+    """Return the metadata of the first view; without bodies that were `seen`, frames of the whole sequence are read."""
+    sequence = job.sequence
+
+    def read(number: int) -> list[Body]:
+        mesh = clean(sequence[number])
+        pieces = piece_of_faces(mesh)
+        return bodies_of((part_of(mesh, pieces == piece) for piece in np.unique(pieces)), sequence.up)
+
+    if seen is None:
+        numbers = sampled(len(sequence), sequence.frame_rate)
+        seen = dict(zip(numbers, ahead(read, numbers), strict=True))
+    cameras = cameras_of(sequence.depth or sequence.colors, len(sequence))
+    view = guessed_view(seen, sequence.frame_rate, Setting(sequence.up, cameras, room or Mesh.empty()), survey)
+    return {} if view is None else view.item
+
+
+def guessed_view(
+    frames: Mapping[int, Sequence[Body]], frame_rate: float, setting: Setting, survey: Survey
+) -> View | None:
+    """Return the view of the bodies in some frames, by their numbers; None where there are none."""
+    bodies = [body for some in frames.values() for body in some]
+    if not bodies:
+        return None
+    corners = np.array([corner for body in bodies for corner in product(*zip(body.low, body.high, strict=True))])
+    target = (corners.min(axis=0) + corners.max(axis=0)) / 2
+    floor, turn = float(corners[:, 1].min()), np.array(UPRIGHT[setting.up], np.float64)
+    eyes = floor + EYES * max(body.height for body in bodies)
+    way = _to_cameras(setting.cameras, corners, target, turn)
+    if way is None:
+        front = front_of(frames, frame_rate, ASIDE)
+        x, z = ASIDE if front is None else front
+        level = np.array([x, 0.0, z])
+        rise = (eyes - target[1]) / (_distance(corners - target, level, USUAL) or 1.0)
+        way = level + np.array([0.0, rise, 0.0])
+    way = _no_steeper(way / math.hypot(*way))
+    distance, fov = _distance(corners - target, way, USUAL), USUAL
+    room = Rays(setting.room.at(setting.room.vertices @ turn.T))
+    wall = FREE * float(room.cast(np.array([[target[0], eyes, target[2]]]), way[None]).distances[0])
+    if CLOSEST * distance < wall < distance:
+        distance, fov = wall, min(_angle(corners - target, way, wall), WIDEST)
+    places = np.stack([target + distance * way, target]) @ turn
+    position, target = np.round((places - survey.center) / survey.unit, DIGITS).tolist()
+    view = View(tuple(position), tuple(target), round(fov, 1))
+    return view if view.is_valid else None
+
+
+def _to_cameras(cameras: Sequence[Camera], corners: np.ndarray, target: Point, turn: np.ndarray) -> Point | None:
+    """Return the way to the middle of the cameras that see the bodies; None where these are on no one side of them."""
+    seeing = [camera for camera in cameras if len(camera.seen(corners @ turn)[1]) >= SEEN * len(corners)]
+    ways = np.array([turn @ camera.eye - target for camera in seeing]).reshape(-1, 3)
+    lengths = np.sqrt((ways**2).sum(axis=1))
+    if not len(ways) or not lengths.all():
+        return None
+    mean, way = (ways / lengths[:, None]).mean(axis=0), ways.mean(axis=0)
+    return way if math.hypot(*mean) >= ONE_SIDE and way.any() else None
+
+
+def _no_steeper(way: Point) -> Point:
+    """Return a direction of length 1 that is no steeper than `STEEPEST`; one that is upright is seen from the front."""
+    if abs(way[1]) <= STEEPEST:
+        return way
+    level = math.sqrt(1 - STEEPEST**2)
+    x, z = (way[0], way[2]) if math.hypot(way[0], way[2]) > 1e-6 else (0.0, 1.0)
+    return np.array([x, 0.0, z]) * level / math.hypot(x, z) + np.array([0.0, math.copysign(STEEPEST, way[1]), 0.0])
+
+
+def _aside(points: np.ndarray, way: Point) -> tuple[Float64[np.ndarray, " N"], Float64[np.ndarray, " N"]]:
+    """Return how far points are to the viewer, and aside or up, at most; relative to the target."""
+    right, down = looking_at(way, np.zeros(3))[:3, :2].T
+    offsets = [np.abs((points * axis).sum(axis=1)) for axis in (right, down)]
+    return (points * way).sum(axis=1), MARGIN * np.maximum(*offsets)
+
+
+def _distance(points: np.ndarray, way: Point, fov: float) -> float:
+    """Return the distance along a way from which a square picture holds points."""
+    nearer, aside = _aside(points, way)
+    return float((nearer + aside / math.tan(math.radians(fov) / 2)).max())
+
+
+def _angle(points: np.ndarray, way: Point, distance: float) -> float:
+    """Return the degrees at which a square picture from a distance holds points, at least the usual ones."""
+    nearer, aside = _aside(points, way)
+    before = np.maximum(distance - nearer, 1e-3 * distance)
+    return max(math.degrees(2 * math.atan(float((aside / before).max()))), USUAL)
