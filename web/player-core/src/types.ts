@@ -133,6 +133,15 @@ export type CompanionKind = "colors" | "atlas" | "splats" | Rendition;
 /** Video from which textures are decoded: AV1, or the same pictures in H.264. */
 export type Rendition = "pictures" | "compatible";
 
+export type Point = readonly [number, number, number];
+
+/** A camera that looks at a target, in the scene's own space. */
+export interface FirstView {
+  readonly position: Point;
+  readonly target: Point;
+  readonly fov: number; // degrees, of the picture's height
+}
+
 /** Facts from the head, known before any chunk is there. */
 export interface Info {
   readonly frameCount: number;
@@ -141,6 +150,7 @@ export interface Info {
   readonly origin: readonly [number, number, number]; // m, where the scene's own space has its zero
   readonly box: Box; // around all frames
   readonly rotation?: readonly number[] | null | undefined; // that frames are shown with, about the origin: nine numbers, row by row
+  readonly view?: FirstView | null | undefined; // what it begins with; null where the file does not say
   readonly trackCount: number;
   readonly mostLayers: number; // layers beyond the first that the richest group has
   readonly size: number; // bytes

@@ -28,12 +28,13 @@ export interface Stage extends EventTarget {
   background: string; // a CSS colour
   autoRotate: boolean;
   fly: boolean; // the camera moves through the scene, instead of around what it looks at
-  readonly isFit: boolean; // the view was not changed since it fitted
+  readonly isFit: boolean; // the view is the one that a recording begins with
   ground: boolean; // true for a ground, if the recording has none
   exposure: number; // times the usual light
-  camera: string; // as the attribute has it; "" fits the view
+  camera: string; // as the attribute has it; "" is the view that a recording begins with
+  readonly viewOfFile: string; // the view of now as `meshreel tag --view` takes it; "" where there is no recording
   up: Up | null; // the recording's axis that points up; null: as it says itself. A change fits the view.
-  /** A new recording: forgets the last one's groups, fits the view. */
+  /** A new recording: forgets the last one's groups, begins with its first view, or else a view of all of it. */
   begin(info: Info): void;
   prepare(packed: Packed): void;
   release(packed: Packed): void;
@@ -41,6 +42,7 @@ export interface Stage extends EventTarget {
   draw(shown: Shown | null): boolean;
   /** All in CSS pixels; the lowest `covered` of them lie under the bar, and what is looked at is put into the middle of the others. */
   resize(width: number, height: number, pixelRatio: number, covered: number): void;
+  /** The view that the recording begins with; where that is shown, all of it. */
   fit(): void;
   /** Turns the camera by radians, and divides its distance by `closer`. */
   orbit(right: number, up: number, closer: number): void;

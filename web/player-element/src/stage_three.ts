@@ -1,7 +1,7 @@
 // A stage that draws with three.js: the recording, a camera that orbits it, and a headset.
 
-import type { Box, Info, Packed, Shown } from "@meshreel/player-core/types";
-import { Ground, ReelScene, Sorter, standing, updateFar } from "@meshreel/player-three";
+import type { Box, FirstView, Info, Packed, Shown } from "@meshreel/player-core/types";
+import { Ground, lying, ReelScene, Sorter, standing, updateFar } from "@meshreel/player-three";
 import type { Mode, OrderWorker } from "@meshreel/player-three";
 import { VrSession } from "@meshreel/xr";
 import type { VrActions } from "@meshreel/xr";
@@ -13,8 +13,8 @@ import { Fly } from "./fly.ts";
 import type { PictureStats, Stage } from "./stage.ts";
 import type { Up } from "@meshreel/player-three/upright";
 
-const FOV = 45; // degrees, of the picture's height
-const TANGENT = Math.tan((FOV * Math.PI) / 360); // of half of that
+const FOV = 45; // degrees, of the picture's height, where the recording does not say
+const DIGITS = 4; // of a view's numbers, relative to its distance
 const MARGIN = 1.05; // around what just fits
 const STEEPEST = 0.01; // radians from straight above or below
 const CLOSEST = 1e-3; // of the recording's size: how near the camera comes
@@ -38,13 +38,14 @@ export class ThreeStage extends EventTarget implements Stage {
   #reel: ReelScene;
   #box: Box | null = null; // of the recording, as it stands
   #info: Info | null = null; // of the recording
+  #first: FirstView | null = null; // the recording's own first view, as it stands
   #up: Up | null = null;
   #mode: Mode = "shaded";
   #background = "";
   #free = 1; // of the picture's height: what the bar leaves
   readonly #fly = new Fly(this.#eye, () => this.#flown());
   #drawnAt = 0; // ms
-  isFit = true; // the camera was not moved by hand: it fits again when the picture's size changes
+  isFit = true; // it shows what it begins with, and does so again when the picture's size changes
   #session: VrSession | null = null;
   readonly #place = new Vector3(); // of the eye, in the recording's space
   readonly far = new Set<number>();
@@ -116,7 +117,16 @@ export class ThreeStage extends EventTarget implements Stage {
   set camera(text: string) {
     const values = readCamera(text);
     if (values) this.#look(new Vector3(...values.slice(0, 3)), new Vector3(...values.slice(3)));
-    else this.fit();
+    else this.#begin();
+  }
+
+  get viewOfFile(): string {
+    if (!this.#info) return "";
+    const { target } = this.#orbit;
+    const eye = target.clone().addScaledVector(this.#eye.position.clone().sub(target), 1 / this.#back);
+    const digits = Math.min(12, Math.max(0, DIGITS - Math.floor(Math.log10(eye.distanceTo(target)))));
+    const places = [eye, target].flatMap((place) => lying(place, this.#info!, this.#up).toArray());
+    return [...places.map((value) => value.toFixed(digits)), this.#eye.fov].join(",");
   }
 
   get autoRotate(): boolean {
@@ -173,7 +183,7 @@ export class ThreeStage extends EventTarget implements Stage {
   draw(shown: Shown | null): boolean {
     if (shown) this.#reel.show(shown);
     if (this.presenting) this.far.clear(); // it comes near
-    else if (shown) updateFar(this.far, shown, this.#reel.worldToLocal(this.#place.copy(this.#eye.position)), this.canvas.height / (2 * TANGENT));
+    else if (shown) updateFar(this.far, shown, this.#reel.worldToLocal(this.#place.copy(this.#eye.position)), this.canvas.height / (2 * this.#tangent));
     this.#reel.splats.forEach((count, track) => void (count > 0 && this.far.add(track)));
     this.#reel.visible = shown !== null;
     this.#shade(shown);
@@ -200,16 +210,12 @@ export class ThreeStage extends EventTarget implements Stage {
     this.#eye.aspect = width / height;
     this.#free = Math.max(0.2, 1 - covered / height);
     this.#eye.setViewOffset(width, height, 0, ((1 - this.#free) * height) / 2, width, height);
-    if (this.isFit) this.fit();
+    if (this.isFit) this.#begin();
   }
 
   fit(): void {
-    if (!this.#box) return;
-    const { middle } = this.#ball(this.#box);
-    const { lift, distance } = fitting(this.#box, (TANGENT * this.#eye.aspect) / MARGIN, (TANGENT * this.#free) / MARGIN);
-    middle.y += lift;
-    this.#look(middle.clone().addScaledVector(FROM, distance || 1), middle);
-    this.isFit = true;
+    if (this.isFit && this.#first) this.#whole();
+    else this.#begin();
   }
 
   orbit(right: number, up: number, closer: number): void {
@@ -228,13 +234,14 @@ export class ThreeStage extends EventTarget implements Stage {
 
   async enterVr(frame: (now: number) => void, actions: VrActions, passthrough: boolean): Promise<void> {
     const box = this.#box;
+    const view = this.#first;
     if (this.#session !== null || !box) return;
     const onend = (): void => {
       this.#session = null;
       this.dispatchEvent(new Event("vrend"));
     };
     const [renderer, camera, content] = [this.#renderer, this.#eye, this.#content];
-    this.#session = await VrSession.enter({ renderer, camera, content, box, actions, frame, onend, passthrough });
+    this.#session = await VrSession.enter({ renderer, camera, content, box, view, actions, frame, onend, passthrough });
     this.dispatchEvent(new Event("vrstart"));
   }
 
@@ -258,6 +265,33 @@ export class ThreeStage extends EventTarget implements Stage {
   #ball({ minimum, size }: Box): { middle: Vector3; radius: number } {
     const middle = new Vector3(...minimum).addScaledVector(new Vector3(...size), 0.5);
     return { middle, radius: Math.hypot(...size) / 2 || 1 };
+  }
+
+  /** Of half of the angle of view. */
+  get #tangent(): number {
+    return Math.tan((this.#eye.fov * Math.PI) / 360);
+  }
+
+  /** Times the distance of a file's view: a picture that is higher than wide shows at least what a square one does. */
+  get #back(): number {
+    return Math.max(1, 1 / this.#eye.aspect);
+  }
+
+  /** The recording's first view, or else all of it. */
+  #begin(): void {
+    if (this.#first) {
+      const target = new Vector3(...this.#first.target);
+      this.#look(new Vector3(...this.#first.position).sub(target).multiplyScalar(this.#back).add(target), target);
+    } else this.#whole();
+    this.isFit = true;
+  }
+
+  #whole(): void {
+    if (!this.#box) return;
+    const { middle } = this.#ball(this.#box);
+    const { lift, distance } = fitting(this.#box, (this.#tangent * this.#eye.aspect) / MARGIN, (this.#tangent * this.#free) / MARGIN);
+    middle.y += lift;
+    this.#look(middle.clone().addScaledVector(FROM, distance || 1), middle);
   }
 
   #look(eye: Vector3, target: Vector3): void {
@@ -285,13 +319,15 @@ export class ThreeStage extends EventTarget implements Stage {
   /** A recording on its floor, all of it in view. */
   #stand(info: Info): void {
     this.#info = info;
-    const { turned, box } = standing(info, this.#up);
+    const { turned, box, view } = standing(info, this.#up);
     this.#box = box;
+    this.#first = view;
+    this.#eye.fov = view?.fov ?? FOV;
     this.#reel.stand(turned, box.minimum[1], box.size[1]);
     this.#floor.lie(box);
     this.#fly.size = 2 * this.#ball(box).radius;
     this.#shaded = null;
-    this.fit();
+    this.#begin();
   }
 
   /** Near and far follow the camera, so that depth has its precision where the recording is. */

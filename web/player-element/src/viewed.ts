@@ -19,11 +19,15 @@ export class Viewed extends Reflected {
   set camera(value: string) {
     this.setAttribute("camera", value);
   }
-  /** True if the view was changed since it fitted. */
+  /** The view of now, as `meshreel tag FILE --view` takes it; "" where nothing is shown. */
+  get viewOfFile(): string {
+    return this.view?.stage.viewOfFile ?? "";
+  }
+  /** True if the view is not the one that the recording begins with. */
   get cameraMoved(): boolean {
     return this.view !== null && !this.view.stage.isFit;
   }
-  /** Looks at the whole scene. */
+  /** Looks from where the recording begins; from there, at the whole scene. */
   fit(): void {
     this.view?.stage.fit();
   }

@@ -159,6 +159,7 @@ export class FakeStage extends EventTarget implements Stage {
   isFit = true;
   up: Stage["up"] = null;
   camera = "1,1,1";
+  viewOfFile = "1,2,3,0,1,0,45";
   draws = 0;
   fits = 0;
   disposed = false;

@@ -1,9 +1,13 @@
 // What viewers do beyond playing: flying, turning, repeating a part, counting frames, sending links.
 
+import { execFileSync } from "node:child_process";
+import { join } from "node:path";
+
 import type { Page } from "playwright-core";
 import { afterAll, beforeAll, expect, test } from "vitest";
 
 import { describeInBrowser } from "../../test/browser.ts";
+import { hasPython, PYTHON, ROOT } from "../../test/python.ts";
 import { Site } from "./product.ts";
 
 describeInBrowser("the page of a recording", () => {
@@ -62,6 +66,39 @@ describeInBrowser("the page of a recording", () => {
     await page.locator(".toast").getByText("Link copied").waitFor();
     expect(await page.evaluate(() => navigator.clipboard.readText())).toMatch(/layers\.reel&t=0\.04#t=0\.040$/);
     await page.close();
+  });
+
+  test.skipIf(!hasPython)("it begins with the file's view, unless the address has another, and copies the command for the view of now", async () => {
+    const tagged = join(site.folder, "tagged.reel");
+    const numbers = [0.5, 0.7, -4, 0.5, 0.6, 0, 30];
+    execFileSync(PYTHON, ["-m", "meshreel", "tag", "conformance/v1/layers.reel", `--view=${numbers.join(",")}`, "-o", tagged], { cwd: ROOT });
+    const open = async (rest: string): Promise<Page> => {
+      const { page } = await site.visit(`player/index.html?src=/tagged.reel${rest}`);
+      await page.waitForFunction(() => (document.querySelector("meshreel-player")!.statistics?.triangles ?? 0) > 0);
+      return page;
+    };
+    const page = await open("");
+    const told = (): Promise<number[]> => page.evaluate(() => document.querySelector("meshreel-player")!.viewOfFile.split(",").map(Number));
+    const isAsTagged = async (): Promise<void> => (await told()).forEach((value, k) => expect(value).toBeCloseTo(numbers[k], 3));
+    await isAsTagged();
+    await page.setViewportSize({ width: 300, height: 600 }); // from farther away, but the same view
+    await expect.poll(() => page.evaluate(() => document.querySelector("meshreel-player")!.cameraMoved)).toBe(false);
+    await isAsTagged();
+    const before = await camera(page);
+    await page.keyboard.press("0"); // all of it
+    await expect.poll(() => camera(page)).not.toEqual(before);
+    await page.keyboard.press("0");
+    await expect.poll(() => camera(page)).toEqual(before);
+    await page.context().grantPermissions(["clipboard-read", "clipboard-write"]);
+    await page.locator("button.more").click();
+    await page.locator(".settings button.view").click();
+    await page.locator(".toast").getByText("Command copied").waitFor();
+    const command = await page.evaluate(() => navigator.clipboard.readText());
+    expect(command).toMatch(/^meshreel tag tagged\.reel --view=[-\d.,]+,30 -o view-tagged\.reel$/);
+    await page.close();
+    const other = await open("#camera=1,2,3,0,0,0");
+    expect(await camera(other)).toEqual([1, 2, 3, 0, 0, 0]);
+    await other.close();
   });
 
   test("a part is repeated, and marked on the bar", async () => {

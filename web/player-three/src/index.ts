@@ -7,7 +7,7 @@ export { Sorter } from "./sorter.ts";
 export type { OrderWorker } from "./sorter.ts";
 export { MODES, shownMode } from "./modes.ts";
 export type { Mode } from "./modes.ts";
-export { standing } from "./standing.ts";
+export { lying, standing } from "./standing.ts";
 export type { Up } from "./upright.ts";
 export { Bench, formatReport } from "./bench.ts";
 export type { BenchExtra, BenchReport, Spread } from "./bench.ts";

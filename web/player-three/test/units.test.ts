@@ -1,17 +1,30 @@
+import { Vector3 } from "three";
 import { describe, expect, test } from "vitest";
 import { SPLAT_WEIGHT, SPLAT_WORDS } from "@meshreel/player-core/types";
 import { trackColor } from "../src/colors.ts";
 import type { Vector } from "../src/colors.ts";
-import type { Shown } from "@meshreel/player-core/types";
+import type { Info, Shown } from "@meshreel/player-core/types";
 import { updateFar } from "../src/far.ts";
 import { orderSplats } from "../src/order.ts";
 import type { OrderJob } from "../src/order.ts";
 import { localFrame, triangleCount, vertexRoom } from "../src/ranges.ts";
 import { surfaceVertex, SURFACE_FRAGMENT } from "../src/shaders.ts";
 import { Sorter } from "../src/sorter.ts";
+import { lying, standing } from "../src/standing.ts";
 import type { OrderWorker } from "../src/sorter.ts";
 import { Upload } from "../src/upload.ts";
 import { makeFloor, makeGroup } from "./analytic.ts";
+
+test("a first view stands up with its recording, and a place in the scene has one in the file", () => {
+  const view = { position: [1, -3, 0.5], target: [1, 0, 0.5], fov: 30 } as const; // of a file in which z points up
+  const info = { metadata: { up: "z" }, box: { minimum: [0, 0, 0], size: [1, 2, 3] }, origin: [10, 20, 30], view } as unknown as Info;
+  const stood = standing(info, null).view!;
+  stood.position.forEach((value, k) => expect(value).toBeCloseTo([1, 0.5, 3][k]));
+  stood.target.forEach((value, k) => expect(value).toBeCloseTo([1, 0.5, 0][k]));
+  lying(new Vector3(...stood.position), info, null).toArray().forEach((value, k) => expect(value).toBeCloseTo([11, 17, 30.5][k]));
+  expect(standing(info, "z").view?.fov).toBe(30);
+  expect(standing(info, "y").view).toBeNull(); // it would look from above
+});
 
 test("a frame shows the group's triangles and its own, and a frame beside the group its nearest", () => {
   const { packed } = makeGroup({ firstFrame: 10 });

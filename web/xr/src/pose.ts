@@ -2,7 +2,7 @@
 
 import { Quaternion, Vector3 } from "three";
 import type { Object3D } from "three";
-import type { Box } from "@meshreel/player-core/types";
+import type { Box, FirstView } from "@meshreel/player-core/types";
 
 export const SCALES = { least: 0.05, most: 20 } as const;
 
@@ -43,16 +43,17 @@ export function applyPose(pose: Pose, object: Object3D): void {
 
 /**
  * Stands the recording in front of the viewer, or around them where it is a room: at true scale, its lowest point on the floor. With `passthrough`
- * they are in a room already: another one stands before them as a model.
+ * they are in a room already: another one stands before them as a model. With a `view` they look as it does, in a room from where it does.
  */
-export function place(box: Box, viewer: Viewer, pose: Pose, passthrough = false): void {
+export function place(box: Box, viewer: Viewer, pose: Pose, passthrough = false, view: FirstView | null = null): void {
   const wide = Math.max(box.size[0], box.size[2]);
   const distance = wide > ROOM && !passthrough ? 0 : DISTANCE;
-  const [sin, cos] = [Math.sin(viewer.turn), Math.cos(viewer.turn)];
-  const [x, z] = [box.minimum[0] + box.size[0] / 2, box.minimum[2] + box.size[2] / 2];
-  pose.turn = viewer.turn;
+  const middle = [box.minimum[0] + box.size[0] / 2, 0, box.minimum[2] + box.size[2] / 2];
+  const [x, , z] = view === null ? middle : distance === 0 ? view.position : view.target;
+  pose.turn = viewer.turn - (view === null ? 0 : Math.atan2(view.position[0] - view.target[0], view.position[2] - view.target[2]));
+  const [sin, cos] = [Math.sin(pose.turn), Math.cos(pose.turn)];
   const scale = (pose.scale = wide > ROOM && passthrough ? MODEL / wide : 1);
-  pose.position.set(viewer.x - distance * sin - scale * (cos * x + sin * z), -scale * box.minimum[1], viewer.z - distance * cos - scale * (cos * z - sin * x));
+  pose.position.set(viewer.x - distance * Math.sin(viewer.turn) - scale * (cos * x + sin * z), -scale * box.minimum[1], viewer.z - distance * Math.cos(viewer.turn) - scale * (cos * z - sin * x));
 }
 
 /** Position and direction of a head, seen from above. */

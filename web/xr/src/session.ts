@@ -1,7 +1,7 @@
 // A session in a headset, from the click to the moment at which the page is as it was.
 
 import type { Object3D, PerspectiveCamera, Vector3, WebGLRenderer } from "three";
-import type { Box } from "@meshreel/player-core/types";
+import type { Box, FirstView } from "@meshreel/player-core/types";
 import type { VrActions } from "./actions.ts";
 import { Floor } from "./floor.ts";
 import { Grab } from "./grab.ts";
@@ -17,6 +17,7 @@ export interface VrOptions {
   /** Stands in a scene that has no transformation. The session sets its own one; what is below it stays. */
   readonly content: Object3D;
   readonly box: Box; // around the content, y up
+  readonly view?: FirstView | null; // from which it is seen at first
   readonly actions: VrActions;
   readonly passthrough?: boolean; // in the viewer's own room, seen by the headset's cameras
   /** Draws a picture, with a clock's milliseconds. Must not set the renderer's size or the camera. */
@@ -145,7 +146,8 @@ export class VrSession {
   /** In front of where the viewer is now. Until the headset knows, of where the room has its zero. */
   #place(): void {
     this.#placed = this.#look();
-    place(this.#options.box, this.#viewer, this.#pose, this.#options.passthrough);
+    const { box, view, passthrough } = this.#options;
+    place(box, this.#viewer, this.#pose, passthrough, view);
     this.#grab.release();
   }
 

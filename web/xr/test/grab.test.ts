@@ -125,6 +125,17 @@ describe("where it stands", () => {
     expectNear(at(2.5, -1, 1).applyMatrix4(matrixOf(pose)), at(1, 0, 0));
   });
 
+  test("as its first view looks at it; in a room from where that looks", () => {
+    const pose = makePose();
+    const view = { position: [-2, 1.6, 0.5], target: [1, 1, 0.5], fov: 45 } as const;
+    place(person, { x: 2, z: 1, turn: Math.PI / 2 }, pose, false, view);
+    expectNear(at(1, 0.4, 0.5).applyMatrix4(matrixOf(pose)), at(0.5, 0, 1));
+    expectNear(at(-1, 0, 0).transformDirection(matrixOf(pose)), at(1, 0, 0)); // the side that the view is on is the viewer's
+    place({ minimum: [-5, 0, -5], size: [10, 2.5, 10] }, { x: 1, z: 0, turn: 0 }, pose, false, view);
+    expectNear(at(-2, 0, 0.5).applyMatrix4(matrixOf(pose)), at(1, 0, 0));
+    expectNear(at(1, 0, 0).transformDirection(matrixOf(pose)), at(0, 0, -1));
+  });
+
   test.each([
     ["level", orientation(0, Math.sin(0.35), 0, Math.cos(0.35)), 0.7],
     ["straight down", orientation(-Math.SQRT1_2, 0, 0, Math.SQRT1_2), 0],

@@ -10,6 +10,7 @@ import { FormatError } from "../errors.ts";
 import { Checksum, ChunkKind, EDITED, Form, Header, Index, LIMITS, MAGIC, Preamble, VERSION } from "./layout.gen.ts";
 import type { Layer } from "./layout.gen.ts";
 import { unpack, unpackAll } from "./records.ts";
+import { viewOf } from "./view.ts";
 import type { Box, CompanionKind, Info, Rendition } from "../types.ts";
 
 export const FIRST_REQUEST = 16384; // bytes; the head of some minutes of video
@@ -288,13 +289,15 @@ function infoOf(
 ): Info {
   const last = chunks[chunks.length - 1];
   const scaled = chunks.filter(({ kind, form }) => kind === "group" && (form === Form.LAYERS || form === Form.LAPLACIAN));
+  const turned = rotation ?? [1, 0, 0, 0, 1, 0, 0, 0, 1];
   return {
     frameCount,
     frameRate: header.frameRate,
     duration: lastTime + 1 / header.frameRate,
     origin: header.origin as unknown as Info["origin"],
-    box: boxOf(header, rotation ?? [1, 0, 0, 0, 1, 0, 0, 0, 1]),
+    box: boxOf(header, turned),
     rotation,
+    view: viewOf(metadata, header.scale, turned),
     trackCount,
     mostLayers: scaled.reduce((most, chunk) => Math.max(most, chunk.layers.length - 1), 0),
     size: last.offset + last.size,

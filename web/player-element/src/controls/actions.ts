@@ -126,6 +126,18 @@ export async function copyLink(player: MeshreelPlayer, surface: Surface): Promis
   }
 }
 
+/** Puts a command on the clipboard that makes the view of now the first one of the file, which a page cannot write. */
+export async function copyView(player: MeshreelPlayer, surface: Surface): Promise<void> {
+  const name = player.currentSrc === "" ? "" : recordingName(player.currentSrc);
+  const file = /^\w[\w.+-]*$/.test(name) ? `${name}.reel` : "FILE.reel"; // nothing that a shell takes as its own
+  try {
+    await navigator.clipboard.writeText(`meshreel tag ${file} --view=${player.viewOfFile} -o view-${file}`);
+    surface.tell("Command copied: run it to make this the first view");
+  } catch {
+    surface.tell("Copying is not allowed here");
+  }
+}
+
 /** Saves the picture as a file named after recording and frame. */
 export async function saveScreenshot(player: MeshreelPlayer, surface: Surface): Promise<void> {
   try {

@@ -17,6 +17,7 @@ export interface BarActs {
   screenshot(): void;
   openFile(): void;
   copyLink(): void;
+  copyView(): void;
   enterAr(): void;
 }
 
@@ -129,6 +130,7 @@ export class Bar {
       this.#button("autorotate", "R", () => ({ icon: "replay", label: "Auto-rotate", pressed: player.autoRotate }), () => act("autoRotate")),
       this.#button("fly", "G", () => ({ icon: "fly", label: "Fly mode", pressed: player.fly }), () => act("fly")),
       this.#button("share", "", () => ({ icon: "link", label: "Copy link", shown: player.share, enabled: player.info !== null }), () => this.#acts.copyLink()),
+      this.#button("view", "", () => ({ icon: "camera", label: "Use this view", enabled: player.info !== null }), () => this.#acts.copyView()),
       this.#button("open", "", () => ({ icon: "open", label: "Open file" }), () => this.#acts.openFile()),
       this.#button("help", "?", () => ({ icon: "help", label: "Keyboard shortcuts" }), () => this.#acts.act("help")),
     ];

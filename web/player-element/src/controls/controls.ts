@@ -5,7 +5,7 @@ import type { MeshreelPlayer } from "../element.ts";
 import { icon } from "../icons.ts";
 import { type Action, actionOf, isOfSound, takesKey, type Target } from "../keyboard.ts";
 import { styleSheet } from "../styles.ts";
-import { copyLink, perform, saveScreenshot, type Surface, toggleVr } from "./actions.ts";
+import { copyLink, copyView, perform, saveScreenshot, type Surface, toggleVr } from "./actions.ts";
 import { acceptTaps, Activity, type Tap } from "./activity.ts";
 import { Bar } from "./bar.ts";
 import { make } from "./dom.ts";
@@ -40,7 +40,7 @@ export class Controls implements Surface {
     });
     const open = () => this.#file.click();
     const act = (action: Action) => this.#act(action);
-    this.#bar = new Bar(player, { act, openFile: open, screenshot: () => void saveScreenshot(player, this), copyLink: () => void copyLink(player, this), enterAr: () => void toggleVr(player, this, true) });
+    this.#bar = new Bar(player, { act, openFile: open, screenshot: () => void saveScreenshot(player, this), copyLink: () => void copyLink(player, this), copyView: () => void copyView(player, this), enterAr: () => void toggleVr(player, this, true) });
     this.#error = new ErrorPanel(() => player.retry(), open);
     this.#help = new HelpPanel(() => this.toggleHelp());
     this.#statistics = new StatisticsPanel(player);
