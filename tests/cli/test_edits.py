@@ -51,3 +51,15 @@ def test_wrong_words_are_said(run, tmp_path):
     assert failed(run("cut", SCENE, "--frames", "1:2", "-o", tmp_path / "a.mesh"), "must end in .reel")
     assert failed(run("retime", SCENE, *out), "a frame rate or a speed")
     assert failed(run("cut", SCENE, "--frames", "99:", *out), "leave 0")
+
+
+def test_a_first_view_is_tagged_and_told(run, tmp_path):
+    view, out = "-0.5,1.6,3,0,1,0,50", ("-o", tmp_path / "a.reel")
+    assert run("tag", SCENE, "--view", view, *out).code == 0
+    said = run("info", tmp_path / "a.reel")
+    assert "first view: from -0.5 1.6 3 to 0 1 0 m, 50 degrees" in said.out and "position" not in said.out
+    assert run("info", tmp_path / "a.reel", "--json").row["view"]["fov"] == 50
+    assert run("info", SCENE, "--json").row["view"] is None
+    assert failed(run("tag", SCENE, "--view", "0,1,2", *out), "--view '0,1,2': give six numbers with commas")
+    assert failed(run("tag", SCENE, "--view", "0,1,2,a,1,0", *out), "give six numbers")
+    assert failed(run("tag", SCENE, "--view", "0,1,2,0,1,2", *out), "position and target are the same")

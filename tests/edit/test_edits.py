@@ -405,3 +405,41 @@ def test_without_its_flag_an_edit_is_metadata_like_others_and_other_flags_are_re
     data = bytearray(pack_head(ReelReader(BytesSource(DATA)).header, ReelReader(BytesSource(DATA)).index))
     with pytest.raises(FormatError, match="flags 2: this reader knows 1 alone"):
         meshreel.open(bytes([*data[:9], 2, *data[10:]]))
+
+
+def test_a_view_is_tagged_in_metres_and_moves_with_the_file(tmp_path):
+    view = [0.5, 1.6, 3.0, 0.0, 1.0, 0.25, 60.0]
+    tag(GOLDEN / "scene.reel", tmp_path / "a.reel", view=view)
+    found = meshreel.open(tmp_path / "a.reel").view
+    assert found is not None and [*found.position, *found.target, found.fov] == pytest.approx(view, abs=1e-6)
+    transform(tmp_path / "a.reel", tmp_path / "b.reel", 2.0, TURN, (1.0, 2.0, 3.0))
+    cut(tmp_path / "b.reel", tmp_path / "c.reel", "2:5")
+    moved = meshreel.open(tmp_path / "c.reel").view
+    assert moved is not None and moved.fov == 60.0
+    for place, before in ((moved.position, view[:3]), (moved.target, view[3:6])):
+        np.testing.assert_allclose(place, 2 * TURN @ before + [1.0, 2.0, 3.0], atol=1e-9)
+    tag(tmp_path / "c.reel", tmp_path / "d.reel", view=[*moved.position, *moved.target])
+    again = meshreel.open(tmp_path / "d.reel").view
+    assert again is not None and again.position == pytest.approx(moved.position) and again.fov == 45.0
+
+
+@pytest.mark.parametrize(
+    ("view", "message"),
+    [
+        ([0, 0, 0, 0, 0], "give 7 finite numbers"),
+        ([0, 0, 3, 0, 0, float("nan")], "give 7 finite numbers"),
+        ([0, 0, 3, 0, 0, 3], "position and target are the same"),
+        ([0, 0, 3, 0, 0, 1e30], "too far away"),
+        ([0, 0, 3, 0, 0, 0, 180], "180 degrees"),
+        ([0, 0, 3, 0, 0, 0, 0], "0 degrees"),
+    ],
+)
+def test_a_view_that_no_file_may_have_is_refused(tmp_path, view, message):
+    with pytest.raises(InputError, match=message):
+        tag(GOLDEN / "scene.reel", tmp_path / "a.reel", view=view)
+    assert not (tmp_path / "a.reel").exists()
+
+
+def test_the_name_of_the_view_is_no_name_for_a_tag(tmp_path):
+    with pytest.raises(InputError, match="'view' is no name for a tag"):
+        tag(GOLDEN / "scene.reel", tmp_path / "a.reel", {"view": "front"})

@@ -1,5 +1,6 @@
 """Exported files show the decoded mesh at the time of each frame, and motion between frames."""
 
+import json
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -10,10 +11,12 @@ import pytest
 import meshreel
 from meshreel.coding.mesh import encode_intra
 from meshreel.container.writer import ReelWriter
+from meshreel.edit.edits import tag, transform
 from meshreel.encoder.sequence import encode
 from meshreel.errors import FormatError, InputError
 from meshreel.export.animated_file import ExportOptions
 from meshreel.export.animated_file import export as export_file
+from meshreel.export.shapes import Animation
 from meshreel.geometry.topology import vertex_normals
 from meshreel.io.sequence import open_sequence
 from meshreel.types import Mesh, MeshList
@@ -321,3 +324,25 @@ def test_an_impossible_target_is_an_error_at_once(tmp_path):
     with pytest.raises(InputError, match="-1"):
         ExportOptions(layers=-1)
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(("up", "eye", "target"), [("y", (0.5, 2, 3), (0.5, 2, 0)), ("z", (0.5, -3, 2), (0.5, 0, 2))])
+def test_a_glb_file_has_a_camera_of_the_first_view(tmp_path, up, eye, target):
+    """In the file y is up, and a camera looks along its -z."""
+    transform(GOLDEN / "scene.reel", tmp_path / "up.reel", up=up)
+    tag(tmp_path / "up.reel", tmp_path / "a.reel", view=[*eye, *target, 30])
+    export(meshreel.open(tmp_path / "a.reel"), tmp_path / "out.glb")
+    data = (tmp_path / "out.glb").read_bytes()
+    tree = json.loads(data[20 : 20 + int.from_bytes(data[12:16], "little")])
+    [node] = [node for node in tree["nodes"] if "camera" in node]
+    matrix = np.array(node["matrix"]).reshape(4, 4).T
+    np.testing.assert_allclose(matrix[:3, 3], [0.5, 2.0, 3.0], atol=1e-9)
+    np.testing.assert_allclose(matrix[:3, :3], np.eye(3), atol=1e-9)
+    assert tree["cameras"][0]["perspective"]["yfov"] == pytest.approx(np.radians(30))
+    assert tree["nodes"].index(node) in tree["scenes"][0]["nodes"]
+
+
+def test_a_view_straight_down_is_a_camera_too(tmp_path):
+    tag(GOLDEN / "scene.reel", tmp_path / "a.reel", view=[0, 9, 0, 0, 1, 0])
+    camera = Animation(np.zeros(1), 1.0, view=meshreel.open(tmp_path / "a.reel").view).camera
+    assert camera is not None and np.isfinite(camera).all() and camera[1, 2] == pytest.approx(1)

@@ -92,7 +92,7 @@ def _looks(row: dict[str, Any]) -> str:
         begin = f", from {sound['start_s']:g} s" if "start_s" in sound else ""
         parts.append(f"audio: {sound.get('type', 'damaged')}, {sound['bytes']} bytes{begin}")
     if (view := row["view"]) is not None:
-        begin, end = (" ".join(f"{number:.3g}" for number in view[name]) for name in ("position", "target"))
+        begin, end = (" ".join(f"{round(number, 6):.3g}" for number in view[name]) for name in ("position", "target"))
         parts.append(f"first view: from {begin} to {end} m, {view['fov']:g} degrees")
     return "; ".join([*parts, *([f"{hidden} frames more are hidden"] if hidden else [])])
 

@@ -107,7 +107,7 @@ def _animation(reader: ReelReader, frames: range, up: Up) -> Animation:
     corners = np.array(reader.box)
     is_far = np.abs(corners).max() > _FAR * np.linalg.norm(corners[1] - corners[0])
     x, y, z = corners.mean(axis=0).tolist() if is_far else (0.0, 0.0, 0.0)
-    return Animation(times, header.frame_rate, (x, y, z), up)
+    return Animation(times, header.frame_rate, (x, y, z), up, reader.view)
 
 
 def _states(source: _Source) -> Iterator[Shape]:

@@ -1,13 +1,15 @@
 """Writer of animated GLB (binary glTF 2.0): a node and a mesh for each shape, morph targets for its frames.
 
-In: shapes, one after the other. Out: a file whose binary chunk is never in memory as a whole. Only core glTF, except
-for colours (see `GlbFile`): a scale of 0 hides a node, as the specification allows ("Transformations"), and weights are
-interpolated linearly between frames. A compressed file has streams of meshoptimizer (EXT_meshopt_compression), and
-positions as 16-bit numbers on a lattice of each shape, which its node scales and translates (KHR_mesh_quantization).
+In: shapes, one after the other. Out: a file whose binary chunk is never in memory as a whole, with a camera of the
+first view. Only core glTF, except for colours (see `GlbFile`): a scale of 0 hides a node, as the specification allows
+("Transformations"), and weights are interpolated linearly between frames. A compressed file has streams of
+meshoptimizer (EXT_meshopt_compression), and positions as 16-bit numbers on a lattice of each shape, which its node
+scales and translates (KHR_mesh_quantization).
 """
 
 from __future__ import annotations
 
+import math
 import tempfile
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
@@ -25,6 +27,7 @@ from ..types import cut_at_seams
 from .shapes import Animation, Shape, changes, unit_normals
 
 BITS = 14  # of positions along the longest side of a shape in a compressed file, gltfpack's default
+NEAR = 0.002  # of the distance of a camera: how near it sees, as the player has it
 _ROUNDED = {"NORMAL": 6, COLORS: 10}  # fractional bits, guesses: half a degree of normals, a 2048th of light
 _MATERIAL = {
     "name": "surface",
@@ -76,10 +79,20 @@ class GlbWriter:
         """Write the complete file: header, description, and the spooled arrays."""
         tree: dict[str, Any] = {"asset": {"version": "2.0", "generator": "meshreel"}, "scene": 0, "scenes": [{}]}
         if self._parts:
-            tree |= {"scenes": [{"nodes": [0]}], "nodes": self._nodes}
+            tree |= {"scenes": [{"nodes": [0]}], "nodes": self._nodes} | self._camera()
         if self._channels:
             tree["animations"] = [{"name": "frames", "channels": self._channels, "samplers": self._samplers}]
         self._file.finish(file, tree)
+
+    def _camera(self) -> dict[str, Any]:
+        """Return the scene with a camera of the first view, if it is known."""
+        view, matrix = self._animation.view, self._animation.camera
+        if view is None or matrix is None:
+            return {}
+        lens = {"yfov": math.radians(view.fov), "znear": NEAR * math.dist(view.position, view.target)}
+        node = {"name": "first view", "camera": 0, "matrix": matrix.T.reshape(-1).tolist()}
+        cameras = [{"name": "first view", "type": "perspective", "perspective": lens}]
+        return {"scenes": [{"nodes": [0, len(self._nodes)]}], "nodes": [*self._nodes, node], "cameras": cameras}
 
     def _primitives(self, shape: Shape) -> tuple[list[dict[str, Any]], _Lattice]:
         """Write vertices and faces of the first frame, and the difference of each other frame from it."""

@@ -10,7 +10,8 @@ import numpy as np
 from jaxtyping import Bool, Float32, Float64, Int32
 
 from ..errors import InputError
-from ..geometry.cameras import matrix_of
+from ..format.view import View
+from ..geometry.cameras import looking_at, matrix_of
 from ..geometry.topology import vertex_normals
 from ..types import UPRIGHT, Mesh, Up
 
@@ -45,6 +46,7 @@ class Animation:
     frame_rate: float  # 1/s
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0)  # m; float32 coordinates are relative to it
     up: Up = "y"  # axis of the vertices that points up; in files it is +y
+    view: View | None = None  # the first view, m; None: it is not known
 
     @property
     def ends(self) -> Float64[np.ndarray, " N"]:
@@ -56,6 +58,16 @@ class Animation:
         """Matrix from coordinates relative to `origin` to the coordinates of the file, in which +y is up."""
         turn = np.array(UPRIGHT[self.up], np.float64)
         return matrix_of(turn, turn @ np.asarray(self.origin))
+
+    @property
+    def camera(self) -> Float64[np.ndarray, "4 4"] | None:
+        """Matrix from the frame of the first view's camera, which looks along -z with y up, to the file's; or None."""
+        if self.view is None:
+            return None
+        eye, target = np.array([self.view.position, self.view.target]) @ np.array(UPRIGHT[self.up], np.float64).T
+        if not (eye - target)[[0, 2]].any():  # straight down or up: as if from a little in front
+            eye = eye + [0.0, 0.0, 1e-6 * abs(eye[1] - target[1])]
+        return looking_at(eye, target) * [1, -1, -1, 1]
 
     def local(self, shape: Shape, vertices: Float64[np.ndarray, "V 3"]) -> Float32[np.ndarray, "V 3"]:
         """Return coordinates relative to the origin. Raises InputError if float32 cannot hold them."""
