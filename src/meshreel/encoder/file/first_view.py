@@ -29,7 +29,7 @@ Point = Float64[np.ndarray, "3"]
 
 ASIDE = np.array([0.6, 0.8])  # direction, seen from above, of a three-quarter view of what has no front (guess)
 EYES = 0.93  # of the height of what stands: people's eyes
-ONE_SIDE = 0.5  # length of the mean direction to the cameras, from which on they are on one side (guess)
+ONE_SIDE = 0.5  # of the directions' lengths, seen from above: what their mean has where cameras are on one side (guess)
 SEEN = 0.5  # share of the corners of the bodies' boxes that a camera must see, to count (guess)
 STEEPEST = 0.87  # sine of the steepest look down or up, 60 degrees (guess)
 MARGIN = 1.1  # times the picture that just holds all: for the player's controls, and for beauty (guess)
@@ -96,14 +96,16 @@ def guessed_view(
 
 
 def _to_cameras(cameras: Sequence[Camera], corners: np.ndarray, target: Point, turn: np.ndarray) -> Point | None:
-    """Return the way to the middle of the cameras that see the bodies; None where these are on no one side of them."""
+    """Return the way to the middle of the cameras that see the bodies; None where these stand around them."""
     seeing = [camera for camera in cameras if len(camera.seen(corners @ turn)[1]) >= SEEN * len(corners)]
     ways = np.array([turn @ camera.eye - target for camera in seeing]).reshape(-1, 3)
     lengths = np.sqrt((ways**2).sum(axis=1))
     if not len(ways) or not lengths.all():
         return None
-    mean, way = (ways / lengths[:, None]).mean(axis=0), ways.mean(axis=0)
-    return way if math.hypot(*mean) >= ONE_SIDE and way.any() else None
+    level, way = ways[:, [0, 2]] / lengths[:, None], ways.mean(axis=0)
+    usual = float(np.sqrt((level**2).sum(axis=1)).mean())
+    are_above = usual**2 < 1 - STEEPEST**2
+    return way if way.any() and (are_above or math.hypot(*level.mean(axis=0)) >= ONE_SIDE * usual) else None
 
 
 def _no_steeper(way: Point) -> Point:
