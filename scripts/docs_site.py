@@ -3,11 +3,18 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import posixpath
 import re
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from meshreel.format.view import View
+    from meshreel.geometry.cameras import Camera
 
 ROOT = Path(__file__).resolve().parents[1]
 OUTSIDE = ("FORMAT.md", "CHANGELOG.md", "CONTRIBUTING.md")
@@ -101,7 +108,18 @@ def make_samples(folder: Path) -> None:
     if not bodies.exists():
         meshreel.encode(soft_bodies(SoftBodiesOptions(frames=FRAMES)), bodies)
     for path in (room, bodies):
-        path.with_suffix(".png").write_bytes(picture(meshreel.open(path)[0]))
+        video = meshreel.open(path)
+        path.with_suffix(".png").write_bytes(picture(video[0], video.view and _camera(video.view)))
+
+
+def _camera(view: View) -> Camera:
+    """Return the camera of a file's first view, so that a poster shows what the player begins with."""
+    from meshreel.geometry.cameras import Camera, CameraPose, looking_at
+    from meshreel.geometry.picture import HEIGHT, WIDTH
+
+    focal = HEIGHT / 2 / math.tan(math.radians(view.fov) / 2)
+    pose = CameraPose.of_camera(looking_at(np.array(view.position), np.array(view.target)))
+    return Camera(WIDTH, HEIGHT, (focal, focal), (WIDTH / 2, HEIGHT / 2), pose)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Which way people face, by their surface alone: toes are ahead of ankles, faces ahead of necks, and walks lead ahead.
+"""Direction that people face, by their surface: toes are ahead of ankles, faces ahead of necks, and walks lead ahead.
 
 In: the bodies of some frames. Out: their boxes, upright (y up), and the direction from which most are seen from in
 front. Votes are shares of a body's own height, so that neither units nor sensors matter.
@@ -37,7 +37,7 @@ FACING = 0.8  # share of the votes along one line where people face each other (
 
 @dataclass(frozen=True, slots=True)
 class Body:
-    """What a frame's body tells of the first view."""
+    """Box of a body in a frame, upright, and its votes on where its front is."""
 
     low: Float64[np.ndarray, "3"]  # corner of its box, without bits
     high: Float64[np.ndarray, "3"]
@@ -55,7 +55,7 @@ def sampled(count: int, frame_rate: float) -> list[int]:
 
 
 def bodies_of(meshes: Iterable[Mesh], up: Up) -> list[Body]:
-    """Return what the bodies of a frame tell, stood up; those without area tell nothing."""
+    """Return boxes and votes of the bodies of a frame, stood up; those without area are left out."""
     turn = np.array(UPRIGHT[up], np.float64)
     stood = (mesh.at(mesh.vertices @ turn.T) for mesh in meshes if not mesh.is_empty)
     return [_body(mesh) for mesh in stood if float(face_normals(mesh)[1].sum()) > 0]

@@ -39,7 +39,7 @@ DIGITS = 4  # of normalised places: 0.2 mm of a person
 
 @dataclass(frozen=True, slots=True)
 class Setting:
-    """What stands around the bodies, in the world."""
+    """Cameras and room around the bodies, in the world's coordinates."""
 
     up: Up
     cameras: tuple[Camera, ...] = ()
