@@ -53,9 +53,9 @@ def first_view(
     sequence = job.sequence
 
     def read(number: int) -> list[Body]:
-        mesh = clean(sequence[number])
-        pieces = piece_of_faces(mesh)
-        return bodies_of((part_of(mesh, pieces == piece) for piece in np.unique(pieces)), sequence.up)
+        mesh, count = clean(sequence[number]), len(survey.pieces[number])
+        pieces = piece_of_faces(mesh) if count else np.zeros(len(mesh.faces), np.int64)
+        return bodies_of((part_of(mesh, pieces == piece) for piece in range(max(count, 1))), sequence.up)
 
     if seen is None:
         numbers = sampled(len(sequence), sequence.frame_rate)
