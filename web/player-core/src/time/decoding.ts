@@ -144,9 +144,8 @@ export class Decoding implements Holdings {
   /** Milliseconds of decoding a frame of one track with so many layers beyond the first, over the last groups; 0 before there are some. */
   msPerFrame(layers: number): number {
     const timings = this.#timings.get(layers) ?? [];
-    if (timings.length < FEWEST_TIMINGS) return 0;
-    const frames = timings.reduce((sum, timing) => sum + timing.frames, 0);
-    return timings.reduce((sum, timing) => sum + timing.ms, 0) / frames;
+    const sum = (of: "ms" | "frames"): number => timings.reduce((total, timing) => total + timing[of], 0);
+    return timings.length < FEWEST_TIMINGS ? 0 : sum("ms") / sum("frames");
   }
 
   /** Does the steps whose bytes are at hand, in their order; cancels all others that have not started. */
@@ -288,7 +287,7 @@ export class Decoding implements Holdings {
       this.#share.clear(); // later chunks of the chain would fail, too: plan again
       this.#submitted.clear();
       this.#states.delete(chunk.number);
-      if (outcome.missingState && this.#countTry(chunk) < TRIES) this.#forgetChain(chunk);
+      if (outcome.missingState && this.#countTry(chunk) < TRIES) this.#forgetStates(this.#links.rootOf(chunk));
       else this.#fail(chunk, outcome.message);
     }
     this.#events.changed();
@@ -332,18 +331,13 @@ export class Decoding implements Holdings {
   #time({ chunk: { kind, frameCount: frames }, layers }: Step, ms: number): void {
     if (kind !== "group") return; // the background is decoded once
     [this.lastMs, this.lastLayers] = [ms, layers];
-    const timings = this.#timings.get(layers) ?? [];
-    this.#timings.set(layers, [...timings, { ms, frames }].slice(-TIMINGS));
+    this.#timings.set(layers, [...(this.#timings.get(layers) ?? []), { ms, frames }].slice(-TIMINGS));
   }
 
   #countTry(chunk: Chunk): number {
     const tries = (this.#tries.get(chunk.number) ?? 0) + 1;
     this.#tries.set(chunk.number, tries);
     return tries;
-  }
-
-  #forgetChain(chunk: Chunk): void {
-    this.#forgetStates(this.#links.rootOf(chunk));
   }
 
   #forgetStates(first: number): void {
