@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float64
+from jaxtyping import Float
 
 from .person import ANKLE, ARM, COLLAR, EYE, SHOULDER, Build, eyelids, finger_joints, hair, in_head, strands
 from .solid_colors import Colors, Points, noise
 
 RGB = tuple[int, int, int]
-Share = Float64[np.ndarray, " N"]
+Share = Float[np.ndarray, " N"]
 OVER = 0.0042  # m from the solid of the hair that is hair, too (guess)
 
 

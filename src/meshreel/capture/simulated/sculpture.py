@@ -6,15 +6,16 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float32, Float64
+from jaxtyping import Float, Float64
 
 from ...geometry.decimate import decimate_faces
 from ...types import Mesh
 from .implicit import capsule
 
-Places = Float32[np.ndarray, "... 3"]  # m
-Depths = Float32[np.ndarray, "..."]  # m, signed distances: negative inside
+Places = Float[np.ndarray, "... 3"]  # m
+Depths = Float[np.ndarray, "..."]  # m, signed distances: negative inside
 Vector = Float64[np.ndarray, "3"]
+Place = Vector | Sequence[float]
 MARGIN = 0.02  # m from a part's surface within which it is computed, beyond its blend (guess)
 
 
@@ -29,9 +30,7 @@ class Part:
     is_cut: bool = False
 
 
-def ball(
-    center: Sequence[float], radii: Sequence[float], blend: float, turn: np.ndarray | None = None, is_cut: bool = False
-) -> Part:
+def ball(center: Place, radii: Place, blend: float, turn: np.ndarray | None = None, is_cut: bool = False) -> Part:
     """Return an ellipsoid; the columns of `turn` are its axes."""
     axes, middle, sizes = np.eye(3) if turn is None else turn, np.asarray(center, float), np.asarray(radii, float)
 
@@ -45,7 +44,7 @@ def ball(
     return Part(distance, middle - reach, middle + reach, blend, is_cut)
 
 
-def rod(start: Sequence[float], end: Sequence[float], radii: tuple[float, float], blend: float) -> Part:
+def rod(start: Place, end: Place, radii: tuple[float, float], blend: float) -> Part:
     """Return a tapered capsule."""
     ends = np.array([start, end], np.float32)
     thick = np.array(radii, np.float32)
@@ -53,7 +52,7 @@ def rod(start: Sequence[float], end: Sequence[float], radii: tuple[float, float]
     return Part(lambda points: capsule(points, ends[0], ends[1], thick), low.astype(float), high.astype(float), blend)
 
 
-def block(low: Sequence[float], high: Sequence[float], rounding: float, blend: float) -> Part:
+def block(low: Place, high: Place, rounding: float, blend: float) -> Part:
     """Return a box with round edges."""
     first, last = np.asarray(low, float), np.asarray(high, float)
     middle, half = (first + last) / 2, (last - first) / 2 - rounding

@@ -9,7 +9,7 @@ from functools import cache, partial
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Float64, Int64
+from jaxtyping import Float64, Int32, Int64
 
 from ...geometry.topology import blend, vertex_normals
 from ...types import Mesh
@@ -149,7 +149,7 @@ def _actor(number: int) -> Actor:
     return Actor.of(*CAST[number])
 
 
-def _barycentric(mesh: Mesh, corners: Int64[np.ndarray, "N 3"], points: Points) -> Float64[np.ndarray, "N 3"]:
+def _barycentric(mesh: Mesh, corners: Int32[np.ndarray, "N 3"], points: Points) -> Float64[np.ndarray, "N 3"]:
     """Return the weights of a face's corners at a place on it."""
     a, b, c = (mesh.vertices[corners[:, k]] for k in range(3))
     normal = np.cross(b - a, c - a)
