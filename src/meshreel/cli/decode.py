@@ -18,13 +18,16 @@ from ..errors import FormatError, InputError
 from ..export.animated_file import ExportOptions
 from ..export.animated_file import export as export_animated
 from ..export.animated_usd import EXTENSIONS
+from ..export.film_files import KINDS as FILMS
 from ..export.frames import Part, check_part, check_splats, write_frames, write_splats
 from ..format.layout import ChunkKind
 from ..io.sequence import SequenceOptions
 from ..io.write import check_apart, check_free, frame_names, left_over, make_folder, write_file, write_mesh
 from ..types import Mesh, Texture, Up
 from .console import Common, Force
+from .film import Filming, film
 
+FLAGS = {".usdc": "usd"}  # of formats, where it is not their extension
 How = tuple[Callable[[int], Any], Callable[[Any, Path], None]]  # decodes a frame, and writes it
 UNKNOWN = "chunks of kinds that this version does not know (update meshreel)"
 CONTENTS: dict[int, str] = {  # of chunks, by their kind, and how else they are written; "": in all outputs
@@ -194,28 +197,40 @@ def export(
     output: Annotated[Path | None, Parameter(name=["--output", "-o"])] = None,
     glb: Annotated[bool, Parameter(negative="")] = False,
     usd: Annotated[bool, Parameter(negative="")] = False,
+    mp4: Annotated[bool, Parameter(negative="")] = False,
+    webm: Annotated[bool, Parameter(negative="")] = False,
+    gif: Annotated[bool, Parameter(negative="")] = False,
     layers: int | None = None,
     frames: str = ":",
     only: Part = "all",
     up: Annotated[Up | None, Parameter(allow_leading_hyphen=True)] = None,
     texture: Annotated[bool, Parameter(negative="")] = False,
     compress: Annotated[bool, Parameter(negative="")] = False,
+    filming: Filming = Filming(),
     force: Force = False,
     common: Common = Common(),
 ) -> None:
-    """Write a .reel file as one animated file: GLB for viewers and engines, USD for film tools.
+    """Write a .reel file as one animated file: GLB for viewers and engines, USD for film tools; or as a film to post.
 
     Parameters
     ----------
     file
         The .reel file. Nothing is written where a group of it is damaged.
     output
-        The file to write: .glb, .usdc or .usd (binary), .usda (text), .usdz (package). If not given, the name of the
-        .reel file with .glb or .usdc, in the current directory.
+        The file to write: .glb, .usdc or .usd (binary), .usda (text), .usdz (package), .mp4, .webm, .gif, or .png, a
+        picture of the first frame. If not given, the name of the .reel file with the extension of the format, in the
+        current directory.
     glb
         Write GLB; implied by the extension of `output`.
     usd
         Write USD; implied by the extension of `output`. Needs the extra `usd`.
+    mp4
+        Write a film in H.264, with the audio that MP4 takes; implied by the extension of `output`, as the next two.
+        Films need the extra `color`.
+    webm
+        Write a film in VP9, with audio in Opus.
+    gif
+        Write a film without sound that begins again at its end.
     layers
         Largest number of layers (subdivisions, or KLT components) to decode of each group beyond its first: fewer
         give coarser, valid meshes from fewer bytes.
@@ -233,10 +248,15 @@ def export(
         Compress GLB to a quarter of its bytes or so, for viewers that know `EXT_meshopt_compression` and
         `KHR_mesh_quantization`. Needs the extra `glb`.
     """
-    options = ExportOptions(layers, only, up, texture, compress)
-    target = _target(file, output, glb, usd)
+    kinds = {".glb": glb, ".usdc": usd, ".mp4": mp4, ".webm": webm, ".gif": gif}
+    target = _target(file, output, [kind for kind, wanted in kinds.items() if wanted])
+    options, is_film = ExportOptions(layers, only, up, texture, compress), target.suffix.lower() in FILMS
+    if is_film and (texture or compress):
+        raise InputError(f"--{'texture' if texture else 'compress'}: is for GLB and USD; pictures always have textures")
+    if filming.given and not is_film:
+        raise InputError(f"{filming.given}: is for films, {', '.join(FILMS)}; {target} is none")
     wanted = SequenceOptions(frames=frames)
-    with open_video(file) as video:
+    with open_video(file).at(layers) as video:
         if target.exists() and target.samefile(file):  # also through links and under other names
             raise InputError(f"{target}: is the recording itself, which would be lost; give another name with -o")
         has_folder = texture and target.suffix.lower() not in (".glb", ".usdz")
@@ -245,35 +265,49 @@ def export(
         check_part(file, video.reader, only)
         chosen = wanted.chosen(len(video))
         try:
-            with common.stages() as progress:
-                count = export_animated(video.reader, target, chosen, options, progress)
+            if is_film:
+                written = film(video, target, chosen, filming.options(video, only, up), common)
+            else:
+                with common.stages() as progress:
+                    count = export_animated(video.reader, target, chosen, options, progress)
         except FormatError as error:
             raise FormatError(f"{file}: {error}; nothing is written, copy the file again") from error
-    pale = "" if texture else "colours of vertices are: --texture writes them"
-    common.warn(unwritten(file, video.reader, ("background", "uneven times of frames"), pale))
+    row = {"output": str(target), "format": target.suffix[1:].lower(), "bytes": target.stat().st_size}
+    if is_film:
+        kept = ("background", "textures", "uneven times of frames", *(["audio"] if written.has_audio else []))
+        common.warn(unwritten(file, video.reader, kept))
+        row |= {"pictures": written.pictures}
+        common.result(row, f"{target}: {written.pictures} pictures, {row['bytes']} bytes")
+        return
+    _warn_of_textures(file, video.reader, target, options, common)
     if count == 0:
         common.warn([f"{target}: no frame has a surface, so it shows nothing"])
-    if texture and not video.reader.has_textures:
+    row |= {"frames": len(chosen), "frame_rate": video.frame_rate, "meshes": count}
+    common.result(row, f"{target}: {len(chosen)} frames in {count} meshes, {row['bytes']} bytes")
+
+
+def _warn_of_textures(file: Path, reader: ReelReader, target: Path, options: ExportOptions, common: Common) -> None:
+    """Warn of what an animated file lacks."""
+    texture = options.texture
+    pale = "" if texture else "colours of vertices are: --texture writes them"
+    common.warn(unwritten(file, reader, ("background", "uneven times of frames"), pale))
+    if texture and not reader.has_textures:
         common.warn([f"{file}: has no textures to export"])
     elif texture and target.suffix.lower() == ".glb":
         common.warn([f"{target}: glTF cannot change a picture in time: each mesh has the texture of its first frame"])
-    elif texture and video.reader.has_background and only != "moving":
+    elif texture and reader.has_background and options.only != "moving":
         common.warn([f"{target}: the background has its first picture in all frames: its shadows stand still"])
-    size = target.stat().st_size
-    row = {"output": str(target), "format": target.suffix[1:].lower(), "bytes": size}
-    row |= {"frames": len(chosen), "frame_rate": video.frame_rate, "meshes": count}
-    common.result(row, f"{target}: {len(chosen)} frames in {count} meshes, {size} bytes")
 
 
-def _target(file: Path, output: Path | None, glb: bool, usd: bool) -> Path:
+def _target(file: Path, output: Path | None, kinds: list[str]) -> Path:
     """Return the file to write. Raises InputError if flags and name give no format, or different ones."""
-    if glb and usd:
-        raise InputError("--glb and --usd: give one of both")
+    if len(kinds) > 1:
+        raise InputError(f"{' and '.join(f'--{FLAGS.get(kind, kind[1:])}' for kind in kinds)}: give one of them")
     if output is None:
-        if not (glb or usd):
-            raise InputError("no format: give --glb, --usd, or a name with -o")
-        return Path(file.stem + (".glb" if glb else ".usdc"))
-    extensions = (".glb",) if glb else EXTENSIONS if usd else (".glb", *EXTENSIONS)
+        if not kinds:
+            raise InputError("no format: give --glb, --usd, --mp4, --webm, --gif, or a name with -o")
+        return Path(file.stem + kinds[0])
+    extensions = (".glb", *EXTENSIONS, *FILMS) if not kinds else EXTENSIONS if kinds == [".usdc"] else tuple(kinds)
     if output.suffix.lower() not in extensions:
         text = f"{output}: the output must end in {' or '.join(extensions)}"
         raise InputError(f"{text}; a mesh file for each frame is written by meshreel decode")

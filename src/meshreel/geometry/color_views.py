@@ -332,16 +332,25 @@ class Painted:
 
     def on(self, faces: Int32[np.ndarray, " N"], barycentric: Float64[np.ndarray, "N 3"]) -> Points:
         """Return the colours at places inside faces."""
-        mesh = self._mesh
-        if mesh.colors is None:
-            colors = np.full((len(faces), 3), float(GREY))
-        else:
-            colors = blend(mesh.colors.astype(np.float64), mesh.faces[faces], barycentric)
-        if self._pixels is not None and mesh.uv is not None:
-            places = np.einsum("nkc,nk->nc", mesh.uv[faces].astype(np.float64), barycentric)
-            textured = np.isfinite(places).all(axis=1)
-            colors[textured] = bilinear(self._pixels, places[textured])
-        return colors
+        return colors_on(self._mesh, self._pixels, faces, barycentric)
+
+
+def colors_on(
+    mesh: Mesh,
+    pixels: UInt8[np.ndarray, "H W 3"] | None,
+    faces: Int32[np.ndarray, " N"],
+    barycentric: Float64[np.ndarray, "N 3"],
+) -> Points:
+    """Return the colours at places inside faces of a mesh whose texture, if it has one, has these pixels."""
+    if mesh.colors is None:
+        colors = np.full((len(faces), 3), float(GREY))
+    else:
+        colors = blend(mesh.colors.astype(np.float64), mesh.faces[faces], barycentric)
+    if pixels is not None and mesh.uv is not None:
+        places = np.einsum("nkc,nk->nc", mesh.uv[faces].astype(np.float64), barycentric)
+        textured = np.isfinite(places).all(axis=1)
+        colors[textured] = bilinear(pixels, places[textured])
+    return colors
 
 
 def bilinear(pixels: UInt8[np.ndarray, "H W 3"], places: Float[np.ndarray, "N 2"]) -> Points:

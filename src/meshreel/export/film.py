@@ -1,0 +1,124 @@
+"""Export of a .reel file to a film of pictures, as the player shows it: MP4, WebM or GIF; or to one picture, PNG.
+
+In: a video, frames, a view. Out: a file, in which each picture is drawn by `geometry.picture`. Splats are not drawn.
+"""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_right
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+from ..decoder.tracks import moving_of_frame
+from ..decoder.video import Video
+from ..errors import InputError
+from ..geometry.picture import Body, Standing, View, draw_picture, finished
+from ..shapes import UInt8
+from ..types import Up
+from .film_files import GIF_RATE, VIDEOS, Film, Written, write_film
+from .frames import Part
+from .shapes import check_output
+
+Color = tuple[int, ...]  # red, green and blue, 0 to 255
+BACKGROUND: Color = (20, 23, 28)  # the player's, where it is dark
+SIZE, GIF_SIZE = (1280, 720), (640, 360)  # pixels (guess)
+SIDES = (16, 8192)  # pixels, of a side: encoders and the rasteriser take these
+MOST_PICTURES = 100_000  # an hour at 25/s (guess)
+ROUNDED = 1e-6  # s: times of .reel files are whole microseconds
+
+
+@dataclass(frozen=True, slots=True)
+class FilmOptions:
+    """View, size and times of a film."""
+
+    view: View | None = None  # in the unit of the vertices; None: all of the recording, as the player begins
+    turntable: bool = False  # the camera goes around once, from there
+    size: tuple[int, int] | None = None  # pixels, width and height; None: `SIZE`, and of a GIF `GIF_SIZE`
+    background: Color | None = BACKGROUND  # None: transparent
+    seconds: float | None = None  # length: frames are repeated, or left out at the end; None: that of the frames
+    rate: float | None = None  # pictures per second; None: one for each frame
+    only: Part = "all"
+    up: Up | None = None  # axis of the meshes that points up in the pictures; None: as the .reel file says
+
+    def __post_init__(self) -> None:
+        for side in self.size or ():
+            if not SIDES[0] <= side <= SIDES[1]:
+                raise InputError(f"a picture of {side} pixels: give {SIDES[0]} to {SIDES[1]} on each side")
+        for name, value in (("seconds", self.seconds), ("pictures a second", self.rate)):
+            if value is not None and not 0 < value < math.inf:
+                raise InputError(f"{value:g} {name}: give a number above 0")
+
+
+def export_film(
+    video: Video,
+    path: Path,
+    frames: range,
+    options: FilmOptions = FilmOptions(),
+    progress: Callable[[int, int], None] = lambda *_: None,
+) -> Written:
+    """Write frames to a .mp4, .webm or .gif file, or the first of them to a .png file.
+
+    The file appears when it is complete. Raises InputError if the format cannot hold the pictures or the file cannot be
+    written, and FormatError if a chunk is damaged.
+    """
+    check_output(path)
+    kind, start = path.suffix.lower(), video.timestamps[frames.start] - video.timestamps[0]
+    size = options.size or (GIF_SIZE if kind == ".gif" else SIZE)
+    _check(path, kind, size, options)
+    standing = Standing(video.box, options.up or video.up)
+    view = options.view or standing.fitted(*size)
+    times, shown = _times(video, frames[:1] if kind == ".png" else frames, options, kind)
+
+    @lru_cache(maxsize=1)
+    def drawn(frame: int, share: float) -> UInt8[np.ndarray, "H W C"]:
+        bodies = _bodies(video, frame, options.only)
+        has_ground = options.only != "background" and video.reader.static_of_frame(frame) is None
+        seen = view.turned(share, standing.up)
+        return finished(draw_picture(bodies, standing, seen, size, has_ground), options.background)
+
+    def picture(number: int) -> UInt8[np.ndarray, "H W C"]:
+        return drawn(shown[number], times[number] / times[-1] if options.turntable else 0.0)
+
+    audio = video.audio if kind in VIDEOS else None
+    rate = options.rate or video.frame_rate
+    return write_film(Film(picture, options.background is None, times, size, rate, audio, start), path, progress)
+
+
+def _check(path: Path, kind: str, size: tuple[int, int], options: FilmOptions) -> None:
+    width, height = size
+    if kind in VIDEOS and (width % 2 or height % 2):
+        text = f"{path}: a size of {width} x {height}, and videos have even ones"
+        raise InputError(f"{text}; give {width + width % 2} x {height + height % 2}")
+    if kind == ".mp4" and options.background is None:
+        raise InputError(f"{path}: MP4 has no transparency; give a colour, or write .webm or .gif")
+    if kind == ".gif" and (options.rate or 0) > GIF_RATE:
+        raise InputError(f"{path}: {options.rate:g} pictures a second, and a GIF has {GIF_RATE} at most; give fewer")
+
+
+def _times(video: Video, frames: range, options: FilmOptions, kind: str) -> tuple[list[float], list[int]]:
+    """Return the times of the pictures, followed by that of the end, s, and the frame that each picture shows."""
+    ends = [*video.timestamps, video.timestamps[0] + video.duration]
+    stamps = [ends[frame] - ends[frames.start] for frame in frames]
+    clip = ends[frames.stop] - ends[frames.start]
+    length, rate = options.seconds or clip, options.rate
+    if kind == ".gif" and len(stamps) > GIF_RATE * clip:
+        rate = rate or GIF_RATE
+    if rate is None:
+        times = [loop * clip + stamp for loop in range(math.ceil(length / clip)) for stamp in stamps]
+        times = [time for time in times if time < length - ROUNDED]
+    else:
+        times = [number / rate for number in range(max(1, round(length * rate)))]
+    if len(times) > MOST_PICTURES:
+        raise InputError(f"a film of {len(times)} pictures: {MOST_PICTURES} at most; give fewer seconds or frames")
+    return [*times, length], [frames[bisect_right(stamps, (time + ROUNDED) % clip) - 1] for time in times]
+
+
+def _bodies(video: Video, frame: int, only: Part) -> list[Body]:
+    moving = [] if only == "background" else moving_of_frame(video.tracks, frame)
+    still = [] if only == "moving" else [video.background(frame)]
+    return [*(Body.of_track(mesh, number) for number, mesh in enumerate(moving)), *map(Body.behind, still)]
