@@ -27,8 +27,7 @@ from meshreel.container.sources import BytesSource
 from meshreel.decoder import video as module
 from meshreel.decoder.page import player_page
 from meshreel.errors import FormatError, InputError
-from meshreel.geometry.cameras import Camera, CameraPose, looking_at
-from meshreel.geometry.picture import HEIGHT, WIDTH, picture
+from meshreel.geometry.picture import NOTEBOOK
 from tests.container.test_http import LARGE
 from tests.golden import GOLDEN, frame_record
 from tests.metrics.shapes import sphere
@@ -149,29 +148,8 @@ def pixels_of(data: bytes) -> np.ndarray:
     """The pixels of a PNG as `picture` writes it."""
     assert data[:8] == b"\x89PNG\r\n\x1a\n"
     size = struct.unpack(">I", data[33:37])[0]
-    rows = np.frombuffer(zlib.decompress(data[41 : 41 + size]), np.uint8).reshape(HEIGHT, 1 + 4 * WIDTH)
-    return rows[:, 1:].reshape(HEIGHT, WIDTH, 4)
-
-
-def test_the_picture_of_a_ball_is_a_disk_without_holes_brightest_in_its_middle():
-    seen = pixels_of(picture(sphere(0.5, 4)))
-    rows, columns = np.mgrid[:HEIGHT, :WIDTH]
-    far = np.hypot(rows + 0.5 - HEIGHT / 2, columns + 0.5 - WIDTH / 2) / (0.47 * HEIGHT)
-    assert (seen[far < 0.98, 3] == 255).all() and (seen[far > 1.03, 3] == 0).all()
-    assert seen[far < 0.2, 0].mean() > 1.5 * seen[(far > 0.9) & (far < 0.97), 0].mean()
-
-
-def test_the_picture_from_a_camera_has_what_that_sees():
-    """A ball to the left of what the camera looks at is in the left half, and lit from the camera."""
-    pose = CameraPose.of_camera(looking_at(np.array([0.0, 0.0, 4.0]), np.zeros(3)))
-    camera = Camera(WIDTH, HEIGHT, (300.0, 300.0), (WIDTH / 2, HEIGHT / 2), pose)
-    ball = sphere(0.5, 4)
-    seen = pixels_of(picture(ball.at(ball.vertices - [1.0, 0.0, 0.0]), camera))
-    left = int(WIDTH / 2 - 300 / 4)
-    assert seen[HEIGHT // 2, left, 3] == 255 and (seen[:, WIDTH // 2 :, 3] == 0).all()
-    assert seen[HEIGHT // 2, left, 0] > 180 and np.ptp(np.flatnonzero(seen[HEIGHT // 2, :, 3])) == pytest.approx(
-        75, abs=4
-    )
+    rows = np.frombuffer(zlib.decompress(data[41 : 41 + size]), np.uint8).reshape(NOTEBOOK[1], 1 + 4 * NOTEBOOK[0])
+    return rows[:, 1:].reshape(*NOTEBOOK[::-1], 4)
 
 
 def test_the_picture_of_a_mesh_has_its_colors_and_an_empty_one_has_none():

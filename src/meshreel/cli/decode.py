@@ -256,7 +256,7 @@ def export(
     if filming.given and not is_film:
         raise InputError(f"{filming.given}: is for films, {', '.join(FILMS)}; {target} is none")
     wanted = SequenceOptions(frames=frames)
-    with open_video(file).at(layers) as video:
+    with open_video(file) as video:
         if target.exists() and target.samefile(file):  # also through links and under other names
             raise InputError(f"{target}: is the recording itself, which would be lost; give another name with -o")
         has_folder = texture and target.suffix.lower() not in (".glb", ".usdz")
@@ -266,7 +266,7 @@ def export(
         chosen = wanted.chosen(len(video))
         try:
             if is_film:
-                written = film(video, target, chosen, filming.options(video, only, up), common)
+                written = film(video.reader, target, chosen, filming.options(video.reader, options), common)
             else:
                 with common.stages() as progress:
                     count = export_animated(video.reader, target, chosen, options, progress)

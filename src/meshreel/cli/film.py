@@ -12,11 +12,11 @@ from typing import Annotated
 import numpy as np
 from cyclopts import Parameter
 
-from ..decoder.video import Video
+from ..container.reader import ReelReader
 from ..errors import InputError, needed
+from ..export.animated_file import ExportOptions
 from ..export.film import BACKGROUND, Color, FilmOptions, export_film
 from ..export.film_files import Written
-from ..export.frames import Part
 from ..geometry.picture import TURNS, View
 from ..geometry.threads import cores, threads
 from ..types import Up
@@ -50,18 +50,19 @@ class Filming:
         """The first flag that was given; empty if none was."""
         return next((f"--{field.name}" for field in fields(self) if getattr(self, field.name) != field.default), "")
 
-    def options(self, video: Video, only: Part, up: Up | None) -> FilmOptions:
+    def options(self, reader: ReelReader, exported: ExportOptions) -> FilmOptions:
         """Return what was asked for. Raises InputError for what cannot be understood."""
         size = None if self.size is None else _size(self.size)
-        view = None if self.camera is None else _view(self.camera, video, up or video.up)
+        view = None if self.camera is None else _view(self.camera, reader, exported.up or reader.up)
         background = BACKGROUND if self.background is None else _color(self.background)
-        return FilmOptions(view, self.turntable, size, background, self.seconds, self.fps, only, up)
+        layers, only, up = exported.layers, exported.only, exported.up
+        return FilmOptions(view, self.turntable, size, background, self.seconds, self.fps, layers, only, up)
 
 
-def film(video: Video, target: Path, frames: range, options: FilmOptions, common: Common) -> Written:
+def film(reader: ReelReader, target: Path, frames: range, options: FilmOptions, common: Common) -> Written:
     """Write a film with all cores, and show how far it is."""
     with common.stages("pictures") as progress, threads(cores()):
-        return export_film(video, target, frames, options, lambda done, all: progress("export", done, all))
+        return export_film(reader, target, frames, options, lambda done, all: progress("export", done, all))
 
 
 def _size(text: str) -> tuple[int, int]:
@@ -82,7 +83,7 @@ def _color(text: str) -> Color | None:
         raise InputError(f"--background {text}: is no colour; give one as #20242a or white, or {TRANSPARENT}") from None
 
 
-def _view(text: str, video: Video, up: Up) -> View:
+def _view(text: str, reader: ReelReader, up: Up) -> View:
     """Return the view of a player's camera, whose places are upright, relative to the file's origin."""
     try:
         numbers = [float(part) for part in text.split(",")]
@@ -91,6 +92,6 @@ def _view(text: str, video: Video, up: Up) -> View:
     if len(numbers) != 6 or not all(map(math.isfinite, numbers)) or numbers[:3] == numbers[3:]:
         raise InputError(f"--camera {text}: give two places, x,y,z,x,y,z: the camera's, and what it looks at")
     places: Sequence[Sequence[float]] = (
-        np.array(numbers).reshape(2, 3) @ TURNS[up] + np.array(video.reader.header.origin)
+        np.array(numbers).reshape(2, 3) @ TURNS[up] + np.array(reader.header.origin)
     ).tolist()
     return View(tuple(places[0]), tuple(places[1]))

@@ -1,6 +1,6 @@
 """Export of a .reel file to a film of pictures, as the player shows it: MP4, WebM or GIF; or to one picture, PNG.
 
-In: a video, frames, a view. Out: a file, in which each picture is drawn by `geometry.picture`. Splats are not drawn.
+In: a reader, frames, a view. Out: a file, in which each picture is drawn by `geometry.picture`. Splats are not drawn.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..container.reader import ReelReader
 from ..decoder.tracks import moving_of_frame
 from ..decoder.video import Video
 from ..errors import InputError
@@ -42,6 +43,7 @@ class FilmOptions:
     background: Color | None = BACKGROUND  # None: transparent
     seconds: float | None = None  # length: frames are repeated, or left out at the end; None: that of the frames
     rate: float | None = None  # pictures per second; None: one for each frame
+    layers: int | None = None  # largest number of layers of each group beyond its first; None: all
     only: Part = "all"
     up: Up | None = None  # axis of the meshes that points up in the pictures; None: as the .reel file says
 
@@ -55,7 +57,7 @@ class FilmOptions:
 
 
 def export_film(
-    video: Video,
+    reader: ReelReader,
     path: Path,
     frames: range,
     options: FilmOptions = FilmOptions(),
@@ -67,24 +69,29 @@ def export_film(
     written, and FormatError if a chunk is damaged.
     """
     check_output(path)
-    kind, start = path.suffix.lower(), video.timestamps[frames.start] - video.timestamps[0]
+    video, kind = Video(reader, options.layers), path.suffix.lower()
     size = options.size or (GIF_SIZE if kind == ".gif" else SIZE)
     _check(path, kind, size, options)
     standing = Standing(video.box, options.up or video.up)
     view = options.view or standing.fitted(*size)
-    times, shown = _times(video, frames[:1] if kind == ".png" else frames, options, kind)
+    times, shown = _times(reader, frames[:1] if kind == ".png" else frames, options, kind)
+
+    def bodies(frame: int) -> list[Body]:
+        moving = [] if options.only == "background" else moving_of_frame(video.tracks, frame)
+        still = [] if options.only == "moving" else [video.background(frame)]
+        return [*(Body.of_track(mesh, number) for number, mesh in enumerate(moving)), *map(Body.behind, still)]
 
     @lru_cache(maxsize=1)
     def drawn(frame: int, share: float) -> UInt8[np.ndarray, "H W C"]:
-        bodies = _bodies(video, frame, options.only)
-        has_ground = options.only != "background" and video.reader.static_of_frame(frame) is None
+        is_bare = options.only == "background" or reader.static_of_frame(frame) is not None
+        has_ground = not is_bare and not (kind == ".gif" and options.background is None)  # where nothing is half dark
         seen = view.turned(share, standing.up)
-        return finished(draw_picture(bodies, standing, seen, size, has_ground), options.background)
+        return finished(draw_picture(bodies(frame), standing, seen, size, has_ground), options.background)
 
     def picture(number: int) -> UInt8[np.ndarray, "H W C"]:
         return drawn(shown[number], times[number] / times[-1] if options.turntable else 0.0)
 
-    audio = video.audio if kind in VIDEOS else None
+    audio, start = video.audio if kind in VIDEOS else None, reader.timestamp(frames.start) - reader.timestamp(0)
     rate = options.rate or video.frame_rate
     return write_film(Film(picture, options.background is None, times, size, rate, audio, start), path, progress)
 
@@ -100,25 +107,20 @@ def _check(path: Path, kind: str, size: tuple[int, int], options: FilmOptions) -
         raise InputError(f"{path}: {options.rate:g} pictures a second, and a GIF has {GIF_RATE} at most; give fewer")
 
 
-def _times(video: Video, frames: range, options: FilmOptions, kind: str) -> tuple[list[float], list[int]]:
+def _times(reader: ReelReader, frames: range, options: FilmOptions, kind: str) -> tuple[list[float], list[int]]:
     """Return the times of the pictures, followed by that of the end, s, and the frame that each picture shows."""
-    ends = [*video.timestamps, video.timestamps[0] + video.duration]
+    ends = [reader.timestamp(frame) for frame in range(reader.frame_count)]
+    ends.append(ends[0] + reader.duration)
     stamps = [ends[frame] - ends[frames.start] for frame in frames]
     clip = ends[frames.stop] - ends[frames.start]
     length, rate = options.seconds or clip, options.rate
     if kind == ".gif" and len(stamps) > GIF_RATE * clip:
         rate = rate or GIF_RATE
+    if (count := length * (rate or len(stamps) / clip)) > MOST_PICTURES:
+        raise InputError(f"a film of {count:.0f} pictures: {MOST_PICTURES} at most; give fewer seconds or frames")
     if rate is None:
         times = [loop * clip + stamp for loop in range(math.ceil(length / clip)) for stamp in stamps]
         times = [time for time in times if time < length - ROUNDED]
     else:
-        times = [number / rate for number in range(max(1, round(length * rate)))]
-    if len(times) > MOST_PICTURES:
-        raise InputError(f"a film of {len(times)} pictures: {MOST_PICTURES} at most; give fewer seconds or frames")
+        times = [number / rate for number in range(max(1, round(count)))]
     return [*times, length], [frames[bisect_right(stamps, (time + ROUNDED) % clip) - 1] for time in times]
-
-
-def _bodies(video: Video, frame: int, only: Part) -> list[Body]:
-    moving = [] if only == "background" else moving_of_frame(video.tracks, frame)
-    still = [] if only == "moving" else [video.background(frame)]
-    return [*(Body.of_track(mesh, number) for number, mesh in enumerate(moving)), *map(Body.behind, still)]

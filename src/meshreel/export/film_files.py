@@ -12,13 +12,13 @@ from dataclasses import dataclass
 from fractions import Fraction
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 import numpy as np
 
 from ..coding.appearance.pictures import to_i420
 from ..errors import needed
-from ..io.write import part_of, replacing, write_picture
+from ..io.write import replacing, write_picture
 from ..shapes import UInt8
 from ..types import Audio, evenly
 
@@ -71,21 +71,19 @@ def write_film(film: Film, path: Path, progress: Progress) -> Written:
         write_picture(film.picture(0), path)
         return Written(1)
     with replacing(path) as file:
-        if kind == ".gif":
-            _write_gif(film, file, progress)
-            return Written(film.count)
-        return Written(film.count, _write_video(film, file, path, progress))
+        packed = io.BytesIO()  # encoders seek, and what they meet on a full disk they print
+        has_audio = _pack_gif(film, packed, progress) if kind == ".gif" else _pack_video(film, packed, kind, progress)
+        file.write(packed.getbuffer())
+    return Written(film.count, has_audio)
 
 
-def _write_video(film: Film, file: BinaryIO, path: Path, progress: Progress) -> bool:
+def _pack_video(film: Film, file: io.BytesIO, kind: str, progress: Progress) -> bool:
     """Write pictures and audio; return whether the format takes that audio."""
     with needed("videos need the extra `color`: pip install 'meshreel[color]'"):
         import av
-    kind = path.suffix.lower()
 
-    def again(*_: object) -> BinaryIO:  # FFmpeg moves the index of an MP4 to its start, and reads the file for that
-        file.flush()
-        return part_of(path).open("rb")
+    def again(*_: object) -> io.BytesIO:  # FFmpeg moves the index of an MP4 to its start, and reads the file for that
+        return io.BytesIO(file.getvalue())
 
     options = {"fflags": "+bitexact"} | ({"movflags": "faststart"} if kind == ".mp4" else {})
     with av.open(file, "w", format=kind[1:], options=options, io_open=again) as out:
@@ -133,13 +131,17 @@ def _sound(film: Film, out: Any, kind: str) -> list[Any]:
     if film.audio is None:
         return []
     kept = list[Any]()
-    with av.open(io.BytesIO(film.audio.data)) as source:
+    try:
+        source = av.open(io.BytesIO(film.audio.data))
+    except av.error.FFmpegError:  # no audio that FFmpeg knows: any bytes may be in a .reel file
+        return []
+    with source:
         given = source.streams.audio[0]
         if given.codec_context.name not in SOUNDS[kind]:
             return []
         stream = out.add_stream_from_template(given)
         for packet in source.demux(given):
-            if packet.pts is None:
+            if packet.pts is None:  # the end
                 continue
             time = float(packet.pts * packet.time_base) + film.audio.start - film.start
             if 0 <= time < film.times[-1]:
@@ -149,13 +151,16 @@ def _sound(film: Film, out: Any, kind: str) -> list[Any]:
     return kept
 
 
-def _write_gif(film: Film, file: BinaryIO, progress: Progress) -> None:
-    """Write a GIF that begins again at its end; its colours are those of some pictures, so that nothing flickers."""
+def _pack_gif(film: Film, file: io.BytesIO, progress: Progress) -> bool:
+    """Write a GIF that begins again at its end, and return False: it has no audio.
+
+    Its colours are those of some pictures, so that nothing flickers.
+    """
     with needed("a GIF needs the extra `color`: pip install 'meshreel[color]'"):
         from PIL import Image
     samples = np.concatenate([film.picture(number) for number in evenly(film.count, LOOKED_AT)])
     opaque = samples[samples[..., 3] >= OPAQUE][None] if film.is_transparent else samples
-    palette = Image.fromarray(np.ascontiguousarray(opaque[..., :3])).quantize(255, Image.Quantize.MEDIANCUT)
+    palette = Image.fromarray(np.ascontiguousarray(opaque[..., :3])).quantize(255, Image.Quantize.FASTOCTREE)
 
     def indexed(number: int) -> Any:
         pixels = film.picture(number)
@@ -184,3 +189,4 @@ def _write_gif(film: Film, file: BinaryIO, progress: Progress) -> None:
         optimize=False,
         disposal=2 if film.is_transparent else 1,
     )
+    return False

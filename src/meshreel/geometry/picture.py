@@ -219,7 +219,7 @@ def _areas(corners: Float64[np.ndarray, "F 3 2"]) -> Float64[np.ndarray, " F"]:
     return np.abs(x * w - y * z)
 
 
-def _halved(pixels: UInt8[np.ndarray, "H W 3"]) -> UInt8[np.ndarray, "H W 3"]:
+def _halved(pixels: UInt8[np.ndarray, "H W 3"]) -> UInt8[np.ndarray, "R C 3"]:
     if min(pixels.shape[:2]) < 4:
         return pixels
     rows, columns = (side // 2 * 2 for side in pixels.shape[:2])
