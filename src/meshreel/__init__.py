@@ -68,9 +68,14 @@ def __getattr__(name: str) -> Any:
 
 def _picture(mesh: Mesh) -> bytes | None:
     """Return the picture of a mesh for notebooks, None for one without faces."""
+    from dataclasses import replace
+
     from .geometry.picture import picture
 
-    return None if mesh.is_empty else picture(mesh)
+    try:
+        return None if mesh.is_empty else picture(mesh)
+    except MeshreelError:  # its texture is damaged, or needs PyAV
+        return picture(replace(mesh, texture=None))
 
 
 def __dir__() -> list[str]:

@@ -54,15 +54,18 @@ def test_flags_reach_the_pictures(run, tmp_path):
     assert row["pictures"] == 7
 
 
-def test_a_camera_is_where_the_player_has_it(run, tmp_path):
-    """Places are upright and relative to the file's origin: what it looks at is in the middle."""
+def test_a_view_is_in_the_unit_and_axes_of_the_frames(run, tmp_path):
     with meshreel.open(FILE) as video:
-        target = np.mean(video.box, axis=0) - video.reader.header.origin
+        target = np.mean(video.box, axis=0)
         far = target + [0, 0, 6 * np.ptp(video.box, axis=0).max()]
-    camera = ",".join(f"{number:.6f}" for number in (*far, *target))
-    run("export", FILE, "-o", tmp_path / "a.png", *SMALL, f"--camera={camera}", "--background", "transparent")
-    rows, columns = np.nonzero(np.asarray(Image.open(tmp_path / "a.png"))[..., 3] > 200)
-    assert 0 < len(rows) < 40 and abs(rows.mean() - 23.5) < 2 and abs(columns.mean() - 31.5) < 2
+    view, seen = ",".join(f"{number:.6f}" for number in (*far, *target)), []
+    for degrees in ("", ",22"):
+        out = ("-o", tmp_path / "a.png", *SMALL, "--background", "transparent")
+        assert run("export", FILE, *out, "--view", view + degrees).code == 0
+        rows, columns = np.nonzero(np.asarray(Image.open(tmp_path / "a.png"))[..., 3] > 204)  # no shadow is so dark
+        assert abs(rows.mean() - 23.5) < 2 and abs(columns.mean() - 31.5) < 2
+        seen.append(len(rows))
+    assert 3 * seen[0] < seen[1] < 6 * seen[0]
 
 
 def test_what_cannot_be_understood_is_an_error_that_says_what_to_give(run, tmp_path):
@@ -70,7 +73,9 @@ def test_what_cannot_be_understood_is_an_error_that_says_what_to_give(run, tmp_p
     assert failed(run(*out, "--size", "64"), "--size 64", "1280x720")
     assert failed(run(*out, "--size", "9x9"), "9 pixels", "16 to 8192")
     assert failed(run(*out, "--background", "dusk"), "--background dusk", "transparent")
-    assert failed(run(*out, "--camera", "1,2,3"), "--camera 1,2,3", "x,y,z,x,y,z")
+    assert failed(run(*out, "--view", "1,2,3"), "--view 1,2,3", "six numbers")
+    assert failed(run(*out, "--view", "-1,2,3,-1,2,3"), "--view -1,2,3,-1,2,3")
+    assert failed(run(*out, "--view", "0,0,1,0,0,0,180"), "degrees")
     assert failed(run(*out, "--fps", "0"), "0 pictures a second", "above 0")
     assert failed(run(*out, "--texture"), "--texture", "GLB and USD")
     assert failed(run("export", FILE, "-o", tmp_path / "a.glb", "--size", "64x48"), "--size", "a.glb", ".mp4")

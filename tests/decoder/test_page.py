@@ -28,6 +28,7 @@ from meshreel.decoder import video as module
 from meshreel.decoder.page import player_page
 from meshreel.errors import FormatError, InputError
 from meshreel.geometry.picture import NOTEBOOK
+from meshreel.types import Texture
 from tests.container.test_http import LARGE
 from tests.golden import GOLDEN, frame_record
 from tests.metrics.shapes import sphere
@@ -158,6 +159,16 @@ def test_the_picture_of_a_mesh_has_its_colors_and_an_empty_one_has_none():
     seen = pixels_of(meshreel.Mesh._repr_png_(red) or b"")
     assert seen[..., 0].max() > 200 and seen[..., 1:3].max() == 0
     assert meshreel.Mesh.empty()._repr_png_() is None
+
+
+def test_the_picture_of_a_mesh_whose_texture_cannot_be_read_has_the_colors_of_its_vertices():
+    def refuse() -> np.ndarray:
+        raise InputError("textures need the extra `color`")
+
+    ball = sphere(0.5, 2)
+    green = replace(ball, colors=np.tile(np.array([0, 255, 0], np.uint8), (len(ball.vertices), 1)))
+    uv = np.zeros((len(ball.faces), 3, 2), np.float32)
+    assert meshreel.Mesh._repr_png_(replace(green, uv=uv, texture=Texture(refuse))) == meshreel.Mesh._repr_png_(green)
 
 
 def last_frame(video: meshreel.Video) -> object:

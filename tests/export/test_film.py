@@ -10,7 +10,7 @@ import meshreel
 from meshreel.edit.edits import tag
 from meshreel.errors import InputError
 from meshreel.export.film import BACKGROUND, FilmOptions, export_film
-from meshreel.geometry.picture import View
+from meshreel.geometry.picture import Viewpoint
 from meshreel.geometry.threads import threads
 from tests.golden import GOLDEN
 from tests.tones import tone
@@ -105,7 +105,7 @@ def test_a_turntable_goes_around_a_still_and_ends_before_its_begin(tmp_path):
 def test_a_png_is_the_first_frame_from_a_view(tmp_path):
     with meshreel.open(FILE) as video:
         middle = np.mean(video.box, axis=0)
-        view = View(tuple(middle + [0, 0, 10]), tuple(middle), 30.0)
+        view = Viewpoint(tuple(middle + [0, 0, 10]), tuple(middle), 30.0)
         export_film(video.reader, tmp_path / "a.png", range(3, 7), FilmOptions(view, size=SMALL, background=None))
         near, edge = (np.asarray(Image.open(tmp_path / "a.png"))[at] for at in ((24, 32), (0, 0)))
     assert near[3] == 255 and edge[3] == 0

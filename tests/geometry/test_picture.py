@@ -5,21 +5,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from meshreel.geometry.picture import Body, Standing, View, draw_picture, finished
+from meshreel.geometry.picture import Body, Standing, Viewpoint, draw_picture, finished
 from meshreel.geometry.threads import threads
 from meshreel.types import UPS, Mesh, Texture, Up
 
 from ..metrics.shapes import plane, sphere
 
 SIZE = (96, 64)
-BEFORE = View((0.0, 0.0, 3.0), (0.0, 0.0, 0.0))  # sees 3 x 2.485 at the target
+BEFORE = Viewpoint((0.0, 0.0, 3.0), (0.0, 0.0, 0.0))  # sees 3 x 2.485 at the target
 QUAD = Mesh.of([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], [[0, 1, 2], [0, 2, 3]])
 UV = ((QUAD.vertices[QUAD.faces][:, :, :2] + 1) / 2).astype(np.float32)
 RED, GREEN, BLUE, WHITE = (255, 0, 0), (0, 255, 0), (0, 0, 255), (255, 255, 255)
 
 
 def drawn(
-    mesh: Mesh, view: View = BEFORE, background: tuple[int, ...] | None = WHITE, ground: bool = False
+    mesh: Mesh, view: Viewpoint = BEFORE, background: tuple[int, ...] | None = WHITE, ground: bool = False
 ) -> np.ndarray:
     standing = Standing(mesh.box)
     return finished(draw_picture([Body.of_track(mesh)], standing, view, SIZE, ground), background)
@@ -114,20 +114,20 @@ def test_a_view_of_the_whole_shows_all_of_it_upright(up: Up):
 
 
 def test_a_turned_view_goes_around_at_the_same_height_and_comes_back():
-    view = View((1.0, 2.0, 3.0), (0.5, 0.0, 0.0))
+    view = Viewpoint((1.0, 2.0, 3.0), (0.5, 0.0, 0.0))
     places = np.array([view.turned(share, "z").position for share in (0, 0.25, 0.5, 1)])
     assert np.allclose(places, [[1, 2, 3], [2.5, -0.5, 3], [0, -2, 3], [1, 2, 3]], atol=1e-9)
 
 
 def test_a_view_straight_from_above_has_a_picture():
-    seen = drawn(replace(plane(2.0, 2)), View((0.0, 3.0, 0.0), (0.0, 0.0, 0.0)), background=None)
+    seen = drawn(replace(plane(2.0, 2)), Viewpoint((0.0, 3.0, 0.0), (0.0, 0.0, 0.0)), background=None)
     assert np.isfinite(seen).all()
 
 
 def test_the_ground_has_a_shadow_below_a_body_and_fades_away():
     ball = sphere(0.5, 3)
     bare, grounded = (
-        drawn(ball, View((0.0, 1.0, 3.0), (0.0, -0.3, 0.0)), None, ground)[..., 3] for ground in (False, True)
+        drawn(ball, Viewpoint((0.0, 1.0, 3.0), (0.0, -0.3, 0.0)), None, ground)[..., 3] for ground in (False, True)
     )
     more = grounded.astype(int) - bare
     assert (more >= 0).all() and more.max() > 120 and grounded[0].max() == 0

@@ -266,7 +266,7 @@ def export(
         chosen = wanted.chosen(len(video))
         try:
             if is_film:
-                written = film(video.reader, target, chosen, filming.options(video.reader, options), common)
+                written = film(video.reader, target, chosen, filming.options(options), common)
             else:
                 with common.stages() as progress:
                     count = export_animated(video.reader, target, chosen, options, progress)

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import math
 import re
-from collections.abc import Sequence
 from dataclasses import dataclass, fields
+from math import isfinite
 from pathlib import Path
 from typing import Annotated
 
-import numpy as np
 from cyclopts import Parameter
 
 from ..container.reader import ReelReader
@@ -17,9 +15,8 @@ from ..errors import InputError, needed
 from ..export.animated_file import ExportOptions
 from ..export.film import BACKGROUND, Color, FilmOptions, export_film
 from ..export.film_files import Written
-from ..geometry.picture import TURNS, View
+from ..geometry.picture import Viewpoint
 from ..geometry.threads import cores, threads
-from ..types import Up
 from .console import Common
 
 TRANSPARENT = "transparent"
@@ -35,9 +32,9 @@ class Filming:
     background: str | None = None
     """Colour behind the recording, as #20242a or white, or transparent (WebM, GIF, PNG); by default the dark one of the
     player."""
-    camera: str | None = None
-    """Where the camera is and what it looks at, six numbers with commas, as the player has and shares them; by default
-    all is in view."""
+    view: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None
+    """x,y,z of the camera and x,y,z of what it looks at, in metres as frames have them, and perhaps ,DEGREES of its
+    field of view (45); by default all is in view."""
     turntable: Annotated[bool, Parameter(negative="")] = False
     """Let the camera go around once, from there."""
     seconds: float | None = None
@@ -50,10 +47,10 @@ class Filming:
         """The first flag that was given; empty if none was."""
         return next((f"--{field.name}" for field in fields(self) if getattr(self, field.name) != field.default), "")
 
-    def options(self, reader: ReelReader, exported: ExportOptions) -> FilmOptions:
+    def options(self, exported: ExportOptions) -> FilmOptions:
         """Return what was asked for. Raises InputError for what cannot be understood."""
         size = None if self.size is None else _size(self.size)
-        view = None if self.camera is None else _view(self.camera, reader, exported.up or reader.up)
+        view = None if self.view is None else _view(self.view)
         background = BACKGROUND if self.background is None else _color(self.background)
         layers, only, up = exported.layers, exported.only, exported.up
         return FilmOptions(view, self.turntable, size, background, self.seconds, self.fps, layers, only, up)
@@ -83,15 +80,17 @@ def _color(text: str) -> Color | None:
         raise InputError(f"--background {text}: is no colour; give one as #20242a or white, or {TRANSPARENT}") from None
 
 
-def _view(text: str, reader: ReelReader, up: Up) -> View:
-    """Return the view of a player's camera, whose places are upright, relative to the file's origin."""
+def _view(text: str) -> Viewpoint:
     try:
-        numbers = [float(part) for part in text.split(",")]
-    except ValueError:
-        numbers = []
-    if len(numbers) != 6 or not all(map(math.isfinite, numbers)) or numbers[:3] == numbers[3:]:
-        raise InputError(f"--camera {text}: give two places, x,y,z,x,y,z: the camera's, and what it looks at")
-    places: Sequence[Sequence[float]] = (
-        np.array(numbers).reshape(2, 3) @ TURNS[up] + np.array(reader.header.origin)
-    ).tolist()
-    return View(tuple(places[0]), tuple(places[1]))
+        x, y, z, *target = (float(number) for number in text.split(","))
+        view = Viewpoint((x, y, z), tuple(target[:3]), *target[3:])
+    except (ValueError, TypeError):
+        view = Viewpoint((), ())
+    numbers = (*view.position, *view.target, view.fov)
+    if (
+        len(view.target) != 3
+        or view.position == view.target
+        or not (0 < view.fov < 180 and all(map(isfinite, numbers)))
+    ):
+        raise InputError(f"--view {text}: give six numbers with commas, as 0,1.6,3,0,1,0; a seventh may be degrees")
+    return view

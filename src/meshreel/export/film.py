@@ -18,7 +18,7 @@ from ..container.reader import ReelReader
 from ..decoder.tracks import moving_of_frame
 from ..decoder.video import Video
 from ..errors import InputError
-from ..geometry.picture import Body, Standing, View, draw_picture, finished
+from ..geometry.picture import Body, Standing, Viewpoint, draw_picture, finished
 from ..shapes import UInt8
 from ..types import Up
 from .film_files import GIF_RATE, VIDEOS, Film, Written, write_film
@@ -35,9 +35,9 @@ ROUNDED = 1e-6  # s: times of .reel files are whole microseconds
 
 @dataclass(frozen=True, slots=True)
 class FilmOptions:
-    """View, size and times of a film."""
+    """Viewpoint, size and times of a film."""
 
-    view: View | None = None  # in the unit of the vertices; None: all of the recording, as the player begins
+    view: Viewpoint | None = None  # in the unit of the vertices; None: all of the recording, as the player begins
     turntable: bool = False  # the camera goes around once, from there
     size: tuple[int, int] | None = None  # pixels, width and height; None: `SIZE`, and of a GIF `GIF_SIZE`
     background: Color | None = BACKGROUND  # None: transparent

@@ -120,7 +120,7 @@ def _planes(pixels: Pixels, form: str) -> Any:
     for plane, values in zip(frame.planes, [*planes, *([pixels[..., 3]] if form == "yuva420p" else [])], strict=True):
         rows = np.zeros((plane.height, plane.line_size), np.uint8)
         rows[:, : plane.width] = values.reshape(plane.height, plane.width)
-        plane.update(rows)
+        plane.update(rows.tobytes())
     return frame
 
 
@@ -132,7 +132,7 @@ def _sound(film: Film, out: Any, kind: str) -> list[Any]:
         return []
     kept = list[Any]()
     try:
-        source = av.open(io.BytesIO(film.audio.data))
+        source = av.open(io.BytesIO(film.audio.data), "r")
     except av.error.FFmpegError:  # no audio that FFmpeg knows: any bytes may be in a .reel file
         return []
     with source:
@@ -161,6 +161,7 @@ def _pack_gif(film: Film, file: io.BytesIO, progress: Progress) -> bool:
     samples = np.concatenate([film.picture(number) for number in evenly(film.count, LOOKED_AT)])
     opaque = samples[samples[..., 3] >= OPAQUE][None] if film.is_transparent else samples
     palette = Image.fromarray(np.ascontiguousarray(opaque[..., :3])).quantize(255, Image.Quantize.FASTOCTREE)
+    colors = palette.getpalette() or []
 
     def indexed(number: int) -> Any:
         pixels = film.picture(number)
@@ -169,8 +170,8 @@ def _pack_gif(film: Film, file: io.BytesIO, progress: Progress) -> bool:
         )
         if film.is_transparent:
             indices = np.where(pixels[..., 3] < OPAQUE, 255, np.asarray(image)).astype(np.uint8)
-            shown, image = image, Image.fromarray(indices, "P")
-            image.putpalette(shown.getpalette())
+            image = Image.fromarray(indices, "P")
+            image.putpalette(colors)
             image.info["transparency"] = 255
         progress(number + 1, film.count)
         return image

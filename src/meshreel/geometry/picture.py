@@ -47,7 +47,7 @@ _HUES = (0x56B4E9, 0x009E73, 0xF0E442, 0x0072B2, 0xD55E00, 0xCC79A7, 0xE69F00)  
 
 
 @dataclass(frozen=True, slots=True)
-class View:
+class Viewpoint:
     """A camera that looks at a target, with what points up in the recording up in the picture."""
 
     position: tuple[float, ...]  # three, in the unit of the vertices, as the target
@@ -65,7 +65,7 @@ class View:
         pose = CameraPose(matrix_of(axes.T, eye), matrix_of(axes, -(axes * eye).sum(axis=1)))
         return Camera(width, height, (focal, focal), (width / 2, height / 2), pose)
 
-    def turned(self, share: float, up: Up) -> View:
+    def turned(self, share: float, up: Up) -> Viewpoint:
         """Return the view with the camera a share of a turn around the target, as the player turns by itself."""
         c, s = (rounded(of(-2 * math.pi * share)) for of in (math.cos, math.sin))
         turn = TURNS[up].T @ np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]]) @ TURNS[up]
@@ -94,7 +94,7 @@ class Standing:
         """Where it stands along the axis that points up."""
         return float((np.array(UP_AXES[self.up]) * self.middle).sum()) - float(self.size[1]) / 2
 
-    def fitted(self, width: int, height: int) -> View:
+    def fitted(self, width: int, height: int) -> Viewpoint:
         """Return the view of all of it with which the player begins."""
         toward = _unit(np.array(FROM))
         right = _unit(np.cross([0.0, 1.0, 0.0], toward))
@@ -104,7 +104,7 @@ class Standing:
         widest = np.maximum(np.abs(aside[0]) * height / width, np.abs(aside[1])) / tangent
         distance = MARGIN * float(((corners * toward).sum(axis=1) + widest).max()) or 1.0
         eye = self.middle + TURNS[self.up].T @ (distance * toward)
-        return View(tuple(eye.tolist()), tuple(self.middle.tolist()))
+        return Viewpoint(tuple(eye.tolist()), tuple(self.middle.tolist()))
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,7 +128,7 @@ class Body:
 
 
 def draw_picture(
-    bodies: Sequence[Body], standing: Standing, view: View, size: tuple[int, int], ground: bool = False
+    bodies: Sequence[Body], standing: Standing, view: Viewpoint, size: tuple[int, int], ground: bool = False
 ) -> Rgba:
     """Return the picture of a frame, transparent where nothing is; of equally near parts the first is seen.
 
@@ -211,7 +211,7 @@ def _level(mesh: Mesh, camera: Camera, shape: tuple[int, ...]) -> Int32[np.ndarr
     assert mesh.uv is not None
     places = camera.project(camera.local(mesh.vertices))[mesh.faces]  # NaN behind the camera
     ratio = shape[0] * shape[1] * _areas(mesh.uv.astype(np.float64)) / np.maximum(_areas(places), 1e-12)
-    return np.sum([ratio >= 4**k for k in range(1, SMALLEST + 1)], axis=0, dtype=np.int32)
+    return (ratio[:, None] >= 4.0 ** np.arange(1, SMALLEST + 1)).sum(axis=1).astype(np.int32)
 
 
 def _areas(corners: Float64[np.ndarray, "F 3 2"]) -> Float64[np.ndarray, " F"]:

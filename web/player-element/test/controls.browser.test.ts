@@ -1,5 +1,6 @@
 // Every control and every key, in a browser, on a playback and a stage that are made up.
 
+import { readFileSync } from "node:fs";
 import { expect, test } from "vitest";
 import { describeOnPage } from "./fixture.ts";
 
@@ -230,6 +231,36 @@ describeOnPage("controls of <meshreel-player>", (on) => {
       return engine.stages[0]!.shown!.frame;
     });
     expect(frame).toBe(24);
+  });
+
+  test("a loop, or its section, is recorded from its start as a video that plays, and pausing ends it early", async () => {
+    for (const [attributes, pause, length] of [['section="0.5,1.2"', false, 0.7], ["loop", false, 2], ["loop", true, 1]] as const) {
+      await on.shown(attributes);
+      await on.get((player) => void (player.currentTime = 1));
+      await on.page.getByRole("button", { name: "Settings" }).click();
+      const download = on.page.waitForEvent("download");
+      await on.page.locator(".settings button.record").click();
+      await on.eventually((player) => !player.paused);
+      expect(await on.page.locator(".settings button.record").getAttribute("aria-label")).toBe("Stop recording");
+      if (pause) {
+        await on.page.waitForTimeout(800);
+        await on.page.locator(".settings button.record").click();
+      }
+      const file = await download;
+      expect(file.suggestedFilename()).toMatch(/^walk\.(mp4|webm)$/);
+      await on.eventually((player) => player.paused);
+      const data = readFileSync(await file.path()).toString("base64");
+      const video = await on.page.evaluate(async ([text, type]) => {
+        const shown = document.createElement("video");
+        shown.src = `data:${type};base64,${text}`;
+        await new Promise((done, fail) => Object.assign(shown, { onloadedmetadata: done, onerror: fail }));
+        shown.currentTime = 1e6; // what a browser records does not say how long it is
+        await new Promise((done) => void (shown.onseeked = done));
+        return [shown.currentTime, shown.videoWidth];
+      }, [data, file.suggestedFilename().endsWith("mp4") ? "video/mp4" : "video/webm"] as const);
+      expect(Math.abs(video[0]! - length)).toBeLessThan(0.65); // of a busy machine
+      expect(video[1]).toBeGreaterThan(100);
+    }
   });
 
   test("full screen is entered and left with button and key", async () => {

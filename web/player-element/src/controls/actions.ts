@@ -4,6 +4,7 @@ import type { MeshreelPlayer } from "../element.ts";
 import { recordingName } from "../format.ts";
 import { type Action, seekStep } from "../keyboard.ts";
 import { linkOf } from "../address.ts";
+import { record } from "../record.ts";
 import { cut } from "../section.ts";
 import { modeName, nextMode } from "./choices.ts";
 
@@ -141,14 +142,28 @@ export async function copyView(player: MeshreelPlayer, surface: Surface): Promis
 /** Saves the picture as a file named after recording and frame. */
 export async function saveScreenshot(player: MeshreelPlayer, surface: Surface): Promise<void> {
   try {
-    const address = URL.createObjectURL(await player.screenshot());
-    const link = document.createElement("a");
-    link.href = address;
-    link.download = `${recordingName(player.currentSrc)}-${player.currentFrame + 1}.png`;
-    link.click();
-    setTimeout(() => URL.revokeObjectURL(address), 10_000);
+    save(await player.screenshot(), `${recordingName(player.currentSrc)}-${player.currentFrame + 1}.png`);
     surface.tell("Screenshot saved");
   } catch (error) {
     surface.tell(`Screenshot failed: ${error instanceof Error ? error.message : error}`);
   }
+}
+
+/** Saves a video of one loop, seen as the viewer moves the camera meanwhile. */
+export async function saveLoop(player: MeshreelPlayer, surface: Surface, canvas: HTMLCanvasElement): Promise<void> {
+  try {
+    const video = await record(player, canvas);
+    save(video, `${recordingName(player.currentSrc)}.${video.type.startsWith("video/mp4") ? "mp4" : "webm"}`);
+    surface.tell("Loop saved");
+  } catch (error) {
+    surface.tell(`No video: ${error instanceof Error ? error.message : error}`);
+  }
+}
+
+function save(file: Blob, name: string): void {
+  const link = document.createElement("a");
+  link.href = URL.createObjectURL(file);
+  link.download = name;
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
 }

@@ -5,6 +5,7 @@ import { formatTime, timeDigits } from "../format.ts";
 import type { Action } from "../keyboard.ts";
 import type { Mode } from "@meshreel/player-three/modes";
 import { parseLayers } from "../attributes.ts";
+import { canRecord } from "../record.ts";
 import { nextCut } from "../section.ts";
 import { layersChoices, layersValue, modeChoices, speedChoices } from "./choices.ts";
 import { Button, type Look, make, Menu, setText } from "./dom.ts";
@@ -19,6 +20,7 @@ export interface BarActs {
   copyLink(): void;
   copyView(): void;
   enterAr(): void;
+  recordLoop(): void;
 }
 
 export class Bar {
@@ -28,6 +30,7 @@ export class Bar {
   /** True if this browser has a headset; determined when the player enters a document. */
   headset = false;
   passthrough = false; // and whether it shows the viewer's own room
+  recording = false; // a video of a loop
   #player: MeshreelPlayer;
   #acts: BarActs;
   #more: Button;
@@ -124,11 +127,15 @@ export class Bar {
       const label = { sectionFrom: "Set loop start", sectionTo: "Set loop end", sectionOff: "Clear loop" }[nextCut(player)];
       return { icon: "section", label, pressed: player.section !== null, enabled: player.duration > 0 };
     };
+    const record = (): Look => ({
+      icon: "record", label: this.recording ? "Stop recording" : "Record loop", pressed: this.recording, shown: canRecord(), enabled: player.duration > 0,
+    });
     return [
       this.#button("repeat", "", section, () => act(nextCut(player))),
       this.#button("frames", "N", () => ({ icon: "frames", label: "Frame numbers", pressed: player.frames }), () => act("frames")),
       this.#button("autorotate", "R", () => ({ icon: "replay", label: "Auto-rotate", pressed: player.autoRotate }), () => act("autoRotate")),
       this.#button("fly", "G", () => ({ icon: "fly", label: "Fly mode", pressed: player.fly }), () => act("fly")),
+      this.#button("record", "", record, () => this.#acts.recordLoop()),
       this.#button("share", "", () => ({ icon: "link", label: "Copy link", shown: player.share, enabled: player.info !== null }), () => this.#acts.copyLink()),
       this.#button("view", "", () => ({ icon: "camera", label: "Use this view", enabled: player.info !== null }), () => this.#acts.copyView()),
       this.#button("open", "", () => ({ icon: "open", label: "Open file" }), () => this.#acts.openFile()),

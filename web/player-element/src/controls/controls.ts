@@ -5,7 +5,7 @@ import type { MeshreelPlayer } from "../element.ts";
 import { icon } from "../icons.ts";
 import { type Action, actionOf, isOfSound, takesKey, type Target } from "../keyboard.ts";
 import { styleSheet } from "../styles.ts";
-import { copyLink, copyView, perform, saveScreenshot, type Surface, toggleVr } from "./actions.ts";
+import { copyLink, copyView, perform, saveLoop, saveScreenshot, type Surface, toggleVr } from "./actions.ts";
 import { acceptTaps, Activity, type Tap } from "./activity.ts";
 import { Bar } from "./bar.ts";
 import { make } from "./dom.ts";
@@ -40,7 +40,7 @@ export class Controls implements Surface {
     });
     const open = () => this.#file.click();
     const act = (action: Action) => this.#act(action);
-    this.#bar = new Bar(player, { act, openFile: open, screenshot: () => void saveScreenshot(player, this), copyLink: () => void copyLink(player, this), copyView: () => void copyView(player, this), enterAr: () => void toggleVr(player, this, true) });
+    this.#bar = new Bar(player, { act, openFile: open, screenshot: () => void saveScreenshot(player, this), copyLink: () => void copyLink(player, this), copyView: () => void copyView(player, this), enterAr: () => void toggleVr(player, this, true), recordLoop: () => void this.#record() });
     this.#error = new ErrorPanel(() => player.retry(), open);
     this.#help = new HelpPanel(() => this.toggleHelp());
     this.#statistics = new StatisticsPanel(player);
@@ -65,6 +65,17 @@ export class Controls implements Surface {
   get background(): string {
     this.picture.style.backgroundColor = this.#player.background;
     return getComputedStyle(this.picture).backgroundColor;
+  }
+
+  /** Records one loop; asked again, ends it early. */
+  async #record(): Promise<void> {
+    const canvas = this.picture.querySelector("canvas");
+    if (this.#bar.recording || !canvas) return this.#player.pause();
+    this.#bar.recording = true;
+    this.refresh();
+    await saveLoop(this.#player, this, canvas);
+    this.#bar.recording = false;
+    this.refresh();
   }
 
   connect(): void {
