@@ -48,7 +48,7 @@ class Filming:
         return next((f"--{field.name}" for field in fields(self) if getattr(self, field.name) != field.default), "")
 
     def options(self, exported: ExportOptions) -> FilmOptions:
-        """Return what was asked for. Raises InputError for what cannot be understood."""
+        """Return the options of a film, with those of every export. Raises InputError for a flag without a meaning."""
         size = None if self.size is None else _size(self.size)
         view = None if self.view is None else _view(self.view)
         background = BACKGROUND if self.background is None else _color(self.background)

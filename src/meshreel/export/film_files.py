@@ -58,7 +58,7 @@ class Film:
 
 @dataclass(frozen=True, slots=True)
 class Written:
-    """What a file has."""
+    """Content of a finished file."""
 
     pictures: int
     has_audio: bool = False

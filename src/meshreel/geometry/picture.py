@@ -75,7 +75,7 @@ class Viewpoint:
 
 @dataclass(frozen=True, slots=True)
 class Standing:
-    """How a recording stands: its box, in the unit of its vertices, and its axis that points up."""
+    """Orientation and extent of a recording: its box, in the unit of its vertices, and its axis that points up."""
 
     box: tuple[Float64[np.ndarray, "3"], Float64[np.ndarray, "3"]]  # lower and upper corner
     up: Up = "y"
@@ -91,7 +91,7 @@ class Standing:
 
     @property
     def bottom(self) -> float:
-        """Where it stands along the axis that points up."""
+        """Coordinate of its lowest side along the axis that points up."""
         return float((np.array(UP_AXES[self.up]) * self.middle).sum()) - float(self.size[1]) / 2
 
     def fitted(self, width: int, height: int) -> Viewpoint:
