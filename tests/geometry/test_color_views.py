@@ -143,10 +143,7 @@ def test_guessed_surface_beyond_what_was_measured_has_no_color(scale: float) -> 
     for depths, wanted in (([depth], [True, True, False, False, True, False]), ([], [True] * 6)):
         views = ColorViews([picture], hides, 0.01 / scale, depths)
         assert views.at(points / scale, normals)[1].tolist() == wanted
-    assert views.clear.at(points / scale, normals)[1].all()
-    assert ColorViews([picture], hides, 0.01 / scale, [depth]).clear.at(points / scale, normals)[1].tolist() == [
-        True, False, False, False, True, False
-    ]  # fmt: skip
+        assert views.clear.at(points / scale, normals)[1].tolist() == wanted
 
 
 def test_noisy_measurements_confirm_a_surface_and_those_of_a_camera_elsewhere_say_nothing() -> None:
