@@ -3,18 +3,11 @@
 from __future__ import annotations
 
 import json
-import math
 import os
 import posixpath
 import re
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
-
-import numpy as np
-
-if TYPE_CHECKING:
-    from meshreel.format.view import View
-    from meshreel.geometry.cameras import Camera
+from typing import Any
 
 ROOT = Path(__file__).resolve().parents[1]
 OUTSIDE = ("FORMAT.md", "CHANGELOG.md", "CONTRIBUTING.md")
@@ -26,6 +19,7 @@ LINK = re.compile(r"(?<!!)\[([^\]]*)\]\(([^)#\s:]+)(#[^)\s]*)?\)")  # text, file
 VALUE = re.compile(r"\{\{(size|seconds):([\w.]+)\}\}")
 HOME = "index.md"
 FRAMES = 60  # of the bodies: two seconds
+POSTER = (800, 600)  # pixels
 
 
 def on_files(files: Any, config: Any) -> Any:
@@ -97,7 +91,7 @@ def make_samples(folder: Path) -> None:
     from meshreel.capture.recording import FusionOptions, open_recording
     from meshreel.capture.simulated.procedural import SoftBodiesOptions, soft_bodies
     from meshreel.capture.simulated.stage import VOXEL, StageOptions, record_stage
-    from meshreel.geometry.picture import picture
+    from meshreel.export.film import FilmOptions, export_film
 
     folder.mkdir(parents=True, exist_ok=True)
     room, bodies = folder / "room.reel", folder / "bodies.reel"
@@ -108,18 +102,8 @@ def make_samples(folder: Path) -> None:
     if not bodies.exists():
         meshreel.encode(soft_bodies(SoftBodiesOptions(frames=FRAMES)), bodies)
     for path in (room, bodies):
-        video = meshreel.open(path)
-        path.with_suffix(".png").write_bytes(picture(video[0], video.view and _camera(video.view)))
-
-
-def _camera(view: View) -> Camera:
-    """Return the camera of a file's first view, so that a poster shows what the player begins with."""
-    from meshreel.geometry.cameras import Camera, CameraPose, looking_at
-    from meshreel.geometry.picture import HEIGHT, WIDTH
-
-    focal = HEIGHT / 2 / math.tan(math.radians(view.fov) / 2)
-    pose = CameraPose.of_camera(looking_at(np.array(view.position), np.array(view.target)))
-    return Camera(WIDTH, HEIGHT, (focal, focal), (WIDTH / 2, HEIGHT / 2), pose)
+        with meshreel.open(path) as video:
+            export_film(video.reader, path.with_suffix(".png"), range(1), FilmOptions(size=POSTER, background=None))
 
 
 if __name__ == "__main__":

@@ -68,13 +68,22 @@ def test_a_view_is_in_the_unit_and_axes_of_the_frames(run, tmp_path):
     assert 3 * seen[0] < seen[1] < 6 * seen[0]
 
 
+def test_a_film_begins_with_the_first_view_of_its_file(run, tmp_path):
+    view, pictures = "1000000.2,-2,4,1000000,-2.5,0,30", []
+    assert run("tag", FILE, "--view", view, "-o", tmp_path / "viewed.reel").code == 0
+    for file, flags in ((tmp_path / "viewed.reel", ()), (FILE, ("--view", view)), (FILE, ())):
+        assert run("export", file, "-o", tmp_path / "a.png", *SMALL, *flags).code == 0
+        pictures.append(np.asarray(Image.open(tmp_path / "a.png")).astype(int))
+    assert np.abs(pictures[0] - pictures[1]).mean() < 0.1 < np.abs(pictures[0] - pictures[2]).mean()
+
+
 def test_what_cannot_be_understood_is_an_error_that_says_what_to_give(run, tmp_path):
     out = ("export", FILE, "-o", tmp_path / "a.gif")
     assert failed(run(*out, "--size", "64"), "--size 64", "1280x720")
     assert failed(run(*out, "--size", "9x9"), "9 pixels", "16 to 8192")
     assert failed(run(*out, "--background", "dusk"), "--background dusk", "transparent")
-    assert failed(run(*out, "--view", "1,2,3"), "--view 1,2,3", "six numbers")
-    assert failed(run(*out, "--view", "-1,2,3,-1,2,3"), "--view -1,2,3,-1,2,3")
+    assert failed(run(*out, "--view", "1,2,3"), "--view '1,2,3'", "six numbers")
+    assert failed(run(*out, "--view", "-1,2,3,-1,2,3"), "the places are one")
     assert failed(run(*out, "--view", "0,0,1,0,0,0,180"), "degrees")
     assert failed(run(*out, "--fps", "0"), "0 pictures a second", "above 0")
     assert failed(run(*out, "--texture"), "--texture", "GLB and USD")

@@ -14,6 +14,7 @@ from ..io.files import Place, located
 from ..texts import json_of
 from ..types import Up
 from .console import Common, Flag
+from .film import numbers_of_view
 
 File = Annotated[str, Parameter(help="The .reel file; it may be a URL (extra `remote`).")]
 Output = Annotated[
@@ -153,19 +154,9 @@ def tag(
             tags[name] = json_of(text) if text else None
         except ValueError:
             tags[name] = text
-    sound, numbers = b"" if no_audio else audio, None if view is None else _numbers(view)
+    sound, numbers = b"" if no_audio else audio, None if view is None else numbers_of_view(view)
     done = edit.tag(file, _checked(output), tags, audio=sound, audio_start=audio_start, view=numbers)
     _tell(_checked(output), done, common)
-
-
-def _numbers(view: str) -> list[float]:
-    try:
-        numbers = [float(number) for number in view.split(",")]
-    except ValueError:
-        numbers = []
-    if len(numbers) not in (6, 7):
-        raise InputError(f"--view {view!r}: give six numbers with commas, as 0,1.6,3,0,1,0; a seventh may be degrees")
-    return numbers
 
 
 def _checked(output: str) -> Place:

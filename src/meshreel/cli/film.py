@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, fields
-from math import isfinite
 from pathlib import Path
 from typing import Annotated
 
@@ -15,6 +14,7 @@ from ..errors import InputError, needed
 from ..export.animated_file import ExportOptions
 from ..export.film import BACKGROUND, Color, FilmOptions, export_film
 from ..export.film_files import Written
+from ..format.view import View
 from ..geometry.picture import Viewpoint
 from ..geometry.threads import cores, threads
 from .console import Common
@@ -34,7 +34,7 @@ class Filming:
     player."""
     view: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None
     """x,y,z of the camera and x,y,z of what it looks at, in metres as frames have them, and perhaps ,DEGREES of its
-    field of view (45); by default all is in view."""
+    field of view (45); by default the file's first view, or all of it."""
     turntable: Annotated[bool, Parameter(negative="")] = False
     """Let the camera go around once, from there."""
     seconds: float | None = None
@@ -81,16 +81,19 @@ def _color(text: str) -> Color | None:
 
 
 def _view(text: str) -> Viewpoint:
+    x, y, z, *target = numbers_of_view(text)
+    view = View((x, y, z), tuple(target[:3]), *target[3:])
+    if not view.is_valid:
+        raise InputError(f"--view {text!r}: the places are one, or the degrees not between 0 and 180; give others")
+    return Viewpoint(view.position, view.target, view.fov)
+
+
+def numbers_of_view(view: str) -> list[float]:
+    """Return the six or seven numbers of a flag --view. Raises InputError for anything else."""
     try:
-        x, y, z, *target = (float(number) for number in text.split(","))
-        view = Viewpoint((x, y, z), tuple(target[:3]), *target[3:])
-    except (ValueError, TypeError):
-        view = Viewpoint((), ())
-    numbers = (*view.position, *view.target, view.fov)
-    if (
-        len(view.target) != 3
-        or view.position == view.target
-        or not (0 < view.fov < 180 and all(map(isfinite, numbers)))
-    ):
-        raise InputError(f"--view {text}: give six numbers with commas, as 0,1.6,3,0,1,0; a seventh may be degrees")
-    return view
+        numbers = [float(number) for number in view.split(",")]
+    except ValueError:
+        numbers = []
+    if len(numbers) not in (6, 7):
+        raise InputError(f"--view {view!r}: give six numbers with commas, as 0,1.6,3,0,1,0; a seventh may be degrees")
+    return numbers

@@ -37,7 +37,7 @@ ROUNDED = 1e-6  # s: times of .reel files are whole microseconds
 class FilmOptions:
     """Viewpoint, size and times of a film."""
 
-    view: Viewpoint | None = None  # in the unit of the vertices; None: all of the recording, as the player begins
+    view: Viewpoint | None = None  # in the unit of the vertices; None: the file's first view, or all of it
     turntable: bool = False  # the camera goes around once, from there
     size: tuple[int, int] | None = None  # pixels, width and height; None: `SIZE`, and of a GIF `GIF_SIZE`
     background: Color | None = BACKGROUND  # None: transparent
@@ -73,7 +73,8 @@ def export_film(
     size = options.size or (GIF_SIZE if kind == ".gif" else SIZE)
     _check(path, kind, size, options)
     standing = Standing(video.box, options.up or video.up)
-    view = options.view or standing.fitted(*size)
+    first = reader.view and Viewpoint(reader.view.position, reader.view.target, reader.view.fov)
+    view = options.view or first or standing.fitted(*size)
     times, shown = _times(reader, frames[:1] if kind == ".png" else frames, options, kind)
 
     def bodies(frame: int) -> list[Body]:

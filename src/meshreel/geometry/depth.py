@@ -8,7 +8,6 @@ from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Bool, Float, Float32, Float64, Int64, UInt16
-from scipy.ndimage import minimum_filter
 
 from ..types import Placement
 from .cameras import Camera
@@ -82,6 +81,8 @@ class FreeSpace:
     @staticmethod
     def of(pictures: Sequence[DepthPicture | None], place: Placement = WORLD) -> FreeSpace:
         """Return the space that cameras saw through, in the coordinates of `place`."""
+        from scipy.ndimage import minimum_filter
+
         eroded = (replace(each, depth=minimum_filter(each.depth, 3)) for each in pictures if each is not None)
         return FreeSpace(tuple(eroded), place)
 

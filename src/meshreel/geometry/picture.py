@@ -17,7 +17,7 @@ from functools import partial
 import numpy as np
 
 from ..shapes import Float64, Int32, UInt8
-from ..types import UP_AXES, Mesh, Up
+from ..types import UP_AXES, UPRIGHT, Mesh, Up
 from .cameras import Camera, CameraPose, matrix_of
 from .color_views import colors_on
 from .drawing import Crop, SeenPlaces, draw_places
@@ -32,12 +32,6 @@ MARGIN = 1.05  # of the distance at which everything just fits: the player's
 SIDE = 2  # samples along each side of a pixel
 BAND = 64  # rows of samples that are in memory together (guess)
 SMALLEST = 3  # how often a texture is halved at most: gutters keep charts apart in so many levels
-TURNS: dict[Up, Float64[np.ndarray, "3 3"]] = {  # rotations that turn an axis to +y
-    "y": np.eye(3),
-    "z": np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]]),
-    "-y": np.array([[1.0, 0, 0], [0, -1, 0], [0, 0, -1]]),
-    "-z": np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]]),
-}
 NOTEBOOK = (400, 300)  # pixels of the picture of a mesh (guess)
 
 Vectors = Float64[np.ndarray, "N 3"]
@@ -68,7 +62,8 @@ class Viewpoint:
     def turned(self, share: float, up: Up) -> Viewpoint:
         """Return the view with the camera a share of a turn around the target, as the player turns by itself."""
         c, s = (rounded(of(-2 * math.pi * share)) for of in (math.cos, math.sin))
-        turn = TURNS[up].T @ np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]]) @ TURNS[up]
+        upright, around = np.array(UPRIGHT[up], np.float64), np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
+        turn = products(products(upright.T, around), upright)
         away = products(turn, (np.array(self.position) - self.target)[:, None])[:, 0]
         return replace(self, position=tuple((self.target + away).tolist()))
 
@@ -87,7 +82,7 @@ class Standing:
     @property
     def size(self) -> Float64[np.ndarray, "3"]:
         """Width, height and depth, upright."""
-        return np.abs(TURNS[self.up] @ (self.box[1] - self.box[0]))
+        return np.abs(np.array(UPRIGHT[self.up]) @ (self.box[1] - self.box[0]))
 
     @property
     def bottom(self) -> float:
@@ -103,7 +98,7 @@ class Standing:
         aside = [(corners * axis).sum(axis=1) for axis in (right, np.cross(toward, right))]
         widest = np.maximum(np.abs(aside[0]) * height / width, np.abs(aside[1])) / tangent
         distance = MARGIN * float(((corners * toward).sum(axis=1) + widest).max()) or 1.0
-        eye = self.middle + TURNS[self.up].T @ (distance * toward)
+        eye = self.middle + (distance * toward) @ np.array(UPRIGHT[self.up])
         return Viewpoint(tuple(eye.tolist()), tuple(self.middle.tolist()))
 
 
