@@ -35,6 +35,7 @@ export class ThreeStage extends EventTarget implements Stage {
   readonly #floor = new Ground();
   #shaded: Shown | null = null; // the mesh of the shadow on it
   ground = true;
+  exposure = 1;
   #reel: ReelScene;
   #box: Box | null = null; // of the recording, as it stands
   #info: Info | null = null; // of the recording
@@ -88,14 +89,6 @@ export class ThreeStage extends EventTarget implements Stage {
 
   set mode(mode: Mode) {
     this.#mode = this.#reel.mode = mode;
-  }
-
-  get exposure(): number {
-    return this.#reel.exposure;
-  }
-
-  set exposure(exposure: number) {
-    this.#reel.exposure = exposure;
   }
 
   get background(): string {
@@ -164,10 +157,9 @@ export class ThreeStage extends EventTarget implements Stage {
   begin(info: Info): void {
     this.exitVr(); // a session's place is that of one recording
     this.#reel.removeFromParent();
-    const { exposure } = this.#reel;
     this.#reel.dispose();
     this.#reel = new ReelScene(this.#sorter);
-    Object.assign(this.#reel, { mode: this.#mode, exposure });
+    this.#reel.mode = this.#mode;
     this.#content.add(this.#reel);
     this.#stand(info);
   }
@@ -181,6 +173,7 @@ export class ThreeStage extends EventTarget implements Stage {
   }
 
   draw(shown: Shown | null): boolean {
+    this.#reel.exposure = this.exposure;
     if (shown) this.#reel.show(shown);
     if (this.presenting) this.far.clear(); // it comes near
     else if (shown) updateFar(this.far, shown, this.#reel.worldToLocal(this.#place.copy(this.#eye.position)), this.canvas.height / (2 * this.#tangent));

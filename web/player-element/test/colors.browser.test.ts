@@ -93,12 +93,16 @@ describeInBrowser("the player and a recording's own colours", () => {
     expect([bare, normals]).toEqual([off, off]);
   });
 
-  test("on a dark page the ground is brighter, so that its shadow is seen", async () => {
+  test("on a dark page the ground is brighter, so that its shadow is seen, and exposure darkens what is lit", async () => {
     const { page } = await site.visit("player/index.html?src=/layers.reel&background=rgb(20,23,28)&controls=0&mode=shaded");
     await page.waitForFunction(() => (document.querySelector("meshreel-player")!.statistics?.triangles ?? 0) > 0);
     const greys = Object.entries(await colorsOf(page)).map(([color, count]) => [Number(color.split(",")[0]), count] as const);
     const bright = greys.reduce((sum, [red, count]) => sum + (red > 45 && red < 75 ? count : 0), 0);
     expect(bright).toBeGreaterThan(3000);
+    const brightest = async (): Promise<number> => Math.max(...Object.keys(await colorsOf(page)).map((color) => Number(color.split(",")[0])));
+    const usual = await brightest();
+    await page.evaluate(() => void (document.querySelector("meshreel-player")!.exposure = 0.5));
+    expect(await brightest()).toBeLessThan(0.6 * usual); // the body is the brightest of what is seen
     await page.close();
   });
 
