@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from meshreel.geometry.picture import Body, Standing, Viewpoint, draw_picture, finished
+from meshreel.geometry.picture import MARGIN, Body, Standing, Viewpoint, draw_picture, finished
 from meshreel.geometry.threads import threads
 from meshreel.types import UPS, Mesh, Texture, Up
 
@@ -108,7 +108,8 @@ def test_a_view_of_the_whole_shows_all_of_it_upright(up: Up):
     camera = standing.fitted(*SIZE).camera(up, *SIZE)
     places = camera.project(camera.local(mesh.vertices))
     assert (places > 0).all() and (places < SIZE).all() and np.isfinite(places).all()
-    assert max(np.ptp(places / SIZE, axis=0)) > 0.6
+    assert np.abs(places / SIZE - 0.5).max() == pytest.approx(0.5 / MARGIN, abs=0.01)  # and as large as it can be
+    assert places[:, 1].min() == pytest.approx(SIZE[1] - places[:, 1].max(), abs=2)  # about the middle
     above = camera.project(camera.local(np.array([standing.middle, standing.middle + np.eye(3)["xyz".index(up[-1])]])))
     assert (above[1, 1] < above[0, 1]) == (not up.startswith("-"))
 

@@ -93,13 +93,17 @@ class Standing:
         """Return the view of all of it with which the player begins."""
         toward = _unit(np.array(FROM))
         right = _unit(np.cross([0.0, 1.0, 0.0], toward))
+        above = np.cross(toward, right)
         signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
-        corners, tangent = signs * self.size / 2, math.sqrt(2) - 1  # of half of FOV
-        aside = [(corners * axis).sum(axis=1) for axis in (right, np.cross(toward, right))]
-        widest = np.maximum(np.abs(aside[0]) * height / width, np.abs(aside[1])) / tangent
-        distance = MARGIN * float(((corners * toward).sum(axis=1) + widest).max()) or 1.0
-        eye = self.middle + (distance * toward) @ np.array(UPRIGHT[self.up])
-        return Viewpoint(tuple(eye.tolist()), tuple(self.middle.tolist()))
+        x, y, z = (((signs * self.size / 2) * axis).sum(axis=1) for axis in (right, above, toward))
+        high = (math.sqrt(2) - 1) / MARGIN  # of half of FOV
+        top, bottom = float((y + high * z).max()), float((y - high * z).min())  # where the view's borders meet the axis
+        lift = (top + bottom) / 2 / above[1]
+        widest = float((np.abs(x) * height / width / high + z).max())
+        distance = max((top - bottom) / (2 * high), widest) - lift * toward[1] or 1.0
+        target = self.middle + np.array([0.0, lift, 0.0]) @ np.array(UPRIGHT[self.up])
+        eye = target + (distance * toward) @ np.array(UPRIGHT[self.up])
+        return Viewpoint(tuple(eye.tolist()), tuple(target.tolist()))
 
 
 @dataclass(frozen=True, slots=True)
