@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from meshreel.analysis.appearance.bake import bake, median_colors, picture, texels_of, unwrap, vertex_colors
+from meshreel.errors import InputError
 from meshreel.geometry.atlas import Layout
 from meshreel.geometry.color_views import Painted, bilinear
 from meshreel.geometry.topology import subdivide_midpoint
@@ -99,11 +100,20 @@ def test_the_median_has_no_ghost_of_who_passes() -> None:
 def test_unwrapped_faces_do_not_overlap_and_fill_a_third_of_the_texture() -> None:
     pytest.importorskip("xatlas")
     ball = sphere(levels=3)
-    layout = unwrap(ball, 256)
+    layout = unwrap(ball, [256])
     assert layout.width == 256 and layout.height <= 256 and layout.places.min() >= 0
     texels = texels_of(layout, 0)
     a, b, c = np.moveaxis(layout.places.astype(float), 1, 0)
     areas = np.abs((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]) / 2
     assert areas.sum() > layout.width * layout.height / 3
     assert 1 < len(texels.pixels) / areas.sum() < 1.1  # texels that two faces have would count once
-    np.testing.assert_array_equal(unwrap(ball, 256).places, layout.places)
+    np.testing.assert_array_equal(unwrap(ball, [256]).places, layout.places)
+
+
+def test_a_mesh_of_many_small_charts_takes_the_first_texture_into_which_it_fits() -> None:
+    pytest.importorskip("xatlas")
+    corners = np.random.default_rng(0).random((900, 1, 3)) * [40, 40, 1] + np.eye(3)
+    rags = Mesh.of(corners.reshape(-1, 3), np.arange(2700).reshape(-1, 3))
+    assert unwrap(rags, [128, 256, 512]).width == 256
+    with pytest.raises(InputError, match="900 faces does not fit a texture of 128 texels"):
+        unwrap(rags, [128])

@@ -8,7 +8,7 @@ leave no ghosts.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -32,7 +32,9 @@ PLACES = np.array([[1, 1, 1], [4, 1, 1], [1, 4, 1], [1, 1, 4]]) / np.array([[3],
 REFINEMENTS = 4  # of refinement: the rest of the error falls below a grey level (guess)
 TOGETHER = 1 << 16  # places whose medians are taken at a time: 16 frames of them take 10 MB
 GUTTERS = 128  # in the width of a texture; 8 texels of 1024 keep charts apart in three mip levels
-PACKINGS = 8  # of packing, with texels per metre corrected after each (guess)
+PACKINGS = (
+    8  # of packing, with texels per metre corrected after each; as many more halve them (guess)
+)
 MARGIN = 0.995  # of the size that would just fit: packing is not quite proportional (guess)
 ENLARGED = 3.0  # largest number of texels along a pixel: 39 dB of living_room; with 2: 38, with 1: 36, at similar rates
 USUAL_SIDE = 1024  # texels, side up to which small pictures are enlarged (guess)
@@ -210,15 +212,22 @@ def median_colors(points: Points, normals: Points, paints: Iterable[Paint]) -> t
     return medians_or_grey, mask
 
 
-def unwrap(base: Mesh, size: int) -> Layout:
-    """Return places of all corners of a base mesh in a texture `size` texels wide and at most as high.
+def unwrap(base: Mesh, sizes: Sequence[int]) -> Layout:
+    """Return places of all corners of a base mesh in a texture, in the first of these widths into which they fit.
 
-    Raises InputError if xatlas is missing, or cannot fit the mesh.
+    It is at most as high as wide. Raises InputError if xatlas is missing, or the mesh fits into none of them.
     """
+    for size in sizes:
+        if (layout := _packed(base, size)) is not None:
+            return layout
+    raise InputError(f"a base of {len(base.faces)} faces does not fit a texture of {size} texels; give a larger one")
+
+
+def _packed(base: Mesh, size: int) -> Layout | None:
     with needed("textures need the extra `color`: pip install 'meshreel[color]', or give --color vertices"):
         import xatlas
     density = 0.0
-    for _ in range(PACKINGS):
+    for attempt in range(2 * PACKINGS):
         atlas = xatlas.Atlas()
         atlas.add_mesh(base.vertices.astype(np.float32), base.faces.astype(np.uint32))
         options = xatlas.PackOptions()
@@ -228,10 +237,10 @@ def unwrap(base: Mesh, size: int) -> Layout:
         widest = max(atlas.width, atlas.height)
         if widest <= size and density:
             break
-        density = atlas.texels_per_unit * MARGIN * size / max(widest, 1)
+        fitting = MARGIN * size / max(widest, 1)
+        density = atlas.texels_per_unit * (fitting if attempt < PACKINGS else min(fitting, 0.5))
     else:
-        text = f"a base of {len(base.faces)} faces does not fit a texture of {size} texels"
-        raise InputError(f"{text}; give a larger one")
+        return None
     _, corners, uv = atlas[0]
     places = np.rint(uv.astype(np.float64) * [atlas.width, atlas.height]).astype(np.int32)[corners]
     height = -(-int(places[..., 1].max(initial=1)) // BLOCK) * BLOCK

@@ -132,7 +132,7 @@ class _Video:
         self, canvas: Canvas, options: TextureOptions, paints: Sequence[Paint | None], meshes: Sequence[Mesh]
     ) -> None:
         template = canvas.meshes[0]
-        layout = unwrap(template.base, options.size or fitting_size(paints, meshes))
+        layout = unwrap(template.base, fitting_sizes(options.size, paints, meshes))
         self.atlas = encode_atlas(template.base, layout)
         self._texels, self._count = texels_of(layout, template.levels), template.vertices
         self._faces = finest_faces(template.base, template.levels)
@@ -166,11 +166,17 @@ def _vertex_colors(paint: Paint | None, mesh: Mesh) -> UInt8[np.ndarray, "V 3"]:
     return vertex_colors(paint, mesh)
 
 
-def fitting_size(paints: Sequence[Paint | None], meshes: Sequence[Mesh]) -> int:
-    """Return the width of the texture that has the detail of the pictures that show some of these frames."""
+def fitting_sizes(size: int | None, paints: Sequence[Paint | None], meshes: Sequence[Mesh]) -> Sequence[int]:
+    """Return the width of a texture that is asked for, or else widths to try: the first has the detail of the pictures.
+
+    The pictures are those that show some of these frames. Larger textures are for meshes of many small charts.
+    """
+    if size is not None:
+        return (size,)
     pairs = zip(paints, meshes, strict=True)
     wanted = next(paint.pixels_on(mesh) for paint, mesh in pairs if paint is not None) / USED
-    return next((size for size in TEXTURE_SIZES if size <= MOST_FITTING and size * size >= wanted), MOST_FITTING)
+    first = next((size for size in TEXTURE_SIZES if size <= MOST_FITTING and size * size >= wanted), MOST_FITTING)
+    return [size for size in TEXTURE_SIZES if size >= first]
 
 
 FRAMES = 16  # of a chain, whose pictures are looked at, at most (guess)

@@ -38,7 +38,7 @@ from ...geometry.threads import ahead
 from ...geometry.topology import clean, face_normals
 from ...geometry.work import passed
 from ...types import Mesh, Placement, evenly
-from ..appearance.colors import fitting_size
+from ..appearance.colors import fitting_sizes
 from ..appearance.videos import AppearanceOptions, TextureOptions, layered_pictures
 from ..settings.options import SceneOptions
 from .parts import Parts
@@ -264,7 +264,7 @@ class _Looks:
     def layout(self, mesh: Mesh, frames: range, size: int | None) -> tuple[Layout, float]:
         """Return the places of a background in a texture, as cameras see it where there are some, and its scale."""
         if self._views is None:
-            return unwrap(mesh, size or fitting_size([self._paint(frames.start)], [mesh])), 1.0
+            return unwrap(mesh, fitting_sizes(size, [self._paint(frames.start)], [mesh])), 1.0
         return projected(mesh, self._views.of_surface(frames[evenly(len(frames), 1)[0]], mesh))
 
     def _paint(self, number: int) -> Paint:
