@@ -34,6 +34,10 @@ SEEN = 0.5  # share of the corners of the bodies' boxes that a camera must see, 
 STEEPEST = 0.87  # sine of the steepest look down or up, 60 degrees (guess)
 MARGIN = 1.1  # times the picture that just holds all: for the player's controls, and for beauty (guess)
 FREE, CLOSEST, WIDEST = 0.9, 0.5, 90.0  # of the way to a wall, of the distance wanted; degrees before a wall (guesses)
+TURNS = (0, 15, -15, 30, -30, 45, -45, 60, -60)  # degrees from the way wanted that are tried where a wall hides bodies
+HEIGHTS = (0.2, 0.5, 0.8)  # shares of a body's height that must be seen (guess)
+LESS = 0.05  # share of them by which a view may be worse than the best, to be nearer to the way wanted (guess)
+BEFORE = 0.98  # of the way to a body: what is hit nearer hides it (guess)
 DIGITS = 4  # of normalised places: 0.2 mm of a person
 
 
@@ -84,15 +88,42 @@ def guessed_view(
         rise = (eyes - target[1]) / (_distance(corners - target, level, USUAL) or 1.0)
         way = level + np.array([0.0, rise, 0.0])
     way = _no_steeper(way / math.hypot(*way))
-    distance, fov = _distance(corners - target, way, USUAL), USUAL
     room = Rays(setting.room.at(setting.room.vertices @ turn.T))
-    wall = FREE * float(room.cast(np.array([[target[0], eyes, target[2]]]), way[None]).distances[0])
-    if CLOSEST * distance < wall < distance:
-        distance, fov = wall, min(_angle(corners - target, way, wall), WIDEST)
+    points = np.array([point for body in bodies for point in _heights(body)])
+    stands = [_stand(corners - target, _turned(way, angle), target, eyes, room) for angle in TURNS]
+    shares = [_visible(room, points, target + distance * way) for way, distance, _ in stands]
+    way, distance, fov = next(stand for stand, share in zip(stands, shares, strict=True) if share >= max(shares) - LESS)
     places = np.stack([target + distance * way, target]) @ turn
     position, target = np.round((places - survey.center) / survey.unit, DIGITS).tolist()
     view = View(tuple(position), tuple(target), round(fov, 1))
     return view if view.is_valid else None
+
+
+def _stand(points: np.ndarray, way: Point, target: Point, eyes: float, room: Rays) -> tuple[Point, float, float]:
+    """Return a way, the distance along it from which a picture holds points, and its degrees: before a wall, if any."""
+    distance, fov = _distance(points, way, USUAL), USUAL
+    wall = FREE * float(room.cast(np.array([[target[0], eyes, target[2]]]), way[None]).distances[0])
+    if CLOSEST * distance < wall < distance:
+        distance, fov = wall, min(_angle(points, way, wall), WIDEST)
+    return way, distance, fov
+
+
+def _turned(way: Point, angle: float) -> Point:
+    """Return a direction turned about the vertical by degrees."""
+    c, s = math.cos(math.radians(angle)), math.sin(math.radians(angle))
+    return np.array([c * way[0] + s * way[2], way[1], c * way[2] - s * way[0]])
+
+
+def _visible(room: Rays, points: Float64[np.ndarray, "N 3"], eye: Point) -> float:
+    """Return the share of points that no surface of the room hides from a place."""
+    hits = room.cast(eye[None], points - eye)
+    return float((hits.distances > BEFORE).mean())
+
+
+def _heights(body: Body) -> list[Point]:
+    """Return points of the axis of a body's box."""
+    middle = (body.low + body.high) / 2
+    return [np.array([middle[0], body.low[1] + share * body.height, middle[2]]) for share in HEIGHTS]
 
 
 def _to_cameras(cameras: Sequence[Camera], corners: np.ndarray, target: Point, turn: np.ndarray) -> Point | None:
