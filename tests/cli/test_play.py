@@ -150,3 +150,15 @@ def test_where_no_browser_is_found_the_address_is_reported_again(monkeypatch):
 
 def test_an_origin_with_a_path_is_reported(run, tmp_path):
     assert failed(run("serve", tmp_path, "--cors", "https://example.org/"), "--cors 'https://example.org/'")
+
+
+@needs_signals
+def test_without_a_file_a_small_sample_plays(started):
+    process, address = started("play", "--no-browser")
+    data = fetch(f"{address}files/sample.reel")
+    with meshreel.open(data) as video:
+        assert len(video) >= 20 and len(video.tracks) == 2 and video.view is not None
+    assert len(data) <= 250_000
+    process.send_signal(signal.SIGINT)
+    process.communicate(timeout=60)
+    assert process.returncode == 0
