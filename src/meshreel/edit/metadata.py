@@ -9,6 +9,7 @@ from itertools import accumulate
 from typing import Any
 
 from ..format.edit import ITEM
+from ..format.view import ITEM as VIEW
 from ..types import Up
 
 HISTORY = "history"  # of an edited file: its edits, in words
@@ -85,8 +86,8 @@ def joined_metadata(parts: Sequence[tuple[dict[str, Any], int]]) -> tuple[dict[s
 
 
 def tags_of(metadata: dict[str, Any]) -> set[str]:
-    """Return the names of metadata that users gave."""
-    return metadata.keys() - {PART, ITEM, HISTORY, LAST, *RECORDED}
+    """Return the names of metadata that users gave, but for the first view, of which a guess is no loss."""
+    return metadata.keys() - {PART, ITEM, HISTORY, LAST, VIEW, *RECORDED}
 
 
 def scaled_metadata(metadata: dict[str, Any], scale: float) -> dict[str, Any]:
