@@ -61,7 +61,7 @@ class PlayedGlb:
         """What is seen, mesh and normals, by part of the scene; without a time as it is before it plays."""
         if not self.tree.get("nodes"):
             return {}
-        assert self.tree["scenes"] == [{"nodes": [0]}]
+        assert [scene["nodes"][0] for scene in self.tree["scenes"]] == [0]  # beside it, perhaps, a camera
         root = self.tree["nodes"][0]
         matrix = np.array(root.get("matrix", np.eye(4)), np.float64).reshape(4, 4).T
         found: dict[str, list[tuple[Mesh, np.ndarray]]] = {}
