@@ -161,7 +161,8 @@ def _pack_gif(film: Film, file: io.BytesIO, progress: Progress) -> bool:
     samples = np.concatenate([film.picture(number) for number in evenly(film.count, LOOKED_AT)])
     opaque = samples[samples[..., 3] >= OPAQUE][None] if film.is_transparent else samples
     palette = Image.fromarray(np.ascontiguousarray(opaque[..., :3])).quantize(255, Image.Quantize.FASTOCTREE)
-    colors = palette.getpalette() or []
+    found = palette.getpalette() or []
+    colors = [*found, *[0] * (3 * 256 - len(found))]  # a shorter palette would have no place for number 255
 
     def indexed(number: int) -> Any:
         pixels = film.picture(number)
@@ -176,15 +177,17 @@ def _pack_gif(film: Film, file: io.BytesIO, progress: Progress) -> bool:
         progress(number + 1, film.count)
         return image
 
-    steps = [round(100 * time) for time in film.times]
+    images = [indexed(number) for number in range(film.count)]
+    # Pillow (13.0) writes a second head for a picture without anything: the one before it stays instead.
+    shown = [k for k, image in enumerate(images) if k == 0 or image.getextrema() != (255, 255)]
+    steps = [round(100 * film.times[k]) for k in [*shown, film.count]]
     delays = [10 * max(after - before, 2) for before, after in pairwise(steps)]
-    images = map(indexed, range(film.count))
-    first = next(images)
+    first, *others = (images[k] for k in shown)
     first.save(
         file,
         "GIF",
         save_all=True,
-        append_images=images,
+        append_images=others,
         duration=delays,
         loop=0,
         optimize=False,

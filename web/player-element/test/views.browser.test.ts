@@ -81,7 +81,9 @@ describeInBrowser("the page of a recording", () => {
     const told = (): Promise<number[]> => page.evaluate(() => document.querySelector("meshreel-player")!.viewOfFile.split(",").map(Number));
     const isAsTagged = async (): Promise<void> => (await told()).forEach((value, k) => expect(value).toBeCloseTo(numbers[k], 3));
     await isAsTagged();
+    const wide = await camera(page);
     await page.setViewportSize({ width: 300, height: 600 }); // from farther away, but the same view
+    await expect.poll(() => camera(page)).not.toEqual(wide);
     await expect.poll(() => page.evaluate(() => document.querySelector("meshreel-player")!.cameraMoved)).toBe(false);
     await isAsTagged();
     const before = await camera(page);
@@ -143,7 +145,7 @@ describeInBrowser("the page of a recording", () => {
     const [before] = [await camera(page)];
     await page.keyboard.press("g");
     await page.keyboard.down("w");
-    await page.waitForTimeout(400);
+    await expect.poll(() => camera(page)).not.toEqual(before);
     await page.keyboard.up("w");
     const after = await camera(page);
     const towards = before.slice(3).map((value, k) => value - before[k]!);
