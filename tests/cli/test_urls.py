@@ -84,7 +84,7 @@ def test_workers_read_from_a_web_server_to_the_same_bytes(run, server, whole, tm
     said = run("encode", f"{server.url}/ball", "-o", tmp_path / "a.reel", *FLAGS, "--jobs", "2")
     assert said.code == 0 and (tmp_path / "a.reel").read_bytes() == whole
     frames = {path: count for path, count in server.asked.items() if path.endswith(".ply")}
-    assert len(frames) == FRAMES and set(frames.values()) == {2}  # the survey, and the encode: none by this process
+    assert len(frames) == FRAMES and set(frames.values()) == {3}  # survey, encode, and first view
 
 
 def test_parts_by_url_join_to_the_same_bytes(run, store, whole):

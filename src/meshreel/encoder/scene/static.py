@@ -181,7 +181,8 @@ def colored_states(
             surface = _Unwrapped(mesh, layout, scale, texels, texels.places(mesh), normals_there)
             points, normals = [*points, surface.places], [*normals, surface.normals]
         colors, seen = looks.colors(frames, np.concatenate(points), np.concatenate(normals))
-        shown = fitted_colors(mesh, colors[:count], seen[:count])[len(mesh.vertices) - coded.vertices :]
+        fitted = fitted_colors(mesh, colors[:count].astype(np.float64), seen[:count])
+        shown = fitted[len(mesh.vertices) - coded.vertices :]
         try:
             encoded = encode_group_colors(canvas, [shown], options.color_step, None)
         except CostlyError:  # the summary tells of it
