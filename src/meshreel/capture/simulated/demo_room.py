@@ -1,4 +1,4 @@
-"""The demo's scene: two people in a furnished room; y is up, m, the floor at 0, open at the front and on the right."""
+"""A furnished room and two people of capsules, as of many measurements; y is up, m, open at the front and the right."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from .procedural import check_frames, grid_of_frame
 from .simulated_rig import ColorSensorOptions, SceneFrame, SensorOptions, corner_cameras, simulate_rig
 from .solid_colors import CHILD, WALKER, Colors, Points, person_colors, room_colors
 
-# Sizes and speeds for a demo of a minute or two.
+# Sizes and speeds.
 WIDTH = 256  # pixels of a depth picture (guess)
 COLOR_SCALE = 1.5  # of a colour picture's width to that of depth (guess)
 NOISE = 0.3  # of the sensor, see `SensorOptions.noise` (guess)
@@ -53,7 +53,7 @@ FURNITURE: tuple[Box, ...] = (
 
 @dataclass(frozen=True, slots=True)
 class RoomOptions:
-    """Length and resolution of the demo's scene."""
+    """Length and resolution of the scene."""
 
     frames: int = 20
     frame_rate: float = 30.0  # 1/s
@@ -109,11 +109,11 @@ def furnished_room(options: RoomOptions | None = None) -> Room:
     """Return the frames of the room and its people; the same options give the same frames."""
     x, y, z = SIZE[0] / 2, SIZE[1], SIZE[2] / 2
     panels = [
-        _panel((-x, 0, z), (2 * x, 0, 0), (0, 0, -2 * z)),  # the floor
-        _panel((-x, 0, -z), (2 * x, 0, 0), (0, y, 0)),  # the wall at the back
-        _panel((-x, 0, z), (0, 0, -2 * z), (0, y, 0)),  # and that on the left
+        panel((-x, 0, z), (2 * x, 0, 0), (0, 0, -2 * z)),  # the floor
+        panel((-x, 0, -z), (2 * x, 0, 0), (0, y, 0)),  # the wall at the back
+        panel((-x, 0, z), (0, 0, -2 * z), (0, y, 0)),  # and that on the left
     ]
-    return Room(options or RoomOptions(), concatenate([_joined(panels), *map(box, FURNITURE)]))
+    return Room(options or RoomOptions(), concatenate([joined(panels), *map(box, FURNITURE)]))
 
 
 def record_room(
@@ -153,18 +153,18 @@ def box(corners: Box) -> Mesh:
     """Return a closed box whose faces point outward."""
     low, high = (np.array(corner) for corner in corners)
     a, b, c = np.diag(high - low)
-    lower = [_panel(low, b, a), _panel(low, c, b), _panel(low, a, c)]
-    upper = [_panel(high, -a, -b), _panel(high, -b, -c), _panel(high, -c, -a)]
-    return _joined(lower + upper)
+    lower = [panel(low, b, a), panel(low, c, b), panel(low, a, c)]
+    upper = [panel(high, -a, -b), panel(high, -b, -c), panel(high, -c, -a)]
+    return joined(lower + upper)
 
 
-def _joined(panels: list[Mesh]) -> Mesh:
+def joined(panels: list[Mesh]) -> Mesh:
     """Join panels into one mesh; where two meet, they share vertices."""
     mesh = concatenate(panels)
     return weld(Mesh.of(mesh.vertices.round(9), mesh.faces))  # both panels compute a shared vertex by different sums
 
 
-def _panel(corner: Vector, right: Vector, up: Vector) -> Mesh:
+def panel(corner: Vector, right: Vector, up: Vector) -> Mesh:
     """Return a rectangle of small faces whose normal is right x up."""
     counts = [max(1, round(float(np.linalg.norm(side)) / _FACE)) for side in (right, up)]
     i, j = np.meshgrid(*(np.arange(count + 1) for count in counts), indexing="ij")

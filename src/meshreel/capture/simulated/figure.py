@@ -98,7 +98,7 @@ def _leg(lift: Vector, side: float, phase: float, stride: float) -> Chain:
     ahead, up, pitch = _foot_track(phase)
     hip = np.array([0.09 * side, 0.92, 0.0]) + lift
     ankle = np.array([0.10 * side, 0.085 + up * stride, ahead * stride])
-    knee, ankle = _bent(hip, ankle, (_THIGH, _SHIN), np.array([0.12 * side, 0.0, 1.0]))
+    knee, ankle = bent(hip, ankle, (_THIGH, _SHIN), np.array([0.12 * side, 0.0, 1.0]))
     slope = pitch * min(stride / 0.5, 1.0)
     toward = np.array([0.18 * side, -np.sin(slope), np.cos(slope)])
     heel, ball = ankle + [0.0, -0.045, -0.03], ankle + [0.0, -0.05, 0.0] + 0.11 * toward
@@ -136,7 +136,7 @@ def _arm(lift: Vector, side: float, pose: Pose) -> list[Chain]:
         out = np.array([0.12 * side, 0.0, 0.10]) * 4 * reach * (1 - reach)  # around the hip, not through it
         wrist = (1 - reach) * wrist + reach * local + out
         pole = (1 - reach) * pole + reach * np.array([0.8 * side, -1.0, -0.3])
-    elbow, wrist = _bent(shoulder, wrist, (_UPPER_ARM, _FOREARM), pole)
+    elbow, wrist = bent(shoulder, wrist, (_UPPER_ARM, _FOREARM), pole)
     upper = [(tuple(shoulder), tuple(elbow), 0.056, 0.041), (tuple(elbow), tuple(wrist), 0.042, 0.028)]
     upper += [(tuple(elbow + 0.1 * (wrist - elbow)), tuple(elbow + 0.4 * (wrist - elbow)), 0.043, 0.038)]
     return [_chain([*upper, *_hand(wrist, wrist - elbow, side)], 0.018, 0.035)]
@@ -161,7 +161,7 @@ def _hand(wrist: Vector, along: Vector, side: float) -> list[Row]:
     return rows
 
 
-def _bent(root: Vector, end: Vector, lengths: tuple[float, float], pole: Vector) -> tuple[Vector, Vector]:
+def bent(root: Vector, end: Vector, lengths: tuple[float, float], pole: Vector) -> tuple[Vector, Vector]:
     """Return the middle joint and the end of a two-bone limb; the joint bends towards the pole."""
     first, second = lengths
     span = end - root

@@ -48,6 +48,7 @@ class SceneFrame:
     mesh: Mesh
     dynamic: Bool[np.ndarray, " F"]
     paint: Painter | None = None  # the colours of places on it, where they are known
+    is_lit: bool = False  # whether the colours have light and shade in them
 
     @staticmethod
     def of(still: Sequence[Mesh], moving: Sequence[Mesh]) -> SceneFrame:
@@ -92,7 +93,7 @@ def simulate_rig(
             clean = _cut_grazing(frame.mesh, normals, camera.view, sensor.grazing)
             write_picture(measured(clean, camera, sensor, random), place / f"depth_{number:05}.png")
             if which < len(eyes) and frame.paint is not None:
-                picture = eyes[which].picture(frame.mesh, frame.paint, number, random)
+                picture = eyes[which].picture(frame.mesh, frame.paint, None if frame.is_lit else number, random)
                 write_picture(picture, folder / camera.name / "color" / f"color_{number:05}.png")
         write_mesh(frame.mesh, folder / TRUTH / f"frame_{number:05}.ply")
         labels[f"frame_{number:05}"] = np.packbits(frame.dynamic)
@@ -205,8 +206,8 @@ class SimulatedColor:
         names = ("width", "height", "fx", "fy", "cx", "cy", "camera_to_world")
         return {"folder": folder} | {name: known[name] for name in names}
 
-    def picture(self, mesh: Mesh, paint: Painter, frame: int, random: np.random.Generator) -> Pixels:
-        """Render a mesh in a frame as the camera sees it, on black."""
+    def picture(self, mesh: Mesh, paint: Painter, frame: int | None, random: np.random.Generator) -> Pixels:
+        """Render a mesh as the camera sees it, on black, in the light of a frame, or None: paint is lit."""
         from scipy.ndimage import gaussian_filter
 
         camera = self.camera.view
@@ -217,7 +218,8 @@ class SimulatedColor:
         to_world = camera.pose.to_world
         points = products(ahead * depth[:, None], to_world[:3, :3].T) + to_world[:3, 3]
         image = np.zeros((*seen.faces.shape, 3))
-        image[rows, columns] = paint(points, faces) * shade_of(mesh, faces, frame)[:, None] * self.gains
+        light = np.ones(len(faces)) if frame is None else shade_of(mesh, faces, frame)
+        image[rows, columns] = paint(points, faces) * light[:, None] * self.gains
         image = np.stack([gaussian_filter(image[..., k], self.sensor.blur) for k in range(3)], axis=2)
         image += self.sensor.noise * random.standard_normal(image.shape)
         return np.clip(np.rint(image), 0, 255).astype(np.uint8)

@@ -52,7 +52,7 @@ def person_colors(pose: Pose, thinnest: float, outfit: Outfit, points: Points) -
     colors[legs] = np.where((row < THIGH_AND_SHIN)[legs, None], outfit.trousers, outfit.shoes)
     hair = (chain == HEAD) & (row == SKULL) & ((own[:, 1] > 1.7) | ((own[:, 2] < 0.0) & (own[:, 1] > 1.58)))
     colors[hair] = outfit.hair
-    return np.clip(colors * (1 + 0.12 * _noise(local, GRAIN)[:, None]), 0, 255)
+    return np.clip(colors * (1 + 0.12 * noise(local, GRAIN)[:, None]), 0, 255)
 
 
 def room_colors(points: Points) -> Colors:
@@ -67,7 +67,7 @@ def room_colors(points: Points) -> Colors:
     wall &= ~floor
     stripes = np.where(np.floor((x + z) / 0.08) % 2 == 0, 222.0, 205.0)
     colors[wall] = np.stack([stripes, stripes - 6, stripes - 22], axis=1)[wall]
-    return np.clip(colors * (1 + 0.06 * _noise(points, 0.02)[:, None]), 0, 255)
+    return np.clip(colors * (1 + 0.06 * noise(points, 0.02)[:, None]), 0, 255)
 
 
 def _local(body: Body, pose: Pose, points: Points) -> tuple[Int64[np.ndarray, " N"], Int64[np.ndarray, " N"], Points]:
@@ -108,7 +108,7 @@ def _on(
     return along, gap, np.column_stack([apart @ side, apart @ np.cross(way, side)])
 
 
-def _noise(places: Points, size: float) -> Float64[np.ndarray, " N"]:
+def noise(places: Points, size: float) -> Float64[np.ndarray, " N"]:
     """Return noise in -1 to 1 that changes every `size` and, half as strong, every third of it (m)."""
     return (_cells(places, size) + 0.5 * _cells(places, size / 3)) / 1.5
 
