@@ -6,7 +6,8 @@ from meshreel.analysis.fit.frame import FrameSurface
 from meshreel.analysis.follow.embedded import EmbeddedOptions, Stage, Tracker
 from meshreel.analysis.follow.embedded_graph import Motion, Pose
 from meshreel.analysis.follow.embedded_graph import moved as moved_by
-from meshreel.geometry.topology import concatenate, drop_unreferenced
+from meshreel.capture.simulated.procedural import SoftBodiesOptions, soft_bodies
+from meshreel.geometry.topology import concatenate, drop_unreferenced, face_normals
 from meshreel.types import Mesh
 from tests.analysis.fit.test_surface_fit import ball, sheet
 
@@ -176,3 +177,18 @@ def test_normals_keep_a_point_off_a_near_sheet_that_faces_away() -> None:
     up = np.array([[0.0, 0.0, 1.0]])
     motion = register(frames[0], frames, 0, SMALL)
     assert abs(move(motion, asked, -up)[1, 0, 2] - move(motion, asked, up)[1, 0, 2] - 0.01) < 0.002
+
+
+def test_a_noisy_body_keeps_its_area_from_frame_to_frame() -> None:
+    """A motion that follows the noise crumples the surface more in each frame, and what is torn is left out."""
+    bodies = list(soft_bodies(SoftBodiesOptions(frames=11, people=1, spacing=0.03)))
+    random, noise = np.random.default_rng(0), 0.002
+    frames = [
+        Mesh(mesh.vertices / bodies[0].diagonal + random.normal(0, noise, mesh.vertices.shape), mesh.faces)
+        for mesh in bodies
+    ]
+    tracker = Tracker(frames[0], 0, EmbeddedOptions(), noise)
+    for number, frame in enumerate(frames[1:], 1):
+        assert tracker.step(number, FrameSurface(frame)) < tracker.lost
+    back = tracker.motion([10]).back(0, frames[10])
+    assert 0.97 < face_normals(back)[1].sum() / face_normals(frames[10])[1].sum() < 1.03

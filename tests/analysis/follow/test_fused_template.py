@@ -66,6 +66,17 @@ def test_a_mesh_that_was_moved_goes_back_exactly() -> None:
     np.testing.assert_allclose(motion.back(2, frame).vertices, key.vertices, atol=1e-9)
 
 
+def test_faces_that_the_motion_tears_apart_are_left_out() -> None:
+    key = sheet()
+    motion = moving(key, 1)
+    away = motion.graph.nodes[:, 0] > 0.4 * SIDE / 2
+    motion.positions[0, away] += (0.1, 0, 0)  # though the sheet rests
+    back = motion.back(0, key)
+    longest = np.linalg.norm(back.vertices[back.faces] - back.vertices[np.roll(back.faces, 1, axis=1)], axis=2).max()
+    assert longest < 2.01 * np.sqrt(2) * SIDE / CELLS * 1.1
+    assert 0.7 < len(back.faces) / len(key.faces) < 0.99
+
+
 def test_a_hole_that_moves_over_time_is_closed() -> None:
     frames = holey(6)
     motion = moving(frames[0], 6)

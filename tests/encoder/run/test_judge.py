@@ -88,6 +88,17 @@ def test_faces_without_area_cover_nothing(monkeypatch):
         groups_of(Interval(frames_of(frames)), recipe())
 
 
+@pytest.mark.parametrize("noise, mended", [(0.002, True), (0.0, False)])
+def test_a_template_inside_out_is_encoded_again_where_frames_are_captured(monkeypatch, noise: float, mended: bool):
+    """Clean frames may be wound as they like."""
+    ball = sphere(0.3, 4)
+    turned = Mesh(ball.vertices, np.ascontiguousarray(ball.faces[:, ::-1]))
+    monkeypatch.setattr("meshreel.encoder.run.judge._core.Group", lambda *_: Decoded([turned] * 2))
+    groups = groups_of(Interval(frames_of([ball] * 2), noise), recipe())
+    assert all(group.mended == mended for group in groups)
+    assert all(group.form == (Form.DRACO if mended else Form.LAYERS) for group in groups)
+
+
 class Decoded:
     """A group that decodes to given meshes."""
 

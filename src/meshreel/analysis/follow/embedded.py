@@ -48,6 +48,8 @@ CLEARLY = 0.8  # share of the best residual that a start by colour must reach: i
 UNUSUAL = 1.25  # a frame is retried if its residual exceeds this many times the median so far, and its neighbour's
 AGREEMENT = 0.3  # smallest cosine between the normals of a pair (guess)
 TORN = (0.5, 0.15)  # an edge off by this share of its length counts a quarter; try, retry (decision 15)
+NOISY_TORN = (0.9,)  # the same under noise, which tears short edges: surface crumples from frame to frame (decision 15)
+NOISY_NODES = 500  # of the fine graph under noise, at most: more follow the noise (decision 15)
 DOUBT = 0.0005  # diagonals: a frame with a larger, unusual residual is tried again from elsewhere (decision 15)
 LOST = 0.004  # diagonals: a frame with a larger residual is lost: no surface fit would recover it (decision 15)
 DAMPING = 0.01  # squared row weight of a node's step relative to its data (guess)
@@ -91,7 +93,8 @@ class Tracker:
         o = self.options
         self._samples = area_samples(self.mesh, o.samples)
         self._moved = MovingSurface(self.mesh)
-        nodes = farthest_first(self.mesh, self._samples, o.fine.nodes)
+        self._tears, count = (NOISY_TORN, min(o.fine.nodes, NOISY_NODES)) if noise else (TORN, o.fine.nodes)
+        nodes = farthest_first(self.mesh, self._samples, count)
         self._graph, coarse = build_graph(self.mesh, nodes), build_graph(self.mesh, nodes[: o.coarse.nodes])
         self._fine, self._few = self._rest(self._graph), self._rest(coarse)
         self._nodes_by_few = coarse.bind(self._graph.nodes, coarse.cells[nodes])
@@ -100,7 +103,7 @@ class Tracker:
         self.residuals = {key: 0.0}  # RMS distances of the moved key mesh and registered frames, as by `step`
         self._paint, self._coloring = paint, Lock()
         self._colored: ColoredPlaces | None = None
-        self._torn = dict[int, float]()  # of `TORN`, that with which a frame was registered best: it is tried first
+        self._torn = dict[int, float]()  # of `_tears`, that with which a frame was registered best: it is tried first
         self._body = RigidBody(self.mesh, noise) if noise > 0 else None  # bending costs clean bodies nothing
         self._rigid = {} if self._body is None else {key: RigidMotion(np.eye(3), np.zeros(3))}
 
@@ -116,7 +119,7 @@ class Tracker:
         self._poses[frame], self.residuals[frame] = pose, residual
         if self._body is not None and self._known(frame) in self._rigid:
             motion = self._body.brought(surface, RigidMotion.between(self._graph.nodes, pose.positions))
-            if self._body.holds(surface, motion, residual):
+            if self._body.holds(surface, motion, self._carried(pose), residual):
                 self._rigid[frame] = motion
         return residual
 
@@ -169,9 +172,9 @@ class Tracker:
         starts = self._starts(frame, target)
         best = self._poses[last], np.inf
         enough = max(self._doubt, UNUSUAL * usual)
-        before = self._torn.get(self.key + 1 if last == self.key else last, TORN[0])
-        tries = [(starts[0], before), *((starts[0], torn) for torn in TORN if torn != before)]
-        tries += [(start, TORN[0]) for start in starts[1:]]
+        before = self._torn.get(self.key + 1 if last == self.key else last, self._tears[0])
+        tries = [(starts[0], before), *((starts[0], torn) for torn in self._tears if torn != before)]
+        tries += [(start, self._tears[0]) for start in starts[1:]]
 
         def tried(start: Pose, torn: float) -> tuple[Pose, float]:
             return self._from(start, target, torn, surface)
@@ -182,7 +185,7 @@ class Tracker:
         if found[-1][1] < enough:
             return best
         for start in self._by_color(starts[0], surface, paint):
-            result = self._from(start, target, TORN[0], surface)
+            result = self._from(start, target, self._tears[0], surface)
             if result[1] < CLEARLY * best[1] or result[1] <= self.lost < best[1]:
                 best = result
         stay = self._poses[last], self._measure(self._poses[last], surface)
@@ -237,9 +240,13 @@ class Tracker:
         rounds = (gates, rigidity, torn, DAMPING, AGREEMENT, TOLERANCE, ITERATIONS)
         return Pose(*rest.core.deform(surface, pose.rotations, pose.positions, *rounds))
 
+    def _carried(self, pose: Pose) -> Float64[np.ndarray, "V 3"]:
+        """Return the vertices of the key mesh in a pose."""
+        return moved(self.mesh.vertices, self._graph.nodes, self._all, pose)
+
     def _measure(self, pose: Pose, surface: FrameSurface) -> float:
         """Return the RMS distance over samples of both surfaces; the larger of both directions."""
-        vertices = moved(self.mesh.vertices, self._graph.nodes, self._all, pose)
+        vertices = self._carried(pose)
         frame_points, key_points = surface.mesh.vertices[surface.samples(self.options.samples)], vertices[self._samples]
         with self._moved.at(vertices) as now:
             back = now.closest(frame_points)

@@ -27,6 +27,7 @@ TOGETHER = 2048  # points that are bound together: bounds memory (guess)
 NORMAL_REACH = 0.01  # diagonals, weight of a difference of unit normals in a search: a guess
 BACK_ROUNDS = 2  # rounds of the inverse, the first of which only estimates the nodes that move a point: a guess
 NEIGHBOURS = 4  # nodes that move a point (guess)
+STRETCHED = 2.0  # times its length: a face with an edge that the motion makes longer is left out (guess)
 FLATTEST = 0.1  # a blend of rotations with a smaller determinant has no usable inverse: a guess
 
 
@@ -169,7 +170,15 @@ class Motion:
             invertible = np.abs(determinants(linear)) > FLATTEST
             linear[~invertible] = np.eye(3)
             points = products(inverses(linear), offsets[:, :, None])[:, :, 0]
-        return clean(Mesh(points, mesh.faces[invertible[mesh.faces].all(axis=1)]))
+        kept = invertible[mesh.faces].all(axis=1) & (_stretch(points, mesh) <= STRETCHED)
+        return clean(Mesh(points, mesh.faces[kept]))
+
+
+def _stretch(points: Points, mesh: Mesh) -> Float64[np.ndarray, " F"]:
+    """Return how many times longer each face's edges become, at most, when the vertices of a mesh go to `points`."""
+    sides = (corners - np.roll(corners, 1, axis=1) for corners in (points[mesh.faces], mesh.vertices[mesh.faces]))
+    after, before = (np.einsum("fed,fed->fe", side, side) for side in sides)
+    return np.sqrt((after / np.maximum(before, np.finfo(float).tiny)).max(axis=1, initial=0))
 
 
 def moved(points: Points, nodes: Nodes, binding: Binding, pose: Pose) -> Points:

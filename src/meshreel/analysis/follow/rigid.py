@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float64
+from jaxtyping import Bool, Float64
 
 from ...geometry.closest_points import MovingSurface, area_samples
 from ...geometry.rigid import fit_rigid
@@ -29,6 +29,8 @@ WHOLE, WORST = 1.6, 3.25  # RMS noise, largest residual of the body and of its w
 BENDS = 1.75  # times the residual of a motion that bends (people: 2.5 and more; decision 28)
 EXACT = 1e-4  # diagonals, in place of the noise of clean frames (guess)
 SAMPLES = 1500  # of each surface (guess)
+FEWEST = 8  # samples of a part that say something of it (guess)
+MISSED = 0.25  # share of a part that may be where only a motion that bends brings it (guess)
 BLOCKS = 24  # parts of a surface that are judged separately, so that a moving arm is not lost in a mean (guess)
 
 
@@ -81,14 +83,24 @@ class RigidBody:
                 break
         return motion
 
-    def holds(self, frame: FrameSurface, motion: RigidMotion, free: float) -> bool:
-        """Return whether a rigid motion fits a frame about as well as a bending one, whose residual is `free`."""
-        overall, worst = self.residual(frame, motion)
-        noise = max(self._noise, EXACT, free)  # a body may be noisier than the rest
-        return overall <= min(WHOLE * noise, BENDS * max(free, EXACT)) and worst <= WORST * noise
+    def holds(self, frame: FrameSurface, motion: RigidMotion, bent: Float64[np.ndarray, "V 3"], free: float) -> bool:
+        """Return whether a rigid motion fits a frame about as well as one that bends the body.
 
-    def residual(self, frame: FrameSurface, motion: RigidMotion) -> tuple[float, float]:
-        """Return the body's RMS distance from a frame, and that of its worst part."""
+        `bent` are the vertices by the latter, `free` is its residual. No part may go where only bending brings it: a
+        waving hand is far from the frame, as surface that the frame lacks is.
+        """
+        overall, worst, found = self.residual(frame, motion)
+        noise = max(self._noise, EXACT, free)  # a body may be noisier than the rest
+        if overall > min(WHOLE * noise, BENDS * max(free, EXACT)) or worst > WORST * noise:
+            return False
+        hits = frame.surface.closest(bent[self._chosen])
+        near = ((hits.points - bent[self._chosen]) ** 2).sum(axis=1) <= (STRAY * max(self._noise, EXACT)) ** 2
+        reached = near & (frame.inside_at(hits) > ON_BORDER)
+        missed = np.bincount(self._block[reached & ~found], minlength=BLOCKS)
+        return bool((missed <= np.maximum(MISSED * np.bincount(self._block, minlength=BLOCKS), FEWEST)).all())
+
+    def residual(self, frame: FrameSurface, motion: RigidMotion) -> tuple[float, float, Bool[np.ndarray, " S"]]:
+        """Return the body's RMS distance from a frame, that of its worst part, and which samples the frame has."""
         vertices, frame_points = motion.of(self._vertices), frame.mesh.vertices[frame.samples(SAMPLES)]
         body = vertices[self._chosen]
         ahead = frame.surface.closest(body)
@@ -100,8 +112,8 @@ class RigidBody:
         usable = over[0] & (squares[0] <= (STRAY * noise) ** 2)
         count = np.bincount(self._block[usable], minlength=BLOCKS)
         sums = np.bincount(self._block[usable], squares[0][usable], minlength=BLOCKS)
-        parts = np.sqrt(sums[count >= 8] / count[count >= 8])
-        return shared_distance(squares, over, noise), float(parts.max(initial=0.0))
+        parts = np.sqrt(sums[count >= FEWEST] / count[count >= FEWEST])
+        return shared_distance(squares, over, noise), float(parts.max(initial=0.0)), usable
 
     def _pairs(
         self, frame: FrameSurface, motion: RigidMotion, gate: float
