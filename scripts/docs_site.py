@@ -18,7 +18,7 @@ CHECKED = {"room.reel": "scene.reel", "bodies.reel": "mixed.reel"}  # conformanc
 LINK = re.compile(r"(?<!!)\[([^\]]*)\]\(([^)#\s:]+)(#[^)\s]*)?\)")  # text, file, anchor; no pictures, no addresses
 VALUE = re.compile(r"\{\{(size|seconds):([\w.]+)\}\}")
 HOME = "index.md"
-FRAMES = 60  # of a sample: two seconds
+FRAMES = 60  # of the bodies: two seconds
 POSTER = (800, 600)  # pixels
 
 
@@ -89,14 +89,14 @@ def make_samples(folder: Path) -> None:
     """Write the samples that are not there yet, and a picture of each."""
     import meshreel
     from meshreel.capture.recording import FusionOptions, open_recording
-    from meshreel.capture.simulated.demo_room import VOXEL, RoomOptions, record_room
     from meshreel.capture.simulated.procedural import SoftBodiesOptions, soft_bodies
+    from meshreel.capture.simulated.stage import VOXEL, StageOptions, record_stage
     from meshreel.export.film import FilmOptions, export_film
 
     folder.mkdir(parents=True, exist_ok=True)
     room, bodies = folder / "room.reel", folder / "bodies.reel"
     if not room.exists():
-        record_room(rig := folder / "rig", RoomOptions(frames=FRAMES))
+        record_stage(rig := folder / "rig", StageOptions())
         recording, _ = open_recording(rig, FusionOptions(VOXEL))
         meshreel.encode(recording, room)
     if not bodies.exists():

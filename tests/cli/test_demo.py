@@ -8,8 +8,8 @@ import pytest
 
 import meshreel
 from meshreel.capture.recording import open_recording
-from meshreel.capture.simulated.demo_room import RoomOptions, record_room
 from meshreel.capture.simulated.simulated_rig import read_truth
+from meshreel.capture.simulated.stage import StageOptions, record_stage
 from meshreel.cli.console import called_as
 from tests.capture.depth_scenes import camera, record
 from tests.cli.conftest import failed
@@ -47,7 +47,7 @@ def test_the_demo_leaves_a_rig_a_file_and_a_picture_and_shows_its_numbers(run, t
 def test_at_the_demos_own_resolution_two_people_are_two_tracks(run, tmp_path, monkeypatch):
     resolve_small(monkeypatch.setattr)
     look_quickly(monkeypatch.setattr)
-    monkeypatch.setattr("meshreel.cli.demo.RoomOptions", partial(RoomOptions, frame_rate=10.0))  # time to move in
+    monkeypatch.setattr("meshreel.cli.demo.StageOptions", partial(StageOptions, frame_rate=10.0))  # time to move in
     row = run("demo", "-o", tmp_path, "--frames", "7", "--json").row
     assert row["scene"]["tracks"] == 2
     found, floor = (row["truth"][name]["background_median_m"] for name in ("decoded", "noise_floor"))
@@ -65,12 +65,12 @@ def test_the_rig_of_somebody_else_is_not_overwritten(run, tmp_path):
 @pytest.mark.usefixtures("coarse")
 def test_the_same_seed_gives_the_same_bytes_and_another_one_other_noise(run, tmp_path):
     """Also where a longer demo was before, of which nothing is left."""
-    record_room(tmp_path / "a" / "rig", RoomOptions(frames=3, seed=5), 128)
+    record_stage(tmp_path / "a" / "rig", StageOptions(frames=3, seed=5), 128)
     for name in ("a", "b"):
         assert run("demo", "-o", tmp_path / name, "--frames", "2", "--seed", "0", "--quiet").code == 0
     recording, warnings = open_recording(tmp_path / "a" / "rig")
     assert (len(recording), len(read_truth(tmp_path / "a" / "rig" / "truth")), warnings) == (2, 2, [])
-    record_room(tmp_path / "c" / "rig", RoomOptions(frames=2, seed=1), 128)
+    record_stage(tmp_path / "c" / "rig", StageOptions(frames=2, seed=1), 128)
     picture = "rig/corner0/depth/depth_00001.png"
     for file, same in (("demo.reel", "b"), (picture, "b")):
         assert (tmp_path / "a" / file).read_bytes() == (tmp_path / same / file).read_bytes()

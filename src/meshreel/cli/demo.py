@@ -1,4 +1,4 @@
-"""`meshreel demo`: record, capture, encode, decode and measure a procedural room in which two people move."""
+"""`meshreel demo`: record, capture, encode, decode and measure a woman and a child in a procedural room."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from cyclopts import Parameter
 
 from ..capture.recording import FusionOptions, open_recording
 from ..capture.rig.rig import RIG, read_cameras
-from ..capture.simulated.demo_room import VOXEL, WIDTH, RoomOptions, record_room, room_cameras
 from ..capture.simulated.simulated_rig import TRUTH, read_truth
+from ..capture.simulated.stage import VOXEL, WIDTH, StageOptions, record_stage, stage_cameras
 from ..decoder.describe import describe_file
 from ..decoder.video import open as open_video
 from ..encoder.sequence import encode
@@ -34,14 +34,14 @@ _JUDGED = 4  # largest number of frames compared with the truth: each takes seco
 def command(
     *,
     output: Annotated[Path, Parameter(name=["--output", "-o"])] = Path("demo"),
-    frames: int = RoomOptions().frames,
+    frames: int = StageOptions().frames,
     quality: float = QUALITY,
     seed: int = 0,
     jobs: int | None = None,
     force: Force = False,
     common: Common = Common(),
 ) -> None:
-    """Simulate depth cameras in a room where two people move, capture and encode it, and measure the result.
+    """Simulate depth cameras in a room where a woman walks in and waves and a child jumps, encode and measure that.
 
     Captured meshes, which are noisy, and decoded ones are compared with the truth, which a simulation knows.
 
@@ -60,12 +60,12 @@ def command(
     """
     if seed < 0:
         raise InputError(f"--seed must not be negative, got {seed}")
-    options, room = Settings(quality=quality).resolved(), RoomOptions(frames=frames, seed=seed)  # errors before work
+    options, room = Settings(quality=quality).resolved(), StageOptions(frames=frames, seed=seed)  # errors before work
     file, picture = output / "demo.reel", output / "demo.png"
     check_free([file, picture], force or (output / "rig" / TRUTH).is_dir())  # of an earlier demo
     with common.stages() as progress, workers(jobs) as executor, threads(jobs or cores()):
-        _forget(output / "rig", [camera.name for camera in room_cameras(WIDTH)])
-        record_room(output / "rig", room, WIDTH, lambda k: progress("simulate", k, frames))
+        _forget(output / "rig", [camera.name for camera in stage_cameras(WIDTH)])
+        record_stage(output / "rig", room, WIDTH, lambda k: progress("simulate", k, frames))
         capture, _ = open_recording(output / "rig", FusionOptions(VOXEL))
         for number, _ in enumerate(ahead(capture.__getitem__, range(len(capture))), 1):  # the recording keeps them
             progress("fuse", number, len(capture))

@@ -17,7 +17,7 @@ from ..server.library import Library
 from ..server.run import ServerOptions, run
 from .console import Common, called_as
 
-SAMPLE = "sample.reel"  # in the folder of the server: what `meshreel demo` makes
+SAMPLE = "sample.reel"  # beside the player: the demo's recording, which scripts/build-sample makes
 
 
 def play(
@@ -38,7 +38,7 @@ def play(
     browser
         Open the page in the browser of this machine.
     """
-    sample = files("meshreel") / "server" / SAMPLE
+    sample = files("meshreel") / "player" / SAMPLE
     with (
         TemporaryDirectory(prefix="meshreel-") as scratch,
         as_file(sample) if input is None else nullcontext(input) as file,

@@ -19,7 +19,7 @@ from meshreel.capture.rig.rig import read_cameras
 
 from ..measure.headset import WEB, playing
 
-FRAMES = 45  # of the recording
+FRAMES = 40  # of the recording
 ALL = 99  # layers: no file has more
 SIZE = (640, 420)  # pixels, width and height
 CAMERA = "0.5,0.45,2.7,-0.25,-0.2,-0.3"  # where it stands and what it looks at, m; chosen by eye
