@@ -100,6 +100,14 @@ def test_no_wall_is_between():
     assert abs(degrees(guess([body(0.0)], room=pillar)[1])) == pytest.approx(15, abs=0.1)
 
 
+def test_no_wall_fills_a_part_of_the_picture():
+    """The end of a side wall, before the picture and beside the body, is turned away from."""
+    x, z = 0.15, 1.1  # nearer than half of the distance: no picture is taken from before it
+    side = Mesh.of([[x, -9, z], [9, -9, z], [9, 9, z], [x, 9, z]], [[0, 1, 2], [0, 2, 3]])
+    angle = degrees(guess([body(0.0)], room=side)[1])
+    assert angle < degrees(guess([body(0.0)])[1]) - 10
+
+
 @pytest.mark.parametrize("up", ["z", "-y", "-z"])
 def test_another_axis_may_point_up(up):
     """A body is stood up already; the view is in the coordinates of the file."""

@@ -36,7 +36,8 @@ MARGIN = 1.1  # times the picture that just holds all: for the player's controls
 FREE, CLOSEST, WIDEST = 0.9, 0.5, 90.0  # of the way to a wall, of the distance wanted; degrees before a wall (guesses)
 TURNS = (0, 15, -15, 30, -30, 45, -45, 60, -60)  # degrees from the way wanted that are tried where a wall hides bodies
 HEIGHTS = (0.2, 0.5, 0.8)  # shares of a body's height that must be seen (guess)
-LESS = 0.05  # share of them by which a view may be worse than the best, to be nearer to the way wanted (guess)
+ACROSS = 9  # places across a picture at which it is asked whether a wall is before it (guess)
+A_DEGREE = 0.006  # share of a picture that a turn by a degree must show more (guess)
 BEFORE = 0.98  # of the way to a body: what is hit nearer hides it (guess)
 DIGITS = 4  # of normalised places: 0.2 mm of a person
 
@@ -91,8 +92,10 @@ def guessed_view(
     room = Rays(setting.room.at(setting.room.vertices @ turn.T))
     points = np.array([point for body in bodies for point in _heights(body)])
     stands = [_stand(corners - target, _turned(way, angle), target, eyes, room) for angle in TURNS]
-    shares = [_visible(room, points, target + distance * way) for way, distance, _ in stands]
-    way, distance, fov = next(stand for stand, share in zip(stands, shares, strict=True) if share >= max(shares) - LESS)
+    shown = [
+        _shown(room, points, target, *stand) - A_DEGREE * abs(angle) for stand, angle in zip(stands, TURNS, strict=True)
+    ]
+    way, distance, fov = stands[shown.index(max(shown))]
     places = np.stack([target + distance * way, target]) @ turn
     position, target = np.round((places - survey.center) / survey.unit, DIGITS).tolist()
     view = View(tuple(position), tuple(target), round(fov, 1))
@@ -112,6 +115,17 @@ def _turned(way: Point, angle: float) -> Point:
     """Return a direction turned about the vertical by degrees."""
     c, s = math.cos(math.radians(angle)), math.sin(math.radians(angle))
     return np.array([c * way[0] + s * way[2], way[1], c * way[2] - s * way[0]])
+
+
+def _shown(
+    room: Rays, points: Float64[np.ndarray, "N 3"], target: Point, way: Point, distance: float, fov: float
+) -> float:
+    """Return the share of points, times that of the picture around the target, before which no surface is."""
+    eye, half = target + distance * way, distance * math.tan(math.radians(fov) / 2)
+    right, down = looking_at(way, np.zeros(3))[:3, :2].T
+    grid = half * np.linspace(-1, 1, ACROSS)
+    around = target + (grid[:, None, None] * right + grid[None, :, None] * down).reshape(-1, 3)
+    return _visible(room, points, eye) * _visible(room, around, eye)
 
 
 def _visible(room: Rays, points: Float64[np.ndarray, "N 3"], eye: Point) -> float:
