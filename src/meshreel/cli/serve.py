@@ -17,7 +17,7 @@ from ..server.library import Library
 from ..server.run import ServerOptions, run
 from .console import Common, called_as
 
-SAMPLE = "sample.reel"  # beside the player: the demo's recording, which scripts/build-sample makes
+SAMPLE = "sample.reel"  # beside the player: what `meshreel demo` leaves
 
 
 def play(

@@ -1,7 +1,7 @@
 """The moving picture of README.md: the room of `meshreel demo`, in the player.
 
 `python -m meshreel_bench.decisions.moving_picture [FOLDER [DEMO]]` writes moving.webp, and moving.json with the numbers
-of README.md, into docs/pictures. It runs the demo first, some twenty minutes, unless it is given the folder of one.
+of README.md, into docs/pictures. It runs the demo first, some minutes, unless it is given the folder of one.
 """
 
 from __future__ import annotations
@@ -22,7 +22,6 @@ from ..measure.headset import WEB, playing
 FRAMES = 40  # of the recording
 ALL = 99  # layers: no file has more
 SIZE = (640, 420)  # pixels, width and height
-CAMERA = "0.5,0.45,2.7,-0.25,-0.2,-0.3"  # where it stands and what it looks at, m; chosen by eye
 QUALITY = 75  # of WebP, 0 to 100; chosen by eye
 
 
@@ -46,7 +45,7 @@ def main(folder: Path = Path("docs/pictures"), demo: Path | None = None) -> None
 
 def played(file: Path, frames: range, folder: Path) -> list[Image.Image]:
     """Return the player's pictures of frames."""
-    query = f"?autoplay=0&controls=0&layers={ALL}&interpolate=off&background=white&camera={CAMERA}"
+    query = f"?autoplay=0&controls=0&layers={ALL}&interpolate=off"
     with playing(file) as address:
         values = [address + query, folder, *SIZE, *frames]
         subprocess.run(["node", "frames.mjs", *map(str, values)], cwd=WEB, check=True)
