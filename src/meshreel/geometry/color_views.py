@@ -21,7 +21,7 @@ from ..types import GREY, Mesh, Placement
 from . import work
 from .cameras import Camera
 from .closest_points import Surface
-from .depth import DepthPicture
+from .depth import STEP, DepthPicture, rise, smoothed, steps_of
 from .drawing import draw
 from .strict import products
 from .threads import mapped
@@ -35,11 +35,9 @@ MOST_SIDE = 512  # pixels, of the depth pictures that test occlusion: a third of
 MARGIN = 0.01  # of the depth, and at least as many metres: how far a place may lie off the visible surface (guess)
 FEATHER = 4.0  # pixels from a step in depth within which a colour counts less, and none at it: both sides mix (guess)
 LEAST = 0.01  # of a frontal view's weight, near a step: at outlines, pixels mix a body with what is behind (measured)
-NOISE = 5  # pixels across, of the median that a depth picture is smoothed by (guess)
 BESIDE = 0.1  # of the usual depth, between two cameras: the largest distance at which both see the same (guess)
 OUTLIER = 4.0  # standard deviations of measured depths from the drawn surface, beyond which they are of another (guess)
 MEDIAN = 0.6745  # of an absolute value, in standard deviations
-STEP = 0.03  # of the depth between neighbours: a step (guess)
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,7 +153,7 @@ class View:
 
     def cleared(self) -> View:
         """Return the view in which places near a step are hidden, and at a hole: steps are those of smoothed depth."""
-        clear = (_from_step(_smooth(self.depth), self.shrink) == 255) & (self.from_step > 0)
+        clear = (_from_step(smoothed(self.depth), self.shrink) == 255) & (self.from_step > 0)
         return replace(self, from_step=np.where(clear, 255, 0).astype(np.uint8))
 
     def weights(self, points: Points, normals: Points, at_step: float = 0.0) -> Float64[np.ndarray, " N"]:
@@ -215,7 +213,7 @@ def _confirmed(
     known = off[off < STEP]
     noise = float(np.median(known)) / MEDIAN if len(known) else 0.0
     pitch = max(1.0, camera.focal[0] / beside.camera.focal[0], camera.focal[1] / beside.camera.focal[1])
-    allowed = np.maximum(margin / there, max(MARGIN, OUTLIER * noise)) + pitch * _rise(drawn)[covered][inside] / there
+    allowed = np.maximum(margin / there, max(MARGIN, OUTLIER * noise)) + pitch * rise(drawn)[covered][inside] / there
     agrees = np.ones(len(own), bool)
     agrees[inside] = off <= allowed
     confirmed = np.zeros(drawn.shape, bool)
@@ -224,50 +222,12 @@ def _confirmed(
     return np.where(confirmed, drawn, np.inf).astype(np.float32)
 
 
-def _rise(depth: Float32[np.ndarray, "H W"]) -> Float32[np.ndarray, "H W"]:
-    """Return the change of depth from each pixel to its neighbours on the same surface, the largest."""
-    rise = np.zeros_like(depth)
-    for axis in (0, 1):
-        before, after = np.moveaxis(depth, axis, 0)[:-1], np.moveaxis(depth, axis, 0)[1:]
-        with np.errstate(invalid="ignore"):
-            change = np.abs(before - after)
-            change[~(change <= STEP * np.minimum(before, after))] = 0
-        there = np.moveaxis(rise, axis, 0)
-        there[:-1], there[1:] = np.maximum(there[:-1], change), np.maximum(there[1:], change)
-    return rise
-
-
 def _from_step(depth: Float32[np.ndarray, "H W"], shrink: int) -> UInt8[np.ndarray, "H W"]:
     """Return the distance of each pixel from a step in depth, in 255ths of `FEATHER`, at most 255."""
     from scipy.ndimage import distance_transform_edt
 
-    away = distance_transform_edt(~_steps(depth)) * shrink
+    away = distance_transform_edt(~steps_of(depth)) * shrink
     return np.floor(np.minimum(away / FEATHER, 1.0) * 255).astype(np.uint8)
-
-
-def _smooth(depth: Float32[np.ndarray, "H W"]) -> Float32[np.ndarray, "H W"]:
-    """Return a depth picture without holes and noise, so that steps are those of the surface.
-
-    A hole takes the depth of the nearest pixel: between near and far surface its middle is a step.
-    """
-    from scipy.ndimage import distance_transform_edt, median_filter
-
-    nearest = distance_transform_edt(~np.isfinite(depth), return_distances=False, return_indices=True)
-    return median_filter(depth[tuple(nearest)], NOISE)
-
-
-def _steps(depth: Float32[np.ndarray, "H W"]) -> Bool[np.ndarray, "H W"]:
-    """Return the pixels beside a step in depth."""
-    steps = np.zeros(depth.shape, bool)
-    for axis in (0, 1):
-        before, after = np.moveaxis(depth, axis, 0)[:-1], np.moveaxis(depth, axis, 0)[1:]
-        with np.errstate(invalid="ignore"):
-            differ = ~(np.abs(before - after) <= STEP * np.minimum(before, after))  # also if one is a hole
-        differ &= np.isfinite(before) | np.isfinite(after)
-        edge = np.moveaxis(steps, axis, 0)
-        edge[:-1] |= differ
-        edge[1:] |= differ
-    return steps
 
 
 def sampled(

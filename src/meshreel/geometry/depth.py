@@ -19,6 +19,7 @@ THROUGH = (0.03, 0.015)  # m, and share of the depth: a measurement so far behin
 APART = (0.06, 0.02)  # m, and share of the depth: measurements farther apart are of different surfaces (guess)
 WORLD = Placement(1.0, (0.0, 0.0, 0.0))
 STEP = 0.03  # of the depth, between neighbours: pixels that differ by more are of two surfaces (guess)
+SMOOTHED = 5  # pixels across, of the median that a depth picture is smoothed by (guess)
 
 
 def apart(depth: Float[np.ndarray, "..."]) -> Float[np.ndarray, "..."]:
@@ -129,3 +130,41 @@ class DepthFrames(Protocol):
 
     def __getitem__(self, index: int, /) -> list[DepthPicture | None]:
         """Return a frame's pictures, one for each camera; None for a camera that lacks the frame."""
+
+
+def rise(depth: Float32[np.ndarray, "H W"]) -> Float32[np.ndarray, "H W"]:
+    """Return the change of depth from each pixel to its neighbours on the same surface, the largest."""
+    largest = np.zeros_like(depth)
+    for axis in (0, 1):
+        before, after = np.moveaxis(depth, axis, 0)[:-1], np.moveaxis(depth, axis, 0)[1:]
+        with np.errstate(invalid="ignore"):
+            change = np.abs(before - after)
+            change[~(change <= STEP * np.minimum(before, after))] = 0
+        there = np.moveaxis(largest, axis, 0)
+        there[:-1], there[1:] = np.maximum(there[:-1], change), np.maximum(there[1:], change)
+    return largest
+
+
+def smoothed(depth: Float32[np.ndarray, "H W"]) -> Float32[np.ndarray, "H W"]:
+    """Return a depth picture without holes and noise, so that steps are those of the surface.
+
+    A hole takes the depth of the nearest pixel: between near and far surface its middle is a step.
+    """
+    from scipy.ndimage import distance_transform_edt, median_filter
+
+    nearest = distance_transform_edt(~np.isfinite(depth), return_distances=False, return_indices=True)
+    return median_filter(depth[tuple(nearest)], SMOOTHED)
+
+
+def steps_of(depth: Float32[np.ndarray, "H W"]) -> Bool[np.ndarray, "H W"]:
+    """Return the pixels beside a step in depth."""
+    steps = np.zeros(depth.shape, bool)
+    for axis in (0, 1):
+        before, after = np.moveaxis(depth, axis, 0)[:-1], np.moveaxis(depth, axis, 0)[1:]
+        with np.errstate(invalid="ignore"):
+            differ = ~(np.abs(before - after) <= STEP * np.minimum(before, after))  # also if one is a hole
+        differ &= np.isfinite(before) | np.isfinite(after)
+        edge = np.moveaxis(steps, axis, 0)
+        edge[:-1] |= differ
+        edge[1:] |= differ
+    return steps
