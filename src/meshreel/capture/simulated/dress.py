@@ -1,4 +1,4 @@
-"""Painted colours of a person, sRGB in 0 to 255, by places in the still pose of `person`."""
+"""Painted colours of a person, sRGB in 0 to 255, by places in the still pose of `person`; all are guesses by eye."""
 
 from __future__ import annotations
 
@@ -28,7 +28,6 @@ class Look:
     trousers: RGB
     seam: RGB
     shoes: RGB
-    stripes: tuple[float, float] = (0.115, 0.40)  # m from one to the next, and the share that is coloured
 
 
 WOMAN = Look(

@@ -10,7 +10,7 @@ from jaxtyping import Float, Float64
 
 from ...geometry.decimate import decimate_faces
 from ...types import Mesh
-from .implicit import capsule
+from .implicit import capsule, smooth_min
 
 Places = Float[np.ndarray, "... 3"]  # m
 Depths = Float[np.ndarray, "..."]  # m, signed distances: negative inside
@@ -76,10 +76,8 @@ class Tube:
 
     def part(self, blend: float) -> Part:
         """Return the solid."""
-        length = self.rows[-1, 0] - self.rows[0, 0]
         reach = np.abs(self.rows[:, 1:]).max() * 1.3
         ends = self.start + self.rows[[0, -1], :1] * self.way
-        assert length > 0
         return Part(self.distance, ends.min(axis=0) - reach, ends.max(axis=0) + reach, blend)
 
     def distance(self, points: Places) -> Depths:
@@ -109,16 +107,8 @@ def depths(parts: Sequence[Part], points: Places) -> Depths:
     for part in parts:
         reach = MARGIN + part.blend
         near = ((points > part.low - reach) & (points < part.high + reach)).all(axis=-1)
-        total[near] = joined(total[near], part.distance(points[near]), part)
+        total[near] = _combined(total[near], part.distance(points[near]), part)
     return total
-
-
-def joined(before: Depths, own: Depths, part: Part) -> Depths:
-    """Return the distances after a part is joined to what was before, or cut out of it."""
-    a, b = (-before, own) if part.is_cut else (before, own)
-    near = np.maximum(part.blend - np.abs(a - b), 0)
-    found = np.minimum(a, b) - near * near / (4 * max(part.blend, 1e-6))
-    return (-found if part.is_cut else found).astype(np.float32)
 
 
 def meshed(parts: Sequence[Part], spacing: float, faces: int) -> Mesh:
@@ -134,6 +124,13 @@ def meshed(parts: Sequence[Part], spacing: float, faces: int) -> Mesh:
         corners = zip(axes, part.low - reach, part.high + reach, strict=True)
         box = tuple(slice(*np.searchsorted(axis, (a, b))) for axis, a, b in corners)
         points = np.stack(np.meshgrid(*(axis[s] for axis, s in zip(axes, box, strict=True)), indexing="ij"), axis=-1)
-        values[box] = joined(values[box], part.distance(points), part)
+        values[box] = _combined(values[box], part.distance(points), part)
     corners, triangles, _, _ = marching_cubes(values, level=0.0)
     return decimate_faces(Mesh.of(corners * spacing + [axis[0] for axis in axes], triangles), faces)
+
+
+def _combined(before: Depths, own: Depths, part: Part) -> Depths:
+    """Return the distances to a solid after a part is joined to it, or cut out of it."""
+    a, b = (-before, own) if part.is_cut else (before, own)
+    found = smooth_min(a, b, max(part.blend, 1e-6))
+    return (-found if part.is_cut else found).astype(np.float32)
