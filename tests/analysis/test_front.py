@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from meshreel.analysis.front import bodies_of, front_of, sampled
+from meshreel.analysis.front import bodies_of, frames_looked_at, front_of
 from meshreel.capture.simulated.figure import Pose, figure
 from meshreel.capture.simulated.implicit import polygonize
 from meshreel.capture.simulated.procedural import grid_of_frame
@@ -92,7 +92,7 @@ def test_what_is_no_person_has_no_front():
 
 
 def test_frames_are_sampled_from_all_and_from_the_beginning():
-    numbers = sampled(3000, 30.0)
+    numbers = frames_looked_at(3000, 30.0)
     assert numbers[0] == 0 and numbers[-1] == 2999
     assert sum(number < 60 for number in numbers) >= 12 and len(numbers) <= 24
-    assert sampled(1, 30.0) == [0]
+    assert frames_looked_at(1, 30.0) == [0]

@@ -8,7 +8,7 @@ import pytest
 import meshreel
 from meshreel.analysis.front import Body
 from meshreel.analysis.survey import Survey
-from meshreel.encoder.file.first_view import FREE, Setting, guessed_view
+from meshreel.encoder.file.first_view import FREE, Surroundings, guessed_view
 from meshreel.geometry.cameras import Camera, CameraPose, looking_at
 from meshreel.types import UPRIGHT, Mesh, MeshList
 from tests.metrics.shapes import sphere
@@ -32,7 +32,7 @@ def camera(x: float, y: float, z: float, to: tuple[float, float, float] = (0.0, 
 
 def guess(bodies: list[Body], cameras: tuple[Camera, ...] = (), room: Mesh | None = None, up: str = "y"):
     frames = {number: [one] for number, one in enumerate(bodies)}
-    view = guessed_view(frames, 30.0, Setting(up, cameras, room or Mesh.empty()), SURVEY)
+    view = guessed_view(frames, 30.0, Surroundings(up, cameras, room or Mesh.empty()), SURVEY)
     assert view is not None
     return view, np.array(view.position) - view.target
 
@@ -117,7 +117,7 @@ def test_another_axis_may_point_up(up):
 
 
 def test_nothing_has_no_view():
-    assert guessed_view({0: [], 1: []}, 30.0, Setting("y"), SURVEY) is None
+    assert guessed_view({0: [], 1: []}, 30.0, Surroundings("y"), SURVEY) is None
 
 
 def test_an_encode_has_a_view_of_its_body(tmp_path):

@@ -20,8 +20,8 @@ Plane = Float64[np.ndarray, "2"]  # x and z
 Votes = Float64[np.ndarray, "N 2"]
 
 LOOKED_AT = 12  # frames of the whole sequence, and of its beginning (guess)
-FIRST = 2.0  # s of the beginning: people face who meets them then (guess)
-TRIMMED = 0.005  # share of the vertices beyond each side of a body's box: bits and noise (guess)
+FIRST = 2.0  # s of the beginning, in which people face the place to look from (guess)
+TRIMMED = 0.005  # share of the vertices beyond each side of a body's box: loose bits and noise (guess)
 # Heights of parts of a standing person, as shares of the whole: drawing canons have the ankle at .05, the chin at .87.
 SOLE, ANKLE, NECK, FACE = (0.0, 0.035), (0.05, 0.1), (0.82, 0.87), (0.89, 0.96)
 CROWN = 0.89
@@ -49,8 +49,8 @@ class Body:
         return float(self.high[1] - self.low[1])
 
 
-def sampled(count: int, frame_rate: float) -> list[int]:
-    """Return the frames to be looked at: some of all, and some of the beginning."""
+def frames_looked_at(count: int, frame_rate: float) -> list[int]:
+    """Return the numbers of the frames whose bodies tell the front: some of all, and some of the beginning."""
     return sorted({*evenly(count, LOOKED_AT), *evenly(min(count, _beginning(frame_rate)), LOOKED_AT)})
 
 
@@ -104,7 +104,7 @@ def _walked(before: Sequence[Body], after: Sequence[Body], seconds: float) -> Vo
 
 
 def _elected(votes: Votes, usual: Plane) -> Plane | None:
-    """Return the direction that votes agree on, or the side of two that are opposed; None if they are weak or many."""
+    """Return the direction that votes agree on, or the side of two that are opposed; None if weak or at odds."""
     lengths = np.sqrt((votes**2).sum(axis=1))
     total, summed = float(lengths.sum()), votes.sum(axis=0)
     if total < LEAST * max(len(votes), 1):

@@ -9,7 +9,7 @@ import fsspec
 import numpy as np
 import pytest
 
-from meshreel.analysis.front import sampled
+from meshreel.analysis.front import frames_looked_at
 from meshreel.encoder.group.forms import EncodedGroup, Fidelity
 from meshreel.encoder.run import schedule as recipe
 from meshreel.encoder.run.schedule import AHEAD, as_done, workers_of
@@ -135,7 +135,7 @@ def test_workers_read_the_files_and_the_bytes_are_those_of_one_process(folder, t
     summary = Encoder(many, executor).encode(tmp_path / "many.reel", EACH_ALONE)
     assert readers - {threading.get_ident()} and max(executor.sizes) < 5000
     assert (tmp_path / "one.reel").read_bytes() == (tmp_path / "many.reel").read_bytes()
-    looked_at = len(sampled(FRAMES, 10.0))  # here, for the first view
+    looked_at = len(frames_looked_at(FRAMES, 10.0))  # here, for the first view
     assert summary.work["frames read"] == 2 * FRAMES + looked_at and many.warnings == one.warnings
 
 

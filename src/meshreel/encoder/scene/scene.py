@@ -19,7 +19,7 @@ import numpy as np
 from jaxtyping import Bool, UInt16
 from scipy.spatial import cKDTree
 
-from ...analysis.front import Body, bodies_of, sampled
+from ...analysis.front import Body, bodies_of, frames_looked_at
 from ...analysis.scene.bodies import NEAR, at_most, find_bodies, same_bodies, with_ring
 from ...analysis.scene.labelling import ByRest, Segmentation
 from ...analysis.survey import Survey
@@ -71,7 +71,7 @@ def scene_intervals(job: Job, parts: Parts, tracks: Tracks) -> Iterator[Interval
     sequence, survey = job.sequence, parts.survey
     place = Placement(survey.unit, tuple(survey.center))
     longest = job.recipe.longest(sequence.frame_rate)
-    looked_at = set(sampled(len(sequence), sequence.frame_rate))
+    looked_at = set(frames_looked_at(len(sequence), sequence.frame_rate))
     for frames in key_intervals(sequence, parts.segmentation, job.options):
         found = list[Interval]()
         moving, lost = zip(*ahead(lambda number: parts.moving(number, sequence[number]), frames), strict=True)
