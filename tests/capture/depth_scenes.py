@@ -4,6 +4,8 @@ import numpy as np
 
 from meshreel.capture.rig.cameras import DepthCamera
 from meshreel.capture.rig.rig import write_rig
+from meshreel.capture.simulated.demo_room import RoomOptions, furnished_room, room_cameras
+from meshreel.capture.simulated.simulated_rig import ColorSensorOptions, SensorOptions, simulate_rig
 from meshreel.geometry.cameras import Camera, CameraPose
 from meshreel.io.write import write_picture
 
@@ -45,3 +47,9 @@ def record(folder, cameras, balls, wall=True):
         for number, ball in enumerate(balls):
             write_picture(measured(one, ball, wall), place / f"depth_{number:05}.png")
     return folder
+
+
+def record_room(folder, options: RoomOptions):
+    """The rig of a room with people and its colours, in small pictures."""
+    sensor, color = SensorOptions(noise=0.3, seed=options.seed), ColorSensorOptions(scale=1.5)
+    simulate_rig(folder, furnished_room(options), room_cameras(96), options.frame_rate, sensor, color=color)

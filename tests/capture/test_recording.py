@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 from meshreel.capture.recording import FusionOptions, Kept, fuse_depths, open_recording
-from meshreel.capture.simulated.demo_room import RoomOptions, record_room
+from meshreel.capture.simulated.demo_room import RoomOptions
 from meshreel.errors import InputError
 from meshreel.geometry.derived_sequences import captured, picked
 from meshreel.geometry.topology import components, face_normals, without_fragments
 from meshreel.types import Mesh
 from tests.capture import depth_scenes
-from tests.capture.depth_scenes import RADIUS, WALL, camera, measured
+from tests.capture.depth_scenes import RADIUS, WALL, camera, measured, record_room
 from tests.spheres import sliding_sphere
 
 CAMERAS = [camera("left", -20), camera("right", 20)]
@@ -177,7 +177,7 @@ def test_a_slanted_wall_is_fused_at_its_place(side):
 
 
 def test_frames_without_colors_are_the_same_but_for_them_whichever_is_read_first(tmp_path):
-    record_room(tmp_path, RoomOptions(frames=2, seed=5), 96)
+    record_room(tmp_path, RoomOptions(frames=2, seed=5))
     frames, other = (open_recording(tmp_path, FusionOptions(0.08))[0] for _ in range(2))
     bare = [frames.uncolored[0], frames[0], frames.uncolored[0], other[0], other.uncolored[0], other[0]]
     assert [mesh.is_colored for mesh in bare] == [False, True, False, True, False, True]

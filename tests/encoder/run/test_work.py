@@ -4,12 +4,13 @@ import numpy as np
 import pytest
 
 from meshreel.capture.recording import FusionOptions, open_recording
-from meshreel.capture.simulated.demo_room import RoomOptions, record_room
+from meshreel.capture.simulated.demo_room import RoomOptions
 from meshreel.encoder.sequence import encode
 from meshreel.encoder.settings.settings import Settings
 from meshreel.format.layout import Form
 from meshreel.io.sequence import SequenceOptions, open_sequence
 from meshreel.types import Mesh, MeshList
+from tests.capture.depth_scenes import record_room
 from tests.scenes import ball, with_room
 from tests.shared_data import performer
 from tests.small_options import quick, small
@@ -48,7 +49,7 @@ def test_frames_of_a_room_are_read_once_and_tracked_and_fitted_once(tmp_path):
 
 
 def test_each_camera_s_view_of_a_frame_is_drawn_once_and_threads_change_no_byte(tmp_path):
-    record_room(tmp_path / "rig", RoomOptions(frames=3, seed=5), 96)
+    record_room(tmp_path / "rig", RoomOptions(frames=3, seed=5))
     options, files = small(Settings(texture=128).resolved()), [tmp_path / f"{jobs}.reel" for jobs in (1, 3)]
     for jobs, file in zip((1, 3), files, strict=True):
         frames, _ = open_recording(tmp_path / "rig", FusionOptions(0.06))

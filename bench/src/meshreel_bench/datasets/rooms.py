@@ -15,12 +15,12 @@ import numpy as np
 from jaxtyping import Bool, Float64, Int64
 
 from meshreel.capture.rig.cameras import DepthCamera
-from meshreel.capture.simulated.demo_room import Box, box
+from meshreel.capture.simulated.demo_room import Box, RoomOptions, box, furnished_room, room_cameras
 from meshreel.capture.simulated.figure import Pose, figure, turn_about_y
 from meshreel.capture.simulated.implicit import polygonize
 from meshreel.capture.simulated.procedural import grid_of_frame
 from meshreel.capture.simulated.sensors import CORNERS, LOW_DOWN, OVERHEAD, SENSORS, Mount, SensorOptions, mounted
-from meshreel.capture.simulated.simulated_rig import TRUTH, SceneFrame, corner_cameras, simulate_rig
+from meshreel.capture.simulated.simulated_rig import TRUTH, ColorSensorOptions, SceneFrame, corner_cameras, simulate_rig
 from meshreel.errors import InputError
 from meshreel.geometry.topology import concatenate, subdivide_midpoint
 from meshreel.io.meshes import read_mesh
@@ -63,6 +63,12 @@ SETTINGS = {  # of the depth cameras of the market, 5 to 60 frames a second
 }
 ROOM2, ROOM3, PROCEDURAL = ROOMS = ("room2", "room3", "procedural_room")  # the last two need no benchmark data
 SENSED = {f"sensors/{name}/{room}": (setting, room) for name, setting in SETTINGS.items() for room in ROOMS}
+
+
+def record_procedural(folder: Path, options: RoomOptions, width: int = 256) -> None:
+    """Write the rig of the procedural room, with colours, and its truth; `width`: pixels of a depth picture."""
+    sensor, color = SensorOptions(noise=0.3, seed=options.seed), ColorSensorOptions(scale=1.5)
+    simulate_rig(folder, furnished_room(options), room_cameras(width), options.frame_rate, sensor, color=color)
 
 
 def simulate_room(folder: Path, data: Path, name: str, frames: int, setting: Setting = PAPER) -> None:

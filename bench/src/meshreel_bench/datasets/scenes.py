@@ -51,6 +51,7 @@ class Captured(DerivedSequence):
 SCENES = tuple(rooms.SPEEDS)
 PEOPLE = "people"  # needs the extra of that name, and no benchmark data
 TRUE, FOUND = "truth", "found"  # labels: those of the nearest clean faces, and those that the encoder finds
+VOXEL = 0.03  # m, for the fusion of the procedural room, whose pictures are small (guess)
 SPACING = 0.015  # m, of the grid of people in the procedural room, where sensors of full size see it
 
 
@@ -141,7 +142,7 @@ def open_scene(name: str, data: Path, cache: Path, frames: int | None = None) ->
         count = (people.FRAMES if name == PEOPLE else rooms.FRAMES) if frames is None else frames
         setting, room = SENSED.get(name, (rooms.PAPER, name))
         if name == PROCEDURAL:
-            demo_room.record_room(rig, demo_room.RoomOptions(count))
+            rooms.record_procedural(rig, demo_room.RoomOptions(count))
         elif name == PEOPLE:
             people.record_people(rig, count)
         elif room == PROCEDURAL:
@@ -151,7 +152,7 @@ def open_scene(name: str, data: Path, cache: Path, frames: int | None = None) ->
             rooms.Room3(count, setting=setting).record(rig)
         else:
             rooms.simulate_room(rig, data, room, count, setting)
-    fusion = FusionOptions(demo_room.VOXEL) if name == PROCEDURAL else FusionOptions()
+    fusion = FusionOptions(VOXEL) if name == PROCEDURAL else FusionOptions()
     recording, _ = open_recording(rig, fusion, keep=False)
     return SceneData(name, folder, Captured(recording, meshes), read_truth(rig / TRUTH), rooms.read_parts(rig))
 

@@ -178,7 +178,7 @@ def _averaged(picture: np.ndarray) -> np.ndarray:
 
 
 FRAMES, SHOWN = 20, 9
-WIDTH, NOISE, VOXEL = 256, 0.3, 0.03  # as `meshreel demo` has them
+WIDTH, NOISE, VOXEL = 256, 0.3, 0.03  # pixels; of the sensor; m: as the procedural room of experiments has them
 PANEL = 300  # pixels
 FROM = np.array([0.42, 0.42, 1.0])  # where the picture is seen from
 

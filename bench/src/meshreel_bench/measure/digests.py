@@ -14,7 +14,7 @@ from functools import cache
 from pathlib import Path
 
 from meshreel.capture.recording import FusionOptions, open_recording
-from meshreel.capture.simulated import demo_room
+from meshreel.capture.simulated.demo_room import RoomOptions
 from meshreel.capture.simulated.procedural import SoftBodiesOptions, soft_bodies
 from meshreel.capture.simulated.simulated_rig import TRUTH, read_truth
 from meshreel.geometry.color_views import Painted
@@ -23,6 +23,7 @@ from meshreel.types import Mesh, MeshList, MeshSequence
 
 from ..codecs import codec_version, make_codec
 from ..datasets import is_scene
+from ..datasets.rooms import record_procedural
 from ..datasets.scenes import Captured, SceneData, SceneFrames
 from ..datasets.solid import solid_colors, textured
 from ..experiments.study import INSTEAD
@@ -66,7 +67,7 @@ def _digest(codec: str, options: tuple[tuple[str, Option], ...], of_scene: bool)
 
 @cache
 def _body() -> MeshSequence:
-    """Return one of the demo's bodies, with colours and a texture."""
+    """Return one of the procedural bodies, with colours and a texture."""
     frames = list[Mesh]()
     for mesh in soft_bodies(SoftBodiesOptions(FRAMES, spacing=SPACING)):
         body = part_of(mesh, components(mesh.faces, len(mesh.vertices))[mesh.faces[:, 0]] == 0)
@@ -76,10 +77,10 @@ def _body() -> MeshSequence:
 
 @cache
 def _room() -> tuple[SceneFrames, object]:
-    """Return the demo's room with the colours and the depth of its cameras, and the folder that it lies in."""
+    """Return the procedural room with the colours and the depth of its cameras, and the folder that it lies in."""
     kept = tempfile.TemporaryDirectory()
     folder = Path(kept.name)
-    demo_room.record_room(folder / "rig", demo_room.RoomOptions(FRAMES, RATE, APART), WIDTH)
+    record_procedural(folder / "rig", RoomOptions(FRAMES, RATE, APART), WIDTH)
     recording, _ = open_recording(folder / "rig", FusionOptions(APART), keep=False)
     captured, truth = Captured(recording, folder / "meshes"), read_truth(folder / "rig" / TRUTH)
     return SceneFrames(SceneData("small", folder, captured, truth), range(FRAMES)), kept

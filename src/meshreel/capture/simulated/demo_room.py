@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import math
 import operator
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float64, Int64
@@ -18,14 +17,9 @@ from ..rig.cameras import DepthCamera
 from .figure import Pose, figure
 from .implicit import polygonize
 from .procedural import check_frames, grid_of_frame
-from .simulated_rig import ColorSensorOptions, SceneFrame, SensorOptions, corner_cameras, simulate_rig
+from .simulated_rig import SceneFrame, corner_cameras
 from .solid_colors import CHILD, WALKER, Colors, Points, person_colors, room_colors
 
-# Sizes and speeds.
-WIDTH = 256  # pixels of a depth picture (guess)
-COLOR_SCALE = 1.5  # of a colour picture's width to that of depth (guess)
-NOISE = 0.3  # of the sensor, see `SensorOptions.noise` (guess)
-VOXEL = 0.03  # m, for the fusion of such pictures (guess)
 SIZE = (3.0, 1.7, 2.6)  # m, of the room; its origin is the middle of the floor (guess)
 _FACE = 0.1  # m, about the side length of the room's faces (guess)
 # m, box of the cameras: inside the walls, outside the open sides (guess).
@@ -114,15 +108,6 @@ def furnished_room(options: RoomOptions | None = None) -> Room:
         panel((-x, 0, z), (0, 0, -2 * z), (0, y, 0)),  # and that on the left
     ]
     return Room(options or RoomOptions(), concatenate([joined(panels), *map(box, FURNITURE)]))
-
-
-def record_room(
-    folder: Path, options: RoomOptions, width: int = WIDTH, progress: Callable[[int], None] = lambda _done: None
-) -> None:
-    """Write what four depth cameras measure, and the truth; `progress` gets the number of finished frames."""
-    sensor, cameras = SensorOptions(noise=NOISE, seed=options.seed), room_cameras(width)
-    color = ColorSensorOptions(scale=COLOR_SCALE)
-    simulate_rig(folder, furnished_room(options), cameras, options.frame_rate, sensor, progress, color)
 
 
 def room_cameras(width: int = 320) -> tuple[DepthCamera, ...]:
