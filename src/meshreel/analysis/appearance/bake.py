@@ -29,10 +29,10 @@ Colors = UInt8[np.ndarray, "N 3"]
 Known = Bool[np.ndarray, " N"]  # whose colour is known
 # Samples of each face: its middle, and a point towards each corner. Samples at vertices alone would alias.
 PLACES = np.array([[1, 1, 1], [4, 1, 1], [1, 4, 1], [1, 1, 4]]) / np.array([[3], [6], [6], [6]])
-REFINEMENTS = 4  # of refinement: the rest of the error falls below a grey level (guess)
+REFINEMENTS = 4  # rounds of least squares: the rest of the error falls below a grey level (guess)
 TOGETHER = 1 << 16  # places whose medians are taken at a time: 16 frames of them take 10 MB
 GUTTERS = 128  # in the width of a texture; 8 texels of 1024 keep charts apart in three mip levels
-PACKINGS = 8  # of packing, with texels per metre corrected after each; as many more halve them (guess)
+PACKINGS = 8  # rounds of packing, with texels per metre corrected after each; as many more halve them (guess)
 MARGIN = 0.995  # of the size that would just fit: packing is not quite proportional (guess)
 ENLARGED = 3.0  # largest number of texels along a pixel: 39 dB of living_room; with 2: 38, with 1: 36, at similar rates
 USUAL_SIDE = 1024  # texels, side up to which small pictures are enlarged (guess)

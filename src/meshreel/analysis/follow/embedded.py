@@ -42,8 +42,10 @@ from .embedded_graph import (
 )
 from .rigid import RigidBody, RigidMotion
 
-NOISY_LOST = 3.0  # RMS distances of the noise that a residual may have in addition: legs vanish (decision 16)
 Painter = Callable[[], Paint | None]  # opens the colour source of a frame, if it has one
+Samples = Float64[np.ndarray, "S 3"]
+
+NOISY_LOST = 3.0  # RMS distances of the noise that a residual may have in addition: legs vanish (decision 16)
 CLEARLY = 0.8  # share of the best residual that a start by colour must reach: it is rougher than one by shape (guess)
 UNUSUAL = 1.25  # a frame is retried if its residual exceeds this many times the median so far, and its neighbour's
 AGREEMENT = 0.3  # smallest cosine between the normals of a pair (guess)
@@ -55,8 +57,7 @@ LOST = 0.004  # diagonals: a frame with a larger residual is lost: no surface fi
 DAMPING = 0.01  # squared row weight of a node's step relative to its data (guess)
 ITERATIONS = 60  # largest number of conjugate-gradient iterations per round (guess)
 TOLERANCE = 1e-2  # relative residual at which they stop (guess)
-Samples = Float64[np.ndarray, "S 3"]
-GREY = 0.001  # diagonals equivalent to one level of a colour, of 255; .0003 does as well (decision 28)
+LEVEL = 0.001  # diagonals that count as one level of a colour, of 255; .0003 does as well (decision 28)
 REACH = 0.3  # diagonals, largest joint distance in place and colour of a pair (guess)
 AROUND = 40  # samples next to a node whose median offset it takes (guess)
 FEWEST = 200  # smallest number of samples of known colour, on either side, for an estimate (guess)
@@ -294,8 +295,8 @@ class ColoredPlaces:
         frame_points, key_points = frame.mesh.vertices[samples][known], points[self._known]
         if min(len(frame_points), len(key_points)) < FEWEST:
             return None
-        joint = cKDTree(np.concatenate([frame_points, GREY * colors[known]], axis=1))
-        far, near = joint.query(np.concatenate([key_points, GREY * self._colors[self._known]], axis=1))
+        joint = cKDTree(np.concatenate([frame_points, LEVEL * colors[known]], axis=1))
+        far, near = joint.query(np.concatenate([key_points, LEVEL * self._colors[self._known]], axis=1))
         paired = far <= REACH
         if paired.sum() < FEWEST:
             return None

@@ -21,14 +21,13 @@ from ...types import Mesh
 
 Points = Float64[np.ndarray, "P 3"]
 Nodes = Float64[np.ndarray, "N 3"]
-TURN = 0.01  # diagonals, weight of a difference of unit normals, so that both sides of a thin part get nodes: a guess
-SEEDED = 0.25  # largest share of nodes that begin a component: a guess
+SEEDED = 0.25  # largest share of nodes that begin a component (guess)
 TOGETHER = 2048  # points that are bound together: bounds memory (guess)
-NORMAL_REACH = 0.01  # diagonals, weight of a difference of unit normals in a search: a guess
-BACK_ROUNDS = 2  # rounds of the inverse, the first of which only estimates the nodes that move a point: a guess
+NORMAL_REACH = 0.01  # diagonals, weight of a difference of unit normals: both sides of a thin part are apart (guess)
+BACK_ROUNDS = 2  # rounds of the inverse, the first of which only estimates the nodes that move a point (guess)
 NEIGHBOURS = 4  # nodes that move a point (guess)
 STRETCHED = 2.0  # times its length: a face with an edge that the motion makes longer is left out (guess)
-FLATTEST = 0.1  # a blend of rotations with a smaller determinant has no usable inverse: a guess
+FLATTEST = 0.1  # a blend of rotations with a smaller determinant has no usable inverse (guess)
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +74,7 @@ def farthest_first(mesh: Mesh, candidates: Int64[np.ndarray, " S"], count: int) 
     _, first, sizes = np.unique(labels, return_index=True, return_counts=True)
     seeds = first[np.argsort(-sizes, kind="stable")][: max(1, int(SEEDED * count))]
     normals = vertex_normals(mesh)[candidates]
-    places = np.concatenate([mesh.vertices[candidates], TURN * normals], axis=1)
+    places = np.concatenate([mesh.vertices[candidates], NORMAL_REACH * normals], axis=1)
     nearest = np.full(len(candidates), np.inf)
     chosen = np.empty(min(count, len(candidates)), np.int64)
     for n in range(len(chosen)):

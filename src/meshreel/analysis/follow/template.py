@@ -26,11 +26,11 @@ from .embedded_graph import Motion
 
 NOISY_ERROR = 0.5  # RMS distances of the noise that a base mesh may miss in addition (decision 16)
 NOISY_BORDER = 100.0  # weight of open borders under noise: a coarse base cuts their corners (decision 16)
-FEWEST = 40  # smallest number of vertices of a base mesh, enough for a body's limbs: a guess
+FEWEST = 40  # smallest number of vertices of a base mesh, enough for a body's limbs (guess)
 DECAY = 1.2  # the error of quadric decimation falls with this power of the number of vertices (measured on bodies)
 CURVATURE = 52  # 64ths, lift of midpoints, between the coder's 48 and 58 (decision 14)
-NEAR, FAR = 0.05, 0.25  # logarithms of errors at which the search stops, in the first rounds and after: guesses
-ROUNDS, MOST_ROUNDS = 3, 8  # first rounds of the search for the number of vertices, and all of them: guesses
+NEAR, FAR = 0.05, 0.25  # logarithms of errors at which the search stops, in the first rounds and after (guesses)
+ROUNDS, MOST_ROUNDS = 3, 8  # first rounds of the search for the number of vertices, and all of them (guesses)
 LEVELS = 2  # midpoint subdivisions of the base (decision 14)
 FINEST = 1024  # voxels along the frames at most: bounds memory (guess)
 NOISE = 7.25  # smallest voxel, in RMS noise: finer ones resolve noise, which every frame would pay for (decision 16)

@@ -16,7 +16,7 @@ from ...types import Mesh
 from ..rig.cameras import DepthCamera
 from .figure import Pose, figure
 from .implicit import polygonize
-from .procedural import check_frames, grid_of_frame
+from .procedural import check_length, check_spacing, grid_of_frame
 from .simulated_rig import SceneFrame, corner_cameras
 from .solid_colors import CHILD, WALKER, Colors, Points, person_colors, room_colors
 
@@ -55,7 +55,8 @@ class RoomOptions:
     seed: int = 0  # of the grids
 
     def __post_init__(self) -> None:
-        check_frames(self.frames, self.frame_rate, self.spacing)
+        check_length(self.frames, self.frame_rate)
+        check_spacing(self.spacing)
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,7 @@
-"""The room of the demo: three walls, a floor of oak, a sofa, shelves, a plant and a ball, and their colours."""
+"""The room of the demo: three walls, a floor of oak, a sofa, shelves, a plant and a ball, and their colours.
+
+Places, sizes and colours (sRGB, 0 to 255) are guesses by eye.
+"""
 
 from __future__ import annotations
 
@@ -13,9 +16,9 @@ from .dress import Share, mixed, near, plain, soft, spot
 from .sculpture import Part, ball, block, meshed, rod
 from .solid_colors import Colors, Points, noise
 
-SIZE = (3.4, 2.25, 2.8)  # m; the origin is the middle of the floor (guess)
-WINDOW = np.array([[-0.55, 1.00], [0.95, 2.00]])  # m, its corners on the left wall, z and y (guess)
-# m, pictures on the back wall: x and y of their middles, and half their sides (guess).
+SIZE = (3.4, 2.25, 2.8)  # m; the origin is the middle of the floor
+WINDOW = np.array([[-0.55, 1.00], [0.95, 2.00]])  # m, its corners on the left wall, z and y
+# m, pictures on the back wall: x and y of their middles, and half their sides.
 FRAMES = ((0.30, 1.40, 0.17, 0.22), (0.78, 1.46, 0.20, 0.15), (1.22, 1.38, 0.14, 0.18))
 SHELF: Box = ((-1.62, 0.0, -1.38), (-0.92, 1.55, -1.08))
 BALL = ((1.22, 0.12, 0.85), 0.12)  # m, its middle and radius
@@ -32,7 +35,7 @@ FOOTPRINTS = np.array(
 BOOKS = np.array(
     [(176, 74, 60), (54, 84, 110), (214, 170, 88), (96, 124, 98), (226, 214, 192), (120, 72, 84), (70, 110, 120)], float
 )
-COARSE, MANY = 0.03, 20_000  # m, of the lattice of furniture, and faces, which none has (guess)
+COARSE, MANY = 0.03, 20_000  # m, of the lattice of furniture, and faces, which none has
 FLAT = 0.004  # m from a plane that still is on it
 
 

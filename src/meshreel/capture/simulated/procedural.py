@@ -31,19 +31,24 @@ class SoftBodiesOptions:
     seed: int = 0  # of the grids
 
     def __post_init__(self) -> None:
-        check_frames(self.frames, self.frame_rate, self.spacing)
+        check_length(self.frames, self.frame_rate)
+        check_spacing(self.spacing)
         if not 1 <= self.people <= 3:
             raise InputError(f"people {self.people} is not 1, 2 or 3; choose one of these")
         if not 0 <= self.begin < math.inf:
             raise InputError(f"begin {self.begin} is not a time from 0 on; give seconds, as 0.95")
 
 
-def check_frames(frames: int, frame_rate: float, spacing: float) -> None:
-    """Raise InputError for numbers that no procedural sequence can have."""
+def check_length(frames: int, frame_rate: float) -> None:
+    """Raise InputError for a length or a rate that no procedural sequence can have."""
     if frames < 1:
         raise InputError(f"frames {frames} is below 1; ask for at least one")
     if not 0 < frame_rate < math.inf:
         raise InputError(f"frame rate {frame_rate} is not a positive number; give one, as 30")
+
+
+def check_spacing(spacing: float) -> None:
+    """Raise InputError for a grid that is too fine to make, or too coarse for people."""
     if not 0.008 <= spacing <= 0.1:
         raise InputError(f"spacing {spacing} m is outside 0.008 to 0.1; 0.022 suits two people, 0.03 a room")
 

@@ -18,21 +18,21 @@ from .acting import stances
 from .dress import CHILD, WOMAN, Look, dressed_colors
 from .parlour import Thing, furniture
 from .person import Build, person
-from .procedural import check_frames
+from .procedural import check_length
 from .sculpture import depths, meshed
 from .simulated_rig import ColorSensorOptions, SceneFrame, SensorOptions, corner_cameras, simulate_rig
 from .skeleton import Shares, Stance, carried, weights
 from .solid_colors import Colors, Points
 
-# Sizes for a demo of a minute or two.
-WIDTH = 256  # pixels of a depth picture (guess)
+WIDTH = 256  # pixels of a depth picture: the demo takes a minute or two (guess)
 COLOR_SCALE = 1.5  # of a colour picture's width to that of depth (guess)
 NOISE, COLOR_NOISE = 0.3, 1.0  # of the sensors, see `SensorOptions` and `ColorSensorOptions` (guess)
-VOXEL = 0.02  # m, for the fusion of such pictures: with 0.03, fingers and folds are lost
+VOXEL = 0.02  # m, for the fusion of such pictures: with 0.03, fingers and folds are lost (seen)
 BOX = np.array([[-1.6, 0.0, -1.3], [1.6, 2.45, 1.75]])  # m, of the cameras: inside the walls (guess)
 SPACING, FACES = 0.005, 24_000  # m, of the lattice of a person of an adult's size, and faces that are left (guess)
+# The woman and the child: build and colours (guess).
 CAST = ((Build(size=0.97), WOMAN), (Build(0.68, head=1.27, is_child=True, sleeve=0.17, trouser=0.55), CHILD))
-KEY = np.array([0.458, 0.598, 0.658])  # where a lamp is, a unit vector
+KEY = np.array([0.458, 0.598, 0.658])  # where a lamp is, a unit vector (guess)
 # Distances, m, and weights by which what is near a place hides the sky there (guess).
 HIDDEN = ((0.006, 0.30), (0.012, 0.20), (0.018, 0.13))
 
@@ -42,14 +42,14 @@ Amounts = Float64[np.ndarray, " N"]
 
 @dataclass(frozen=True, slots=True)
 class StageOptions:
-    """Length of the demo's scene."""
+    """Length of the demo's scene, and the seed of what its sensors measure."""
 
     frames: int = 40
     frame_rate: float = 20.0  # 1/s
     seed: int = 0  # of the sensors' errors
 
     def __post_init__(self) -> None:
-        check_frames(self.frames, self.frame_rate, VOXEL)
+        check_length(self.frames, self.frame_rate)
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,7 +88,7 @@ class Actor:
 
 @dataclass(frozen=True, slots=True)
 class Stage:
-    """Clean frames of `stage`."""
+    """Clean frames of the demo's scene, each made when it is asked for."""
 
     options: StageOptions
     still: tuple[Thing, ...]
@@ -126,7 +126,7 @@ class Stage:
 
 
 def stage(options: StageOptions | None = None) -> Stage:
-    """Return the frames of the scene; the same options give the same frames."""
+    """Return the demo's scene; the same options give the same frames."""
     return Stage(options or StageOptions(), furniture(), tuple(_actor(number) for number in range(len(CAST))))
 
 

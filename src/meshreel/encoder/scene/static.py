@@ -45,14 +45,14 @@ from .parts import Parts
 
 FRACTIONS = (0.75, 0.5, 0.35, 0.22, 0.15, 0.1, 0.07, 0.045, 0.03, 0.02)  # of the background's vertices (decision 19)
 HALVINGS = 2  # of the factor between two fractions, in search for a smaller mesh that is near enough (guess)
-LEAST_NOISE = 8e-4  # of the unit: the noise that a background is coded for, at least: bodies come as near to frames
+LEAST_NOISE = 8e-4  # of the unit, the least noise that a background is coded for: bodies are as near to frames (guess)
 WORST = 4.0  # times what is allowed on average, of a place where there is no noise to hide it (guess)
 STILL_FRAMES = 16  # in which a background is looked at for its colours, at most (guess)
 PICTURES_A_SECOND = 8  # of a background: shadows move slowly (guess)
-FINER = 2  # of the rate factor of a background's pictures than of a body's (guess)
-ENLARGED = 9  # coarser for each doubling of its texels along a pixel: 38 dB of living_room at .06 Mbps, quality 50
+FINER = 2  # by which the rate factor of a background's pictures is below that of a body's (guess)
+FOR_A_DOUBLING = 9  # of the rate factor, for each doubling of texels along a pixel: living_room has 38 dB at .06 Mbps
 NEAR = 3.0  # times the noise, within which a frame shows a place of the background (guess)
-LEAST_NEAR = 0.01  # m, the same at least (guess)
+LEAST_NEAR = 0.01  # m, the least such distance (guess)
 
 
 @dataclass(frozen=True, slots=True)
@@ -218,7 +218,7 @@ def _pictured(
     options: TextureOptions,
 ) -> list[Companion]:
     """Return a slow video of what a background looks like, where shadows move: what a frame hides is as usual."""
-    crf = options.crf - FINER + round(ENLARGED * math.log2(max(1.0, surface.scale)))
+    crf = options.crf - FINER + round(FOR_A_DOUBLING * math.log2(max(1.0, surface.scale)))
     slow = replace(options, crf=min(max(1, crf), MOST_CRF))
 
     def picture_of(frame: int) -> UInt8[np.ndarray, "H W 3"]:
@@ -230,7 +230,7 @@ def _pictured(
 
 
 class _Looks:
-    """Evidence of a scene's still surface from its frames, in normalised coordinates."""
+    """Colours of a scene's still surface in its frames, by places in normalised coordinates."""
 
     def __init__(self, sequence: CapturedSequence, parts: Parts) -> None:
         self._sequence, self._parts, self._views = sequence, parts, parts.views
