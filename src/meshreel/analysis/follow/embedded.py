@@ -94,7 +94,8 @@ class Tracker:
         o = self.options
         self._samples = area_samples(self.mesh, o.samples)
         self._moved = MovingSurface(self.mesh)
-        self._tears, count = (NOISY_TORN, min(o.fine.nodes, NOISY_NODES)) if noise else (TORN, o.fine.nodes)
+        self._tears: tuple[float, ...] = NOISY_TORN if noise else TORN
+        count = min(o.fine.nodes, NOISY_NODES) if noise else o.fine.nodes
         nodes = farthest_first(self.mesh, self._samples, count)
         self._graph, coarse = build_graph(self.mesh, nodes), build_graph(self.mesh, nodes[: o.coarse.nodes])
         self._fine, self._few = self._rest(self._graph), self._rest(coarse)

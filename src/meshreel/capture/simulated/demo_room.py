@@ -1,4 +1,7 @@
-"""A furnished room and two people of capsules, as of many measurements; y is up, m, open at the front and the right."""
+"""A furnished room and two people of capsules, for tutorial and experiments: the demo's own scene is `stage`.
+
+y is up, in metres; the room is open at the front and the right.
+"""
 
 from __future__ import annotations
 

@@ -190,19 +190,19 @@ def _head(build: Build, look: Look, own: Points, colors: Colors) -> Colors:
     colors = mixed(colors, warm, blush)
     colors = mixed(colors, shaded, 0.5 * front * spot(x - EYE[0], y - EYE[1] - 0.005, 0.021, 0.010))
     colors = mixed(colors, (120, 70, 60), 0.75 * front * spot(x - 0.0068, y + 0.0462 - low, 0.0032, 0.0020))
-    colors = _brows(build, look, colors, x, y - low / 2, front)
+    brows = _brows(x, y - low / 2, 0.62 if build.is_child else 0.72)
+    colors = mixed(colors, darker(look.hair, 0.75, 0.75, 0.75), brows * front)
     colors = _mouth(look, colors, x, y, front)
     return _hair(build, look, own, _eyes(build, look, colors, own, front))
 
 
-def _brows(build: Build, look: Look, colors: Colors, x: Share, y: Share, front: Share) -> Colors:
+def _brows(x: Share, y: Share, most: float) -> Share:
+    """Return the share of the hairs of brows, `most` in their middle."""
     middle = 0.0205 + 0.0040 * np.sin(np.pi * np.clip((x - 0.006) / 0.056, 0, 1))
     thick = 0.0026 * np.clip(1.15 - (x - 0.012) / 0.045, 0.2, 1.0)
     share = soft(thick - np.abs(y - middle), 0, 0.002) * near(x - 0.031, 0.0185, 0.004)
     hairs = 0.85 + 0.15 * np.sin(2400 * x + 900 * y)
-    return mixed(
-        colors, darker(look.hair, 0.75, 0.75, 0.75), (0.62 if build.is_child else 0.72) * share * hairs * front
-    )
+    return most * share * hairs
 
 
 def _mouth(look: Look, colors: Colors, x: Share, y: Share, front: Share) -> Colors:
