@@ -83,7 +83,7 @@ def test_what_cannot_be_understood_is_an_error_that_says_what_to_give(run, tmp_p
     assert failed(run(*out, "--size", "9x9"), "9 pixels", "16 to 8192")
     assert failed(run(*out, "--background", "dusk"), "--background dusk", "transparent")
     assert failed(run(*out, "--view", "1,2,3"), "--view '1,2,3'", "six numbers")
-    assert failed(run(*out, "--view", "-1,2,3,-1,2,3"), "the places are one")
+    assert failed(run(*out, "--view", "-1,2,3,-1,2,3"), "both places are one")
     assert failed(run(*out, "--view", "0,0,1,0,0,0,180"), "degrees")
     assert failed(run(*out, "--fps", "0"), "0 pictures a second", "above 0")
     assert failed(run(*out, "--texture"), "--texture", "GLB and USD")

@@ -10,7 +10,7 @@ import meshreel
 from meshreel.edit.edits import tag
 from meshreel.errors import InputError
 from meshreel.export.film import BACKGROUND, FilmOptions, export_film
-from meshreel.geometry.picture import Viewpoint
+from meshreel.format.view import View
 from meshreel.geometry.threads import threads
 from tests.golden import GOLDEN
 from tests.tones import tone
@@ -105,7 +105,7 @@ def test_a_turntable_goes_around_a_still_and_ends_before_its_begin(tmp_path):
 def test_a_png_is_the_first_frame_from_a_view(tmp_path):
     with meshreel.open(FILE) as video:
         middle = np.mean(video.box, axis=0)
-        view = Viewpoint(tuple(middle + [0, 0, 10]), tuple(middle), 30.0)
+        view = View(tuple(middle + [0, 0, 10]), tuple(middle), 30.0)
         export_film(video.reader, tmp_path / "a.png", range(3, 7), FilmOptions(view, size=SMALL, background=None))
         near, edge = (np.asarray(Image.open(tmp_path / "a.png"))[at] for at in ((24, 32), (0, 0)))
     assert near[3] == 255 and edge[3] == 0
@@ -156,7 +156,16 @@ def test_what_a_format_cannot_hold_is_an_error_that_names_it(tmp_path, name, opt
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("values", [{"size": (8, 48)}, {"size": (64, 9000)}, {"seconds": 0.0}, {"rate": float("nan")}])
+@pytest.mark.parametrize(
+    "values",
+    [
+        {"size": (8, 48)},
+        {"size": (64, 9000)},
+        {"seconds": 0.0},
+        {"rate": float("nan")},
+        {"view": View((0, 0, 1), (0, 0, 1))},
+    ],
+)
 def test_values_out_of_range_are_errors(values):
     with pytest.raises(InputError, match="give"):
         FilmOptions(**values)

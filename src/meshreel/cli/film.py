@@ -15,7 +15,6 @@ from ..export.animated_file import ExportOptions
 from ..export.film import BACKGROUND, Color, FilmOptions, export_film
 from ..export.film_files import Written
 from ..format.view import View
-from ..geometry.picture import Viewpoint
 from ..geometry.threads import cores, threads
 from .console import Common
 
@@ -80,12 +79,9 @@ def _color(text: str) -> Color | None:
         raise InputError(f"--background {text}: is no colour; give one as #20242a or white, or {TRANSPARENT}") from None
 
 
-def _view(text: str) -> Viewpoint:
+def _view(text: str) -> View:
     x, y, z, *target = numbers_of_view(text)
-    view = View((x, y, z), tuple(target[:3]), *target[3:])
-    if not view.is_valid:
-        raise InputError(f"--view {text!r}: the places are one, or the degrees not between 0 and 180; give others")
-    return Viewpoint(view.position, view.target, view.fov)
+    return View((x, y, z), tuple(target[:3]), *target[3:])
 
 
 def numbers_of_view(view: str) -> list[float]:

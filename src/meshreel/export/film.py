@@ -18,6 +18,7 @@ from ..container.reader import ReelReader
 from ..decoder.tracks import moving_of_frame
 from ..decoder.video import Video
 from ..errors import InputError
+from ..format.view import View
 from ..geometry.picture import Body, Standing, Viewpoint, draw_picture, finished
 from ..shapes import UInt8
 from ..types import Up
@@ -37,7 +38,7 @@ ROUNDED = 1e-6  # s: times of .reel files are whole microseconds
 class FilmOptions:
     """Viewpoint, size and times of a film."""
 
-    view: Viewpoint | None = None  # in the unit of the vertices; None: the file's first view, or all of it
+    view: View | None = None  # in the unit of the vertices; None: the file's first view, or all of it
     turntable: bool = False  # the camera goes around once, from there
     size: tuple[int, int] | None = None  # pixels, width and height; None: `SIZE`, and of a GIF `GIF_SIZE`
     background: Color | None = BACKGROUND  # None: transparent
@@ -54,6 +55,9 @@ class FilmOptions:
         for name, value in (("seconds", self.seconds), ("pictures a second", self.rate)):
             if value is not None and not 0 < value < math.inf:
                 raise InputError(f"{value:g} {name}: give a number above 0")
+        if self.view is not None and not self.view.is_valid:
+            text = f"view from {self.view.position} to {self.view.target}, {self.view.fov:g} degrees"
+            raise InputError(f"{text}: both places are one or too far away, or no degrees from 0 to 180; give others")
 
 
 def export_film(
@@ -73,8 +77,8 @@ def export_film(
     size = options.size or (GIF_SIZE if kind == ".gif" else SIZE)
     _check(path, kind, size, options)
     standing = Standing(video.box, options.up or video.up)
-    first = reader.view and Viewpoint(reader.view.position, reader.view.target, reader.view.fov)
-    view = options.view or first or standing.fitted(*size)
+    given = options.view or reader.view
+    view = Viewpoint(given.position, given.target, given.fov) if given else standing.fitted(*size)
     times, shown = _times(reader, frames[:1] if kind == ".png" else frames, options, kind)
 
     def bodies(frame: int) -> list[Body]:
