@@ -26,7 +26,7 @@ TOGETHER = 2048  # points that are bound together: bounds memory (guess)
 NORMAL_REACH = 0.01  # diagonals, weight of a difference of unit normals: both sides of a thin part are apart (guess)
 BACK_ROUNDS = 2  # rounds of the inverse, the first of which only estimates the nodes that move a point (guess)
 NEIGHBOURS = 4  # nodes that move a point (guess)
-STRETCHED = 2.0  # times its length: a face with an edge that the motion makes longer is left out (guess)
+STRETCHED = 2.0  # times its length: a face with an edge that the motion makes longer is left out (decision 28)
 FLATTEST = 0.1  # a blend of rotations with a smaller determinant has no usable inverse (guess)
 
 

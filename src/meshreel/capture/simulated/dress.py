@@ -30,28 +30,16 @@ class Look:
     shoes: RGB
 
 
+# fmt: off
 WOMAN = Look(
-    skin=(236, 190, 162),
-    lips=(190, 92, 88),
-    iris=(88, 62, 38),
-    hair=(78, 46, 28),
-    shirt=(44, 66, 112),
-    stripe=(240, 232, 216),
-    trousers=(84, 112, 154),
-    seam=(196, 158, 96),
-    shoes=(238, 236, 230),
+    skin=(236, 190, 162), lips=(190, 92, 88), iris=(88, 62, 38), hair=(78, 46, 28), shirt=(44, 66, 112),
+    stripe=(240, 232, 216), trousers=(84, 112, 154), seam=(196, 158, 96), shoes=(238, 236, 230),
 )
 CHILD = Look(
-    skin=(240, 196, 168),
-    lips=(206, 116, 108),
-    iris=(64, 98, 120),
-    hair=(150, 100, 54),
-    shirt=(244, 190, 64),
-    stripe=(228, 92, 60),
-    trousers=(62, 92, 106),
-    seam=(50, 74, 86),
-    shoes=(206, 60, 52),
+    skin=(240, 196, 168), lips=(206, 116, 108), iris=(64, 98, 120), hair=(150, 100, 54), shirt=(244, 190, 64),
+    stripe=(228, 92, 60), trousers=(62, 92, 106), seam=(50, 74, 86), shoes=(206, 60, 52),
 )
+# fmt: on
 BAND = (0.115, 0.40)  # m from a stripe of the shirt to the next, and its share of that (guess)
 
 

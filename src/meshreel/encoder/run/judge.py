@@ -190,7 +190,7 @@ def _largest(frame: Mesh, surface: Surface, near: Float64[np.ndarray, " V"]) -> 
     return float(pieces.max() / areas.sum())
 
 
-class _Some(Frames):
+class _Excerpt(Frames):
     """Successive frames of an interval."""
 
     def __init__(self, frames: Frames | Sequence[Mesh], numbers: range) -> None:
@@ -208,5 +208,5 @@ def _from(interval: Interval, start: int, stop: int) -> Interval:
     if stop - start == len(interval.frames):
         return interval
     return replace(
-        interval, frames=_Some(interval.frames, range(start, stop)), first_frame=interval.first_frame + start
+        interval, frames=_Excerpt(interval.frames, range(start, stop)), first_frame=interval.first_frame + start
     )
