@@ -1,4 +1,4 @@
-"""Depth pictures: the measurements of a depth camera at one moment, and those of a recording by frame."""
+"""Depth pictures: what a depth camera measures at a moment, those of a recording by frame, and steps in depth."""
 
 from __future__ import annotations
 

@@ -52,9 +52,9 @@ def _woman(time: float) -> Stance:
     swing = math.cos(2 * math.pi * (phase - 0.05)) * speed
     raised = curve(time, (0.55, 0.0), (1.1, 1.0), (3.2, 1.0), (3.9, 0.0))
     waving = curve(time, (0.9, 0.0), (1.2, 1.0), (3.0, 1.0), (3.4, 0.0)) * math.sin(3.8 * math.pi * (time - 0.9))
-    low = HANGING * (-1, 1, 1) + [0.0, 0.0, 0.23 * swing]
+    low = HANGING * SIDES[1] + [0.0, 0.0, 0.23 * swing]
     wrist = _between(low, np.array([-0.42, 1.15, 0.26]), np.array([-0.30 - 0.075 * waving, 1.60, 0.17]), raised)
-    pole = (1 - raised) * BACK * (-1, 1, 1) + raised * np.array([-0.8, -1.0, -0.15])
+    pole = (1 - raised) * BACK * SIDES[1] + raised * np.array([-0.8, -1.0, -0.15])
     left = Limb(HANGING - [0.0, 0.0, 0.23 * swing], BACK, 0.28)
     right = Limb(wrist, pole, 0.28 - 0.24 * raised, 0.25 * waving)
     head = (

@@ -127,7 +127,7 @@ class Stage:
 
 def stage(options: StageOptions | None = None) -> Stage:
     """Return the demo's scene; the same options give the same frames."""
-    return Stage(options or StageOptions(), furniture(), tuple(_actor(number) for number in range(len(CAST))))
+    return Stage(options or StageOptions(), furniture(), _cast())
 
 
 def record_stage(
@@ -145,8 +145,8 @@ def stage_cameras(width: int = WIDTH) -> tuple[DepthCamera, ...]:
 
 
 @cache
-def _actor(number: int) -> Actor:
-    return Actor.of(*CAST[number])
+def _cast() -> tuple[Actor, ...]:
+    return tuple(Actor.of(build, look) for build, look in CAST)
 
 
 def _barycentric(mesh: Mesh, corners: Int32[np.ndarray, "N 3"], points: Points) -> Float64[np.ndarray, "N 3"]:
