@@ -27,7 +27,8 @@ def on_files(files: Any, config: Any) -> Any:
     from mkdocs.structure.files import File
 
     added = [(name, ROOT / name) for name in OUTSIDE]
-    added += [(f"player/{path.name}", path) for path in sorted(PLAYER.iterdir()) if path.suffix in (".js", ".wasm")]
+    built = [path for path in sorted(PLAYER.iterdir()) if path.suffix in (".js", ".wasm", ".gz")]
+    added += [(f"player/{path.name}", path) for path in built]
     for name in CHECKED:
         sample = _sample(name)
         poster = sample.with_suffix(".png")

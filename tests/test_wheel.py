@@ -119,6 +119,8 @@ def test_an_installed_wheel_plays_a_file_with_the_player_that_it_brings(python, 
             "worker.js",
             "order.js",
             "core.wasm",
+            "core.wasm.gz",
+            "load.js",
             "page.js",
         } <= names
         assert "LICENSES.txt" in names

@@ -1,17 +1,19 @@
-// Builds the player into src/meshreel/player/, or into the folder MESHREEL_PLAYER: meshreel-player.js, which defines the element, three.js, which
-// draws, the page that `meshreel play` opens, the decoding worker, the worker that orders splats, the licences of what is in them, and each in
-// Brotli. core.wasm is put there before by scripts/build_wasm.py. Two builds give the same bytes.
+// Builds the player into src/meshreel/player/, or into the folder MESHREEL_PLAYER: meshreel-player.js, which defines the element, load.js, which loads
+// it with fewer bytes, three.js, which draws, the page that `meshreel play` opens, the decoding worker, the worker that orders splats, the licences of
+// what is in them, each in Brotli, and what is large as a gzip. core.wasm is put there before by scripts/build_wasm.py. Two builds give the same bytes.
 
 import { mkdirSync, readdirSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { extname, join, resolve } from "node:path";
 import { fileURLToPath } from "node:url";
 import { brotliCompressSync, constants } from "node:zlib";
+import { gzipSync } from "three/addons/libs/fflate.module.js";
 import { defineConfig } from "vite";
 import type { Plugin } from "vite";
 
 const here = fileURLToPath(new URL(".", import.meta.url));
 const out = resolve(here, process.env.MESHREEL_PLAYER ?? "../src/meshreel/player");
 const KEPT = new Set(["core.wasm"]);
+const LARGE = new Set(["core.wasm", "three.js", "meshreel-player.js"]);
 
 /** Built one after the other (`vite build --mode NAME`), so that each is one file of a known name. */
 export const ENTRIES: Readonly<Record<string, string>> = {
@@ -19,6 +21,7 @@ export const ENTRIES: Readonly<Record<string, string>> = {
   three: "player-element/src/stage_three.ts",
   worker: "player-core/src/worker_entry.ts",
   order: "player-three/src/order_worker.ts",
+  load: "player-element/src/load.ts",
   page: "player-element/src/page.ts",
 };
 
@@ -45,16 +48,16 @@ function inlined(page: string, styles: string): string {
   return page.replace(link, `<style>${styles}</style>`).replace("</body>", `${link}\n</body>`);
 }
 
-/** The page takes the element from the file that is built already. */
+/** The page takes the element by the file that is built already. */
 function beside(): Plugin {
   return {
     name: "meshreel-beside",
     enforce: "pre",
-    resolveId: (source) => (source === "./index.ts" ? { id: "./meshreel-player.js", external: true } : null),
+    resolveId: (source) => (source === "./load.ts" ? { id: "./load.js", external: true } : null),
   };
 }
 
-/** Behind the last build: what web servers send to browsers that take it. */
+/** Behind the last build: what web servers send to browsers that take it, and what the player unpacks itself where they send nothing compressed. */
 function compressed(): Plugin {
   return {
     name: "meshreel-compressed",
@@ -64,6 +67,7 @@ function compressed(): Plugin {
         const bytes = readFileSync(join(out, name));
         const params = { [constants.BROTLI_PARAM_QUALITY]: constants.BROTLI_MAX_QUALITY, [constants.BROTLI_PARAM_SIZE_HINT]: bytes.length };
         writeFileSync(join(out, `${name}.br`), brotliCompressSync(bytes, { params }));
+        if (LARGE.has(name)) writeFileSync(join(out, `${name}.gz`), gzipSync(bytes, { level: 9, mem: 12, mtime: 0 })); // zlib's bytes depend on the machine
       }
     },
   };

@@ -41,7 +41,7 @@ def test_the_player_is_copied_whole_and_its_folder_is_told(run, tmp_path):
     folder = files("meshreel") / "player"
     assert run("player").out.strip() == str(folder)
     said = run("player", "--copy-to", tmp_path / "site" / "player")
-    assert said.code == 0 and 'src="player/meshreel-player.js"' in said.out
+    assert said.code == 0 and 'src="player/load.js"' in said.out
     copied = {path.name: path.read_bytes() for path in (tmp_path / "site" / "player").iterdir()}
     assert copied == {path.name: path.read_bytes() for path in folder.iterdir()} and "core.wasm" in copied
 

@@ -23,7 +23,7 @@ from .console import Common, Force
 _NEEDS = re.compile(r"([A-Za-z0-9._-]+)[^;]*(?:;.*extra == [\"']([a-z0-9]+)[\"'])?")
 _CODECS = {"AV1 decoded": "libdav1d", "AV1 encoded": "libsvtav1", "H.264 encoded": "libx264"}
 EMBED = """\
-<script type="module" src="{folder}/meshreel-player.js"></script>
+<script type="module" src="{folder}/load.js"></script>
 <meshreel-player src="walk.reel" controls loop style="width: 640px; aspect-ratio: 16 / 9"></meshreel-player>"""
 
 

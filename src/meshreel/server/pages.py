@@ -56,7 +56,7 @@ def policy(styles: str = "") -> str:
 def player_page(name: str, player: str, styles: str) -> str:
     """Return the page that plays one file; `player` is the address of the player's folder, `styles` its page.css."""
     source = escape(f"/files/{quote(name)}")
-    modules = ("meshreel-player.js", "three.js")
+    modules = ("load.js", "meshreel-player.js", "three.js")
     preloads = "".join(f'<link rel="modulepreload" href="{player}/{file}">\n' for file in modules)
     preloads += f'<link rel="preload" as="fetch" crossorigin href="{player}/core.wasm">\n'
     return (

@@ -1,5 +1,6 @@
 // Opens recordings that share decoding workers.
 
+import { bytesOf, plainOf } from "./net/built.ts";
 import { BlobSource } from "./net/source.ts";
 import { HttpSource } from "./net/http_source.ts";
 import { Player } from "./player.ts";
@@ -70,7 +71,7 @@ class PooledPlayer extends Player {
 
 /** A file's bytes, once for all workers; its address where they do not come, so that a worker tells why. */
 function bytesAt(file: URL): Promise<ArrayBuffer | string> {
-  return fetch(file).then<ArrayBuffer | string>((response) => (response.ok ? response.arrayBuffer() : file.href)).catch(() => file.href);
+  return bytesOf(file).catch(() => plainOf(file).href);
 }
 
 /**

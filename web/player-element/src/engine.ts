@@ -1,6 +1,6 @@
 // The real engine: recordings come from the network or from files, workers decode them, three.js draws them.
 
-import { openWorker, Players, type Player, type WorkerFiles } from "@meshreel/player-core";
+import { importFile, openWorker, plainOf, Players, type Player, type WorkerFiles } from "@meshreel/player-core";
 import type { OrderWorker } from "@meshreel/player-three";
 import { GraphicsError } from "./stage.ts";
 import type { Engine, Settings, Stage } from "./stage.ts";
@@ -33,15 +33,15 @@ export class RealEngine implements Engine {
 
   load(): Promise<void> | null {
     if (this.#stages !== null) return null;
-    return (this.#loading ??= this.#import(this.#files.three.href));
+    return (this.#loading ??= this.#import(this.#files.three));
   }
 
-  async #import(address: string): Promise<void> {
+  async #import(file: URL): Promise<void> {
     try {
-      this.#stages = (await import(/* @vite-ignore */ address)) as typeof import("./stage_three.ts");
+      this.#stages = await importFile<typeof import("./stage_three.ts")>(file);
     } catch (error) {
       this.#loading = null; // to be tried again
-      throw new Error(`${address} cannot be loaded; load the page again`, { cause: error });
+      throw new Error(`${plainOf(file).href} cannot be loaded; load the page again`, { cause: error });
     }
   }
 

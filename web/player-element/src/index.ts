@@ -1,5 +1,6 @@
 // The package: importing it defines <meshreel-player>.
 
+import { fileBeside } from "@meshreel/player-core";
 import { MeshreelPlayer } from "./element.ts";
 import { RealEngine } from "./engine.ts";
 
@@ -12,7 +13,7 @@ const beside = (name: string): URL => new URL(elsewhere?.[name] ?? name, import.
 
 if (globalThis.customElements && !customElements.get("meshreel-player")) {
   MeshreelPlayer.engine = new RealEngine({
-    worker: beside("worker.js"), core: beside("core.wasm"), order: beside("order.js"), three: beside("three.js"),
+    worker: beside("worker.js"), core: elsewhere ? beside("core.wasm") : fileBeside(import.meta.url, "core.wasm"), order: beside("order.js"), three: beside("three.js"),
   });
   customElements.define("meshreel-player", MeshreelPlayer);
 }

@@ -2,8 +2,9 @@
 
 import { followAddress } from "./address.ts";
 import { runBench } from "./bench_page.ts";
-import { MeshreelPlayer } from "./index.ts";
 import { recordingName } from "./format.ts";
+import type { MeshreelPlayer as Player } from "./index.ts";
+import { MeshreelPlayer } from "./load.ts";
 import { readParameters } from "./parameters.ts";
 
 async function start(): Promise<void> {
@@ -31,7 +32,7 @@ async function start(): Promise<void> {
   if (player.src) document.title = `${recordingName(player.src)} · meshreel`;
 }
 
-function apply(player: MeshreelPlayer, attributes: ReadonlyMap<string, string | null>, time: number): void {
+function apply(player: Player, attributes: ReadonlyMap<string, string | null>, time: number): void {
   for (const [name, value] of attributes) {
     if (value === null) player.removeAttribute(name);
     else player.setAttribute(name, value);
@@ -40,7 +41,7 @@ function apply(player: MeshreelPlayer, attributes: ReadonlyMap<string, string | 
 }
 
 /** So that keys act without a click, which would play. A frame of another page leaves the focus where that has it. */
-function takeFocus(player: MeshreelPlayer): void {
+function takeFocus(player: Player): void {
   const isFree = document.activeElement === null || document.activeElement === document.body;
   if (window.parent === window && isFree) player.focus({ preventScroll: true, focusVisible: false });
 }

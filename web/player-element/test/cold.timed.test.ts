@@ -2,6 +2,7 @@
 
 import { spawn } from "node:child_process";
 import { once } from "node:events";
+import { copyFileSync } from "node:fs";
 import { join } from "node:path";
 
 import { devices } from "playwright-core";
@@ -12,6 +13,7 @@ import { describeInBrowser, launchBrowser } from "../../test/browser.ts";
 import { openLink } from "../../test/link.ts";
 import { PYTHON, hasPython, ROOT } from "../../test/python.ts";
 import { ALL } from "../../test/slow.ts";
+import { Site } from "./product.ts";
 
 const RECORDING = join(ROOT, "conformance/v1/colored/scene.reel"); // 8 kB
 const [BITS, MILLISECONDS] = [1e6, 200];
@@ -27,7 +29,7 @@ async function visit(browser: Browser, address: URL, bits: number, milliseconds:
     await page.goto(link.origin + address.pathname + address.search, { waitUntil: "commit" });
     const shown = () => (document.querySelector("meshreel-player")?.statistics?.triangles ?? 0) > 0 && performance.now();
     const seen = (await (await page.waitForFunction(shown, undefined, { polling: 20 })).jsonValue()) as number;
-    const painted = await page.evaluate(() => performance.getEntriesByName("first-contentful-paint")[0]!.startTime);
+    const painted = await page.evaluate(() => performance.getEntriesByName("first-contentful-paint")[0]?.startTime ?? NaN);
     return { painted, seen, bytes: link.bytes };
   } finally {
     await context.close();
@@ -119,6 +121,27 @@ describeInBrowser("the player of meshreel play, on a cold line of 1 Mbit/s and 2
     } finally {
       await browser.close();
       server.kill();
+    }
+  });
+});
+
+describeInBrowser("the player on a host that compresses nothing and closes each connection, on a cold line of 1 Mbit/s and 200 ms", () => {
+  const EMBEDDED = '<!doctype html><link rel="icon" href="data:,"><h1>A room</h1><script type="module" src="player/load.js"></script><meshreel-player src="room.reel"></meshreel-player>';
+
+  test.runIf(ALL)("shows its first frame within 5 s", async () => {
+    const site = new Site();
+    await site.open();
+    try {
+      copyFileSync(RECORDING, join(site.folder, "room.reel"));
+      site.write("embedded.html", EMBEDDED);
+      const origin = await site.serveAgain({ Connection: "close" });
+      for (const page of ["player/index.html?src=/room.reel", "embedded.html"]) {
+        const [slow, fast] = [await visit(site.browser, new URL(page, origin), BITS, MILLISECONDS), await visit(site.browser, new URL(page, origin), 1e9, 0)];
+        console.log(`${page}: first paint ${(slow.painted / 1000).toFixed(2)} s, first frame ${(slow.seen / 1000).toFixed(2)} s (${(fast.seen / 1000).toFixed(2)} s without a line), ${slow.bytes} bytes`);
+        expect(slow.seen, page).toBeLessThan(5000 + Math.max(0, fast.seen - OWN.seen));
+      }
+    } finally {
+      await site.close();
     }
   });
 });

@@ -1,6 +1,6 @@
 // The built player with real recordings, as it is embedded: in pages, frames, under strict policies, from another origin.
 
-import { readdirSync, readFileSync } from "node:fs";
+import { readdirSync, readFileSync, statSync } from "node:fs";
 import { join } from "node:path";
 import { gzipSync } from "node:zlib";
 import type { Frame, Page } from "playwright-core";
@@ -230,6 +230,27 @@ describeInBrowser("the built player", () => {
     await page.close();
   });
 
+  test.each([
+    { where: "a host that compresses nothing", headers: {}, script: null, aborted: null, packed: ["core.wasm.gz", "meshreel-player.js.gz", "three.js.gz"], refusals: 0 },
+    { where: "a browser that unpacks nothing", headers: {}, script: "delete globalThis.DecompressionStream", aborted: null, packed: [], refusals: 0 },
+    { where: "a host that has no gzips", headers: {}, script: null, aborted: "**/*.gz", packed: ["core.wasm.gz", "meshreel-player.js.gz", "three.js.gz"], refusals: 3 },
+    { where: "a page whose policy refuses what is unpacked", headers: { "Content-Security-Policy": STRICT }, script: null, aborted: null, packed: ["core.wasm.gz", "meshreel-player.js.gz", "three.js.gz"], refusals: 2 },
+  ])("load.js plays on $where", async ({ headers, script, aborted, packed, refusals }) => {
+    site.write("loaded.html", '<!doctype html><link rel="icon" href="data:,"><script type="module" src="player/load.js"></script><meshreel-player src="scene.reel"></meshreel-player>');
+    const url = await site.serveAgain(headers);
+    site.write("empty.html", '<!doctype html><link rel="icon" href="data:,">');
+    const { page, errors } = await site.visit("empty.html", script === null ? [] : [{ content: script }]);
+    if (aborted !== null) await page.route(aborted, (route) => route.abort());
+    const asked: string[] = [];
+    page.on("request", (request) => asked.push(request.url().replace(/.*\//, "")));
+    await page.goto(`${url}loaded.html`);
+    await ready(page);
+    expect([...new Set(asked)].filter((name) => name.endsWith(".gz")).sort()).toEqual(packed);
+    expect(asked.includes("three.js")).toBe(packed.length === 0 || refusals > 0);
+    expect(new Set(errors).size > 0).toBe(refusals > 0);
+    await page.close();
+  });
+
   test("it plays in a frame without rights, and offers no full screen there", async () => {
     site.write("inner.html", `<!doctype html>${SCRIPT}${PLAYER}`);
     const frameOf = `<iframe src="inner.html" sandbox="allow-scripts allow-same-origin" allow="fullscreen 'none'" width="340" height="260"></iframe>`;
@@ -357,8 +378,8 @@ describeInBrowser("the built player", () => {
     const files = readdirSync(join(site.folder, "player")).sort();
     expect(readdirSync(join(site.folder, "again")).sort()).toEqual(files);
     expect(files).toEqual([
-      "LICENSES.txt", "core.wasm", "core.wasm.br", "index.html", "meshreel-player.js", "meshreel-player.js.br", "order.js", "order.js.br",
-      "page.css", "page.js", "page.js.br", "three.js", "three.js.br", "worker.js", "worker.js.br",
+      "LICENSES.txt", "core.wasm", "core.wasm.br", "core.wasm.gz", "index.html", "load.js", "load.js.br", "meshreel-player.js", "meshreel-player.js.br",
+      "meshreel-player.js.gz", "order.js", "order.js.br", "page.css", "page.js", "page.js.br", "three.js", "three.js.br", "three.js.gz", "worker.js", "worker.js.br",
     ]);
     for (const name of files) {
       const bytes = readFileSync(join(site.folder, "player", name));
@@ -371,8 +392,10 @@ describeInBrowser("the built player", () => {
 
   test("the player is small enough for a page", () => {
     const size = (name: string) => gzipSync(readFileSync(join(site.folder, "player", name))).length;
-    expect(size("meshreel-player.js")).toBeLessThan(48_500);
+    expect(size("meshreel-player.js")).toBeLessThan(52_000);
     expect(size("three.js")).toBeLessThan(140_000);
     expect(size("worker.js") + size("core.wasm")).toBeLessThan(150_000);
+    const sent = ["load.js", "page.js", "meshreel-player.js", "three.js", "worker.js", "core.wasm"].map((name) => statSync(join(site.folder, "player", `${name}.br`)).size);
+    expect(sent.reduce((sum, bytes) => sum + bytes)).toBeLessThan(280_000);
   });
 });

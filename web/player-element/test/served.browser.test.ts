@@ -28,7 +28,8 @@ describeInBrowser("the player of meshreel play", () => {
       };
       const [first, second] = [await load(), await load()];
       const names = first.map((entry) => entry.name.replace(/.*\//, ""));
-      expect(names).toEqual(expect.arrayContaining(["page.js", "meshreel-player.js", "three.js", "core.wasm"]));
+      expect(names).toEqual(expect.arrayContaining(["page.js", "load.js", "meshreel-player.js", "three.js", "core.wasm"]));
+      expect(names.filter((name) => name.endsWith(".gz"))).toEqual([]);
       for (const entry of first) expect(entry.encodedBodySize).toBeLessThan(entry.decodedBodySize);
       expect(first.every((entry) => entry.transferSize > 0)).toBe(true);
       expect(second.map((entry) => entry.transferSize)).toEqual(second.map(() => 0));

@@ -205,7 +205,7 @@ describeInBrowser("the page of a recording", () => {
 
   test("without three.js an error says what is missing", async () => {
     const page = await site.browser.newPage();
-    await page.route("**/three.js", (route) => route.abort());
+    await page.route("**/three.js*", (route) => route.abort());
     await page.goto(new URL("player/index.html?src=/layers.reel", site.served.url).href);
     await page.getByRole("alert").waitFor();
     expect(await page.getByRole("alert").textContent()).toMatch(/player\/three\.js cannot be loaded/);
