@@ -12,7 +12,7 @@ import { NO_STATS, Session } from "./session.ts";
 import type { Limits } from "./session.ts";
 import type { Source } from "./net/source.ts";
 import { PLAYBACK_RATES } from "./types.ts";
-import type { Info, Layers, Playback, PlaybackEvents, Shown, Stats } from "./types.ts";
+import type { Direction, Info, Layers, Playback, PlaybackEvents, Shown, Stats } from "./types.ts";
 
 export interface PlayerOptions extends Partial<Limits> {
   readonly source: Source; // the player's own from here on: `dispose` closes it
@@ -40,6 +40,7 @@ export class Player extends PlaybackTarget implements Playback {
   #error: Error | null = null;
   #start = 0; // s, where to begin once the head is there
   #loop = false;
+  #direction: Direction = "normal";
   #rate = 1;
   #layers: Layers = "auto";
   #textures = true;
@@ -114,6 +115,15 @@ export class Player extends PlaybackTarget implements Playback {
     this.#wake();
   }
 
+  get direction(): Direction {
+    return this.#direction;
+  }
+  set direction(direction: Direction) {
+    this.#direction = direction;
+    if (this.#clock) this.#clock.direction = direction;
+    this.#wake();
+  }
+
   get playbackRate(): number {
     return this.#rate;
   }
@@ -161,7 +171,7 @@ export class Player extends PlaybackTarget implements Playback {
   async play(): Promise<void> {
     if (this.#error !== null) throw this.#error;
     this.load().catch(() => {}); // reported by the event, and by the promise below
-    if (this.#ended && this.#clock) this.#seek(this.#clock, 0);
+    if (this.#clock && (this.#ended || this.#clock.isAtEnd)) this.#seek(this.#clock, this.#clock.begin());
     if (this.#paused) {
       this.#paused = false;
       this.#ticking = setInterval(() => this.#tick(), TICK_MS);
@@ -197,9 +207,11 @@ export class Player extends PlaybackTarget implements Playback {
     this.#updated = performance.now();
     clock.advance(now);
     const frame = timeline.frameAt(clock.time);
+    session.textures.isBack = clock.isBack;
+    session.textures.turns = clock.direction === "alternate";
     const isShown = picture.show(frame, this.interpolate ? timeline.blendAt(clock.time, frame) : 0);
     if (clock.isRunning && !isShown) {
-      if (picture.isReady(frame)) session.textures.late(now);
+      if (picture.isReady(frame) && clock.direction === "normal") session.textures.late(now); // at a turn, and backwards, they are waited for
       clock.hold();
       this.#hasStalled = this.#isStallNew = true;
       this.#wake();
@@ -240,7 +252,9 @@ export class Player extends PlaybackTarget implements Playback {
       this.sound.open(opened.head, this.#source, this.#closed.signal);
       this.#clock.rate = this.#rate;
       this.#clock.loop = this.#loop;
+      this.#clock.direction = this.#direction;
       this.#clock.time = this.#session.timeline.clamp(this.#start);
+      if (this.#clock.isBack && this.#start === 0) this.#clock.time = this.#clock.begin();
       this.#tell("loadedmetadata");
       this.#wake();
     } catch (error) {
@@ -271,7 +285,7 @@ export class Player extends PlaybackTarget implements Playback {
     this.#wakesIn = Infinity;
     const [session, clock] = [this.#session, this.#clock];
     if (session === null || clock === null || this.#error !== null) return;
-    session.pump({ time: clock.time, speed: this.#rate, loop: this.#loop, layers: this.#layers, splats: this.splats, isPaused: this.#paused, isWaiting: this.#hasStalled && !clock.isRunning });
+    session.pump({ time: clock.time, speed: this.#rate, loop: this.#loop, direction: this.#direction, isBack: clock.isBack, layers: this.#layers, splats: this.splats, isPaused: this.#paused, isWaiting: this.#hasStalled && !clock.isRunning });
     if (this.#progress.isNew(session.fetcher.isFetching, TICK_MS)) this.#tell("progress");
     if (performance.now() - this.#updated > UNSEEN_MS) this.sound.rest(); // time stands still while nothing is displayed
     const level = this.#layers === "auto" ? session.level : this.#layers;
@@ -303,7 +317,8 @@ export class Player extends PlaybackTarget implements Playback {
     }
     if (this.#paused || clock.isRunning || clock.isAtEnd) return;
     const enough = ENOUGH[this.#hasStalled ? 1 : 0] * this.#rate;
-    if (!this.sound.isReady || (!session.isSated && session.readyAhead(clock.time, this.#loop, enough) < enough)) return;
+    const ready = (): number => (clock.isBack ? session.readyBehind(clock.time, this.#loop, enough) : session.readyAhead(clock.time, this.#loop, enough));
+    if (!this.sound.isReady || (!session.isSated && ready() < enough)) return;
     clock.start();
     this.#hasStalled = false;
     this.#tell("playing");

@@ -17,7 +17,7 @@ import { plan } from "./time/scheduler.ts";
 import type { Coming, Plan, Step } from "./time/scheduler.ts";
 import type { Source } from "./net/source.ts";
 import { Textures } from "./time/textures.ts";
-import type { Layers, Packed, Stats } from "./types.ts";
+import type { Direction, Layers, Packed, Stats } from "./types.ts";
 
 export interface Limits {
   readonly bufferSeconds: number; // of bytes fetched ahead, at normal speed
@@ -30,6 +30,8 @@ export interface Aim {
   readonly time: number; // s
   readonly speed: number; // content seconds a second
   readonly loop: boolean;
+  readonly direction: Direction;
+  readonly isBack: boolean; // time goes down
   readonly layers: Layers;
   readonly splats: boolean; // true if they are wanted
   readonly isPaused: boolean;
@@ -113,6 +115,8 @@ export class Session {
     const outlook = {
       time: aim.time,
       loop: aim.loop,
+      direction: aim.direction,
+      isBack: aim.isBack,
       fetchSeconds: Math.max(bufferSeconds, decodedSeconds) * aim.speed,
       decodeSeconds: decodedSeconds * aim.speed,
       behindSeconds: BEHIND,
@@ -137,7 +141,7 @@ export class Session {
     const later = wishesOf(made.steps.filter(({ ahead }) => ahead > 0));
     const more = made.more.flatMap(({ ahead, ...wanted }) => this.#wishesOf(wanted, whenOf(ahead)));
     const whole = isAuto && this.#isResting ? this.#wholeWishes(made) : [];
-    const slow = this.#slowWishes(made, aim.time, aim.time + outlook.fetchSeconds);
+    const slow = this.#slowWishes(made, aim.isBack ? aim.time - outlook.fetchSeconds : aim.time, aim.isBack ? aim.time : aim.time + outlook.fetchSeconds);
     const idle = isAuto ? this.#idleWishes(made, aim, outlook.bearable, whenOf) : [];
     this.fetcher.want([...this.#pictureWishes(made, whenOf), ...urgent, ...whole, ...slow, ...later, ...more, ...idle]);
   }
@@ -152,6 +156,20 @@ export class Session {
       sum += this.timeline.startOf(next) - this.timeline.startOf(frame);
       frame = next % frameCount;
       if (frame === 0 && (!loop || sum >= duration)) return Infinity;
+    }
+    return Math.max(0, sum);
+  }
+
+  /** As `readyAhead`, where time goes down. */
+  readyBehind(time: number, loop: boolean, most: number): number {
+    const { duration, frameCount } = this.timeline;
+    let frame = this.timeline.frameAt(time);
+    let sum = time - this.timeline.startOf(frame);
+    while (sum < most && this.picture.isReady(frame)) {
+      const first = Math.max(...this.head.tracks.map((_, track) => this.head.chunkOfFrame(frame, track).shownFirst));
+      sum += this.timeline.startOf(frame) - this.timeline.startOf(first);
+      if (first === 0 && (!loop || sum >= duration)) return Infinity;
+      frame = first > 0 ? first - 1 : frameCount - 1;
     }
     return Math.max(0, sum);
   }

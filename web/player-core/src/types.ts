@@ -204,6 +204,10 @@ export interface PlaybackEvents {
   error: CustomEvent<Error>; // nothing more can be played
 }
 
+/** Directions of playback: to the end, to the start, or there and back; the words are those of CSS animations. */
+export const DIRECTIONS = ["normal", "reverse", "alternate"] as const;
+export type Direction = (typeof DIRECTIONS)[number];
+
 /** Sound of a recording, if it has any. */
 export interface Heard {
   muted: boolean; // set by itself, where the browser plays nothing aloud before the viewer has done something
@@ -223,6 +227,7 @@ export interface Playback extends EventTarget {
   readonly sound: Heard;
   currentTime: number; // s from the first frame; setting it seeks
   loop: boolean;
+  direction: Direction; // backwards it is silent
   playbackRate: number; // within PLAYBACK_RATES
   interpolate: boolean; // blend between frames of a group
   layers: Layers;

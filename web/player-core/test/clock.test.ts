@@ -76,6 +76,47 @@ describe("a clock", () => {
     expect(clock.isAtEnd).toBe(false);
   });
 
+  test("in reverse goes down to the start, and with loop on from the end, no time lost", () => {
+    const clock = new Clock(TEN);
+    clock.direction = "reverse";
+    clock.time = clock.begin();
+    expect([clock.time, clock.isAtEnd]).toEqual([10, false]);
+    clock.start();
+    run(clock, 0, 3000);
+    expect(clock.time).toBeCloseTo(7, 9);
+    run(clock, 3010, 11_000);
+    expect([clock.time, clock.isAtEnd]).toEqual([0, true]);
+    clock.loop = true;
+    run(clock, 11_007, 13_002, 7);
+    expect(clock.time).toBeCloseTo(10 - 2.002 + 0.002, 2);
+  });
+
+  test("to and fro turns at the end, and at the start with loop, no time lost", () => {
+    const clock = new Clock(TEN);
+    clock.direction = "alternate";
+    clock.start();
+    run(clock, 0, 12_000);
+    expect([clock.time, clock.isBack]).toEqual([expect.closeTo(8, 9), true]);
+    run(clock, 12_010, 21_000);
+    expect([clock.time, clock.isAtEnd]).toEqual([0, true]);
+    clock.time = clock.begin();
+    clock.loop = true;
+    run(clock, 21_010, 44_000);
+    expect([clock.time, clock.isBack]).toEqual([expect.closeTo(3, 9), false]);
+  });
+
+  test("a hold takes back a turn, too", () => {
+    const clock = new Clock(TEN);
+    clock.direction = "alternate";
+    clock.time = 9.99;
+    clock.start();
+    clock.advance(0);
+    clock.advance(30);
+    expect(clock.isBack).toBe(true);
+    clock.hold();
+    expect([clock.time, clock.isBack]).toEqual([9.99, false]);
+  });
+
   test("holds where it was at the picture before", () => {
     const clock = new Clock(TEN);
     clock.start();

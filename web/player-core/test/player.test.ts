@@ -198,6 +198,27 @@ describe("a stall", () => {
   });
 });
 
+describe("backwards", () => {
+  test("every frame is shown from the last to the first, chains or not, and again from the last", async () => {
+    rig.begin(stream(20, FULL, 5), 3 * RATE);
+    rig.player.direction = "reverse";
+    await Promise.all([rig.player.play(), pass(25)]);
+    expect(rig.viewer.frames).toEqual(frames(0, 500).reverse());
+    expect([rig.viewer.events.at(-1), rig.player.stats.stalls, rig.player.currentTime]).toEqual(["ended", 0, 0]);
+    await Promise.all([rig.player.play(), pass(1)]);
+    expect(rig.player.currentFrame).toBeGreaterThan(470);
+  });
+
+  test("a loop that turns shows every frame on both ways, and waits at no turn", async () => {
+    rig.begin(stream(4, FULL, 5), 3 * RATE);
+    Object.assign(rig.player, { direction: "alternate", loop: true });
+    await Promise.all([rig.player.play(), pass(9.5)]);
+    const round = [...frames(0, 100), ...frames(1, 99).reverse()];
+    expect(rig.viewer.frames.slice(0, round.length + 20)).toEqual([...round, ...frames(0, 20)]);
+    expect([rig.player.stats.stalls, rig.player.paused]).toEqual([0, false]);
+  });
+});
+
 describe("a loop", () => {
   test("is played without a stall, and every frame in it", async () => {
     rig.begin(stream(8, FULL, 5), 2 * RATE, { bufferSeconds: 3, decodedSeconds: 2 });

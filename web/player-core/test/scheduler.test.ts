@@ -29,7 +29,7 @@ class Table implements Holdings {
   secondsOf = (): number => this.seconds;
 }
 
-const OUTLOOK: Outlook = { time: 0, loop: false, fetchSeconds: 4, decodeSeconds: 2, behindSeconds: 1, memory: 1e9, layers: 9, bearable: Infinity, isResting: false, speed: 1, exact: false };
+const OUTLOOK: Outlook = { time: 0, loop: false, direction: "normal", isBack: false, fetchSeconds: 4, decodeSeconds: 2, behindSeconds: 1, memory: 1e9, layers: 9, bearable: Infinity, isResting: false, speed: 1, exact: false };
 
 function planned(file: Uint8Array, outlook: Partial<Outlook> = {}, table = new Table()): Plan {
   const head = Head.parse(file);
@@ -52,6 +52,21 @@ describe("ahead", () => {
     expect(steps.steps.filter(({ decode }) => decode).map(({ chunk }) => chunk.number)).toEqual([0, 1, 2, 3, 4, 5]);
     expect([...steps.keep]).toEqual([0, 1, 2, 3, 4, 5]);
     expect(steps.steps.map(({ ahead }) => ahead)).toEqual([0, 0.4, 0.8, 1.2, 1.6, 2, 2.4, 2.8, 3.2, 3.6, 4].map((time) => expect.closeTo(time, 9) as number));
+  });
+
+  test("where time goes down groups come in the other order, from the end again with loop, and back up where it turns", () => {
+    const back = { time: 1.9, isBack: true, direction: "reverse", fetchSeconds: 1, decodeSeconds: 0.5 } as const;
+    const steps = planned(stream(20, [100, 100]), back);
+    expect(numbers(steps)).toEqual([4, 3, 2]);
+    expect(steps.steps.map(({ ahead }) => ahead)).toEqual([0, 0.3, 0.7].map((time) => expect.closeTo(time, 9) as number));
+    expect(steps.steps.map(({ decode }) => decode)).toEqual([true, true, false]);
+    expect([...steps.keep].sort((a, b) => a - b)).toEqual([3, 4, 5, 6, 7]); // those of a second that were shown, too
+    const short = stream(4, [100]);
+    expect(numbers(planned(short, { ...back, time: 0.5 }))).toEqual([1, 0]);
+    expect(numbers(planned(short, { ...back, time: 0.5, loop: true }))).toEqual([1, 0, 9, 8]);
+    expect(numbers(planned(short, { ...back, time: 0.5, loop: true, direction: "alternate" }))).toEqual([1, 0]);
+    expect(numbers(planned(short, { ...back, time: 0.3, loop: true, direction: "alternate" }))).toEqual([0, 1]);
+    expect(numbers(planned(short, { time: 3.7, direction: "alternate", fetchSeconds: 1 }))).toEqual([9, 8]);
   });
 
   test("of the end nothing comes; with loop the beginning does, in time", () => {

@@ -54,6 +54,27 @@ describe("pictures", () => {
     };
   }
 
+  test.each([["reverse", 5], ["alternate", 5], ["alternate", 30]] as const)("in %s are a few of each group, of no other group and none missing, and come in time: a picture in %i ms", async (direction, ms) => {
+    FakeDecoder.ms = ms;
+    rig.begin(textured(6, 3), FAST);
+    Object.assign(rig.player, { direction, loop: true });
+    const behind: number[] = [];
+    const look = rig.viewer.look.bind(rig.viewer);
+    rig.viewer.look = () => {
+      look();
+      const { shown } = rig.viewer;
+      if (frameOf(shown) === undefined) return expect(behind.length).toBe(0); // before the first
+      behind.push(shown!.frame - frameOf(shown)!);
+      expect(Math.floor(shown!.frame / FRAMES)).toBe(Math.floor(frameOf(shown)! / FRAMES));
+    };
+    await Promise.all([rig.player.play(), pass(12)]);
+    expect(rig.viewer.frames.length).toBeGreaterThan(ms > 5 ? 50 : 250);
+    expect(behind.length).toBeGreaterThan(500);
+    expect(new Set(behind)).toEqual(new Set([0, 1, 2]));
+    if (ms === 5) expect(rig.player.stats.stalls).toBe(0); // a chain of 30 in 0.4 s
+    expect(rig.player.stats).toMatchObject({ textures: "shown" });
+  });
+
   test("come with the layers that need them: until they are decoded a loop goes on without, and does not wait", async () => {
     rig.begin(textured(2, 2), FAST);
     rig.player.loop = true;

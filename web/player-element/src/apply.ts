@@ -6,6 +6,7 @@ import type { Stage } from "./stage.ts";
 
 export function applyToPlayback(name: string, settings: Reflected, playback: Playback): void {
   if (name === "loop") playback.loop = settings.loop;
+  if (name === "direction") playback.direction = settings.direction;
   if (name === "layers") playback.layers = settings.layers;
   if (name === "speed" || name === "playbackrate") playback.playbackRate = settings.playbackRate;
   if (name === "textures") playback.textures = settings.textures;

@@ -1,7 +1,7 @@
 // Attributes and properties: what a page writes, and what the player takes from it. Nothing here knows the DOM.
 
-import { PLAYBACK_RATES } from "@meshreel/player-core/types";
-import type { Layers } from "@meshreel/player-core/types";
+import { DIRECTIONS, PLAYBACK_RATES } from "@meshreel/player-core/types";
+import type { Direction, Layers } from "@meshreel/player-core/types";
 import { MODES, shownMode } from "@meshreel/player-three/modes";
 import type { Looks, Mode } from "@meshreel/player-three/modes";
 import type { Up } from "@meshreel/player-three/upright";
@@ -10,7 +10,7 @@ export type Theme = "auto" | "light" | "dark";
 
 /** Attributes whose change the element must hear of. */
 export const OBSERVED = [
-  "src", "controls", "autoplay", "loop", "poster", "layers", "speed", "playbackrate", "interpolate", "mode", "camera",
+  "src", "controls", "autoplay", "loop", "direction", "poster", "layers", "speed", "playbackrate", "interpolate", "mode", "camera",
   "up", "stats", "background", "theme", "textures", "ground", "exposure",
   "autorotate", "fly", "section", "frames", "share", "muted", "volume", "playsinline", "crossorigin",
 ] as const;
@@ -26,6 +26,8 @@ const readNumber: Reader<number> = (text) => (text.trim() !== "" && Number.isFin
 const readLayers: Reader<Layers> = (text) => (/^\s*\d+\s*$/.test(text) ? Number(text) : words("auto")(text));
 
 const readMode: Reader<Mode> = (text) => (words("colour")(text) ? "color" : words(...MODES)(text));
+
+const readDirection = words(...DIRECTIONS);
 
 const readTheme = words<Theme>("auto", "light", "dark");
 
@@ -61,6 +63,7 @@ const readSwitch: Reader<boolean> = (text) => {
 /** Attributes that keep their value where a new one is none. Text without anything in it is as no attribute. */
 const RULES: Readonly<Record<string, { read: Reader<unknown>; wanted: string }>> = {
   camera: { read: readCamera, wanted: "six numbers with commas, as 0,1,3,0,1,0" },
+  direction: { read: readDirection, wanted: DIRECTIONS.join(", ") },
   interpolate: { read: readSwitch, wanted: "on, or off" },
   textures: { read: readSwitch, wanted: "on, or off" },
   ground: { read: readSwitch, wanted: "on, or off" },
@@ -102,6 +105,10 @@ export function parseLayers(text: string | null): Layers {
   return readLayers(text ?? "") ?? "auto";
 }
 
+export function parseDirection(text: string | null): Direction {
+  return readDirection(text ?? "") ?? "normal";
+}
+
 /** Appearance of surfaces without an attribute: the first of splats, colours and shading that the recording has. */
 export function parseMode(text: string | null, has: Looks | null): Mode {
   return shownMode(readMode(text ?? "") ?? "splats", has);
@@ -133,6 +140,6 @@ export function parseFlag(text: string | null): boolean {
 
 /** Properties that a page may have set before the element was defined. */
 export const PROPERTIES = [
-  "src", "poster", "preload", "controls", "autoplay", "loop", "stats", "layers", "playbackRate", "interpolate", "textures", "mode", "theme",
+  "src", "poster", "preload", "controls", "autoplay", "loop", "direction", "stats", "layers", "playbackRate", "interpolate", "textures", "mode", "theme",
   "up", "background", "camera", "currentTime", "ground", "exposure", "autoRotate", "fly", "section", "frames", "share", "muted", "volume", "playsInline", "crossOrigin",
 ];

@@ -23,10 +23,10 @@ export class RealEngine implements Engine {
     this.#players = new Players(files);
   }
 
-  open(source: string | Blob, { layers, interpolate, textures, splats, loop, playbackRate, muted, volume, crossOrigin }: Settings): Player {
+  open(source: string | Blob, { layers, interpolate, textures, splats, loop, direction, playbackRate, muted, volume, crossOrigin }: Settings): Player {
     const player = this.#players.open(source, crossOrigin);
     Object.assign(player.sound, { muted, volume });
-    Object.assign(player, { layers, interpolate, textures, splats, loop, playbackRate });
+    Object.assign(player, { layers, interpolate, textures, splats, loop, direction, playbackRate });
     player.load().catch(() => undefined); // reported by the error event
     return player;
   }

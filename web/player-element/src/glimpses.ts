@@ -18,7 +18,7 @@ export class Glimpses {
   /** Opens the source a second time. */
   constructor(engine: Engine, source: string | Blob, crossOrigin: string | null, easel: Easel) {
     this.#playback = engine.open(source, {
-      layers: 0, interpolate: false, textures: false, splats: false, loop: false, playbackRate: 1, muted: true, volume: 0, crossOrigin,
+      layers: 0, interpolate: false, textures: false, splats: false, loop: false, direction: "normal", playbackRate: 1, muted: true, volume: 0, crossOrigin,
     });
     this.#playback.addEventListener("release", (event) => easel.release((event as CustomEvent<Packed>).detail));
     for (const type of ["canplay", "seeked"]) {

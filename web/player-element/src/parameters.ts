@@ -1,4 +1,4 @@
-// Parameters of the page's address: ?src, ?t, ?autoplay, ?loop, ?stats, ?mode, ?layers, ?camera, ?speed, ?theme, ?up, ?background,
+// Parameters of the page's address: ?src, ?t, ?autoplay, ?loop, ?direction, ?stats, ?mode, ?layers, ?camera, ?speed, ?theme, ?up, ?background,
 // ?poster, ?interpolate, ?textures, ?ground, ?exposure, ?section, ?controls, ?autorotate, ?fly, ?frames, ?muted, ?volume, ?bench. All but t and bench are attributes of the element.
 
 export interface Parameters {
@@ -8,7 +8,7 @@ export interface Parameters {
   readonly bench: number | null; // s to measure for; null where it is not asked for
 }
 
-const TEXTS = ["src", "mode", "layers", "camera", "speed", "theme", "up", "background", "poster", "interpolate", "textures", "ground", "exposure", "section", "volume"];
+const TEXTS = ["src", "mode", "layers", "camera", "speed", "theme", "up", "background", "poster", "interpolate", "textures", "ground", "exposure", "direction", "section", "volume"];
 const BENCH = 20; // s, where none are given
 const FLAGS = ["autoplay", "loop", "stats", "controls", "autorotate", "fly", "frames", "muted"];
 

@@ -16,11 +16,14 @@ export interface Recorded extends Sectioned, EventTarget {
   pause(): void;
 }
 
-/** Plays the section, or all, once from its start, and gives what the canvas showed; less if the viewer pauses. It has no sound. */
+/** Plays the section, or all, once in its direction, and gives what the canvas showed; less if the viewer pauses. It has no sound. */
 export async function record(player: Recorded, canvas: HTMLCanvasElement): Promise<Blob> {
-  const [from] = player.section ?? [0];
+  const [from, to] = player.section ?? [0, player.duration];
+  let way = player.direction === "reverse" ? -1 : 1;
+  let turns = player.direction === "alternate" ? 2 : 1; // and jumps, until it is where it began
+  let last = way > 0 ? from : to;
   player.pause();
-  player.currentTime = from;
+  player.currentTime = last;
   await until(() => !player.seeking || player.error !== null);
   const recorder = new MediaRecorder(canvas.captureStream(), { mimeType: TYPES.find((type) => MediaRecorder.isTypeSupported(type)) ?? "", videoBitsPerSecond: BITS });
   const parts: Blob[] = [];
@@ -29,11 +32,11 @@ export async function record(player: Recorded, canvas: HTMLCanvasElement): Promi
   recorder.start();
   try {
     await player.play();
-    let last = from;
     await until(() => {
-      const before = last;
-      last = player.currentTime;
-      return last < before || player.paused || player.ended; // it began again, or does not go on
+      const moved = player.currentTime - last;
+      last += moved;
+      if (moved * way < 0) [way, turns] = [-way, turns - 1];
+      return turns === 0 || player.paused || player.ended;
     });
   } finally {
     recorder.stop();

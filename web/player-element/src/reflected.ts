@@ -1,6 +1,6 @@
 // Properties that are attributes: the attribute is the one place where a setting is kept, so HTML, scripts and controls agree.
 
-import type { Info, Layers } from "@meshreel/player-core/types";
+import type { Direction, Info, Layers } from "@meshreel/player-core/types";
 import type { Mode } from "@meshreel/player-three/modes";
 import * as parse from "./attributes.ts";
 import type { Up } from "@meshreel/player-three/upright";
@@ -82,6 +82,14 @@ export class Reflected extends Element {
   }
   set loop(value: boolean) {
     this.toggleAttribute("loop", value);
+  }
+
+  /** To the end, to the start, or there and back. */
+  get direction(): Direction {
+    return parse.parseDirection(this.getAttribute("direction"));
+  }
+  set direction(value: Direction) {
+    this.setAttribute("direction", value);
   }
 
   /** True while the statistics are shown. */

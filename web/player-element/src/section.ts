@@ -1,5 +1,7 @@
 // Playing one part over and over.
 
+import type { Direction } from "@meshreel/player-core/types";
+
 const NEAR_END = 1e-3; // s: attributes have three digits
 
 /** The part of a player that it needs. */
@@ -9,17 +11,19 @@ export interface Sectioned {
   readonly paused: boolean;
   readonly ended: boolean;
   readonly seeking: boolean;
+  readonly direction: Direction;
   currentTime: number;
   play(): Promise<void>;
 }
 
-/** After each picture, and at the end: goes back to the section's start where its end is passed. */
+/** After each picture, and at the end: goes back to the section's start where its end is passed; in reverse, to its end. */
 export function keepToSection(player: Sectioned): void {
   const { section } = player;
   if (section === null || player.seeking || (player.paused && !player.ended)) return;
   const [from, to] = section;
-  if (player.currentTime < to && !player.ended) return;
-  player.currentTime = from;
+  const isReverse = player.direction === "reverse";
+  if ((isReverse ? player.currentTime > from : player.currentTime < to) && !player.ended) return;
+  player.currentTime = isReverse ? to : from;
   if (player.paused) player.play().catch(() => undefined); // reported by the error event
 }
 

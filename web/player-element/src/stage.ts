@@ -1,6 +1,6 @@
 // Interfaces of the stage, which draws, and of the playback, which opens files, for the element, which knows no WebGL.
 
-import type { Info, Layers, Packed, Playback, Shown } from "@meshreel/player-core/types";
+import type { Direction, Info, Layers, Packed, Playback, Shown } from "@meshreel/player-core/types";
 import type { Mode } from "@meshreel/player-three/modes";
 import type { VrActions } from "@meshreel/xr/actions";
 import type { Up } from "@meshreel/player-three/upright";
@@ -60,6 +60,7 @@ export interface Settings {
   readonly textures: boolean;
   readonly splats: boolean;
   readonly loop: boolean;
+  readonly direction: Direction;
   readonly playbackRate: number;
   readonly muted: boolean;
   readonly volume: number;

@@ -1,7 +1,7 @@
 // A playback and a stage that fetch, decode and draw nothing: what the element does with them can be seen from outside.
 
 import { SourceError, type SourceErrorKind } from "@meshreel/player-core/errors";
-import type { Info, Layers, Packed, Playback, Shown, Stats } from "@meshreel/player-core/types";
+import type { Direction, Info, Layers, Packed, Playback, Shown, Stats } from "@meshreel/player-core/types";
 import type { Mode } from "@meshreel/player-three/modes";
 import { GraphicsError } from "../src/stage.ts";
 import type { Engine, Settings, Stage } from "../src/stage.ts";
@@ -18,6 +18,7 @@ export class FakePlayback extends EventTarget implements Playback {
   ended = false;
   seeking = false;
   loop: boolean;
+  direction: Direction;
   playbackRate: number;
   interpolate: boolean;
   textures: boolean;
@@ -28,6 +29,7 @@ export class FakePlayback extends EventTarget implements Playback {
   updates = 0;
   disposed = false;
   #time = 0;
+  #isBack = false;
   #before: number | null = null;
   #shown: Shown | null = null;
   #timers: ReturnType<typeof setTimeout>[] = [];
@@ -37,6 +39,7 @@ export class FakePlayback extends EventTarget implements Playback {
     super();
     this.source = source;
     this.loop = settings.loop;
+    this.direction = settings.direction;
     this.playbackRate = settings.playbackRate;
     this.interpolate = settings.interpolate;
     this.textures = settings.textures;
@@ -97,8 +100,12 @@ export class FakePlayback extends EventTarget implements Playback {
     this.updates++;
     if (!this.info) return null;
     if (!this.paused && !this.seeking && !this.stalled && this.#before !== null) {
-      this.#time += ((now - this.#before) / 1000) * this.playbackRate;
-      if (this.#time >= this.duration) this.#end();
+      this.#isBack = this.direction === "reverse" || (this.direction === "alternate" && this.#isBack);
+      this.#time += ((now - this.#before) / 1000) * this.playbackRate * (this.#isBack ? -1 : 1);
+      if (this.#isBack ? this.#time <= 0 : this.#time >= this.duration) {
+        if (this.direction === "alternate" && !this.#isBack) this.#isBack = true;
+        else this.#end();
+      }
     }
     this.#before = now;
     if (this.#shown?.frame !== this.currentFrame) this.#shown = { frame: this.currentFrame, blend: 0, frames: [this.currentFrame], groups: [null], background: null, images: [null], backgroundImage: null };

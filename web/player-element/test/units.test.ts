@@ -199,7 +199,7 @@ describe("messages", () => {
 describe("drawing only what changed", () => {
   const shown = { frame: 3, blend: 0.5, frames: [3], groups: [null], background: null, images: [null], backgroundImage: null };
   test("a paused playback that has shown something needs no pictures", () => {
-    const playback = new FakePlayback("x", { layers: "auto", interpolate: true, textures: true, splats: true, loop: false, playbackRate: 1, muted: false, volume: 1, crossOrigin: null });
+    const playback = new FakePlayback("x", { layers: "auto", interpolate: true, textures: true, splats: true, loop: false, direction: "normal", playbackRate: 1, muted: false, volume: 1, crossOrigin: null });
     expect(goesOn(playback, null)).toBe(true);
     expect(goesOn(playback, shown)).toBe(false);
     playback.seeking = true;
@@ -225,7 +225,7 @@ describe("small parts", () => {
     expect([ranges(2, 2).length, ranges(0, NaN).length]).toEqual([0, 0]);
   });
   test("the statistics name what the overlay must show", () => {
-    const playback = new FakePlayback("x", { layers: "auto", interpolate: true, textures: true, splats: true, loop: false, playbackRate: 1, muted: false, volume: 1, crossOrigin: null });
+    const playback = new FakePlayback("x", { layers: "auto", interpolate: true, textures: true, splats: true, loop: false, direction: "normal", playbackRate: 1, muted: false, volume: 1, crossOrigin: null });
     const lines = statisticsLines({ ...playback.stats, triangles: 41_234, gpuBytes: 12_345_678, splats: 0, sortMs: 0, headsetRate: 0, fps: 60, frameMs: 0.42, drawn: 1 }, INFO, 4);
     expect(Object.fromEntries(lines)).toMatchObject({
       Frame: "5 of 48, 24 fps", Bitrate: "2.41 Mbit/s", "Connection speed": "48.2 Mbit/s", Triangles: "41,234", "GPU memory": "12.3 MB", Layers: "3 of 3",
@@ -239,7 +239,7 @@ describe("the layers in the overlay", () => {
   test.each([
     [3, 3, 3, "3 of 3"], [1, 3, 3, "1 of 3"], [0, 0, 3, "3 of 3"], [2, 2, 3, "3 of 3"], [1, 2, 3, "1 of 2"], [0, 0, 0, "one only"],
   ])("%i layers of the %i there are, of %i in the file: %s", (layers, wholeLayers, mostLayers, text) => {
-    const playback = new FakePlayback("x", { layers: "auto", interpolate: true, textures: true, splats: true, loop: false, playbackRate: 1, muted: false, volume: 1, crossOrigin: null });
+    const playback = new FakePlayback("x", { layers: "auto", interpolate: true, textures: true, splats: true, loop: false, direction: "normal", playbackRate: 1, muted: false, volume: 1, crossOrigin: null });
     const numbers = { ...playback.stats, layers, wholeLayers, triangles: 0, gpuBytes: 0, splats: 0, sortMs: 0, headsetRate: 0, fps: 0, frameMs: 0, drawn: 0 };
     expect(Object.fromEntries(statisticsLines(numbers, { ...INFO, mostLayers }, 0)).Layers).toBe(text);
     playback.dispose();

@@ -125,6 +125,41 @@ describeInBrowser("the page of a recording", () => {
     await page.close();
   });
 
+  test("it plays backwards, there and back, and a part backwards", async () => {
+    const { page, errors } = await visit("&loop&direction=reverse");
+    await page.keyboard.press("k");
+    /** The turns and jumps until there are so many, and the times between which it was; how much it moved each way. */
+    const watch = (count: number) => page.evaluate(async (most) => {
+      const player = document.querySelector("meshreel-player")!;
+      let [last, turns, up, down, way] = [player.currentTime, 0, 0, 0, 0];
+      const range = [last, last];
+      while (turns < most) {
+        await new Promise((done) => requestAnimationFrame(done));
+        const moved = player.currentTime - last;
+        last += moved;
+        if (moved > 0) up += moved;
+        else down -= moved;
+        if (moved * way < 0) turns++;
+        if (moved !== 0) way = Math.sign(moved);
+        range.splice(0, 2, Math.min(range[0]!, last), Math.max(range[1]!, last));
+      }
+      return { range, up, down, jumps: way };
+    }, count);
+    const { duration } = await page.evaluate(() => ({ duration: document.querySelector("meshreel-player")!.duration }));
+    const reverse = await watch(4); // down, a jump up, down, a jump up, down
+    expect([reverse.up / duration > 1.2, reverse.range[0]! < 0.2 * duration, reverse.range[1]! > 0.8 * duration]).toEqual([true, true, true]);
+    await page.evaluate(() => void (document.querySelector("meshreel-player")!.section = [0.1, 0.25]));
+    await watch(3); // until it is there
+    const part = await watch(4);
+    expect([part.range[0]! > 0, part.range[1]! < 0.3]).toEqual([true, true]);
+    await page.evaluate(() => Object.assign(document.querySelector("meshreel-player")!, { section: null, direction: "alternate" }));
+    const both = await watch(3);
+    expect(Math.min(both.up, both.down)).toBeGreaterThan(0.5 * duration);
+    expect(await page.evaluate(() => document.querySelector("meshreel-player")!.statistics!.skippedGroups)).toBe(0);
+    expect(errors).toEqual([]);
+    await page.close();
+  });
+
   test("the keys [ and ] set where a part begins and ends, N counts frames", async () => {
     const { page } = await visit("");
     const section = () => page.evaluate(() => document.querySelector("meshreel-player")!.section);

@@ -1,5 +1,7 @@
 // Content time from display time.
 
+import type { Direction } from "../types.ts";
+
 const LONGEST_STEP = 0.5; // s of display time; where nothing was displayed for longer, time stood still
 const PULL = 0.15; // s in which two thirds of a difference to what leads are made up for: it may not tell its time evenly
 const NEAR = 0.03; // s that it is never off by, but where it stands still until that is so
@@ -56,10 +58,12 @@ export class Clock {
   time = 0; // s
   rate = 1;
   loop = false;
-  lead: Lead | null = null;
+  lead: Lead | null = null; // forwards; backwards it rests
+  #direction: Direction = "normal";
+  #isBack = false; // time goes down
   #isRunning = false;
   #last = NaN; // ms, of the picture before
-  #before = 0; // s, time at the picture before
+  #before = { time: 0, isBack: false }; // at the picture before
 
   constructor(timeline: Timeline) {
     this.timeline = timeline;
@@ -80,26 +84,59 @@ export class Clock {
     this.lead?.rest();
   }
 
+  get direction(): Direction {
+    return this.#direction;
+  }
+  set direction(direction: Direction) {
+    this.#direction = direction;
+    this.#isBack = direction === "reverse";
+    this.lead?.rest();
+  }
+
+  get isBack(): boolean {
+    return this.#isBack;
+  }
+
   get isAtEnd(): boolean {
-    return !this.loop && this.time >= this.timeline.duration;
+    if (this.loop) return false;
+    return this.#isBack ? this.time <= 0 : this.#direction === "normal" && this.time >= this.timeline.duration;
+  }
+
+  /** Where it goes on from its end, s; from there to and fro begins with its way to the end. */
+  begin(): number {
+    this.#isBack = this.#direction === "reverse";
+    return this.#isBack ? this.timeline.duration : 0;
   }
 
   /** Goes on to the time of a picture that is displayed at `now`, ms of any clock that does not go back. */
   advance(now: number): void {
     const passed = (now - this.#last) / 1000;
     this.#last = now;
-    this.#before = this.time;
+    this.#before.time = this.time;
+    this.#before.isBack = this.#isBack;
     if (!this.#isRunning || !(passed > 0)) return;
+    const step = Math.min(passed, LONGEST_STEP);
+    if (this.#isBack) this.time -= step * this.rate;
+    else this.#step(step);
+    if (this.#isBack ? this.time <= 0 : this.time >= this.timeline.duration) this.#turn(this.#isBack ? -this.time : this.time - this.timeline.duration);
+  }
+
+  /** Goes on from an end that was passed by so many seconds, or stays there. */
+  #turn(beyond: number): void {
     const { duration } = this.timeline;
-    this.#step(Math.min(passed, LONGEST_STEP));
-    if (this.time < duration) return;
-    this.time = this.loop ? this.time % duration : duration;
+    const isAlternate = this.#direction === "alternate";
     this.lead?.rest();
+    if (!this.loop && !(isAlternate && !this.#isBack)) this.time = this.#isBack ? 0 : duration;
+    else {
+      if (isAlternate) this.#isBack = !this.#isBack;
+      this.time = this.#isBack ? duration - (beyond % duration) : beyond % duration;
+    }
   }
 
   /** Stops, and takes the last step back: what it led to is not at hand. */
   hold(): void {
-    this.time = this.#before;
+    this.time = this.#before.time;
+    this.#isBack = this.#before.isBack;
     this.stop();
   }
 

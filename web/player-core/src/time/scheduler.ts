@@ -5,6 +5,7 @@ import { Form } from "../format/layout.gen.ts";
 import { mostLayers } from "../format/links.ts";
 import type { Links } from "../format/links.ts";
 import type { Chunk, Head } from "../format/reader.ts";
+import type { Direction } from "../types.ts";
 
 /** State on which a plan is based. Layers are counted beyond the first; -1: not at hand. */
 export interface Holdings {
@@ -26,6 +27,8 @@ export interface Holdings {
 export interface Outlook {
   readonly time: number; // s
   readonly loop: boolean;
+  readonly direction: Direction;
+  readonly isBack: boolean; // time goes down
   readonly fetchSeconds: number; // of content, ahead
   readonly decodeSeconds: number; // of content, ahead; not more than fetchSeconds
   readonly behindSeconds: number; // of content: what is decoded behind the play head is kept
@@ -84,7 +87,7 @@ const SPARE = 1 / 2; // of the time until a group was shown: what decoding its c
 const SURE_GROUPS = 2; // of each track, the shown one and the next: wanted whatever memory they take
 
 /**
- * Steps for the frame at the play head first, then for those ahead in their order, from the start again with `loop`.
+ * Steps for the frame at the play head first, then for those ahead in their order, from the start again with `loop`. Ahead is where time goes to.
  *
  * Chunks are fetched with `layers` and decoded with all that are at hand. A group predicted from another is decoded with as many layers or fewer, so
  * within a chain their number falls; it rises with the next group that stands alone, or where finer bytes are at hand and there is time to decode the chain
@@ -92,28 +95,50 @@ const SURE_GROUPS = 2; // of each track, the shown one and the next: wanted what
  */
 export function plan(head: Head, links: Links, timeline: Timeline, outlook: Outlook, holdings: Holdings): Plan {
   const planner = new Planner(head, links, outlook, holdings);
-  const { time, decodeSeconds, behindSeconds } = outlook;
+  const { time, decodeSeconds, behindSeconds, isBack } = outlook;
   const now = timeline.frameAt(time);
   const most = Math.max(FEWEST_GROUPS, Math.floor(MOST_GROUPS / head.tracks.length));
-  for (const [first, last] of framesAhead(timeline, outlook)) {
-    for (const group of groupsBetween(head, first, last, most)) {
-      const frame = Math.max(group.shownFirst, first);
-      const ahead = timeline.startOf(frame) - time + (frame < now ? timeline.duration : 0);
-      const left = ahead + timeline.startOf(group.shownEnd) - timeline.startOf(frame);
+  const added = new Set<Chunk>();
+  for (const run of runsAhead(timeline, outlook)) {
+    const first = run.isBack ? Math.max(run.first, run.last - most) : run.first;
+    const groups = groupsBetween(head, first, run.last, most);
+    for (const group of run.isBack ? groups.reverse() : groups) {
+      if (added.has(group)) continue; // it is shown before, on the way there
+      added.add(group);
+      const [begin, end] = [Math.max(group.shownFirst, first), Math.min(group.shownEnd, run.last + 1)];
+      const frame = run.isBack ? end - 1 : begin;
+      const ahead = run.ahead + (run.isBack ? run.from - timeline.startOf(end) : timeline.startOf(begin) - run.from);
+      const left = ahead + timeline.startOf(run.isBack ? end : group.shownEnd) - timeline.startOf(begin);
       planner.addGroup(group, frame, { ahead: frame === now ? 0 : ahead, left, decode: ahead <= decodeSeconds });
     }
   }
-  const behind = Math.max(timeline.frameAt(time - behindSeconds), now - most);
-  for (const group of groupsBetween(head, behind, now)) planner.keep.add(group.number);
+  const behind = timeline.frameAt(time + (isBack ? behindSeconds : -behindSeconds));
+  const kept = isBack ? [now, Math.min(behind, now + most)] as const : [Math.max(behind, now - most), now] as const;
+  for (const group of groupsBetween(head, ...kept)) planner.keep.add(group.number);
   return planner.plan();
 }
 
-/** First and last frames of the runs that lie before the play head. */
-function framesAhead(timeline: Timeline, { time, loop, fetchSeconds }: Outlook): [number, number][] {
+/** Frames that are shown one after the other, up or down. */
+interface Run {
+  readonly first: number;
+  readonly last: number; // not below the first
+  readonly isBack: boolean;
+  readonly from: number; // s, time at which it begins
+  readonly ahead: number; // s of content until then
+}
+
+/** Runs that lie before the play head: up to the end or down to the start, and on from there. */
+function runsAhead(timeline: Timeline, { time, loop, direction, isBack, fetchSeconds }: Outlook): Run[] {
+  const { duration, frameCount } = timeline;
   const now = timeline.frameAt(time);
-  const beyond = time + fetchSeconds - timeline.duration;
-  const runs: [number, number][] = [[now, timeline.frameAt(time + fetchSeconds)]];
-  if (loop && beyond > 0 && now > 0) runs.push([0, Math.min(now - 1, timeline.frameAt(beyond))]);
+  const upTo = (from: number, first: number, ahead: number): Run => ({ first, last: timeline.frameAt(from + fetchSeconds - ahead), isBack: false, from, ahead });
+  const downTo = (from: number, last: number, ahead: number): Run => ({ first: timeline.frameAt(from - fetchSeconds + ahead), last, isBack: true, from, ahead });
+  const left = isBack ? time : duration - time;
+  const runs = [isBack ? downTo(time, now, 0) : upTo(time, now, 0)];
+  if (left >= fetchSeconds) return runs;
+  if (direction === "alternate" && (loop || !isBack)) runs.push(isBack ? upTo(0, 0, left) : downTo(duration, frameCount - 1, left));
+  else if (loop && isBack && now < frameCount - 1) runs.push(downTo(duration, frameCount - 1, left));
+  else if (loop && !isBack && now > 0) runs.push(upTo(0, 0, left));
   return runs;
 }
 

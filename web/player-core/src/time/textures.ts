@@ -27,6 +27,7 @@ export interface TextureEvents {
 }
 
 const AHEAD = 6; // pictures of a track that are decoded, the shown one included: decoders have few to give (guess)
+const BACK = 4; // pictures of a group that are decoded where time goes down: for each group a video is decoded from its key on (guess)
 const NO_WEBCODECS = "this browser has no WebCodecs, or the page is not served securely";
 const MOST_LANES = 8; // tracks with textures: each has a decoder of its own (guess)
 const LATE = 3; // times within LATE_MS that playback had to wait for a picture, until another video or none is tried (guess)
@@ -37,6 +38,8 @@ export class Textures implements LaneHost {
   /** Counts what changes in what can be shown. */
   version = 0;
   loop = false;
+  isBack = false; // time goes down
+  turns = false; // at the ends
   readonly #head: Head;
   readonly #fetcher: Fetcher;
   readonly #decoding: Decoding;
@@ -112,25 +115,55 @@ export class Textures implements LaneHost {
     if (this.rendition === null) return;
     const { frameCount, tracks } = this.#head;
     for (let track = 0; track < Math.min(tracks.length, MOST_LANES); track++) {
-      const places: Place[] = [];
-      for (let k = 0; k < Math.min(AHEAD, frameCount); k++) {
-        if (frame + k >= frameCount && !this.loop) break;
-        const place = this.#placeOf((frame + k) % frameCount, track);
-        if (place !== null) places.push(place);
-      }
+      const places = (this.isBack ? this.#behind(frame, track) : this.#ahead(frame, track)).map((other) => this.#placeOf(other, track)).filter((place) => place !== null);
       if (places.length > 0 || this.#lanes.has(track)) this.#lane(track).want(places, isShown);
       if (places.length > 0 && this.#lane(track).imageOf(places[0]) !== null) this.#early.delete(track);
     }
     const slow = this.#slowOf(frame);
-    const next = frame + (slow?.interval ?? 0);
-    const places = slow === null ? [] : [frame, ...(next < frameCount && this.#slowOf(next) === slow ? [next] : [])].map((shown) => slow.placeOf(shown));
+    const next = frame + (slow?.interval ?? 0) * (this.isBack ? -1 : 1);
+    const places = slow === null ? [] : [frame, ...(next >= 0 && next < frameCount && this.#slowOf(next) === slow ? [next] : [])].map((shown) => slow.placeOf(shown));
     if (places.length > 0 || this.#lanes.has(-1)) this.#lane(-1).want(places, isShown);
+  }
+
+  /** Frames from one on, as many as are decoded; then those whose pictures are shown on the way back. */
+  #ahead(frame: number, track: number): number[] {
+    const { frameCount } = this.#head;
+    const frames = Array.from({ length: Math.min(AHEAD, frameCount) }, (_, k) => frame + k);
+    const inTime = frames.filter((other) => other < frameCount);
+    if (this.turns && inTime.length < frames.length) return [...inTime, ...this.#downTo(frameCount - 1, track)];
+    return this.loop ? frames.map((other) => other % frameCount) : inTime;
+  }
+
+  /** Frames whose pictures are shown from one down; then those of the group before, or what comes where there is none. */
+  #behind(frame: number, track: number): number[] {
+    const { shownFirst } = this.#head.chunkOfFrame(frame, track);
+    const frames = this.#downTo(frame, track);
+    if (shownFirst > 0) return [...frames, ...this.#downTo(shownFirst - 1, track)];
+    if (this.turns) return [...frames, ...Array.from({ length: Math.min(AHEAD, this.#head.frameCount) }, (_, k) => k)];
+    return this.loop ? [...frames, ...this.#downTo(this.#head.frameCount - 1, track)] : frames;
+  }
+
+  /** Frames of a group whose pictures serve for all of it up to one, in the order of their video. */
+  #downTo(last: number, track: number): number[] {
+    const { shownFirst } = this.#head.chunkOfFrame(last, track);
+    return [...new Set(Array.from({ length: last - shownFirst + 1 }, (_, k) => this.#serving(shownFirst + k, track)))];
+  }
+
+  #pictured(frame: number, track: number): number {
+    return this.isBack ? this.#serving(frame, track) : frame;
+  }
+
+  /** The frame whose picture serves for one where time goes down: there are a few in each group. */
+  #serving(frame: number, track: number): number {
+    const { shownFirst, shownEnd } = this.#head.chunkOfFrame(frame, track);
+    const stride = Math.ceil((shownEnd - shownFirst) / BACK);
+    return shownFirst + stride * Math.floor((frame - shownFirst) / stride);
   }
 
   /** True if the bodies' pictures of a frame whose groups are at hand are there, except for those that can never be. */
   isReady(frame: number): boolean {
     for (let track = 0; track < this.#head.tracks.length; track++) {
-      const place = this.#placeOf(frame, track);
+      const place = this.#placeOf(this.#pictured(frame, track), track);
       if (place !== null && !this.#early.has(track) && this.#lane(track).imageOf(place) === null) return false;
     }
     return true;
@@ -138,7 +171,7 @@ export class Textures implements LaneHost {
 
   /** The texture of a track in a frame; null where it has none. */
   imageOf(frame: number, track: number): TextureImage | null {
-    const place = this.#placeOf(frame, track);
+    const place = this.#placeOf(this.#pictured(frame, track), track);
     return place && this.#sized(this.#lane(track).imageOf(place), place, this.#head.chunkOfFrame(frame, track));
   }
 

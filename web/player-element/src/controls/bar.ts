@@ -3,11 +3,12 @@
 import type { MeshreelPlayer } from "../element.ts";
 import { formatTime, timeDigits } from "../format.ts";
 import type { Action } from "../keyboard.ts";
+import type { Direction } from "@meshreel/player-core/types";
 import type { Mode } from "@meshreel/player-three/modes";
 import { parseLayers } from "../attributes.ts";
 import { canRecord } from "../record.ts";
 import { nextCut } from "../section.ts";
-import { layersChoices, layersValue, modeChoices, speedChoices } from "./choices.ts";
+import { DIRECTION_CHOICES, layersChoices, layersValue, modeChoices, speedChoices } from "./choices.ts";
 import { Button, type Look, make, Menu, setText } from "./dom.ts";
 import { SeekBar } from "./seek.ts";
 import { Volume } from "./volume.ts";
@@ -166,6 +167,8 @@ export class Bar {
     const menus = [
       new Menu("speed", "Playback speed", () => ({ choices: speedChoices(player.playbackRate), value: String(player.playbackRate) }),
         (value) => void (player.playbackRate = Number(value))),
+      new Menu("direction", "Direction", () => ({ choices: DIRECTION_CHOICES, value: player.direction }),
+        (value) => void (player.direction = value as Direction)),
       new Menu("layers", "Quality",
         () => ({ choices: layersChoices(most(), player.layers), value: layersValue(most(), player.layers), enabled: most() > 0 }),
         (value) => void (player.layers = parseLayers(value))),

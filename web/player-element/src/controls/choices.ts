@@ -1,6 +1,6 @@
 // Choices of the menus.
 
-import type { Layers } from "@meshreel/player-core/types";
+import type { Direction, Layers } from "@meshreel/player-core/types";
 import { modesOf, type Looks, type Mode } from "@meshreel/player-three/modes";
 import { formatSpeed } from "../format.ts";
 import type { Choice } from "./dom.ts";
@@ -10,6 +10,11 @@ const MOST_LEVELS = 6;
 const MODE_NAMES: Readonly<Record<Mode, string>> = {
   splats: "Splats", color: "Colour", shaded: "Shaded", normal: "Normals", wireframe: "Wireframe", tracks: "Colour by body",
 };
+
+/** Directions of playback; viewers of 3D files call them so. */
+export const DIRECTION_CHOICES: readonly (Choice & { readonly value: Direction })[] = [
+  { value: "normal", text: "Forward" }, { value: "reverse", text: "Reverse" }, { value: "alternate", text: "Ping-pong" },
+];
 
 /** Usual speeds, and the one that is set if it is none of them. */
 export function speedChoices(current: number): readonly Choice[] {
