@@ -127,6 +127,15 @@ describeInBrowser("the built player", () => {
     await page.close();
   });
 
+  test("what the address says holds when the recording of a page opens, not after", async () => {
+    site.write("watch.html", '<!doctype html><link rel="icon" href="data:,"><script type="module" src="player/page.js"></script><meshreel-player src="scene.reel" autoplay></meshreel-player>');
+    const { page, errors } = await site.visit("watch.html?autoplay=0", [{ content: 'addEventListener("play", () => (globalThis.played = true), true)' }]);
+    await ready(page);
+    expect(await page.evaluate(() => "played" in globalThis)).toBe(false);
+    expect(errors).toEqual([]);
+    await page.close();
+  });
+
   test("a view that fits lies above the bar, in any shape, until somebody moves the camera", async () => {
     const { page } = await site.visit("player/index.html?src=/layers.reel&background=white");
     await ready(page);
