@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from meshreel.geometry.cameras import Camera
-from meshreel.geometry.depth import DepthPicture, FreeSpace
+from meshreel.geometry.depth import DepthPicture, FreeSpace, rise
 from meshreel.types import Placement
 
 WIDTH, HEIGHT, FOCAL = 64, 128, 60.0
@@ -60,3 +60,10 @@ def test_a_place_is_free_where_a_camera_saw_past_it():
     moved = FreeSpace.of([picture(depth)], place).at((points - place.origin) / 2.0)
     assert np.array_equal(moved, found)
     assert not FreeSpace.of([]).at(points).any()
+
+
+def test_the_rise_of_a_pixel_is_the_largest_to_a_neighbour_and_steps_are_none() -> None:
+    depth = np.array([[1, 1, 1, 1.02, 1.02, 2.0], [1, 1, 1, 1.02, 1.02, 2.0]], np.float32)
+    for axis in (0, 1):
+        found = rise(np.moveaxis(depth, axis, 0).copy())
+        np.testing.assert_allclose(np.moveaxis(found, 0, axis)[0], [0, 0, 0.02, 0.02, 0, 0], atol=1e-6)

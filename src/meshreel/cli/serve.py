@@ -17,7 +17,7 @@ from ..server.library import Library
 from ..server.run import ServerOptions, run
 from .console import Common, called_as
 
-SAMPLE = "sample.reel"  # beside the player: what `meshreel demo` leaves
+SAMPLE = "sample.reel"  # in the package of the server: what `meshreel demo` leaves
 
 
 def play(
@@ -38,7 +38,7 @@ def play(
     browser
         Open the page in the browser of this machine.
     """
-    sample = files("meshreel") / "player" / SAMPLE
+    sample = files("meshreel") / "server" / SAMPLE
     with (
         TemporaryDirectory(prefix="meshreel-") as scratch,
         as_file(sample) if input is None else nullcontext(input) as file,

@@ -141,7 +141,8 @@ def rise(depth: Float32[np.ndarray, "H W"]) -> Float32[np.ndarray, "H W"]:
             change = np.abs(before - after)
             change[~(change <= STEP * np.minimum(before, after))] = 0
         there = np.moveaxis(largest, axis, 0)
-        there[:-1], there[1:] = np.maximum(there[:-1], change), np.maximum(there[1:], change)
+        for side in (there[:-1], there[1:]):
+            np.maximum(side, change, out=side)
     return largest
 
 
