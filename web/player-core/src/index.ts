@@ -1,7 +1,7 @@
 // The public surface of player-core: the player without a picture.
 
 export { FormatError, SourceError, type FormatErrorKind, type SourceErrorKind } from "./errors.ts";
-export { fileBeside, importFile, plainOf } from "./net/built.ts";
+export { importFile, plainOf } from "./net/built.ts";
 export { HttpSource, type HttpOptions } from "./net/http_source.ts";
 export { Player, type PlayerOptions } from "./player.ts";
 export { openWorker, Players, type WorkerFiles } from "./players.ts";

@@ -1,6 +1,6 @@
 // The package: importing it defines <meshreel-player>.
 
-import { fileBeside } from "@meshreel/player-core";
+import { fileBeside } from "./beside.ts";
 import { MeshreelPlayer } from "./element.ts";
 import { RealEngine } from "./engine.ts";
 

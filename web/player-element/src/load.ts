@@ -1,7 +1,9 @@
 // Defines <meshreel-player> as meshreel-player.js does, but takes that and its files from their gzips where the host compresses nothing. What an
 // element of the page needs at once is asked for side by side.
 
-import { fileBeside, importFile } from "@meshreel/player-core/net/built";
+import { importFile } from "@meshreel/player-core/net/built";
+
+import { fileBeside } from "./beside.ts";
 
 const here = import.meta.url;
 const LARGE = ["core.wasm", "three.js"].map((name) => [name, fileBeside(here, name)] as const);
