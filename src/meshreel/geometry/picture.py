@@ -191,14 +191,22 @@ class _Look:
         corners, up = self.mesh.faces[faces], np.array(UP_AXES[self._standing.up])
         points, normals = blend(self.mesh.vertices, corners, weights), _units(blend(self._normals, corners, weights))
         to_eye, faced = self._eye - points, self._face_normals[faces]
-        outside = _dots(faced, to_eye) * _dots(faced, normals) >= 0  # else its inside is seen
-        normals, to_eye = np.where(outside[:, None], normals, -normals), _units(to_eye)
+        outside = _dots(faced, to_eye) * _dots(faced, normals) >= 0
+        to_eye = _units(to_eye)
+        away = np.clip((-_dots(normals, to_eye) - 0.1) / 0.4, 0, 1)
+        inside = np.where(outside, 0, away * away * (3 - 2 * away))[:, None]
+        height = (_dots(points, up) - self._standing.bottom) / (float(self._standing.size[1]) or 1.0)
+        light = self._light_on(normals, to_eye, height)
+        return light + inside * (self._light_on(-normals, to_eye, height) - light) if inside.any() else light
+
+    def _light_on(self, normals: Vectors, to_eye: Vectors, height: Float64[np.ndarray, " N"]) -> Vectors:
+        """Return the light on surface of these normals, seen from outside."""
+        up = np.array(UP_AXES[self._standing.up])
         lamp = _units(to_eye + 0.7 * up + 0.5 * _units(np.cross(up, to_eye) + 1e-6))
         key = np.maximum((_dots(normals, lamp) + 0.3) / 1.3, 0)
         quarter = np.sqrt(np.sqrt(key))
         key = key * quarter * np.sqrt(np.sqrt(quarter))  # to the power of 1.3125, for the shader's 1.3: roots are exact
         sky = 0.5 + 0.5 * _dots(normals, up)
-        height = (_dots(points, up) - self._standing.bottom) / (float(self._standing.size[1]) or 1.0)
         hidden = (1 - sky) * exp(-7 * np.maximum(height, 0))
         low, high = np.array([0.27, 0.255, 0.245]), np.array([0.43, 0.44, 0.46])
         ambient = (low + (high - low) * sky[:, None]) * (1 - 0.6 * hidden[:, None])
