@@ -47,7 +47,7 @@ class Verdict:
     lost: float = 0.0  # without decoded surface near it
     piece: float = 0.0  # the largest connected area of that, or all of it where that is little
     invented: float = 0.0  # of the decoded surface, that without surface of the frame near it
-    turned: float = 0.0  # of the decoded surface, that which faces away from the frame's surface nearest to it
+    turned: float = 0.0  # of the decoded surface, that which faces away from a noisy frame's surface nearest to it
     distance: float = 0.0  # normalised, RMS of the samples of the side that is farther off
 
     def fault(self, noise: float, target: float, follows: bool) -> str:
@@ -60,7 +60,7 @@ class Verdict:
             ("lost", self.lost, lost),
             ("lost in one piece", self.piece, piece),
             ("invented", self.invented, invented),
-            ("inside out", self.turned, TURNED if follows and noise else 1.0),
+            ("inside out", self.turned, TURNED if follows else 1.0),
         ):
             if share > most:
                 return f"{100 * share:.1f} % of its surface is {name}"
@@ -155,11 +155,14 @@ def _verdict(interval: Interval, number: int, frame: Mesh, mesh: Mesh) -> Verdic
     beyond = back > near[frame.faces[hits.faces]].mean(axis=1)
     if beyond.any() and (free := interval.free(number)) is not None:  # surface is invented where a camera saw through
         beyond[beyond] = free.at(points[beyond])
-    facing = np.einsum("nd,nd->n", vertex_normals(mesh)[others].sum(axis=1), original.normals[hits.faces])
+    turned = 0.0
+    if noisy:  # clean frames may be wound as they like
+        facing = np.einsum("nd,nd->n", vertex_normals(mesh)[others].sum(axis=1), original.normals[hits.faces])
+        turned = float(weights[facing < 0].sum())
     lost = float(shares[gaps > near[corners].mean(axis=1)].sum())
     piece = _largest(frame, surface, near) if lost > PIECE[noisy] else lost
     rms = max(float((shares * gaps**2).sum()), float((weights * back**2).sum())) ** 0.5
-    return Verdict(lost, piece, float(weights[beyond].sum()), float(weights[facing < 0].sum()), rms)
+    return Verdict(lost, piece, float(weights[beyond].sum()), turned, rms)
 
 
 def _samples(mesh: Mesh) -> tuple[Int64[np.ndarray, "N 3"], Float64[np.ndarray, " N"]]:
