@@ -12,7 +12,7 @@ export type Theme = "auto" | "light" | "dark";
 export const OBSERVED = [
   "src", "controls", "autoplay", "loop", "direction", "poster", "layers", "speed", "playbackrate", "interpolate", "mode", "camera",
   "up", "stats", "background", "theme", "textures", "ground", "exposure",
-  "autorotate", "fly", "section", "frames", "share", "muted", "volume", "playsinline", "crossorigin",
+  "autorotate", "fly", "section", "frames", "share", "muted", "volume", "playsinline", "crossorigin", "usdz", "glb",
 ] as const;
 
 /** Value of an attribute's text, "" meaning none; null if the text is no valid value. */
@@ -141,5 +141,5 @@ export function parseFlag(text: string | null): boolean {
 /** Properties that a page may have set before the element was defined. */
 export const PROPERTIES = [
   "src", "poster", "preload", "controls", "autoplay", "loop", "direction", "stats", "layers", "playbackRate", "interpolate", "textures", "mode", "theme",
-  "up", "background", "camera", "currentTime", "ground", "exposure", "autoRotate", "fly", "section", "frames", "share", "muted", "volume", "playsInline", "crossOrigin",
+  "up", "background", "camera", "currentTime", "ground", "exposure", "autoRotate", "fly", "section", "frames", "share", "muted", "volume", "playsInline", "crossOrigin", "usdz", "glb",
 ];

@@ -223,6 +223,22 @@ export class Reflected extends Element {
     else this.setAttribute("crossorigin", value);
   }
 
+  /** Address of the recording as USDZ, which iPhones show in AR. */
+  get usdz(): string {
+    return this.getAttribute("usdz") ?? "";
+  }
+  set usdz(value: string) {
+    this.setAttribute("usdz", value);
+  }
+
+  /** Address of the recording as GLB, which Android phones show in AR. */
+  get glb(): string {
+    return this.getAttribute("glb") ?? "";
+  }
+  set glb(value: string) {
+    this.setAttribute("glb", value);
+  }
+
   /** Appearance of surfaces; if none is set, or one that the recording lacks, the first of `splats`, `color` and `shaded` that it has. */
   get mode(): Mode {
     return parse.parseMode(this.getAttribute("mode"), this.info);

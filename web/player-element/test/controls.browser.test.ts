@@ -400,6 +400,37 @@ describeOnPage("controls of <meshreel-player>", (on) => {
     await expect.poll(() => on.page.locator(".toasts").textContent()).toBe("No headset found");
   });
 
+  test("on a phone without WebXR its own app shows the file that the page names for it", async () => {
+    await on.page.evaluate(() => {
+      HTMLAnchorElement.prototype.click = function () {
+        Object.assign(globalThis, { opened: this });
+      };
+    });
+    /** What a click opens on a phone; "" where there is no button. */
+    const opened = async (phone: "iPhone" | "Android" | "", attributes: string): Promise<string> => {
+      await on.page.evaluate((name) => {
+        Object.defineProperty(navigator, "userAgent", { configurable: true, value: `Mozilla/5.0 (${name})` });
+        DOMTokenList.prototype.supports = () => name === "iPhone";
+      }, phone);
+      await on.shown(attributes);
+      if (!(await on.page.locator("button.ar").isVisible())) return "";
+      await on.page.locator("button.ar").click();
+      return on.page.evaluate("`${opened.rel} ${opened.querySelectorAll('img').length} ${opened.href}`");
+    };
+    const both = 'usdz="/walk.usdz" glb="/walk.glb"';
+    const site = new URL("/", on.page.url()).href;
+    expect(await opened("", both)).toBe("");
+    expect(await opened("iPhone", 'glb="/walk.glb"')).toBe("");
+    expect(await opened("Android", 'usdz="/walk.usdz"')).toBe("");
+    expect(await opened("iPhone", both)).toBe(`ar 1 ${site}walk.usdz#allowsContentScaling=0`);
+    const [address, intent] = (await opened("Android", both)).split("#");
+    expect(address).toBe(` 0 intent://arvr.google.com/scene-viewer/1.0?file=${encodeURIComponent(site)}walk.glb&mode=ar_preferred&resizable=false`);
+    expect(intent).toBe(`Intent;scheme=https;package=com.google.android.googlequicksearchbox;action=android.intent.action.VIEW;S.browser_fallback_url=${encodeURIComponent(on.page.url())};end;`);
+    await on.page.evaluate(() => {
+      for (const [from, name] of [[HTMLAnchorElement.prototype, "click"], [DOMTokenList.prototype, "supports"], [navigator, "userAgent"]] as const) Reflect.deleteProperty(from, name);
+    });
+  });
+
   test("time stands still while no picture can be drawn, as in a page that was hidden", async () => {
     await on.shown("loop");
     const times = await on.page.evaluate(async () => {

@@ -6,7 +6,10 @@ import { Stick } from "./stick.ts";
 import type { StickActions } from "./stick.ts";
 
 export interface HandActions extends StickActions {
-  select(): void;
+  /** `isHeld`: it was pressed for a while. */
+  select(isHeld: boolean): void;
+  /** Points along the -z of a space; null: no longer. Of the right hand alone, or the only one. */
+  point(space: XRSpace | null): void;
   /** Goes to a point of the floor. */
   teleport(place: Vector3): void;
 }
@@ -16,6 +19,7 @@ const GRIP = { width: 0.03, length: 0.1 } as const; // m
 const FREE = 0xd8dde6;
 const HOLDING = 0x4da3ff;
 const STILL = 0.03; // m: a bare hand that pinches and moves less plays or pauses (guess)
+const HELD = 600; // ms that a press is held (guess)
 const AIMS = 0.6; // of the way to the edge that a stick is pushed forward
 const LONGEST = 8; // m, of a jump (guess)
 const RING = [0.14, 0.18] as const; // m, radii of the mark on the floor
@@ -37,6 +41,7 @@ export class Hand {
   readonly #panel: Object3D;
   #source: XRInputSource | null = null;
   #squeezes = false;
+  #pressed = 0; // ms
   readonly #pinched = new Vector3(); // where a bare hand began to pinch, m
 
   /** To be made before the session starts, so that three gives it the controller. `room` is where the tracking space is drawn, `panel` what the left one wears. */
@@ -52,9 +57,8 @@ export class Hand {
     room.add(this.#pointing, this.#grip, this.#mark);
     this.#pointing.addEventListener("connected", this.#connect);
     this.#pointing.addEventListener("disconnected", this.#disconnect);
-    this.#pointing.addEventListener("select", this.#select);
-    this.#pointing.addEventListener("selectstart", this.#pinch);
-    this.#pointing.addEventListener("selectend", this.#part);
+    this.#pointing.addEventListener("selectstart", this.#press);
+    this.#pointing.addEventListener("selectend", this.#release);
     this.#pointing.addEventListener("squeezestart", this.#squeeze);
     this.#pointing.addEventListener("squeezeend", this.#letGo);
   }
@@ -74,9 +78,8 @@ export class Hand {
   dispose(): void {
     this.#pointing.removeEventListener("connected", this.#connect);
     this.#pointing.removeEventListener("disconnected", this.#disconnect);
-    this.#pointing.removeEventListener("select", this.#select);
-    this.#pointing.removeEventListener("selectstart", this.#pinch);
-    this.#pointing.removeEventListener("selectend", this.#part);
+    this.#pointing.removeEventListener("selectstart", this.#press);
+    this.#pointing.removeEventListener("selectend", this.#release);
     this.#pointing.removeEventListener("squeezestart", this.#squeeze);
     this.#pointing.removeEventListener("squeezeend", this.#letGo);
     for (const mesh of [this.#ray, this.#body, this.#mark]) {
@@ -101,32 +104,32 @@ export class Hand {
   }
 
   #connect = (event: WebXRSpaceEventMap["connected"]): void => {
-    this.#source = event.data;
-    if (event.data.handedness === "left") this.#grip.add(this.#panel);
+    const { handedness, targetRayMode, targetRaySpace } = (this.#source = event.data);
+    this.#ray.visible = targetRayMode === "tracked-pointer"; // a finger on a screen is seen already
+    if (handedness === "left") this.#grip.add(this.#panel);
+    else if (this.#ray.visible) this.#actions.point(targetRaySpace);
   };
 
   #disconnect = (): void => {
+    if (this.#ray.visible && this.#source?.handedness !== "left") this.#actions.point(null);
     this.#source = null;
     this.#stick.reset();
     this.#mark.visible = false;
     this.#letGo();
   };
 
-  #select = (): void => {
-    if (!this.#isBare) this.#actions.select();
-  };
-
   /** A bare hand has no grip: it holds by a pinch. */
-  #pinch = (): void => {
+  #press = (): void => {
+    this.#pressed = performance.now();
     if (!this.#isBare) return;
     this.#pinched.copy(this.#grip.position);
     this.#squeeze();
   };
 
-  #part = (): void => {
-    if (!this.#isBare) return;
-    this.#letGo();
-    if (this.#grip.position.distanceTo(this.#pinched) < STILL) this.#actions.select();
+  #release = (): void => {
+    if (this.#isBare) this.#letGo();
+    const isStill = !this.#isBare || this.#grip.position.distanceTo(this.#pinched) < STILL;
+    if (isStill) this.#actions.select(performance.now() - this.#pressed > HELD);
   };
 
   get #isBare(): boolean {

@@ -9,7 +9,7 @@ export const SCALES = { least: 0.05, most: 20 } as const;
 const DISTANCE = 1.5; // m from the viewer to the middle of the recording
 const MODEL = 1; // m: how wide a room is that stands in another
 const ROOM = 3; // m; what is larger is stood in, not looked at
-const UP = new Vector3(0, 1, 0);
+export const UP = new Vector3(0, 1, 0);
 
 /** A similarity that keeps the vertical. */
 export interface Pose {
@@ -54,6 +54,13 @@ export function place(box: Box, viewer: Viewer, pose: Pose, passthrough = false,
   const [sin, cos] = [Math.sin(pose.turn), Math.cos(pose.turn)];
   const scale = (pose.scale = wide > ROOM && passthrough ? MODEL / wide : 1);
   pose.position.set(viewer.x - distance * Math.sin(viewer.turn) - scale * (cos * x + sin * z), -scale * box.minimum[1], viewer.z - distance * Math.cos(viewer.turn) - scale * (cos * z - sin * x));
+}
+
+/** Has a viewer look at a point of the floor from where `place` stands a recording there in their own room. */
+export function standBefore(viewer: Viewer, { x, z }: Vector3): void {
+  viewer.turn = Math.atan2(viewer.x - x, viewer.z - z);
+  viewer.x = x + DISTANCE * Math.sin(viewer.turn);
+  viewer.z = z + DISTANCE * Math.cos(viewer.turn);
 }
 
 /** Position and direction of a head, seen from above. */

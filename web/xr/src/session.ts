@@ -3,13 +3,15 @@
 import type { Object3D, PerspectiveCamera, Vector3, WebGLRenderer } from "three";
 import type { Box, FirstView } from "@meshreel/player-core/types";
 import type { VrActions } from "./actions.ts";
+import { Anchor } from "./anchor.ts";
 import { Floor } from "./floor.ts";
 import { Grab } from "./grab.ts";
 import { Hand } from "./hand.ts";
 import { keep } from "./keep.ts";
 import { Panel } from "./panel.ts";
-import { applyPose, makePose, place, setViewer } from "./pose.ts";
+import { applyPose, makePose, place, setViewer, standBefore } from "./pose.ts";
 import type { Viewer } from "./pose.ts";
+import { Reticle } from "./reticle.ts";
 
 export interface VrOptions {
   readonly renderer: WebGLRenderer;
@@ -30,7 +32,7 @@ const RATE = 90; // Hz: at most, of those that the headset offers
 const NEAR = 0.05; // m
 const FAR = 1000; // m
 const SEEK = 1; // s, each time that a held thumbstick repeats
-const INIT: XRSessionInit = { requiredFeatures: ["local-floor"], optionalFeatures: ["bounded-floor", "layers", "hand-tracking"] };
+const OPTIONAL = ["bounded-floor", "layers", "hand-tracking"];
 
 /** The recording in a headset, at true scale in front of the viewer. */
 export class VrSession {
@@ -39,6 +41,9 @@ export class VrSession {
   readonly #restore: () => void;
   readonly #hands: readonly Hand[];
   readonly #floor: Floor | null;
+  readonly #reticle: Reticle | null; // in the viewer's own room
+  readonly #anchor = new Anchor();
+  #isChosen = false; // the place that the reticle is at
   readonly #panel = new Panel();
   readonly #pose = makePose();
   readonly #grab = new Grab();
@@ -58,7 +63,9 @@ export class VrSession {
     const { xr } = navigator;
     if (xr === undefined) throw new Error("this browser has no WebXR here; it needs https, or localhost");
     if (options.content.parent === null) throw new Error("the content is in no scene; add it to one first");
-    const entered = new VrSession(options, await xr.requestSession(options.passthrough ? "immersive-ar" : "immersive-vr", INIT));
+    const optionalFeatures = options.passthrough ? [...OPTIONAL, "hit-test", "anchors"] : OPTIONAL;
+    const session = await xr.requestSession(options.passthrough ? "immersive-ar" : "immersive-vr", { requiredFeatures: ["local-floor"], optionalFeatures });
+    const entered = new VrSession(options, session);
     await entered.#begin();
     return entered;
   }
@@ -70,15 +77,21 @@ export class VrSession {
     this.#over = new Promise((resolve) => (this.#resolve = resolve));
     this.#restore = keep(renderer, camera, content);
     const handActions = {
-      select: () => actions.toggle(),
+      select: (isHeld: boolean) => this.#select(isHeld),
+      point: (space: XRSpace | null) => void this.#reticle?.aim(space),
       tap: (side: number) => actions.step(side),
       hold: (side: number) => actions.seekBy(SEEK * side),
-      click: () => this.#place(),
+      click: () => {
+        this.#place();
+        if (this.#reticle) this.#reticle.seeks = true;
+      },
       teleport: (place: Vector3) => this.#go(place),
     };
     const room = content.parent!;
     this.#floor = options.passthrough ? null : new Floor();
     if (this.#floor) room.add(this.#floor);
+    this.#reticle = options.passthrough ? new Reticle(session) : null;
+    if (this.#reticle) room.add(this.#reticle);
     this.#hands = [0, 1].map((index) => new Hand(renderer.xr, index, room, handActions, this.#panel));
   }
 
@@ -122,7 +135,7 @@ export class VrSession {
     if (offered.length > 0) session.updateTargetFrameRate(Math.max(...offered)).catch(() => undefined); // its own rate does too
   }
 
-  /** Nothing is allocated here, but four times a second for the panel. */
+  /** Nothing is allocated here, but four times a second for the panel, and where the device knows the viewer's own room. */
   #frame = (now: number): void => {
     const left = this.#hands[0];
     const right = this.#hands[1];
@@ -130,10 +143,35 @@ export class VrSession {
     left.update(now);
     right.update(now);
     this.#panel.update(now, this.#options.actions.time);
+    this.#settle();
     this.#grab.follow(this.#pose, left.holds, right.holds);
     applyPose(this.#pose, this.#options.content);
     this.#options.frame(now);
   };
+
+  /** In the viewer's own room: stands the recording where they chose, and keeps it there. */
+  #settle(): void {
+    const { xr } = this.#options.renderer;
+    const [frame, space, reticle] = [xr.getFrame(), xr.getReferenceSpace(), this.#reticle];
+    if (space === null || reticle === null) return;
+    this.#anchor.follow(this.#pose, frame, space);
+    const hit = reticle.find(frame, space);
+    if (this.#isChosen && hit !== null) {
+      this.#look();
+      standBefore(this.#viewer, reticle.position);
+      this.#stand(reticle.position.y);
+      reticle.seeks = reticle.visible = false;
+      void this.#anchor.drop(hit);
+    }
+    this.#isChosen = false;
+  }
+
+  /** Chooses the place that the reticle shows; else plays or pauses. Held, it looks for another place. */
+  #select(isHeld: boolean): void {
+    if (this.#reticle?.visible) this.#isChosen = true;
+    else if (this.#reticle?.finds && isHeld) this.#reticle.seeks = true;
+    else this.#options.actions.toggle();
+  }
 
   /** Moves the recording so that what is at a point of the floor comes under the viewer. */
   #go({ x, z }: Vector3): void {
@@ -146,8 +184,14 @@ export class VrSession {
   /** In front of where the viewer is now. Until the headset knows, of where the room has its zero. */
   #place(): void {
     this.#placed = this.#look();
+    this.#stand(0);
+  }
+
+  /** Before the viewer, or around them, at a height. */
+  #stand(height: number): void {
     const { box, view, passthrough } = this.#options;
     place(box, this.#viewer, this.#pose, passthrough, view);
+    this.#pose.position.y += height;
     this.#grab.release();
   }
 
@@ -169,6 +213,7 @@ export class VrSession {
     if (this.#foveation !== undefined) renderer.xr.setFoveation(this.#foveation);
     for (const hand of this.#hands) hand.dispose();
     this.#floor?.dispose();
+    this.#reticle?.dispose();
     this.#panel.dispose();
     this.#restore();
     this.#resolve();

@@ -263,3 +263,91 @@ describeInBrowser("a session in a simulated Quest 3", () => {
     expect(await open.page.evaluate(() => window.vr.memory())).toEqual(memory);
   });
 });
+
+describeInBrowser("a session in the viewer's own room", () => {
+  const reticle = (): Promise<number[] | null> => open.page.evaluate(() => window.vr.reticle());
+  /** Within one call, so that a slow machine does not make it a pull that is held. */
+  const pull = (): Promise<void> =>
+    open.page.evaluate(async () => {
+      for (const value of [1, 0]) {
+        window.vr.button("right", "trigger", value);
+        await window.vr.frames(2);
+      }
+    });
+  /** From 1.3 m above the recording's floor: 1 m ahead where the device knows that the real one is 0.3 m higher. */
+  async function enterAr(): Promise<void> {
+    await open.page.evaluate(() => {
+      window.vr.head(0, 1.6, 0);
+      window.vr.pose("right", 0.25, 1.3, -0.4);
+      window.vr.tilt("right", 45);
+    });
+    await open.page.evaluate(() => window.vr.enter(true));
+    await frames(4);
+  }
+  beforeAll(async () => {
+    await openHeadset();
+    await open.page.evaluate(() => window.vr.install());
+  });
+  afterEach(async () => {
+    await open.page.evaluate(() => window.vr.end());
+    expect(open.errors).toEqual([]);
+  });
+  afterAll(async () => open?.close());
+
+  test("that the device does not know has the recording 1.5 m ahead, where the trigger plays it", async () => {
+    await enterAr();
+    expectNear((await content()).position, [0, 0.5, -1.5]);
+    await pull();
+    expect(await reticle()).toBe(null);
+    expectNear((await content()).position, [0, 0.5, -1.5]);
+    expect(await told()).toEqual(["toggle"]);
+  });
+
+  test("has a ring where a hand points at the floor; the trigger stands the recording there, at true scale and facing the viewer, then plays it", async () => {
+    await open.page.evaluate(() => window.vr.knowRoom());
+    await enterAr();
+    expectNear((await reticle())!, [0.25, 0.3, -1.4]);
+    await pull();
+    expect(await reticle()).toBe(null);
+    const placed = await content();
+    expectNear(placed.position, [0.25, 0.8, -1.4]);
+    expect(placed.scale).toBe(1);
+    expect(placed.turn).toBeCloseTo(Math.atan2(-0.25, 1.4), 4);
+    expect(await told()).toEqual([]);
+    await pull();
+    expect(await told()).toEqual(["toggle"]);
+  });
+
+  test("takes no wall for a floor, and a trigger that is held looks for another place", async () => {
+    await enterAr();
+    await pull();
+    await press("right", "trigger", 1);
+    await open.page.waitForTimeout(700);
+    await press("right", "trigger", 0);
+    await open.page.evaluate(() => window.vr.tilt("right", 0));
+    await frames(2);
+    expect(await reticle()).toBe(null);
+    await open.page.evaluate(() => window.vr.tilt("right", 45));
+    await move("right", -0.5, 1.3, -0.4);
+    await pull();
+    expectNear((await content()).position, [-0.5, 0.8, -1.4]);
+    expect(await told()).toEqual([]);
+  });
+
+  test("keeps it where the device finds the place to be, also after a hand has moved it", async () => {
+    await enterAr();
+    await pull();
+    await frames(3);
+    const { turn } = await content();
+    await open.page.evaluate(() => window.vr.correct(0.2, 0.5));
+    await frames(3);
+    expectNear((await content()).position, [0.45, 0.8, -1.4]);
+    expect((await content()).turn).toBeCloseTo(turn + 0.5, 4);
+    await press("right", "squeeze", 1);
+    await move("right", 0.25, 1.3, -0.9);
+    await press("right", "squeeze", 0);
+    await open.page.evaluate(() => window.vr.correct(0.3, 0.5));
+    await frames(3);
+    expectNear((await content()).position, [0.55, 0.8, -1.9]);
+  });
+});

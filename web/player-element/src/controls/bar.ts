@@ -3,6 +3,7 @@
 import type { MeshreelPlayer } from "../element.ts";
 import { formatTime, timeDigits } from "../format.ts";
 import type { Action } from "../keyboard.ts";
+import { phoneLink } from "../phone_ar.ts";
 import type { Direction } from "@meshreel/player-core/types";
 import type { Mode } from "@meshreel/player-three/modes";
 import { parseLayers } from "../attributes.ts";
@@ -149,7 +150,10 @@ export class Bar {
     const vr = (): Look => ({
       icon: "vr", label: player.presenting ? "Exit VR" : "Enter VR", shown: this.headset, enabled: player.info !== null,
     });
-    const ar = (): Look => ({ icon: "ar", label: "View in your space", shown: this.passthrough && !player.presenting, enabled: player.info !== null });
+    const ar = (): Look => {
+      const onPhone = !this.passthrough && phoneLink(player) !== null;
+      return { icon: "ar", label: "View in your space", shown: (this.passthrough || onPhone) && !player.presenting, enabled: onPhone || player.info !== null };
+    };
     const screen = (): Look => {
       const full = document.fullscreenElement !== null;
       return { icon: full ? "exitFullscreen" : "fullscreen", label: full ? "Exit full screen" : "Full screen", shown: document.fullscreenEnabled };

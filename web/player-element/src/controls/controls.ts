@@ -4,6 +4,7 @@ import { acceptDrops } from "../drop.ts";
 import type { MeshreelPlayer } from "../element.ts";
 import { icon } from "../icons.ts";
 import { type Action, actionOf, isOfSound, takesKey, type Target } from "../keyboard.ts";
+import { phoneLink } from "../phone_ar.ts";
 import { styleSheet } from "../styles.ts";
 import { copyLink, copyView, perform, saveLoop, saveScreenshot, type Surface, toggleVr } from "./actions.ts";
 import { acceptTaps, Activity, type Tap } from "./activity.ts";
@@ -40,7 +41,7 @@ export class Controls implements Surface {
     });
     const open = () => this.#file.click();
     const act = (action: Action) => this.#act(action);
-    this.#bar = new Bar(player, { act, openFile: open, screenshot: () => void saveScreenshot(player, this), copyLink: () => void copyLink(player, this), copyView: () => void copyView(player, this), enterAr: () => void toggleVr(player, this, true), recordLoop: () => void this.#record() });
+    this.#bar = new Bar(player, { act, openFile: open, screenshot: () => void saveScreenshot(player, this), copyLink: () => void copyLink(player, this), copyView: () => void copyView(player, this), enterAr: () => this.#enterAr(), recordLoop: () => void this.#record() });
     this.#error = new ErrorPanel(() => player.retry(), open);
     this.#help = new HelpPanel(() => this.toggleHelp());
     this.#statistics = new StatisticsPanel(player);
@@ -65,6 +66,13 @@ export class Controls implements Surface {
   get background(): string {
     this.picture.style.backgroundColor = this.#player.background;
     return getComputedStyle(this.picture).backgroundColor;
+  }
+
+  /** Without WebXR, by the phone's own app. */
+  #enterAr(): void {
+    const link = this.#bar.passthrough ? null : phoneLink(this.#player);
+    if (link === null) void toggleVr(this.#player, this, true);
+    else link.click();
   }
 
   /** Records one loop; asked again, ends it early. */

@@ -6,6 +6,7 @@ import type { Box } from "@meshreel/player-core/types";
 import { ReelScene } from "@meshreel/player-three";
 import { makeFloor, makeGroup } from "../../../player-three/test/analytic.ts";
 import { vrSupported, VrSession } from "../../src/index.ts";
+import { Reticle } from "../../src/reticle.ts";
 
 const [WIDTH, HEIGHT] = [640, 320];
 const BOX: Box = { minimum: [-1, -0.5, -1], size: [2, 1.3, 2] }; // the sphere's way and the floor below it
@@ -30,10 +31,39 @@ root.add(content);
 const [group, floor] = [makeGroup({ isColored: true, center: (t) => [-0.3 + 0.2 * t, 0, 0] }).packed, makeFloor(4).packed];
 for (const packed of [group, floor]) reel.prepare(packed, renderer);
 
+type Surroundings = InstanceType<Parameters<XRDevice["installSEM"]>[0]>;
+
+/** A real room that the device knows: a floor, not quite where its tracking takes it to be, before a wall. */
+class Room implements Surroundings {
+  static readonly floor = 0.3; // m
+  readonly version = "";
+  readonly environmentCanvas = document.createElement("canvas");
+  readonly trackedPlanes: Surroundings["trackedPlanes"] = new Set();
+  readonly trackedMeshes: Surroundings["trackedMeshes"] = new Set();
+  planesVisible = false;
+  boundingBoxesVisible = false;
+  meshesVisible = false;
+  render(): void {}
+  loadEnvironment(): void {}
+  loadDefaultEnvironment(): void {}
+  deleteAll(): void {}
+  computeDepthBuffer(): null {
+    return null;
+  }
+  /** Where a ray along its -z meets the floor; else the wall, whose y points at the viewer. */
+  computeHitTestResults(ray: ArrayLike<number>): number[][] {
+    const way = (Room.floor - ray[13]) / -ray[9];
+    const [x, z] = [ray[12] - way * ray[8], ray[14] - way * ray[10]];
+    if (way > 0 && z > -3) return [[1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, x, Room.floor, z, 1]];
+    return [[1, 0, 0, 0, 0, 0, 1, 0, 0, -1, 0, 0, 0, 1, -3, 1]];
+  }
+}
+
 let vr: VrSession | null = null;
 let pictures = 0;
 let pageFrames = 0;
 let told: string[] = [];
+let correction = { x: 0, turn: 0 }; // of anchors
 let time = 0; // s
 let wanted: ((picture: string) => void) | null = null;
 renderer.setAnimationLoop(() => pageFrames++);
@@ -84,7 +114,18 @@ async function pixelsOf(picture: string): Promise<ImageData> {
 
 const api = {
   supported: vrSupported,
-  install: () => device.installRuntime({ forceInstall: true }),
+  install(): void {
+    device.installRuntime({ forceInstall: true });
+    const { prototype } = XRFrame;
+    const own = prototype.getPose;
+    prototype.getPose = function (space, base) {
+      const pose = own.call(this, space, base);
+      if (!pose || ![...(this.trackedAnchors ?? [])].some(({ anchorSpace }) => anchorSpace === space)) return pose;
+      const { x, y, z } = pose.transform.position;
+      const { turn } = correction;
+      return { transform: new XRRigidTransform({ x: x + correction.x, y, z }, { x: 0, y: Math.sin(turn / 2), z: 0, w: Math.cos(turn / 2) }) } as XRPose;
+    };
+  },
   /** The session comes, its space does not. */
   async enterWithoutSpace(): Promise<void> {
     const { prototype } = XRSession;
@@ -92,10 +133,10 @@ const api = {
     prototype.requestReferenceSpace = () => Promise.reject(new Error("no floor"));
     await api.enter().finally(() => (prototype.requestReferenceSpace = own));
   },
-  async enter(): Promise<void> {
+  async enter(passthrough = false): Promise<void> {
     told = [];
     vr = await VrSession.enter({
-      renderer, camera, content, box: BOX, frame,
+      renderer, camera, content, box: BOX, frame, passthrough,
       actions: {
         toggle: () => told.push("toggle"),
         step: (frames) => told.push(`step ${frames}`),
@@ -104,6 +145,17 @@ const api = {
       },
       onend: () => told.push(`end ${renderer.xr.isPresenting}`),
     });
+  },
+  /** From now on the device knows the room around it. */
+  knowRoom: () => device.installSEM(Room),
+  /** Where the ring on the floor is; null where there is none. */
+  reticle(): number[] | null {
+    const ring = root.children.find((object) => object instanceof Reticle);
+    return ring?.visible ? ring.position.toArray() : null;
+  },
+  /** The device finds that all places it keeps track of are elsewhere: so far to the right, and turned about the vertical. */
+  correct(x: number, turn: number): void {
+    correction = { x, turn };
   },
   end: async (): Promise<void> => vr?.end(),
   /** As when the viewer presses the headset's own button. */
