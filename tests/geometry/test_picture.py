@@ -146,3 +146,19 @@ def test_a_picture_of_nothing_is_the_background():
     empty = Mesh.empty()
     seen = finished(draw_picture([Body.behind(empty)], Standing((np.zeros(3), np.ones(3))), BEFORE, SIZE), RED)
     assert (seen == RED).all()
+
+
+@pytest.mark.parametrize(
+    ("box", "away", "aspect", "times"),
+    [  # of somebody who walks from side to side, as the player's test of `timesAway` has it, and who stands
+        ([[-2, 0, -0.3], [2, 1.8, 0.3]], [0, 0.5, 6.5], 16 / 9, 0.5935),
+        ([[-2, 0, -0.3], [2, 1.8, 0.3]], [0, 0.5, 6.5], 0.5, 2),
+        ([[-2, 0, -0.3], [2, 1.8, 0.3]], [0, 0, 1], 16 / 9, 1),
+        ([[-0.4, 0, -0.3], [0.4, 1.8, 0.3]], [0, 0.4, 2.8], 16 / 9, 1),
+    ],
+)
+def test_a_files_view_comes_nearer_where_the_sides_of_a_wide_picture_would_be_empty(box, away, aspect, times):
+    low, high = np.array(box, np.float64)
+    target = np.array([0, 0.9, 0])
+    view = Standing((low, high)).framed(Viewpoint(tuple(target + away), tuple(target)), round(900 * aspect), 900)
+    assert np.allclose(np.array(view.position) - target, times * np.array(away), rtol=1e-4)

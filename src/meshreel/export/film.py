@@ -79,6 +79,8 @@ def export_film(
     standing = Standing(video.box, options.up or video.up)
     given = options.view or reader.view
     view = Viewpoint(given.position, given.target, given.fov) if given else standing.fitted(*size)
+    if options.view is None and given:
+        view = standing.framed(view, *size)
     times, shown = _times(reader, frames[:1] if kind == ".png" else frames, options, kind)
 
     def bodies(frame: int) -> list[Body]:

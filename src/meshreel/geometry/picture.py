@@ -13,6 +13,7 @@ import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import product
 
 import numpy as np
 
@@ -104,6 +105,20 @@ class Standing:
         target = self.middle + np.array([0.0, lift, 0.0]) @ np.array(UPRIGHT[self.up])
         eye = target + (distance * toward) @ np.array(UPRIGHT[self.up])
         return Viewpoint(tuple(eye.tolist()), tuple(target.tolist()))
+
+    def framed(self, view: Viewpoint, width: int, height: int) -> Viewpoint:
+        """Return a file's view, made for a square picture, in one of so many pixels, by the player's `timesAway`."""
+        target = np.array(view.target)
+        away = np.array(view.position) - target
+        corners = np.array(list(product(*zip(*self.box, strict=True)))) - target
+        x, y, z = products(view.camera(self.up, width, height).pose.from_world[:3, :3], corners.T)
+        tangent, aspect = rounded(math.tan(math.radians(view.fov) / 2)), width / height
+
+        def least(wide: float) -> float:  # distance at which a picture so much wider than high holds all corners
+            return float((np.maximum(np.abs(x) / wide, np.abs(y)) / tangent - z).max())
+
+        times = 1 / aspect if aspect < 1 else least(aspect) / least(1) if norm(away) >= least(1) else 1.0
+        return replace(view, position=tuple((target + times * away).tolist()))
 
 
 @dataclass(frozen=True, slots=True)

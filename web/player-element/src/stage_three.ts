@@ -8,7 +8,7 @@ import type { VrActions } from "@meshreel/xr";
 import { Color, Group, PerspectiveCamera, Scene, Spherical, Vector3, WebGLRenderer } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import { readCamera } from "./attributes.ts";
-import { fitting, FROM } from "./fitting.ts";
+import { fitting, FROM, timesAway } from "./fitting.ts";
 import { Fly } from "./fly.ts";
 import type { PictureStats, Stage } from "./stage.ts";
 import type { Up } from "@meshreel/player-three/upright";
@@ -116,7 +116,8 @@ export class ThreeStage extends EventTarget implements Stage {
   get viewOfFile(): string {
     if (!this.#info) return "";
     const { target } = this.#orbit;
-    const eye = target.clone().addScaledVector(this.#eye.position.clone().sub(target), 1 / this.#back);
+    const away = this.#eye.position.clone().sub(target);
+    const eye = target.clone().addScaledVector(away, 1 / this.#back(target, away, true));
     const digits = Math.min(12, Math.max(0, DIGITS - Math.floor(Math.log10(eye.distanceTo(target)))));
     const places = [eye, target].flatMap((place) => lying(place, this.#info!, this.#up).toArray());
     return [...places.map((value) => value.toFixed(digits)), this.#eye.fov].join(",");
@@ -265,16 +266,17 @@ export class ThreeStage extends EventTarget implements Stage {
     return Math.tan((this.#eye.fov * Math.PI) / 360);
   }
 
-  /** Times the distance of a file's view: a picture that is higher than wide shows at least what a square one does. */
-  get #back(): number {
-    return Math.max(1, 1 / this.#eye.aspect);
+  /** Times the distance of a file's view. */
+  #back(target: Vector3, away: Vector3, isShown: boolean): number {
+    return timesAway(this.#box!, target, away, { tangent: this.#tangent, aspect: this.#eye.aspect, free: this.#free }, isShown);
   }
 
   /** The recording's first view, or else all of it. */
   #begin(): void {
     if (this.#first) {
       const target = new Vector3(...this.#first.target);
-      this.#look(new Vector3(...this.#first.position).sub(target).multiplyScalar(this.#back).add(target), target);
+      const away = new Vector3(...this.#first.position).sub(target);
+      this.#look(target.clone().addScaledVector(away, this.#back(target, away, false)), target);
     } else this.#whole();
     this.isFit = true;
   }

@@ -82,6 +82,9 @@ describeInBrowser("the page of a recording", () => {
     const isAsTagged = async (): Promise<void> => (await told()).forEach((value, k) => expect(value).toBeCloseTo(numbers[k], 3));
     await isAsTagged();
     const wide = await camera(page);
+    await page.setViewportSize({ width: 800, height: 240 });
+    await page.waitForFunction(() => document.querySelector("meshreel-player")!.shadowRoot!.querySelector("canvas")!.clientWidth === 800);
+    await isAsTagged();
     await page.setViewportSize({ width: 300, height: 600 }); // from farther away, but the same view
     await expect.poll(() => camera(page)).not.toEqual(wide);
     await expect.poll(() => page.evaluate(() => document.querySelector("meshreel-player")!.cameraMoved)).toBe(false);
