@@ -1,6 +1,6 @@
 """Makes the generated files anew, or with --check changes nothing and fails where one is stale: FORMAT.md's tables and
-the records of the player and of the C++ decoder from meshreel.format.layout, the table of docs/reliability.md from its
-rows.
+the records of the player and of the C++ decoder from meshreel.format.layout, the constants of the player's ground from
+meshreel.geometry.ground, the table of docs/reliability.md from its rows.
 """
 
 from __future__ import annotations
@@ -13,10 +13,12 @@ import format_tables
 import reliability
 
 from meshreel.format.layout import PAYLOADS, RECORDS
+from meshreel.geometry import ground
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCUMENT = ROOT / "FORMAT.md"
 MODULE = ROOT / "web/player-core/src/format/layout.gen.ts"
+GROUND = ROOT / "web/player-three/src/ground.gen.ts"
 HEADER = ROOT / "core/src/layout.gen.h"
 
 
@@ -25,9 +27,17 @@ def made() -> dict[Path, str]:
     return {
         DOCUMENT: format_tables.fill_tables(DOCUMENT.read_text(encoding="utf-8"), RECORDS + PAYLOADS),
         MODULE: format_code.typescript(RECORDS + PAYLOADS),
+        GROUND: ground_constants(),
         HEADER: format_code.cpp(RECORDS + PAYLOADS),
         reliability.PAGE: reliability.filled(),
     }
+
+
+def ground_constants() -> str:
+    """The module of the ground's constants for the player; their meanings stand in ground.py."""
+    names = ("TEXELS", "ASIDE", "REACH", "RIM", "BELOW", "GLOW")
+    head = "// Made from src/meshreel/geometry/ground.py, which explains these, by scripts/generate. Do not edit.\n\n"
+    return head + "".join(f"export const {name} = {getattr(ground, name):g};\n" for name in names)
 
 
 def main(arguments: list[str]) -> int:

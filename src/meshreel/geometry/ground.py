@@ -1,6 +1,7 @@
 """Ground below a recording, as in the player's `ground.ts`: hardly seen itself, it takes a soft shadow.
 
-In: meshes, and how they stand. Out: a disc that is laid over the samples of a picture.
+In: meshes, and how they stand. Out: a disc that is laid over the samples of a picture. The player has the same
+constants: `scripts/generate` writes them to its `ground.gen.ts`.
 """
 
 from __future__ import annotations
@@ -22,11 +23,12 @@ from .strict import products
 if TYPE_CHECKING:
     from .picture import Rgba, Standing
 
-_TEXELS = 256  # of the shadow's picture along a side
-_ASIDE = 0.35  # of the recording's size: how far the shadow's picture reaches beyond it
-_REACH = 0.5  # of the recording's height: what hangs higher casts none
-_RIM = 2.0  # of the half side of the shadow's picture: where the ground has faded away
-_BELOW = 0.002  # of its height: so that soles hide it
+TEXELS = 256  # of the shadow's picture along a side
+ASIDE = 0.35  # of the recording's size: how far the shadow's picture reaches beyond it
+REACH = 0.5  # of the recording's height: what hangs higher casts none
+RIM = 2.0  # of the half side of the shadow's picture: where the ground has faded away
+BELOW = 0.002  # of its height: so that soles hide it
+GLOW = 0.12  # how bright the ground's middle is: on a dark page a shadow is seen only where that is brighter (guess)
 _SOFT = ((1.5, 0.3), (3.0, 0.35), (4.5, 0.4))  # how blurred a copy of the shadow is, and its share
 
 Plane = Float64[np.ndarray, "R C"]
@@ -44,15 +46,15 @@ class Ground:
     def under(meshes: Sequence[Mesh], standing: Standing) -> Ground:
         """Return the ground below meshes, with their shadow."""
         width, height, depth = standing.size.tolist()
-        half = (0.5 + _ASIDE) * max(width, depth, _REACH * height) or 1.0
+        half = (0.5 + ASIDE) * max(width, depth, REACH * height) or 1.0
         above = np.array(UP_AXES[standing.up])
         right = np.array([1.0, 0.0, 0.0])
         axes = np.stack([right, np.cross(above, right), above])
-        middle = standing.middle - above * (0.5 + _BELOW) * height
+        middle = standing.middle - above * (0.5 + BELOW) * height
         pose = matrix_of(axes, -(axes * middle).sum(axis=1))
-        eye, near = Parallel(_TEXELS, _TEXELS, 2 * half / _TEXELS, pose), np.zeros((_TEXELS, _TEXELS))
+        eye, near = Parallel(TEXELS, TEXELS, 2 * half / TEXELS, pose), np.zeros((TEXELS, TEXELS))
         for mesh in meshes:
-            away = draw(mesh, eye).depth.astype(np.float64) / (_REACH * (height or 1.0))
+            away = draw(mesh, eye).depth.astype(np.float64) / (REACH * (height or 1.0))
             near = np.maximum(near, np.clip(1 - away, 0, 1))
         dark = (255 * np.minimum(1.2 * _softened(near * near), 0.8)).round().astype(np.uint8)
         return Ground(pose, half, np.repeat(dark[..., None], 3, axis=2))
@@ -66,11 +68,11 @@ class Ground:
         with np.errstate(divide="ignore", invalid="ignore"):
             depth = -to_disc[2, 3] / z
             x, y = ((to_disc[k, 3] + depth * way) / self.half for k, way in enumerate((x, y)))
-            at = np.flatnonzero((depth > 0) & (depth < nearest) & (x * x + y * y < _RIM * _RIM))
+            at = np.flatnonzero((depth > 0) & (depth < nearest) & (x * x + y * y < RIM * RIM))
         x, y = x.reshape(-1)[at], y.reshape(-1)[at]
-        faint = np.maximum(1 - np.sqrt(x * x + y * y) / _RIM, 0)
-        light = 0.08 * faint * np.sqrt(faint)
-        places = (np.stack([x, y], axis=1) + 1) * _TEXELS / 2
+        faint = np.maximum(1 - np.sqrt(x * x + y * y) / RIM, 0)
+        light = GLOW * faint * np.sqrt(faint)
+        places = (np.stack([x, y], axis=1) + 1) * TEXELS / 2
         dark = sampled(self.dark, places)[:, 0] / 255
         samples = found.reshape(-1, 4)
         samples[at] *= ((1 - light) * (1 - dark))[:, None]
@@ -85,7 +87,7 @@ def _softened(shadow: Plane) -> Plane:
         wide = levels[-1]
         levels.append((wide[::2, ::2] + wide[1::2, ::2] + (wide[::2, 1::2] + wide[1::2, 1::2])) / 4)
     for lod, share in _SOFT:
-        offset = 0.6 * math.sqrt(2.0 ** (2 * lod)) / _TEXELS
+        offset = 0.6 * math.sqrt(2.0 ** (2 * lod)) / TEXELS
         between = {math.floor(lod), math.ceil(lod)}
         for level in sorted(between):
             small = levels[level]
@@ -96,5 +98,5 @@ def _softened(shadow: Plane) -> Plane:
 
 def _tents(side: int, offset: float) -> Plane:
     """Return the shares of so many texels in each texel of the shadow's picture, `offset` of its side away."""
-    places = np.clip(((np.arange(_TEXELS) + 0.5) / _TEXELS + offset) * side - 0.5, 0, side - 1)
+    places = np.clip(((np.arange(TEXELS) + 0.5) / TEXELS + offset) * side - 0.5, 0, side - 1)
     return np.maximum(1 - np.abs(places[:, None] - np.arange(side)), 0)

@@ -5,7 +5,8 @@ import { Ground, lying, ReelScene, Sorter, standing, updateFar } from "@meshreel
 import type { Mode, OrderWorker } from "@meshreel/player-three";
 import { VrSession } from "@meshreel/xr";
 import type { VrActions } from "@meshreel/xr";
-import { Color, Group, PerspectiveCamera, Scene, Spherical, Vector3, WebGLRenderer } from "three";
+import { Box3, Color, Group, PerspectiveCamera, Scene, Spherical, Vector3, WebGLRenderer } from "three";
+import type { Matrix4 } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import { readCamera } from "./attributes.ts";
 import { fitting, FROM, timesAway } from "./fitting.ts";
@@ -19,7 +20,6 @@ const MARGIN = 1.05; // around what just fits
 const STEEPEST = 0.01; // radians from straight above or below
 const CLOSEST = 1e-3; // of the recording's size: how near the camera comes
 const FARTHEST = 20; // of its size: how far the camera goes
-const DARK = 0.2; // lightness (linear) below which a background is dark
 const NEAR = 0.002; // of the camera's distance: what it sees. A background may reach far beyond the recording's box.
 const FAR = 50;
 
@@ -98,9 +98,7 @@ export class ThreeStage extends EventTarget implements Stage {
   set background(colour: string) {
     this.#background = colour;
     const isOpaque = !/^rgba|\//.test(colour); // as a computed style is written; what lies behind the canvas has the colour, too
-    const behind = isOpaque ? new Color(colour) : null;
-    this.#scene.background = behind; // not a clear colour: that would be lost with the context
-    this.#floor.isDark = behind !== null && behind.getHSL({ h: 0, s: 0, l: 0 }).l < DARK;
+    this.#scene.background = isOpaque ? new Color(colour) : null; // not a clear colour: that would be lost with the context
   }
 
   get camera(): string {
@@ -188,13 +186,22 @@ export class ThreeStage extends EventTarget implements Stage {
     return moves;
   }
 
-  /** The shadow is drawn anew where what is shown is another; a room has a floor of its own, and splats cast none. */
+  /** The shadow is drawn anew where what is shown is another. A room has a floor of its own, and in its colours are shadows already; splats cast none. */
   #shade(shown: Shown | null): void {
     const isLit = this.#mode === "color" || this.#mode === "shaded" || this.#mode === "splats";
-    this.#floor.visible = this.ground && isLit && shown !== null && shown.background === null && !this.#reel.splats.some((count) => count > 0);
-    if (!this.#floor.visible || shown === this.#shaded) return;
-    this.#shaded = shown;
-    this.#floor.shade(this.#reel, this.#renderer);
+    const room = shown?.background ?? null;
+    const isColored = room !== null && (room.colors !== null || shown!.backgroundImage !== null);
+    const casts = this.ground && isLit && !isColored && !this.#reel.splats.some((count) => count > 0);
+    this.#floor.visible = casts && shown !== null && room === null;
+    const box = casts && shown !== null && room !== null ? boxOf(shown, this.#reel.matrix) : null; // of who is in the room
+    if (!this.#floor.visible && box === null) {
+      this.#shaded = null;
+      this.#reel.darken(null);
+    } else if (shown !== this.#shaded) {
+      this.#shaded = shown;
+      if (box !== null) this.#floor.lie(box);
+      this.#floor.shade(this.#reel, this.#renderer, box !== null);
+    }
   }
 
   resize(width: number, height: number, pixelRatio: number, covered: number): void {
@@ -339,6 +346,15 @@ export class ThreeStage extends EventTarget implements Stage {
     this.dispatchEvent(new Event("change"));
     this.dispatchEvent(new Event("camerachange"));
   }
+}
+
+/** Around all that moves, as it stands; null where nothing does. */
+function boxOf({ groups }: Shown, standing: Matrix4): Box | null {
+  const around = new Box3();
+  for (const group of groups) if (group !== null) around.union(new Box3(new Vector3(...group.box.minimum), new Vector3(...group.box.minimum).add(new Vector3(...group.box.size))));
+  if (around.isEmpty()) return null;
+  around.applyMatrix4(standing);
+  return { minimum: around.min.toArray(), size: around.getSize(new Vector3()).toArray() };
 }
 
 /** True if the camera comes to rest softly. */

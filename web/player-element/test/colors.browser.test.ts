@@ -97,7 +97,7 @@ describeInBrowser("the player and a recording's own colours", () => {
     const { page } = await site.visit("player/index.html?src=/layers.reel&background=rgb(20,23,28)&controls=0&mode=shaded");
     await page.waitForFunction(() => (document.querySelector("meshreel-player")!.statistics?.triangles ?? 0) > 0);
     const greys = Object.entries(await colorsOf(page)).map(([color, count]) => [Number(color.split(",")[0]), count] as const);
-    const bright = greys.reduce((sum, [red, count]) => sum + (red > 45 && red < 75 ? count : 0), 0);
+    const bright = greys.reduce((sum, [red, count]) => sum + (red > 32 && red < 75 ? count : 0), 0);
     expect(bright).toBeGreaterThan(3000);
     const brightest = async (): Promise<number> => Math.max(...Object.keys(await colorsOf(page)).map((color) => Number(color.split(",")[0])));
     const usual = await brightest();

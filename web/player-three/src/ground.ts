@@ -1,22 +1,18 @@
 // The ground under a recording: hardly seen itself, it takes the shadow of what stands on it or hangs close above.
 
-import { CircleGeometry, CustomBlending, GLSL3, Group, LinearMipmapLinearFilter, Mesh, OneFactor, OneMinusSrcAlphaFactor, OrthographicCamera, RawShaderMaterial, WebGLRenderTarget } from "three";
+import { CircleGeometry, CustomBlending, GLSL3, Group, LinearMipmapLinearFilter, Matrix4, Mesh, OneFactor, OneMinusSrcAlphaFactor, OrthographicCamera, RawShaderMaterial, WebGLRenderTarget } from "three";
 import type { WebGLRenderer } from "three";
 import type { Box } from "@meshreel/player-core/types";
+import { ASIDE, BELOW, GLOW, REACH, RIM, TEXELS } from "./ground.gen.ts";
 import { drawOffscreen } from "./offscreen.ts";
 import type { ReelScene } from "./scene.ts";
 import { GROUND_FRAGMENT, GROUND_VERTEX } from "./shaders.ts";
 
-const SIDE = 256; // texels of the shadow
-const ASIDE = 0.35; // of the recording's size: how far the shadow's picture reaches beyond it (guess)
-const REACH = 0.5; // of the recording's height: what hangs higher casts none (guess)
-const RIM = 2; // of the half side of the shadow's picture: where the ground has faded away (guess)
-const GLOWS = { bright: 0.08, dark: 0.2 }; // of the ground on pages: on dark ones a shadow is seen only where that is brighter (guess)
-const BELOW = 0.002; // of its height: so that soles hide it
+const THICK = 0.2; // of the shadow's reach: how far above and below the feet a room's floor takes it (guess)
 
 /** To be put beside a recording, in the space in which that stands upright. */
 export class Ground extends Group {
-  readonly #target = new WebGLRenderTarget(SIDE, SIDE, { generateMipmaps: true, minFilter: LinearMipmapLinearFilter });
+  readonly #target = new WebGLRenderTarget(TEXELS, TEXELS, { generateMipmaps: true, minFilter: LinearMipmapLinearFilter });
   readonly #eye = new OrthographicCamera(); // below the ground, looks up
   readonly #disc: Mesh<CircleGeometry, RawShaderMaterial>;
 
@@ -27,7 +23,7 @@ export class Ground extends Group {
       glslVersion: GLSL3,
       vertexShader: GROUND_VERTEX,
       fragmentShader: GROUND_FRAGMENT,
-      uniforms: { shadow: { value: this.#target.texture }, rim: { value: RIM }, glow: { value: GLOWS.bright } },
+      uniforms: { shadow: { value: this.#target.texture }, rim: { value: RIM }, glow: { value: GLOW } },
       blending: CustomBlending, // of colours that have their alpha in them
       blendSrc: OneFactor,
       blendDst: OneMinusSrcAlphaFactor,
@@ -40,11 +36,6 @@ export class Ground extends Group {
     this.add(this.#disc, this.#eye);
   }
 
-  /** True on a dark background. */
-  set isDark(isDark: boolean) {
-    this.#disc.material.uniforms.glow!.value = isDark ? GLOWS.dark : GLOWS.bright;
-  }
-
   /** Lies under a box. */
   lie({ minimum: [x, y, z], size: [width, height, depth] }: Box): void {
     const half = (0.5 + ASIDE) * Math.max(width, depth, REACH * height) || 1;
@@ -54,13 +45,16 @@ export class Ground extends Group {
     this.#eye.updateProjectionMatrix();
   }
 
-  /** Takes the shadow of what a recording shows now. */
-  shade(reel: ReelScene, renderer: WebGLRenderer): void {
+  /** Takes the shadow of what a recording shows now; `inRoom`, the room's floor does. */
+  shade(reel: ReelScene, renderer: WebGLRenderer, inRoom: boolean): void {
     this.updateWorldMatrix(true, true);
     drawOffscreen(renderer, this.#target, () => {
       renderer.clear();
       reel.cast(() => renderer.render(reel, this.#eye));
     });
+    if (!inRoom) return reel.darken(null);
+    const [{ x: half }, high, { x, y, z }] = [this.#disc.scale, THICK * this.#eye.far, this.position];
+    reel.darken(this.#target.texture, new Matrix4().makeScale(1 / half, 1 / high, 1 / half).multiply(new Matrix4().makeTranslation(-x, -y, -z)).multiply(reel.matrix));
   }
 
   override dispose(): void {

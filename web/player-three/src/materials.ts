@@ -1,6 +1,6 @@
 // Materials: one set of uniforms for each part of the scene, one program for each way its vertices come.
 
-import { DoubleSide, GLSL3, RawShaderMaterial } from "three";
+import { DoubleSide, GLSL3, Matrix4, RawShaderMaterial } from "three";
 import type { DataTexture, IUniform, Texture } from "three";
 import { PLACE_SCALE } from "@meshreel/player-core/types";
 import { EDGE_COLOR } from "./colors.ts";
@@ -16,10 +16,15 @@ export interface Look {
   readonly exposure: IUniform<number>;
   readonly up: IUniform<Vector>;
   readonly ground: IUniform<readonly [number, number]>; // its position along `up`, and 1 / the height of the recording
+  readonly shadow: IUniform<Texture | null>; // on a room's floor
+  readonly toFloor: IUniform<Matrix4>;
 }
 
+/** A floor without a shadow. */
+export const NOWHERE: Matrix4 = new Matrix4().makeScale(0, 0, 0).setPosition(0, 1, 0);
+
 export function makeLook(): Look {
-  return { mode: { value: MODES.indexOf("shaded") }, flatNormals: { value: false }, exposure: { value: 1 }, up: { value: [0, 1, 0] }, ground: { value: [-1e6, 1] } };
+  return { mode: { value: MODES.indexOf("shaded") }, flatNormals: { value: false }, exposure: { value: 1 }, up: { value: [0, 1, 0] }, ground: { value: [-1e6, 1] }, shadow: { value: null }, toFloor: { value: NOWHERE } };
 }
 
 /** Uniforms of a part: which vertices of which frames it shows. Names as in shaders.ts. */
@@ -81,6 +86,7 @@ export function surfaceMaterial(feed: Feed, { edges, places, patches }: Extras, 
       ...(edges ? { EDGES: 1 } : {}),
       ...(places ? { PLACES: 1, PLACE_SCALE } : {}),
       ...(patches ? { PATCHES: 1 } : {}),
+      ...(feed === "attribute" ? { FLOOR: 1 } : {}),
     },
     uniforms: {
       ...look,

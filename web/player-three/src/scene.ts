@@ -1,11 +1,11 @@
 // The scene of a recording: takes packed values ahead of time, shows any of them with a few uniforms.
 
 import { Group } from "three";
-import type { Matrix4, WebGLRenderer } from "three";
+import type { Matrix4, Texture, WebGLRenderer } from "three";
 import { SPLATS_WIDTH } from "@meshreel/player-core/types";
 import type { Packed, Shown, TextureImage } from "@meshreel/player-core/types";
 import { BACKGROUND_CLAY, BACKGROUND_COLOR, trackClay, trackColor } from "./colors.ts";
-import { makeLook } from "./materials.ts";
+import { makeLook, NOWHERE } from "./materials.ts";
 import { MODES } from "./modes.ts";
 import type { Mode } from "./modes.ts";
 import { Part } from "./part.ts";
@@ -98,12 +98,20 @@ export class ReelScene extends Group {
     this.#look.ground.value = [bottom, 1 / (height || 1)];
   }
 
-  /** Has `draw` draw how close its surfaces are to an eye, as alpha. */
+  /** Has `draw` draw how close the surfaces of what moves are to an eye, as alpha. */
   cast(draw: () => void): void {
-    const { value } = this.#look.mode;
+    const [{ value }, { visible }] = [this.#look.mode, this.#background];
     this.#look.mode.value = -1;
+    this.#background.visible = false;
     draw();
     this.#look.mode.value = value;
+    this.#background.visible = visible;
+  }
+
+  /** Darkens the floor of a room that has no colours by a picture of a shadow, in a place; null for none. */
+  darken(shadow: Texture | null, place: Matrix4 = NOWHERE): void {
+    this.#look.shadow.value = shadow;
+    this.#look.toFloor.value = place;
   }
 
   /** Uploads a value's vertices and triangles now, so that showing it later costs nothing. RangeError where the GPU cannot hold it. */

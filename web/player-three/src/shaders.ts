@@ -140,6 +140,23 @@ export function surfaceVertex(feed: Feed): string {
   return PRECISION + POSITION + NORMAL + FEEDS[feed] + SURFACE_VERTEX;
 }
 
+// The picture's smaller copies are blurred ones: what touches the ground is sharp by the first, what hangs above is soft by the last.
+const SHADOW = /* glsl */ `
+uniform sampler2D shadow;
+
+float blurred(vec2 uv, float lod) {
+  vec2 d = exp2(lod) * 0.6 / vec2(textureSize(shadow, 0));
+  return 0.25 * (textureLod(shadow, uv + d, lod).a + textureLod(shadow, uv - d, lod).a
+    + textureLod(shadow, uv + vec2(d.x, -d.y), lod).a + textureLod(shadow, uv + vec2(-d.x, d.y), lod).a);
+}
+
+// 1 at the borders of the shadow's picture.
+float darkAt(vec2 place) {
+  vec2 uv = 0.5 + 0.5 * place;
+  return min(1.2 * (0.3 * blurred(uv, 1.5) + 0.35 * blurred(uv, 3.0) + 0.4 * blurred(uv, 4.5)), 0.8);
+}
+`;
+
 // The face's own normal comes from the picture: it looks at the viewer however the face is wound, which makes shading two-sided.
 export const SURFACE_FRAGMENT = `${PRECISION}
 uniform int mode; // the number of a Mode in modes.ts; -1: the shadow on the ground, seen from below
@@ -162,6 +179,10 @@ centroid in vec2 texturePlace;
 #endif
 #ifdef EDGES
 in vec3 barycentric;
+#endif
+#ifdef FLOOR
+uniform mat4 toFloor; // to where x and z are 1 at the borders of the shadow's picture, and y is 0 on the floor, 1 where that takes no shadow
+${SHADOW}
 #endif
 out vec4 fragment;
 
@@ -218,6 +239,10 @@ void main() {
     float inside = seenFromOutside ? 0.0 : smoothstep(0.1, 0.5, -dot(n, normalize(toEye)));
     vec3 light = mix(lightOn(n), lightOn(-n), inside);
     result = exposure * own * (isOwn ? 1.0 + RELIEF * (light - FACING_LIGHT) : light); // captured colours have light in them already
+#ifdef FLOOR
+    vec3 place = (toFloor * vec4(scenePosition, 1.0)).xyz;
+    if (!isOwn) result *= 1.0 - darkAt(place.xz) * max(1.0 - abs(place.y), 0.0) * max(dot(n, up), 0.0); // and shadows
+#endif
   }
 #ifdef EDGES
   result = mix(result, edgeColor, edge());
@@ -238,25 +263,15 @@ void main() {
 }
 `;
 
-// The picture's smaller copies are blurred ones: what touches the ground is sharp by the first, what hangs above is soft by the last.
-export const GROUND_FRAGMENT = `${PRECISION}
-uniform sampler2D shadow;
+export const GROUND_FRAGMENT = `${PRECISION}${SHADOW}
 uniform float rim;
 uniform float glow; // of the ground's middle
 in vec2 place;
 out vec4 fragment;
 
-float blurred(vec2 uv, float lod) {
-  vec2 d = exp2(lod) * 0.6 / vec2(textureSize(shadow, 0));
-  return 0.25 * (textureLod(shadow, uv + d, lod).a + textureLod(shadow, uv - d, lod).a
-    + textureLod(shadow, uv + vec2(d.x, -d.y), lod).a + textureLod(shadow, uv + vec2(-d.x, d.y), lod).a);
-}
-
 void main() {
-  vec2 uv = 0.5 + 0.5 * place;
-  float dark = 0.3 * blurred(uv, 1.5) + 0.35 * blurred(uv, 3.0) + 0.4 * blurred(uv, 4.5);
+  float dark = darkAt(place);
   float light = glow * pow(max(1.0 - length(place) / rim, 0.0), 1.5);
-  dark = min(1.2 * dark, 0.8);
   fragment = vec4(vec3(light * (1.0 - dark)), light + dark * (1.0 - light));
 }
 `;

@@ -53,6 +53,21 @@ describeInBrowser("a scene in Chromium", () => {
   const positions = (kind: "group" | "static", frame: number, blend: number): Promise<number[]> =>
     open.page.evaluate(([k, f, b]) => window.api.read(k, f, b), [kind, frame, blend] as const);
 
+  test("the floor of a room takes a soft shadow of what moves, if it has no colours, which have one in them", async () => {
+    for (const [share, prepared] of [[0.01, () => window.api.prepare(true)], [0, () => window.api.prepareColored()]] as const) {
+      await open.page.evaluate(prepared);
+      await look("shaded");
+      await open.page.evaluate(() => window.api.camera(0, 2, 3));
+      await show(0);
+      const before = await picture();
+      await open.page.evaluate(() => window.api.shade());
+      const shaded = await picture();
+      expect(shaded.difference(before)).toBeGreaterThanOrEqual(share);
+      expect(shaded.difference(before)).toBeLessThan(share === 0 ? 1e-9 : 0.2);
+      await open.page.evaluate(() => window.api.renew());
+    }
+  });
+
   test("a sphere is where its frame has it, with its normals as colours", async () => {
     await prepare(false);
     for (const t of [0, 1, 3]) {

@@ -3,7 +3,7 @@
 import { Color, PerspectiveCamera, Scene, WebGLRenderer } from "three";
 import { PLACE_SCALE } from "@meshreel/player-core/types";
 import type { Packed, PackedGroup, PackedStatic, Shown } from "@meshreel/player-core/types";
-import { ReelScene } from "../../src/index.ts";
+import { Ground, ReelScene } from "../../src/index.ts";
 import type { Mode } from "../../src/index.ts";
 import { readPositions } from "../../src/readback.ts";
 import { makeFloor, makeGroup } from "../analytic.ts";
@@ -19,6 +19,7 @@ const root = new Scene();
 root.background = new Color(0xffffff); // three forgets a clear colour with a lost context
 let scene = new ReelScene();
 root.add(scene);
+const ground = new Ground();
 let prepared: (PackedGroup | PackedStatic)[] = [];
 
 function texelsOf(track: number): PackedGroup {
@@ -72,6 +73,12 @@ const api = {
   camera(x: number, y: number, z: number): void {
     camera.position.set(x, y, z);
     camera.lookAt(0, 0, 0);
+  },
+  /** Has the room's floor take the shadow of what moves. */
+  shade(): void {
+    ground.lie({ minimum: [-0.6, -0.5, -0.6], size: [1.2, 1, 1.2] });
+    renderer.setClearAlpha(0); // as a player's has it
+    ground.shade(scene, renderer, true);
   },
   /** Draws; the pixels, rows from the bottom, four bytes each, as base64. */
   draw(): string {
