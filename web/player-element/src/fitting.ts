@@ -3,7 +3,7 @@
 import { Vector3 } from "three";
 import type { Box } from "@meshreel/player-core/types";
 
-/** Direction from which it looks. */
+/** Direction from which a view of the whole looks. */
 export const FROM = new Vector3(0.25, 0.25, 1).normalize();
 
 const SPARE = 1.05; // times the size of what a file's view shows: what a bar may take of the encoder's MARGIN of 1.1 (guess)

@@ -193,14 +193,14 @@ export class ThreeStage extends EventTarget implements Stage {
     const isColored = room !== null && (room.colors !== null || shown!.backgroundImage !== null);
     const casts = this.ground && isLit && !isColored && !this.#reel.splats.some((count) => count > 0);
     this.#floor.visible = casts && shown !== null && room === null;
-    const box = casts && shown !== null && room !== null ? boxOf(shown, this.#reel.matrix) : null; // of who is in the room
-    if (!this.#floor.visible && box === null) {
+    if (!casts || shown === null) {
       this.#shaded = null;
       this.#reel.darken(null);
     } else if (shown !== this.#shaded) {
       this.#shaded = shown;
+      const box = room && boxOf(shown, this.#reel.matrix); // of who is in the room
       if (box !== null) this.#floor.lie(box);
-      this.#floor.shade(this.#reel, this.#renderer, box !== null);
+      this.#floor.shade(this.#reel, this.#renderer, room !== null);
     }
   }
 
@@ -351,7 +351,11 @@ export class ThreeStage extends EventTarget implements Stage {
 /** Around all that moves, as it stands; null where nothing does. */
 function boxOf({ groups }: Shown, standing: Matrix4): Box | null {
   const around = new Box3();
-  for (const group of groups) if (group !== null) around.union(new Box3(new Vector3(...group.box.minimum), new Vector3(...group.box.minimum).add(new Vector3(...group.box.size))));
+  for (const group of groups) {
+    if (group === null) continue;
+    const low = new Vector3(...group.box.minimum);
+    around.union(new Box3(low, low.clone().add(new Vector3(...group.box.size))));
+  }
   if (around.isEmpty()) return null;
   around.applyMatrix4(standing);
   return { minimum: around.min.toArray(), size: around.getSize(new Vector3()).toArray() };

@@ -93,6 +93,7 @@ export class ReelScene extends Group {
   /** Stands the recording up: turned by a rotation, then the lowest of it at `bottom`, `height` below the highest. */
   stand(turned: Matrix4, bottom: number, height: number): void {
     this.quaternion.setFromRotationMatrix(turned);
+    this.updateMatrix();
     const row = turned.elements;
     this.#look.up.value = [row[1], row[5], row[9]]; // up in the recording's axes
     this.#look.ground.value = [bottom, 1 / (height || 1)];

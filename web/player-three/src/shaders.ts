@@ -241,7 +241,7 @@ void main() {
     result = exposure * own * (isOwn ? 1.0 + RELIEF * (light - FACING_LIGHT) : light); // captured colours have light in them already
 #ifdef FLOOR
     vec3 place = (toFloor * vec4(scenePosition, 1.0)).xyz;
-    if (!isOwn) result *= 1.0 - darkAt(place.xz) * max(1.0 - abs(place.y), 0.0) * max(dot(n, up), 0.0); // and shadows
+    if (!isOwn && abs(place.y) < 1.0) result *= 1.0 - darkAt(place.xz) * (1.0 - abs(place.y)) * max(dot(n, up), 0.0); // and shadows
 #endif
   }
 #ifdef EDGES
