@@ -31,7 +31,11 @@ def test_generate_check_passes_and_fails_on_a_stale_document(tmp_path):
     (tmp_path / "src").symlink_to(ROOT / "src")
     text = (ROOT / "FORMAT.md").read_text(encoding="utf-8")
     (tmp_path / "FORMAT.md").write_text(text, encoding="utf-8")
-    generated = ("web/player-core/src/format/layout.gen.ts", "core/src/layout.gen.h")
+    generated = (
+        "web/player-core/src/format/layout.gen.ts",
+        "web/player-three/src/ground.gen.ts",
+        "core/src/layout.gen.h",
+    )
     for module in (tmp_path / name for name in generated):
         module.parent.mkdir(parents=True)
         module.write_bytes((ROOT / module.relative_to(tmp_path)).read_bytes())
@@ -43,9 +47,9 @@ def test_generate_check_passes_and_fails_on_a_stale_document(tmp_path):
     assert subprocess.run(command[:-1], env=environment).returncode == 0
     assert (tmp_path / "FORMAT.md").read_text(encoding="utf-8") == text
     for module in (tmp_path / name for name in generated):
-        stale = (
-            module.read_text(encoding="utf-8").replace("RSION = 1", "RSION = 2").replace("kVersion = 1", "kVersion = 2")
-        )
+        stale = module.read_text(encoding="utf-8")
+        for name in ("VERSION", "kVersion", "RIM"):
+            stale = stale.replace(f"{name} = ", f"{name} = 1")
         module.write_text(stale, encoding="utf-8")
         assert subprocess.run(command, env=environment, capture_output=True).returncode == 1
         assert subprocess.run(command[:-1], env=environment).returncode == 0
