@@ -5,6 +5,7 @@ meshreel.geometry.ground, the table of docs/reliability.md from its rows.
 
 from __future__ import annotations
 
+import re
 import sys
 from pathlib import Path
 
@@ -13,7 +14,6 @@ import format_tables
 import reliability
 
 from meshreel.format.layout import PAYLOADS, RECORDS
-from meshreel.geometry import ground
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCUMENT = ROOT / "FORMAT.md"
@@ -34,10 +34,11 @@ def made() -> dict[Path, str]:
 
 
 def ground_constants() -> str:
-    """The module of the ground's constants for the player; their meanings stand in ground.py."""
-    names = ("TEXELS", "ASIDE", "REACH", "RIM", "BELOW", "GLOW")
+    """The module of the ground's constants for the player; read as text, as importing them needs the compiled core."""
+    text = (ROOT / "src/meshreel/geometry/ground.py").read_text(encoding="utf-8")
     head = "// Made from src/meshreel/geometry/ground.py, which explains these, by scripts/generate. Do not edit.\n\n"
-    return head + "".join(f"export const {name} = {getattr(ground, name):g};\n" for name in names)
+    found = re.findall(r"^([A-Z]+) = ([\d.]+)  #", text, re.MULTILINE)
+    return head + "".join(f"export const {name} = {float(value):g};\n" for name, value in found)
 
 
 def main(arguments: list[str]) -> int:
