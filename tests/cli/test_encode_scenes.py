@@ -9,7 +9,7 @@ from PIL import Image
 
 import meshreel
 from meshreel.capture.recording import open_recording
-from meshreel.cli.encode import describe
+from meshreel.cli.encode import _describe_scene, describe
 from meshreel.encoder.group.interval import Interval
 from meshreel.encoder.paper.recipe import PaperRecipe
 from meshreel.io.write import write_picture
@@ -83,6 +83,17 @@ def test_a_background_that_leaves_nothing_of_the_rate_is_reported_at_once(run, s
 def test_a_refresh_of_what_is_not_there_is_reported(run, balls, tmp_path):
     said = run("encode", balls, "-o", tmp_path / "a.reel", "--frames", ":1", "--background-refresh", "1")
     assert said.code == 0 and "--background-refresh does nothing" in said.err
+
+
+def test_planes_that_nothing_closes_are_reported(run, balls, tmp_path):
+    said = run("encode", balls, "-o", tmp_path / "a.reel", "--frames", ":1", "--close-planes")
+    assert said.code == 0 and "--close-planes closes nothing" in said.err
+
+
+def test_guessed_surface_is_reported():
+    scene = {"background_bytes": 9, "guessed_m2": 0.31, "tracks": 1, "noise_m": 0.003}
+    told = _describe_scene(scene | {"mbps_by_content": {"background": 0.1, "track 0": 0.2}})
+    assert told == "background 9 bytes (0.100 Mbps), 0.31 m2 of it guessed, 1 track (0.200 Mbps), noise 3 mm, "
 
 
 def test_a_rig_is_fused_on_the_fly_at_its_own_rate(run, rig, tmp_path):

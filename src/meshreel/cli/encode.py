@@ -169,6 +169,8 @@ def encode(
     warnings = (*source.warnings, *getattr(masker, "remarks", ()), *summary.warnings)
     if summary.scene is None and settings.background_refresh is not None:
         warnings += ("no background was found that could be sent again: --background-refresh does nothing",)
+    if settings.close_planes and (summary.scene is None or not summary.scene.guessed):
+        warnings += ("no hole in a plane that depth cameras could not see into: --close-planes closes nothing",)
     common.warn(text for text in warnings if text not in early)
     row = summary_row(summary, sequence.frame_rate) | {"quality": quality}
     common.result({"output": str(place), "warnings": warnings} | row, f"{place}: {describe(row)}; {_reached(row)}")
@@ -231,6 +233,7 @@ def _scene_row(summary: Summary, scene: SceneSummary, frame_rate: float) -> dict
         "background_bytes": scene.background,
         "background_faces": scene.faces,
         "noise_m": scene.noise,
+        "guessed_m2": scene.guessed,
         "measured_frames": list(scene.measured),
         "bytes_by_content": sizes,
         "mbps_by_content": {name: _mbps(size, summary, frame_rate) for name, size in sizes.items()},
@@ -247,7 +250,8 @@ def _describe_scene(row: dict[str, Any]) -> str:
     moving = sum(rate for name, rate in rates.items() if name.startswith("track"))
     background = f"background {row['background_bytes']} bytes ({rates['background']:.3f} Mbps)"
     tracks = "1 track" if row["tracks"] == 1 else f"{row['tracks']} tracks"
-    return f"{background}, {tracks} ({moving:.3f} Mbps), noise {1000 * row['noise_m']:.2g} mm, "
+    guessed = f"{row['guessed_m2']:.2g} m2 of it guessed, " if row["guessed_m2"] else ""
+    return f"{background}, {guessed}{tracks} ({moving:.3f} Mbps), noise {1000 * row['noise_m']:.2g} mm, "
 
 
 def describe(row: dict[str, Any]) -> str:

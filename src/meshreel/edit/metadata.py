@@ -18,9 +18,10 @@ LAST = "last_interval"  # of a cut whose frames are not even: microseconds from 
 KEYS = "key_frames"
 CANONICAL = "canonical_references"
 LEAST_COVERED = "least_covered"  # a share of a frame's surface, the track, and the frame
+GUESSED = "guessed_m2"  # area of a background's surface that nobody saw, where planes go on through holes
 MEANS = ("rms_m", "worst_rms_m", "d2_psnr_paper", "normal_error_deg")
 _OF_GROUPS = (KEYS, CANONICAL, LEAST_COVERED, *MEANS)
-_SHARED = ("preset", "quality", "noise_m", "up")  # that files are joined by
+_SHARED = ("preset", "quality", "noise_m", GUESSED, "up")  # that files are joined by
 RECORDED = (*_OF_GROUPS, *_SHARED)  # by an encoder
 
 
@@ -91,11 +92,12 @@ def tags_of(metadata: dict[str, Any]) -> set[str]:
 
 
 def scaled_metadata(metadata: dict[str, Any], scale: float) -> dict[str, Any]:
-    """Return the metadata of scaled frames: `_m` and totals are in metres. Raises KeyError, TypeError or ValueError."""
+    """Return the metadata of scaled frames, whose units are metres. Raises KeyError, TypeError or ValueError."""
     if scale == 1:
         return metadata
-    lengths = {name for name, value in metadata.items() if name.endswith("_m") and type(value) in (int, float)}
-    found = {name: shortened(value * scale) if name in lengths else value for name, value in metadata.items()}
+    units = {name: scale**2 if name == GUESSED else scale for name in metadata if name.endswith(("_m", GUESSED))}
+    lengths = {name for name, value in metadata.items() if name in units and type(value) in (int, float)}
+    found = {name: shortened(value * units[name]) if name in lengths else value for name, value in metadata.items()}
     if PART in metadata:
         squares, worst, *others = metadata[PART]["totals"]
         exact = [None if squares is None else squares * scale**2, None if worst is None else worst * scale, *others]

@@ -24,11 +24,12 @@ from ..coding.background import decode_background
 from ..container.writer import ReelWriter
 from ..conversions import as_sequence
 from ..edit.audio import Given, packed_audio
-from ..edit.metadata import shortened, up_metadata
+from ..edit.metadata import GUESSED, shortened, up_metadata
 from ..errors import InputError
 from ..format.layout import Form
 from ..geometry.derived_sequences import captured, is_colored, unchanging, uncolored, welded
 from ..geometry.threads import cores, threads
+from ..geometry.topology import face_normals
 from ..geometry.work import reporting, since, so_far
 from ..io.files import Place, located
 from ..types import MeshSequence, evenly
@@ -84,6 +85,7 @@ def encode(
     splats: int | None = None,
     dynamic_only: bool = False,
     background_refresh: float | None = None,
+    close_planes: bool = False,
     options: EncoderOptions | Settings | None = None,
     executor: Executor | None = None,
     jobs: int | None = None,
@@ -95,7 +97,7 @@ def encode(
     """Encode meshes as a .reel file at `path`, also a URL (extra `remote`); it appears only when it is complete.
 
     `sequence` is a MeshSequence or an iterable of meshes (`as_sequence`, which also takes a frame rate); vertices
-    at equal positions are welded. The keywords from `quality` to `background_refresh` are the fields of `Settings`,
+    at equal positions are welded. The keywords from `quality` to `close_planes` are the fields of `Settings`,
     which say when to touch them; `options` replace them all. Most of a scene stands still: it becomes a background and
     bodies. Bodies that never touch are coded apart in any sequence. Warns of surface that the file lacks.
     `jobs` is the number of cores to use, by default all that the process may use: threads share the frames of a group.
@@ -124,6 +126,7 @@ def encode(
         splats=splats,
         dynamic_only=dynamic_only,
         background_refresh=background_refresh,
+        close_planes=close_planes,
     )
     if options is not None and settings != Settings():
         raise InputError("options and settings: leave the settings out, or give Settings(...) as options")
@@ -165,7 +168,7 @@ class Encoder:
         self.progress, self.digests, self._excerpt = progress, digests, excerpt
         self.find: FindGroups = find_groups
         self.audio = b""  # payload of `packed_audio` that files get
-        self._scene: tuple[Cameras, bool, Parts] | None = None
+        self._scene: tuple[tuple[Cameras, bool, bool], Parts] | None = None
         self._stands: bool | None = masker is not None or None  # most stands still; None: unknown yet
         self._standing: Standing | None = None
         self._moves: tuple[str, ...] = ()  # why a sequence that seemed to be a scene is none
@@ -279,8 +282,8 @@ class Encoder:
 
         None where its background does not hold, so that it is none after all.
         """
-        how = (job.scene.cameras, job.scene.from_depth)
-        if self._scene is None or self._scene[:2] != how:
+        how = (job.scene.cameras, job.scene.from_depth, job.scene.close_planes)
+        if self._scene is None or self._scene[0] != how:
             survey = survey_job(job, cleaned=False) if survey is None else survey
             parts = None
             if files is not None:
@@ -288,7 +291,7 @@ class Encoder:
                 parts = None if files.scene is None else unpack_parts(files.scene, job.sequence, survey)
             try:
                 made = job.sequence, survey, job.scene, self._masker, self._standing
-                self._scene = (*how, parts or take_apart(*made))
+                self._scene = (how, parts or take_apart(*made))
             except NoRoom as reason:
                 if self._masker is not None:
                     raise InputError(f"{reason}: the masks call it still; look at them, or encode without") from None
@@ -296,7 +299,7 @@ class Encoder:
                 self._stands, self._moves = False, (f"{reason}: encoded as bodies, without a background; {remedy}",)
                 self._expect(job)
                 return None
-        return self._scene[2]
+        return self._scene[1]
 
 
 def _encode_tracked(job: Job, writer: ReelWriter, survey: Survey) -> Summary:
@@ -327,6 +330,7 @@ def _encode_scene(job: Job, file: BinaryIO, writer: ReelWriter, parts: Parts) ->
         parts.noise.off,
     )
     states = colored_states(sequence, parts, job.scene, options.appearance)
+    guessed = float(face_normals(parts.guessed)[1].sum())
     note("background, coded", *(state.payload for state in states))
     with writer:
         coded, tracks = encode_bodies(job, parts)
@@ -334,6 +338,7 @@ def _encode_scene(job: Job, file: BinaryIO, writer: ReelWriter, parts: Parts) ->
         metadata = {
             **chosen_options(options, groups),
             "noise_m": shortened(parts.noise.mean),
+            **({GUESSED: shortened(guessed)} if guessed else {}),
             **up_metadata(sequence.up),
             **first_view(job, survey, tracks.seen, parts.background),
         }
@@ -342,7 +347,7 @@ def _encode_scene(job: Job, file: BinaryIO, writer: ReelWriter, parts: Parts) ->
     psnr = mean_psnr(sequence, file, survey.diagonal, measured)
     size, count = sum(map(len, states)), 1 + max(group.track for group in groups)
     faces = len(decode_background(states[0].payload).faces) if states else 0
-    scene = SceneSummary(size, faces, parts.noise.mean, psnr, tuple(measured), count)
+    scene = SceneSummary(size, faces, parts.noise.mean, psnr, tuple(measured), count, guessed)
     moves = any(group.form != Form.EMPTY for group in groups)
     lost = (*warnings_of_scene(parts, moves, tracks.dropped), *warnings_of_groups(groups))
     texts = (*warnings_of(survey), *lost, *warnings_of_colors(groups, states))

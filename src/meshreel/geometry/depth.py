@@ -98,10 +98,16 @@ class FreeSpace:
         """Return the points with these normals that face some camera which measured nothing in front of them."""
         facing_points = np.zeros(len(points), bool)
         for way, inside, depth, ahead, past in self._measured(points):
-            facing = np.einsum("nd,nd->n", way, normals[inside]) > FACING * np.linalg.norm(way, axis=1)
             hidden = (depth > 0) & (depth < ahead - past)
-            facing_points[inside[facing & ~hidden]] = True
+            facing_points[inside[_facing(way, normals[inside]) & ~hidden]] = True
         return facing_points
+
+    def blank(self, points: Float64[np.ndarray, "N 3"], normals: Float64[np.ndarray, "N 3"]) -> Bool[np.ndarray, " N"]:
+        """Return the points with these normals that face some camera which measured nothing there."""
+        blank_points = np.zeros(len(points), bool)
+        for way, inside, depth, _, _ in self._measured(points):
+            blank_points[inside[(depth == 0) & _facing(way, normals[inside])]] = True
+        return blank_points
 
     def _measured(self, points: Float64[np.ndarray, "N 3"]) -> Iterator[tuple[Any, Any, Any, Any, Any]]:
         """Yield for each camera the ways to it from the points in its picture, their numbers, their measured and their
@@ -113,6 +119,11 @@ class FreeSpace:
             depth = picture.depth.reshape(-1)[pixels] * picture.unit
             significant = np.maximum(THROUGH[0], THROUGH[1] * ahead)
             yield picture.camera.eye - world[inside], inside, depth, ahead, significant
+
+
+def _facing(way: Float64[np.ndarray, "N 3"], normals: Float64[np.ndarray, "N 3"]) -> Bool[np.ndarray, " N"]:
+    """Return whether surface with these normals faces what is that way."""
+    return np.einsum("nd,nd->n", way, normals) > FACING * np.linalg.norm(way, axis=1)
 
 
 def _between(count: int, factor: int) -> tuple[list[_Shares], Int64[np.ndarray, " N"]]:

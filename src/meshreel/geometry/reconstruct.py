@@ -214,7 +214,7 @@ def close_holes(
     """
     edges, _ = unique_edges(mesh.faces)
     edge_keys, patches = edges[:, 0] * len(mesh.vertices) + edges[:, 1], list[Int64[np.ndarray, "n 3"]]()
-    for loop in _loops(mesh):
+    for loop in border_loops(mesh):
         rim = mesh.vertices[loop]
         if np.linalg.norm(rim - np.roll(rim, -1, axis=0), axis=1).sum() <= perimeter:
             pairs = np.sort(np.stack(np.broadcast_arrays(loop[:, None], loop[None])), axis=0)
@@ -257,7 +257,7 @@ def _least_area(rim: Float64[np.ndarray, "n 3"], taken: Bool[np.ndarray, "n n"])
     return np.array(faces)
 
 
-def _loops(mesh: Mesh) -> Iterator[Int64[np.ndarray, " n"]]:
+def border_loops(mesh: Mesh) -> Iterator[Int64[np.ndarray, " n"]]:
     """Yield the half-edges without an opposite as loops that pass no vertex twice, each as its vertices.
 
     If several loops meet at a vertex, a walk along the border cuts off a loop whenever it returns to itself.

@@ -31,6 +31,7 @@ def test_encode_takes_the_settings_as_keywords_with_the_same_defaults_and_types(
 def test_every_setting_reaches_its_option():
     assert Settings(dynamic_only=True).resolved().scene is None
     assert Settings(background_refresh=2.0).resolved().scene.refresh == 2.0
+    assert Settings(close_planes=True).resolved().scene.close_planes and not Settings().resolved().scene.close_planes
     assert Settings(group_size=7).resolved().method.group_size == 7
     assert Settings(key_interval=1.5).resolved().key_interval == 1.5
     assert Settings("paper", basis_size=3, centers=80).resolved().method.displacements.basis_size == 3
@@ -59,6 +60,7 @@ def test_every_setting_reaches_its_option():
         ({"preset": "paper", "centers": NAN}, "centers nan: give a whole number"),
         *(({name: "3"}, "'3': give a number") for name in ("quality", "key_interval", "background_refresh")),
         ({"background_refresh": 1.0, "dynamic_only": True}, "background refresh"),
+        ({"close_planes": True, "dynamic_only": True}, "close planes"),
     ],
 )
 def test_settings_that_make_no_sense_are_refused_with_the_remedy(given, words):

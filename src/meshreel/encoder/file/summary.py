@@ -62,6 +62,7 @@ class SceneSummary:
     psnr: float  # d2_psnr_paper of some frames, the scene's diagonal as peak, dB
     measured: tuple[int, ...]  # these frames
     tracks: int
+    guessed: float  # m^2 of the background, where planes go on through holes that no camera saw into
 
 
 @dataclass(frozen=True, slots=True)

@@ -30,6 +30,7 @@ from ...geometry.closest_points import Surface, area_samples
 from ...geometry.color_views import ColorFrames
 from ...geometry.depth import DepthFrames, FreeSpace
 from ...geometry.derived_sequences import CapturedSequence, picked
+from ...geometry.planes import close_planes
 from ...geometry.threads import ahead
 from ...geometry.topology import components, concatenate, face_means, face_normals, part_of
 from ...geometry.voxels import Lattice
@@ -43,6 +44,7 @@ LOST = 0.5  # share of a frame's faces that may stand still where no background 
 SEEN_THROUGH = 2  # probed frames in which cameras see through a place whose surface counts as moving (guess)
 APART, LEAST_APART = 4.0, 0.03  # deviations, and m: what is farther from the room is not of it (guess)
 OUTLIER = 3.0  # times the segmentation's `noise`: still surface farther from the background is no noise (guess)
+BLANK = 0.5  # share of the probed frames, and of a hole, in which a camera looks there and measures nothing (guess)
 SAMPLES = 20_000  # vertices of a frame at which noise is measured (guess)
 LOOKED_AT = 4  # frames in which surface that is called still is asked whether it rests (guess)
 MOVED = 0.02  # share of the still surface that may be elsewhere at other times: rooms have less than .01
@@ -68,11 +70,18 @@ class Parts:
     noise: LocalNoise  # distances of still surface from the background: what bodies near it have
     free: tuple[FreeSpace, ...] = ()  # of some frames; none where no depth is known
     views: Views | None = None  # of colour cameras
+    guesses: int = 0  # faces of the background, the last: there planes go on through holes that no camera saw into
 
     @cached_property
     def room(self) -> Callable[[int], Surface | None]:
         """The room after so many changes, prepared for queries; None where nothing stands in it."""
         return _rooms(self.background, self.changes)
+
+    @cached_property
+    def guessed(self) -> Mesh:
+        """The surface of the background that is guessed."""
+        count = len(self.background.faces)
+        return part_of(self.background, np.arange(count) >= count - self.guesses)
 
     def moving(self, frame: int, mesh: Mesh) -> tuple[Mesh, int]:
         """Cut the surface that moves out of a frame, with what the room does not have there.
@@ -136,7 +145,24 @@ def take_apart(
     changes = [_change(sequence, depth, segmentation, frame) for frame in segmentation.changes]
     sizes, noise = _measured(sequence, segmentation, noisy, changes)
     survey = replace(survey, scale=(float(np.median(sizes)) if sizes else 0.0) or survey.diagonal)
-    return Parts(survey, segmentation, background, changes, noise, free_space(sequence), Views.of(sequence, survey))
+    free, seen = free_space(sequence), len(background.faces)
+    if options.close_planes and free:
+        background = _closed(background, noise, free, changes)
+    views, guesses = Views.of(sequence, survey), len(background.faces) - seen
+    return Parts(survey, segmentation, background, changes, noise, free, views, guesses)
+
+
+def _closed(background: Mesh, noise: LocalNoise, free: Sequence[FreeSpace], changes: Sequence[Change]) -> Mesh:
+    """Let planes go on through holes of the background that no depth camera saw into, and where nothing comes later."""
+    came = _rooms(Mesh.empty(), changes)(len(changes))
+
+    def is_open(points: Float64[np.ndarray, "N 3"], normals: Float64[np.ndarray, "N 3"]) -> Bool[np.ndarray, " N"]:
+        through = np.sum([one.at(points) for one in free], axis=0) >= min(SEEN_THROUGH, len(free))
+        blank = np.sum([one.blank(points, normals) for one in free], axis=0) > BLANK * len(free)
+        later = np.zeros(len(points), bool) if came is None else came.distances(points) <= LEAST_APART
+        return through | later | (blank.mean() > BLANK)
+
+    return close_planes(background, lambda points: noise.at(points)[0], is_open)
 
 
 def free_space(sequence: CapturedSequence) -> tuple[FreeSpace, ...]:
@@ -285,7 +311,7 @@ def pack_parts(parts: Parts) -> bytes | None:
     if not isinstance(by, ByPlace):
         return None
     arrays: dict[str, Any] = {
-        "numbers": [parts.survey.unit, by.cell, by.lattice.size, by.island],
+        "numbers": [parts.survey.unit, by.cell, by.lattice.size, by.island, parts.guesses],
         "noise places": parts.noise.places,
         "noise": np.stack([parts.noise.rms, parts.noise.off]),
         "origin": by.lattice.origin,
@@ -310,7 +336,7 @@ def unpack_parts(data: bytes, sequence: CapturedSequence, survey: Survey) -> Par
     """Return the parts of a surveyed scene, or None where no encoder packed them."""
     try:
         with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
-            unit, cell, size, island = arrays["numbers"].tolist()
+            unit, cell, size, island, guesses = arrays["numbers"].tolist()
             rms, off = arrays["noise"]
             noise = LocalNoise(arrays["noise places"], rms, off, cameras_of(sequence.depth, len(sequence)))
             rest = Rest(arrays["until"], arrays["since"])
@@ -325,7 +351,7 @@ def unpack_parts(data: bytes, sequence: CapturedSequence, survey: Survey) -> Par
         return None
     changes = [Change(frame, mesh) for frame, mesh in zip(frames, came, strict=True)]
     survey = replace(survey, scale=unit)
-    return Parts(survey, by, background, changes, noise, free_space(sequence), Views.of(sequence, survey))
+    return Parts(survey, by, background, changes, noise, free_space(sequence), Views.of(sequence, survey), int(guesses))
 
 
 def _colors(arrays: Any, sequence: CapturedSequence) -> ColorChange | None:

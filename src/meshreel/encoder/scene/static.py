@@ -181,6 +181,8 @@ def colored_states(
             surface = _Unwrapped(mesh, layout, scale, texels, texels.places(mesh), normals_there)
             points, normals = [*points, surface.places], [*normals, surface.normals]
         colors, seen = looks.colors(frames, np.concatenate(points), np.concatenate(normals))
+        guessed = looks.guessed(np.concatenate(points))
+        seen &= ~guessed
         fitted = fitted_colors(mesh, colors[:count].astype(np.float64), seen[:count])
         shown = fitted[len(mesh.vertices) - coded.vertices :]
         try:
@@ -193,7 +195,8 @@ def colored_states(
         companions = [Companion(ChunkKind.COLORS, encoded.payload)]
         if surface is not None and texture is not None:
             companions.append(Companion(ChunkKind.ATLAS, encode_atlas(mesh, surface.layout)))
-            companions += _pictured(surface, (colors[count:], seen[count:]), frames, looks, texture)
+            usual = colors[count:], seen[count:], guessed[count:]
+            companions += _pictured(surface, usual, frames, looks, texture)
         found.append(replace(state, companions=tuple(companions)))
     return found
 
@@ -212,17 +215,21 @@ class _Unwrapped:
 
 def _pictured(
     surface: _Unwrapped,
-    usual: tuple[UInt8[np.ndarray, "N 3"], Bool[np.ndarray, " N"]],
+    usual: tuple[UInt8[np.ndarray, "N 3"], Bool[np.ndarray, " N"], Bool[np.ndarray, " N"]],
     frames: range,
     looks: _Looks,
     options: TextureOptions,
 ) -> list[Companion]:
-    """Return a slow video of what a background looks like, where shadows move: what a frame hides is as usual."""
+    """Return a slow video of what a background looks like, where shadows move: what a frame hides is as usual.
+
+    `usual` are the colours of the texels, which of them are known, and which are of surface that is guessed.
+    """
     crf = options.crf - FINER + round(FOR_A_DOUBLING * math.log2(max(1.0, surface.scale)))
     slow = replace(options, crf=min(max(1, crf), MOST_CRF))
 
     def picture_of(frame: int) -> UInt8[np.ndarray, "H W 3"]:
         colors, seen = looks.moment(min(frame + some.step // 2, frames[-1]), surface.places, surface.normals)
+        seen &= ~usual[2]
         return picture(surface.texels, surface.mesh, np.where(seen[:, None], colors, usual[0]), usual[1] | seen)
 
     some = frames[:: max(1, round(looks.frame_rate / PICTURES_A_SECOND))]
@@ -236,6 +243,13 @@ class _Looks:
         self._sequence, self._parts, self._views = sequence, parts, parts.views
         self.has_pictures = self._views is not None or sequence[0].texture is not None
         self.frame_rate = sequence.frame_rate
+
+    def guessed(self, points: Float64[np.ndarray, "N 3"]) -> Bool[np.ndarray, " N"]:
+        """Return which places are of surface that is guessed: pictures show what stands before it."""
+        if self._parts.guessed.is_empty:
+            return np.zeros(len(points), bool)
+        survey = self._parts.survey
+        return distances(survey.center + survey.unit * points, self._parts.guessed) <= LEAST_NEAR
 
     def colors(
         self, frames: range, points: Float64[np.ndarray, "N 3"], normals: Float64[np.ndarray, "N 3"]

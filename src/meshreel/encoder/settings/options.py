@@ -55,6 +55,7 @@ class SceneOptions:
     coarse: float = 0.5  # RMS distance that decimation may cost the background, in RMS noise (decision 19)
     lattice: float = 0.3  # spacing of the background's lattice, in RMS noise (decision 19)
     refresh: float | None = None  # s between two copies of the background in the file; None: one copy
+    close_planes: bool = False  # let planes go on through holes of the background that nobody saw into
     near: float = NEAR  # cells of the scene: pieces of consecutive frames nearer than this are one body
 
 

@@ -66,6 +66,9 @@ class Settings:
     background_refresh: float | None = None
     """Seconds between copies of a scene's background in the file, for viewers who join late. One copy for all frames if
     not given."""
+    close_planes: bool = False
+    """Let planes go on through holes of a scene's background that no depth camera saw into, as a floor below one who
+    never moves. That surface is a guess: the file says how much of it there is. Doors and windows stay open."""
 
     def __post_init__(self) -> None:
         for name, kind in self.__annotations__.items():
@@ -90,6 +93,8 @@ class Settings:
             raise InputError(f"background refresh {self.background_refresh:g}: give seconds above 0")
         if self.dynamic_only and self.background_refresh is not None:
             raise InputError("dynamic only looks for no background: leave background refresh out")
+        if self.dynamic_only and self.close_planes:
+            raise InputError("dynamic only looks for no background: leave close planes out")
         self._check_preset()
         self._check_color()
         self.resolved()  # refuses what no option can have
@@ -131,6 +136,7 @@ class Settings:
             method = replace(method, group_size=self.group_size)
         drawn = float(quality if self.color_quality is None else self.color_quality)
         appearance = appearance_options(drawn, self.color, self.texture, self.compatible, self.splats)
-        scene = None if self.dynamic_only else replace(scene_options(quality), refresh=self.background_refresh)
-        options = EncoderOptions(method, scene, appearance, quality=quality)
+        scene = scene_options(quality)
+        scene = replace(scene, refresh=self.background_refresh, close_planes=self.close_planes)
+        options = EncoderOptions(method, None if self.dynamic_only else scene, appearance, quality=quality)
         return options if self.key_interval is None else replace(options, key_interval=self.key_interval)
