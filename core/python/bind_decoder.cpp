@@ -246,6 +246,7 @@ void bind_decoder(nb::module_& m) {
              "layers"_a.none(), "previous"_a.none(), "place"_a, "shown"_a = true)
         .def_prop_ro("state", &CoreGroup::state)
         .def_prop_ro("nbytes", [](const CoreGroup& group) { return static_cast<size_t>(group.memory()); })
+        .def_prop_ro("vertices", [](const CoreGroup& group) { return group.group().vertices; })
         .def("paint", &CoreGroup::paint, "data"_a)
         .def("place", &CoreGroup::place, "layout"_a)
         .def("turn", &CoreGroup::turn, "rotation"_a, "origin"_a)

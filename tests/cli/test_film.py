@@ -101,7 +101,7 @@ def test_what_a_film_lacks_is_told(run, tmp_path):
     heard = ("export", tmp_path / "heard.reel", *SMALL, "--frames", ":2", "-o")
     assert "audio" in run(*heard, tmp_path / "a.gif").err and run(*heard, tmp_path / "a.webm").err == ""
     said = run("export", GOLDEN / "splats/splats.reel", *SMALL, "--frames", ":1", "-o", tmp_path / "a.png")
-    assert said.code == 0 and "splats" in said.err
+    assert said.code == 0 and said.err == ""
 
 
 def test_without_pyav_the_extra_is_named(run, tmp_path, monkeypatch):

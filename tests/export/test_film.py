@@ -18,6 +18,7 @@ from tests.tones import tone
 av = pytest.importorskip("av", reason="films need the extra color")
 Image, ImageSequence = (pytest.importorskip(f"PIL.{name}") for name in ("Image", "ImageSequence"))
 
+SPLATS = GOLDEN / "splats/splats.reel"
 FILE, UNEVEN, SCENE = GOLDEN / "colored/vertices.reel", GOLDEN / "mixed.reel", GOLDEN / "scene.reel"
 SMALL = (64, 48)
 
@@ -129,6 +130,19 @@ def test_audio_that_a_format_does_not_take_is_left_out(tmp_path, data):
     tag(FILE, tmp_path / "heard.reel", audio=data)
     with meshreel.open(tmp_path / "heard.reel") as video:
         assert not export_film(video.reader, tmp_path / "a.webm", range(2), FilmOptions(size=SMALL)).has_audio
+
+
+@pytest.mark.parametrize("frame", [0, 5, 9])
+def test_splats_are_drawn_in_place_of_the_surface_but_for_patches(tmp_path, frame):
+    """Frame 0 has a patch beside its splats, frame 5 splats alone, and frame 9 none; the surface is grey clay."""
+    with meshreel.open(SPLATS) as video:
+        assert len(video.tracks[0].patches(frame).faces) == {0: 32, 5: 0, 9: 128}[frame]
+    exported(tmp_path / "a.png", FilmOptions(size=(128, 96), background=None), SPLATS, range(frame, frame + 1))
+    seen = np.asarray(Image.open(tmp_path / "a.png")).astype(int)
+    seen = seen[seen[..., 3] > 250, :3]
+    clay = (np.ptp(seen, axis=1) < 30) & (seen.min(axis=1) > 60)
+    assert (np.ptp(seen, axis=1) > 90).any() == (frame != 9)
+    assert clay.any() == (frame != 5)
 
 
 def test_parts_of_a_scene_are_drawn_alone(tmp_path):

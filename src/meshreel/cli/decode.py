@@ -274,7 +274,7 @@ def export(
             raise FormatError(f"{file}: {error}; nothing is written, copy the file again") from error
     row = {"output": str(target), "format": target.suffix[1:].lower(), "bytes": target.stat().st_size}
     if is_film:
-        kept = ("background", "textures", "uneven times of frames", *(["audio"] if written.has_audio else []))
+        kept = ("background", "textures", "splats", "uneven times of frames", *(["audio"] if written.has_audio else []))
         common.warn(unwritten(file, video.reader, kept))
         row |= {"pictures": written.pictures}
         common.result(row, f"{target}: {written.pictures} pictures, {row['bytes']} bytes")

@@ -17,6 +17,7 @@ from ..errors import FormatError
 from ..format.budget import Chain
 from ..format.layout import ChunkKind, Form
 from ..geometry.splats import Bound
+from ..geometry.topology import part_of
 from ..types import Frames, Mesh, Texture
 from .cache import MOST_KEPT, CachedGroup, CachedStates, Refusals, most_together
 from .pictures import Decoders, TrackPictures
@@ -75,6 +76,13 @@ class Track(Frames):
         if (of := self._splats.of(chunk)) is None:
             return None
         return self._splats.bound(of, self._decoded(chunk).core, index - chunk.first_frame)
+
+    def patches(self, index: int) -> Mesh:
+        """Return the faces of frame `index` in place of its template's, which have no splats. Raises as indexing."""
+        chunk = self.reader.chunk_of_frame(index, self.number)
+        group = self._decoded(chunk)
+        mesh = group.frames[index - chunk.first_frame]
+        return part_of(mesh, mesh.faces.min(axis=1) >= group.core.vertices)
 
     def _decoded(self, chunk: Chunk) -> CachedGroup:
         """Return a group, from the cache if it was the last one decoded."""

@@ -1,6 +1,6 @@
 """Export of a .reel file to a film of pictures, as the player shows it: MP4, WebM or GIF; or to one picture, PNG.
 
-In: a reader, frames, a view. Out: a file, in which each picture is drawn by `geometry.picture`. Splats are not drawn.
+In: a reader, frames, a view. Out: a file, in which each picture is drawn by `geometry.picture`.
 """
 
 from __future__ import annotations
@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from bisect import bisect_right
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 
@@ -86,7 +86,11 @@ def export_film(
     def bodies(frame: int) -> list[Body]:
         moving = [] if options.only == "background" else moving_of_frame(video.tracks, frame)
         still = [] if options.only == "moving" else [video.background(frame)]
-        return [*(Body.of_track(mesh, number) for number, mesh in enumerate(moving)), *map(Body.behind, still)]
+        parts = [Body.of_track(mesh, number) for number, mesh in enumerate(moving)]
+        for number, track in enumerate(video.tracks[: len(parts)]):
+            if (splats := track.splats(frame)) is not None:
+                parts[number] = replace(parts[number], splats=splats, patches=track.patches(frame))
+        return [*parts, *map(Body.behind, still)]
 
     @lru_cache(maxsize=1)
     def drawn(frame: int, share: float) -> UInt8[np.ndarray, "H W C"]:

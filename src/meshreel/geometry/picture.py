@@ -23,6 +23,8 @@ from .cameras import Camera, CameraPose, matrix_of
 from .color_views import colors_on
 from .drawing import Crop, SeenPlaces, draw_places
 from .ground import Ground
+from .splat_drawing import FlatSplats
+from .splats import Bound
 from .strict import exp, norm, products, rounded
 from .threads import mapped
 from .topology import blend, face_normals, vertex_normals
@@ -127,6 +129,13 @@ class Body:
 
     mesh: Mesh
     clay: Float64[np.ndarray, "3"]  # 0 to 255
+    splats: Bound | None = None  # drawn in place of the mesh, which still casts its shadow
+    patches: Mesh | None = None  # of the mesh, drawn beside splats
+
+    @property
+    def surface(self) -> Mesh:
+        """Part of the mesh that is drawn."""
+        return self.mesh if self.splats is None else self.patches or Mesh.empty()
 
     @staticmethod
     def of_track(mesh: Mesh, number: int = 0) -> Body:
@@ -150,13 +159,15 @@ def draw_picture(
     """
     camera = view.camera(standing.up, SIDE * size[0], SIDE * size[1])
     below = Ground.under([body.mesh for body in bodies], standing) if ground else None
-    looks = [_Look(body, camera, standing) for body in bodies if not body.mesh.is_empty]
+    looks = [_Look(body, camera, standing) for body in bodies if not body.surface.is_empty]
+    splats = [body.splats for body in bodies if body.splats is not None]
+    flat = FlatSplats.of(Bound.join(splats), view.camera(standing.up, *size)) if splats else None
     tops = range(0, camera.height, BAND)
     crops = [Crop(top, min(top + BAND, camera.height), 0, camera.width) for top in tops]
-    return np.concatenate(mapped(partial(_band, looks, below, camera), crops))
+    return np.concatenate(mapped(partial(_band, looks, flat, below, camera), crops))
 
 
-def _band(looks: list[_Look], ground: Ground | None, camera: Camera, crop: Crop) -> Rgba:
+def _band(looks: list[_Look], splats: FlatSplats | None, ground: Ground | None, camera: Camera, crop: Crop) -> Rgba:
     nearest, found = np.full(crop.shape, np.inf), np.zeros((*crop.shape, 4))
     for look in looks:
         seen = draw_places(look.mesh, camera, crop)
@@ -166,14 +177,18 @@ def _band(looks: list[_Look], ground: Ground | None, camera: Camera, crop: Crop)
         found.reshape(-1, 4)[at, :3], found.reshape(-1, 4)[at, 3] = look.colors(seen, nearer) / 255, 1
     if ground is not None:
         ground.lay(found, nearest, camera, crop)
-    return (found[::2, ::2] + found[1::2, ::2] + (found[::2, 1::2] + found[1::2, 1::2])) / 4
+    picture = (found[::2, ::2] + found[1::2, ::2] + (found[::2, 1::2] + found[1::2, 1::2])) / 4
+    if splats is not None:
+        samples = nearest.reshape(len(picture), SIDE, -1, SIDE).swapaxes(1, 2).reshape(-1, SIDE * SIDE)
+        splats.lay(picture, crop.top // SIDE, samples)
+    return picture
 
 
 class _Look:
     """A part prepared to be drawn."""
 
     def __init__(self, body: Body, camera: Camera, standing: Standing) -> None:
-        mesh = body.mesh
+        mesh = body.surface
         self._is_lit = mesh.colors is None
         clay = np.broadcast_to(body.clay.round().astype(np.uint8), mesh.vertices.shape)
         self.mesh = replace(mesh, colors=np.ascontiguousarray(clay)) if self._is_lit else mesh

@@ -10,18 +10,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float32, Float64, Int64
+from jaxtyping import Float32, Float64
 
 from ...geometry.cameras import Camera
+from ...geometry.splat_drawing import BLUR, LEAST, MOST, NEAR, Pairs, pairs, stable_order
 from ...geometry.splats import Bound
 
-Pairs = Int64[np.ndarray, " P"]  # a number for each pair of a pixel and a Gaussian
 Shares = Float64[np.ndarray, " N"]  # of each Gaussian
-BLUR = 0.3  # pixels squared, added to projected variances so that no Gaussian falls between pixels
-LEAST = 1 / 255  # smallest opacity that is drawn: less changes no 8-bit picture
-MOST = 0.999  # largest opacity, so that Gaussians behind it have a gradient (guess)
 SPENT = 1e-4  # share of the remaining light below which Gaussians behind are not drawn
-NEAR = 1e-6  # depth up to which nothing is drawn
 WHITE = 1.0  # the background, as in `metrics.color_render`
 
 
@@ -68,7 +64,7 @@ class Drawing:
         alphas = opacities.astype(np.float32)[index] * np.exp(power)
         drawn = np.flatnonzero(alphas >= LEAST)
         pixels = (y * size[1] + x)[drawn]
-        drawn = drawn[_stable_order(pixels)]
+        drawn = drawn[stable_order(pixels)]
         self._index, self._pixels, alphas = index[drawn], (y * size[1] + x)[drawn], alphas[drawn]
         self._dx, self._dy = self._dx[drawn], self._dy[drawn]
         self._is_free = alphas < MOST  # not clipped
@@ -121,26 +117,9 @@ class Drawing:
 def _pairs(flat: Flat, opacities: Shares, size: tuple[int, int]) -> tuple[Pairs, Pairs, Pairs]:
     """Return Gaussian, column and row of each pixel in the boxes that Gaussians reach, the nearest Gaussian first."""
     reach = np.sqrt(2 * np.log(np.maximum(opacities / LEAST, 1))[:, None] * flat.spreads)
-    limits = np.array([size[1], size[0]])
-    low = np.clip(np.ceil(flat.centers - reach - 0.5), 0, limits).astype(np.int64)
-    high = np.clip(np.floor(flat.centers + reach - 0.5) + 1, 0, limits).astype(np.int64)
-    sides = np.maximum(high - low, 0)
-    counts = np.where((flat.depths > NEAR) & (opacities >= LEAST), sides[:, 0] * sides[:, 1], 0)
     order = np.argsort(flat.depths, kind="stable")
-    order = order[counts[order] > 0]
-    index = np.repeat(order, counts[order])
-    ends = np.cumsum(counts[order])
-    within = np.arange(len(index)) - np.repeat(ends - counts[order], counts[order])
-    rows = within // sides[index, 0]
-    return index, low[index, 0] + within - rows * sides[index, 0], low[index, 1] + rows
-
-
-def _stable_order(pixels: Pairs) -> Pairs:
-    """Return a stable order by pixel, by NumPy's radix sort, which exists for 16 bits."""
-    order = np.argsort((pixels & 0xFFFF).astype(np.uint16), kind="stable")
-    if pixels.max(initial=0) > 0xFFFF:
-        order = order[np.argsort((pixels >> 16).astype(np.uint16)[order], kind="stable")]
-    return order
+    order = order[((flat.depths > NEAR) & (opacities >= LEAST))[order]]
+    return pairs(flat.centers, reach, order, (0, 0, size[1], size[0]))
 
 
 def draw(bound: Bound, camera: Camera) -> Float32[np.ndarray, "H W 3"]:
