@@ -331,6 +331,23 @@ def draw(
     crop: Int32[np.ndarray, " 4"],
     weighted: bool,
 ) -> tuple[Int32[np.ndarray, "H W"], Float64[np.ndarray, "H W"], Float64[np.ndarray, "N 3"] | None]: ...
+def add_view(
+    turn: Float64[np.ndarray, "3 3"],
+    shift: Float64[np.ndarray, " 3"],
+    eye: Float64[np.ndarray, " 3"],
+    lens: Float64[np.ndarray, " 4"],
+    bend: Float64[np.ndarray, " K"],
+    size: Int32[np.ndarray, " 3"],
+    depth: Float32[np.ndarray, "H W"],
+    from_step: UInt8[np.ndarray, "H W"],
+    limits: Float64[np.ndarray, " 4"],
+    pixels: UInt8[np.ndarray, "R C 3"] | None,
+    gains: Float64[np.ndarray, " 3"],
+    points: Float64[np.ndarray, "N 3"],
+    normals: Float64[np.ndarray, "N 3"],
+    sums: Float64[np.ndarray, "N 3"],
+    weights: Float64[np.ndarray, " N"],
+) -> None: ...
 
 class FitTarget:
     def __init__(

@@ -18,7 +18,7 @@ from ..encoder.sequence import encode
 from ..encoder.settings.options import QUALITY
 from ..encoder.settings.settings import Settings
 from ..errors import InputError
-from ..geometry.threads import ahead, cores, threads
+from ..geometry.threads import cores, threads
 from ..io.write import check_free
 from ..metrics.error_sheet import SheetOptions, write_sheet
 from ..types import evenly
@@ -67,8 +67,6 @@ def command(
         _forget(output / "rig", [camera.name for camera in stage_cameras(WIDTH)])
         record_stage(output / "rig", room, WIDTH, lambda k: progress("simulate", k, frames))
         capture, _ = open_recording(output / "rig", FusionOptions(VOXEL))
-        for number, _ in enumerate(ahead(capture.__getitem__, range(len(capture))), 1):  # the recording keeps them
-            progress("fuse", number, len(capture))
         encoded = partial(encode, options=options, executor=executor, jobs=jobs, resume=False)
         summary = encoded(capture, file, progress=progress.encode)
         with open_video(file) as video:

@@ -17,6 +17,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from jaxtyping import Bool, Float, Float32, Float64, Int32, Int64, UInt8
 
+from .. import _core
 from ..types import GREY, Mesh, Placement
 from . import work
 from .cameras import Camera
@@ -110,10 +111,7 @@ class ColorViews:
         """Return the colours of places with these normals, 0 to 255, and a mask of those that some camera saw."""
         sums, weights = np.zeros((len(points), 3)), np.zeros(len(points))
         for view in self.views:
-            weight = view.weights(points, normals)
-            colors = view.colors(points, weight > 0)
-            sums += colors * weight[:, None]
-            weights += weight
+            view.add(points, normals, sums, weights)
         known = weights > 0
         sums[known] /= weights[known, None]
         return sums, known
@@ -161,31 +159,30 @@ class View:
 
         `at_step` is the share of the weight that remains at a step.
         """
-        camera = self.picture.camera
-        local, to_eye = camera.local(points), camera.eye - points
-        positions, depth = camera.project(local), local[:, 2]
-        straight = camera.straight.project(local) if any(camera.distortion) else positions
-        cosine = np.einsum("nd,nd->n", normals, to_eye) / np.maximum(np.linalg.norm(to_eye, axis=1), 1e-12)
-        size = np.array([camera.width, camera.height])
-        with np.errstate(invalid="ignore"):
-            inside = (positions >= 0.5).all(axis=1) & (positions <= size - 0.5).all(axis=1) & (cosine > 0)
-            inside &= (straight >= 0).all(axis=1) & (straight <= size).all(axis=1)
-        rows = np.flatnonzero(inside)
-        places = straight[rows] / self.shrink
-        cells = np.minimum(places, np.array(self.depth.shape[::-1]) - 1e-9).astype(np.int64)
-        squarely, near = cosine[rows] ** 3, self.from_step[cells[:, 1], cells[:, 0]] / 255
-        near[(near < 1) & (squarely * near < LEAST)] = 0
-        seen = sampled(1 / self.depth[..., None], places)[:, 0]  # the inverse depth of a plane is linear in a picture
-        agrees = np.abs(seen * depth[rows] - 1) <= np.maximum(self.margin / depth[rows], MARGIN)
         weights = np.zeros(len(points))
-        weights[rows] = np.where(agrees, squarely * np.maximum(near, at_step), 0.0)
+        self._add(points, normals, None, np.zeros((0, 3)), weights, at_step)
         return weights
 
-    def colors(self, points: Points, chosen: Mask) -> Points:
-        """Return the colours of the chosen places in the picture; 0 of others."""
-        colors = np.zeros((len(points), 3))
-        colors[chosen] = sampled(self.picture.pixels, self.picture.project(points[chosen])[0]) / self.picture.gains
-        return colors
+    def add(self, points: Points, normals: Points, sums: Points, weights: Float64[np.ndarray, " N"]) -> None:
+        """Add to sums the colours of places in the picture times their weights, and these to weights."""
+        self._add(points, normals, self.picture.pixels, sums, weights, 0.0)
+
+    def _add(
+        self,
+        points: Points,
+        normals: Points,
+        pixels: UInt8[np.ndarray, "H W 3"] | None,
+        sums: Points,
+        weights: Float64[np.ndarray, " N"],
+        at_step: float,
+    ) -> None:
+        camera = self.picture.camera
+        turn, shift = (np.ascontiguousarray(part) for part in (camera.extrinsic[:3, :3], camera.extrinsic[:3, 3]))
+        lens, bend = np.array([*camera.focal, *camera.center]), np.array(camera.distortion, np.float64)
+        size = np.array([camera.width, camera.height, self.shrink], np.int32)
+        limits, gains = np.array([self.margin, MARGIN, LEAST, at_step]), np.array(self.picture.gains, np.float64)
+        seen = size, self.depth, self.from_step, limits
+        _core.add_view(turn, shift, camera.eye, lens, bend, *seen, pixels, gains, points, normals, sums, weights)
 
 
 def _confirmed(

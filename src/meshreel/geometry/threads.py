@@ -9,10 +9,12 @@ from __future__ import annotations
 
 import os
 import sys
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sized
-from concurrent.futures import ThreadPoolExecutor, wait
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextlib import ExitStack, contextmanager
 from contextvars import ContextVar, copy_context
+from functools import partial
 from itertools import islice
 from pathlib import Path
 from threading import Lock
@@ -67,11 +69,24 @@ def mapped(function: Callable[..., _T], *arguments: Iterable[Any]) -> list[_T]:
 def ahead(function: Callable[[Any], _T], arguments: Iterable[Any], most: int = 1 << 20) -> Iterator[_T]:
     """Yield the results of calls in order; as many as there are threads are done, and in memory, together.
 
-    They are at most `most`.
+    They are at most `most`. Other threads do the next ones while the results are used.
     """
-    pool, waiting = _pool.get(), iter(arguments)
-    while some := list(islice(waiting, 1 if pool is None else min(1 + pool.count, most))):
-        yield from mapped(function, some)
+    pool, waiting, begun = _pool.get(), iter(arguments), deque[_Call]()
+    together = 1 if pool is None else min(1 + pool.count, most)
+    try:
+        while True:
+            for argument in islice(waiting, together - len(begun)):
+                begun.append(_Call(function, argument, pool if together > 1 else None))
+            if not begun:
+                return
+            for call in begun:  # those that no other thread has taken, while one of these does the first
+                if begun[0].is_done:
+                    break
+                call.take()
+            yield begun.popleft().found()
+    finally:
+        for call in begun:
+            call.drop()
 
 
 def mapped_until(enough: Callable[[_T], bool], function: Callable[..., _T], *arguments: Iterable[Any]) -> list[_T]:
@@ -90,6 +105,46 @@ def mapped_until(enough: Callable[[_T], bool], function: Callable[..., _T], *arg
     for done in shared.helped:
         work.add(done)
     return shared.found()
+
+
+class _Call:
+    """A call that another thread does, or the one that needs its result; its work is counted there."""
+
+    def __init__(self, function: Callable[[Any], Any], argument: Any, pool: _Pool | None) -> None:
+        self._done, self._reporter = partial(function, argument), work.reporter()
+        self._own = Future[Any]()
+        self._beside = None if pool is None else pool.submit(copy_context().run, self._help)
+
+    @property
+    def is_done(self) -> bool:
+        return self._own.done() or (self._beside is not None and self._beside.done())
+
+    def take(self) -> None:
+        """Do the call here unless another thread has begun it."""
+        if self.is_done or not (self._beside is None or self._beside.cancel()):
+            return
+        try:
+            self._own.set_result(self._done())
+        except BaseException as error:
+            self._own.set_exception(error)
+
+    def found(self) -> Any:
+        """Return the result, or raise the error, of the call."""
+        if self._own.done() or self._beside is None:
+            return self._own.result()
+        result, done = self._beside.result()
+        work.add(done)
+        return result
+
+    def drop(self) -> None:
+        """Return when no other thread does the call."""
+        if self._beside is not None and not self._beside.cancel():
+            wait([self._beside])
+
+    def _help(self) -> tuple[Any, work.Work]:
+        before = work.so_far()
+        with work.reporting_by(self._reporter):
+            return self._done(), work.since(before)
 
 
 class _Calls:
