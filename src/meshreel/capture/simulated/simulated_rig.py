@@ -20,6 +20,7 @@ from ...errors import InputError
 from ...geometry.cameras import Camera
 from ...geometry.drawing import draw
 from ...geometry.strict import products
+from ...geometry.threads import ahead
 from ...geometry.topology import concatenate, face_normals
 from ...io.files import read_file
 from ...io.meshes import read_mesh
@@ -86,7 +87,9 @@ def simulate_rig(
     eyes = [] if color is None else [SimulatedColor.beside(camera, color, drawn) for camera in cameras]
     for camera in cameras[: len(eyes)]:
         make_folder(folder / camera.name / "color")
-    for number, frame in enumerate(frames):
+
+    def written(numbered: tuple[int, SceneFrame]) -> UInt8[np.ndarray, " N"]:
+        number, frame = numbered
         normals = face_normals(frame.mesh)[0]
         for which, (camera, place) in enumerate(zip(cameras, places, strict=True)):
             random = np.random.default_rng([sensor.seed, number, which])
@@ -96,7 +99,10 @@ def simulate_rig(
                 picture = eyes[which].picture(frame.mesh, frame.paint, None if frame.is_lit else number, random)
                 write_picture(picture, folder / camera.name / "color" / f"color_{number:05}.png")
         write_mesh(frame.mesh, folder / TRUTH / f"frame_{number:05}.ply")
-        labels[f"frame_{number:05}"] = np.packbits(frame.dynamic)
+        return np.packbits(frame.dynamic)
+
+    for number, bits in enumerate(ahead(written, enumerate(frames))):
+        labels[f"frame_{number:05}"] = bits
         progress(number + 1)
     with replacing(folder / TRUTH / LABELS) as file:
         np.savez_compressed(file, **labels)  # type: ignore[arg-type]  # NumPy 2.1 stores `allow_pickle=` as an array

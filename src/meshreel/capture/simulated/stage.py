@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float64, Int32, Int64
 
+from ...geometry.threads import mapped
 from ...geometry.topology import blend, vertex_normals
 from ...types import Mesh
 from ..rig.cameras import DepthCamera
@@ -146,7 +147,7 @@ def stage_cameras(width: int = WIDTH) -> tuple[DepthCamera, ...]:
 
 @cache
 def _cast() -> tuple[Actor, ...]:
-    return tuple(Actor.of(build, look) for build, look in CAST)
+    return tuple(mapped(Actor.of, *zip(*CAST, strict=True)))
 
 
 def _barycentric(mesh: Mesh, corners: Int32[np.ndarray, "N 3"], points: Points) -> Float64[np.ndarray, "N 3"]:
