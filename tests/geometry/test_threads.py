@@ -86,6 +86,43 @@ def test_no_more_results_wait_than_there_are_threads(count, most, together):
     assert sorted(begun) == list(range(10))
 
 
+def test_other_threads_go_on_while_a_result_is_used():
+    begun = [threading.Event() for _ in range(4)]
+    with threads(2):
+        for number in ahead(lambda k: (begun[k].set(), k)[1], range(4)):
+            assert number == 3 or begun[number + 1].wait(10)
+
+
+def test_an_error_is_raised_in_its_turn_and_no_call_goes_on_afterwards():
+    done = list[int]()
+
+    def call(number: int) -> int:
+        slowly(number)
+        done.append(number)
+        return 1 // (number - 2)
+
+    with threads(3):
+        found = list[int]()
+        with pytest.raises(ZeroDivisionError):
+            for result in ahead(call, range(100)):
+                found.append(result)
+        assert found == [-1, -1] and len(done) <= 5
+        before = len(done)
+        time.sleep(0.05)
+        assert len(done) == before
+        with pytest.raises(StopIteration):
+            next(ahead(call, []))
+
+
+def test_work_done_ahead_is_counted_and_reported_once():
+    told = list[int]()
+    with threads(3), work.reporting(lambda _, number: told.append(number)):
+        before = work.so_far()
+        for _ in ahead(lambda number: (slowly(number), work.count("frames fitted", number)), range(8)):
+            pass
+        assert work.since(before) == {"frames fitted": 28} and sum(told) == 28
+
+
 def test_work_of_all_threads_is_counted_and_reported_once():
     told = list[int]()
     with threads(3), work.reporting(lambda _, number: told.append(number)):

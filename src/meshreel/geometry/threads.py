@@ -73,17 +73,22 @@ def ahead(function: Callable[[Any], _T], arguments: Iterable[Any], most: int = 1
     """
     pool, waiting, begun = _pool.get(), iter(arguments), deque[_Call]()
     together = 1 if pool is None else min(1 + pool.count, most)
+
+    def begin(count: int) -> None:
+        for argument in islice(waiting, count - len(begun)):
+            begun.append(_Call(function, argument, pool if together > 1 else None))
+
     try:
-        while True:
-            for argument in islice(waiting, together - len(begun)):
-                begun.append(_Call(function, argument, pool if together > 1 else None))
-            if not begun:
-                return
+        begin(together)
+        while begun:
             for call in begun:  # those that no other thread has taken, while one of these does the first
                 if begun[0].is_done:
                     break
                 call.take()
-            yield begun.popleft().found()
+            result = begun.popleft().found()
+            begin(together - 1)  # the one that is used counts, too
+            yield result
+            begin(together)
     finally:
         for call in begun:
             call.drop()
