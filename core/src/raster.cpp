@@ -24,6 +24,16 @@ constexpr int kMostCorners = 3 + 5;
 
 struct Corner {
     int64_t x, y;  // in 1/256 pixel
+    bool is_nowhere() const { return x == std::numeric_limits<int64_t>::min(); }
+};
+
+constexpr Corner kNowhere{std::numeric_limits<int64_t>::min(), 0};  // behind the eye, or too far from the crop
+
+// Pixels around a triangle, the last ones included, and whether its corners turn the other way.
+struct Pixels {
+    int64_t left = 0, right = -1, top = 0, bottom = -1;
+    bool is_turned = false;
+    bool is_empty() const { return left > right || top > bottom; }
 };
 
 // Nearness as a linear function of a pixel's column and row, within the corners' range: 1 / z, or -z of parallel rays.
@@ -37,7 +47,11 @@ struct Nearness {
 class Raster {
 public:
     Raster(const mr_mesh& mesh, const mr_viewer& viewer, const mr_crop& crop)
-        : mesh_(mesh), viewer_(viewer), crop_(crop), corners_(scratch<Vec>(mesh.vertices)) {
+        : mesh_(mesh),
+          viewer_(viewer),
+          crop_(crop),
+          corners_(scratch<Vec>(mesh.vertices)),
+          spots_(scratch<Corner>(mesh.vertices)) {
         const Matrix turn{{load(viewer.turn), load(viewer.turn + 3), load(viewer.turn + 6)}};
         double farthest = 0;
         for (size_t v = 0; v < mesh.vertices; ++v) {
@@ -46,18 +60,24 @@ public:
         }
         near_ = std::max(kNear * farthest, std::numeric_limits<double>::min());
         center_[0] = viewer.center[0] - crop.left, center_[1] = viewer.center[1] - crop.top;
+        for (size_t v = 0; v < mesh.vertices; ++v) spots_[v] = is_within(corners_[v]) ? placed(corners_[v]) : kNowhere;
     }
 
     void draw(int32_t* faces, double* nearness) const {
         for (size_t f = 0; f < mesh_.face_count; ++f) {
+            const Corner own[3] = {spot(f, 0), spot(f, 1), spot(f, 2)};
+            const bool is_whole = !own[0].is_nowhere() && !own[1].is_nowhere() && !own[2].is_nowhere();
+            const Pixels whole = is_whole ? pixels_of(own) : Pixels{};
+            if (is_whole && whole.is_empty()) continue;
             Vec polygon[kMostCorners];
             for (int k = 0; k < 3; ++k) polygon[k] = corner(f, k);
-            const Nearness depth = nearness_of(polygon);
-            int count = 3;
-            if (!is_within(polygon)) count = clipped(polygon);
-            for (int k = 2; k < count; ++k) {
-                const Corner triangle[3] = {placed(polygon[0]), placed(polygon[k - 1]), placed(polygon[k])};
-                fill(triangle, limited(depth, polygon, count), static_cast<int32_t>(f), faces, nearness);
+            const Nearness plane = nearness_of(polygon);
+            const int count = is_whole ? 3 : clipped(polygon);
+            const Nearness depth = limited(plane, polygon, count);
+            if (is_whole) fill(own, whole, depth, static_cast<int32_t>(f), faces, nearness);
+            for (int k = 2; k < count && !is_whole; ++k) {
+                const Corner part[3] = {placed(polygon[0]), placed(polygon[k - 1]), placed(polygon[k])};
+                fill(part, pixels_of(part), depth, static_cast<int32_t>(f), faces, nearness);
             }
         }
     }
@@ -103,13 +123,26 @@ private:
                 static_cast<int64_t>(std::floor(kPixel * pixel(p.y, p.z, 1) + 0.5))};
     }
 
-    bool is_within(const Vec* polygon) const {
-        for (int k = 0; k < 3; ++k) {
-            const Vec p = polygon[k];
-            if (!viewer_.parallel && p.z < near_) return false;
-            if (!(std::fabs(pixel(p.x, p.z, 0)) < kReach) || !(std::fabs(pixel(p.y, p.z, 1)) < kReach)) return false;
-        }
-        return true;
+    Corner spot(size_t face, int k) const {
+        return spots_[static_cast<size_t>(mesh_.faces[3 * face + static_cast<size_t>(k)])];
+    }
+
+    bool is_within(Vec p) const {
+        if (!viewer_.parallel && p.z < near_) return false;
+        return std::fabs(pixel(p.x, p.z, 0)) < kReach && std::fabs(pixel(p.y, p.z, 1)) < kReach;
+    }
+
+    // The pixels around a triangle that lie in the crop; none where the triangle has no area.
+    Pixels pixels_of(const Corner (&p)[3]) const {
+        // The first pixel whose middle is not before a place, and the last one whose middle is not behind it.
+        const auto first = [](int64_t place) { return (place + kPixel / 2 - 1) >> kBits; };
+        const auto last = [](int64_t place) { return (place - kPixel / 2) >> kBits; };
+        const int64_t area = (p[1].x - p[0].x) * (p[2].y - p[0].y) - (p[1].y - p[0].y) * (p[2].x - p[0].x);
+        if (area == 0) return {};
+        return {std::max<int64_t>(first(std::min({p[0].x, p[1].x, p[2].x})), 0),
+                std::min<int64_t>(last(std::max({p[0].x, p[1].x, p[2].x})), crop_.width - 1),
+                std::max<int64_t>(first(std::min({p[0].y, p[1].y, p[2].y})), 0),
+                std::min<int64_t>(last(std::max({p[0].y, p[1].y, p[2].y})), crop_.height - 1), area < 0};
     }
 
     // How far inside one of the limits a place is: 0 near the eye's plane, then left, right, top and bottom.
@@ -163,19 +196,11 @@ private:
         return depth;
     }
 
-    void fill(const Corner (&given)[3], const Nearness& depth, int32_t face, int32_t* faces, double* nearness) const {
-        Corner p[3] = {given[0], given[1], given[2]};
-        const int64_t area = (p[1].x - p[0].x) * (p[2].y - p[0].y) - (p[1].y - p[0].y) * (p[2].x - p[0].x);
-        if (area == 0) return;
-        if (area < 0) std::swap(p[1], p[2]);
-        // The first pixel whose middle is not before a place, and the last one whose middle is not behind it.
-        const auto first = [](int64_t place) { return (place + kPixel / 2 - 1) >> kBits; };
-        const auto last = [](int64_t place) { return (place - kPixel / 2) >> kBits; };
-        const int64_t left = std::max<int64_t>(first(std::min({p[0].x, p[1].x, p[2].x})), 0);
-        const int64_t right = std::min<int64_t>(last(std::max({p[0].x, p[1].x, p[2].x})), crop_.width - 1);
-        const int64_t top = std::max<int64_t>(first(std::min({p[0].y, p[1].y, p[2].y})), 0);
-        const int64_t bottom = std::min<int64_t>(last(std::max({p[0].y, p[1].y, p[2].y})), crop_.height - 1);
-        if (left > right || top > bottom) return;
+    void fill(const Corner (&given)[3], const Pixels& part, const Nearness& depth, int32_t face, int32_t* faces,
+              double* nearness) const {
+        if (part.is_empty()) return;
+        const auto [left, right, top, bottom, is_turned] = part;
+        const Corner p[3] = {given[0], given[is_turned ? 2 : 1], given[is_turned ? 1 : 2]};
         int64_t edge[3], across[3], down[3];
         for (int k = 0; k < 3; ++k) {
             const Corner a = p[k], b = p[(k + 1) % 3];
@@ -201,7 +226,8 @@ private:
     const mr_mesh& mesh_;
     const mr_viewer& viewer_;
     const mr_crop& crop_;
-    Scratch<Vec> corners_;  // in the camera's frame
+    Scratch<Vec> corners_;   // in the camera's frame
+    Scratch<Corner> spots_;  // in the picture
     double near_, center_[2];
 };
 
