@@ -30,7 +30,7 @@ Known = Bool[np.ndarray, " N"]  # whose colour is known
 # Samples of each face: its middle, and a point towards each corner. Samples at vertices alone would alias.
 PLACES = np.array([[1, 1, 1], [4, 1, 1], [1, 4, 1], [1, 1, 4]]) / np.array([[3], [6], [6], [6]])
 REFINEMENTS = 4  # rounds of least squares: the rest of the error falls below a grey level (guess)
-TOGETHER = 1 << 16  # places whose medians are taken at a time: 16 frames of them take 10 MB
+TOGETHER = 1 << 16  # places or texels at a time: the medians of 16 frames of them take 10 MB
 GUTTERS = 128  # in the width of a texture; 8 texels of 1024 keep charts apart in three mip levels
 PACKINGS = 8  # rounds of packing, with texels per metre corrected after each; as many more halve them (guess)
 MARGIN = 0.995  # of the size that would just fit: packing is not quite proportional (guess)
@@ -60,31 +60,34 @@ def texels_of(layout: Layout, levels: int) -> Texels:
 
     Those within `BESIDE` of a chart are mixed with its texels where it is shown, and so are of it, too.
     """
-    pixels, faces, weights, away = ([np.zeros((0, *shape))] for shape in ((), (), (3,), ()))
     corners = layout.places.astype(np.float64)
     size = np.array([layout.width, layout.height])
     low = np.clip(np.ceil(corners.min(axis=1) - 0.5 - BESIDE), 0, None).astype(np.int64)
     high = np.minimum(np.floor(corners.max(axis=1) - 0.5 + BESIDE), size - 1).astype(np.int64)
-    for face, ((a, b, c), (x0, y0), (x1, y1)) in enumerate(zip(corners, low, high, strict=True)):
-        area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
-        if area == 0 or x1 < x0 or y1 < y0:
-            continue
-        x, y = np.meshgrid(np.arange(x0, x1 + 1) + 0.5, np.arange(y0, y1 + 1) + 0.5)
-        v = ((x - a[0]) * (c[1] - a[1]) - (y - a[1]) * (c[0] - a[0])) / area
-        w = ((b[0] - a[0]) * (y - a[1]) - (b[1] - a[1]) * (x - a[0])) / area
-        shares = np.stack([1 - v - w, v, w], axis=-1)
-        heights = abs(area) / np.hypot(*np.stack([c - b, a - c, b - a], axis=1))  # of the corners over their edges
-        outside = np.maximum(-(shares * heights).min(axis=-1), 0)
+    across, down = np.maximum(high - low + 1, 0).T
+    edges = np.roll(corners, 1, axis=1) - np.roll(corners, -1, axis=1)  # opposite to each corner
+    (v0, v1), (w0, w1) = (np.moveaxis(corners[:, k] - corners[:, 0], 1, 0) for k in (1, 2))
+    areas = v0 * w1 - v1 * w0
+    counts = np.where(areas == 0, 0, across * down)
+    found = list[tuple[np.ndarray, ...]]()
+    for some in np.split(np.arange(len(corners)), np.flatnonzero(np.diff(np.cumsum(counts) // TOGETHER)) + 1):
+        face = some.repeat(counts[some])
+        number = np.arange(len(face)) - (np.cumsum(counts[some]) - counts[some]).repeat(counts[some])
+        column, row = low[face, 0] + number % across[face], low[face, 1] + number // across[face]
+        x, y = column + 0.5 - corners[face, 0, 0], row + 0.5 - corners[face, 0, 1]
+        v, w = (x * w1[face] - y * w0[face]) / areas[face], (v0[face] * y - v1[face] * x) / areas[face]
+        shares = np.stack([1 - v - w, v, w], axis=1)
+        heights = np.abs(areas[face])[:, None] / np.hypot(edges[face, :, 0], edges[face, :, 1])  # over their edges
+        outside = np.maximum(-(shares * heights).min(axis=1), 0)
         near = outside <= BESIDE
-        pixels.append(y[near].astype(np.int64) * layout.width + x[near].astype(np.int64))
-        faces.append(np.full(int(near.sum()), face))
-        weights.append(np.maximum(shares[near], 0))
-        away.append(outside[near])
-    order = np.argsort(np.concatenate(away), kind="stable")  # the nearest face has a texel
-    numbers, first = np.unique(np.concatenate(pixels)[order].astype(np.int64), return_index=True)
-    chosen, whole = order[first], np.concatenate(weights)
-    shares = whole[chosen] / whole[chosen].sum(axis=1, keepdims=True)
-    finer, barycentric, _ = located(np.concatenate(faces)[chosen].astype(np.int64), shares, levels)
+        texel = row[near] * layout.width + column[near]
+        found.append((texel, face[near], np.maximum(shares[near], 0), outside[near]))
+    pixels, faces, weights, away = (np.concatenate(each) for each in zip(*found, strict=True))
+    order = np.argsort(away, kind="stable")  # the nearest face has a texel
+    numbers, first = np.unique(pixels[order], return_index=True)
+    chosen = order[first]
+    shares = weights[chosen] / weights[chosen].sum(axis=1, keepdims=True)
+    finer, barycentric, _ = located(faces[chosen], shares, levels)
     return Texels(layout.height, layout.width, numbers, finer.astype(np.int32), barycentric)
 
 

@@ -18,6 +18,7 @@ from ...container.writer import Companion
 from ...errors import InputError
 from ...format.layout import LAYER_PICTURES, ChunkKind, VideoCodec
 from ...geometry.atlas import Layout
+from ...geometry.threads import ahead
 
 TextureSize = Literal[128, 256, 512, 1024, 2048]  # texels
 TEXTURE_SIZES: tuple[int, ...] = get_args(TextureSize)
@@ -87,8 +88,8 @@ def layered_pictures(
     layers = list[list[Companion]]()
     for start in range(0, len(frames), LAYER_PICTURES):
         some, videos = frames[start : start + LAYER_PICTURES], Videos(layout, options)
-        for frame in some:
-            videos.add(picture_of(frame))
+        for pixels in ahead(picture_of, some):
+            videos.add(pixels)
         layers += videos.finish([len(some)], frames.step)
     found = list[Companion]()
     for same in zip(*layers, strict=True):
