@@ -99,7 +99,7 @@ def make_samples(folder: Path) -> None:
     if not room.exists():
         record_stage(rig := folder / "rig", StageOptions())
         recording, _ = open_recording(rig, FusionOptions(VOXEL))
-        meshreel.encode(recording, room)
+        meshreel.encode(recording, room, close_planes=True)
     if not bodies.exists():
         meshreel.encode(soft_bodies(SoftBodiesOptions(frames=FRAMES)), bodies)
     for path in (room, bodies):

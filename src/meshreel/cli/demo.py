@@ -60,7 +60,8 @@ def command(
     """
     if seed < 0:
         raise InputError(f"--seed must not be negative, got {seed}")
-    options, room = Settings(quality=quality).resolved(), StageOptions(frames=frames, seed=seed)  # errors before work
+    options = Settings(quality=quality, close_planes=True).resolved()  # under who stays, no camera sees the floor
+    room = StageOptions(frames=frames, seed=seed)
     file, picture = output / "demo.reel", output / "demo.png"
     check_free([file, picture], force or (output / "rig" / TRUTH).is_dir())  # of an earlier demo
     with common.stages() as progress, workers(jobs) as executor, threads(jobs or cores()):
