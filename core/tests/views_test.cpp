@@ -77,12 +77,30 @@ TEST(a_lens_that_bends_moves_the_color_and_not_the_depth) {
     CHECK(std::fabs(scene.sums[0] / weight - 2 * (32 + 50 * 0.204 - 0.5)) < 1e-9);
 }
 
-TEST(coarse_depths_and_pictures_without_pixels_are_refused_or_read) {
+TEST(depths_and_steps_are_those_of_the_pixel_that_sees_a_place) {
     Scene scene;
     scene.view.shrink = 2, scene.view.columns = kWide / 2, scene.view.rows = kHigh / 2;
-    CHECK(scene.seen(0.9, 0.5, 2) > 0);
+    for (int32_t row = 0; row < scene.view.rows; ++row)
+        for (int32_t column = 0; column < scene.view.columns; ++column)  // the plane z = 2 + x / 2
+            scene.depth[static_cast<size_t>(row * scene.view.columns + column)] =
+                static_cast<float>(2 / (1 - 0.5 * (2 * column + 1 - 32) / 50));
+    CHECK(scene.seen(0.8, 0.3, 2.4) > 0 && scene.seen(-0.8, 0.3, 1.6) > 0);
+    CHECK(scene.seen(-0.8, 0.3, 2.4) == 0 && scene.seen(0.3, 0.8, 2.4) == 0);
+    const double weight = scene.seen(0.8, 0.3, 2.4), red = scene.sums[0] / weight;
+    CHECK(std::fabs(red - 2 * (32 + 50 * 0.8 / 2.4 - 0.5)) < 1e-9);
+    scene.from_step[static_cast<size_t>(15 * scene.view.columns + 24)] = 51;  // of the pixel at 48.67, 30.25
+    CHECK(std::fabs(scene.seen(0.8, 0.3, 2.4) - 0.2 * weight) < 1e-12);
+    CHECK(std::fabs(scene.seen(0.9, 0.3, 2.45) - 0.2 * weight) > 0.1);  // the pixel beside it
+}
+
+TEST(without_pixels_weights_alone_are_found) {
+    Scene scene;
     scene.view.pixels = nullptr;
     CHECK(scene.seen(0.9, 0.5, 2) > 0 && scene.sums[0] == 0);
+}
+
+TEST(a_view_without_depths_is_refused) {
+    Scene scene;
     scene.view.rows = 0;
     const double place[3] = {0, 0, 2};
     CHECK(mr_add_view(&scene.view, place, place, 1, nullptr, nullptr) == MR_BAD_INPUT);

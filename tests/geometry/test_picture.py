@@ -148,6 +148,12 @@ def test_a_picture_of_nothing_is_the_background():
     assert (seen == RED).all()
 
 
+def test_a_files_view_whose_target_is_before_all_that_is_shown_stays_where_it_is():
+    for low, high in (((-0.1, 0.8, -2.5), (0.1, 1.0, -2.3)), ((0, 0.9, 0), (0, 0.9, 0))):
+        given = Viewpoint((0, 0.9, 2), (0, 0.9, 0))
+        assert Standing((np.array(low, np.float64), np.array(high, np.float64))).framed(given, 1600, 900) == given
+
+
 @pytest.mark.parametrize(
     ("box", "away", "aspect", "times"),
     [  # of somebody who walks from side to side, as the player's test of `timesAway` has it, and who stands

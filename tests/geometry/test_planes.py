@@ -84,3 +84,36 @@ def test_a_hole_in_a_ball_stays_open() -> None:
 def test_several_holes_of_a_plane_are_closed() -> None:
     floor = sheet(HOLE, DOOR)
     assert len([*border_loops(floor)]) == 3 and len([*border_loops(closed(floor))]) == 1
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_a_ragged_hole_is_filled_once_or_stays_open(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    flat = plane(SIDE, round(SIDE / SPACING))
+    flat = flat.at(flat.vertices - flat.vertices.mean(axis=0))
+    flat = flat.at(flat.vertices + random.normal(0, 1, flat.vertices.shape) * [0.2 * SPACING, 0.2 * SPACING, NOISE])
+    away = face_means(flat.vertices, flat.faces)[:, None, :2] - random.uniform(-0.4, 0.4, (6, 2))
+    gone = (np.linalg.norm(away, axis=2) < random.uniform(0.05, 0.25, 6)).any(axis=1)
+    floor = part_of(flat, ~gone)
+    found = closed(floor)
+    new = added(floor, found)
+    assert np.bincount(unique_edges(found.faces)[1].reshape(-1)).max() == 2
+    assert not len(new.faces) or face_normals(new)[0][:, 2].min() > 0  # none is turned over
+    area = face_normals(flat)[1][gone].sum()
+    assert face_normals(new)[1].sum() <= 1.05 * area
+    if len([*border_loops(floor)]) == 2:
+        assert len([*border_loops(found)]) == 1 and face_normals(new)[1].sum() > 0.9 * area
+
+
+def test_an_island_in_a_hole_is_not_covered_again() -> None:
+    flat = sheet()
+    middles = face_means(flat.vertices, flat.faces)[:, :2]
+    away = np.linalg.norm(middles - HOLE, axis=1)
+    floor = part_of(flat, (away > RADIUS) | (away < RADIUS / 2))
+    area = face_normals(closed(floor))[1].sum()
+    assert face_normals(floor)[1].sum() + 0.5 * np.pi * RADIUS**2 < area < SIDE**2 * 1.02
+
+
+def test_surface_without_area_around_a_hole_closes_nothing() -> None:
+    flat = Mesh.of(np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0], [3, 0, 0]]), np.array([[0, 1, 2], [1, 2, 3]]))
+    assert not len(added(flat, closed(flat)).faces)

@@ -114,6 +114,22 @@ def test_an_error_is_raised_in_its_turn_and_no_call_goes_on_afterwards():
             next(ahead(call, []))
 
 
+def test_what_stops_the_program_stops_calls_at_once():
+    begun = list[int]()
+
+    def call(number: int) -> int:
+        begun.append(number)
+        if threading.current_thread() is threading.main_thread():
+            raise KeyboardInterrupt
+        time.sleep(0.05)
+        return number
+
+    with threads(2), pytest.raises(KeyboardInterrupt):
+        for _ in range(3):  # until this thread takes a call
+            list(ahead(call, range(20)))
+    assert len(begun) <= 4
+
+
 def test_work_done_ahead_is_counted_and_reported_once():
     told = list[int]()
     with threads(3), work.reporting(lambda _, number: told.append(number)):

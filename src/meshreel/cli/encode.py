@@ -170,7 +170,9 @@ def encode(
     if summary.scene is None and settings.background_refresh is not None:
         warnings += ("no background was found that could be sent again: --background-refresh does nothing",)
     if settings.close_planes and (summary.scene is None or not summary.scene.guessed):
-        warnings += ("no hole in a plane that depth cameras could not see into: --close-planes closes nothing",)
+        why = "no hole in a plane that no depth camera saw into"
+        why = "it needs a rig of depth cameras" if sequence.depth is None else why
+        warnings += (f"--close-planes closes nothing: {why}",)
     common.warn(text for text in warnings if text not in early)
     row = summary_row(summary, sequence.frame_rate) | {"quality": quality}
     common.result({"output": str(place), "warnings": warnings} | row, f"{place}: {describe(row)}; {_reached(row)}")

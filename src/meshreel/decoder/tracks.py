@@ -78,7 +78,7 @@ class Track(Frames):
         return self._splats.bound(of, self._decoded(chunk).core, index - chunk.first_frame)
 
     def patches(self, index: int) -> Mesh:
-        """Return the faces of frame `index` in place of its template's, which have no splats. Raises as indexing."""
+        """Return the patches of frame `index`: faces that its template lacks, without splats. Raises as indexing."""
         chunk = self.reader.chunk_of_frame(index, self.number)
         group = self._decoded(chunk)
         mesh = group.frames[index - chunk.first_frame]

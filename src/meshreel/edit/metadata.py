@@ -95,7 +95,9 @@ def scaled_metadata(metadata: dict[str, Any], scale: float) -> dict[str, Any]:
     """Return the metadata of scaled frames, whose units are metres. Raises KeyError, TypeError or ValueError."""
     if scale == 1:
         return metadata
-    units = {name: scale**2 if name == GUESSED else scale for name in metadata if name.endswith(("_m", GUESSED))}
+    units = {
+        name: scale**2 if name == GUESSED else scale for name in metadata if name.endswith("_m") or name == GUESSED
+    }
     lengths = {name for name, value in metadata.items() if name in units and type(value) in (int, float)}
     found = {name: shortened(value * units[name]) if name in lengths else value for name, value in metadata.items()}
     if PART in metadata:

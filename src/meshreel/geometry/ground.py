@@ -23,12 +23,13 @@ from .strict import products
 if TYPE_CHECKING:
     from .picture import Rgba, Standing
 
+# These are guesses.
 TEXELS = 256  # of the shadow's picture along a side
 ASIDE = 0.35  # of the recording's size: how far the shadow's picture reaches beyond it
 REACH = 0.5  # of the recording's height: what hangs higher casts none
 RIM = 2.0  # of the half side of the shadow's picture: where the ground has faded away
 BELOW = 0.002  # of its height: so that soles hide it
-GLOW = 0.12  # how bright the ground's middle is: on a dark page a shadow is seen only where that is brighter (guess)
+GLOW = 0.12  # how bright the ground's middle is: on a dark page a shadow is seen only where that is brighter
 _SOFT = ((1.5, 0.3), (3.0, 0.35), (4.5, 0.4))  # how blurred a copy of the shadow is, and its share
 
 Plane = Float64[np.ndarray, "R C"]

@@ -119,7 +119,9 @@ class Standing:
         def least(wide: float) -> float:  # distance at which a picture so much wider than high holds all corners
             return float((np.maximum(np.abs(x) / wide, np.abs(y)) / tangent - z).max())
 
-        times = 1 / aspect if aspect < 1 else least(aspect) / least(1) if norm(away) >= least(1) else 1.0
+        square, near = least(1), least(aspect)  # not above 0 where all is behind the target
+        is_held = min(square, near) > 0 and norm(away) >= square
+        times = 1 / aspect if aspect < 1 else near / square if is_held else 1.0
         return replace(view, position=tuple((target + times * away).tolist()))
 
 
@@ -129,7 +131,7 @@ class Body:
 
     mesh: Mesh
     clay: Float64[np.ndarray, "3"]  # 0 to 255
-    splats: Bound | None = None  # drawn in place of the mesh, which still casts its shadow
+    splats: Bound | None = None  # drawn in place of the mesh
     patches: Mesh | None = None  # of the mesh, drawn beside splats
 
     @property

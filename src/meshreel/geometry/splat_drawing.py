@@ -1,7 +1,8 @@
 """Splats in pictures, as in the player's `splat_shaders.ts`: projected by the local affine approximation (EWA).
 
 In: Gaussians in space, a camera, a picture. Out: the picture with the Gaussians blended over it, the farthest first.
-Unlike those of the fit (`analysis/appearance/splat_raster.py`), the same pictures come on every machine.
+Unlike those of the fit (`analysis/appearance/splat_raster.py`), the same pictures come on every machine. Sizes and
+limits are those of 3DGS (Kerbl et al. 2023) and of gsplat.
 """
 
 from __future__ import annotations

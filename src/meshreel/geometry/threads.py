@@ -67,16 +67,16 @@ def mapped(function: Callable[..., _T], *arguments: Iterable[Any]) -> list[_T]:
 
 
 def ahead(function: Callable[[Any], _T], arguments: Iterable[Any], most: int = 1 << 20) -> Iterator[_T]:
-    """Yield the results of calls in order; as many as there are threads are done, and in memory, together.
+    """Yield the results of calls in order; other threads compute the next ones while a result is used.
 
-    They are at most `most`. Other threads do the next ones while the results are used.
+    At most `most` results, and no more than there are threads, are in memory.
     """
-    pool, waiting, begun = _pool.get(), iter(arguments), deque[_Call]()
+    pool, waiting, begun = _pool.get(), iter(arguments), deque[_CallAhead]()
     together = 1 if pool is None else min(1 + pool.count, most)
 
     def begin(count: int) -> None:
         for argument in islice(waiting, count - len(begun)):
-            begun.append(_Call(function, argument, pool if together > 1 else None))
+            begun.append(_CallAhead(function, argument, pool if together > 1 else None))
 
     try:
         begin(together)
@@ -90,8 +90,7 @@ def ahead(function: Callable[[Any], _T], arguments: Iterable[Any], most: int = 1
             yield result
             begin(together)
     finally:
-        for call in begun:
-            call.drop()
+        wait([beside for call in begun if (beside := call.beside) is not None and not beside.cancel()])
 
 
 def mapped_until(enough: Callable[[_T], bool], function: Callable[..., _T], *arguments: Iterable[Any]) -> list[_T]:
@@ -112,44 +111,39 @@ def mapped_until(enough: Callable[[_T], bool], function: Callable[..., _T], *arg
     return shared.found()
 
 
-class _Call:
-    """A call that another thread does, or the one that needs its result; its work is counted there."""
+class _CallAhead:
+    """A call that another thread does, or the one that needs its result; its work is counted in the latter."""
 
     def __init__(self, function: Callable[[Any], Any], argument: Any, pool: _Pool | None) -> None:
-        self._done, self._reporter = partial(function, argument), work.reporter()
+        self._call, self._reporter = partial(function, argument), work.reporter()
         self._own = Future[Any]()
-        self._beside = None if pool is None else pool.submit(copy_context().run, self._help)
+        self.beside = None if pool is None else pool.submit(copy_context().run, self._help)
 
     @property
     def is_done(self) -> bool:
-        return self._own.done() or (self._beside is not None and self._beside.done())
+        return self._own.done() or (self.beside is not None and self.beside.done())
 
     def take(self) -> None:
         """Do the call here unless another thread has begun it."""
-        if self.is_done or not (self._beside is None or self._beside.cancel()):
+        if self.is_done or not (self.beside is None or self.beside.cancel()):
             return
         try:
-            self._own.set_result(self._done())
-        except BaseException as error:
+            self._own.set_result(self._call())
+        except Exception as error:  # raised in its turn; what stops the program is raised at once
             self._own.set_exception(error)
 
     def found(self) -> Any:
         """Return the result, or raise the error, of the call."""
-        if self._own.done() or self._beside is None:
+        if self._own.done() or self.beside is None:
             return self._own.result()
-        result, done = self._beside.result()
+        result, done = self.beside.result()
         work.add(done)
         return result
-
-    def drop(self) -> None:
-        """Return when no other thread does the call."""
-        if self._beside is not None and not self._beside.cancel():
-            wait([self._beside])
 
     def _help(self) -> tuple[Any, work.Work]:
         before = work.so_far()
         with work.reporting_by(self._reporter):
-            return self._done(), work.since(before)
+            return self._call(), work.since(before)
 
 
 class _Calls:

@@ -42,7 +42,9 @@ export function timesAway(box: Box, target: Vector3, away: Vector3, { tangent, a
   const corners = cornersOf(box, target, away.clone().normalize());
   const least = (right: number, up: number): number => Math.max(...corners.map(([x, y, z]) => Math.max(Math.abs(x) / right, Math.abs(y) / up) + z));
   const square = least(tangent, tangent);
-  const times = Math.min(usual, least(tangent * aspect, tangent * high) / square);
+  const wide = least(tangent * aspect, tangent * high);
+  if (square <= 0 || wide <= 0) return usual; // all is behind the target
+  const times = Math.min(usual, wide / square);
   return away.length() < square * (isShown ? times : 1) ? usual : times;
 }
 

@@ -199,7 +199,7 @@ export class ThreeStage extends EventTarget implements Stage {
     } else if (shown !== this.#shaded) {
       this.#shaded = shown;
       const box = room && boxOf(shown, this.#reel.matrix); // of who is in the room
-      if (box !== null) this.#floor.lie(box);
+      this.#floor.lie(box ?? this.#box!);
       this.#floor.shade(this.#reel, this.#renderer, room !== null);
     }
   }

@@ -405,6 +405,7 @@ describeOnPage("controls of <meshreel-player>", (on) => {
       HTMLAnchorElement.prototype.click = function () {
         Object.assign(globalThis, { opened: this });
       };
+      Object.assign(globalThis, { supports: DOMTokenList.prototype.supports });
     });
     /** What a click opens on a phone; "" where there is no button. */
     const opened = async (phone: "iPhone" | "Android" | "", attributes: string): Promise<string> => {
@@ -422,12 +423,17 @@ describeOnPage("controls of <meshreel-player>", (on) => {
     expect(await opened("", both)).toBe("");
     expect(await opened("iPhone", 'glb="/walk.glb"')).toBe("");
     expect(await opened("Android", 'usdz="/walk.usdz"')).toBe("");
+    for (const wrong of ["javascript:alert(1)", "http://"]) {
+      expect(await opened("iPhone", `usdz="${wrong}"`)).toBe("");
+      expect(await opened("Android", `glb="${wrong}"`)).toBe("");
+    }
     expect(await opened("iPhone", both)).toBe(`ar 1 ${site}walk.usdz#allowsContentScaling=0`);
     const [address, intent] = (await opened("Android", both)).split("#");
     expect(address).toBe(` 0 intent://arvr.google.com/scene-viewer/1.0?file=${encodeURIComponent(site)}walk.glb&mode=ar_preferred&resizable=false`);
     expect(intent).toBe(`Intent;scheme=https;package=com.google.android.googlequicksearchbox;action=android.intent.action.VIEW;S.browser_fallback_url=${encodeURIComponent(on.page.url())};end;`);
     await on.page.evaluate(() => {
-      for (const [from, name] of [[HTMLAnchorElement.prototype, "click"], [DOMTokenList.prototype, "supports"], [navigator, "userAgent"]] as const) Reflect.deleteProperty(from, name);
+      for (const [from, name] of [[HTMLAnchorElement.prototype, "click"], [navigator, "userAgent"]] as const) Reflect.deleteProperty(from, name);
+      DOMTokenList.prototype.supports = (globalThis as unknown as DOMTokenList).supports;
     });
   });
 

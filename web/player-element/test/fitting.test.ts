@@ -55,6 +55,12 @@ describe("a file's view", () => {
     expect(high).toBeLessThan(free);
   });
 
+  test("whose target lies before all that is shown stays where it is", () => {
+    const behind: Box = { minimum: [-0.1, 0.8, -2.5], size: [0.2, 0.2, 0.2] };
+    for (const aspect of [0.5, 16 / 9]) expect(timesAway(behind, TARGET, away, { tangent: TANGENT, aspect, free: 1 })).toBeCloseTo(1 / Math.min(1, aspect), 9);
+    expect(timesAway({ minimum: [0, 0.9, 0], size: [0, 0, 0] }, TARGET, away, { tangent: TANGENT, aspect: 2, free: 1 })).toBe(1);
+  });
+
   test("shows as much from farther away in a picture that is higher than wide", () => {
     expect(shown(WALK, away, 0.5).sub(TARGET).length()).toBeCloseTo(2 * away.length(), 6);
   });

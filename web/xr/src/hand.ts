@@ -8,7 +8,7 @@ import type { StickActions } from "./stick.ts";
 export interface HandActions extends StickActions {
   /** `isHeld`: it was pressed for a while. */
   select(isHeld: boolean): void;
-  /** Points along the -z of a space; null: no longer. Of the right hand alone, or the only one. */
+  /** Points along the -z of a space; null: no longer. Of a hand that is not the left one. */
   point(space: XRSpace | null): void;
   /** Goes to a point of the floor. */
   teleport(place: Vector3): void;
@@ -42,6 +42,7 @@ export class Hand {
   #source: XRInputSource | null = null;
   #squeezes = false;
   #pressed = 0; // ms
+  #isSelected = false; // a press that the device cancels ends without a selection
   readonly #pinched = new Vector3(); // where a bare hand began to pinch, m
 
   /** To be made before the session starts, so that three gives it the controller. `room` is where the tracking space is drawn, `panel` what the left one wears. */
@@ -58,6 +59,7 @@ export class Hand {
     this.#pointing.addEventListener("connected", this.#connect);
     this.#pointing.addEventListener("disconnected", this.#disconnect);
     this.#pointing.addEventListener("selectstart", this.#press);
+    this.#pointing.addEventListener("select", this.#select);
     this.#pointing.addEventListener("selectend", this.#release);
     this.#pointing.addEventListener("squeezestart", this.#squeeze);
     this.#pointing.addEventListener("squeezeend", this.#letGo);
@@ -79,6 +81,7 @@ export class Hand {
     this.#pointing.removeEventListener("connected", this.#connect);
     this.#pointing.removeEventListener("disconnected", this.#disconnect);
     this.#pointing.removeEventListener("selectstart", this.#press);
+    this.#pointing.removeEventListener("select", this.#select);
     this.#pointing.removeEventListener("selectend", this.#release);
     this.#pointing.removeEventListener("squeezestart", this.#squeeze);
     this.#pointing.removeEventListener("squeezeend", this.#letGo);
@@ -126,10 +129,16 @@ export class Hand {
     this.#squeeze();
   };
 
+  #select = (): void => {
+    this.#isSelected = true;
+  };
+
   #release = (): void => {
     if (this.#isBare) this.#letGo();
+    const isSelected = this.#isSelected;
+    this.#isSelected = false;
     const isStill = !this.#isBare || this.#grip.position.distanceTo(this.#pinched) < STILL;
-    if (isStill) this.#actions.select(performance.now() - this.#pressed > HELD);
+    if (isSelected && isStill) this.#actions.select(performance.now() - this.#pressed > HELD);
   };
 
   get #isBare(): boolean {

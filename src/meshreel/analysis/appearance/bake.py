@@ -30,7 +30,8 @@ Known = Bool[np.ndarray, " N"]  # whose colour is known
 # Samples of each face: its middle, and a point towards each corner. Samples at vertices alone would alias.
 PLACES = np.array([[1, 1, 1], [4, 1, 1], [1, 4, 1], [1, 1, 4]]) / np.array([[3], [6], [6], [6]])
 REFINEMENTS = 4  # rounds of least squares: the rest of the error falls below a grey level (guess)
-TOGETHER = 1 << 16  # places or texels at a time: the medians of 16 frames of them take 10 MB
+TOGETHER = 1 << 16  # places whose medians are taken at a time: 16 frames of them take 10 MB
+TEXELS_TOGETHER = 1 << 16  # bounds memory (guess)
 GUTTERS = 128  # in the width of a texture; 8 texels of 1024 keep charts apart in three mip levels
 PACKINGS = 8  # rounds of packing, with texels per metre corrected after each; as many more halve them (guess)
 MARGIN = 0.995  # of the size that would just fit: packing is not quite proportional (guess)
@@ -70,7 +71,7 @@ def texels_of(layout: Layout, levels: int) -> Texels:
     areas = v0 * w1 - v1 * w0
     counts = np.where(areas == 0, 0, across * down)
     found = list[tuple[np.ndarray, ...]]()
-    for some in np.split(np.arange(len(corners)), np.flatnonzero(np.diff(np.cumsum(counts) // TOGETHER)) + 1):
+    for some in np.split(np.arange(len(corners)), np.flatnonzero(np.diff(np.cumsum(counts) // TEXELS_TOGETHER)) + 1):
         face = some.repeat(counts[some])
         number = np.arange(len(face)) - (np.cumsum(counts[some]) - counts[some]).repeat(counts[some])
         column, row = low[face, 0] + number % across[face], low[face, 1] + number // across[face]

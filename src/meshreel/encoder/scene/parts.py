@@ -153,7 +153,7 @@ def take_apart(
 
 
 def _closed(background: Mesh, noise: LocalNoise, free: Sequence[FreeSpace], changes: Sequence[Change]) -> Mesh:
-    """Let planes go on through holes of the background that no depth camera saw into, and where nothing comes later."""
+    """Close holes in planes of the background that no depth camera saw into and that no later surface fills."""
     came = _rooms(Mesh.empty(), changes)(len(changes))
 
     def is_open(points: Float64[np.ndarray, "N 3"], normals: Float64[np.ndarray, "N 3"]) -> Bool[np.ndarray, " N"]:

@@ -249,7 +249,7 @@ class _Looks:
         if self._parts.guessed.is_empty:
             return np.zeros(len(points), bool)
         survey = self._parts.survey
-        return distances(survey.center + survey.unit * points, self._parts.guessed) <= LEAST_NEAR
+        return distances(survey.center + survey.unit * points, self._parts.guessed) <= self._near
 
     def colors(
         self, frames: range, points: Float64[np.ndarray, "N 3"], normals: Float64[np.ndarray, "N 3"]
@@ -288,5 +288,9 @@ class _Looks:
         survey = self._parts.survey
         mesh = self._sequence[number]
         still = mesh.with_faces(~self._parts.segmentation.moving(number, mesh))
-        far = max(NEAR * self._parts.noise.mean, LEAST_NEAR) / survey.unit
-        return Painted(still.at((still.vertices - survey.center) / survey.unit), far)
+        return Painted(still.at((still.vertices - survey.center) / survey.unit), self._near / survey.unit)
+
+    @property
+    def _near(self) -> float:
+        """Distance, m, within which a frame or what is guessed shows a place of the background."""
+        return max(NEAR * self._parts.noise.mean, LEAST_NEAR)

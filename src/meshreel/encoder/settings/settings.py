@@ -67,8 +67,8 @@ class Settings:
     """Seconds between copies of a scene's background in the file, for viewers who join late. One copy for all frames if
     not given."""
     close_planes: bool = False
-    """Let planes go on through holes of a scene's background that no depth camera saw into, as a floor below one who
-    never moves. That surface is a guess: the file says how much of it there is. Doors and windows stay open."""
+    """Let planes go on through holes of a scene's background that no depth camera saw into, such as the floor under a
+    person who never moves. That surface is a guess: the file says how much of it there is. Openings stay open."""
 
     def __post_init__(self) -> None:
         for name, kind in self.__annotations__.items():
