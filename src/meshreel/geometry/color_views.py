@@ -160,20 +160,19 @@ class View:
         `at_step` is the share of the weight that remains at a step.
         """
         weights = np.zeros(len(points))
-        self._add(points, normals, None, np.zeros((0, 3)), weights, at_step)
+        self._add(points, normals, weights, None, at_step)
         return weights
 
     def add(self, points: Points, normals: Points, sums: Points, weights: Float64[np.ndarray, " N"]) -> None:
-        """Add to sums the colours of places in the picture times their weights, and these to weights."""
-        self._add(points, normals, self.picture.pixels, sums, weights, 0.0)
+        """Add each place's weight to `weights`, and its colour in the picture times that weight to `sums`."""
+        self._add(points, normals, weights, sums, 0.0)
 
     def _add(
         self,
         points: Points,
         normals: Points,
-        pixels: UInt8[np.ndarray, "H W 3"] | None,
-        sums: Points,
         weights: Float64[np.ndarray, " N"],
+        sums: Points | None,
         at_step: float,
     ) -> None:
         camera = self.picture.camera
@@ -181,8 +180,9 @@ class View:
         lens, bend = np.array([*camera.focal, *camera.center]), np.array(camera.distortion, np.float64)
         size = np.array([camera.width, camera.height, self.shrink], np.int32)
         limits, gains = np.array([self.margin, MARGIN, LEAST, at_step]), np.array(self.picture.gains, np.float64)
-        seen = size, self.depth, self.from_step, limits
-        _core.add_view(turn, shift, camera.eye, lens, bend, *seen, pixels, gains, points, normals, sums, weights)
+        seen, pixels = (size, self.depth, self.from_step, limits), None if sums is None else self.picture.pixels
+        total = np.zeros((0, 3)) if sums is None else sums
+        _core.add_view(turn, shift, camera.eye, lens, bend, *seen, pixels, gains, points, normals, total, weights)
 
 
 def _confirmed(
