@@ -103,12 +103,13 @@ public:
 
 private:
     struct Entry {
-        double cost;
-        int32_t a, b;  // ends, a < b
+        double cost, length;  // the latter squared: on flat surface nothing costs, and one vertex would take in all
+        int32_t a, b;         // ends, a < b
         uint32_t version_a, version_b;
 
         bool operator<(const Entry& other) const {  // the queue's top is the largest
             if (cost != other.cost) return cost > other.cost;
+            if (length != other.length) return length > other.length;
             return a != other.a ? a > other.a : b > other.b;
         }
     };
@@ -177,7 +178,8 @@ private:
 
     void offer(int32_t a, int32_t b) {
         if (a > b) std::swap(a, b);
-        queue_.push({merged(a, b).first, a, b, versions_[at(a)], versions_[at(b)]});
+        const Vec way = positions_[at(b)] - positions_[at(a)];
+        queue_.push({merged(a, b).first, dot(way, way), a, b, versions_[at(a)], versions_[at(b)]});
     }
 
     // Whether a face of `v` that `other` has not would turn over, or become a line, if `v` were at a place.

@@ -64,8 +64,9 @@ def test_the_rig_of_somebody_else_is_not_overwritten(run, tmp_path):
 @pytest.mark.slow
 @pytest.mark.usefixtures("coarse")
 def test_the_same_seed_gives_the_same_bytes_and_another_one_other_noise(run, tmp_path):
-    """Also where a longer demo was before, of which nothing is left."""
+    """Also where a longer demo was stopped before, of which nothing is left."""
     record_stage(tmp_path / "a" / "rig", StageOptions(frames=3, seed=5), 128)
+    (tmp_path / "a" / "rig" / "rig.json").unlink()  # as if it had been stopped
     for name in ("a", "b"):
         assert run("demo", "-o", tmp_path / name, "--frames", "2", "--seed", "0", "--quiet").code == 0
     recording, warnings = open_recording(tmp_path / "a" / "rig")

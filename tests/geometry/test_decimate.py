@@ -37,6 +37,12 @@ def test_an_open_mesh_keeps_its_border(scale: float) -> None:
     assert np.linalg.norm(gap, axis=1).max() < 0.005
 
 
+def test_no_vertex_of_flat_surface_takes_in_all_others() -> None:
+    flat = plane(1.0, 60)
+    small = decimate_faces(flat, len(flat.faces) // 2)
+    assert np.bincount(small.faces.reshape(-1)).max() <= 16
+
+
 def test_what_is_left_is_clean_and_the_same_each_time() -> None:
     a, b = decimate(sphere(levels=5), 300), decimate(sphere(levels=5), 300)
     assert np.array_equal(a.vertices, b.vertices)

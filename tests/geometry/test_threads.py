@@ -130,6 +130,19 @@ def test_what_stops_the_program_stops_calls_at_once():
     assert len(begun) <= 4
 
 
+def test_what_stops_the_program_counts_though_an_earlier_call_was_enough():
+    both = threading.Barrier(2)
+
+    def call(number: int) -> int:
+        both.wait(10)
+        if threading.current_thread() is threading.main_thread():
+            raise KeyboardInterrupt
+        return number
+
+    with threads(2), pytest.raises(KeyboardInterrupt):
+        mapped_until(lambda _: True, call, range(2))
+
+
 def test_work_done_ahead_is_counted_and_reported_once():
     told = list[int]()
     with threads(3), work.reporting(lambda _, number: told.append(number)):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from functools import partial
 from pathlib import Path
 from typing import Annotated
@@ -69,7 +70,8 @@ def command(
         record_stage(output / "rig", room, WIDTH, lambda k: progress("simulate", k, frames))
         capture, _ = open_recording(output / "rig", FusionOptions(VOXEL))
         encoded = partial(encode, options=options, executor=executor, jobs=jobs, resume=False)
-        summary = encoded(capture, file, progress=progress.encode)
+        with warnings.catch_warnings(action="ignore"):  # they are told with the result
+            summary = encoded(capture, file, progress=progress.encode)
         with open_video(file) as video:
             clean = read_truth(output / "rig" / TRUTH)
             truth = against_truth(capture, video, clean, evenly(frames, _JUDGED), progress)
@@ -91,11 +93,12 @@ def command(
 
 
 def _forget(folder: Path, names: list[str]) -> None:
-    """Remove the frames of an earlier demo, so that rig and truth match. Raises InputError for other rigs."""
-    if not (folder / RIG).exists():
-        return
-    if not (folder / TRUTH).is_dir() or [camera.name for camera in read_cameras(folder)[0]] != names:
+    """Remove the frames of an earlier demo, also of one that was stopped. Raises InputError for other rigs."""
+    is_whole, has_truth = (folder / RIG).exists(), (folder / TRUTH).is_dir()
+    if is_whole and not (has_truth and [camera.name for camera in read_cameras(folder)[0]] == names):
         raise InputError(f"{folder}: has a rig that is not of a demo, and would be overwritten; give another --output")
-    for pattern in ("rig.json", "corner*/depth/depth_*.png", "corner*/color/color_*.png", f"{TRUTH}/frame_*.ply"):
+    if not has_truth:
+        return
+    for pattern in ("corner*/depth/depth_*.png", "corner*/color/color_*.png", f"{TRUTH}/frame_*.ply", RIG):
         for path in folder.glob(pattern):
             path.unlink()

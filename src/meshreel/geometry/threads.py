@@ -174,6 +174,8 @@ class _Calls:
             except BaseException as error:  # which the thread that waits raises
                 self._errors[number] = error
                 self.stop()
+                if not isinstance(error, Exception):  # what stops the program does so at once
+                    raise
 
     def stop(self) -> None:
         """Let no thread begin another call."""
