@@ -112,7 +112,7 @@ class Stage:
         now = stances(number / self.options.frame_rate)
         return [actor.posed(stance) for actor, stance in zip(self.cast, now, strict=True)]
 
-    def _colors(self, people: list[Mesh], parts: Faces, points: Points, faces: Faces) -> Colors:
+    def _colors(self, people: list[Mesh], parts: Int64[np.ndarray, " F"], points: Points, faces: Faces) -> Colors:
         """Return the colours of places on faces of a frame, of which `parts` are things or, after these, people."""
         colors, part = np.empty((len(points), 3)), parts[faces]
         for number, thing in enumerate(self.still):
