@@ -85,7 +85,7 @@ def test_a_file_is_measured_in_the_unit_of_the_goal() -> None:
 
 def test_a_background_alone_can_exceed_a_target_rate_but_no_target_psnr() -> None:
     groups = (GroupSummary(Form.EMPTY, 10, 4, Fidelity(0, 0, 0)),)
-    summary = Summary(6000, groups, scene=SceneSummary(5000, 100, 0.001, 60.0, (0, 1), 1))
+    summary = Summary(6000, groups, scene=SceneSummary(5000, 100, 0.001, 60.0, (0, 1), 1, 0.0))
     assert "5000 bytes, 0.1 Mbps over 0.4 s" in Goal(mbps=0.09).exceeded_by_background(summary, 25.0)
     assert Goal(mbps=0.1).exceeded_by_background(summary, 25.0) == ""
     assert Goal(psnr=90.0).exceeded_by_background(summary, 25.0) == ""
