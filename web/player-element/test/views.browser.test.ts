@@ -152,7 +152,7 @@ describeInBrowser("the page of a recording", () => {
     const reverse = await watch(4); // down, a jump up, down, a jump up, down
     expect([reverse.up / duration > 1.2, reverse.range[0]! < 0.2 * duration, reverse.range[1]! > 0.8 * duration]).toEqual([true, true, true]);
     await page.evaluate(() => void (document.querySelector("meshreel-player")!.section = [0.1, 0.25]));
-    await watch(3); // until it is there
+    await page.waitForFunction(() => document.querySelector("meshreel-player")!.currentTime < 0.26); // it is there
     const part = await watch(4);
     expect([part.range[0]! > 0, part.range[1]! < 0.3]).toEqual([true, true]);
     await page.evaluate(() => Object.assign(document.querySelector("meshreel-player")!, { section: null, direction: "alternate" }));
