@@ -95,11 +95,10 @@ def scaled_metadata(metadata: dict[str, Any], scale: float) -> dict[str, Any]:
     """Return the metadata of scaled frames, whose units are metres. Raises KeyError, TypeError or ValueError."""
     if scale == 1:
         return metadata
-    units = {
-        name: scale**2 if name == GUESSED else scale for name in metadata if name.endswith("_m") or name == GUESSED
-    }
-    lengths = {name for name, value in metadata.items() if name in units and type(value) in (int, float)}
-    found = {name: shortened(value * units[name]) if name in lengths else value for name, value in metadata.items()}
+    numbers = {name for name, value in metadata.items() if type(value) in (int, float)}
+    times = {name: scale for name in numbers if name.endswith("_m")} | {GUESSED: scale**2}
+    scaled = numbers & times.keys()
+    found = {name: shortened(value * times[name]) if name in scaled else value for name, value in metadata.items()}
     if PART in metadata:
         squares, worst, *others = metadata[PART]["totals"]
         exact = [None if squares is None else squares * scale**2, None if worst is None else worst * scale, *others]

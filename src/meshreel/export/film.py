@@ -96,8 +96,8 @@ def export_film(
     def drawn(frame: int, share: float) -> UInt8[np.ndarray, "H W C"]:
         is_bare = options.only == "background" or reader.static_of_frame(frame) is not None
         parts = bodies(frame)
-        is_soft = any(part.splats is not None for part in parts)  # splats cast no shadow, as in the player
-        has_ground = not is_bare and not is_soft and not (kind == ".gif" and options.background is None)  # half dark
+        is_bare |= any(part.splats is not None for part in parts)  # splats cast no shadow, as in the player
+        has_ground = not is_bare and not (kind == ".gif" and options.background is None)  # where nothing is half dark
         seen = view.turned(share, standing.up)
         return finished(draw_picture(parts, standing, seen, size, has_ground), options.background)
 

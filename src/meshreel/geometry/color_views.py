@@ -111,7 +111,7 @@ class ColorViews:
         """Return the colours of places with these normals, 0 to 255, and a mask of those that some camera saw."""
         sums, weights = np.zeros((len(points), 3)), np.zeros(len(points))
         for view in self.views:
-            view.add(points, normals, sums, weights)
+            view.add(points, normals, weights, sums)
         known = weights > 0
         sums[known] /= weights[known, None]
         return sums, known
@@ -160,21 +160,18 @@ class View:
         `at_step` is the share of the weight that remains at a step.
         """
         weights = np.zeros(len(points))
-        self._add(points, normals, weights, None, at_step)
+        self.add(points, normals, weights, at_step=at_step)
         return weights
 
-    def add(self, points: Points, normals: Points, sums: Points, weights: Float64[np.ndarray, " N"]) -> None:
-        """Add each place's weight to `weights`, and its colour in the picture times that weight to `sums`."""
-        self._add(points, normals, weights, sums, 0.0)
-
-    def _add(
+    def add(
         self,
         points: Points,
         normals: Points,
         weights: Float64[np.ndarray, " N"],
-        sums: Points | None,
-        at_step: float,
+        sums: Points | None = None,
+        at_step: float = 0.0,
     ) -> None:
+        """Add each place's weight to `weights`, and its colour in the picture times that weight to `sums`."""
         camera = self.picture.camera
         turn, shift = (np.ascontiguousarray(part) for part in (camera.extrinsic[:3, :3], camera.extrinsic[:3, 3]))
         lens, bend = np.array([*camera.focal, *camera.center]), np.array(camera.distortion, np.float64)

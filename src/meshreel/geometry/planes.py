@@ -44,7 +44,7 @@ def close_planes(mesh: Mesh, noise: Noise, is_open: IsOpen) -> Mesh:
     usual = float(np.median(lengths)) if lengths.size else 0.0
     surface = cache(lambda: Surface(mesh))
     for loop in border_loops(mesh):
-        around = mesh.vertices[loop]
+        around = mesh.vertices[loop] - mesh.vertices[loop[0]]  # far from the origin, products would be coarse
         if norm(np.cross(around, np.roll(around, -1, axis=0)).sum(axis=0)) < usual**2:  # twice its area, at least
             continue
         if (plane := _plane(mesh, loop, noise)) is None:
