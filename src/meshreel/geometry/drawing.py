@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from jaxtyping import Bool, Float32, Float64, Int32
+from jaxtyping import Bool, Float32, Float64, Int32, Int64
 
 from .. import _core
 from ..types import Mesh
@@ -39,6 +39,8 @@ class Parallel:
 
 
 Viewer = Camera | Parallel
+Corners = Int64[np.ndarray, "N 2"]  # of boxes of pixels, column and row
+Numbers = Int64[np.ndarray, " _"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,6 +84,16 @@ class SeenPlaces:
     def points(self) -> Float64[np.ndarray, "N 3"]:
         """The places in the coordinates of the mesh."""
         return blend(self.mesh.vertices, self.mesh.faces[self.faces], self.barycentric)
+
+
+def box_pixels(low: Corners, high: Corners, order: Numbers) -> tuple[Numbers, Numbers, Numbers]:
+    """Return box, column and row of each pixel in boxes of pixels, these in an order; `high` is beyond the last."""
+    sides = np.maximum(high - low, 0)
+    counts = sides[order, 0] * sides[order, 1]
+    index = np.repeat(order, counts)
+    within = np.arange(len(index)) - np.repeat(np.cumsum(counts) - counts, counts)
+    rows = within // sides[index, 0]
+    return index, low[index, 0] + within - rows * sides[index, 0], low[index, 1] + rows
 
 
 def draw(mesh: Mesh, camera: Viewer, crop: Crop | None = None) -> Seen:

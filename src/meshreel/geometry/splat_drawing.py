@@ -15,6 +15,7 @@ import numpy as np
 
 from ..shapes import Float64, Int64
 from .cameras import Camera
+from .drawing import box_pixels
 from .splats import Bound
 from .strict import exp, inverses, log2, products
 
@@ -96,12 +97,7 @@ def pairs(
     least, most = np.array(window[:2]), np.array(window[2:])
     low = np.clip(np.ceil(centers - reach - 0.5), least, most).astype(np.int64)
     high = np.clip(np.floor(centers + reach - 0.5) + 1, least, most).astype(np.int64)
-    sides = np.maximum(high - low, 0)
-    counts = sides[order, 0] * sides[order, 1]
-    index = np.repeat(order, counts)
-    within = np.arange(len(index)) - np.repeat(np.cumsum(counts) - counts, counts)
-    rows = within // sides[index, 0]
-    return index, low[index, 0] + within - rows * sides[index, 0], low[index, 1] + rows
+    return box_pixels(low, high, order)
 
 
 def stable_order(numbers: Pairs) -> Pairs:

@@ -111,6 +111,13 @@ def mapped_until(enough: Callable[[_T], bool], function: Callable[..., _T], *arg
     return shared.found()
 
 
+def _counted(call: Callable[[], _T], reporter: work.Reporter | None) -> tuple[_T, work.Work]:
+    """Return the result of a call in another thread, which reports as the first does, and the work that it took."""
+    before = work.so_far()
+    with work.reporting_by(reporter):
+        return call(), work.since(before)
+
+
 class _CallAhead:
     """A call that another thread does, or the one that needs its result; its work is counted in the latter."""
 
@@ -141,9 +148,7 @@ class _CallAhead:
         return result
 
     def _help(self) -> tuple[Any, work.Work]:
-        before = work.so_far()
-        with work.reporting_by(self._reporter):
-            return self._call(), work.since(before)
+        return _counted(self._call, self._reporter)
 
 
 class _Calls:
@@ -159,10 +164,7 @@ class _Calls:
 
     def help(self) -> None:
         """Do calls in another thread, which reports its work as the first does, and remember that work."""
-        before = work.so_far()
-        with work.reporting_by(self._reporter):
-            self.do()
-        self.helped.append(work.since(before))
+        self.helped.append(_counted(self.do, self._reporter)[1])
 
     def do(self) -> None:
         """Do calls until none is left, one has failed, or one is enough: those before it have begun then."""

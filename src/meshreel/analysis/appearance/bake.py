@@ -17,6 +17,7 @@ from jaxtyping import Bool, Float64, Int32, Int64, UInt8
 from ...errors import InputError, needed
 from ...geometry.atlas import MOST_SIDE, Layout
 from ...geometry.color_views import ColorViews, Paint, spread_colors
+from ...geometry.drawing import box_pixels
 from ...geometry.splats import located
 from ...geometry.topology import blend, face_means, face_normals
 from ...geometry.work import passed
@@ -72,9 +73,7 @@ def texels_of(layout: Layout, levels: int) -> Texels:
     counts = np.where(areas == 0, 0, across * down)
     found = list[tuple[np.ndarray, ...]]()
     for some in np.split(np.arange(len(corners)), np.flatnonzero(np.diff(np.cumsum(counts) // TEXELS_TOGETHER)) + 1):
-        face = some.repeat(counts[some])
-        number = np.arange(len(face)) - (np.cumsum(counts[some]) - counts[some]).repeat(counts[some])
-        column, row = low[face, 0] + number % across[face], low[face, 1] + number // across[face]
+        face, column, row = box_pixels(low, high + 1, some[counts[some] > 0])
         x, y = column + 0.5 - corners[face, 0, 0], row + 0.5 - corners[face, 0, 1]
         v, w = (x * w1[face] - y * w0[face]) / areas[face], (v0[face] * y - v1[face] * x) / areas[face]
         shares = np.stack([1 - v - w, v, w], axis=1)
