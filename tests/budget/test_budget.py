@@ -13,7 +13,7 @@ import pytest
 import meshreel
 from meshreel.coding.group import decode_group
 from meshreel.coding.layers.coder import read_layers
-from meshreel.coding.mesh import encode_empty
+from meshreel.coding.mesh import decode_intra, encode_empty
 from meshreel.coding.paper import laplacian
 from meshreel.container.reader import ReelReader
 from meshreel.container.sources import BytesSource
@@ -213,11 +213,14 @@ def test_a_group_that_readers_would_refuse_is_coded_as_shorter_ones(monkeypatch:
 
 
 def test_a_mesh_that_readers_would_refuse_is_an_error_of_the_input(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(budget, "LIMITS", budget.Limits(free=1000, per_byte=1))
+    frames, target = [worst.grid(10)] * 3, Fidelity(1e-4, 7.0, 1e-3)
+    [alone] = decode_intra(intra_only(frames[:1], target, IntraOptions()).payload)
+    cost = budget.draco_cost([Size.of(alone)])
+    monkeypatch.setattr(budget, "LIMITS", budget.Limits(free=cost, per_byte=1))
+    assert intra_only(frames, target, IntraOptions()).frame_count == 1
+    monkeypatch.setattr(budget, "LIMITS", budget.Limits(free=cost // 4, per_byte=1))
     with pytest.raises(InputError, match=r"a mesh of 200 faces: draco: .* simplify it"):
-        intra_only([worst.grid(10)] * 3, Fidelity(1e-4, 7.0, 1e-3), IntraOptions())
-    monkeypatch.setattr(budget, "LIMITS", budget.Limits(free=4000, per_byte=1))
-    assert intra_only([worst.grid(10)] * 3, Fidelity(1e-4, 7.0, 1e-3), IntraOptions()).frame_count < 3
+        intra_only(frames, target, IntraOptions())
 
 
 def test_a_frame_refused_for_its_tracks_decodes_none_again(monkeypatch: pytest.MonkeyPatch):
