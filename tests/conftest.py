@@ -10,12 +10,12 @@ import hypothesis
 import jaxtyping
 from jaxtyping import install_import_hook
 
-import tests.typecheck  # noqa: F401  (the hook finds it by name)
+from tests.typecheck import modules_with_shapes
 
 SHAPES = os.environ.get("MESHREEL_SHAPES") != "0"
 
 if SHAPES:
     sys.modules["meshreel.shapes"] = jaxtyping  # whose names check what ours only say
-    install_import_hook("meshreel", "tests.typecheck.check")
+    install_import_hook(modules_with_shapes("meshreel"), "tests.typecheck.check")
 hypothesis.settings.register_profile("shared", deadline=None)  # a machine that does other work, too, misses any
 hypothesis.settings.load_profile("shared")

@@ -2,9 +2,9 @@
 
 from jaxtyping import install_import_hook
 
-import tests.typecheck  # noqa: F401  (the hook finds it by name)
 from tests.cli.conftest import balls, quick_presets, run, scan  # noqa: F401
 from tests.conftest import SHAPES  # and its settings
+from tests.typecheck import modules_with_shapes
 
 if SHAPES:
-    install_import_hook("meshreel_bench", "tests.typecheck.check")
+    install_import_hook(modules_with_shapes("meshreel_bench"), "tests.typecheck.check")

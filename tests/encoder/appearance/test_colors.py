@@ -139,6 +139,16 @@ def test_a_chain_has_one_atlas_and_pictures_of_each_frame(files: dict[str, bytes
     assert len(coarse.uv) == len(coarse.faces)
 
 
+def test_beneath_pictures_colors_of_vertices_do_not_change_and_take_little(files: dict[str, bytes]) -> None:
+    video = meshreel.open(files["texture"])
+    count = min(len(mesh.vertices) for mesh in video)  # the template's, at least; patches differ
+    shown = [mesh.colors[:count] for mesh in video]
+    assert all(np.array_equal(colors, shown[0]) for colors in shown) and np.ptp(shown[0], axis=0).max() > 30
+    reader = video.reader
+    first, second = (len(reader.read_chunk(c.number)) for c in reader.chunks if c.kind == ChunkKind.COLORS)
+    assert second < first / 20  # nothing but that nothing changes
+
+
 def without(data: bytes, kind: ChunkKind) -> bytes:
     """The file without the chunks of a kind."""
     reader, output, numbers = ReelReader(BytesSource(data)), BytesIO(), dict[int, int]()

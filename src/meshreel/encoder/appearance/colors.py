@@ -35,7 +35,7 @@ from ..group.interval import Interval
 from .videos import TEXTURE_SIZES, AppearanceOptions, TextureOptions, Videos
 
 USED = 0.43  # of a texture is on the surface, as unwrapped; measured on basketball_player
-COARSER = 2.0  # steps of vertex colours beneath pictures, at half of their bytes (decision 28)
+BENEATH, BESIDE = 4.0, 2.0  # steps of vertex colours beneath pictures, and of those of patches (decisions 28, 41)
 MOST_FITTING = 1024  # texels, unless a larger texture is asked for: 2 mm on a person
 
 
@@ -80,6 +80,7 @@ class _Chain:
         self._pictured = list[int]()  # which of the groups have pictures
         self._options = options
         self._video: _Video | None = None
+        self._still: UInt8[np.ndarray, "V 3"] | None = None  # of the template beneath pictures, in all frames
         self._before: tuple[_core.GroupState | None, LayersState | None] = None, None  # that predict the next group
 
     def add(self, group: EncodedGroup, numbers: range, paints: Sequence[Paint | None], pictured: bool) -> None:
@@ -93,10 +94,13 @@ class _Chain:
         colors = mapped(_vertex_colors, paints, meshes)
         texture = options.texture if pictured and not self.groups and group.form == Form.LAYERS else None
         is_covered = texture is not None or self._video is not None
-        step = COARSER * options.color_step if is_covered else options.color_step
+        step, of_rest = options.color_step, options.color_step
+        if is_covered:
+            step, of_rest = BENEATH * step, BESIDE * step
+            colors = self._stilled(colors, paints, canvas.meshes[0].vertices)
         encoded, self._before = None, (None, None)
         with suppress(CostlyError):
-            encoded = encode_group_colors(canvas, colors, step, None if known is None else known.colors)
+            encoded = encode_group_colors(canvas, colors, step, None if known is None else known.colors, of_rest)
         if decoded.state is not None:
             base, coded = canvas.meshes[0].base, None if encoded is None else encoded.state
             last = LayersState(base.faces, meshes[-1].vertices[: len(base.vertices)], (), coded)
@@ -112,6 +116,15 @@ class _Chain:
             self._pictured.append(len(self.groups))
             self._video.add(paints, meshes)
         self.groups.append(replace(group, companions=tuple(companions)))
+
+    def _stilled(
+        self, colors: Sequence[UInt8[np.ndarray, "_ 3"]], paints: Sequence[Paint | None], count: int
+    ) -> list[UInt8[np.ndarray, "_ 3"]]:
+        """Return colours of vertices, of which the template's `count` do not change: pictures lie above them."""
+        if self._still is None:
+            painted = [color[:count] for color, paint in zip(colors, paints, strict=True) if paint is not None]
+            self._still = np.rint(np.mean(painted, axis=0)).astype(np.uint8)
+        return [np.concatenate([self._still, color[count:]]) for color in colors]
 
     def done(self) -> list[EncodedGroup]:
         """Return the groups with their splats and pictures."""

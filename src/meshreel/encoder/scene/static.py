@@ -6,6 +6,7 @@ In: the parts of a scene. Out: the payloads of its states, in the order of time.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,6 +19,8 @@ from ...analysis.appearance.bake import (
     median_colors,
     picture,
     projected,
+    shown_whole,
+    steady_normals,
     texels_of,
     unwrap,
 )
@@ -34,16 +37,31 @@ from ...geometry.closest_points import distances
 from ...geometry.color_views import Paint, Painted
 from ...geometry.decimate import decimate_faces
 from ...geometry.derived_sequences import CapturedSequence, is_colored
+from ...geometry.flat import flattened
 from ...geometry.threads import ahead
-from ...geometry.topology import clean, face_normals
+from ...geometry.topology import clean
 from ...geometry.work import passed
 from ...types import Mesh, Placement, evenly
-from ..appearance.colors import fitting_sizes
+from ..appearance.colors import BENEATH, fitting_sizes
 from ..appearance.videos import AppearanceOptions, TextureOptions, layered_pictures
 from ..settings.options import SceneOptions
 from .parts import Parts
 
-FRACTIONS = (0.75, 0.5, 0.35, 0.22, 0.15, 0.1, 0.07, 0.045, 0.03, 0.02)  # of the background's vertices (decision 19)
+FRACTIONS = (
+    0.75,
+    0.5,
+    0.35,
+    0.22,
+    0.15,
+    0.1,
+    0.07,
+    0.045,
+    0.03,
+    0.02,
+    0.013,
+    0.009,
+    0.006,
+)  # of the background's vertices (decision 19)
 HALVINGS = 2  # of the factor between two fractions, in search for a smaller mesh that is near enough (guess)
 LEAST_NOISE = 8e-4  # of the unit, the least noise that a background is coded for: bodies are as near to frames (guess)
 WORST = 4.0  # times what is allowed on average, of a place where there is no noise to hide it (guess)
@@ -70,9 +88,17 @@ class Static:
 
 
 def encode_static(
-    parts: Parts, count: int, frame_rate: float, options: SceneOptions, pictured: bool = False
+    parts: Parts,
+    count: int,
+    frame_rate: float,
+    options: SceneOptions,
+    flat: bool = True,
+    pictured: Callable[[int, Mesh], Mesh] | None = None,
 ) -> list[Static]:
     """Encode the states of the background: as few faces as stay about as near to it as the noise.
+
+    With `flat`, flat pieces lie on planes, in large faces, whose corners alone would not have the colours of what is
+    between. `pictured`, of a frame and a mesh, cuts the faces of a whole state as its texture needs them.
 
     The first state is whole, as are those of a refresh; each change of the room is a patch of the state before, but for
     a background with pictures, whose atlas is of a whole state.
@@ -82,20 +108,27 @@ def encode_static(
     usual = max(float(np.median(parts.noise.off)) / survey.unit if len(parts.noise.off) else 0.0, LEAST_NOISE)
     step = options.lattice * usual
 
-    def coded(mesh: Mesh) -> tuple[bytes, Mesh]:
+    def coded(mesh: Mesh) -> list[tuple[bytes, Mesh]]:
         # Where there is less noise than usual, more would be spent on little: a room's background would double.
         most = options.coarse * np.maximum(parts.noise.at(mesh.vertices)[1] / survey.unit, usual)
         exact = isinstance(parts.segmentation, ByRest)
-        return _coded(mesh.at((mesh.vertices - survey.center) / survey.unit), most, step, exact)
+        return _coded(mesh.at((mesh.vertices - survey.center) / survey.unit), most, step, exact, flat)
 
-    payload, state = coded(parts.background)
+    def whole_state(frame: int, mesh: Mesh) -> tuple[bytes, Mesh]:
+        payload = encode_background(mesh if pictured is None else pictured(frame, mesh), step)
+        return payload, decode_background(payload)  # the next patch counts faces in the decoded order
+
+    ways = coded(parts.background)
+    if pictured is not None and not parts.background.is_empty:
+        ways = [whole_state(0, mesh) for _, mesh in ways]
+    payload, state = min(ways, key=_size)
     found = [] if state.is_empty else [Static(0, payload, False)]
     chain, changes = Chain(0, len(payload)), {change.frame: change for change in parts.changes}
-    again = set(refreshes(count, frame_rate, options)) | (set(changes) if pictured else set())
+    again = set(refreshes(count, frame_rate, options)) | (set() if pictured is None else set(changes))
     for frame in sorted({*changes, *again} - {0}):
         whole = state.is_empty or frame in again
         if change := changes.get(frame):
-            came = coded(change.came)[1]
+            came = min(coded(change.came), key=_size)[1]
             before, gone = state, parts.segmentation.gone(frame, place.of(state))
             payload = encode_change(before, gone, came, step)
             try:
@@ -104,8 +137,7 @@ def encode_static(
             except CostlyError:  # no reader would decode it
                 state, whole = changed(before, gone, came), True
         if whole and not state.is_empty:
-            payload = encode_background(state, step)
-            state = decode_background(payload)  # the next patch counts faces in the decoded order
+            payload, state = whole_state(frame, state)
             chain = Chain(0, len(payload))
         if not (whole and state.is_empty):
             found.append(Static(frame, payload, not whole))
@@ -117,37 +149,66 @@ def refreshes(count: int, frame_rate: float, options: SceneOptions) -> range:
     return range(0, count, count if options.refresh is None else max(1, round(options.refresh * frame_rate)))
 
 
-def _coded(mesh: Mesh, most: Float64[np.ndarray, " V"], step: float, exact: bool) -> tuple[bytes, Mesh]:
-    """Encode a mesh with the fewest vertices that keep it near; return payload and decoded mesh.
+def _size(way: tuple[bytes, Mesh]) -> int:
+    return len(way[0])
+
+
+def _coded(
+    mesh: Mesh, most: Float64[np.ndarray, " V"], step: float, exact: bool, flat: bool
+) -> list[tuple[bytes, Mesh]]:
+    """Encode a mesh with the fewest vertices that keep it near; return payload and decoded mesh, of each way.
 
     The RMS of its vertices' distances, in units of what is allowed at each, is at most 1; if `exact`, no distance is
-    over `WORST`, from it or from what is decoded.
+    over `WORST`, from it or from what is decoded. With `flat`, there is a way in which flat pieces lie on planes, and
+    all else is as near as without planes.
     """
     if mesh.is_empty:
-        return b"", mesh
+        return [(b"", mesh)]
 
-    def tried(small: Mesh) -> tuple[bytes, Mesh, bool]:
-        """Return the payload of a simplified mesh, the decoded mesh, and whether this is near enough."""
-        payload = encode_background(small, step)
-        decoded = decode_background(payload)
-        if decoded.is_empty:
-            return payload, decoded, False
+    def is_near(decoded: Mesh) -> bool:
         off = distances(mesh.vertices, decoded) / most
         near = float((off**2).mean()) <= 1
         if near and exact:
             near = float(max(off.max(), (distances(decoded.vertices, mesh) / np.median(most)).max())) <= WORST
-        return payload, decoded, near
+        return near
+
+    plain = _smallest(mesh, step, is_near)
+    laid, on_planes = flattened(mesh, most) if flat and not exact else (mesh, np.zeros(len(mesh.vertices), bool))
+    if not on_planes.any():
+        return [plain]
+    rough = ~on_planes
+
+    def off_by(decoded: Mesh, reference: Mesh) -> float:
+        """Return the sum of squared distances, in units of what is allowed, of the vertices that are not on planes."""
+        return float(((distances(reference.vertices[rough], decoded) / most[rough]) ** 2).sum())
+
+    limit = off_by(plain[1], mesh)
+
+    def is_as_near(decoded: Mesh) -> bool:
+        near = off_by(decoded, laid) <= limit
+        return near and float(((distances(laid.vertices[on_planes], decoded) / most[on_planes]) ** 2).mean()) <= 1
+
+    return [plain, _smallest(laid, step, is_as_near)]
+
+
+def _smallest(mesh: Mesh, step: float, is_near: Callable[[Mesh], bool]) -> tuple[bytes, Mesh]:
+    """Return the payload and the decoded mesh with the fewest faces of those tried that are near."""
+
+    def tried(small: Mesh) -> tuple[bytes, Mesh, bool]:
+        payload = encode_background(small, step)
+        decoded = decode_background(payload)
+        return payload, decoded, not decoded.is_empty and is_near(decoded)
 
     steps = [clean(mesh)]  # each from the one before: these are nearer to the mesh than what is made from it at once
     for fraction in FRACTIONS:
         steps.append(decimate_faces(steps[-1], max(4, round(2 * fraction * len(mesh.vertices)))))
     failed = 0
     for best in reversed(steps):
-        payload, decoded, is_near = tried(best)
-        if is_near:
+        payload, decoded, near = tried(best)
+        if near:
             break
         failed = len(best.faces)
-    for _ in range(HALVINGS if failed and is_near else 0):
+    for _ in range(HALVINGS if failed and near else 0):
         small = decimate_faces(best, round((failed * len(best.faces)) ** 0.5))
         smaller = tried(small)
         if smaller[2]:
@@ -165,7 +226,8 @@ def colored_states(
         return encode_static(parts, len(sequence), sequence.frame_rate, background)
     found, mesh, looks, bare = list[Static](), Mesh.empty(), _Looks(sequence, parts), False
     texture = options.texture if options.texture and (options.texture.always or looks.has_pictures) else None
-    states = encode_static(parts, len(sequence), sequence.frame_rate, background, texture is not None)
+    pictured = None if texture is None else looks.shown_whole
+    states = encode_static(parts, len(sequence), sequence.frame_rate, background, texture is not None, pictured)
     ends = [state.frame for state in states[1:]] + [len(sequence)]
     for state, end in zip(states, ends, strict=True):
         mesh = decode_change(state.payload, mesh) if state.is_patch else decode_background(state.payload)
@@ -177,7 +239,7 @@ def colored_states(
         if texture and not state.is_patch:
             layout, scale = looks.layout(mesh, frames, texture.size)
             texels = texels_of(layout, 0)
-            normals_there = face_normals(mesh)[0][texels.faces]
+            normals_there = steady_normals(mesh)[texels.faces]
             surface = _Unwrapped(mesh, layout, scale, texels, texels.places(mesh), normals_there)
             points, normals = [*points, surface.places], [*normals, surface.normals]
         colors, seen = looks.colors(frames, np.concatenate(points), np.concatenate(normals))
@@ -186,7 +248,8 @@ def colored_states(
         fitted = fitted_colors(mesh, colors[:count].astype(np.float64), seen[:count])
         shown = fitted[len(mesh.vertices) - coded.vertices :]
         try:
-            encoded = encode_group_colors(canvas, [shown], options.color_step, None)
+            step = options.color_step if surface is None else BENEATH * options.color_step
+            encoded = encode_group_colors(canvas, [shown], step, None)
         except CostlyError:  # the summary tells of it
             bare = True
         if bare:
@@ -281,6 +344,10 @@ class _Looks:
         if self._views is None:
             return unwrap(mesh, fitting_sizes(size, [self._paint(frames.start)], [mesh])), 1.0
         return projected(mesh, self._views.of_surface(frames[evenly(len(frames), 1)[0]], mesh))
+
+    def shown_whole(self, frame: int, mesh: Mesh) -> Mesh:
+        """Return a background from a frame on, of faces that are in pictures entirely, where cameras took some."""
+        return mesh if self._views is None else shown_whole(mesh, self._views.of_surface(frame, mesh))
 
     def _paint(self, number: int) -> Paint:
         if self._views is not None:
