@@ -144,10 +144,14 @@ class View:
         work.count("pictures drawn")
         camera = picture.camera
         shrink = max(1, -(-max(camera.width, camera.height) // MOST_SIDE))
-        width, height = -(-camera.width // shrink), -(-camera.height // shrink)
-        coarse = Camera.of(width, height, camera.intrinsic / [[shrink], [shrink], [1.0]], camera.extrinsic)
+        coarse = _of_depths(camera, shrink)
         depth = _confirmed(draw(hides, coarse).depth, coarse, margin, depths)
         return View(picture, shrink, depth, _from_step(depth, shrink), margin)
+
+    @property
+    def camera(self) -> Camera:
+        """The camera of the depths: its lens has no distortion."""
+        return _of_depths(self.picture.camera, self.shrink)
 
     def cleared(self) -> View:
         """Return the view in which places near a step are hidden, and at a hole: steps are those of smoothed depth."""
@@ -180,6 +184,11 @@ class View:
         seen, pixels = (size, self.depth, self.from_step, limits), None if sums is None else self.picture.pixels
         total = np.zeros((0, 3)) if sums is None else sums
         _core.add_view(turn, shift, camera.eye, lens, bend, *seen, pixels, gains, points, normals, total, weights)
+
+
+def _of_depths(camera: Camera, shrink: int) -> Camera:
+    width, height = -(-camera.width // shrink), -(-camera.height // shrink)
+    return Camera.of(width, height, camera.intrinsic / [[shrink], [shrink], [1.0]], camera.extrinsic)
 
 
 def _confirmed(

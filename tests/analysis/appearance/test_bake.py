@@ -144,14 +144,14 @@ def looking(*sides: float) -> list[ColorPicture]:
 def test_a_large_face_that_something_hides_is_cut_and_each_piece_is_whole_in_a_picture() -> None:
     screen = Mesh.of([[-0.05, -0.05, 1], [0.05, -0.05, 1], [0.05, 0.05, 1], [-0.05, 0.05, 1]], [[0, 2, 1], [0, 3, 2]])
     mesh = concatenate([WALL, screen])
-    views = ColorViews(looking(-0.2, 0.2), mesh)
+    views = ColorViews(looking(-0.2), mesh)
     whole = projected(mesh, views)[0].places[:2]
-    assert (whole == whole[:, :1]).all(axis=(1, 2)).any()  # neither picture has all of it
+    assert (whole == whole[:, :1]).all(axis=(1, 2)).any()  # the picture has not all of it
     cut = shown_whole(mesh, views)
     places = projected(cut, views)[0].places
     placed = (places != places[:, :1]).any(axis=(1, 2))
     area = face_normals(cut)[1]
-    assert area[placed].sum() > 0.97 * area.sum() and 20 < len(cut.faces) < 1500
+    assert area[placed].sum() > 0.95 * area.sum() and 20 < len(cut.faces) < 1500
     assert shown_whole(WALL, ColorViews(looking(0.0), WALL)) is WALL  # all of it is seen, and squarely
 
 

@@ -324,7 +324,7 @@ def shown_whole(mesh: Mesh, views: ColorViews) -> Mesh:
             middles, ends = mesh.vertices[edges].mean(axis=1), view.picture.project(mesh.vertices)[0][edges]
             with np.errstate(invalid="ignore"):
                 off = np.linalg.norm(view.picture.project(middles)[0] - ends.mean(axis=1), axis=1)[sides].max(axis=1)
-            large, better = shown.longest > SMALL, shown.has_all & (shown.weights > most)
+            large, better = ~(shown.longest <= SMALL), shown.has_all & (shown.weights > most)
             most[better], wanted[better] = shown.weights[better], (large & (off > BENT * side))[better]
             wanted |= shown.has_some & large & (most == 0)
         if not wanted.any():
@@ -338,7 +338,7 @@ class _Shown:
     """How a picture shows the faces of a mesh."""
 
     corners: Float64[np.ndarray, "F 3 2"]  # where they are in the picture
-    longest: PerFace  # side, as a share of the picture's longer one
+    longest: PerFace  # side, as a share of the picture's longer one; NaN where a corner is behind the camera
     weights: PerFace  # of their middles; 0 where the face is not within the picture
     has_some: Known  # of the face
     has_all: Known
@@ -350,14 +350,17 @@ class _Shown:
         corners = taken.project(mesh.vertices)[0][mesh.faces]
         with np.errstate(invalid="ignore"):
             inside = ((corners >= 0) & (corners <= size)).all(axis=(1, 2))
-            sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
+            longest = _sides(corners).max(axis=1) / size.max()
         weights = np.where(inside, view.weights(middles, normals, at_step=0.1), 0.0)
-        # Pixels are counted without the lens, as they are drawn.
-        straight = replace(taken, camera=replace(taken.camera, distortion=(0.0,) * 5))
-        drawn = draw(mesh, straight.camera).faces
+        drawn = draw(mesh, view.camera).faces
         counts = np.bincount(drawn[drawn >= 0], minlength=len(mesh.faces))
-        a, b, c = np.moveaxis(straight.project(mesh.vertices)[0][mesh.faces], 1, 0)
+        straight = replace(taken, camera=view.camera).project(mesh.vertices)[0][mesh.faces]
+        a, b, c = np.moveaxis(straight, 1, 0)
         with np.errstate(invalid="ignore"):
             areas = np.abs((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]) / 2
-            has_all = counts >= areas - COUNTED * np.sqrt(sides.sum(axis=1)) - 1
-        return _Shown(corners, sides.max(axis=1) / size.max(), weights, counts > 0, has_all & (weights > 0))
+            has_all = counts >= areas - COUNTED * np.sqrt(_sides(straight).sum(axis=1)) - 1
+        return _Shown(corners, longest, weights, counts > 0, has_all & (weights > 0))
+
+
+def _sides(corners: Float64[np.ndarray, "F 3 2"]) -> Float64[np.ndarray, "F 3"]:
+    return np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
