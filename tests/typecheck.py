@@ -21,4 +21,5 @@ def modules_with_shapes(package: str) -> list[str]:
     assert spec is not None and spec.origin is not None
     root = Path(spec.origin).parent
     paths = [path for path in root.rglob("*.py") if "[np.ndarray, " in path.read_text(encoding="utf-8")]
-    return [".".join((package, *path.relative_to(root).with_suffix("").parts)) for path in paths]
+    names = [".".join((package, *path.relative_to(root).with_suffix("").parts)) for path in paths]
+    return [name.removesuffix(".__init__") for name in names]

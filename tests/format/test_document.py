@@ -204,7 +204,7 @@ def test_the_document_decodes_colors_to_the_bit(decoder: dict[str, Any]) -> None
     for round_number in range(2):
         wanted = generator.integers(0, 256, (1, count, 3)) + 9 * np.arange(frames)[:, None, None] + 20 * round_number
         colors = np.clip(wanted, 0, 255).astype(np.uint8)
-        data = encode_colors([shape], [colors], [1 / 8], state).payload
+        data = encode_colors([shape], [colors], 1 / 8, state).payload
         [found], state = decode_colors(data, [shape], state)
         head, offset = records.unpack(VertexColors, data)
         assert (head.origin == Origin.PREVIOUS) == (round_number > 0)
@@ -226,7 +226,7 @@ def test_colors_take_at_most_a_tenth_more_than_the_entropy_of_their_contexts(
     noise = np.random.default_rng(10).normal(0, 12, (frames, *points.shape))
     shape = ColoredMesh(mesh, 3, frames, len(points))
     colors = np.clip(128 + 90 * waves + noise, 0, 255).astype(np.uint8)
-    data = encode_colors([shape], [colors], [1 / 16]).payload
+    data = encode_colors([shape], [colors], 1 / 16).payload
     kind, raw = decoder["Decoder"], [0]
 
     def bit(self: Any, model: Any, code: Any = kind.bit) -> int:

@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
+from meshreel.geometry import flat
 from meshreel.geometry.closest_points import distances
 from meshreel.geometry.decimate import decimate_faces
 from meshreel.geometry.flat import OFF, flattened
-from meshreel.geometry.topology import face_normals, weld
+from meshreel.geometry.topology import weld
 from meshreel.types import Mesh
 from tests.metrics.shapes import plane, sphere
 
@@ -54,7 +55,7 @@ def test_three_planes_meet_in_straight_edges_and_a_corner_wherever_they_are(turn
     edge = np.isclose(true.vertices, 0).sum(axis=1) >= 2
     assert on_planes.mean() > 0.98 and on_planes[edge].mean() > 0.9
     off = np.where(np.isclose(true.vertices, 0), back, 0.0)[on_planes]
-    assert np.abs(off).max() < 0.5 * NOISE
+    assert np.percentile(np.abs(off), 99.5) < 0.5 * NOISE and np.abs(off).max() < 3 * NOISE
 
 
 def test_what_is_curved_rough_or_small_stays_as_it_is():
@@ -66,24 +67,44 @@ def test_what_is_curved_rough_or_small_stays_as_it_is():
 
 
 def test_a_step_of_more_than_noise_stays_and_one_within_it_goes():
-    for height, stays in ((6 * NOISE, True), (0.5 * NOISE, False)):
-        plate = np.linalg.norm(FLOOR.vertices[:, :2] - 0.5, axis=1) < 0.1  # too small to be a piece of its own
+    for height, stays in ((6 * NOISE, True), (3.5 * NOISE, True), (0.5 * NOISE, False)):
+        plate = np.linalg.norm(FLOOR.vertices[:, :2] - 0.5, axis=1) < 0.15  # too small to be a piece of its own
         mesh = noisy(FLOOR.at(FLOOR.vertices + np.outer(plate, [0, 0, height])))
         found, _ = laid(mesh)
         rise = found.vertices[plate, 2].mean() - np.median(found.vertices[~plate, 2])
-        assert (rise > 0.8 * height) == stays and (rise < 0.1 * NOISE) != stays
+        assert (rise > 0.6 * height) == stays and (rise < 0.1 * NOISE) != stays
 
 
-def test_nothing_moves_far_nor_turns_over_and_what_is_beside_planes_goes_with_them():
-    true = corner()
+def test_what_is_beside_a_plane_goes_with_it_and_what_is_apart_stays():
+    away = np.linalg.norm(FLOOR.vertices[:, :2] - 0.5, axis=1)
+    bump = FLOOR.at(FLOOR.vertices + np.outer(np.maximum(0.25 - away, 0), [0, 0, 1]))  # a cone of 25 cm
     ball = sphere(0.15, 4)
-    joined = Mesh.of(
-        np.concatenate([true.vertices, ball.vertices + 0.5]), [*true.faces, *(ball.faces + len(true.vertices))]
-    )
-    mesh = noisy(joined, 0.5 * NOISE)
+    faces = np.concatenate([bump.faces, ball.faces + len(bump.vertices)])
+    mesh = noisy(Mesh(np.concatenate([bump.vertices, ball.vertices + [0.5, 0.5, 0.6]]), faces))
     found, on_planes = laid(mesh)
     ways = np.linalg.norm(found.vertices - mesh.vertices, axis=1)
-    assert ways.max() <= 2 * OFF * NOISE and not on_planes[len(true.vertices) :].any()
-    assert not ways[len(true.vertices) :].any()
-    (before, areas), (after, _) = face_normals(mesh), face_normals(found)
-    assert ((before * after).sum(axis=1) > 0)[areas > 1e-5].all()
+    foot = np.flatnonzero(~on_planes[: len(away)] & (away < 0.22) & (away > 0.18))
+    assert ways.max() <= 2 * OFF * NOISE and ways[len(away) :].max() < 1e-12
+    assert 0.05 * NOISE < ways[foot].mean() < ways[on_planes].mean() and not on_planes[away.argmin()]
+
+
+def test_planes_at_a_shallow_angle_meet_in_a_straight_edge():
+    slope = np.tan(np.radians(30))
+    true = FLOOR.at(FLOOR.vertices + np.outer(np.maximum(FLOOR.vertices[:, 0] - 0.5, 0), [0, 0, slope]))
+    found, on_planes = laid(noisy(true))
+    edge = on_planes & np.isclose(FLOOR.vertices[:, 0], 0.5)
+    assert on_planes.mean() > 0.9 and edge.sum() > 20
+    x, _, z = found.vertices[on_planes].T
+    assert np.abs(z - slope * np.maximum(x - 0.5, 0)).max() < NOISE
+
+
+def test_clutter_takes_no_more_rounds_than_it_has_directions(monkeypatch: pytest.MonkeyPatch):
+    random = np.random.default_rng(0)
+    balls = [sphere(0.03, 2) for _ in range(150)]
+    count = len(balls[0].vertices)
+    places = np.concatenate([ball.vertices + random.uniform(-1, 1, 3) for ball in balls])
+    clutter = Mesh(places, np.concatenate([ball.faces + k * count for k, ball in enumerate(balls)]))
+    asked, fitted = [], flat._plane
+    monkeypatch.setattr(flat, "_plane", lambda *given: asked.append(1) or fitted(*given))
+    laid(clutter, 4e-4)
+    assert len(asked) < 9**3

@@ -21,7 +21,6 @@ from ..export.animated_usd import EXTENSIONS
 from ..export.film_files import KINDS as FILMS
 from ..export.frames import Part, check_part, check_splats, write_frames, write_splats
 from ..format.layout import ChunkKind
-from ..geometry.color_views import without_texture
 from ..io.sequence import SequenceOptions
 from ..io.write import check_apart, check_free, frame_names, left_over, make_folder, write_file, write_mesh
 from ..types import Mesh, Texture, Up
@@ -30,7 +29,6 @@ from .film import Filming, film
 
 FLAGS = {".usdc": "usd"}  # of formats, where it is not their extension
 How = tuple[Callable[[int], Any], Callable[[Any, Path], None]]  # decodes a frame, and writes it
-NO_PACKAGES = "colours of vertices are kept: textures need the extra color: pip install 'meshreel[color]'"
 UNKNOWN = "chunks of kinds that this version does not know (update meshreel)"
 CONTENTS: dict[int, str] = {  # of chunks, by their kind, and how else they are written; "": in all outputs
     ChunkKind.STATIC: "background (meshreel decode without --splats)",
@@ -93,17 +91,15 @@ def decode(
     looks: dict[Part, Callable[[Video, int], Mesh]]
     looks = {"all": Video.__getitem__, "background": Video.background, "moving": Video.moving}
     lost = _not_kept(video.reader, format)
-    pictured = video.background if video.reader.has_textures and lost != NO_PACKAGES else lambda _: None
+    pictured = video.background if video.reader.has_textures and not lost else lambda _: None
     written = _changes(video.reader, pictured) if only == "background" else range(len(video))
     bare, pale = video.at(layers, colors=False), list[FormatError]()
 
     def decoded(frame: int) -> Mesh:
         try:
             mesh = looks[only](video, frame)
-            if mesh.texture is None or lost == NO_PACKAGES:
+            if mesh.texture is None or lost:
                 return replace(mesh, uv=None, texture=None)
-            if lost:
-                return without_texture(mesh)
             return replace(mesh, texture=Texture.of(mesh.texture.pixels))
         except FormatError as error:
             mesh = looks[only](bare, frame)  # raises if the surface is damaged
@@ -174,10 +170,10 @@ def unwritten(file: Path, reader: ReelReader, kept: Collection[str], textures: s
 
 def _not_kept(reader: ReelReader, format: str) -> str:
     """Return a remedy if files of a format cannot keep a video's textures."""
-    if reader.has_textures and not (find_spec("av") and find_spec("PIL")):
-        return NO_PACKAGES
     if reader.has_textures and format == "ply":
-        return "PLY has no textures, vertices have their colours: give --format obj or glb for textures"
+        return "PLY has no textures, colours of vertices are kept: give --format obj or glb for textures"
+    if reader.has_textures and not (find_spec("av") and find_spec("PIL")):
+        return "colours of vertices are kept: textures need the extra color: pip install 'meshreel[color]'"
     return ""
 
 

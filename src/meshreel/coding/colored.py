@@ -105,18 +105,10 @@ def canvas_of(
 
 
 def encode_group_colors(
-    canvas: Canvas,
-    colors: Sequence[UInt8[np.ndarray, "_ 3"]],
-    step: float,
-    before: Float64[np.ndarray, "V 3"] | None = None,
-    step_of_rest: float | None = None,
+    canvas: Canvas, colors: Sequence[UInt8[np.ndarray, "_ 3"]], step: float, before: Float64[np.ndarray, "V 3"] | None
 ) -> EncodedColors:
-    """Encode the colours of the vertices of each frame of a group; CostlyError if a reader would refuse them.
-
-    `step_of_rest` is the step of meshes after the first, if it is another.
-    """
-    steps = [step if not number or step_of_rest is None else step_of_rest for number in range(len(canvas.meshes))]
-    encoded = encode_colors(canvas.meshes, canvas.by_mesh(colors), steps, before, canvas.is_layered)
+    """Encode the colours of the vertices of each frame of a group; CostlyError if a reader would refuse them."""
+    encoded = encode_colors(canvas.meshes, canvas.by_mesh(colors), step, before, canvas.is_layered)
     _check_cost(canvas, len(encoded.payload))
     return encoded
 

@@ -316,21 +316,6 @@ def colors_on(
     return colors
 
 
-def without_texture(mesh: Mesh) -> Mesh:
-    """Return a mesh whose vertices have the colours of its texture, at one of their places there, in place of it."""
-    if mesh.uv is None or mesh.texture is None:
-        return mesh
-    count, corners = len(mesh.vertices), mesh.faces.reshape(-1)
-    chosen = np.full(count, -1)
-    known = np.flatnonzero(np.isfinite(mesh.uv).all(axis=2))
-    chosen[corners[known]] = known
-    shown, colors = chosen >= 0, np.full((count, 3), GREY, np.uint8) if mesh.colors is None else mesh.colors.copy()
-    at = chosen[shown]
-    found = bilinear(mesh.texture.pixels, mesh.uv.reshape(-1, 2)[at])
-    colors[shown] = np.rint(found).astype(np.uint8)
-    return replace(mesh, colors=colors, uv=None, texture=None)
-
-
 def bilinear(pixels: UInt8[np.ndarray, "H W 3"], places: Float[np.ndarray, "N 2"]) -> Points:
     """Return the colours at places of a texture, as in `Mesh.uv`; outside of 0 to 1 the texture is repeated."""
     height, width = pixels.shape[:2]

@@ -15,10 +15,13 @@ from ..types import Mesh
 from .strict import eigen, norm
 from .topology import connected_faces, edge_lengths, face_means, face_normals
 
-RINGS = 6  # of faces around each, over which normals are averaged to find planes (guess)
+RINGS = 6  # of faces around each, over which normals and places are averaged to find planes (guess)
 NEAR_RINGS = 2  # of those that tell on which of two planes a face lies (guess)
 ALIKE, SIMILAR = 0.95, 0.5  # least cosines between a plane's normal and those averages (guess)
 OFF = 4.0  # times what is allowed, largest distance of a vertex from its plane (guess)
+# Times what is allowed, the largest distance of the mean of the surface around a face from its plane, over `RINGS` and
+# `NEAR_RINGS` (guess).
+LEVEL, GROWN = 1.5, 2.0
 # Times what is allowed, the largest RMS distance of a piece from its plane. Of what is much rougher, too, the part
 # within `OFF` would be near: 1.8 times for a normal distribution of twice what is allowed.
 SHARE = 1.5
@@ -26,6 +29,7 @@ ACROSS = 12  # usual edges, the width of the smallest piece (guess)
 ROUNDS = 4  # of fitting a plane to what lies on it (guess)
 TURNS = 8  # of laying a vertex onto each of its planes in turn (guess)
 FADING, FADE = 12, 0.9  # rings of faces around planes that move with these, and how much from ring to ring (guess)
+FULL = 0.25  # of the smallest piece, the least surface at one height in which a plane is looked for (guess)
 CELL = 0.25  # of directions, in which surface that faces the same way is counted (guess)
 
 Normals = Float64[np.ndarray, "F 3"]
@@ -65,7 +69,8 @@ def flattened(mesh: Mesh, most: Most) -> tuple[Mesh, Bool[np.ndarray, " V"]]:
     if not found:
         return mesh, np.zeros(len(mesh.vertices), bool)
     planes = _Planes(of_face, np.stack([normal for normal, _ in found]), np.array([offset for _, offset in found]))
-    _grow(local, planes, _averaged(local, normals, areas, NEAR_RINGS), most)
+    smooth, places = _averaged(local, normals, areas, NEAR_RINGS), face_means(local.vertices, local.faces)
+    _grow(local, planes, smooth, _means(local, places, NEAR_RINGS), most)
     vertices, moved = _moved(local, planes, most)
     return mesh.at(vertices + middle), moved
 
@@ -79,11 +84,22 @@ def _averaged(mesh: Mesh, normals: Normals, areas: Areas, rings: int) -> Normals
     return sums / np.maximum(np.linalg.norm(sums, axis=1), 1e-300)[:, None]
 
 
+def _means(mesh: Mesh, places: Normals, rings: int) -> Normals:
+    """Return the middles of the surface around each face, which are as far from a plane as that is in the mean."""
+    corners, count = mesh.faces.T.reshape(-1), len(mesh.vertices)
+    times = np.maximum(np.bincount(corners, minlength=count), 1)
+    for _ in range(rings):
+        at = [np.bincount(corners, np.tile(places[:, k], 3), count) / times for k in range(3)]
+        places = face_means(np.stack(at, axis=1), mesh.faces)
+    return places
+
+
 def _pieces(
     mesh: Mesh, normals: Normals, areas: Areas, most: Most, least: float
 ) -> Iterator[tuple[Int64[np.ndarray, " n"], Float64[np.ndarray, "3"], float]]:
     """Yield the faces of each flat piece, of the largest planes first, with the plane's normal and offset."""
     smooth, places = _averaged(mesh, normals, areas, RINGS), face_means(mesh.vertices, mesh.faces)
+    level = _means(mesh, places, RINGS)  # noise averages out there, relief and bends do not
     allowed, side = face_means(np.repeat(most[:, None], 3, axis=1), mesh.faces)[:, 0], round(1 / CELL)
     cells = (np.rint(smooth / CELL).astype(np.int64) + side) @ ((2 * side + 1) ** np.arange(3))
     is_free = areas > 0
@@ -94,13 +110,17 @@ def _pieces(
         height = _along(places[own], normal)
         step = 2 * OFF * float(np.median(allowed[own]))
         bins = np.rint((height - height.min()) / step).astype(np.int64)
-        fullest = np.bincount(bins, areas[own]).argmax()
-        on, reach = own[bins == fullest], step
+        at_heights = np.bincount(bins, areas[own])
+        if at_heights.max() < FULL * least:  # clutter
+            is_free[own] = False
+            free = np.flatnonzero(is_free)
+            continue
+        on, reach = own[bins == at_heights.argmax()], step
         is_free[on] = False  # whether or not a piece comes of it
         normal, offset = _plane(places[on], areas[on], normal)
         around = free[np.abs(_along(places[free], normal) - offset) <= 2 * step]
         for _ in range(ROUNDS):
-            near = np.abs(_along(places[around], normal) - offset) <= np.maximum(reach, OFF * allowed[around])
+            near = np.abs(_along(level[around], normal) - offset) <= np.maximum(reach, LEVEL * allowed[around])
             on, reach = around[near & (_along(smooth[around], normal) >= ALIKE)], 0.0
             if not len(on):
                 break
@@ -134,8 +154,8 @@ def _plane(places: Normals, areas: Areas, normal: Float64[np.ndarray, "3"]) -> t
     return found, float((found * middle).sum())
 
 
-def _grow(mesh: Mesh, planes: _Planes, smooth: Normals, most: Most) -> None:
-    """Give faces beside a piece that lie near its plane to it, ring by ring, to where two pieces meet."""
+def _grow(mesh: Mesh, planes: _Planes, smooth: Normals, level: Normals, most: Most) -> None:
+    """Give faces beside a piece that lie near its plane to it, in place, ring by ring, to where two pieces meet."""
     for _ in range(2 * RINGS):
         on, rest = np.flatnonzero(planes.of_face >= 0), np.flatnonzero(planes.of_face < 0)
         of_vertex = np.full(len(mesh.vertices), -1)
@@ -146,6 +166,7 @@ def _grow(mesh: Mesh, planes: _Planes, smooth: Normals, most: Most) -> None:
         for number in beside.T:
             takes = (planes.of_face[rest] < 0) & (number >= 0)
             takes &= np.einsum("nc,nc->n", smooth[rest], planes.normals[number]) >= SIMILAR
+            takes &= np.abs(planes.off(level[rest], number)) <= GROWN * most[mesh.faces[rest]].mean(axis=1)
             for corner in mesh.faces[rest].T:
                 takes &= np.abs(planes.off(mesh.vertices[corner], number)) <= OFF * most[corner]
             planes.of_face[rest[takes]] = number[takes]

@@ -17,7 +17,7 @@ STILL = np.repeat(WAVES[None], FRAMES, axis=0)
 
 
 def coded(colors: np.ndarray = STILL, before: np.ndarray | None = None, step: float = 1 / 64):
-    return encode_colors([SHAPE], [colors], [step], before, layered=True)
+    return encode_colors([SHAPE], [colors], step, before, layered=True)
 
 
 def test_colors_come_back_within_the_step() -> None:
@@ -49,7 +49,7 @@ def test_the_first_layers_are_the_colors_of_the_first_levels() -> None:
 def test_grey_is_grey_and_nothing_is_nothing() -> None:
     grey = np.full_like(STILL, 128)
     assert (coded(grey).colors[0] == 128).all()
-    assert encode_colors([], [], []).colors == ()
+    assert encode_colors([], [], 0.0909).colors == ()
 
 
 def test_frames_and_meshes_have_the_same_colors() -> None:

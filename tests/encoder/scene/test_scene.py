@@ -23,7 +23,7 @@ from meshreel.encoder.run.interval_files import IntervalFiles
 from meshreel.encoder.run.schedule import Job
 from meshreel.encoder.scene.parts import Parts, take_apart
 from meshreel.encoder.scene.scene import encode_bodies
-from meshreel.encoder.scene.static import LEAST_NOISE, encode_static
+from meshreel.encoder.scene.static import LEAST_NOISE, Look, encode_static
 from meshreel.encoder.scene.tracks import TrackGroup
 from meshreel.encoder.sequence import Encoder, encode
 from meshreel.encoder.settings.options import EncoderOptions, SceneOptions
@@ -362,12 +362,24 @@ def test_a_background_is_no_finer_than_its_noise_asks_for():
     sizes = []
     for noise in (0.0, 0.002, 0.01):
         parts, options = Parts(survey, ALL, with_room([NONE], sigma=0.002)[0], [], noise_of(noise)), SceneOptions()
-        payload = encode_static(parts, 1, 30.0, options)[0].payload
+        payload = encode_static(parts, 1, 30.0, options, Look(is_flat=False))[0].payload
         place = Placement(1.0, tuple(survey.center))
         away = rms(parts.background.vertices, place.of(decode_background(payload)))
         assert away <= options.coarse * max(noise, LEAST_NOISE)
         sizes.append(len(payload))
     assert sizes[0] > sizes[1] > sizes[2]
+
+
+def test_a_noisy_room_lies_on_planes_in_fewer_bytes_and_is_as_near_to_the_truth():
+    survey = replace(survey_sequence(MeshList((room(),))), scale=1.0)
+    true, place = with_room([NONE], sigma=0.0)[0], Placement(1.0, tuple(survey.center))
+    found = []
+    for look in (Look(is_flat=False), Look()):
+        parts = Parts(survey, ALL, with_room([NONE], sigma=0.002)[0], [], noise_of(0.004))
+        payload = encode_static(parts, 1, 30.0, SceneOptions(), look)[0].payload
+        found.append((len(payload), rms(true.vertices, place.of(decode_background(payload)))))
+    (plain, plain_off), (flat, flat_off) = found
+    assert flat < 0.8 * plain and flat_off < 1.02 * plain_off
 
 
 @pytest.mark.usefixtures("plainly")

@@ -52,18 +52,18 @@ class EncodedColors:
 def encode_colors(
     meshes: Sequence[ColoredMesh],
     colors: Sequence[UInt8[np.ndarray, "_ _ 3"]],
-    steps: Sequence[float],
+    step: float,
     before: Float64[np.ndarray, "V 3"] | None = None,
     layered: bool = False,
 ) -> EncodedColors:
     """Encode the colours of the vertices of meshes, the first of them predicted from `before` if given.
 
-    `steps` are the quantiser steps of the meshes, in units of the whole range. With `layered`, each level of the first
-    mesh is a separate layer, and the other meshes together are one.
+    `step` is the quantiser step, in units of the whole range. With `layered`, each level of the first mesh is a
+    separate layer, and the other meshes together are one.
     """
     head = VertexColors(Form.VERTEX_COLORS, Origin.ALONE if before is None else Origin.PREVIOUS, CHROMA)
     parts, decoded_colors, state = [pack(head)], list[UInt8[np.ndarray, "_ _ 3"]](), None
-    for number, (mesh, target, step) in enumerate(zip(meshes, colors, steps, strict=True)):
+    for number, (mesh, target) in enumerate(zip(meshes, colors, strict=True)):
         records = _encode_mesh(mesh, target, step, None if number else before)
         decoded, last = _decode_mesh(b"".join(records), mesh, head, None if number else before)
         state = last if number == 0 else state

@@ -35,7 +35,7 @@ from ..group.interval import Interval
 from .videos import TEXTURE_SIZES, AppearanceOptions, TextureOptions, Videos
 
 USED = 0.43  # of a texture is on the surface, as unwrapped; measured on basketball_player
-BENEATH, BESIDE = 4.0, 2.0  # steps of vertex colours beneath pictures, and of those of patches (decisions 28, 41)
+COARSER = 2.0  # steps of vertex colours beneath pictures, at half of their bytes (decision 28)
 MOST_FITTING = 1024  # texels, unless a larger texture is asked for: 2 mm on a person
 
 
@@ -94,13 +94,12 @@ class _Chain:
         colors = mapped(_vertex_colors, paints, meshes)
         texture = options.texture if pictured and not self.groups and group.form == Form.LAYERS else None
         is_covered = texture is not None or self._video is not None
-        step, of_rest = options.color_step, options.color_step
+        step = COARSER * options.color_step if is_covered else options.color_step
         if is_covered:
-            step, of_rest = BENEATH * step, BESIDE * step
             colors = self._stilled(colors, paints, canvas.meshes[0].vertices)
         encoded, self._before = None, (None, None)
         with suppress(CostlyError):
-            encoded = encode_group_colors(canvas, colors, step, None if known is None else known.colors, of_rest)
+            encoded = encode_group_colors(canvas, colors, step, None if known is None else known.colors)
         if decoded.state is not None:
             base, coded = canvas.meshes[0].base, None if encoded is None else encoded.state
             last = LayersState(base.faces, meshes[-1].vertices[: len(base.vertices)], (), coded)

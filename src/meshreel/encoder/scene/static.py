@@ -18,12 +18,10 @@ from ...analysis.appearance.bake import (
     fitted_colors,
     median_colors,
     picture,
-    projected,
-    shown_whole,
-    steady_normals,
     texels_of,
     unwrap,
 )
+from ...analysis.appearance.projection import projected, shown_whole, steady_normals
 from ...analysis.scene.labelling import ByRest
 from ...coding.appearance.atlas import encode_atlas
 from ...coding.appearance.pictures import MOST_CRF
@@ -42,28 +40,16 @@ from ...geometry.threads import ahead
 from ...geometry.topology import clean
 from ...geometry.work import passed
 from ...types import Mesh, Placement, evenly
-from ..appearance.colors import BENEATH, fitting_sizes
+from ..appearance.colors import fitting_sizes
 from ..appearance.videos import AppearanceOptions, TextureOptions, layered_pictures
 from ..settings.options import SceneOptions
 from .parts import Parts
 
-FRACTIONS = (
-    0.75,
-    0.5,
-    0.35,
-    0.22,
-    0.15,
-    0.1,
-    0.07,
-    0.045,
-    0.03,
-    0.02,
-    0.013,
-    0.009,
-    0.006,
-)  # of the background's vertices (decision 19)
+# Of the background's vertices (decision 19; the last three: decision 41).
+FRACTIONS = (0.75, 0.5, 0.35, 0.22, 0.15, 0.1, 0.07, 0.045, 0.03, 0.02, 0.013, 0.009, 0.006)
 HALVINGS = 2  # of the factor between two fractions, in search for a smaller mesh that is near enough (guess)
 LEAST_NOISE = 8e-4  # of the unit, the least noise that a background is coded for: bodies are as near to frames (guess)
+WORTH = 0.9  # of the bytes without planes, that a way with planes may take: they cost nearness on what bends (guess)
 WORST = 4.0  # times what is allowed on average, of a place where there is no noise to hide it (guess)
 STILL_FRAMES = 16  # in which a background is looked at for its colours, at most (guess)
 PICTURES_A_SECOND = 8  # of a background: shadows move slowly (guess)
@@ -87,18 +73,22 @@ class Static:
         return len(self.payload) + sum(map(len, self.companions))
 
 
+@dataclass(frozen=True, slots=True)
+class Look:
+    """What the colours of a background ask of its faces."""
+
+    is_flat: bool = True  # flat pieces lie on planes, in large faces: their corners lack the colours of what is between
+    cut: Callable[[int, Mesh], Mesh] | None = None  # faces of a whole state from a frame on, for a texture
+
+
 def encode_static(
     parts: Parts,
     count: int,
     frame_rate: float,
     options: SceneOptions,
-    flat: bool = True,
-    pictured: Callable[[int, Mesh], Mesh] | None = None,
+    look: Look = Look(),
 ) -> list[Static]:
     """Encode the states of the background: as few faces as stay about as near to it as the noise.
-
-    With `flat`, flat pieces lie on planes, in large faces, whose corners alone would not have the colours of what is
-    between. `pictured`, of a frame and a mesh, cuts the faces of a whole state as its texture needs them.
 
     The first state is whole, as are those of a refresh; each change of the room is a patch of the state before, but for
     a background with pictures, whose atlas is of a whole state.
@@ -112,19 +102,19 @@ def encode_static(
         # Where there is less noise than usual, more would be spent on little: a room's background would double.
         most = options.coarse * np.maximum(parts.noise.at(mesh.vertices)[1] / survey.unit, usual)
         exact = isinstance(parts.segmentation, ByRest)
-        return _coded(mesh.at((mesh.vertices - survey.center) / survey.unit), most, step, exact, flat)
+        return _coded(mesh.at((mesh.vertices - survey.center) / survey.unit), most, step, exact, look.is_flat)
 
     def whole_state(frame: int, mesh: Mesh) -> tuple[bytes, Mesh]:
-        payload = encode_background(mesh if pictured is None else pictured(frame, mesh), step)
+        payload = encode_background(mesh if look.cut is None else look.cut(frame, mesh), step)
         return payload, decode_background(payload)  # the next patch counts faces in the decoded order
 
     ways = coded(parts.background)
-    if pictured is not None and not parts.background.is_empty:
+    if look.cut is not None and not parts.background.is_empty:
         ways = [whole_state(0, mesh) for _, mesh in ways]
     payload, state = min(ways, key=_size)
     found = [] if state.is_empty else [Static(0, payload, False)]
     chain, changes = Chain(0, len(payload)), {change.frame: change for change in parts.changes}
-    again = set(refreshes(count, frame_rate, options)) | (set() if pictured is None else set(changes))
+    again = set(refreshes(count, frame_rate, options)) | (set() if look.cut is None else set(changes))
     for frame in sorted({*changes, *again} - {0}):
         whole = state.is_empty or frame in again
         if change := changes.get(frame):
@@ -178,17 +168,18 @@ def _coded(
         return [plain]
     rough = ~on_planes
 
-    def off_by(decoded: Mesh, reference: Mesh) -> float:
+    def off_by(decoded: Mesh) -> float:
         """Return the sum of squared distances, in units of what is allowed, of the vertices that are not on planes."""
-        return float(((distances(reference.vertices[rough], decoded) / most[rough]) ** 2).sum())
+        return float(((distances(mesh.vertices[rough], decoded) / most[rough]) ** 2).sum())
 
-    limit = off_by(plain[1], mesh)
+    limit = off_by(plain[1])
 
     def is_as_near(decoded: Mesh) -> bool:
-        near = off_by(decoded, laid) <= limit
+        near = off_by(decoded) <= limit
         return near and float(((distances(laid.vertices[on_planes], decoded) / most[on_planes]) ** 2).mean()) <= 1
 
-    return [plain, _smallest(laid, step, is_as_near)]
+    flat_way = _smallest(laid, step, is_as_near)
+    return [plain, flat_way] if len(flat_way[0]) < WORTH * len(plain[0]) else [plain]
 
 
 def _smallest(mesh: Mesh, step: float, is_near: Callable[[Mesh], bool]) -> tuple[bytes, Mesh]:
@@ -226,8 +217,8 @@ def colored_states(
         return encode_static(parts, len(sequence), sequence.frame_rate, background)
     found, mesh, looks, bare = list[Static](), Mesh.empty(), _Looks(sequence, parts), False
     texture = options.texture if options.texture and (options.texture.always or looks.has_pictures) else None
-    pictured = None if texture is None else looks.shown_whole
-    states = encode_static(parts, len(sequence), sequence.frame_rate, background, texture is not None, pictured)
+    look = Look(False) if texture is None else Look(cut=looks.shown_whole)
+    states = encode_static(parts, len(sequence), sequence.frame_rate, background, look)
     ends = [state.frame for state in states[1:]] + [len(sequence)]
     for state, end in zip(states, ends, strict=True):
         mesh = decode_change(state.payload, mesh) if state.is_patch else decode_background(state.payload)
@@ -248,8 +239,7 @@ def colored_states(
         fitted = fitted_colors(mesh, colors[:count].astype(np.float64), seen[:count])
         shown = fitted[len(mesh.vertices) - coded.vertices :]
         try:
-            step = options.color_step if surface is None else BENEATH * options.color_step
-            encoded = encode_group_colors(canvas, [shown], step, None)
+            encoded = encode_group_colors(canvas, [shown], options.color_step, None)
         except CostlyError:  # the summary tells of it
             bare = True
         if bare:
