@@ -102,7 +102,7 @@ def shown_whole(mesh: Mesh, views: ColorViews) -> Mesh:
 
 @dataclass(frozen=True, slots=True)
 class _Shown:
-    """How a picture shows the faces of a mesh."""
+    """The faces of a mesh, as a picture shows them."""
 
     corners: Float64[np.ndarray, "F 3 2"]  # where they are in the picture
     longest: PerFace  # side, as a share of the picture's longer one; NaN where a corner is behind the camera

@@ -75,7 +75,7 @@ class Static:
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """What the colours of a background ask of its faces."""
+    """The demands of the colours of a background on its faces."""
 
     is_flat: bool = True  # flat pieces lie on planes, in large faces: their corners lack the colours of what is between
     cut: Callable[[int, Mesh], Mesh] | None = None  # faces of a whole state from a frame on, for a texture
