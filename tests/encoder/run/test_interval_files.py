@@ -459,7 +459,7 @@ def test_a_stopped_scene_continues_to_the_same_bytes(tmp_path, preset, monkeypat
 
     def stops(*arguments):
         calls.append(1)
-        if len(calls) == 4:
+        if len(calls) >= 4:  # in whatever thread
             raise Stopped
         return real(*arguments)
 
