@@ -466,6 +466,7 @@ def test_a_stopped_scene_continues_to_the_same_bytes(tmp_path, preset, monkeypat
     monkeypatch.setattr(recipe, "encode_interval", stops)
     with pytest.raises(Stopped):
         encoder.encode(tmp_path / "a.reel", options)
+    monkeypatch.undo()
     summary = encoder.encode(tmp_path / "a.reel", options, resume=True)
     assert (tmp_path / "a.reel").read_bytes() == (tmp_path / "whole.reel").read_bytes()
     assert summary.continued == 3 and summary.size == (tmp_path / "a.reel").stat().st_size
