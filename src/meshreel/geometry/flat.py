@@ -77,21 +77,29 @@ def flattened(mesh: Mesh, most: Most) -> tuple[Mesh, Bool[np.ndarray, " V"]]:
 
 def _averaged(mesh: Mesh, normals: Normals, areas: Areas, rings: int) -> Normals:
     """Return the directions of the mean normals around each face."""
-    sums, corners = normals * (areas / max(areas.max(), 1e-300))[:, None], mesh.faces.T.reshape(-1)
+    sums = normals * (areas / max(areas.max(), 1e-300))[:, None]
     for _ in range(rings):
-        at = [np.bincount(corners, np.tile(sums[:, k], 3), len(mesh.vertices)) for k in range(3)]
-        sums = face_means(np.stack(at, axis=1) / 6, mesh.faces)  # usually six faces meet
+        sums = face_means(_at_vertices(mesh, sums) / 6, mesh.faces)  # usually six faces meet
     return sums / np.maximum(np.linalg.norm(sums, axis=1), 1e-300)[:, None]
 
 
 def _means(mesh: Mesh, places: Normals, rings: int) -> Normals:
     """Return the middles of the surface around each face, which are as far from a plane as that is in the mean."""
-    corners, count = mesh.faces.T.reshape(-1), len(mesh.vertices)
-    times = np.maximum(np.bincount(corners, minlength=count), 1)
+    times = _times(mesh)
     for _ in range(rings):
-        at = [np.bincount(corners, np.tile(places[:, k], 3), count) / times for k in range(3)]
-        places = face_means(np.stack(at, axis=1), mesh.faces)
+        places = face_means(_at_vertices(mesh, places) / times, mesh.faces)
     return places
+
+
+def _at_vertices(mesh: Mesh, values: Normals) -> Float64[np.ndarray, "V 3"]:
+    """Return the sums of the values of the faces at each vertex."""
+    corners = mesh.faces.T.reshape(-1)
+    return np.stack([np.bincount(corners, np.tile(of, 3), len(mesh.vertices)) for of in values.T], axis=1)
+
+
+def _times(mesh: Mesh) -> Int64[np.ndarray, "V 1"]:
+    """Return how many faces meet at each vertex, at least 1."""
+    return np.maximum(np.bincount(mesh.faces.reshape(-1), minlength=len(mesh.vertices)), 1)[:, None]
 
 
 def _pieces(
@@ -195,10 +203,8 @@ def _moved(mesh: Mesh, planes: _Planes, most: Most) -> tuple[Float64[np.ndarray,
 
 def _faded(mesh: Mesh, ways: Float64[np.ndarray, "V 3"], laid: Bool[np.ndarray, " V"]) -> Float64[np.ndarray, "V 3"]:
     """Return the ways of vertices, with those around what is laid on planes: a step there would take many faces."""
-    corners, rest = mesh.faces.T.reshape(-1), np.flatnonzero(~laid)
-    times = np.maximum(np.bincount(corners, minlength=len(laid)), 1)[rest, None]
+    rest, times = np.flatnonzero(~laid), _times(mesh)
     for _ in range(FADING):
-        middles = face_means(ways, mesh.faces)
-        sums = np.stack([np.bincount(corners, np.tile(middles[:, k], 3), len(laid)) for k in range(3)], axis=1)
-        ways[rest] = FADE * sums[rest] / times
+        sums = _at_vertices(mesh, face_means(ways, mesh.faces))
+        ways[rest] = FADE * sums[rest] / times[rest]
     return ways

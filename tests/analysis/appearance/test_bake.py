@@ -5,14 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from meshreel.analysis.appearance.bake import (
-    bake,
-    median_colors,
-    picture,
-    texels_of,
-    unwrap,
-    vertex_colors,
-)
+from meshreel.analysis.appearance.bake import bake, median_colors, picture, texels_of, unwrap, vertex_colors
 from meshreel.errors import InputError
 from meshreel.geometry.atlas import Layout
 from meshreel.geometry.color_views import Painted, bilinear
