@@ -7,7 +7,7 @@ import { OBSERVED, PROPERTIES } from "./attributes.ts";
 import { Controls } from "./controls/controls.ts";
 import { PASSED } from "./events.ts";
 import { type Ranges, ranges } from "./ranges.ts";
-import { keepToSection } from "./section.ts";
+import { SectionKeeper } from "./section.ts";
 import type { Engine } from "./stage.ts";
 import type { Statistics } from "./stats.ts";
 import { View } from "./view.ts";
@@ -30,6 +30,7 @@ export class MeshreelPlayer extends Viewed {
   #error: Error | null = null;
   #waiting = false;
   #playable = false;
+  #sectionKeeper = new SectionKeeper();
   #wished = false; // it plays, or would if it could
   #startAt = 0; // s; where to begin once the head is there
   #left: boolean | null = null; // true if it played when it was taken out of the document; null if it was not open
@@ -296,7 +297,7 @@ export class MeshreelPlayer extends Viewed {
     if (event.type === "volumechange" && this.#playback) this.muted = this.#playback.sound.muted;
     if (event.type === "ended") {
       this.#wished = false;
-      queueMicrotask(() => keepToSection(this));
+      queueMicrotask(() => this.#sectionKeeper.keep(this));
     }
     if (event.type === "error") {
       this.#fail(detail instanceof Error ? detail : new Error("unknown"));
@@ -326,7 +327,7 @@ export class MeshreelPlayer extends Viewed {
   #onView(event: Event): void {
     if (event.type === "drawn") {
       if (this.view?.shows) this.#controls.drawn(this.view.canvas, this.view.frame);
-      keepToSection(this);
+      this.#sectionKeeper.keep(this);
     } else {
       if (event.type !== "change") this.dispatchEvent(new Event(event.type));
       this.#controls.onStage(event.type);

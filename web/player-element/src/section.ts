@@ -16,15 +16,23 @@ export interface Sectioned {
   play(): Promise<void>;
 }
 
-/** After each picture, and at the end: goes back to the section's start where its end is passed; in reverse, to its end. */
-export function keepToSection(player: Sectioned): void {
-  const { section } = player;
-  if (section === null || player.seeking || (player.paused && !player.ended)) return;
-  const [from, to] = section;
-  const isReverse = player.direction === "reverse";
-  if ((isReverse ? player.currentTime > from : player.currentTime < to) && !player.ended) return;
-  player.currentTime = isReverse ? to : from;
-  if (player.paused) player.play().catch(() => undefined); // reported by the error event
+/** Goes back to the section's start where its end is passed; in reverse, to its end. */
+export class SectionKeeper {
+  #wasInside = false; // at the picture before, without a seek since
+
+  /** After each picture, and at the end. */
+  keep(player: Sectioned): void {
+    const { section, currentTime: time } = player;
+    const wasInside = this.#wasInside;
+    this.#wasInside = section !== null && !player.seeking && time >= section[0] && time <= section[1];
+    if (section === null || player.seeking || (player.paused && !player.ended)) return;
+    const [from, to] = section;
+    const isReverse = player.direction === "reverse";
+    const hasLeft = wasInside && !this.#wasInside; // also by a step so long that it went past the end of the recording
+    if (!hasLeft && (isReverse ? time > from : time < to) && !player.ended) return;
+    player.currentTime = isReverse ? to : from;
+    if (player.paused) player.play().catch(() => undefined); // reported by the error event
+  }
 }
 
 /** The section with another start or end; null where it would have no length. */

@@ -9,6 +9,7 @@ import { actionOf, KEYS, seekStep, takesKey } from "../src/keyboard.ts";
 import { explain } from "../src/messages.ts";
 import { readParameters, readTime } from "../src/parameters.ts";
 import { ranges } from "../src/ranges.ts";
+import { SectionKeeper } from "../src/section.ts";
 import { GraphicsError } from "../src/stage.ts";
 import { statisticsLines } from "../src/stats.ts";
 import { stoodUp, turnOf } from "@meshreel/player-three/upright";
@@ -30,6 +31,26 @@ describe("standing upright", () => {
   });
   test("an axis that is given counts, whatever the file tells", () => {
     expect((["z", "-y", null] as const).map((given) => turnOf({ up: "-z" }, given))).toEqual([-Math.PI / 2, Math.PI, Math.PI / 2]);
+  });
+});
+
+describe("a section", () => {
+  /** Where a player of 2 s, of which .5 to 1.5 is the section, is after each of these times; a seek where a time is below 0. */
+  const kept = (direction: "normal" | "reverse", times: readonly number[]): number[] => {
+    const keeper = new SectionKeeper();
+    return times.map((time) => {
+      const player = { section: [0.5, 1.5] as const, duration: 2, paused: false, ended: false, seeking: time < 0, direction, currentTime: Math.abs(time), play: () => Promise.resolve() };
+      keeper.keep(player);
+      return player.currentTime;
+    });
+  };
+  test("goes back to its start where its end is passed, however far, and past the end of the recording", () => {
+    expect(kept("normal", [1, 1.4, 1.6, 0.6, 0.1])).toEqual([1, 1.4, 0.5, 0.6, 0.5]);
+    expect(kept("reverse", [1, 0.6, 0.4, 1.4, 1.9])).toEqual([1, 0.6, 1.5, 1.4, 1.5]);
+  });
+  test("is come to from before, also after a seek out of it", () => {
+    expect(kept("normal", [0.1, 0.4, 1, -0.2, 0.2, 0.3])).toEqual([0.1, 0.4, 1, 0.2, 0.2, 0.3]);
+    expect(kept("reverse", [1.9, 1.6, 1, -1.8, 1.8, 1.7])).toEqual([1.9, 1.6, 1, 1.8, 1.8, 1.7]);
   });
 });
 

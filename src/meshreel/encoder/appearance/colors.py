@@ -12,7 +12,7 @@ from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
-from jaxtyping import UInt8
+from jaxtyping import Float64, UInt8
 
 from ... import _core
 from ...analysis.appearance.bake import bake, picture, texels_of, unwrap, vertex_colors
@@ -80,7 +80,7 @@ class _Chain:
         self._pictured = list[int]()  # which of the groups have pictures
         self._options = options
         self._video: _Video | None = None
-        self._still: UInt8[np.ndarray, "V 3"] | None = None  # of the template beneath pictures, in all frames
+        self._still: Float64[np.ndarray, "V 3"] | None = None  # of the template beneath pictures, in all frames
         self._before: tuple[_core.GroupState | None, LayersState | None] = None, None  # that predict the next group
 
     def add(self, group: EncodedGroup, numbers: range, paints: Sequence[Paint | None], pictured: bool) -> None:
@@ -96,7 +96,7 @@ class _Chain:
         is_covered = texture is not None or self._video is not None
         step = COARSER * options.color_step if is_covered else options.color_step
         if is_covered:
-            colors = self._stilled(colors, paints, canvas.meshes[0].vertices)
+            colors = self._stilled(colors, paints, canvas.meshes[0].vertices, step)
         encoded, self._before = None, (None, None)
         with suppress(CostlyError):
             encoded = encode_group_colors(canvas, colors, step, None if known is None else known.colors)
@@ -117,13 +117,21 @@ class _Chain:
         self.groups.append(replace(group, companions=tuple(companions)))
 
     def _stilled(
-        self, colors: Sequence[UInt8[np.ndarray, "_ 3"]], paints: Sequence[Paint | None], count: int
+        self, colors: Sequence[UInt8[np.ndarray, "_ 3"]], paints: Sequence[Paint | None], count: int, step: float
     ) -> list[UInt8[np.ndarray, "_ 3"]]:
-        """Return colours of vertices, of which the template's `count` do not change: pictures lie above them."""
+        """Return colours of vertices, of which the template's `count` change with the light alone: pictures lie above.
+
+        They are the mean of the chain's first group, and follow the mean of all vertices where that moves by a step.
+        """
+        pairs = zip(colors, paints, strict=True)
+        painted = np.mean([color[:count] for color, paint in pairs if paint is not None], axis=0)
         if self._still is None:
-            painted = [color[:count] for color, paint in zip(colors, paints, strict=True) if paint is not None]
-            self._still = np.rint(np.mean(painted, axis=0)).astype(np.uint8)
-        return [np.concatenate([self._still, color[count:]]) for color in colors]
+            self._still = painted
+        light = painted.mean(axis=0) - self._still.mean(axis=0)
+        if np.abs(light).max() > 255 * step:
+            self._still = self._still + light
+        still = np.rint(self._still.clip(0, 255)).astype(np.uint8)
+        return [np.concatenate([still, color[count:]]) for color in colors]
 
     def done(self) -> list[EncodedGroup]:
         """Return the groups with their splats and pictures."""
