@@ -40,9 +40,11 @@ from .color import (
     texel_products,
     texel_psnr,
 )
+from .pcqm import pcqm
 
 KEPT = ("d2_psnr_paper", "normal_error_deg", "ssim", "ssim_masked")  # of each frame
 NO_METRICS = ("frames_compared", "frames_missing", "key_frames", "per_frame", "cameras")  # of a comparison's record
+JUDGED = 3  # frames of which PCQM is taken, at most: a person takes 15 s
 PIXELS = 512  # side of IBSM's pictures; mmetric's 2048 take three times as long (dancer: 52.5 dB instead of 52.2)
 Values = dict[str, float | None]
 PerFrame = dict[str, list[float | None]]
@@ -93,7 +95,7 @@ def _to_input(frames: Measured, metrics: Metrics) -> tuple[Values, PerFrame]:
 
 
 def _colors(frames: Measured) -> dict[str, float]:
-    """Return PSNRs beside the pictures of cameras, where there are any, and of a file's successive textures."""
+    """Return PCQM, PSNRs beside the pictures of cameras, where there are any, and of a file's successive textures."""
     video = open_video(frames.data) if frames.data.startswith(MAGIC) else None
     pictures, originals = frames.known.pictures, frames.known.sequence
     found = picture_psnrs(
@@ -102,6 +104,9 @@ def _colors(frames: Measured) -> dict[str, float]:
         for picture in (pictures[k] if pictures else ())
         if picture is not None
     )
+    spread = np.unique(np.linspace(0, len(frames.numbers) - 1, JUDGED).astype(int))
+    scores = [pcqm(originals[frames.numbers[k]], frames.decoded[k]) for k in spread]
+    found["pcqm"] = float(np.mean(scores))
     truth = frames.known.truth
     if truth is not None:
         found |= texel_psnr(texel_products(truth, *pair) for pair in zip(frames.numbers, frames.decoded, strict=True))
