@@ -130,6 +130,21 @@ COLUMNS: dict[str, Columns] = {
         "> normals, degrees": "{normal_error_deg:.1f}",
         "> CPU s": "{cpu_s:.0f}",
     },
+    "still_normals": {
+        "frames": "{case}",
+        "normals": "{way}",
+        "> bytes": optional("bytes", "d"),
+        "> normals, degrees": "{normal_error_deg:.2f}",
+        "> rate at equal normals": optional("equal", "+.0%"),
+    },
+    "detail": {
+        "frames": "{case}",
+        "way": "{way}",
+        "> bytes": "{bytes}",
+        "> d2 (paper), dB": "{d2_psnr_paper:.2f}",
+        "> symmetric, dB": "{symmetric_psnr:.2f}",
+        "> normals, degrees": "{normal_error_deg:.2f}",
+    },
 }
 
 

@@ -133,7 +133,9 @@ def _features(own: Cloud, bend: Numbers, other: _Compared, some: slice) -> Float
     there = np.isfinite(distances)
     which = np.where(there, which, 0)
     moved = np.linalg.norm(other.feet[which] - other.feet[some, None], axis=2)
-    sides = [np.exp(-((each / own.radius) ** 2) / 2, where=there, out=np.zeros_like(each)) for each in (distances, moved)]
+    sides = [
+        np.exp(-((each / own.radius) ** 2) / 2, where=there, out=np.zeros_like(each)) for each in (distances, moved)
+    ]
     sides = [each / each.sum(axis=1, keepdims=True) for each in sides]
     evenly = there / there.sum(axis=1, keepdims=True)
     bends = _Statistics.of(bend[which], other.bend[which], *sides)
