@@ -249,9 +249,14 @@ def test_absurd_sizes_are_refused_before_memory_is_taken(tmp_path: Path) -> None
         read(tmp_path, "m.ply", huge)
 
 
-def test_a_point_cloud_is_an_empty_frame(tmp_path: Path) -> None:
+def test_a_point_cloud_is_refused_with_what_makes_surface_of_it(tmp_path: Path) -> None:
     head, body = PLY_TEXT.replace("element face 3", "element face 0").split("3 0 1 2 7")[0].split("end_header\n")
-    loaded = read(tmp_path, "m.ply", f"{head}end_header\n{body}")
+    with pytest.raises(InputError, match=r"m\.ply: 5 vertices and no faces: a point cloud is no surface; make one"):
+        read(tmp_path, "m.ply", f"{head}end_header\n{body}")
+
+
+def test_a_few_points_without_faces_mark_an_empty_frame(tmp_path: Path) -> None:
+    loaded = read(tmp_path, "m.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\n")
     assert loaded.mesh.is_empty
     assert "vertices without faces" in loaded.dropped
 

@@ -40,6 +40,7 @@ _BEGINNINGS = {  # of files of other kinds, in small letters
     b"off": "an OFF file",
     b"solid": "an STL file",
 }
+CLOUD = 4  # vertices without a face that are data, not a mark of an empty frame: fewer make no surface
 FARTHEST = 1e12  # m, largest coordinate: beyond it the spacing of float64 exceeds 0.1 mm (guess)
 
 
@@ -52,7 +53,10 @@ class Loaded:
 
 
 def read_mesh(path: Place, where: str | None = None) -> Loaded:
-    """Read a mesh in the file's order, cut into triangles; without faces it is empty. `where` begins errors."""
+    """Read a mesh in the file's order, cut into triangles; without faces it is empty. `where` begins errors.
+
+    Raises InputError for what cannot be read, and for points without faces.
+    """
     where, kind = where or str(path), path.suffix.lower()
     parse = _PARSERS.get(kind)
     if parse is None:
@@ -136,6 +140,9 @@ def checked(polygons: Polygons) -> Loaded:
         face = int(np.searchsorted(np.cumsum(sizes), wrong[0], side="right"))
         raise Unreadable(f"face {face} refers to vertex {corners[wrong[0]]}, but there are {len(vertices)} (from 0)")
     if len(sizes) == 0:
+        if len(vertices) >= CLOUD:
+            text = f"{len(vertices)} vertices and no faces: a point cloud is no surface"
+            raise Unreadable(f"{text}; make one, as by Poisson reconstruction in Open3D or MeshLab")
         loose = frozenset({"vertices without faces"} if len(vertices) else ())
         return Loaded(Mesh.empty(), polygons.dropped | loose)
     triangles = triangulate(polygons)
