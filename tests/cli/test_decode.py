@@ -66,6 +66,18 @@ def test_a_damaged_group_costs_only_its_frames_and_the_exit_code(run, tmp_path):
     assert len(list((tmp_path / "out").iterdir())) == 6
 
 
+def test_a_file_of_which_nothing_decodes_leaves_no_folder_but_one_that_was_there(run, tmp_path):
+    data = bytearray(FILE.read_bytes())
+    for group in meshreel.open(FILE).reader.groups:
+        data[group.offset + 60 if group.size > 60 else group.offset] ^= 4
+    (tmp_path / "a.reel").write_bytes(data)
+    (tmp_path / "old").mkdir()
+    for name in ("new", "old"):
+        said = run("decode", tmp_path / "a.reel", "-o", tmp_path / name, "--quiet")
+        assert failed(said, "all frames are lost")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.reel", "old"]
+
+
 @pytest.mark.parametrize("only", ["all", "background", "moving"])
 def test_decode_writes_a_whole_scene_or_only_its_background_or_its_bodies(run, tmp_path, only):
     arguments = [] if only == "all" else ["--only", only]

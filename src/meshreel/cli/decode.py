@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
@@ -179,6 +180,7 @@ def _not_kept(reader: ReelReader, format: str) -> str:
 
 def _write(file: Path, output: Path, names: list[str], how: How, common: Common) -> None:
     """Decode and write frames by the functions `how`. Raises FormatError at the end if some are damaged."""
+    is_new = not output.exists()
     make_folder(output)
     common.warn(left_over(output, names, f"frame_*{Path(names[0]).suffix}"))
     with common.stages() as progress:
@@ -186,7 +188,11 @@ def _write(file: Path, output: Path, names: list[str], how: How, common: Common)
         failed = write_frames(decode, paths, lambda done: progress("decode", done, len(names)), write)
     if failed:
         lost = f"{len(failed)} of {len(names)} frames are lost, the others are written"
-        lost = lost if len(failed) < len(names) else "all frames are lost"
+        if len(failed) == len(names):
+            lost = "all frames are lost"
+            if is_new:
+                with suppress(OSError):  # another program has put something there
+                    output.rmdir()
         raise FormatError(f"{file}: {failed[0]}; {lost}; copy the file again, or encode it again")
 
 
