@@ -27,6 +27,12 @@ def test_parallel_planes_are_their_distance_apart():
     assert found["mpeg_d2_psnr"] == pytest.approx(expected, abs=1e-3)
 
 
+def test_frames_of_a_larger_sequence_are_measured_by_its_edge():
+    found = mpeg_errors(plane(), plane(height=0.01), Box.of([plane()]), replace(FEW, edge=2.5))
+    expected = 10 * math.log10(3 * (2.5 / 0.01) ** 2)
+    assert (found["mpeg_d1_psnr"], found["mpeg_d2_psnr"]) == pytest.approx((expected, expected), abs=1e-3)
+
+
 def test_motion_in_a_plane_costs_points_but_not_planes():
     found = measured(plane(), moved(plane(), (0.003, 0, 0)))  # less than half a cell of the grid
     assert found["mpeg_d2_psnr"] == CEILING
@@ -85,8 +91,7 @@ def test_luma_of_two_greys_is_their_difference():
 
 
 def test_points_lie_on_lines_along_the_axis_of_the_normal():
-    box = Box(np.zeros(3), np.ones(3))
-    cloud = Cloud.of(moved(plane(cells=3), (0, 0, 0.3)), box, 65)
+    cloud = Cloud.of(moved(plane(cells=3), (0, 0, 0.3)), np.zeros(3), 1 / 64)
     assert len(cloud.points) == 65**2
     assert np.abs(cloud.points[:, :2] * 64 - np.rint(cloud.points[:, :2] * 64)).max() < 1e-3
     np.testing.assert_allclose(cloud.normals, [[0, 0, 1]] * len(cloud.normals))

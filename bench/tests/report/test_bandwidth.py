@@ -41,7 +41,7 @@ def test_points_of_v_dmc_are_rows_whose_rate_is_the_published_one():
     rows = [row for row in anchor_rows() if row.point.sequence == "dancer"]
     assert {each.name for each in rows} == {VDMC, VDMC_HERE} and len(rows) == 6
     assert rows[0].mbps == pytest.approx(1.15, rel=1e-5) and rows[0].metrics == {"mpeg_d1_psnr": 70.21}
-    assert {each.point.sequence for each in anchor_rows()} == {"dancer", "basketball_player", "mitch"}
+    assert {each.point.sequence for each in anchor_rows()} == {"dancer", "basketball_player", "mitch", "thomas"}
 
 
 def test_best_stands_beside_each_point_of_v_dmc_at_equal_quality():

@@ -42,6 +42,7 @@ class MpegOptions:
 
     pixels: int = 2048  # side of the pictures of IBSM
     grid: int = 1024  # lines along the longest edge of the box (`gridSize` of V-DMC's conditions)
+    edge: float | None = None  # m, this edge, where the frames are a part of a sequence; None: that of their own box
 
     def __post_init__(self) -> None:
         if self.pixels < 8 or self.grid < 8:
@@ -52,16 +53,18 @@ def mpeg_errors(original: Mesh, decoded: Mesh, box: Box, options: MpegOptions = 
     """Return the PSNRs of a decoded frame, dB, by name; `box` is that of all original frames.
 
     D1 (point to point) and D2 (point to plane) are the worse of both directions, whose peak is three squares of the
-    box's longest edge; IBSM is of depth and, for meshes with colours, of luma. Where one mesh alone is empty: 0 dB.
+    box's longest edge, or of the edge in the options. IBSM is of depth and, for meshes with colours, of luma. Where one
+    mesh alone is empty: 0 dB.
     """
     names = MEASURES if original.is_colored and decoded.is_colored else MEASURES[:3]
     pair = original, decoded
     if any(used_surface(mesh).is_empty for mesh in pair):
         worst = CEILING if all(used_surface(mesh).is_empty for mesh in pair) else 0.0
         return dict.fromkeys(names, worst)
-    clouds = [Cloud.of(mesh, box, options.grid) for mesh in pair]
+    edge = float(box.size.max()) if options.edge is None else options.edge
+    clouds = [Cloud.of(mesh, box.low, edge / (options.grid - 1) or 1.0) for mesh in pair]
     ways = np.maximum(clouds[0].squares(clouds[1]), clouds[1].squares(clouds[0]))
-    d1, d2 = (_psnr(square / 3, float(box.size.max())) for square in ways.tolist())
+    d1, d2 = (_psnr(square / 3, edge) for square in ways.tolist())
     depth, luma = _picture_squares(original, decoded, options.pixels)
     return dict(zip(names, (d1, d2, _psnr(depth, DEPTH_PEAK), _psnr(luma, PEAK)), strict=False))
 
@@ -74,12 +77,14 @@ class Cloud:
     normals: Points
 
     @classmethod
-    def of(cls, mesh: Mesh, box: Box, grid: int) -> Cloud:
-        """Sample a mesh where the lines of the box's grid, along the axis nearest to a face's normal, meet the face."""
-        step = float(box.size.max()) / (grid - 1) or 1.0
+    def of(cls, mesh: Mesh, low: Way, step: float) -> Cloud:
+        """Sample a mesh where the lines of a grid, along the axis nearest to a face's normal, meet the face.
+
+        `low` is a corner of the grid, `step` its spacing, m.
+        """
         normals, areas = face_normals(mesh)
         axes = np.where(areas > 0, np.abs(normals).argmax(axis=1), -1)
-        crossings = [_crossed(mesh, np.flatnonzero(axes == axis), axis, (box.low, step)) for axis in range(3)]
+        crossings = [_crossed(mesh, np.flatnonzero(axes == axis), axis, (low, step)) for axis in range(3)]
         points, faces = (np.concatenate(parts) for parts in zip(*crossings, strict=True))
         if not len(points):  # a mesh smaller than the grid's spacing: its vertices
             points, faces = mesh.vertices[mesh.faces.reshape(-1)], np.repeat(np.arange(len(mesh.faces)), 3)

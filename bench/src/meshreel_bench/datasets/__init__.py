@@ -50,6 +50,8 @@ RECORDINGS = ("living_room",)
 WALKER = "procedural_walker"  # needs no benchmark data
 PERFORMERS, RECORDED = "performers", "captures"  # folders of the benchmark data
 SCALES = {"basketball_player": 0.1, "textured/basketball_player": 0.1}  # to metres; the others are in metres
+# m, longest edges of the boxes of MPEG's whole sequences, which its D1 and D2 are relative to (V-DMC's conditions).
+MPEG_EDGES = {"dancer": 2.06224, "basketball_player": 1.97783, "mitch": 1.82389, "thomas": 1.82497}
 REMESHED = {  # new connectivity in every frame: of a body, its first frames
     "crane60": ("crane", 60, RemeshOptions()),
     "samba60": ("samba", 60, RemeshOptions()),
@@ -77,6 +79,7 @@ class Dataset:
     scene: SceneData | None = None  # of a simulated scene
     pictures: ColorFrames | None = None  # of colour cameras: what decoded colours are compared with
     truth: TrueLuma | None = None  # what simulated colour cameras without errors would see
+    edge: float | None = None  # m, of `MPEG_EDGES`
     painted: Callable[[int], SceneFrame] | None = None  # clean frames with their colours, of a room that is simulated
 
 
@@ -124,7 +127,7 @@ class Store:
             return Dataset(remeshed(source, None if self.cache is None else self.cache / name, options))
         folder = _found(name, self.data)
         seen_from = read_view_file(folder) if folder.is_dir() and any(folder.glob(VIEW_FILES)) else ()
-        return Dataset(_open_files(name, self.data, frames, self.own), seen_from)
+        return Dataset(_open_files(name, self.data, frames, self.own), seen_from, edge=MPEG_EDGES.get(name))
 
     def digest(self, name: str) -> str | None:
         """Return a digest of a user's sequence and its options of reading; None for benchmark data."""

@@ -81,7 +81,7 @@ def _to_input(frames: Measured, metrics: Metrics) -> tuple[Values, PerFrame]:
     cameras: Sequence[Viewer] | None = known.cameras or None
     if cameras is None and metrics in ("parallel views", "colors"):
         cameras = parallel_views_around(Box.of(originals))
-    mpeg = MpegOptions(PIXELS) if metrics == "mpeg" else None
+    mpeg = MpegOptions(PIXELS, edge=known.edge) if metrics == "mpeg" else None
     options = ComparisonOptions(cameras, ssim=metrics not in ("distances", "depth", "mpeg"), mpeg=mpeg)
     row: dict[str, Any] = compare_sequences(prepared or originals, frames.decoded, options).to_row()
     if row.pop("frames_empty") == row["frames_compared"]:
