@@ -255,6 +255,12 @@ def test_a_point_cloud_is_refused_with_what_makes_surface_of_it(tmp_path: Path) 
         read(tmp_path, "m.ply", f"{head}end_header\n{body}")
 
 
+def test_a_glb_file_of_points_is_refused_too(tmp_path: Path) -> None:
+    data = trimesh.PointCloud(np.random.default_rng(1).normal(size=(50, 3))).export(file_type="glb")
+    with pytest.raises(InputError, match=r"m\.glb: points and no faces: a point cloud is no surface"):
+        read(tmp_path, "m.glb", data)
+
+
 def test_a_few_points_without_faces_mark_an_empty_frame(tmp_path: Path) -> None:
     loaded = read(tmp_path, "m.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\n")
     assert loaded.mesh.is_empty

@@ -41,6 +41,7 @@ _BEGINNINGS = {  # of files of other kinds, in small letters
     b"solid": "an STL file",
 }
 CLOUD = 4  # vertices without a face that are data, not a mark of an empty frame: fewer make no surface
+UNFACED = frozenset({"points", "lines"})  # kinds of dropped data
 FARTHEST = 1e12  # m, largest coordinate: beyond it the spacing of float64 exceeds 0.1 mm (guess)
 
 
@@ -140,8 +141,9 @@ def checked(polygons: Polygons) -> Loaded:
         face = int(np.searchsorted(np.cumsum(sizes), wrong[0], side="right"))
         raise Unreadable(f"face {face} refers to vertex {corners[wrong[0]]}, but there are {len(vertices)} (from 0)")
     if len(sizes) == 0:
-        if len(vertices) >= CLOUD:
-            text = f"{len(vertices)} vertices and no faces: a point cloud is no surface"
+        if len(vertices) >= CLOUD or polygons.dropped & UNFACED:
+            what = f"{len(vertices)} vertices" if len(vertices) else " and ".join(sorted(polygons.dropped & UNFACED))
+            text = f"{what} and no faces: a point cloud is no surface"
             raise Unreadable(f"{text}; make one, as by Poisson reconstruction in Open3D or MeshLab")
         loose = frozenset({"vertices without faces"} if len(vertices) else ())
         return Loaded(Mesh.empty(), polygons.dropped | loose)
