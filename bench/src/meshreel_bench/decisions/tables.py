@@ -137,6 +137,13 @@ COLUMNS: dict[str, Columns] = {
         "> normals, degrees": "{normal_error_deg:.2f}",
         "> rate at equal normals": optional("equal", "+.0%"),
     },
+    "pcqm": {
+        "three frames of a person": "{way}",
+        "> Mbps": "{mbps:.2f}",
+        "> YUV 6:1:1, dB": "{yuv_psnr:.1f}",
+        "> SSIM in colour": "{view_ssim:.3f}",
+        "> PCQM x 1000": thousandths("pcqm"),
+    },
     "detail": {
         "frames": "{case}",
         "way": "{way}",
