@@ -115,7 +115,7 @@ class Cloud:
 
 @dataclass(frozen=True, slots=True)
 class _Compared:
-    """What the other surface has at each point of a cloud: where it is, its lightness and its curvature."""
+    """Feet of a cloud's points on the other surface, with its lightness and its curvature there."""
 
     feet: Points
     light: Numbers
