@@ -99,8 +99,8 @@ def test_the_readme_says_the_headline_of_the_results() -> None:
         "TVMC*": times["TVMC*"]["median"],
     }
     d1, pictures = found["vdmc_times"]["mpeg_d1_psnr"], found["vdmc_times"]["ssim_masked"]
-    assert f"needs {d1[0]:.1f} to {d1[-1]:.1f} times the bytes at equal D1, by its published sheet" in text
-    assert f"needs {pictures[0]:.1f} to {pictures[-1]:.1f} times the bytes at equal masked SSIM" in text
+    assert f"needs {d1[0]:.2g} to {d1[-1]:.2g} times the bytes at equal D1, by its published sheet" in text
+    assert f"needs {pictures[0]:.2g} to {pictures[-1]:.2g} times the bytes at equal masked SSIM" in text
 
 
 def _run_page(page: Path, folder: Path, *arguments: str) -> str:

@@ -17,7 +17,7 @@ from .io.glb import parse_glb, tinted
 from .io.glb_file import from_linear
 from .io.looks import Look, with_looks
 from .io.meshes import checked
-from .io.polygons import Polygons
+from .io.polygons import CLOUD, Polygons, Surfaceless
 from .shapes import Float32, Int64, UInt8
 from .types import Mesh, MeshList, MeshSequence, Texture
 
@@ -43,8 +43,12 @@ def as_sequence(value: object, frame_rate: float | None = None) -> MeshSequence:
 
 def _as_mesh(item: Any, where: str) -> Mesh:
     if isinstance(item, Mesh):
+        _check_faces(len(item.vertices), len(item.faces), where)
         return item
     if hasattr(item, "to_mesh"):  # a scene of trimesh: all its meshes, in their places
+        parts = item.geometry.values()
+        counts = (sum(len(getattr(one, name, ())) for one in parts) for name in ("vertices", "faces"))
+        _check_faces(*counts, where)
         if len({one.visual.kind for one in item.geometry.values() if hasattr(one, "visual")}) > 1:  # it would mix them
             return checked(parse_glb(item.export(file_type="glb"))).mesh
         item = item.to_mesh()
@@ -61,6 +65,7 @@ def _as_mesh(item: Any, where: str) -> Mesh:
     if corners.size and not 0 <= corners.min() <= corners.max() < len(vertices):
         wrong = corners.min() if corners.min() < 0 else corners.max()
         raise InputError(f"{where}: a face refers to vertex {wrong}, but there are {len(vertices)} (from 0)")
+    _check_faces(len(vertices), len(corners), where)
     mesh = Mesh.of(vertices, corners)
     uv, looks, which = _looks_of(item, mesh)
     visual, faces = getattr(item, "visual", None), None
@@ -72,6 +77,12 @@ def _as_mesh(item: Any, where: str) -> Mesh:
     known = with_looks(triangles, looks, which)
     uv = None if known.uv is None else known.uv.reshape(-1, 3, 2)
     return replace(mesh, colors=known.colors, uv=uv, texture=known.texture)
+
+
+def _check_faces(vertices: int, faces: int, where: str) -> None:
+    """Raise InputError for vertices alone, but for the few that mark an empty frame."""
+    if not faces and vertices >= CLOUD:
+        raise InputError(f"{where}: {Surfaceless(vertices)}")
 
 
 def _colors_of(item: Any, mesh: Mesh, where: str) -> Colors | None:

@@ -251,18 +251,25 @@ def test_absurd_sizes_are_refused_before_memory_is_taken(tmp_path: Path) -> None
 
 def test_a_point_cloud_is_refused_with_what_makes_surface_of_it(tmp_path: Path) -> None:
     head, body = PLY_TEXT.replace("element face 3", "element face 0").split("3 0 1 2 7")[0].split("end_header\n")
-    with pytest.raises(InputError, match=r"m\.ply: 5 vertices and no faces: a point cloud is no surface; make one"):
+    with pytest.raises(InputError, match=r"m\.ply: 5 vertices and no faces: only surface is coded; reconstruct it"):
         read(tmp_path, "m.ply", f"{head}end_header\n{body}")
 
 
 def test_a_glb_file_of_points_is_refused_too(tmp_path: Path) -> None:
     data = trimesh.PointCloud(np.random.default_rng(1).normal(size=(50, 3))).export(file_type="glb")
-    with pytest.raises(InputError, match=r"m\.glb: points and no faces: a point cloud is no surface"):
+    with pytest.raises(InputError, match=r"m\.glb: 50 vertices and no faces: only surface is coded"):
         read(tmp_path, "m.glb", data)
 
 
+def test_points_beside_a_mesh_that_is_hidden_in_a_frame_do_not_make_it_a_cloud(tmp_path: Path) -> None:
+    scene = trimesh.Scene([trimesh.PointCloud(np.eye(50, 3))])
+    scene.add_geometry(trimesh.creation.box(), transform=np.diag([0.0, 0, 0, 1]))
+    loaded = read(tmp_path, "m.glb", scene.export(file_type="glb"))
+    assert loaded.mesh.is_empty and "points" in loaded.dropped
+
+
 def test_a_few_points_without_faces_mark_an_empty_frame(tmp_path: Path) -> None:
-    loaded = read(tmp_path, "m.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\n")
+    loaded = read(tmp_path, "m.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\np 1 2 3\n")
     assert loaded.mesh.is_empty
     assert "vertices without faces" in loaded.dropped
 

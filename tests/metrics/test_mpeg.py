@@ -103,6 +103,9 @@ def test_cameras_go_from_top_to_bottom_around_the_sphere():
     assert found[0, 1] == 1 and found[-1, 1] == -1 and len(found) == 16
 
 
-def test_pictures_without_pixels_are_refused():
+def test_pictures_without_pixels_and_boxes_without_edges_are_refused():
     with pytest.raises(InputError, match="give at least 8"):
         MpegOptions(pixels=4)
+    for edge in (0.0, -1.0, math.nan):
+        with pytest.raises(InputError, match="give a length above 0"):
+            MpegOptions(edge=edge)

@@ -61,6 +61,15 @@ def test_colours_that_are_turned_round_have_another_structure_though_their_light
     assert 2 * WEIGHTS[2] * 0.8 < score < 2 * WEIGHTS[2] * 1.1
 
 
+def test_faces_in_another_order_are_nearly_the_same_surface():
+    """Points then lie elsewhere; colours are those of the nearest ones, which a smooth surface nearly shares."""
+    smooth = replace(BALL, colors=(128 + 60 * np.sin(2 * BALL.vertices)).astype(np.uint8))
+    order = np.random.default_rng(5).permutation(len(BALL.faces))
+    other = Mesh(smooth.vertices, smooth.faces[order], smooth.colors)
+    shifted = replace(smooth, colors=smooth.colors + np.uint8(10))
+    assert 0 < pcqm(smooth, other) < 0.2 * pcqm(smooth, shifted)
+
+
 def test_rough_surface_is_worse_the_rougher_it_is():
     lengths = np.random.default_rng(3).normal(size=len(BALL.vertices))
     scores = [pcqm(BALL, moved(BALL, by * lengths)) for by in (0.002, 0.01)]

@@ -18,7 +18,7 @@ from ..types import Texture
 from .glb_file import PASSED_OVER, from_linear, to_linear
 from .gltf import DRACO, MESHOPTS, QUANTIZED, Entry, Gltf
 from .looks import Look, light_in_picture, with_looks
-from .polygons import Polygons, Unreadable, shares_of
+from .polygons import CLOUD, Polygons, Surfaceless, Unreadable, shares_of
 
 Matrix = Float64[np.ndarray, "4 4"]
 T = TypeVar("T")
@@ -78,8 +78,8 @@ class Scene:
         self.duration = _guarded(self._begin)
 
     def at(self, time: float) -> Polygons:
-        """Return the surface at a time, s."""
-        return _guarded(lambda: self._joined(list(self._parts(time))))
+        """Return the surface at a time, s. Raises Surfaceless if the file has points, and triangles nowhere."""
+        return _guarded(lambda: self._joined(list(self._parts(time)) or self._no_parts()))
 
     def count(self, frame_rate: float) -> int:
         """Return the number of frames at a rate, 1/s; the last time of an animation of ours is the end of a frame."""
@@ -346,6 +346,17 @@ class Scene:
             c, s = np.cos(turn), np.sin(turn)
             uv = (uv * size) @ np.array([[c, -s], [s, c]]) + moved.numbers("offset", (0.0, 0.0))
         return np.stack([uv[:, 0], 1 - uv[:, 1]], axis=1).astype(np.float32)
+
+    def _no_parts(self) -> list[_Part]:
+        """Return an empty list, where the file is no point cloud."""
+        every = [one for mesh in self._file.tree.get("meshes", []) for one in mesh.get("primitives", [])]
+        modes = [one.whole("mode", 4) for one in every]
+        points = [one for one, mode in zip(every, modes, strict=True) if _OTHER_MODES.get(mode) == "points"]
+        places = [one.get("attributes", Entry({}, "")).get("POSITION") for one in points]
+        count = sum(self._file.item("accessors", at).whole("count") for at in places if at is not None)
+        if count >= CLOUD and _OTHER_MODES.keys() >= set(modes):
+            raise Surfaceless(count)
+        return []
 
     def _joined(self, parts: list[_Part]) -> Polygons:
         """Return all parts as one surface."""

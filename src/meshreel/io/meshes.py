@@ -18,7 +18,7 @@ from .glb import Scene, parse_glb
 from .materials import with_materials
 from .obj import parse_obj
 from .ply import parse_ply
-from .polygons import Dropped, Polygons, Unreadable, triangulate
+from .polygons import CLOUD, Dropped, Polygons, Surfaceless, Unreadable, triangulate
 from .stl_off import parse_off, parse_stl
 
 _PARSERS = {".obj": parse_obj, ".ply": parse_ply, ".glb": parse_glb, ".stl": parse_stl, ".off": parse_off}
@@ -40,8 +40,6 @@ _BEGINNINGS = {  # of files of other kinds, in small letters
     b"off": "an OFF file",
     b"solid": "an STL file",
 }
-CLOUD = 4  # vertices without a face that are data, not a mark of an empty frame: fewer make no surface
-UNFACED = frozenset({"points", "lines"})  # kinds of dropped data
 FARTHEST = 1e12  # m, largest coordinate: beyond it the spacing of float64 exceeds 0.1 mm (guess)
 
 
@@ -87,6 +85,8 @@ def _reading(path: Place, where: str) -> Iterator[None]:
     """Turn Unreadable into an InputError with a remedy."""
     try:
         yield
+    except Surfaceless as error:
+        raise InputError(f"{where}: {error}") from None
     except Unreadable as error:
         kind, begins = path.suffix[1:].upper(), _read(path, where)[:256].removeprefix(_MARK).lstrip().lower()
         for beginning, name in _BEGINNINGS.items():
@@ -141,10 +141,8 @@ def checked(polygons: Polygons) -> Loaded:
         face = int(np.searchsorted(np.cumsum(sizes), wrong[0], side="right"))
         raise Unreadable(f"face {face} refers to vertex {corners[wrong[0]]}, but there are {len(vertices)} (from 0)")
     if len(sizes) == 0:
-        if len(vertices) >= CLOUD or polygons.dropped & UNFACED:
-            what = f"{len(vertices)} vertices" if len(vertices) else " and ".join(sorted(polygons.dropped & UNFACED))
-            text = f"{what} and no faces: a point cloud is no surface"
-            raise Unreadable(f"{text}; make one, as by Poisson reconstruction in Open3D or MeshLab")
+        if len(vertices) >= CLOUD:
+            raise Surfaceless(len(vertices))
         loose = frozenset({"vertices without faces"} if len(vertices) else ())
         return Loaded(Mesh.empty(), polygons.dropped | loose)
     triangles = triangulate(polygons)

@@ -23,7 +23,7 @@ from ..errors import InputError
 from ..types import Texture
 from .meshes import Loaded, checked
 from .pictures import MOST_PIXELS
-from .polygons import Polygons, Unreadable, eight_bits
+from .polygons import Polygons, Surfaceless, Unreadable, eight_bits
 
 _ARRAYS = {"vertices", "faces", "colors", "uv", "texture"}
 _DAMAGED = (  # errors of NumPy and zipfile for damaged files; RuntimeError for encrypted ones
@@ -37,6 +37,8 @@ def _reading(where: str) -> Iterator[None]:
     """Turn errors of a damaged file into an InputError."""
     try:
         yield
+    except Surfaceless as error:
+        raise InputError(f"{where}: {error}") from None
     except Unreadable as error:
         raise InputError(f"{where}: {error}; mend the .npz, or leave the frame out with --frames") from None
     except _DAMAGED as error:

@@ -15,12 +15,21 @@ Points = Float64[np.ndarray, "V 3"]
 Corners = Int64[np.ndarray, "P N"]
 Dropped = frozenset[str]  # names of data in a file other than geometry
 
+CLOUD = 4  # vertices without a face that are data, not the mark of an empty frame: fewer make no surface
 _MOST_CORNERS = 4096  # of a concave polygon, whose cutting takes quadratic time: seconds for so many (guess)
 _SEARCHES = 64  # of all corners of a polygon for an ear, in which few are found (guess)
 
 
 class Unreadable(ValueError):
     """The content of a file breaks the rules of its format; the caller adds file, frame and remedy to the message."""
+
+
+class Surfaceless(Unreadable):
+    """A file that has so many vertices and no faces; the message has a remedy."""
+
+    def __init__(self, vertices: int) -> None:
+        remedy = "reconstruct it, as Open3D and MeshLab do from points"
+        super().__init__(f"{vertices} vertices and no faces: only surface is coded; {remedy}")
 
 
 @dataclass(frozen=True, slots=True)

@@ -236,7 +236,7 @@ def _warnings(seen: _Seen, remarks: tuple[str, ...], frames: Files | Archive | A
     yield from remarks
     loose = "vertices without faces"
     if loose in seen.dropped:
-        yield f"frame {seen.dropped[loose]} has vertices but no faces: it counts as empty (a point cloud is no surface)"
+        yield f"frame {seen.dropped[loose]} has vertices but no faces: it counts as empty"
     extras = {what: first for what, first in seen.dropped.items() if what != loose}
     if extras:
         first = min(extras.values())

@@ -42,11 +42,13 @@ class MpegOptions:
 
     pixels: int = 2048  # side of the pictures of IBSM
     grid: int = 1024  # lines along the longest edge of the box (`gridSize` of V-DMC's conditions)
-    edge: float | None = None  # m, this edge, where the frames are a part of a sequence; None: that of their own box
+    edge: float | None = None  # m, longest edge of the box of all of which these frames are a part; None: of their own
 
     def __post_init__(self) -> None:
         if self.pixels < 8 or self.grid < 8:
             raise InputError(f"pictures of {self.pixels} pixels, a grid of {self.grid} lines: give at least 8 of each")
+        if self.edge is not None and not 0 < self.edge < math.inf:
+            raise InputError(f"an edge of {self.edge:g} m: give a length above 0")
 
 
 def mpeg_errors(original: Mesh, decoded: Mesh, box: Box, options: MpegOptions = MpegOptions()) -> dict[str, float]:

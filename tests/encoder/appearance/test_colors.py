@@ -25,7 +25,7 @@ from meshreel.io.sequence import open_sequence
 from meshreel.io.write import write_mesh
 from meshreel.metrics.color import color_errors
 from meshreel.types import Mesh, MeshList, Texture
-from tests.colored_body import BODY, COLORED, FRAMES, painted, textured, written
+from tests.colored_body import BODY, CHECKS, COLORED, FRAMES, painted, textured, written
 from tests.small_bodies import body
 from tests.small_options import quick
 from tests.small_scene import scene
@@ -147,6 +147,22 @@ def test_beneath_pictures_colors_of_vertices_do_not_change_and_take_little(files
     reader = video.reader
     first, second = (len(reader.read_chunk(c.number)) for c in reader.chunks if c.kind == ChunkKind.COLORS)
     assert second < first / 20  # nothing but that nothing changes
+
+
+def test_beneath_pictures_colors_of_vertices_follow_the_light() -> None:
+    """Half of the light goes out between the two groups of a chain, a tenth within each."""
+    lights = [1.0, 0.95, 0.9, 0.5, 0.47, 0.45]
+    meshes = [textured(mesh) for mesh in BODY]
+    lit = [
+        replace(mesh, texture=Texture.of((light * (55 + CHECKS * 0.8)).astype(np.uint8)))
+        for mesh, light in zip(meshes, lights, strict=True)
+    ]
+    video = meshreel.open(written(lit, group_size=3))
+    assert [group.depends_on != () for group in video.reader.groups] == [False, True]  # one chain
+    count = min(len(mesh.vertices) for mesh in video)
+    means = [float(mesh.colors[:count].mean()) for mesh in video]
+    assert np.ptp(means[:3]) == np.ptp(means[3:]) == 0
+    assert means[3] / means[0] == pytest.approx(np.mean(lights[3:]) / np.mean(lights[:3]), abs=0.1)
 
 
 def without(data: bytes, kind: ChunkKind) -> bytes:

@@ -294,6 +294,7 @@ export class MeshreelPlayer extends Viewed {
     if (event.type === "canplay") this.#playable = true;
     if (["canplay", "playing", "seeked"].includes(event.type) || (event.type === "pause" && this.#playable)) this.#waiting = false;
     if (event.type === "waiting") this.#waiting = true;
+    if (event.type === "seeking" || event.type === "emptied") this.#sectionKeeper.forget();
     if (event.type === "volumechange" && this.#playback) this.muted = this.#playback.sound.muted;
     if (event.type === "ended") {
       this.#wished = false;

@@ -18,17 +18,22 @@ export interface Sectioned {
 
 /** Goes back to the section's start where its end is passed; in reverse, to its end. */
 export class SectionKeeper {
-  #wasInside = false; // at the picture before, without a seek since
+  #within = ""; // the section in which the picture before was, without a seek since
+
+  /** Where a seek begins: it may lead out of the section. */
+  forget(): void {
+    this.#within = "";
+  }
 
   /** After each picture, and at the end. */
   keep(player: Sectioned): void {
     const { section, currentTime: time } = player;
-    const wasInside = this.#wasInside;
-    this.#wasInside = section !== null && !player.seeking && time >= section[0] && time <= section[1];
+    const [before, own] = [this.#within, String(section)];
+    this.#within = section !== null && !player.seeking && time >= section[0] && time <= section[1] ? own : "";
     if (section === null || player.seeking || (player.paused && !player.ended)) return;
     const [from, to] = section;
     const isReverse = player.direction === "reverse";
-    const hasLeft = wasInside && !this.#wasInside; // also by a step so long that it went past the end of the recording
+    const hasLeft = before === own && this.#within === ""; // also by a step so long that it went past the end of the recording
     if (!hasLeft && (isReverse ? time > from : time < to) && !player.ended) return;
     player.currentTime = isReverse ? to : from;
     if (player.paused) player.play().catch(() => undefined); // reported by the error event

@@ -35,11 +35,12 @@ describe("standing upright", () => {
 });
 
 describe("a section", () => {
-  /** Where a player of 2 s, of which .5 to 1.5 is the section, is after each of these times; a seek where a time is below 0. */
-  const kept = (direction: "normal" | "reverse", times: readonly number[]): number[] => {
+  /** Where a player of 2 s, of which .5 to 1.5 is the section, is after each of these times; a seek led to those below 0. */
+  const kept = (direction: "normal" | "reverse", times: readonly number[], section: readonly [number, number] = [0.5, 1.5]): number[] => {
     const keeper = new SectionKeeper();
-    return times.map((time) => {
-      const player = { section: [0.5, 1.5] as const, duration: 2, paused: false, ended: false, seeking: time < 0, direction, currentTime: Math.abs(time), play: () => Promise.resolve() };
+    return times.map((time, k) => {
+      if (time < 0) keeper.forget();
+      const player = { section: k === 0 ? ([0.5, 1.5] as const) : section, duration: 2, paused: false, ended: false, seeking: false, direction, currentTime: Math.abs(time), play: () => Promise.resolve() };
       keeper.keep(player);
       return player.currentTime;
     });
@@ -51,6 +52,9 @@ describe("a section", () => {
   test("is come to from before, also after a seek out of it", () => {
     expect(kept("normal", [0.1, 0.4, 1, -0.2, 0.2, 0.3])).toEqual([0.1, 0.4, 1, 0.2, 0.2, 0.3]);
     expect(kept("reverse", [1.9, 1.6, 1, -1.8, 1.8, 1.7])).toEqual([1.9, 1.6, 1, 1.8, 1.8, 1.7]);
+  });
+  test("is come to where another one is set", () => {
+    expect(kept("normal", [1, 1.1, 1.7, 2], [1.6, 1.9])).toEqual([1, 1.1, 1.7, 1.6]);
   });
 });
 

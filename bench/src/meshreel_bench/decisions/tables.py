@@ -139,9 +139,9 @@ COLUMNS: dict[str, Columns] = {
     },
     "pcqm": {
         "three frames of a person": "{way}",
-        "> Mbps": "{mbps:.2f}",
-        "> YUV 6:1:1, dB": "{yuv_psnr:.1f}",
-        "> SSIM in colour": "{view_ssim:.3f}",
+        "> Mbps": optional("mbps", ".2f"),
+        "> YUV 6:1:1, dB": optional("yuv_psnr", ".1f"),
+        "> SSIM in colour": optional("view_ssim", ".3f"),
         "> PCQM x 1000": thousandths("pcqm"),
     },
     "detail": {

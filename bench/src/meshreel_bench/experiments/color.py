@@ -101,9 +101,6 @@ STUDY = Study(
         "Places of the demo that a camera sees are as they truly are if their colour is within 12 levels of what the",
         "true surface has within a pixel around. At open edges colours from beyond the surface would be dark.",
         "A person's rates of *a key in 120 frames* follow from three: what a chain begins with counts once.",
-        "PCQM (Meynet and others, 2020) is 0 where nothing is seen: of curvature and lightness around the points of",
-        "three frames. It was fitted to opinions on point clouds; on textured meshes the best of 13 metrics reach a",
-        "correlation of about .6 with opinions.",
     ),
 )
 

@@ -24,7 +24,7 @@ from meshreel.metrics.mpeg import MpegOptions
 from meshreel.metrics.scene_accuracy import Scene, people_flicker, scene_means, scene_row, visible
 from meshreel.metrics.surface_samples import scatter
 from meshreel.metrics.viewpoints import Box
-from meshreel.types import UP_AXES, Frames, Mesh
+from meshreel.types import UP_AXES, Frames, Mesh, evenly
 
 from ..datasets import Dataset
 from ..datasets.rooms import NAMES, PEOPLE, THINGS, Parts, moving_parts
@@ -104,8 +104,8 @@ def _colors(frames: Measured) -> dict[str, float]:
         for picture in (pictures[k] if pictures else ())
         if picture is not None
     )
-    spread = np.unique(np.linspace(0, len(frames.numbers) - 1, JUDGED).astype(int))
-    scores = [pcqm(originals[frames.numbers[k]], frames.decoded[k]) for k in spread]
+    judged = evenly(len(frames.numbers), JUDGED)
+    scores = [pcqm(originals[frames.numbers[k]], frames.decoded[k]) for k in judged]
     found["pcqm"] = float(np.mean(scores))
     truth = frames.known.truth
     if truth is not None:

@@ -1,8 +1,11 @@
 """PCQM: how much worse people find a coloured surface than its original, by its curvature and its lightness.
 
 Source: G. Meynet, Y. Nehmé, J. Digne, G. Lavoué, *PCQM: A Full-Reference Quality Metric for Colored 3D Point Clouds*,
-QoMEX 2020, with the radii and constants that its authors publish. Surfaces are spread with points of their colours.
-The metric was fitted to opinions on point clouds; on textured meshes its correlation with opinions is about .6.
+QoMEX 2020, with the radii and constants that its authors publish. It was fitted to opinions on point clouds.
+
+Differs from the paper: points are spread over surfaces, at most `MOST`; at most `SLACK` times the usual number count in
+a neighbourhood; the box has its own sides, not the sums of the absolute values of its ends; where several quadrics fit,
+the flattest counts.
 """
 
 from __future__ import annotations
@@ -36,6 +39,7 @@ Numbers = Float64[np.ndarray, " N"]
 
 def pcqm(original: Mesh, decoded: Mesh) -> float:
     """Return the PCQM of a decoded mesh: 0 is equal, larger is worse, at most about 1."""
+    original, decoded = (mesh.with_faces(face_normals(mesh)[1] > 0) for mesh in (original, decoded))
     if original.is_empty or decoded.is_empty:
         return 0.0 if original.is_empty and decoded.is_empty else WORST
     low, high = original.box

@@ -73,6 +73,7 @@ def losses(rows: Sequence[Row], points: Sequence[Row]) -> Iterator[str]:
                 if ratio and ratio.rate is not None and ratio.rate < 1:
                     times = f"{'at most ' * ratio.at_most}{ratio.rate:.2g} times"
                     yield f"- {name}: {title(codec)} needs {times} its bytes at equal {measure.name}."
+    for measure in (D1, *EQUAL):
         for row, _, factor in vdmc_ratios(points, measure):
             if factor < 1:
                 point = f"V-DMC's point {row.point.options['rate']} ({row.mbps:.3g} Mbps)"

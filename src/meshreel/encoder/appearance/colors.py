@@ -36,6 +36,7 @@ from .videos import TEXTURE_SIZES, AppearanceOptions, TextureOptions, Videos
 
 USED = 0.43  # of a texture is on the surface, as unwrapped; measured on basketball_player
 COARSER = 2.0  # steps of vertex colours beneath pictures, at half of their bytes (decision 28)
+LIGHT = 25.0  # levels of 255 by which the mean colour beneath pictures may be off: a tenth of the range (guess)
 MOST_FITTING = 1024  # texels, unless a larger texture is asked for: 2 mm on a person
 
 
@@ -96,7 +97,7 @@ class _Chain:
         is_covered = texture is not None or self._video is not None
         step = COARSER * options.color_step if is_covered else options.color_step
         if is_covered:
-            colors = self._stilled(colors, paints, canvas.meshes[0].vertices, step)
+            colors = self._stilled(colors, paints, canvas.meshes[0].vertices)
         encoded, self._before = None, (None, None)
         with suppress(CostlyError):
             encoded = encode_group_colors(canvas, colors, step, None if known is None else known.colors)
@@ -117,18 +118,18 @@ class _Chain:
         self.groups.append(replace(group, companions=tuple(companions)))
 
     def _stilled(
-        self, colors: Sequence[UInt8[np.ndarray, "_ 3"]], paints: Sequence[Paint | None], count: int, step: float
+        self, colors: Sequence[UInt8[np.ndarray, "_ 3"]], paints: Sequence[Paint | None], count: int
     ) -> list[UInt8[np.ndarray, "_ 3"]]:
         """Return colours of vertices, of which the template's `count` change with the light alone: pictures lie above.
 
-        They are the mean of the chain's first group, and follow the mean of all vertices where that moves by a step.
+        They are the mean of the chain's first group, and move on with the mean of all vertices where that is off.
         """
         pairs = zip(colors, paints, strict=True)
         painted = np.mean([color[:count] for color, paint in pairs if paint is not None], axis=0)
         if self._still is None:
             self._still = painted
         light = painted.mean(axis=0) - self._still.mean(axis=0)
-        if np.abs(light).max() > 255 * step:
+        if np.abs(light).max() > LIGHT:
             self._still = self._still + light
         still = np.rint(self._still.clip(0, 255)).astype(np.uint8)
         return [np.concatenate([still, color[count:]]) for color in colors]
