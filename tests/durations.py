@@ -13,7 +13,7 @@ import pytest
 
 RECORDED = Path(__file__).with_name("durations.json")
 PROPERTY = "cpu"  # s, in the report
-LONGEST = 3.0  # s: tests that take longer are recorded by themselves, and slow, so that the others end within minutes
+LONGEST = 1.5  # s: tests that take longer are recorded by themselves, and slow, so that the others end within minutes
 _BEGUN = pytest.StashKey[float]()
 
 

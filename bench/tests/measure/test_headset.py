@@ -12,6 +12,7 @@ DATA = (ROOT / "conformance/v1/layers.reel").read_bytes()
 can_play = (os.environ.get("CHROMIUM") or shutil.which("chromium")) and (WEB / "node_modules/playwright-core").exists()
 
 
+@pytest.mark.clock  # on a busy machine it plays nothing in its time
 @pytest.mark.skipif(not can_play, reason="no chromium, or no node_modules: scripts/setup web")
 def test_what_decoding_takes_grows_with_the_throttle():
     fast, slow = (headset_values(DATA, 1, throttle, 24) for throttle in (1, 16))
