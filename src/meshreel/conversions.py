@@ -47,8 +47,8 @@ def _as_mesh(item: Any, where: str) -> Mesh:
         return item
     if hasattr(item, "to_mesh"):  # a scene of trimesh: all its meshes, in their places
         parts = item.geometry.values()
-        counts = (sum(len(getattr(one, name, ())) for one in parts) for name in ("vertices", "faces"))
-        _check_faces(*counts, where)
+        count, face_count = (sum(len(getattr(one, name, ())) for one in parts) for name in ("vertices", "faces"))
+        _check_faces(count, face_count, where)
         if len({one.visual.kind for one in item.geometry.values() if hasattr(one, "visual")}) > 1:  # it would mix them
             return checked(parse_glb(item.export(file_type="glb"))).mesh
         item = item.to_mesh()
