@@ -49,7 +49,7 @@ def _as_mesh(item: Any, where: str) -> Mesh:
         parts = item.geometry.values()
         count, face_count = (sum(len(getattr(one, name, ())) for one in parts) for name in ("vertices", "faces"))
         _check_faces(count, face_count, where)
-        if len({one.visual.kind for one in item.geometry.values() if hasattr(one, "visual")}) > 1:  # it would mix them
+        if len({one.visual.kind for one in parts if hasattr(one, "visual")}) > 1:  # it would mix them
             return checked(parse_glb(item.export(file_type="glb"))).mesh
         item = item.to_mesh()
     item = getattr(item, "geometry", item)  # of a frame of Open4D
