@@ -96,6 +96,7 @@ def found(scene: MeshList) -> ByPlace:
     return segment(scene, CAMERAS)
 
 
+BOX = len(box((0, 0, 0)).vertices)
 ROOM = 2 * 8192  # faces of floor and wall, which come first
 
 
@@ -118,6 +119,19 @@ def test_what_stands_still_as_a_thing_does_needs_no_long_rest(scene: MeshList, m
     monkeypatch.setattr(cut, "_REST", 20.0)
     found = segment(scene, CAMERAS)
     assert len(found.rest.changes) == 2
+
+
+def test_what_sways_in_a_part_stands_as_nobody_does(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Most of a person who stands there and waves is as still as a thing."""
+    monkeypatch.setattr(cut, "_REST", 20.0)
+
+    def swaying(number: int) -> Mesh:
+        mesh = frame(number)
+        top = (np.arange(len(mesh.vertices)) >= len(frame(0).vertices) - BOX) & (mesh.vertices[:, 1] > 0.34)
+        return replace(mesh, vertices=mesh.vertices + 0.01 * np.cos(2 * number) * top[:, None])
+
+    scene = MeshList(tuple(swaying(number) for number in range(FRAMES)), 4.0)
+    assert segment(scene, CAMERAS).rest.changes == []
 
 
 def test_changes_are_two_of_the_frames(found: ByPlace) -> None:
@@ -200,7 +214,7 @@ def stand(frames: int, seen_from: int, patch: slice) -> Places:
 def rests(places: Places, holds: bool) -> list[int]:
     every = np.ones(len(places.keys), bool)
 
-    def stands(groups: list[Int64[np.ndarray, " C"]], _numbers: list[int], _times: float) -> list[bool]:
+    def stands(groups: list[Int64[np.ndarray, " C"]], _numbers: list[int], *_: float) -> list[bool]:
         return [holds or len(group) > 200 for group in groups]
 
     rest = find_rest(places, every, range(16), 4.0, stands)

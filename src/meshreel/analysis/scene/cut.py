@@ -9,6 +9,7 @@ places has no part that never moves, so growth from such places is expensive.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -45,10 +46,11 @@ _FEWEST_FRAMES = 3  # smallest number of inspected frames with surface in a time
 NEAR_CHANGE = 0.1  # m, largest step from a change to a place that may be part of it: a guess
 _SMALLEST = 10  # places: smaller sets stay as they are, for speed: a guess
 _STANDS = 1.5  # times the noise: surface that is farther off from one frame to another has moved (decision 28)
+_PART = 0.25  # m, of the parts of a thing of which each stands: noise evens out over them (decision 28)
 _STILL_BESIDE = 2.0  # the same beside a change, where cameras often see at grazing angles: a guess
 _SAME_TIME = 1  # largest difference, in inspected frames, between neighbours that change together: a guess
 FrameNumbers = Int32[np.ndarray, " P"]  # frame numbers
-Holds = Callable[[Sequence[Int64[np.ndarray, " C"]], list[int], float], Sequence[bool]]
+Holds = Callable[[Sequence[Int64[np.ndarray, " C"]], list[int], float, float], Sequence[bool]]
 _REST = 10.0  # s of uninterrupted rest before or after the change: people do not stand still for as long (decision 18)
 _SHORT_REST = 0.8  # s of rest that suffice for surface that moves no more than noise, as a crate's (decision 28)
 _MOSTLY_THERE = 0.8  # smallest share of the inspected frames in that time that have surface at the place (decision 18)
@@ -207,8 +209,8 @@ class Rest:
 def find_rest(places: Places, moving: Mask, numbers: Sequence[int], frame_rate: float, holds: Holds) -> Rest:
     """Find the frames in which moving places rest; `numbers` are those of the inspected frames.
 
-    `holds(sets of places, frame numbers, factor)` returns for each set whether surface there stays in place in these
-    frames, up to `factor` times the noise: nobody stands so still.
+    `holds(sets of places, frame numbers, factor, part)` returns for each set whether surface there stays in place in
+    these frames, up to `factor` times the noise, in each part of size `part` (m): nobody stands so still.
     """
     rest = Rest.none(len(places.keys))
     frames, tally = np.asarray(numbers, np.int32), places.tally
@@ -224,7 +226,7 @@ def find_rest(places: Places, moving: Mask, numbers: Sequence[int], frame_rate: 
             # Rest begins with the last place to come to rest: a slowing object reaches its last place before it stands.
             last = min(int(at[group].max()) + 1, len(order) - 1)
             long = abs(int(order[-1] - order[last])) >= _REST * frame_rate
-            if long or holds([group], order[last:].tolist(), _STANDS)[0]:
+            if long or holds([group], order[last:].tolist(), _STANDS, _PART)[0]:
                 out[group] = order[last] if never else order[last] + 1
         _join(places, moving & (stay.first >= 0) & (stay.count >= _FEWEST_FRAMES), order, out, never, holds)
     free = places.tally.free > 0
@@ -255,7 +257,7 @@ def _join(
             reached[beside[times == time]] = True
             groups = _together(places, reached, np.zeros(len(reached), np.int64), _SMALLEST)
             after = order[order >= time] if never else order[order < time]
-            for group, stands in zip(groups, holds(groups, after.tolist(), _STILL_BESIDE), strict=True):
+            for group, stands in zip(groups, holds(groups, after.tolist(), _STILL_BESIDE, math.inf), strict=True):
                 out[group] = time if stands else never
 
 

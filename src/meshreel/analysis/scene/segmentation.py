@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from functools import lru_cache
 
 import numpy as np
-from jaxtyping import Bool, Int64
+from jaxtyping import Bool, Float64, Int64
 
 from ...errors import InputError
 from ...geometry.cameras import Camera
@@ -34,6 +34,7 @@ _WIDTH = 4.75  # smallest width of a cell, in median distances between two frame
 _WIDEST = 4.0  # largest width of a cell, in edge lengths: decision 18
 _LOOKS = 5  # frames that are compared to decide if surface stands still: a guess
 _THRESHOLD = 0.3  # the paper's tau: a low one followed by clean-up misses less than a high one (guess)
+_MOVED = 0.1  # share of what rests, in parts that do not: .03 of crates and doors, .3 of who stands (decision 28)
 _ISLAND = 0.01  # m^2: connected faces with less area take the label of the faces around them (guess)
 Cameras = tuple[Camera, ...]
 
@@ -80,9 +81,10 @@ def _by_place(frames: CapturedSequence, chosen: Sequence[int], cameras: Cameras,
         surfaces = [Surface(frames[numbers[k]]) for k in evenly(len(numbers), _LOOKS)]
         return surfaces, [lattice.keys(surface.mesh.vertices) for surface in surfaces]
 
-    def holds(groups: Sequence[Int64[np.ndarray, " C"]], numbers: list[int], times: float) -> list[bool]:
+    def holds(groups: Sequence[Int64[np.ndarray, " C"]], numbers: list[int], times: float, part: float) -> list[bool]:
         surfaces, keys = looked_at(tuple(numbers))
-        return [_stands(surfaces, [np.isin(k, places.keys[g]) for k in keys], 2 * cell, times * noise) for g in groups]
+        chosen = ([np.isin(each, places.keys[group]) for each in keys] for group in groups)
+        return [_stands(surfaces, masks, 2 * cell, times * noise, part) for masks in chosen]
 
     rest = find_rest(places, moving, chosen, frames.frame_rate, holds)
     looks = _color_looks(frames, chosen, CHANGE_SIDE) if moving.any() else None
@@ -150,11 +152,14 @@ def _looking(views: Cameras | None, frames: MeshSequence, chosen: Sequence[int])
     return views
 
 
-def _stands(probes: Sequence[Surface], masks: Sequence[Bool[np.ndarray, " V"]], reach: float, limit: float) -> bool:
+def _stands(
+    probes: Sequence[Surface], masks: Sequence[Bool[np.ndarray, " V"]], reach: float, limit: float, part: float
+) -> bool:
     """Return whether chosen surface is in the same place, up to `limit` (m), in all frames that show it.
 
     The surface is that of the frame with most of it. A frame shows it if it has surface within `reach` (m) of at least
-    half of it: people in front hide things at times.
+    half of it: people in front hide things at times. All parts of size `part` (m) stay, but for a few: the median of a
+    person who stands there and waves is that of a trunk.
     """
     counts = [np.count_nonzero(chosen) for chosen in masks]
     most = int(np.argmax(counts))
@@ -163,12 +168,21 @@ def _stands(probes: Sequence[Surface], masks: Sequence[Bool[np.ndarray, " V"]], 
         if number == most or counts[most] == 0:
             continue
         gaps = probe.distances(points)
-        near = gaps[gaps <= reach]
-        if len(near) >= len(gaps) / 2:
+        near = gaps <= reach
+        if near.sum() >= len(gaps) / 2:
             visible += 1
-            if np.median(near) > limit:
+            if (_usual(points[near], gaps[near], part) > limit).mean() > _MOVED:
                 return False
     return visible >= len(probes) / 2
+
+
+def _usual(
+    points: Float64[np.ndarray, "N 3"], gaps: Float64[np.ndarray, " N"], size: float
+) -> Float64[np.ndarray, " N"]:
+    """Return for each point the median distance of its part, a cube of size `size`."""
+    part = np.unique(np.floor(points / size), axis=0, return_inverse=True)[1].reshape(-1)
+    sizes = np.bincount(part)
+    return gaps[np.lexsort((gaps, part))][np.cumsum(sizes) - sizes + sizes // 2][part]
 
 
 def edge_length(frames: MeshSequence, chosen: Sequence[int]) -> float:
