@@ -125,7 +125,7 @@ def test_only_rows_of_another_encoder_are_measured_again_where_it_is_asked_for(b
 
 def test_experiments_and_codecs_are_listed(bench):
     _, found, _ = bench("list", "--json")
-    assert {"experiment": "table2", "sequences": ["synthetic4"], "points": 36} in found["experiments"]
+    assert {"experiment": "table2", "sequences": ["synthetic4", "synthetic4-crane"], "points": 72} in found["experiments"]
     _, found, _ = bench("codecs", "--json")
     assert found["codecs"]["tvmc"] == "meshreel-bench"
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from meshreel_bench.datasets import BODIES, DEMO, SYNTHETIC, Store, checksums
+from meshreel_bench.datasets import DEMO, FOURS, Store, checksums
 from meshreel_bench.datasets.remesh import SideBySide
 from meshreel_bench.datasets.rooms import PROCEDURAL
 
@@ -96,16 +96,17 @@ def test_the_procedural_sequences_need_no_data(tmp_path):
     assert np.array_equal(again.sequence[0].vertices, room.sequence[0].vertices)
 
 
-def test_the_papers_synthetic_scene_in_small():
+@pytest.mark.parametrize("four", FOURS)
+def test_the_papers_synthetic_scene_in_small(four: str) -> None:
     if not ROOT.exists():
         pytest.skip(f"benchmark data not present: {ROOT}")
-    sequence = open_dataset(SYNTHETIC, ROOT)
+    sequence = open_dataset(four, ROOT)
     assert len(sequence) == 10 and sequence.frame_rate == 30.0
     mesh = sequence[9]
-    alone = [open_dataset(name, ROOT, 10)[9] for name in BODIES]
+    alone = [open_dataset(name, ROOT, 10)[9] for name in FOURS[four]]
     assert len(mesh.faces) == sum(len(body.faces) for body in alone)
     ends = []
-    for body, place in zip(alone, BODIES.values(), strict=True):
+    for body, place in zip(alone, FOURS[four].values(), strict=True):
         low, high = body.vertices.min(axis=0) + place, body.vertices.max(axis=0) + place
         assert abs(low[1]) < 0.1  # on one floor
         ends += [low[0], high[0]]

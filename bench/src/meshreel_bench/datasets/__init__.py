@@ -38,12 +38,15 @@ from .walker import FRAMES, TrueLuma, Walker, true_luma
 DEMO = "demo"  # procedural bodies: needs no benchmark data
 # Neither do these.
 SHAPES: dict[str, Callable[..., MeshSequence]] = {"gears": gears, "prism": prism, "long_room": LongRoom}
-SYNTHETIC = "synthetic4"
-BODIES: dict[str, Place] = {  # of SYNTHETIC, m: on one floor, 30 cm apart
+SYNTHETIC, WITH_CRANE = "synthetic4", "synthetic4-crane"  # the paper's; and the same with crane for thomas
+_THREE: dict[str, Place] = {
     "dancer": (-1.39, 0.48, 0.0),
     "basketball_player": (-0.32, 0.48, 0.0),
     "mitch": (0.73, 0.0, 0.0),
-    "crane": (0.81, 0.0, 0.0),
+}
+FOURS: dict[str, dict[str, Place]] = {  # bodies and their places, m: on one floor, 30 cm apart
+    SYNTHETIC: {**_THREE, "thomas": (1.96, 0.0, 0.0)},
+    WITH_CRANE: {**_THREE, "crane": (0.81, 0.0, 0.0)},
 }
 SYNTHETIC_FRAMES = 10
 RECORDINGS = ("living_room",)
@@ -63,7 +66,7 @@ RELEASED = ("answering", "drinking", "arena", "sitting", "synthetic")  # folders
 LONG, LONG_FRAMES = "synthetic2x150", 150  # crane150, and samba150 that passes close by
 FAR, NEAR = 2.2, 0.5  # m, of the second body's way: surfaces are 1.2 m apart first, 0.06 in the middle, 0.7 last
 ROOMS = (*SCENES, ROOM3, PROCEDURAL, *SENSED, PEOPLE)
-NAMES = (DEMO, *SHAPES, SYNTHETIC, LONG, *ROOMS, WALKER, *RECORDINGS, *REMESHED)
+NAMES = (DEMO, *SHAPES, *FOURS, LONG, *ROOMS, WALKER, *RECORDINGS, *REMESHED)
 PLAYED: dict[str, Callable[[int], Iterable[int]]] = {  # endings of names: the order of so many frames
     "-backwards": lambda count: reversed(range(count)),
     "-forth-and-back": lambda count: cycle([*range(count), *range(count - 2, 0, -1)]),  # ends are not repeated
@@ -113,9 +116,9 @@ class Store:
         if name == WALKER:
             count = frames or FRAMES
             return Dataset(Walker(_kept(name, self.cache) / f"{name}-{count}", count), truth=true_luma)
-        if name == SYNTHETIC:
+        if name in FOURS:
             count = min(frames or SYNTHETIC_FRAMES, SYNTHETIC_FRAMES)
-            bodies = [(_open_files(body, self.data, count), place) for body, place in BODIES.items()]
+            bodies = [(_open_files(body, self.data, count), place) for body, place in FOURS[name].items()]
             return Dataset(SideBySide(bodies))
         if name == LONG:
             first, second = (self.open(body, frames).sequence for body in ("crane150", "samba150"))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from ..codecs.meshreel import LARGER
 from ..codecs.necgs import QUICK
+from ..datasets import FOURS, SYNTHETIC
 from ..names import BEST, DRACO, KLT, NECGS, TUNED, TVMC
 from ..rows import Options
 from .study import D2, MASKED, VIEWS, Always, Bound, LeastRate, Measure, Reaches, Rises, Study, Sweep, Which, at_most
@@ -21,7 +22,7 @@ VOXELS = {"cells": (64, 96, 128, 192, 384, 576), "basis": (*KEPT, 32), "step": (
 FINER = {"cells": (128, 192, 288, 432, 640), "basis": KEPT, "step": (0.1, 0.08, 0.06, 0.06, 0.06)}
 LONGER = {name: values[1:4] for name, values in FINER.items()}
 M = {"basis_size": (2, 4, 10)}
-LARGE = dict.fromkeys(("synthetic4", *SCENES), FINER)
+LARGE = dict.fromkeys((*FOURS, *SCENES), FINER)
 FEWER_M = dict.fromkeys(SCENES[1:], M) | {ROOM: {"basis_size": (3, 10)}}
 NECGS_FULL: Options = {"configuration": "full"}  # hours without a GPU
 FEW = {"centers": 200}  # for `--small`
@@ -31,7 +32,7 @@ SYSTEMS = (
     Sweep("meshreel", QUALITIES, {"preset": "best"}, {ROOM: {"quality": (0.0, 35.0, 80.0)}}),
     Sweep("meshreel", {"quality": (95.0, 99.0, 100.0)}, {"preset": "best"}, only=BODIES[:3]),  # V-DMC's best lie here
     Sweep("meshreel", {"basis_size": (*M["basis_size"], 30)}, PAPER, FEWER_M, small=FEW | {"basis_size": 2}),
-    Sweep("meshreel", {"quality": (20.0, 50.0, 80.0)}, PAPER, only=("synthetic4", *BODIES), small=FEW),
+    Sweep("meshreel", {"quality": (20.0, 50.0, 80.0)}, PAPER, only=(*FOURS, *BODIES), small=FEW),
     Sweep("tvmc", {"qp": (5, 7, 9, 11)}, on={ROOM: {"qp": (5, 7, 9)}}, small=FEW | {"vertices": 600}),
     Sweep("meshreel", {"basis_size": (4, 10, 30)}, PAPER | {"variant": LARGER}, only=("dancer",)),
     Sweep("tvmc", {"qp": (9, 11, 13)}, {"vertices": 5000}, only=("dancer",)),
@@ -40,9 +41,9 @@ SYSTEMS = (
     Sweep("meshoptimizer", BITS, only=BODIES),
     Sweep("klt_tsdf", VOXELS, on=LARGE, sampled=(ROOM,), small={"cells": 96}),
     Sweep("necgs", {"channels": (8, 16)}, {"device": "cpu"}, sampled=SCENES, small=QUICK),
-    Sweep("necgs", {}, NECGS_FULL, only=("dancer", "synthetic4"), small=QUICK),
+    Sweep("necgs", {}, NECGS_FULL, only=("dancer", *FOURS), small=QUICK),
     Sweep("decimated_draco", FRACTIONS, on=OF_SCENES, sampled=SCENES),
-    Sweep("decimated_draco", FRACTIONS, {"levels": 1}, OF_SCENES, ("synthetic4", *SCENES[1:], *BODIES), sampled=SCENES),
+    Sweep("decimated_draco", FRACTIONS, {"levels": 1}, OF_SCENES, (*FOURS, *SCENES[1:], *BODIES), sampled=SCENES),
     Sweep("background_once_draco", FRACTIONS, on={ROOM: FEWER}, only=SCENES),
 )
 NOTES = (
@@ -71,7 +72,7 @@ NEAR = at_most("hausdorff95_backward_percent", 2.0, "%")
 WORST = Bound("d2_psnr_paper_worst", 55.0, "dB")
 STUDY = Study(
     title="Every system on every data set (figure 6)",
-    sequences=("synthetic4", *SCENES, *BODIES),
+    sequences=(*FOURS, *SCENES, *BODIES),
     sweeps=SYSTEMS,
     measures=(*VIEWS, *MEASURED_TRUTH),
     best=BEST,
@@ -85,7 +86,7 @@ STUDY = Study(
             )
             for qp, mbps in DANCER_DRACO.items()
         ),
-        Reaches("synthetic4: tvmc is better than its released code", Which("synthetic4", TVMC), RELEASED),
+        Reaches("synthetic4: tvmc is better than its released code", Which(SYNTHETIC, TVMC), RELEASED),
         *(Always(f"{body}: worst frame of TSMC", Which(body, TUNED), WORST) for body in BODIES[1:3]),
         Reaches(
             "dancer, TSMC at quality 50: CPU s a frame of the encode and of its tracking, faces without area",
@@ -122,7 +123,7 @@ LONG = Study(
     ),
 )
 TABLE_1 = Study(title="Scenes (table 1)", sequences=SCENES, sweeps=SYSTEMS, floors=STUDY.floors, frames=STUDY.frames)
-TABLE_2 = Study(title="Four people (table 2)", sequences=("synthetic4",), sweeps=SYSTEMS)
+TABLE_2 = Study(title="Four people (table 2)", sequences=tuple(FOURS), sweeps=SYSTEMS)
 MPEG = Study(
     title="By MPEG's measures, beside V-DMC",
     sequences=("dancer", "basketball_player", "mitch", "thomas"),

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from itertools import product
 
+from ..datasets import WITH_CRANE
 from ..rows import Options
 from .study import HEADSET, Measure, Study, Sweep
 
 ENCODED: Options = {"preset": "best", "quality": 50.0}  # the file that is played
 AARCH64 = "aarch64"
-SEQUENCES, LEVELS = ("dancer", "synthetic4", "room2"), (0, 1, 2)
+SEQUENCES, LEVELS = ("dancer", WITH_CRANE, "room2"), (0, 1, 2)
 THROTTLES, RATES = (1, 4, 6), (24, 30, 72)
 FILM, MORE = 24, (2, 10)  # Hz, and throttles at that rate alone: up to where it is not held
 HOLDS = 0.95  # of the pictures that a display asks for; the rest may be lost to neighbours on the machine (guess)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from math import log2
 
+from ..datasets import WITH_CRANE
 from ..names import BEST, DECIMATED, DRACO, SUBDIVIDED
 from ..rows import Options
 from . import study
@@ -105,7 +106,7 @@ LIMITS |= {"dancer160k": (4.0, "")}
 EFFICIENCY = {8: 0.97, 32: 0.95, 100: 0.95}  # of an encode of an hour of frames, at least, by workers
 CORES = {4: {8: 0.8}, 60: {8: 0.8}}  # of clips of so many s, on so many cores
 WORSE = {"fraction": 0.1, "qp": 10}  # a little worse than the default quality in D2
-TOGETHER, OF_FOUR = "synthetic4", {35.0: (2.0, "1.5"), 60.0: (2.0, "1.5"), 85.0: (3.0, "")}  # by quality
+TOGETHER, OF_FOUR = WITH_CRANE, {35.0: (2.0, "1.5"), 60.0: (2.0, "1.5"), 85.0: (3.0, "")}  # by quality
 LEAST = min(OF_FOUR)
 # Diagonals of the boxes of ten frames, m: a quality is a step in these, and 25 of quality halve the step.
 DIAGONALS = {"dancer": 2.197, "basketball_player": 2.131, "mitch": 2.284, "crane": 2.164}

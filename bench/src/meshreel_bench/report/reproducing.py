@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from importlib.resources import files
 
+from ..datasets import FOURS
 from ..datasets import RELEASED as DATA_OF_AUTHORS
 from ..experiments import EXPERIMENTS
 from ..experiments.headset import FILM, HOLDS, THROTTLES
@@ -16,7 +17,7 @@ from .values import curve_of, rated, value
 WRITTEN = (LITERAL, LITERAL_FINEST)  # the second where the first does not reach
 *AUTHORS, AUTHORS_FOUR = DATA_OF_AUTHORS
 SCENES = ("room2", "living_room", "procedural_room", *AUTHORS)
-FOUR_AND_TWO = ("synthetic4", "synthetic2x150", AUTHORS_FOUR)  # people
+FOUR_AND_TWO = (*FOURS, "synthetic2x150", AUTHORS_FOUR)  # people
 Cell = Callable[[Sequence[Row], str, Published | None], str]  # of a codec's rows on a sequence beside a system
 SLACK_DB, SHORT = 0.1, " †"  # a point that is worse by more is marked
 PAPER_3 = (("TSMC", 6.13, 25.35, 0.9462), ("uncompressed", 357.6, 26.46, 0.9594))  # LMG of 2026: name, Mbps, dB, SSIM
