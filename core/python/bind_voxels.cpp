@@ -40,6 +40,16 @@ void integrate(In<float, 2> depths, In<double, 2> projection, In<double, 2> ways
     check(without_gil([&] { return mr_integrate(&picture, reach, &into); }));
 }
 
+void point_distances(In<double, 2> points, In<double, 2> normals, double voxel, double radius, double past,
+                     Blocks blocks, OutVoxels distances, OutVoxels weights) {
+    const size_t count = blocks.shape(0), many = points.shape(0);
+    expect(are_vectors(points, many) && are_vectors(normals, many));
+    expect(distances.shape(0) == count && weights.shape(0) == count);
+    const mr_oriented from{points.data(), normals.data(), many};
+    const mr_blocks into{blocks.data(), count, voxel, distances.data(), weights.data()};
+    check(without_gil([&] { return mr_point_distances(&from, radius, past, &into); }));
+}
+
 nb::tuple zero_level(Blocks blocks, Voxels distances, Voxels weights, double voxel, float least) {
     const size_t count = blocks.shape(0);
     expect(distances.shape(0) == count && weights.shape(0) == count);
@@ -61,6 +71,9 @@ void bind_voxels(nb::module_& m) {
     m.def("integrate", &integrate, "depths"_a, "projection"_a, "ways"_a, "eye"_a, "voxel"_a, "reach"_a, "blocks"_a,
           "distances"_a.noconvert(), "weights"_a.noconvert(),
           "Takes a depth picture into `distances` and `weights` (in place).");
+    m.def("point_distances", &point_distances, "points"_a, "normals"_a, "voxel"_a, "radius"_a, "past"_a, "blocks"_a,
+          "distances"_a.noconvert(), "weights"_a.noconvert(),
+          "Sets the distances of voxels near points with normals, and their weights (in place).");
     m.def("zero_level", &zero_level, "blocks"_a, "distances"_a, "weights"_a, "voxel"_a, "least"_a,
           "Positions and faces of the surface where distances are 0, by marching cubes.");
 }

@@ -1,5 +1,6 @@
 #include "meshreel/voxels.h"
 
+#include <algorithm>
 #include <cmath>
 #include <vector>
 
@@ -80,4 +81,38 @@ TEST(a_picture_moves_the_distances_of_the_voxels_that_it_sees) {
     CHECK(found);
     mr_touched_destroy(touched);
     CHECK(mr_touched_create(&picture, 0.0, 1.5, &touched, &blocks, &count) == MR_BAD_INPUT);
+}
+
+TEST(points_of_a_plane_give_its_distances_up_to_its_border) {
+    Ball made = ball(0.0f);
+    std::fill(made.weights.begin(), made.weights.end(), 0.0f);
+    const mr_blocks view = made.view();
+    std::vector<double> positions, normals;
+    for (int x = -6; x <= 6; ++x)
+        for (int y = -6; y <= 6; ++y) {
+            positions.insert(positions.end(), {0.25 * x, 0.25 * y, 0.1});
+            normals.insert(normals.end(), {0, 0, 1});
+        }
+    const mr_oriented points{positions.data(), normals.data(), positions.size() / 3};
+    CHECK(mr_point_distances(&points, 1.0, 0.3, &view) == MR_OK);
+    size_t known = 0;
+    for (size_t n = 0; n < view.count; ++n)
+        for (size_t v = 0; v < 512; ++v) {
+            const double x = 0.5 * (8 * made.blocks[3 * n] + static_cast<int32_t>(v % 8));
+            const double y = 0.5 * (8 * made.blocks[3 * n + 1] + static_cast<int32_t>(v / 8 % 8));
+            const double z = 0.5 * (8 * made.blocks[3 * n + 2] + static_cast<int32_t>(v / 64));
+            const bool near = std::fabs(z - 0.1) < 1.0, inside = std::fabs(x) <= 1.0 && std::fabs(y) <= 1.0;
+            if (made.weights[512 * n + v] > 0) {
+                CHECK(near && std::fabs(made.distances[512 * n + v] - (z - 0.1)) < 1e-6);
+                CHECK(std::fabs(x) < 2.0 && std::fabs(y) < 2.0);
+                ++known;
+            } else {
+                CHECK(!(near && inside));
+            }
+        }
+    CHECK(known >= 4 * 25);
+    CHECK(mr_point_distances(&points, 0.0, 0.3, &view) == MR_BAD_INPUT);
+    CHECK(mr_point_distances(&points, 4.5, 0.3, &view) == MR_BAD_INPUT);  // farther than a block is wide
+    positions[0] = std::nan("");
+    CHECK(mr_point_distances(&points, 1.0, 0.3, &view) == MR_BAD_INPUT);
 }

@@ -453,6 +453,16 @@ def integrate(
     distances: Float32[np.ndarray, "B 8 8 8"],
     weights: Float32[np.ndarray, "B 8 8 8"],
 ) -> None: ...
+def point_distances(
+    points: Float64[np.ndarray, "N 3"],
+    normals: Float64[np.ndarray, "N 3"],
+    voxel: float,
+    radius: float,
+    past: float,
+    blocks: Int32[np.ndarray, "B 3"],
+    distances: Float32[np.ndarray, "B 8 8 8"],
+    weights: Float32[np.ndarray, "B 8 8 8"],
+) -> None: ...
 def zero_level(
     blocks: Int32[np.ndarray, "B 3"],
     distances: Float32[np.ndarray, "B 8 8 8"],

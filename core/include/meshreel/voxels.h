@@ -40,6 +40,18 @@ void mr_touched_destroy(mr_touched* touched);
 // is left as it is. A measurement has the weight 1.
 int mr_integrate(const struct mr_depth* picture, double reach, const struct mr_blocks* into);
 
+// Points on surfaces, with normals that point outside; coordinates are less than 1e8 blocks from 0.
+struct mr_oriented {
+    const double *positions, *normals;  // count x 3
+    size_t count;
+};
+
+// Sets the distances, in units of `radius`, of the voxels within `radius` of points, at most a block's side, and their
+// weights to 1: the mean distance from the planes of these points, near ones more. A voxel that is more than `past`
+// aside of the mean of its points is past the border of a surface, and left as it is. Blocks must be ascending and
+// distinct; points in others do not count.
+int mr_point_distances(const struct mr_oriented* points, double radius, double past, const struct mr_blocks* into);
+
 // The surface where distances change their sign, between voxels whose weight is above `least`, by marching cubes; it
 // faces positive distances. Blocks must be ascending and distinct: MR_BAD_INPUT. `out` keeps the mesh.
 typedef struct mr_zero mr_zero;

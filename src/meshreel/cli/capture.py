@@ -5,14 +5,15 @@ from __future__ import annotations
 import json
 import zlib
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from cyclopts import Parameter, Token
 
+from ..capture.clouds import CloudOptions, Clouds, are_clouds, open_clouds
 from ..capture.recording import FusionOptions, Recording, open_recording
-from ..capture.recordings import is_rig, open_take
+from ..capture.recordings import is_rig, is_take, open_take
 from ..capture.recordings.takes import Take
 from ..capture.rig.cameras import ColorCamera, DepthCamera
 from ..capture.rig.rig import RIG, Rig, read_rig
@@ -41,19 +42,19 @@ def command(
     /,
     *,
     output: Annotated[Path | None, Parameter(name=["--output", "-o"])] = None,
-    voxel: float = _FUSION.voxel,
+    voxel: float | None = None,
     truncation: float | None = _FUSION.truncation,
     fragment: float = _FUSION.fragment,
     frames: str = ":",
     format: Literal["ply", "obj", "glb"] = "ply",
     order: Order = "auto",
-    depth_unit: Annotated[float | None, Parameter(converter=_as_unit)] = None,
+    depth_unit: Annotated[float | None, Parameter(name=["--depth-unit", "--unit"], converter=_as_unit)] = None,
     show: Annotated[bool, Parameter(name="--list", negative="")] = False,
     common: Common = Common(),
 ) -> None:
-    """Fuse the depth pictures of a rig of still cameras into one mesh per frame, or make a rig of recordings.
+    """Fuse the depth pictures of a rig of still cameras, or the points of each frame, into one mesh per frame.
 
-    Run again after an interruption, it makes the missing frames of a rig.
+    Or make a rig of recordings. Run again after an interruption, it makes the missing frames.
 
     Parameters
     ----------
@@ -65,10 +66,11 @@ def command(
         camera, with frames_per_second), depth/ and, for colours, color/. A camera's `color` is a folder of pictures
         aligned with its depth, or an object with a folder and what differs; `color_cameras` lists others. Or recordings
         of other programs, together one rig: TUM RGB-D, Stray Scanner and Record3D folders, .r3d, .bag, .mcap, .mkv.
+        Or point clouds, one a frame: a folder or a list of .ply, .pcd, .npz (points, normals, colors), .las, .laz.
     output
         The directory for frame_00000.ply and so on, created if needed; of recordings, the new folder of the rig.
     voxel
-        Side of a voxel, m.
+        Side of a voxel, m; by default 0.02 for depth, and for points what their distances and noise allow.
     truncation
         Number of voxels before and behind a measurement that it changes; 4 with one camera, 3 with several.
     fragment
@@ -81,16 +83,24 @@ def command(
         Order of a rig's pictures with several numbers in their names: by all of them, by the last one, or by letters.
         By default the one that all readings of the names agree on.
     depth_unit
-        Unit of depth in pictures of recordings, in metres, as 0.0002, or mm; in place of what the recordings say.
+        Unit of depth in pictures of recordings, in place of what they say, or of the coordinates of points: in metres,
+        as 0.0002, or mm, cm, m.
     show
         Show the streams of recordings or rigs, their sizes, rates and calibration, and write nothing.
     """
-    options = FusionOptions(voxel, truncation, fragment)
+    options = replace(_FUSION if voxel is None else FusionOptions(voxel), truncation=truncation, fragment=fragment)
     if show:  # reads no picture
         facts = [_rig_facts(read_rig(path, order)) if is_rig(path) else _take_facts(open_take(path)) for path in inputs]
         return common.result({"recordings": [row for row, _ in facts]}, *(line for _, of in facts for line in of))
     if output is None:
         raise InputError("--output is missing: a folder for meshes, or for the rig of recordings; or give --list")
+    if are_clouds(inputs) and not (len(inputs) == 1 and (is_rig(inputs[0]) or is_take(inputs[0]))):
+        if truncation is not None:
+            raise InputError("--truncation: is of depth pictures; the surface of points has none, leave it out")
+        chosen = CloudOptions(voxel, fragment, 1.0 if depth_unit is None else depth_unit)
+        clouds, warnings = open_clouds(inputs, chosen, frames, order)
+        common.warn(warnings)
+        return _fuse(clouds, clouds.source, output, format, common)
     if len(inputs) > 1 or (inputs[0].exists() and not is_rig(inputs[0])):
         if (options, frames, format, order) != (_FUSION, ":", "ply", "auto"):
             raise InputError(f"{inputs[0]}: is no rig: make one of it without options of fusion, then capture that")
@@ -106,7 +116,7 @@ def command(
         raise InputError(f"--depth-unit: {inputs[0]} is a rig, whose {RIG} says it as depth_unit_m; mend that")
     recording, warnings = open_recording(inputs[0], options, frames, keep=False, order=order)
     common.warn(warnings)
-    return _fuse(recording, output, format, common)
+    return _fuse(recording, _made(recording), output, format, common)
 
 
 def _take_facts(take: Take) -> tuple[dict[str, Any], list[str]]:
@@ -141,25 +151,26 @@ def _rig_facts(rig: Rig) -> tuple[dict[str, Any], list[str]]:
     return about | {"cameras": cameras}, lines
 
 
-def _fuse(recording: Recording, output: Path, format: str, common: Common) -> None:
-    names = frame_names(len(recording), format)
-    missing = _started(output, _made(recording), names)
+def _fuse(frames: Recording | Clouds, made: dict[str, Any], output: Path, format: str, common: Common) -> None:
+    """Write the frames that a folder lacks; `made` is what they depend on."""
+    names = frame_names(len(frames), format)
+    missing = _started(output, made | {"frames_per_second": frames.frame_rate, "up": frames.up}, names)
     bare = []
     with common.stages() as progress:
         done = len(names) - len(missing)
         progress("fuse", done, len(names))
         for index, name in enumerate(names):
             if name in missing:
-                mesh = recording[index]
+                mesh = frames[index]
                 write_mesh(mesh, output / name)
                 bare += [name] if mesh.is_empty else []
                 done += 1
                 progress("fuse", done, len(names))
     if bare:
         common.warn([f"{output}: {len(bare)} of {len(missing)} fused frames have no surface, as {bare[0]}"])
-    row = {"output": str(output), "frames": len(names), "fused": len(missing), "frame_rate": recording.frame_rate}
+    row = {"output": str(output), "frames": len(names), "fused": len(missing), "frame_rate": frames.frame_rate}
     earlier = "" if len(missing) == len(names) else f", {len(names) - len(missing)} of them from before"
-    text = f"{output}: {len(names)} {format} files{earlier}, {recording.frame_rate:g} frames a second"
+    text = f"{output}: {len(names)} {format} files{earlier}, {frames.frame_rate:g} frames a second"
     common.result(row | {"format": format}, text)
 
 
@@ -168,8 +179,6 @@ def _made(recording: Recording) -> dict[str, Any]:
     sizes = [[_size(files[n]) if n in files else -1 for n in recording.numbers] for files in recording.rig.files]
     return {
         "rig": str(recording.rig.folder.resolve()),
-        "frames_per_second": recording.frame_rate,
-        "up": recording.rig.up,
         "frames": recording.numbers,
         "fusion": asdict(recording.options),
         "cameras": [camera.record() for camera in recording.rig.cameras],

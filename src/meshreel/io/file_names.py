@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from fractions import Fraction
 from itertools import pairwise
 from pathlib import Path, PurePath, PurePosixPath
@@ -47,18 +47,18 @@ def find_frames(
     except OSError as error:  # a name that is too long, or a folder without permission
         raise InputError(f"{source}: cannot be read ({error.strerror}); check the path and its rights") from None
     if is_folder:
-        folder, meshes = path, _listed(path)
+        folder, meshes = path, listed(path)
         if not meshes and (path / MESHES).is_dir():
-            folder, meshes = path / MESHES, _listed(path / MESHES)
+            folder, meshes = path / MESHES, listed(path / MESHES)
         _check_kind(folder, meshes)
-        return _ordered(folder, folder, meshes, order)
+        return ordered(folder, folder, meshes, order)
     if path.exists():
         return (path,), ()
     if is_pattern(str(source)):
-        root, meshes = _globbed(path)
+        root, meshes = globbed(path)
         if not meshes:
             raise InputError(f"{source}: no mesh file fits this pattern; check it, or name the folder")
-        return _ordered(root, root, meshes, order)
+        return ordered(root, root, meshes, order)
     raise InputError(f"{source}: no such file or folder; check the path")
 
 
@@ -73,14 +73,15 @@ def _find_remote(place: Remote, order: Order) -> tuple[tuple[Remote, ...], tuple
         names = folder.names(place.url[end + 1 :])
     except OSError as error:
         raise InputError(f"{place}: cannot be read ({error}); check the URL and your rights") from None
-    meshes = [path for path in map(PurePosixPath, names) if _has_mesh_name(path)]
+    meshes = [path for path in map(PurePosixPath, names) if _is_shown(path)]
     if wild is None or not meshes:
         _check_kind(place, meshes)
-    paths, remarks = _ordered(place, PurePosixPath(), meshes, order)
+    paths, remarks = ordered(place, PurePosixPath(), meshes, order)
     return tuple(folder / str(path) for path in paths), remarks
 
 
-def _globbed(pattern: Path) -> tuple[Path, list[Path]]:
+def globbed(pattern: Path, kinds: Collection[str] = EXTENSIONS) -> tuple[Path, list[Path]]:
+    """Return the folder above a pattern's first wildcard, and the files of these kinds that fit. Raises InputError."""
     parts = pattern.parts
     there = [k for k in range(len(parts)) if Path(*parts[: k + 1]).is_dir()]  # a folder may have brackets in its name
     fixed = next(k for k in range(len(there), len(parts)) if k == len(parts) - 1 or _MAGIC.search(parts[k]))
@@ -89,16 +90,17 @@ def _globbed(pattern: Path) -> tuple[Path, list[Path]]:
         paths = list(root.glob(str(Path(*pattern.parts[fixed:]))))
     except ValueError as error:
         raise InputError(f"{pattern}: is no pattern ({error}); mend it, or name the folder") from None
-    return root, [path for path in paths if _has_mesh_name(path) and not path.is_dir()]
+    return root, [path for path in paths if _is_shown(path, kinds) and not path.is_dir()]
 
 
-def _has_mesh_name(path: PurePath) -> bool:
-    return path.suffix.lower() in EXTENSIONS and not path.name.startswith(".")
+def _is_shown(path: PurePath, kinds: Collection[str] = EXTENSIONS) -> bool:
+    return path.suffix.lower() in kinds and not path.name.startswith(".")
 
 
-def _listed(folder: Path) -> list[Path]:
+def listed(folder: Path, kinds: Collection[str] = EXTENSIONS) -> list[Path]:
+    """Return the files of these kinds in a folder, in any order. Raises InputError for one without permission."""
     try:
-        return [path for path in folder.iterdir() if _has_mesh_name(path) and not path.is_dir()]
+        return [path for path in folder.iterdir() if _is_shown(path, kinds) and not path.is_dir()]
     except OSError as error:
         raise InputError(f"{folder}: cannot be read ({error.strerror}); check its rights") from None
 
@@ -113,7 +115,7 @@ def _check_kind(folder: Place, files: Sequence[PurePath]) -> None:
         raise InputError(f"{folder}: holds several kinds of files ({counts}); choose one, as '{folder}/*{min(kinds)}'")
 
 
-def _ordered(source: Place, root: _P, paths: list[_P], order: Order) -> tuple[tuple[_P, ...], tuple[str, ...]]:
+def ordered(source: Place, root: _P, paths: list[_P], order: Order) -> tuple[tuple[_P, ...], tuple[str, ...]]:
     """Sort paths below `root` by the numbers in their names; return warnings about these, too."""
     names = {path.relative_to(root).with_suffix("").as_posix(): path for path in sorted(paths)}
     if len(paths) == 1:

@@ -51,12 +51,7 @@ class _Element:
 
 
 def parse_ply(data: bytes) -> Polygons:
-    end = re.search(rb"[\r\n][ \t]*end_header[ \t]*(\r\n|\n|\r)", data)
-    if not re.match(rb"ply\s", data) or end is None:
-        raise Unreadable("PLY header does not run from 'ply' to 'end_header' (truncated?)")
-    lines = re.split(r"\r\n|\n|\r", data[: end.start()].decode("utf-8", "replace"))[1:]
-    encoding, elements = _header(lines)
-    body = _Text(data[end.end() :]) if encoding == "ascii" else _Binary(data[end.end() :])
+    lines, elements, body = _opened(data)
     comments = (re.match(r"\s*comment\s+TextureFile\s+(.+)", line) for line in lines)
     pictures = tuple(found[1].strip() for found in comments if found)
     surface, kept = Polygons(np.zeros((0, 3)), np.zeros(0, np.int64), np.zeros(0, np.int64)), _Kept()
@@ -78,6 +73,35 @@ def parse_ply(data: bytes) -> Polygons:
             body.read(element, ())
     surface = _placed(surface, vertex_places, pictures, kept)
     return surface.naming(_dropped(elements, kept))
+
+
+def _opened(data: bytes) -> tuple[list[str], list[_Element], _Text | _Binary]:
+    """Return the lines of a file's header, its elements, and its body."""
+    end = re.search(rb"[\r\n][ \t]*end_header[ \t]*(\r\n|\n|\r)", data)
+    if not re.match(rb"ply\s", data) or end is None:
+        raise Unreadable("PLY header does not run from 'ply' to 'end_header' (truncated?)")
+    lines = re.split(r"\r\n|\n|\r", data[: end.start()].decode("utf-8", "replace"))[1:]
+    encoding, elements = _header(lines)
+    return lines, elements, _Text(data[end.end() :]) if encoding == "ascii" else _Binary(data[end.end() :])
+
+
+def parse_ply_points(data: bytes) -> tuple[np.ndarray, np.ndarray | None, np.ndarray | None, int]:
+    """Return the places of a file's vertices, their normals and colours (8 bits) or None, and the number of faces."""
+    _, elements, body = _opened(data)
+    faces = sum(element.rows for element in elements if element.name in ("face", _STRIPS))
+    for element in elements:
+        if element.name != "vertex":
+            body.read(element, ())
+            continue
+        kept = _Kept()
+        chosen = [_named(element, names, kept) for names in ((("x", "y", "z"),), (("nx", "ny", "nz"),), _COLORS)]
+        columns, _ = body.read(element, {name for names in chosen for name in names})
+        places, normals, colors = (_stacked(columns, names) if names else None for names in chosen)
+        if places is None:
+            raise Unreadable("PLY vertices have no x, y, z")
+        colors = None if colors is None else eight_bits(_of_kind(element, colors, chosen[2][0]))
+        return places, normals, colors, faces
+    raise Unreadable("PLY has no vertices")
 
 
 _Kept = set[tuple[str, str]]  # element and property of what is read

@@ -28,7 +28,7 @@ class Surfaceless(Unreadable):
     """A file that has so many vertices and no faces; the message has a remedy."""
 
     def __init__(self, vertices: int) -> None:
-        remedy = "reconstruct it, as Open3D and MeshLab do from points"
+        remedy = "`meshreel capture POINTS -o MESHES` makes one of points"
         super().__init__(f"{vertices} vertices and no faces: only surface is coded; {remedy}")
 
 
