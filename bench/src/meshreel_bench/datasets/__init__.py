@@ -15,7 +15,10 @@ from pathlib import Path
 import numpy as np
 
 from meshreel.analysis.scene.masks import VIEW_FILES, read_view_file
-from meshreel.capture.recording import open_recording
+from meshreel.capture.clouds import Clouds, are_clouds, open_clouds
+from meshreel.capture.recording import Recording, open_recording
+from meshreel.capture.recordings import is_take, open_take
+from meshreel.capture.recordings.to_rig import write_takes
 from meshreel.capture.simulated.demo_room import RoomOptions, furnished_room
 from meshreel.capture.simulated.procedural import SoftBodiesOptions, soft_bodies
 from meshreel.capture.simulated.simulated_rig import SceneFrame
@@ -111,8 +114,9 @@ class Store:
             known_as, chosen = Path(RECORDED, name), ":" if frames is None else f":{frames}"
             check_source(self.data / known_as, known_as)
             recording, _ = open_recording(self.data / known_as, frames=chosen, keep=False)
-            captured = Captured(recording, _kept(name, self.cache) / name / "meshes")
-            return Dataset(captured, captured.cameras, pictures=captured.colors)
+            return _captured(recording, _kept(name, self.cache) / name)
+        if name in RELEASED and _is_published(self.data / name):
+            return _published(self.data / name, _kept(name, self.cache) / name, frames)
         if name == WALKER:
             count = frames or FRAMES
             return Dataset(Walker(_kept(name, self.cache) / f"{name}-{count}", count), truth=true_luma)
@@ -153,14 +157,35 @@ def is_scene(name: str) -> bool:
     return name in (*ROOMS, *RECORDINGS, *RELEASED)
 
 
+def _captured(recording: Recording | Clouds, kept: Path) -> Dataset:
+    captured = Captured(recording, kept / "meshes")
+    return Dataset(captured, captured.cameras, pictures=captured.colors)
+
+
+def _is_published(folder: Path) -> bool:
+    """Return whether a scene is as SceneHub4D and FSVVD publish theirs: recordings of cameras, or point clouds."""
+    return folder.is_dir() and not any((folder / MESHES).glob("*")) and (is_take(folder) or are_clouds([folder]))
+
+
+def _published(folder: Path, kept: Path, frames: int | None) -> Dataset:
+    """Return a scene of others as `meshreel capture` makes it; the rig of cameras is kept, too."""
+    chosen = ":" if frames is None else f":{frames}"
+    if not is_take(folder):
+        return _captured(open_clouds([folder], frames=chosen)[0], kept)
+    if not (kept / "rig").exists():
+        write_takes([open_take(folder)], kept / "rig")
+    return _captured(open_recording(kept / "rig", frames=chosen, keep=False)[0], kept)
+
+
 def released_in(data: Path) -> tuple[str, ...]:
-    """Return the names of the sequences of TSMC's authors in a folder."""
-    return tuple(name for name in RELEASED if any((data / name / MESHES).glob("*")))
+    """Return the names of the sequences of TSMC's authors, or of whom they took them from, in a folder."""
+    return tuple(name for name in RELEASED if any((data / name / MESHES).glob("*")) or _is_published(data / name))
 
 
 def views_missing(data: Path, names: Iterable[str]) -> tuple[str, ...]:
     """Return a line for each sequence of the authors without the views that its pictures are to be seen from."""
-    lacking = [name for name in released_in(data) if name in names and not any((data / name).glob(VIEW_FILES))]
+    released = (name for name in released_in(data) if name in names and not _is_published(data / name))
+    lacking = [name for name in released if not any((data / name).glob(VIEW_FILES))]
     return tuple(f"{data / name}: no {VIEW_FILES}; pictures are seen from views around the meshes" for name in lacking)
 
 

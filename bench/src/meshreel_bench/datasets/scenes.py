@@ -15,6 +15,7 @@ from meshreel import geometry
 from meshreel.analysis import scene as segmenter
 from meshreel.analysis.scene.background import FRAMES, Moment, fuse_still_depth
 from meshreel.analysis.scene.segmentation import segment
+from meshreel.capture.clouds import Clouds
 from meshreel.capture.recording import FusionOptions, Recording, open_recording
 from meshreel.capture.rig.rig import RIG
 from meshreel.capture.simulated import demo_room
@@ -33,16 +34,17 @@ from .rooms import PROCEDURAL, ROOM3, SENSED
 
 
 class Captured(DerivedSequence):
-    """The frames of a recording, made as `meshreel capture` makes them where the folder lacks them."""
+    """The frames of a recording or of point clouds, made as `meshreel capture` makes them where a folder lacks them."""
 
-    def __init__(self, recording: Recording, folder: Path) -> None:
+    def __init__(self, recording: Recording | Clouds, folder: Path) -> None:
         super().__init__(recording)
         make_folder(folder)
         for number, name in enumerate(frame_names(len(recording), "ply")):
             if not (folder / name).exists():
                 write_mesh(recording[number], folder / name)
         self._meshes = open_sequence(folder)
-        self.cameras = tuple(camera.view for camera in recording.rig.cameras)
+        rig = recording.rig if isinstance(recording, Recording) else None
+        self.cameras = () if rig is None else tuple(camera.view for camera in rig.cameras)
 
     def __getitem__(self, index: int) -> Mesh:
         return self._meshes[range(len(self))[index]]
