@@ -251,7 +251,7 @@ def test_absurd_sizes_are_refused_before_memory_is_taken(tmp_path: Path) -> None
 
 def test_a_point_cloud_is_refused_with_what_makes_surface_of_it(tmp_path: Path) -> None:
     head, body = PLY_TEXT.replace("element face 3", "element face 0").split("3 0 1 2 7")[0].split("end_header\n")
-    with pytest.raises(InputError, match=r"m\.ply: 5 vertices and no faces: only surface is coded; reconstruct it"):
+    with pytest.raises(InputError, match=r"m\.ply: 5 vertices and no faces: only surface is coded; `meshreel capture"):
         read(tmp_path, "m.ply", f"{head}end_header\n{body}")
 
 

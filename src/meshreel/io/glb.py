@@ -14,10 +14,10 @@ from typing import TypeVar
 import numpy as np
 from jaxtyping import Float32, Float64, Int64, UInt8
 
-from ..types import Texture
+from ..types import Texture, Up
 from .glb_file import PASSED_OVER, from_linear, to_linear
 from .gltf import DRACO, MESHOPTS, QUANTIZED, Entry, Gltf
-from .looks import Look, light_in_picture, with_looks
+from .looks import Look, Part, joined, light_in_picture
 from .polygons import CLOUD, Polygons, Surfaceless, Unreadable, shares_of
 
 Matrix = Float64[np.ndarray, "4 4"]
@@ -68,6 +68,9 @@ class _Part:
 
 class Scene:
     """The scene of a GLB file."""
+
+    frame_rate: float | None = None  # 1/s; a GLB does not tell
+    up: Up = "y"
 
     def __init__(self, data: bytes) -> None:
         """Raises Unreadable if the file is damaged, or needs what is not read."""
@@ -359,28 +362,17 @@ class Scene:
         return []
 
     def _joined(self, parts: list[_Part]) -> Polygons:
-        """Return all parts as one surface."""
-        counts = np.array([len(part.vertices) for part in parts], np.int64)
-        vertices = np.concatenate([np.zeros((0, 3)), *(part.vertices for part in parts)])
-        faces = [part.faces + begin for part, begin in zip(parts, np.cumsum(counts) - counts, strict=True)]
-        corners = np.concatenate([np.zeros((0, 3), np.int64), *faces]).reshape(-1)
-        # A vertex without colours beside others has none of its own; its look may have one.
-        colored = np.repeat(np.array([part.colors is not None for part in parts], bool), counts)
-        none = [np.zeros((len(part.vertices), 3), np.uint8) if part.colors is None else part.colors for part in parts]
-        colors = np.concatenate([np.zeros((0, 3), np.uint8), *none])
-        places = [np.full((len(p.vertices), 2), np.nan, np.float32) if p.uv is None else p.uv for p in parts]
-        uv = np.concatenate([np.zeros((0, 2), np.float32), *places])[corners]
-        which = np.repeat(np.arange(len(parts)), [len(part.faces) for part in parts])
-        uv = uv if np.isfinite(uv).any() else None
-        sizes = np.full(len(corners) // 3, 3, np.int64)
-        surface = Polygons(vertices, corners, sizes, colors=colors, colored=colored, uv=uv)
-        looks = [part.look for part in parts]
-        # Beside colours, what has none is white, not unknown.
-        if colored.any() or any(look.color is not None for look in looks):
-            looks = [look if look != Look() else Look((255, 255, 255)) for look in looks]
-        found = with_looks(surface, looks, which)
+        """Return all parts as one surface, which names what is not read."""
+        found = joined([_polygons(part) for part in parts])
         named = {_WORDS.get(".".join(name.split(".")[-2:]), _plain(name)) for name in self._file.tree.unread()}
         return found.naming(named | self._named)
+
+
+def _polygons(part: _Part) -> Part:
+    corners, sizes = part.faces.reshape(-1), np.full(len(part.faces), 3, np.int64)
+    valid = (corners >= 0) & (corners < len(part.vertices))  # `checked` refuses others
+    uv = None if part.uv is None else part.uv[np.where(valid, corners, 0)]
+    return Part(part.vertices, corners, sizes, part.colors, uv, part.look)
 
 
 def _plain(name: str) -> str:

@@ -26,6 +26,42 @@ class Look:
     picture: Texture | None = None
 
 
+@dataclass(frozen=True, slots=True)
+class Part:
+    """The polygons of a scene that have one look."""
+
+    vertices: Float64[np.ndarray, "V 3"]
+    corners: Int64[np.ndarray, " C"]  # vertex of each corner of each polygon
+    sizes: Int64[np.ndarray, " P"]  # corners of each polygon
+    colors: UInt8[np.ndarray, "V 3"] | None = None  # sRGB
+    uv: Float32[np.ndarray, "C 2"] | None = None  # as `Mesh.uv`
+    look: Look = Look()
+
+
+def joined(parts: Sequence[Part]) -> Polygons:
+    """Return the parts of a scene as one surface."""
+    counts = np.array([len(part.vertices) for part in parts], np.int64)
+    begins = np.cumsum(counts) - counts
+    vertices = np.concatenate([np.zeros((0, 3)), *(part.vertices for part in parts)])
+    corners = np.concatenate(
+        [np.zeros(0, np.int64), *(part.corners + begin for part, begin in zip(parts, begins, strict=True))]
+    )
+    # A vertex without colours beside others has none of its own; its look may have one.
+    colored = np.repeat(np.array([part.colors is not None for part in parts], bool), counts)
+    none = [np.zeros((len(part.vertices), 3), np.uint8) if part.colors is None else part.colors for part in parts]
+    colors = np.concatenate([np.zeros((0, 3), np.uint8), *none])
+    places = [np.full((len(p.corners), 2), np.nan, np.float32) if p.uv is None else p.uv for p in parts]
+    uv = np.concatenate([np.zeros((0, 2), np.float32), *places])
+    sizes = np.concatenate([np.zeros(0, np.int64), *(part.sizes for part in parts)])
+    which = np.repeat(np.arange(len(parts)), [len(part.sizes) for part in parts])
+    uv_or_none = uv if np.isfinite(uv).any() else None
+    looks = [part.look for part in parts]
+    # Beside colours, what has none is white, not unknown.
+    if colored.any() or any(look.color is not None for look in looks):
+        looks = [look if look != Look() else Look((255, 255, 255)) for look in looks]
+    return with_looks(Polygons(vertices, corners, sizes, colors=colors, colored=colored, uv=uv_or_none), looks, which)
+
+
 def with_looks(polygons: Polygons, looks: Sequence[Look], which: Int64[np.ndarray, " P"]) -> Polygons:
     """Return polygons with their looks, whose numbers are `which`, -1 for none, as colours of vertices and a picture.
 

@@ -20,9 +20,12 @@ from .obj import parse_obj
 from .ply import parse_ply
 from .polygons import CLOUD, Dropped, Polygons, Surfaceless, Unreadable, triangulate
 from .stl_off import parse_off, parse_stl
+from .usd import EXTENSIONS as USD
+from .usd import Stage
 
 _PARSERS = {".obj": parse_obj, ".ply": parse_ply, ".glb": parse_glb, ".stl": parse_stl, ".off": parse_off}
-EXTENSIONS = tuple(_PARSERS)
+EXTENSIONS = (*_PARSERS, *USD)
+MOVING = (".glb", *USD)  # of files that may have all frames
 _MARK = b"\xef\xbb\xbf"  # of byte order, at the beginning of texts of some programs
 _BEGINNINGS = {  # of files of other kinds, in small letters
     b"\x89png": "a PNG picture",
@@ -57,6 +60,13 @@ def read_mesh(path: Place, where: str | None = None) -> Loaded:
     Raises InputError for what cannot be read, and for points without faces.
     """
     where, kind = where or str(path), path.suffix.lower()
+    if kind in USD:
+        with _reading(path, where):
+            stage = moving_scene(path, where)
+            if stage.count(stage.frame_rate or 1.0) > 1:
+                text = "USD has an animation, and is one of several files; give it alone, to have its frames"
+                raise Unreadable(text)
+            return checked(stage.at(0.0))
     parse = _PARSERS.get(kind)
     if parse is None:
         raise InputError(f"{where}: {path.suffix or 'no'} extension is not one of {', '.join(EXTENSIONS)}; convert it")
@@ -66,18 +76,18 @@ def read_mesh(path: Place, where: str | None = None) -> Loaded:
         return checked(with_materials(polygons, path) if polygons.has_looks else polygons)
 
 
-def frames_of_animation(path: Place, frame_rate: float) -> int:
-    """Return the number of frames of a GLB file at a frame rate; 1 if nothing moves, or if it cannot be read."""
+def animation_of(path: Place) -> Scene | Stage | None:
+    """Return the scene of a file that may move; None if it cannot be read, which `read_mesh` raises with the frame."""
     try:
-        return _scene(path, str(path)).count(frame_rate)
-    except (Unreadable, InputError):  # which `read_mesh` raises with the frame
-        return 1
+        return moving_scene(path, str(path))
+    except (Unreadable, InputError):
+        return None
 
 
 def read_animated(path: Place, time: float, where: str) -> Loaded:
-    """Read the mesh in a GLB file as its animation has it at a time, s. Raises InputError as `read_mesh` does."""
+    """Read the mesh in a file as its animation has it at a time, s. Raises InputError as `read_mesh` does."""
     with _reading(path, where):
-        return checked(_scene(path, where).at(time))
+        return checked(moving_scene(path, where).at(time))
 
 
 @contextmanager
@@ -89,8 +99,9 @@ def _reading(path: Place, where: str) -> Iterator[None]:
         raise InputError(f"{where}: {error}") from None
     except Unreadable as error:
         kind, begins = path.suffix[1:].upper(), _read(path, where)[:256].removeprefix(_MARK).lstrip().lower()
+        own = {"USDZ": "ZIP"}.get(kind, "USD" if path.suffix.lower() in USD else kind)
         for beginning, name in _BEGINNINGS.items():
-            if begins.startswith(beginning) and kind not in name:
+            if begins.startswith(beginning) and own not in name:
                 raise InputError(f"{where}: is {name}, whatever its name says; put a {kind} file there") from None
         raise InputError(f"{where}: {error}; re-export the {kind} file, or leave it out with --frames") from None
 
@@ -102,15 +113,21 @@ def _read(path: Place, where: str) -> bytes:
     return data
 
 
-def _scene(path: Place, where: str) -> Scene:
+def moving_scene(path: Place, where: str) -> Scene | Stage:
+    """Return the scene of a file of `MOVING`, which is kept. Raises Unreadable and InputError."""
     state = path.stat() if isinstance(path, Path) and path.exists() else None
     return _opened(path, where if state is None else str(path), state and (state.st_size, state.st_mtime_ns))
 
 
 @lru_cache(maxsize=2)  # scenes at a time (guess)
-def _opened(path: Place, where: str, _state: object) -> Scene:
+def _opened(path: Place, where: str, _state: object) -> Scene | Stage:
     """Return the scene of a file, read again if the file has changed."""
-    return Scene(_read(path, where))
+    if path.suffix.lower() not in USD:
+        return Scene(_read(path, where))
+    if not isinstance(path, Path):
+        raise InputError(f"{where}: a USD file is not read by URL; copy it here")
+    _read(path, where)
+    return Stage(path)
 
 
 def _only(polygons: Polygons, kept: Bool[np.ndarray, " V"]) -> Polygons:

@@ -18,7 +18,7 @@ from ..texts import json_of
 from ..types import Mesh, MeshSequence, Up, known_up
 from .file_names import Order, find_frames
 from .files import Place, Remote, located, read_file
-from .meshes import Loaded, frames_of_animation, read_animated, read_mesh
+from .meshes import MOVING, Loaded, animation_of, read_animated, read_mesh
 from .npz import Archive
 
 CAPTURED = "capture.json"  # record of the capture, in a folder that `meshreel capture` wrote
@@ -85,7 +85,7 @@ class Files:
 
 @dataclass(frozen=True, slots=True)
 class Animation:
-    """Frames of one GLB file, whose animation is sampled at a frame rate."""
+    """Frames of one GLB or USD file, whose animation is sampled at a frame rate."""
 
     path: Place
     frame_rate: float  # 1/s
@@ -200,8 +200,9 @@ class FileSequence(MeshSequence):
 def open_sequence(source: str | Path | Sequence[str | Path], options: SequenceOptions | None = None) -> FileSequence:
     """Return the frames of a folder, a glob pattern, a list of files, one file or an .npz; none is read yet.
 
-    An animated GLB file alone has a frame for each moment of its animation at the frame rate. All but an .npz may be
-    URLs, such as s3:// and https:// (extra `remote`). The up axis is that of `meshreel capture` in the folder, or y.
+    An animated GLB or USD file alone has a frame for each moment of its animation at the frame rate, which a USD file
+    tells. All but .npz and USD may be URLs, such as s3:// and https:// (extra `remote`). The up axis is that of a USD
+    file, that of `meshreel capture` in the folder, or y.
     """
     options = options or SequenceOptions()
     place = located(source) if isinstance(source, str | Path) else None
@@ -215,10 +216,12 @@ def open_sequence(source: str | Path | Sequence[str | Path], options: SequenceOp
     paths, remarks = find_frames(source, options.order)
     if not paths:
         raise InputError("the list of files has 0 frames; give at least one")
-    if len(paths) == 1 and paths[0].suffix.lower() == ".glb":
-        rate = RATE if options.frame_rate is None else options.frame_rate
-        if (count := frames_of_animation(paths[0], rate)) > 1:
-            return FileSequence(Animation(paths[0], rate, count), options, remarks)
+    if len(paths) == 1 and paths[0].suffix.lower() in MOVING and (scene := animation_of(paths[0])) is not None:
+        rate = options.frame_rate or scene.frame_rate or RATE
+        if (count := scene.count(rate)) > 1:
+            moving = Animation(paths[0], rate, count)
+            return FileSequence(moving, replace(options, frame_rate=rate), remarks, scene.up)
+        return FileSequence(Files(paths), options, remarks, scene.up)
     up = "y" if place is None else known_up(capture_record(place).get("up"))
     return FileSequence(Files(paths), options, remarks, up)
 
