@@ -22,6 +22,7 @@ from ..export.animated_usd import EXTENSIONS
 from ..export.film_files import KINDS as FILMS
 from ..export.frames import Part, check_part, check_splats, write_frames, write_splats
 from ..format.layout import ChunkKind
+from ..io.alembic import EXTENSION as ABC
 from ..io.sequence import SequenceOptions
 from ..io.write import check_apart, check_free, frame_names, left_over, make_folder, write_file, write_mesh
 from ..types import Mesh, Texture, Up
@@ -216,16 +217,16 @@ def export(
     force: Force = False,
     common: Common = Common(),
 ) -> None:
-    """Write a .reel file as one animated file: GLB for viewers and engines, USD for film tools; or as a film to post.
+    """Write a .reel file as one animated file: GLB for viewers, USD or Alembic for film tools; or as a film to post.
 
     Parameters
     ----------
     file
         The .reel file. Nothing is written where a group of it is damaged.
     output
-        The file to write: .glb, .usdc or .usd (binary), .usda (text), .usdz (package), .mp4, .webm, .gif, or .png, a
-        picture of the first frame. If not given, the name of the .reel file with the extension of the format, in the
-        current directory.
+        The file to write: .glb, .abc, .usdc or .usd (binary), .usda (text), .usdz (package), .mp4, .webm, .gif, or
+        .png, a picture of the first frame. If not given, the name of the .reel file with the extension of the format,
+        in the current directory.
     glb
         Write GLB; implied by the extension of `output`.
     usd
@@ -247,9 +248,9 @@ def export(
     up
         Axis of the meshes that points up; by default the one that the .reel file names. In the written file it is +y.
     texture
-        Write textures, too, which take far more space than colours of vertices: in USD one of each frame, PNG files in
-        the folder NAME_textures (.usdz: inside); in GLB, which cannot change a picture in time, one for each mesh.
-        Needs the extra `color`.
+        Write textures, too, which take far more space than colours of vertices: in USD and Alembic one of each frame,
+        PNG files in the folder NAME_textures (.usdz: inside); in GLB, which cannot change a picture in time, one for
+        each mesh. Needs the extra `color`.
     compress
         Compress GLB to a quarter of its bytes or so, for viewers that know `EXT_meshopt_compression` and
         `KHR_mesh_quantization`. Needs the extra `glb`.
@@ -313,7 +314,7 @@ def _target(file: Path, output: Path | None, kinds: list[str]) -> Path:
         if not kinds:
             raise InputError("no format: give --glb, --usd, --mp4, --webm, --gif, or a name with -o")
         return Path(file.stem + kinds[0])
-    extensions = (".glb", *EXTENSIONS, *FILMS) if not kinds else EXTENSIONS if kinds == [".usdc"] else tuple(kinds)
+    extensions = (".glb", ABC, *EXTENSIONS, *FILMS) if not kinds else EXTENSIONS if kinds == [".usdc"] else tuple(kinds)
     if output.suffix.lower() not in extensions:
         text = f"{output}: the output must end in {' or '.join(extensions)}"
         raise InputError(f"{text}; a mesh file for each frame is written by meshreel decode")

@@ -1,4 +1,4 @@
-"""Export of a .reel file to one animated file that other programs play: GLB or USD.
+"""Export of a .reel file to one animated file that other programs play: GLB, USD or Alembic.
 
 Frames of a group with the same vertices become one moving shape, every other frame a shape that is visible for one
 frame. The states of a background are still shapes.
@@ -20,7 +20,9 @@ from ..decoder.pictures import Decoders
 from ..decoder.tracks import Background, Track
 from ..errors import InputError, path_of
 from ..format.layout import Form
+from ..io.alembic import EXTENSION
 from ..types import Mesh, Up
+from .animated_abc import AbcWriter, animated_abc
 from .animated_glb import GlbWriter, animated_glb
 from .animated_usd import EXTENSIONS, UsdWriter, animated_usd
 from .frames import Part
@@ -29,6 +31,7 @@ from .shapes import Animation, Shape, check_output
 MOST_FRAMES = 64  # of a shape, all in memory together; viewers limit the morph targets of a mesh (guess)
 _FAR = 8.0  # diagonals; coordinates farther from the origin are stored relative to the center (guess)
 
+Writer = GlbWriter | UsdWriter | AbcWriter
 Progress = Callable[[str, int, int], None]  # stage, number of frames done, number of all frames
 
 
@@ -65,7 +68,7 @@ def export(
     options: ExportOptions = ExportOptions(),
     progress: Progress | None = None,
 ) -> int:
-    """Write consecutive frames, by default all, to a .glb, .usd, .usdc, .usda or .usdz file; return the shape count.
+    """Write consecutive frames, by default all, to a .glb, .abc, .usd, .usdc, .usda or .usdz; return the shape count.
 
     The file appears when it is complete. At most two groups are in memory. Raises InputError if the format cannot hold
     the frames or the file cannot be written, and FormatError if a chunk is damaged.
@@ -84,16 +87,21 @@ def export(
     return written
 
 
-def _writer(path: Path, animation: Animation, compressed: bool) -> AbstractContextManager[GlbWriter | UsdWriter]:
+def _writer(
+    path: Path, animation: Animation, compressed: bool
+) -> AbstractContextManager[GlbWriter | UsdWriter | AbcWriter]:
     check_output(path)
     extension = path.suffix.lower()
     if extension == ".glb":
         return animated_glb(path, animation, compressed)
     if compressed:
         raise InputError(f"{path}: only .glb is compressed; name such a file, or leave compression out")
+    if extension == EXTENSION:
+        return animated_abc(path, animation)
     if extension in EXTENSIONS:
         return animated_usd(path, animation)
-    raise InputError(f"{path}: {extension or 'no'} extension is not one of .glb, {', '.join(EXTENSIONS)}; choose one")
+    known = ", ".join((".glb", EXTENSION, *EXTENSIONS))
+    raise InputError(f"{path}: {extension or 'no'} extension is not one of {known}; choose one")
 
 
 def _animation(reader: ReelReader, frames: range, up: Up) -> Animation:

@@ -50,14 +50,20 @@ def animated_usd(path: Path, animation: Animation) -> Iterator[UsdWriter]:
             finally:
                 writer.close()
             converted = _converted(crate, path)
-            if textures.exists() and path.suffix.lower() != ".usdz":
-                (path.parent / textures.name).mkdir(exist_ok=True)
-                for picture in textures.iterdir():
-                    picture.replace(path.parent / textures.name / picture.name)
+            if path.suffix.lower() != ".usdz":
+                move_textures(textures, path)
             converted.replace(path)
     except (OSError, Tf.ErrorException) as error:
         remedy = "free space, or choose another folder"
         raise InputError(f"{path}: cannot be written ({_reason(error)}); {remedy}") from None
+
+
+def move_textures(textures: Path, path: Path) -> None:
+    """Move the pictures of a folder, if there is one, beside a file."""
+    if textures.exists():
+        (path.parent / textures.name).mkdir(exist_ok=True)
+        for picture in textures.iterdir():
+            picture.replace(path.parent / textures.name / picture.name)
 
 
 class UsdWriter:

@@ -62,6 +62,26 @@ def joined(parts: Sequence[Part]) -> Polygons:
     return with_looks(Polygons(vertices, corners, sizes, colors=colors, colored=colored, uv=uv_or_none), looks, which)
 
 
+def of_vertices(
+    colors: UInt8[np.ndarray, "N 3"], count: int, corners: Int64[np.ndarray, " C"], sizes: Int64[np.ndarray, " P"]
+) -> tuple[UInt8[np.ndarray, "V 3"] | None, tuple[int, int, int] | None]:
+    """Return the colours of `count` vertices, those of faces and corners as their means; or the one of all of them.
+
+    Whose colours they are is known by their number; None of other numbers.
+    """
+    if len(colors) == 1:
+        red, green, blue = colors[0].tolist()
+        return None, (red, green, blue)
+    if len(colors) == count and count:
+        return colors, None
+    own = np.repeat(colors, sizes, axis=0) if len(colors) == len(sizes) else colors
+    if not len(own) or len(own) != len(corners) or not 0 <= corners.min() <= corners.max() < count:
+        return None, None
+    counts = np.maximum(np.bincount(corners, minlength=count), 1)
+    sums = [np.bincount(corners, own[:, axis], count) for axis in range(3)]
+    return np.rint(np.stack(sums, axis=1) / counts[:, None]).astype(np.uint8), None
+
+
 def with_looks(polygons: Polygons, looks: Sequence[Look], which: Int64[np.ndarray, " P"]) -> Polygons:
     """Return polygons with their looks, whose numbers are `which`, -1 for none, as colours of vertices and a picture.
 

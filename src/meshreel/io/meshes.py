@@ -13,6 +13,8 @@ from jaxtyping import Bool
 
 from ..errors import InputError
 from ..types import Mesh
+from .alembic import EXTENSION as ABC
+from .alembic import Archive
 from .files import Place, read_input
 from .glb import Scene, parse_glb
 from .materials import with_materials
@@ -24,8 +26,9 @@ from .usd import EXTENSIONS as USD
 from .usd import Stage
 
 _PARSERS = {".obj": parse_obj, ".ply": parse_ply, ".glb": parse_glb, ".stl": parse_stl, ".off": parse_off}
-EXTENSIONS = (*_PARSERS, *USD)
-MOVING = (".glb", *USD)  # of files that may have all frames
+_STAGES: dict[str, type[Stage | Archive]] = {**dict.fromkeys(USD, Stage), ABC: Archive}  # packages open the file
+EXTENSIONS = (*_PARSERS, *_STAGES)
+MOVING = (".glb", *_STAGES)  # of files that may have all frames
 _MARK = b"\xef\xbb\xbf"  # of byte order, at the beginning of texts of some programs
 _BEGINNINGS = {  # of files of other kinds, in small letters
     b"\x89png": "a PNG picture",
@@ -60,11 +63,11 @@ def read_mesh(path: Place, where: str | None = None) -> Loaded:
     Raises InputError for what cannot be read, and for points without faces.
     """
     where, kind = where or str(path), path.suffix.lower()
-    if kind in USD:
+    if kind in _STAGES:
         with _reading(path, where):
             stage = moving_scene(path, where)
             if stage.count(stage.frame_rate or 1.0) > 1:
-                text = "USD has an animation, and is one of several files; give it alone, to have its frames"
+                text = "it has an animation, and is one of several files; give it alone, to have its frames"
                 raise Unreadable(text)
             return checked(stage.at(0.0))
     parse = _PARSERS.get(kind)
@@ -76,7 +79,7 @@ def read_mesh(path: Place, where: str | None = None) -> Loaded:
         return checked(with_materials(polygons, path) if polygons.has_looks else polygons)
 
 
-def animation_of(path: Place) -> Scene | Stage | None:
+def animation_of(path: Place) -> Scene | Stage | Archive | None:
     """Return the scene of a file that may move; None if it cannot be read, which `read_mesh` raises with the frame."""
     try:
         return moving_scene(path, str(path))
@@ -113,21 +116,21 @@ def _read(path: Place, where: str) -> bytes:
     return data
 
 
-def moving_scene(path: Place, where: str) -> Scene | Stage:
+def moving_scene(path: Place, where: str) -> Scene | Stage | Archive:
     """Return the scene of a file of `MOVING`, which is kept. Raises Unreadable and InputError."""
     state = path.stat() if isinstance(path, Path) and path.exists() else None
     return _opened(path, where if state is None else str(path), state and (state.st_size, state.st_mtime_ns))
 
 
 @lru_cache(maxsize=2)  # scenes at a time (guess)
-def _opened(path: Place, where: str, _state: object) -> Scene | Stage:
+def _opened(path: Place, where: str, _state: object) -> Scene | Stage | Archive:
     """Return the scene of a file, read again if the file has changed."""
-    if path.suffix.lower() not in USD:
-        return Scene(_read(path, where))
+    data, kind = _read(path, where), _STAGES.get(path.suffix.lower())
+    if kind is None:
+        return Scene(data)
     if not isinstance(path, Path):
-        raise InputError(f"{where}: a USD file is not read by URL; copy it here")
-    _read(path, where)
-    return Stage(path)
+        raise InputError(f"{where}: {path.suffix} is not read by URL; copy it here")
+    return kind(path)
 
 
 def _only(polygons: Polygons, kept: Bool[np.ndarray, " V"]) -> Polygons:

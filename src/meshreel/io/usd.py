@@ -17,7 +17,7 @@ from jaxtyping import Float32, Float64, Int64, UInt8
 from ..errors import InputError, needed
 from ..types import Texture, Up, known_up
 from .glb_file import from_linear
-from .looks import Look, Part, joined
+from .looks import Look, Part, joined, of_vertices
 from .pictures import parse_picture
 from .polygons import Polygons, Unreadable
 
@@ -59,7 +59,7 @@ class Stage:
         named = set[str]()
         try:
             parts = list(self._parts(Usd.TimeCode(self._begin + seconds * self._a_second), named))
-        except (Tf.ErrorException, ValueError, IndexError, RuntimeError) as error:
+        except (Tf.ErrorException, TypeError, ValueError, IndexError, RuntimeError) as error:
             raise Unreadable(f"USD cannot be read ({str(error).strip().splitlines()[0]:.200})") from None
         return joined(parts).naming(named)
 
@@ -113,7 +113,10 @@ class Stage:
         if (mesh.GetOrientationAttr().Get(time) == "leftHanded") != (np.linalg.det(matrix[:3, :3]) < 0):
             ends = np.cumsum(sizes)
             order = np.repeat(ends - sizes + ends - 1, sizes) - order  # corners backwards, within each polygon
-        colors, one = _colors(mesh, time, len(points), corners, sizes)
+        found = mesh.GetDisplayColorPrimvar()
+        light = _array(found.ComputeFlattened(time)).reshape(-1, 3) if found.HasValue() else np.zeros((0, 3))
+        painted = from_linear(np.clip(light.astype(np.float64), 0, 1))
+        colors, one = of_vertices(painted, len(points), corners, sizes)
         for chosen, material in _subsets(mesh, len(sizes), time):
             rows = np.repeat(chosen, sizes)
             look, places = _look(material, time, named)
@@ -140,28 +143,6 @@ class Stage:
 
 def _array(value: Any) -> np.ndarray:
     return np.zeros(0) if value is None else np.asarray(value)
-
-
-def _colors(
-    mesh: Any, time: Any, count: int, corners: Int64[np.ndarray, " C"], sizes: Int64[np.ndarray, " P"]
-) -> tuple[UInt8[np.ndarray, "V 3"] | None, tuple[int, int, int] | None]:
-    """Return the colours of a mesh's vertices, those of faces and corners as their means, or the one of all of it."""
-    found = mesh.GetDisplayColorPrimvar()
-    values = _array(found.ComputeFlattened(time)) if found.HasValue() else np.zeros(0)
-    if not len(values):
-        return None, None
-    painted = from_linear(np.clip(values.astype(np.float64), 0, 1))
-    if len(painted) == 1:
-        red, green, blue = painted[0].tolist()
-        return None, (red, green, blue)
-    if len(painted) == count:
-        return painted, None
-    of_corners = np.repeat(painted, sizes, axis=0) if len(painted) == len(sizes) else painted
-    if len(of_corners) != len(corners) or (corners < 0).any() or (corners >= count).any():
-        return None, None
-    counts = np.maximum(np.bincount(corners, minlength=count), 1)
-    sums = [np.bincount(corners, of_corners[:, axis], count) for axis in range(3)]
-    return np.rint(np.stack(sums, axis=1) / counts[:, None]).astype(np.uint8), None
 
 
 def _subsets(mesh: Any, count: int, time: Any) -> Iterator[tuple[np.ndarray, Any]]:
