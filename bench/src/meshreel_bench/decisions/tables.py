@@ -144,6 +144,23 @@ COLUMNS: dict[str, Columns] = {
         "> SSIM in colour": optional("view_ssim", ".3f"),
         "> PCQM x 1000": thousandths("pcqm"),
     },
+    "four": {
+        "system": "{system}",
+        "operating point": "{point}",
+        "> Mbps": "{mbps:.3f}",
+        "> D2 (paper), dB": "{d2_psnr_paper:.2f}",
+        "> masked SSIM": "{ssim_masked:.3f}",
+        "> normals, degrees": "{normal_error_deg:.2f}",
+        "> decode, ms a frame": "{decode_ms:.1f}",
+    },
+    "points": {
+        "points": "{case}",
+        "> voxel, mm": thousandths("voxel_m"),
+        "> from the truth, mm RMS": thousandths("rms_forward_m"),
+        "> the truth from it, mm RMS": thousandths("rms_backward_m"),
+        "> faces that face the right way, %": lambda row: f"{100 * row['right_side']:.2f}",
+        "> CPU s": optional("cpu_s", ".2f"),
+    },
     "detail": {
         "frames": "{case}",
         "way": "{way}",
