@@ -13,7 +13,7 @@ from pathlib import Path
 from packaging.requirements import Requirement
 
 PLAYER = Path(__file__).resolve().parents[1] / "src/meshreel/player/LICENSES.txt"
-EXTRAS = ("", "cli", "encode", "demo", "open3d", "play", "usd", "glb", "cluster", "remote")
+EXTRAS = ("", "cli", "encode", "demo", "open3d", "las", "play", "usd", "alembic", "glb", "cluster", "remote")
 MAY_BE_ANY = {"usd"}  # asked for by name: the user decides
 COPYLEFT = re.compile(r"\b[AL]?GPL|General Public License", re.IGNORECASE)
 WEAK = re.compile(r"\bMPL|Mozilla|\bEPL|\bCDDL|LicenseRef", re.IGNORECASE)  # its own files only, or read it yourself
