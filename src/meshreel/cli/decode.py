@@ -65,14 +65,14 @@ def decode(
         The directory for frame_00000.ply and so on; created if needed.
     format
         Format of the mesh files. All keep colours of vertices; OBJ (with .mtl and .png), GLB and npz keep textures.
-        Of splats, ply or spz.
+        Of splats, ply, spz or glb (KHR_gaussian_splatting).
     layers
         Largest number of layers (subdivisions, or KLT components) to decode of each group beyond its first: fewer
         give coarser, valid meshes from fewer bytes.
     only
         Of a scene, only the background, once for each change of it, or only the moving bodies; by default whole frames.
     splats
-        Write the splats of each frame in place of meshes: PLY or SPZ files for viewers of 3D Gaussian splatting.
+        Write the splats of each frame in place of meshes: PLY, SPZ or GLB files for viewers of 3D Gaussian splatting.
     audio
         Write the audio file instead, as it was given, to the file that --output names.
     """
@@ -152,8 +152,8 @@ def _write_audio(file: Path, video: Video, output: Path, common: Common) -> None
 
 def _write_splats(file: Path, video: Video, output: Path, format: str, common: Common) -> None:
     """Write the splats of all frames. Raises InputError if there are none, or for a format of meshes."""
-    if format not in ("ply", "spz"):
-        raise InputError(f"--format {format}: splats are written as PLY or SPZ; give --format ply or spz")
+    if format not in ("ply", "spz", "glb"):
+        raise InputError(f"--format {format}: splats are written as PLY, SPZ or GLB; give --format ply, spz or glb")
     check_splats(video, str(file))
     _write(file, output, frame_names(len(video), format), (video.splats, write_splats), common)
     row = {"output": str(output), "frames": len(video), "format": format, "frame_rate": video.frame_rate}

@@ -1,12 +1,14 @@
-"""Export of a .reel file to one file per frame: a mesh, or its splats as PLY (Kerbl et al. 2023) or SPZ.
+"""Export of a .reel file to one file per frame: a mesh, or its splats as PLY (Kerbl et al. 2023), SPZ or GLB.
 
 Splats have positions, logarithms of scales, quaternions, opacities (in PLY their logits), and colours as harmonics of
-degree 0, without those that the frame hides. SPZ is Niantic's, version 3: 20 bytes a splat, packed by gzip.
+degree 0, without those that the frame hides. SPZ is Niantic's, version 3: 20 bytes a splat, packed by gzip. GLB has the
+extension KHR_gaussian_splatting, as the draft under review has it.
 """
 
 from __future__ import annotations
 
 import gzip
+import io
 import math
 import struct
 from collections.abc import Callable, Sequence
@@ -20,6 +22,7 @@ from ..decoder.video import Video
 from ..errors import FormatError, InputError, path_of
 from ..geometry.rigid import quaternions
 from ..geometry.splats import Bound
+from ..io.glb_file import GlbFile, light
 from ..io.write import write_file, write_mesh
 from ..shapes import Float64, UInt8
 
@@ -52,6 +55,7 @@ def check_part(file: Path, reader: ReelReader, part: Part) -> None:
 
 
 HARMONIC = 0.28209479177387814  # of degree 0: 1 / (2 sqrt(pi))
+SPLATS = "KHR_gaussian_splatting"
 MOST_OPACITY = 1 - 2**-10  # whose logit is finite
 NAMES = "x y z nx ny nz f_dc_0 f_dc_1 f_dc_2 opacity scale_0 scale_1 scale_2 rot_0 rot_1 rot_2 rot_3"
 
@@ -62,10 +66,10 @@ def check_splats(video: Video, name: str) -> None:
 
 
 def write_splats(bound: Bound | None, path: Path) -> None:
-    """Write Gaussians, which may be none, to a .ply or .spz file, which appears when it is complete."""
+    """Write Gaussians, which may be none, to a .ply, .spz or .glb file, which appears when it is complete."""
     rows = np.zeros((0, len(NAMES.split()))) if bound is None else _rows(bound)
     path = Path(path_of(path))
-    write_file(path, _spz(rows) if path.suffix == ".spz" else _ply(rows))
+    write_file(path, {".spz": _spz, ".glb": _glb}.get(path.suffix, _ply)(rows))
 
 
 def _ply(rows: Float64[np.ndarray, "N 17"]) -> bytes:
@@ -85,6 +89,35 @@ def _spz(rows: Float64[np.ndarray, "N 17"]) -> bytes:
     parts = [np.ascontiguousarray(fixed).view(np.uint8).reshape(-1, 4)[:, :3], *looks, packed_turns]
     head = struct.pack("<4sIIBBBB", b"NGSP", 3, len(rows), 0, fraction, 0, 0)
     return gzip.compress(head + b"".join(part.tobytes() for part in parts), mtime=0)
+
+
+def _glb(rows: Float64[np.ndarray, "N 17"]) -> bytes:
+    """Return a GLB file of points with the attributes of splats, and the colours that other viewers show."""
+    file, scene = GlbFile(io.BytesIO(), "splats"), {"asset": {"version": "2.0"}, "scene": 0, "scenes": [{}]}
+    if len(rows):
+        opacities = 1 / (1 + np.exp(-rows[:, 9:10]))
+        shown = light(_bytes(255 * (HARMONIC * rows[:, 6:9] + 0.5)))
+        values = {
+            "POSITION": rows[:, :3],
+            "COLOR_0": np.concatenate([shown, opacities], axis=1),
+            f"{SPLATS}:ROTATION": rows[:, [14, 15, 16, 13]],
+            f"{SPLATS}:SCALE": rows[:, 10:13],  # logarithms, as in PLY
+            f"{SPLATS}:OPACITY": opacities,
+            f"{SPLATS}:SH_DEGREE_0_COEF_0": rows[:, 6:9],
+        }
+        attributes = dict[str, int]()
+        for name, value in values.items():
+            file.open_vertices(4 * value.shape[1])
+            kind = "SCALAR" if value.shape[1] == 1 else f"VEC{value.shape[1]}"
+            attributes[name] = file.put(value.astype("<f4"), kind, bounded=name == "POSITION")
+        about = {SPLATS: {"kernel": "ellipse", "colorSpace": "srgb_rec709_display"}}
+        file.use(SPLATS)
+        file.add("meshes", {"primitives": [{"attributes": attributes, "mode": 0, "extensions": about}]})
+        file.add("nodes", {"mesh": 0})
+        scene["scenes"] = [{"nodes": [0]}]
+    packed = io.BytesIO()
+    file.finish(packed, scene)
+    return packed.getvalue()
 
 
 def _smallest_three(turns: Float64[np.ndarray, "N 4"]) -> np.ndarray:

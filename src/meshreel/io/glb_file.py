@@ -62,6 +62,10 @@ class GlbFile:
         self._tree.setdefault(kind, []).append(item)
         return len(self._tree[kind]) - 1
 
+    def use(self, extension: str) -> None:
+        """Name an extension that the file uses, and that viewers may do without."""
+        self._used.add(extension)
+
     def open_vertices(self, stride: int = 12, bits: int = 0) -> None:
         """Begin a view of vertex attributes of `stride` bytes; compressed floats are rounded to 2^-bits, if not 0."""
         self.open_view((ATTRIBUTES, stride, bits), byteStride=stride, target=_VERTICES)

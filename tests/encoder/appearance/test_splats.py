@@ -2,6 +2,7 @@
 
 import gzip
 import io
+import json
 import struct
 from collections.abc import Iterator
 from dataclasses import replace
@@ -163,6 +164,37 @@ def test_a_viewer_of_splats_reads_what_is_written(video: Video, tmp_path) -> Non
     np.testing.assert_allclose(0.5 + 0.28209479 * column["f_dc_2"], bound.colors[1:, 2], atol=1e-5)
     write_splats(None, tmp_path / "empty.ply")
     assert b"element vertex 0\n" in (tmp_path / "empty.ply").read_bytes()
+
+
+def test_glb_has_the_same_splats_as_attributes_of_points(video: Video, tmp_path) -> None:
+    bound = video.splats(1)
+    assert bound is not None
+    write_splats(bound, tmp_path / "frame.glb")
+    data = (tmp_path / "frame.glb").read_bytes()
+    size = int.from_bytes(data[12:16], "little")
+    tree, body = json.loads(data[20 : 20 + size]), data[28 + size :]
+    [primitive] = tree["meshes"][0]["primitives"]
+    assert tree["extensionsUsed"] == ["KHR_gaussian_splatting"] and primitive["mode"] == 0
+    about = {"kernel": "ellipse", "colorSpace": "srgb_rec709_display"}
+    assert primitive["extensions"] == {"KHR_gaussian_splatting": about}
+
+    def values(name: str) -> np.ndarray:
+        accessor = tree["accessors"][primitive["attributes"][name]]
+        begin = tree["bufferViews"][accessor["bufferView"]]["byteOffset"]
+        width = {"SCALAR": 1, "VEC3": 3, "VEC4": 4}[accessor["type"]]
+        return np.frombuffer(body, "<f4", accessor["count"] * width, begin).reshape(-1, width)
+
+    own = "KHR_gaussian_splatting:"
+    np.testing.assert_allclose(values("POSITION"), bound.means, atol=1e-6)
+    np.testing.assert_allclose(np.exp(values(f"{own}SCALE")), bound.scales, rtol=1e-4)
+    np.testing.assert_allclose(values(f"{own}OPACITY")[:, 0], bound.opacities, atol=2e-3)
+    np.testing.assert_allclose(0.5 + 0.28209479 * values(f"{own}SH_DEGREE_0_COEF_0"), bound.colors, atol=1e-5)
+    x, y, z, w = values(f"{own}ROTATION").T
+    np.testing.assert_allclose(x * x + y * y + z * z + w * w, 1, atol=1e-5)
+    np.testing.assert_allclose(1 - 2 * (y * y + z * z), np.swapaxes(bound.axes, 1, 2)[:, 0, 0], atol=1e-4)
+    assert values("COLOR_0").shape == (len(bound.means), 4)
+    write_splats(None, tmp_path / "empty.glb")
+    assert b'"scenes":[{}]' in (tmp_path / "empty.glb").read_bytes()
 
 
 def test_spz_has_the_same_splats_within_its_steps(video: Video, tmp_path) -> None:
