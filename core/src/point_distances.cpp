@@ -13,6 +13,7 @@ namespace meshreel {
 namespace {
 
 constexpr int kSide = MR_BLOCK_SIDE;
+constexpr int32_t kFarthest = 100'000'000;  // blocks from the origin: their voxels have whole numbers of 32 bits
 
 struct Block {
     int32_t x, y, z;
@@ -76,7 +77,7 @@ private:
                 static_cast<int32_t>(std::floor(p.z / side))};
     }
 
-    // The number of a block, or of all of them where it is none.
+    // The index of a block; the count of all where there is none.
     size_t find(Block wanted) const {
         size_t low = 0, high = into_.count;
         while (low < high) {
@@ -130,6 +131,12 @@ using namespace meshreel;
 int mr_point_distances(const mr_oriented* points, double radius, double past, const mr_blocks* into) {
     return guarded(MR_NO_MEMORY, [&]() -> int {
         if (!(radius > 0.0) || !(radius <= MR_BLOCK_SIDE * into->voxel)) return MR_BAD_INPUT;
+        for (size_t n = 0; n < into->count; ++n) {
+            const int32_t* b = into->blocks + 3 * n;
+            for (int d = 0; d < 3; ++d)
+                if (b[d] < -kFarthest || b[d] > kFarthest) return MR_BAD_INPUT;
+            if (n > 0 && !(Block{b[-3], b[-2], b[-1]} < Block{b[0], b[1], b[2]})) return MR_BAD_INPUT;
+        }
         const double most = 1e8 * MR_BLOCK_SIDE * into->voxel;
         for (size_t k = 0; k < 3 * points->count; ++k)
             if (!(std::fabs(points->positions[k]) < most)) return MR_BAD_INPUT;

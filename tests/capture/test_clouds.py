@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from meshreel.capture.clouds import KINDS, CloudOptions, are_clouds, read_cloud
+from meshreel.capture.clouds import are_clouds, read_cloud
 from meshreel.errors import InputError
 from meshreel.io.write import write_mesh
 from tests.geometry.test_points import ball
@@ -149,7 +149,16 @@ def test_a_cloud_is_in_metres_and_knows_its_sensor(tmp_path: Path) -> None:
         ("a.pcd", b"FIELDS x y\nSIZE 4 4\nTYPE F F\nPOINTS 1\nDATA ascii\n1 2\n", "x, y and z are missing"),
         ("a.pcd", b"FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nPOINTS 9000000000000\nDATA binary\n123", "truncated"),
         ("a.pcd", b"FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nPOINTS 1\nDATA binary_packed\n", "write ascii"),
+        ("a.pcd", b"FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nPOINTS 1\nVIEWPOINT a b c\nDATA ascii\n1 2 3\n", "VIEWPOINT"),
+        ("a.pcd", b"FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 0\nPOINTS 1\nDATA ascii\n1 2 3\n", "no matching"),
+        ("a.pcd", b"FIELDS x y z\nSIZE 8 8 8\nTYPE C C C\nPOINTS 1\nDATA ascii\n1 2 3\n", "no matching"),
+        (
+            "a.pcd",
+            b"FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nPOINTS 1\nDATA binary_compressed\n\x03\0\0\0\xff\xff\0\0\xe0\xff\0",
+            "for points of 12",
+        ),
         ("a.npz", b"PK", "cannot be read as .npz"),
+        ("a.las", b"LASF" + bytes(300), "cannot be read as LAS"),
         ("a.ply", b"", "header"),
     ],
 )
@@ -161,12 +170,23 @@ def test_damage_is_named(name: str, data: bytes, message: str, tmp_path: Path) -
 
 def test_arrays_of_other_shapes_are_refused(tmp_path: Path) -> None:
     for arrays, message in (
-        ({"places": POINTS}, r"has places \(3000, 3\); points are an array 'points', N x 3"),
+        ({"places": POINTS}, r"has places; points are an array 'points', N x 3"),
         ({"points": POINTS, "colors": COLORS[:-1]}, r"'colors' is uint8 \(2999, 3\), and 'points' \(3000, 3\)"),
     ):
         np.savez(tmp_path / "a.npz", **arrays)
         with pytest.raises(InputError, match=message):
             read_cloud(tmp_path / "a.npz")
+
+
+def test_a_las_file_that_lacks_points_or_announces_records_without_end_is_refused(tmp_path: Path) -> None:
+    whole = las(tmp_path / "a.las").read_bytes()
+    for data, message in (
+        (whole[: -34 * 100], "announces 3000 points but has 2900"),
+        (whole[:100] + b"\xff" * 4 + whole[104:], "announces 4294967295 records"),
+    ):
+        (tmp_path / "b.las").write_bytes(data)
+        with pytest.raises(InputError, match=rf"b\.las.*{message}"):
+            read_cloud(tmp_path / "b.las")
 
 
 def test_a_mesh_is_no_cloud(tmp_path: Path) -> None:
@@ -203,4 +223,3 @@ def small(tmp_path_factory: pytest.TempPathFactory) -> None:
 def test_other_files_are_no_clouds(tmp_path: Path) -> None:
     write_mesh(deforming_sphere(2)[0], tmp_path / "a.obj")
     assert not are_clouds([tmp_path]) and not are_clouds([tmp_path / "a.obj"]) and are_clouds([tmp_path / "a.ply"])
-    assert {".ply", ".pcd"} <= {*KINDS} and CloudOptions().unit == 1.0

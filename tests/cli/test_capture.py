@@ -59,7 +59,7 @@ def test_frames_of_other_options_are_not_mixed(rig, tmp_path, capsys):
     out = tmp_path / "frames"
     assert main(["capture", str(rig), "-o", str(out), "--voxel", "0.05"]) == 0
     assert main(["capture", str(rig), "-o", str(out), "--voxel", "0.04"]) == 2
-    assert "another rig or of other options (fusion.voxel 0.05, now 0.04); choose" in capsys.readouterr().err
+    assert "other inputs or options (fusion.voxel 0.05, now 0.04); choose" in capsys.readouterr().err
     (out / "capture.json").write_text("{")
     assert main(["capture", str(rig), "-o", str(out), "--voxel", "0.05"]) == 2
     (out / "capture.json").unlink()

@@ -33,7 +33,7 @@ def test_a_folder_becomes_a_mesh_per_frame_also_after_an_interruption(run, folde
     (out / "frame_00001.ply").unlink()
     assert json.loads(run("capture", folder, "-o", out, "--json").out)["fused"] == 1
     assert {path.name: path.read_bytes() for path in out.glob("*.ply")} == before
-    assert failed(run("capture", folder, "-o", out, "--voxel", "0.1"), "another rig or of other options", "voxel")
+    assert failed(run("capture", folder, "-o", out, "--voxel", "0.1"), "other inputs or options", "voxel")
 
 
 def test_lists_patterns_ranges_and_units_are_taken(run, folder, tmp_path):
@@ -56,3 +56,27 @@ def test_several_kinds_and_few_points_are_refused(run, folder, tmp_path):
 
 def test_what_encode_refuses_names_capture(run, folder, tmp_path):
     assert failed(run("encode", folder, "-o", tmp_path / "x.reel"), "3000 vertices and no faces", "meshreel capture")
+
+
+def test_a_sensor_turns_faces_to_it_and_bare_points_and_large_units_are_told(run, folder, tmp_path):
+    said = run("capture", folder, "-o", tmp_path / "a", "--frames", ":1", "--seen-from", "0.5", "1", "-2")
+    assert said.code == 0 and outwards(open_sequence(tmp_path / "a")[0]) < 0.01  # from the middle of the ball
+    few = np.concatenate([POINTS, POINTS[:300] * 3])
+    points = ply(tmp_path / "b.ply", few[:3000]).parent / "c.npz"
+    np.savez(points, points=few)
+    said = run("capture", points, "-o", tmp_path / "c", "--voxel", "0.05")
+    assert "% of its points got no surface; a --voxel above 0.05" in said.err and "--seen-from" in said.err
+    np.savez(tmp_path / "mm.npz", points=1000 * POINTS)
+    assert "give --unit mm or cm" in run("capture", tmp_path / "mm.npz", "-o", tmp_path / "d").err
+
+
+def test_a_list_in_another_order_than_its_numbers_is_told(run, folder, tmp_path):
+    files = [folder / f"cloud_{number}.ply" for number in (0, 2, 1)]
+    assert "cloud_2.ply: is not in the order of the numbers" in run("capture", *files, "-o", tmp_path / "a").err
+
+
+def test_a_run_that_made_no_frame_blocks_no_folder(run, folder, tmp_path):
+    (tmp_path / "a").mkdir()
+    (tmp_path / "a" / "capture.json").write_text("{}")
+    assert run("capture", folder, "-o", tmp_path / "a").code == 0
+    assert "points" in json.loads((tmp_path / "a" / "capture.json").read_text())

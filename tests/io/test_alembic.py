@@ -1,5 +1,6 @@
 """Alembic files by exact values, written by the format's own package: read, and written by export."""
 
+import shutil
 import sys
 from pathlib import Path
 from typing import Any
@@ -159,6 +160,44 @@ def test_files_that_are_none_or_cut_off_are_named(tmp_path: Path) -> None:
         (tmp_path / name).write_bytes(data)
         with pytest.raises(InputError, match=name):
             open_sequence(tmp_path / name)[0]
+
+
+def test_no_module_of_the_current_folder_is_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    made = Made(tmp_path / "a.abc")
+    made.mesh().set(sample())
+    made.close()
+    (tmp_path / "numpy.py").write_text("open('run', 'w')")
+    monkeypatch.chdir(tmp_path)
+    assert len(open_sequence("a.abc")[0].faces) == 2 and not (tmp_path / "run").exists()
+
+
+def test_a_file_that_crashes_the_package_is_named_whatever_frame_does(tmp_path: Path) -> None:
+    made = Made(tmp_path / "a.abc")
+    schema = made.mesh()
+    schema.set(sample(corners=(3, 2, 1, 9)))  # which the reader refuses itself
+    schema.set(sample(SQUARE + 1))
+    del schema
+    made.close()
+    data = bytearray((tmp_path / "a.abc").read_bytes())
+    for at in range(0, len(data) - 8, 97):
+        changed = data[:at] + (16).to_bytes(8, "little") + data[at + 8 :]
+        (tmp_path / "b.abc").write_bytes(changed)
+        try:
+            open_sequence(tmp_path / "b.abc", SequenceOptions(frames=":1"))[0]
+        except InputError as error:
+            assert "b.abc" in str(error)
+
+
+def test_a_full_disk_is_an_error_and_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    usage = shutil.disk_usage(tmp_path)
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: usage._replace(free=1 << 20))
+    mesh, animation = body(1.0), Animation(np.zeros(1), 10.0)
+    with (
+        pytest.raises(InputError, match=r"a\.abc: cannot be written"),
+        animated_abc(tmp_path / "a.abc", animation) as file,
+    ):
+        file.add(Shape("track_0", "all", mesh.faces, 0, [mesh], ((0, 1),)))
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_without_the_package_the_extra_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -75,6 +75,90 @@ def test_topology_changes_in_time_at_the_rate_of_the_stage(kind: str, tmp_path: 
     assert len(slow) == 2 and slow.frame_rate == 8.0 and slow[1].vertices[0, 2] == 1.0
 
 
+@pytest.mark.parametrize("rate", [25.0, 30.0, 24000 / 1001])
+def test_no_frame_has_the_sample_before_by_rounding(rate: float, tmp_path: Path) -> None:
+    made = stage(tmp_path / "a.usda")
+    made.SetTimeCodesPerSecond(rate)
+    made.SetFramesPerSecond(rate)
+    mesh = square(made)
+    for code in range(150):
+        mesh.GetPointsAttr().Set([*SQUARE, (0, 0, code)], code)
+        mesh.GetFaceVertexCountsAttr().Set([3] if code % 2 else [4], code)
+        mesh.GetFaceVertexIndicesAttr().Set([0, 1, 4] if code % 2 else [0, 1, 2, 4], code)
+    frames = saved(made)
+    assert len(frames) == 150 and frames.frame_rate == pytest.approx(rate)
+    for number in range(150):
+        assert (len(frames[number].faces), frames[number].vertices[:, 2].max()) == (2 - number % 2, number)
+
+
+def test_time_codes_a_second_are_the_rate_where_no_other_is_named(tmp_path: Path) -> None:
+    made = Usd.Stage.CreateNew(str(tmp_path / "a.usda"))
+    UsdGeom.SetStageMetersPerUnit(made, 1)
+    made.SetTimeCodesPerSecond(60)
+    mesh = square(made)
+    for code in range(6):
+        mesh.GetPointsAttr().Set(np.array(SQUARE) + [0, 0, float(code)], code)
+    frames = saved(made)
+    assert frames.frame_rate == 60.0 and [mesh.vertices[0, 2] for mesh in frames] == list(range(6))
+
+
+def test_a_file_that_changed_is_read_again_and_one_that_does_not_move_is_a_frame(tmp_path: Path) -> None:
+    made = stage(tmp_path / "a.usda", end=240)
+    mesh = square(made)
+    assert len(saved(made)) == 1 and saved(made)[0].vertices[0, 2] == 0.0
+    text = (tmp_path / "a.usda").read_text()
+    assert mesh
+    (tmp_path / "a.usda").write_text(text.replace("(0, 0, 0)", "(0, 0, 7)"))
+    assert open_sequence(tmp_path / "a.usda")[0].vertices[:, 2].max() == 7.0
+
+
+def test_a_folder_has_the_axis_up_of_its_stages(tmp_path: Path) -> None:
+    for number in range(2):
+        made = stage(tmp_path / f"{number}.usda", up="Z")
+        square(made)
+        made.Save()
+    assert open_sequence(tmp_path).up == "z"
+
+
+def test_what_is_missing_is_refused_and_prototypes_are_nowhere(tmp_path: Path) -> None:
+    (tmp_path / "a.usda").write_text('#usda 1.0\ndef "r" (references = @./none.usda@</x>) {}\n')
+    with pytest.raises(InputError, match=r"a\.usda.*refers to what cannot be read.*none\.usda"):
+        open_sequence(tmp_path / "a.usda")[0]
+    made = stage(tmp_path / "b.usda")
+    square(made)
+    instancer = UsdGeom.PointInstancer.Define(made, "/many")
+    square(made, "/many/prototype", np.array(SQUARE) + 5.0)
+    instancer.CreatePrototypesRel().SetTargets(["/many/prototype"])
+    frames = saved(made)
+    assert len(frames[0].faces) == 2 and "prims of type PointInstancer" in frames.warnings[0]
+
+
+@pytest.mark.parametrize("scope", ["uniform", "vertex"])
+def test_colours_of_a_tetrahedron_are_whose_the_file_says(scope: str, tmp_path: Path) -> None:
+    """It has as many faces as vertices."""
+    faces = ((0, 1, 2), (0, 2, 3), (0, 3, 1), (1, 3, 2))
+    made = stage(tmp_path / "a.usda")
+    mesh = square(made, points=[(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)], faces=faces)
+    mesh.CreateDisplayColorAttr([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)])
+    mesh.GetDisplayColorPrimvar().SetInterpolation(scope)
+    colors = saved(made)[0].colors
+    assert colors is not None
+    wanted = {"uniform": [85, 85, 0], "vertex": [0, 0, 0]}[scope]  # of vertex 0: the mean of three faces, or its own
+    assert np.abs(colors[0].astype(int) - wanted).max() <= 1
+
+
+def test_places_of_vertices_are_not_those_of_corners(tmp_path: Path) -> None:
+    write_picture(np.zeros((4, 4, 3), np.uint8), tmp_path / "skin.png")
+    made = stage(tmp_path / "a.usda")
+    mesh = square(made, faces=((3, 2, 1, 0),))
+    pictured(made, mesh, "./skin.png")
+    places = UsdGeom.PrimvarsAPI(mesh).GetPrimvar("places")
+    places.SetInterpolation("vertex")
+    places.Set(Vt.Vec2fArray([(point[0], point[1]) for point in SQUARE]))
+    found = saved(made)[0]
+    assert found.uv is not None and np.array_equal(found.uv, found.vertices[found.faces][..., :2].astype(np.float32))
+
+
 def test_places_are_in_metres_and_the_stage_names_the_axis_up(tmp_path: Path) -> None:
     made = stage(tmp_path / "a.usda", up="Z", unit=0.01)
     outer = UsdGeom.Xform.Define(made, "/outer")
@@ -176,7 +260,7 @@ def test_a_picture_is_where_the_material_says(tmp_path: Path) -> None:
 
 def test_the_colour_of_a_material_counts_and_bones_move_points(tmp_path: Path) -> None:
     made = stage(tmp_path / "a.usda", end=2)
-    root = UsdSkel.Root.Define(made, "/root")
+    UsdSkel.Root.Define(made, "/root")
     skeleton = UsdSkel.Skeleton.Define(made, "/root/bones")
     skeleton.CreateJointsAttr(["bone"])
     skeleton.CreateBindTransformsAttr([Gf.Matrix4d(1)])
@@ -202,7 +286,6 @@ def test_the_colour_of_a_material_counts_and_bones_move_points(tmp_path: Path) -
     frames = saved(made)
     assert [mesh.vertices[:, 2].tolist() for mesh in frames] == [[1.0] * 4, [2.0] * 4]
     assert frames[0].colors is not None and frames[0].colors.tolist() == [[255, 0, 0]] * 4
-    assert root
 
 
 @pytest.mark.parametrize("kind", ["usdc", "usdz"])

@@ -49,7 +49,7 @@ struct mr_oriented {
 // Sets the distances, in units of `radius`, of the voxels within `radius` of points, at most a block's side, and their
 // weights to 1: the mean distance from the planes of these points, near ones more. A voxel that is more than `past`
 // aside of the mean of its points is past the border of a surface, and left as it is. Blocks must be ascending and
-// distinct; points in others do not count.
+// distinct, and less than 1e8 from 0: MR_BAD_INPUT. Points in others do not count.
 int mr_point_distances(const struct mr_oriented* points, double radius, double past, const struct mr_blocks* into);
 
 // The surface where distances change their sign, between voxels whose weight is above `least`, by marching cubes; it

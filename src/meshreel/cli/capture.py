@@ -26,12 +26,17 @@ from .console import Common
 from .sources import make_rig
 
 _FUSION = FusionOptions()
+BARE = 0.02  # share of a frame's points without surface that is told (guess)
+LARGEST = 100.0  # m, of a recording; what is larger is in another unit (guess)
 
 
 def _as_unit(_kind: object, tokens: Sequence[Token]) -> float:
     """Return a unit in metres that is written as a number, or as mm, cm or m. Raises ValueError for other words."""
     word = tokens[0].value
-    unit = {"mm": 0.001, "cm": 0.01, "m": 1.0}.get(word) or float(word)
+    try:
+        unit = {"mm": 0.001, "cm": 0.01, "m": 1.0}.get(word) or float(word)
+    except ValueError:
+        raise ValueError(f"{word} is no unit; give mm, cm, m, or metres as 0.0002") from None
     if not 1e-6 <= unit <= 10:
         raise ValueError(f"{word} is no unit in metres; 5000 steps a metre are 0.0002")
     return unit
@@ -49,6 +54,7 @@ def command(
     format: Literal["ply", "obj", "glb"] = "ply",
     order: Order = "auto",
     depth_unit: Annotated[float | None, Parameter(name=["--depth-unit", "--unit"], converter=_as_unit)] = None,
+    seen_from: Annotated[tuple[float, float, float] | None, Parameter(allow_leading_hyphen=True)] = None,
     show: Annotated[bool, Parameter(name="--list", negative="")] = False,
     common: Common = Common(),
 ) -> None:
@@ -66,7 +72,8 @@ def command(
         camera, with frames_per_second), depth/ and, for colours, color/. A camera's `color` is a folder of pictures
         aligned with its depth, or an object with a folder and what differs; `color_cameras` lists others. Or recordings
         of other programs, together one rig: TUM RGB-D, Stray Scanner and Record3D folders, .r3d, .bag, .mcap, .mkv.
-        Or point clouds, one a frame: a folder or a list of .ply, .pcd, .npz (points, normals, colors), .las, .laz.
+        Or point clouds, one a frame: a folder, pattern or list of .ply, .pcd, .npz (points, normals, colors), .las,
+        .laz.
     output
         The directory for frame_00000.ply and so on, created if needed; of recordings, the new folder of the rig.
     voxel
@@ -85,10 +92,11 @@ def command(
     depth_unit
         Unit of depth in pictures of recordings, in place of what they say, or of the coordinates of points: in metres,
         as 0.0002, or mm, cm, m.
+    seen_from
+        Place of the sensor in metres, as 0 1.5 2, if one took all points: faces point to it.
     show
         Show the streams of recordings or rigs, their sizes, rates and calibration, and write nothing.
     """
-    options = replace(_FUSION if voxel is None else FusionOptions(voxel), truncation=truncation, fragment=fragment)
     if show:  # reads no picture
         facts = [_rig_facts(read_rig(path, order)) if is_rig(path) else _take_facts(open_take(path)) for path in inputs]
         return common.result({"recordings": [row for row, _ in facts]}, *(line for _, of in facts for line in of))
@@ -97,10 +105,16 @@ def command(
     if are_clouds(inputs) and not (len(inputs) == 1 and (is_rig(inputs[0]) or is_take(inputs[0]))):
         if truncation is not None:
             raise InputError("--truncation: is of depth pictures; the surface of points has none, leave it out")
-        chosen = CloudOptions(voxel, fragment, 1.0 if depth_unit is None else depth_unit)
+        chosen = CloudOptions(voxel, fragment, 1.0 if depth_unit is None else depth_unit, seen_from)
         clouds, warnings = open_clouds(inputs, chosen, frames, order)
         common.warn(warnings)
-        return _fuse(clouds, clouds.source, output, format, common)
+        _fuse(clouds, clouds.source, output, format, common)
+        return common.warn(_of_points(clouds, output))
+    if seen_from is not None:
+        raise InputError(
+            "--seen-from: is of points; cameras of a rig and of recordings know their places, leave it out"
+        )
+    options = replace(_FUSION if voxel is None else FusionOptions(voxel), truncation=truncation, fragment=fragment)
     if len(inputs) > 1 or (inputs[0].exists() and not is_rig(inputs[0])):
         if (options, frames, format, order) != (_FUSION, ":", "ply", "auto"):
             raise InputError(f"{inputs[0]}: is no rig: make one of it without options of fusion, then capture that")
@@ -117,6 +131,17 @@ def command(
     recording, warnings = open_recording(inputs[0], options, frames, keep=False, order=order)
     common.warn(warnings)
     return _fuse(recording, _made(recording), output, format, common)
+
+
+def _of_points(clouds: Clouds, output: Path) -> list[str]:
+    """Return warnings about points that got no surface, and a line about the voxels."""
+    found = [f"{output}: the surface of points in voxels of {clouds.options.voxel:g} m"] if clouds.bare else []
+    worst = max(clouds.bare, key=lambda number: clouds.bare[number], default=None)
+    if worst is not None and clouds.bare[worst] > BARE:
+        share, file = 100 * clouds.bare[worst], clouds.files[worst]
+        text = f"{file}: {share:.0f} % of its points got no surface"
+        found.append(f"{text}; a --voxel above {clouds.options.voxel:g} covers more")
+    return found
 
 
 def _take_facts(take: Take) -> tuple[dict[str, Any], list[str]]:
@@ -155,7 +180,7 @@ def _fuse(frames: Recording | Clouds, made: dict[str, Any], output: Path, format
     """Write the frames that a folder lacks; `made` is what they depend on."""
     names = frame_names(len(frames), format)
     missing = _started(output, made | {"frames_per_second": frames.frame_rate, "up": frames.up}, names)
-    bare = []
+    bare, huge = list[str](), list[str]()
     with common.stages() as progress:
         done = len(names) - len(missing)
         progress("fuse", done, len(names))
@@ -164,10 +189,14 @@ def _fuse(frames: Recording | Clouds, made: dict[str, Any], output: Path, format
                 mesh = frames[index]
                 write_mesh(mesh, output / name)
                 bare += [name] if mesh.is_empty else []
+                huge += [f"{name}: {mesh.diagonal:.3g} m"] if mesh.diagonal > LARGEST else []
                 done += 1
                 progress("fuse", done, len(names))
     if bare:
-        common.warn([f"{output}: {len(bare)} of {len(missing)} fused frames have no surface, as {bare[0]}"])
+        text = f"{output}: {len(bare)} of {len(missing)} fused frames have no surface, as {bare[0]}"
+        common.warn([f"{text}; is the unit right, and are voxels no smaller than the distances of pixels or points?"])
+    if huge:
+        common.warn([f"{output}/{huge[0]} from corner to corner: meshreel counts in metres; give --unit mm or cm"])
     row = {"output": str(output), "frames": len(names), "fused": len(missing), "frame_rate": frames.frame_rate}
     earlier = "" if len(missing) == len(names) else f", {len(names) - len(missing)} of them from before"
     text = f"{output}: {len(names)} {format} files{earlier}, {frames.frame_rate:g} frames a second"
@@ -198,13 +227,13 @@ def _started(output: Path, made: dict[str, Any], names: list[str]) -> set[str]:
     """Record the run in the folder; return the missing files. Raises InputError for a folder of another run."""
     path = output / CAPTURED
     make_folder(output)
-    existing = {name for name in names if (output / name).exists()}
-    if path.exists():
+    existing, has_frames = {name for name in names if (output / name).exists()}, any(output.glob("frame_*"))
+    if path.exists() and has_frames:
         before = read_json(path, "delete the folder, or choose another")
         if before != (now := json.loads(json.dumps(made))):
-            text = f"{output}: holds frames of another rig or of other options"
+            text = f"{output}: holds frames of other inputs or options"
             raise InputError(f"{text} ({first_difference(before, now)}); choose another folder")
-    elif any(output.glob("frame_*")):
+    elif has_frames:
         raise InputError(f"{output}: holds frames without a {CAPTURED}; choose another folder")
     else:
         write_file(path, (json.dumps(made, indent=1) + "\n").encode())

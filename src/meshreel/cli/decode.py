@@ -18,12 +18,12 @@ from ..edit.metadata import tags_of
 from ..errors import FormatError, InputError
 from ..export.animated_file import ExportOptions
 from ..export.animated_file import export as export_animated
-from ..export.animated_usd import EXTENSIONS
 from ..export.film_files import KINDS as FILMS
 from ..export.frames import Part, check_part, check_splats, write_frames, write_splats
 from ..format.layout import ChunkKind
 from ..io.alembic import EXTENSION as ABC
 from ..io.sequence import SequenceOptions
+from ..io.usd import EXTENSIONS
 from ..io.write import check_apart, check_free, frame_names, left_over, make_folder, write_file, write_mesh
 from ..types import Mesh, Texture, Up
 from .console import Common, Force

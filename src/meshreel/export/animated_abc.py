@@ -6,6 +6,9 @@ folder beside the file, one for each frame. Needs the extra `alembic`.
 
 from __future__ import annotations
 
+import errno
+import os
+import shutil
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -22,6 +25,7 @@ from ..types import Mesh
 from .animated_usd import move_textures
 from .shapes import Animation, Shape, unit_normals
 
+SPARE, TIMES = 4 << 20, 8  # bytes that a disk must have free, and times those of a sample's places and faces (guess)
 _EVEN = 1e-6  # s, by which times of frames that are even may be off: those of .reel files are whole microseconds
 
 
@@ -56,6 +60,7 @@ class AbcWriter:
         from alembic3d import Abc, AbcCoreAbstract, AbcGeom
 
         self._textures, self._animation, self._count = textures, animation, len(animation.times)
+        self._folder = path.parent
         rate, even = animation.frame_rate, np.arange(self._count) / animation.frame_rate
         self._archive = Abc.OArchive(str(path))
         if np.abs(animation.times - even).max() <= _EVEN:
@@ -73,7 +78,7 @@ class AbcWriter:
         self._states = list[Shape]()
 
     def add(self, shape: Shape) -> None:
-        """Add a shape that no shape of its part follows; states of a background may be shown again."""
+        """Write a moving shape at once; keep the states of a background until the end, for they may be shown again."""
         if shape.part == "background":
             self._states.append(shape)
             return
@@ -96,7 +101,11 @@ class AbcWriter:
         part.fill(first)
         for number in range(first, end):
             frame = shape.frames[min(number - shape.first, len(shape.frames) - 1) if len(shape.frames) > 1 else 0]
-            part.add(shape, frame, self._animation.local(shape, frame.vertices))
+            places = self._animation.local(shape, frame.vertices)
+            # The package ends the process where a disk is full.
+            if shutil.disk_usage(self._folder).free < SPARE + TIMES * (places.nbytes + shape.faces.nbytes):
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+            part.add(shape, frame, places)
             if shape.uv is not None and frame.texture is not None:
                 self._textures.mkdir(exist_ok=True)
                 name = f"{shape.part}_{number:05}.png"
@@ -114,7 +123,7 @@ class _Part:
         self._written = 0
 
     def fill(self, until: int) -> None:
-        """Show nothing up to a frame."""
+        """Write empty samples up to a frame."""
         empty = Shape(self._name, "", np.zeros((0, 3), np.int32), 0, [Mesh.empty()], ((0, 0),))
         for _ in range(self._written, until):
             self.add(empty, Mesh.empty(), np.zeros((0, 3), np.float32))

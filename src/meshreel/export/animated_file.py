@@ -21,10 +21,11 @@ from ..decoder.tracks import Background, Track
 from ..errors import InputError, path_of
 from ..format.layout import Form
 from ..io.alembic import EXTENSION
+from ..io.usd import EXTENSIONS
 from ..types import Mesh, Up
 from .animated_abc import AbcWriter, animated_abc
 from .animated_glb import GlbWriter, animated_glb
-from .animated_usd import EXTENSIONS, UsdWriter, animated_usd
+from .animated_usd import UsdWriter, animated_usd
 from .frames import Part
 from .shapes import Animation, Shape, check_output
 
@@ -87,9 +88,7 @@ def export(
     return written
 
 
-def _writer(
-    path: Path, animation: Animation, compressed: bool
-) -> AbstractContextManager[GlbWriter | UsdWriter | AbcWriter]:
+def _writer(path: Path, animation: Animation, compressed: bool) -> AbstractContextManager[Writer]:
     check_output(path)
     extension = path.suffix.lower()
     if extension == ".glb":

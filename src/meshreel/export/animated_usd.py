@@ -24,7 +24,6 @@ from ..io.glb_file import light
 from ..io.pictures import pack_picture
 from .shapes import Animation, Shape, changes, unit_normals
 
-EXTENSIONS = (".usdc", ".usda", ".usdz", ".usd")
 _GREY = (0.8, 0.8, 0.8)
 _MOST_UNSAVED = 64 << 20  # bytes (guess); each save writes the names of all prims again
 _MOST_PACKED = (1 << 32) - (1 << 16)  # bytes of a crate in a .usdz file, a zip without 64-bit lengths

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float64, Int64, UInt8
@@ -18,15 +19,25 @@ from scipy.spatial import cKDTree
 from .. import _core
 from ..errors import InputError
 from ..types import Mesh
-from .reconstruct import MOST_BLOCKS, SEEN, SIDE, Grid, Points, extract
+from .reconstruct import MOST_BLOCKS, SEEN, SIDE, Grid, Points, close_holes, extract
 from .topology import linked
 from .voxels import Lattice, distinct, neighbours
 
 AROUND = 16  # nearest points that a plane is fitted to (guess)
 TOGETHER = 100_000  # points whose planes are fitted at a time: bounds memory
-VOXEL, WIDER = 1.5, 1.5  # voxels to a spacing of points, and from one size that is tried to the next (guess)
-FLAT, LOOKED_AT, TRIED = 0.6, 2000, 12  # share of a plane's width that noise may have (seen: least errors); guesses
-CELL = 1.5  # voxels, side of the cells that agree on a side (guess)
+VOXEL = 1.5  # distances between points along a voxel (guess)
+WIDER = 1.5  # from one size of voxels that is tried to the next (guess)
+TRIED = 12  # sizes, at most (guess)
+LOOKED_AT = 2000  # points around which planes are fitted, to judge a size (guess)
+FLAT = 0.6  # most extent across a plane that noise may have, in extents along it (decision 43)
+COVERED = 0.5  # share of the surface on which points are as dense as voxels need (guess)
+ALONE = 4.0  # times the usual reach, beyond which a point stands for no more surface: it flies (guess)
+ALIKE = 0.01  # of the reach of neighbours: points that are nearer to each other are one (guess)
+HOLES = 8.0  # voxels, longest border of a hole that is closed: points are not even (guess)
+BARE = 3.0  # voxels from a surface, beyond which a point has none (guess)
+SHARP = 0.5  # cosine below which normals of linked cells meet at an edge (guess)
+FARTHEST_CELL = 1 << 18  # cells from the middle of a cloud: half of what keys of cells reach
+CELL = 1.2  # voxels, side of the cells that agree on a side (guess)
 RADIUS, PAST = 2.0, 0.75  # voxels within which points count, and past a border that surface goes on (guess)
 ROOM = 2.0  # m, least extent of a room that is seen from inside, along two axes (guess)
 SHELL, WALLS = 0.05, 0.5  # share of a room's extent beside its sides, and of its points that lie there (guess)
@@ -46,14 +57,19 @@ class Cloud:
     eye: Float64[np.ndarray, " 3"] | None = None  # m, of the sensor, where it is known
 
     def thinned(self, size: float) -> Cloud:
-        """Return the means of the points, normals and colours in cells of a size (m), in the order of the cells."""
+        """Return the means of the points, normals and colours in cells of a size (m), in the order of the cells.
+
+        Points beyond `FARTHEST_CELL` cells from the middle are left out.
+        """
         if not len(self.points):
             return self
-        _, cell = np.unique(_lattice(self.points, size).keys(self.points), return_inverse=True)
+        lattice = _lattice(self.points, size)
+        near = (np.abs(self.points - lattice.origin) < FARTHEST_CELL * size).all(axis=1)
+        _, cell = np.unique(lattice.keys(self.points[near]), return_inverse=True)
         cell, count = cell.reshape(-1), np.bincount(cell.reshape(-1))[:, None]
 
         def mean(values: np.ndarray) -> np.ndarray:
-            return np.stack([np.bincount(cell, column) for column in values.T], axis=1) / count
+            return np.stack([np.bincount(cell, column) for column in values[near].T], axis=1) / count
 
         colors = None if self.colors is None else np.rint(mean(self.colors)).astype(np.uint8)
         return Cloud(mean(self.points), None if self.normals is None else mean(self.normals), colors, self.eye)
@@ -67,7 +83,7 @@ def surface_of(cloud: Cloud, voxel: float) -> Mesh:
     else:
         length = np.linalg.norm(thin.normals, axis=1, keepdims=True)
         normals = np.where(length > 0, thin.normals / np.where(length > 0, length, 1), 0)
-    mesh = surface_through(thin.points, normals, voxel)
+    mesh = close_holes(surface_through(thin.points, normals, voxel), HOLES * voxel)
     if thin.colors is None or mesh.is_empty:
         return mesh
     gaps, near = cKDTree(thin.points).query(mesh.vertices, k=np.arange(1, min(COLORED, len(thin.points)) + 1))
@@ -80,14 +96,17 @@ def voxel_for(cloud: Cloud) -> float:
     """Return the side of the smallest voxels that points are dense enough for, and no noisier than; 0 for too few."""
     if len(cloud.points) <= AROUND:
         return 0.0
-    some = cloud.points[:: max(1, len(cloud.points) // LOOKED_AT)]
-    reach = float(np.median(cKDTree(cloud.points).query(some, k=[AROUND])[0]))
+    reach = _reach(cloud.points)
+    # Programs repeat points, and overlapping exports have the same ones twice.
+    points = cloud.points if reach == 0 else np.round(cloud.points / (ALIKE * reach)) * (ALIKE * reach)
+    cloud = Cloud(np.unique(points, axis=0))
+    reach = _reach(cloud.points) if len(cloud.points) > AROUND else 0.0
     voxel = VOXEL * reach * math.sqrt(math.pi / AROUND)  # as if they lay on a square grid
     for _ in range(TRIED if voxel else 0):
         points = cloud.thinned(voxel / VOXEL).points
         if len(points) <= AROUND:
             break
-        sizes, _ = _planes(points, points[:: max(1, len(points) // LOOKED_AT)])
+        sizes, _ = _planes(cKDTree(points), points, points[:: max(1, len(points) // LOOKED_AT)])
         if np.median(np.sqrt(np.maximum(sizes[:, 0], 0) / np.maximum(sizes[:, 1], 1e-300))) <= FLAT:
             break
         voxel *= WIDER
@@ -95,14 +114,36 @@ def voxel_for(cloud: Cloud) -> float:
 
 
 def _lattice(points: Points, size: float) -> Lattice:
-    return Lattice.near(Mesh(points[:1], np.zeros((1, 3), np.int32)), size)
+    """Return the lattice of points, most of which are near each other: single ones may fly."""
+    middle = np.sort(points, axis=0)[len(points) // 2][None]
+    return Lattice.near(Mesh(middle, np.zeros((1, 3), np.int32)), size)
+
+
+def _reach(points: Points) -> float:
+    """Return the distance of the farthest of `AROUND` neighbours, m, that `COVERED` of the surface do not exceed.
+
+    A point stands for as much surface as its neighbours leave it: where points are sparse, few have a lot.
+    """
+    some = points[:: max(1, len(points) // LOOKED_AT)]
+    reaches = np.sort(cKDTree(points).query(some, k=[AROUND])[0][:, 0])
+    reaches = np.minimum(reaches, ALONE * reaches[len(reaches) // 2])
+    shares = np.cumsum(reaches**2)
+    return float(reaches[np.searchsorted(shares, COVERED * shares[-1])])
+
+
+def bare_share(cloud: Cloud, mesh: Mesh, voxel: float) -> float:
+    """Return the share of a cloud's points that are farther than `BARE` voxels from the vertices of a mesh."""
+    some = cloud.points[:: max(1, len(cloud.points) // TOGETHER)]
+    if mesh.is_empty or not len(some):
+        return float(len(some) > 0)
+    return float(np.isinf(cKDTree(mesh.vertices).query(some, distance_upper_bound=BARE * voxel)[0]).mean())
 
 
 def _planes(
-    points: Points, some: Float64[np.ndarray, "S 3"]
+    tree: Any, points: Points, some: Float64[np.ndarray, "S 3"]
 ) -> tuple[Float64[np.ndarray, "S 3"], Float64[np.ndarray, "S 3 3"]]:
-    """Return the squared extents, ascending, of the points around some, and their axes, in columns."""
-    near = points[cKDTree(points).query(some, k=AROUND)[1]]
+    """Return the squared extents, ascending, of the points of a tree around some, and their axes, in columns."""
+    near = points[tree.query(some, k=AROUND)[1]]
     away = near - near.mean(axis=1, keepdims=True)
     return _core.eigen(np.einsum("nki,nkj->nij", away, away))
 
@@ -115,11 +156,11 @@ def normals_of(points: Points, size: float, eye: Float64[np.ndarray, " 3"] | Non
     """
     if len(points) <= AROUND:
         return np.zeros((len(points), 3))
-    found = np.concatenate([_planes(points, points[k : k + TOGETHER])[1] for k in range(0, len(points), TOGETHER)])
-    found = np.ascontiguousarray(found[:, :, 0])
+    tree, starts = cKDTree(points), range(0, len(points), TOGETHER)
+    normals = np.concatenate([_planes(tree, points, points[k : k + TOGETHER])[1][:, :, 0] for k in starts])
     keys, cell = np.unique(_lattice(points, size).keys(points), return_inverse=True)
     cell = cell.reshape(-1)
-    outer = (found[:, :, None] * found[:, None]).reshape(-1, 9)
+    outer = (normals[:, :, None] * normals[:, None]).reshape(-1, 9)
     squares = np.stack([np.bincount(cell, column, len(keys)) for column in outer.T], axis=1)
     axes = np.ascontiguousarray(_core.eigen(squares.reshape(-1, 3, 3))[1][:, :, 2])
     middles = np.stack([np.bincount(cell, column) for column in points.T], axis=1) / np.bincount(cell)[:, None]
@@ -127,7 +168,7 @@ def normals_of(points: Points, size: float, eye: Float64[np.ndarray, " 3"] | Non
     axes *= _agreed(links, middles, axes)[:, None]
     piece = linked(links, len(keys))
     axes *= _outward(middles, axes, piece, eye)[piece][:, None]
-    return np.where((found * axes[cell]).sum(axis=1, keepdims=True) < 0, -found, found)
+    return np.where((normals * axes[cell]).sum(axis=1, keepdims=True) < 0, -normals, normals)
 
 
 def _links(keys: Int64[np.ndarray, " C"]) -> Int64[np.ndarray, "L 2"]:
@@ -150,7 +191,10 @@ def _agreed(links: Int64[np.ndarray, "L 2"], middles: Cells, axes: Cells) -> Flo
     tree = minimum_spanning_tree(coo_array((costs, (rows, columns)), shape=(count + 1, count + 1)).tocsr())
     order, before = breadth_first_order(tree, count, directed=False)
     ends = np.where(before[:count] == count, np.arange(count), before[:count])
-    same = ((axes * axes[ends]).sum(axis=1) >= 0).tolist()
+    ways, turns = middles[ends] - middles, (axes * axes[ends]).sum(axis=1)
+    # At an edge, both sides lie before each other's planes, or both behind: in a corner of a room, on a crate.
+    at_edge = -(axes * ways).sum(axis=1) * (axes[ends] * ways).sum(axis=1)
+    same = (np.where(np.abs(turns) < SHARP, at_edge, turns) >= 0).tolist()
     sides = [1.0] * (count + 1)
     for cell, origin in zip(order[1:].tolist(), before[order[1:]].tolist(), strict=True):
         sides[cell] = sides[origin] if same[cell] else -sides[origin]

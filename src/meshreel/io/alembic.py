@@ -1,7 +1,7 @@
 """Surfaces of Alembic files (.abc): the visible polygon meshes of an archive at a time, with colours and UVs.
 
 A frame is a sample: between two, the one before holds, for topology may change. Needs the extra `alembic`, whose
-package may end the process that reads a damaged file: another process reads all of it before, and tells.
+package may crash on a damaged file: a child process reads the file first.
 """
 
 from __future__ import annotations
@@ -17,19 +17,32 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float64
 
-from ..errors import needed
+from ..errors import InputError, needed
 from ..types import Up
 from .glb_file import from_linear
-from .looks import Look, Part, joined, of_vertices
+from .looks import CONSTANT, CORNERS, FACES, VERTICES, Look, Part, backwards, joined, of_corners, of_vertices
 from .polygons import Polygons, Unreadable
 
 EXTENSION, COLORS = ".abc", "Cs"  # the name that film tools give the colours of a surface
-_FEW = 1e-3  # of a frame, by which a moment may be missed by rounding
+_FEW = 1e-3  # frames: tolerance of rounded times
+_SAME_TIME = 1e-4  # s: samples of several meshes that are nearer to each other are of one frame (guess)
+_EVEN = 0.01  # of a step, by which steps of an even rate differ by rounding (guess)
+_SCOPES = {
+    "kConstantScope": CONSTANT,
+    "kUniformScope": FACES,
+    "kVaryingScope": VERTICES,
+    "kVertexScope": VERTICES,
+    "kFacevaryingScope": CORNERS,
+}
 _SCHEMAS = {"AbcGeom_Curve_v2": "curves", "AbcGeom_Points_v1": "points", "AbcGeom_NuPatch_v2": "NURBS"}
-_ONE_THREAD = Lock()  # at a time, at an archive, whose file has one position
+_ONE_THREAD = Lock()  # an archive's reader has one file position: one thread at a time
+RATES = 1e-3, 1e4  # 1/s, between which that of a recording is (guess)
+_CRASHED = 0xC0000000  # exit codes of processes that crashed on Windows, at least; elsewhere they are negative
+# What the child does: with the parent's path of modules, so that no module of the current folder is taken.
+_CHILD = "import sys; sys.path[:] = sys.argv[2:]; from meshreel.io.alembic import read_all; read_all(sys.argv[1])"
 
 
-class Archive:
+class AlembicFile:
     """An Alembic file that is open."""
 
     up: Up = "y"  # the format does not tell; film tools write y
@@ -38,18 +51,26 @@ class Archive:
         """Raises Unreadable if the file is damaged, and InputError without the package."""
         with needed(f"{path}: Alembic needs the extra alembic: pip install 'meshreel[alembic]'"):
             from alembic3d import Abc
-        if not is_sound and subprocess.run([sys.executable, "-m", __name__, path], capture_output=True).returncode:
-            raise Unreadable("Alembic cannot be read (damaged)")
+        if not is_sound:
+            _check(path)
         try:
-            self._top = (archive := Abc.IArchive(str(path))).getTop()
-            self._archive = archive
-            spans = [times for _, times in self._times(self._top)]
+            self._archive = Abc.IArchive(str(path))
+            self._top = self._archive.getTop()
+            times = np.unique(np.concatenate([np.zeros(0), *self._times(self._top)]))
         except (RuntimeError, ValueError, MemoryError) as error:
             raise Unreadable(f"Alembic cannot be read ({' '.join(str(error).split())[:200]})") from None
-        times = self.times = np.unique(np.concatenate([np.zeros(0), *spans]))
-        steps = np.diff(times)
-        self.frame_rate: float | None = float(f"{1 / np.median(steps):.9g}") if len(steps) else None
-        self._begin, self._end = (float(times[0]), float(times[-1])) if len(times) else (0.0, 0.0)
+        if not np.isfinite(times).all():
+            raise Unreadable("Alembic has samples at times that are no numbers")
+        self.times = times[np.diff(times, prepend=-np.inf) > _SAME_TIME]
+        steps = np.diff(self.times)
+        self.frame_rate: float | None = None
+        if len(steps):
+            usual = float(np.median(steps))
+            is_even = (np.abs(steps - usual) <= _EVEN * usual).all()
+            self.frame_rate = float(f"{1 / (steps.mean() if is_even else usual):.6g}")
+            if not RATES[0] <= self.frame_rate <= RATES[1]:
+                raise Unreadable(f"Alembic has samples {usual:g} s apart; mend its times")
+        self._begin, self._end = (float(self.times[0]), float(self.times[-1])) if len(times) else (0.0, 0.0)
 
     def count(self, frame_rate: float) -> int:
         """Return the number of frames at a rate, 1/s."""
@@ -68,7 +89,7 @@ class Archive:
         except (RuntimeError, ValueError, IndexError, MemoryError) as error:
             raise Unreadable(f"Alembic cannot be read ({' '.join(str(error).split())[:200]})") from None
 
-    def _times(self, parent: Any) -> Iterator[tuple[str, np.ndarray]]:
+    def _times(self, parent: Any) -> Iterator[np.ndarray]:
         """Yield the times of the samples of what moves, s."""
         from alembic3d import AbcGeom
 
@@ -79,7 +100,7 @@ class Archive:
                     schema = kind(parent, child.getName()).getSchema()
                     count, sampling = schema.getNumSamples(), schema.getTimeSampling()
                     if count > 1:
-                        yield child.getFullName(), np.array([sampling.getSampleTime(k) for k in range(count)])
+                        yield np.array([sampling.getSampleTime(k) for k in range(count)], np.float64)
             yield from self._times(child)
 
     def _parts(self, parent: Any, matrix: Float64[np.ndarray, "4 4"], chosen: Any, named: set[str]) -> Iterator[Part]:
@@ -111,23 +132,21 @@ class Archive:
         if (sizes < 0).any() or sizes.sum() != len(corners):
             raise Unreadable(f"{child.getFullName()} has {len(corners)} corners, and its polygons {int(sizes.sum())}")
         if not 0 <= corners.min() <= corners.max() < len(points):
-            text = f"{child.getFullName()} refers to point {int(corners.max())}, and has {len(points)}"
-            raise Unreadable(text)
-        order = np.arange(len(corners))
-        if np.linalg.det(matrix[:3, :3]) > 0:  # Alembic's polygons run clockwise
-            ends = np.cumsum(sizes)
-            order = np.repeat(ends - sizes + ends - 1, sizes) - order
-        colors, one = of_vertices(_colors(schema, chosen), len(points), corners, sizes)
-        uv, places = None, schema.getUVsParam()
-        if places.valid():
-            values = np.array(places.getExpandedValue(chosen).getVals(), np.float32).reshape(-1, 2)
-            uv = values if len(values) == len(corners) else values[corners] if len(values) == len(points) else None
+            wrong = int(corners[(corners < 0) | (corners >= len(points))][0])
+            raise Unreadable(f"{child.getFullName()} refers to point {wrong}, and has {len(points)}")
+        # Alembic's polygons run clockwise.
+        order = backwards(sizes) if np.linalg.det(matrix[:3, :3]) > 0 else np.arange(len(corners))
+        colors, one = of_vertices(*_colors(schema, chosen), len(points), corners, sizes)
+        uv, params = None, schema.getUVsParam()
+        if params.valid():
+            values = np.array(params.getExpandedValue(chosen).getVals(), np.float32).reshape(-1, 2)
+            uv = of_corners(values, _SCOPES.get(str(params.getScope())), len(points), corners)
         vertices = points @ matrix[:3, :3] + matrix[3, :3]
         yield Part(vertices, corners[order], sizes, colors, None if uv is None else uv[order], Look(one))
 
 
-def _colors(schema: Any, chosen: Any) -> np.ndarray:
-    """Return the colours of a mesh, sRGB, as many as it has; none where it has none."""
+def _colors(schema: Any, chosen: Any) -> tuple[np.ndarray, str | None]:
+    """Return the colours of a mesh, sRGB, as many as it has, none where it has none; and whose they are."""
     from alembic3d import AbcGeom
 
     params = schema.getArbGeomParams()
@@ -135,19 +154,32 @@ def _colors(schema: Any, chosen: Any) -> np.ndarray:
         header = params.getPropertyHeader(number)
         for kind in (AbcGeom.IC3fGeomParam, AbcGeom.IC4fGeomParam):
             if header.getName() == COLORS and kind.matches(header):
-                found = kind(params, COLORS).getExpandedValue(chosen).getVals()
-                light = np.stack([np.array(of, np.float64) for of in (found.r, found.g, found.b)], axis=1)
-                return from_linear(np.clip(light, 0, 1))
-    return np.zeros((0, 3), np.uint8)
+                param = kind(params, COLORS)
+                values = param.getExpandedValue(chosen).getVals()
+                light = np.stack([np.array(of, np.float64) for of in (values.r, values.g, values.b)], axis=1)
+                return from_linear(np.clip(np.nan_to_num(light), 0, 1)), _SCOPES.get(str(param.getScope()))
+    return np.zeros((0, 3), np.uint8), None
 
 
-def _read_all(path: Path) -> None:
-    """Read all that an archive has."""
-    archive = Archive(path, is_sound=True)
-    for time in archive.times.tolist() or [0.0]:
-        archive.at(time - archive.times[0] if len(archive.times) else 0.0)
+def _check(path: Path) -> None:
+    """Raise Unreadable if a process that reads the file crashes, and InputError if no process can be started."""
+    remedy = "let Python start processes here, or export the file as USD"
+    try:
+        done = subprocess.run([sys.executable, "-P", "-c", _CHILD, path, *sys.path], capture_output=True)
+    except OSError as error:
+        raise InputError(f"{path}: Alembic is read by a process first, which fails ({error}); {remedy}") from None
+    if done.returncode < 0 or done.returncode >= _CRASHED:
+        raise Unreadable("Alembic cannot be read (damaged: its package crashes)")
+    if done.returncode:
+        lines = done.stderr.decode("utf-8", "replace").strip().splitlines()
+        reason = lines[-1][:200] if lines else f"exit code {done.returncode}"
+        raise InputError(f"{path}: Alembic is read by a process first, which fails ({reason}); {remedy}")
 
 
-if __name__ == "__main__":
-    with suppress(Unreadable):  # whom it may concern reads it again
-        _read_all(Path(sys.argv[1]))
+def read_all(name: str) -> None:
+    """Read all that an archive has; that it breaks rules is no fault here, for the parent says so."""
+    with suppress(Unreadable):
+        archive = AlembicFile(Path(name), is_sound=True)
+        for time in archive.times.tolist() or [0.0]:
+            with suppress(Unreadable):
+                archive.at(time - (archive.times[0] if len(archive.times) else 0.0))

@@ -62,24 +62,55 @@ def joined(parts: Sequence[Part]) -> Polygons:
     return with_looks(Polygons(vertices, corners, sizes, colors=colors, colored=colored, uv=uv_or_none), looks, which)
 
 
-def of_vertices(
-    colors: UInt8[np.ndarray, "N 3"], count: int, corners: Int64[np.ndarray, " C"], sizes: Int64[np.ndarray, " P"]
-) -> tuple[UInt8[np.ndarray, "V 3"] | None, tuple[int, int, int] | None]:
-    """Return the colours of `count` vertices, those of faces and corners as their means; or the one of all of them.
+CONSTANT, FACES, VERTICES, CORNERS = "constant", "uniform", "vertex", "faceVarying"  # whose values are, in USD's words
 
-    Whose colours they are is known by their number; None of other numbers.
+
+def of_vertices(
+    colors: UInt8[np.ndarray, "N 3"],
+    scope: str | None,
+    count: int,
+    corners: Int64[np.ndarray, " C"],
+    sizes: Int64[np.ndarray, " P"],
+) -> tuple[UInt8[np.ndarray, "V 3"] | None, tuple[int, int, int] | None]:
+    """Return the colours of `count` vertices, those of faces and corners as their means; or one for all of them.
+
+    Where the file does not say whose the colours are, and `scope` is None, their number tells. Colours of another
+    number are none.
     """
-    if len(colors) == 1:
+    scope = scope or _scope(len(colors), count, corners, sizes)
+    if scope == CONSTANT and len(colors):
         red, green, blue = colors[0].tolist()
         return None, (red, green, blue)
-    if len(colors) == count and count:
-        return colors, None
-    own = np.repeat(colors, sizes, axis=0) if len(colors) == len(sizes) else colors
+    if scope == VERTICES:
+        return (colors if len(colors) == count else None), None
+    own = np.repeat(colors, sizes, axis=0) if scope == FACES and len(colors) == len(sizes) else colors
     if not len(own) or len(own) != len(corners) or not 0 <= corners.min() <= corners.max() < count:
         return None, None
     counts = np.maximum(np.bincount(corners, minlength=count), 1)
     sums = [np.bincount(corners, own[:, axis], count) for axis in range(3)]
     return np.rint(np.stack(sums, axis=1) / counts[:, None]).astype(np.uint8), None
+
+
+def of_corners(
+    values: Float32[np.ndarray, "N 2"], scope: str | None, count: int, corners: Int64[np.ndarray, " C"]
+) -> Float32[np.ndarray, "C 2"] | None:
+    """Return the values of corners, of which `count` vertices or the corners have some; None of another number."""
+    scope = scope or _scope(len(values), count, corners, np.zeros(0, np.int64))
+    if scope == CORNERS:
+        return values if len(values) == len(corners) else None
+    valid = (corners >= 0) & (corners < count)
+    return values[np.where(valid, corners, 0)] if scope == VERTICES and len(values) == count else None
+
+
+def _scope(number: int, count: int, corners: np.ndarray, sizes: np.ndarray) -> str:
+    numbers = {1: CONSTANT, len(sizes): FACES, len(corners): CORNERS, count: VERTICES}
+    return numbers.get(number, "")
+
+
+def backwards(sizes: Int64[np.ndarray, " P"]) -> Int64[np.ndarray, " C"]:
+    """Return the order of corners in which each polygon runs the other way."""
+    ends = np.cumsum(sizes)
+    return np.repeat(ends - sizes + ends - 1, sizes) - np.arange(int(sizes.sum()))
 
 
 def with_looks(polygons: Polygons, looks: Sequence[Look], which: Int64[np.ndarray, " P"]) -> Polygons:

@@ -14,7 +14,7 @@ from jaxtyping import Bool
 from ..errors import InputError
 from ..types import Mesh
 from .alembic import EXTENSION as ABC
-from .alembic import Archive
+from .alembic import AlembicFile
 from .files import Place, read_input
 from .glb import Scene, parse_glb
 from .materials import with_materials
@@ -23,12 +23,15 @@ from .ply import parse_ply
 from .polygons import CLOUD, Dropped, Polygons, Surfaceless, Unreadable, triangulate
 from .stl_off import parse_off, parse_stl
 from .usd import EXTENSIONS as USD
-from .usd import Stage
+from .usd import UsdFile
 
 _PARSERS = {".obj": parse_obj, ".ply": parse_ply, ".glb": parse_glb, ".stl": parse_stl, ".off": parse_off}
-_STAGES: dict[str, type[Stage | Archive]] = {**dict.fromkeys(USD, Stage), ABC: Archive}  # packages open the file
-EXTENSIONS = (*_PARSERS, *_STAGES)
-MOVING = (".glb", *_STAGES)  # of files that may have all frames
+_PACKAGED: dict[str, type[UsdFile | AlembicFile]] = {
+    **dict.fromkeys(USD, UsdFile),
+    ABC: AlembicFile,
+}
+EXTENSIONS = (*_PARSERS, *_PACKAGED)
+MOVING = (".glb", *_PACKAGED)  # of files that may have all frames
 _MARK = b"\xef\xbb\xbf"  # of byte order, at the beginning of texts of some programs
 _BEGINNINGS = {  # of files of other kinds, in small letters
     b"\x89png": "a PNG picture",
@@ -63,7 +66,7 @@ def read_mesh(path: Place, where: str | None = None) -> Loaded:
     Raises InputError for what cannot be read, and for points without faces.
     """
     where, kind = where or str(path), path.suffix.lower()
-    if kind in _STAGES:
+    if kind in _PACKAGED:
         with _reading(path, where):
             stage = moving_scene(path, where)
             if stage.count(stage.frame_rate or 1.0) > 1:
@@ -79,7 +82,7 @@ def read_mesh(path: Place, where: str | None = None) -> Loaded:
         return checked(with_materials(polygons, path) if polygons.has_looks else polygons)
 
 
-def animation_of(path: Place) -> Scene | Stage | Archive | None:
+def animation_of(path: Place) -> Scene | UsdFile | AlembicFile | None:
     """Return the scene of a file that may move; None if it cannot be read, which `read_mesh` raises with the frame."""
     try:
         return moving_scene(path, str(path))
@@ -116,20 +119,22 @@ def _read(path: Place, where: str) -> bytes:
     return data
 
 
-def moving_scene(path: Place, where: str) -> Scene | Stage | Archive:
+def moving_scene(path: Place, where: str) -> Scene | UsdFile | AlembicFile:
     """Return the scene of a file of `MOVING`, which is kept. Raises Unreadable and InputError."""
     state = path.stat() if isinstance(path, Path) and path.exists() else None
     return _opened(path, where if state is None else str(path), state and (state.st_size, state.st_mtime_ns))
 
 
 @lru_cache(maxsize=2)  # scenes at a time (guess)
-def _opened(path: Place, where: str, _state: object) -> Scene | Stage | Archive:
+def _opened(path: Place, where: str, _state: object) -> Scene | UsdFile | AlembicFile:
     """Return the scene of a file, read again if the file has changed."""
-    data, kind = _read(path, where), _STAGES.get(path.suffix.lower())
+    kind = _PACKAGED.get(path.suffix.lower())
     if kind is None:
-        return Scene(data)
+        return Scene(_read(path, where))
     if not isinstance(path, Path):
         raise InputError(f"{where}: {path.suffix} is not read by URL; copy it here")
+    if not path.is_file() or not path.stat().st_size:
+        _read(path, where)  # raises
     return kind(path)
 
 

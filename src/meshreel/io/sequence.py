@@ -22,6 +22,7 @@ from .meshes import MOVING, Loaded, animation_of, read_animated, read_mesh
 from .npz import Archive
 
 CAPTURED = "capture.json"  # record of the capture, in a folder that `meshreel capture` wrote
+MOST_FRAMES = 10_000_000  # of an animation: four days at 30/s (guess)
 RATE = 30.0  # frames a second, where neither the user nor the source says another
 _FRAMES = re.compile(r"(-?\d{1,18})?:(-?\d{1,18})?")
 _SIZES = 0.02, 100.0  # m, usual diagonals of recordings; outside this range the unit is doubtful (guess)
@@ -85,7 +86,7 @@ class Files:
 
 @dataclass(frozen=True, slots=True)
 class Animation:
-    """Frames of one GLB or USD file, whose animation is sampled at a frame rate."""
+    """Frames of one GLB, USD or Alembic file, whose animation is sampled at a frame rate."""
 
     path: Place
     frame_rate: float  # 1/s
@@ -200,9 +201,9 @@ class FileSequence(MeshSequence):
 def open_sequence(source: str | Path | Sequence[str | Path], options: SequenceOptions | None = None) -> FileSequence:
     """Return the frames of a folder, a glob pattern, a list of files, one file or an .npz; none is read yet.
 
-    An animated GLB or USD file alone has a frame for each moment of its animation at the frame rate, which a USD file
-    tells. All but .npz and USD may be URLs, such as s3:// and https:// (extra `remote`). The up axis is that of a USD
-    file, that of `meshreel capture` in the folder, or y.
+    An animated GLB, USD or Alembic file alone has a frame for each moment of its animation at the frame rate, which the
+    last two tell. All but .npz, USD and Alembic may be URLs, such as s3:// and https:// (extra `remote`). The up axis
+    is that of a USD file, that of `meshreel capture` in the folder, or y.
     """
     options = options or SequenceOptions()
     place = located(source) if isinstance(source, str | Path) else None
@@ -218,11 +219,15 @@ def open_sequence(source: str | Path | Sequence[str | Path], options: SequenceOp
         raise InputError("the list of files has 0 frames; give at least one")
     if len(paths) == 1 and paths[0].suffix.lower() in MOVING and (scene := animation_of(paths[0])) is not None:
         rate = options.frame_rate or scene.frame_rate or RATE
-        if (count := scene.count(rate)) > 1:
+        if (count := scene.count(rate)) > MOST_FRAMES:
+            raise InputError(f"{paths[0]}: has {count} frames by its times; mend these, or give a lower --fps")
+        if count > 1:
             moving = Animation(paths[0], rate, count)
             return FileSequence(moving, replace(options, frame_rate=rate), remarks, scene.up)
         return FileSequence(Files(paths), options, remarks, scene.up)
     up = "y" if place is None else known_up(capture_record(place).get("up"))
+    if len(paths) > 1 and paths[0].suffix.lower() in MOVING and (scene := animation_of(paths[0])) is not None:
+        up = scene.up
     return FileSequence(Files(paths), options, remarks, up)
 
 

@@ -6,6 +6,7 @@ smooth subdivision. Needs the extra `usd`.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from functools import lru_cache, partial
 from pathlib import Path
@@ -16,18 +17,28 @@ from jaxtyping import Float32, Float64, Int64, UInt8
 
 from ..errors import InputError, needed
 from ..types import Texture, Up, known_up
+from .files import MOST_BYTES
 from .glb_file import from_linear
-from .looks import Look, Part, joined, of_vertices
+from .looks import CONSTANT, CORNERS, FACES, VERTICES, Look, Part, backwards, joined, of_corners, of_vertices
 from .pictures import parse_picture
 from .polygons import Polygons, Unreadable
 
 EXTENSIONS = (".usd", ".usda", ".usdc", ".usdz")
-_FEW = 1e-3  # of a frame, by which the last moment may be missed by rounding
+_FEW = 1e-3  # frames: tolerance of rounded times
 _PLACES = "st"  # name of the places in a picture, where no material says another
+_MOST_PRIMS = 1_000_000  # of a stage (guess)
+_TRANSFORMS = 8  # of places, one after the other, at most (guess)
+_NEUTRAL: dict[str, Any] = {  # values that change nothing
+    **dict.fromkeys(("wrapS", "wrapT"), ("useMetadata", "repeat")),
+    "scale": ((1.0,) * 4,),
+    "bias": ((0.0,) * 4,),
+}
 _KEPT_PICTURES = 4  # decoded, as many as a frame and its neighbours have (guess)
+_KEPT_TEXTURES = 64  # of materials (guess)
+_SCOPES = {"constant": CONSTANT, "uniform": FACES, "varying": VERTICES, "vertex": VERTICES, "faceVarying": CORNERS}
 
 
-class Stage:
+class UsdFile:
     """A USD file that is open."""
 
     def __init__(self, path: Path) -> None:
@@ -36,16 +47,33 @@ class Stage:
             from pxr import Tf, Usd, UsdGeom, UsdSkel
         try:
             self._stage = Usd.Stage.Open(str(path))
+            self._stage.Reload()  # the package keeps what it read before
             self._stage.SetEditTarget(self._stage.GetSessionLayer())  # the file is not changed
             if any(prim.IsA(UsdSkel.Root) for prim in self._stage.Traverse()):
                 UsdSkel.BakeSkinning(self._stage.Traverse())
         except Tf.ErrorException as error:
-            lines = str(error).strip().splitlines()
-            raise Unreadable(f"USD cannot be read ({lines[-1].strip() if lines else 'damaged'})") from None
+            quoted = re.findall(r": '(.*)'", str(error))
+            raise Unreadable(f"USD cannot be read ({quoted[-1] if quoted else 'damaged'})") from None
+        if errors := self._stage.GetCompositionErrors():
+            texts = [str(one) for prim in self._stage.TraverseAll() for one in prim.GetPrimIndex().localErrors]
+            reason = " ".join((texts or [type(errors[0]).__name__])[0].split())
+            raise Unreadable(f"USD refers to what cannot be read ({reason:.200})")
         self._unit = UsdGeom.GetStageMetersPerUnit(self._stage)
         self.up: Up = known_up(UsdGeom.GetStageUpAxis(self._stage).lower())
-        self.frame_rate: float | None = float(self._stage.GetFramesPerSecond() or self._stage.GetTimeCodesPerSecond())
         self._a_second = float(self._stage.GetTimeCodesPerSecond())
+        authored = self._stage.HasAuthoredMetadata("framesPerSecond")
+        rate = float(self._stage.GetFramesPerSecond()) if authored else self._a_second
+        if not all(0 < one < np.inf for one in (rate, self._a_second, self._unit)):
+            text = f"{rate:g} frames and {self._a_second:g} time codes a second, a unit of {self._unit:g} m"
+            raise Unreadable(f"USD has {text}: give numbers above 0")
+        self.frame_rate: float | None = rate
+        codes = [
+            code
+            for prim in self._stage.Traverse()
+            for attribute in prim.GetAttributes()
+            for code in attribute.GetTimeSamples()
+        ]
+        self._codes = np.unique(np.array(codes, np.float64))  # of what changes, ascending
         self._begin, self._end = self._span()
 
     def count(self, frame_rate: float) -> int:
@@ -56,30 +84,36 @@ class Stage:
         """Return the surface at a time after the beginning, s."""
         from pxr import Tf, Usd
 
-        named = set[str]()
+        named, code = set[str](), self._begin + seconds * self._a_second
+        if len(self._codes):  # a sample is not missed by rounding
+            nearest = self._codes[np.abs(self._codes - code).argmin()]
+            few = _FEW * self._a_second / (self.frame_rate or 1.0)
+            code = float(nearest) if abs(nearest - code) <= few else code
         try:
-            parts = list(self._parts(Usd.TimeCode(self._begin + seconds * self._a_second), named))
+            parts = list(self._parts(Usd.TimeCode(code), named))
         except (Tf.ErrorException, TypeError, ValueError, IndexError, RuntimeError) as error:
             raise Unreadable(f"USD cannot be read ({str(error).strip().splitlines()[0]:.200})") from None
         return joined(parts).naming(named)
 
     def _span(self) -> tuple[float, float]:
-        """Return the first and the last time code: those of the stage, or else of what moves in it."""
+        """Return the first and the last time code: those of the stage, or of what changes; one if nothing does."""
+        if not len(self._codes):
+            return 0.0, 0.0
         if self._stage.HasAuthoredTimeCodeRange():
-            return self._stage.GetStartTimeCode(), max(self._stage.GetStartTimeCode(), self._stage.GetEndTimeCode())
-        times = [
-            time
-            for prim in self._stage.Traverse()
-            for attribute in prim.GetAttributes()
-            for time in attribute.GetTimeSamples()
-        ]
-        return min(times, default=0.0), max(times, default=0.0)
+            begin, end = self._stage.GetStartTimeCode(), self._stage.GetEndTimeCode()
+            if not np.isfinite([begin, end]).all():
+                raise Unreadable(f"USD runs from {begin:g} to {end:g}: give numbers")
+            return begin, max(begin, end)
+        return float(self._codes[0]), float(self._codes[-1])
 
     def _parts(self, time: Any, named: set[str]) -> Iterator[Part]:
         from pxr import Usd, UsdGeom
 
         places = UsdGeom.XformCache(time)
-        for prim in Usd.PrimRange.Stage(self._stage, Usd.TraverseInstanceProxies()):
+        prims = iter(Usd.PrimRange.Stage(self._stage, Usd.TraverseInstanceProxies()))
+        for number, prim in enumerate(prims):
+            if number > _MOST_PRIMS:
+                raise Unreadable(f"USD has more than {_MOST_PRIMS} prims, counted as often as they are shown")
             imageable = UsdGeom.Imageable(prim)
             if not (prim.IsA(UsdGeom.Boundable) and imageable):
                 continue
@@ -87,6 +121,8 @@ class Stage:
             if hidden or imageable.ComputePurpose() in (UsdGeom.Tokens.guide, UsdGeom.Tokens.proxy):
                 continue
             if not prim.IsA(UsdGeom.Mesh):
+                if prim.IsA(UsdGeom.PointInstancer):
+                    prims.PruneChildren()  # its prototypes are nowhere themselves
                 if prim.IsA(UsdGeom.Gprim) or prim.IsA(UsdGeom.PointInstancer):
                     named.add(f"prims of type {prim.GetTypeName()}")
                 continue
@@ -103,20 +139,17 @@ class Stage:
         if sizes.sum() != len(corners) or (sizes < 0).any():
             text = f"{mesh.GetPath()} has {len(corners)} corners, and its polygons {int(sizes.sum())}"
             raise Unreadable(f"USD mesh {text}")
-        scheme = mesh.GetSubdivisionSchemeAttr()
-        if scheme.HasAuthoredValue() and scheme.Get(time) not in ("none", None):
+        if mesh.GetSubdivisionSchemeAttr().Get(time) not in ("none", None):
             named.add("smooth subdivision (the cage is taken)")
         if len(mesh.GetHoleIndicesAttr().Get(time) or ()):
             named.add("holes of meshes")
         vertices = (points.astype(np.float64) @ matrix[:3, :3] + matrix[3, :3]) * self._unit
-        order = np.arange(len(corners))
-        if (mesh.GetOrientationAttr().Get(time) == "leftHanded") != (np.linalg.det(matrix[:3, :3]) < 0):
-            ends = np.cumsum(sizes)
-            order = np.repeat(ends - sizes + ends - 1, sizes) - order  # corners backwards, within each polygon
-        found = mesh.GetDisplayColorPrimvar()
-        light = _array(found.ComputeFlattened(time)).reshape(-1, 3) if found.HasValue() else np.zeros((0, 3))
-        painted = from_linear(np.clip(light.astype(np.float64), 0, 1))
-        colors, one = of_vertices(painted, len(points), corners, sizes)
+        is_turned = (mesh.GetOrientationAttr().Get(time) == "leftHanded") != (np.linalg.det(matrix[:3, :3]) < 0)
+        order = backwards(sizes) if is_turned else np.arange(len(corners))
+        primvar = mesh.GetDisplayColorPrimvar()
+        light = _array(primvar.ComputeFlattened(time)).reshape(-1, 3) if primvar.HasValue() else np.zeros((0, 3))
+        painted = from_linear(np.clip(np.nan_to_num(light.astype(np.float64)), 0, 1))
+        colors, one = of_vertices(painted, _scope_of(primvar), len(points), corners, sizes)
         for chosen, material in _subsets(mesh, len(sizes), time):
             rows = np.repeat(chosen, sizes)
             look, places = _look(material, time, named)
@@ -128,8 +161,8 @@ class Stage:
             own = corners[order][rows]
             used, numbers = np.unique(own, return_inverse=True)
             if len(used) and not 0 <= used[0] <= used[-1] < len(points):
-                text = f"{mesh.GetPath()} refers to point {int(used[-1])}, and has {len(points)}"
-                raise Unreadable(f"USD mesh {text}")
+                wrong = int(used[(used < 0) | (used >= len(points))][0])
+                raise Unreadable(f"USD mesh {mesh.GetPath()} refers to point {wrong}, and has {len(points)}")
             shown = None if colors is None else colors[used]
             yield Part(
                 vertices[used],
@@ -143,6 +176,11 @@ class Stage:
 
 def _array(value: Any) -> np.ndarray:
     return np.zeros(0) if value is None else np.asarray(value)
+
+
+def _scope_of(primvar: Any) -> str | None:
+    """Return whose values a primvar has, as `looks` names it; None where the file does not say."""
+    return _SCOPES.get(primvar.GetInterpolation()) if primvar.HasAuthoredInterpolation() else None
 
 
 def _subsets(mesh: Any, count: int, time: Any) -> Iterator[tuple[np.ndarray, Any]]:
@@ -171,6 +209,9 @@ def _look(material: Any, time: Any, named: set[str]) -> tuple[Look, str]:
     if material is None:
         return Look(), _PLACES
     surface, _, _ = material.ComputeSurfaceSource()
+    opacity = surface.GetInput("opacity") if surface else None
+    if opacity and (opacity.GetConnectedSources()[0] or opacity.Get(time) not in (None, 1.0)):
+        named.add("transparency")
     color = surface.GetInput("diffuseColor") if surface else None
     if not color:
         named.add("materials without diffuseColor")
@@ -186,14 +227,40 @@ def _look(material: Any, time: Any, named: set[str]) -> tuple[Look, str]:
         if not str(sources[0].sourceName).startswith("result"):
             named.add("materials that compute their colours")
         return Look(), _PLACES  # as from displayColor, which the mesh has
-    where = source.GetInput("st").GetConnectedSources()[0] if source.GetInput("st") else []
-    name = where[0].source.GetInput("varname").Get(time) if where and where[0].source.GetInput("varname") else None
-    resolved = str(file.resolvedPath or file.path)
-    return Look(None, Texture(partial(_picture, resolved))), str(name or _PLACES)
+    reader = _source(source, "st")
+    for _ in range(_TRANSFORMS):
+        if reader is not None and reader.GetInput("in"):  # of UsdTransform2d
+            named.add("moved pictures (UsdTransform2d)")
+            reader = _source(reader, "in")
+    name = reader.GetInput("varname").Get(time) if reader is not None and reader.GetInput("varname") else None
+    for word, neutral in _NEUTRAL.items():
+        given = source.GetInput(word).Get(time) if source.GetInput(word) else None
+        if given is not None and (given if isinstance(given, str) else tuple(given)) not in neutral:
+            named.add(f"{word} of pictures")
+    path = str(file.resolvedPath or file.path)
+    state = Path(path).stat() if Path(path).exists() else None
+    if state is not None and (not Path(path).is_file() or state.st_size > MOST_BYTES):
+        raise Unreadable(f"the texture {path} is no file of at most {MOST_BYTES} bytes")
+    texture = _texture(path, state and (state.st_size, state.st_mtime_ns))
+    return Look(None, texture), str(name or _PLACES)
+
+
+def _source(shader: Any, name: str) -> Any:
+    """Return the shader that an input is connected to, or None."""
+    from pxr import UsdShade
+
+    sources = shader.GetInput(name).GetConnectedSources()[0] if shader.GetInput(name) else []
+    return UsdShade.Shader(sources[0].source.GetPrim()) if sources else None
+
+
+@lru_cache(maxsize=_KEPT_TEXTURES)
+def _texture(path: str, state: object) -> Texture:
+    """Return the one texture of a picture, which several materials may have, in a state of its file."""
+    return Texture(partial(_picture, path, state))
 
 
 @lru_cache(maxsize=_KEPT_PICTURES)
-def _picture(path: str) -> UInt8[np.ndarray, "H W 3"]:
+def _picture(path: str, _state: object) -> UInt8[np.ndarray, "H W 3"]:
     """Return the picture in a file, also in one of a package. Raises InputError if it cannot be read."""
     from pxr import Ar
 
@@ -209,11 +276,8 @@ def _uv(
     """Return the places of corners in a picture; None where a mesh has none of this name."""
     from pxr import UsdGeom
 
-    found = UsdGeom.PrimvarsAPI(mesh).FindPrimvarWithInheritance(name)
-    values = _array(found.ComputeFlattened(time)) if found and found.HasValue() else np.zeros(0)
+    primvar = UsdGeom.PrimvarsAPI(mesh).FindPrimvarWithInheritance(name)
+    values = _array(primvar.ComputeFlattened(time)) if primvar and primvar.HasValue() else np.zeros(0)
     if values.ndim != 2 or values.shape[1] != 2:
         return None
-    if len(values) == len(corners):
-        return values.astype(np.float32)
-    valid = (corners >= 0) & (corners < count)
-    return values[np.where(valid, corners, 0)].astype(np.float32) if len(values) == count else None
+    return of_corners(values.astype(np.float32), _scope_of(primvar), count, corners)

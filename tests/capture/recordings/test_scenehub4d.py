@@ -75,6 +75,17 @@ def test_the_calibration_is_found_where_it_lies(calibration, bends, tmp_path):
         assert tuple(lens.distortion)[: len(wanted)] == wanted and not any(lens.distortion[len(wanted) :])
 
 
+def test_lenses_are_those_of_the_cameras_that_are_named(tmp_path):
+    lenses = {f"cam{number}": LENS | {"fx": 90.0 + number} for number in (2, 0, 3, 1)}
+    sensors = open_take(scene(tmp_path / "arena", {"device_calibration": lenses}, 1)).sensors
+    assert [sensor.depth.lens.focal[0] for sensor in sensors] == [90.0, 91.0, 92.0, 93.0]
+
+
+def test_the_rate_is_that_of_the_settings(tmp_path, made):
+    rig, _ = made(scene(tmp_path / "arena", of_each(LENS) | {"camera_config": {"fps": 15}}))
+    assert rig.frame_rate == 15
+
+
 def test_calibration_may_lie_beside_the_scenes(tmp_path):
     folder = scene(tmp_path / "Sitting", of_each(LENS), 1, "sitting")
     for name in ("camera_pose", "intrinsics"):
@@ -93,6 +104,14 @@ def test_calibration_may_lie_beside_the_scenes(tmp_path):
         (lambda f: np.save(f / "camera_pose/extrinsics/more.npy", np.eye(4)), None),  # the scene's name tells
         (lambda f: (f / "intrinsics/arena_config.json").write_text('{"a": {}}'), "has 0 cameras with fx, fy, cx, cy"),
         (lambda f: (f / "intrinsics/arena_config.json").write_text("[]"), "is not a JSON object"),
+        (lambda f: np.save(f / "camera_pose/extrinsics/extrinsics_arena.npy", np.zeros((4, 4, 4))), "cam0 is no pose"),
+        (lambda f: (f / "camera_pose/extrinsics/extrinsics_arena.npy").write_bytes(b"PK\x03\x04"), "cannot be read"),
+        (
+            lambda f: (f / "intrinsics/arena_config.json").write_text(
+                json.dumps(of_each(LENS | {"distortion": [0.1] * 6}))
+            ),
+            "the distortion of cam0 has 6 numbers",
+        ),
         (lambda f: (f / "rgbd/cam1/trans_depth/7_depth.png").rename(f / "rgbd/cam1/trans_depth/x.png"), "no PNG"),
         (lambda f: (f / "rgbd/cam1/trans_depth/7_depth.png").write_bytes(b"no"), "7_depth.png"),
     ],

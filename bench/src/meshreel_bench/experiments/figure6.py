@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ..codecs.meshreel import LARGER
 from ..codecs.necgs import QUICK
-from ..datasets import FOURS, SYNTHETIC
+from ..datasets import FOURS, WITH_CRANE
 from ..names import BEST, DRACO, KLT, NECGS, TUNED, TVMC
 from ..rows import Options
 from .study import D2, MASKED, VIEWS, Always, Bound, LeastRate, Measure, Reaches, Rises, Study, Sweep, Which, at_most
@@ -86,7 +86,7 @@ STUDY = Study(
             )
             for qp, mbps in DANCER_DRACO.items()
         ),
-        Reaches("synthetic4: tvmc is better than its released code", Which(SYNTHETIC, TVMC), RELEASED),
+        Reaches(f"{WITH_CRANE}: tvmc is better than its released code", Which(WITH_CRANE, TVMC), RELEASED),
         *(Always(f"{body}: worst frame of TSMC", Which(body, TUNED), WORST) for body in BODIES[1:3]),
         Reaches(
             "dancer, TSMC at quality 50: CPU s a frame of the encode and of its tracking, faces without area",

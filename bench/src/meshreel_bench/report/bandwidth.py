@@ -44,7 +44,7 @@ class Table(msgspec.Struct, frozen=True):
 
 _TABLES = msgspec.json.decode((files(__package__) / DATA).read_bytes(), type=dict[str, Table])
 TABLE_1, TABLE_2 = _TABLES["table_1"].systems, _TABLES["table_2"].systems
-RELEASED = {name: _TABLES[name].systems for name in ("dancer", "synthetic4")}
+RELEASED = {name: _TABLES[name].systems for name in ("dancer", "synthetic4-crane")}
 
 
 def anchor_rows() -> list[Row]:

@@ -69,4 +69,4 @@ def open_take(path: Path) -> Take:
             return found[0].read(path)
     known = "; ".join(reader.KIND for reader in readers())
     text = "is neither the folder of a rig (rig.json, camera.json) nor a recording that can be read"
-    raise InputError(f"{path}: {text}: {known}")
+    raise InputError(f"{path}: {text}: {known}; nor point clouds (.ply, .pcd, .npz, .las, .laz)")

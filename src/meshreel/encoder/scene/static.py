@@ -40,7 +40,7 @@ from ...geometry.threads import ahead
 from ...geometry.topology import clean
 from ...geometry.work import passed
 from ...types import Mesh, Placement, evenly
-from ..appearance.colors import fitting_sizes
+from ..appearance.colors import COARSER, fitting_sizes
 from ..appearance.videos import AppearanceOptions, TextureOptions, layered_pictures
 from ..settings.options import SceneOptions
 from .parts import Parts
@@ -239,7 +239,8 @@ def colored_states(
         fitted = fitted_colors(mesh, colors[:count].astype(np.float64), seen[:count])
         shown = fitted[len(mesh.vertices) - coded.vertices :]
         try:
-            encoded = encode_group_colors(canvas, [shown], options.color_step, None)
+            step = COARSER * options.color_step if texture else options.color_step  # beneath pictures
+            encoded = encode_group_colors(canvas, [shown], step, None)
         except CostlyError:  # the summary tells of it
             bare = True
         if bare:
