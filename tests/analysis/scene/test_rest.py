@@ -121,7 +121,7 @@ def test_what_stands_still_as_a_thing_does_needs_no_long_rest(scene: MeshList, m
     assert len(found.rest.changes) == 2
 
 
-def test_what_sways_in_a_part_stands_as_nobody_does(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_person_who_waves_is_not_at_rest(monkeypatch: pytest.MonkeyPatch) -> None:
     """Most of a person who stands there and waves is as still as a thing."""
     monkeypatch.setattr(cut, "_REST", 20.0)
 

@@ -34,7 +34,7 @@ _WIDTH = 4.75  # smallest width of a cell, in median distances between two frame
 _WIDEST = 4.0  # largest width of a cell, in edge lengths: decision 18
 _LOOKS = 5  # frames that are compared to decide if surface stands still: a guess
 _THRESHOLD = 0.3  # the paper's tau: a low one followed by clean-up misses less than a high one (guess)
-_MOVED = 0.1  # share of what rests, in parts that do not: .03 of crates and doors, .3 of who stands (decision 28)
+_MOVED = 0.1  # share of what rests, in parts that do not: .03 of a door, .3 of a standing person (decision 28)
 _ISLAND = 0.01  # m^2: connected faces with less area take the label of the faces around them (guess)
 Cameras = tuple[Camera, ...]
 
@@ -83,8 +83,8 @@ def _by_place(frames: CapturedSequence, chosen: Sequence[int], cameras: Cameras,
 
     def holds(groups: Sequence[Int64[np.ndarray, " C"]], numbers: list[int], times: float, part: float) -> list[bool]:
         surfaces, keys = looked_at(tuple(numbers))
-        chosen = ([np.isin(each, places.keys[group]) for each in keys] for group in groups)
-        return [_stands(surfaces, masks, 2 * cell, times * noise, part) for masks in chosen]
+        masks_of_groups = ([np.isin(each, places.keys[group]) for each in keys] for group in groups)
+        return [_stands(surfaces, masks, 2 * cell, times * noise, part) for masks in masks_of_groups]
 
     rest = find_rest(places, moving, chosen, frames.frame_rate, holds)
     looks = _color_looks(frames, chosen, CHANGE_SIDE) if moving.any() else None
