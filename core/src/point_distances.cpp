@@ -82,10 +82,8 @@ private:
         size_t low = 0, high = into_.count;
         while (low < high) {
             const size_t middle = (low + high) / 2;
-            if (at(middle) < wanted)
-                low = middle + 1;
-            else
-                high = middle;
+            if (at(middle) < wanted) low = middle + 1;
+            else high = middle;
         }
         return low < into_.count && at(low) == wanted ? low : into_.count;
     }

@@ -30,7 +30,7 @@ LEAST_VOXEL = 1e-6  # m
 
 @dataclass(frozen=True, slots=True)
 class CloudOptions:
-    """How clouds become surface."""
+    """Size of voxels, unit and sensor of point clouds that become surface."""
 
     voxel: float | None = None  # m; None: measured
     fragment: float = 0.002  # m^2: connected pieces with less area are dropped, as of fused depth
@@ -111,7 +111,7 @@ class Clouds(MeshSequence):
 
     @property
     def frame_rate(self) -> float:
-        """That of sequences whose files name none, 1/s."""
+        """The usual rate, 1/s: files of points name none."""
         return RATE
 
     @property
@@ -121,7 +121,7 @@ class Clouds(MeshSequence):
 
     @property
     def source(self) -> dict[str, Any]:
-        """What the frames are made of, for a record of it; files are told apart by their sizes."""
+        """A record of the files and options that the frames are made of; files are told apart by their sizes."""
         sizes = [(path.name, path.stat().st_size if path.exists() else 0) for path in self.files]
         folder = str(self.files[0].parent.resolve())
         return {"points": folder, "files_crc32": zlib.crc32(repr(sizes).encode())} | asdict(self.options)
