@@ -108,8 +108,7 @@ def command(
         chosen = CloudOptions(voxel, fragment, 1.0 if depth_unit is None else depth_unit, seen_from)
         clouds, warnings = open_clouds(inputs, chosen, frames, order)
         common.warn(warnings)
-        _fuse(clouds, clouds.source, output, format, common)
-        return common.warn(_of_points(clouds, output))
+        return _fuse(clouds, clouds.source, output, format, common)
     if seen_from is not None:
         raise InputError(
             "--seen-from: is of points; cameras of a rig and of recordings know their places, leave it out"
@@ -133,15 +132,13 @@ def command(
     return _fuse(recording, _made(recording), output, format, common)
 
 
-def _of_points(clouds: Clouds, output: Path) -> list[str]:
-    """Return warnings about points that got no surface, and a line about the voxels."""
-    found = [f"{output}: the surface of points in voxels of {clouds.options.voxel:g} m"] if clouds.bare else []
+def _bare_points(clouds: Clouds) -> list[str]:
+    """Return a warning about the frame of those read whose points got the least surface, where that is too little."""
     worst = max(clouds.bare, key=lambda number: clouds.bare[number], default=None)
-    if worst is not None and clouds.bare[worst] > BARE:
-        share, file = 100 * clouds.bare[worst], clouds.files[worst]
-        text = f"{file}: {share:.0f} % of its points got no surface"
-        found.append(f"{text}; a --voxel above {clouds.options.voxel:g} covers more")
-    return found
+    if worst is None or clouds.bare[worst] <= BARE:
+        return []
+    text = f"{clouds.files[worst]}: {100 * clouds.bare[worst]:.0f} % of its points got no surface"
+    return [f"{text}; a --voxel above {clouds.options.voxel:g} covers more"]
 
 
 def _take_facts(take: Take) -> tuple[dict[str, Any], list[str]]:
@@ -197,9 +194,13 @@ def _fuse(frames: Recording | Clouds, made: dict[str, Any], output: Path, format
         common.warn([f"{text}; is the unit right, and are voxels no smaller than the distances of pixels or points?"])
     if huge:
         common.warn([f"{output}/{huge[0]} from corner to corner: meshreel counts in metres; give --unit mm or cm"])
-    row = {"output": str(output), "frames": len(names), "fused": len(missing), "frame_rate": frames.frame_rate}
+    row: dict[str, Any] = {"output": str(output), "frames": len(names), "fused": len(missing)}
+    row |= {"frame_rate": frames.frame_rate, "voxel": frames.options.voxel}
+    if isinstance(frames, Clouds):
+        common.warn(_bare_points(frames))
     earlier = "" if len(missing) == len(names) else f", {len(names) - len(missing)} of them from before"
     text = f"{output}: {len(names)} {format} files{earlier}, {frames.frame_rate:g} frames a second"
+    text += f", voxels of {frames.options.voxel:g} m"
     common.result(row | {"format": format}, text)
 
 
