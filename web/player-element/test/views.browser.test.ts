@@ -86,6 +86,7 @@ describeInBrowser("the page of a recording", () => {
     await page.waitForFunction(() => document.querySelector("meshreel-player")!.shadowRoot!.querySelector("canvas")!.clientWidth === 800);
     await isAsTagged();
     await page.setViewportSize({ width: 300, height: 600 }); // from farther away, but the same view
+    await page.waitForFunction(() => document.querySelector("meshreel-player")!.shadowRoot!.querySelector("canvas")!.clientWidth === 300);
     await expect.poll(() => camera(page)).not.toEqual(wide);
     await expect.poll(() => page.evaluate(() => document.querySelector("meshreel-player")!.cameraMoved)).toBe(false);
     await isAsTagged();
