@@ -103,7 +103,7 @@ def test_a_value_that_is_no_sequence_of_meshes_is_refused(value: object):
         (([["a", "b", "c"]], [[0, 0, 0]]), "frame 1: vertices are <U1"),
         ((TRIANGLE.vertices, [[0, 1, 2, 0]]), r"frame 1: faces are int64 of shape \(1, 4\)"),
         ((TRIANGLE.vertices, [[0, 1], [2]]), "frame 1: faces are no array"),
-        ((np.eye(4, 3), np.zeros((0, 3))), "frame 1: 4 vertices and no faces: only surface is coded; .meshreel capture"),
+        ((np.eye(4, 3), np.zeros((0, 3))), "frame 1: 4 vertices and no faces: only surface is coded; .meshreel"),
         (Mesh.of(np.eye(4, 3), []), "frame 1: 4 vertices and no faces"),
         (trimesh.Scene([trimesh.PointCloud(np.eye(4, 3))]), "frame 1: 4 vertices and no faces"),
         ((TRIANGLE.vertices, [[0.0, 1.0, 2.0]]), "frame 1: faces are float64; give integers"),
