@@ -41,6 +41,7 @@ def animated_abc(path: Path, animation: Animation) -> Iterator[AbcWriter]:
             writer = AbcWriter(made, textures, animation)
             try:
                 yield writer
+                writer.save()
             finally:
                 writer.close()
             if Abc.IArchive(str(made)).getTop().getNumChildren() != 1:  # a full disk is no error of the package
@@ -84,13 +85,16 @@ class AbcWriter:
             return
         self._write(shape, *shape.shown[0])
 
-    def close(self) -> None:
-        """Write what is left, and close the file."""
+    def save(self) -> None:
+        """Write the states of the background, and empty samples for the parts that are gone at the end."""
         spans = ((first, end, number) for number, shape in enumerate(self._states) for first, end in shape.shown)
         for first, end, number in sorted(spans):
             self._write(self._states[number], first, end)
         for part in self._parts.values():
             part.fill(self._count)
+
+    def close(self) -> None:
+        """Close the file."""
         self._parts.clear()
         self._scene = self._archive = None
 

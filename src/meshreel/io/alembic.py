@@ -20,7 +20,19 @@ from jaxtyping import Float64
 from ..errors import InputError, needed
 from ..types import Up
 from .glb_file import from_linear
-from .looks import CONSTANT, CORNERS, FACES, VERTICES, Look, Part, backwards, joined, of_corners, of_vertices
+from .looks import (
+    CONSTANT,
+    CORNERS,
+    FACES,
+    VERTICES,
+    Look,
+    Part,
+    backwards,
+    check_corners,
+    joined,
+    of_corners,
+    of_vertices,
+)
 from .polygons import Polygons, Unreadable
 
 EXTENSION, COLORS = ".abc", "Cs"  # the name that film tools give the colours of a surface
@@ -129,11 +141,7 @@ class AlembicFile:
         sizes, corners = (np.array(of(), np.int64) for of in (sample.getFaceCounts, sample.getFaceIndices))
         if not len(points) or not len(sizes):
             return
-        if (sizes < 0).any() or sizes.sum() != len(corners):
-            raise Unreadable(f"{child.getFullName()} has {len(corners)} corners, and its polygons {int(sizes.sum())}")
-        if not 0 <= corners.min() <= corners.max() < len(points):
-            wrong = int(corners[(corners < 0) | (corners >= len(points))][0])
-            raise Unreadable(f"{child.getFullName()} refers to point {wrong}, and has {len(points)}")
+        check_corners(f"Alembic mesh {child.getFullName()}", corners, sizes, len(points))
         # Alembic's polygons run clockwise.
         order = backwards(sizes) if np.linalg.det(matrix[:3, :3]) > 0 else np.arange(len(corners))
         colors, one = of_vertices(*_colors(schema, chosen), len(points), corners, sizes)

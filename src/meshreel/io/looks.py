@@ -11,7 +11,7 @@ from jaxtyping import Bool, Float32, Float64, Int64, UInt8
 
 from ..types import GREY, Texture
 from .pictures import MOST_PIXELS
-from .polygons import Polygons
+from .polygons import Polygons, Unreadable
 
 _TRIED = 8  # times the texels of a picture may be looked at: faces that cover it so often overlap (guess)
 _AT_ONCE = 1 << 20  # texels, some 200 MB
@@ -62,6 +62,15 @@ def joined(parts: Sequence[Part]) -> Polygons:
     return with_looks(Polygons(vertices, corners, sizes, colors=colors, colored=colored, uv=uv_or_none), looks, which)
 
 
+def check_corners(name: object, corners: Int64[np.ndarray, " C"], sizes: Int64[np.ndarray, " P"], count: int) -> None:
+    """Raise Unreadable, which names a mesh of `count` vertices, where its polygons have other corners."""
+    if sizes.sum() != len(corners) or (sizes < 0).any():
+        raise Unreadable(f"{name} has {len(corners)} corners, and its polygons {int(sizes.sum())}")
+    wrong = corners[(corners < 0) | (corners >= count)]
+    if len(wrong):
+        raise Unreadable(f"{name} refers to point {wrong[0]}, and has {count}")
+
+
 CONSTANT, FACES, VERTICES, CORNERS = "constant", "uniform", "vertex", "faceVarying"  # whose values are, in USD's words
 
 
@@ -84,7 +93,7 @@ def of_vertices(
     if scope == VERTICES:
         return (colors if len(colors) == count else None), None
     own = np.repeat(colors, sizes, axis=0) if scope == FACES and len(colors) == len(sizes) else colors
-    if not len(own) or len(own) != len(corners) or not 0 <= corners.min() <= corners.max() < count:
+    if not len(own) or len(own) != len(corners):
         return None, None
     counts = np.maximum(np.bincount(corners, minlength=count), 1)
     sums = [np.bincount(corners, own[:, axis], count) for axis in range(3)]
@@ -98,8 +107,7 @@ def of_corners(
     scope = scope or _scope(len(values), count, corners, np.zeros(0, np.int64))
     if scope == CORNERS:
         return values if len(values) == len(corners) else None
-    valid = (corners >= 0) & (corners < count)
-    return values[np.where(valid, corners, 0)] if scope == VERTICES and len(values) == count else None
+    return values[corners] if scope == VERTICES and len(values) == count else None
 
 
 def _scope(number: int, count: int, corners: np.ndarray, sizes: np.ndarray) -> str:

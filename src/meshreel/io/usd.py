@@ -19,7 +19,19 @@ from ..errors import InputError, needed
 from ..types import Texture, Up, known_up
 from .files import MOST_BYTES
 from .glb_file import from_linear
-from .looks import CONSTANT, CORNERS, FACES, VERTICES, Look, Part, backwards, joined, of_corners, of_vertices
+from .looks import (
+    CONSTANT,
+    CORNERS,
+    FACES,
+    VERTICES,
+    Look,
+    Part,
+    backwards,
+    check_corners,
+    joined,
+    of_corners,
+    of_vertices,
+)
 from .pictures import parse_picture
 from .polygons import Polygons, Unreadable
 
@@ -136,9 +148,7 @@ class UsdFile:
         sizes = sizes.astype(np.int64)
         if not len(points) or not len(sizes):
             return
-        if sizes.sum() != len(corners) or (sizes < 0).any():
-            text = f"{mesh.GetPath()} has {len(corners)} corners, and its polygons {int(sizes.sum())}"
-            raise Unreadable(f"USD mesh {text}")
+        check_corners(f"USD mesh {mesh.GetPath()}", corners, sizes, len(points))
         if mesh.GetSubdivisionSchemeAttr().Get(time) not in ("none", None):
             named.add("smooth subdivision (the cage is taken)")
         if len(mesh.GetHoleIndicesAttr().Get(time) or ()):
@@ -158,11 +168,7 @@ class UsdFile:
                 named.add("a texture (without places)")
                 look = Look()
             look = look if look != Look() or one is None else Look(one)
-            own = corners[order][rows]
-            used, numbers = np.unique(own, return_inverse=True)
-            if len(used) and not 0 <= used[0] <= used[-1] < len(points):
-                wrong = int(used[(used < 0) | (used >= len(points))][0])
-                raise Unreadable(f"USD mesh {mesh.GetPath()} refers to point {wrong}, and has {len(points)}")
+            used, numbers = np.unique(corners[order][rows], return_inverse=True)
             shown = None if colors is None else colors[used]
             yield Part(
                 vertices[used],
