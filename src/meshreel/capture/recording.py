@@ -122,7 +122,7 @@ class Recording(MeshSequence):
         described = [path for path in (self.rig.folder / RIG, self.rig.folder / SINGLE) if path.exists()]
         pictures = (*self.rig.files, *(camera.files for camera in self.rig.color_cameras))
         frames = (*described, *(of[number] for number in self.numbers for of in pictures if number in of))
-        return (*frames, *(path for path in self.steady.files if path not in set(frames)))
+        return (*frames, *self.rig.paths.values(), *(path for path in self.steady.files if path not in set(frames)))
 
     @property
     def up(self) -> Up:
@@ -186,15 +186,18 @@ class Kept:
 def open_recording(
     folder: Path, options: FusionOptions = FusionOptions(), frames: str = ":", keep: bool = True, order: Order = "auto"
 ) -> tuple[Recording, list[str]]:
-    """Open the recording in a rig's folder, frames A:B, with warnings. Raises InputError, also for moving cameras."""
+    """Open the recording in a rig's folder, frames A:B, with warnings.
+
+    Raises InputError, also for a camera that moves and has no path.
+    """
     rig = read_rig(folder, order)
     warnings = [*rig.remarks, *rig.missing()]
     for number, camera in enumerate(rig.cameras):
         seen = rig.looked_at(number)
         warnings += rig.blind(number, seen)
-        if (share := moved_share(seen)) > MOVED:
+        if not camera.path and (share := moved_share(seen)) > MOVED:
             text = f"{folder}: camera {camera.name} seems to move: {100 * share:.0f} % of its pixels see something else"
-            remedy = "record with cameras that stand still, or cut the recording where it was moved"
+            remedy = "say where it was in each frame (`poses`), or cut the recording where it was moved"
             raise InputError(f"{text} than usual; {remedy}")
     recording = Recording(rig, options, frames, keep)
     return recording, warnings + unsteady(recording)

@@ -154,7 +154,7 @@ def _take_facts(take: Take) -> tuple[dict[str, Any], list[str]]:
                 calibration = "calibrated" if stream.lens is not None else f"NOT calibrated: {take.calibrate}"
                 times = f"{stream.count} pictures in {stream.seconds:.2f} s ({stream.rate:.4g} a second)"
                 lines.append(f"  {sensor.name}: {kind} {stream.width} x {stream.height}, {times}, {calibration}")
-        cameras.append(camera | {"poses": 0 if sensor.poses is None else len(sensor.poses)})
+        cameras.append(camera | {"poses": 0 if sensor.poses is None else len(sensor.poses.matrices)})
     lines += [f"  not read: {', '.join(take.others)}"] if take.others else []
     return {"path": str(take.path), "kind": take.kind, "cameras": cameras, "others": list(take.others)}, lines
 
@@ -207,7 +207,9 @@ def _fuse(frames: Recording | Clouds, made: dict[str, Any], output: Path, format
 def _made(recording: Recording) -> dict[str, Any]:
     """Return everything that the frames depend on; the files of pictures are told apart by their sizes."""
     sizes = [[_size(files[n]) if n in files else -1 for n in recording.numbers] for files in recording.rig.files]
-    return {
+    paths = [[p.to_world.tolist() for p in camera.path.values()] for camera in recording.rig.cameras if camera.path]
+    moving = {"paths": [zlib.crc32(json.dumps(each).encode()) for each in paths]} if paths else {}
+    return moving | {
         "rig": str(recording.rig.folder.resolve()),
         "frames": recording.numbers,
         "fusion": asdict(recording.options),

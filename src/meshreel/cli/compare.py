@@ -14,6 +14,7 @@ from rich.table import Table
 
 from ..analysis.appearance.splat_fit import GOLDEN, SplatView, rendered, ring, taken
 from ..analysis.appearance.splat_raster import draw
+from ..capture.rig.cameras import at_frame
 from ..capture.simulated.simulated_rig import Truth, read_truth
 from ..container.sources import FileSource
 from ..decoder.describe import describe_file
@@ -162,10 +163,10 @@ def against_truth(
     sequence: MeshSequence, other: Frames, truth: Truth, numbers: Sequence[int], progress: StageBars
 ) -> dict[str, Any]:
     """Compare the meshes of some frames with the clean ones, as `compare_with_truth` does."""
-    sights = [Sight(camera.view, *camera.depth_range) for camera in truth.cameras]
 
     def clean(number: int) -> Scene:
         frame = truth[number]
+        sights = [Sight(at_frame(camera, number).view, *camera.depth_range) for camera in truth.cameras]
         return Scene(frame.mesh, frame.dynamic, sights, complete=True)
 
     return compare_with_truth(sequence, other, clean, numbers, lambda done: progress("truth", done, len(numbers)))

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Bool, Float, Float32, Float64, Int64, UInt16
 
-from ..types import Placement
+from ..types import Placement, evenly
 from .cameras import Camera
 
 _Shares = tuple[Int64[np.ndarray, " N"], Float64[np.ndarray, " N"]]  # pixels, and how much each counts
@@ -19,6 +19,7 @@ THROUGH = (0.03, 0.015)  # m, and share of the depth: a measurement so far behin
 APART = (0.06, 0.02)  # m, and share of the depth: measurements farther apart are of different surfaces (guess)
 WORLD = Placement(1.0, (0.0, 0.0, 0.0))
 STEP = 0.03  # of the depth, between neighbours: pixels that differ by more are of two surfaces (guess)
+PLACES = 4  # frames in which cameras are looked for: one that a person carries is never where it was (guess)
 SMOOTHED = 5  # pixels across, of the median that a depth picture is smoothed by (guess)
 
 
@@ -137,10 +138,38 @@ def _between(count: int, factor: int) -> tuple[list[_Shares], Int64[np.ndarray, 
 
 @runtime_checkable
 class DepthFrames(Protocol):
-    """The depth pictures of a recording, by frame; its cameras stand still."""
+    """The depth pictures of a recording, by frame; each has its camera, where it is in that frame."""
 
     def __getitem__(self, index: int, /) -> list[DepthPicture | None]:
         """Return a frame's pictures, one for each camera; None for a camera that lacks the frame."""
+
+
+class _Taken(Protocol):
+    """A picture and its camera."""
+
+    @property
+    def camera(self) -> Camera: ...
+
+
+def is_carried(pictures: Callable[[int], Sequence[_Taken | None]], count: int) -> bool:
+    """Return whether a camera of the depth or colour pictures of `count` frames is elsewhere in another frame."""
+    seen = dict[int, Camera]()
+    for index in evenly(count, PLACES):
+        for number, picture in enumerate(pictures(index)):
+            if picture is not None and seen.setdefault(number, picture.camera) != picture.camera:
+                return True
+    return False
+
+
+def looked_at(pictures: Sequence[DepthPicture | None], points: Float64[np.ndarray, "N 3"]) -> Bool[np.ndarray, " N"]:
+    """Return the points that some camera would measure if surface were there: nothing nearer hides them."""
+    seen = np.zeros(len(points), bool)
+    for picture in pictures:
+        if picture is not None:
+            pixels, inside, depth = picture.camera.seen(points)
+            measured = picture.depth.reshape(-1)[pixels] * picture.unit
+            seen[inside[measured > depth - apart(depth)]] = True
+    return seen
 
 
 def rise(depth: Float32[np.ndarray, "H W"]) -> Float32[np.ndarray, "H W"]:

@@ -20,7 +20,7 @@ from scipy.spatial.transform import Rotation
 
 from ..geometry.cameras import Camera
 from ..geometry.closest_points import Surface
-from ..geometry.depth import STEP, DepthFrames, DepthPicture, apart
+from ..geometry.depth import STEP, DepthFrames, DepthPicture, apart, is_carried
 from ..types import Frames, Mesh, evenly
 from .comparison import Row
 from .render import View, Visible
@@ -119,10 +119,11 @@ class DepthJudge:
         """Read at most `LOOKED_AT` of `count` frames for the usual depth; `up` is the direction that points up."""
         self._frames, self._up = frames, np.asarray(up, np.float64)
         samples = [frames[number] for number in evenly(count, LOOKED_AT)]
+        is_moving = is_carried(frames.__getitem__, count)  # a pixel of such a camera has no usual depth, and no body
         self._usual = dict[int, np.ndarray]()
         for camera, pictures in enumerate(zip(*samples, strict=True)):
             depths = [picture.depth * picture.unit for picture in pictures if picture is not None]
-            if depths:
+            if depths and not is_moving:
                 self._usual[camera] = _usual(np.stack(depths))
         heights = [self._heights(pictures) for pictures in samples]
         lows = [np.quantile(each, ENDS[0]) for each in heights if len(each) >= LIMB]

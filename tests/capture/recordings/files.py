@@ -138,6 +138,7 @@ class Bag:
         plugin = {} if self.old else {"version": 9, "storage_plugin": rosbag2.StoragePlugin[form.upper()]}
         self.writer = (rosbag1.Writer if self.old else rosbag2.Writer)(path, **plugin)
         self.topics: dict = {}
+        self.path = path
 
     def __enter__(self):
         self.writer.open()
@@ -178,6 +179,10 @@ class Bag:
     def transform(self, place, turn=(0.0, 0.0, 0.0, 1.0)):
         made = self.of("geometry_msgs/Vector3", *place), self.of("geometry_msgs/Quaternion", *turn)
         return self.of("geometry_msgs/Transform", *made)
+
+    def move(self, parent, child, place, time):
+        one = self.of("geometry_msgs/TransformStamped", self.header(time, parent), child, self.transform(place))
+        self.write("/tf", "tf2_msgs/TFMessage", self.of("tf2_msgs/TFMessage", [one]), time)
 
     def still(self, parent, child, place, turn=(0.0, 0.0, 0.0, 1.0)):
         one = self.of("geometry_msgs/TransformStamped", self.header(0, parent), child, self.transform(place, turn))

@@ -21,7 +21,7 @@ def test_what_cannot_be_read_is_named_with_a_remedy(tmp_path, made):
         open_take(tmp_path / "nothing.bag")
     with pytest.raises(InputError, match=r"depth of camera has no calibration: write fx fy cx cy .*calibration\.txt"):
         made(files.tum(tmp_path / "desk", numbers=""))
-    assert len(readers()) == 6 and not is_take(tmp_path)
+    assert len(readers()) == 8 and not is_take(tmp_path)
 
 
 @pytest.mark.parametrize(

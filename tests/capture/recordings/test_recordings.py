@@ -11,10 +11,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from meshreel.capture.recordings import is_rig, open_take
+from meshreel.capture.recordings import is_rig, open_take, to_rig
 from meshreel.capture.recordings.record3d import FLIP
 from meshreel.errors import InputError
 from meshreel.io.pictures import pack_picture
+from meshreel.io.write import write_picture
 from tests.capture.recordings import files
 from tests.capture.recordings.files import COUNT, DEPTHS, SIZE, TIMES, Bag, jpeg, shade
 
@@ -248,14 +249,142 @@ def test_several_recordings_are_cameras_of_one_rig(tmp_path, made):
     assert "both begin together now" in remarks[0] and "meshreel calibrate finds it" in remarks[1]
 
 
-def test_a_camera_that_moves_by_its_own_poses_is_refused_by_name(tmp_path, made):
-    moved = [[*files.STILL[:4], 0.1 + 0.1 * n, 1.5, 0.2] for n in range(COUNT)]
-    with pytest.raises(InputError, match=r"camera camera moves: by 0\.15 m and 0 degrees in its recorded poses"):
-        made(files.tum(tmp_path / "desk", poses=moved))
+MOVED = [[*files.STILL[:4], 0.1 + 0.1 * n, 1.5, 0.2] for n in range(COUNT)]
+
+
+def paths(rig):
+    """The places of a rig's depth and colour camera, frame by frame."""
+    return [
+        [one.path[frame].to_world[:3, 3].tolist() for frame in rig.frames] for one in (*rig.cameras, *rig.color_cameras)
+    ]
+
+
+@pytest.fixture
+def as_recorded(monkeypatch):
+    """Poses stay as they were recorded: the pictures of these files are of a camera that stands still."""
+    monkeypatch.setattr(to_rig, "refine_paths", lambda _: [])
+
+
+@pytest.mark.usefixtures("as_recorded")
+def test_a_camera_that_moves_by_its_own_poses_has_one_in_each_frame(tmp_path, made):
+    rig, remarks = made(files.tum(tmp_path / "desk", poses=MOVED))
+    assert same(rig) and remarks == [] and np.allclose(paths(rig), [[pose[4:] for pose in MOVED]] * 2)
     turned = [[np.sin(n / 20), 0, 0, np.cos(n / 20), *PLACE] for n in range(COUNT)]
-    with pytest.raises(InputError, match=r"moves: by 0 m and .* degrees"):
-        made(files.tum(tmp_path / "chair", poses=turned))
-    assert not list(tmp_path.glob("rig*")) and not list(tmp_path.glob(".rig*"))
+    rig, _ = made(files.tum(tmp_path / "chair", poses=turned))
+    assert (
+        paths(rig) == [[PLACE] * COUNT] * 2
+        and np.ptp([rig.cameras[0].path[k].to_world[1, 2] for k in rig.frames]) > 0.2
+    )
+
+
+@pytest.mark.usefixtures("as_recorded")
+def test_a_picture_between_two_poses_is_taken_between_them(tmp_path, made):
+    late = [time + 0.04 for time in TIMES]
+    rig, _ = made(files.tum(tmp_path / "desk", TIMES, late, poses=MOVED))
+    depth, color = paths(rig)
+    assert np.allclose(np.subtract(color, depth)[:-1], [0.04, 0, 0]) and color[-1] == depth[-1]
+
+
+@pytest.mark.usefixtures("as_recorded")
+def test_frames_without_a_pose_near_them_are_left_out_and_told(tmp_path, made):
+    folder = files.tum(tmp_path / "desk", poses=MOVED)
+    rows = (folder / "groundtruth.txt").read_text().splitlines()
+    (folder / "groundtruth.txt").write_text("\n".join([*rows[:2], f"{TIMES[2] + 99} 9 9 9 0 0 0 1"]))
+    late = [TIMES[0], TIMES[1], TIMES[1] + 0.5, TIMES[1] + 0.6]
+    (folder / "depth.txt").write_text("\n".join(f"{time} depth/{n}.png" for n, time in enumerate(late)))
+    (folder / "rgb.txt").write_text("\n".join(f"{time} rgb/{n}.jpg" for n, time in enumerate(late)))
+    rig, remarks = made(folder)
+    assert rig.frames == [0, 1] and any(
+        "2 of 4 frames are left out: no pose of camera is known then" in r for r in remarks
+    )
+
+
+@pytest.mark.usefixtures("as_recorded")
+def test_stray_scanner_and_record3d_move_with_their_phone(tmp_path, made):
+    pytest.importorskip("av")
+    rig, _ = made(files.stray(tmp_path / "scan", poses=MOVED))
+    assert same(rig, slice(1, None)) and np.allclose(paths(rig)[0], [pose[4:] for pose in MOVED])
+
+
+@pytest.mark.usefixtures("as_recorded")
+@pytest.mark.parametrize("form", ["bag", "mcap"])
+def test_a_camera_on_a_robot_moves_by_its_bags_tf(tmp_path, made, form):
+    pytest.importorskip("rosbags")
+    with Bag(tmp_path / f"robot.{form}" if form == "bag" else tmp_path / "robot", form) as bag:
+        bag.info("/camera/depth/camera_info")
+        bag.still("base", "optical", (0.0, 1.0, 0.0))
+        bag.still("map", "odom", (0.0, 0.0, 5.0))
+        for number, time in enumerate([*TIMES, TIMES[-1] + 0.1]):
+            bag.move("odom", "base", (0.1 * number, 0.0, 0.0), time)
+        for number, time in enumerate(TIMES):
+            bag.image("/camera/depth/image", DEPTHS[number], "16UC1", time + 0.05)
+    rig, _ = made(bag.path)
+    assert same(rig) and np.allclose(paths(rig)[0], [[0.1 * n + 0.05, 1.0, 5.0] for n in range(COUNT)])
+
+
+def seven_scenes(folder, lost=()):
+    folder.mkdir()
+    for number in range(COUNT):
+        name = f"frame-{3 * number:06}"
+        depth = DEPTHS[number].copy()
+        depth[0] = 65535  # none
+        write_picture(depth, folder / f"{name}.depth.png")
+        (folder / f"{name}.color.jpg").write_bytes(jpeg(number))
+        pose = np.full((4, 4), np.nan) if number in lost else np.eye(4)
+        pose[0, 3] += 0.1 * number
+        (folder / f"{name}.pose.txt").write_text("\n".join(" ".join(f"{x:.9f}" for x in row) for row in pose))
+    (folder / "camera-intrinsics.txt").write_text("\n".join(" ".join(map(str, row)) for row in files.MATRIX))
+    return folder
+
+
+@pytest.mark.usefixtures("as_recorded")
+def test_a_folder_of_7_scenes_has_a_pose_a_frame_and_nothing_at_its_mark_for_none(tmp_path, made):
+    rig, remarks = made(seven_scenes(tmp_path / "chess"))
+    assert same(rig, slice(1, None)) and remarks == [] and not rig.depth(0, 0)[0].any()
+    assert np.allclose(paths(rig), [[[0.1 * n, 0, 0] for n in range(COUNT)]] * 2)
+    rig, _ = made(seven_scenes(tmp_path / "fire", lost=[1]))  # the poses around it are near in time
+    assert np.allclose(paths(rig)[0][1], [0.1, 0, 0])
+    (tmp_path / "chess" / "frame-000000.pose.txt").write_text("1 2 3")
+    with pytest.raises(InputError, match=r"frame-000000\.pose\.txt: has 3 numbers; give 4 rows of 4"):
+        made(tmp_path / "chess")
+
+
+def nerfstudio(folder, **changed):
+    (folder / "images").mkdir(parents=True)
+    frames = []
+    for number in range(COUNT):
+        write_picture(DEPTHS[number], folder / f"depth-{number}.png")
+        (folder / "images" / f"{number}.jpg").write_bytes(jpeg(number))
+        pose = np.diag([1.0, -1.0, -1.0, 1.0])  # OpenGL's axes
+        pose[0, 3] = 0.1 * number
+        names = {"file_path": f"images/{number}.jpg", "depth_file_path": f"depth-{number}.png"}
+        frames.append(names | {"transform_matrix": pose.tolist()})
+    about = {"fl_x": SIZE, "fl_y": SIZE, "cx": SIZE / 2, "cy": SIZE / 2, "w": SIZE, "h": SIZE, "fps": files.RATE}
+    about |= {"frames": frames[::-1], "integer_depth_scale": 0.001} | changed
+    (folder / "transforms.json").write_text(json.dumps({key: about[key] for key in about if about[key] is not None}))
+    return folder
+
+
+@pytest.mark.usefixtures("as_recorded")
+def test_a_nerfstudio_folder_has_opengls_axes_and_frames_in_any_order(tmp_path, made):
+    rig, remarks = made(nerfstudio(tmp_path / "scan"))
+    assert same(rig) and remarks == [] and rig.cameras[0].view.center == (SIZE / 2, SIZE / 2)
+    assert np.allclose(paths(rig), [[[0.1 * n, 0, 0] for n in range(COUNT)]] * 2)
+    assert np.allclose(rig.cameras[0].path[2].to_world[:3, :3], np.eye(3))
+
+
+@pytest.mark.parametrize(
+    ("changed", "told"),
+    [
+        ({"frames": [{"file_path": "a.jpg"}]}, "no frame of transforms.json has a depth_file_path"),
+        ({"camera_model": "OPENCV_FISHEYE"}, "the camera_model OPENCV_FISHEYE"),
+        ({"fl_x": None}, "write fl_x fl_y cx cy w h into"),
+        ({"frames": 3}, "cannot be read"),
+    ],
+)
+def test_a_nerfstudio_folder_that_cannot_be_read_is_told_by_what_it_lacks(tmp_path, made, changed, told):
+    with pytest.raises(InputError, match=told):
+        made(nerfstudio(tmp_path / "scan", **changed))
 
 
 def test_what_is_written_as_docs_and_other_tools_have_it_is_read(tmp_path, made):

@@ -2,14 +2,14 @@
 
 In: the still faces of some frames, or their depth pictures. Out: one mesh. Signed distances to the surfaces of the
 frames are averaged, which reduces noise, and surface that people hide in one frame comes from others. Of depth, the
-median over time of every pixel is fused, which lies on a surface and has less noise, so voxels may be finer. Cameras
-must not move; a sequence that offers depth pictures has checked that.
+median over time of every pixel is fused, which lies on a surface and has less noise, so voxels may be finer; that of
+cameras that move is fused from the pictures of the whole take.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import repeat
 
@@ -24,6 +24,7 @@ from ...geometry.threads import mapped
 from ...geometry.topology import face_means, face_normals, part_of, without_fragments
 from ...types import Mesh
 
+WALKED = 80  # the same where a camera moves, and sees a part of the scene in each (guess)
 FRAMES = 20  # of a scene: largest number of fused frames, spread over the sequence (decision 19)
 SHARED = 0.15  # smallest share of the frames that must have surface at a voxel (decision 19)
 STEADY = 0.6  # voxels: where the standard deviation of the distances is larger, the surface was not still (decision 19)
@@ -36,6 +37,7 @@ SIMILAR = 4.0  # times the noise, standard deviation of the inverse depths that 
 SECOND_MEDIAN = 0.6745 * 6**0.5  # of the absolute second difference of normally distributed values, in deviations
 FINER_VOXEL = 0.75  # in voxels of the frames: averaged depth has less noise (decision 19)
 FACING = 0.15  # cosine: faces that no camera sees more frontally lie between two real surfaces (decision 19)
+WALK_SEEN = 1.5  # pictures of a walk in which a voxel must be measured: what one alone has is noise (guess)
 HOLE = 0.4  # m: shorter loops of its border are closed where no camera saw through (decision 28)
 FINER = 3  # times the rows and columns of the pictures, interpolated, that are fused (decision 28)
 
@@ -76,13 +78,43 @@ def fuse_still_depth(moments: Iterable[Moment], voxel: float) -> Mesh:
     fine = mapped(DepthPicture.finer, usual, repeat(FINER))
     past = mapped(lambda picture: _continued(picture).finer(FINER), usual)
     mesh = extract(integrate(fine, FINER_VOXEL * voxel, GRAZING if len(usual) > 1 else ALONE, past), SEEN)
+    whole = without_fragments(_faced(mesh, usual), FRAGMENT)
+    return close_holes(whole, HOLE, FreeSpace.of(usual).at)
+
+
+def fuse_walk(moments: Iterable[Moment], voxel: float) -> Mesh:
+    """Fuse the still surface in the depth pictures of cameras that move; `voxel` (m) is that of the frames' meshes.
+
+    What one picture sees through is no surface of the others: signed distances are averaged over all.
+    """
+    pictures = list[DepthPicture]()
+    for moment in moments:
+        for picture in moment.pictures:
+            if picture is not None:
+                depth = np.maximum(_still(picture, moment), 0).astype(np.float32)
+                pictures += [replace(picture, depth=depth)] if depth.any() else []
+    if not pictures:
+        return Mesh.empty()
+    fine = [picture.finer(_times(picture, FINER_VOXEL * voxel)) for picture in pictures]
+    mesh = extract(integrate(fine, FINER_VOXEL * voxel, GRAZING), WALK_SEEN)
+    whole = without_fragments(_faced(mesh, pictures), FRAGMENT)
+    return close_holes(whole, HOLE, FreeSpace.of(pictures).at)
+
+
+def _times(picture: DepthPicture, voxel: float) -> int:
+    """Return by how much finer a picture must be so that two pixels are within a voxel at its usual depth."""
+    usual = float(np.median(picture.depth[picture.depth > 0])) * picture.unit
+    return int(np.clip(math.ceil(2 * usual / min(picture.camera.focal) / voxel), 1, FINER))
+
+
+def _faced(mesh: Mesh, pictures: Sequence[DepthPicture]) -> Mesh:
+    """Return the faces that some camera sees at more than a grazing angle."""
     normals, middles = face_normals(mesh)[0], face_means(mesh.vertices, mesh.faces)
     best = np.full(len(middles), -1.0)  # cosine between a face's normal and the ray of the camera that it faces most
-    for picture in usual:
+    for picture in pictures:
         rays = picture.camera.eye - middles
         best = np.maximum(best, (rays * normals).sum(axis=1) / np.maximum(np.linalg.norm(rays, axis=1), 1e-12))
-    whole = without_fragments(part_of(mesh, best >= FACING), FRAGMENT)
-    return close_holes(whole, HOLE, FreeSpace.of(usual).at)
+    return part_of(mesh, best >= FACING)
 
 
 def usual_pictures(moments: Iterable[Moment]) -> list[DepthPicture]:

@@ -20,7 +20,7 @@ from scipy.ndimage import minimum_filter
 
 from ...geometry import work
 from ...geometry.cameras import Camera
-from ...geometry.depth import DepthPicture
+from ...geometry.depth import DepthPicture, is_carried
 from ...geometry.drawing import backs, draw
 from ...geometry.threads import ahead
 from ...geometry.topology import face_normals
@@ -124,8 +124,10 @@ class Places:
     beside: Int32[np.ndarray, "P 26"]  # numbers of the neighbouring places; a place's own number where there is none
     normals: Float64[np.ndarray, "P 3"]  # mean normal of the surface there, unit length; 0 where normals cancel
     tally: Tally
-    # By number, depth cameras that stand still, and the pixels in which each has a depth in half of the frames or more.
+    # By number, depth cameras that stand still, and the pixels in which each has a depth in half of the frames or more;
+    # none where a camera moves: a frame is a part of the scene then, and only what is measured past is seen free.
     eyes: dict[int, tuple[Camera, Bool[np.ndarray, "H W"]]] = field(default_factory=dict)
+    is_part: bool = False  # whether a frame shows a part of the scene, as from a camera that moves
 
     @property
     def free_share(self) -> Float64[np.ndarray, " P"]:
@@ -163,7 +165,8 @@ def find_places(observed: Observations, lattice: Lattice) -> Places:
         work.passed("observe")
     keys, normals = cells.places()
     eyes = {number: (camera, 2 * count >= len(observed.frames)) for number, (camera, count) in cameras.items()}
-    places = Places(lattice, keys, neighbours(keys), normals, Tally(len(keys)), eyes)
+    is_part = observed.pictures is not None and is_carried(observed.pictures, len(observed.frames))
+    places = Places(lattice, keys, neighbours(keys), normals, Tally(len(keys)), {} if is_part else eyes, is_part)
     for occupied, free in _states(observations, places, observed.views):
         places.tally.add(occupied, free)
     observations.clear()
@@ -209,10 +212,13 @@ def _sensed(frames: Sequence[_Observation], places: Places, reach: float) -> Ite
     at = {number: camera.seen(middles) for number, (camera, _) in places.eyes.items()}
     for frame in frames:
         expected, past, clear = np.zeros((3, len(middles)), bool)
+        expected |= places.is_part
         for number, (_, sees) in places.eyes.items():
-            pixels, inside, depth = at[number]
+            pixels, inside, _ = at[number]
             expected[inside[sees.reshape(-1)[pixels]]] = True
-            if frame.measured and (picture := frame.measured[number]) is not None:
+        for number, picture in enumerate(frame.measured or ()):
+            if picture is not None:
+                pixels, inside, depth = at[number] if number in at else picture.camera.seen(middles)
                 depths = picture.depth.reshape(-1)[pixels] * picture.unit
                 expected[inside[depths > 0]] = True
                 past[inside[depths > depth + reach]] = True

@@ -17,6 +17,7 @@ from jaxtyping import Bool, Float64, Int64
 from ...errors import InputError
 from ...geometry.cameras import Camera
 from ...geometry.closest_points import Surface
+from ...geometry.depth import is_carried
 from ...geometry.derived_sequences import CapturedSequence, DerivedSequence, captured, picked, turned_over
 from ...geometry.topology import edge_lengths, face_means, face_normals
 from ...geometry.voxels import Lattice
@@ -122,7 +123,7 @@ def mask_views(frames: MeshSequence, cameras: Cameras = ()) -> tuple[Cameras, Co
 def _color_looks(frames: MeshSequence, chosen: Sequence[int], side: int = SIDE) -> ColorLooks | None:
     """Return the pictures of the colour cameras; None if there are none."""
     colors = captured(frames).colors
-    if colors is None or not chosen:
+    if colors is None or not chosen or is_carried(colors.__getitem__, len(frames)):  # a view is at one place
         return None
     looks = ColorLooks(colors, chosen[0], side)
     return looks if looks.views else None

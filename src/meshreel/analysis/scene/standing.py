@@ -19,6 +19,7 @@ from scipy.spatial import cKDTree
 
 from ...geometry.cameras import Camera
 from ...geometry.closest_points import Surface, area_samples
+from ...geometry.depth import is_carried, looked_at
 from ...geometry.derived_sequences import CapturedSequence
 from ...geometry.threads import mapped
 from ...geometry.topology import (
@@ -104,7 +105,12 @@ def scene_standing(frames: Frames) -> Standing | None:
         check(mesh := frames[number], f"frame {number}")
         return mesh if mesh.is_empty else drop_unreferenced(mesh)
 
-    meshes = [mesh for mesh in mapped(checked, evenly(len(frames), PROBES)) if not mesh.is_empty]
+    probes = evenly(len(frames), PROBES)
+    numbers, meshes = list[int](), list[Mesh]()
+    for number, mesh in zip(probes, mapped(checked, probes), strict=True):
+        if not mesh.is_empty:
+            numbers.append(number)
+            meshes.append(mesh)
     sizes = [mesh.diagonal for mesh in meshes]
     if len(meshes) < 2 or sizes[0] == 0 or max(sizes) > UNLIKE * min(sizes):
         return None
@@ -115,12 +121,23 @@ def scene_standing(frames: Frames) -> Standing | None:
     lattice = Lattice.near(meshes[0], sizes[0] / CELLS)
     cells = [distinct(lattice.keys(spread(mesh, lattice.size)[0])) for mesh in meshes]
     wide = [around(occupied) for occupied in cells]
-    still = [np.mean([contains(other, occupied).mean() for other in wide]) for occupied in cells]
+    depth = frames.depth if isinstance(frames, CapturedSequence) else None
+    is_moving = depth is not None and is_carried(depth.__getitem__, len(frames))
+
+    def shared(occupied: Int64[np.ndarray, " C"], other: int) -> float:
+        """Return the share of cells that another frame has, too, of those that its cameras look at."""
+        there = contains(wide[other], occupied)
+        if depth is not None and is_moving:
+            there = there[looked_at(depth[numbers[other]], lattice.centers(occupied))]
+        return float(there.mean()) if len(there) else 1.0
+
+    still = [np.mean([shared(occupied, other) for other in range(len(wide))]) for occupied in cells]
     if float(np.median(still)) < SHARE:
         return None
     found, whole = standing(frames), float(np.mean([face_normals(mesh)[1].sum() for mesh in meshes]))
     rests, known = float(found.area[found.rests].sum()), float(found.area.sum())
-    return found if rests >= SHARE * known and known >= KNOWN * whole else None
+    # What a camera that moves saw once, nobody can judge: it is a part of the scene where what it saw twice is.
+    return found if rests >= SHARE * known and known >= (0 if is_moving else KNOWN) * whole else None
 
 
 def standing(frames: Frames) -> Standing:

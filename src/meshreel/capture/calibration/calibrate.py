@@ -45,7 +45,7 @@ _UPRIGHT = 0.5  # largest cosine between up and the normals that are shown: floo
 _SHOWN = 8000  # points of a camera, about (guess)
 
 Poses = Float64[np.ndarray, "n 4 4"]  # camera to world, m
-Step = Float64[np.ndarray, " m"]  # a motion of each camera, see `_Scene`
+Step = Float64[np.ndarray, " m"]  # a motion of each camera, see `Scene`
 Report = Callable[[str, int, int], None]  # a stage, how many of its rounds are done, and how many it has
 Directions = Float64[np.ndarray, "m k"]  # k such motions
 
@@ -84,7 +84,7 @@ def refine(rig: Rig, report: Report = lambda *_: None) -> Calibration:
 
 def refine_views(views: Sequence[StillView], report: Report = lambda *_: None) -> Calibration:
     """Refine the poses of cameras on what they see."""
-    start, scene = np.array([view.camera.view.pose.to_world for view in views]), _Scene(views)
+    start, scene = np.array([view.camera.view.pose.to_world for view in views]), Scene(views)
     poses = scene.solved(start, np.zeros((6 * len(views), 0)), partial(report, "refine"))
     if (unfixed := scene.unfixed(poses)).size:
         poses = scene.solved(start, unfixed, partial(report, "refine held"))
@@ -113,16 +113,19 @@ class _Match:
     near: Float64[np.ndarray, " N"]  # 1 on the plane, 0 where the distances that count end
 
 
-class _Scene:
+class Scene:
     """Views of all cameras, and their agreement.
 
     The motion of a camera is six numbers in m: a turn about the middle of all points, times their mean distance from
     there, and a shift.
     """
 
-    def __init__(self, views: Sequence[StillView]) -> None:
-        self.views = views
-        steps = [max(1, round(math.sqrt(view.known.sum() / POINTS))) for view in views]
+    def __init__(
+        self, views: Sequence[StillView], count: int = POINTS, pairs: Sequence[tuple[int, int]] | None = None
+    ) -> None:
+        """Take about `count` points of each view, and the pairs of views that may overlap; by default all."""
+        self.views, self.pairs = views, list(combinations(range(len(views)), 2)) if pairs is None else pairs
+        steps = [max(1, round(math.sqrt(view.known.sum() / count))) for view in views]
         thinned = [(view.points[::k, ::k], view.normals[::k, ::k]) for view, k in zip(views, steps, strict=True)]
         chosen = [np.isfinite(points[..., 2]) for points, _ in thinned]
         self.points = [points[some] for (points, _), some in zip(thinned, chosen, strict=True)]
@@ -181,7 +184,7 @@ class _Scene:
 
     def overlaps(self, poses: Poses, reach: float) -> Iterator[tuple[tuple[int, int], tuple[_Match, _Match]]]:
         """Yield the pairs of cameras that see a surface together, with the points of each on the other's planes."""
-        for i, j in combinations(range(len(poses)), 2):
+        for i, j in self.pairs:
             ways = self.match(poses, i, j, reach), self.match(poses, j, i, reach)
             if self.overlap((i, j), ways) >= OVERLAP:
                 yield (i, j), ways

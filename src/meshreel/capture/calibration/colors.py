@@ -343,5 +343,6 @@ def _digest(rig: Rig, looked_at: Sequence[int], depends_on: dict[str, Any]) -> s
     sizes = [[each[frame].stat().st_size if frame in each else -1 for frame in looked_at] for each in files]
     colors = [camera.view.record() | {"distortion": camera.view.distortion} for camera in rig.color_cameras]
     cameras = [camera.record() for camera in rig.cameras]
+    cameras += [{"path": each.path[n].to_world.tolist()} for each in rig.color_cameras if each.path for n in looked_at]
     facts = depends_on | {"cameras": cameras, "colors": colors, "frames": list(looked_at), "sizes": sizes}
     return hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()

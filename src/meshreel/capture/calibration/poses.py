@@ -94,6 +94,19 @@ def pose_of(turns: Any, shifts: Any) -> Float64[np.ndarray, "*T 4 4"]:
     return poses
 
 
+def poses_between(
+    known: Float64[np.ndarray, " K"], poses: Float64[np.ndarray, "K 4 4"], times: Float64[np.ndarray, " T"]
+) -> Float64[np.ndarray, "T 4 4"]:
+    """Return the poses at times between those that are known, ascending; before and after, the first and the last."""
+    from scipy.spatial.transform import Rotation, Slerp
+
+    found, inside = np.repeat(poses[:1], len(times), axis=0), np.clip(times, known[0], known[-1])
+    if len(known) > 1:
+        found[:, :3, :3] = Slerp(known, Rotation.from_matrix(poses[:, :3, :3]))(inside).as_matrix()
+        found[:, :3, 3] = np.stack([np.interp(inside, known, poses[:, axis, 3]) for axis in range(3)], axis=1)
+    return found
+
+
 def pose_in_root(above: Mapping[str, tuple[str, Matrix]], frame: str) -> tuple[str, Matrix]:
     """Return a frame's root and its pose there; `above`: parent and pose of each. Raises ValueError for a circle."""
     pose = np.eye(4)

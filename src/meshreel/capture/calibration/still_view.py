@@ -67,7 +67,7 @@ def still_view(camera: DepthCamera, depths: list[Picture]) -> StillView:
         flat &= measure <= max(FLAT * float(np.median(measure[good])) if good.any() else 0.0, FINE)
     depth = np.where(flat, depth, np.nan)
     (fx, fy), rays = camera.view.focal, camera.view.ahead
-    a, b = right * fx, down * fy
+    a, b = (np.where(flat, slope, np.nan) for slope in (right * fx, down * fy))
     normals = -np.stack([a, b, 1 / depth - a * rays[..., 0] - b * rays[..., 1]], axis=2)
     return StillView(camera, rays * depth[..., None], normals / np.linalg.norm(normals, axis=2, keepdims=True))
 

@@ -18,7 +18,7 @@ from ...io.files import MOST_BYTES, read_file
 from ...io.pictures import last_number
 from ...texts import json_of
 from ..calibration.poses import pose_of
-from .takes import Picture, Pictures, Sensor, Stream, Take, lens_of, picture_size, reading
+from .takes import Picture, Pictures, Poses, Sensor, Stream, Take, lens_of, picture_size, reading
 
 KIND = "a Record3D recording (.r3d, or the folder of its export EXR + JPG)"
 EXPORT = "EXR_RGBD"
@@ -62,7 +62,8 @@ def read(path: Path) -> Take:
         return Stream(*size, len(names), max(there) - min(there), lens and lens.resized(*size), pictures)
 
     given = np.array(about.get("poses") or np.zeros((0, 7)), np.float64).reshape(-1, 7)
-    poses = pose_of(given[:, :4], given[:, 4:]) @ FLIP if len(given) else None
+    when = np.array([float(stamps[n]) if stamped else n / rate for n in range(len(given))])
+    poses = Poses(pose_of(given[:, :4], given[:, 4:]) @ FLIP, when) if len(given) else None
     first = next(iter(color.values()), "")
     beside = stream(color, picture_size(load(first), first), load) if color else None
     sensor = Sensor("phone", stream(deep, (int(width), int(height)), decode), 1.0, beside, np.eye(4), poses)

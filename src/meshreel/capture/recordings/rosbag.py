@@ -1,7 +1,8 @@
 """ROS bags: ROS 1 (`.bag`, also of RealSense's own tools), ROS 2 (folders, `.db3`) and MCAP (`.mcap`).
 
 Depth cameras are the image topics of 16 bits or floats; `camera_info` beside them has their lenses, `/tf_static` (in
-RealSense's files `tf/0`) their poses. Times are those of the pictures, not of their recording.
+RealSense's files `tf/0`) their poses, `/tf` the way of what carries them. Times are those of the pictures, not of their
+recording.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from ...errors import InputError
 from ...geometry.cameras import Camera, Matrix
 from ...io.pictures import MOST_PIXELS, is_deep, parse_depth
 from ..calibration.poses import pose_in_root, pose_of
-from .takes import Picture, Pictures, Sensor, Stream, Take, lens_of, picture_size
+from .takes import Picture, Pictures, Poses, Sensor, Stream, Take, lens_of, picture_size
 
 KIND = "a ROS 1 or RealSense .bag, a ROS 2 bag, an .mcap"
 # Type of depth, and its unit in ROS, m.
@@ -129,6 +130,32 @@ class _Bag:
         parents = [(one.header.frame_id.lstrip("/"), _matrix(one.transform)) for one in stills]
         return dict(zip((one.child_frame_id.lstrip("/") for one in stills), parents, strict=True))
 
+    def way(self, frame: str) -> Poses | None:
+        """Return the poses of a frame in the root of all that carries it, by `/tf`; None where nothing moves it."""
+        links, tree = dict[str, list[tuple[float, str, Matrix]]](), self.tree()
+        for _, message in self.messages("/tf"):
+            for one in message.transforms:
+                time = one.header.stamp.sec + one.header.stamp.nanosec / 1e9
+                link = (time, one.header.frame_id.lstrip("/"), _matrix(one.transform))
+                links.setdefault(one.child_frame_id.lstrip("/"), []).append(link)
+        found: Poses | None = None
+        seen = set[str]()
+        while frame in links and frame not in seen:
+            seen.add(frame)
+            times, parents, matrices = zip(*links[frame], strict=True)
+            own = Poses(np.stack(matrices), np.array(times))
+            if found is None:
+                found = own
+            else:
+                assert found.times is not None
+                found = Poses(own.at(found.times) @ found.matrices, found.times)
+            root, placed = pose_in_root(tree, parents[0])
+            found, frame = Poses(placed @ found.matrices, found.times), root
+        if found is None or found.times is None:
+            return None
+        known = np.isfinite(found.matrices).all(axis=(1, 2))
+        return Poses(found.matrices[known], found.times[known]) if known.any() else None
+
 
 @contextmanager
 def _opened(path: Path) -> Iterator[_Bag]:
@@ -209,7 +236,10 @@ def _sensor(bag: _Bag, depth: _Topic, color: _Topic | None, tree: dict[str, Any]
             apart = _matrix(to_depth) @ np.linalg.inv(_matrix(to_color))
         elif root == other:
             apart = np.linalg.inv(placed) @ beside
-    poses = placed[None] if depth.frame in tree and root == world else None
+    if (way := bag.way(root)) is not None:
+        poses: Poses | None = Poses(way.matrices @ placed, way.times)
+    else:
+        poses = Poses(placed[None]) if depth.frame in tree and root == world else None
     return Sensor(depth.base.strip("/").replace("/", "-"), _stream(bag, depth), unit, seen, apart, poses)
 
 

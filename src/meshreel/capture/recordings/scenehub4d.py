@@ -22,7 +22,7 @@ from ...geometry.cameras import Camera
 from ...geometry.strict import inverses
 from ...io.files import read_input, read_json
 from ...io.pictures import last_number, read_depth
-from .takes import Pictures, Sensor, Stream, Take, lens_of, picture_size
+from .takes import Pictures, Poses, Sensor, Stream, Take, lens_of, picture_size
 
 KIND = "a SceneHub4D folder (rgbd/cam0/trans_depth, camera_pose, intrinsics)"
 RATE = 30.0  # 1/s, of all its scenes, where camera_config names none
@@ -50,7 +50,7 @@ def read(path: Path) -> Take:
         lens = lens_of(width, height, (numbers[0], numbers[1]), (numbers[2], numbers[3]), bends)
         seen = _stream(depth, lens, rate, deep=True)
         beside = _stream(color, lens, rate, deep=False) if color else None
-        sensors.append(Sensor(folder.name, seen, color=beside, color_to_depth=np.eye(4), poses=pose[None]))
+        sensors.append(Sensor(folder.name, seen, color=beside, color_to_depth=np.eye(4), poses=Poses(pose[None])))
     return Take(path, KIND, tuple(sensors), f"write its intrinsics into {path / 'intrinsics'}")
 
 

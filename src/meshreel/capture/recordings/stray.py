@@ -10,13 +10,12 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Float64
 
 from ...errors import InputError
 from ...io.files import read_file, read_input
 from ...io.pictures import last_number, read_depth, read_picture
 from ..calibration.poses import pose_of
-from .takes import Pictures, Sensor, Stream, Take, lens_of, picture_size, reading
+from .takes import Pictures, Poses, Sensor, Stream, Take, lens_of, picture_size, reading
 
 KIND = "a Stray Scanner folder (depth/, rgb.mp4, odometry.csv)"
 MATRIX, VIDEO = "camera_matrix.csv", "rgb.mp4"
@@ -60,7 +59,7 @@ def read(path: Path) -> Take:
     return Take(path, KIND, (sensor,), f"it needs {MATRIX} and {VIDEO}, whose size the matrix is for")
 
 
-def _odometry(path: Path) -> tuple[dict[int, float], Float64[np.ndarray, "T 4 4"] | None]:
+def _odometry(path: Path) -> tuple[dict[int, float], Poses | None]:
     """Return times, s, by frame, and poses; early versions of the app wrote neither titles nor times."""
     rows = [line.replace(" ", "").split(",") for line in read_file(path / "odometry.csv").decode().splitlines() if line]
     titled = bool(rows) and "qx" in rows[0]
@@ -72,7 +71,8 @@ def _odometry(path: Path) -> tuple[dict[int, float], Float64[np.ndarray, "T 4 4"
     stamped = (columns[name].tolist() for name in ("frame", "timestamp")) if titled else ([], [])
     times = {int(frame): time for frame, time in zip(*stamped, strict=True)}
     turns, places = (np.stack([columns[name] for name in names], axis=1) for names in (("qx", "qy", "qz", "qw"), "xyz"))
-    return times, pose_of(turns, places) if len(table) else None
+    when = columns["timestamp"] if titled else np.arange(len(table)) / RATE
+    return times, Poses(pose_of(turns, places), when) if len(table) else None
 
 
 def _video(path: Path, times: dict[int, float]) -> Stream:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -12,11 +13,14 @@ from jaxtyping import Float64
 
 from ...errors import InputError
 from ...geometry.cameras import Camera
+from ...io.files import read_input
 from ...io.pictures import opened
+from ..calibration.poses import poses_between
 
 Picture = np.ndarray | bytes  # depths H x W in the sensor's unit, integers or floats; colours H x W x 3; a PNG or JPEG
 Unread = Callable[[], Picture]  # reads one picture, which may be damaged
 Pair = tuple[float, float]  # along x and y
+LOST_TRACK = 0.2  # s without a pose, after which a camera that moves may be anywhere (guess)
 Pictures = Iterator[tuple[float, Picture | Unread]]  # each with its time on the take's clock, s
 
 
@@ -43,6 +47,26 @@ class Stream:
 
 
 @dataclass(frozen=True, slots=True)
+class Poses:
+    """Where a camera was: one pose for all times, or one for each time."""
+
+    matrices: Float64[np.ndarray, "T 4 4"]  # camera to world, m
+    times: Float64[np.ndarray, " T"] | None = None  # s, on the take's clock; None: one pose, for all times
+
+    def at(self, times: Float64[np.ndarray, " P"]) -> Float64[np.ndarray, "P 4 4"]:
+        """Return poses at times, between those before and after; NaN where none is known within `LOST_TRACK`."""
+        if self.times is None:
+            return np.repeat(self.matrices[:1], len(times), axis=0)
+        good = np.isfinite(self.matrices).all(axis=(1, 2))
+        known, first = np.unique(self.times[good], return_index=True)
+        found = poses_between(known, self.matrices[good][first], times)
+        after = np.clip(np.searchsorted(known, times), 0, len(known) - 1)
+        gaps = np.minimum(np.abs(known[after] - times), np.abs(times - known[np.maximum(after - 1, 0)]))
+        found[gaps > LOST_TRACK] = np.nan
+        return found
+
+
+@dataclass(frozen=True, slots=True)
 class Sensor:
     """A depth camera, and the colour camera beside it."""
 
@@ -51,7 +75,7 @@ class Sensor:
     unit: float = 0.001  # m, what 1 means in its pictures
     color: Stream | None = None
     color_to_depth: Float64[np.ndarray, "4 4"] | None = None  # m; None where the take does not say
-    poses: Float64[np.ndarray, "T 4 4"] | None = None  # camera to world, m: one, or one for each moment
+    poses: Poses | None = None  # of the depth camera
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,6 +94,23 @@ def lens_of(width: int, height: int, focal: Pair, center: Pair, distortion: tupl
     if not np.isfinite(distortion).all():
         raise ValueError(f"its lens bends by {distortion}: not finite")
     return Camera(width, height, focal, (center[0] + 0.5, center[1] + 0.5), distortion=distortion)
+
+
+def stream_of(
+    files: Sequence[tuple[float, Path]], lens: Callable[[int, int], Camera | None], read: Callable[[Path], Picture]
+) -> Stream:
+    """Return the stream of files with their times, s; `lens` gets the size of the first that is there."""
+    if not files:
+        raise ValueError("its list of pictures is empty")
+    first = next((file for _, file in files if file.is_file()), files[0][1])
+    width, height = picture_size(read_input(first, "mend the list that names it"), str(first))
+
+    def pictures() -> Pictures:
+        for time, file in files:
+            yield time, partial(read, file)
+
+    times = [time for time, _ in files]
+    return Stream(width, height, len(files), max(times) - min(times), lens(width, height), pictures)
 
 
 def check_size(lens: Camera, width: int, height: int) -> None:

@@ -21,11 +21,12 @@ import numpy as np
 from jaxtyping import Bool, Float64, Int64
 
 from ...errors import InputError
-from ...geometry.cameras import Camera
+from ...geometry.cameras import Camera, Matrix
 from ...io.pictures import pack_picture
-from ...io.write import cannot_be_written, make_folder, part_of
+from ...io.write import cannot_be_written, make_folder, part_of, write_file
+from ..calibration.paths import refine_paths
 from ..rig.cameras import DepthCamera, distortion_of, placed
-from ..rig.rig import write_rig
+from ..rig.rig import POSES, packed_path, write_rig
 from .takes import Picture, Sensor, Stream, Take, check_size, picture_size, reading
 
 MILLIMETRE = 0.001  # m, the unit of depths that are recorded as floats
@@ -54,11 +55,16 @@ def write_takes(
             text = f"its depth pictures are {clock.period:.3g} s apart by their time stamps"
             raise InputError(f"{parts[0].take.path}: {text}; give time stamps in seconds")
         frames, remarks = _common(parts, clock)
+        frames, untracked = _tracked(parts, frames)
+        remarks += untracked
         for part in parts:
             part.depth.rename(frames)
             if part.color is not None:
                 part.color.rename(frames)
+            if part.color_path:
+                write_file(place / part.name / "color" / POSES, packed_path(part.color_path))
         write_rig(place, tuple(part.camera() for part in parts), clock.rate, [part.beside() for part in parts])
+        remarks += refine_paths(place)
     unread = {take.path: ", ".join(other for other in take.others if "Image" in other) for take in takes}
     remarks += [f"{path}: not read: {topics}" for path, topics in unread.items() if topics]
     unknown = sum(part.sensor.poses is None for part in parts)
@@ -133,7 +139,9 @@ class _Part:
         if sensor.depth.lens is None:
             raise InputError(f"{take.path}: depth of {sensor.name} has no calibration: {take.calibrate}")
         self.take, self.sensor, self.name, self.lens = take, sensor, name, sensor.depth.lens
-        self.pose, self.unit, self.remarks = _still(take, sensor), sensor.unit, list[str]()
+        self.unit, self.remarks, still = sensor.unit, list[str](), _still(take, sensor)
+        self.moves, self.pose = still is None, np.eye(4) if still is None else still
+        self.depth_path, self.color_path = dict[int, Matrix](), dict[int, Matrix]()  # by frame, of a camera that moves
         self.depth, self._farthest = _Written(), list[float]()  # steps, of each picture
         self.color: _Written | None = None
         self.stream = sensor.color
@@ -155,13 +163,15 @@ class _Part:
         apart = np.eye(4) if self.sensor.color_to_depth is None else self.sensor.color_to_depth
         record = self._as_camera(f"{self.name}-color", self.stream.lens, self.pose @ apart).record()
         record |= {"folder": f"{self.name}/color", "distortion": list(self.stream.lens.distortion)}
+        record |= {"poses": f"{self.name}/color/{POSES}"} if self.moves else {}
         with reading(self.take.path):
             distortion_of(record)  # raises InputError for what no rig may have
         return record
 
     def _as_camera(self, name: str, lens: Camera, pose: Float64[np.ndarray, "4 4"]) -> DepthCamera:
         with reading(self.take.path):
-            return DepthCamera(name, replace(lens, pose=placed(name, pose)), self.unit)
+            path = {frame: placed(name, each) for frame, each in self.depth_path.items()}
+            return DepthCamera(name, replace(lens, pose=placed(name, pose)), self.unit, path=path)
 
     def read(self, folder: Path, report: Callable[[], None]) -> None:
         """Write all pictures to a folder."""
@@ -259,21 +269,52 @@ def _common(parts: list[_Part], clock: Clock) -> tuple[set[int], list[str]]:
     return frames, remarks
 
 
-def _still(take: Take, sensor: Sensor) -> Float64[np.ndarray, "4 4"]:
-    """Return the pose of a sensor that stands still, the identity where it is not known. Raises InputError."""
+def _tracked(parts: list[_Part], frames: set[int]) -> tuple[set[int], list[str]]:
+    """Give cameras that move their poses; return the frames of which all are known that have a picture, and warnings.
+
+    The pose of a picture is that at its own time, so colour that was taken between two depths is where it was then.
+    """
+    remarks = list[str]()
+    for part in parts:
+        if not part.moves or part.sensor.poses is None:
+            continue
+        apart = np.eye(4) if part.sensor.color_to_depth is None else part.sensor.color_to_depth
+        pairs = [(part.depth, part.depth_path, np.eye(4))]
+        pairs += [(part.color, part.color_path, apart)] if part.color is not None else []
+        lost = set[int]()
+        for written, path, beside in pairs:
+            numbers = sorted(frames & written.by_frame.keys())
+            times = written.times()[[written.by_frame[number] for number in numbers]]
+            for number, pose in zip(numbers, part.sensor.poses.at(times), strict=True):
+                path[number] = pose @ beside
+            lost |= {number for number in numbers if not np.isfinite(path[number]).all()}
+        if lost:
+            text = f"{len(lost)} of {len(frames)} frames are left out: no pose of {part.sensor.name} is known then"
+            remarks.append(f"{part.take.path}: {text}; the first is frame {min(lost)}")
+        frames = frames - lost
+        if not frames:
+            text = f"no pose of {part.sensor.name} is of the time of a picture"
+            raise InputError(f"{part.take.path}: {text}; do the clocks of poses and pictures agree?")
+    for part in parts:
+        for path in (part.depth_path, part.color_path):
+            for number in path.keys() - frames:
+                del path[number]
+    return frames, remarks
+
+
+def _still(take: Take, sensor: Sensor) -> Matrix | None:
+    """Return the pose of a sensor that stands still, the identity where it is not known, None where it moves."""
     if sensor.poses is None:
         return np.eye(4)
-    if not np.isfinite(sensor.poses).all():
-        raise InputError(f"{take.path}: a pose of {sensor.name} is not finite; record it again")
-    places = sensor.poses[:, :3, 3]
+    poses = sensor.poses.matrices[np.isfinite(sensor.poses.matrices).all(axis=(1, 2))]  # trackers write NaN when lost
+    if not len(poses):
+        raise InputError(f"{take.path}: no pose of {sensor.name} is finite; record it again")
+    places = poses[:, :3, 3]
     away = np.linalg.norm(places - np.median(places, axis=0), axis=1)
-    usual = sensor.poses[int(away.argmin())]
-    cosines = (np.einsum("tij,ij->t", sensor.poses[:, :3, :3], usual[:3, :3]) - 1) / 2
+    usual = poses[int(away.argmin())]
+    cosines = (np.einsum("tij,ij->t", poses[:, :3, :3], usual[:3, :3]) - 1) / 2
     turned = float(np.degrees(np.arccos(np.clip(cosines, -1, 1))).max())
-    if away.max() > MOVES or turned > TURNS:
-        text = f"camera {sensor.name} moves: by {away.max():.2g} m and {turned:.2g} degrees in its recorded poses"
-        raise InputError(f"{take.path}: {text}; record with cameras that stand still, or cut the recording there")
-    return usual
+    return None if away.max() > MOVES or turned > TURNS else usual
 
 
 def _straightened(lens: Camera, reach: float) -> tuple[tuple[np.ndarray, np.ndarray], Bool[np.ndarray, "H W"]] | None:

@@ -8,18 +8,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float64
 
 from ...errors import InputError
+from ...geometry.cameras import Camera
 from ...io.files import read_input
 from ...io.pictures import read_depth
 from ..calibration.poses import pose_of
-from .takes import Pictures, Sensor, Stream, Take, lens_of, picture_size, reading
+from .takes import Poses, Sensor, Stream, Take, lens_of, reading, stream_of
 
 KIND = "a TUM RGB-D folder (depth.txt, rgb.txt)"
 UNIT = 1 / 5000  # m
@@ -96,26 +95,19 @@ def _rows(path: Path, columns: tuple[type, ...]) -> Iterator[list[Any]]:
 
 
 def _stream(rows: list[tuple[float, Path]], given: list[float], deep: bool) -> Stream:
-    if not rows:
-        raise ValueError("its list of pictures is empty")
-    first = next((file for _, file in rows if file.is_file()), rows[0][1])
-    width, height = picture_size(read_input(first, "mend the list that names it"), str(first))
-    lens = lens_of(width, height, (given[0], given[1]), (given[2], given[3]), tuple(given[4:9])) if given else None
+    def lens(width: int, height: int) -> Camera | None:
+        return lens_of(width, height, (given[0], given[1]), (given[2], given[3]), tuple(given[4:9])) if given else None
 
-    def pictures() -> Pictures:
-        for time, file in rows:
-            yield time, partial(read_depth if deep else read_input, file)
-
-    times = [time for time, _ in rows]
-    return Stream(width, height, len(rows), max(times) - min(times), lens, pictures)
+    return stream_of(rows, lens, read_depth if deep else read_input)
 
 
-def _poses(path: Path, depth: list[tuple[float, Path]]) -> Float64[np.ndarray, "T 4 4"] | None:
+def _poses(path: Path, depth: list[tuple[float, Path]]) -> Poses | None:
     """Return the poses while depth was recorded."""
     if not (path / "groundtruth.txt").is_file():
         return None
     rows = np.array(list(_rows(path / "groundtruth.txt", (float,) * 8)), dtype=np.float64).reshape(-1, 8)
     times = [time for time, _ in depth]
-    rows = rows[(rows[:, 0] >= min(times)) & (rows[:, 0] <= max(times))]
+    first, last = (np.searchsorted(np.sort(rows[:, 0]), edge) for edge in (min(times), max(times)))
+    rows = rows[np.argsort(rows[:, 0], kind="stable")][max(first - 1, 0) : last + 1]  # with those before and after
     with reading(path / "groundtruth.txt"):
-        return pose_of(rows[:, 4:], rows[:, 1:4]) if len(rows) else None
+        return Poses(pose_of(rows[:, 4:], rows[:, 1:4]), rows[:, 0]) if len(rows) else None

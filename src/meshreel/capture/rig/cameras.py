@@ -6,7 +6,7 @@ In `rig.json` the middles of pixels are whole numbers: `cx` and `cy` are half a 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Any, Literal, TypeVar
@@ -40,6 +40,7 @@ class DepthCamera:
     view: Camera
     depth_unit: float = 0.001  # m, what 1 means in a depth picture
     depth_range: tuple[float, float] = (0.1, 10.0)  # m, nearest and farthest depth that counts
+    path: Mapping[int, CameraPose] = field(default_factory=dict)  # of a camera that moves, its pose in each frame
 
     def __post_init__(self) -> None:
         name, view = self.name, self.view
@@ -86,6 +87,7 @@ class ColorCamera:
     view: Camera
     files: Mapping[int, Path]  # pictures by frame number
     beside: int | None = None  # number of the depth camera that it stands beside; None: it stands alone
+    path: Mapping[int, CameraPose] = field(default_factory=dict)  # of a camera that moves, its pose in each frame
 
     def picture(self, frame: int) -> ColorPicture | None:
         """Read the picture of a frame, None where there is none. Raises InputError where it has another size."""
@@ -93,7 +95,12 @@ class ColorCamera:
             return None
         pixels = read_picture(self.files[frame])
         check_size(self.files[frame], pixels, self)
-        return ColorPicture(self.view, pixels)
+        return ColorPicture(at_frame(self, frame).view, pixels)
+
+
+def at_frame(camera: C, frame: int) -> C:
+    """Return a camera where it is in a frame; one that stands still is returned as it is."""
+    return replace(camera, view=replace(camera.view, pose=camera.path[frame])) if camera.path else camera
 
 
 def posed(camera: C, to_world: Matrix) -> C:

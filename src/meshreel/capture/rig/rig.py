@@ -1,4 +1,4 @@
-"""A rig: depth cameras that stand still around a scene, and the depth pictures that they recorded.
+"""A rig: depth cameras around a scene, which stand still or move on known paths, and what they recorded.
 
 A folder with `camera.json` and `depth/` is a rig of one camera. Pictures of different cameras belong to one frame if
 their file names have the same number, or numbers.
@@ -9,8 +9,8 @@ from __future__ import annotations
 import difflib
 import json
 import math
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -19,20 +19,22 @@ import numpy as np
 from jaxtyping import Float64, UInt16
 
 from ...errors import InputError
-from ...geometry.cameras import Camera, Matrix
+from ...geometry.cameras import Camera, CameraPose, Matrix
 from ...geometry.color_views import ColorPicture
 from ...geometry.depth import DepthPicture
 from ...io.file_names import Order, gaps
 from ...io.files import read_json
 from ...io.pictures import read_depth
-from ...io.write import write_file
+from ...io.write import make_folder, write_file
 from ...types import UP_AXES, UPS, Up
-from .cameras import ColorCamera, DepthCamera, Key, check_size, distortion_of, pictures_in, placed
+from .cameras import C, ColorCamera, DepthCamera, Key, at_frame, check_size, distortion_of, pictures_in, placed
 
 RIG, SINGLE = "rig.json", "camera.json"
+POSES = "poses.json"  # of a camera that moves, in its folder
+POSE_DIGITS = 9  # of its numbers: more differ between machines, whose sines are not the same to the last bit
 LOOKED_AT = 12  # frames examined for movement and for what stands still, spread over the recording (guess)
 RATES = (1e-9, 1e9)  # 1/s, the range of a sequence of meshes
-_TEXTS = ("name", "depth")
+_TEXTS = ("name", "depth", "poses")
 _NUMBERS = ("width", "height", "fx", "fy", "cx", "cy", "depth_unit_m", "depth_min_m", "depth_max_m")
 _UPRIGHT = 0.5  # least cosine between an axis and the pictures' mean upward direction (guess)
 _SEE = "see `meshreel capture --help`"
@@ -48,11 +50,13 @@ class Rig:
     frame_rate: float  # 1/s
     remarks: tuple[str, ...] = ()  # warnings about the description, for the user
     color_cameras: tuple[ColorCamera, ...] = ()
+    paths: Mapping[str, Path] = field(default_factory=dict)  # files with the poses of cameras that move, by name
 
     @property
     def up(self) -> Up:
         """The axis nearest to upward in the cameras' pictures: y, z, -y or -z; y where none is near."""
-        mean = np.mean([-camera.view.pose.to_world[:3, 1] for camera in self.cameras], axis=0)
+        stands = [camera.path.values() or [camera.view.pose] for camera in self.cameras]
+        mean = np.mean([np.mean([-pose.to_world[:3, 1] for pose in each], axis=0) for each in stands], axis=0)
         along = {axis: float(mean @ UP_AXES[axis]) for axis in UPS}
         best = max(along, key=along.__getitem__)
         return best if along[best] > _UPRIGHT else "y"
@@ -65,7 +69,10 @@ class Rig:
     def depth_pictures(self, frame: int) -> list[DepthPicture | None]:
         """Read a frame's depths; None for a camera without it. Raises InputError where a picture has another size."""
         cameras = enumerate(self.cameras)
-        return [camera.picture(self.depth(k, frame)) if frame in self.files[k] else None for k, camera in cameras]
+        return [
+            at_frame(camera, frame).picture(self.depth(k, frame)) if frame in self.files[k] else None
+            for k, camera in cameras
+        ]
 
     def color_pictures(self, frame: int) -> list[ColorPicture | None]:
         """Read a frame's pictures of the colour cameras, as `depth_pictures` does those of depth."""
@@ -110,7 +117,14 @@ def read_rig(folder: Path, order: Order = "auto") -> Rig:
     keyed += [pictures_in(place, camera.name, "color", order) for camera, place in colors]
     files = _numbered(folder, keyed)
     seen = tuple(replace(each, files=of) for (each, _), of in zip(colors, files[len(cameras) :], strict=True))
-    rig = Rig(folder, cameras, files[: len(cameras)], rate, tuple(_unknown(folder, entries)), seen)
+    cameras = tuple(_moving(folder, *each) for each in zip(entries, cameras, files, strict=False))
+    described = [_beside(folder, entries[number]) for number in beside]
+    described += [entry if isinstance(entry, dict) else {} for entry in alone]
+    seen = tuple(_moving(folder, entry, each, each.files) for entry, each in zip(described, seen, strict=True))
+    names = [camera.name for camera in cameras] + [camera.name for camera in seen]
+    named = zip(names, (*entries, *described), strict=True)
+    paths = {name: folder / entry["poses"] for name, entry in named if "poses" in entry}
+    rig = Rig(folder, cameras, files[: len(cameras)], rate, tuple(_unknown(folder, entries)), seen, paths)
     for camera in seen:
         camera.picture(min(camera.files))  # an error of its size is told before anything else is done
         if odd := set(camera.files) ^ set(rig.frames):
@@ -119,6 +133,48 @@ def read_rig(folder: Path, order: Order = "auto") -> Rig:
             text = f"{folder}: camera {camera.name} has {counts}; only one of both has frame {min(odd)}"
             raise InputError(f"{text}: {one} stands alone; give every frame a picture of its number, and no others")
     return rig
+
+
+def _beside(folder: Path, entry: dict[str, Any]) -> dict[str, Any]:
+    """Return the entry of the colour camera beside a depth camera, which moves as that does unless it says how."""
+    color = entry["color"] if isinstance(entry["color"], dict) else {}
+    if "poses" in entry and "poses" not in color and "camera_to_world" in color:
+        text = f"{folder / RIG}: camera {entry.get('name', '')} moves by {entry['poses']}, its color stands still"
+        raise InputError(f"{text}; give poses of both, or leave out camera_to_world of color")
+    return color if "poses" in color else {key: entry[key] for key in ("poses",) if key in entry}
+
+
+def _moving(folder: Path, entry: dict[str, Any], camera: C, files: Mapping[int, Path] | None = None) -> C:
+    """Return a camera with its pose in each frame where its entry has poses; by default in all that are there.
+
+    Raises InputError for a picture without a pose.
+    """
+    if "poses" not in entry:
+        return camera
+    path = folder / str(entry["poses"])
+    record = read_json(path, "give JSON").get("camera_to_world")
+    if not isinstance(record, dict) or not record:
+        raise InputError(f"{path}: has no object `camera_to_world`; give 4 rows of 4 numbers for each frame's number")
+    if files is None:
+        files = {int(frame): path for frame in record if frame.isdecimal()}
+    if lost := sorted(frame for frame in files if str(frame) not in record):
+        text = f"{path}: has no pose of camera {camera.name} in {len(lost)} of {len(files)} frames"
+        raise InputError(f"{text}, as {lost[0]}: {files[lost[0]]}; give one for each picture, or leave these out")
+    found = dict[int, CameraPose]()
+    for frame in sorted(files):
+        try:
+            found[frame] = placed(camera.name, _matrix({"camera_to_world": record[str(frame)]}))
+        except InputError as error:
+            raise InputError(f"{path}: frame {frame}: {error}") from None
+    return replace(camera, path=found, view=replace(camera.view, pose=found[min(found)]))
+
+
+def packed_path(path: Mapping[int, Matrix]) -> bytes:
+    """Return the poses of a camera by frame, camera to world, as a file that `poses` of a camera names."""
+    rows = (
+        f"{json.dumps(str(frame))}: {json.dumps(np.round(path[frame], POSE_DIGITS).tolist())}" for frame in sorted(path)
+    )
+    return ('{"camera_to_world": {\n' + ",\n".join(rows) + "\n}}\n").encode()
 
 
 def _numbered(folder: Path, keyed: list[dict[Key, Path]]) -> tuple[dict[int, Path], ...]:
@@ -135,8 +191,8 @@ def _numbered(folder: Path, keyed: list[dict[Key, Path]]) -> tuple[dict[int, Pat
 
 def read_cameras(folder: Path) -> tuple[tuple[DepthCamera, ...], float]:
     """Read the cameras that a folder describes, and their frame rate, 1/s; their pictures may be missing."""
-    _, cameras, rate, _ = _described(folder)
-    return cameras, rate
+    entries, cameras, rate, _ = _described(folder)
+    return tuple(_moving(folder, *pair) for pair in zip(entries, cameras, strict=True)), rate
 
 
 def _described(folder: Path) -> tuple[list[Any], tuple[DepthCamera, ...], float, list[Any]]:
@@ -173,8 +229,17 @@ def _described(folder: Path) -> tuple[list[Any], tuple[DepthCamera, ...], float,
 def write_rig(
     folder: Path, cameras: tuple[DepthCamera, ...], frame_rate: float, colors: Sequence[dict[str, Any] | None] = ()
 ) -> None:
-    """Write `rig.json`; `colors` describe the colour cameras beside the first of the cameras, None where is none."""
+    """Write `rig.json`, and the poses of depth cameras that move into files beside their pictures.
+
+    `colors` describe the colour cameras beside the first of the cameras, None where is none.
+    """
     entries = [camera.record() | {"depth": f"{camera.name}/depth"} for camera in cameras]
+    for entry, camera in zip(entries, cameras, strict=True):
+        if camera.path:
+            entry["poses"] = f"{camera.name}/{POSES}"
+            path = {frame: pose.to_world for frame, pose in camera.path.items()}
+            make_folder(folder / camera.name)
+            write_file(folder / camera.name / POSES, packed_path(path))
     for entry, color in zip(entries, colors, strict=False):
         entry |= {} if color is None else {"color": color}
     text = json.dumps({"frames_per_second": frame_rate, "cameras": entries}, indent=1) + "\n"
@@ -192,7 +257,7 @@ def _camera(path: Path, label: str, entry: Any) -> DepthCamera:
         width, height, fx, fy, cx, cy, unit, near, far = (_number(given, key) for key in _NUMBERS)
         if not (width.is_integer() and height.is_integer()):
             raise InputError(f"pictures of {width:g} x {height:g}; give whole numbers of pixels")
-        to_world = _matrix(given)
+        to_world = np.eye(4) if "poses" in given else _matrix(given)
     except InputError as error:
         raise InputError(f"{path}: camera {label} is not described: {error}; {_SEE}") from None
     try:

@@ -73,6 +73,8 @@ class SteadyDepth:
 
     def _are_jumps(self, number: int) -> bool:
         """Return whether the errors of a camera are new in every frame: motion nearly cancels in second differences."""
+        if number not in self._jumps and self.rig.cameras[number].path:
+            self._jumps[number] = False  # a pixel of a camera that moves has no usual depth
         if number not in self._jumps:
             frames = sorted(self.rig.files[number])
             middles = evenly(len(frames) - 2, PROBES) if len(frames) > 2 else []

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import operator
 import zipfile
@@ -17,17 +16,17 @@ import numpy as np
 from jaxtyping import Bool, Float64, Int64, UInt8
 
 from ...errors import InputError
-from ...geometry.cameras import Camera
+from ...geometry.cameras import Camera, CameraPose
 from ...geometry.drawing import draw
 from ...geometry.strict import products
 from ...geometry.threads import ahead
 from ...geometry.topology import concatenate, face_normals
 from ...io.files import read_file
 from ...io.meshes import read_mesh
-from ...io.write import make_folder, replacing, write_file, write_mesh, write_picture
+from ...io.write import make_folder, replacing, write_mesh, write_picture
 from ...types import Mesh
-from ..rig.cameras import DepthCamera, posed
-from ..rig.rig import RIG, read_cameras, write_rig
+from ..rig.cameras import DepthCamera, at_frame, posed
+from ..rig.rig import read_cameras, write_rig
 from .sensors import Depth, Point, SensorOptions, measured, mounted
 
 Pixels = UInt8[np.ndarray, "H W 3"]
@@ -76,8 +75,9 @@ def simulate_rig(
 ) -> int:
     """Write what the cameras measure of each frame, and the truth; return the number of frames.
 
-    With `color`, each has a colour camera beside it, which sees frames that have a `paint`. `rig.json` is written last:
-    a folder without it is incomplete. `progress` gets the number of finished frames.
+    With `color`, each has a colour camera beside it, which sees frames that have a `paint`. Cameras with a path move;
+    the errors of their recorded poses grow with time. `rig.json` is written last: a folder without it is incomplete.
+    `progress` gets the number of finished frames.
     """
     places = [folder / camera.name / "depth" for camera in cameras]  # where `rig.json` will name them
     for place in (*places, folder / TRUTH):
@@ -91,12 +91,13 @@ def simulate_rig(
     def written(numbered: tuple[int, SceneFrame]) -> UInt8[np.ndarray, " N"]:
         number, frame = numbered
         normals = face_normals(frame.mesh)[0]
-        for which, (camera, place) in enumerate(zip(cameras, places, strict=True)):
+        for which, (one, place) in enumerate(zip(cameras, places, strict=True)):
+            camera, eye = at_frame(one, number), eyes[which].at(number) if which < len(eyes) else None
             random = np.random.default_rng([sensor.seed, number, which])
             clean = _cut_grazing(frame.mesh, normals, camera.view, sensor.grazing)
             write_picture(measured(clean, camera, sensor, random), place / f"depth_{number:05}.png")
-            if which < len(eyes) and frame.paint is not None:
-                picture = eyes[which].picture(frame.mesh, frame.paint, None if frame.is_lit else number, random)
+            if eye is not None and frame.paint is not None:
+                picture = eye.picture(frame.mesh, frame.paint, None if frame.is_lit else number, random)
                 write_picture(picture, folder / camera.name / "color" / f"color_{number:05}.png")
         write_mesh(frame.mesh, folder / TRUTH / f"frame_{number:05}.ply")
         return np.packbits(frame.dynamic)
@@ -106,17 +107,31 @@ def simulate_rig(
         progress(number + 1)
     with replacing(folder / TRUTH / LABELS) as file:
         np.savez_compressed(file, **labels)  # type: ignore[arg-type]  # NumPy 2.1 stores `allow_pickle=` as an array
-    record = {"frames_per_second": frame_rate, "cameras": [camera.record() for camera in cameras]}
-    write_file(folder / TRUTH / RIG, (json.dumps(record, indent=1) + "\n").encode())
+    write_rig(folder / TRUTH, cameras, frame_rate)
     random = np.random.default_rng([sensor.seed, 1 << 30])
     wrong = []  # cameras with the errors of their calibration
     for camera in cameras:
         pose = turned(camera.view.pose.to_world, sensor.pose_error[1], random)
         pose[:3, 3] += sensor.pose_error[0] * random.standard_normal(3)
-        wrong.append(posed(camera, pose))
+        path = _drifted(camera, sensor.pose_error, random)
+        wrong.append(replace(posed(camera, path[min(path)].to_world if path else pose), path=path))
     described = [eye.record(f"{camera.name}/color", random) for camera, eye in zip(cameras, eyes, strict=False)]
     write_rig(folder, tuple(wrong), frame_rate, described)
     return len(labels)
+
+
+def _drifted(camera: DepthCamera, error: tuple[float, float], random: np.random.Generator) -> dict[int, CameraPose]:
+    """Return a camera's path as a tracker records it, with errors that grow to these deviations (m, degrees)."""
+    count, turn, shift = len(camera.path), np.eye(4), np.zeros(3)
+    found = dict[int, CameraPose]()
+    for frame in sorted(camera.path):
+        turn = turned(turn, error[1] / math.sqrt(count), random)
+        shift = shift + error[0] / math.sqrt(count) * random.standard_normal(3)
+        pose = camera.path[frame].to_world.copy()
+        pose[:3, :3] = products(turn[:3, :3], pose[:3, :3])
+        pose[:3, 3] += shift
+        found[frame] = CameraPose.of_camera(pose)
+    return found
 
 
 def _cut_grazing(mesh: Mesh, normals: Float64[np.ndarray, "F 3"], camera: Camera, grazing: float) -> Depth:
@@ -141,7 +156,13 @@ class Truth:
 
     def only(self, numbers: Sequence[int]) -> Truth:
         """Return the truth of some of its frames, which are numbered anew."""
-        return replace(self, paths=tuple(self.paths[k] for k in numbers), packed=tuple(self.packed[k] for k in numbers))
+        cameras = tuple(
+            replace(one, path={new: one.path[k] for new, k in enumerate(numbers)}) if one.path else one
+            for one in self.cameras
+        )
+        return Truth(
+            tuple(self.paths[k] for k in numbers), tuple(self.packed[k] for k in numbers), cameras, self.frame_rate
+        )
 
     def __len__(self) -> int:
         return len(self.paths)
@@ -206,10 +227,15 @@ class SimulatedColor:
         gains = np.exp(sensor.gain * random.standard_normal() + sensor.balance * random.standard_normal(3))
         return SimulatedColor(camera, gains, sensor)
 
+    def at(self, frame: int) -> SimulatedColor:
+        """Return the camera where it is in a frame."""
+        return replace(self, camera=at_frame(self.camera, frame))
+
     def record(self, folder: str, random: np.random.Generator) -> dict[str, Any]:
         """Return the object of `rig.json` that describes it, with the error of its pose."""
         known = posed(self.camera, turned(self.camera.view.pose.to_world, self.sensor.pose_error, random)).record()
-        names = ("width", "height", "fx", "fy", "cx", "cy", "camera_to_world")
+        names = ["width", "height", "fx", "fy", "cx", "cy"]
+        names += [] if self.camera.path else ["camera_to_world"]  # else it moves as the depth camera beside it
         return {"folder": folder} | {name: known[name] for name in names}
 
     def picture(self, mesh: Mesh, paint: Painter, frame: int | None, random: np.random.Generator) -> Pixels:

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Bool, Float64
 
-from ...analysis.scene.background import FRAMES, Moment, fuse_background, fuse_still_depth
+from ...analysis.scene.background import FRAMES, WALKED, Moment, fuse_background, fuse_still_depth, fuse_walk
 from ...analysis.scene.bodies import beyond, ring, with_ring
 from ...analysis.scene.color_looks import CHANGE_SIDE, ColorChange, ColorLooks
 from ...analysis.scene.cut import Rest
@@ -28,7 +28,7 @@ from ...analysis.survey import Survey, check_one_unit
 from ...geometry.cameras import Camera
 from ...geometry.closest_points import Surface, area_samples
 from ...geometry.color_views import ColorFrames
-from ...geometry.depth import DepthFrames, FreeSpace
+from ...geometry.depth import DepthFrames, FreeSpace, is_carried
 from ...geometry.derived_sequences import CapturedSequence, picked
 from ...geometry.planes import close_planes
 from ...geometry.threads import ahead
@@ -172,9 +172,12 @@ def free_space(sequence: CapturedSequence) -> tuple[FreeSpace, ...]:
 
 
 def cameras_of(pictures: DepthFrames | ColorFrames | None, count: int) -> tuple[Camera, ...]:
-    """Return the cameras of the pictures of `count` frames, some of which may lack a camera's picture."""
+    """Return the cameras of the pictures of `count` frames, some of which may lack a camera's picture.
+
+    None where one moves: what is known of a place in its picture holds for no other frame.
+    """
     found = dict[int, Camera]()
-    if pictures is None:
+    if pictures is None or is_carried(pictures.__getitem__, count):
         return ()
     for number in evenly(count, PROBES):
         some = pictures[number]
@@ -212,14 +215,16 @@ def _check_nothing_lost(sequence: MeshSequence, segmentation: Segmentation) -> N
 
 def _background(sequence: CapturedSequence, depth: DepthFrames | None, segmentation: Segmentation) -> Mesh:
     """Fuse the surface that stands still at first, from the cameras' depth where it is known."""
-    numbers, cell = evenly(len(sequence), FRAMES), segmentation.cell
+    cell = segmentation.cell
+    is_moving = depth is not None and is_carried(depth.__getitem__, len(sequence))
+    numbers = evenly(len(sequence), WALKED if is_moving else FRAMES)
 
     def stands(number: int, mesh: Mesh) -> Bool[np.ndarray, " F"]:
         passed("background")
         return segmentation.still_at_first(number, mesh)
 
     if depth is not None:
-        return _fused(sequence, depth, numbers, stands, cell)
+        return _fused(sequence, depth, numbers, stands, cell, is_moving)
 
     def clear(number: int, mesh: Mesh) -> Bool[np.ndarray, " F"]:
         still = stands(number, mesh)
@@ -234,20 +239,23 @@ def _fused(
     numbers: Sequence[int],
     still: Callable[[int, Mesh], Bool[np.ndarray, " F"]],
     cell: float,
+    is_moving: bool,
 ) -> Mesh:
-    """Fuse the still faces of some frames from their depth pictures, which are known."""
+    """Fuse the still faces of some frames from their depth pictures, which are known; cameras may be moving."""
 
     def moment(number: int) -> Moment:
         mesh = sequence[number]
         return Moment(depth[number], mesh, still(number, mesh))
 
-    return fuse_still_depth(ahead(moment, numbers), cell)
+    return (fuse_walk if is_moving else fuse_still_depth)(ahead(moment, numbers), cell)
 
 
 def _change(sequence: CapturedSequence, depth: DepthFrames | None, segmentation: Segmentation, frame: int) -> Change:
     numbers = [frame + number for number in evenly(len(sequence) - frame, FRAMES)]
     if depth is not None:
-        room = _fused(sequence, depth, numbers, lambda k, mesh: ~segmentation.moving(k, mesh), segmentation.cell)
+        is_moving = is_carried(depth.__getitem__, len(sequence))
+        still = lambda k, mesh: ~segmentation.moving(k, mesh)  # noqa: E731
+        room = _fused(sequence, depth, numbers, still, segmentation.cell, is_moving)
         return Change(frame, part_of(room, segmentation.came(frame, room)))
     later = picked(sequence, numbers, lambda _, mesh: segmentation.came(frame, mesh))
     return Change(frame, fuse_background(later, segmentation.cell))

@@ -1,0 +1,167 @@
+"""Poses of cameras that move, refined on what stands still: trackers of phones drift, and jump when they find back.
+
+Some frames of a path, the keys, are as many cameras: the surfaces that they see of one room must lie on each other. One
+least-squares problem has the motions of all keys, as that of a rig's cameras has. What surfaces leave open, as along a
+corridor, goes on as the tracker says: errors of successive keys are alike. Frames between keys move with them.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float64
+
+from ...geometry import strict
+from ...io.write import write_file
+from ..rig.cameras import ColorCamera, DepthCamera, at_frame
+from ..rig.rig import Rig, packed_path, read_rig
+from .calibrate import LONGEST, REACH, Scene
+from .poses import poses_between
+from .still_view import StillView, still_view
+
+WAY, TURN = 0.15, 8.0  # m, degrees, from one key to the next, at most (guess)
+MOST_KEYS = 64  # of a path; a longer one has keys farther apart (guess)
+WIDEST = 256  # pixels of a picture; of a wider one, every second or so is enough (guess)
+POINTS = 1000  # of a key, about (guess)
+NEAR = 4  # keys that another frame is laid on (guess)
+DONE = 1e-4  # m, of a step that ends a round (guess)
+STEPS = 20  # of a round, at most (guess)
+SHARED = 0.2  # least share of a key's points that another one sees, of those that are compared (guess)
+PARTNERS = 8  # keys that a key is compared with, at most: those that share most, near and far in time (guess)
+DRIFT = 0.003  # m, standard deviation of how the errors of successive keys differ: some 2 % of a way (guess)
+
+Poses = Float64[np.ndarray, "K 4 4"]
+
+
+def refine_paths(folder: Path) -> list[str]:
+    """Refine the poses of the cameras of a rig that move, in their files; return what it did, for the user."""
+    rig, remarks = read_rig(folder), list[str]()
+    for number, camera in enumerate(rig.cameras):
+        if camera.path and (found := refined(rig, number)) is not None:
+            poses, before, after = found
+            given = np.stack([camera.path[frame].to_world for frame in sorted(camera.path)])
+            _write(rig, number, strict.products(poses, strict.inverses(given)))
+            away = np.linalg.norm(poses[:, :3, 3] - given[:, :3, 3], axis=1).max()
+            text = f"camera {camera.name} moves: surfaces seen twice lie {1000 * after:.1f} mm apart, in the median"
+            text += f", {1000 * before:.1f} mm by its recorded poses; these are corrected by up to"
+            remarks.append(f"{text} {1000 * away:.0f} mm and {_turns(poses, given).max():.1f} degrees")
+    return remarks
+
+
+def refined(rig: Rig, number: int) -> tuple[Poses, float, float] | None:
+    """Return the refined poses of a camera in all its frames, and how far apart surfaces lie, m, before and after.
+
+    None where no two keys see the same surface, or where it lies no nearer afterwards.
+    """
+    path, frames = rig.cameras[number].path, sorted(rig.cameras[number].path)
+    given = np.stack([path[frame].to_world for frame in frames])
+    keys = _keys(given)
+    views = [_view(rig, number, frames[key]) for key in keys]
+    if not all(view.known.any() for view in views):
+        keys = [key for key, view in zip(keys, views, strict=True) if view.known.any()]
+        views = [view for view in views if view.known.any()]
+    if len(keys) < 2:
+        return None
+    shares = _shares(Scene(views, POINTS // 4), given[keys])
+    best = [[int(j) for j in np.argsort(-row, kind="stable")[:PARTNERS] if row[j] >= SHARED] for row in shares]
+    pairs = sorted({(min(i, j), max(i, j)) for i, some in enumerate(best) for j in some})
+    if not pairs:
+        return None
+    scene = Scene(views, POINTS, pairs)
+    poses = _solved(scene, given[keys], len(keys))
+    before, after = _apart(scene, given[keys]), _apart(scene, poses)
+    if not after < before:
+        return None
+    motions = strict.products(poses, strict.inverses(given[keys]))
+    found = strict.products(poses_between(np.array(keys, np.float64), motions, np.arange(len(frames)) * 1.0), given)
+    for at in range(len(frames)):
+        if at not in keys and (view := _view(rig, number, frames[at])).known.any():
+            after_key = int(np.clip(np.searchsorted(keys, at), 1, len(keys) - 1))
+            near = dict.fromkeys([after_key - 1, after_key, *best[after_key - 1], *best[after_key]])
+            some = list(near)[:NEAR]
+            one = Scene([view, *(views[k] for k in some)], POINTS, [(0, number) for number in range(1, len(some) + 1)])
+            found[at] = _solved(one, np.concatenate([found[at : at + 1], poses[some]]), 1)[0]
+    return found, before, after
+
+
+def _solved(scene: Scene, poses: Poses, free: int) -> Poses:
+    """Return poses of which the first `free`, successive ones, are moved so that surfaces lie on each other."""
+    size, given = 6 * free, poses
+    stiff = (2 * np.eye(free) - np.eye(free, k=1) - np.eye(free, k=-1)) / DRIFT**2
+    if free == len(poses):  # the errors of the first and of the last are like those of one neighbour
+        stiff[0, 0] = stiff[-1, -1] = 1 / DRIFT**2
+    smooth, total = np.kron(stiff, np.eye(6)), np.zeros(6 * len(poses))
+    for reach in REACH:
+        for _ in range(STEPS):
+            matrix, gradient = scene.problem(poses, reach)
+            held = matrix[:size, :size] + smooth + 1e-9 * np.trace(matrix) / size * np.eye(size)
+            slope = gradient[:size] + strict.products(smooth, total[:size, None])[:, 0]
+            step = np.zeros_like(total)
+            step[:size] = -strict.products(strict.inverse(held), slope[:, None])[:, 0]
+            longest = float(np.sqrt((step.reshape(-1, 6) ** 2).sum(axis=1).max()))
+            step *= min(1.0, LONGEST / max(longest, 1e-12))
+            poses, total = scene.moved(poses, step), total + step
+            if longest < DONE:
+                break
+    return poses if np.isfinite(poses).all() else given
+
+
+def _view(rig: Rig, number: int, frame: int) -> StillView:
+    """Return the planes that a camera sees in a frame, in a picture of at most `WIDEST` pixels."""
+    camera = at_frame(rig.cameras[number], frame)
+    view, every = camera.view, math.ceil(camera.view.width / WIDEST)
+    depth = rig.depth(number, frame)[::every, ::every] * camera.depth_unit
+    focal, center = ((x / every, y / every) for x, y in (view.focal, (view.center[0] - 0.5, view.center[1] - 0.5)))
+    center = (center[0] + 0.5, center[1] + 0.5)
+    small = replace(view, width=depth.shape[1], height=depth.shape[0], focal=focal, center=center)
+    return still_view(replace(camera, view=small, path={}), [depth])
+
+
+def _apart(scene: Scene, poses: Poses) -> float:
+    """Return the median distance of the surfaces that pairs of keys see, m."""
+    found = [np.abs(way.distances) for _, ways in scene.overlaps(poses, REACH[1]) for way in ways]
+    return float(np.median(np.concatenate(found))) if found else np.inf
+
+
+def _keys(poses: Poses) -> list[int]:
+    """Return the numbers of the poses that are keys, the first and the last among them."""
+    times = 1.0
+    while True:
+        keys = [0]
+        for number in range(1, len(poses)):
+            last = poses[keys[-1]]
+            far = np.linalg.norm(poses[number, :3, 3] - last[:3, 3]) >= times * WAY
+            if far or _turns(poses[number : number + 1], last[None])[0] >= times * TURN:
+                keys.append(number)
+        keys = keys if keys[-1] == len(poses) - 1 else [*keys, len(poses) - 1]
+        if len(keys) <= MOST_KEYS:
+            return keys
+        times *= 1.25
+
+
+def _turns(first: Poses, second: Poses) -> Float64[np.ndarray, " K"]:
+    """Return the angles between poses, degrees."""
+    cosines = (np.einsum("kij,kij->k", first[:, :3, :3], second[:, :3, :3]) - 1) / 2
+    return np.degrees(np.arccos(np.clip(cosines, -1, 1)))
+
+
+def _shares(scene: Scene, poses: Poses) -> Float64[np.ndarray, "K K"]:
+    """Return the share of the points of a key that another one sees, the larger one of both."""
+    shares = np.zeros((len(poses), len(poses)))
+    for (i, j), ways in scene.overlaps(poses, REACH[0]):
+        shares[i, j] = shares[j, i] = scene.overlap((i, j), ways)
+    return shares
+
+
+def _write(rig: Rig, number: int, motions: Poses) -> None:
+    """Write the poses of a camera, and of colour beside it, after a motion in each frame."""
+    frames = sorted(rig.cameras[number].path)
+    cameras: list[DepthCamera | ColorCamera] = [rig.cameras[number]]
+    for camera in (*cameras, *(eye for eye in rig.color_cameras if eye.beside == number)):
+        moved = {
+            frame: strict.products(m, camera.path[frame].to_world) for frame, m in zip(frames, motions, strict=True)
+        }
+        write_file(rig.paths[camera.name], packed_path(moved))
