@@ -154,7 +154,7 @@ def _looking(views: Cameras | None, frames: MeshSequence, chosen: Sequence[int])
 
 
 def _stands(
-    probes: Sequence[Surface], masks: Sequence[Bool[np.ndarray, " V"]], reach: float, limit: float, part: float
+    probes: Sequence[Surface], masks: Sequence[Bool[np.ndarray, " _"]], reach: float, limit: float, part: float
 ) -> bool:
     """Return whether chosen surface is in the same place, up to `limit` (m), in all frames that show it.
 

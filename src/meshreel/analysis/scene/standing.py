@@ -9,7 +9,7 @@ frames, in which steady motion cancels, and surface rests where frames far apart
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -70,6 +70,14 @@ class Standing:
     area: Float64[np.ndarray, " R"]  # m^2, in a frame, of surface whose noise is known
     sensed: bool  # by sensors that are known
     diagonal: float  # m, of the largest frame
+
+    def carried(self) -> Standing:
+        """Return the regions as a camera that moves sees them: what rests is off by its pose and its side, too.
+
+        In a scene most surface rests, so that half of all regions tell by how much, up to a cell.
+        """
+        usual = min(float(np.median(self.change)), self.diagonal / CELLS) if len(self.change) else 0.0
+        return replace(self, noise=np.maximum(self.noise, usual))
 
     @property
     def same(self) -> float:
@@ -163,8 +171,13 @@ def standing(frames: Frames) -> Standing:
         for (probe, is_far), each in zip(those, own, strict=False):
             (probe.far if is_far else probe.beside).append(each)
     # Two frames tell nothing of noise; where a sensor is known, too, only what a region does on its own counts then.
-    sensed = len(frames) > 2 and isinstance(frames, CapturedSequence) and frames.depth is not None
-    return _regions([probe for probe in probes.values() if probe.beside], sensed)
+    depth = frames.depth if isinstance(frames, CapturedSequence) else None
+    found_regions = _regions(
+        [probe for probe in probes.values() if probe.beside], len(frames) > 2 and depth is not None
+    )
+    return (
+        found_regions.carried() if depth is not None and is_carried(depth.__getitem__, len(frames)) else found_regions
+    )
 
 
 @dataclass(frozen=True, slots=True)
