@@ -10,6 +10,7 @@ from meshreel.capture.rig.rig import read_rig
 from meshreel.cli import main
 from meshreel.cli.calibrate import BEFORE
 from tests.capture.depth_scenes import camera, record
+from tests.capture.walks import record_walk
 
 SHIFT = np.array([0.01, 0.0, 0.02])  # m
 CAMERAS = [camera(name, side, size=160) for name, side in (("left", -25), ("middle", 0), ("right", 25))]
@@ -51,6 +52,17 @@ def test_new_poses_and_a_picture_are_written_beside_the_old_ones(rig, tmp_path, 
     assert row["pairs"][0]["after_mm"] < 1 < row["pairs"][0]["before_mm"]
     assert (rig / "rig.json").read_bytes() == before and (tmp_path / "new.png").stat().st_size > 10_000
     assert apart(out, rig) < 0.003 < np.linalg.norm(SHIFT)
+
+
+def test_poses_of_a_camera_that_moves_are_refined_in_place_alone_and_kept(tmp_path, capsys):
+    rig = tmp_path / "rig"
+    record_walk(rig, 8, people=False, width=96)
+    assert main(["calibrate", str(rig), "-o", str(tmp_path / "new.json")]) == 2
+    assert "has cameras that move" in (told := capsys.readouterr().err) and "give --in-place alone" in told
+    before = (rig / "phone" / "poses.json").read_bytes()
+    assert main(["calibrate", str(rig), "--in-place"]) == 0
+    assert "camera phone moves: surfaces seen twice lie" in capsys.readouterr().out
+    assert (rig / "phone" / "poses.before.json").read_bytes() == before != (rig / "phone" / "poses.json").read_bytes()
 
 
 def test_in_place_keeps_the_description_before(rig, capsys):

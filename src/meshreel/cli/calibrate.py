@@ -13,6 +13,7 @@ from rich.table import Table
 from ..capture.calibration.board import BoardOptions, poses_by_board
 from ..capture.calibration.calibrate import Calibration, write_calibration_sheet
 from ..capture.calibration.calibrate import refine as refined
+from ..capture.calibration.paths import refine_paths
 from ..capture.calibration.poses import described, posed_by, read_poses, with_poses
 from ..capture.recording import open_recording
 from ..capture.rig.rig import RIG, SINGLE
@@ -50,7 +51,8 @@ def command(
     output
         The .json file to write: rig.json with new poses. The picture beside it is a .png of that name.
     in_place
-        Replace the rig's rig.json; the one before is kept as rig.before.json.
+        Replace the rig's rig.json; the one before is kept as rig.before.json. Of cameras that move, the files of their
+        poses are replaced, and kept alike.
     poses
         File to begin with: COLMAP's images.txt or images.bin, OpenCV's .yml, caliscope's .toml, ROS tf_static as .yaml
         or .json, or a rig.json. Cameras are found by their names.
@@ -73,6 +75,20 @@ def command(
     if not refine and poses is None and board.kind is None:
         raise InputError("--no-refine leaves nothing to do without --poses or --board; give one, or leave it out")
     recording, warnings = open_recording(rig, keep=False)
+    if paths := set(recording.rig.paths.values()):
+        if not in_place or not refine or poses is not None or board.kind is not None:
+            text = f"{rig}: has cameras that move, whose poses are in files as {min(paths)}"
+            raise InputError(f"{text}; give --in-place alone, which refines these")
+        kept = {path: path.with_name(f"{path.stem}.before.json") for path in sorted(paths)}
+        check_free(list(kept.values()), force)
+        for path, copy in kept.items():
+            write_file(copy, path.read_bytes())
+        remarks = refine_paths(rig)
+        common.warn(warnings)
+        row = {"output": [str(path) for path in sorted(paths)], "cameras": remarks, "warnings": warnings}
+        text = f"{rig}: nothing that its cameras see twice would lie nearer with other poses"
+        common.result(row, *(remarks or [text]))
+        return
     posed, calibration = recording.rig, None
     if poses is not None:
         unit = np.array([[1, 1, 1, scale]] * 3 + [[1, 1, 1, 1]])

@@ -58,7 +58,7 @@ def command(
     show: Annotated[bool, Parameter(name="--list", negative="")] = False,
     common: Common = Common(),
 ) -> None:
-    """Fuse the depth pictures of a rig of still cameras, or the points of each frame, into one mesh per frame.
+    """Fuse the depth pictures of a rig of cameras, or the points of each frame, into one mesh per frame.
 
     Or make a rig of recordings. Run again after an interruption, it makes the missing frames.
 
@@ -68,10 +68,13 @@ def command(
         A folder with rig.json: {"frames_per_second": 30, "cameras": [{"name": "left", "width": 640, "height": 576,
         "fx": 504, "fy": 504, "cx": 320, "cy": 288, "camera_to_world": 4 x 4 rows in metres, "depth_unit_m": 0.001,
         "depth_min_m": 0.1, "depth_max_m": 5, "depth": "left/depth"}]}, each `depth` a folder of 16-bit PNG whose names
-        have the frame's number. Cameras look along +z, x right, y down. Or a folder with camera.json (one such
+        have the frame's number. Cameras look along +z, x right, y down. One that moves has, in place of
+        camera_to_world, `poses`: a file with {"camera_to_world": {"0": 4 x 4 rows, ...}}, by the frame's number. Or a
+        folder with camera.json (one such
         camera, with frames_per_second), depth/ and, for colours, color/. A camera's `color` is a folder of pictures
         aligned with its depth, or an object with a folder and what differs; `color_cameras` lists others. Or recordings
-        of other programs, together one rig: TUM RGB-D, Stray Scanner and Record3D folders, .r3d, .bag, .mcap, .mkv.
+        of other programs, together one rig: TUM RGB-D, 7-scenes, nerfstudio, Stray Scanner and Record3D folders, .r3d,
+        .bag, .mcap, .mkv.
         Or point clouds, one a frame: a folder, pattern or list of .ply, .pcd, .npz (points, normals, colors), .las,
         .laz.
     output
