@@ -1,6 +1,8 @@
-"""Vertices of several frames in one array: the same numbers, in the caller's memory, as float64 or float32."""
+"""Vertices of several frames in one array, of a video and of each track, and the runs of frames that share them."""
 
 import io
+import pickle
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -41,10 +43,80 @@ def test_frames_afterwards_do_not_change_with_the_array():
     assert video[MOVING - 1].vertices.tobytes() == stacked(MOVING - 1, MOVING).tobytes()
 
 
-@pytest.mark.parametrize("name", ["scene", "layers_patched", "draco", "laplacian"])
+@pytest.mark.parametrize("name", ["scene", "mixed", "draco", "laplacian"])
 def test_other_videos_give_the_vertices_of_their_frames_too(name: str):
     path = GOLDEN / f"{name}.reel"
     assert meshreel.open(path).vertices(0, 1).tobytes() == meshreel.open(path)[0].vertices.tobytes()
+
+
+FILES = sorted(GOLDEN.rglob("*.reel"))
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
+@pytest.mark.parametrize("layers", [None, 1])
+def test_runs_are_all_frames_and_as_long_as_vertices_and_faces_last(path: Path, layers: int | None):
+    video = meshreel.open(path).at(layers)
+    for body in (video, *video.tracks):
+        runs = body.topology
+        assert [run.first for run in runs] == [0, *(run.last for run in runs[:-1])] and runs[-1].last == len(video)
+        for run in runs:
+            count = sum(rows.stop - rows.start for rows in run.parts.values())
+            assert body.vertices(run.first, run.last).shape == (run.last - run.first, count, 3)
+            assert run.faces.flags.writeable and run.faces.dtype == np.int32
+            assert run.faces.max(initial=-1) < count
+            if run.last < len(video):
+                with pytest.raises(InputError, match=f"frame {run.last}: (track|background).* other vertices"):
+                    body.vertices(run.first, run.last + 1)
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
+def test_every_part_of_every_frame_is_in_the_rows_that_its_run_names(path: Path):
+    video = meshreel.open(path)
+    for run in video.topology:
+        whole, faces = video.vertices(run.first, run.last), run.faces
+        for row, frame in zip(whole, range(run.first, run.last), strict=True):
+            parts = video.parts(frame)
+            assert set(parts) <= set(run.parts)
+            for name, mesh in parts.items():
+                rows = run.parts[name]
+                count = rows.stop - rows.start
+                np.testing.assert_array_equal(row[rows], mesh.vertices[:count])
+                own = faces[(faces >= rows.start).all(axis=1) & (faces < rows.stop).all(axis=1)] - rows.start
+                shown = mesh.faces[mesh.faces.max(axis=1) < count]  # the others are patches
+                assert set(map(tuple, shown.tolist())) <= set(map(tuple, own.tolist()))
+
+
+def test_a_track_of_a_scene_has_its_own_vertices_and_runs():
+    video = meshreel.open(GOLDEN / "scene.reel")
+    walker, visitor = video.tracks
+    assert [(run.first, run.last) for run in walker.topology] == [(0, 14)]
+    assert [(run.first, run.last) for run in visitor.topology] == [(0, 4), (4, 9), (9, 14)]
+    wanted = np.stack([mesh.vertices for mesh in walker])
+    assert walker.vertices().tobytes() == wanted.tobytes()
+    out = np.empty((5, 258, 3), np.float32)
+    assert visitor.vertices(4, 9, out) is out
+    np.testing.assert_array_equal(out, video.vertices(4, 9)[:, video.topology[1].parts["track 1"]].astype(np.float32))
+
+
+def test_a_scene_whose_parts_change_names_the_part_and_the_way_to_each_track():
+    with pytest.raises(InputError, match=r"frame 4: background .*\(78 after 90\).*each of `tracks` has vertices"):
+        meshreel.open(GOLDEN / "scene.reel").vertices()
+
+
+def test_patches_and_hidden_faces_change_neither_vertices_nor_faces_of_a_run():
+    video = meshreel.open(GOLDEN / "layers_patched.reel")
+    assert len({len(mesh.vertices) for mesh in video}) > 1  # some frames have patches
+    (run,), whole = video.topology, video.at(layers=2)
+    assert len({len(mesh.faces) for mesh in whole}) == 1  # without the layer of patches none is hidden
+    np.testing.assert_array_equal(run.faces, whole[0].faces)
+    assert video.vertices().tobytes() == np.stack([mesh.vertices for mesh in whole]).tobytes()
+
+
+def test_tracks_say_where_they_are_shown_and_survive_a_pickled_video():
+    video = meshreel.open(GOLDEN / "scene.reel")
+    assert repr(video.tracks[1]).startswith("<meshreel.Track: track 1, shown in 5 of 14 frames (4 to 8), ")
+    assert repr(pickle.loads(pickle.dumps(video)).tracks) == repr(video.tracks)
+    assert "shown in 0 of 2 frames, 0 bytes" in repr(meshreel.open(GOLDEN / "empty.reel").tracks[0])
 
 
 def test_vertices_that_are_no_longer_the_same_are_refused_though_as_many():
@@ -55,7 +127,7 @@ def test_vertices_that_are_no_longer_the_same_are_refused_though_as_many():
         writer.add_group(0, 2, encode_intra(frames, 0.001, 0))
     video = meshreel.open(file.getvalue())
     assert len(video[0].vertices) == len(video[1].vertices)
-    with pytest.raises(InputError, match="frame 1 has other vertices than frame 0"):
+    with pytest.raises(InputError, match=r"frame 1: track 0 has other vertices than in frame 0 \(5 after 5\)"):
         video.vertices(0, 2)
 
 
@@ -65,7 +137,7 @@ def test_vertices_that_are_no_longer_the_same_are_refused_though_as_many():
         *((3, np.zeros(shape, kind), "3 frames: give one of float64 or float32")
           for shape, kind in (((3, 9, 3), np.float16), ((4, 9, 3), float), ((3, 9), float))),
         (3, np.zeros((3, 9, 3)), "frame 0 has"),
-        (COUNT, None, f"frame {MOVING} has 0 vertices"),
+        (COUNT, None, f"frame {MOVING}: track 0 has other vertices than in frame {MOVING - 1}"),
     ],
 )  # fmt: skip
 def test_arrays_and_frames_that_do_not_fit_are_refused(last: int, out: np.ndarray | None, words: str):

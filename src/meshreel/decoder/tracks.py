@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -18,10 +19,13 @@ from ..format.budget import Chain
 from ..format.layout import ChunkKind, Form
 from ..geometry.splats import Bound
 from ..geometry.topology import part_of
+from ..shapes import Float, Int32
 from ..types import Frames, Mesh, Texture
 from .cache import MOST_KEPT, CachedGroup, CachedStates, Refusals, most_together
 from .pictures import Decoders, TrackPictures
+from .topology import FramePart, Topology, frames_of, positions, topologies
 
+BACKGROUND = "background"  # its name among the parts of a frame
 MOST_SPLATS = 4  # chunks of splats that all tracks keep (guess): each may take some 24 MB
 
 
@@ -46,6 +50,18 @@ class Track(Frames):
         self._refusals = Refusals()  # of frames
         self._lost = Refusals()  # of states, which may be valid if frames of the same group are damaged
 
+    @property
+    def name(self) -> str:
+        """The track's name among the parts of a frame, as in "track 0"."""
+        return f"track {self.number}"
+
+    def __repr__(self) -> str:
+        groups = [group for group in self.reader.tracks[self.number] if group.form != Form.EMPTY and group.shown]
+        count = sum(len(group.shown) for group in groups)
+        span = f" ({groups[0].shown.start} to {groups[-1].shown[-1]})" if groups else ""
+        size = sum(group.size for group in groups)
+        return f"<meshreel.Track: {self.name}, shown in {count} of {len(self)} frames{span}, {size} bytes>"
+
     def __len__(self) -> int:
         return self.reader.frame_count
 
@@ -53,6 +69,44 @@ class Track(Frames):
         """Return frame `index` in metres. Raises IndexError out of range and FormatError if its group is damaged."""
         chunk = self.reader.chunk_of_frame(index, self.number)
         return self._decoded(chunk).frames[index - chunk.first_frame]
+
+    def vertices(
+        self, first: int = 0, last: int | None = None, out: np.ndarray | None = None
+    ) -> Float[np.ndarray, "T V 3"]:
+        """Return the positions (m) of the body's vertices in frames `first` to `last` - 1, without patches.
+
+        By default in all frames. `out`, errors and what is left out are as of `Video.vertices`.
+        """
+        return positions(lambda frame: [self.part(frame)], frames_of(first, last, len(self)), out)
+
+    @cached_property
+    def topology(self) -> tuple[Topology, ...]:
+        """Runs of frames in which the body keeps its vertices and faces, in order; frames without it are runs, too.
+
+        The first use decodes every group once. Raises FormatError as indexing does.
+        """
+        return topologies(lambda frame: [self.part(frame)], len(self))
+
+    def part(self, index: int) -> FramePart:
+        """Return frame `index` without patches, as `vertices` and `topology` compare it. Raises as indexing does."""
+        chunk = self.reader.chunk_of_frame(index, self.number)
+        group = self._decoded(chunk)
+        mesh = group.frames[index - chunk.first_frame]
+        if not group.core.vertices:  # frames without a common mesh
+            return FramePart(self.name, mesh.vertices, chunk.number, (), lambda: mesh.faces)
+        before, state = self.reader.group_before(chunk), group.core.state
+        same = (chunk.number,) if before is None else (chunk.number, before.number)
+        levels = None if state is None else state.levels
+        is_patched = (
+            levels is not None and levels + 1 < len(chunk.layers) and (self.layers is None or self.layers > levels)
+        )
+
+        def faces() -> Int32[np.ndarray, "F 3"]:
+            if not is_patched:
+                return mesh.faces
+            return Track(self.reader, self.number, Decoders(), levels, colored=False)[index].faces
+
+        return FramePart(self.name, mesh.vertices[: group.core.vertices], chunk.number, same, faces)
 
     def memory(self, index: int) -> int:
         """Return the memory of all frames of the group of frame `index`, bytes; decoded once. Raises as indexing."""
@@ -178,6 +232,13 @@ class Background:
             return self._pictures.shown(chunk, self._state(chunk), frame)
         except FormatError as error:
             raise FormatError(f"the background of frame {frame}: {error}") from error
+
+    def part(self, frame: int) -> FramePart:
+        """Return the background of a frame, as `Video.vertices` compares it. Raises as `of_frame` does."""
+        mesh, chunk = self.of_frame(frame), self.reader.static_of_frame(frame)
+        if mesh is None or chunk is None:
+            return FramePart(BACKGROUND, Mesh.empty().vertices, -1, (-1,), lambda: Mesh.empty().faces)
+        return FramePart(BACKGROUND, mesh.vertices, chunk.number, (chunk.number,), lambda: mesh.faces)
 
     def _state(self, chunk: Chunk) -> Mesh:
         """Decode a state, starting from the last decoded one if it is that state or changes it."""

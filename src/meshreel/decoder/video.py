@@ -13,25 +13,26 @@ import sys
 import time
 import weakref
 from collections.abc import Callable, Iterator, Sequence
+from functools import cached_property
 from mmap import mmap
 from pathlib import Path
 from typing import Any, overload
 
 import numpy as np
 
-from ..container.reader import Chunk, ReelReader
+from ..container.reader import ReelReader
 from ..container.sources import BytesSource, FileSource, Source, Stream, StreamSource, source_at, viewed
 from ..errors import FormatError, InputError, path_of, without_secret
-from ..format.layout import MEDIA_TYPES, Form
+from ..format.layout import MEDIA_TYPES
 from ..format.view import View
 from ..geometry.splats import Bound
 from ..geometry.topology import concatenate
 from ..shapes import Float, Float64
 from ..types import Audio, Mesh, Up
 from .pictures import Decoders
-from .tracks import Background, Track, moving_of_frame
+from .topology import FramePart, Topology, frames_of, positions, topologies
+from .tracks import BACKGROUND, Background, Track, moving_of_frame
 
-BACKGROUND = "background"  # its name among the parts of a frame
 _MOST_LAYERS = 255  # beyond the first, more than any group has
 LOADED = 10.0  # s in which a browser has loaded a page (guess)
 INLINE = 8_000_000  # bytes, largest file in a notebook's output (guess): saved notebooks hold 4/3 of it
@@ -85,7 +86,7 @@ class Video(Sequence[Mesh]):
         self.layers = layers
         self._colored = colored
         decoders, numbers = Decoders(), range(len(reader.tracks))
-        self.tracks = tuple(Track(reader, number, decoders, layers, colored) for number in numbers)
+        self._tracks = tuple(Track(reader, number, decoders, layers, colored) for number in numbers)
         self._background = Background(reader, decoders, colored)
         self._close = close
         self._hide: weakref.finalize[..., Video] | Callable[[], None] = lambda: None  # removes the page of `show`
@@ -123,6 +124,14 @@ class Video(Sequence[Mesh]):
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+    @property
+    def tracks(self) -> tuple[Track, ...]:
+        """The moving bodies, each a sequence of meshes as long as the video; `parts` calls them "track 0" and so on.
+
+        A sequence that is no scene is one track.
+        """
+        return self._tracks
 
     @property
     def frame_rate(self) -> float:
@@ -203,7 +212,7 @@ class Video(Sequence[Mesh]):
         background = self._background.of_frame(frame)
         parts = {} if background is None else {BACKGROUND: background}
         moving = moving_of_frame(self.tracks, frame)
-        return parts | {f"track {number}": mesh for number, mesh in enumerate(moving)}
+        return parts | {track.name: mesh for track, mesh in zip(self.tracks, moving, strict=True)}
 
     def background(self, index: int) -> Mesh:
         """Return the background of frame `index`: the same object while it does not change, empty if there is none."""
@@ -223,39 +232,32 @@ class Video(Sequence[Mesh]):
         bound = [splats for splats in (track.splats(frame) for track in self.tracks) if splats is not None]
         return Bound.join(bound) if bound else None
 
-    def vertices(self, first: int, last: int, out: np.ndarray | None = None) -> Float[np.ndarray, "T V 3"]:
-        """Return the positions (m) of the vertices, which must be the same in frames `first` to `last` - 1.
+    def vertices(
+        self, first: int = 0, last: int | None = None, out: np.ndarray | None = None
+    ) -> Float[np.ndarray, "T V 3"]:
+        """Return the positions (m) of the vertices of frames `first` to `last` - 1, by default of all frames.
 
-        They are written to `out` if it is given, an array of float64 or float32, for which coordinates are rounded;
-        otherwise to a new array of float64. Raises InputError, which names the frame, if the vertices or their number
-        change or do not fit the array; and otherwise as indexing does.
+        V are the vertices of the background, then those of each track; patches are left out, because they are other
+        vertices in each frame. `topology` has their faces, the rows of each part, and the runs of frames in which
+        they stay the same. Of a scene each of `tracks` has `vertices` and `topology` of its own, for a body may come
+        or change while others stay. Positions are written to `out` if it is given, an array of float64 or float32,
+        for which coordinates are rounded; otherwise to a new array of float64. Raises InputError, which names the
+        frame and the part, if vertices or faces change or do not fit the array; and otherwise as indexing does.
         """
-        if not 0 <= first < last <= len(self):
-            raise IndexError(f"frames {first} to {last} of a video of {len(self)} frames")
-        if out is not None and (out.ndim != 3 or len(out) != last - first or out.dtype.char not in "df"):
-            text = f"an array of {out.dtype} {out.shape} for {last - first} frames"
-            raise InputError(f"{text}: give one of float64 or float32, frames x vertices x 3")
-        first_parts, static = [*self.parts(first).values()], self.reader.static_of_frame(first)
-        before = self.reader.chunks_of_frame(first)
-        if out is None:
-            out = np.empty((last - first, sum(len(mesh.vertices) for mesh in first_parts), 3))
-        for row, frame in zip(out, range(first, last), strict=True):
-            parts, chunks = [*self.parts(frame).values()], self.reader.chunks_of_frame(frame)
-            if (count := sum(len(mesh.vertices) for mesh in parts)) != len(row) or row.shape[1:] != (3,):
-                raise InputError(f"frame {frame} has {count} vertices: the array has room for {len(row)}")
-            is_same = self._follow(chunks, before) or _are_alike(parts, first_parts)
-            if self.reader.static_of_frame(frame) != static or not is_same:
-                raise InputError(f"frame {frame} has other vertices than frame {first}: ask for the frames before it")
-            np.concatenate([mesh.vertices for mesh in parts], out=row, casting="same_kind")
-            before = chunks
-        return out
+        return positions(self._parts_of, frames_of(first, last, len(self)), out)
 
-    def _follow(self, chunks: tuple[Chunk, ...], before: tuple[Chunk, ...]) -> bool:
-        """Return whether groups continue with the vertices of the groups before them."""
-        return all(
-            chunk.form != Form.DRACO and (chunk == earlier or self.reader.group_before(chunk) == earlier)
-            for chunk, earlier in zip(chunks, before, strict=True)
-        )
+    @cached_property
+    def topology(self) -> tuple[Topology, ...]:
+        """Runs of frames in which no part changes its vertices or faces, in order; together they are all frames.
+
+        The first use decodes every group once. Raises FormatError as indexing does.
+        """
+        return topologies(self._parts_of, len(self))
+
+    def _parts_of(self, frame: int) -> list[FramePart]:
+        background = [self._background.part(frame)] if self.reader.has_background else []
+        moving_of_frame(self.tracks, frame)  # refuses groups that take too much memory together
+        return background + [track.part(frame) for track in self.tracks]
 
     def __repr__(self) -> str:
         return f"<meshreel.Video: {', '.join(self._facts().values())}>"
@@ -349,14 +351,6 @@ def _remove(folder: str, when: float, process: int) -> None:
 
 def _counted(count: int, what: str) -> str:
     return f"{count} {what}" if count == 1 else f"{count} {what}s"
-
-
-def _are_alike(parts: list[Mesh], others: list[Mesh]) -> bool:
-    """Return whether corresponding parts of two frames have equally many vertices and the same faces."""
-    return all(
-        len(part.vertices) == len(other.vertices) and np.array_equal(part.faces, other.faces)
-        for part, other in zip(parts, others, strict=True)
-    )
 
 
 def _joined(meshes: list[Mesh]) -> Mesh:
