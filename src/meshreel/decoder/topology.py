@@ -37,19 +37,20 @@ PartsOf = Callable[[int], list[FramePart]]  # of a frame; in each frame of a vid
 
 @dataclass(frozen=True, slots=True)
 class Topology:
-    """Frames in a row whose vertices and faces are the same, apart from patches and from faces that a frame hides."""
+    """Frames in a row whose vertices and faces are the same, apart from patches and from faces that a frame hides.
+
+    They are frames `first` to `last` - 1, as arguments of `vertices`. The slices `parts` are the rows of the vertices
+    of each part: "background", if there is one, "track 0", "track 1" ...
+    """
 
     first: int
-    last: int  # the first frame after them: `vertices(first, last)` returns their positions
-    parts: dict[str, slice]  # rows of the vertices of each part: "background", "track 0", "track 1" ...
+    last: int
+    parts: dict[str, slice]
     _parts_of: PartsOf = field(repr=False, compare=False)
 
     @property
     def faces(self) -> Int32[np.ndarray, "F 3"]:
-        """Faces as rows of the vertices, in a new array; those that some frame hides are included.
-
-        Decoded when asked for. Raises FormatError as indexing does.
-        """
+        """Faces as rows of the vertices, those that some frame hides included; decoded into a new array."""
         parts = zip(self._parts_of(self.first), self.parts.values(), strict=True)
         return np.concatenate([part.faces() + np.int32(rows.start) for part, rows in parts])
 
@@ -68,41 +69,32 @@ def topologies(parts_of: PartsOf, count: int) -> tuple[Topology, ...]:
     return tuple(Topology(first, last, rows, parts_of) for (first, rows), last in zip(starts, lasts, strict=True))
 
 
-def positions(parts_of: PartsOf, frames: range, out: np.ndarray | None) -> Float[np.ndarray, "T V 3"]:
-    """Write the positions of the vertices of `frames` (m) to `out`, or to a new array, and return it.
+def positions(
+    parts_of: PartsOf, first: int, last: int, count: int, out: np.ndarray | None
+) -> Float[np.ndarray, "T V 3"]:
+    """Write the positions (m) of the vertices of frames `first` to `last` - 1 of `count` to `out` or a new array.
 
-    Raises InputError if vertices or faces change, or do not fit the array.
+    Raises IndexError out of range, and InputError if vertices or faces change, or do not fit the array.
     """
-    if out is not None and (out.ndim != 3 or len(out) != len(frames) or out.dtype.char not in "df"):
-        text = f"an array of {out.dtype} {out.shape} for {len(frames)} frames"
+    if not 0 <= first < last <= count:
+        raise IndexError(f"frames {first} to {last} of a video of {count} frames")
+    if out is not None and (out.ndim != 3 or len(out) != last - first or out.dtype.char not in "df"):
+        text = f"an array of {out.dtype} {out.shape} for {last - first} frames"
         raise InputError(f"{text}: give one of float64 or float32, frames x vertices x 3")
-    before = parts_of(frames[0])
-    count = sum(len(part.vertices) for part in before)
+    before = parts_of(first)
+    rows = sum(len(part.vertices) for part in before)
     if out is None:
-        out = np.empty((len(frames), count, 3))
-    elif out.shape[1:] != (count, 3):
-        raise InputError(f"frame {frames[0]} has {count} vertices: the array has room for {out.shape[1:]}")
-    for row, frame in zip(out, frames, strict=True):
+        out = np.empty((last - first, rows, 3))
+    elif out.shape[1:] != (rows, 3):
+        raise InputError(f"frame {first} has {rows} vertices: the array has room for {out.shape[1:]}")
+    for row, frame in zip(out, range(first, last), strict=True):
         parts = parts_of(frame)
         for part, earlier in zip(parts, before, strict=True):
             if not part.continues(earlier):
-                raise InputError(_change(frame, part, earlier, len(parts)))
+                numbers = f"({len(part.vertices)} after {len(earlier.vertices)})"
+                change = f"frame {frame}: {part.name} has other vertices than in frame {frame - 1} {numbers}"
+                alone = ", and each of `tracks` has vertices and a topology of its own" if len(parts) > 1 else ""
+                raise InputError(f"{change}: ask for the frames before it; `topology` tells where they change{alone}")
         np.concatenate([part.vertices for part in parts], out=row, casting="same_kind")
         before = parts
     return out
-
-
-def _change(frame: int, part: FramePart, before: FramePart, count: int) -> str:
-    """Return the message about a part that has other vertices than in the frame before."""
-    numbers = f"{len(part.vertices)} after {len(before.vertices)}"
-    remedy = "ask for the frames before it; `topology` tells where vertices change"
-    alone = ", and each of `tracks` has vertices and a topology of its own" if count > 1 else ""
-    return f"frame {frame}: {part.name} has other vertices than in frame {frame - 1} ({numbers}): {remedy}{alone}"
-
-
-def frames_of(first: int, last: int | None, count: int) -> range:
-    """Return frames `first` to `last` - 1, None: to the end. Raises IndexError if they are not in `count` frames."""
-    last = count if last is None else last
-    if not 0 <= first < last <= count:
-        raise IndexError(f"frames {first} to {last} of a video of {count} frames")
-    return range(first, last)

@@ -23,7 +23,7 @@ from ..shapes import Float, Int32
 from ..types import Frames, Mesh, Texture
 from .cache import MOST_KEPT, CachedGroup, CachedStates, Refusals, most_together
 from .pictures import Decoders, TrackPictures
-from .topology import FramePart, Topology, frames_of, positions, topologies
+from .topology import FramePart, Topology, positions, topologies
 
 BACKGROUND = "background"  # its name among the parts of a frame
 MOST_SPLATS = 4  # chunks of splats that all tracks keep (guess): each may take some 24 MB
@@ -77,14 +77,12 @@ class Track(Frames):
 
         By default in all frames. `out`, errors and what is left out are as of `Video.vertices`.
         """
-        return positions(lambda frame: [self.part(frame)], frames_of(first, last, len(self)), out)
+        last = len(self) if last is None else last
+        return positions(lambda frame: [self.part(frame)], first, last, len(self), out)
 
     @cached_property
     def topology(self) -> tuple[Topology, ...]:
-        """Runs of frames in which the body keeps its vertices and faces, in order; frames without it are runs, too.
-
-        The first use decodes every group once. Raises FormatError as indexing does.
-        """
+        """Runs of frames in which the body keeps its vertices and faces, as of `Video.topology`; some may lack it."""
         return topologies(lambda frame: [self.part(frame)], len(self))
 
     def part(self, index: int) -> FramePart:
@@ -92,21 +90,16 @@ class Track(Frames):
         chunk = self.reader.chunk_of_frame(index, self.number)
         group = self._decoded(chunk)
         mesh = group.frames[index - chunk.first_frame]
-        if not group.core.vertices:  # frames without a common mesh
-            return FramePart(self.name, mesh.vertices, chunk.number, (), lambda: mesh.faces)
-        before, state = self.reader.group_before(chunk), group.core.state
-        same = (chunk.number,) if before is None else (chunk.number, before.number)
-        levels = None if state is None else state.levels
-        is_patched = (
-            levels is not None and levels + 1 < len(chunk.layers) and (self.layers is None or self.layers > levels)
-        )
+        whole = [chunk, self.reader.group_before(chunk)] if group.core.vertices else []  # else each frame has its mesh
+        same = tuple(one.number for one in whole if one is not None)
 
         def faces() -> Int32[np.ndarray, "F 3"]:
-            if not is_patched:
+            state = group.core.state
+            if state is None or state.levels + 1 == len(chunk.layers):
                 return mesh.faces
-            return Track(self.reader, self.number, Decoders(), levels, colored=False)[index].faces
+            return Track(self.reader, self.number, Decoders(), state.levels, colored=False)[index].faces  # hides none
 
-        return FramePart(self.name, mesh.vertices[: group.core.vertices], chunk.number, same, faces)
+        return FramePart(self.name, mesh.vertices[: group.core.vertices or None], chunk.number, same, faces)
 
     def memory(self, index: int) -> int:
         """Return the memory of all frames of the group of frame `index`, bytes; decoded once. Raises as indexing."""
@@ -235,10 +228,9 @@ class Background:
 
     def part(self, frame: int) -> FramePart:
         """Return the background of a frame, as `Video.vertices` compares it. Raises as `of_frame` does."""
-        mesh, chunk = self.of_frame(frame), self.reader.static_of_frame(frame)
-        if mesh is None or chunk is None:
-            return FramePart(BACKGROUND, Mesh.empty().vertices, -1, (-1,), lambda: Mesh.empty().faces)
-        return FramePart(BACKGROUND, mesh.vertices, chunk.number, (chunk.number,), lambda: mesh.faces)
+        mesh, chunk = self.of_frame(frame) or Mesh.empty(), self.reader.static_of_frame(frame)
+        number = -1 if chunk is None else chunk.number
+        return FramePart(BACKGROUND, mesh.vertices, number, (number,), lambda: mesh.faces)
 
     def _state(self, chunk: Chunk) -> Mesh:
         """Decode a state, starting from the last decoded one if it is that state or changes it."""

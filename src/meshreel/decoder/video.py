@@ -30,7 +30,7 @@ from ..geometry.topology import concatenate
 from ..shapes import Float, Float64
 from ..types import Audio, Mesh, Up
 from .pictures import Decoders
-from .topology import FramePart, Topology, frames_of, positions, topologies
+from .topology import FramePart, Topology, positions, topologies
 from .tracks import BACKGROUND, Background, Track, moving_of_frame
 
 _MOST_LAYERS = 255  # beyond the first, more than any group has
@@ -127,10 +127,7 @@ class Video(Sequence[Mesh]):
 
     @property
     def tracks(self) -> tuple[Track, ...]:
-        """The moving bodies, each a sequence of meshes as long as the video; `parts` calls them "track 0" and so on.
-
-        A sequence that is no scene is one track.
-        """
+        """The moving bodies, each a sequence of meshes as long as the video; what is no scene is one track."""
         return self._tracks
 
     @property
@@ -244,7 +241,7 @@ class Video(Sequence[Mesh]):
         for which coordinates are rounded; otherwise to a new array of float64. Raises InputError, which names the
         frame and the part, if vertices or faces change or do not fit the array; and otherwise as indexing does.
         """
-        return positions(self._parts_of, frames_of(first, last, len(self)), out)
+        return positions(self._parts_of, first, len(self) if last is None else last, len(self), out)
 
     @cached_property
     def topology(self) -> tuple[Topology, ...]:
