@@ -18,6 +18,7 @@ CHECKED = {"room.reel": "scene.reel", "bodies.reel": "mixed.reel"}  # conformanc
 LINK = re.compile(r"(?<!!)\[([^\]]*)\]\(([^)#\s:]+)(#[^)\s]*)?\)")  # text, file, anchor; no pictures, no addresses
 VALUE = re.compile(r"\{\{(size|seconds):([\w.]+)\}\}")
 HOME = "index.md"
+EXAMPLES = (".ipynb", ".py")  # endings of the files that become pages
 FRAMES = 60  # of the bodies: two seconds
 POSTER = (800, 600)  # pixels
 
@@ -33,7 +34,7 @@ def on_files(files: Any, config: Any) -> Any:
         sample = _sample(name)
         poster = sample.with_suffix(".png")
         added += [(f"samples/{name}", sample), (f"samples/{Path(name).stem}.png", poster if poster.exists() else ROOM)]
-    for path in sorted((ROOT / "docs" / "examples").glob("*.ipynb")):
+    for path in sorted(one for one in (ROOT / "docs" / "examples").iterdir() if one.suffix in EXAMPLES):
         page = f"examples/{path.stem}.md"
         files.append(File.generated(config, page, content=_page_of(path)))
     for place, path in added:
@@ -41,12 +42,15 @@ def on_files(files: Any, config: Any) -> Any:
     return files
 
 
-def _page_of(notebook: Path) -> str:
-    """A notebook as a page: its text, and its code as blocks."""
-    cells = json.loads(notebook.read_text(encoding="utf-8"))["cells"]
-    texts = [("".join(cell["source"]), cell["cell_type"] == "code") for cell in cells]
+def _page_of(example: Path) -> str:
+    """A notebook or a script as a page: its text, and its code as blocks."""
+    source = example.read_text(encoding="utf-8")
+    if example.suffix == ".py":
+        texts = [(f"# {example.name}", False), (source.rstrip(), True)]
+    else:
+        texts = [("".join(cell["source"]), cell["cell_type"] == "code") for cell in json.loads(source)["cells"]]
     blocks = [f"```python\n{text}\n```" if is_code else text for text, is_code in texts]
-    return "\n\n".join([*blocks, f"[Download this notebook]({notebook.name})"]) + "\n"
+    return "\n\n".join([*blocks, f"[Download {example.name}]({example.name})"]) + "\n"
 
 
 def on_page_markdown(markdown: str, page: Any, config: Any, files: Any) -> str:
@@ -61,7 +65,7 @@ def on_page_markdown(markdown: str, page: Any, config: Any, files: Any) -> str:
     def moved(match: re.Match[str]) -> str:
         to = posixpath.normpath(posixpath.join(folder, match[2]))
         place = HOME if to == "README.md" else to.removeprefix("docs/")
-        if here == "examples/index.md" and place.endswith(".ipynb"):
+        if here == "examples/index.md" and place.endswith(EXAMPLES):
             place = str(Path(place).with_suffix(".md").as_posix())
         is_page = place in files.src_uris or not (ROOT / to).exists()  # what is nowhere is left for mkdocs to refuse
         if not is_page:
