@@ -1,7 +1,7 @@
 // Opens recordings that share decoding workers.
 
 import { bytesOf, plainOf } from "./net/built.ts";
-import { BlobSource } from "./net/source.ts";
+import { BlobSource, type Source } from "./net/source.ts";
 import { HttpSource } from "./net/http_source.ts";
 import { Player } from "./player.ts";
 import { WorkerPool, type WorkerLike } from "./time/pool.ts";
@@ -28,14 +28,14 @@ export class Players {
     this.#files = files;
   }
 
-  /** A player of an address or a file; `crossOrigin` as a video has it. */
-  open(source: string | Blob, crossOrigin: string | null): Player {
+  /** A player of an address, a file or a source; `crossOrigin` as a video has it. */
+  open(source: string | Blob | Source, crossOrigin: string | null): Player {
     const { worker, core } = this.#files;
     const create = (): WorkerLike => openWorker(worker) as WorkerLike;
     const shared = (this.#shared ??= { workers: new WorkerPool({ create, core: bytesAt(core) }), users: 0 });
     shared.users++;
     const player = new PooledPlayer({
-      source: typeof source === "string" ? new HttpSource(source, { credentials: crossOrigin === "use-credentials" ? "include" : "same-origin" }) : new BlobSource(source),
+      source: typeof source === "string" ? new HttpSource(source, { credentials: crossOrigin === "use-credentials" ? "include" : "same-origin" }) : source instanceof Blob ? new BlobSource(source) : source,
       workers: shared.workers,
     });
     player.leave = () => this.#leave(shared);

@@ -1,6 +1,6 @@
 // The real engine: recordings come from the network or from files, workers decode them, three.js draws them.
 
-import { importFile, openWorker, plainOf, Players, type Player, type WorkerFiles } from "@meshreel/player-core";
+import { importFile, openWorker, plainOf, Players, type Player, type Source, type WorkerFiles } from "@meshreel/player-core";
 import type { OrderWorker } from "@meshreel/player-three";
 import { GraphicsError } from "./stage.ts";
 import type { Engine, Settings, Stage } from "./stage.ts";
@@ -23,7 +23,7 @@ export class RealEngine implements Engine {
     this.#players = new Players(files);
   }
 
-  open(source: string | Blob, { layers, interpolate, textures, splats, loop, direction, playbackRate, muted, volume, crossOrigin }: Settings): Player {
+  open(source: string | Blob | Source, { layers, interpolate, textures, splats, loop, direction, playbackRate, muted, volume, crossOrigin }: Settings): Player {
     const player = this.#players.open(source, crossOrigin);
     Object.assign(player.sound, { muted, volume });
     Object.assign(player, { layers, interpolate, textures, splats, loop, direction, playbackRate });

@@ -1,5 +1,6 @@
 // Interfaces of the stage, which draws, and of the playback, which opens files, for the element, which knows no WebGL.
 
+import type { Source } from "@meshreel/player-core/net/source";
 import type { Direction, Info, Layers, Packed, Playback, Shown } from "@meshreel/player-core/types";
 import type { Mode } from "@meshreel/player-three/modes";
 import type { VrActions } from "@meshreel/xr/actions";
@@ -74,7 +75,7 @@ export class GraphicsError extends Error {
 
 /** Factory of playbacks and stages; tests replace it. */
 export interface Engine {
-  open(source: string | Blob, settings: Settings): Playback;
+  open(source: string | Blob | Source, settings: Settings): Playback;
   /** Fetches what stages are made with; null where that is there. Rejects where it cannot be fetched. */
   load(): Promise<void> | null;
   /** To be called after `load`. Throws GraphicsError where there is no WebGL 2. */
