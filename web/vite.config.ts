@@ -1,6 +1,7 @@
 // Builds the player into src/meshreel/player/, or into the folder MESHREEL_PLAYER: meshreel-player.js, which defines the element, load.js, which loads
-// it with fewer bytes, three.js, which draws, the page that `meshreel play` opens, the decoding worker, the worker that orders splats, the licences of
-// what is in them, each in Brotli, and what is large as a gzip. core.wasm is put there before by scripts/build_wasm.py. Two builds give the same bytes.
+// it with fewer bytes, three.js, which draws, the page that `meshreel play` opens, study.js, which that loads for studies alone, the decoding worker, the
+// worker that orders splats, the licences of what is in them, each in Brotli, and what is large as a gzip. core.wasm is put there before by
+// scripts/build_wasm.py. Two builds give the same bytes.
 
 import { mkdirSync, readdirSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { extname, join, resolve } from "node:path";
@@ -22,6 +23,7 @@ export const ENTRIES: Readonly<Record<string, string>> = {
   worker: "player-core/src/worker_entry.ts",
   order: "player-three/src/order_worker.ts",
   load: "player-element/src/load.ts",
+  study: "player-element/src/study.ts",
   page: "player-element/src/page.ts",
 };
 
@@ -48,12 +50,12 @@ function inlined(page: string, styles: string): string {
   return page.replace(link, `<style>${styles}</style>`).replace("</body>", `${link}\n</body>`);
 }
 
-/** The page takes the element by the file that is built already. */
+/** The page takes the element, and studies, by the files that are built already. */
 function beside(): Plugin {
   return {
     name: "meshreel-beside",
     enforce: "pre",
-    resolveId: (source) => (source === "./load.ts" ? { id: "./load.js", external: true } : null),
+    resolveId: (source) => (source === "./load.ts" || source === "./study.ts" ? { id: source.replace(".ts", ".js"), external: true } : null),
   };
 }
 

@@ -226,3 +226,15 @@ def raw(port, path):
     with socket.create_connection(("127.0.0.1", port), timeout=60) as line:
         line.sendall(f"GET {path} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n".encode())
         return b"".join(iter(lambda: line.recv(2**16), b""))
+
+
+def test_studies_and_their_network_traces_are_sent_and_not_listed_or_watched(client, folder):
+    (folder / ".hidden.study.json").write_text("{}", encoding="utf-8")
+    (folder / "package.json").write_text("{}", encoding="utf-8")
+    for name in ("walk.study.json", "sub/slow.network.csv"):
+        (folder / name).write_text(name, encoding="utf-8")
+        assert client.get(f"/files/{name}").text == name
+        assert client.get(f"/watch/{name}").status_code == 404
+        assert name not in Library(folder).names()
+    for name in (".hidden.study.json", "package.json", "../sub/slow.network.csv", "secret.txt"):
+        assert client.get(f"/files/{name}").status_code == 404

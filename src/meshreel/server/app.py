@@ -23,7 +23,7 @@ from starlette.staticfiles import NotModifiedResponse, StaticFiles
 
 from ..errors import InputError
 from ..web import begun
-from .library import Library, as_text
+from .library import OF_STUDIES, SUFFIX, Library, as_text
 from .pages import gallery_page, player_page, policy
 
 EXPOSED = ("Accept-Ranges", "Content-Length", "Content-Range", "ETag")
@@ -45,7 +45,7 @@ def make_app(
     """Return the application for a library: it answers requests for `hosts`, and pages of the origins `cors` may read.
 
     "*" allows all of them. `/` plays the file of a library with `only` one, otherwise it is a gallery; `/watch/NAME`
-    plays a file and `/files/NAME` sends it. Raises InputError for a malformed origin.
+    plays a file and `/files/NAME` sends it, or a file of a study. Raises InputError for a malformed origin.
     """
     pages = _Pages(library, player or _OWN.parent / "player")
     packed = [Middleware(GZipMiddleware)]
@@ -106,8 +106,9 @@ class _Pages:
         return self._watch(name)
 
     async def file(self, request: Request) -> Response:
-        """Return a .reel file, or ranges of it."""
-        return await _file(request, await self._path(request.path_params["name"]), BYTES, FRESH)
+        """Return a .reel file, or what a study needs beside it, or ranges of it."""
+        path = await self._path(request.path_params["name"], (SUFFIX, *OF_STUDIES))
+        return await _file(request, path, BYTES, FRESH)
 
     async def own(self, request: Request) -> Response:
         """Return the style or the script of the gallery."""
@@ -129,8 +130,8 @@ class _Pages:
                 return await _file(request, self._player / f"{name}.br", kind, headers | {"Content-Encoding": "br"})
         return await _file(request, self._player / name, kind, headers)
 
-    async def _path(self, name: str) -> Path:
-        path = await run_in_threadpool(self._library.path_of, name)
+    async def _path(self, name: str, endings: tuple[str, ...] = (SUFFIX,)) -> Path:
+        path = await run_in_threadpool(self._library.path_of, name, endings)
         if path is None:
             raise HTTPException(404, f"there is no file {name}")
         return path

@@ -12,6 +12,7 @@ from ..io.file_names import is_text
 from .heads import HeadReader
 
 SUFFIX = ".reel"
+OF_STUDIES = (".study.json", ".network.csv")  # endings of what the player's study page reads beside recordings
 HIDDEN = "."  # first character of hidden names
 Version = tuple[int, int, int]  # of a file, which changes with its contents: size in bytes; mtime and ctime in ns
 
@@ -59,12 +60,12 @@ class Library:
             found += [path.relative_to(self.folder).as_posix() for path in paths]
         return sorted(filter(self.path_of, found), key=lambda name: (name.lower(), name))
 
-    def path_of(self, name: str) -> Path | None:
-        """Return the path of a name, None if the name is not that of a file in this library."""
+    def path_of(self, name: str, endings: tuple[str, ...] = (SUFFIX,)) -> Path | None:
+        """Return the path of a name, None if the name is not that of a file in this library with one of the endings."""
         if self.only is not None:
             path = self.folder / self.only  # named by the user, so that links may lead anywhere
             return path if name == self.only and path.is_file() else None
-        if not _is_plain(name):
+        if not _is_plain(name, endings):
             return None
         try:
             root = self.folder.resolve()
@@ -105,8 +106,8 @@ def as_text(name: str) -> str:
     return name.encode("utf-8", "replace").decode()
 
 
-def _is_plain(name: str) -> bool:
-    """Return whether a name from a URL is relative, without "..", hidden parts and drives, and ends in .reel."""
-    if not name.lower().endswith(SUFFIX) or "\\" in name or (os.name == "nt" and ":" in name):
+def _is_plain(name: str, endings: tuple[str, ...]) -> bool:
+    """Return whether a name from a URL is relative, without "..", hidden parts and drives, and ends as it should."""
+    if not name.lower().endswith(endings) or "\\" in name or (os.name == "nt" and ":" in name):
         return False
     return not any(part == "" or part.startswith(HIDDEN) for part in name.split("/"))

@@ -1,4 +1,4 @@
-// The page that plays one recording over the whole window: the address says which, and how.
+// The page that plays one recording over the whole window, or runs a study: the address says which, and how.
 
 import { followAddress } from "./address.ts";
 import { runBench } from "./bench_page.ts";
@@ -9,7 +9,13 @@ import { readParameters } from "./parameters.ts";
 async function start(): Promise<void> {
   const player = document.querySelector<MeshreelPlayer>("meshreel-player");
   if (player === null) return;
-  const { attributes, time, bench } = readParameters(location.search);
+  const { attributes, time, bench, study, participant } = readParameters(location.search);
+  if (study !== "") {
+    player.removeAttribute("src");
+    const [{ MeshreelPlayer: element }, { runStudy }] = await Promise.all([import("./load.ts"), import("./study.ts")]);
+    await element.engine.load();
+    return runStudy(element, study, participant);
+  }
   const opened = player.getAttribute("src"); // of a server's page
   const follow = (): void => {
     const typed = readParameters(`?${location.hash.slice(1)}`);

@@ -1,11 +1,14 @@
 // Parameters of the page's address: ?src, ?t, ?autoplay, ?loop, ?direction, ?stats, ?mode, ?layers, ?camera, ?speed, ?theme, ?up, ?background,
-// ?poster, ?interpolate, ?textures, ?ground, ?exposure, ?section, ?controls, ?autorotate, ?fly, ?frames, ?muted, ?volume, ?bench. All but t and bench are attributes of the element.
+// ?poster, ?interpolate, ?textures, ?ground, ?exposure, ?section, ?controls, ?autorotate, ?fly, ?frames, ?muted, ?volume, ?bench, ?study, ?participant.
+// All but t, bench, study and participant are attributes of the element.
 
 export interface Parameters {
   /** Attributes to set; null to take one away. */
   readonly attributes: ReadonlyMap<string, string | null>;
   readonly time: number; // s; 0 where none is asked for
   readonly bench: number | null; // s to measure for; null where it is not asked for
+  readonly study: string; // address of a study's description; empty where none is asked for
+  readonly participant: string; // of the study; empty where the viewer is to say
 }
 
 const TEXTS = ["src", "mode", "layers", "camera", "speed", "theme", "up", "background", "poster", "interpolate", "textures", "ground", "exposure", "direction", "section", "volume"];
@@ -21,7 +24,8 @@ export function readParameters(search: string): Parameters {
     if (text !== null && text !== "") attributes.set(name, text);
   }
   for (const name of FLAGS) if (given.has(name)) attributes.set(name, isOn(given.get(name)) ? "" : null);
-  return { attributes, time: readTime(given.get("t")), bench: isOn(given.get("bench")) ? readTime(given.get("bench")) || BENCH : null };
+  const bench = isOn(given.get("bench")) ? readTime(given.get("bench")) || BENCH : null;
+  return { attributes, time: readTime(given.get("t")), bench, study: given.get("study") ?? "", participant: given.get("participant") ?? "" };
 }
 
 function isOn(text: string | null): boolean {
