@@ -42,8 +42,8 @@ describe("docs/player.md", () => {
     const names = named(section("URL parameters"), 0);
     expect(names.length).toBeGreaterThan(12);
     const taken = readParameters(`?${names.map((name) => `${name}=1`).join("&")}`);
-    expect(new Set([...taken.attributes.keys(), "t", "bench"])).toEqual(new Set(names));
-    expect([taken.time, taken.bench]).toEqual([1, 1]);
+    expect(new Set([...taken.attributes.keys(), "t", "bench", "study", "participant"])).toEqual(new Set(names));
+    expect([taken.time, taken.bench, taken.study, taken.participant]).toEqual([1, 1, "1", "1"]);
   });
 
   test("has a row for each row of the help overlay, and Escape", () => {

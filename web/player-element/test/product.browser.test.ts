@@ -388,7 +388,8 @@ describeInBrowser("the built player", () => {
     expect(readdirSync(join(site.folder, "again")).sort()).toEqual(files);
     expect(files).toEqual([
       "LICENSES.txt", "core.wasm", "core.wasm.br", "core.wasm.gz", "index.html", "load.js", "load.js.br", "meshreel-player.js", "meshreel-player.js.br",
-      "meshreel-player.js.gz", "order.js", "order.js.br", "page.css", "page.js", "page.js.br", "three.js", "three.js.br", "three.js.gz", "worker.js", "worker.js.br",
+      "meshreel-player.js.gz", "order.js", "order.js.br", "page.css", "page.js", "page.js.br", "study.js", "study.js.br", "three.js", "three.js.br", "three.js.gz",
+      "worker.js", "worker.js.br",
     ]);
     for (const name of files) {
       const bytes = readFileSync(join(site.folder, "player", name));
@@ -404,6 +405,7 @@ describeInBrowser("the built player", () => {
     expect(size("meshreel-player.js")).toBeLessThan(52_000);
     expect(size("three.js")).toBeLessThan(140_000);
     expect(size("worker.js") + size("core.wasm")).toBeLessThan(150_000);
+    expect(size("study.js")).toBeLessThan(9_000); // of studies alone
     const sent = ["load.js", "page.js", "meshreel-player.js", "three.js", "worker.js", "core.wasm"].map((name) => statSync(join(site.folder, "player", `${name}.br`)).size);
     expect(sent.reduce((sum, bytes) => sum + bytes)).toBeLessThan(280_000);
   });
