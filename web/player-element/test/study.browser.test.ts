@@ -68,7 +68,7 @@ describeInBrowser("a study", () => {
       for (const file of ["a", "b"] as const) {
         expect(Number(row[`${file}_bytes`])).toBe(readFileSync(join(site.folder, own[file])).length); // all of so small a file comes with its head
         expect(Number(row[`${file}_start_s`])).toBeGreaterThan(0.04); // an answer takes as long
-        expect(row[`${file}_layers_by_group`]).toMatch(/^[\d |]+$/);
+        expect(row[`${file}_layers_by_group`]).toMatch(/^[\d: |]+$/);
       }
       expect(Number(row.seconds)).toBeGreaterThan(0);
       expect(Math.abs(Date.parse(row.answered!) - Date.now())).toBeLessThan(600_000);
@@ -117,7 +117,12 @@ describeInBrowser("a study", () => {
       return rows[0]!;
     };
     const [slow, again, fast] = [await taken("slow.network.csv"), await taken("slow.network.csv"), await taken("fast.network.csv")];
-    expect(again.a_layers_by_group).toBe(slow.a_layers_by_group);
+    const groups = ({ a_layers_by_group: text }: Row): Record<string, string> =>
+      Object.fromEntries(text!.split(" | ").flatMap((body, k) => body.split(" ").map((group) => [`${k} ${group.split(":")[0]}`, group.split(":")[1]!])));
+    const [before, after] = [groups(slow), groups(again)];
+    const both = Object.keys(before).filter((group) => group in after); // a busy machine may draw no picture of a group
+    expect(both.length).toBeGreaterThan(3);
+    for (const group of both) expect(after[group], group).toBe(before[group]);
     expect(Number(slow.a_layers)).toBeLessThan(Number(fast.a_layers));
     expect(Number(slow.a_start_s)).toBeGreaterThan(Number(fast.a_start_s));
     expect(Number(slow.a_stalled_s)).toBeGreaterThan(Number(fast.a_stalled_s));

@@ -102,16 +102,16 @@ test("a showing has the layers of each group in its first picture, weighted by f
     shown = { groups };
     expect(playback.update()).toBe(shown);
   }
-  expect(showing.result()).toMatchObject({ layers: "1.667", layers_by_group: "1 0 | 3", stalls: 2, stalled_s: "0.000", bytes: 1234 });
+  expect(showing.result()).toMatchObject({ layers: "1.667", layers_by_group: "0:1 10:0 | 0:3", stalls: 2, stalled_s: "0.000", bytes: 1234 });
 });
 
 test("a CSV quotes what needs it, and has a row for each answer", () => {
-  const result = { start_s: "0.1", stalls: 0, stalled_s: "0.000", layers: "1.500", layers_by_group: "1 2", bytes: 10 };
+  const result = { start_s: "0.1", stalls: 0, stalled_s: "0.000", layers: "1.500", layers_by_group: "0:1 10:2", bytes: 10 };
   const answer: Answer = {
     study: 'A "study", two', seed: 1, participant: "P1", trial: 1, pair: "walk", a: "a.reel", b: "b.reel", network: "", show: "in turn", first: "b", choice: "a",
     seconds: "2.000", replays: 0, hidden: 0, width: 600, height: 400, answered: "2026-01-02T03:04:05.000Z", results: { a: result, b: { ...result, bytes: 20 } },
   };
-  const row = '"A ""study"", two",1,P1,1,walk,a.reel,b.reel,,in turn,b,a,2.000,0,0,600,400,2026-01-02T03:04:05.000Z,0.1,0,0.000,1.500,1 2,10,0.1,0,0.000,1.500,1 2,20';
+  const row = '"A ""study"", two",1,P1,1,walk,a.reel,b.reel,,in turn,b,a,2.000,0,0,600,400,2026-01-02T03:04:05.000Z,0.1,0,0.000,1.500,0:1 10:2,10,0.1,0,0.000,1.500,0:1 10:2,20';
   expect(asCsv([answer])).toBe(`${HEAD.join(",")}\r\n${row}\r\n`);
 });
 

@@ -37,7 +37,7 @@ export class Showing {
     const { stalls, fetchedBytes } = this.#playback!.stats;
     const groups = this.#layers.flatMap((layers, track) => [...layers].map(([frame, count]) => ({ count, frames: this.#frames[track]!.get(frame)! })));
     const frames = groups.reduce((sum, group) => sum + group.frames, 0);
-    const sorted = this.#layers.map((layers) => [...layers].sort(([one], [other]) => one - other).map(([, count]) => count).join(" "));
+    const sorted = this.#layers.map((layers) => [...layers].sort(([one], [other]) => one - other).map((entry) => entry.join(":")).join(" "));
     return {
       start_s: ((this.#started - this.#opened) / 1000).toFixed(3),
       stalls,
@@ -64,7 +64,7 @@ export interface Result {
   readonly stalls: number;
   readonly stalled_s: string;
   readonly layers: string; // mean over frames and bodies
-  readonly layers_by_group: string; // of each body; bodies are apart by a bar
+  readonly layers_by_group: string; // first frame and layers of each group that was seen; bodies are apart by a bar
   readonly bytes: number; // that had come when it ended
 }
 
