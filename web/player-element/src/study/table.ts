@@ -18,7 +18,7 @@ export interface Answer {
   readonly choice: File | "none"; // a file, not a side
   readonly seconds: string; // from the end of the first showing to the choice
   readonly replays: number;
-  readonly hidden: number; // times that the page was out of sight while it played
+  readonly hidden: number; // times that the page was out of sight before the choice
   readonly width: number; // of a picture, CSS pixels
   readonly height: number;
   readonly answered: string; // date and time, UTC
