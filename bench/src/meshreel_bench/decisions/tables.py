@@ -161,6 +161,17 @@ COLUMNS: dict[str, Columns] = {
         "> faces that face the right way, %": lambda row: f"{100 * row['right_side']:.2f}",
         "> CPU s": optional("cpu_s", ".2f"),
     },
+    "walks": {
+        "recording": "{case}",
+        "> surfaces apart as recorded, mm": optional("before_mm", ".1f"),
+        "> refined, mm": optional("after_mm", ".1f"),
+        "> people, median mm": optional("people_median_mm", ".1f"),
+        "> people covered, %": optional("people_covered", ".1%"),
+        "> room, median mm": optional("background_median_mm", ".1f"),
+        "> depth covered, %": "{all_covered:.2%}",
+        "> invented, %": "{all_invented:.3%}",
+        "> bytes": "{bytes:,}",
+    },
     "detail": {
         "frames": "{case}",
         "way": "{way}",

@@ -34,6 +34,7 @@ from ...geometry.atlas import Layout
 from ...geometry.closest_points import distances
 from ...geometry.color_views import Paint, Painted
 from ...geometry.decimate import decimate_faces
+from ...geometry.depth import is_carried
 from ...geometry.derived_sequences import CapturedSequence, is_colored
 from ...geometry.flat import flattened
 from ...geometry.threads import ahead
@@ -52,6 +53,7 @@ LEAST_NOISE = 8e-4  # of the unit, the least noise that a background is coded fo
 WORTH = 0.9  # of the bytes without planes, that a way with planes may take: they cost nearness on what bends (guess)
 WORST = 4.0  # times what is allowed on average, of a place where there is no noise to hide it (guess)
 STILL_FRAMES = 16  # in which a background is looked at for its colours, at most (guess)
+WALK_FRAMES = 64  # the same where a camera moves, and sees a part in each (guess)
 PICTURES_A_SECOND = 8  # of a background: shadows move slowly (guess)
 FINER = 2  # by which the rate factor of a background's pictures is below that of a body's (guess)
 FOR_A_DOUBLING = 9  # of the rate factor, for each doubling of texels along a pixel: living_room has 38 dB at .06 Mbps
@@ -282,11 +284,13 @@ def _pictured(
     slow = replace(options, crf=min(max(1, crf), MOST_CRF))
 
     def picture_of(frame: int) -> UInt8[np.ndarray, "H W 3"]:
+        if looks.is_walk:  # what a camera that moves sees at a moment would be a patch that wanders over the room
+            return picture(surface.texels, surface.mesh, usual[0], usual[1])
         colors, seen = looks.moment(min(frame + some.step // 2, frames[-1]), surface.places, surface.normals)
         seen &= ~usual[2]
         return picture(surface.texels, surface.mesh, np.where(seen[:, None], colors, usual[0]), usual[1] | seen)
 
-    some = frames[:: max(1, round(looks.frame_rate / PICTURES_A_SECOND))]
+    some = frames[:: len(frames)] if looks.is_walk else frames[:: max(1, round(looks.frame_rate / PICTURES_A_SECOND))]
     return layered_pictures(surface.layout, some, picture_of, slow)
 
 
@@ -297,6 +301,7 @@ class _Looks:
         self._sequence, self._parts, self._views = sequence, parts, parts.views
         self.has_pictures = self._views is not None or sequence[0].texture is not None
         self.frame_rate = sequence.frame_rate
+        self.is_walk = sequence.colors is not None and is_carried(sequence.colors.__getitem__, len(sequence))
 
     def guessed(self, points: Float64[np.ndarray, "N 3"]) -> Bool[np.ndarray, " N"]:
         """Return which places are of surface that is guessed: pictures show what stands before it."""
@@ -312,7 +317,7 @@ class _Looks:
 
         Prefer frames in which the point is away from a depth discontinuity; near one, foreground colour bleeds in.
         """
-        some = [frames[number] for number in evenly(len(frames), STILL_FRAMES)]
+        some = [frames[number] for number in evenly(len(frames), WALK_FRAMES if self.is_walk else STILL_FRAMES)]
         if self._views is None:
             return median_colors(points, normals, map(self._paint, some))
         views = self._views
