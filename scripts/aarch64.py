@@ -24,28 +24,31 @@ COMPILERS = {
     "here": [os.environ.get("CXX", "c++")],
 }
 RUNNERS = {"aarch64": ["qemu-aarch64-static"], "here": []}
-# As strict_arithmetic.cmake has them; programs are static, so that QEMU needs no libraries.
-FLAGS = ("-std=c++17", "-O2", "-static", "-ffp-contract=off", "-fno-fast-math", "-fno-math-errno", "-fno-trapping-math")
-DEFINES = ("-DEIGEN_DONT_VECTORIZE", "-DEIGEN_MPL2_ONLY", "-DMESHREEL_STATIC")
+# As strict_arithmetic.cmake has them.
+STRICT = (
+    *("-std=c++17", "-O2", "-ffp-contract=off", "-fno-fast-math", "-fno-math-errno", "-fno-trapping-math"),
+    *("-DEIGEN_DONT_VECTORIZE", "-DEIGEN_MPL2_ONLY"),
+)
 SPLATS = 1e-9  # as tests/test_conformance.py has it: sines are of another library
 GOLDEN = ROOT / "conformance" / "v1"
 
 
 def sources() -> list[Path]:
-    """The decoder's sources, as its CMakeLists.txt lists them."""
+    """The sources of the decoder's library, as its CMakeLists.txt lists them."""
     text = (ROOT / "core/decoder/CMakeLists.txt").read_text(encoding="utf-8")
     listed = re.search(r"add_library\(meshreel_objects OBJECT([^)]*)\)", text)
     assert listed is not None
     names = listed[1].replace("${CORE}", "../src").split()
-    return [ROOT / "core/decoder" / name for name in names] + [ROOT / "core/tests/frame_bytes.cpp"]
+    return [ROOT / "core/decoder" / name for name in names]
 
 
 def build(machine: str, folder: Path) -> Path:
     """Compile the program for a machine."""
     program = folder / machine
-    compiler = [*COMPILERS[machine], *FLAGS, *DEFINES]
+    compiler = [*COMPILERS[machine], *STRICT, "-DMESHREEL_STATIC", "-static"]  # so that QEMU needs no libraries
     includes = [f"-I{ROOT / 'core/include'}", "-isystem", str(eigen())]
-    subprocess.run([*compiler, *includes, *map(str, sources()), "-o", str(program)], check=True)
+    parts = [*sources(), ROOT / "core/tests/frame_bytes.cpp"]
+    subprocess.run([*compiler, *includes, *map(str, parts), "-o", str(program)], check=True)
     return program
 
 

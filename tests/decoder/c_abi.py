@@ -60,6 +60,12 @@ class Packet(ctypes.Structure):
     ]
 
 
+class Sound(ctypes.Structure):
+    """`meshreel_sound`."""
+
+    _fields_ = [("data", POINTER(c_uint8)), ("size", c_uint64), ("start", c_double), ("type", c_int32)]
+
+
 class CSplats(ctypes.Structure):
     """`meshreel_splats`."""
 
@@ -112,6 +118,7 @@ def library() -> ctypes.CDLL:
         "decode": [handle, c_uint64, c_int32, POINTER(Shown)],
         "picture": [handle, c_uint64, c_int32, c_int32, POINTER(Packet)],
         "decode_splats": [handle, c_uint64, c_int32, POINTER(CSplats)],
+        "audio": [handle, POINTER(Sound)],
         "round": [POINTER(Shown), POINTER(c_double), POINTER(c_float)],
     }.items():
         getattr(loaded, f"meshreel_{name}").argtypes = arguments
@@ -194,6 +201,11 @@ class CVideo:
         packet = Packet()
         self._check(self._c.meshreel_picture(self._handle, frame, part, codec, byref(packet)))
         return (ctypes.string_at(packet.data, packet.size), packet) if packet.data else None
+
+    def audio(self) -> tuple[bytes, float, int] | None:
+        found = Sound()
+        self._check(self._c.meshreel_audio(self._handle, byref(found)))
+        return (ctypes.string_at(found.data, found.size), found.start, found.type) if found.data else None
 
     def splats(self, frame: int, track: int) -> dict[str, np.ndarray] | None:
         found = CSplats()

