@@ -44,9 +44,8 @@ IMPORTERS = {
 }
 
 
-def compiled(compiler: list[str], folder: Path) -> bytes:
-    """The library as a compiler makes it."""
-    made = folder / "library"
+def compiled(compiler: list[str], made: Path) -> bytes:
+    """The library as a compiler makes it, which keeps the name of its file."""
     includes = [f"-I{ROOT / 'core/include'}", "-isystem", str(eigen())]
     subprocess.run([*compiler, *STRICT, *FLAGS, *includes, *map(str, sources()), "-o", str(made)], check=True)
     return made.read_bytes()
@@ -67,7 +66,7 @@ def libraries(folder: Path) -> dict[str, bytes]:
     """Compile all libraries; that of Android where there is an NDK."""
     zig, found = [sys.executable, "-m", "ziglang", "c++", NARROW, "-target"], dict[str, bytes]()
     for name, (targets, *_) in LIBRARIES.items():
-        made = [compiled([*zig, target], folder) for target in targets]
+        made = [compiled([*zig, target], folder / Path(name).name) for target in targets]
         if made:
             found[name] = made[0] if len(made) == 1 else universal(made)
     if ndk := os.environ.get("ANDROID_NDK_HOME"):
@@ -75,7 +74,8 @@ def libraries(folder: Path) -> dict[str, bytes]:
         if not compilers:
             sys.exit(f"unity: ANDROID_NDK_HOME {ndk}: no {ANDROID} there; give the folder of an NDK of r21 or later")
         pages = "-Wl,-z,max-page-size=16384"
-        found[[*LIBRARIES][-1]] = compiled([str(compilers[0]), "-static-libstdc++", pages], folder)
+        compiler, name = [str(compilers[0]), "-static-libstdc++", pages], [*LIBRARIES][-1]
+        found[name] = compiled(compiler, folder / Path(name).name)
     return found
 
 

@@ -96,15 +96,18 @@ def blender(monkeypatch):
         materials=SimpleNamespace(new=lambda name: SimpleNamespace(name=name, node_tree=tree)),
     )
     bpy.path = SimpleNamespace(abspath=str, display_name_from_filepath=lambda path: Path(path).stem)
-    bpy.props = SimpleNamespace(StringProperty=lambda **_options: str)
+    bpy.props = SimpleNamespace(
+        **dict.fromkeys(("StringProperty", "BoolProperty", "IntProperty"), lambda **_options: str)
+    )
     bpy.types = SimpleNamespace(
         Operator=type("Operator", (), {}),
         FileHandler=type("FileHandler", (), {}),
         TOPBAR_MT_file_import=SimpleNamespace(append=menus.append, remove=menus.remove),
+        TOPBAR_MT_file_export=SimpleNamespace(append=menus.append, remove=menus.remove),
     )
     bpy.utils = SimpleNamespace(register_class=classes.append, unregister_class=classes.remove)
     utils = types.ModuleType("bpy_extras.io_utils")
-    utils.ImportHelper = type("ImportHelper", (), {})
+    utils.ImportHelper, utils.ExportHelper = type("ImportHelper", (), {}), type("ExportHelper", (), {})
     for name, module in {"bpy": bpy, "bpy.app.handlers": handlers, "bpy_extras.io_utils": utils}.items():
         monkeypatch.setitem(sys.modules, name, module)
     monkeypatch.setitem(sys.modules, "bpy.app", types.ModuleType("bpy.app"))
@@ -116,7 +119,8 @@ def blender(monkeypatch):
     monkeypatch.setitem(sys.modules, "reel_addon", addon)
     spec.loader.exec_module(addon)
     yield SimpleNamespace(addon=addon, handlers=handlers, menus=menus, classes=classes)
-    sys.modules.pop("reel_addon.reel", None)
+    for name in ("reel_addon.reel", "reel_addon.scene"):
+        sys.modules.pop(name, None)
 
 
 def scene(frame: int = 1, fps: int = 24) -> Any:
@@ -127,7 +131,7 @@ def scene(frame: int = 1, fps: int = 24) -> Any:
 
 def test_an_imported_file_follows_the_timeline(blender):
     video, context = meshreel.open(COLORED), scene(frame=10)
-    added = blender.addon.import_reel(context, str(COLORED))
+    [added] = blender.addon.import_reel(context, str(COLORED))
     assert context.scene.objects == [added] and len(added.data.materials) == 1
     seconds = len(video) / video.frame_rate
     assert context.scene.frame_end == 10 + round(24 * seconds) - 1
@@ -153,7 +157,7 @@ def test_each_axis_that_points_up_becomes_z():
 
 def test_a_lost_file_stops_neither_the_timeline_nor_other_objects(blender, capsys):
     context = scene()
-    first, second = (blender.addon.import_reel(context, str(COLORED)) for _ in "ab")
+    [first], [second] = (blender.addon.import_reel(context, str(COLORED)) for _ in "ab")
     first["meshreel_file"] = "lost.reel"
     context.scene.frame_current = 2
     blender.addon.follow(context.scene)
@@ -166,7 +170,7 @@ def test_a_lost_file_stops_neither_the_timeline_nor_other_objects(blender, capsy
 def test_the_operator_says_what_is_wrong_with_a_file(blender, tmp_path):
     operator, told = blender.addon.ImportReel(), []
     operator.report = lambda kind, text: told.append((kind, text))
-    operator.filepath = str(tmp_path / "none.reel")
+    operator.filepath, operator.textures, operator.audio = str(tmp_path / "none.reel"), True, True
     assert operator.execute(scene()) == {"CANCELLED"} and "none.reel" in told[0][1]
     operator.filepath = str(COLORED)
     assert operator.execute(scene()) == {"FINISHED"}
@@ -174,7 +178,7 @@ def test_the_operator_says_what_is_wrong_with_a_file(blender, tmp_path):
 
 def test_switching_it_off_leaves_nothing(blender):
     blender.addon.register()
-    assert blender.handlers.frame_change_pre and blender.menus and len(blender.classes) == 2
+    assert blender.handlers.frame_change_pre and blender.menus and len(blender.classes) == 3
     blender.addon.unregister()
     assert not (blender.handlers.frame_change_pre or blender.menus or blender.classes)
 
