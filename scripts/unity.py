@@ -66,7 +66,8 @@ def libraries(folder: Path) -> dict[str, bytes]:
     """Compile all libraries; that of Android where there is an NDK."""
     zig, found = [sys.executable, "-m", "ziglang", "c++", NARROW, "-target"], dict[str, bytes]()
     for name, (targets, *_) in LIBRARIES.items():
-        made = [compiled([*zig, target], folder / Path(name).name) for target in targets]
+        extra = ["-Wl,-install_name,@rpath/libmeshreel.dylib"] if targets == MACOS else []
+        made = [compiled([*zig, target, *extra], folder / Path(name).name) for target in targets]
         if made:
             found[name] = made[0] if len(made) == 1 else universal(made)
     if ndk := os.environ.get("ANDROID_NDK_HOME"):
@@ -103,7 +104,7 @@ def package(built: dict[str, bytes]) -> bytes:
     """The package as a tarball, which Unity's package manager takes."""
     files = {path.relative_to(PACKAGE).as_posix(): path.read_bytes() for path in PACKAGE.rglob("*") if path.is_file()}
     files |= built | {"Samples~/Play/recording.bytes": RECORDING.read_bytes()}
-    files["LICENSE.md"] = (ROOT / "LICENSE").read_bytes()
+    files |= {f"{name}.md": (ROOT / name).read_bytes() for name in ("LICENSE", "NOTICE")}
     names = {*files} | {parent.as_posix() for name in files for parent in Path(name).parents} - {".", "Samples~"}
     for name in names:
         importer = plugin(name) if name in built else IMPORTERS[Path(name).suffix if name in files else ""]

@@ -349,6 +349,22 @@ def test_the_wrapper_has_the_calls_of_the_header():
     assert f"AbiVersion = {version};" in wrapper
 
 
+@needs_mono
+def test_the_example_of_the_docs_compiles(programs, tmp_path):
+    docs = (ROOT / "docs/engines.md").read_text(encoding="utf-8")
+    [example] = re.findall(r"```csharp\n(.*?)```", docs, re.DOTALL)
+    (tmp_path / "Example.cs").write_text(f"class Example {{ void Run() {{ {example} }} }}")
+    decoder = programs / "Meshreel.Decoder.dll"
+    run(
+        "mcs",
+        "-unsafe",
+        "-target:library",
+        f"-r:{decoder}",
+        f"-out:{tmp_path / 'Example.dll'}",
+        tmp_path / "Example.cs",
+    )
+
+
 @pytest.fixture
 def unity(monkeypatch) -> ModuleType:
     monkeypatch.syspath_prepend(ROOT / "scripts")
@@ -387,6 +403,23 @@ def test_a_package_without_android_has_no_place_for_it(unity):
     built = {name: b"" for name in unity.LIBRARIES if "Android" not in name}
     with tarfile.open(fileobj=io.BytesIO(unity.package(built))) as tar:
         assert not [name for name in tar.getnames() if "Android" in name]
+
+
+@pytest.mark.skipif(os.name == "nt", reason="the stand-in for a compiler is a script of sh")
+def test_the_library_of_android_is_made_by_the_ndk(unity, monkeypatch, tmp_path):
+    compiler = tmp_path / "ndk/toolchains/llvm/prebuilt/linux-x86_64/bin/aarch64-linux-android24-clang++"
+    android = [*unity.LIBRARIES][-1]
+    monkeypatch.setattr(unity, "LIBRARIES", {android: unity.LIBRARIES[android]})
+    monkeypatch.setenv("ANDROID_NDK_HOME", str(tmp_path / "ndk"))
+    with pytest.raises(SystemExit, match=r"ANDROID_NDK_HOME .*: no toolchains"):
+        unity.libraries(tmp_path)
+    compiler.parent.mkdir(parents=True)
+    compiler.write_text('#!/bin/sh\necho "$@" >"$(echo "$@" | sed "s/.* -o //")"\n')
+    compiler.chmod(0o755)
+    [(name, library)] = unity.libraries(tmp_path).items()
+    assert name == android and b"-static-libstdc++" in library and b"file/api.cpp" in library
+    monkeypatch.delenv("ANDROID_NDK_HOME")
+    assert unity.libraries(tmp_path) == {}
 
 
 def test_libraries_of_two_processors_become_one_file(unity):
