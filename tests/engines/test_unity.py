@@ -10,15 +10,20 @@ import struct
 import subprocess
 import tarfile
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
+from zlib import crc32
 
 import av
 import numpy as np
 import pytest
 
 import meshreel
-from meshreel.edit import cut, tag
+from meshreel.container.writer import pack_head
+from meshreel.edit import cut, retime, tag
+from meshreel.format.layout import Header, Index, Layer, Preamble
+from meshreel.format.records import unpack, unpack_all
 from meshreel.types import UP_AXES, Mesh, MeshList
 from tests.decoder.c_abi import AV1, BACKGROUND, H264, ROOT, WHOLE, CVideo, library, run
 from tests.golden import GOLDEN
@@ -174,8 +179,16 @@ def test_a_file_is_described_as_by_python(programs, path):
     for frame, row in enumerate(times):
         time, *frames = row.split()
         assert float(time) == pytest.approx(stamps[frame], abs=1e-9)
-        assert [int(number) for number in frames] == [frame, max(frame - 1, 0), frame]
+        assert [int(number) for number in frames] == [frame, max(frame - 1, 0), frame, frame]
     assert len(times) == len(known)
+
+
+@needs_mono
+def test_a_frame_is_found_by_its_time_as_a_texture_file_rounds_it(programs, tmp_path):
+    path = tmp_path / "odd.reel"
+    retime(GOLDEN / "layers.reel", path, frame_rate=61)
+    found = [row.split()[-1] for row in called(programs, "Dump", "facts", path)[3:]]
+    assert found == [str(frame) for frame in range(14)]
 
 
 @needs_mono
@@ -242,6 +255,25 @@ def _packets(path: Path) -> list[av.Packet]:
 def test_a_part_without_h264_has_no_texture_file(programs, tmp_path):
     assert called(programs, "Dump", "texture", GOLDEN / "layers.reel", tmp_path / "out", 0) == ["False"]
     assert (tmp_path / "out").read_bytes() == b""
+
+
+@needs_mono
+@pytest.mark.parametrize("mark", [b"\0\0\x01\x67", b"\0\0\x01\x68"])  # of the parameter sets
+def test_pictures_without_parameter_sets_are_damage(programs, tmp_path, mark):
+    data, path = (GOLDEN / "colored/textures.reel").read_bytes(), tmp_path / "damaged.reel"
+    preamble, start = unpack(Preamble, data)
+    header, start = unpack(Header, data, start)
+    index = unpack_all(Index, data[start : preamble.head_size - 4])
+    body, at, chunks = data[preamble.head_size :].replace(mark, mark[:3] + b"\x66"), 0, []
+    for chunk in index.chunks:
+        layers = []
+        for layer in chunk.layers:
+            layers.append(Layer(layer.size, crc32(body[at : at + layer.size])))
+            at += layer.size
+        chunks.append(replace(chunk, layers=tuple(layers)))
+    path.write_bytes(pack_head(header, Index(tuple(chunks))) + body)
+    [told] = called(programs, "Dump", "texture", path, tmp_path / "out", 0)
+    assert told == f"damaged: {path}: pictures of H.264 without parameter sets"
 
 
 @needs_mono

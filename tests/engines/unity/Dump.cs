@@ -48,7 +48,8 @@ static unsafe class Dump
         for (var frame = 0; frame < video.FrameCount; ++frame)
         {
             var time = video.TimeOf(frame);
-            Console.WriteLine($"{time:R} {video.FrameAt(time)} {video.FrameAt(time - 1e-4)} {video.FrameAt(time + 1e-4)}");
+            var rounded = Math.Round(90000 * time) / 90000; // as texture files have it
+            Console.WriteLine($"{time:R} {video.FrameAt(time)} {video.FrameAt(time - 1e-4)} {video.FrameAt(time + 1e-4)} {video.FrameAt(rounded)}");
         }
     }
 

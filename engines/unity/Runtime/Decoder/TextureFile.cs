@@ -46,7 +46,8 @@ namespace Meshreel
                 last = picture;
             }
             if (samples.Count == 0) return false;
-            if (sps == null || pps == null) throw new MeshreelException(video.Name + ": pictures of H.264 without parameter sets");
+            if (sps == null || sps.Length < 4 || pps == null)
+                throw new MeshreelException(video.Name + ": pictures of H.264 without parameter sets", true);
             var end = Ticks(video.Duration);
             for (var k = 0; k < samples.Count; ++k)
                 samples[k].Duration = (k + 1 < samples.Count ? samples[k + 1].Time : System.Math.Max(end, samples[k].Time + 1)) - samples[k].Time;

@@ -64,6 +64,7 @@ namespace Meshreel
         /// <summary>Parts of a frame besides tracks, which have numbers from 0.</summary>
         public const int Whole = -1, Background = -2;
 
+        const double Close = 1e-5; // s: times in files are whole microseconds, those of texture files 90,000ths
         internal int Turn { get; private set; } // grows with each call after which earlier meshes are gone
         readonly VideoHandle handle;
         readonly StreamReader reader; // null: all bytes are in memory
@@ -167,7 +168,7 @@ namespace Meshreel
             while (high - low > 1)
             {
                 var middle = (low + high) / 2;
-                if (TimeOf(middle) <= seconds + 1e-6) low = middle; // times in files are whole microseconds
+                if (TimeOf(middle) <= seconds + Close) low = middle;
                 else high = middle;
             }
             return low;
