@@ -7,6 +7,7 @@ import shlex
 import shutil
 import subprocess
 import sys
+import tomllib
 from itertools import pairwise
 from pathlib import Path
 
@@ -19,7 +20,9 @@ from tests.run_page import blocks
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md")])
 RUN = [ROOT / "README.md", ROOT / "docs" / "tutorial.md"]
-INTERCHANGE, COMMANDS, CALIBRATION = (ROOT / "docs" / name for name in ("interchange.md", "cli.md", "calibration.md"))
+INTERCHANGE, COMMANDS, CALIBRATION, FARM = (
+    ROOT / "docs" / name for name in ("interchange.md", "cli.md", "calibration.md", "farm.md")
+)
 
 
 def test_the_python_of_the_readme_runs(tmp_path: Path) -> None:
@@ -45,7 +48,7 @@ def test_the_python_of_interchange_runs(tmp_path: Path) -> None:
     assert (tmp_path / "scan.glb").exists()
 
 
-@pytest.mark.parametrize("page", [*RUN, INTERCHANGE, COMMANDS, CALIBRATION], ids=lambda page: page.name)
+@pytest.mark.parametrize("page", [*RUN, INTERCHANGE, COMMANDS, CALIBRATION, FARM], ids=lambda page: page.name)
 def test_the_commands_of_the_docs_parse(page: Path) -> None:
     from meshreel.cli import make_app
 
@@ -69,6 +72,12 @@ def test_links_lead_somewhere(page: Path) -> None:
     titles = re.findall(r"^#+ (.*)$", text, re.MULTILINE)
     anchors = {re.sub(r"[^\w -]", "", title.lower()).strip().replace(" ", "-") for title in titles}
     assert [target for target in re.findall(r"\]\(#([^)]+)\)", text) if target not in anchors] == []
+
+
+def test_the_page_of_cameras_has_a_row_for_each_reader() -> None:
+    named = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["entry-points"]
+    rows = re.findall(r"^\|[^|]+\| `(\w+)` \|", (ROOT / "docs" / "cameras.md").read_text("utf-8"), re.MULTILINE)
+    assert set(rows) == set(named["meshreel.recordings"])
 
 
 def test_the_pictures_are_small() -> None:
@@ -106,12 +115,12 @@ def test_the_readme_says_the_headline_of_the_results() -> None:
 def _run_page(page: Path, folder: Path, *arguments: str) -> str:
     """What the page prints."""
     command = [sys.executable, str(ROOT / "tests" / "run_page.py"), str(page), *arguments]
-    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, env=_environment())
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, env=run_environment())
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
 
 
-def _environment() -> dict[str, str]:
+def run_environment() -> dict[str, str]:
     """The meshreel that is tested here is the one that the page imports."""
     paths = [str(Path(meshreel.__file__).parents[1]), os.environ.get("PYTHONPATH", "")]
     return os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, paths))}
