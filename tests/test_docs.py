@@ -80,6 +80,16 @@ def test_the_page_of_cameras_has_a_row_for_each_reader() -> None:
     assert set(rows) == set(named["meshreel.recordings"])
 
 
+def test_the_environment_for_a_first_run_has_a_tested_python_and_extras_that_exist() -> None:
+    yaml = pytest.importorskip("yaml")
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    python, *_, pip = yaml.safe_load((ROOT / "environment.yml").read_text(encoding="utf-8"))["dependencies"]
+    assert f"Programming Language :: Python :: {python.removeprefix('python=')}" in project["classifiers"]
+    [wanted] = pip["pip"]
+    extras = wanted.removeprefix(".[").removesuffix("]").split(",")
+    assert set(extras) <= project["optional-dependencies"].keys() and {"demo", "play"} <= set(extras)
+
+
 def test_the_pictures_are_small() -> None:
     sizes = {path.name: path.stat().st_size for path in (ROOT / "docs" / "pictures").iterdir()}
     assert sizes.pop("moving.webp") <= 600_000  # 45 pictures
