@@ -21,6 +21,7 @@ from ..io.meshes import FARTHEST
 from ..io.point_files import KINDS, read_points
 from ..io.polygons import Unreadable
 from ..io.sequence import RATE, SequenceOptions
+from ..io.unity import FLIP, record_of
 from ..types import Mesh, MeshSequence, Up, evenly
 
 PROBES = 3  # frames whose points tell the side of the voxels (guess)
@@ -111,8 +112,8 @@ class Clouds(MeshSequence):
 
     @property
     def frame_rate(self) -> float:
-        """The usual rate, 1/s: files of points name none."""
-        return RATE
+        """The rate of Unity's record, 1/s, where it has one, or the usual one: files of points name none."""
+        return (record_of(self.files[0].parent) or {}).get("fps") or RATE
 
     @property
     def up(self) -> Up:
@@ -150,6 +151,8 @@ def read_cloud(path: Path, unit: float = 1.0) -> Cloud:
     except Unreadable as error:
         raise InputError(f"{path}: {error}; write it again, or leave it out with --frames") from None
     points, normals = fields.points, fields.normals
+    if record_of(path.parent) is not None:  # in Unity's axes
+        points, normals = points * FLIP, None if normals is None else normals * FLIP
     valid = (np.abs(points) <= FARTHEST).all(axis=1)  # NaN is not <= anything
     if normals is not None:
         normals = np.where(np.isfinite(normals).all(axis=1, keepdims=True), normals, 0)[valid].astype(np.float64)

@@ -60,10 +60,11 @@ class Loaded:
     dropped: Dropped
 
 
-def read_mesh(path: Place, where: str | None = None) -> Loaded:
+def read_mesh(path: Place, where: str | None = None, pictures: tuple[str, ...] = ()) -> Loaded:
     """Read a mesh in the file's order, cut into triangles; without faces it is empty. `where` begins errors.
 
-    Raises InputError for what cannot be read, and for points without faces.
+    `pictures` are names of files beside a PLY that names none. Raises InputError for what cannot be read, and for
+    points without faces.
     """
     where, kind = where or str(path), path.suffix.lower()
     if kind in _PACKAGED:
@@ -78,7 +79,8 @@ def read_mesh(path: Place, where: str | None = None) -> Loaded:
         raise InputError(f"{where}: {path.suffix or 'no'} extension is not one of {', '.join(EXTENSIONS)}; convert it")
     data = _read(path, where)
     with _reading(path, where):
-        polygons = parse(data.removeprefix(_MARK) if kind in (".obj", ".ply", ".off") else data)
+        data = data.removeprefix(_MARK) if kind in (".obj", ".ply", ".off") else data
+        polygons = parse_ply(data, pictures) if kind == ".ply" else parse(data)
         return checked(with_materials(polygons, path) if polygons.has_looks else polygons)
 
 

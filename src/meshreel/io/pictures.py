@@ -23,7 +23,7 @@ from .files import Place, read_input
 if TYPE_CHECKING:
     from PIL import Image
 
-FORMATS = ("PNG", "JPEG", "WEBP", "AVIF", "BMP", "TIFF", "TGA", "GIF", "PPM")  # EPS would start another program
+FORMATS = ("PNG", "JPEG", "WEBP", "AVIF", "BMP", "TIFF", "TGA", "GIF", "PPM", "DDS")  # EPS would start another program
 MOST_PIXELS = 1 << 26  # of a picture: 8192 x 8192, 200 MB in memory (guess)
 DEEP = ("I;16", "I;16B", "I;16L", "I")  # modes of 16-bit grey pictures in versions of Pillow
 _AGAIN = "record the frame again, or delete the file"

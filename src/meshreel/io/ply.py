@@ -50,10 +50,11 @@ class _Element:
     properties: list[_Property]
 
 
-def parse_ply(data: bytes) -> Polygons:
+def parse_ply(data: bytes, beside: tuple[str, ...] = ()) -> Polygons:
+    """Return the surface of a file; `beside` are its pictures where the header names none."""
     lines, elements, body = _opened(data)
     comments = (re.match(r"\s*comment\s+TextureFile\s+(.+)", line) for line in lines)
-    pictures = tuple(found[1].strip() for found in comments if found)
+    pictures = tuple(found[1].strip() for found in comments if found) or beside
     surface, kept = Polygons(np.zeros((0, 3)), np.zeros(0, np.int64), np.zeros(0, np.int64)), _Kept()
     vertex_places, full = None, [element.name for element in elements if element.rows]
     if twice := [name for name in ("vertex", "face", _STRIPS) if full.count(name) > 1]:

@@ -20,6 +20,7 @@ from .file_names import Order, find_frames
 from .files import Place, Remote, located, read_file
 from .meshes import MOVING, Loaded, animation_of, read_animated, read_mesh
 from .npz import Archive
+from .unity import mirrored, pictures_of, record_of
 
 CAPTURED = "capture.json"  # record of the capture, in a folder that `meshreel capture` wrote
 MOST_FRAMES = 10_000_000  # of an animation: four days at 30/s (guess)
@@ -75,13 +76,24 @@ class Files:
 
     def only(self, numbers: Sequence[int]) -> Files:
         """Return these files by absolute paths, for another process with another working directory."""
-        return Files({number: self.named[number].absolute() for number in numbers})
+        return replace(self, named={number: self.named[number].absolute() for number in numbers})
 
     def name(self, index: int) -> str:
         return str(self.named[index])
 
     def load(self, index: int, where: str) -> Loaded:
         return read_mesh(self.named[index], where)
+
+
+@dataclass(frozen=True, slots=True)
+class UnityFiles(Files):
+    """Frames of a folder of Unity's player of geometry sequences."""
+
+    pictures: tuple[str, ...] = ()  # beside the frames, a name for each, or none
+
+    def load(self, index: int, where: str) -> Loaded:
+        loaded = read_mesh(self.named[index], where, self.pictures[index : index + 1])
+        return replace(loaded, mesh=mirrored(loaded.mesh))
 
 
 @dataclass(frozen=True, slots=True)
@@ -217,6 +229,11 @@ def open_sequence(source: str | Path | Sequence[str | Path], options: SequenceOp
     paths, remarks = find_frames(source, options.order)
     if not paths:
         raise InputError("the list of files has 0 frames; give at least one")
+    first = paths[0]
+    if isinstance(first, Path) and first.suffix.lower() == ".ply" and (record := record_of(first.parent)) is not None:
+        pictures, warnings = pictures_of(first.parent, record, len(paths), options.order)
+        options = replace(options, frame_rate=options.frame_rate or record.get("fps"))
+        return FileSequence(UnityFiles(paths, pictures), options, (*remarks, *warnings))
     if len(paths) == 1 and paths[0].suffix.lower() in MOVING and (scene := animation_of(paths[0])) is not None:
         rate = options.frame_rate or scene.frame_rate or RATE
         if (count := scene.count(rate)) > MOST_FRAMES:
