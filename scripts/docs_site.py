@@ -1,9 +1,8 @@
-"""Hooks of mkdocs: pages from outside docs/, the player's files, samples; run by itself, it makes the samples."""
+"""Hooks of mkdocs: pages from outside docs/, the player's files, samples; run by itself, it draws their posters."""
 
 from __future__ import annotations
 
 import json
-import os
 import posixpath
 import re
 from pathlib import Path
@@ -12,28 +11,31 @@ from typing import Any
 ROOT = Path(__file__).resolve().parents[1]
 OUTSIDE = ("FORMAT.md", "CHANGELOG.md", "CONTRIBUTING.md")
 PLAYER = ROOT / "src" / "meshreel" / "player"
-SAMPLES = ROOT / "build" / "samples"
+SAMPLES, POSTERS = ROOT / "docs" / "samples", ROOT / "build" / "posters"
 ROOM = ROOT / "docs" / "pictures" / "room.png"  # in place of posters, for a check
-CHECKED = {"room.reel": "scene.reel", "bodies.reel": "mixed.reel"}  # conformance files in their place, for a check
 LINK = re.compile(r"(?<!!)\[([^\]]*)\]\(([^)#\s:]+)(#[^)\s]*)?\)")  # text, file, anchor; no pictures, no addresses
-VALUE = re.compile(r"\{\{(size|seconds):([\w.]+)\}\}")
+VALUE = re.compile(r"\{\{(size|seconds|player):([\w.]+)\}\}")
+# How the gallery shows a sample.
+SHOWN = """<meshreel-player src="samples/{name}" controls loop preload="none" poster="samples/{stem}.png" \
+style="width: 100%; aspect-ratio: 16 / 9"></meshreel-player>
+
+<a href="samples/{name}" download>{name}</a>, {size} for {seconds} \
+<button type="button" class="md-button" data-link="samples/{name}">Copy link</button>"""
 HOME = "index.md"
 EXAMPLES = (".ipynb", ".py")  # endings of the files that become pages
-FRAMES = 60  # of the bodies: two seconds
 POSTER = (800, 600)  # pixels
 
 
 def on_files(files: Any, config: Any) -> Any:
-    """Add what is not in docs/ to the site. Raises FileNotFoundError where there are no samples."""
+    """Add what is not in docs/ to the site."""
     from mkdocs.structure.files import File
 
     added = [(name, ROOT / name) for name in OUTSIDE]
     built = [path for path in sorted(PLAYER.iterdir()) if path.suffix in (".js", ".wasm", ".gz")]
     added += [(f"player/{path.name}", path) for path in built]
-    for name in CHECKED:
-        sample = _sample(name)
-        poster = sample.with_suffix(".png")
-        added += [(f"samples/{name}", sample), (f"samples/{Path(name).stem}.png", poster if poster.exists() else ROOM)]
+    for sample in SAMPLES.glob("*.reel"):
+        poster = POSTERS / f"{sample.stem}.png"
+        added.append((f"samples/{poster.name}", poster if poster.exists() else ROOM))
     for path in sorted(one for one in (ROOT / "docs" / "examples").iterdir() if one.suffix in EXAMPLES):
         page = f"examples/{path.stem}.md"
         files.append(File.generated(config, page, content=_page_of(path)))
@@ -54,7 +56,7 @@ def _page_of(example: Path) -> str:
 
 
 def on_page_markdown(markdown: str, page: Any, config: Any, files: Any) -> str:
-    """Point links at where pages are on the site, and say how large and long samples are.
+    """Point links at where pages are on the site, and show samples, or say how large and long they are.
 
     What is in the repository and not on the site is named without a link.
     """
@@ -76,40 +78,28 @@ def on_page_markdown(markdown: str, page: Any, config: Any, files: Any) -> str:
 
 
 def _measured(match: re.Match[str]) -> str:
-    path = _sample(match[2])
-    if match[1] == "size":
-        return f"{path.stat().st_size / 1000:.0f} kB"
     import meshreel
 
-    with meshreel.open(str(path)) as video:
-        return f"{video.duration:.2g} s"
+    kind, name = match.groups()
+    path = SAMPLES / name
+    size = f"{path.stat().st_size / 1000:.0f} kB"
+    with meshreel.open(path) as video:
+        seconds = f"{video.duration:.2g} s"
+    if kind == "player":
+        return SHOWN.format(name=name, stem=path.stem, size=size, seconds=seconds)
+    return size if kind == "size" else seconds
 
 
-def _sample(name: str) -> Path:
-    folder = os.environ.get("MESHREEL_SAMPLES")
-    return SAMPLES / name if folder is None else ROOT / folder / CHECKED[name]
-
-
-def make_samples(folder: Path) -> None:
-    """Write the samples that are not there yet, and a picture of each."""
+def draw_posters() -> None:
+    """Draw the first frame of each sample."""
     import meshreel
-    from meshreel.capture.recording import FusionOptions, open_recording
-    from meshreel.capture.simulated.procedural import SoftBodiesOptions, soft_bodies
-    from meshreel.capture.simulated.stage import VOXEL, StageOptions, record_stage
     from meshreel.export.film import FilmOptions, export_film
 
-    folder.mkdir(parents=True, exist_ok=True)
-    room, bodies = folder / "room.reel", folder / "bodies.reel"
-    if not room.exists():
-        record_stage(rig := folder / "rig", StageOptions())
-        recording, _ = open_recording(rig, FusionOptions(VOXEL))
-        meshreel.encode(recording, room, close_planes=True)
-    if not bodies.exists():
-        meshreel.encode(soft_bodies(SoftBodiesOptions(frames=FRAMES)), bodies)
-    for path in (room, bodies):
+    POSTERS.mkdir(parents=True, exist_ok=True)
+    for path in sorted(SAMPLES.glob("*.reel")):
         with meshreel.open(path) as video:
-            export_film(video.reader, path.with_suffix(".png"), range(1), FilmOptions(size=POSTER, background=None))
+            export_film(video.reader, POSTERS / f"{path.stem}.png", range(1), FilmOptions(size=POSTER, background=None))
 
 
 if __name__ == "__main__":
-    make_samples(SAMPLES)
+    draw_posters()
