@@ -60,7 +60,7 @@ def read(path: Path) -> Take:
 
 
 def _order(frame: Mapping[str, Any]) -> tuple[float, int, str]:
-    """Return what frames are sorted by: their time, and the number in their name."""
+    """Return a frame's time and the number in its name, by which frames are sorted."""
     name = str(frame["file_path"])
     return float(frame.get("time", 0.0)), last_number(Path(name).stem) or 0, name
 

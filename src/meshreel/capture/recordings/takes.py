@@ -48,7 +48,7 @@ class Stream:
 
 @dataclass(frozen=True, slots=True)
 class Poses:
-    """Where a camera was: one pose for all times, or one for each time."""
+    """The poses of a camera: one for all times, or one for each time."""
 
     matrices: Float64[np.ndarray, "T 4 4"]  # camera to world, m
     times: Float64[np.ndarray, " T"] | None = None  # s, on the take's clock; None: one pose, for all times
