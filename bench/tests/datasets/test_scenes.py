@@ -227,7 +227,7 @@ class Decoded(Video):
         chunk = SimpleNamespace(track=0, first_frame=0, frame_count=6, size=700)
         self.reader = SimpleNamespace(groups=[chunk], frame_rate=10.0, frame_count=6)
         self.frames, self.room_from = frames, room_from
-        self.tracks = [[self.moving(number) for number in range(6)]]
+        self._tracks = [[self.moving(number) for number in range(6)]]
 
     def __getitem__(self, index):
         return concatenate(self.frames[index])

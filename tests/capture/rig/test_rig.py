@@ -359,7 +359,7 @@ def test_a_moving_camera_is_detected_in_its_depths(tmp_path):
     moving = record(tmp_path / "moving", [camera()], walking)
     for number in range(6):
         write_picture(measured(camera(side=8.0 * number)), moving / "front" / "depth" / f"depth_{number:05}.png")
-    with pytest.raises(InputError, match=r"camera front seems to move: .* stand still"):
+    with pytest.raises(InputError, match=r"camera front seems to move: .* say where it was in each frame"):
         open_recording(moving)
 
 
