@@ -75,6 +75,7 @@ def test_a_recording_of_it_is_opened_and_its_frames_lie_on_the_truth(walk):
     [
         (lambda poses: poses.pop("3"), r"poses\.json: has no pose of camera phone in 1 of 12 frames, as 3: .*png"),
         (lambda poses: poses.update({"4": [[1]]}), r"poses\.json: frame 4: camera : camera_to_world has the shape"),
+        (lambda poses: poses.update({"first": poses["4"]}), r"poses\.json: has no object `camera_to_world`"),
         (lambda poses: poses.update({"4": np.zeros((4, 4)).tolist()}), r"frame 4: camera phone: camera_to_world "),
         (lambda poses: poses.clear(), r"poses\.json: has no object `camera_to_world`"),
     ],
@@ -125,7 +126,7 @@ def test_a_camera_before_a_bare_wall_keeps_its_poses(tmp_path):
     (tmp_path / "phone" / "depth").mkdir()
     for number in path:
         write_picture(np.full((96, 96), 2000, np.uint16), tmp_path / "phone" / "depth" / f"{number}.png")
-    refine_paths(tmp_path)
+    assert refine_paths(tmp_path) == [] and not list((tmp_path / "phone").glob("*.before.json"))
     found = read_rig(tmp_path).cameras[0].path
     assert max(np.abs(found[k].to_world - path[k].to_world).max() for k in path) < 1e-3
 
@@ -135,3 +136,57 @@ def test_a_point_is_looked_at_unless_it_is_hidden_or_outside_of_the_picture():
     points = np.array([[0.0, 0, 1.0], [0, 0, 2.01], [0, 0, 2.5], [3, 0, 2.0], [0, 0, -1.0]])
     assert looked_at([picture, None], points).tolist() == [True, True, False, False, False]
     assert not is_carried(lambda _: [picture, None], 9)
+
+
+def test_numbers_of_frames_may_have_zeros_before_them(walk, tmp_path):
+    folder = tmp_path / "rig"
+    shutil.copytree(walk[0], folder)
+    path = folder / "phone" / "poses.json"
+    record = json.loads(path.read_text())["camera_to_world"]
+    path.write_text(json.dumps({"camera_to_world": {f"{int(frame):04}": pose for frame, pose in record.items()}}))
+    assert read_rig(folder).cameras[0].path == read_rig(walk[0]).cameras[0].path
+    assert read_cameras(folder)[0][0].path == read_rig(walk[0]).cameras[0].path
+
+
+@pytest.fixture
+def two(walk, tmp_path):
+    """A rig of two cameras on the same path, of which the second lacks a picture of depth."""
+    folder = tmp_path / "rig"
+    shutil.copytree(walk[0], folder)
+    shutil.copytree(folder / "phone", folder / "second")
+    record = json.loads((folder / RIG).read_text())
+    record["cameras"].append(json.loads(json.dumps(record["cameras"][0]).replace("phone", "second")))
+    (folder / RIG).write_text(json.dumps(record))
+    next((folder / "second" / "depth").glob("*00005.png")).unlink()
+    return folder
+
+
+def test_poses_of_frames_without_a_picture_of_depth_are_kept_and_those_as_recorded_too(two):
+    before = (two / "second" / "poses.json").read_bytes()
+    assert len(refine_paths(two)) == 2
+    rig = read_rig(two)
+    assert 5 not in rig.cameras[1].path and 5 in rig.color_cameras[1].path
+    moved = rig.color_cameras[1].path[5].to_world[:3, 3] - read_rig(two).cameras[0].path[5].to_world[:3, 3]
+    assert np.abs(moved).max() < 0.01  # with the frames beside it
+    assert (two / "second" / "poses.before.json").read_bytes() == before
+    refine_paths(two)
+    assert (two / "second" / "poses.before.json").read_bytes() == before  # those of the first time
+
+
+def test_two_cameras_with_one_file_of_poses_are_refused(two):
+    record = json.loads((two / RIG).read_text())
+    record["cameras"][1]["poses"] = "phone/poses.json"
+    (two / RIG).write_text(json.dumps(record))
+    with pytest.raises(InputError, match=r"two cameras have the poses phone/poses\.json; give each"):
+        read_rig(two)
+
+
+@pytest.mark.parametrize("pose", [2 * np.eye(4), np.diag([1.0, 1, -1, 1]), np.zeros((4, 4))])
+def test_a_matrix_that_is_no_pose_is_told_by_its_number(pose):
+    with pytest.raises(InputError, match=r"pose 1 is \[\["):
+        Poses(np.stack([np.eye(4), pose]), np.array([0.0, 1.0]))
+
+
+def test_poses_that_are_far_apart_in_time_hold_between_them():
+    slow = Poses(np.stack([turned(0), turned(0, (1.0, 0, 0)), turned(0, (2.0, 0, 0))]), np.array([0.0, 1.0, 2.0]))
+    assert np.allclose(slow.at(np.array([0.5, 2.9]))[:, 0, 3], [0.5, 2.0]) and np.isnan(slow.at(np.array([3.1]))).all()

@@ -9,7 +9,7 @@ from meshreel.capture.simulated.simulated_rig import ColorSensorOptions, SensorO
 from meshreel.geometry.cameras import CameraPose, looking_at
 
 
-def carried(count, width=128, sway=0.5):
+def walking_camera(count, width=128, sway=0.5):
     """A camera on an arc of `sway` rad before the open front of the room, with the tremble of a hand."""
     path = {}
     for number in range(count):
@@ -23,7 +23,7 @@ def carried(count, width=128, sway=0.5):
 
 def record_walk(folder, count=12, drift=(0.01, 0.5), people=True, width=128):
     """The rig of a walk whose recorded poses drift by so many metres and degrees; return the camera with the truth."""
-    camera, room = carried(count, width), furnished_room(RoomOptions(count, 10.0, spacing=0.05))
+    camera, room = walking_camera(count, width), furnished_room(RoomOptions(count, 10.0, spacing=0.05))
     frames = room if people else [room[0]] * count
     sensor = SensorOptions(noise=0.3, pose_error=drift)
     simulate_rig(folder, frames, (camera,), 10.0, sensor, color=ColorSensorOptions(scale=1.5))

@@ -79,11 +79,9 @@ def command(
         if not in_place or not refine or poses is not None or board.kind is not None:
             text = f"{rig}: has cameras that move, whose poses are in files as {min(paths)}"
             raise InputError(f"{text}; give --in-place alone, which refines these")
-        kept = {path: path.with_name(f"{path.stem}.before.json") for path in sorted(paths)}
-        check_free(list(kept.values()), force)
-        for path, copy in kept.items():
-            write_file(copy, path.read_bytes())
         remarks = refine_paths(rig)
+        if still := [camera.name for camera in recording.rig.cameras if not camera.path]:
+            warnings.append(f"{rig}: {', '.join(still)} stand still, and stay where they are: only paths are refined")
         common.warn(warnings)
         row = {"output": [str(path) for path in sorted(paths)], "cameras": remarks, "warnings": warnings}
         text = f"{rig}: nothing that its cameras see twice would lie nearer with other poses"

@@ -210,7 +210,8 @@ def _fuse(frames: Recording | Clouds, made: dict[str, Any], output: Path, format
 def _made(recording: Recording) -> dict[str, Any]:
     """Return everything that the frames depend on; the files of pictures are told apart by their sizes."""
     sizes = [[_size(files[n]) if n in files else -1 for n in recording.numbers] for files in recording.rig.files]
-    paths = [[p.to_world.tolist() for p in camera.path.values()] for camera in recording.rig.cameras if camera.path]
+    cameras = [camera.path for camera in recording.rig.cameras] + [eye.path for eye in recording.rig.color_cameras]
+    paths = [[pose.to_world.tolist() for pose in path.values()] for path in cameras if path]
     moving = {"paths": [zlib.crc32(json.dumps(each).encode()) for each in paths]} if paths else {}
     return moving | {
         "rig": str(recording.rig.folder.resolve()),

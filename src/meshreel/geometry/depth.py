@@ -19,7 +19,7 @@ THROUGH = (0.03, 0.015)  # m, and share of the depth: a measurement so far behin
 APART = (0.06, 0.02)  # m, and share of the depth: measurements farther apart are of different surfaces (guess)
 WORLD = Placement(1.0, (0.0, 0.0, 0.0))
 STEP = 0.03  # of the depth, between neighbours: pixels that differ by more are of two surfaces (guess)
-PLACES = 4  # frames in which cameras are looked for: one that a person carries is never where it was (guess)
+PLACES = 4  # frames in which it is asked where cameras are: one that moves is in no two at the same place (guess)
 SMOOTHED = 5  # pixels across, of the median that a depth picture is smoothed by (guess)
 
 

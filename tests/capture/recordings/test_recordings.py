@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import sys
 import types
 import zipfile
@@ -246,7 +247,7 @@ def test_several_recordings_are_cameras_of_one_rig(tmp_path, made):
     )
     rig, remarks = made(first, second)
     assert [one.name for one in rig.cameras] == ["desk-camera", "desk-camera-2"] and rig.frames == list(range(COUNT))
-    assert "both begin together now" in remarks[0] and "meshreel calibrate finds it" in remarks[1]
+    assert "both begin together now" in remarks[0] and "meshreel calibrate finds it" in remarks[-1]
 
 
 MOVED = [[*files.STILL[:4], 0.1 + 0.1 * n, 1.5, 0.2] for n in range(COUNT)]
@@ -373,13 +374,66 @@ def test_a_nerfstudio_folder_has_opengls_axes_and_frames_in_any_order(tmp_path, 
     assert np.allclose(rig.cameras[0].path[2].to_world[:3, :3], np.eye(3))
 
 
+@pytest.mark.usefixtures("as_recorded")
+def test_lenses_of_nerfstudio_frames_may_differ_by_what_autofocus_does_and_no_more(tmp_path, made):
+    folder = nerfstudio(tmp_path / "scan")
+    about = json.loads((folder / "transforms.json").read_text())
+    for number, frame in enumerate(about["frames"]):
+        frame |= {"fl_x": SIZE * (1 + 0.002 * number), "cx": SIZE / 2 + 0.1 * number}
+    (folder / "transforms.json").write_text(json.dumps(about))
+    assert same(made(folder)[0])
+    about["frames"][0]["fl_x"] = 2 * SIZE
+    (folder / "transforms.json").write_text(json.dumps(about))
+    with pytest.raises(InputError, match=r"fl_x of transforms\.json is 192 in images/3\.jpg and .* of each lens alone"):
+        made(folder)
+
+
+@pytest.mark.usefixtures("as_recorded")
+def test_a_nerfstudio_folder_without_its_colours_has_depth(tmp_path, made):
+    folder = nerfstudio(tmp_path / "scan")
+    shutil.rmtree(folder / "images")
+    rig, _ = made(folder)
+    assert rig.frames == list(range(COUNT)) and not rig.color_cameras
+
+
+def test_poses_of_another_clock_are_refused_and_few_are_told(tmp_path, made):
+    folder = files.tum(tmp_path / "desk", poses=MOVED)
+    rows = (folder / "groundtruth.txt").read_text().splitlines()
+    (folder / "groundtruth.txt").write_text(rows[0])
+    remarks = made(folder)[1]
+    assert "only 2 of 4 depth pictures have a pose of camera near them; by these it stands still" in remarks[0]
+    folder = files.tum(tmp_path / "chair", poses=MOVED)
+    shifted = [" ".join([str(float(row.split()[0]) + 3600), *row.split()[1:]]) for row in rows]
+    (folder / "groundtruth.txt").write_text("\n".join(shifted))
+    with pytest.raises(InputError, match="chair: no pose of camera is of the time of a picture; do the clocks"):
+        made(folder)
+
+
+@pytest.mark.usefixtures("as_recorded")
+def test_links_of_tf_that_are_said_seldom_hold_between(tmp_path, made):
+    pytest.importorskip("rosbags")
+    with Bag(tmp_path / "robot.bag", "bag") as bag:
+        bag.info("/camera/depth/camera_info")
+        bag.move("map", "odom", (0.0, 0.0, 5.0), TIMES[0] - 30)  # once
+        for number in range(8):
+            bag.move("odom", "optical", (0.1 * number, 0.0, 0.0), TIMES[0] + 0.05 * number)
+        for number, time in enumerate(TIMES):
+            bag.image("/camera/depth/image", DEPTHS[number], "16UC1", time)
+    assert np.allclose(paths(made(bag.path)[0])[0], [[0.2 * n, 0, 5.0] for n in range(COUNT)])
+
+
 @pytest.mark.parametrize(
     ("changed", "told"),
     [
-        ({"frames": [{"file_path": "a.jpg"}]}, "no frame of transforms.json has a depth_file_path"),
+        ({"frames": [{"file_path": "a.jpg"}]}, r"no frame of transforms\.json has a depth_file_path"),
+        ({"frames": [{"file_path": 3, "depth_file_path": "a.png"}]}, r"frame 0 of .*: file_path is 3 and no text"),
+        ({"frames": [{"file_path": "a", "depth_file_path": "b"}]}, "transform_matrix of a is None; give 4 rows"),
+        ({"fl_x": [1]}, r"fl_x of transforms\.json is \[1\] in images/0\.jpg; give a number"),
+        ({"fps": 0}, r"fps of transforms\.json is 0: give a number above 0"),
+        ({"w": 0}, r"pictures of 0 x 96: give w and h"),
         ({"camera_model": "OPENCV_FISHEYE"}, "the camera_model OPENCV_FISHEYE"),
         ({"fl_x": None}, "write fl_x fl_y cx cy w h into"),
-        ({"frames": 3}, "cannot be read"),
+        ({"frames": 3}, "no list `frames` of objects"),
     ],
 )
 def test_a_nerfstudio_folder_that_cannot_be_read_is_told_by_what_it_lacks(tmp_path, made, changed, told):

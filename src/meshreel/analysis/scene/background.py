@@ -24,8 +24,8 @@ from ...geometry.threads import mapped
 from ...geometry.topology import face_means, face_normals, part_of, without_fragments
 from ...types import Mesh
 
-WALKED = 80  # the same where a camera moves, and sees a part of the scene in each (guess)
 FRAMES = 20  # of a scene: largest number of fused frames, spread over the sequence (decision 19)
+WALKED = 80  # frames that are fused where a camera moves, and sees a part of the scene in each (guess)
 SHARED = 0.15  # smallest share of the frames that must have surface at a voxel (decision 19)
 STEADY = 0.6  # voxels: where the standard deviation of the distances is larger, the surface was not still (decision 19)
 PAST = 0.5  # voxels by which a surface is continued past its border, so that borders do not recede (decision 19)

@@ -71,7 +71,7 @@ class Standing:
     sensed: bool  # by sensors that are known
     diagonal: float  # m, of the largest frame
 
-    def carried(self) -> Standing:
+    def with_pose_errors(self) -> Standing:
         """Return the regions as a camera that moves sees them: what rests is off by its pose and its side, too.
 
         In a scene most surface rests, so that half of all regions tell by how much, up to a cell.
@@ -176,7 +176,9 @@ def standing(frames: Frames) -> Standing:
         [probe for probe in probes.values() if probe.beside], len(frames) > 2 and depth is not None
     )
     return (
-        found_regions.carried() if depth is not None and is_carried(depth.__getitem__, len(frames)) else found_regions
+        found_regions.with_pose_errors()
+        if depth is not None and is_carried(depth.__getitem__, len(frames))
+        else found_regions
     )
 
 

@@ -143,16 +143,15 @@ class _Bag:
         while frame in links and frame not in seen:
             seen.add(frame)
             times, parents, matrices = zip(*links[frame], strict=True)
-            own = Poses(np.stack(matrices), np.array(times))
-            if found is None:
-                found = own
+            own = Poses(np.stack(matrices), np.array(times) if len(times) > 1 else None)  # one that is said once holds
+            if found is None or found.times is None:
+                found = Poses(own.matrices if found is None else own.matrices @ found.matrices, own.times)
             else:
-                assert found.times is not None
                 found = Poses(own.at(found.times) @ found.matrices, found.times)
             root, placed = pose_in_root(tree, parents[0])
             found, frame = Poses(placed @ found.matrices, found.times), root
         if found is None or found.times is None:
-            return None
+            return found
         known = np.isfinite(found.matrices).all(axis=(1, 2))
         return Poses(found.matrices[known], found.times[known]) if known.any() else None
 

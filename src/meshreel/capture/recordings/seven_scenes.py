@@ -7,6 +7,7 @@ https://www.microsoft.com/en-us/research/project/rgb-d-dataset-7-scenes.
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +17,7 @@ from ...errors import InputError
 from ...geometry.cameras import Camera
 from ...io.files import read_input
 from ...io.pictures import last_number, read_depth
-from .takes import Poses, Sensor, Stream, Take, lens_of, reading, stream_of
+from .takes import Poses, Sensor, Take, lens_of, reading, stream_of
 
 KIND = "a folder of 7-scenes (frame-000000.depth.png, .color.png, .pose.txt)"
 NUMBERS = "camera-intrinsics.txt"
@@ -33,9 +34,10 @@ def read(path: Path) -> Take:
     if not deep:
         raise ValueError("it has no frame-000000.depth.png and so on")
     poses = Poses(np.stack([_matrix(file, 4) for file in turns.values()]), np.array(list(turns)) / RATE)
-    numbers = _matrix(path / NUMBERS, 3) if (path / NUMBERS).is_file() else None
-    seen = _stream(deep, numbers, True)
-    beside = _stream(color, None if seen.lens is None else seen.lens, False) if color else None
+    seen = stream_of(_timed(deep), partial(_lens, path / NUMBERS), _depth)
+    beside = None
+    if color:
+        beside = stream_of(_timed(color), lambda *size: seen.lens and seen.lens.resized(*size), read_input)
     sensor = Sensor("camera", seen, 0.001, beside, np.eye(4), poses)
     return Take(path, KIND, (sensor,), f"write K of the depth camera, 3 x 3 numbers, into {path / NUMBERS}")
 
@@ -55,13 +57,17 @@ def _matrix(path: Path, side: int) -> Float64[np.ndarray, "N N"]:
     return numbers.reshape(side, side)
 
 
-def _stream(files: dict[int, Path], numbers: Camera | Float64[np.ndarray, "3 3"] | None, deep: bool) -> Stream:
-    def lens(width: int, height: int) -> Camera | None:
-        if numbers is None or isinstance(numbers, Camera):
-            return numbers and numbers.resized(width, height)
-        return lens_of(width, height, (numbers[0, 0], numbers[1, 1]), (numbers[0, 2], numbers[1, 2]))
+def _timed(files: dict[int, Path]) -> list[tuple[float, Path]]:
+    """Return files with the times of their frames, s."""
+    return [(number / RATE, file) for number, file in files.items()]
 
-    return stream_of([(number / RATE, file) for number, file in files.items()], lens, _depth if deep else read_input)
+
+def _lens(path: Path, width: int, height: int) -> Camera | None:
+    """Return the lens that a file describes, None without the file."""
+    if not path.is_file():
+        return None
+    numbers = _matrix(path, 3)
+    return lens_of(width, height, (numbers[0, 0], numbers[1, 1]), (numbers[0, 2], numbers[1, 2]))
 
 
 def _depth(path: Path) -> np.ndarray:

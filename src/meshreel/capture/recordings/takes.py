@@ -21,6 +21,7 @@ Picture = np.ndarray | bytes  # depths H x W in the sensor's unit, integers or f
 Unread = Callable[[], Picture]  # reads one picture, which may be damaged
 Pair = tuple[float, float]  # along x and y
 LOST_TRACK = 0.2  # s without a pose, after which a camera that moves may be anywhere (guess)
+SKEW = 0.05  # of a product of a rotation with its transpose: recorded ones are rounded (guess)
 Pictures = Iterator[tuple[float, Picture | Unread]]  # each with its time on the take's clock, s
 
 
@@ -53,8 +54,22 @@ class Poses:
     matrices: Float64[np.ndarray, "T 4 4"]  # camera to world, m
     times: Float64[np.ndarray, " T"] | None = None  # s, on the take's clock; None: one pose, for all times
 
+    def __post_init__(self) -> None:
+        turns, last = self.matrices[:, :3, :3], self.matrices[:, 3]
+        known = np.isfinite(self.matrices).all(axis=(1, 2))
+        with np.errstate(invalid="ignore", over="ignore"):
+            skew = np.abs(turns @ np.swapaxes(turns, 1, 2) - np.eye(3)).max(axis=(1, 2))
+            bad = known & ((skew > SKEW) | (np.linalg.det(turns) < 0) | (last != [0, 0, 0, 1]).any(axis=1))
+        if bad.any():
+            which = int(bad.argmax())
+            rows = self.matrices[which].round(3).tolist()
+            raise InputError(f"pose {which} is {rows}: give a rotation and a translation, camera to world, in metres")
+
     def at(self, times: Float64[np.ndarray, " P"]) -> Float64[np.ndarray, "P 4 4"]:
-        """Return poses at times, between those before and after; NaN where none is known within `LOST_TRACK`."""
+        """Return poses at times, between those before and after; NaN where none is known near a time.
+
+        Near is `LOST_TRACK`, or what usually is between two poses where that is more.
+        """
         if self.times is None:
             return np.repeat(self.matrices[:1], len(times), axis=0)
         good = np.isfinite(self.matrices).all(axis=(1, 2))
@@ -62,7 +77,8 @@ class Poses:
         found = poses_between(known, self.matrices[good][first], times)
         after = np.clip(np.searchsorted(known, times), 0, len(known) - 1)
         gaps = np.minimum(np.abs(known[after] - times), np.abs(times - known[np.maximum(after - 1, 0)]))
-        found[gaps > LOST_TRACK] = np.nan
+        usual = float(np.quantile(np.diff(known), 0.25, method="lower")) if len(known) > 1 else 0.0
+        found[gaps > max(LOST_TRACK, usual)] = np.nan
         return found
 
 

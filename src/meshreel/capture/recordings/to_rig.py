@@ -69,7 +69,9 @@ def write_takes(
     remarks += [f"{path}: not read: {topics}" for path, topics in unread.items() if topics]
     unknown = sum(part.sensor.poses is None for part in parts)
     if len(parts) > 1 and (unknown or len(takes) > 1):
-        text = f"how its {len(parts)} cameras stand to each other is not known; meshreel calibrate finds it"
+        finds = "and is not looked for where one moves: give poses in one world"
+        finds = finds if any(part.moves for part in parts) else "meshreel calibrate finds it"
+        text = f"how its {len(parts)} cameras stand to each other is not known; {finds}"
         remarks.append(f"{folder}: {text}")
     return [remark for part in parts for remark in part.remarks] + remarks
 
@@ -127,7 +129,8 @@ class _Written:
         for frame, index in sorted(self.by_frame.items()):
             if frame in frames:
                 path = self.files[index][1]
-                shutil.copyfile(path, path.with_name(f"frame_{frame:05}{path.suffix}"))
+                with cannot_be_written(path):
+                    shutil.copyfile(path, path.with_name(f"frame_{frame:05}{path.suffix}"))
         for _, path in self.files:
             path.unlink()
 
@@ -154,7 +157,8 @@ class _Part:
         self.camera(), self.beside()  # raise InputError for numbers that no camera has
 
     def camera(self) -> DepthCamera:
-        return self._as_camera(self.name, self.lens, self.pose)
+        path = {frame: placed(self.name, pose) for frame, pose in self.depth_path.items()}
+        return replace(self._as_camera(self.name, self.lens, self.pose), path=path)
 
     def beside(self) -> dict[str, Any] | None:
         """Return the colour camera as a record of `rig.json`."""
@@ -170,8 +174,7 @@ class _Part:
 
     def _as_camera(self, name: str, lens: Camera, pose: Float64[np.ndarray, "4 4"]) -> DepthCamera:
         with reading(self.take.path):
-            path = {frame: placed(name, each) for frame, each in self.depth_path.items()}
-            return DepthCamera(name, replace(lens, pose=placed(name, pose)), self.unit, path=path)
+            return DepthCamera(name, replace(lens, pose=placed(name, pose)), self.unit)
 
     def read(self, folder: Path, report: Callable[[], None]) -> None:
         """Write all pictures to a folder."""
@@ -276,7 +279,13 @@ def _tracked(parts: list[_Part], frames: set[int]) -> tuple[set[int], list[str]]
     """
     remarks = list[str]()
     for part in parts:
-        if not part.moves or part.sensor.poses is None:
+        if part.sensor.poses is None or part.sensor.poses.times is None:
+            continue
+        if not part.moves:
+            known = np.isfinite(part.sensor.poses.at(part.depth.times())).all(axis=(1, 2))
+            if not known.all():
+                text = f"only {known.sum()} of {len(known)} depth pictures have a pose of {part.sensor.name} near them"
+                remarks.append(f"{part.take.path}: {text}; by these it stands still")
             continue
         apart = np.eye(4) if part.sensor.color_to_depth is None else part.sensor.color_to_depth
         pairs = [(part.depth, part.depth_path, np.eye(4))]

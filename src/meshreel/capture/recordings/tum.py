@@ -107,7 +107,9 @@ def _poses(path: Path, depth: list[tuple[float, Path]]) -> Poses | None:
         return None
     rows = np.array(list(_rows(path / "groundtruth.txt", (float,) * 8)), dtype=np.float64).reshape(-1, 8)
     times = [time for time, _ in depth]
-    first, last = (np.searchsorted(np.sort(rows[:, 0]), edge) for edge in (min(times), max(times)))
-    rows = rows[np.argsort(rows[:, 0], kind="stable")][max(first - 1, 0) : last + 1]  # with those before and after
+    rows = rows[np.argsort(rows[:, 0], kind="stable")]
+    first, last = (int(np.searchsorted(rows[:, 0], edge)) for edge in (min(times), max(times)))
+    if first < last:  # with those before and after; of another clock all count
+        rows = rows[max(first - 1, 0) : last + 1]
     with reading(path / "groundtruth.txt"):
         return Poses(pose_of(rows[:, 4:], rows[:, 1:4]), rows[:, 0]) if len(rows) else None

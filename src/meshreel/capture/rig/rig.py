@@ -124,6 +124,9 @@ def read_rig(folder: Path, order: Order = "auto") -> Rig:
     names = [camera.name for camera in cameras] + [camera.name for camera in seen]
     named = zip(names, (*entries, *described), strict=True)
     paths = {name: folder / entry["poses"] for name, entry in named if "poses" in entry}
+    own = [entry["poses"] for entry in entries if "poses" in entry]
+    if twice := next((name for name in own if own.count(name) > 1), None):
+        raise InputError(f"{folder / RIG}: two cameras have the poses {twice}; give each camera a file of its own")
     rig = Rig(folder, cameras, files[: len(cameras)], rate, tuple(_unknown(folder, entries)), seen, paths)
     for camera in seen:
         camera.picture(min(camera.files))  # an error of its size is told before anything else is done
@@ -152,21 +155,33 @@ def _moving(folder: Path, entry: dict[str, Any], camera: C, files: Mapping[int, 
     if "poses" not in entry:
         return camera
     path = folder / str(entry["poses"])
-    record = read_json(path, "give JSON").get("camera_to_world")
-    if not isinstance(record, dict) or not record:
-        raise InputError(f"{path}: has no object `camera_to_world`; give 4 rows of 4 numbers for each frame's number")
-    if files is None:
-        files = {int(frame): path for frame in record if frame.isdecimal()}
-    if lost := sorted(frame for frame in files if str(frame) not in record):
-        text = f"{path}: has no pose of camera {camera.name} in {len(lost)} of {len(files)} frames"
-        raise InputError(f"{text}, as {lost[0]}: {files[lost[0]]}; give one for each picture, or leave these out")
+    known = read_path(path)
+    if lost := sorted(set(known if files is None else files) - known.keys()):
+        text = f"{path}: has no pose of camera {camera.name} in {len(lost)} of {len(files or ())} frames"
+        raise InputError(
+            f"{text}, as {lost[0]}: {(files or {})[lost[0]]}; give one for each picture, or leave these out"
+        )
     found = dict[int, CameraPose]()
-    for frame in sorted(files):
+    for frame in sorted(known if files is None else files):
         try:
-            found[frame] = placed(camera.name, _matrix({"camera_to_world": record[str(frame)]}))
+            found[frame] = placed(camera.name, known[frame])
         except InputError as error:
             raise InputError(f"{path}: frame {frame}: {error}") from None
     return replace(camera, path=found, view=replace(camera.view, pose=found[min(found)]))
+
+
+def read_path(path: Path) -> dict[int, Matrix]:
+    """Read the poses of a camera by frame, camera to world. Raises InputError where the file has none, or others."""
+    record = read_json(path, "give JSON").get("camera_to_world")
+    if not isinstance(record, dict) or not record or not all(map(str.isdecimal, record)):
+        raise InputError(f"{path}: has no object `camera_to_world`; give 4 rows of 4 numbers for each frame's number")
+    found = dict[int, Matrix]()
+    for frame, rows in record.items():
+        try:
+            found[int(frame)] = _matrix({"camera_to_world": rows})
+        except InputError as error:
+            raise InputError(f"{path}: frame {frame}: {error}") from None
+    return found
 
 
 def packed_path(path: Mapping[int, Matrix]) -> bytes:

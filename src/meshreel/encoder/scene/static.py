@@ -284,13 +284,14 @@ def _pictured(
     slow = replace(options, crf=min(max(1, crf), MOST_CRF))
 
     def picture_of(frame: int) -> UInt8[np.ndarray, "H W 3"]:
-        if looks.is_walk:  # what a camera that moves sees at a moment would be a patch that wanders over the room
-            return picture(surface.texels, surface.mesh, usual[0], usual[1])
         colors, seen = looks.moment(min(frame + some.step // 2, frames[-1]), surface.places, surface.normals)
         seen &= ~usual[2]
         return picture(surface.texels, surface.mesh, np.where(seen[:, None], colors, usual[0]), usual[1] | seen)
 
-    some = frames[:: len(frames)] if looks.is_walk else frames[:: max(1, round(looks.frame_rate / PICTURES_A_SECOND))]
+    if looks.is_walk:  # what a camera that moves sees at a moment would be a patch that wanders over the room
+        once = picture(surface.texels, surface.mesh, usual[0], usual[1])
+        return layered_pictures(surface.layout, frames[:: len(frames)], lambda _: once, slow)
+    some = frames[:: max(1, round(looks.frame_rate / PICTURES_A_SECOND))]
     return layered_pictures(surface.layout, some, picture_of, slow)
 
 
