@@ -223,11 +223,13 @@ def test_crate_and_door_rest_for_a_second():
 class Decoded(Video):
     """A decoded file: a wall that has the ball from a frame on, and a track of the ball until then."""
 
+    tracks = ()  # in place of the property
+
     def __init__(self, frames, room_from):
         chunk = SimpleNamespace(track=0, first_frame=0, frame_count=6, size=700)
         self.reader = SimpleNamespace(groups=[chunk], frame_rate=10.0, frame_count=6)
         self.frames, self.room_from = frames, room_from
-        self._tracks = [[self.moving(number) for number in range(6)]]
+        self.tracks = [[self.moving(number) for number in range(6)]]
 
     def __getitem__(self, index):
         return concatenate(self.frames[index])
