@@ -53,6 +53,7 @@ LEAST_NOISE = 8e-4  # of the unit, the least noise that a background is coded fo
 WORTH = 0.9  # of the bytes without planes, that a way with planes may take: they cost nearness on what bends (guess)
 WORST = 4.0  # times what is allowed on average, of a place where there is no noise to hide it (guess)
 STILL_FRAMES = 16  # in which a background is looked at for its colours, at most (guess)
+WALK_PICTURES = 8  # of a walk that say how fine its texture is (guess)
 WALK_FRAMES = 64  # the same where a camera moves, and sees a part in each (guess)
 PICTURES_A_SECOND = 8  # of a background: shadows move slowly (guess)
 FINER = 2  # by which the rate factor of a background's pictures is below that of a body's (guess)
@@ -340,11 +341,16 @@ class _Looks:
         """Return the places of a background in a texture, as cameras see it where there are some, and its scale."""
         if self._views is None:
             return unwrap(mesh, fitting_sizes(size, [self._paint(frames.start)], [mesh])), 1.0
+        if self.is_walk:  # no moment has pictures of it all: a texture for twice as many pixels as the fullest has
+            some = [frames[number] for number in evenly(len(frames), WALK_PICTURES)]
+            widths = [fitting_sizes(size, [self._paint(number)], [mesh]) for number in some]
+            wide = min(2 * max(each[0] for each in widths), max(each[-1] for each in widths))
+            return unwrap(mesh, sorted({width for each in widths for width in each if size or width >= wide})), 1.0
         return projected(mesh, self._views.of_surface(frames[evenly(len(frames), 1)[0]], mesh))
 
     def shown_whole(self, frame: int, mesh: Mesh) -> Mesh:
         """Return a background from a frame on, of faces that are in pictures entirely, where cameras took some."""
-        return mesh if self._views is None else shown_whole(mesh, self._views.of_surface(frame, mesh))
+        return mesh if self._views is None or self.is_walk else shown_whole(mesh, self._views.of_surface(frame, mesh))
 
     def _paint(self, number: int) -> Paint:
         if self._views is not None:
