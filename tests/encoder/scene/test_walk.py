@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 
+import meshreel
 from meshreel.analysis.scene.standing import scene_standing
 from meshreel.capture.calibration.paths import refine_paths
 from meshreel.capture.recording import FusionOptions, open_recording
 from meshreel.capture.simulated.simulated_rig import TRUTH, read_truth
-from meshreel.encoder.sequence import Encoder
+from meshreel.encoder.sequence import Encoder, encode
 from meshreel.encoder.settings.settings import Settings
 from meshreel.geometry.closest_points import Surface, carried_labels
 from meshreel.geometry.topology import face_means, face_normals, part_of
@@ -60,3 +61,17 @@ def test_the_room_is_seen_from_all_sides_of_the_walk_and_has_no_ghosts(walk, par
     seen = walk[0][0].vertices  # what the first frame shows, and others hide
     still = room.distances(seen) < 0.02
     assert np.mean(Surface(parts.background).distances(seen[still]) < 0.03) > 0.97
+
+
+@pytest.mark.slow
+def test_the_colours_of_the_room_are_one_picture_of_all_that_the_walk_saw(walk, tmp_path):
+    """What the first frame does not show has its place in the picture, too."""
+    pytest.importorskip("av")
+    pytest.importorskip("xatlas")
+    path = tmp_path / "walk.reel"
+    encode(walk[0], path, effort="fast", texture=512)
+    with meshreel.open(path) as video:
+        first, last = (video.background(number) for number in (0, COUNT - 1))
+        assert np.array_equal(first.texture.pixels, last.texture.pixels) and first.texture.pixels.std() > 10
+    areas, placed = face_normals(first)[1], np.isfinite(first.uv).all(axis=(1, 2))
+    assert areas[placed].sum() > 0.98 * areas.sum()
