@@ -18,6 +18,7 @@ from meshreel.geometry.cameras import Camera, CameraPose
 from meshreel.geometry.closest_points import Surface
 from meshreel.geometry.depth import DepthPicture, is_carried, looked_at
 from meshreel.io.write import write_picture
+from meshreel.metrics.depth import DepthJudge, judge
 from tests.capture.walks import record_walk
 from tests.capture.wrong_poses import errors
 
@@ -190,3 +191,11 @@ def test_a_matrix_that_is_no_pose_is_told_by_its_number(pose):
 def test_poses_that_are_far_apart_in_time_hold_between_them():
     slow = Poses(np.stack([turned(0), turned(0, (1.0, 0, 0)), turned(0, (2.0, 0, 0))]), np.array([0.0, 1.0, 2.0]))
     assert np.allclose(slow.at(np.array([0.5, 2.9]))[:, 0, 3], [0.5, 2.0]) and np.isnan(slow.at(np.array([3.1]))).all()
+
+
+def test_depth_judges_a_walk_without_bodies_and_flicker(walk):
+    recording, _ = open_recording(walk[0], frames="0:3")
+    judged = DepthJudge(recording.depth, 3, (0.0, 1.0, 0.0))
+    row = judge(judged, recording, range(3))
+    assert row["all_covered"] > 0.9 and row["body_covered"] is None
+    assert row["still_flicker_m"] is None and row["body_flicker_deg"] is None

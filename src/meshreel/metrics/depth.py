@@ -119,11 +119,12 @@ class DepthJudge:
         """Read at most `LOOKED_AT` of `count` frames for the usual depth; `up` is the direction that points up."""
         self._frames, self._up = frames, np.asarray(up, np.float64)
         samples = [frames[number] for number in evenly(count, LOOKED_AT)]
-        is_moving = is_carried(frames.__getitem__, count)  # a pixel of such a camera has no usual depth, and no body
+        # A pixel of a camera that moves has no usual depth, no body, and in the next frame another place.
+        self.is_moving = is_carried(frames.__getitem__, count)
         self._usual = dict[int, np.ndarray]()
         for camera, pictures in enumerate(zip(*samples, strict=True)):
             depths = [picture.depth * picture.unit for picture in pictures if picture is not None]
-            if depths and not is_moving:
+            if depths and not self.is_moving:
                 self._usual[camera] = _usual(np.stack(depths))
         heights = [self._heights(pictures) for pictures in samples]
         lows = [np.quantile(each, ENDS[0]) for each in heights if len(each) >= LIMB]
@@ -177,12 +178,12 @@ def judge(judged: DepthJudge, decoded: Frames, numbers: Iterable[int], refreshes
     decoded mesh covers less than half of it. Between successive frames: `still_flicker_m` is the RMS change of decoded
     depth at pixels that measured still surface in both, and `body_flicker_deg` that of normals on bodies, with their
     motion removed. `refreshes` are the frames in which another background begins: its change does not count. Shares of
-    nothing are None.
+    nothing are None, as is flicker where a camera moves.
     """
     rows, before = list[Row](), dict[int, Judged]()
     for number in numbers:
         now = judged.of(number, decoded[number])
-        follows = bool(rows) and rows[-1]["frame"] == number - 1
+        follows = bool(rows) and rows[-1]["frame"] == number - 1 and not judged.is_moving
         row = _counts(list(now.values())) | _changes(before if follows else {}, now, number in refreshes)
         limb, kept = judged.limb(now.values())
         row |= {"limbs_shown": limb >= LIMB, "limbs_lost": limb >= LIMB and 2 * kept < limb}

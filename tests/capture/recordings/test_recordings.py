@@ -89,6 +89,15 @@ def test_an_r3d_is_read_with_lzfse_and_without_it_says_what_to_export(tmp_path, 
         made(path)
 
 
+@pytest.mark.usefixtures("as_recorded")
+def test_the_poses_of_record3d_have_the_times_of_its_pictures_and_more_of_them_do_not_count(tmp_path, made):
+    pytest.importorskip("OpenEXR")
+    folder = files.exr(tmp_path / "scan")
+    about = files.record3d_metadata([*MOVED, MOVED[0]])
+    (folder / "EXR_RGBD" / "metadata.json").write_text(json.dumps(about))
+    assert np.allclose(paths(made(folder)[0])[0], [pose[4:] for pose in MOVED])
+
+
 @pytest.mark.parametrize("form", ["bag", "sqlite3", "mcap"])
 def test_bags_of_all_kinds_have_the_same_camera(tmp_path, made, form):
     pytest.importorskip("rosbags")

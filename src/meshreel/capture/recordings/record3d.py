@@ -62,6 +62,7 @@ def read(path: Path) -> Take:
         return Stream(*size, len(names), max(there) - min(there), lens and lens.resized(*size), pictures)
 
     given = np.array(about.get("poses") or np.zeros((0, 7)), np.float64).reshape(-1, 7)
+    given = given[: len(stamps)] if stamped else given
     when = np.array([float(stamps[n]) if stamped else n / rate for n in range(len(given))])
     poses = Poses(pose_of(given[:, :4], given[:, 4:]) @ FLIP, when) if len(given) else None
     first = next(iter(color.values()), "")
