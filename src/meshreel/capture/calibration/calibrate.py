@@ -148,9 +148,9 @@ class Scene:
                 step = -np.einsum("ab,b->a", vectors, along)
                 step -= np.einsum("ak,bk,b->a", unfixed, unfixed, step)
                 taken = _ahead(step, before)
-                taken *= min(1.0, LONGEST / max(_size(taken), 1e-12))
+                taken *= min(1.0, LONGEST / max(largest_motion(taken), 1e-12))
                 poses, before = self.moved(poses, taken), (step, taken)
-                if _size(step) < DONE:
+                if largest_motion(step) < DONE:
                     break
         report(len(REACH), len(REACH))
         return poses
@@ -218,7 +218,7 @@ class Scene:
         weak = (values > 1e-9 * max(float(values.mean()), 1.0)) & (values < WEAK * values.mean())
         rest, found = max(self.cost(poses), LEAST_COST), []
         for direction in vectors.T[weak]:
-            trial = direction * (TRIAL / _size(direction))
+            trial = direction * (TRIAL / largest_motion(direction))
             costs = [self.cost(self.moved(poses, sign * trial)) for sign in (1, -1)]
             found += [direction] if sum(costs) / 2 - self.cost(poses) < RISE * rest else []
         return np.array(found).reshape(-1, 6 * len(poses)).T
@@ -266,7 +266,7 @@ def _ahead(step: Step, before: tuple[Step, Step] | None) -> Step:
     return step - min(max(share, -MOST_AHEAD), 0.5) * (taken + change)
 
 
-def _size(step: Step) -> float:
+def largest_motion(step: Step) -> float:
     """Return the largest motion of a camera, m."""
     return float(np.sqrt((step.reshape(-1, 6) ** 2).sum(axis=1).max()))
 

@@ -2,7 +2,7 @@
 
 Some frames of a path, the keys, are as many cameras: the surfaces that they see of one room must lie on each other. One
 least-squares problem has the motions of all keys, as that of a rig's cameras has. What surfaces leave open, as along a
-corridor, goes on as the tracker says: errors of successive keys are alike. Frames between keys move with them.
+corridor, goes on as the tracker says: errors of successive keys are alike. Other frames are laid on keys near them.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from ...geometry.cameras import Matrix
 from ...io.write import write_file
 from ..rig.cameras import at_frame
 from ..rig.rig import Rig, packed_path, read_path, read_rig
-from .calibrate import LONGEST, REACH, Scene
-from .poses import poses_between
+from .calibrate import LONGEST, REACH, Poses, Scene, largest_motion
+from .poses import poses_between, turns_between
 from .still_view import StillView, still_view
 
 WAY, TURN = 0.15, 8.0  # m, degrees, from one key to the next, at most (guess)
@@ -37,8 +37,6 @@ STEPS = 20  # of a round, at most (guess)
 SHARED = 0.2  # least share of a key's points that another one sees, of those that are compared (guess)
 PARTNERS = 8  # keys that a key is compared with, at most: those that share most, near and far in time (guess)
 DRIFT = 0.003  # m over `WAY`, standard deviation of how the errors of successive keys differ (guess)
-
-Poses = Float64[np.ndarray, "K 4 4"]
 
 
 def refine_paths(folder: Path) -> list[str]:
@@ -64,7 +62,7 @@ def refine_paths(folder: Path) -> list[str]:
             away = np.linalg.norm(poses[:, :3, 3] - given[:, :3, 3], axis=1).max()
             text = f"camera {camera.name} moves: surfaces seen twice lie {1000 * after:.1f} mm apart, in the median"
             text += f", {1000 * before:.1f} mm by its recorded poses; these are corrected by up to"
-            remarks.append(f"{text} {1000 * away:.0f} mm and {_turns(poses, given).max():.1f} degrees")
+            remarks.append(f"{text} {1000 * away:.0f} mm and {turns_between(poses, given).max():.1f} degrees")
     for file, poses_of in moved.items():
         if not kept(file).exists():  # that of the first time stays, also where that was interrupted
             write_file(kept(file), file.read_bytes())
@@ -118,7 +116,7 @@ def refined(rig: Rig, number: int) -> tuple[Poses, float, float] | None:
 def _gaps(poses: Poses) -> Float64[np.ndarray, " G"]:
     """Return how far each key is from the one before, in the distances at which keys usually follow each other."""
     ways = np.linalg.norm(np.diff(poses[:, :3, 3], axis=0), axis=1) / WAY
-    return np.maximum(ways, _turns(poses[1:], poses[:-1]) / TURN)
+    return np.maximum(ways, turns_between(poses[1:], poses[:-1]) / TURN)
 
 
 def _smooth(gaps: Float64[np.ndarray, " G"]) -> Float64[np.ndarray, "K K"]:
@@ -138,7 +136,7 @@ def _solved(scene: Scene, poses: Poses, stiff: Float64[np.ndarray, "M M"]) -> Po
             slope = gradient[:size] + strict.products(smooth, total[:size, None])[:, 0]
             step = np.zeros_like(total)
             step[:size] = -strict.products(strict.inverse(held), slope[:, None])[:, 0]
-            longest = float(np.sqrt((step.reshape(-1, 6) ** 2).sum(axis=1).max()))
+            longest = largest_motion(step)
             step *= min(1.0, LONGEST / max(longest, 1e-12))
             poses, total = scene.moved(poses, step), total + step
             if longest < DONE:
@@ -172,18 +170,12 @@ def _keys(poses: Poses) -> list[int]:
         for number in range(1, len(poses)):
             last = poses[keys[-1]]
             far = np.linalg.norm(poses[number, :3, 3] - last[:3, 3]) >= times * WAY
-            if far or _turns(poses[number : number + 1], last[None])[0] >= times * TURN:
+            if far or turns_between(poses[number : number + 1], last[None])[0] >= times * TURN:
                 keys.append(number)
         keys = keys if keys[-1] == len(poses) - 1 else [*keys, len(poses) - 1]
         if len(keys) <= MOST_KEYS:
             return keys
         times *= 1.25
-
-
-def _turns(first: Poses, second: Poses) -> Float64[np.ndarray, " K"]:
-    """Return the angles between poses, degrees."""
-    cosines = (np.einsum("kij,kij->k", first[:, :3, :3], second[:, :3, :3]) - 1) / 2
-    return np.degrees(np.arccos(np.clip(cosines, -1, 1)))
 
 
 def _shares(scene: Scene, poses: Poses) -> Float64[np.ndarray, "K K"]:

@@ -107,6 +107,14 @@ def poses_between(
     return found
 
 
+def turns_between(
+    first: Float64[np.ndarray, "T 4 4"], second: Float64[np.ndarray, "T 4 4"]
+) -> Float64[np.ndarray, " T"]:
+    """Return the angles between the rotations of poses, degrees."""
+    cosines = (np.einsum("tij,tij->t", first[:, :3, :3], second[:, :3, :3]) - 1) / 2
+    return np.degrees(np.arccos(np.clip(cosines, -1, 1)))
+
+
 def pose_in_root(above: Mapping[str, tuple[str, Matrix]], frame: str) -> tuple[str, Matrix]:
     """Return a frame's root and its pose there; `above`: parent and pose of each. Raises ValueError for a circle."""
     pose = np.eye(4)

@@ -1,6 +1,6 @@
 """Folders of nerfstudio's form with depth, as Polycam's, Record3D's and Stray Scanner's recordings are converted to.
 
-`transforms.json` has the lens (`fl_x fl_y cx cy w h k1 k2 p1 p2 k3`, of all frames or of each), and for each frame
+`transforms.json` has the lens (`fl_x fl_y cx cy w h k1 k2 p1 p2 k3`, of all, or alike in each), and for each frame
 `file_path`, `depth_file_path` and `transform_matrix` (camera to world, x right, y up, z backward), at `time` s or one
 after the other. Depth is in steps of `integer_depth_scale` (or `depth_unit_scale_factor`) m, 0.001 if neither is there:
 https://docs.nerf.studio/quickstart/data_conventions.html.
@@ -21,11 +21,10 @@ from ...geometry.cameras import Camera
 from ...io.files import read_file, read_input
 from ...io.pictures import last_number, read_depth
 from ...texts import json_of
-from .takes import Poses, Sensor, Take, lens_of, stream_of
+from .takes import FLIP, Poses, Sensor, Take, lens_of, stream_of
 
 KIND = "a nerfstudio folder with depth (transforms.json)"
 ABOUT = "transforms.json"
-FLIP = np.diag([1.0, -1.0, -1.0, 1.0])  # from x right, y down, z forward to OpenGL's x right, y up, z backward
 LENS = ("fl_x", "fl_y", "cx", "cy", "w", "h")
 BENDS = ("k1", "k2", "p1", "p2", "k3")
 MODELS = ("OPENCV", "PINHOLE", "SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADIAL")

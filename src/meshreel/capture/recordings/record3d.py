@@ -18,11 +18,10 @@ from ...io.files import MOST_BYTES, read_file
 from ...io.pictures import last_number
 from ...texts import json_of
 from ..calibration.poses import pose_of
-from .takes import Picture, Pictures, Poses, Sensor, Stream, Take, lens_of, picture_size, reading
+from .takes import FLIP, Picture, Pictures, Poses, Sensor, Stream, Take, lens_of, picture_size, reading
 
 KIND = "a Record3D recording (.r3d, or the folder of its export EXR + JPG)"
 EXPORT = "EXR_RGBD"
-FLIP = np.diag([1.0, -1.0, -1.0, 1.0])  # from x right, y down, z forward to ARKit's x right, y up, z backward
 
 
 def fits(path: Path) -> bool:

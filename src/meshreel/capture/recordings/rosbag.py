@@ -12,7 +12,7 @@ import struct
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 from itertools import product, takewhile
 from pathlib import Path
 from typing import Any
@@ -130,14 +130,20 @@ class _Bag:
         parents = [(one.header.frame_id.lstrip("/"), _matrix(one.transform)) for one in stills]
         return dict(zip((one.child_frame_id.lstrip("/") for one in stills), parents, strict=True))
 
-    def way(self, frame: str) -> Poses | None:
-        """Return the poses of a frame in the root of all that carries it, by `/tf`; None where nothing moves it."""
-        links, tree = dict[str, list[tuple[float, str, Matrix]]](), self.tree()
+    @cached_property
+    def links(self) -> dict[str, list[tuple[float, str, Matrix]]]:
+        """The times, s, parents and poses of each frame that `/tf` moves."""
+        links = dict[str, list[tuple[float, str, Matrix]]]()
         for _, message in self.messages("/tf"):
             for one in message.transforms:
                 time = one.header.stamp.sec + one.header.stamp.nanosec / 1e9
                 link = (time, one.header.frame_id.lstrip("/"), _matrix(one.transform))
                 links.setdefault(one.child_frame_id.lstrip("/"), []).append(link)
+        return links
+
+    def way(self, frame: str, tree: dict[str, tuple[str, Matrix]]) -> Poses | None:
+        """Return the poses of a frame in the root of all that carries it, by `/tf`; None where nothing moves it."""
+        links = self.links
         found: Poses | None = None
         seen = set[str]()
         while frame in links and frame not in seen:
@@ -235,7 +241,7 @@ def _sensor(bag: _Bag, depth: _Topic, color: _Topic | None, tree: dict[str, Any]
             apart = _matrix(to_depth) @ np.linalg.inv(_matrix(to_color))
         elif root == other:
             apart = np.linalg.inv(placed) @ beside
-    if (way := bag.way(root)) is not None:
+    if (way := bag.way(root, tree)) is not None:
         poses: Poses | None = Poses(way.matrices @ placed, way.times)
     else:
         poses = Poses(placed[None]) if depth.frame in tree and root == world else None

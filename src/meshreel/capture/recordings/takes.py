@@ -20,6 +20,7 @@ from ..calibration.poses import poses_between
 Picture = np.ndarray | bytes  # depths H x W in the sensor's unit, integers or floats; colours H x W x 3; a PNG or JPEG
 Unread = Callable[[], Picture]  # reads one picture, which may be damaged
 Pair = tuple[float, float]  # along x and y
+FLIP = np.diag([1.0, -1.0, -1.0, 1.0])  # from x right, y down, z forward to x right, y up, z backward (ARKit, OpenGL)
 LOST_TRACK = 0.2  # s without a pose, after which a camera that moves may be anywhere (guess)
 SKEW = 0.05  # of a product of a rotation with its transpose: recorded ones are rounded (guess)
 Pictures = Iterator[tuple[float, Picture | Unread]]  # each with its time on the take's clock, s

@@ -25,6 +25,7 @@ from ...geometry.cameras import Camera, Matrix
 from ...io.pictures import pack_picture
 from ...io.write import cannot_be_written, make_folder, part_of, write_file
 from ..calibration.paths import refine_paths
+from ..calibration.poses import turns_between
 from ..rig.cameras import DepthCamera, distortion_of, placed
 from ..rig.rig import POSES, packed_path, write_rig
 from .takes import Picture, Sensor, Stream, Take, check_size, picture_size, reading
@@ -321,8 +322,7 @@ def _still(take: Take, sensor: Sensor) -> Matrix | None:
     places = poses[:, :3, 3]
     away = np.linalg.norm(places - np.median(places, axis=0), axis=1)
     usual = poses[int(away.argmin())]
-    cosines = (np.einsum("tij,ij->t", poses[:, :3, :3], usual[:3, :3]) - 1) / 2
-    turned = float(np.degrees(np.arccos(np.clip(cosines, -1, 1))).max())
+    turned = float(turns_between(poses, np.broadcast_to(usual, poses.shape)).max())
     return None if away.max() > MOVES or turned > TURNS else usual
 
 

@@ -253,8 +253,11 @@ def _fused(
 def _change(sequence: CapturedSequence, depth: DepthFrames | None, segmentation: Segmentation, frame: int) -> Change:
     numbers = [frame + number for number in evenly(len(sequence) - frame, FRAMES)]
     if depth is not None:
+
+        def still(number: int, mesh: Mesh) -> Bool[np.ndarray, " F"]:
+            return ~segmentation.moving(number, mesh)
+
         is_moving = is_carried(depth.__getitem__, len(sequence))
-        still = lambda k, mesh: ~segmentation.moving(k, mesh)  # noqa: E731
         room = _fused(sequence, depth, numbers, still, segmentation.cell, is_moving)
         return Change(frame, part_of(room, segmentation.came(frame, room)))
     later = picked(sequence, numbers, lambda _, mesh: segmentation.came(frame, mesh))
